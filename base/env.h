@@ -1,0 +1,90 @@
+// Env: the only way in which a library reaches the clock and the disk.
+//
+// A library that needs time or files takes an Env (or just its Clock or FileSystem). The program
+// passes posix_env(); tests pass a MemoryEnv (memory_env.h), whose clock moves when told to and
+// whose disk forgets on command whatever was not synced.
+//
+// Paths are strings as the operating system takes them. All functions are safe to call from several
+// threads; one file object belongs to one thread at a time.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/time.h"
+
+namespace sixpoint {
+
+using Bytes = std::vector<std::uint8_t>;
+
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  virtual UtcTime now() = 0;                       // calendar time; may be set back by the system
+  virtual std::chrono::nanoseconds elapsed() = 0;  // since an arbitrary start; never goes back
+  virtual void sleep(std::chrono::nanoseconds duration) = 0;
+};
+
+class ReadableFile {
+ public:
+  virtual ~ReadableFile() = default;
+  virtual std::uint64_t size() const = 0;
+  // Reads up to out.size() bytes at `offset`; returns how many there were (0 at the end).
+  virtual Result<std::size_t> read_at(std::uint64_t offset, std::span<std::uint8_t> out) const = 0;
+};
+
+class WritableFile {
+ public:
+  virtual ~WritableFile() = default;  // closes; what was not synced may be lost
+  virtual Status write_at(std::uint64_t offset, std::span<const std::uint8_t> bytes) = 0;
+  virtual Result<std::size_t> read_at(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
+  virtual Status sync() = 0;   // the bytes are on the medium when this returns
+  virtual Status close() = 0;  // reports what the destructor could not
+};
+
+struct FileInfo {
+  bool is_folder = false;
+  std::uint64_t size = 0;
+};
+
+class FileSystem {
+ public:
+  virtual ~FileSystem() = default;
+  virtual Result<std::unique_ptr<ReadableFile>> open(const std::string& path) = 0;
+  // Makes a new file; cannot_create where one of that name exists.
+  virtual Result<std::unique_ptr<WritableFile>> create(const std::string& path) = 0;
+  virtual Result<FileInfo> info(const std::string& path) = 0;  // no_input where there is none
+  virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;  // names, sorted
+  virtual Status make_folders(const std::string& path) = 0;                      // like mkdir -p
+  virtual Status rename(const std::string& from, const std::string& to) = 0;     // replaces `to`
+  virtual Status remove(const std::string& path) = 0;
+  virtual Status sync_folder(const std::string& path) = 0;  // makes renames in it durable
+};
+
+struct Env {
+  Clock& clock;
+  FileSystem& files;
+  // Seed for everything random that nobody gave a seed to. Fixed unless the program changes it, so
+  // that two runs are alike.
+  std::uint64_t seed = 20140324;
+};
+
+// The real machine. One per process; threads share it.
+Env& posix_env();
+
+// The whole of a file that is expected to be small (headers, JSON, constants). bad_data above
+// `limit`.
+Result<Bytes> read_file(FileSystem& files, const std::string& path,
+                        std::uint64_t limit = 64ULL << 20);
+
+// The folder part of a path ("." where there is none), and the last part.
+std::string folder_of(const std::string& path);
+std::string file_name_of(const std::string& path);
+
+}  // namespace sixpoint

@@ -1,0 +1,234 @@
+// The real clock and disk behind Env.
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <thread>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/env.h"
+
+namespace sixpoint {
+namespace {
+
+// One errno, three kinds of answer: what was asked for decides between "no such input" and "cannot
+// create"; permission and a full disk are the same for both.
+tl::unexpected<Error> system_failure(int error, ErrorCode otherwise, const std::string& doing,
+                                     const std::string& path) {
+  const std::string what = fmt::format("{}: {}", doing, std::strerror(error));
+  switch (error) {
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return fail(ErrorCode::permission, what, path,
+                  "check who owns the path and whether the disk is mounted read-only");
+    case ENOSPC:
+    case EDQUOT:
+      return fail(ErrorCode::io, what, path, "free some space and run the command again");
+    case ENOENT:
+      return fail(otherwise, what, path, "check the path");
+    default:
+      return fail(otherwise, what, path, "check the path and the disk");
+  }
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+    }
+  }
+  int get() const { return fd_; }
+  int close() {
+    const int result = ::close(fd_);
+    fd_ = -1;
+    return result;
+  }
+
+ private:
+  int fd_;
+};
+
+Result<std::size_t> pread_all(int fd, std::uint64_t offset, std::span<std::uint8_t> out,
+                              const std::string& path) {
+  std::size_t done = 0;
+  while (done < out.size()) {
+    const ssize_t count =
+        ::pread(fd, out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
+    if (count < 0) {
+      if (errno == EINTR) {
+        continue;
+      }
+      return system_failure(errno, ErrorCode::io, "reading failed", path);
+    }
+    if (count == 0) {
+      break;
+    }
+    done += static_cast<std::size_t>(count);
+  }
+  return done;
+}
+
+class PosixReadableFile final : public ReadableFile {
+ public:
+  PosixReadableFile(int fd, std::uint64_t size, std::string path)
+      : fd_(fd), size_(size), path_(std::move(path)) {}
+  std::uint64_t size() const override { return size_; }
+  Result<std::size_t> read_at(std::uint64_t offset, std::span<std::uint8_t> out) const override {
+    return pread_all(fd_.get(), offset, out, path_);
+  }
+
+ private:
+  Descriptor fd_;
+  std::uint64_t size_;
+  std::string path_;
+};
+
+class PosixWritableFile final : public WritableFile {
+ public:
+  PosixWritableFile(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
+  Status write_at(std::uint64_t offset, std::span<const std::uint8_t> bytes) override {
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+      const ssize_t count = ::pwrite(fd_.get(), bytes.data() + done, bytes.size() - done,
+                                     static_cast<off_t>(offset + done));
+      if (count < 0) {
+        if (errno == EINTR) {
+          continue;
+        }
+        return system_failure(errno, ErrorCode::io, "writing failed", path_);
+      }
+      done += static_cast<std::size_t>(count);
+    }
+    return {};
+  }
+  Result<std::size_t> read_at(std::uint64_t offset, std::span<std::uint8_t> out) override {
+    return pread_all(fd_.get(), offset, out, path_);
+  }
+  Status sync() override {
+    if (::fsync(fd_.get()) != 0) {
+      return system_failure(errno, ErrorCode::io, "syncing failed", path_);
+    }
+    return {};
+  }
+  Status close() override {
+    if (fd_.close() != 0) {
+      return system_failure(errno, ErrorCode::io, "closing failed", path_);
+    }
+    return {};
+  }
+
+ private:
+  Descriptor fd_;
+  std::string path_;
+};
+
+class PosixFileSystem final : public FileSystem {
+ public:
+  Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
+    // O_NONBLOCK: opening a FIFO by mistake must not hang; it changes nothing for a regular file.
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (fd < 0) {
+      return system_failure(errno, ErrorCode::no_input, "cannot open", path);
+    }
+    struct stat status {};
+    if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {
+      ::close(fd);
+      return fail(ErrorCode::no_input, "not a regular file", path, "name a file");
+    }
+    return std::make_unique<PosixReadableFile>(fd, static_cast<std::uint64_t>(status.st_size),
+                                               path);
+  }
+
+  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
+    const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd < 0) {
+      return system_failure(errno, ErrorCode::cannot_create, "cannot create", path);
+    }
+    return std::make_unique<PosixWritableFile>(fd, path);
+  }
+
+  Result<FileInfo> info(const std::string& path) override {
+    struct stat status {};
+    if (::stat(path.c_str(), &status) != 0) {
+      return system_failure(errno, ErrorCode::no_input, "cannot look at", path);
+    }
+    return FileInfo{S_ISDIR(status.st_mode), static_cast<std::uint64_t>(status.st_size)};
+  }
+
+  Result<std::vector<std::string>> list(const std::string& folder) override {
+    std::error_code error;
+    std::filesystem::directory_iterator entry(folder, error);
+    std::vector<std::string> names;
+    for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+      names.push_back(entry->path().filename().string());
+    }
+    if (error) {
+      return system_failure(error.value(), ErrorCode::no_input, "cannot list", folder);
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  Status make_folders(const std::string& path) override {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error) {
+      return system_failure(error.value(), ErrorCode::cannot_create, "cannot make the folder",
+                            path);
+    }
+    return {};
+  }
+
+  Status rename(const std::string& from, const std::string& to) override {
+    if (::rename(from.c_str(), to.c_str()) != 0) {
+      return system_failure(errno, ErrorCode::cannot_create, "cannot put in place", to);
+    }
+    return {};
+  }
+
+  Status remove(const std::string& path) override {
+    if (::unlink(path.c_str()) != 0) {
+      return system_failure(errno, ErrorCode::io, "cannot remove", path);
+    }
+    return {};
+  }
+
+  Status sync_folder(const std::string& path) override {
+    const Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (folder.get() < 0 || ::fsync(folder.get()) != 0) {
+      return system_failure(errno, ErrorCode::io, "cannot sync the folder", path);
+    }
+    return {};
+  }
+};
+
+class PosixClock final : public Clock {
+ public:
+  UtcTime now() override {
+    return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+  }
+  std::chrono::nanoseconds elapsed() override {
+    return std::chrono::steady_clock::now().time_since_epoch();
+  }
+  void sleep(std::chrono::nanoseconds duration) override { std::this_thread::sleep_for(duration); }
+};
+
+}  // namespace
+
+Env& posix_env() {
+  static PosixClock clock;
+  static PosixFileSystem files;
+  static Env env{clock, files};
+  return env;
+}
+
+}  // namespace sixpoint

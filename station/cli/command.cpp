@@ -1,0 +1,133 @@
+#include "station/cli/command.h"
+
+#include <cmath>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <fmt/format.h>
+
+namespace sixpoint::cli {
+
+namespace {
+
+// The contract's order of badness.
+int badness(int code) {
+  switch (code) {
+    case kExitPassed:
+      return 0;
+    case kExitInconclusive:
+      return 1;
+    case kExitFailed:
+      return 2;
+    case kExitStopped:
+      return 3;
+    default:
+      return code;
+  }
+}
+
+}  // namespace
+
+void Context::worsen(int code) {
+  if (badness(code) > badness(exit_code)) {
+    exit_code = code;
+  }
+}
+
+Json document(std::string_view command) {
+  Json json;
+  json["schema"] = fmt::format("sixpoint/{}/1", command);
+  return json;
+}
+
+void print_json(Context& context, const Json& json) {
+  // Bytes from outside that are no UTF-8 are replaced, never thrown on.
+  context.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+}
+
+Json error_to_json(const Error& error) {
+  Json json;
+  json["code"] = to_string(error.code);
+  json["what"] = error.what;
+  json["where"] = error.where;
+  json["hint"] = error.hint;
+  return json;
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+void report_error(Context& context, std::string_view command, const Error& error, bool json) {
+  context.people << "sixpoint: " << error.brief() << '\n';
+  context.worsen(static_cast<int>(error.code));
+  if (json) {
+    Json answer = document(command);
+    answer["error"] = error_to_json(error);
+    print_json(context, answer);
+  }
+}
+
+Progress::Progress(Context& context, std::string doing, std::uint64_t total)
+    : context_(context),
+      doing_(std::move(doing)),
+      total_(total),
+      start_(context.env.clock.elapsed()) {}
+
+Progress::~Progress() {
+  if (last_percent_ >= 0) {
+    context_.people << "\r\x1b[K" << std::flush;
+  }
+}
+
+void Progress::at(std::uint64_t done) {
+  if (!context_.people_at_terminal || total_ == 0) {
+    return;
+  }
+  const auto percent = static_cast<int>(std::min<std::uint64_t>(100, done * 100 / total_));
+  if (percent == last_percent_) {
+    return;
+  }
+  last_percent_ = percent;
+  const double elapsed_s =
+      std::chrono::duration<double>(context_.env.clock.elapsed() - start_).count();
+  const int left_s = percent > 0 ? static_cast<int>(elapsed_s * (100 - percent) / percent) : 0;
+  const int filled = percent / 5;
+  context_.people << fmt::format("\r{}  [{:=<{}}{: <{}}] {:3} %  {:02}:{:02} left", doing_, "",
+                                 filled, "", 20 - filled, percent, left_s / 60, left_s % 60)
+                  << std::flush;
+}
+
+int run_program(const std::vector<std::string>& arguments, Context& context) {
+  CLI::App app("Sixpoint makes an activity monitor tell the truth about gravity.", "sixpoint");
+  app.set_version_flag("--version", "sixpoint " SIXPOINT_VERSION);
+  app.require_subcommand(1);
+  app.failure_message(CLI::FailureMessage::simple);
+  for (const CommandEntry& entry : commands()) {
+    entry.add(app, context);
+  }
+  // CLI11 takes the arguments in reverse order.
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  context.exit_code = 0;
+  try {
+    app.parse(reversed);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {  // --help, --version
+      return app.exit(error, context.out, context.people);
+    }
+    context.people << "sixpoint: " << error.what()
+                   << "; 'sixpoint --help' and 'sixpoint COMMAND --help' list what there is\n";
+    return static_cast<int>(ErrorCode::usage);
+  } catch (const std::exception& error) {
+    // A defect: libraries answer with Result. Said as such, never hidden.
+    context.people << "sixpoint: internal error: " << error.what()
+                   << "; please report it with the command line\n";
+    return static_cast<int>(ErrorCode::internal);
+  }
+  context.out.flush();
+  if (!context.out) {
+    context.people << "sixpoint: standard output could not be written; free some space\n";
+    return static_cast<int>(ErrorCode::io);
+  }
+  return context.exit_code;
+}
+
+}  // namespace sixpoint::cli
