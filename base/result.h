@@ -25,6 +25,7 @@ inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(st
 
 }  // namespace sixpoint
 
+// NOLINTBEGIN(bugprone-macro-parentheses): a declaration cannot stand in parentheses.
 // The two ways to pass an error on to the caller:
 //   SIXPOINT_CHECK(file->sync());                     for a Status (or to ignore the value)
 //   SIXPOINT_ASSIGN(const auto header, parse(bytes));  for a Result<T>
@@ -42,3 +43,4 @@ inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(st
   auto result = (expression);                                                           \
   if (!(result)) return ::tl::unexpected<::sixpoint::Error>(std::move(result).error()); \
   declaration = *std::move(result)
+// NOLINTEND(bugprone-macro-parentheses)
