@@ -31,11 +31,13 @@ inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(st
 //   SIXPOINT_ASSIGN(const auto header, parse(bytes));  for a Result<T>
 #define SIXPOINT_CONCAT_INNER(a, b) a##b
 #define SIXPOINT_CONCAT(a, b) SIXPOINT_CONCAT_INNER(a, b)
-#define SIXPOINT_CHECK(expression)                                                    \
-  do {                                                                                \
-    if (auto sixpoint_status = (expression); !sixpoint_status) {                      \
-      return ::tl::unexpected<::sixpoint::Error>(std::move(sixpoint_status).error()); \
-    }                                                                                 \
+#define SIXPOINT_CHECK(expression) \
+  SIXPOINT_CHECK_INNER(expression, SIXPOINT_CONCAT(sixpoint_status_, __LINE__))
+#define SIXPOINT_CHECK_INNER(expression, status)                             \
+  do {                                                                       \
+    if (auto status = (expression); !status) {                               \
+      return ::tl::unexpected<::sixpoint::Error>(std::move(status).error()); \
+    }                                                                        \
   } while (false)
 #define SIXPOINT_ASSIGN(declaration, expression) \
   SIXPOINT_ASSIGN_INNER(declaration, expression, SIXPOINT_CONCAT(sixpoint_result_, __LINE__))
