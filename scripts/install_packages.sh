@@ -11,7 +11,7 @@ build_packages=(
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
-  libceres-dev libgmock-dev libgtest-dev librapidcheck-dev unzip
+  libceres-dev libgmock-dev libgtest-dev librapidcheck-dev python3 unzip zip
 )
 
 wanted=()
