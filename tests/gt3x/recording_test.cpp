@@ -7,8 +7,8 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "gt3x_made_log.h"
 #include "gt3x/recording_writer.h"
+#include "gt3x_made_log.h"
 #include "shared_data.h"
 
 namespace sixpoint::gt3x {

@@ -4,8 +4,8 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "gt3x_made_log.h"
 #include "gt3x/recording_writer.h"
+#include "gt3x_made_log.h"
 #include "shared_data.h"
 
 namespace sixpoint::gt3x {
