@@ -1,0 +1,295 @@
+#include "calib/constants.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace sixpoint::calib {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kMaxZero_lsb = 32768;
+constexpr double kMinSensitivity = 1.0 / 32768;
+constexpr double kMaxSensitivity = 1.0;
+constexpr std::string_view kHint =
+    "take the constants from the unit, from the store or from another recording of it";
+
+tl::unexpected<Error> bad_constants(std::string what) {
+  return fail(ErrorCode::bad_data, std::move(what), "constants", std::string(kHint));
+}
+
+Result<double> read_number(const Json& json, const std::string& where) {
+  if (!json.is_number()) {
+    return fail(ErrorCode::bad_data, "is not a number", where, "write the file with sixpoint");
+  }
+  const auto value = json.get<double>();
+  if (!std::isfinite(value)) {
+    return fail(ErrorCode::bad_data, "is not finite", where, "write the file with sixpoint");
+  }
+  return value;
+}
+
+template <class T>
+Result<PerAxis<T>> read_axes(const Json& parent, const char* key) {
+  const std::string where = fmt::format("constants.json, {}", key);
+  const auto found = parent.find(key);
+  if (found == parent.end() || !found->is_array() || found->size() != kAxes) {
+    return fail(ErrorCode::bad_data, "is not an array of three numbers, X Y Z", where,
+                "write the file with sixpoint");
+  }
+  PerAxis<T> out{};
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    SIXPOINT_ASSIGN(const double value, read_number((*found)[a], where));
+    if constexpr (std::is_integral_v<T>) {
+      if (value != std::floor(value) || std::abs(value) > 1e6) {
+        return fail(ErrorCode::bad_data, "is not a whole number of counts", where,
+                    "write the file with sixpoint");
+      }
+    }
+    out[a] = static_cast<T>(value);
+  }
+  return out;
+}
+
+std::string read_text(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+}  // namespace
+
+std::string_view to_string(FilterConfiguration filter) {
+  return filter == FilterConfiguration::legacy ? "legacy" : "current";
+}
+
+Result<FilterConfiguration> parse_filter_configuration(std::string_view text) {
+  if (text == "legacy") {
+    return FilterConfiguration::legacy;
+  }
+  if (text == "current") {
+    return FilterConfiguration::current;
+  }
+  return fail(ErrorCode::usage, fmt::format("unknown filter configuration '{}'", text), "",
+              "use 'legacy' or 'current'");
+}
+
+Status validate(const StoredConstants& stored) {
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    for (const int value : {stored.positive_lsb[a], stored.negative_lsb[a], stored.zero_lsb[a]}) {
+      if (value < kStoredConstantMin || value > kStoredConstantMax) {
+        return bad_constants(fmt::format("{} axis: {} LSB is outside [{}, {}]", kAxisNames[a],
+                                         value, kStoredConstantMin, kStoredConstantMax));
+      }
+    }
+    if (stored.positive_lsb[a] <= stored.negative_lsb[a]) {
+      return bad_constants(fmt::format(
+          "{} axis: the reading at +1 g ({} LSB) is not above the reading at -1 g ({} LSB)",
+          kAxisNames[a], stored.positive_lsb[a], stored.negative_lsb[a]));
+    }
+  }
+  return {};
+}
+
+Status validate(const Calibration& calibration) {
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const double sensitivity = calibration.sensitivity_g_per_lsb[a];
+    const double zero = calibration.zero_lsb[a];
+    // Written so that NaN fails.
+    if (!(sensitivity >= kMinSensitivity && sensitivity <= kMaxSensitivity)) {
+      return bad_constants(fmt::format("{} axis: a sensitivity of {} g per LSB is impossible",
+                                       kAxisNames[a], sensitivity));
+    }
+    if (!(std::abs(zero) <= kMaxZero_lsb)) {
+      return bad_constants(
+          fmt::format("{} axis: a zero of {} LSB is impossible", kAxisNames[a], zero));
+    }
+  }
+  return {};
+}
+
+Result<Calibration> calibration_from(const StoredConstants& stored) {
+  SIXPOINT_CHECK(validate(stored));
+  Calibration calibration;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    calibration.sensitivity_g_per_lsb[a] = 2.0 / (stored.positive_lsb[a] - stored.negative_lsb[a]);
+    calibration.zero_lsb[a] = stored.zero_lsb[a];
+  }
+  return calibration;
+}
+
+Result<StoredConstants> nearest_stored(const Calibration& calibration) {
+  SIXPOINT_CHECK(validate(calibration));
+  StoredConstants stored;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const double half = 1.0 / calibration.sensitivity_g_per_lsb[a];
+    const auto span = static_cast<int>(std::lround(2 * half));
+    stored.zero_lsb[a] = static_cast<int>(std::lround(calibration.zero_lsb[a]));
+    stored.negative_lsb[a] = static_cast<int>(std::lround(calibration.zero_lsb[a] - half));
+    stored.positive_lsb[a] = stored.negative_lsb[a] + span;
+  }
+  SIXPOINT_CHECK(validate(stored));
+  return stored;
+}
+
+std::string ConstantsRecord::brief() const {
+  std::string line = fmt::format("{} ({} filter), {}:", serial, to_string(filter), method);
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    line += fmt::format(" {} {:.2f} LSB/g zero {:.2f} LSB{}", kAxisNames[a],
+                        1.0 / calibration.sensitivity_g_per_lsb[a], calibration.zero_lsb[a],
+                        a + 1 < kAxes ? "," : "");
+  }
+  if (from_prior) {
+    line += " (rests on a population prior)";
+  }
+  return line;
+}
+
+Json to_json(const StoredConstants& stored) {
+  Json json;
+  json["positive_lsb"] = stored.positive_lsb;
+  json["negative_lsb"] = stored.negative_lsb;
+  json["zero_lsb"] = stored.zero_lsb;
+  return json;
+}
+
+Json to_json(const Calibration& calibration, const StoredConstants& stored) {
+  Json json;
+  json["sensitivity_g_per_lsb"] = calibration.sensitivity_g_per_lsb;
+  json["zero_lsb"] = calibration.zero_lsb;
+  json["positive_lsb"] = stored.positive_lsb;
+  json["negative_lsb"] = stored.negative_lsb;
+  // The unrounded zero above holds; the unit's memory takes this one.
+  json["stored_zero_lsb"] = stored.zero_lsb;
+  return json;
+}
+
+Json to_json(const ConstantsUncertainty& uncertainty) {
+  const auto axes = [](const PerAxis<double>& values) {
+    Json json = Json::array();
+    for (const double value : values) {
+      json.push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
+    }
+    return json;
+  };
+  Json json;
+  json["sensitivity_relative"] = axes(uncertainty.sensitivity_relative);
+  json["zero_mg"] = axes(uncertainty.zero_mg);
+  return json;
+}
+
+Json to_json(const ConstantsRecord& record) {
+  Json json;
+  json["serial"] = record.serial;
+  json["filter"] = to_string(record.filter);
+  json["constants"] = to_json(record.calibration, record.stored);
+  json["standard_uncertainty"] = to_json(record.uncertainty);
+  json["method"] = record.method;
+  json["made_at"] = to_iso8601(record.made_at);
+  json["made_from"]["sha256"] = record.made_from.sha256;
+  if (!record.made_from.file.empty()) {
+    json["made_from"]["file"] = record.made_from.file;
+  }
+  if (!record.made_from.station.empty()) {
+    json["made_from"]["station"] = record.made_from.station;
+  }
+  json["gravity_m_per_s2"] = record.gravity_m_per_s2;
+  if (record.from_prior) {
+    json["from_prior"] = true;
+  }
+  return json;
+}
+
+Result<ConstantsRecord> constants_record_from_json(const Json& json) {
+  const std::string hint = "write the file with 'sixpoint solve -o' or 'sixpoint jig'";
+  if (!json.is_object()) {
+    return fail(ErrorCode::bad_data, "is not a JSON object", "constants.json", hint);
+  }
+  ConstantsRecord record;
+  record.serial = read_text(json, "serial");
+  if (record.serial.empty()) {
+    return fail(ErrorCode::bad_data, "names no serial number", "constants.json", hint);
+  }
+  auto filter = parse_filter_configuration(read_text(json, "filter"));
+  if (!filter) {
+    return fail(ErrorCode::bad_data, filter.error().what, "constants.json, filter", hint);
+  }
+  record.filter = *filter;
+  const auto constants = json.find("constants");
+  if (constants == json.end() || !constants->is_object()) {
+    return fail(ErrorCode::bad_data, "holds no constants", "constants.json", hint);
+  }
+  const bool has_integers = constants->contains("positive_lsb");
+  if (constants->contains("sensitivity_g_per_lsb")) {
+    SIXPOINT_ASSIGN(record.calibration.sensitivity_g_per_lsb,
+                    read_axes<double>(*constants, "sensitivity_g_per_lsb"));
+    SIXPOINT_ASSIGN(record.calibration.zero_lsb, read_axes<double>(*constants, "zero_lsb"));
+    SIXPOINT_CHECK(validate(record.calibration));
+    if (has_integers) {
+      SIXPOINT_ASSIGN(record.stored.positive_lsb, read_axes<int>(*constants, "positive_lsb"));
+      SIXPOINT_ASSIGN(record.stored.negative_lsb, read_axes<int>(*constants, "negative_lsb"));
+      if (constants->contains("stored_zero_lsb")) {
+        SIXPOINT_ASSIGN(record.stored.zero_lsb, read_axes<int>(*constants, "stored_zero_lsb"));
+      } else {
+        for (std::size_t a = 0; a < kAxes; ++a) {
+          record.stored.zero_lsb[a] = static_cast<int>(std::lround(record.calibration.zero_lsb[a]));
+        }
+      }
+      SIXPOINT_CHECK(validate(record.stored));
+    } else {
+      SIXPOINT_ASSIGN(record.stored, nearest_stored(record.calibration));
+    }
+  } else {
+    SIXPOINT_ASSIGN(record.stored.positive_lsb, read_axes<int>(*constants, "positive_lsb"));
+    SIXPOINT_ASSIGN(record.stored.negative_lsb, read_axes<int>(*constants, "negative_lsb"));
+    SIXPOINT_ASSIGN(record.stored.zero_lsb, read_axes<int>(*constants, "zero_lsb"));
+    SIXPOINT_ASSIGN(record.calibration, calibration_from(record.stored));
+  }
+  if (const auto found = json.find("standard_uncertainty");
+      found != json.end() && found->is_object()) {
+    SIXPOINT_ASSIGN(record.uncertainty.sensitivity_relative,
+                    read_axes<double>(*found, "sensitivity_relative"));
+    SIXPOINT_ASSIGN(record.uncertainty.zero_mg, read_axes<double>(*found, "zero_mg"));
+  }
+  record.method = read_text(json, "method");
+  if (const std::string made_at = read_text(json, "made_at"); !made_at.empty()) {
+    SIXPOINT_ASSIGN(record.made_at, parse_iso8601(made_at));
+  }
+  if (const auto found = json.find("made_from"); found != json.end() && found->is_object()) {
+    record.made_from.sha256 = read_text(*found, "sha256");
+    record.made_from.file = read_text(*found, "file");
+    record.made_from.station = read_text(*found, "station");
+  }
+  if (const auto found = json.find("gravity_m_per_s2"); found != json.end()) {
+    SIXPOINT_ASSIGN(record.gravity_m_per_s2,
+                    read_number(*found, "constants.json, gravity_m_per_s2"));
+    if (record.gravity_m_per_s2 < 9.7 || record.gravity_m_per_s2 > 9.9) {
+      return fail(ErrorCode::bad_data, "is no gravity of this planet's surface",
+                  "constants.json, gravity_m_per_s2", hint);
+    }
+  }
+  if (const auto found = json.find("from_prior"); found != json.end() && found->is_boolean()) {
+    record.from_prior = found->get<bool>();
+  }
+  return record;
+}
+
+Result<ConstantsRecord> parse_constants_record(std::string_view text) {
+  constexpr std::size_t kLimit = 1U << 20;
+  if (text.size() > kLimit) {
+    return fail(ErrorCode::bad_data, "is too long for a constants file", "constants.json",
+                "give a file written by 'sixpoint solve -o'");
+  }
+  // Without a callback and with exceptions off; nesting is bounded by the size limit and the parser
+  // is not recursive.
+  const Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded()) {
+    return fail(ErrorCode::bad_data, "is not JSON", "constants.json",
+                "give a file written by 'sixpoint solve -o'");
+  }
+  return constants_record_from_json(json);
+}
+
+}  // namespace sixpoint::calib

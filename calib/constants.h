@@ -1,0 +1,103 @@
+// Constants: what turns a unit's raw counts into g, under which filter they hold, and their file.
+//
+// Constants belong to (serial number, filter configuration): the same sensor reads differently
+// under the two antialiasing configurations, and constants measured under one and applied under the
+// other are the defect that this program mends.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "base/constants.h"
+#include "base/measure.h"
+#include "base/result.h"
+#include "base/time.h"
+
+namespace sixpoint::calib {
+
+// What the firmware set the sensor's antialiasing filter to: `legacy` on units calibrated before
+// 2014-03-24 and run by firmware below 1.4.0 or from 1.8.0 on, `current` on everything else.
+enum class FilterConfiguration { legacy, current };
+std::string_view to_string(FilterConfiguration filter);
+Result<FilterConfiguration> parse_filter_configuration(std::string_view text);  // usage if unknown
+
+// The six degrees of freedom of the paper's nine coefficients: Eq. 1-3 use `positive` and
+// `negative` only through their difference. In raw counts of the sensor, not rounded.
+struct Calibration {
+  PerAxis<double> sensitivity_g_per_lsb{};
+  PerAxis<double> zero_lsb{};
+
+  // Paper, Eq. 4-6.
+  double to_g(std::size_t axis, double raw_lsb) const {
+    return sensitivity_g_per_lsb[axis] * (raw_lsb - zero_lsb[axis]);
+  }
+  PerAxis<double> to_g(const PerAxis<double>& raw_lsb) const {
+    return {to_g(0, raw_lsb[0]), to_g(1, raw_lsb[1]), to_g(2, raw_lsb[2])};
+  }
+  bool operator==(const Calibration&) const = default;
+};
+
+// bad_data, naming the axis, when a constant is outside [-2048, 2047] or positive is not above
+// negative (Eq. 1-3 would divide by zero or turn the axis over).
+Status validate(const StoredConstants& stored);
+// bad_data when a number is not finite, a sensitivity is not positive, or either is beyond what any
+// 16-bit sensor can have (sensitivity within 1/32768 .. 1 g per LSB, zero within +-32768 LSB).
+Status validate(const Calibration& calibration);
+
+// Eq. 1-3. Fails as validate() does.
+Result<Calibration> calibration_from(const StoredConstants& stored);
+
+// The nine integers nearest to a calibration, each rounded by itself: zero, the difference
+// positive - negative (which is what Eq. 1-3 use), and the pair placed about zero. One count of
+// zero is 3.9 mg, so solvers search the neighbours (round_constants in solve.h) instead.
+// bad_data when they do not fit into [-2048, 2047].
+Result<StoredConstants> nearest_stored(const Calibration& calibration);
+
+// Standard (one sigma) uncertainty of a calibration.
+struct ConstantsUncertainty {
+  PerAxis<double> sensitivity_relative{};
+  PerAxis<double> zero_mg{};
+};
+
+// Where constants came from. `sha256` is that of the recording or session; empty when there is none
+// (constants typed in).
+struct ConstantsOrigin {
+  std::string sha256;
+  std::string file;     // name of the recording, for people
+  std::string station;  // who measured, for people
+};
+
+// One set of constants with everything needed to trust it: the content of constants.json and a row
+// of the store.
+struct ConstantsRecord {
+  std::string serial;
+  FilterConfiguration filter = FilterConfiguration::current;
+  Calibration calibration;  // these hold; `stored` is what fits into a unit's memory
+  StoredConstants stored;
+  ConstantsUncertainty uncertainty;
+  std::string method;  // "least_squares", "genetic", "six_pose", ...
+  UtcTime made_at{};
+  ConstantsOrigin made_from;
+  double gravity_m_per_s2 = kStandardGravity_m_per_s2;
+  // The constants rest on a population prior (solve --prior population) and not on this unit's data
+  // alone. `repair` refuses them unless asked for by name.
+  bool from_prior = false;
+
+  std::string brief() const;  // one line for people
+};
+
+nlohmann::ordered_json to_json(const StoredConstants& stored);  // {positive_lsb, ...}
+nlohmann::ordered_json to_json(const Calibration& calibration, const StoredConstants& stored);
+nlohmann::ordered_json to_json(const ConstantsUncertainty& uncertainty);
+nlohmann::ordered_json to_json(const ConstantsRecord& record);
+
+// Reads constants.json. Strict where a wrong value would make data worse: serial, filter and
+// constants must be there and valid. `constants` may hold the doubles, the nine integers, or both
+// (then the doubles hold). What is only for people may be missing.
+Result<ConstantsRecord> constants_record_from_json(const nlohmann::ordered_json& json);
+Result<ConstantsRecord> parse_constants_record(std::string_view text);
+
+}  // namespace sixpoint::calib

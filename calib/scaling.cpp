@@ -1,0 +1,210 @@
+#include "calib/scaling.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace sixpoint::calib {
+
+namespace {
+
+constexpr int kRawLow = -32768;  // any sensor with counts of up to 16 bits
+constexpr int kRawHigh = 32767;
+
+// 2 scale (m - zero) / (positive - negative). Both products are exact in a double (accel_scale has
+// at most 24 significant bits), so the one division decides every half-way case correctly.
+double firmware_value(double twice_scale, int zero, int span, int raw) {
+  return twice_scale * (raw - zero) / span;
+}
+
+std::size_t table_size(RecordWidth width) {
+  return static_cast<std::size_t>(highest_count(width) - lowest_count(width) + 1);
+}
+
+Status check_scale(double accel_scale) {
+  if (!(accel_scale >= 1 && accel_scale <= 32768)) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("an acceleration scale of {} LSB/g is impossible", accel_scale),
+                "scaling", "the recording's info.txt or PARAMETERS record is damaged");
+  }
+  return {};
+}
+
+}  // namespace
+
+int round_half_away(double value) {
+  constexpr double kLimit = 1 << 30;
+  if (std::isnan(value)) {
+    return 0;
+  }
+  return static_cast<int>(std::round(std::clamp(value, -kLimit, kLimit)));
+}
+
+std::int16_t firmware_count(const StoredConstants& stored, double accel_scale_lsb_per_g,
+                            std::size_t axis, int raw_lsb, RecordWidth width) {
+  const int span = stored.positive_lsb[axis] - stored.negative_lsb[axis];
+  const int count = round_half_away(
+      firmware_value(2 * accel_scale_lsb_per_g, stored.zero_lsb[axis], span, raw_lsb));
+  return static_cast<std::int16_t>(std::clamp(count, lowest_count(width), highest_count(width)));
+}
+
+Result<Reversal> Reversal::make(const StoredConstants& stored, double accel_scale_lsb_per_g,
+                                RecordWidth width) {
+  SIXPOINT_CHECK(check_scale(accel_scale_lsb_per_g));
+  Reversal reversal;
+  SIXPOINT_ASSIGN(reversal.calibration_, calibration_from(stored));
+  reversal.accel_scale_ = accel_scale_lsb_per_g;
+  reversal.width_ = width;
+  const int low = lowest_count(width);
+  const int high = highest_count(width);
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    auto& first = reversal.first_[a];
+    auto& number = reversal.number_[a];
+    auto& tie = reversal.tie_[a];
+    first.assign(table_size(width), 0);
+    number.assign(table_size(width), 0);
+    tie.assign(table_size(width), 0);
+    const int span = stored.positive_lsb[a] - stored.negative_lsb[a];
+    const double twice_scale = 2 * accel_scale_lsb_per_g;
+    const auto value_of = [&](int raw) {
+      return firmware_value(twice_scale, stored.zero_lsb[a], span, raw);
+    };
+    const auto slot = [&](int count) { return static_cast<std::size_t>(count - low); };
+    for (int raw = kRawLow; raw <= kRawHigh; ++raw) {
+      const int count = round_half_away(value_of(raw));
+      if (count < low || count > high) {
+        continue;
+      }
+      const std::size_t i = slot(count);
+      if (number[i] == 0) {
+        first[i] = static_cast<std::int16_t>(raw);
+      }
+      ++number[i];
+    }
+    // A firmware that computes in single precision may send an exact half to the other side. That
+    // counts as an explanation only where there is no better one.
+    for (int raw = kRawLow; raw <= kRawHigh; ++raw) {
+      const double value = value_of(raw);
+      if (std::abs(value - std::trunc(value)) != 0.5) {
+        continue;
+      }
+      const int other = static_cast<int>(std::clamp(std::trunc(value), -1e6, 1e6));
+      if (other < low || other > high || number[slot(other)] != 0) {
+        continue;
+      }
+      first[slot(other)] = static_cast<std::int16_t>(raw);
+      number[slot(other)] = 1;
+      tie[slot(other)] = 1;
+    }
+    auto& raw_table = reversal.raw_[a];
+    raw_table.resize(table_size(width));
+    for (int count = low; count <= high; ++count) {
+      const std::size_t i = slot(count);
+      raw_table[i] =
+          number[i] > 0 ? first[i] + 0.5 * (number[i] - 1) : reversal.affine_raw_lsb(a, count);
+    }
+  }
+  return reversal;
+}
+
+Result<Reversal> Reversal::of_raw_counts(double accel_scale_lsb_per_g, RecordWidth width) {
+  SIXPOINT_CHECK(check_scale(accel_scale_lsb_per_g));
+  Reversal reversal;
+  reversal.accel_scale_ = accel_scale_lsb_per_g;
+  reversal.width_ = width;
+  reversal.raw_counts_ = true;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    reversal.calibration_.sensitivity_g_per_lsb[a] = 1.0 / accel_scale_lsb_per_g;
+    reversal.calibration_.zero_lsb[a] = 0;
+    reversal.number_[a].assign(table_size(width), 1);
+    reversal.tie_[a].assign(table_size(width), 0);
+    for (int count = lowest_count(width); count <= highest_count(width); ++count) {
+      reversal.first_[a].push_back(static_cast<std::int16_t>(count));
+      reversal.raw_[a].push_back(count);
+    }
+  }
+  return reversal;
+}
+
+RawCandidates Reversal::candidates(std::size_t axis, int stored_count) const {
+  const std::size_t i = index(stored_count);
+  return {first_[axis][i], number_[axis][i], tie_[axis][i] != 0, raw_[axis][i]};
+}
+
+void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
+           PlausibilityTally& counts) {
+  for (const StoredCounts& sample : samples) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      if (reversal.clipped(sample[a])) {
+        continue;
+      }
+      ++counts.counts;
+      counts.impossible += reversal.candidates(a, sample[a]).number == 0 ? 1 : 0;
+    }
+  }
+}
+
+Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh,
+                              const Options& options) {
+  SIXPOINT_CHECK(validate(fresh));
+  Rescale rescale;
+  rescale.input_ = reversal.width();
+  rescale.identity_ = fresh == reversal.calibration();
+  const int low = lowest_count(reversal.width());
+  const int high = highest_count(reversal.width());
+  const int out_low = lowest_count(options.output);
+  const int out_high = highest_count(options.output);
+  const bool widens = out_high > high;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    auto& table = rescale.count_[a];
+    auto& flags = rescale.flags_[a];
+    table.reserve(table_size(reversal.width()));
+    flags.reserve(table_size(reversal.width()));
+    const double scale = fresh.sensitivity_g_per_lsb[a] * reversal.accel_scale_lsb_per_g();
+    for (int count = low; count <= high; ++count) {
+      const RawCandidates candidates = reversal.candidates(a, count);
+      const bool affine = options.affine || candidates.number == 0;
+      const double raw = affine ? reversal.affine_raw_lsb(a, count) : candidates.middle;
+      const bool at_limit = count == low || count == high;
+      int fresh_count = round_half_away(scale * (raw - fresh.zero_lsb[a]));
+      if (rescale.identity_) {
+        fresh_count = count;
+      } else if (at_limit && !widens) {
+        fresh_count = count == low ? out_low : out_high;
+      }
+      std::uint8_t flag = 0;
+      if (at_limit) {
+        flag |= kClippedBefore;
+      } else if (fresh_count < out_low || fresh_count > out_high) {
+        flag |= kClippedAfter;
+      }
+      if (affine && !at_limit) {
+        flag |= kAffine;
+      }
+      table.push_back(static_cast<std::int16_t>(std::clamp(fresh_count, out_low, out_high)));
+      flags.push_back(flag);
+    }
+  }
+  return rescale;
+}
+
+void Rescale::apply(std::span<const StoredCounts> in, std::span<StoredCounts> out,
+                    RescaleTally& counts) const {
+  const std::size_t size = std::min(in.size(), out.size());
+  for (std::size_t i = 0; i < size; ++i) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const std::size_t slot = index(in[i][a]);
+      const std::uint8_t flag = flags_[a][slot];
+      out[i][a] = count_[a][slot];
+      if (flag != 0) {
+        counts.clipped_before[a] += (flag & kClippedBefore) != 0 ? 1U : 0U;
+        counts.clipped_after[a] += (flag & kClippedAfter) != 0 ? 1U : 0U;
+        counts.affine[a] += (flag & kAffine) != 0 ? 1U : 0U;
+      }
+    }
+  }
+  counts.samples += size;
+}
+
+}  // namespace sixpoint::calib

@@ -1,0 +1,123 @@
+// Still blocks: the stretches in which a sensor feels gravity and nothing else.
+//
+// A legitimate block is "any 4-second long block of data" (paper, Step 2) in which, on calibrated
+// g, the linear regression of every axis has a slope below 0.0005 g per sample, no sample lies
+// 0.015 g or more from its line, and the unit was not charging. The finder reads a run of gapless
+// samples once, in order. A block starts at the first sample where one fits and not on a fixed
+// grid of 4 s: a stretch of 7.9 s then always gives a block, a grid only sometimes. After a block
+// the search goes on behind it, so blocks never overlap and stay independent of each other; after a
+// failure it goes on half a second later (StillBlockOptions::step_s).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/measure.h"
+#include "base/result.h"
+#include "calib/scaling.h"
+
+namespace sixpoint::calib {
+
+struct StillBlockOptions {
+  double block_s = 4.0;                    // paper
+  double max_slope_g_per_sample = 0.0005;  // paper, criterion 1
+  double max_residual_g = 0.015;           // paper, criterion 2
+  // Paper, criterion 3: its formula asks that no axis of any sample is zero, its reason (a charging
+  // unit records zero on all axes) that not all three are. A level axis reads exactly 0 quite
+  // often, so the formula throws away good data; false rejects all-zero samples only.
+  bool strict_nonzero = false;
+  // How far to move on after a failure. Half a second finds all but the last half second of what
+  // any start would, at an eighth of a block.
+  double step_s = 0.5;
+  // The residual limit is three standard deviations of a sensor with 5 mg of noise, and a block of
+  // 400 samples on three axes nearly always has one sample beyond that: at 100 Hz the letter of
+  // criterion 2 refuses a noisy sensor lying on a rock. With this set, a block that fails only
+  // criterion 2 is kept and marked `noisy` when its residuals look like noise: standard deviation
+  // below this, largest below 5 of them. Solvers take noisy blocks only where the others do not
+  // suffice, and say so. 0 switches it off. 7 mg is the ADXL362's datasheet noise of its worst axis
+  // (920 ug/sqrt(Hz)) in 50 Hz.
+  double noisy_sd_g = 0.007;
+  // Upper bound of memory: beyond it every second block is forgotten and from then on only every
+  // second one kept (and so on). 250,000 blocks are eleven days of uninterrupted stillness.
+  std::size_t max_blocks = 250'000;
+};
+
+struct StillBlock {
+  double start_time_s = 0;
+  int samples = 0;
+  PerAxis<double> mean_g{};    // by the constants in the file
+  PerAxis<double> mean_lsb{};  // of the recovered raw counts, which is what solvers work on
+  // Standard deviation about the regression line, per sample, raw counts.
+  PerAxis<double> sd_lsb{};
+  // Slow rotation shortens the mean vector; this is what it takes from each axis' mean square:
+  // variance of the regression line over the block, raw counts squared.
+  PerAxis<double> ramp_variance_lsb2{};
+  std::optional<double> temperature_c;
+  bool noisy = false;  // fails criterion 2 of the paper, kept by StillBlockOptions::noisy_sd_g
+};
+
+// What the finder met, for reports.
+struct StillBlockTally {
+  std::uint64_t samples = 0;
+  std::uint64_t runs = 0;
+  std::uint64_t blocks = 0;            // found, whether or not still kept
+  std::uint64_t noisy_blocks = 0;      // of these
+  std::uint64_t rejected_zero = 0;     // windows that failed for all-zero (or strict) samples only
+  std::uint64_t rejected_clipped = 0;  // still windows with a sample at the record's limit
+  std::uint64_t thinned = 1;           // only every so many-th block is kept
+};
+
+// One pass, memory bounded by a block and the blocks found. One object belongs to one thread.
+class StillBlockFinder {
+ public:
+  // `reversal` must outlive the finder. bad_data for a rate outside 5 .. 1000 Hz, usage for options
+  // that make no sense.
+  static Result<StillBlockFinder> make(const Reversal& reversal, double rate_hz,
+                                       const StillBlockOptions& options = {});
+
+  // Samples of the current run, the first of them taken at start_time_s (any epoch). Consecutive
+  // calls continue the run without a gap.
+  void push(double start_time_s, std::span<const StoredCounts> stored);
+  // The run ends here: a gap, an idle-sleep fill, a charging stretch. Blocks never span it.
+  void break_run();
+  // Holds for the blocks that end after it, until the next call.
+  void set_temperature(std::optional<double> celsius) { temperature_c_ = celsius; }
+
+  // Valid at any time; complete after break_run().
+  const std::vector<StillBlock>& blocks() const { return blocks_; }
+  const StillBlockTally& tally() const { return tally_; }
+  int samples_per_block() const { return block_samples_; }
+
+ private:
+  StillBlockFinder(const Reversal& reversal, double rate_hz, const StillBlockOptions& options);
+  void search();
+  bool take_block(std::size_t begin);
+  void keep(StillBlock block);
+
+  const Reversal* reversal_;
+  StillBlockOptions options_;
+  double rate_hz_;
+  int block_samples_;
+  int step_samples_;
+  PerAxis<double> g_per_count_{};
+  PerAxis<std::vector<std::int16_t>> run_;  // the samples of the run that are not yet behind us
+  std::size_t next_ = 0;                    // where the next window starts in run_
+  struct Mark {
+    std::size_t index;  // into run_
+    double time_s;
+  };
+  std::deque<Mark> marks_;
+  std::vector<float> centred_;  // sample number minus the middle of the block
+  double sum_square_index_ = 0;
+  std::optional<double> temperature_c_;
+  std::vector<StillBlock> blocks_;
+  std::uint64_t since_kept_ = 0;
+  StillBlockTally tally_;
+  bool in_run_ = false;
+};
+
+}  // namespace sixpoint::calib

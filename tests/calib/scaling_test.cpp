@@ -1,0 +1,225 @@
+#include "calib/scaling.h"
+
+#include <gtest/gtest.h>
+
+#include "calib/constants.h"
+#include "expect_result.h"
+#include "synthetic_unit.h"
+
+namespace sixpoint::calib {
+namespace {
+
+// The constants of a real affected unit (domain.md's example), one with steeper scaling, one odd.
+StoredConstants affected() { return {{311, 310, 287}, {-204, -216, -234}, {54, 47, 26}}; }
+StoredConstants steep() { return {{240, 246, 251}, {-238, -256, -261}, {3, -4, -5}}; }
+StoredConstants half() { return {{512, 1024, 2047}, {-512, -1024, -2048}, {0, 7, -3}}; }
+
+// Oracle: the tests' own forward model in synthetic_unit.h, over every raw count.
+TEST(FirmwareCount, EqualsAnIndependentForwardModel) {
+  for (const StoredConstants& stored : {affected(), steep(), half()}) {
+    for (const double scale : {256.0, 341.0, 333.5}) {
+      tests::SyntheticUnit unit;
+      unit.positive = stored.positive_lsb;
+      unit.negative = stored.negative_lsb;
+      unit.zero = stored.zero_lsb;
+      unit.accel_scale = scale;
+      for (int raw = -4096; raw <= 4096; ++raw) {
+        const tests::Sample expected = tests::stored_sample(unit, {raw, raw, raw});
+        for (std::size_t a = 0; a < kAxes; ++a) {
+          ASSERT_EQ(firmware_count(stored, scale, a, raw, RecordWidth::bits12), expected[a])
+              << "raw " << raw << " axis " << a << " scale " << scale;
+        }
+      }
+    }
+  }
+}
+
+TEST(Reversal, FindsEveryRawCountAgain) {
+  for (const StoredConstants& stored : {affected(), steep(), half()}) {
+    const auto reversal = Reversal::make(stored, 256, RecordWidth::bits12);
+    ASSERT_OK(reversal);
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const int span = stored.positive_lsb[a] - stored.negative_lsb[a];
+      const int most = (span + 511) / 512;
+      for (int raw = -2048; raw <= 2047; ++raw) {
+        const auto count = firmware_count(stored, 256, a, raw, RecordWidth::bits12);
+        if (reversal->clipped(count)) {
+          continue;
+        }
+        const RawCandidates found = reversal->candidates(a, count);
+        ASSERT_GE(found.number, 1);
+        ASSERT_LE(found.number, most);
+        ASSERT_FALSE(found.tie);
+        ASSERT_LE(found.first, raw);
+        ASSERT_GE(found.first + found.number - 1, raw);
+      }
+    }
+  }
+}
+
+// positive - negative = 478 < 512: some stored counts have no integer behind them, and those are
+// just what the forward rule never gives.
+TEST(Reversal, KnowsWhatCannotHaveBeen) {
+  const auto reversal = Reversal::make(steep(), 256, RecordWidth::bits12);
+  ASSERT_OK(reversal);
+  std::array<bool, 4096> reached{};
+  for (int raw = -32768; raw <= 32767; ++raw) {
+    const double value = 512.0 * (raw - 3) / 478;
+    for (const int count : {tests::rounded(value), static_cast<int>(std::trunc(value))}) {
+      const bool rounds_here =
+          count == tests::rounded(value) || std::abs(value - std::trunc(value)) == 0.5;
+      if (rounds_here && count >= -2048 && count <= 2047) {
+        reached[static_cast<std::size_t>(count + 2048)] = true;
+      }
+    }
+  }
+  int impossible = 0;
+  std::vector<StoredCounts> samples;
+  for (int count = -2047; count < 2047; ++count) {
+    EXPECT_EQ(reversal->candidates(0, count).number > 0,
+              reached[static_cast<std::size_t>(count + 2048)])
+        << count;
+    impossible += reached[static_cast<std::size_t>(count + 2048)] ? 0 : 1;
+    // Axes Y and Z hold 0, which is reached.
+    samples.push_back({static_cast<std::int16_t>(count), 0, 0});
+  }
+  EXPECT_GT(impossible, 200);
+  PlausibilityTally counts;
+  tally(*reversal, samples, counts);
+  EXPECT_EQ(counts.impossible, static_cast<std::uint64_t>(impossible));
+  EXPECT_FALSE(counts.plausible());
+  // And one that never gives an impossible count is plausible.
+  PlausibilityTally good;
+  tally(*Reversal::make(affected(), 256, RecordWidth::bits12), samples, good);
+  EXPECT_TRUE(good.plausible());
+  EXPECT_EQ(good.counts, samples.size() * 3);
+}
+
+TEST(Reversal, AcceptsEitherSideOfAnExactHalf) {
+  // 2 * 768 / 1024 = 1.5 stored counts per raw count, so that every odd raw count is a half.
+  const StoredConstants stored{{512, 256, 256}, {-512, -256, -256}, {0, 0, 0}};
+  const auto reversal = Reversal::make(stored, 768, RecordWidth::bits12);
+  ASSERT_OK(reversal);
+  // raw 1 -> 1.5 -> 2; 1 is reached only when the firmware rounds that half down.
+  EXPECT_EQ(reversal->candidates(0, 2).first, 1);
+  EXPECT_FALSE(reversal->candidates(0, 2).tie);
+  EXPECT_EQ(reversal->candidates(0, 1).first, 1);
+  EXPECT_TRUE(reversal->candidates(0, 1).tie);
+  EXPECT_EQ(reversal->candidates(0, -1).first, -1);
+  EXPECT_TRUE(reversal->candidates(0, -1).tie);
+}
+
+TEST(Rescale, UnchangedConstantsChangeNothing) {
+  for (const StoredConstants& stored : {affected(), steep(), half()}) {
+    for (const double scale : {256.0, 341.0, 1000.0}) {
+      for (const RecordWidth width : {RecordWidth::bits12, RecordWidth::bits16}) {
+        const auto reversal = Reversal::make(stored, scale, width);
+        ASSERT_OK(reversal);
+        const auto rescale = Rescale::make(*reversal, *calibration_from(stored), {.output = width});
+        ASSERT_OK(rescale);
+        EXPECT_TRUE(rescale->changes_nothing());
+        for (int count = lowest_count(width); count <= highest_count(width); ++count) {
+          for (std::size_t a = 0; a < kAxes; ++a) {
+            ASSERT_EQ((*rescale)(a, static_cast<std::int16_t>(count)), count);
+          }
+        }
+      }
+    }
+  }
+}
+
+// Even constants that differ in the last digit only move nothing but exact halves.
+TEST(Rescale, NearlyUnchangedConstantsChangeNothingButHalves) {
+  const auto reversal = Reversal::make(affected(), 256, RecordWidth::bits12);
+  Calibration nearly = *calibration_from(affected());
+  for (double& sensitivity : nearly.sensitivity_g_per_lsb) {
+    sensitivity *= 1 + 1e-12;
+  }
+  const auto rescale = Rescale::make(*reversal, nearly, {});
+  ASSERT_OK(rescale);
+  EXPECT_FALSE(rescale->changes_nothing());
+  for (int count = -2048; count <= 2047; ++count) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      ASSERT_EQ((*rescale)(a, static_cast<std::int16_t>(count)), count);
+    }
+  }
+}
+
+// Oracle: the tests' own forward model run with the true constants on the same raw counts. Exact
+// wherever one candidate exists; within the pair's half count where there are two.
+TEST(Rescale, EqualsWhatTheFirmwareWouldHaveStored) {
+  const StoredConstants old = affected();
+  const StoredConstants fresh{{290, 350, 300}, {-186, -154, -185}, {50, 96, 61}};
+  const auto reversal = Reversal::make(old, 256, RecordWidth::bits12);
+  const auto rescale = Rescale::make(*reversal, *calibration_from(fresh), {});
+  ASSERT_OK(rescale);
+  int exact = 0;
+  for (int raw = -1500; raw <= 1500; ++raw) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const auto before = firmware_count(old, 256, a, raw, RecordWidth::bits12);
+      const auto wanted = firmware_count(fresh, 256, a, raw, RecordWidth::bits12);
+      const auto got = (*rescale)(a, before);
+      if (reversal->candidates(a, before).number == 1) {
+        ASSERT_EQ(got, wanted) << "raw " << raw << " axis " << a;
+        ++exact;
+      } else {
+        ASSERT_NEAR(got, wanted, 1);
+      }
+    }
+  }
+  EXPECT_GT(exact, 8000);
+}
+
+TEST(Rescale, ClippedStaysAtTheLimitAndIsCounted) {
+  const auto reversal = Reversal::make(affected(), 256, RecordWidth::bits12);
+  Calibration stronger = *calibration_from(affected());
+  for (double& sensitivity : stronger.sensitivity_g_per_lsb) {
+    sensitivity *= 1.2;
+  }
+  const std::vector<StoredCounts> in = {{2047, -2048, 0}, {1900, -1900, 10}, {100, 100, 100}};
+  std::vector<StoredCounts> out(in.size());
+  RescaleTally counts;
+  Rescale::make(*reversal, stronger, {})->apply(in, out, counts);
+  EXPECT_EQ(out[0][0], 2047);
+  EXPECT_EQ(out[0][1], -2048);
+  EXPECT_EQ(out[1][0], 2047);
+  EXPECT_EQ(out[1][1], -2048);
+  EXPECT_EQ(counts.samples, 3U);
+  EXPECT_EQ(counts.clipped_before, (PerAxis<std::uint64_t>{1, 1, 0}));
+  EXPECT_EQ(counts.clipped_after, (PerAxis<std::uint64_t>{1, 1, 0}));
+  // Wide records have room for them.
+  RescaleTally wide;
+  Rescale::make(*reversal, stronger, {.output = RecordWidth::bits16})->apply(in, out, wide);
+  EXPECT_GT(out[0][0], 2400);
+  EXPECT_LT(out[1][1], -2200);
+  EXPECT_EQ(wide.clipped_before, (PerAxis<std::uint64_t>{1, 1, 0}));
+  EXPECT_EQ(wide.clipped_after, (PerAxis<std::uint64_t>{0, 0, 0}));
+}
+
+TEST(Scaling, HostileConstants) {
+  StoredConstants equal = affected();
+  equal.negative_lsb[1] = equal.positive_lsb[1];
+  EXPECT_FAILS(calibration_from(equal), ErrorCode::bad_data);
+  EXPECT_FAILS(Reversal::make(equal, 256, RecordWidth::bits12), ErrorCode::bad_data);
+  StoredConstants turned = affected();
+  std::swap(turned.positive_lsb, turned.negative_lsb);
+  EXPECT_FAILS(calibration_from(turned), ErrorCode::bad_data);
+  StoredConstants wide = affected();
+  wide.zero_lsb[2] = 40'000;
+  EXPECT_FAILS(calibration_from(wide), ErrorCode::bad_data);
+  for (const double scale : {0.0, -256.0, std::nan(""), 1e300}) {
+    EXPECT_FAILS(Reversal::make(affected(), scale, RecordWidth::bits12), ErrorCode::bad_data);
+  }
+  Calibration broken = *calibration_from(affected());
+  broken.zero_lsb[0] = std::nan("");
+  EXPECT_FAILS(validate(broken), ErrorCode::bad_data);
+  broken = *calibration_from(affected());
+  broken.sensitivity_g_per_lsb[2] = 0;
+  EXPECT_FAILS(validate(broken), ErrorCode::bad_data);
+  // The flattest slope a unit's memory can hold does no harm.
+  StoredConstants flat{{2047, 2047, 2047}, {-2048, -2048, -2048}, {0, 0, 0}};
+  EXPECT_OK(Reversal::make(flat, 1, RecordWidth::bits16));
+}
+
+}  // namespace
+}  // namespace sixpoint::calib

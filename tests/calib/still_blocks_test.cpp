@@ -1,0 +1,198 @@
+#include "calib/still_blocks.h"
+
+#include <gtest/gtest.h>
+
+#include "calib/coverage.h"
+#include "expect_result.h"
+#include "synthetic_unit.h"
+
+namespace sixpoint::calib {
+namespace {
+
+using tests::Sample;
+using tests::SyntheticUnit;
+using tests::Vector;
+
+Reversal reversal_of(const SyntheticUnit& unit) {
+  return *Reversal::make({unit.positive, unit.negative, unit.zero}, unit.accel_scale,
+                         RecordWidth::bits12);
+}
+
+std::size_t blocks_in(const std::vector<Sample>& samples, double rate_hz,
+                      const StillBlockOptions& options = {}) {
+  const Reversal reversal = reversal_of({});
+  auto finder = *StillBlockFinder::make(reversal, rate_hz, options);
+  finder.push(0, samples);
+  finder.break_run();
+  return finder.blocks().size();
+}
+
+// Stored counts straight: value per sample and axis.
+std::vector<Sample> line(int count, double start, double step, std::int16_t others = 100) {
+  std::vector<Sample> samples;
+  for (int i = 0; i < count; ++i) {
+    samples.push_back({static_cast<std::int16_t>(std::lround(start + step * i)), others, others});
+  }
+  return samples;
+}
+
+TEST(StillBlocks, FindsThemAtEveryRate) {
+  std::mt19937_64 random(1);
+  for (const double rate : {30.0, 32.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0}) {
+    SyntheticUnit unit;
+    unit.noise_mg = 3;
+    const auto samples = tests::at_rest(unit, tests::unit_vector(0.1, 0.2, 1), 60, rate, random);
+    const Reversal reversal = reversal_of(unit);
+    auto finder = *StillBlockFinder::make(reversal, rate);
+    finder.push(1000, samples);
+    EXPECT_EQ(finder.samples_per_block(), static_cast<int>(4 * rate));
+    EXPECT_GE(finder.blocks().size(), 14U) << rate;
+    EXPECT_LE(finder.blocks().size(), 15U) << rate;
+    for (std::size_t i = 1; i < finder.blocks().size(); ++i) {
+      EXPECT_GE(finder.blocks()[i].start_time_s, finder.blocks()[i - 1].start_time_s + 4 - 1e-9);
+    }
+  }
+}
+
+// Oracle: what the generator put in. Standard error of a block mean is 4 mg / sqrt(120) = 0.37 mg.
+TEST(StillBlocks, MeansAreTheRecoveredRawCounts) {
+  std::mt19937_64 random(2);
+  const SyntheticUnit unit;
+  const Vector up = tests::unit_vector(0.6, -0.5, 0.62);
+  const Reversal reversal = reversal_of(unit);
+  auto finder = *StillBlockFinder::make(reversal, 30);
+  finder.push(0, tests::at_rest(unit, up, 400, 30, random));
+  ASSERT_GT(finder.blocks().size(), 90U);
+  Vector mean{};
+  for (const StillBlock& block : finder.blocks()) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      mean[a] += block.mean_lsb[a] / static_cast<double>(finder.blocks().size());
+      EXPECT_NEAR(block.sd_lsb[a] / unit.counts_per_g[a], 0.004, 0.0012);
+    }
+  }
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    EXPECT_NEAR((mean[a] - unit.zero_counts[a]) / unit.counts_per_g[a], up[a], 0.00025) << a;
+  }
+}
+
+// The slope criterion's edge, in the file's own g: 0.0005 g per sample is 0.128 counts.
+TEST(StillBlocks, SlopeCriterion) {
+  EXPECT_EQ(blocks_in(line(120, 0, 0.120), 30), 1U);
+  EXPECT_EQ(blocks_in(line(120, 0, -0.120), 30), 1U);
+  EXPECT_EQ(blocks_in(line(120, 0, 0.136), 30), 0U);
+  EXPECT_EQ(blocks_in(line(120, 0, -0.136), 30), 0U);
+}
+
+// The residual criterion's edge: 0.015 g is 3.84 counts.
+TEST(StillBlocks, ResidualCriterion) {
+  auto samples = line(120, 200, 0);
+  samples[60][1] = static_cast<std::int16_t>(samples[60][1] + 3);
+  EXPECT_EQ(blocks_in(samples, 30), 1U);
+  samples[60][1] = static_cast<std::int16_t>(samples[60][1] + 2);
+  EXPECT_EQ(blocks_in(samples, 30), 0U);
+}
+
+TEST(StillBlocks, ChargingAndZeros) {
+  EXPECT_EQ(blocks_in(std::vector<Sample>(300, Sample{0, 0, 0}), 30), 0U);
+  auto one = line(120, 200, 0);
+  one[7] = {0, 0, 0};
+  EXPECT_EQ(blocks_in(one, 30), 0U);
+  // A level axis at exactly zero is good data, except by the letter of the formula.
+  const auto level = line(120, 200, 0, 0);
+  EXPECT_EQ(blocks_in(level, 30), 1U);
+  EXPECT_EQ(blocks_in(level, 30, {.strict_nonzero = true}), 0U);
+}
+
+TEST(StillBlocks, ClippedIsUnusable) {
+  const Reversal reversal = reversal_of({});
+  auto finder = *StillBlockFinder::make(reversal, 30);
+  finder.push(0, line(200, 2047, 0));
+  EXPECT_EQ(finder.blocks().size(), 0U);
+  EXPECT_GT(finder.tally().rejected_clipped, 0U);
+}
+
+TEST(StillBlocks, NeverSpanAGapAndDoNotDependOnHowTheyArrive) {
+  std::mt19937_64 random(3);
+  SyntheticUnit unit;
+  unit.noise_mg = 3;
+  const auto samples = tests::at_rest(unit, {0, 0, 1}, 301, 30, random);
+  const Reversal reversal = reversal_of(unit);
+  auto whole = *StillBlockFinder::make(reversal, 30);
+  whole.push(5, samples);
+  auto pieces = *StillBlockFinder::make(reversal, 30);
+  for (std::size_t i = 0; i < samples.size(); i += 30) {
+    pieces.push(5 + static_cast<double>(i) / 30,
+                std::span(samples).subspan(i, std::min<std::size_t>(30, samples.size() - i)));
+  }
+  ASSERT_EQ(whole.blocks().size(), pieces.blocks().size());
+  for (std::size_t i = 0; i < whole.blocks().size(); ++i) {
+    EXPECT_NEAR(whole.blocks()[i].start_time_s, pieces.blocks()[i].start_time_s, 1e-6);
+    EXPECT_EQ(whole.blocks()[i].mean_lsb, pieces.blocks()[i].mean_lsb);
+  }
+  // Runs of 3.9 s never hold a block; runs of 4 s hold one each.
+  for (const auto& [length, expected] : {std::pair<std::size_t, std::size_t>{117, 0}, {120, 50}}) {
+    auto finder = *StillBlockFinder::make(reversal, 30);
+    for (std::size_t i = 0; i < 50; ++i) {
+      finder.push(static_cast<double>(10 * i), line(static_cast<int>(length), 200, 0));
+      finder.break_run();
+    }
+    EXPECT_EQ(finder.blocks().size(), expected);
+    EXPECT_EQ(finder.tally().runs, 50U);
+  }
+}
+
+TEST(StillBlocks, NoiseAloneIsKeptApartAndMarked) {
+  std::mt19937_64 random(4);
+  SyntheticUnit unit;
+  unit.noise_mg = 5.5;
+  const auto samples = tests::at_rest(unit, {0, 0, 1}, 60, 100, random);
+  const Reversal reversal = reversal_of(unit);
+  auto paper = *StillBlockFinder::make(reversal, 100, {.noisy_sd_g = 0});
+  paper.push(0, samples);
+  auto tolerant = *StillBlockFinder::make(reversal, 100);
+  tolerant.push(0, samples);
+  EXPECT_LE(paper.blocks().size(), 3U);
+  EXPECT_GE(tolerant.blocks().size(), 13U);
+  EXPECT_EQ(tolerant.tally().noisy_blocks + paper.tally().blocks, tolerant.tally().blocks);
+  // Movement of the same size that is no noise stays out: a nudge of 20 mg in a quiet block.
+  auto nudged = line(120, 200, 0);
+  nudged[50][0] = static_cast<std::int16_t>(nudged[50][0] + 5);
+  EXPECT_EQ(blocks_in(nudged, 30), 0U);
+}
+
+TEST(StillBlocks, MemoryIsBounded) {
+  EXPECT_LE(blocks_in(line(120 * 300, 200, 0), 30, {.max_blocks = 64}), 64U);
+  EXPECT_GE(blocks_in(line(120 * 300, 200, 0), 30, {.max_blocks = 64}), 32U);
+}
+
+TEST(StillBlocks, NonsenseOptions) {
+  const Reversal reversal = reversal_of({});
+  for (const double rate : {0.0, -30.0, 1e6, std::nan("")}) {
+    EXPECT_FAILS(StillBlockFinder::make(reversal, rate), ErrorCode::bad_data);
+  }
+  EXPECT_FAILS(StillBlockFinder::make(reversal, 30, {.block_s = -1}), ErrorCode::usage);
+  EXPECT_FAILS(StillBlockFinder::make(reversal, 30, {.max_residual_g = std::nan("")}),
+               ErrorCode::usage);
+}
+
+TEST(Coverage, NineSubsetsAndTheThirtyPercentRule) {
+  EXPECT_EQ(value_subset(1.0), ValueSubset::high);
+  EXPECT_EQ(value_subset(0.69), ValueSubset::middle);
+  EXPECT_EQ(value_subset(-0.7), ValueSubset::low);
+  EXPECT_EQ(value_subset(1.31), ValueSubset::outside);
+  EXPECT_EQ(value_subset(std::nan("")), ValueSubset::outside);
+  std::vector<PerAxis<double>> means = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}};
+  Coverage coverage = coverage_of(means);
+  EXPECT_EQ(coverage.missing_directions(), std::vector<std::string>{"-z"});
+  EXPECT_EQ(coverage.subset_blocks[0][0], 1U);
+  EXPECT_EQ(coverage.subset_blocks[0][1], 3U);
+  means.push_back({0.95, 0, -0.3});
+  EXPECT_FALSE(coverage_of(means).complete());
+  means.push_back({0.95, 0, -0.301});
+  EXPECT_TRUE(coverage_of(means).complete());
+  const std::vector<std::string> all = {"+x", "-x", "+y", "-y", "+z", "-z"};
+  EXPECT_EQ(coverage_of(std::span<const PerAxis<double>>{}).missing_directions(), all);
+}
+
+}  // namespace
+}  // namespace sixpoint::calib
