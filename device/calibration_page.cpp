@@ -39,8 +39,8 @@ Result<Bytes> encode_calibration_page(const CalibrationPage& page) {
   }
   PayloadWriter writer;
   writer.put(std::string_view("TUNE"), 4);
-  for (const auto& axes : {page.constants.zero_lsb, page.constants.positive_lsb,
-                           page.constants.negative_lsb}) {
+  for (const auto& axes :
+       {page.constants.zero_lsb, page.constants.positive_lsb, page.constants.negative_lsb}) {
     for (const int lsb : axes) {
       writer.put(static_cast<std::int16_t>(lsb));
     }
@@ -73,8 +73,8 @@ Result<CalibrationPage> decode_calibration_page(std::span<const std::uint8_t> by
     return no_page("the page holds no calibration");
   }
   CalibrationPage page;
-  for (auto* axes : {&page.constants.zero_lsb, &page.constants.positive_lsb,
-                     &page.constants.negative_lsb}) {
+  for (auto* axes :
+       {&page.constants.zero_lsb, &page.constants.positive_lsb, &page.constants.negative_lsb}) {
     for (int& lsb : *axes) {
       lsb = reader.get<std::int16_t>();
     }
@@ -88,8 +88,8 @@ Result<CalibrationPage> decode_calibration_page(std::span<const std::uint8_t> by
   if (const Status valid = calib::validate(page.constants); !valid) {
     return no_page(valid.error().what);
   }
-  const std::chrono::year_month_day date(std::chrono::year(year), std::chrono::month(month),
-                                         std::chrono::day(day));
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(month),
+                                         std::chrono::day(day)};
   if (!date.ok() || hour > 23 || minute > 59 || second > 59) {
     return no_page("the page's date does not exist");
   }

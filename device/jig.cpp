@@ -1,5 +1,7 @@
 #include "device/jig.h"
 
+#include <fmt/format.h>
+
 namespace sixpoint::device {
 
 std::string_view to_string(Pose pose) {
@@ -26,7 +28,7 @@ Result<Pose> parse_pose(std::string_view text) {
       return pose;
     }
   }
-  return fail(ErrorCode::usage, "'" + printable(text, 20) + "' is no pose", {},
+  return fail(ErrorCode::usage, fmt::format("'{}' is no pose", printable(text, 20)), {},
               "use one of +x -x +y -y +z -z: the axis that points up, or down");
 }
 

@@ -15,8 +15,8 @@ namespace sixpoint::device {
 
 enum class Pose { plus_x, minus_x, plus_y, minus_y, plus_z, minus_z };
 
-inline constexpr std::array<Pose, 6> kPoses = {Pose::plus_z, Pose::minus_z, Pose::plus_x,
-                                               Pose::minus_x, Pose::plus_y, Pose::minus_y};
+inline constexpr std::array<Pose, 6> kPoses = {Pose::plus_z,  Pose::minus_z, Pose::plus_x,
+                                               Pose::minus_x, Pose::plus_y,  Pose::minus_y};
 
 std::string_view to_string(Pose pose);           // "+x"
 Result<Pose> parse_pose(std::string_view text);  // usage when it is none

@@ -139,8 +139,7 @@ Result<Message> decode(std::span<const std::uint8_t> bytes) {
   if (bytes.size() != kReportBytes) {
     return damaged(fmt::format("a report has {} bytes, not {}", kReportBytes, bytes.size()));
   }
-  const auto crc =
-      static_cast<std::uint16_t>(bytes[kCrcOffset] | (bytes[kCrcOffset + 1] << 8U));
+  const auto crc = static_cast<std::uint16_t>(bytes[kCrcOffset] | (bytes[kCrcOffset + 1] << 8U));
   if (crc != crc_ccitt(bytes.first(kCrcOffset))) {
     return damaged("a report's CRC is wrong");
   }
@@ -303,8 +302,8 @@ Bytes encode_bulk(const BulkBlock& block) {
       .put(static_cast<std::uint32_t>(content.size()))
       .put(content);
   Bytes bytes = writer.take();
-  const auto crc = static_cast<std::uint32_t>(
-      ::crc32(0, bytes.data(), static_cast<unsigned>(bytes.size())));
+  const auto crc =
+      static_cast<std::uint32_t>(::crc32(0, bytes.data(), static_cast<unsigned>(bytes.size())));
   for (unsigned shift = 0; shift < 32; shift += 8) {
     bytes.push_back(static_cast<std::uint8_t>((crc >> shift) & 0xFFU));
   }
@@ -318,8 +317,7 @@ Result<BulkBlock> decode_bulk(std::span<const std::uint8_t> bytes) {
   PayloadReader tail(bytes.last(4));
   const auto before = bytes.first(bytes.size() - 4);
   if (tail.get<std::uint32_t>() !=
-      static_cast<std::uint32_t>(
-          ::crc32(0, before.data(), static_cast<unsigned>(before.size())))) {
+      static_cast<std::uint32_t>(::crc32(0, before.data(), static_cast<unsigned>(before.size())))) {
     return damaged("a bulk block's CRC is wrong");
   }
   PayloadReader reader(before);

@@ -185,9 +185,8 @@ Status Unit::write_calibration(const CalibrationPage& page) {
   for (std::size_t offset = 0; offset < bytes.size(); offset += kPageChunkBytes) {
     const auto chunk =
         std::span(bytes).subspan(offset, std::min(kPageChunkBytes, bytes.size() - offset));
-    SIXPOINT_CHECK(ask(
-        Command::write_staged,
-        PayloadWriter().put(static_cast<std::uint16_t>(offset)).put(chunk).take()));
+    SIXPOINT_CHECK(ask(Command::write_staged,
+                       PayloadWriter().put(static_cast<std::uint16_t>(offset)).put(chunk).take()));
   }
   for (std::size_t offset = 0; offset < bytes.size(); offset += kPageChunkBytes) {
     const auto chunk =
@@ -199,8 +198,8 @@ Status Unit::write_calibration(const CalibrationPage& page) {
                                                   .take()));
     if (!std::equal(chunk.begin(), chunk.end(), staged.begin(), staged.end())) {
       SIXPOINT_CHECK(ask(Command::abort_write));
-      return fail(ErrorCode::io, "the unit read back other constants than were sent",
-                  link_.address, "try again; the unit still holds its old constants");
+      return fail(ErrorCode::io, "the unit read back other constants than were sent", link_.address,
+                  "try again; the unit still holds its old constants");
     }
   }
   SIXPOINT_ASSIGN(const Bytes committed, ask(Command::commit, PayloadWriter().put(crc).take()));
@@ -223,11 +222,10 @@ Result<FilterState> Unit::filter() {
 }
 
 Status Unit::set_filter(FilterConfiguration filter) {
-  SIXPOINT_CHECK(ask(
-      Command::set_filter,
-      PayloadWriter()
-          .put(static_cast<std::uint8_t>(filter == FilterConfiguration::legacy ? 0 : 1))
-          .take()));
+  SIXPOINT_CHECK(ask(Command::set_filter, PayloadWriter()
+                                              .put(static_cast<std::uint8_t>(
+                                                  filter == FilterConfiguration::legacy ? 0 : 1))
+                                              .take()));
   SIXPOINT_ASSIGN(const FilterState state, this->filter());
   if (state.stream != filter) {
     return fail(ErrorCode::io,
@@ -243,8 +241,8 @@ Status Unit::start_stream(int rate_hz) {
   statistics_ = {};
   next_index_ = 0;
   streaming_ = true;
-  const auto answer = ask(
-      Command::start_stream, PayloadWriter().put(static_cast<std::uint16_t>(rate_hz)).take());
+  const auto answer =
+      ask(Command::start_stream, PayloadWriter().put(static_cast<std::uint16_t>(rate_hz)).take());
   streaming_ = answer.has_value();
   SIXPOINT_CHECK(answer);
   return {};
@@ -276,12 +274,12 @@ Status Unit::stop_stream() {
 }
 
 Result<std::uint16_t> Unit::start_recording(int rate_hz, UtcTime now) {
-  SIXPOINT_ASSIGN(const Bytes payload,
-                  ask(Command::start_recording,
-                      PayloadWriter()
-                          .put(static_cast<std::uint16_t>(rate_hz))
-                          .put(static_cast<std::uint32_t>(to_unix_seconds(now)))
-                          .take()));
+  SIXPOINT_ASSIGN(
+      const Bytes payload,
+      ask(Command::start_recording, PayloadWriter()
+                                        .put(static_cast<std::uint16_t>(rate_hz))
+                                        .put(static_cast<std::uint32_t>(to_unix_seconds(now)))
+                                        .take()));
   PayloadReader reader(payload);
   const auto id = reader.get<std::uint16_t>();
   if (!reader.ok()) {
@@ -304,10 +302,9 @@ Result<std::vector<RecordingInfo>> Unit::recordings() {
   std::vector<RecordingInfo> list;
   std::size_t count = 0;
   do {
-    SIXPOINT_ASSIGN(
-        const Bytes payload,
-        ask(Command::list_recording,
-            PayloadWriter().put(static_cast<std::uint16_t>(list.size())).take()));
+    SIXPOINT_ASSIGN(const Bytes payload,
+                    ask(Command::list_recording,
+                        PayloadWriter().put(static_cast<std::uint16_t>(list.size())).take()));
     SIXPOINT_ASSIGN(const RecordingEntry entry, decode_recording(payload));
     if (!list.empty() && entry.count != count) {
       return nonsense(link_.address, "the unit's list of recordings changes while it is read");
@@ -331,12 +328,12 @@ Status Unit::download_from(const RecordingInfo& recording, std::uint64_t& offset
     const std::uint64_t length = std::min(kPerRequest, recording.bytes - offset);
     const std::uint64_t end = offset + length;
     const std::uint64_t begin = offset;
-    SIXPOINT_ASSIGN(const Bytes payload, ask(Command::download,
-                                             PayloadWriter()
-                                                 .put(recording.id)
-                                                 .put(offset)
-                                                 .put(static_cast<std::uint32_t>(length))
-                                                 .take()));
+    SIXPOINT_ASSIGN(const Bytes payload,
+                    ask(Command::download, PayloadWriter()
+                                               .put(recording.id)
+                                               .put(offset)
+                                               .put(static_cast<std::uint32_t>(length))
+                                               .take()));
     PayloadReader reader(payload);
     if (reader.get<std::uint64_t>() != length || !reader.ok()) {
       return nonsense(link_.address, "the unit offers another length than its list says");
@@ -384,8 +381,7 @@ Status Unit::download(const RecordingInfo& recording, FileSystem& files, const s
     return fail(ErrorCode::cannot_create, "the file exists already", path,
                 "choose another name or remove it");
   }
-  const std::string part =
-      fmt::format("{}.{}.part", path, to_hex(recording.sha256).substr(0, 12));
+  const std::string part = fmt::format("{}.{}.part", path, to_hex(recording.sha256).substr(0, 12));
   const std::string before = part + ".before";
 
   // A part from an earlier call moves aside and is copied, so that a loss of power now costs
@@ -399,8 +395,7 @@ Status Unit::download(const RecordingInfo& recording, FileSystem& files, const s
   if (const auto earlier = files.open(before); earlier) {
     Bytes chunk(kBulkContentBytes);
     while (offset < recording.bytes) {
-      const std::uint64_t wanted =
-          std::min<std::uint64_t>(chunk.size(), recording.bytes - offset);
+      const std::uint64_t wanted = std::min<std::uint64_t>(chunk.size(), recording.bytes - offset);
       SIXPOINT_ASSIGN(const std::size_t count,
                       (*earlier)->read_at(offset, std::span(chunk).first(wanted)));
       if (count == 0) {

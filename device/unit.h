@@ -74,9 +74,9 @@ class Unit {
   Result<std::uint16_t> start_recording(int rate_hz, UtcTime now);
   Result<std::uint16_t> stop_recording();
   Result<std::vector<RecordingInfo>> recordings();
-  // Saves a recording under `path`. What arrives is kept in `path`.HASH.part, and goes on from there
-  // in a later call; `path` appears when the whole has the announced SHA-256. cannot_create where
-  // `path` exists. `progress` gets the bytes so far.
+  // Saves a recording under `path`. What arrives is kept in `path`.HASH.part, and goes on from
+  // there in a later call; `path` appears when the whole has the announced SHA-256. cannot_create
+  // where `path` exists. `progress` gets the bytes so far.
   Status download(const RecordingInfo& recording, FileSystem& files, const std::string& path,
                   const std::function<void(std::uint64_t)>& progress = {});
 

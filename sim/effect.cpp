@@ -1,9 +1,9 @@
 #include "sim/effect.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <numbers>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -29,8 +29,8 @@ std::string_view to_string(Stage stage) {
 
 const std::vector<EffectKind>& effect_catalogue() {
   static const std::vector<EffectKind> kCatalogue = {
-      tilt_kind(),         misalignment_kind(), second_order_kind(),  offset_tempco_kind(),
-      clock_error_kind(),  truncation_kind(),   charging_zeros_kind(),
+      tilt_kind(),        misalignment_kind(), second_order_kind(),   offset_tempco_kind(),
+      clock_error_kind(), truncation_kind(),   charging_zeros_kind(),
   };
   return kCatalogue;
 }
@@ -43,9 +43,8 @@ Result<const EffectKind*> find_effect(std::string_view name) {
     }
     names.push_back(kind.name);
   }
-  return fail(ErrorCode::configuration,
-              fmt::format("there is no effect '{}'", printable(name, 60)), {},
-              fmt::format("use one of: {}", fmt::join(names, ", ")));
+  return fail(ErrorCode::configuration, fmt::format("there is no effect '{}'", printable(name, 60)),
+              {}, fmt::format("use one of: {}", fmt::join(names, ", ")));
 }
 
 Result<ParameterSet> complete_parameters(const EffectKind& kind, const ParameterSet& given) {
@@ -56,10 +55,10 @@ Result<ParameterSet> complete_parameters(const EffectKind& kind, const Parameter
   for (const auto& [name, numbers] : given) {
     const auto value = values.find(name);
     if (value == values.end()) {
-      return fail(ErrorCode::configuration,
-                  fmt::format("the effect '{}' has no parameter '{}'", kind.name,
-                              printable(name, 60)),
-                  {}, "docs/scenario.md lists the parameters of every effect");
+      return fail(
+          ErrorCode::configuration,
+          fmt::format("the effect '{}' has no parameter '{}'", kind.name, printable(name, 60)), {},
+          "docs/scenario.md lists the parameters of every effect");
     }
     if (numbers.size() != value->second.size() ||
         !std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); })) {

@@ -14,6 +14,7 @@
 //   firmware  on_firmware: changes stored
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -21,8 +22,6 @@
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "base/measure.h"
 #include "base/random.h"
@@ -40,13 +39,13 @@ struct MotionState {
 
 struct SimulatedBlock {
   std::uint64_t first_sample = 0;
-  std::vector<double> time_s;              // true time of each sample since power-on
-  std::vector<MotionState> motion;         // per sample
-  std::vector<Eigen::Vector3d> true_g;     // specific force in the case's axes: the truth
-  std::vector<Eigen::Vector3d> sensed_g;   // the same as the sensor element has it
-  std::vector<double> temperature_c;       // of the die
-  std::vector<PerAxis<int>> raw_lsb;       // the sensor's reading
-  std::vector<gt3x::Counts> stored;        // what the firmware makes of it
+  std::vector<double> time_s;             // true time of each sample since power-on
+  std::vector<MotionState> motion;        // per sample
+  std::vector<Eigen::Vector3d> true_g;    // specific force in the case's axes: the truth
+  std::vector<Eigen::Vector3d> sensed_g;  // the same as the sensor element has it
+  std::vector<double> temperature_c;      // of the die
+  std::vector<PerAxis<int>> raw_lsb;      // the sensor's reading
+  std::vector<gt3x::Counts> stored;       // what the firmware makes of it
 
   std::size_t size() const { return time_s.size(); }
 };

@@ -28,8 +28,7 @@ Eigen::Vector3d random_direction(Random& random) {
 
 class Still final : public Motion {
  public:
-  Still(const Eigen::Matrix3d& rotation, double gravity_g)
-      : state_{rotation, {0, 0, gravity_g}} {}
+  Still(const Eigen::Matrix3d& rotation, double gravity_g) : state_{rotation, {0, 0, gravity_g}} {}
   void at(double /*time_s*/, MotionState& state) override { state = state_; }
 
  private:
@@ -53,9 +52,9 @@ class Turn final : public Motion {
     if (part > 0 && part < 1) {
       const double fade = std::sin(std::numbers::pi * part);
       for (const Tone& tone : tremor_) {
-        state.force_lab_g +=
-            fade * tone.amplitude_g *
-            std::sin(kTwoPi * tone.frequency_hz * time_s + tone.phase_rad) * tone.direction_lab;
+        state.force_lab_g += fade * tone.amplitude_g *
+                             std::sin(kTwoPi * tone.frequency_hz * time_s + tone.phase_rad) *
+                             tone.direction_lab;
       }
     }
   }
@@ -76,10 +75,10 @@ class Shaker final : public Motion {
   }
   void at(double time_s, MotionState& state) override {
     state.rotation = rotation_;
-    state.force_lab_g =
-        Eigen::Vector3d(0, 0, gravity_g_) +
-        tone_.amplitude_g * std::sin(kTwoPi * tone_.frequency_hz * time_s + tone_.phase_rad) *
-            tone_.direction_lab;
+    state.force_lab_g = Eigen::Vector3d(0, 0, gravity_g_) +
+                        tone_.amplitude_g *
+                            std::sin(kTwoPi * tone_.frequency_hz * time_s + tone_.phase_rad) *
+                            tone_.direction_lab;
   }
 
  private:
@@ -135,15 +134,15 @@ class FreeLiving final : public Motion {
     const double part = local_s / (bout.end_s - bout.start_s);
     const double fade = std::min(smooth_step(local_s), smooth_step(bout.end_s - time_s));
     const Tone& first = bout.tones[0];
-    const double swing = fade * bout.swing_rad *
-                         std::sin(kTwoPi * first.frequency_hz * local_s + first.phase_rad);
-    state.rotation = (Eigen::AngleAxisd(swing, bout.swing_axis) *
-                      bout.from.slerp(smooth_step(part), bout.to))
-                         .toRotationMatrix();
+    const double swing =
+        fade * bout.swing_rad * std::sin(kTwoPi * first.frequency_hz * local_s + first.phase_rad);
+    state.rotation =
+        (Eigen::AngleAxisd(swing, bout.swing_axis) * bout.from.slerp(smooth_step(part), bout.to))
+            .toRotationMatrix();
     for (const Tone& tone : bout.tones) {
-      state.force_lab_g +=
-          fade * tone.amplitude_g *
-          std::sin(kTwoPi * tone.frequency_hz * local_s + tone.phase_rad) * tone.direction_lab;
+      state.force_lab_g += fade * tone.amplitude_g *
+                           std::sin(kTwoPi * tone.frequency_hz * local_s + tone.phase_rad) *
+                           tone.direction_lab;
     }
   }
 

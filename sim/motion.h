@@ -3,12 +3,11 @@
 // The laboratory's frame has z up; the specific force of a unit at rest is (0, 0, gravity).
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
 #include <vector>
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 
 #include "sim/effect.h"
 

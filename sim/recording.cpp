@@ -17,9 +17,8 @@ namespace {
 std::uint32_t unix_time(UtcTime time) { return static_cast<std::uint32_t>(to_unix_seconds(time)); }
 
 void append_text(Bytes& log, UtcTime time, std::string_view json) {
-  gt3x::append_record(
-      log, gt3x::RecordType::metadata, unix_time(time),
-      std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+  gt3x::append_record(log, gt3x::RecordType::metadata, unix_time(time),
+                      std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
 }
 
 // A stable number of the unit for the identifiers that real files hold.
@@ -73,9 +72,8 @@ class ScenarioLog final : public gt3x::ByteSource {
     if (second_ % kBatteryEvery_s == 0) {
       const auto millivolts = static_cast<std::uint16_t>(
           4170 - std::min<std::uint64_t>(700, second_ / kBatteryEvery_s));
-      const std::array<std::uint8_t, 2> payload = {
-          static_cast<std::uint8_t>(millivolts & 0xFFU),
-          static_cast<std::uint8_t>(millivolts >> 8U)};
+      const std::array<std::uint8_t, 2> payload = {static_cast<std::uint8_t>(millivolts & 0xFFU),
+                                                   static_cast<std::uint8_t>(millivolts >> 8U)};
       gt3x::append_record(pending_, gt3x::RecordType::battery, unix_time(time), payload);
     }
     simulator_.next(static_cast<std::size_t>(scenario_.rate_hz), block_);
@@ -111,12 +109,30 @@ Bytes log_preamble(const UnitTruth& unit, UtcTime start, int rate_hz) {
 
   // Identifiers beyond the named ones: the values of a real wGT3X-BT file.
   gt3x::ParameterValues values = {
-      {{0, 6}, 0},           {{0, 7}, 54'722'035}, {{0, 8}, 1},    {{0, 16}, 1'920'991'232},
-      {{0, 20}, 0},          {{0, 21}, 0},         {{0, 22}, 0},   {{0, 23}, 0},
-      {{0, 26}, 2},          {{0, 28}, 317},       {{0, 29}, 7},   {{0, 32}, 16'842'752},
-      {{0, 37}, 1282},       {{0, 38}, 0},         {{1, 0}, 1},    {{1, 1}, unit_number(unit)},
-      {{1, 2}, 261},         {{1, 3}, 4},          {{1, 20}, 0},   {{1, 21}, 0},
-      {{1, 33}, 0},          {{1, 40}, 0},         {{1, 45}, 122'748'928}, {{1, 46}, 0},
+      {{0, 6}, 0},
+      {{0, 7}, 54'722'035},
+      {{0, 8}, 1},
+      {{0, 16}, 1'920'991'232},
+      {{0, 20}, 0},
+      {{0, 21}, 0},
+      {{0, 22}, 0},
+      {{0, 23}, 0},
+      {{0, 26}, 2},
+      {{0, 28}, 317},
+      {{0, 29}, 7},
+      {{0, 32}, 16'842'752},
+      {{0, 37}, 1282},
+      {{0, 38}, 0},
+      {{1, 0}, 1},
+      {{1, 1}, unit_number(unit)},
+      {{1, 2}, 261},
+      {{1, 3}, 4},
+      {{1, 20}, 0},
+      {{1, 21}, 0},
+      {{1, 33}, 0},
+      {{1, 40}, 0},
+      {{1, 45}, 122'748'928},
+      {{1, 46}, 0},
   };
   values[gt3x::kParameterCalibrationTime] = unix_time(unit.calibrated);
   values[gt3x::kParameterFirmwareVersion] = gt3x::encode_firmware(unit.firmware).value_or(0);
@@ -170,12 +186,12 @@ Result<RecordingReport> write_recording(FileSystem& files, const std::string& pa
   RecordingReport report;
   report.duration_s = static_cast<double>(seconds);
   SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
+  SIXPOINT_CHECK(
+      writer.add("log.bin", std::make_unique<ScenarioLog>(scenario, seconds, report, truth)));
   SIXPOINT_CHECK(writer.add(
-      "log.bin", std::make_unique<ScenarioLog>(scenario, seconds, report, truth)));
-  SIXPOINT_CHECK(writer.add("info.txt", recording_info(scenario.unit, scenario.start,
-                                                       scenario.start + std::chrono::seconds(seconds),
-                                                       scenario.rate_hz)
-                                            .serialise()));
+      "info.txt", recording_info(scenario.unit, scenario.start,
+                                 scenario.start + std::chrono::seconds(seconds), scenario.rate_hz)
+                      .serialise()));
   SIXPOINT_CHECK(writer.commit());
   return report;
 }

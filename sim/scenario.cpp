@@ -78,7 +78,8 @@ class Section {
     if (!good || !std::all_of(found->get_ref<const std::string&>().begin(),
                               found->get_ref<const std::string&>().end(),
                               [](char c) { return c >= ' ' && c <= '~'; })) {
-      return wrong(path(key), fmt::format("this must be a text of 1 to {} ASCII characters", limit));
+      return wrong(path(key),
+                   fmt::format("this must be a text of 1 to {} ASCII characters", limit));
     }
     value = found->get<std::string>();
     return {};
@@ -134,8 +135,8 @@ Status parse_sensor(const Section& parent, std::string_view key,
   if (json == nullptr) {
     return {};
   }
-  SIXPOINT_ASSIGN(const Section section, Section::of(*json, parent.path(key),
-                                                     {"sensitivity_lsb_per_g", "zero_lsb"}));
+  SIXPOINT_ASSIGN(const Section section,
+                  Section::of(*json, parent.path(key), {"sensitivity_lsb_per_g", "zero_lsb"}));
   SIXPOINT_CHECK(section.axes("sensitivity_lsb_per_g", sensitivity, 1, 2047));
   return section.axes("zero_lsb", zero, -2048, 2047);
 }
@@ -161,9 +162,9 @@ Result<UnitTruth> parse_unit(const Json* json, std::uint64_t seed) {
   SIXPOINT_CHECK(unit.number("accel_scale_lsb_per_g", scale, 1, 4096));
   wishes.accel_scale_lsb_per_g = scale;
   if (const Json* constants = unit.find("constants"); constants != nullptr) {
-    SIXPOINT_ASSIGN(const Section section,
-                    Section::of(*constants, "/unit/constants",
-                                {"positive_lsb", "negative_lsb", "zero_lsb"}));
+    SIXPOINT_ASSIGN(
+        const Section section,
+        Section::of(*constants, "/unit/constants", {"positive_lsb", "negative_lsb", "zero_lsb"}));
     SIXPOINT_CHECK(
         section.axes("positive_lsb", wishes.positive_lsb, kStoredConstantMin, kStoredConstantMax));
     SIXPOINT_CHECK(
@@ -348,9 +349,9 @@ Result<Scenario> parse_document(const Json& json) {
   }
   double total_s = 0;
   for (std::size_t i = 0; i < motions->size(); ++i) {
-    SIXPOINT_ASSIGN(const MotionSpec spec,
-                    parse_motion((*motions)[i], fmt::format("/motions/{}", i),
-                                 scenario.seed + 1000 + i));
+    SIXPOINT_ASSIGN(
+        const MotionSpec spec,
+        parse_motion((*motions)[i], fmt::format("/motions/{}", i), scenario.seed + 1000 + i));
     total_s += spec.duration_s + scenario.turn_s;
     scenario.motions.push_back(spec);
   }
@@ -362,8 +363,7 @@ Result<Scenario> parse_document(const Json& json) {
       return wrong("/effects", "this must be a list");
     }
     for (std::size_t i = 0; i < effects->size(); ++i) {
-      SIXPOINT_ASSIGN(EffectSpec spec,
-                      parse_effect((*effects)[i], fmt::format("/effects/{}", i)));
+      SIXPOINT_ASSIGN(EffectSpec spec, parse_effect((*effects)[i], fmt::format("/effects/{}", i)));
       scenario.effects.push_back(std::move(spec));
     }
   }

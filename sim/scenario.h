@@ -3,14 +3,13 @@
 // The same scenario gives the same recording, byte for byte, on every machine.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "sim/effect.h"
 #include "sim/motion.h"

@@ -35,8 +35,7 @@ UnitTruth draw_unit(std::uint64_t seed, const UnitWishes& wishes) {
   PerAxis<double> zero_error_lsb{};
   const double common_gain = random.uniform(0.80, 0.95);
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    legacy.sensitivity_lsb_per_g[axis] =
-        262 * (1 + 0.02 * std::clamp(random.normal(), -2.5, 2.5));
+    legacy.sensitivity_lsb_per_g[axis] = 262 * (1 + 0.02 * std::clamp(random.normal(), -2.5, 2.5));
     legacy.zero_lsb[axis] = 40 + 20 * std::clamp(random.normal(), -2.5, 2.5);
     gain[axis] = common_gain * (1 + 0.01 * std::clamp(random.normal(), -2.0, 2.0));
     offset_g[axis] = random.uniform(0.1, 0.2) * (random.uniform() < 0.5 ? -1 : 1);
@@ -68,8 +67,8 @@ UnitTruth draw_unit(std::uint64_t seed, const UnitWishes& wishes) {
 
   // The sensor under the configuration of its constants: what is wished for it, else what wished
   // constants say, else what was drawn.
-  const auto& own_sensitivity = legacy_constants ? wishes.legacy_sensitivity_lsb_per_g
-                                                 : wishes.current_sensitivity_lsb_per_g;
+  const auto& own_sensitivity =
+      legacy_constants ? wishes.legacy_sensitivity_lsb_per_g : wishes.current_sensitivity_lsb_per_g;
   const auto& own_zero = legacy_constants ? wishes.legacy_zero_lsb : wishes.current_zero_lsb;
   SensorTruth own_sensor = legacy;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {

@@ -25,7 +25,9 @@ class ChargingZeros final : public Effect {
 }  // namespace
 
 EffectKind charging_zeros_kind() {
-  return {"charging_zeros", Stage::firmware, "zero on all axes while the unit charges",
+  return {"charging_zeros",
+          Stage::firmware,
+          "zero on all axes while the unit charges",
           {{"start_s", "s", {60}, 0, 1e6, "since the start of the recording"},
            {"duration_s", "s", {60}, 1, 1e5, "a charge takes up to two hours"}},
           [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {

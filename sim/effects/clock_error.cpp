@@ -21,8 +21,14 @@ class ClockError final : public Effect {
 }  // namespace
 
 EffectKind clock_error_kind() {
-  return {"clock_error", Stage::sampling, "the sample clock is off; positive runs fast",
-          {{"ppm", "ppm", {500}, -5000, 5000,
+  return {"clock_error",
+          Stage::sampling,
+          "the sample clock is off; positive runs fast",
+          {{"ppm",
+            "ppm",
+            {500},
+            -5000,
+            5000,
             "watch crystals 10 to 100 ppm; the ADXL362's own oscillator several thousand"}},
           [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
             return std::make_unique<ClockError>(values);

@@ -22,8 +22,14 @@ class Misalignment final : public Effect {
 }  // namespace
 
 EffectKind misalignment_kind() {
-  return {"misalignment", Stage::sensor, "the sensor's axes rotated in the case",
-          {{"rotation_vector_deg", "deg", {0.5, 0, 0}, -1, 1,
+  return {"misalignment",
+          Stage::sensor,
+          "the sensor's axes rotated in the case",
+          {{"rotation_vector_deg",
+            "deg",
+            {0.5, 0, 0},
+            -1,
+            1,
             "soldering and case tolerances: 0.1 to 1 degree"}},
           [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
             return std::make_unique<Misalignment>(values);

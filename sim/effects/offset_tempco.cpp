@@ -25,8 +25,14 @@ class OffsetTempco final : public Effect {
 }  // namespace
 
 EffectKind offset_tempco_kind() {
-  return {"offset_tempco", Stage::sensor, "the zero moves with temperature",
-          {{"mg_per_c", "mg/C", {0.4, 0.4, 0.4}, -1, 1,
+  return {"offset_tempco",
+          Stage::sensor,
+          "the zero moves with temperature",
+          {{"mg_per_c",
+            "mg/C",
+            {0.4, 0.4, 0.4},
+            -1,
+            1,
             "ADXL362 datasheet: 0.5 mg/C x and y, 0.6 mg/C z, typical"}},
           [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
             return std::make_unique<OffsetTempco>(values);

@@ -23,8 +23,14 @@ class SecondOrder final : public Effect {
 }  // namespace
 
 EffectKind second_order_kind() {
-  return {"second_order", Stage::sensor, "second-order nonlinearity, K2 a^2",
-          {{"mg_per_g2", "mg/g^2", {0.3, 0.3, 0.3}, -0.6, 0.6,
+  return {"second_order",
+          Stage::sensor,
+          "second-order nonlinearity, K2 a^2",
+          {{"mg_per_g2",
+            "mg/g^2",
+            {0.3, 0.3, 0.3},
+            -0.6,
+            0.6,
             "ADXL362 datasheet: nonlinearity 0.5 % of full scale, mostly of higher order"}},
           [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
             return std::make_unique<SecondOrder>(values);

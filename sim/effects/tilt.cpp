@@ -25,8 +25,14 @@ class Tilt final : public Effect {
 }  // namespace
 
 EffectKind tilt_kind() {
-  return {"tilt", Stage::stimulus, "jig base out of level, fixed in the laboratory's frame",
-          {{"rotation_vector_deg", "deg", {0.2, 0, 0}, -0.5, 0.5,
+  return {"tilt",
+          Stage::stimulus,
+          "jig base out of level, fixed in the laboratory's frame",
+          {{"rotation_vector_deg",
+            "deg",
+            {0.2, 0, 0},
+            -0.5,
+            0.5,
             "a machinist's level on a laboratory bench: 0.05 to 0.5 degree"}},
           [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
             return std::make_unique<Tilt>(values);

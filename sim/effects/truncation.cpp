@@ -15,7 +15,10 @@ class Truncation final : public Effect {
 }  // namespace
 
 EffectKind truncation_kind() {
-  return {"truncation", Stage::digital, "stored counts are cut toward zero instead of rounded", {},
+  return {"truncation",
+          Stage::digital,
+          "stored counts are cut toward zero instead of rounded",
+          {},
           [](const ParameterSet&, Random) -> std::unique_ptr<Effect> {
             return std::make_unique<Truncation>();
           }};

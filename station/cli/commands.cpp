@@ -4,9 +4,12 @@
 namespace sixpoint::cli {
 
 // add_NAME is defined in NAME.cpp.
+void add_simulate(CLI::App& app, Context& context);
 
 const std::vector<CommandEntry>& commands() {
-  static const std::vector<CommandEntry> kCommands = {};
+  static const std::vector<CommandEntry> kCommands = {
+      {"simulate", add_simulate},
+  };
   return kCommands;
 }
 
