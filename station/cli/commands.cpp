@@ -7,6 +7,7 @@ namespace sixpoint::cli {
 void add_audit(CLI::App& app, Context& context);
 void add_history(CLI::App& app, Context& context);
 void add_scan(CLI::App& app, Context& context);
+void add_simulate(CLI::App& app, Context& context);
 void add_units(CLI::App& app, Context& context);
 
 const std::vector<CommandEntry>& commands() {
@@ -15,6 +16,7 @@ const std::vector<CommandEntry>& commands() {
       {"units", add_units},
       {"history", add_history},
       {"audit", add_audit},
+      {"simulate", add_simulate},
   };
   return kCommands;
 }
