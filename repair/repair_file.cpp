@@ -207,8 +207,8 @@ class Repair {
     }
     if (log.tally().affine_counts > 0) {
       report_.reasons.push_back(fmt::format(
-          "{} counts cannot have come from the file's constants (mended before, resampled, or by "
-          "other firmware): mapped by the straight line",
+          "the counts cannot have come from whole raw counts by the file's constants (averaged, "
+          "mended before, or resampled): {} of them mapped by the straight line",
           log.tally().affine_counts));
     }
     if (survey_.log.checksum_failures + survey_.log.damaged_stretches > 0) {

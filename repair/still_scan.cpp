@@ -65,7 +65,15 @@ void StillScan::close_finder() {
     return;
   }
   break_run();
-  blocks_.insert(blocks_.end(), finder_->blocks().begin(), finder_->blocks().end());
+  const calib::Calibration& undone = reversal_->calibration();
+  for (const calib::StillBlock& block : finder_->blocks()) {
+    blocks_.push_back(block);
+    PerAxis<double> affine_lsb{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      affine_lsb[a] = undone.zero_lsb[a] + block.mean_g[a] / undone.sensitivity_g_per_lsb[a];
+    }
+    affine_lsb_.push_back(affine_lsb);
+  }
   const calib::StillBlockTally& tally = finder_->tally();
   tally_.samples += tally.samples;
   tally_.runs += tally.runs;
@@ -79,6 +87,11 @@ void StillScan::close_finder() {
 
 std::vector<calib::StillBlock> StillScan::finish() {
   close_finder();
+  if (!plausibility_.plausible()) {
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      blocks_[i].mean_lsb = affine_lsb_[i];
+    }
+  }
   return std::move(blocks_);
 }
 

@@ -39,7 +39,10 @@ class StillScan {
   void push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples);
   void break_run();
 
-  // Finishes. Blocks in order of time; mean_lsb are raw counts whatever constants were in force.
+  // Finishes. Blocks in order of time; mean_lsb are raw counts whatever constants were in force:
+  // means of the recovered integers, or, where the file's counts cannot have come from integers
+  // (plausibility() says so; seen in every real 30 Hz unit, whose firmware seems to average), the
+  // straight line's inverse of the mean.
   std::vector<calib::StillBlock> finish();
 
   const calib::PlausibilityTally& plausibility() const { return plausibility_; }
@@ -58,6 +61,7 @@ class StillScan {
   std::optional<calib::StillBlockFinder> finder_;
   std::optional<std::uint32_t> last_time_;
   std::vector<calib::StillBlock> blocks_;
+  std::vector<PerAxis<double>> affine_lsb_;  // of each block, what the straight line makes of it
   calib::PlausibilityTally plausibility_;
   calib::StillBlockTally tally_;
 };

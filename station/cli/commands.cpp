@@ -9,6 +9,7 @@ void add_export(CLI::App& app, Context& context);
 void add_history(CLI::App& app, Context& context);
 void add_inspect(CLI::App& app, Context& context);
 void add_scan(CLI::App& app, Context& context);
+void add_simulate(CLI::App& app, Context& context);
 void add_units(CLI::App& app, Context& context);
 
 const std::vector<CommandEntry>& commands() {
@@ -19,6 +20,7 @@ const std::vector<CommandEntry>& commands() {
       {"units", add_units},
       {"history", add_history},
       {"audit", add_audit},
+      {"simulate", add_simulate},
   };
   return kCommands;
 }
