@@ -5,8 +5,10 @@ namespace sixpoint::cli {
 
 // add_NAME is defined in NAME.cpp.
 void add_audit(CLI::App& app, Context& context);
+void add_export(CLI::App& app, Context& context);
 void add_history(CLI::App& app, Context& context);
 void add_repair(CLI::App& app, Context& context);
+void add_inspect(CLI::App& app, Context& context);
 void add_scan(CLI::App& app, Context& context);
 void add_simulate(CLI::App& app, Context& context);
 void add_units(CLI::App& app, Context& context);
@@ -15,6 +17,13 @@ const std::vector<CommandEntry>& commands() {
   static const std::vector<CommandEntry> kCommands = {
       {"scan", add_scan},       {"repair", add_repair}, {"units", add_units},
       {"history", add_history}, {"audit", add_audit},   {"simulate", add_simulate},
+      {"inspect", add_inspect},
+      {"scan", add_scan},
+      {"export", add_export},
+      {"units", add_units},
+      {"history", add_history},
+      {"audit", add_audit},
+      {"simulate", add_simulate},
   };
   return kCommands;
 }
