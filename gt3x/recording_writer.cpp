@@ -9,6 +9,7 @@
 #include <zip.h>
 
 #include "base/atomic_file.h"
+#include "gt3x/recording_archive.h"
 #include "gt3x/zip_bridge.h"
 
 namespace sixpoint::gt3x {
@@ -42,9 +43,41 @@ struct RecordingWriter::Archive {
                 "check the disk and run the command again");
   }
 
+  Status take_name(const std::string& name) {
+    if (name.empty() || name.size() > 255 || name.find_first_of("/\\:") != std::string::npos ||
+        name.starts_with('.')) {
+      return fail(ErrorCode::usage, "an entry cannot be named '" + printable(name, 60) + "'", path,
+                  "use a plain file name");
+    }
+    if (!names.insert(name).second) {
+      return fail(ErrorCode::usage, "an entry named " + printable(name, 60) + " was added already",
+                  path, "add each entry once");
+    }
+    return {};
+  }
+
+  // Takes `source` along, also when it fails.
+  Status add(const std::string& name, zip_source_t* source, int method) {
+    if (source == nullptr) {
+      return failed("adding " + name);
+    }
+    const zip_int64_t index = zip_file_add(zip, name.c_str(), source, ZIP_FL_ENC_UTF_8);
+    if (index < 0) {
+      zip_source_free(source);
+      return failed("adding " + name);
+    }
+    const auto entry = static_cast<zip_uint64_t>(index);
+    if (zip_set_file_compression(zip, entry, method, 6) != 0 ||
+        zip_file_set_dostime(zip, entry, kDosTime, kDosDate, 0) != 0) {
+      return failed("adding " + name);
+    }
+    return {};
+  }
+
   AtomicFile out;
   std::string path;
   std::set<std::string> names;
+  std::vector<std::shared_ptr<void>> origins;  // archives that entries are copied from at commit()
   std::optional<Error> failure;
   zip_t* zip = nullptr;
   std::uint64_t at = 0;
@@ -137,32 +170,32 @@ Status RecordingWriter::add(const std::string& name, std::string_view text,
 
 Status RecordingWriter::add(const std::string& name, std::unique_ptr<ByteSource> source,
                             Compression compression) {
-  Archive& archive = *archive_;
-  if (name.empty() || name.size() > 255 || name.find_first_of("/\\:") != std::string::npos ||
-      name.starts_with('.')) {
-    return fail(ErrorCode::usage, "an entry cannot be named '" + printable(name, 60) + "'",
-                archive.path, "use a plain file name");
+  SIXPOINT_CHECK(archive_->take_name(name));
+  zip_source_t* pulled = make_pulling_source(std::move(source), &archive_->failure);
+  return archive_->add(name, pulled,
+                       compression == Compression::store ? ZIP_CM_STORE : ZIP_CM_DEFLATE);
+}
+
+Status RecordingWriter::copy(Recording& from, const std::string& name) {
+  SIXPOINT_ASSIGN(const auto source, from.open_entry(name));
+  Bytes piece(64 * 1024);
+  for (;;) {
+    SIXPOINT_ASSIGN(const std::size_t count, source->read(piece));
+    if (count == 0) {
+      break;
+    }
   }
-  if (!archive.names.insert(name).second) {
-    return fail(ErrorCode::usage, "an entry named " + printable(name, 60) + " was added already",
-                archive.path, "add each entry once");
+  SIXPOINT_CHECK(archive_->take_name(name));
+  const std::size_t index = *from.archive_->index_of(name);
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  if (zip_stat_index(from.archive_->zip, index, 0, &stat) != 0) {
+    return archive_->failed("copying " + name);
   }
-  zip_source_t* pulled = make_pulling_source(std::move(source), &archive.failure);
-  if (pulled == nullptr) {
-    return archive.failed("adding " + name);
-  }
-  const zip_int64_t index = zip_file_add(archive.zip, name.c_str(), pulled, ZIP_FL_ENC_UTF_8);
-  if (index < 0) {
-    zip_source_free(pulled);
-    return archive.failed("adding " + name);
-  }
-  const auto at = static_cast<zip_uint64_t>(index);
-  const int method = compression == Compression::store ? ZIP_CM_STORE : ZIP_CM_DEFLATE;
-  if (zip_set_file_compression(archive.zip, at, method, 6) != 0 ||
-      zip_file_set_dostime(archive.zip, at, kDosTime, kDosDate, 0) != 0) {
-    return archive.failed("adding " + name);
-  }
-  return {};
+  archive_->origins.push_back(from.archive_);
+  zip_source_t* compressed =
+      zip_source_zip(archive_->zip, from.archive_->zip, index, ZIP_FL_COMPRESSED, 0, -1);
+  return archive_->add(name, compressed, stat.comp_method);
 }
 
 Status RecordingWriter::commit() {

@@ -46,6 +46,10 @@ class RecordingWriter {
   Status add(const std::string& name, std::unique_ptr<ByteSource> source,
              Compression compression = Compression::store);
 
+  // Carries an entry of another archive over untouched, its compressed bytes as they are. The entry
+  // is read once first, so that a damaged one is found (bad_data) and not carried on.
+  Status copy(Recording& from, const std::string& name);
+
   // Once. Errors of a source come back as they are.
   Status commit();
 
