@@ -10,7 +10,6 @@ namespace sixpoint::cli {
   COMMAND(inspect)                 \
   COMMAND(scan)                    \
   COMMAND(export)                  \
-  COMMAND(repair)                  \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
