@@ -25,16 +25,19 @@ inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(st
 
 }  // namespace sixpoint
 
+// NOLINTBEGIN(bugprone-macro-parentheses): a declaration cannot stand in parentheses.
 // The two ways to pass an error on to the caller:
 //   SIXPOINT_CHECK(file->sync());                     for a Status (or to ignore the value)
 //   SIXPOINT_ASSIGN(const auto header, parse(bytes));  for a Result<T>
 #define SIXPOINT_CONCAT_INNER(a, b) a##b
 #define SIXPOINT_CONCAT(a, b) SIXPOINT_CONCAT_INNER(a, b)
-#define SIXPOINT_CHECK(expression)                                                    \
-  do {                                                                                \
-    if (auto sixpoint_status = (expression); !sixpoint_status) {                      \
-      return ::tl::unexpected<::sixpoint::Error>(std::move(sixpoint_status).error()); \
-    }                                                                                 \
+#define SIXPOINT_CHECK(expression) \
+  SIXPOINT_CHECK_INNER(expression, SIXPOINT_CONCAT(sixpoint_status_, __LINE__))
+#define SIXPOINT_CHECK_INNER(expression, status)                             \
+  do {                                                                       \
+    if (auto status = (expression); !status) {                               \
+      return ::tl::unexpected<::sixpoint::Error>(std::move(status).error()); \
+    }                                                                        \
   } while (false)
 #define SIXPOINT_ASSIGN(declaration, expression) \
   SIXPOINT_ASSIGN_INNER(declaration, expression, SIXPOINT_CONCAT(sixpoint_result_, __LINE__))
@@ -42,3 +45,4 @@ inline tl::unexpected<Error> fail(Error error) { return tl::unexpected<Error>(st
   auto result = (expression);                                                           \
   if (!(result)) return ::tl::unexpected<::sixpoint::Error>(std::move(result).error()); \
   declaration = *std::move(result)
+// NOLINTEND(bugprone-macro-parentheses)

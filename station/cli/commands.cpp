@@ -1,12 +1,30 @@
-// The list of commands. A new command is one file, one line here and one in CMakeLists.txt.
+// The list of commands. A new command is one file, one line in the list and one in CMakeLists.txt.
 #include "station/cli/command.h"
 
 namespace sixpoint::cli {
 
-// add_NAME is defined in NAME.cpp.
+// In the order in which --help lists them: looking at files, mending them, measuring units, the store,
+// the simulator. add_NAME is defined in NAME.cpp.
+// clang-format off
+#define SIXPOINT_COMMANDS(COMMAND) \
+  COMMAND(inspect)                 \
+  COMMAND(scan)                    \
+  COMMAND(export)                  \
+  COMMAND(repair)                  \
+  COMMAND(units)                   \
+  COMMAND(history)                 \
+  COMMAND(audit)                   \
+  COMMAND(simulate)
+// clang-format on
+
+#define SIXPOINT_DECLARE(name) void add_##name(CLI::App& app, Context& context);
+SIXPOINT_COMMANDS(SIXPOINT_DECLARE)
+#undef SIXPOINT_DECLARE
 
 const std::vector<CommandEntry>& commands() {
-  static const std::vector<CommandEntry> kCommands = {};
+#define SIXPOINT_ENTRY(name) {#name, add_##name},
+  static const std::vector<CommandEntry> kCommands = {SIXPOINT_COMMANDS(SIXPOINT_ENTRY)};
+#undef SIXPOINT_ENTRY
   return kCommands;
 }
 

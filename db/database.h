@@ -1,0 +1,66 @@
+// The seam between the store and an SQL server: the few things that the store asks of one.
+//
+// Statements are written once, in the SQL that SQLite and PostgreSQL share, with parameters $1, $2
+// ... in order of their first use. One Database is one connection and belongs to one thread at a
+// time; several processes may each have one on the same store.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/env.h"
+#include "base/result.h"
+
+namespace sixpoint::db {
+
+// NULL, INTEGER (64 bits), TEXT, BLOB. There is no floating point: measured numbers are kept as the
+// JSON text that was written, so that both servers return the very same bytes and hashes agree.
+using Value = std::variant<std::monostate, std::int64_t, std::string, Bytes>;
+using Row = std::vector<Value>;
+
+// Rows that come one at a time, so that ten million of them need no memory.
+class RowStream {
+ public:
+  virtual ~RowStream() = default;
+  // False at the end. `row` keeps its storage between calls.
+  virtual Result<bool> next(Row& row) = 0;
+};
+
+class Database {
+ public:
+  virtual ~Database() = default;
+
+  // Starts a transaction that no other writer can interleave with; waits for other writers.
+  virtual Status begin_writing() = 0;
+  virtual Status commit() = 0;   // durable when it returns
+  virtual void roll_back() = 0;  // does nothing outside a transaction
+
+  virtual Status execute(const std::string& sql, std::span<const Value> parameters = {}) = 0;
+  virtual Result<std::unique_ptr<RowStream>> stream(const std::string& sql,
+                                                    std::span<const Value> parameters = {}) = 0;
+
+  // The version of the schema that the store has; 0 for an empty one.
+  virtual Result<std::int64_t> schema_version() = 0;
+  virtual Status set_schema_version(std::int64_t version) = 0;  // inside a transaction
+  // The statements that make `table` refuse every UPDATE and DELETE.
+  virtual std::vector<std::string> append_only_statements(const std::string& table) const = 0;
+  virtual std::string blob_type() const = 0;        // BLOB or BYTEA
+  virtual std::string integer_type() const = 0;     // a name for 64 bits
+  virtual std::string table_options() const = 0;    // " STRICT" where the server knows it
+  virtual const std::string& location() const = 0;  // for error messages; without a password
+
+  // All rows of a query that is known to be short.
+  Result<std::vector<Row>> query(const std::string& sql, std::span<const Value> parameters = {});
+};
+
+// An SQLite file; made when it is not there. WAL mode, every commit synced, foreign keys on; a
+// writer waits up to 30 s for another. Errors: no_input or cannot_create for the path, permission
+// for a read-only place, bad_data for a file that is no store or is damaged, io for a full disk.
+Result<std::unique_ptr<Database>> open_sqlite(const std::string& path);
+
+}  // namespace sixpoint::db

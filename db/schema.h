@@ -1,0 +1,41 @@
+// The tables of the store as data: from this list come the SQL of both servers, the canonical bytes
+// that are hashed, and the export.
+//
+// Every table has, before its own columns, `seq` (the row's place in the whole store's history: 1,
+// 2, 3 ... over all tables together) and, after them, `hash` (the chain, see chain.h). Times are
+// nanoseconds since 1970 UTC. Columns named `document` hold JSON as it was written.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "db/database.h"
+
+namespace sixpoint::db {
+
+inline constexpr std::int64_t kSchemaVersion = 1;
+
+enum class ColumnType { integer, text };
+
+struct Column {
+  std::string_view name;
+  ColumnType type = ColumnType::text;
+  bool required = true;
+  std::string_view references = {};  // "table(column)" of a foreign key, or empty
+};
+
+struct Table {
+  std::string_view name;
+  std::vector<Column> columns;            // the first one is the key, unique
+  std::vector<std::string_view> indexes = {};  // column lists, each becomes an index
+};
+
+const std::vector<Table>& tables();
+const Table& table(std::string_view name);  // a name that is in tables()
+
+// Brings an empty store, or one of an earlier version, to kSchemaVersion in one transaction.
+// configuration error for a store of a newer version than this program knows.
+Status migrate(Database& database);
+
+}  // namespace sixpoint::db

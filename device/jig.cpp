@@ -1,0 +1,53 @@
+#include "device/jig.h"
+
+#include <fmt/format.h>
+
+namespace sixpoint::device {
+
+std::string_view to_string(Pose pose) {
+  switch (pose) {
+    case Pose::plus_x:
+      return "+x";
+    case Pose::minus_x:
+      return "-x";
+    case Pose::plus_y:
+      return "+y";
+    case Pose::minus_y:
+      return "-y";
+    case Pose::plus_z:
+      return "+z";
+    case Pose::minus_z:
+      return "-z";
+  }
+  return "?";
+}
+
+Result<Pose> parse_pose(std::string_view text) {
+  for (const Pose pose : kPoses) {
+    if (to_string(pose) == text) {
+      return pose;
+    }
+  }
+  return fail(ErrorCode::usage, fmt::format("'{}' is no pose", printable(text, 20)), {},
+              "use one of +x -x +y -y +z -z: the axis that points up, or down");
+}
+
+std::size_t axis_of(Pose pose) { return static_cast<std::size_t>(pose) / 2; }
+
+int sign_of(Pose pose) { return static_cast<std::size_t>(pose) % 2 == 0 ? 1 : -1; }
+
+Pose pose_of(std::size_t axis, int sign) {
+  return static_cast<Pose>(axis * 2 + (sign > 0 ? 0 : 1));
+}
+
+PerAxis<double> direction_of(Pose pose) {
+  PerAxis<double> force_g{};
+  force_g[axis_of(pose)] = sign_of(pose);
+  return force_g;
+}
+
+Status ManualJig::go_to(Pose /*pose*/) { return {}; }
+Result<JigReport> ManualJig::report() { return JigReport{std::nullopt, 0.5, {}}; }
+Status ManualJig::stop() { return {}; }
+
+}  // namespace sixpoint::device

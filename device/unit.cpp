@@ -1,0 +1,427 @@
+#include "device/unit.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "device/payload.h"
+
+namespace sixpoint::device {
+
+namespace {
+
+using std::chrono::nanoseconds;
+
+tl::unexpected<Error> refused(const std::string& where, Command command, ReplyCode code) {
+  std::string hint = "update the unit's firmware or this program";
+  switch (code) {
+    case ReplyCode::busy:
+      hint = "stop the recording or the stream first";
+      break;
+    case ReplyCode::battery_low:
+      hint = "charge the unit";
+      break;
+    case ReplyCode::storage_full:
+      hint = "download and clear the unit's recordings";
+      break;
+    case ReplyCode::no_such_recording:
+      hint = "list the unit's recordings again";
+      break;
+    case ReplyCode::crc_mismatch:
+    case ReplyCode::no_transaction:
+      hint = "try again; the unit still holds what it held";
+      break;
+    case ReplyCode::storage_fault:
+      hint = "try again; if it stays, the unit's memory is worn out";
+      break;
+    default:
+      break;
+  }
+  return fail(ErrorCode::io,
+              fmt::format("the unit refused '{}': {}", to_string(command), to_string(code)), where,
+              std::move(hint));
+}
+
+tl::unexpected<Error> nonsense(const std::string& where, std::string what) {
+  return fail(ErrorCode::bad_data, std::move(what), where,
+              "plug the unit in again; if it stays, the unit or its firmware is faulty");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Unit>> Unit::open(Link link, UnitOptions options) {
+  std::unique_ptr<Unit> unit(new Unit(std::move(link), options));
+  SIXPOINT_ASSIGN(const Bytes payload, unit->ask(Command::identify, {}, true));
+  SIXPOINT_ASSIGN(unit->identity_, decode_identity(payload));
+  return unit;
+}
+
+Result<Identity> Unit::identify() {
+  SIXPOINT_ASSIGN(const Bytes payload, ask(Command::identify));
+  SIXPOINT_ASSIGN(Identity identity, decode_identity(payload));
+  if (identity.serial != identity_.serial) {
+    return fail(ErrorCode::device_unavailable,
+                fmt::format("the unit was {} and is now {}", identity_.serial, identity.serial),
+                link_.address, "put the first unit back, or begin anew with this one");
+  }
+  identity_ = identity;
+  return identity;
+}
+
+void Unit::cancel() {
+  link_.reports->cancel();
+  if (link_.bulk) {
+    link_.bulk->cancel();
+  }
+}
+
+Result<std::optional<Message>> Unit::receive(nanoseconds time_out) {
+  // One byte more than a report, so that a longer one is seen to be too long.
+  std::array<std::uint8_t, kReportBytes + 1> buffer{};
+  SIXPOINT_ASSIGN(const std::size_t count, link_.reports->read(buffer, time_out));
+  if (count == 0) {
+    return std::nullopt;
+  }
+  Result<Message> message = decode(std::span(buffer).first(std::min(count, buffer.size())));
+  if (!message || message->kind == ReportKind::request) {
+    ++statistics_.damaged_reports;
+    return std::nullopt;
+  }
+  return std::optional<Message>(std::move(*message));
+}
+
+void Unit::take_samples(const Message& message) {
+  if (!streaming_) {
+    return;  // was under way when the stream stopped
+  }
+  Result<SampleBlock> block = decode_samples(message);
+  if (!block) {
+    ++statistics_.damaged_reports;
+    return;
+  }
+  // Indices wrap at 2^32: compare by signed distance.
+  const auto ahead = static_cast<std::int32_t>(block->first_index - next_index_.value_or(0));
+  if (ahead < 0) {
+    ++statistics_.duplicate_reports;
+    return;
+  }
+  if (waiting_.size() >= options_.waiting_blocks) {
+    ++statistics_.overflowed_blocks;
+    return;  // shows as lost samples when the next block is taken
+  }
+  statistics_.lost_samples += static_cast<std::uint64_t>(ahead);
+  statistics_.samples += block->counts.size();
+  next_index_ = block->first_index + static_cast<std::uint32_t>(block->counts.size());
+  waiting_.push_back(std::move(*block));
+}
+
+Result<Bytes> Unit::ask(Command command, Bytes payload, bool first) {
+  if (first) {
+    sequence_ = 0;
+  } else {
+    sequence_ = sequence_ == 0xFFFF ? std::uint16_t{1} : static_cast<std::uint16_t>(sequence_ + 1);
+  }
+  const Report report =
+      encode({ReportKind::request, sequence_, command, ReplyCode::ok, std::move(payload)});
+  const nanoseconds patience =
+      command == Command::commit ? options_.commit_time_out : options_.reply_time_out;
+  for (int attempt = 0; attempt < options_.attempts; ++attempt) {
+    SIXPOINT_CHECK(link_.reports->write(report, patience));
+    const nanoseconds deadline = link_.clock->elapsed() + patience;
+    for (nanoseconds left = patience; left > nanoseconds::zero();
+         left = deadline - link_.clock->elapsed()) {
+      SIXPOINT_ASSIGN(const auto message, receive(left));
+      if (!message) {
+        continue;
+      }
+      if (message->kind == ReportKind::samples) {
+        take_samples(*message);
+      } else if (message->sequence == sequence_ && message->command == command) {
+        if (message->code != ReplyCode::ok) {
+          return refused(link_.address, command, message->code);
+        }
+        return message->payload;
+      }
+    }
+  }
+  return fail(ErrorCode::device_unavailable,
+              fmt::format("the unit does not answer '{}'", to_string(command)), link_.address,
+              "unplug the unit and plug it in again");
+}
+
+Result<Bytes> Unit::read_page() {
+  Bytes page;
+  while (page.size() < kPageBytes) {
+    const auto length =
+        static_cast<std::uint8_t>(std::min(kPageChunkBytes, kPageBytes - page.size()));
+    SIXPOINT_ASSIGN(const Bytes chunk,
+                    ask(Command::read_page, PayloadWriter()
+                                                .put(kCalibrationPage)
+                                                .put(static_cast<std::uint16_t>(page.size()))
+                                                .put(length)
+                                                .take()));
+    if (chunk.size() != length) {
+      return nonsense(link_.address, "a part of the calibration page has the wrong length");
+    }
+    page.insert(page.end(), chunk.begin(), chunk.end());
+  }
+  return page;
+}
+
+Result<CalibrationPage> Unit::read_calibration() {
+  SIXPOINT_ASSIGN(const Bytes page, read_page());
+  return decode_calibration_page(page);
+}
+
+Status Unit::write_calibration(const CalibrationPage& page) {
+  SIXPOINT_ASSIGN(const Bytes bytes, encode_calibration_page(page));
+  const std::uint16_t crc = crc_ccitt(bytes);
+  SIXPOINT_CHECK(ask(Command::begin_write, PayloadWriter()
+                                               .put(kCalibrationPage)
+                                               .put(static_cast<std::uint16_t>(bytes.size()))
+                                               .put(crc)
+                                               .take()));
+  for (std::size_t offset = 0; offset < bytes.size(); offset += kPageChunkBytes) {
+    const auto chunk =
+        std::span(bytes).subspan(offset, std::min(kPageChunkBytes, bytes.size() - offset));
+    SIXPOINT_CHECK(ask(Command::write_staged,
+                       PayloadWriter().put(static_cast<std::uint16_t>(offset)).put(chunk).take()));
+  }
+  for (std::size_t offset = 0; offset < bytes.size(); offset += kPageChunkBytes) {
+    const auto chunk =
+        std::span(bytes).subspan(offset, std::min(kPageChunkBytes, bytes.size() - offset));
+    SIXPOINT_ASSIGN(const Bytes staged,
+                    ask(Command::read_staged, PayloadWriter()
+                                                  .put(static_cast<std::uint16_t>(offset))
+                                                  .put(static_cast<std::uint8_t>(chunk.size()))
+                                                  .take()));
+    if (!std::equal(chunk.begin(), chunk.end(), staged.begin(), staged.end())) {
+      SIXPOINT_CHECK(ask(Command::abort_write));
+      return fail(ErrorCode::io, "the unit read back other constants than were sent", link_.address,
+                  "try again; the unit still holds its old constants");
+    }
+  }
+  SIXPOINT_ASSIGN(const Bytes committed, ask(Command::commit, PayloadWriter().put(crc).take()));
+  PayloadReader reader(committed);
+  if (reader.get<std::uint16_t>() != crc || !reader.ok()) {
+    return fail(ErrorCode::io, "the unit committed another page than was sent", link_.address,
+                "read the unit's constants before anything else");
+  }
+  SIXPOINT_ASSIGN(const Bytes now, read_page());
+  if (now != bytes) {
+    return fail(ErrorCode::io, "the unit's page is not the one that was written", link_.address,
+                "read the unit's constants before anything else");
+  }
+  return {};
+}
+
+Result<FilterState> Unit::filter() {
+  SIXPOINT_ASSIGN(const Bytes payload, ask(Command::get_filter));
+  return decode_filter(payload);
+}
+
+Status Unit::set_filter(FilterConfiguration filter) {
+  SIXPOINT_CHECK(ask(Command::set_filter, PayloadWriter()
+                                              .put(static_cast<std::uint8_t>(
+                                                  filter == FilterConfiguration::legacy ? 0 : 1))
+                                              .take()));
+  SIXPOINT_ASSIGN(const FilterState state, this->filter());
+  if (state.stream != filter) {
+    return fail(ErrorCode::io,
+                fmt::format("the unit was told to use the filter '{}' and uses '{}'",
+                            calib::to_string(filter), calib::to_string(state.stream)),
+                link_.address, "update the unit's firmware");
+  }
+  return {};
+}
+
+Status Unit::start_stream(int rate_hz) {
+  waiting_.clear();
+  statistics_ = {};
+  next_index_ = 0;
+  streaming_ = true;
+  const auto answer =
+      ask(Command::start_stream, PayloadWriter().put(static_cast<std::uint16_t>(rate_hz)).take());
+  streaming_ = answer.has_value();
+  SIXPOINT_CHECK(answer);
+  return {};
+}
+
+Result<std::optional<SampleBlock>> Unit::next_samples(nanoseconds time_out) {
+  const nanoseconds deadline = link_.clock->elapsed() + time_out;
+  for (nanoseconds left = time_out; waiting_.empty() && left > nanoseconds::zero();
+       left = deadline - link_.clock->elapsed()) {
+    SIXPOINT_ASSIGN(const auto message, receive(left));
+    if (message && message->kind == ReportKind::samples) {
+      take_samples(*message);
+    }
+  }
+  if (waiting_.empty()) {
+    return std::nullopt;
+  }
+  std::optional<SampleBlock> block(std::move(waiting_.front()));
+  waiting_.pop_front();
+  return block;
+}
+
+Status Unit::stop_stream() {
+  const auto answer = ask(Command::stop_stream);
+  streaming_ = false;
+  waiting_.clear();
+  SIXPOINT_CHECK(answer);
+  return {};
+}
+
+Result<std::uint16_t> Unit::start_recording(int rate_hz, UtcTime now) {
+  SIXPOINT_ASSIGN(
+      const Bytes payload,
+      ask(Command::start_recording, PayloadWriter()
+                                        .put(static_cast<std::uint16_t>(rate_hz))
+                                        .put(static_cast<std::uint32_t>(to_unix_seconds(now)))
+                                        .take()));
+  PayloadReader reader(payload);
+  const auto id = reader.get<std::uint16_t>();
+  if (!reader.ok()) {
+    return nonsense(link_.address, "the unit did not name its recording");
+  }
+  return id;
+}
+
+Result<std::uint16_t> Unit::stop_recording() {
+  SIXPOINT_ASSIGN(const Bytes payload, ask(Command::stop_recording));
+  PayloadReader reader(payload);
+  const auto id = reader.get<std::uint16_t>();
+  if (!reader.ok()) {
+    return nonsense(link_.address, "the unit did not name its recording");
+  }
+  return id;
+}
+
+Result<std::vector<RecordingInfo>> Unit::recordings() {
+  std::vector<RecordingInfo> list;
+  std::size_t count = 0;
+  do {
+    SIXPOINT_ASSIGN(const Bytes payload,
+                    ask(Command::list_recording,
+                        PayloadWriter().put(static_cast<std::uint16_t>(list.size())).take()));
+    SIXPOINT_ASSIGN(const RecordingEntry entry, decode_recording(payload));
+    if (!list.empty() && entry.count != count) {
+      return nonsense(link_.address, "the unit's list of recordings changes while it is read");
+    }
+    count = entry.count;
+    if (count != 0) {
+      list.push_back(entry.info);
+    }
+  } while (list.size() < count);
+  return list;
+}
+
+Status Unit::download_from(const RecordingInfo& recording, std::uint64_t& offset,
+                           WritableFile& file, Sha256& hash,
+                           const std::function<void(std::uint64_t)>& progress) {
+  // What an ended request left in the pipe is drained by the offset check below.
+  constexpr std::uint64_t kPerRequest = 64ULL << 20U;
+  std::vector<std::uint8_t> buffer(kBulkBlockBytes + 1);
+  int without_progress = 0;
+  while (offset < recording.bytes) {
+    const std::uint64_t length = std::min(kPerRequest, recording.bytes - offset);
+    const std::uint64_t end = offset + length;
+    const std::uint64_t begin = offset;
+    SIXPOINT_ASSIGN(const Bytes payload,
+                    ask(Command::download, PayloadWriter()
+                                               .put(recording.id)
+                                               .put(offset)
+                                               .put(static_cast<std::uint32_t>(length))
+                                               .take()));
+    PayloadReader reader(payload);
+    if (reader.get<std::uint64_t>() != length || !reader.ok()) {
+      return nonsense(link_.address, "the unit offers another length than its list says");
+    }
+    while (offset < end) {
+      SIXPOINT_ASSIGN(const std::size_t count, link_.bulk->read(buffer, options_.bulk_time_out));
+      if (count == 0) {
+        break;  // ask again from here
+      }
+      const Result<BulkBlock> block =
+          decode_bulk(std::span(buffer).first(std::min(count, buffer.size())));
+      if (!block || block->recording != recording.id) {
+        break;
+      }
+      if (block->offset + block->content.size() <= offset) {
+        continue;  // of the request before
+      }
+      if (block->offset != offset || block->content.size() > end - offset) {
+        break;
+      }
+      SIXPOINT_CHECK(file.write_at(offset, block->content));
+      hash.update(block->content);
+      offset += block->content.size();
+      if (progress) {
+        progress(offset);
+      }
+    }
+    without_progress = offset > begin ? 0 : without_progress + 1;
+    if (without_progress >= options_.download_attempts) {
+      return fail(ErrorCode::device_unavailable,
+                  fmt::format("the download stopped at byte {} of {}", offset, recording.bytes),
+                  link_.address, "plug the unit in again and repeat: what came is kept");
+    }
+  }
+  return {};
+}
+
+Status Unit::download(const RecordingInfo& recording, FileSystem& files, const std::string& path,
+                      const std::function<void(std::uint64_t)>& progress) {
+  if (!link_.bulk) {
+    return fail(ErrorCode::device_unavailable, "this device offers no download", link_.address,
+                "connect the unit by USB");
+  }
+  if (files.info(path)) {
+    return fail(ErrorCode::cannot_create, "the file exists already", path,
+                "choose another name or remove it");
+  }
+  const std::string part = fmt::format("{}.{}.part", path, to_hex(recording.sha256).substr(0, 12));
+  const std::string before = part + ".before";
+
+  // A part from an earlier call moves aside and is copied, so that a loss of power now costs
+  // nothing either.
+  if (files.info(part)) {
+    SIXPOINT_CHECK(files.rename(part, before));
+  }
+  SIXPOINT_ASSIGN(auto file, files.create(part));
+  Sha256 hash;
+  std::uint64_t offset = 0;
+  if (const auto earlier = files.open(before); earlier) {
+    Bytes chunk(kBulkContentBytes);
+    while (offset < recording.bytes) {
+      const std::uint64_t wanted = std::min<std::uint64_t>(chunk.size(), recording.bytes - offset);
+      SIXPOINT_ASSIGN(const std::size_t count,
+                      (*earlier)->read_at(offset, std::span(chunk).first(wanted)));
+      if (count == 0) {
+        break;
+      }
+      const auto bytes = std::span(chunk).first(count);
+      SIXPOINT_CHECK(file->write_at(offset, bytes));
+      hash.update(bytes);
+      offset += count;
+    }
+  }
+  const Status came = download_from(recording, offset, *file, hash, progress);
+  SIXPOINT_CHECK(file->sync());
+  SIXPOINT_CHECK(file->close());
+  SIXPOINT_CHECK(files.sync_folder(folder_of(path)));
+  if (files.info(before)) {
+    SIXPOINT_CHECK(files.remove(before));
+  }
+  SIXPOINT_CHECK(came);
+  if (hash.finish() != recording.sha256) {
+    SIXPOINT_CHECK(files.remove(part));
+    return fail(ErrorCode::bad_data, "what came is not the recording that the unit announced",
+                link_.address, "download it again");
+  }
+  SIXPOINT_CHECK(files.rename(part, path));
+  return files.sync_folder(folder_of(path));
+}
+
+}  // namespace sixpoint::device

@@ -1,0 +1,59 @@
+// What only .agdc files (CentrePoint Insight) hold: die temperatures in log.bin, and calibrations
+// that the unit does not apply itself.
+//
+// In an .agdc file the samples (ACTIVITY3) are raw sensor counts. calibration.json says how they
+// become g, per sample rate, in two forms: the six-point form of Eq. 1-6, and an offset with a
+// symmetric sensitivity matrix ("calibrationMethod": 2), which is what the vendor applies.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "base/constants.h"
+#include "base/measure.h"
+#include "base/result.h"
+#include "gt3x/samples.h"
+
+namespace sixpoint::gt3x {
+
+// One TEMPERATURE record (type 30): entries of a sensor's number and a 16-bit ADC reading.
+struct TemperatureReading {
+  std::optional<int> processor_adc;      // sensor 0
+  std::optional<int> accelerometer_adc;  // sensor 1: the accelerometer's die
+};
+// bad_data when the payload is no whole number of entries.
+Result<TemperatureReading> parse_temperature(std::span<const std::uint8_t> payload);
+
+// temperature_calibration.json: two points of a straight line per sensor.
+struct TemperatureCalibration {
+  double low_c = 0;
+  double high_c = 0;
+  double processor_low_adc = 0;
+  double processor_high_adc = 0;
+  double accelerometer_low_adc = 0;
+  double accelerometer_high_adc = 0;
+
+  double processor_c(double adc) const;
+  double accelerometer_c(double adc) const;
+};
+// bad_data for what is no JSON, lacks a value, or has two points that make no line.
+Result<TemperatureCalibration> parse_temperature_calibration(std::string_view json);
+
+struct AgdcCalibration {
+  bool already_applied = false;  // "isCalibrated": the samples are in g times the file's scale
+  int method = 0;                // 2: the matrix holds
+  PerAxis<double> offset_lsb{};
+  // g per LSB, symmetric: g = sensitivity * (raw - offset).
+  PerAxis<PerAxis<double>> sensitivity_g_per_lsb{};
+  std::optional<StoredConstants> constants;  // the six-point form, where it is there
+
+  PerAxis<double> apply(const Counts& raw_lsb) const;
+};
+// For one of the rates that the file knows (32, 64, 128, 256 Hz); bad_data otherwise, and for what
+// is no such JSON.
+Result<AgdcCalibration> parse_agdc_calibration(std::string_view json, int rate_hz);
+
+}  // namespace sixpoint::gt3x

@@ -1,0 +1,51 @@
+#include "gt3x/model.h"
+
+#include <array>
+
+namespace sixpoint::gt3x {
+namespace {
+
+struct Family {
+  std::string_view prefix;
+  std::string_view model;
+  std::optional<double> accel_scale_lsb_per_g;
+};
+
+// The first prefix that fits holds.
+constexpr std::array<Family, 9> kFamilies = {{
+    {"NEO", "GT3X+", 341},
+    {"CLE", "wGT3X+", 341},
+    {"MRA", "ActiSleep+", std::nullopt},
+    {"MOS0", "wGT3X-BT", 256},
+    {"MOS2", "wGT3X-BT", 256},
+    {"MOS3", "wActiSleep+", 256},
+    {"MOS4", "wActiSleep-BT", 256},
+    {"MOS", "wGT3X-BT family", 256},
+    {"TAS", "GT9X Link", 256},
+}};
+
+const Family* family_of(std::string_view serial) {
+  for (const Family& family : kFamilies) {
+    if (serial.starts_with(family.prefix)) {
+      return &family;
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::string_view model_of(std::string_view serial) {
+  if (serial.starts_with("CPW")) {
+    return "CentrePoint Insight Watch";
+  }
+  const Family* family = family_of(serial);
+  return family != nullptr ? family->model : "unknown";
+}
+
+std::optional<double> default_accel_scale_lsb_per_g(std::string_view serial) {
+  const Family* family = family_of(serial);
+  return family != nullptr ? family->accel_scale_lsb_per_g : std::nullopt;
+}
+
+}  // namespace sixpoint::gt3x

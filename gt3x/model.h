@@ -1,0 +1,18 @@
+// What a serial number says about the unit.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+namespace sixpoint::gt3x {
+
+// By prefix, from the vendor's public descriptions: NEO GT3X+, CLE wGT3X+, MRA ActiSleep+, MOS0 and
+// MOS2 wGT3X-BT, MOS3 wActiSleep+, MOS4 wActiSleep-BT, TAS GT9X Link, CPW CentrePoint Insight
+// Watch. "unknown" for every other; other MOS prefixes are "wGT3X-BT family".
+std::string_view model_of(std::string_view serial);
+
+// The scale of the stored counts where the file does not say: 341 LSB/g for NEO and CLE, 256 for
+// MOS and TAS; nothing for the rest (MRA is described nowhere, CPW stores raw counts).
+std::optional<double> default_accel_scale_lsb_per_g(std::string_view serial);
+
+}  // namespace sixpoint::gt3x

@@ -1,0 +1,275 @@
+#include "gt3x/raw_csv.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "gt3x/agdc.h"
+#include "gt3x/sample_reader.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+constexpr std::uint64_t kLongestFill_s = 400ULL * 86'400;
+constexpr std::size_t kPiece = 64 * 1024;
+
+std::string clock_text(UtcTime time) {
+  const auto day = std::chrono::floor<std::chrono::days>(time);
+  const std::chrono::hh_mm_ss clock(std::chrono::floor<std::chrono::seconds>(time - day));
+  return fmt::format("{:02}:{:02}:{:02}", clock.hours().count(), clock.minutes().count(),
+                     clock.seconds().count());
+}
+
+std::string date_text(UtcTime time) {
+  const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(time));
+  return fmt::format("{}/{}/{}", static_cast<unsigned>(date.month()),
+                     static_cast<unsigned>(date.day()), static_cast<int>(date.year()));
+}
+
+// 1008 -> "1.008", 20 -> "0.02", -1000 -> "-1", 0 -> "0"; returns the length.
+std::size_t print_mg(std::int64_t mg, char* out) {
+  char* at = out;
+  if (mg < 0) {
+    *at++ = '-';
+    mg = -mg;
+  }
+  at = std::to_chars(at, at + 20, mg / 1000).ptr;
+  if (const std::int64_t decimals = mg % 1000; decimals != 0) {
+    *at++ = '.';
+    for (std::int64_t unit = 100, rest = decimals; rest != 0; rest %= unit, unit /= 10) {
+      *at++ = static_cast<char>('0' + rest / unit);
+    }
+  }
+  return static_cast<std::size_t>(at - out);
+}
+
+class Writer {
+ public:
+  Writer(const Recording& recording, const RawCsvOptions& options, const TextSink& sink)
+      : info_(recording.info()), options_(options), sink_(sink) {}
+
+  Status header(std::uint32_t start_time, double rate_hz) {
+    const UtcTime start = from_unix_seconds(start_time);
+    const UtcTime download = info_.download().value_or(start);
+    std::string battery(info_.get("Battery Voltage").value_or("0"));
+    for (char& c : battery) {
+      c = c == ',' ? '.' : c;
+    }
+    text_ = fmt::format(
+        "------------ Data File Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v{} date "
+        "format M/d/yyyy at {} Hz  Filter Normal -----------\r\n"
+        "Serial Number: {}\r\nStart Time {}\r\nStart Date {}\r\n"
+        "Epoch Period (hh:mm:ss) 00:00:00\r\nDownload Time {}\r\nDownload Date {}\r\n"
+        "Current Memory Address: 0\r\nCurrent Battery Voltage: {}     Mode = 12\r\n"
+        "--------------------------------------------------\r\n"
+        "Accelerometer X,Accelerometer Y,Accelerometer Z\r\n",
+        printable(info_.firmware(), 40), rate_hz, printable(info_.serial(), 40), clock_text(start),
+        date_text(start), clock_text(download), date_text(download), printable(battery, 40));
+    return {};
+  }
+
+  // What the counts of these samples mean.
+  Status set_scale(const SampleItem& item, const std::optional<AgdcCalibration>& agdc) {
+    agdc_ = item.type == RecordType::activity3 && agdc && !agdc->already_applied ? &*agdc : nullptr;
+    if (options_.raw_lsb || agdc_ != nullptr) {
+      return {};
+    }
+    const auto scale = accel_scale_lsb_per_g(info_, item.parameters);
+    if (!scale || *scale < 1 || *scale > 65536) {
+      return fail(ErrorCode::bad_data, "the recording does not say how many LSB make one g", {},
+                  "export the stored counts with --raw");
+    }
+    if (item.type == RecordType::activity3 && !agdc) {
+      return fail(ErrorCode::bad_data,
+                  "the recording holds raw counts and no calibration.json that turns them into g",
+                  {}, "export the raw counts with --raw");
+    }
+    if (scale_ != *scale) {
+      scale_ = *scale;
+      for (std::size_t i = 0; i < cells_.size(); ++i) {
+        Cell& cell = cells_[i];
+        cell.size = static_cast<std::uint8_t>(
+            print_mg(round_to_mg(static_cast<int>(i) + kMin12, scale_), cell.text.data()));
+      }
+    }
+    return {};
+  }
+
+  Status line(const Counts& sample) {
+    std::array<char, 96> row{};
+    char* at = row.data();
+    PerAxis<double> agdc_g{};
+    if (agdc_ != nullptr && !options_.raw_lsb) {
+      agdc_g = agdc_->apply(sample);
+    }
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      if (axis > 0) {
+        *at++ = ',';
+      }
+      const int count = sample[axis];
+      if (options_.raw_lsb) {
+        at = std::to_chars(at, at + 8, count).ptr;
+      } else if (agdc_ != nullptr) {
+        // Real numbers: no half-way case is exact here.
+        at += print_mg(std::llround(std::clamp(agdc_g[axis], -1e6, 1e6) * kMgPerG), at);
+      } else if (count >= kMin12 && count <= kMax12) {
+        const Cell& cell = cells_[static_cast<std::size_t>(count - kMin12)];
+        std::memcpy(at, cell.text.data(), cell.text.size());
+        at += cell.size;
+      } else {
+        at += print_mg(round_to_mg(count, scale_), at);
+      }
+    }
+    *at++ = '\r';
+    *at++ = '\n';
+    return put(std::string_view(row.data(), static_cast<std::size_t>(at - row.data())), 1);
+  }
+
+  // The same line many times: what a repeated sample or a second without data becomes.
+  Status repeat(const Counts& sample, std::uint64_t times) {
+    for (std::uint64_t i = 0; i < times; ++i) {
+      SIXPOINT_CHECK(line(sample));
+    }
+    return {};
+  }
+
+  Status zeros(std::uint64_t times) { return put("0,0,0\r\n", times); }
+  Status finish() { return flush(); }
+
+ private:
+  struct Cell {
+    std::array<char, 23> text{};
+    std::uint8_t size = 0;
+  };
+
+  Status put(std::string_view text, std::uint64_t times) {
+    for (std::uint64_t i = 0; i < times; ++i) {
+      text_ += text;
+      if (text_.size() >= kPiece) {
+        SIXPOINT_CHECK(flush());
+      }
+    }
+    return {};
+  }
+
+  Status flush() {
+    SIXPOINT_CHECK(sink_(text_));
+    text_.clear();
+    return {};
+  }
+
+  const Info& info_;
+  const RawCsvOptions& options_;
+  const TextSink& sink_;
+  std::string text_;
+  const AgdcCalibration* agdc_ = nullptr;
+  double scale_ = 0;
+  std::vector<Cell> cells_ = std::vector<Cell>(kMax12 - kMin12 + 1);
+};
+
+Result<std::optional<AgdcCalibration>> agdc_calibration_of(Recording& recording, double rate_hz) {
+  if (!recording.has_entry("calibration.json")) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
+  SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1 << 20));
+  const auto parsed = parse_agdc_calibration(
+      std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
+      static_cast<int>(rate_hz));
+  // Not every calibration.json is one of these; who needs it will say that it is missing.
+  return parsed ? std::optional(*parsed) : std::nullopt;
+}
+
+}  // namespace
+
+std::int64_t round_to_mg(int count, double scale_lsb_per_g) {
+  // Scales come with 24 significant bits (parameters.h) or a few decimals; in units of 2^-23 they
+  // are integers, so that a half-way case is one exactly when it is.
+  constexpr std::int64_t kUnits = 1 << 23;
+  const auto scale = static_cast<std::int64_t>(std::llround(scale_lsb_per_g * kUnits));
+  const std::int64_t magnitude = std::abs(static_cast<std::int64_t>(count));
+  const std::int64_t mg = (2 * 1000 * kUnits * magnitude + scale) / (2 * scale);
+  return count < 0 ? -mg : mg;
+}
+
+Result<RawCsvTally> write_raw_csv(Recording& recording, const RawCsvOptions& options,
+                                  const TextSink& sink) {
+  const double rate_hz = recording.info().sample_rate_hz().value_or(0);
+  if (!(rate_hz >= 1)) {
+    return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all",
+                recording.path(), "download the recording from the unit again");
+  }
+  const auto rate = static_cast<std::uint64_t>(std::llround(rate_hz));
+  SIXPOINT_ASSIGN(const auto agdc, agdc_calibration_of(recording, rate_hz));
+  Writer out(recording, options, sink);
+  SampleReader reader(recording);
+  RawCsvTally tally;
+  Counts last{};
+  bool zeros = false;  // since a USB record
+  std::uint64_t filled_s = 0;
+  bool started = false;
+  const auto fill_lines = [&](std::uint64_t lines) -> Status {
+    tally.filled += lines;
+    return zeros ? out.zeros(lines) : out.repeat(last, lines);
+  };
+  for (;;) {
+    auto next = reader.next();
+    if (!next) {
+      Error error = std::move(next).error();
+      error.where = error.where.empty() ? recording.path() : error.where;
+      return fail(std::move(error));
+    }
+    if (!*next) {
+      break;
+    }
+    const SampleItem& item = **next;
+    if (!started) {
+      SIXPOINT_CHECK(out.header(item.unix_time, rate_hz));
+      started = true;
+    }
+    if (item.kind == SampleItem::Kind::recorded) {
+      if (auto status = out.set_scale(item, agdc); !status) {
+        status.error().where = recording.path();
+        return fail(std::move(status).error());
+      }
+      for (const Counts& sample : item.counts) {
+        SIXPOINT_CHECK(out.line(sample));
+      }
+      last = item.counts.back();
+      zeros = false;
+      tally.samples += item.counts.size();
+      tally.out_of_step_seconds += item.broke_order || item.counts.size() > rate ? 1 : 0;
+      if (options.fill && item.counts.size() < rate) {
+        SIXPOINT_CHECK(fill_lines(rate - item.counts.size()));
+      }
+      continue;
+    }
+    zeros = zeros || item.kind == SampleItem::Kind::usb;
+    if (!options.fill) {
+      continue;
+    }
+    filled_s += item.seconds;
+    if (filled_s > kLongestFill_s) {
+      return fail(
+          ErrorCode::bad_data,
+          fmt::format("more than {} days are missing at {}; a time stamp must be wrong",
+                      kLongestFill_s / 86'400, to_iso8601(from_unix_seconds(item.unix_time))),
+          recording.path(), "export what was recorded with --no-fill");
+    }
+    SIXPOINT_CHECK(fill_lines(item.seconds * rate));
+  }
+  if (tally.samples == 0) {
+    return fail(ErrorCode::bad_data, "the recording holds no samples", recording.path(),
+                "check that the unit was started; download the recording again");
+  }
+  SIXPOINT_CHECK(out.finish());
+  tally.checksum_failures = reader.statistics().checksum_failures;
+  tally.damaged_stretches = reader.statistics().damaged_stretches;
+  return tally;
+}
+
+}  // namespace sixpoint::gt3x

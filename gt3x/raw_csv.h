@@ -1,0 +1,55 @@
+// A recording's samples as the raw CSV that the vendor's software exports, character for character.
+//
+// Ten header lines, one line of column names, then a line per sample, X Y Z, without time stamps:
+// the n-th line belongs to start + n / rate. Lines end in CR LF.
+//
+// Rounding: g to three decimals, half-way cases away from zero, then without trailing zeros
+// ("0.02", "1", "0"). It is computed in integers (round_to_mg), because half-way cases are common
+// at 256 LSB/g (every count of 16 k + 8 is one: 8 / 256 = 0.03125 is not, but 16 / 256 = 0.0625 is)
+// and a binary fraction must not decide them. Tested sample for sample against two exports of the
+// vendor.
+//
+// Missing seconds: the last sample is repeated, as the vendor does for idle sleep. From a one-byte
+// record (USB) on it is zeros instead, until the next sample or the file's Last Sample Time. A
+// second with too few samples is filled up in the same way.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string_view>
+
+#include "base/result.h"
+#include "gt3x/recording.h"
+
+namespace sixpoint::gt3x {
+
+struct RawCsvOptions {
+  // Stored counts instead of g (of .agdc files: the sensor's raw counts).
+  bool raw_lsb = false;
+  // Missing seconds filled in, so that the line number is the time. Without: what was recorded.
+  bool fill = true;
+};
+
+struct RawCsvTally {
+  std::uint64_t samples = 0;  // recorded ones
+  std::uint64_t filled = 0;   // lines that repeat a sample or are zeros
+  std::uint64_t checksum_failures = 0;
+  std::uint64_t damaged_stretches = 0;
+  // Seconds that are not later than the one before, and seconds with more samples than the rate:
+  // behind them a line's number no longer tells its time.
+  std::uint64_t out_of_step_seconds = 0;
+};
+
+// Text for the file, in pieces of some ten thousand characters, in order.
+using TextSink = std::function<Status(std::string_view)>;
+
+// bad_data for a recording without samples, without a sample rate or a scale (nothing then says
+// what the counts mean), and where filling would take more than 400 days. The sink may have been
+// given text before an error is found: a damaged entry shows at its end.
+Result<RawCsvTally> write_raw_csv(Recording& recording, const RawCsvOptions& options,
+                                  const TextSink& sink);
+
+// round(1000 * count / scale), half away from zero, exactly; |count| < 2^16, scale in [1, 65536].
+std::int64_t round_to_mg(int count, double scale_lsb_per_g);
+
+}  // namespace sixpoint::gt3x

@@ -1,0 +1,288 @@
+#include "gt3x/recording.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "gt3x/recording_archive.h"
+#include "gt3x/zip_bridge.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+constexpr std::string_view kDownloadAgain =
+    "download the recording from the unit again, or fetch an undamaged copy";
+
+// A recording has a handful of entries; a hundred days at 100 Hz in 16 bits make 5 GB.
+constexpr zip_int64_t kMaxEntries = 200;
+constexpr std::uint64_t kMaxEntrySize = std::uint64_t{16} << 30;
+// Deflate reaches 1032 : 1. A log of a unit that lay still compresses to about 40 : 1, so beyond
+// this an entry is no recording but an attempt to fill a disk.
+constexpr std::uint64_t kMaxRatio = 300;
+constexpr std::uint64_t kRatioMattersFrom = std::uint64_t{64} << 20;
+
+bool plain_name(std::string_view name) {
+  return !name.empty() && name != "." && name != ".." && std::ranges::none_of(name, [](char c) {
+    return c == '/' || c == '\\' || c == ':' || static_cast<unsigned char>(c) < 0x20;
+  });
+}
+
+// One entry being read.
+class EntrySource final : public ByteSource {
+ public:
+  EntrySource(std::shared_ptr<Recording> recording, std::string where,
+              std::optional<Error>* failure, zip_file_t* file, std::uint64_t size)
+      : recording_(std::move(recording)),
+        where_(std::move(where)),
+        failure_(failure),
+        file_(file),
+        size_(size) {}
+  EntrySource(const EntrySource&) = delete;
+  EntrySource& operator=(const EntrySource&) = delete;
+  ~EntrySource() override { zip_fclose(file_); }
+
+  std::optional<std::uint64_t> size() const override { return size_; }
+
+  Result<std::size_t> read(std::span<std::uint8_t> out) override {
+    if (broken_) {
+      return fail(*broken_);
+    }
+    const zip_int64_t count = zip_fread(file_, out.data(), out.size());
+    if (count < 0) {
+      if (*failure_) {
+        broken_ = **failure_;
+      } else {
+        zip_error_t* error = zip_file_get_error(file_);
+        broken_ = Error{ErrorCode::bad_data,
+                        zip_error_code_zip(error) == ZIP_ER_CRC
+                            ? "the entry is damaged: its CRC does not hold"
+                            : fmt::format("the entry is damaged: {}", zip_error_strerror(error)),
+                        where_, std::string(kDownloadAgain)};
+      }
+      return fail(*broken_);
+    }
+    done_ += static_cast<std::uint64_t>(count);
+    // libzip compares sizes too; said here once more because samples hang on it.
+    if (done_ > size_ || (count == 0 && done_ != size_)) {
+      broken_ = Error{ErrorCode::bad_data,
+                      fmt::format("the entry is damaged: it should have {} bytes", size_), where_,
+                      std::string(kDownloadAgain)};
+      return fail(*broken_);
+    }
+    return static_cast<std::size_t>(count);
+  }
+
+ private:
+  std::shared_ptr<Recording> recording_;  // keeps the archive open
+  std::string where_;
+  std::optional<Error>* failure_;
+  zip_file_t* file_;
+  std::uint64_t size_;
+  std::uint64_t done_ = 0;
+  std::optional<Error> broken_;
+};
+
+}  // namespace
+
+zip_int64_t Recording::Archive::origin(void* user, void* data, zip_uint64_t length,
+                                       zip_source_cmd_t command) {
+  auto* self = static_cast<Archive*>(user);
+  switch (command) {
+    case ZIP_SOURCE_OPEN:
+      self->at = 0;
+      return 0;
+    case ZIP_SOURCE_READ: {
+      if (length == 0) {
+        return 0;
+      }
+      auto count =
+          self->file->read_at(self->at, std::span(static_cast<std::uint8_t*>(data), length));
+      if (!count) {
+        if (!self->failure) {
+          self->failure = std::move(count).error();
+        }
+        zip_error_set(&self->error, ZIP_ER_READ, EIO);
+        return -1;
+      }
+      self->at += *count;
+      return static_cast<zip_int64_t>(*count);
+    }
+    case ZIP_SOURCE_SEEK: {
+      const auto target =
+          zip_source_seek_compute_offset(self->at, self->file->size(), data, length, &self->error);
+      if (target < 0) {
+        return -1;
+      }
+      self->at = static_cast<std::uint64_t>(target);
+      return 0;
+    }
+    case ZIP_SOURCE_TELL:
+      return static_cast<zip_int64_t>(self->at);
+    case ZIP_SOURCE_STAT: {
+      auto* stat = static_cast<zip_stat_t*>(data);
+      zip_stat_init(stat);
+      stat->size = self->file->size();
+      stat->valid |= ZIP_STAT_SIZE;
+      return sizeof *stat;
+    }
+    case ZIP_SOURCE_CLOSE:
+    case ZIP_SOURCE_FREE:  // the archive owns itself
+      return 0;
+    case ZIP_SOURCE_ERROR:
+      return zip_error_to_data(&self->error, data, length);
+    case ZIP_SOURCE_SUPPORTS:
+      return ZIP_SOURCE_SUPPORTS_SEEKABLE;
+    default:
+      zip_error_set(&self->error, ZIP_ER_OPNOTSUPP, 0);
+      return -1;
+  }
+}
+
+std::optional<std::size_t> Recording::Archive::index_of(const std::string& name) const {
+  const auto found = std::ranges::find(entries, name, &EntryInfo::name);
+  return found == entries.end() ? std::nullopt
+                                : std::optional(static_cast<std::size_t>(found - entries.begin()));
+}
+
+tl::unexpected<Error> Recording::Archive::bad(std::string what, std::string hint) const {
+  return fail(ErrorCode::bad_data, std::move(what), path,
+              hint.empty() ? std::string(kDownloadAgain) : std::move(hint));
+}
+
+Recording::Recording(std::shared_ptr<Archive> archive) : archive_(std::move(archive)) {}
+Recording::Recording(Recording&&) noexcept = default;
+Recording& Recording::operator=(Recording&&) noexcept = default;
+Recording::~Recording() = default;
+
+const std::string& Recording::path() const { return archive_->path; }
+const Info& Recording::info() const { return archive_->info; }
+const std::vector<EntryInfo>& Recording::entries() const { return archive_->entries; }
+RecordingForm Recording::form() const { return archive_->form; }
+bool Recording::has_entry(const std::string& name) const {
+  return archive_->index_of(name).has_value();
+}
+
+Result<Recording> Recording::open(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto file, files.open(path));
+  auto archive = std::make_shared<Archive>(std::move(file), path);
+  zip_error_t error;
+  zip_error_init(&error);
+  zip_source_t* source = zip_source_function_create(&Archive::origin, archive.get(), &error);
+  if (source != nullptr) {
+    archive->zip = zip_open_from_source(source, ZIP_RDONLY, &error);
+    if (archive->zip == nullptr) {
+      zip_source_free(source);
+    }
+  }
+  if (archive->zip == nullptr) {
+    const std::string reason = describe(&error);
+    if (archive->failure) {
+      return fail(*archive->failure);
+    }
+    std::array<std::uint8_t, 4> start{};
+    SIXPOINT_ASSIGN(const std::size_t count, archive->file->read_at(0, start));
+    if (count == start.size() && start == std::array<std::uint8_t, 4>{'P', 'K', 3, 4}) {
+      return archive->bad(fmt::format("the archive is cut short or damaged ({})", reason));
+    }
+    return archive->bad("not a zip archive, so no .gt3x recording",
+                        "check that this is the file that the unit's software wrote");
+  }
+  zip_error_fini(&error);
+
+  const zip_int64_t count = zip_get_num_entries(archive->zip, 0);
+  if (count > kMaxEntries) {
+    return archive->bad(fmt::format("the archive has {} entries, a recording has a few", count),
+                        "check that this is a recording");
+  }
+  std::set<std::string, std::less<>> names;
+  for (zip_int64_t index = 0; index < count; ++index) {
+    zip_stat_t stat;
+    zip_stat_init(&stat);
+    const char* name = zip_get_name(archive->zip, static_cast<zip_uint64_t>(index), ZIP_FL_ENC_RAW);
+    if (name == nullptr ||
+        zip_stat_index(archive->zip, static_cast<zip_uint64_t>(index), 0, &stat) != 0) {
+      return archive->bad("the archive's list of entries is damaged");
+    }
+    EntryInfo entry{name, stat.size, stat.comp_size};
+    const std::string shown = printable(entry.name, 60);
+    if (!plain_name(entry.name)) {
+      return archive->bad(fmt::format("the archive holds an entry named with a path: '{}'", shown),
+                          "pack the recording's files again without folders");
+    }
+    if (!names.insert(entry.name).second) {
+      return archive->bad(fmt::format("the archive holds two entries named {}", shown),
+                          "nobody can say which one is right; " + std::string(kDownloadAgain));
+    }
+    if (stat.encryption_method != ZIP_EM_NONE ||
+        (stat.comp_method != ZIP_CM_STORE && stat.comp_method != ZIP_CM_DEFLATE)) {
+      return archive->bad(
+          fmt::format("entry {} is encrypted or packed in a way that recordings are not", shown),
+          "unpack it and pack it again as an ordinary zip");
+    }
+    if (entry.size > kMaxEntrySize ||
+        (entry.size > kRatioMattersFrom && entry.size / kMaxRatio > entry.compressed_size)) {
+      return archive->bad(fmt::format("entry {} claims {} bytes, more than a recording can have",
+                                      shown, entry.size),
+                          "check that this is a recording");
+    }
+    archive->entries.push_back(std::move(entry));
+  }
+  if (archive->index_of("log.bin")) {
+    archive->form = RecordingForm::log;
+  } else if (archive->index_of("activity.bin")) {
+    archive->form = RecordingForm::activity;
+  } else {
+    return archive->bad("the archive holds no log.bin, so no samples",
+                        "check that this is a recording and not another zip file");
+  }
+  Recording recording(archive);
+  if (!archive->index_of("info.txt")) {
+    return archive->bad("the archive holds no info.txt");
+  }
+  SIXPOINT_ASSIGN(const auto info_source, recording.open_entry("info.txt"));
+  auto text = read_all(*info_source, 1 << 20);
+  if (!text) {
+    Error failure = std::move(text).error();
+    failure.where = path + ":info.txt";
+    return fail(std::move(failure));
+  }
+  auto info =
+      Info::parse(std::string_view(reinterpret_cast<const char*>(text->data()), text->size()));
+  if (!info) {
+    return archive->bad(info.error().what, info.error().hint);
+  }
+  archive->info = *std::move(info);
+  return recording;
+}
+
+Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& name) {
+  const auto index = archive_->index_of(name);
+  if (!index) {
+    return archive_->bad(fmt::format("the archive holds no {}", printable(name, 60)));
+  }
+  zip_file_t* file = zip_fopen_index(archive_->zip, *index, 0);
+  if (file == nullptr) {
+    if (archive_->failure) {
+      return fail(*archive_->failure);
+    }
+    return archive_->bad(fmt::format("entry {} cannot be opened: {}", printable(name, 60),
+                                     zip_strerror(archive_->zip)));
+  }
+  return std::make_unique<EntrySource>(std::make_shared<Recording>(Recording(archive_)),
+                                       archive_->path + ":" + name, &archive_->failure, file,
+                                       archive_->entries[*index].size);
+}
+
+Result<LogReader> Recording::open_log() {
+  if (form() != RecordingForm::log) {
+    return archive_->bad("the recording is of the old form (activity.bin) and has no records",
+                         "only its samples can be read");
+  }
+  SIXPOINT_ASSIGN(auto source, open_entry("log.bin"));
+  return LogReader(std::move(source));
+}
+
+}  // namespace sixpoint::gt3x

@@ -1,0 +1,110 @@
+// The samples of a recording, second by second, as stored counts; and what lies between them.
+//
+//   SampleReader samples(recording);
+//   for (;;) {
+//     SIXPOINT_ASSIGN(const auto item, samples.next());
+//     if (!item) break;
+//     if (item->kind == SampleItem::Kind::recorded) use(item->counts, item->parameters);
+//   }
+//
+// Items come in the order of the file. A record whose checksum fails gives no samples: its second
+// is missing (kind gap, `damaged`). Memory is bounded.
+//
+// Where the second is not contiguous with the one before, a gap stands between them; so who wants
+// runs of unbroken data starts a new run at everything that is not `recorded`, and where
+// `broke_order` is set.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "gt3x/parameters.h"
+#include "gt3x/recording.h"
+#include "gt3x/samples.h"
+
+namespace sixpoint::gt3x {
+
+// Why seconds are missing.
+enum class GapKind {
+  idle_sleep,   // an EVENT says that the unit went to sleep
+  usb,          // a one-byte record came before: the unit hung on USB, charging
+  damaged,      // the records of these seconds are damaged
+  unexplained,  // nothing in the file says why; seen in real recordings
+};
+std::string_view to_string(GapKind kind);
+
+struct SampleItem {
+  enum class Kind {
+    recorded,  // `counts`: one second
+    usb,       // a one-byte record: a second without data
+    gap,       // `seconds` seconds without any record, from unix_time on
+  };
+  Kind kind = Kind::recorded;
+  std::uint32_t unix_time = 0;
+  std::uint32_t seconds = 1;
+  GapKind gap = GapKind::unexplained;
+
+  // Of `recorded` only. The counts stay until the next call of next(), the parameters as long as
+  // the reader. Counts are in the units of the record: LSB at the file's scale, or raw sensor
+  // counts for ACTIVITY3.
+  std::span<const Counts> counts;
+  RecordType type = RecordType::activity;
+  std::int16_t limit_min = kMin12;  // a value at one of these was clipped, or may have been
+  std::int16_t limit_max = kMax12;
+  const Parameters* parameters = nullptr;  // in force; nullptr where none came before
+  bool broke_order = false;                // the time is not later than that of the second before
+
+  // Whether any axis of a sample is at a limit of its record.
+  bool clipped(const Counts& sample) const {
+    for (const std::int16_t value : sample) {
+      if (value == limit_min || value == limit_max) {
+        return true;
+      }
+    }
+    return false;
+  }
+};
+
+class SampleReader {
+ public:
+  // The recording must outlive nothing: the reader keeps what it needs open.
+  explicit SampleReader(Recording& recording);
+  SampleReader(SampleReader&&) noexcept;
+  SampleReader& operator=(SampleReader&&) noexcept;
+  ~SampleReader();
+
+  // The next item; nothing at the end. Errors as of LogReader::next(). Behind the last record, a
+  // gap up to the file's Last Sample Time is handed out, where info.txt names one.
+  Result<std::optional<SampleItem>> next();
+
+  // Of the records read so far (empty for the old form).
+  const LogStatistics& statistics() const;
+
+  struct ParameterSet {
+    std::uint32_t unix_time = 0;
+    std::uint64_t samples_before = 0;  // samples handed out when it came
+    Parameters parameters;
+  };
+  // Every PARAMETERS record met so far, but one that repeats the set before it; of more than
+  // kMaxParameterSets the later ones are in force all the same, and the last is kept.
+  static constexpr std::size_t kMaxParameterSets = 100;
+  const std::vector<std::unique_ptr<ParameterSet>>& parameter_sets() const;
+  // True once samples were recorded under different constants: a file that says two things.
+  bool constants_changed() const;
+  std::uint64_t unreadable_parameters() const;  // PARAMETERS records that make no sense
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// The scale of stored counts: ACCEL_SCALE of the parameters in force, else "Acceleration Scale" of
+// info.txt, else what the serial number's family uses; nothing where none of them says. For .agdc
+// files this is not a scale but 1: they hold raw counts (agdc.h).
+std::optional<double> accel_scale_lsb_per_g(const Info& info, const Parameters* parameters);
+
+}  // namespace sixpoint::gt3x

@@ -1,0 +1,18 @@
+// What an .agd file (epochs, an SQLite database) says about the unit that recorded it.
+//
+// Such a file can be triaged but not repaired: its epochs must be made anew from repaired raw data.
+// It does not say when the unit was calibrated.
+#pragma once
+
+#include <string>
+
+#include "base/result.h"
+#include "repair/triage.h"
+
+namespace sixpoint::repair {
+
+// Read-only, without making a journal beside the file. no_input where there is no file, bad_data
+// where it is no .agd.
+Result<FileFacts> read_agd_facts(const std::string& path);
+
+}  // namespace sixpoint::repair

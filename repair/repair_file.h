@@ -1,0 +1,91 @@
+// One file mended: triage, constants, the new log, the mark; written whole or not at all.
+//
+// The original is only ever read. The output is a .gt3x with the same entries in the same order, in
+// which the samples alone differ (rescaled_log.h), and one more entry, the mark (kRepairMark): JSON
+// with what was done, by which constants, to the file of which hash. A file that carries the mark
+// is never mended again.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "base/env.h"
+#include "calib/constants.h"
+#include "repair/survey.h"
+
+namespace sixpoint::repair {
+
+enum class RepairStatus { repaired, not_affected, not_repairable, already_repaired, failed };
+std::string_view to_string(RepairStatus status);
+
+// Constants for one file, and where they came from.
+struct ChosenConstants {
+  calib::ConstantsRecord record;
+  std::string method;        // store, calibration_file, scan, constants
+  std::string constants_id;  // in the store, or empty
+};
+
+// What was found for a file: constants, or one reason per source why there are none.
+struct ConstantsChoice {
+  std::optional<ChosenConstants> chosen;
+  std::vector<std::string> reasons;
+};
+
+// Finds constants for a surveyed file of `path`; called only for files that need them. Must be safe
+// to call from several threads when files are mended side by side.
+class ConstantsSource {
+ public:
+  virtual ~ConstantsSource() = default;
+  virtual Result<ConstantsChoice> choose(const std::string& path, const Survey& survey) = 0;
+};
+
+struct RepairOptions {
+  // 16-bit records on request only: every reader knows the 12-bit form.
+  bool wide = false;
+  // Looks, chooses and computes, but writes nothing.
+  bool dry_run = false;
+  // Also turn back the axes of files whose constants are right. Off: a file that 16CPAN03 does not
+  // affect is left as it is, and the reasons say that its axes are turned.
+  bool undo_rotation = false;
+  // A prior over a model's constants is no measurement of this unit: used only when asked for.
+  bool allow_prior = false;
+  // An output that is there already and was made from this very input is taken as done.
+  bool resume = false;
+  calib::StillBlockOptions still;
+};
+
+struct RepairReport {
+  std::string input;
+  std::string output;  // empty where none was written
+  RepairStatus status = RepairStatus::failed;
+  std::string method;
+  std::vector<std::string> reasons;
+  std::optional<Error> error;  // with `failed`
+  std::string serial;
+  std::uint64_t samples = 0;
+  std::uint64_t clipped_before = 0;
+  std::uint64_t clipped_after = 0;
+  std::size_t still_blocks = 0;
+  std::optional<double> still_error_before_mg;  // mean of |magnitude - 1 g| over still blocks
+  std::optional<double> still_error_after_mg;
+  bool rotation_undone = false;
+  std::string constants_id;
+  std::string input_sha256;
+  std::string output_sha256;
+  bool dry_run = false;
+
+  std::string brief() const;
+  bool usable() const { return status != RepairStatus::failed; }
+  nlohmann::ordered_json to_json() const;
+};
+
+// Mends `input` into `output`, whose folder must be there. Never fails as a function: what went
+// wrong stands in the report (`failed`, with the error). cannot_create where `output` exists
+// already.
+RepairReport repair_file(Env& env, const std::string& input, const std::string& output,
+                         ConstantsSource& source, const RepairOptions& options);
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,149 @@
+#include "repair/rescaled_log.h"
+
+#include <algorithm>
+
+#include "gt3x/parameters.h"
+#include "gt3x/record.h"
+
+namespace sixpoint::repair {
+namespace {
+
+bool at_limit(const gt3x::Counts& sample, calib::RecordWidth width) {
+  return std::any_of(sample.begin(), sample.end(), [&](std::int16_t count) {
+    return count <= calib::lowest_count(width) || count >= calib::highest_count(width);
+  });
+}
+
+}  // namespace
+
+RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options, StillScan still)
+    : log_(std::move(log)), options_(options), still_(std::move(still)) {}
+
+Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
+                                                       const RescaledLogOptions& options) {
+  SIXPOINT_ASSIGN(auto still,
+                  StillScan::make(options.rate_hz, options.accel_scale_lsb_per_g, options.still));
+  std::unique_ptr<RescaledLog> source(new RescaledLog(std::move(log), options, std::move(still)));
+  if (options.first_constants.has_value()) {
+    SIXPOINT_CHECK(source->set_constants(*options.first_constants));
+  }
+  return source;
+}
+
+Status RescaledLog::set_constants(const StoredConstants& constants) {
+  if (!options_.fresh.has_value() || constants_ == constants) {
+    return {};
+  }
+  const auto limit =
+      options_.beyond_12_bits ? calib::RecordWidth::bits16 : calib::RecordWidth::bits12;
+  SIXPOINT_ASSIGN(const auto reversal,
+                  calib::Reversal::make(constants, options_.accel_scale_lsb_per_g, limit));
+  calib::Rescale::Options rescale;
+  rescale.output = options_.wide ? calib::RecordWidth::bits16 : limit;
+  rescale.affine = options_.affine;
+  SIXPOINT_ASSIGN(rescale_, calib::Rescale::make(reversal, *options_.fresh, rescale));
+  constants_ = constants;
+  return {};
+}
+
+void RescaledLog::put_samples(const gt3x::Record& record) {
+  const bool packed = record.is(gt3x::RecordType::activity);
+  if (packed) {
+    gt3x::unpack_activity(record.payload, samples_);
+  } else {
+    gt3x::unpack_activity2(record.payload, samples_);
+  }
+  const auto limit_before =
+      options_.beyond_12_bits ? calib::RecordWidth::bits16 : calib::RecordWidth::bits12;
+  const auto limit_after = options_.wide ? calib::RecordWidth::bits16 : limit_before;
+  fresh_samples_ = samples_;
+  if (options_.undo_rotation) {
+    undo_rotation(fresh_samples_);
+  }
+  if (rescale_.has_value()) {
+    calib::RescaleTally counts;
+    rescale_->apply(fresh_samples_, fresh_samples_, counts);
+    tally_.affine_counts += counts.affine[0] + counts.affine[1] + counts.affine[2];
+  }
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    tally_.clipped_before += at_limit(samples_[i], limit_before) ? 1 : 0;
+    tally_.clipped_after += at_limit(fresh_samples_[i], limit_after) ? 1 : 0;
+    tally_.changed_samples += samples_[i] != fresh_samples_[i] ? 1 : 0;
+  }
+  tally_.samples += samples_.size();
+  ++tally_.sample_records;
+  still_.push(record.unix_time, fresh_samples_);
+
+  payload_.clear();
+  if (packed && !options_.wide) {
+    gt3x::append_activity(payload_, fresh_samples_);
+    // The unused nibble behind an odd number of values, and bytes that make no whole sample, stay.
+    if (samples_.size() % 2 == 1 && !payload_.empty()) {
+      payload_.back() = static_cast<std::uint8_t>((payload_.back() & 0xF0U) |
+                                                  (record.payload[payload_.size() - 1] & 0x0FU));
+    }
+  } else {
+    gt3x::append_activity2(payload_, fresh_samples_);
+  }
+  if (!(packed && options_.wide) && payload_.size() < record.payload.size()) {
+    const auto rest = record.payload.subspan(payload_.size());
+    payload_.insert(payload_.end(), rest.begin(), rest.end());
+  }
+  gt3x::append_record(pending_,
+                      packed && options_.wide ? gt3x::RecordType::activity2
+                                              : static_cast<gt3x::RecordType>(record.type),
+                      record.unix_time, payload_);
+}
+
+Result<bool> RescaledLog::pull() {
+  SIXPOINT_ASSIGN(const auto item, log_.next());
+  if (!item.has_value()) {
+    return false;
+  }
+  pending_.clear();
+  taken_ = 0;
+  const gt3x::Record& record = item->record;
+  if (item->kind == gt3x::LogItem::Kind::record && record.checksum_ok) {
+    const bool activity =
+        record.is(gt3x::RecordType::activity) || record.is(gt3x::RecordType::activity2);
+    if (activity && record.payload.size() > 1) {
+      put_samples(record);
+      return true;
+    }
+    if (activity || (record.is(gt3x::RecordType::event) && record.payload.size() == 1)) {
+      still_.break_run();
+    } else if (record.is(gt3x::RecordType::parameters)) {
+      const auto parameters = gt3x::parse_parameters(record.payload);
+      if (parameters && parameters->constants.has_value()) {
+        SIXPOINT_CHECK(set_constants(*parameters->constants));
+      }
+    }
+  } else if (item->kind != gt3x::LogItem::Kind::stray) {
+    still_.break_run();
+  }
+  pending_.assign(item->raw.begin(), item->raw.end());
+  return true;
+}
+
+Result<std::size_t> RescaledLog::read(std::span<std::uint8_t> out) {
+  std::size_t done = 0;
+  while (done < out.size()) {
+    if (taken_ == pending_.size()) {
+      SIXPOINT_ASSIGN(const bool more, pull());
+      if (!more) {
+        break;
+      }
+      continue;
+    }
+    const std::size_t count = std::min(out.size() - done, pending_.size() - taken_);
+    std::copy_n(pending_.begin() + static_cast<std::ptrdiff_t>(taken_), count,
+                out.begin() + static_cast<std::ptrdiff_t>(done));
+    taken_ += count;
+    done += count;
+  }
+  return done;
+}
+
+MagnitudeError RescaledLog::still_error() { return magnitude_error(still_.finish()); }
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,86 @@
+// A log.bin with other constants: the records of one pulled in, the records of the other pulled
+// out.
+//
+// Only ACTIVITY and ACTIVITY2 records with samples in them and a right checksum change; they are
+// packed anew and get their checksum. Every other byte comes out as it went in: other records, USB
+// records, records whose checksum fails, zero bytes and damage between records.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/constants.h"
+#include "calib/constants.h"
+#include "calib/scaling.h"
+#include "gt3x/byte_source.h"
+#include "gt3x/log_reader.h"
+#include "gt3x/samples.h"
+#include "repair/still_scan.h"
+
+namespace sixpoint::repair {
+
+struct RescaledLogOptions {
+  // The constants to apply. Without them only the rotation is undone.
+  std::optional<calib::Calibration> fresh;
+  double accel_scale_lsb_per_g = 256;
+  double rate_hz = 30;
+  // Scales the samples that stand before the first PARAMETERS record.
+  std::optional<StoredConstants> first_constants;
+  bool undo_rotation = false;
+  // Write ACTIVITY2 records, so that nothing that leaves 12 bits is clipped.
+  bool wide = false;
+  // The file holds counts beyond 12 bits: its own limit is that of ACTIVITY2.
+  bool beyond_12_bits = false;
+  // The counts cannot have come from the constants: one affine map instead of the integers.
+  bool affine = false;
+  // Bytes that will come out, where they are known (Survey::log_bytes, log_bytes_wide).
+  std::optional<std::uint64_t> size;
+  calib::StillBlockOptions still;
+};
+
+struct RescaledLogTally {
+  std::uint64_t samples = 0;
+  std::uint64_t sample_records = 0;
+  std::uint64_t changed_samples = 0;
+  std::uint64_t clipped_before = 0;  // samples with an axis at the limit of the record they came in
+  std::uint64_t clipped_after = 0;   // ... of the record they went out in
+  std::uint64_t affine_counts = 0;   // counts with no integer behind them, mapped by the line
+};
+
+class RescaledLog final : public gt3x::ByteSource {
+ public:
+  // bad_data for a rate or a scale that cannot be.
+  static Result<std::unique_ptr<RescaledLog>> make(gt3x::LogReader log,
+                                                   const RescaledLogOptions& options);
+
+  // bad_data where PARAMETERS bring constants that Eq. 1-3 cannot be used with.
+  Result<std::size_t> read(std::span<std::uint8_t> out) override;
+  std::optional<std::uint64_t> size() const override { return options_.size; }
+
+  // Complete after read() has answered 0.
+  const RescaledLogTally& tally() const { return tally_; }
+  MagnitudeError still_error();  // of what came out, by its own scale; once
+
+ private:
+  RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options, StillScan still);
+  Status set_constants(const StoredConstants& constants);
+  Result<bool> pull();  // the next item into pending_; false at the end
+  void put_samples(const gt3x::Record& record);
+
+  gt3x::LogReader log_;
+  RescaledLogOptions options_;
+  StillScan still_;
+  std::optional<StoredConstants> constants_;
+  std::optional<calib::Rescale> rescale_;
+  std::vector<gt3x::Counts> samples_;
+  std::vector<gt3x::Counts> fresh_samples_;
+  Bytes payload_;
+  Bytes pending_;
+  std::size_t taken_ = 0;
+  RescaledLogTally tally_;
+};
+
+}  // namespace sixpoint::repair

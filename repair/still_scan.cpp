@@ -1,0 +1,120 @@
+#include "repair/still_scan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace sixpoint::repair {
+
+void undo_rotation(std::span<gt3x::Counts> samples) {
+  for (gt3x::Counts& sample : samples) {
+    const std::int16_t stored_x = sample[0];
+    sample[0] = sample[1];
+    sample[1] = stored_x <= gt3x::kMin12   ? gt3x::kMax12
+                : stored_x >= gt3x::kMax12 ? gt3x::kMin12
+                                           : static_cast<std::int16_t>(-stored_x);
+  }
+}
+
+StillScan::StillScan(double rate_hz, double accel_scale, const calib::StillBlockOptions& options)
+    : rate_hz_(rate_hz), accel_scale_(accel_scale), options_(options) {}
+
+Result<StillScan> StillScan::make(double rate_hz, double accel_scale_lsb_per_g,
+                                  const calib::StillBlockOptions& options) {
+  StillScan scan(rate_hz, accel_scale_lsb_per_g, options);
+  SIXPOINT_CHECK(scan.start(
+      calib::Reversal::of_raw_counts(accel_scale_lsb_per_g, calib::RecordWidth::bits12)));
+  return scan;
+}
+
+Status StillScan::start(Result<calib::Reversal> reversal) {
+  if (!reversal) {
+    return fail(std::move(reversal).error());
+  }
+  close_finder();
+  reversal_ = std::make_unique<calib::Reversal>(*std::move(reversal));
+  SIXPOINT_ASSIGN(finder_, calib::StillBlockFinder::make(*reversal_, rate_hz_, options_));
+  return {};
+}
+
+Status StillScan::set_constants(const StoredConstants& constants) {
+  if (constants_ == constants) {
+    return {};
+  }
+  SIXPOINT_CHECK(start(calib::Reversal::make(constants, accel_scale_, calib::RecordWidth::bits12)));
+  constants_ = constants;
+  return {};
+}
+
+void StillScan::push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples) {
+  if (last_time_.has_value() && unix_time != *last_time_ + 1) {
+    break_run();
+  }
+  last_time_ = unix_time;
+  calib::tally(*reversal_, samples, plausibility_);
+  finder_->push(unix_time, samples);
+}
+
+void StillScan::break_run() {
+  finder_->break_run();
+  last_time_.reset();
+}
+
+void StillScan::close_finder() {
+  if (!finder_.has_value()) {
+    return;
+  }
+  break_run();
+  const calib::Calibration& undone = reversal_->calibration();
+  for (const calib::StillBlock& block : finder_->blocks()) {
+    blocks_.push_back(block);
+    PerAxis<double> affine_lsb{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      affine_lsb[a] = undone.zero_lsb[a] + block.mean_g[a] / undone.sensitivity_g_per_lsb[a];
+    }
+    affine_lsb_.push_back(affine_lsb);
+  }
+  const calib::StillBlockTally& tally = finder_->tally();
+  tally_.samples += tally.samples;
+  tally_.runs += tally.runs;
+  tally_.blocks += tally.blocks;
+  tally_.noisy_blocks += tally.noisy_blocks;
+  tally_.rejected_zero += tally.rejected_zero;
+  tally_.rejected_clipped += tally.rejected_clipped;
+  tally_.thinned = std::max(tally_.thinned, tally.thinned);
+  finder_.reset();
+}
+
+std::vector<calib::StillBlock> StillScan::finish() {
+  close_finder();
+  if (!plausibility_.plausible()) {
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      blocks_[i].mean_lsb = affine_lsb_[i];
+    }
+  }
+  return std::move(blocks_);
+}
+
+MagnitudeError magnitude_error(std::span<const calib::StillBlock> blocks) {
+  MagnitudeError result;
+  result.blocks = blocks.size();
+  if (blocks.empty()) {
+    return result;
+  }
+  std::vector<double> errors_mg;
+  errors_mg.reserve(blocks.size());
+  for (const calib::StillBlock& block : blocks) {
+    const double magnitude_g = std::hypot(block.mean_g[0], block.mean_g[1], block.mean_g[2]);
+    errors_mg.push_back(kMgPerG * std::abs(magnitude_g - 1));
+  }
+  std::sort(errors_mg.begin(), errors_mg.end());
+  result.mean_mg = std::accumulate(errors_mg.begin(), errors_mg.end(), 0.0) /
+                   static_cast<double>(errors_mg.size());
+  const auto rank =
+      static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(errors_mg.size())));
+  result.p95_mg = errors_mg[rank - 1];
+  result.worst_mg = errors_mg.back();
+  return result;
+}
+
+}  // namespace sixpoint::repair

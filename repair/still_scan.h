@@ -1,0 +1,78 @@
+// Still blocks of a recording, record by record: what a calibration can learn from it.
+//
+// Feeds the sample records of a log to calib::StillBlockFinder and breaks its runs where the
+// samples do: at a gap in the records' times, at idle sleep, at a USB record, and where the
+// constants in the PARAMETERS records change. Used on what a file holds, and on what repair makes
+// of it. Counts at or beyond 12 bits, the sensor's own full scale, are taken for clipped in 16-bit
+// records too.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/constants.h"
+#include "calib/scaling.h"
+#include "calib/still_blocks.h"
+#include "gt3x/samples.h"
+
+namespace sixpoint::repair {
+
+// Turns stored axes back: firmware 1.6.0 stored x' = -y, y' = x; this gives x = y', y = -x'. A
+// count of -2048 stays at the limit (its mirror image would not fit).
+void undo_rotation(std::span<gt3x::Counts> samples);
+
+class StillScan {
+ public:
+  // bad_data for a rate or a scale that cannot be. Without constants (a file that has none, or
+  // whose counts are g already) the stored counts themselves are taken for raw ones.
+  static Result<StillScan> make(double rate_hz, double accel_scale_lsb_per_g,
+                                const calib::StillBlockOptions& options = {});
+
+  // From here on the counts come from these constants; the same ones again change nothing. bad_data
+  // for constants that Eq. 1-3 cannot be used with.
+  Status set_constants(const StoredConstants& constants);
+
+  // One record's samples in the firmware's order of axes, right way round; X Y Z.
+  void push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples);
+  void break_run();
+
+  // Finishes. Blocks in order of time; mean_lsb are raw counts whatever constants were in force:
+  // means of the recovered integers, or, where the file's counts cannot have come from integers
+  // (plausibility() says so; seen in every real 30 Hz unit, whose firmware seems to average), the
+  // straight line's inverse of the mean.
+  std::vector<calib::StillBlock> finish();
+
+  const calib::PlausibilityTally& plausibility() const { return plausibility_; }
+  const calib::StillBlockTally& tally() const { return tally_; }
+
+ private:
+  StillScan(double rate_hz, double accel_scale, const calib::StillBlockOptions& options);
+  Status start(Result<calib::Reversal> reversal);
+  void close_finder();
+
+  double rate_hz_;
+  double accel_scale_;
+  calib::StillBlockOptions options_;
+  std::optional<StoredConstants> constants_;
+  std::unique_ptr<calib::Reversal> reversal_;  // at a fixed address: the finder keeps a pointer
+  std::optional<calib::StillBlockFinder> finder_;
+  std::optional<std::uint32_t> last_time_;
+  std::vector<calib::StillBlock> blocks_;
+  std::vector<PerAxis<double>> affine_lsb_;  // of each block, what the straight line makes of it
+  calib::PlausibilityTally plausibility_;
+  calib::StillBlockTally tally_;
+};
+
+// How far the blocks' magnitudes are from 1 g, by the file's own scale.
+struct MagnitudeError {
+  std::size_t blocks = 0;
+  double mean_mg = 0;   // mean of |magnitude - 1 g|
+  double p95_mg = 0;    // its 95th percentile (nearest rank)
+  double worst_mg = 0;  // its largest
+};
+MagnitudeError magnitude_error(std::span<const calib::StillBlock> blocks);
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,59 @@
+// One pass over a recording: what it says about itself, and what its still periods say.
+//
+// Everything that triage, solving and repair need to know before a byte is written. Memory is
+// bounded by the still blocks (calib::StillBlockOptions::max_blocks).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/constants.h"
+#include "base/env.h"
+#include "calib/still_blocks.h"
+#include "gt3x/log_reader.h"
+#include "repair/still_scan.h"
+#include "repair/triage.h"
+
+namespace sixpoint::repair {
+
+// The zip entry that a mended file carries beside log.bin and info.txt (docs/repair.md). Readers
+// that open log.bin and info.txt by name do not see it; its presence is what makes a second repair
+// answer `already_repaired`.
+inline constexpr const char* kRepairMark = "sixpoint-repair.json";
+
+struct Survey {
+  FileFacts facts;
+  std::string model;
+  double rate_hz = 0;
+  double accel_scale_lsb_per_g = 0;
+  bool accel_scale_known = false;  // false: 256 was assumed
+  bool already_repaired = false;   // the mark is there
+  // The constants that were in force for at least one sample, in order; usually one set.
+  std::vector<StoredConstants> constants;
+  // Why they cannot be used (none in the file, or positive = negative), where that is so.
+  std::optional<Error> constants_problem;
+
+  std::uint64_t samples = 0;
+  std::uint64_t clipped_samples = 0;  // an axis at the limit of 12 bits
+  std::uint64_t sample_records = 0;   // ACTIVITY and ACTIVITY2 with samples in them
+  std::uint64_t log_bytes = 0;
+  std::uint64_t log_bytes_wide = 0;  // with every ACTIVITY record written as ACTIVITY2
+  bool beyond_12_bits = false;       // a count outside [-2048, 2047], in ACTIVITY2 records
+  gt3x::LogStatistics log;
+
+  std::vector<calib::StillBlock> blocks;
+  calib::PlausibilityTally plausibility;
+  calib::StillBlockTally still_tally;
+  MagnitudeError magnitude;  // of the file as it is, by its own scale
+  double duration_s = 0;     // samples over rate
+};
+
+// no_input, bad_data (no zip, damaged entry ...), as gt3x::Recording and LogReader have it;
+// bad_data also for a sample rate of 0 and for files of other forms than log.bin with ACTIVITY
+// records.
+Result<Survey> survey(FileSystem& files, const std::string& path,
+                      const calib::StillBlockOptions& options = {});
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,56 @@
+// Which files are affected by 16CPAN03, and which cannot be told.
+//
+// A file is affected when all three hold (paper, "16CPAN03 Issue Description"): its unit's serial
+// number begins with MOS; the unit was calibrated before 2014-03-24, so that its constants belong
+// to the `legacy` filter configuration; it was recorded by firmware 1.4.0, 1.4.1, 1.5.0, 1.6.0
+// or 1.7.0, which set `current` regardless. One fact that rules it out suffices to say "not
+// affected"; without such a fact a missing one means "cannot tell".
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/time.h"
+#include "calib/constants.h"
+
+namespace sixpoint::repair {
+
+// What a file says about itself; empty or nothing where it does not say.
+struct FileFacts {
+  std::string serial;
+  std::string firmware;
+  std::optional<UtcTime> calibration_time;
+};
+
+enum class Verdict { affected, not_affected, cannot_tell };
+std::string_view to_string(Verdict verdict);
+
+struct Triage {
+  Verdict verdict = Verdict::cannot_tell;
+  std::vector<std::string> reasons;  // one sentence each, the deciding ones first
+  // Firmware 1.6.0 on a MOS unit: stored x' = -y, y' = x, whatever the verdict on the constants.
+  bool axes_rotated = false;
+};
+Triage triage(const FileFacts& facts);
+
+// Which configuration the firmware had set when the file was recorded, and under which one the
+// stored constants were measured (domain: "What was measured under which configuration"). Nothing
+// where the facts do not suffice, or where the unit is no MOS unit and the question has no meaning.
+std::optional<calib::FilterConfiguration> filter_in_force(const FileFacts& facts);
+std::optional<calib::FilterConfiguration> filter_of_constants(const FileFacts& facts);
+
+// Firmware 1.1.0's release, before which every unit was calibrated under `legacy`.
+UtcTime filter_change();  // 2014-03-24T00:00:00Z
+
+// "1.10.2" compared number by number; nothing where the text is no version.
+struct FirmwareVersion {
+  int major_number = 0;
+  int minor_number = 0;
+  int patch = 0;
+  auto operator<=>(const FirmwareVersion&) const = default;
+};
+std::optional<FirmwareVersion> parse_firmware(std::string_view text);
+
+}  // namespace sixpoint::repair

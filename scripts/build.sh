@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# Builds the program: build/sixpoint. Works from a fresh clone on a fresh Debian 12 as root, and again.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+scripts/install_packages.sh build
+source scripts/build_environment.sh
+configure release -DSIXPOINT_TESTS=OFF -DSIXPOINT_BENCH=OFF
+cmake --build build --target sixpoint -- --quiet
+echo "build/sixpoint is ready: $(build/sixpoint --version)" >&2

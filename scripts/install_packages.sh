@@ -1,0 +1,52 @@
+#!/usr/bin/env bash
+# Installs the Debian 12 packages that are missing; nothing when none is. Sourced or run by the other
+# scripts:  install_packages.sh build|test...
+# Groups: build (to make the program), test (to test it as CI does).
+set -euo pipefail
+
+build_packages=(
+  ca-certificates ccache cmake g++ git ninja-build pkg-config
+  libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libspdlog-dev libsqlite3-dev
+  libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
+)
+test_packages=(
+  clang clang-format clang-tidy libclang-rt-14-dev
+  libceres-dev libgmock-dev libgtest-dev librapidcheck-dev python3 unzip zip
+)
+
+wanted=()
+for group in "${@:-build}"; do
+  case "$group" in
+    build) wanted+=("${build_packages[@]}") ;;
+    test) wanted+=("${test_packages[@]}") ;;
+    *) echo "install_packages.sh: no group '$group'; there are: build test" >&2; exit 64 ;;
+  esac
+done
+
+missing=()
+for package in "${wanted[@]}"; do
+  if ! dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed'; then
+    missing+=("$package")
+  fi
+done
+if [ ${#missing[@]} -eq 0 ]; then
+  exit 0
+fi
+
+if [ "$(id -u)" -ne 0 ]; then
+  echo "These Debian packages are missing: ${missing[*]}" >&2
+  echo "Run this script as root, or install them with: apt-get install ${missing[*]}" >&2
+  exit 77
+fi
+echo "Installing ${#missing[@]} Debian packages: ${missing[*]}" >&2
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+# Another apt may be at work on a fresh machine (unattended upgrades): wait for its lock.
+apt=(apt-get -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 -qq)
+if ! { "${apt[@]}" update &&
+       DEBIAN_FRONTEND=noninteractive "${apt[@]}" install -y --no-install-recommends "${missing[@]}"; } \
+     >"$log" 2>&1; then
+  tail -n 20 "$log" >&2
+  echo "Installing failed; the lines above say why. Check the network and /etc/apt/sources.list." >&2
+  exit 69
+fi

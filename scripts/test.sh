@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Builds and tests everything, as CI does; works from a fresh clone on a fresh Debian 12 as root.
+#   scripts/test.sh               all: tests, the unit tests again under ASan and UBSan (built by
+#                                 clang), format, clang-tidy
+#   scripts/test.sh --label L     builds what the tests of label L need and runs those
+set -euo pipefail
+cd "$(dirname "$0")/.."
+label=""
+case "${1:-}" in
+  "") ;;
+  --label) label=${2:?"--label needs a name: unit, program, docs"} ;;
+  *) echo "usage: scripts/test.sh [--label L]" >&2; exit 64 ;;
+esac
+jobs=$(nproc)
+
+step() { printf '\n== %s\n' "$*"; }
+# ctest's own lines; a skip is shown with its reason, for a skip is not a pass.
+run_ctest() {
+  local folder=$1 log
+  shift
+  log=$(mktemp)
+  local status=0
+  ctest --test-dir "$folder" --output-on-failure --no-tests=error -j "$jobs" "$@" 2>&1 |
+    tee "$log" || status=$?
+  if grep -q 'Skipped' "$log"; then
+    echo "These tests were skipped, which is not a pass:"
+    grep 'Skipped' "$log" || true
+  fi
+  rm -f "$log"
+  return "$status"
+}
+
+scripts/install_packages.sh build test
+source scripts/build_environment.sh
+
+step "Release build (g++)"
+configure release -DSIXPOINT_TESTS=ON -DSIXPOINT_BENCH=ON
+cmake --build build -- --quiet
+
+if [ -n "$label" ]; then
+  run_ctest build -L "^$label\$"
+  exit
+fi
+
+step "Format"
+scripts/check_format.sh
+
+step "Tests"
+run_ctest build
+
+step "Build with AddressSanitizer and UndefinedBehaviorSanitizer (clang++)"
+configure sanitize
+cmake --build build/sanitize -- --quiet
+step "Unit tests under the sanitizers"
+run_ctest build/sanitize -L '^unit$'
+
+step "clang-tidy"
+scripts/tidy.sh
+
+step "Everything passed"

@@ -1,0 +1,41 @@
+// A .gt3x file as a unit of this truth would leave it.
+//
+// PARAMETERS, METADATA and info.txt hold what real files of a wGT3X-BT hold.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+
+#include "base/env.h"
+#include "gt3x/info.h"
+#include "gt3x/samples.h"
+#include "sim/scenario.h"
+
+namespace sixpoint::sim {
+
+// What stands in log.bin before the first sample: METADATA and PARAMETERS.
+Bytes log_preamble(const UnitTruth& unit, UtcTime start, int rate_hz);
+
+// One second of samples as an ACTIVITY (12 bits) or ACTIVITY2 record (16).
+void append_second(Bytes& log, UtcTime time, std::span<const gt3x::Counts> samples, bool wide);
+
+// info.txt. `end` is the time after the last sample.
+gt3x::Info recording_info(const UnitTruth& unit, UtcTime start, UtcTime end, int rate_hz);
+
+struct RecordingReport {
+  std::uint64_t samples = 0;
+  double duration_s = 0;
+  std::uint64_t clipped_samples = 0;
+};
+
+// Gets the truth second by second: Unix time of the first sample, and the specific force in the
+// case's axes in g, one vector per stored sample.
+using TruthSink = std::function<Status(UtcTime time, std::span<const Eigen::Vector3d> true_g)>;
+
+// Simulates the scenario, whole seconds only, and writes it; memory does not grow with its length.
+// cannot_create where `path` cannot be made.
+Result<RecordingReport> write_recording(FileSystem& files, const std::string& path,
+                                        const Scenario& scenario, const TruthSink& truth = {});
+
+}  // namespace sixpoint::sim

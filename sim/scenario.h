@@ -1,0 +1,57 @@
+// A scenario: which unit goes through which motion, and what it records (docs/scenario.md).
+//
+// The same scenario gives the same recording, byte for byte, on every machine.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sim/effect.h"
+#include "sim/motion.h"
+#include "sim/unit_truth.h"
+
+namespace sixpoint::sim {
+
+enum class MotionKind { still, shaker, free_living };
+
+struct MotionSpec {
+  MotionKind kind = MotionKind::still;
+  double duration_s = 60;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // still and shaker
+  Tone tone;                                               // shaker
+  std::uint64_t seed = 0;                                  // free_living
+};
+
+struct EffectSpec {
+  const EffectKind* kind = nullptr;
+  ParameterSet values;  // complete
+};
+
+struct Scenario {
+  std::uint64_t seed = 1;
+  UnitTruth unit;
+  UtcTime start = from_unix_seconds(1'428'588'240);  // whole seconds
+  int rate_hz = 30;
+  bool wide = false;  // ACTIVITY2 records of 16 bits instead of ACTIVITY of 12
+  // None: the one that the unit's firmware chooses. Else that one, against the header.
+  std::optional<FilterConfiguration> filter;
+  double temperature_c = 25;
+  double gravity_g = 1;  // local gravity
+  double turn_s = 2;     // a hand's time from one motion to the next; 0 = no transition
+  std::vector<MotionSpec> motions;
+  std::vector<EffectSpec> effects;
+
+  FilterConfiguration filter_in_force() const;
+  std::unique_ptr<MotionSequence> motion() const;
+  std::vector<std::unique_ptr<Effect>> make_effects() const;
+};
+
+// Strict: unknown keys, wrong types and impossible values are `configuration`, with the key's path.
+Result<Scenario> parse_scenario(std::string_view json);
+
+}  // namespace sixpoint::sim

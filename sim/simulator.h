@@ -1,0 +1,48 @@
+// The whole chain from motion to stored counts, block by block.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "sim/effect.h"
+#include "sim/firmware.h"
+#include "sim/motion.h"
+#include "sim/sensor.h"
+#include "sim/unit_truth.h"
+
+namespace sixpoint::sim {
+
+struct SimulatorOptions {
+  double rate_hz = 30;
+  FilterConfiguration filter = FilterConfiguration::current;  // that the sensor runs under
+  int stored_bits = 12;
+  double start_s = 0;  // of the first sample on the motion's time scale
+  double temperature_c = 25;
+  std::uint64_t seed = 1;  // of noise and random effects
+};
+
+// One object belongs to one thread. `motion` must outlive it.
+class Simulator {
+ public:
+  Simulator(const UnitTruth& unit, const SimulatorOptions& options, Motion& motion,
+            std::vector<std::unique_ptr<Effect>> effects = {});
+
+  // The next `samples`; `block` is overwritten and keeps its memory.
+  void next(std::size_t samples, SimulatedBlock& block);
+  std::uint64_t samples() const { return done_; }
+  std::uint64_t clipped() const { return firmware_.clipped(); }
+  // True time of sample `index` by the nominal clock, on the motion's time scale.
+  double nominal_time_s(std::uint64_t index) const {
+    return options_.start_s + static_cast<double>(index) / options_.rate_hz;
+  }
+
+ private:
+  SimulatorOptions options_;
+  Motion& motion_;
+  std::vector<std::unique_ptr<Effect>> effects_;
+  Sensor sensor_;
+  FirmwareScaler firmware_;
+  std::uint64_t done_ = 0;
+};
+
+}  // namespace sixpoint::sim

@@ -1,0 +1,108 @@
+// sixpoint simulate: a recording from the simulator.
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "base/atomic_file.h"
+#include "base/sha256.h"
+#include "sim/firmware.h"
+#include "sim/recording.h"
+#include "station/cli/command.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+struct Options {
+  std::string scenario;
+  std::string output;
+  std::string truth;
+  bool json = false;
+};
+
+Result<std::string> sha256_of_file(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const auto file, files.open(path));
+  Sha256 hash;
+  Bytes chunk(1U << 20U);
+  for (std::uint64_t offset = 0;;) {
+    SIXPOINT_ASSIGN(const std::size_t count, file->read_at(offset, chunk));
+    if (count == 0) {
+      return to_hex(hash.finish());
+    }
+    hash.update(std::span(chunk).first(count));
+    offset += count;
+  }
+}
+
+Result<Json> simulate(Context& context, const Options& options) {
+  FileSystem& files = context.env.files;
+  SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.scenario));
+  SIXPOINT_ASSIGN(const sim::Scenario scenario,
+                  sim::parse_scenario({reinterpret_cast<const char*>(text.data()), text.size()}));
+
+  std::optional<AtomicFile> truth_file;
+  sim::TruthSink truth;
+  if (!options.truth.empty()) {
+    SIXPOINT_ASSIGN(auto created, AtomicFile::create(files, options.truth));
+    truth_file.emplace(std::move(created));
+    SIXPOINT_CHECK(truth_file->append("unix_time_s,x_g,y_g,z_g\n"));
+    truth = [&](UtcTime time, std::span<const Eigen::Vector3d> true_g) -> Status {
+      std::string lines;
+      for (std::size_t i = 0; i < true_g.size(); ++i) {
+        fmt::format_to(std::back_inserter(lines), "{}.{:06},{:.6f},{:.6f},{:.6f}\n",
+                       to_unix_seconds(time),
+                       static_cast<std::uint64_t>(i) * 1'000'000 / true_g.size(), true_g[i].x(),
+                       true_g[i].y(), true_g[i].z());
+      }
+      return truth_file->append(lines);
+    };
+  }
+  SIXPOINT_ASSIGN(const sim::RecordingReport report,
+                  sim::write_recording(files, options.output, scenario, truth));
+  if (truth_file) {
+    SIXPOINT_CHECK(truth_file->commit());
+  }
+
+  Json json = document("simulate");
+  json["file"] = options.output;
+  SIXPOINT_ASSIGN(json["sha256"], sha256_of_file(files, options.output));
+  json["serial"] = scenario.unit.serial;
+  json["firmware"] = scenario.unit.firmware;
+  json["filter"]["in_force"] = calib::to_string(scenario.filter_in_force());
+  json["filter"]["constants_measured_under"] =
+      calib::to_string(sim::filter_of_constants(scenario.unit.serial, scenario.unit.calibrated));
+  json["samples"] = report.samples;
+  json["duration_s"] = report.duration_s;
+  json["clipped_samples"] = report.clipped_samples;
+  json["truth"] = options.truth.empty() ? Json(nullptr) : Json(options.truth);
+  return json;
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& app, Context& context) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "simulate", "make a recording from a scenario; the same scenario gives the same bytes");
+  command->add_option("--scenario", options->scenario, "what happens (docs/scenario.md)")
+      ->required();
+  command->add_option("-o,--output", options->output, "the .gt3x file to make")->required();
+  command->add_option("--truth", options->truth, "also write the true motion in g, as CSV");
+  command->add_flag("--json", options->json, "answer as JSON");
+  command->callback([options, &context] {
+    const Result<Json> answer = simulate(context, *options);
+    if (!answer) {
+      report_error(context, "simulate", answer.error(), options->json);
+    } else if (options->json) {
+      print_json(context, *answer);
+    } else {
+      const Json& json = *answer;
+      context.out << fmt::format(
+          "{}: {} samples, {:.0f} s, unit {} with firmware {}\n", options->output,
+          json["samples"].get<std::uint64_t>(), json["duration_s"].get<double>(),
+          json["serial"].get<std::string>(), json["firmware"].get<std::string>());
+    }
+  });
+}
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,213 @@
+#include "gt3x/raw_csv.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <zlib.h>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "gt3x/recording_writer.h"
+#include "gt3x_made_log.h"
+#include "shared_data.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+using sixpoint::tests::shared_file;
+
+Result<std::string> csv_of(Recording& recording, const RawCsvOptions& options = {},
+                           RawCsvTally* tally = nullptr) {
+  std::string text;
+  const auto written = write_raw_csv(recording, options, [&](std::string_view piece) -> Status {
+    text += piece;
+    return {};
+  });
+  if (!written) {
+    return fail(written.error());
+  }
+  if (tally != nullptr) {
+    *tally = *written;
+  }
+  return text;
+}
+
+Result<std::string> csv_of(const Bytes& log, const std::string& info,
+                           const RawCsvOptions& options = {}, RawCsvTally* tally = nullptr) {
+  MemoryEnv memory;
+  SIXPOINT_ASSIGN(auto out, RecordingWriter::create(memory.files, "f"));
+  SIXPOINT_CHECK(out.add("log.bin", log));
+  SIXPOINT_CHECK(out.add("info.txt", std::string_view(info)));
+  SIXPOINT_CHECK(out.commit());
+  SIXPOINT_ASSIGN(auto recording, Recording::open(memory.files, "f"));
+  return csv_of(recording, options, tally);
+}
+
+std::string gunzipped(const std::string& path) {
+  std::string text;
+  gzFile file = gzopen(path.c_str(), "rb");
+  std::vector<char> piece(1 << 16);
+  for (int count = 0; (count = gzread(file, piece.data(), 1 << 16)) > 0;) {
+    text.append(piece.data(), static_cast<std::size_t>(count));
+  }
+  gzclose(file);
+  return text;
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    while (!line.empty() && line.back() == '\r') {
+      line.pop_back();
+    }
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+// The lines below header and column names.
+std::vector<std::string> rows_of(const std::string& text) {
+  auto lines = lines_of(text);
+  lines.erase(lines.begin(), lines.begin() + std::min<std::ptrdiff_t>(11, std::ssize(lines)));
+  return lines;
+}
+
+// Oracle: the vendor's own export of the same recording, header, line ends and all 240,500 samples,
+// of which most are fills: idle sleep with the last sample, USB with zeros.
+TEST(RawCsv, EqualsTheVendorsExportByteForByte) {
+  SIXPOINT_NEED_SHARED("data/gt9x/TAS1H30182785_2019-09-17.gt3x");
+  auto recording =
+      Recording::open(posix_env().files, shared_file("data/gt9x/TAS1H30182785_2019-09-17.gt3x"));
+  ASSERT_OK(recording);
+  RawCsvTally tally;
+  const auto text = csv_of(*recording, {}, &tally);
+  ASSERT_OK(text);
+  const std::string wanted = gunzipped(shared_file("data/gt9x/TAS1H30182785_2019-09-17.csv.gz"));
+  ASSERT_EQ(text->size(), wanted.size());
+  EXPECT_TRUE(*text == wanted);
+  EXPECT_EQ(tally.samples, 33'000U);
+  EXPECT_EQ(tally.filled, 240'500U - 33'000U);
+}
+
+// Oracle: another export of the vendor's, which its publisher saved again with other line ends and
+// empty columns behind the header, and cut after 120 of the 180 seconds; so line by line, without
+// trailing commas.
+TEST(RawCsv, EqualsTheVendorsExportSampleForSample) {
+  SIXPOINT_NEED_SHARED("data/gt9x/TAS1E31150129.gt3x");
+  auto recording = Recording::open(posix_env().files, shared_file("data/gt9x/TAS1E31150129.gt3x"));
+  ASSERT_OK(recording);
+  const auto text = csv_of(*recording);
+  ASSERT_OK(text);
+  auto wanted = lines_of(gunzipped(shared_file("data/gt9x/exampleRAW.csv.gz")));
+  for (auto& line : wanted) {
+    line.erase(line.find_last_not_of(',') + 1);
+  }
+  const auto lines = lines_of(*text);
+  ASSERT_EQ(wanted.size(), 11 + 10'800U);
+  ASSERT_EQ(lines.size(), 11 + 16'200U);
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    ASSERT_EQ(lines[i], wanted[i]) << "line " << i;
+  }
+}
+
+// Oracle: long division in integers, written differently: the nearest of all multiples of 1 mg, and
+// of two equally near ones the one further from zero.
+TEST(RawCsv, RoundsHalfAwayFromZeroExactly) {
+  for (const std::int64_t scale : {256, 341, 250, 1000}) {
+    for (int count = -2048; count <= 2047; ++count) {
+      const std::int64_t mg = round_to_mg(count, static_cast<double>(scale));
+      // distance of mg * scale from 1000 * count, doubled, in units of 1 / scale mg
+      const std::int64_t distance = 2 * std::abs(mg * scale - 1000 * std::int64_t{count});
+      ASSERT_LE(distance, scale) << count;
+      if (distance == scale) {
+        ASSERT_GT(std::abs(mg * scale), std::abs(1000 * std::int64_t{count})) << count;
+      }
+    }
+  }
+  EXPECT_EQ(round_to_mg(16, 256), 63);  // 0.0625
+  EXPECT_EQ(round_to_mg(-16, 256), -63);
+  EXPECT_EQ(round_to_mg(1, 2000), 1);  // 0.0005
+  EXPECT_EQ(round_to_mg(0, 256), 0);
+  EXPECT_EQ(round_to_mg(32767, 256), 127'996);
+}
+
+TEST(RawCsv, FillsAsTheRuleSays) {
+  Bytes log;
+  const std::vector<Counts> samples = {{256, 0, -16}, {-256, 16, 2047}};
+  Bytes payload;
+  append_activity(payload, samples);
+  append_record(log, RecordType::activity, tests::kStart, payload);
+  append_record(log, RecordType::activity, tests::kStart + 2, Bytes{0x5A});
+  append_record(log, RecordType::activity, tests::kStart + 4, payload);
+  const std::string info = tests::made_info("2") + "Last Sample Time: 635641850460000000\r\n";
+  RawCsvTally tally;
+  const auto filled = csv_of(log, info, {}, &tally);
+  ASSERT_OK(filled);
+  EXPECT_EQ(rows_of(*filled),
+            (std::vector<std::string>{"1,0,-0.063", "-1,0.063,7.996",         // recorded
+                                      "-1,0.063,7.996", "-1,0.063,7.996",     // missing
+                                      "0,0,0", "0,0,0", "0,0,0", "0,0,0",     // USB and behind it
+                                      "1,0,-0.063", "-1,0.063,7.996",         //
+                                      "-1,0.063,7.996", "-1,0.063,7.996"}));  // to the last time
+  EXPECT_EQ(tally.filled, 8U);
+  const auto plain = csv_of(log, info, {true, false});
+  ASSERT_OK(plain);
+  EXPECT_EQ(rows_of(*plain),
+            (std::vector<std::string>{"256,0,-16", "-256,16,2047", "256,0,-16", "-256,16,2047"}));
+}
+
+TEST(RawCsv, AShortSecondIsFilledUp) {
+  Bytes log = tests::made_log(1);
+  tests::append_second(log, 1, 28);
+  tests::append_second(log, 2);
+  RawCsvTally tally;
+  const auto text = csv_of(log, tests::made_info(), {}, &tally);
+  ASSERT_OK(text);
+  EXPECT_EQ(rows_of(*text).size(), 90U);
+  EXPECT_EQ(tally.filled, 2U);
+}
+
+TEST(RawCsv, Refuses) {
+  const auto no_samples = csv_of(tests::made_log(0), tests::made_info());
+  EXPECT_FAILS(no_samples, ErrorCode::bad_data);
+  EXPECT_THAT(no_samples.error().what, testing::HasSubstr("no samples"));
+  EXPECT_FAILS(csv_of(tests::made_log(1), tests::made_info("0")), ErrorCode::bad_data);
+  Bytes far = tests::made_log(1);
+  tests::append_second(far, 2'000'000'000);
+  const auto leap = csv_of(far, tests::made_info());
+  EXPECT_FAILS(leap, ErrorCode::bad_data);
+  EXPECT_THAT(leap.error().hint, testing::HasSubstr("--no-fill"));
+  EXPECT_OK(csv_of(far, tests::made_info(), {false, false}));
+  Bytes nameless;
+  tests::append_second(nameless, 0);
+  EXPECT_FAILS(csv_of(nameless, "Serial Number: X\r\nSample Rate: 30\r\n"), ErrorCode::bad_data);
+  EXPECT_OK(csv_of(nameless, "Serial Number: X\r\nSample Rate: 30\r\n", {true, true}));
+}
+
+// Every recording of the current form that we have can be exported; the oracle for the count is the
+// file's own record headers, 30 to 100 samples a second.
+TEST(RawCsv, EveryRealRecording) {
+  SIXPOINT_NEED_SHARED("data");
+  std::size_t files = 0;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(sixpoint::tests::shared_folder() / "data")) {
+    const auto ending = entry.path().extension();
+    if (ending != ".gt3x" && ending != ".agdc") {
+      continue;
+    }
+    auto recording = Recording::open(posix_env().files, entry.path().string());
+    ASSERT_OK(recording);
+    RawCsvTally tally;
+    const auto text = csv_of(*recording, {}, &tally);
+    ASSERT_OK(text);
+    EXPECT_EQ(rows_of(*text).size(), tally.samples + tally.filled) << entry.path();
+    EXPECT_EQ(tally.checksum_failures + tally.damaged_stretches, 0U);
+    ++files;
+  }
+  EXPECT_EQ(files, 11U);
+}
+
+}  // namespace
+}  // namespace sixpoint::gt3x

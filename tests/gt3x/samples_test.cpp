@@ -1,0 +1,79 @@
+#include "gt3x/samples.h"
+
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+// Oracle: the worked example of the vendor's public description of ACTIVITY.
+TEST(Samples, PublishedActivityExample) {
+  const Bytes payload = {0x00, 0x60, 0x08, 0xEB, 0xD0, 0x07, 0x00,
+                         0x9E, 0xBF, 0x00, 0x70, 0x08, 0xEB, 0xF0};
+  std::vector<Counts> samples;
+  unpack_activity(payload, samples);
+  EXPECT_EQ(samples, (std::vector<Counts>{{8, 6, -323}, {9, 7, -321}, {8, 7, -321}}));
+  Bytes packed;
+  append_activity(packed, samples);
+  EXPECT_EQ(packed, payload);
+}
+
+TEST(Samples, RoundTripsAtEveryLengthAndLimit) {
+  Random random(1);
+  for (std::size_t count = 0; count < 40; ++count) {
+    std::vector<Counts> samples(count);
+    for (auto& sample : samples) {
+      for (auto& value : sample) {
+        value = static_cast<std::int16_t>(static_cast<int>(random.below(4096)) - 2048);
+      }
+    }
+    if (count > 1) {
+      samples.front() = {kMin12, kMax12, -1};
+      samples.back() = {kMax12, kMin12, 0};
+    }
+    std::vector<Counts> back;
+    Bytes packed;
+    append_activity(packed, samples);
+    EXPECT_EQ(packed.size(), (count * 9 + 1) / 2);
+    unpack_activity(packed, back);
+    EXPECT_EQ(back, samples);
+    packed.clear();
+    append_activity3(packed, samples);
+    unpack_activity3(packed, back);
+    EXPECT_EQ(back, samples);
+    packed.clear();
+    append_activity2(packed, samples);
+    EXPECT_EQ(packed.size(), count * 6);
+    unpack_activity2(packed, back);
+    EXPECT_EQ(back, samples);
+  }
+}
+
+TEST(Samples, WideValuesSurviveOnlyInSixteenBits) {
+  const std::vector<Counts> samples = {{32767, -32768, 300}};
+  std::vector<Counts> back;
+  Bytes packed;
+  append_activity2(packed, samples);
+  EXPECT_EQ(packed, (Bytes{0xFF, 0x7F, 0x00, 0x80, 0x2C, 0x01}));
+  unpack_activity2(packed, back);
+  EXPECT_EQ(back, samples);
+  packed.clear();
+  append_activity(packed, samples);
+  unpack_activity(packed, back);
+  EXPECT_EQ(back, (std::vector<Counts>{{kMax12, kMin12, 300}}));
+}
+
+TEST(Samples, ShortPayloadsGiveWholeSamplesOnly) {
+  const Bytes bytes(16, 0x11);
+  for (std::size_t size = 0; size <= bytes.size(); ++size) {
+    std::vector<Counts> samples;
+    unpack_activity(std::span(bytes).first(size), samples);
+    EXPECT_EQ(samples.size(), size * 2 / 9);
+    unpack_activity2(std::span(bytes).first(size), samples);
+    EXPECT_EQ(samples.size(), size / 6);
+  }
+}
+
+}  // namespace
+}  // namespace sixpoint::gt3x
