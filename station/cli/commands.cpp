@@ -10,6 +10,7 @@ namespace sixpoint::cli {
   COMMAND(inspect)                 \
   COMMAND(scan)                    \
   COMMAND(export)                  \
+  COMMAND(solve)                   \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
