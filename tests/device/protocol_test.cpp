@@ -152,7 +152,7 @@ TEST(Protocol, WellFormedNonsenseIsRefused) {
 
   SampleBlock block;
   block.counts.assign(2, RawCounts{});
-  for (const std::uint8_t count : {0, 1, 3, 7, 255}) {
+  for (const std::uint8_t count : std::initializer_list<std::uint8_t>{0, 1, 3, 7, 255}) {
     Message message = encode_samples(block);
     message.payload[15] = count;
     EXPECT_FAILS(decode_samples(message), ErrorCode::bad_data);
