@@ -1,0 +1,33 @@
+// The in-process carrier: a virtual unit behind function calls, and the `virtual:` scheme.
+//
+// With pace=fast (the default) the link has a clock of its own: waiting moves it, so that six poses
+// of ten seconds take milliseconds. With pace=real it is the machine's.
+#pragma once
+
+#include <memory>
+#include <mutex>
+
+#include "device/transport.h"
+#include "mocks/virtual_unit.h"
+
+namespace sixpoint::mocks {
+
+// A virtual unit that is plugged in: shared by its two channels and its jig.
+struct PluggedUnit {
+  PluggedUnit(VirtualUnitOptions options, std::shared_ptr<Clock> link_clock)
+      : clock(std::move(link_clock)), unit(std::move(options), clock->elapsed()) {}
+
+  std::shared_ptr<Clock> clock;
+  std::mutex mutex;  // guards what follows
+  VirtualUnit unit;
+  bool unplugged = false;  // every transfer answers device_unavailable
+  bool cancelled = false;
+};
+
+// Channels (and, with `with_jig`, the jig) of a unit. The unit lives as long as any of them.
+device::Link link_to(std::shared_ptr<PluggedUnit> plugged, bool with_jig);
+
+// Registers "virtual:".
+void register_virtual(device::TransportRegistry& registry);
+
+}  // namespace sixpoint::mocks

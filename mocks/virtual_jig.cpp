@@ -1,0 +1,34 @@
+#include "mocks/virtual_jig.h"
+
+#include <utility>
+
+namespace sixpoint::mocks {
+
+namespace {
+
+constexpr double kTurn_s = 1.5;
+
+}  // namespace
+
+Status VirtualJig::go_to(device::Pose pose) {
+  const auto up = device::direction_of(pose);
+  const std::lock_guard lock(plugged_->mutex);
+  plugged_->unit.turn_to({up[0], up[1], up[2]}, plugged_->clock->elapsed(), kTurn_s,
+                         std::exchange(tilt_next_deg_, 0.0));
+  pose_ = pose;
+  return {};
+}
+
+Result<device::JigReport> VirtualJig::report() {
+  const std::lock_guard lock(plugged_->mutex);
+  device::JigReport report;
+  report.angle_uncertainty_deg = 0.02;
+  if (!plugged_->unit.is_turning(plugged_->clock->elapsed())) {
+    report.pose = pose_;
+  }
+  return report;
+}
+
+Status VirtualJig::stop() { return {}; }
+
+}  // namespace sixpoint::mocks

@@ -1,0 +1,30 @@
+// A jig that turns a virtual unit, and slips when a test says so.
+#pragma once
+
+#include <memory>
+
+#include "device/jig.h"
+#include "mocks/in_process.h"
+
+namespace sixpoint::mocks {
+
+class VirtualJig final : public device::Jig {
+ public:
+  explicit VirtualJig(std::shared_ptr<PluggedUnit> plugged) : plugged_(std::move(plugged)) {}
+
+  std::string name() const override { return "virtual"; }
+  bool turns_by_itself() const override { return true; }
+  Status go_to(device::Pose pose) override;
+  Result<device::JigReport> report() override;
+  Status stop() override;
+
+  // The next placement ends this far off, in a random direction.
+  void tilt_next(double tilt_deg) { tilt_next_deg_ = tilt_deg; }
+
+ private:
+  std::shared_ptr<PluggedUnit> plugged_;
+  std::optional<device::Pose> pose_;
+  double tilt_next_deg_ = 0;
+};
+
+}  // namespace sixpoint::mocks

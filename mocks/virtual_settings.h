@@ -1,0 +1,25 @@
+// The text behind "virtual:": comma-separated settings, each key=value.
+//
+//   seed, serial, firmware, calibrated (2013-11-12), positive_lsb, negative_lsb, zero_lsb (what the
+//   memory holds, a/b/c), true_sensitivity_lsb_per_g, true_zero_lsb (what the sensor is under
+//   `current`, a/b/c), jig (auto: a virtual jig turns the unit; none), pace (fast: time passes as
+//   it is waited for; real: the machine's clock), battery_mv, temperature_c.
+// What is left out comes from the seed, or is the default of VirtualUnitOptions.
+#pragma once
+
+#include <string_view>
+
+#include "mocks/virtual_unit.h"
+
+namespace sixpoint::mocks {
+
+struct VirtualSettings {
+  VirtualUnitOptions unit;
+  bool with_jig = false;
+  bool real_time = false;
+};
+
+// usage on an unknown key, a key given twice, or a value that no unit can have.
+Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint64_t default_seed);
+
+}  // namespace sixpoint::mocks

@@ -1,0 +1,124 @@
+// A unit in software: what its firmware does, over the simulated sensor.
+//
+// It speaks the wire protocol (docs/protocol.md) and does no input or output of its own: a carrier
+// hands it reports, asks it for reports and bulk blocks, and tells it the time. The same model
+// serves the in-process carrier and any other. Times are those of the carrier's clock
+// (Clock::elapsed) and never go back.
+//
+// Samples are made when they are asked for, so a unit that nobody reads costs nothing. One thread
+// at a time.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/env.h"
+#include "device/protocol.h"
+#include "mocks/page_memory.h"
+#include "sim/motion.h"
+#include "sim/simulator.h"
+#include "sim/unit_truth.h"
+
+namespace sixpoint::mocks {
+
+using std::chrono::nanoseconds;
+
+struct VirtualUnitOptions {
+  sim::UnitTruth truth;
+  std::uint64_t seed = 1;  // of noise and of the hand that turns it
+  std::uint16_t battery_mv = 4100;
+  double temperature_c = 24.5;
+  double gravity_g = 1;
+  // Seating scatter of every placement, standard deviation per axis: a careful hand on a good jig.
+  double seating_deg = 0.01;
+  // Flash for recordings. A recording that does not fit ends where the flash is full.
+  std::uint64_t flash_bytes = 64ULL << 20U;
+};
+
+class VirtualUnit {
+ public:
+  explicit VirtualUnit(VirtualUnitOptions options, nanoseconds power_on = nanoseconds::zero());
+
+  // Carrier side. Anything may come in; what is no report is dropped.
+  void take_report(std::span<const std::uint8_t> report, nanoseconds now);
+  std::optional<device::Report> next_report(nanoseconds now);
+  std::optional<Bytes> next_bulk(nanoseconds now);
+  // When the next report comes by itself; none when nothing will without being asked.
+  std::optional<nanoseconds> next_due() const;
+
+  // The hand or the jig. A turn takes `duration_s`; `tilt_deg` is how far the pose ends off.
+  void turn_to(const Eigen::Vector3d& up, nanoseconds now, double duration_s, double tilt_deg = 0);
+  bool is_turning(nanoseconds now) const;
+
+  // Power. What is in RAM is lost: stream, staged page, kept reply, filter. A recording ends.
+  void cut_power(nanoseconds now);
+  void restore_power(nanoseconds now);
+
+  const sim::UnitTruth& truth() const { return options_.truth; }
+  PageMemory& memory() { return memory_; }
+  void set_battery_mv(std::uint16_t battery_mv) { options_.battery_mv = battery_mv; }
+  sim::FilterConfiguration recording_filter() const;
+  // What a recording holds, as it would be downloaded; for tests.
+  const std::vector<Bytes>& recordings() const { return images_; }
+
+ private:
+  struct Turn;
+  // The pose as a function of time: every turn so far.
+  class Hand;
+  struct Stream {
+    nanoseconds start;
+    int rate_hz;
+    std::unique_ptr<sim::Simulator> simulator;
+    std::uint16_t sequence = 0;
+  };
+  struct RecordingRun {
+    nanoseconds start;
+    int rate_hz;
+    UtcTime start_time;
+  };
+  struct Staged {
+    Bytes bytes;
+    std::uint16_t crc;
+  };
+  struct Download {
+    std::uint16_t id;
+    std::uint64_t offset;
+    std::uint64_t end;
+  };
+
+  device::Message answer(const device::Message& request, nanoseconds now);
+  device::ReplyCode start_stream(int rate_hz, nanoseconds now);
+  device::ReplyCode commit(std::uint16_t crc, Bytes& payload, nanoseconds now);
+  void finish_recording(nanoseconds now);
+  void load_page();
+  std::uint64_t device_time_us(nanoseconds at) const;
+  double seconds_on(nanoseconds at) const;
+  std::uint64_t flash_left() const;
+
+  VirtualUnitOptions options_;
+  PageMemory memory_;
+  nanoseconds power_on_;
+  bool powered_ = true;
+  std::shared_ptr<Hand> hand_;
+  sim::FilterConfiguration stream_filter_ = sim::FilterConfiguration::current;
+  std::optional<Stream> stream_;
+  std::optional<RecordingRun> recording_;
+  std::optional<Staged> staged_;
+  std::optional<Download> download_;
+  std::deque<device::Report> replies_;
+  std::optional<device::Message> last_request_;
+  device::Report last_reply_{};
+  std::vector<Bytes> images_;
+  std::vector<device::RecordingInfo> infos_;
+  UtcTime clock_set_to_ = from_unix_seconds(1'400'000'000);
+  nanoseconds clock_set_at_{0};
+  std::uint64_t runs_ = 0;  // of streams and recordings: each has its own noise
+};
+
+}  // namespace sixpoint::mocks
