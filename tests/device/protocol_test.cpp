@@ -153,7 +153,6 @@ TEST(Protocol, WellFormedNonsenseIsRefused) {
 
   SampleBlock block;
   block.counts.assign(2, RawCounts{});
-  for (const std::uint8_t count : std::initializer_list<std::uint8_t>{0, 1, 3, 7, 255}) {
   for (const unsigned count : {0U, 1U, 3U, 7U, 255U}) {
     Message message = encode_samples(block);
     message.payload[15] = static_cast<std::uint8_t>(count);
