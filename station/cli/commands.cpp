@@ -9,6 +9,7 @@ namespace sixpoint::cli {
 #define SIXPOINT_COMMANDS(COMMAND) \
   COMMAND(inspect)                 \
   COMMAND(scan)                    \
+  COMMAND(repair)                  \
   COMMAND(export)                  \
   COMMAND(units)                   \
   COMMAND(history)                 \
