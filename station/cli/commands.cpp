@@ -12,6 +12,7 @@ namespace sixpoint::cli {
   COMMAND(repair)                  \
   COMMAND(export)                  \
   COMMAND(compare)                 \
+  COMMAND(solve)                   \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
