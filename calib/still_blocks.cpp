@@ -103,8 +103,17 @@ void StillBlockFinder::push(double start_time_s, std::span<const StoredCounts> s
         out[i] = slice[i][a];
       }
     }
+    calib::tally(*reversal_, slice, tally_.plausibility);
     search();
   }
+}
+
+std::vector<StillBlock> StillBlockFinder::finish() {
+  break_run();
+  if (!tally_.plausibility.plausible()) {
+    use_affine_means(blocks_, *reversal_);
+  }
+  return blocks_;
 }
 
 void StillBlockFinder::break_run() {
@@ -248,6 +257,15 @@ void StillBlockFinder::keep(StillBlock block) {
     tally_.thinned *= 2;
   }
   blocks_.push_back(block);
+}
+
+void use_affine_means(std::span<StillBlock> blocks, const Reversal& reversal) {
+  for (StillBlock& block : blocks) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      block.mean_lsb[a] =
+          reversal.affine_raw_lsb(a, block.mean_g[a] * reversal.accel_scale_lsb_per_g());
+    }
+  }
 }
 
 }  // namespace sixpoint::calib

@@ -69,6 +69,7 @@ struct StillBlockTally {
   std::uint64_t rejected_zero = 0;     // windows that failed for all-zero (or strict) samples only
   std::uint64_t rejected_clipped = 0;  // still windows with a sample at the record's limit
   std::uint64_t thinned = 1;           // only every so many-th block is kept
+  PlausibilityTally plausibility;      // of all samples pushed
 };
 
 // One pass, memory bounded by a block and the blocks found. One object belongs to one thread.
@@ -86,6 +87,10 @@ class StillBlockFinder {
   void break_run();
   // Holds for the blocks that end after it, until the next call.
   void set_temperature(std::optional<double> celsius) { temperature_c_ = celsius; }
+
+  // The blocks, on the file's own evidence: recovered raw counts where its counts are plausible,
+  // the affine map where they are not. Ends the run.
+  std::vector<StillBlock> finish();
 
   // Valid at any time; complete after break_run().
   const std::vector<StillBlock>& blocks() const { return blocks_; }
@@ -119,5 +124,9 @@ class StillBlockFinder {
   StillBlockTally tally_;
   bool in_run_ = false;
 };
+
+// Replaces mean_lsb by the affine inverse of mean_g: for files whose counts cannot have come from
+// their constants (StillBlockTally::plausibility), where candidates would be invented.
+void use_affine_means(std::span<StillBlock> blocks, const Reversal& reversal);
 
 }  // namespace sixpoint::calib

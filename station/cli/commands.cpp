@@ -1,23 +1,30 @@
-// The list of commands. A new command is one file, one line here and one in CMakeLists.txt.
+// The list of commands. A new command is one file, one line in the list and one in CMakeLists.txt.
 #include "station/cli/command.h"
 
 namespace sixpoint::cli {
 
-// add_NAME is defined in NAME.cpp.
-void add_audit(CLI::App& app, Context& context);
-void add_history(CLI::App& app, Context& context);
-void add_scan(CLI::App& app, Context& context);
-void add_simulate(CLI::App& app, Context& context);
-void add_units(CLI::App& app, Context& context);
+// In the order in which --help lists them: looking at files, mending them, measuring units, the store,
+// the simulator. add_NAME is defined in NAME.cpp.
+// clang-format off
+#define SIXPOINT_COMMANDS(COMMAND) \
+  COMMAND(inspect)                 \
+  COMMAND(scan)                    \
+  COMMAND(repair)                  \
+  COMMAND(export)                  \
+  COMMAND(units)                   \
+  COMMAND(history)                 \
+  COMMAND(audit)                   \
+  COMMAND(simulate)
+// clang-format on
+
+#define SIXPOINT_DECLARE(name) void add_##name(CLI::App& app, Context& context);
+SIXPOINT_COMMANDS(SIXPOINT_DECLARE)
+#undef SIXPOINT_DECLARE
 
 const std::vector<CommandEntry>& commands() {
-  static const std::vector<CommandEntry> kCommands = {
-      {"scan", add_scan},
-      {"units", add_units},
-      {"history", add_history},
-      {"audit", add_audit},
-      {"simulate", add_simulate},
-  };
+#define SIXPOINT_ENTRY(name) {#name, add_##name},
+  static const std::vector<CommandEntry> kCommands = {SIXPOINT_COMMANDS(SIXPOINT_ENTRY)};
+#undef SIXPOINT_ENTRY
   return kCommands;
 }
 

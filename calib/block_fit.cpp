@@ -1,0 +1,570 @@
+#include "calib/block_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+#include <fmt/format.h>
+
+namespace sixpoint::calib {
+
+namespace {
+
+constexpr int kGrid = 16;                   // cells along a cube face: 90 / 16 = 5.6 degrees
+constexpr double kNeighbourCosine = 0.978;  // 12 degrees
+constexpr double kTemperatureBin_c = 1.0;
+
+int cell_key(const PerAxis<double>& mean_g, int temperature_bin) {
+  std::size_t face_axis = 0;
+  for (std::size_t a = 1; a < kAxes; ++a) {
+    if (std::abs(mean_g[a]) > std::abs(mean_g[face_axis])) {
+      face_axis = a;
+    }
+  }
+  const double length = mean_g[face_axis];
+  if (length == 0) {
+    return -1;
+  }
+  // Angles, not tangents, so that cells are alike in size.
+  const auto slot = [&](std::size_t axis) {
+    const double angle = std::atan(mean_g[axis] / std::abs(length)) / M_PI_2 + 0.5;
+    return std::clamp(static_cast<int>(angle * kGrid), 0, kGrid - 1);
+  };
+  const int face = static_cast<int>(face_axis) * 2 + (length < 0 ? 1 : 0);
+  const int cell = (face * kGrid + slot((face_axis + 1) % 3)) * kGrid + slot((face_axis + 2) % 3);
+  return temperature_bin * 6 * kGrid * kGrid + cell;
+}
+
+PerAxis<double> direction_of(const DirectionCell& cell, const Calibration& calibration) {
+  PerAxis<double> g = calibration.to_g(cell.mean_lsb);
+  const double length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  for (double& value : g) {
+    value /= length > 0 ? length : 1;
+  }
+  return g;
+}
+
+// Numbers the neighbourhoods, the fullest cell of each first. Returns how many there are.
+int number_neighbourhoods(std::vector<DirectionCell>& cells, const Calibration& calibration) {
+  std::vector<std::size_t> order(cells.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t left, std::size_t right) {
+    return cells[left].blocks > cells[right].blocks;
+  });
+  std::vector<PerAxis<double>> leaders;
+  for (const std::size_t i : order) {
+    const PerAxis<double> n = direction_of(cells[i], calibration);
+    int found = -1;
+    double best = kNeighbourCosine;
+    for (std::size_t k = 0; k < leaders.size(); ++k) {
+      const double cosine = n[0] * leaders[k][0] + n[1] * leaders[k][1] + n[2] * leaders[k][2];
+      if (cosine >= best) {
+        best = cosine;
+        found = static_cast<int>(k);
+      }
+    }
+    if (found < 0) {
+      found = static_cast<int>(leaders.size());
+      leaders.push_back(n);
+    }
+    cells[i].neighbourhood = found;
+  }
+  return static_cast<int>(leaders.size());
+}
+
+std::vector<double> neighbours_of(const std::vector<DirectionCell>& cells, int neighbourhoods) {
+  std::vector<double> size(static_cast<std::size_t>(neighbourhoods), 0);
+  for (const DirectionCell& cell : cells) {
+    size[static_cast<std::size_t>(cell.neighbourhood)] += 1;
+  }
+  std::vector<double> out;
+  out.reserve(cells.size());
+  for (const DirectionCell& cell : cells) {
+    out.push_back(size[static_cast<std::size_t>(cell.neighbourhood)]);
+  }
+  return out;
+}
+
+GravityPoint point_of(const DirectionCell& cell, double sigma_g) {
+  return {cell.mean_lsb, cell.variance_lsb2, sigma_g, cell.temperature_c};
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) {
+    return 0;
+  }
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// The structural variance at which the cells' weighted squares add up to their degrees of freedom.
+double paule_mandel(const std::vector<double>& residual_g, const std::vector<double>& white_g2,
+                    const std::vector<double>& neighbours, int parameters) {
+  const double freedom = static_cast<double>(residual_g.size()) - parameters;
+  if (freedom < 1) {
+    return 0;
+  }
+  const auto excess = [&](double structural_g2) {
+    double sum = 0;
+    for (std::size_t i = 0; i < residual_g.size(); ++i) {
+      sum += residual_g[i] * residual_g[i] / (white_g2[i] + structural_g2 * neighbours[i]);
+    }
+    return sum - freedom;
+  };
+  // Three standard deviations of chi-square: below that the scatter is noise.
+  if (excess(0) < 3 * std::sqrt(2 * freedom)) {
+    return 0;
+  }
+  double low = 0;
+  double high = 1e-8;
+  while (excess(high) > 0 && high < 1) {
+    high *= 4;
+  }
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (excess(middle) > 0 ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+struct HeldOut {
+  double rms_mg = 0;
+  int directions = 0;  // that could be predicted at all
+  bool valid() const { return directions > 0; }
+};
+
+// Standard deviation of the magnitude that a fit predicts at a point.
+double predicted_sd_g(const LeastSquaresFit& fit, const DirectionCell& cell) {
+  const PerAxis<double> g = fit.calibration.to_g(cell.mean_lsb);
+  const double length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  const std::array<double, 6> pull = {g[0] * g[0] / length, g[1] * g[1] / length,
+                                      g[2] * g[2] / length, -g[0] / length,
+                                      -g[1] / length,       -g[2] / length};
+  double variance = 0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) {
+      variance += pull[i] * pull[j] * fit.covariance_at(i, j);
+    }
+  }
+  return std::sqrt(std::max(0.0, variance));
+}
+
+// Folds of whole neighbourhoods: five, or one each where there are few.
+HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<double>& sigma_g,
+                 const LeastSquaresFit& fit, const BlockFitOptions& options, FitModel model,
+                 int directions) {
+  constexpr int kFew = 15;
+  constexpr double kPredictable_g = 0.005;
+  const int folds = directions <= kFew ? directions : 5;
+  double square = 0;
+  double weights = 0;
+  std::vector<char> tested(static_cast<std::size_t>(directions), 0);
+  for (int fold = 0; fold < folds; ++fold) {
+    std::vector<GravityPoint> kept;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i].neighbourhood % folds != fold) {
+        kept.push_back(point_of(cells[i], sigma_g[i]));
+      }
+    }
+    LeastSquaresOptions least;
+    least.model = model;
+    least.gravity_g = options.gravity_g;
+    least.prior = options.prior;
+    least.starts = 1;
+    least.max_iterations = 50;
+    const auto fold_fit = least_squares(kept, fit.calibration, least);
+    if (!fold_fit || !fold_fit->converged) {
+      continue;
+    }
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i].neighbourhood % folds != fold ||
+          !(predicted_sd_g(*fold_fit, cells[i]) < kPredictable_g)) {
+        continue;
+      }
+      const double residual =
+          magnitude_g(*fold_fit, point_of(cells[i], sigma_g[i])) - options.gravity_g;
+      const double weight = 1 / (sigma_g[i] * sigma_g[i]);
+      square += weight * residual * residual;
+      weights += weight;
+      tested[static_cast<std::size_t>(cells[i].neighbourhood)] = 1;
+    }
+  }
+  HeldOut out;
+  out.directions = static_cast<int>(std::count(tested.begin(), tested.end(), 1));
+  out.rms_mg = weights > 0 ? kMgPerG * std::sqrt(square / weights) : 0;
+  return out;
+}
+
+}  // namespace
+
+std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::span<const char> used,
+                                    std::vector<int>* cell_of_block) {
+  std::vector<DirectionCell> cells;
+  std::unordered_map<int, int> number;
+  if (cell_of_block != nullptr) {
+    cell_of_block->assign(blocks.size(), -1);
+  }
+  double reference_c = 0;
+  for (const StillBlock& block : blocks) {
+    if (block.temperature_c) {
+      reference_c = *block.temperature_c;
+      break;
+    }
+  }
+  std::vector<PerAxis<double>> square;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    if (!used.empty() && used[i] == 0) {
+      continue;
+    }
+    const StillBlock& block = blocks[i];
+    const double temperature = block.temperature_c ? *block.temperature_c - reference_c : 0;
+    const int bin = static_cast<int>(
+        std::clamp(std::floor(temperature / kTemperatureBin_c + 0.5), -200.0, 200.0));
+    const int key = cell_key(block.mean_g, bin + 200);
+    const auto [found, fresh] = number.try_emplace(key, static_cast<int>(cells.size()));
+    if (fresh) {
+      cells.emplace_back();
+      cells.back().first_s = block.start_time_s;
+      square.emplace_back();
+    }
+    const auto k = static_cast<std::size_t>(found->second);
+    DirectionCell& cell = cells[k];
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      cell.mean_lsb[a] += block.mean_lsb[a];
+      cell.variance_lsb2[a] += block.ramp_variance_lsb2[a];
+      square[k][a] += block.mean_lsb[a] * block.mean_lsb[a];
+    }
+    cell.temperature_c += temperature;
+    cell.blocks += 1;
+    cell.first_s = std::min(cell.first_s, block.start_time_s);
+    cell.last_s = std::max(cell.last_s, block.start_time_s);
+    if (cell_of_block != nullptr) {
+      (*cell_of_block)[i] = found->second;
+    }
+  }
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    DirectionCell& cell = cells[k];
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      cell.mean_lsb[a] /= cell.blocks;
+      cell.variance_lsb2[a] /= cell.blocks;
+      cell.variance_lsb2[a] +=
+          std::max(0.0, square[k][a] / cell.blocks - cell.mean_lsb[a] * cell.mean_lsb[a]);
+    }
+    cell.temperature_c /= cell.blocks;
+  }
+  return cells;
+}
+
+Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibration& start,
+                            const BlockFitOptions& options) {
+  if (blocks.empty()) {
+    return fail(ErrorCode::bad_data, "no still block", "least squares",
+                "lay the unit still on each of its six sides for a minute");
+  }
+  for (const StillBlock& block : blocks) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      if (!std::isfinite(block.mean_g[a]) || !std::isfinite(block.mean_lsb[a]) ||
+          !std::isfinite(block.ramp_variance_lsb2[a])) {
+        return fail(ErrorCode::bad_data, "a still block is not a finite number", "least squares",
+                    "the recording is damaged");
+      }
+    }
+  }
+  BlockFit out;
+  bool all_have_temperature = true;
+  double coldest = 1e9;
+  double warmest = -1e9;
+  for (const StillBlock& block : blocks) {
+    all_have_temperature = all_have_temperature && block.temperature_c.has_value() &&
+                           std::isfinite(*block.temperature_c);
+    if (all_have_temperature) {
+      coldest = std::min(coldest, *block.temperature_c);
+      warmest = std::max(warmest, *block.temperature_c);
+    }
+  }
+  out.temperature_range_c = all_have_temperature ? warmest - coldest : 0;
+  out.reference_temperature_c = blocks.front().temperature_c.value_or(0);
+
+  std::vector<char> used(blocks.size(), 1);
+  std::vector<int> cell_of_block;
+  LeastSquaresOptions least;
+  least.gravity_g = options.gravity_g;
+  least.prior = options.prior;
+  least.model = options.choose_model ? FitModel{} : options.model;
+  Calibration from = start;
+  std::vector<double> sigma_g;
+  double structural_g2 = 9e-6;  // to begin with: every direction nearly equal
+  double block_g2 = 1e-6;
+
+  const auto fit_once = [&]() -> Status {
+    std::vector<GravityPoint> points;
+    points.reserve(out.cells.size());
+    for (std::size_t k = 0; k < out.cells.size(); ++k) {
+      points.push_back(point_of(out.cells[k], sigma_g[k]));
+    }
+    SIXPOINT_ASSIGN(out.fit, least_squares(points, from, least));
+    from = out.fit.calibration;
+    return {};
+  };
+  const auto weigh = [&]() {
+    const auto neighbours = neighbours_of(out.cells, out.directions);
+    sigma_g.resize(out.cells.size());
+    for (std::size_t k = 0; k < out.cells.size(); ++k) {
+      sigma_g[k] =
+          std::sqrt(block_g2 / out.cells[k].blocks + structural_g2 * neighbours[k] + 1e-14);
+    }
+  };
+  const auto merge = [&]() {
+    out.cells = cells_of(blocks, used, &cell_of_block);
+    out.directions = number_neighbourhoods(out.cells, from);
+    weigh();
+  };
+
+  // Magnitude errors of all blocks, and what they say about scatter.
+  std::vector<double> error_g(blocks.size());
+  const auto look = [&]() {
+    std::vector<double> cell_sum(out.cells.size(), 0);
+    double noise = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const StillBlock& block = blocks[i];
+      const double temperature =
+          block.temperature_c ? *block.temperature_c - out.reference_temperature_c : 0;
+      error_g[i] =
+          magnitude_g(out.fit, {block.mean_lsb, block.ramp_variance_lsb2, 1, temperature}) -
+          options.gravity_g;
+      if (used[i] == 0) {
+        continue;
+      }
+      ++count;
+      cell_sum[static_cast<std::size_t>(cell_of_block[i])] += error_g[i];
+      double variance = 0;
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const double s = out.fit.calibration.sensitivity_g_per_lsb[a];
+        const double along = out.fit.calibration.to_g(a, block.mean_lsb[a]) * s * block.sd_lsb[a];
+        variance += along * along;
+      }
+      noise += variance / std::max(1, block.samples);
+    }
+    out.blocks_used = count;
+    noise /= static_cast<double>(std::max<std::size_t>(1, count));
+    double within = 0;
+    double square = 0;
+    double absolute = 0;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (used[i] == 0) {
+        continue;
+      }
+      const auto k = static_cast<std::size_t>(cell_of_block[i]);
+      const double off = error_g[i] - cell_sum[k] / out.cells[k].blocks;
+      within += off * off;
+      square += error_g[i] * error_g[i];
+      absolute += std::abs(error_g[i]);
+    }
+    const double freedom = static_cast<double>(count) - static_cast<double>(out.cells.size());
+    const double pooled = freedom > 0 ? within / freedom : 0;
+    // Few repeats say little about scatter; then it is at least what the samples' noise makes.
+    block_g2 = std::max(freedom >= 20 ? pooled : std::max(pooled, noise), 1e-14);
+    out.block_sd_mg = kMgPerG * std::sqrt(block_g2);
+    out.noise_sd_mg = kMgPerG * std::sqrt(noise);
+    out.rms_mg = kMgPerG * std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count)));
+    out.mean_error_mg = kMgPerG * absolute / static_cast<double>(std::max<std::size_t>(1, count));
+  };
+  std::vector<double> residual_g;
+  const auto look_at_cells = [&]() {
+    const auto neighbours = neighbours_of(out.cells, out.directions);
+    residual_g.clear();
+    std::vector<double> white_g2;
+    for (const DirectionCell& cell : out.cells) {
+      residual_g.push_back(magnitude_g(out.fit, point_of(cell, 1)) - options.gravity_g);
+      white_g2.push_back(block_g2 / cell.blocks + 1e-14);
+    }
+    out.redundancy = out.directions - least.model.parameters();
+    const double found = paule_mandel(residual_g, white_g2, neighbours, least.model.parameters());
+    const double assumed = std::pow(options.assumed_structural_mg / kMgPerG, 2);
+    const double freedom = std::max(0, out.redundancy);
+    constexpr double kAssumedFreedom = 2;
+    structural_g2 = out.redundancy >= 30 ? found
+                                         : (freedom * found + kAssumedFreedom * assumed) /
+                                               (freedom + kAssumedFreedom);
+    out.structural_mg = kMgPerG * std::sqrt(structural_g2);
+  };
+
+  merge();
+  if (out.cells.size() < static_cast<std::size_t>(least.model.parameters()) && !options.prior) {
+    return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
+                "least squares", "lay the unit still on each of its six sides for a minute");
+  }
+  SIXPOINT_CHECK(fit_once());
+  least.starts = 1;
+  double outlier_limit_g = 0;
+  for (int round = 0; round < 6; ++round) {
+    look();
+    look_at_cells();
+    std::vector<double> sizes;
+    for (const double residual : residual_g) {
+      sizes.push_back(std::abs(residual));
+    }
+    outlier_limit_g = std::max(options.outlier_g, 6 * 1.4826 * median(sizes));
+    bool changed = false;
+    std::size_t left_out = 0;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const char keep = std::abs(error_g[i]) <= outlier_limit_g ? 1 : 0;
+      changed = changed || keep != used[i];
+      used[i] = keep;
+      left_out += keep == 0 ? 1 : 0;
+    }
+    if (left_out * 2 > blocks.size()) {
+      // The fit describes less than half of the data: there is no majority to keep to.
+      std::fill(used.begin(), used.end(), 1);
+      changed = true;
+    }
+    const Calibration before = from;
+    if (changed) {
+      merge();
+    } else {
+      weigh();
+    }
+    if (out.cells.size() < static_cast<std::size_t>(least.model.parameters()) && !options.prior) {
+      return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
+                  "least squares", "lay the unit still on each of its six sides for a minute");
+    }
+    SIXPOINT_CHECK(fit_once());
+    if (!changed && round > 0 && difference_over_sphere(before, from).worst_mg < 1e-3) {
+      break;
+    }
+  }
+
+  out.six_parameters = out.fit.calibration;
+  if (options.choose_model) {
+    HeldOut best = hold_out(out.cells, sigma_g, out.fit, options, least.model, out.directions);
+    const FitModel base = least.model;
+    for (const FitModel candidate :
+         {FitModel{true, false}, FitModel{false, true}, FitModel{true, true}}) {
+      if (candidate.temperature && !(out.temperature_range_c >= 5)) {
+        continue;
+      }
+      // Cross-axis terms show between the axes: they need directions well away from them.
+      if (!best.valid() || out.directions < candidate.parameters() + 6) {
+        continue;
+      }
+      const HeldOut held =
+          hold_out(out.cells, sigma_g, out.fit, options, candidate, out.directions);
+      if (held.directions >= best.directions * 3 / 4 &&
+          held.rms_mg < options.model_gain * best.rms_mg) {
+        best = held;
+        least.model = candidate;
+      }
+    }
+    if (!(least.model == base)) {
+      for (int round = 0; round < 3; ++round) {
+        SIXPOINT_CHECK(fit_once());
+        look();
+        look_at_cells();
+        weigh();
+      }
+      SIXPOINT_CHECK(fit_once());
+    }
+  }
+  look();
+  look_at_cells();
+  const HeldOut held = hold_out(out.cells, sigma_g, out.fit, options, least.model, out.directions);
+  if (held.valid()) {
+    out.held_out_rms_mg = held.rms_mg;
+    out.held_out_directions = held.directions;
+  }
+  for (std::size_t k = 0; k < out.cells.size(); ++k) {
+    out.cell_residual_mg.push_back(kMgPerG * residual_g[k]);
+    out.cell_sigma_mg.push_back(kMgPerG * sigma_g[k]);
+  }
+  out.blocks_left_out = blocks.size() - out.blocks_used;
+  if (out.blocks_left_out > 0) {
+    out.left_out_reason = fmt::format(
+        "{} of {} still blocks were left out: more than {:.0f} mg from the magnitude "
+        "that all others agree on",
+        out.blocks_left_out, blocks.size(), kMgPerG * outlier_limit_g);
+  }
+  return out;
+}
+
+Result<StoredConstants> round_constants(const Calibration& calibration,
+                                        std::span<const DirectionCell> cells,
+                                        std::span<const double> sigma_mg, double gravity_g) {
+  SIXPOINT_ASSIGN(const StoredConstants nearest, nearest_stored(calibration));
+  PerAxis<int> span_low{};
+  PerAxis<int> zero_low{};
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    span_low[a] = static_cast<int>(std::floor(2 / calibration.sensitivity_g_per_lsb[a]));
+    zero_low[a] = static_cast<int>(std::floor(calibration.zero_lsb[a]));
+  }
+  // Squares of every cell, axis and choice once; the 16^3 combinations are then sums. Per axis:
+  // floor and floor + 1 of both numbers, and one further on either side.
+  constexpr std::size_t kChoices = 16;
+  PerAxis<std::vector<double>> squares;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    squares[a].resize(cells.size() * kChoices);
+    for (std::size_t c = 0; c < kChoices; ++c) {
+      const double s = 2.0 / std::max(1, span_low[a] - 1 + static_cast<int>(c / 4));
+      const double zero = zero_low[a] - 1 + static_cast<int>(c % 4);
+      for (std::size_t k = 0; k < cells.size(); ++k) {
+        const double level = s * (cells[k].mean_lsb[a] - zero);
+        squares[a][k * kChoices + c] = level * level + s * s * cells[k].variance_lsb2[a];
+      }
+    }
+  }
+  std::vector<double> weight;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    const double sigma = k < sigma_mg.size() && sigma_mg[k] > 0 ? sigma_mg[k] : 1;
+    weight.push_back(1 / (sigma * sigma));
+  }
+  double best = HUGE_VAL;
+  PerAxis<std::size_t> chosen = {5, 5, 5};
+  const auto try_choice = [&](std::size_t x, std::size_t y, std::size_t z) {
+    double cost = 0;
+    for (std::size_t k = 0; k < cells.size() && cost < best; ++k) {
+      const double residual =
+          std::sqrt(squares[0][k * kChoices + x] + squares[1][k * kChoices + y] +
+                    squares[2][k * kChoices + z]) -
+          gravity_g;
+      cost += weight[k] * residual * residual;
+    }
+    if (cost < best) {
+      best = cost;
+      chosen = {x, y, z};
+    }
+  };
+  for (std::size_t x = 0; x < kChoices; ++x) {
+    for (std::size_t y = 0; y < kChoices; ++y) {
+      for (std::size_t z = 0; z < kChoices; ++z) {
+        try_choice(x, y, z);
+      }
+    }
+  }
+  StoredConstants out = nearest;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const int span = span_low[a] - 1 + static_cast<int>(chosen[a] / 4);
+    out.zero_lsb[a] = zero_low[a] - 1 + static_cast<int>(chosen[a] % 4);
+    out.positive_lsb[a] = out.negative_lsb[a] + span;
+  }
+  SIXPOINT_CHECK(validate(out));
+  return out;
+}
+
+double cells_rms_mg(std::span<const DirectionCell> cells, const Calibration& calibration,
+                    double gravity_g) {
+  std::unordered_map<int, double> members;
+  for (const DirectionCell& cell : cells) {
+    members[cell.neighbourhood] += 1;
+  }
+  double square = 0;
+  for (const DirectionCell& cell : cells) {
+    const double residual = magnitude_g(calibration, cell.mean_lsb, cell.variance_lsb2) - gravity_g;
+    square += residual * residual / members[cell.neighbourhood];
+  }
+  return members.empty() ? 0 : kMgPerG * std::sqrt(square / static_cast<double>(members.size()));
+}
+
+}  // namespace sixpoint::calib

@@ -1,0 +1,371 @@
+#include "calib/solve.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+namespace sixpoint::calib {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Blocks by the paper's letter where they do; with the noisy ones besides where the paper's
+// residual limit leaves a side with too few.
+std::vector<StillBlock> choose_blocks(std::span<const StillBlock> blocks, SolveReport& report) {
+  constexpr int kEnoughPerSide = 5;
+  std::vector<StillBlock> paper;
+  for (const StillBlock& block : blocks) {
+    if (!block.noisy) {
+      paper.push_back(block);
+    }
+  }
+  std::array<int, 6> count{};
+  for (const StillBlock& block : paper) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      count[2 * a] += block.mean_g[a] > kCoverageLimit_g ? 1 : 0;
+      count[2 * a + 1] += block.mean_g[a] < -kCoverageLimit_g ? 1 : 0;
+    }
+  }
+  if (*std::min_element(count.begin(), count.end()) >= kEnoughPerSide ||
+      paper.size() == blocks.size()) {
+    return paper;
+  }
+  report.noisy_points = blocks.size() - paper.size();
+  report.notes.push_back(
+      fmt::format("{} of {} still blocks exceed the paper's residual limit of 0.015 g by sensor "
+                  "noise alone and "
+                  "are used because the others do not suffice",
+                  report.noisy_points, blocks.size()));
+  return {blocks.begin(), blocks.end()};
+}
+
+PartialKnowledge know_partially(std::span<const StillBlock> blocks,
+                                const Calibration& file_constants, const SolveOptions& options) {
+  PartialKnowledge out;
+  BlockFitOptions fit_options;
+  fit_options.gravity_g = options.gravity_g;
+  fit_options.choose_model = false;
+  // As wide as the verification's range of a real sensor.
+  fit_options.prior = CalibrationPrior{file_constants, {0.15, 0.15, 0.15}, {0.2, 0.2, 0.2}};
+  out.zero_mg.fill(kMgPerG * 0.2);
+  out.sensitivity_relative.fill(0.15);
+  if (const auto fit = fit_blocks(blocks, file_constants, fit_options)) {
+    const ConstantsUncertainty uncertainty = fit->fit.standard_uncertainty();
+    out.zero_mg = uncertainty.zero_mg;
+    out.sensitivity_relative = uncertainty.sensitivity_relative;
+  }
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    out.zero_determined[a] = out.zero_mg[a] < 5;
+    out.sensitivity_determined[a] = out.sensitivity_relative[a] < 0.005;
+  }
+  return out;
+}
+
+Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOptions& options) {
+  report.statistical = fit.fit.standard_uncertainty();
+  if (options.method == SolveMethod::genetic && report.search) {
+    // Its members wander about the answer; least squares' covariance knows nothing of that.
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      report.statistical.zero_mg[a] =
+          std::hypot(report.statistical.zero_mg[a], report.search->wander_mg);
+      report.statistical.sensitivity_relative[a] = std::hypot(
+          report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
+    }
+  }
+  report.uncertainty = report.statistical;
+  for (double& relative : report.uncertainty.sensitivity_relative) {
+    relative = std::hypot(relative, options.gravity_sd_g / options.gravity_g);
+  }
+  report.residual_after_mg = cells_rms_mg(fit.cells, *report.calibration, options.gravity_g);
+  auto rounded =
+      round_constants(*report.calibration, fit.cells, fit.cell_sigma_mg, options.gravity_g);
+  if (rounded) {
+    report.stored = *rounded;
+    SIXPOINT_ASSIGN(const Calibration applied, calibration_from(*rounded));
+    report.residual_rounded_mg = cells_rms_mg(fit.cells, applied, options.gravity_g);
+  } else {
+    report.notes.push_back("the constants do not fit into a unit's memory: " +
+                           rounded.error().what);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string_view to_string(SolveMethod method) {
+  return method == SolveMethod::genetic ? "ga" : "ls";
+}
+
+Result<SolveMethod> parse_solve_method(std::string_view text) {
+  if (text == "ls") {
+    return SolveMethod::least_squares;
+  }
+  if (text == "ga") {
+    return SolveMethod::genetic;
+  }
+  return fail(ErrorCode::usage, fmt::format("unknown method '{}'", text), "", "use 'ls' or 'ga'");
+}
+
+Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
+                                            const Calibration& file_constants,
+                                            const SolveOptions& options) {
+  SIXPOINT_CHECK(validate(file_constants));
+  if (!(options.gravity_g > 0.99 && options.gravity_g < 1.01) || !(options.gravity_sd_g >= 0)) {
+    return fail(ErrorCode::usage,
+                fmt::format("{} g is no gravity of this planet's surface", options.gravity_g),
+                "solve", "give local gravity in m/s2, or latitude and altitude");
+  }
+  for (const StillBlock& block : blocks) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      if (!std::isfinite(block.mean_g[a]) || !std::isfinite(block.mean_lsb[a]) ||
+          !std::isfinite(block.sd_lsb[a]) || !std::isfinite(block.ramp_variance_lsb2[a])) {
+        return fail(ErrorCode::bad_data, "a still block is not a finite number", "solve",
+                    "the recording is damaged");
+      }
+    }
+  }
+  SolveReport report;
+  report.method = options.method;
+  report.gravity_g = options.gravity_g;
+  report.points_found = blocks.size();
+  const std::vector<StillBlock> chosen = choose_blocks(blocks, report);
+  report.points = chosen.size();
+  report.coverage = coverage_of(chosen);
+  report.verification.missing_directions = report.coverage.missing_directions();
+
+  if (chosen.empty()) {
+    report.verification.verdict = Verdict::incomplete;
+    report.verification.reasons.emplace_back(
+        "no still block of 4 s was found; lay the unit on each of its six sides for a minute");
+    return report;
+  }
+  BlockFitOptions fit_options;
+  fit_options.gravity_g = options.gravity_g;
+  const auto cells = cells_of(chosen);
+  report.residual_before_mg = cells_rms_mg(cells, file_constants, options.gravity_g);
+
+  if (!report.coverage.complete()) {
+    report.verification.verdict = Verdict::incomplete;
+    report.verification.reasons.push_back(
+        fmt::format("no still block reaches beyond 0.3 g towards {}",
+                    fmt::join(report.verification.missing_directions, ", ")));
+    report.partial = know_partially(chosen, file_constants, options);
+    if (options.prior) {
+      fit_options.prior = options.prior;
+      fit_options.choose_model = false;
+      auto fit = fit_blocks(chosen, options.prior->mean, fit_options);
+      if (!fit) {
+        return fail(fit.error());
+      }
+      report.fit = std::move(*fit);
+      report.calibration = report.fit->fit.calibration;
+      report.iterations = report.fit->fit.iterations;
+      report.from_prior = true;
+      report.verification.verdict = Verdict::rests_on_prior;
+      report.verification.reasons.emplace_back(
+          "the constants rest on a population prior where the data are silent");
+      SIXPOINT_CHECK(finish_constants(report, *report.fit, options));
+    }
+    return report;
+  }
+
+  auto fit = fit_blocks(chosen, file_constants, fit_options);
+  if (!fit) {
+    // Directions that pass the 0.3 g rule and are still fewer than six: not a damaged file.
+    report.verification.verdict = Verdict::not_verified;
+    report.verification.reasons.push_back(fit.error().what + "; " + fit.error().hint);
+    report.partial = know_partially(chosen, file_constants, options);
+    return report;
+  }
+  report.fit = std::move(*fit);
+  // Its rounded means are a check on each other: the same minimum by another way.
+  GeneticOptions genetic_options;
+  genetic_options.seed = options.seed;
+  genetic_options.gravity_g = options.gravity_g;
+  SIXPOINT_ASSIGN(report.search, genetic(chosen, file_constants, genetic_options));
+  report.calibration = options.method == SolveMethod::genetic ? report.search->calibration
+                                                              : report.fit->fit.calibration;
+  report.iterations = options.method == SolveMethod::genetic
+                          ? static_cast<int>(report.search->fitness_mg.size())
+                          : report.fit->fit.iterations;
+  SIXPOINT_CHECK(finish_constants(report, *report.fit, options));
+  report.residual_before_mg = cells_rms_mg(report.fit->cells, file_constants, options.gravity_g);
+  report.verification = verify(chosen, file_constants, *report.calibration, *report.fit,
+                               report.search, fit_options, options.limits);
+  if (options.method == SolveMethod::genetic && !report.search->settled) {
+    if (report.verification.verified) {
+      report.verification.reasons.clear();
+    }
+    report.verification.verified = false;
+    report.verification.verdict = Verdict::not_verified;
+    report.verification.reasons.insert(report.verification.reasons.end(),
+                                       report.search->reasons.begin(),
+                                       report.search->reasons.end());
+  }
+  if (!(report.fit->fit.worst_direction_mg() <= options.limits.worst_direction_mg)) {
+    report.partial = know_partially(chosen, file_constants, options);
+  }
+  if (!report.fit->left_out_reason.empty()) {
+    report.notes.push_back(report.fit->left_out_reason);
+  }
+  if (report.fit->fit.model.cross_axis) {
+    const auto& c = report.fit->fit.cross_axis;
+    report.notes.push_back(fmt::format(
+        "the data show cross-axis terms of {:+.2f} % (xy) {:+.2f} % (xz) {:+.2f} % (yz), which six "
+        "constants cannot correct",
+        100 * c[0], 100 * c[1], 100 * c[2]));
+  }
+  if (report.fit->temperature_range_c >= 10 && !report.fit->fit.model.temperature) {
+    report.notes.push_back(
+        fmt::format("the temperature changed by {:.0f} C; the constants hold for its mean",
+                    report.fit->temperature_range_c));
+  }
+  if (report.residual_rounded_mg && *report.residual_rounded_mg > options.limits.applied_mg &&
+      report.verification.verified) {
+    report.notes.emplace_back(
+        "rounded to a unit's nine integers the constants are not good enough");
+    report.stored.reset();
+  }
+  return report;
+}
+
+std::string SolveReport::brief() const {
+  std::string line = fmt::format("{} still blocks: {}", points, verification.brief());
+  if (calibration && residual_after_mg) {
+    line +=
+        fmt::format("; {:.1f} mg before, {:.1f} mg after", residual_before_mg, *residual_after_mg);
+  }
+  return line;
+}
+
+Json to_json(const SolveReport& report) {
+  const auto maybe = [](const std::optional<double>& value) {
+    return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
+  };
+  Json json;
+  json["serial"] = report.serial;
+  json["filter"] = report.filter ? Json(to_string(*report.filter)) : Json(nullptr);
+  json["method"] = to_string(report.method);
+  if (report.calibration && report.stored) {
+    json["constants"] = to_json(*report.calibration, *report.stored);
+  } else if (report.calibration) {
+    json["constants"]["sensitivity_g_per_lsb"] = report.calibration->sensitivity_g_per_lsb;
+    json["constants"]["zero_lsb"] = report.calibration->zero_lsb;
+  } else {
+    json["constants"] = nullptr;
+  }
+  if (report.calibration) {
+    json["standard_uncertainty"] = to_json(report.uncertainty);
+    json["standard_uncertainty"]["of_the_data_alone"] = to_json(report.statistical);
+  } else {
+    json["standard_uncertainty"] = nullptr;
+  }
+  json["points"] = report.points;
+  json["points_found"] = report.points_found;
+  json["noisy_points"] = report.noisy_points;
+  if (report.points > 0) {
+    json["coverage_g"]["min"] = report.coverage.min_g;
+    json["coverage_g"]["max"] = report.coverage.max_g;
+  } else {
+    json["coverage_g"]["min"] = nullptr;
+    json["coverage_g"]["max"] = nullptr;
+  }
+  json["residual_mg"]["before"] =
+      report.points > 0 ? Json(report.residual_before_mg) : Json(nullptr);
+  json["residual_mg"]["after"] = maybe(report.residual_after_mg);
+  json["residual_mg"]["rounded"] = maybe(report.residual_rounded_mg);
+  json["verified"] = report.verification.verified;
+  json["verdict"] = to_string(report.verification.verdict);
+  json["reasons"] = report.verification.reasons;
+  json["missing_directions"] = report.verification.missing_directions;
+  json["notes"] = report.notes;
+  json["iterations"] = report.iterations;
+  json["seconds"] = report.seconds;
+  json["gravity_m_per_s2"] = report.gravity_g * kStandardGravity_m_per_s2;
+  json["from_prior"] = report.from_prior;
+  json["verification"] = to_json(report.verification);
+  if (report.fit) {
+    const BlockFit& fit = *report.fit;
+    Json& least = json["least_squares"];
+    least["converged"] = fit.fit.converged;
+    least["condition"] = fit.fit.condition;
+    least["degrees_of_freedom"] = fit.fit.degrees_of_freedom;
+    least["blocks_left_out"] = fit.blocks_left_out;
+    least["block_sd_mg"] = fit.block_sd_mg;
+    least["structural_mg"] = fit.structural_mg;
+    least["cross_axis"] = fit.fit.model.cross_axis ? Json(fit.fit.cross_axis) : Json(nullptr);
+    least["zero_lsb_per_c"] =
+        fit.fit.model.temperature ? Json(fit.fit.zero_lsb_per_c) : Json(nullptr);
+  }
+  if (report.search) {
+    Json& search = json["genetic"];
+    search["settled"] = report.search->settled;
+    search["fitness_mg"] = report.search->fitness_mg;
+    search["level_mg"] = report.search->level_mg;
+    search["spread_mg"] = report.search->spread_mg;
+    search["trend_mg"] = report.search->trend_mg;
+    search["constants"]["sensitivity_g_per_lsb"] = report.search->calibration.sensitivity_g_per_lsb;
+    search["constants"]["zero_lsb"] = report.search->calibration.zero_lsb;
+  }
+  if (report.partial) {
+    Json& partial = json["partial"];
+    partial["zero_mg"] = report.partial->zero_mg;
+    partial["sensitivity_relative"] = report.partial->sensitivity_relative;
+    partial["zero_determined"] = report.partial->zero_determined;
+    partial["sensitivity_determined"] = report.partial->sensitivity_determined;
+  }
+  return json;
+}
+
+Result<ConstantsRecord> record_of(const SolveReport& report, UtcTime made_at,
+                                  ConstantsOrigin made_from) {
+  if (!report.calibration || !report.stored) {
+    return fail(ErrorCode::bad_data, "the data did not determine constants", report.serial,
+                "see missing_directions and reasons of 'sixpoint solve'");
+  }
+  if (report.serial.empty() || !report.filter) {
+    return fail(ErrorCode::bad_data, "the recording names no serial number or filter configuration",
+                report.serial, "constants belong to both and cannot be kept without");
+  }
+  ConstantsRecord record;
+  record.serial = report.serial;
+  record.filter = *report.filter;
+  record.calibration = *report.calibration;
+  record.stored = *report.stored;
+  record.uncertainty = report.uncertainty;
+  record.method = to_string(report.method);
+  record.made_at = made_at;
+  record.made_from = std::move(made_from);
+  record.gravity_m_per_s2 = report.gravity_g * kStandardGravity_m_per_s2;
+  record.from_prior = report.from_prior;
+  return record;
+}
+
+Result<CalibrationPrior> population_prior(std::string_view serial, FilterConfiguration filter) {
+  if (!serial.starts_with("MOS") && !serial.starts_with("TAS")) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("nothing is known about the constants of units like '{}'", serial),
+                "population prior", "record a calibration file of the six sides");
+  }
+  CalibrationPrior prior;
+  // current: MOS2E39180594, TAS1E31150129, TAS1H30182785; legacy: MOS2A45130450 and
+  // MOS2A45130451. Means of (positive - negative) / 2 and of zero.
+  const PerAxis<double> half = filter == FilterConfiguration::current
+                                   ? PerAxis<double>{233.3, 247.5, 229.5}
+                                   : PerAxis<double>{263.3, 275.8, 247.3};
+  prior.mean.zero_lsb = filter == FilterConfiguration::current ? PerAxis<double>{71.3, 42.7, 77.3}
+                                                               : PerAxis<double>{58.5, 7.0, 52.0};
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    prior.mean.sensitivity_g_per_lsb[a] = 1 / half[a];
+    prior.sensitivity_relative_sd[a] = 0.05;
+    prior.zero_g_sd[a] = 15 / half[a];
+  }
+  return prior;
+}
+
+}  // namespace sixpoint::calib

@@ -1,0 +1,93 @@
+// The verdict on constants: may they be used, and on what evidence.
+//
+// Constants that were fitted to still blocks make those blocks read 1 g; that alone proves nothing.
+// Six directions determine six constants exactly, so a six-sided calibration file has no residual
+// to speak of, right or wrong. What can be tested depends on the data:
+//  - With directions to spare, every direction is predicted by a fit that has not seen it. That
+//    tests the constants, and passing it gives `verified`.
+//  - With six sides alone, what remains is: repeatability (several blocks per side, the earlier
+//    half and the later half give the same constants), noise (a side that was not gravity alone,
+//    in a car, on a running machine, scatters), and whether the constants are those of a real
+//    sensor. Each still side is by itself a valid equation whatever its exact angle, so this is
+//    enough to use them, but it is said: `verified_by_repeatability`.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "calib/block_fit.h"
+#include "calib/coverage.h"
+#include "calib/genetic.h"
+
+namespace sixpoint::calib {
+
+enum class Verdict {
+  verified,                   // held-out directions agree
+  verified_by_repeatability,  // six directions only: repeatable and plausible, not contradicted
+  incomplete,                 // directions are missing (missing_directions)
+  not_verified,               // the data contradict the constants, or cannot support them
+  rests_on_prior,             // computed with a population prior; never verified
+};
+std::string_view to_string(Verdict verdict);
+
+// Where "good enough" comes from.
+struct VerificationLimits {
+  // Held-out directions, RMS. A real unit's six-parameter fit leaves 3.9 mg (GGIR's free-living
+  // sample, a GT9X) and a real wGT3X-BT with 2.8 % of cross-axis 4 mg after the cross-axis terms;
+  // twice that is a defect of the data. An affected file is off by 100 mg and more.
+  double held_out_mg = 8.0;
+  // What a still unit reads with the six constants alone, which is all that a file's repair and a
+  // unit's memory can apply: RMS over directions. The same wGT3X-BT leaves 8.5 mg.
+  double applied_mg = 16.0;
+  // Standard uncertainty of the magnitude in the worst direction. The demo's promise is 5 mg.
+  double worst_direction_mg = 5.0;
+  // Scatter of blocks in one direction. Noise of 5 mg per sample makes 0.5 mg; 20 C at the
+  // ADXL362's 0.5 mg/C make up to 5.
+  double repeatability_mg = 6.0;
+  // Six directions only: earlier and later half, RMS over the sphere.
+  double halves_mg = 2.0;
+  int blocks_per_side = 3;  // so that a half of a side still holds a block
+  // Least squares and genetic algorithm, RMS over the sphere: this or twice their combined
+  // uncertainty.
+  double agreement_mg = 2.0;
+  double left_out_share = 0.2;  // of the blocks
+  int held_out_directions = 3;  // fewer tested directions are no test
+  // A real sensor against its stored constants: the filter mismatch and 10 % each.
+  double gain_low = 0.72;
+  double gain_high = 1.38;
+  double zero_change_g = 0.5;
+};
+
+struct Verification {
+  bool verified = false;
+  Verdict verdict = Verdict::not_verified;
+  std::vector<std::string> reasons;  // why not; and for the weaker verdicts what they rest on
+  std::vector<std::string> missing_directions;
+  std::optional<double> held_out_rms_mg;
+  int held_out_directions = 0;
+  int directions = 0;
+  int redundancy = 0;
+  double applied_rms_mg = 0;
+  double repeatability_mg = 0;
+  std::optional<double> halves_mg;
+  double worst_direction_mg = 0;
+  std::optional<double> agreement_mg;
+  double agreement_limit_mg = 0;
+
+  std::string brief() const;
+  bool usable() const { return verified; }
+};
+nlohmann::ordered_json to_json(const Verification& verification);
+
+// `used` are the blocks that the fit was given, `chosen` the constants under judgement, `search`
+// the genetic algorithm's answer where it was run.
+Verification verify(std::span<const StillBlock> used, const Calibration& file_constants,
+                    const Calibration& chosen, const BlockFit& fit,
+                    const std::optional<GeneticResult>& search, const BlockFitOptions& options,
+                    const VerificationLimits& limits);
+
+}  // namespace sixpoint::calib

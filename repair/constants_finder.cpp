@@ -1,0 +1,156 @@
+#include "repair/constants_finder.h"
+
+#include <fmt/format.h>
+
+namespace sixpoint::repair {
+namespace {
+
+using calib::FilterConfiguration;
+
+std::string joined(const std::vector<std::string>& parts) {
+  return fmt::format("{}", fmt::join(parts, "; "));
+}
+
+// Why a report has no verified constants, in one sentence.
+std::string refusal_of(const calib::SolveReport& report) {
+  std::string text = joined(report.verification.reasons);
+  const auto missing = report.coverage.missing_directions();
+  if (!missing.empty()) {
+    text += fmt::format("{}no still period on the sides {}", text.empty() ? "" : "; ",
+                        fmt::join(missing, " "));
+  }
+  return text;
+}
+
+}  // namespace
+
+Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,
+                                        const calib::SolveOptions& options) {
+  if (survey.already_repaired) {
+    return fail(
+        ErrorCode::bad_data,
+        "the recording was mended already; its counts no longer come from the unit's constants",
+        path, "use the original recording");
+  }
+  if (survey.constants_problem.has_value()) {
+    return fail(*survey.constants_problem);
+  }
+  SIXPOINT_ASSIGN(const auto file_constants, calib::calibration_from(survey.constants.front()));
+  SIXPOINT_ASSIGN(auto report,
+                  calib::solve_from_still_blocks(survey.blocks, file_constants, options));
+  report.serial = survey.facts.serial;
+  report.filter = filter_in_force(survey.facts);
+  return report;
+}
+
+ConstantsFinder::ConstantsFinder(Env& env, ConstantsFinderOptions options)
+    : env_(env), options_(std::move(options)) {}
+
+Status ConstantsFinder::ask_store(const Survey& survey, ConstantsChoice& choice) {
+  const std::lock_guard lock(mutex_);
+  SIXPOINT_ASSIGN(
+      const auto found,
+      options_.store->constants_for(survey.facts.serial,
+                                    std::string(calib::to_string(FilterConfiguration::current))));
+  if (!found.has_value()) {
+    choice.reasons.push_back(fmt::format(
+        "the store holds no constants of {} under the current configuration", survey.facts.serial));
+    return {};
+  }
+  SIXPOINT_ASSIGN(auto record, calib::parse_constants_record(found->document));
+  choice.chosen = ChosenConstants{std::move(record), "store", found->id};
+  return {};
+}
+
+ConstantsFinder::CalibrationFile ConstantsFinder::read_calibration_file(const std::string& path) {
+  CalibrationFile result;
+  const auto surveyed = survey(env_.files, path, options_.still);
+  if (!surveyed) {
+    result.refusal = surveyed.error().brief();
+    return result;
+  }
+  result.serial = surveyed->facts.serial;
+  const auto filter = filter_in_force(surveyed->facts);
+  if (filter != FilterConfiguration::current) {
+    result.refusal =
+        filter.has_value()
+            ? fmt::format(
+                  "it was recorded under the legacy configuration (firmware {} chose it): "
+                  "record one with firmware 1.4.0 to 1.7.0, or put the unit on the jig",
+                  printable(surveyed->facts.firmware, 40))
+            : "it cannot be told under which filter configuration it was recorded";
+    return result;
+  }
+  const auto report = solve_survey(path, *surveyed, options_.solve);
+  if (!report) {
+    result.refusal = report.error().brief();
+    return result;
+  }
+  if (!report->usable()) {
+    result.refusal = refusal_of(*report);
+    return result;
+  }
+  calib::ConstantsOrigin origin;
+  origin.file = path;
+  auto record = calib::record_of(*report, env_.clock.now(), origin);
+  if (!record) {
+    result.refusal = record.error().brief();
+    return result;
+  }
+  result.record = *std::move(record);
+  return result;
+}
+
+void ConstantsFinder::ask_calibration_file(const Survey& survey, ConstantsChoice& choice) {
+  const std::lock_guard lock(mutex_);
+  if (!calibration_file_.has_value()) {
+    calibration_file_ = read_calibration_file(*options_.calibration_file);
+  }
+  const CalibrationFile& file = *calibration_file_;
+  if (!file.serial.empty() && file.serial != survey.facts.serial) {
+    choice.reasons.push_back(fmt::format("the calibration file was made by unit {}, not by {}",
+                                         printable(file.serial, 60),
+                                         printable(survey.facts.serial, 60)));
+  } else if (file.record.has_value()) {
+    choice.chosen = ChosenConstants{*file.record, "calibration_file", ""};
+  } else {
+    choice.reasons.push_back("the calibration file cannot be used: " + file.refusal);
+  }
+}
+
+Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
+                                 ConstantsChoice& choice) {
+  SIXPOINT_ASSIGN(const auto report, solve_survey(path, survey, options_.solve));
+  if (!report.usable()) {
+    choice.reasons.push_back("its own still periods do not suffice: " + refusal_of(report));
+    choice.reasons.emplace_back(
+        "needed: the unit on the jig, or a calibration file made by it under firmware 1.4.0 to "
+        "1.7.0, lying still on each of its six sides");
+    return {};
+  }
+  calib::ConstantsOrigin origin;
+  origin.file = path;
+  SIXPOINT_ASSIGN(auto record, calib::record_of(report, env_.clock.now(), origin));
+  choice.chosen = ChosenConstants{std::move(record), "scan", ""};
+  return {};
+}
+
+Result<ConstantsChoice> ConstantsFinder::choose(const std::string& path, const Survey& survey) {
+  ConstantsChoice choice;
+  if (options_.given.has_value()) {
+    choice.chosen = ChosenConstants{*options_.given, "constants", ""};
+    return choice;
+  }
+  if (options_.store != nullptr) {
+    SIXPOINT_CHECK(ask_store(survey, choice));
+  }
+  if (!choice.chosen && options_.calibration_file.has_value()) {
+    ask_calibration_file(survey, choice);
+  }
+  if (!choice.chosen && options_.scan) {
+    SIXPOINT_CHECK(ask_scan(path, survey, choice));
+  }
+  return choice;
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,60 @@
+// Which constants mend a file: the paper's three methods in order of trust.
+//
+//   given by the user > the store (method 3, the jig) > a calibration file (method 2) > the file's
+//   own still periods (method 1)
+//
+// A calibration file is believed only when it was recorded by the same unit under the `current`
+// configuration: one recorded under `legacy` would make the data worse.
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "calib/solve.h"
+#include "db/store.h"
+#include "repair/repair_file.h"
+
+namespace sixpoint::repair {
+
+struct ConstantsFinderOptions {
+  // Constants from a file that the user named: nothing else is asked.
+  std::optional<calib::ConstantsRecord> given;
+  // Not owned; may be null.
+  db::Store* store = nullptr;
+  std::optional<std::string> calibration_file;
+  // The file's own still periods, where nothing better was found.
+  bool scan = true;
+  calib::SolveOptions solve;
+  calib::StillBlockOptions still;
+};
+
+// Solves the still blocks of a surveyed recording; serial and filter of the report are filled in.
+// bad_data where the recording's constants cannot be undone or it was mended already.
+Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,
+                                        const calib::SolveOptions& options);
+
+// Safe to call from several threads: the store and the calibration file are asked one at a time.
+class ConstantsFinder final : public ConstantsSource {
+ public:
+  ConstantsFinder(Env& env, ConstantsFinderOptions options);
+  Result<ConstantsChoice> choose(const std::string& path, const Survey& survey) override;
+
+ private:
+  struct CalibrationFile {
+    std::optional<calib::ConstantsRecord> record;
+    std::string serial;
+    std::string refusal;  // why there is no record
+  };
+  Status ask_store(const Survey& survey, ConstantsChoice& choice);
+  void ask_calibration_file(const Survey& survey, ConstantsChoice& choice);
+  Status ask_scan(const std::string& path, const Survey& survey, ConstantsChoice& choice);
+  CalibrationFile read_calibration_file(const std::string& path);
+
+  Env& env_;
+  ConstantsFinderOptions options_;
+  std::mutex mutex_;
+  std::optional<CalibrationFile> calibration_file_;
+};
+
+}  // namespace sixpoint::repair

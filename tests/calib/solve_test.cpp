@@ -1,0 +1,287 @@
+#include "calib/solve.h"
+
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "calib/scaling.h"
+#include "expect_result.h"
+#include "synthetic_unit.h"
+
+namespace sixpoint::calib {
+namespace {
+
+using tests::Sample;
+using tests::SyntheticUnit;
+using tests::Vector;
+
+const std::vector<Vector> kSides = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
+                                    {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
+
+// A unit under the wrong filter: stored constants off by 0.1 to 0.2 g and 5 to 20 %.
+SyntheticUnit mismatched(unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> gain(0.80, 0.95);
+  std::uniform_real_distribution<double> shift(0.1, 0.2);
+  std::uniform_int_distribution<int> near(-12, 12);
+  std::bernoulli_distribution sign(0.5);
+  SyntheticUnit unit;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int half = 250 + near(random);
+    unit.zero[a] = 3 * near(random);
+    unit.positive[a] = unit.zero[a] + half + near(random) / 4;
+    unit.negative[a] = unit.positive[a] - 2 * half;
+    unit.counts_per_g[a] = half * gain(random);
+    unit.zero_counts[a] = unit.zero[a] + (sign(random) ? 1 : -1) * shift(random) * half;
+  }
+  return unit;
+}
+
+struct Wearing {
+  double rate_hz = 30;
+  double seconds = 60;
+  double wobble_deg = 0;
+  double warming_c = 0;  // from the first to the last pose
+};
+
+std::vector<StillBlock> blocks_of(const SyntheticUnit& unit, const std::vector<Vector>& poses,
+                                  const Wearing& how, unsigned seed) {
+  std::mt19937_64 random(seed);
+  const auto reversal = Reversal::make({unit.positive, unit.negative, unit.zero}, unit.accel_scale,
+                                       RecordWidth::bits12);
+  EXPECT_OK(reversal);
+  auto finder = StillBlockFinder::make(*reversal, how.rate_hz);
+  EXPECT_OK(finder);
+  double time = 0;
+  Vector before = poses.front();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Vector pose =
+        how.wobble_deg > 0 ? tests::wobbled(poses[i], how.wobble_deg, random) : poses[i];
+    const double warm = how.warming_c * static_cast<double>(i) /
+                        static_cast<double>(std::max<std::size_t>(1, poses.size() - 1));
+    for (const auto& samples :
+         {tests::turning(unit, before, pose, 3, how.rate_hz, random),
+          tests::at_rest(unit, pose, how.seconds, how.rate_hz, random, warm)}) {
+      finder->push(time, samples);
+      time += static_cast<double>(samples.size()) / how.rate_hz;
+    }
+    before = pose;
+  }
+  return finder->finish();
+}
+
+Calibration file_constants(const SyntheticUnit& unit) {
+  return *calibration_from({unit.positive, unit.negative, unit.zero});
+}
+
+Calibration truth(const SyntheticUnit& unit) {
+  Calibration out;
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.sensitivity_g_per_lsb[a] = 1 / unit.counts_per_g[a];
+    out.zero_lsb[a] = unit.zero_counts[a];
+  }
+  return out;
+}
+
+// Oracle: the constants that the generator used.
+TEST(Solve, SixSidesOfAMismatchedUnit) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    SyntheticUnit unit = mismatched(seed);
+    unit.noise_mg = 4 + 0.1 * (seed % 16);
+    const double rate = std::array{30.0, 50.0, 90.0, 100.0}[seed % 4];
+    const double wobble = std::array{0.0, 1.0, 4.0, 8.0, 15.0}[seed % 5];
+    const auto blocks = blocks_of(unit, kSides, {rate, 60, wobble}, seed + 1000);
+    const auto report = solve_from_still_blocks(blocks, file_constants(unit));
+    ASSERT_OK(report);
+    EXPECT_TRUE(report->verification.verified) << "seed " << seed << ": " << report->brief()
+                                               << " rate " << rate << " noise " << unit.noise_mg;
+    ASSERT_TRUE(report->calibration);
+    const auto off = difference_over_sphere(truth(unit), *report->calibration);
+    EXPECT_LT(off.worst_mg, 0.9) << "seed " << seed;
+    EXPECT_LT(*report->residual_after_mg, 1);
+    EXPECT_GT(report->residual_before_mg, 60);
+    EXPECT_THAT(report->verification.missing_directions, testing::IsEmpty());
+    ASSERT_TRUE(report->stored);
+    EXPECT_LT(*report->residual_rounded_mg, 3.5);
+    if (report->verification.redundancy == 0) {
+      EXPECT_EQ(report->verification.verdict, Verdict::verified_by_repeatability);
+    }
+  }
+}
+
+TEST(Solve, ExactDirectionsAreNamed) {
+  const SyntheticUnit unit = mismatched(7);
+  for (std::size_t left_out = 0; left_out < 6; ++left_out) {
+    std::vector<Vector> poses = kSides;
+    poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(left_out));
+    const auto report =
+        solve_from_still_blocks(blocks_of(unit, poses, {30, 60, 3}, 5), file_constants(unit));
+    ASSERT_OK(report);
+    EXPECT_FALSE(report->verification.verified);
+    EXPECT_EQ(report->verification.verdict, Verdict::incomplete);
+    const std::array<const char*, 6> names = {"+x", "-x", "+y", "-y", "+z", "-z"};
+    EXPECT_THAT(report->verification.missing_directions, testing::ElementsAre(names[left_out]));
+    EXPECT_FALSE(report->calibration);
+    EXPECT_THAT(report->verification.reasons, testing::Not(testing::IsEmpty()));
+    // The axes that saw both sides are known, the one that did not is not.
+    ASSERT_TRUE(report->partial);
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (a != left_out / 2) {
+        EXPECT_LT(report->partial->zero_mg[a], 10) << left_out;
+        EXPECT_LT(report->partial->sensitivity_relative[a],
+                  0.5 * report->partial->sensitivity_relative[left_out / 2])
+            << left_out;
+      } else {
+        EXPECT_FALSE(report->partial->zero_determined[a]) << left_out;
+        EXPECT_FALSE(report->partial->sensitivity_determined[a]) << left_out;
+        EXPECT_GT(report->partial->zero_mg[a], 20) << left_out;
+      }
+    }
+  }
+}
+
+TEST(Solve, OnePoseAndNothing) {
+  const SyntheticUnit unit = mismatched(8);
+  const auto one =
+      solve_from_still_blocks(blocks_of(unit, {{0, 0, -1}}, {30, 3600}, 5), file_constants(unit));
+  ASSERT_OK(one);
+  EXPECT_FALSE(one->verification.verified);
+  EXPECT_FALSE(one->calibration);
+  EXPECT_THAT(one->verification.missing_directions,
+              testing::IsSupersetOf({"+x", "-x", "+y", "-y", "+z"}));
+  const auto none = solve_from_still_blocks({}, file_constants(unit));
+  ASSERT_OK(none);
+  EXPECT_FALSE(none->verification.verified);
+  EXPECT_EQ(none->verification.missing_directions.size(), 6U);
+  EXPECT_FALSE(to_json(*none).dump().empty());
+}
+
+// ArduPilot's trap: six poses, six parameters, no residual, no proof. One block per side cannot
+// even show that it repeats.
+TEST(Solve, SixBlocksAreNotVerifiedByTheirOwnResidual) {
+  const SyntheticUnit unit = mismatched(9);
+  auto blocks = blocks_of(unit, kSides, {30, 4.6, 0}, 5);
+  ASSERT_GE(blocks.size(), 6U);
+  const auto report = solve_from_still_blocks(blocks, file_constants(unit));
+  ASSERT_OK(report);
+  ASSERT_TRUE(report->residual_after_mg);
+  EXPECT_LT(*report->residual_after_mg, 1);  // which proves nothing
+  EXPECT_FALSE(report->verification.verified) << report->brief();
+}
+
+// A side that was moved between two places that both are still but not both gravity alone: the
+// halves disagree.
+TEST(Solve, ASideThatDoesNotRepeatIsRefused) {
+  const SyntheticUnit unit = mismatched(10);
+  auto blocks = blocks_of(unit, kSides, {30, 60, 0}, 5);
+  int seen = 0;
+  for (StillBlock& block : blocks) {
+    if (block.mean_g[2] < -0.5 && seen++ >= 7) {
+      block.mean_lsb[2] *= 1.012;  // 12 mg: below the outlier limit
+    }
+  }
+  const auto report = solve_from_still_blocks(blocks, file_constants(unit));
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->verification.verified) << report->brief();
+}
+
+TEST(Solve, TwoUnitsMixedAreRefused) {
+  const SyntheticUnit one = mismatched(11);
+  SyntheticUnit other = mismatched(12);
+  other.positive = one.positive;
+  other.negative = one.negative;
+  other.zero = one.zero;
+  auto blocks = blocks_of(one, kSides, {30, 60, 5}, 5);
+  const auto more = blocks_of(other, kSides, {30, 60, 5}, 6);
+  blocks.insert(blocks.end(), more.begin(), more.end());
+  const auto report = solve_from_still_blocks(blocks, file_constants(one));
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->verification.verified) << report->brief();
+}
+
+TEST(Solve, GeneticAlgorithmAgreesAndIsReproducible) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const SyntheticUnit unit = mismatched(seed);
+    std::vector<Vector> poses = kSides;
+    std::mt19937_64 random(seed);
+    for (int i = 0; i < 12; ++i) {
+      poses.push_back(tests::random_direction(random));
+    }
+    const auto blocks = blocks_of(unit, poses, {30, 40}, seed + 50);
+    SolveOptions options;
+    options.method = SolveMethod::genetic;
+    options.seed = seed;
+    const auto report = solve_from_still_blocks(blocks, file_constants(unit), options);
+    ASSERT_OK(report);
+    EXPECT_TRUE(report->verification.verified) << report->brief();
+    EXPECT_EQ(report->verification.verdict, Verdict::verified);
+    const auto ls = solve_from_still_blocks(blocks, file_constants(unit));
+    EXPECT_LT(difference_over_sphere(*ls->calibration, *report->calibration).rms_mg, 1);
+    const auto again = solve_from_still_blocks(blocks, file_constants(unit), options);
+    EXPECT_EQ(*again->calibration, *report->calibration);
+  }
+}
+
+TEST(Solve, PriorIsMarkedAndNeverVerified) {
+  SyntheticUnit unit;
+  unit.positive = {326, 287, 303};
+  unit.negative = {-201, -268, -192};
+  unit.zero = {61, 4, 61};
+  unit.counts_per_g = {233, 247, 230};
+  unit.zero_counts = {70, 43, 78};
+  const auto blocks = blocks_of(unit, {{0, 0, -1}, {0.1, 0.1, -1}}, {30, 300}, 5);
+  SolveOptions options;
+  options.prior = *population_prior("MOS2A45130450", FilterConfiguration::current);
+  const auto report = solve_from_still_blocks(blocks, file_constants(unit), options);
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->verification.verified);
+  EXPECT_TRUE(report->from_prior);
+  ASSERT_TRUE(report->calibration);
+  // Honest: no true constant lies beyond four stated uncertainties.
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double zero_off_mg =
+        1000 * (report->calibration->zero_lsb[a] - unit.zero_counts[a]) / unit.counts_per_g[a];
+    EXPECT_LT(std::abs(zero_off_mg), 4 * report->uncertainty.zero_mg[a]);
+    EXPECT_GT(report->uncertainty.zero_mg[a], 20);
+  }
+  EXPECT_FAILS(population_prior("NEO1B34100019", FilterConfiguration::current),
+               ErrorCode::bad_data);
+}
+
+TEST(Solve, JsonHasTheContractsKeys) {
+  const SyntheticUnit unit = mismatched(3);
+  auto report =
+      solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 4}, 5), file_constants(unit));
+  ASSERT_OK(report);
+  report->serial = "MOS2A45130450";
+  report->filter = FilterConfiguration::current;
+  const auto json = to_json(*report);
+  for (const char* key : {"serial", "filter", "method", "constants", "standard_uncertainty",
+                          "points", "coverage_g", "residual_mg", "verified", "verdict", "reasons",
+                          "missing_directions", "iterations", "seconds"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+  const auto record = record_of(*report, *parse_iso8601("2016-05-16"), {"00", "a.gt3x", ""});
+  ASSERT_OK(record);
+  const auto back = parse_constants_record(to_json(*record).dump());
+  ASSERT_OK(back);
+  EXPECT_EQ(back->calibration, *report->calibration);
+}
+
+TEST(Solve, HostileNumbers) {
+  const SyntheticUnit unit = mismatched(3);
+  auto blocks = blocks_of(unit, kSides, {30, 60, 4}, 5);
+  blocks[3].mean_lsb[1] = std::nan("");
+  EXPECT_FAILS(solve_from_still_blocks(blocks, file_constants(unit)), ErrorCode::bad_data);
+  Calibration broken = file_constants(unit);
+  broken.sensitivity_g_per_lsb[0] = 0;
+  EXPECT_FAILS(solve_from_still_blocks(blocks, broken), ErrorCode::bad_data);
+  SolveOptions elsewhere;
+  elsewhere.gravity_g = 2;
+  EXPECT_FAILS(solve_from_still_blocks(blocks, file_constants(unit), elsewhere), ErrorCode::usage);
+}
+
+}  // namespace
+}  // namespace sixpoint::calib
