@@ -11,6 +11,7 @@ namespace sixpoint::cli {
   COMMAND(scan)                    \
   COMMAND(repair)                  \
   COMMAND(export)                  \
+  COMMAND(solve)                   \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
