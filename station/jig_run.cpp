@@ -95,9 +95,9 @@ void JigRun::ask_next() {
   if (!open_.empty()) {
     actions_.push_back(
         {JigAction::Kind::place, open_.front(),
-        fmt::format("turn the unit to {}: its {} axis points {}", device::to_string(open_.front()),
-                    kAxisNames[device::axis_of(open_.front())],
-                    device::sign_of(open_.front()) > 0 ? "up" : "down")});
+         fmt::format("turn the unit to {}: its {} axis points {}", device::to_string(open_.front()),
+                     kAxisNames[device::axis_of(open_.front())],
+                     device::sign_of(open_.front()) > 0 ? "up" : "down")});
   }
 }
 
@@ -201,8 +201,8 @@ std::vector<JigAction> JigRun::on_sample(const Sample& sample) {
     }
     case State::dwelling: {
       for (std::size_t axis = 0; axis < kAxes; ++axis) {
-        const double moved_mg = std::abs(now.mean_lsb[axis] - dwell_start_lsb_[axis]) *
-                                g_per_lsb(axis) * kMgPerG;
+        const double moved_mg =
+            std::abs(now.mean_lsb[axis] - dwell_start_lsb_[axis]) * g_per_lsb(axis) * kMgPerG;
         if (moved_mg > options_.moved_mg) {
           refuse(nearest_face(approximation_.to_g(dwell_start_lsb_)).pose,
                  "moved during the reading");
@@ -302,8 +302,8 @@ void JigRun::drop_disagreeing(const PoseReading& reading) {
     double worst_g = 0;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       if (axis != device::axis_of(reading.pose) && axis != device::axis_of(face.pose)) {
-        worst_g = std::max(worst_g, std::abs(face.mean_lsb[axis] - reading.mean_lsb[axis]) *
-                                        g_per_lsb(axis));
+        worst_g = std::max(
+            worst_g, std::abs(face.mean_lsb[axis] - reading.mean_lsb[axis]) * g_per_lsb(axis));
       }
     }
     if (worst_g <= limit_g) {
@@ -405,7 +405,8 @@ void JigRun::refuse(Pose pose, std::string reason) {
   actions_.push_back({JigAction::Kind::refused, pose, std::move(reason)});
   if (refusals_in_row_ >= options_.refusals_in_row || refusals_ >= 5 * options_.refusals_in_row) {
     finish(JigOutcome::too_many_refusals,
-           fmt::format("{} placements were refused, {} of them in a row", refusals_, refusals_in_row_));
+           fmt::format("{} placements were refused, {} of them in a row", refusals_,
+                       refusals_in_row_));
     return;
   }
   ask_next();
@@ -468,8 +469,8 @@ std::vector<JigAction> JigRun::on_operator(OperatorWord word) {
     readings.pop_back();
     open_.insert(open_.begin(), pose);
     leave();
-    actions_.push_back({JigAction::Kind::dropped, pose,
-                        fmt::format("{} is taken back", device::to_string(pose))});
+    actions_.push_back(
+        {JigAction::Kind::dropped, pose, fmt::format("{} is taken back", device::to_string(pose))});
     ask_next();
   }
   return std::exchange(actions_, {});

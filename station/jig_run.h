@@ -11,8 +11,9 @@
 // A pose is recognised from the readings by the unit's own constants, which may be off by 20 % and
 // 0.2 g. Stillness is judged by the unit's own noise, with hysteresis. Tilt is judged by the two
 // level axes: an axis reads its zero in all four poses in which it lies level, so a placement that
-// is off by an angle disagrees with the others. Where one placement disagrees with one other, either
-// may be the tilted one: the newer is asked for again, and when it repeats itself the older goes.
+// is off by an angle disagrees with the others. Where one placement disagrees with one other,
+// either may be the tilted one: the newer is asked for again, and when it repeats itself the older
+// goes.
 #pragma once
 
 #include <cstdint>
@@ -36,8 +37,8 @@ struct JigRunOptions {
   // Mean of 6 s: noise of 5.5 mg falls to 0.2 mg, below the 0.17 mg per 0.01 degree of seating. Six
   // faces and three repeats then cost a minute of dwell, of the three that production allows.
   double dwell_s = 6;
-  double settle_s = 0.5;   // still for this long before the dwell: straps and jigs ring that long
-  double window_s = 1;     // over which noise is judged
+  double settle_s = 0.5;  // still for this long before the dwell: straps and jigs ring that long
+  double window_s = 1;    // over which noise is judged
   double first_noise_limit_mg = 25;  // until the unit's own noise is known; a hand trembles more
   double still_factor = 1.6;         // enters stillness below this many times its own noise
   double moved_factor = 2.5;         // leaves it above
@@ -131,9 +132,7 @@ class JigRun {
   };
 
   std::vector<PoseReading>& readings_of_phase();
-  double g_per_lsb(std::size_t axis) const {
-    return approximation_.sensitivity_g_per_lsb[axis];
-  }
+  double g_per_lsb(std::size_t axis) const { return approximation_.sensitivity_g_per_lsb[axis]; }
   Window window() const;
   bool is_still(const Window& window, bool already) const;
   void leave();

@@ -21,7 +21,9 @@ constexpr std::chrono::milliseconds kReadFor{250};
 constexpr double kNominal_lsb_per_g = 256;
 constexpr double kNominalZero_lsb = 40;
 
-double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
+double seconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
 
 Calibration nominal() {
   Calibration calibration;
@@ -31,7 +33,8 @@ Calibration nominal() {
 }
 
 // A returned unit of 2013-14: the firmware knows two configurations for it.
-bool has_two_filters(const std::string& serial, const std::optional<device::CalibrationPage>& page) {
+bool has_two_filters(const std::string& serial,
+                     const std::optional<device::CalibrationPage>& page) {
   constexpr std::int64_t kFilterChange_unix_s = 1'395'619'200;  // 2014-03-24
   return serial.starts_with("MOS") &&
          (!page || page->calibrated < from_unix_seconds(kFilterChange_unix_s));
@@ -135,8 +138,7 @@ Status Session::stream(JigRun& run) {
       }
       keep_raw(**block);
       for (const device::RawCounts& counts : (*block)->counts) {
-        SIXPOINT_CHECK(
-            handle(run, run.on_sample({now_s, counts, (*block)->temperature_c})));
+        SIXPOINT_CHECK(handle(run, run.on_sample({now_s, counts, (*block)->temperature_c})));
       }
     } else if (now_s - heard_s > options_.silence_s) {
       return fail(ErrorCode::device_unavailable, "the unit stopped sending samples",
@@ -216,13 +218,12 @@ Status Session::write_constants(JigRun& run) {
   SIXPOINT_CHECK(unit_.stop_stream());
   // The date is today's: from it the firmware concludes the filter, and these constants belong to
   // `current`.
-  const device::CalibrationPage page{
-      *report_.stored, std::chrono::floor<std::chrono::seconds>(env_.clock.now())};
+  const device::CalibrationPage page{*report_.stored,
+                                     std::chrono::floor<std::chrono::seconds>(env_.clock.now())};
   SIXPOINT_CHECK(unit_.write_calibration(page));
   SIXPOINT_ASSIGN(report_.as_left, unit_.read_calibration());
   report_.written = true;
-  SIXPOINT_ASSIGN(const Calibration written,
-                  calib::calibration_from(report_.as_left->constants));
+  SIXPOINT_ASSIGN(const Calibration written, calib::calibration_from(report_.as_left->constants));
   run.set_approximation(written);
   SIXPOINT_CHECK(unit_.set_filter(options_.filter));
   SIXPOINT_CHECK(unit_.start_stream(options_.run.rate_hz));
@@ -414,9 +415,8 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["as_left"] = station::to_json(as_left);
   if (as_left) {
     json["as_left"]["written"] = written;
-    json["as_left"]["residual_mg"] =
-        written ? nlohmann::ordered_json(recheck.worst_mg)
-                : nlohmann::ordered_json(as_found_residual_mg);
+    json["as_left"]["residual_mg"] = written ? nlohmann::ordered_json(recheck.worst_mg)
+                                             : nlohmann::ordered_json(as_found_residual_mg);
   }
   json["verification"] = station::to_json(verification);
   json["verification"]["residual_rounded_mg"] = rounded_residual_mg;
@@ -439,8 +439,8 @@ calib::ConstantsRecord JigReport::record() const {
   record.uncertainty = uncertainty;
   record.method = method;
   record.made_at = ended;
-  record.made_from.sha256 = to_hex(sha256(std::span(
-      reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
+  record.made_from.sha256 = to_hex(
+      sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
   record.gravity_m_per_s2 = gravity_m_per_s2;
   return record;
 }

@@ -1,9 +1,9 @@
 // A jig run on a real link: the unit, the jig and the state machine (jig_run.h) brought together.
 //
-// Sets the filter configuration and checks it, streams, lets the machine ask for poses, computes the
-// constants from the six faces, judges them on readings that the fit has not seen, and, when asked,
-// writes them into the unit, reads them back and measures two poses again with what the unit then
-// holds. Stores nothing: the report carries all there is to store.
+// Sets the filter configuration and checks it, streams, lets the machine ask for poses, computes
+// the constants from the six faces, judges them on readings that the fit has not seen, and, when
+// asked, writes them into the unit, reads them back and measures two poses again with what the unit
+// then holds. Stores nothing: the report carries all there is to store.
 #pragma once
 
 #include <functional>
@@ -73,7 +73,8 @@ struct JigReport {
 
   std::optional<device::CalibrationPage> as_found;
   double as_found_residual_mg = 0;  // of the page's constants, on the faces
-  std::optional<device::CalibrationPage> as_left;  // as read back; as_found where nothing was written
+  std::optional<device::CalibrationPage>
+      as_left;  // as read back; as_found where nothing was written
   bool written = false;
   JudgedPoses recheck;  // with the constants that were read back
   int refusals = 0;

@@ -76,8 +76,7 @@ Result<StoredConstants> round_for_unit(const calib::Calibration& calibration,
         if (square < least) {
           least = square;
           best.zero_lsb[axis] = zero_lsb;
-          best.negative_lsb[axis] =
-              static_cast<int>(std::lround(zero_lsb - difference / 2.0));
+          best.negative_lsb[axis] = static_cast<int>(std::lround(zero_lsb - difference / 2.0));
           best.positive_lsb[axis] = best.negative_lsb[axis] + difference;
         }
       }

@@ -12,6 +12,7 @@ namespace sixpoint::cli {
   COMMAND(repair)                  \
   COMMAND(export)                  \
   COMMAND(solve)                   \
+  COMMAND(jig)                     \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \

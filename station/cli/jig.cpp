@@ -103,8 +103,7 @@ Result<Done> run(Context& context, const Options& options) {
                   devices.open(station::with_jig(options.device, options.jig), context.env));
   SIXPOINT_ASSIGN(const auto unit, device::Unit::open(std::move(link)));
   device::ManualJig by_hand;
-  device::Jig& jig =
-      unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
+  device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
 
   context.people << fmt::format("unit {} with firmware {}; jig: {}\n",
                                 printable(unit->identity().serial),
@@ -136,7 +135,8 @@ Result<Done> run(Context& context, const Options& options) {
 Json to_json(const Done& done) {
   Json json = document("jig");
   json["run"] = done.run_id;
-  for (const auto& [key, value] : done.report.to_json().items()) {
+  const Json report = done.report.to_json();
+  for (const auto& [key, value] : report.items()) {
     json[key] = value;
   }
   json["stored_id"] = done.constants_id ? Json(*done.constants_id) : Json(nullptr);
@@ -179,8 +179,7 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--station", options->station, "where it is run, for the record");
   command->add_option("--filter", options->filter, "filter configuration: current or legacy")
       ->capture_default_str();
-  command
-      ->add_option("--gravity", options->gravity_m_per_s2, "local gravity in m/s2")
+  command->add_option("--gravity", options->gravity_m_per_s2, "local gravity in m/s2")
       ->check(CLI::Range(9.76, 9.84))
       ->capture_default_str();
   command->add_flag("--write", options->write,
