@@ -11,6 +11,7 @@ namespace sixpoint::cli {
   COMMAND(scan)                    \
   COMMAND(repair)                  \
   COMMAND(export)                  \
+  COMMAND(compare)                 \
   COMMAND(solve)                   \
   COMMAND(jig)                     \
   COMMAND(units)                   \
