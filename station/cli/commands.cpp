@@ -13,6 +13,7 @@ namespace sixpoint::cli {
   COMMAND(export)                  \
   COMMAND(compare)                 \
   COMMAND(solve)                   \
+  COMMAND(jig)                     \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
