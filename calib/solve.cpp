@@ -38,10 +38,12 @@ PartialKnowledge know_partially(std::span<const StillBlock> blocks,
 Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOptions& options) {
   report.statistical = fit.fit.standard_uncertainty();
   if (options.method == SolveMethod::genetic && report.search) {
-    // Its members wander about the answer; least squares' covariance knows nothing of that.
+    // Its members wander about the answer, and it may lie beside the minimum; least squares'
+    // covariance knows nothing of that.
+    const double apart_mg = difference_over_sphere(fit.six_parameters, *report.calibration).rms_mg;
+    const double wander_mg = std::hypot(report.search->wander_mg, apart_mg);
     for (std::size_t a = 0; a < kAxes; ++a) {
-      report.statistical.zero_mg[a] =
-          std::hypot(report.statistical.zero_mg[a], report.search->wander_mg);
+      report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], wander_mg);
       report.statistical.sensitivity_relative[a] = std::hypot(
           report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
     }
@@ -132,15 +134,27 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   report.residual_before_mg = cells_rms_mg(report.fit->cells, file_constants, options.gravity_g);
   report.verification = verify(chosen, file_constants, *report.calibration, *report.fit,
                                report.search, fit_options, options.limits);
-  if (options.method == SolveMethod::genetic && !report.search->settled) {
+  std::vector<std::string> doubts;
+  if (options.method == SolveMethod::genetic) {
+    doubts = report.search->reasons;
+    // Where it is not the same as least squares it must at least be within what is promised.
+    const double apart_mg =
+        difference_over_sphere(report.fit->fit.calibration, *report.calibration).worst_mg;
+    if (!(apart_mg <= options.limits.worst_direction_mg)) {
+      doubts.push_back(fmt::format(
+          "the genetic algorithm's answer is {:.1f} mg from least squares' in the worst direction "
+          "(limit {:.1f} mg)",
+          apart_mg, options.limits.worst_direction_mg));
+    }
+  }
+  if (!doubts.empty()) {
     if (report.verification.verified) {
       report.verification.reasons.clear();
     }
     report.verification.verified = false;
     report.verification.verdict = Verdict::not_verified;
-    report.verification.reasons.insert(report.verification.reasons.end(),
-                                       report.search->reasons.begin(),
-                                       report.search->reasons.end());
+    report.verification.reasons.insert(report.verification.reasons.end(), doubts.begin(),
+                                       doubts.end());
   }
   if (!(report.fit->fit.worst_direction_mg() <= options.limits.worst_direction_mg)) {
     report.partial = know_partially(chosen, file_constants, options);
