@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
-#include "station/pose_fit.h"
 
 namespace sixpoint::station {
 
@@ -49,7 +48,7 @@ class Session {
         env_(env),
         options_(options),
         tell_(tell),
-        gravity_g_(options.gravity_m_per_s2 / kStandardGravity_m_per_s2) {}
+        gravity_g_(options.gravity.g()) {}
 
   Result<JigReport> run();
 
@@ -58,9 +57,11 @@ class Session {
   Status stream(JigRun& run);
   Status handle(JigRun& run, std::vector<JigAction> actions);
   void keep_raw(const device::SampleBlock& block);
-  bool judge_verification(const JigRun& run);
+  Result<calib::SixPoseReport> solve(const std::vector<PoseReading>& faces,
+                                     const std::vector<PoseReading>& held_out) const;
+  Result<bool> judge_verification(const JigRun& run);
   Status write_constants(JigRun& run);
-  void conclude(const JigRun& run);
+  Status conclude(const JigRun& run);
 
   device::Unit& unit_;
   device::Jig& jig_;
@@ -70,7 +71,6 @@ class Session {
   double gravity_g_;
   JigReport report_;
   Calibration approximation_ = nominal();
-  std::optional<PoseFit> fit_;
   bool ended_ = false;
 };
 
@@ -80,7 +80,7 @@ Status Session::prepare() {
   report_.firmware = unit_.identity().firmware;
   report_.jig = jig_.name();
   report_.filter = options_.filter;
-  report_.gravity_m_per_s2 = options_.gravity_m_per_s2;
+  report_.gravity = options_.gravity;
   const auto page = unit_.read_calibration();
   if (page) {
     report_.as_found = *page;
@@ -132,6 +132,7 @@ Status Session::stream(JigRun& run) {
                                 calib::to_string((*block)->filter)),
                     report_.serial, "begin the run anew");
       }
+      lost = std::min(lost, unit_.stream_statistics().lost_samples);  // a new stream counts anew
       if (unit_.stream_statistics().lost_samples > lost) {
         lost = unit_.stream_statistics().lost_samples;
         SIXPOINT_CHECK(handle(run, run.on_loss()));
@@ -162,17 +163,18 @@ Status Session::handle(JigRun& run, std::vector<JigAction> actions) {
         place = action.pose;
         break;
       case JigAction::Kind::fit: {
-        SIXPOINT_ASSIGN(fit_, fit_poses(run.faces(), gravity_g_));
-        run.set_approximation(fit_->least_squares);
+        SIXPOINT_ASSIGN(const calib::SixPoseReport first, solve(run.faces(), {}));
+        run.set_approximation(first.pair.calibration);
         break;
       }
-      case JigAction::Kind::write:
-        if (!judge_verification(run)) {
+      case JigAction::Kind::write: {
+        SIXPOINT_ASSIGN(const bool verified, judge_verification(run));
+        if (!verified) {
           ended_ = true;  // constants that failed are not written
           return {};
         }
-        SIXPOINT_CHECK(write_constants(run));
-        return {};
+        return write_constants(run);
+      }
       case JigAction::Kind::accepted:
       case JigAction::Kind::refused:
       case JigAction::Kind::dropped:
@@ -183,45 +185,57 @@ Status Session::handle(JigRun& run, std::vector<JigAction> actions) {
   return place ? jig_.go_to(*place) : Status{};
 }
 
-// Chooses between the two pairs by the readings that neither has seen.
-bool Session::judge_verification(const JigRun& run) {
-  if (!fit_) {
+Result<calib::SixPoseReport> Session::solve(const std::vector<PoseReading>& faces,
+                                            const std::vector<PoseReading>& held_out) const {
+  const auto readings = [](const std::vector<PoseReading>& from) {
+    std::vector<calib::PoseReading> to;
+    for (const PoseReading& reading : from) {
+      to.push_back({device::direction_of(reading.pose), reading.mean_lsb, reading.sd_lsb,
+                    reading.samples, reading.temperature_c});
+    }
+    return to;
+  };
+  calib::SixPoseOptions options;
+  options.gravity = options_.gravity;
+  return calib::solve_six_poses(readings(faces), readings(held_out), options);
+}
+
+// Solves, chooses by the readings that no solution has seen, and says whether they may be used.
+Result<bool> Session::judge_verification(const JigRun& run) {
+  report_.faces = run.faces();
+  if (report_.faces.size() < device::kPoses.size()) {
     return false;
   }
-  const JudgedPoses paper = judge(run.verification(), fit_->paper, gravity_g_);
-  const JudgedPoses squares = judge(run.verification(), fit_->least_squares, gravity_g_);
-  const bool use_paper = paper.rms_mg < squares.rms_mg;
-  report_.calibration = use_paper ? fit_->paper : fit_->least_squares;
-  report_.method = use_paper ? "six_pose_paper" : "six_pose";
-  report_.other = use_paper ? fit_->least_squares : fit_->paper;
-  report_.other_method = use_paper ? "six_pose" : "six_pose_paper";
-  report_.other_residual_mg = use_paper ? squares.worst_mg : paper.worst_mg;
-  report_.verification = use_paper ? paper : squares;
-  report_.uncertainty = fit_->uncertainty;
-
-  if (const auto stored = round_for_unit(*report_.calibration, run.faces(), gravity_g_)) {
-    report_.stored = *stored;
-    if (const auto rounded = calib::calibration_from(*stored)) {
-      report_.rounded_residual_mg = judge(run.verification(), *rounded, gravity_g_).worst_mg;
-    }
-  } else {
-    report_.reasons.push_back(stored.error().what);
+  SIXPOINT_ASSIGN(report_.six, solve(run.faces(), run.verification()));
+  const calib::SixPoseSolution& best = report_.six->best();
+  report_.method = fmt::format("six_pose_{}", calib::to_string(report_.six->chosen));
+  report_.verification = judge(run.verification(), best.calibration, gravity_g_);
+  if (const auto rounded = calib::calibration_from(best.stored)) {
+    report_.rounded_residual_mg = judge(run.verification(), *rounded, gravity_g_).worst_mg;
   }
-  return report_.verification.worst_mg <= options_.residual_limit_mg;
+  for (PoseReading& face : report_.faces) {
+    for (const calib::PoseResidual& residual : report_.six->poses) {
+      if (!residual.held_out && residual.side == device::to_string(face.pose)) {
+        face.tilt_deg = residual.tilt_deg;
+      }
+    }
+  }
+  return report_.six->verified && report_.verification.worst_mg <= options_.residual_limit_mg;
 }
 
 Status Session::write_constants(JigRun& run) {
-  if (!report_.stored) {
-    ended_ = true;
-    return {};
-  }
   SIXPOINT_CHECK(unit_.stop_stream());
   // The date is today's: from it the firmware concludes the filter, and these constants belong to
   // `current`.
-  const device::CalibrationPage page{*report_.stored,
+  const device::CalibrationPage page{report_.six->best().stored,
                                      std::chrono::floor<std::chrono::seconds>(env_.clock.now())};
-  SIXPOINT_CHECK(unit_.write_calibration(page));
+  const Status written_status = unit_.write_calibration(page);
   SIXPOINT_ASSIGN(report_.as_left, unit_.read_calibration());
+  if (!written_status) {
+    ended_ = true;
+    report_.reasons.push_back(written_status.error().what);
+    return {};
+  }
   report_.written = true;
   SIXPOINT_ASSIGN(const Calibration written, calib::calibration_from(report_.as_left->constants));
   run.set_approximation(written);
@@ -230,12 +244,11 @@ Status Session::write_constants(JigRun& run) {
   return handle(run, run.on_written(seconds(unit_.clock().elapsed())));
 }
 
-void Session::conclude(const JigRun& run) {
+Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
-  report_.faces = run.faces();
   report_.refusals = run.refusals();
-  const bool verified = judge_verification(run);
-  if (!report_.written) {
+  SIXPOINT_ASSIGN(const bool verified, judge_verification(run));
+  if (!report_.as_left) {
     report_.as_left = report_.as_found;
   }
   if (report_.as_found) {
@@ -247,7 +260,7 @@ void Session::conclude(const JigRun& run) {
     case JigOutcome::stopped:
       report_.verdict = JigVerdict::stopped;
       report_.reasons.push_back("stopped by the operator");
-      return;
+      return {};
     case JigOutcome::timed_out:
     case JigOutcome::too_many_refusals:
     case JigOutcome::unit_gone:
@@ -256,23 +269,29 @@ void Session::conclude(const JigRun& run) {
           run.outcome() == JigOutcome::timed_out
               ? "no pose was accepted in time; is the unit on the jig, and does the jig turn it?"
               : "too many placements were refused; look at jig, seat and cable");
-      return;
+      return {};
     case JigOutcome::running:
     case JigOutcome::complete:
       break;
   }
   if (!verified) {
     report_.verdict = JigVerdict::fail;
-    report_.reasons.push_back(fmt::format(
-        "on poses that were not fitted the constants are {:.1f} mg off, more than {:.1f}",
-        report_.verification.worst_mg, options_.residual_limit_mg));
-    return;
+    if (report_.six) {
+      report_.reasons.insert(report_.reasons.end(), report_.six->reasons.begin(),
+                             report_.six->reasons.end());
+    }
+    if (report_.verification.worst_mg > options_.residual_limit_mg) {
+      report_.reasons.push_back(fmt::format(
+          "on poses that were not fitted the constants are {:.1f} mg off, more than {:.1f}",
+          report_.verification.worst_mg, options_.residual_limit_mg));
+    }
+    return {};
   }
   report_.verdict = JigVerdict::pass;
   if (report_.written) {
     const auto left = calib::calibration_from(report_.as_left->constants);
     report_.recheck = judge(run.recheck(), *left, gravity_g_);
-    if (report_.as_left->constants != *report_.stored ||
+    if (report_.as_left->constants != report_.six->best().stored ||
         report_.recheck.worst_mg > options_.residual_limit_mg) {
       report_.verdict = JigVerdict::fail;
       report_.reasons.push_back(fmt::format(
@@ -283,6 +302,7 @@ void Session::conclude(const JigRun& run) {
     report_.verdict = JigVerdict::fail;
     report_.reasons.push_back("the constants were not written into the unit");
   }
+  return {};
 }
 
 Result<JigReport> Session::run() {
@@ -295,7 +315,7 @@ Result<JigReport> Session::run() {
     static_cast<void>(jig_.stop());
     return fail(streamed.error());
   }
-  conclude(machine);
+  SIXPOINT_CHECK(conclude(machine));
   return std::move(report_);
 }
 
@@ -391,23 +411,17 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["reasons"] = reasons;
   json["started"] = to_iso8601(started);
   json["ended"] = to_iso8601(ended);
-  json["gravity_m_per_s2"] = gravity_m_per_s2;
+  json["gravity_m_per_s2"] = gravity.m_per_s2;
   json["poses"] = nlohmann::ordered_json::array();
   for (const PoseReading& face : faces) {
     json["poses"].push_back(station::to_json(face));
   }
-  if (calibration && stored) {
-    json["constants"] = calib::to_json(*calibration, *stored);
+  if (six) {
+    json["constants"] = calib::to_json(six->best().calibration, six->best().stored);
   } else {
     json["constants"] = nullptr;
   }
   json["method"] = method;
-  if (other) {
-    json["other"]["method"] = other_method;
-    json["other"]["sensitivity_g_per_lsb"] = other->sensitivity_g_per_lsb;
-    json["other"]["zero_lsb"] = other->zero_lsb;
-    json["other"]["residual_mg"] = other_residual_mg;
-  }
   json["as_found"] = station::to_json(as_found);
   if (as_found) {
     json["as_found"]["residual_mg"] = as_found_residual_mg;
@@ -421,7 +435,9 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["verification"] = station::to_json(verification);
   json["verification"]["residual_rounded_mg"] = rounded_residual_mg;
   json["recheck"] = written ? station::to_json(recheck) : nlohmann::ordered_json(nullptr);
-  json["uncertainty"] = calib::to_json(uncertainty);
+  json["uncertainty"] =
+      six ? calib::to_json(six->best().uncertainty) : nlohmann::ordered_json(nullptr);
+  json["solutions"] = six ? calib::to_json(*six) : nlohmann::ordered_json(nullptr);
   json["refusals"] = refusals;
   json["stream"]["samples"] = stream.samples;
   json["stream"]["lost_samples"] = stream.lost_samples;
@@ -434,14 +450,16 @@ calib::ConstantsRecord JigReport::record() const {
   calib::ConstantsRecord record;
   record.serial = serial;
   record.filter = filter;
-  record.calibration = calibration.value_or(Calibration{});
-  record.stored = stored.value_or(StoredConstants{});
-  record.uncertainty = uncertainty;
+  if (six) {
+    record.calibration = six->best().calibration;
+    record.stored = six->best().stored;
+    record.uncertainty = six->best().uncertainty;
+  }
   record.method = method;
   record.made_at = ended;
   record.made_from.sha256 = to_hex(
       sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
-  record.gravity_m_per_s2 = gravity_m_per_s2;
+  record.gravity_m_per_s2 = gravity.m_per_s2;
   return record;
 }
 

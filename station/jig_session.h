@@ -15,6 +15,8 @@
 
 #include "base/env.h"
 #include "calib/constants.h"
+#include "calib/gravity.h"
+#include "calib/six_pose.h"
 #include "device/unit.h"
 #include "station/jig_run.h"
 
@@ -23,7 +25,7 @@ namespace sixpoint::station {
 struct JigSessionOptions {
   JigRunOptions run;
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
-  double gravity_m_per_s2 = kStandardGravity_m_per_s2;  // where the jig stands
+  calib::LocalGravity gravity = calib::gravity_unknown();  // where the jig stands
   // Largest distance of a verification reading's magnitude from local gravity. A real sensor's six
   // constants leave 4 to 8 mg (curvature, cross-axis); an affected one is off by 100 and more.
   double residual_limit_mg = 10;
@@ -57,19 +59,14 @@ struct JigReport {
   UtcTime ended{};
   JigVerdict verdict = JigVerdict::inconclusive;
   std::vector<std::string> reasons;
-  double gravity_m_per_s2 = kStandardGravity_m_per_s2;
+  calib::LocalGravity gravity;
 
   std::vector<PoseReading> faces;
-  // The constants that hold (`method` says which of the two), and the other pair beside them.
-  std::optional<calib::Calibration> calibration;
-  std::optional<StoredConstants> stored;  // the nine integers, searched about the estimate
-  std::string method;                     // "six_pose_paper" (Eq. 1-6 to the letter) or "six_pose"
-  std::optional<calib::Calibration> other;
-  std::string other_method;
-  double other_residual_mg = 0;
-  calib::ConstantsUncertainty uncertainty;
+  // The three solutions, the choice among them by unused readings, and the verdict on it.
+  std::optional<calib::SixPoseReport> six;
+  std::string method;  // "six_pose_letter" (Eq. 1-6 to the letter), "six_pose_pair" ...
   JudgedPoses verification;
-  double rounded_residual_mg = 0;  // of `stored`, on the same readings
+  double rounded_residual_mg = 0;  // of the nine integers, on the same readings
 
   std::optional<device::CalibrationPage> as_found;
   double as_found_residual_mg = 0;  // of the page's constants, on the faces

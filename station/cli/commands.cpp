@@ -14,9 +14,11 @@ namespace sixpoint::cli {
   COMMAND(compare)                 \
   COMMAND(solve)                   \
   COMMAND(jig)                     \
+  COMMAND(capture)                 \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
+  COMMAND(virtual)                 \
   COMMAND(simulate)
 // clang-format on
 

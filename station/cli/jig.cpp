@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/gravity.h"
 #include "device/unit.h"
 #include "gt3x/model.h"
 #include "station/cli/command.h"
@@ -21,7 +22,9 @@ struct Options {
   std::string station;
   std::string filter = "current";
   std::string store;
-  double gravity_m_per_s2 = kStandardGravity_m_per_s2;
+  std::optional<double> gravity_m_per_s2;
+  std::optional<double> latitude_deg;
+  double altitude_m = 0;
   bool write = false;
   bool json = false;
 };
@@ -73,7 +76,7 @@ Status keep(Context& context, const Options& options, Done& done) {
     write.written = report.ended;
     write.as_found =
         report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
-    write.as_left = calib::to_json(*report.stored).dump();
+    write.as_left = calib::to_json(report.six->best().stored).dump();
     write.read_back = calib::to_json(report.as_left->constants).dump();
     SIXPOINT_CHECK(store.add_unit_write(write));
   }
@@ -95,7 +98,11 @@ Status keep(Context& context, const Options& options, Done& done) {
 Result<Done> run(Context& context, const Options& options) {
   station::JigSessionOptions session;
   SIXPOINT_ASSIGN(session.filter, calib::parse_filter_configuration(options.filter));
-  session.gravity_m_per_s2 = options.gravity_m_per_s2;
+  if (options.gravity_m_per_s2) {
+    SIXPOINT_ASSIGN(session.gravity, calib::gravity_entered(*options.gravity_m_per_s2));
+  } else if (options.latitude_deg) {
+    SIXPOINT_ASSIGN(session.gravity, calib::gravity_at(*options.latitude_deg, options.altitude_m));
+  }
   session.run.write = options.write;
 
   const device::TransportRegistry devices = station::known_devices();
@@ -147,14 +154,14 @@ Json to_json(const Done& done) {
 void print(Context& context, const Done& done) {
   const station::JigReport& report = done.report;
   context.out << report.brief() << '\n';
-  if (report.calibration && report.stored) {
-    context.out << "      sensitivity    zero      stored +1 g  -1 g   0 g\n";
+  if (report.six) {
+    const calib::SixPoseSolution& best = report.six->best();
+    context.out << "     sensitivity         zero        +1 g   -1 g    0 g\n";
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      context.out << fmt::format(
-          "  {}  {:8.3f} LSB/g {:8.3f} LSB  {:5} {:8} {:5}\n", kAxisNames[axis],
-          1 / report.calibration->sensitivity_g_per_lsb[axis], report.calibration->zero_lsb[axis],
-          report.stored->positive_lsb[axis], report.stored->negative_lsb[axis],
-          report.stored->zero_lsb[axis]);
+      context.out << fmt::format("  {}  {:8.3f} LSB/g {:8.3f} LSB {:6} {:6} {:6}\n",
+                                 kAxisNames[axis], 1 / best.calibration.sensitivity_g_per_lsb[axis],
+                                 best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
+                                 best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
     }
   }
   context.out << fmt::format("run {}\n", done.run_id);
@@ -179,9 +186,11 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--station", options->station, "where it is run, for the record");
   command->add_option("--filter", options->filter, "filter configuration: current or legacy")
       ->capture_default_str();
-  command->add_option("--gravity", options->gravity_m_per_s2, "local gravity in m/s2")
-      ->check(CLI::Range(9.76, 9.84))
-      ->capture_default_str();
+  command->add_option("--gravity", options->gravity_m_per_s2,
+                      "local gravity in m/s2; unknown: standard gravity, and its uncertainty");
+  command->add_option("--latitude", options->latitude_deg,
+                      "... or computed from the latitude in degrees");
+  command->add_option("--altitude", options->altitude_m, "... and metres above sea level");
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);
