@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -211,6 +212,7 @@ Result<RawCsvTally> write_raw_csv(Recording& recording, const RawCsvOptions& opt
   Counts last{};
   bool zeros = false;  // since a USB record
   std::uint64_t filled_s = 0;
+  std::uint64_t short_by = 0;  // lines that the second before lacks; the last of all may be short
   bool started = false;
   const auto fill_lines = [&](std::uint64_t lines) -> Status {
     tally.filled += lines;
@@ -231,6 +233,9 @@ Result<RawCsvTally> write_raw_csv(Recording& recording, const RawCsvOptions& opt
       SIXPOINT_CHECK(out.header(item.unix_time, rate_hz));
       started = true;
     }
+    if (options.fill && short_by > 0) {
+      SIXPOINT_CHECK(fill_lines(std::exchange(short_by, 0)));
+    }
     if (item.kind == SampleItem::Kind::recorded) {
       if (auto status = out.set_scale(item, agdc); !status) {
         status.error().where = recording.path();
@@ -243,9 +248,7 @@ Result<RawCsvTally> write_raw_csv(Recording& recording, const RawCsvOptions& opt
       zeros = false;
       tally.samples += item.counts.size();
       tally.out_of_step_seconds += item.broke_order || item.counts.size() > rate ? 1 : 0;
-      if (options.fill && item.counts.size() < rate) {
-        SIXPOINT_CHECK(fill_lines(rate - item.counts.size()));
-      }
+      short_by = item.counts.size() < rate ? rate - item.counts.size() : 0;
       continue;
     }
     zeros = zeros || item.kind == SampleItem::Kind::usb;

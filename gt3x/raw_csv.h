@@ -11,7 +11,7 @@
 //
 // Missing seconds: the last sample is repeated, as the vendor does for idle sleep. From a one-byte
 // record (USB) on it is zeros instead, until the next sample or the file's Last Sample Time. A
-// second with too few samples is filled up in the same way.
+// second with too few samples is filled up in the same way, but for the last of all.
 #pragma once
 
 #include <cstdint>

@@ -4,6 +4,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/install_packages.sh build
 source scripts/build_environment.sh
-configure release -DSIXPOINT_TESTS=OFF -DSIXPOINT_BENCH=OFF
+# Tests and benchmarks need packages of their own (scripts/test.sh); a folder that has them keeps them.
+if [ ! -f build/CMakeCache.txt ]; then
+  configure release -DSIXPOINT_TESTS=OFF -DSIXPOINT_BENCH=OFF
+fi
 cmake --build build --target sixpoint -- --quiet
 echo "build/sixpoint is ready: $(build/sixpoint --version)" >&2

@@ -9,11 +9,16 @@ namespace sixpoint::cli {
 #define SIXPOINT_COMMANDS(COMMAND) \
   COMMAND(inspect)                 \
   COMMAND(scan)                    \
+  COMMAND(repair)                  \
   COMMAND(export)                  \
+  COMMAND(compare)                 \
   COMMAND(solve)                   \
+  COMMAND(jig)                     \
+  COMMAND(capture)                 \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
+  COMMAND(virtual)                 \
   COMMAND(simulate)
 // clang-format on
 

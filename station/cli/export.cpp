@@ -19,15 +19,14 @@ struct Options {
 
 // A slip of the hand must not cost a recording: an output that exists and is a zip is no CSV.
 Status refuse_recordings(FileSystem& files, const Options& options) {
-  const auto existing = files.open(options.csv);
-  if (!existing) {
-    return {};
+  bool recording = std::filesystem::path(options.csv).lexically_normal() ==
+                   std::filesystem::path(options.path).lexically_normal();
+  if (const auto existing = files.open(options.csv)) {
+    std::array<std::uint8_t, 2> start{};
+    const auto count = (*existing)->read_at(0, start);
+    recording = recording || (count && *count == 2 && start[0] == 'P' && start[1] == 'K');
   }
-  std::array<std::uint8_t, 2> start{};
-  const auto count = (*existing)->read_at(0, start);
-  const bool same_path = std::filesystem::path(options.csv).lexically_normal() ==
-                         std::filesystem::path(options.path).lexically_normal();
-  if (same_path || (count && *count == 2 && start[0] == 'P' && start[1] == 'K')) {
+  if (recording) {
     return fail(ErrorCode::cannot_create, "this is a recording and will not be written over",
                 options.csv, "choose another name for the CSV");
   }

@@ -38,7 +38,7 @@ struct Findings {
   std::optional<double> rate_hz;
   std::optional<double> accel_scale_lsb_per_g;
   std::optional<std::uint32_t> start;
-  double end_s = 0;  // Unix time behind the last sample
+  double end_s = 0;  // Unix time behind the last sample, or the last gap where that is later
   std::uint64_t samples = 0;
   std::uint64_t clipped_samples = 0;
   gt3x::LogStatistics log;
@@ -57,6 +57,7 @@ void add_gap(Findings& findings, const gt3x::SampleItem& item) {
   const bool usb_record = item.kind == gt3x::SampleItem::Kind::usb;
   const gt3x::GapKind kind = usb_record ? gt3x::GapKind::usb : item.gap;
   findings.gap_seconds += item.seconds;
+  findings.end_s = std::max(findings.end_s, static_cast<double>(item.unix_time) + item.seconds);
   if (!findings.gaps.empty() && findings.gaps.size() == findings.gap_count) {
     Gap& last = findings.gaps.back();
     // A USB record and the silence behind it are one stretch of charging.

@@ -130,7 +130,8 @@ TEST(Protocol, WellFormedNonsenseIsRefused) {
   };
   const Report good = encode({});
   EXPECT_FALSE(refused(good));
-  for (const auto& [at, value] : {std::pair{0, 2}, {1, 0}, {1, 4}, {6, 55}, {6, 255}, {7, 1}, {8, 1}}) {
+  for (const auto& [at, value] :
+       {std::pair{0, 2}, {1, 0}, {1, 4}, {6, 55}, {6, 255}, {7, 1}, {8, 1}}) {
     Report report = good;
     report[static_cast<std::size_t>(at)] = static_cast<std::uint8_t>(value);
     EXPECT_TRUE(refused(report)) << at << " = " << value;
@@ -152,9 +153,9 @@ TEST(Protocol, WellFormedNonsenseIsRefused) {
 
   SampleBlock block;
   block.counts.assign(2, RawCounts{});
-  for (const std::uint8_t count : {0, 1, 3, 7, 255}) {
+  for (const unsigned count : {0U, 1U, 3U, 7U, 255U}) {
     Message message = encode_samples(block);
-    message.payload[15] = count;
+    message.payload[15] = static_cast<std::uint8_t>(count);
     EXPECT_FAILS(decode_samples(message), ErrorCode::bad_data);
   }
   Message filter = encode_samples(block);

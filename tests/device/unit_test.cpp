@@ -27,8 +27,8 @@ struct Bench {
   Link link() { return mocks::link_to(plugged, false); }
   Link tampered(TamperingTransport::Tamper on_write, TamperingTransport::Tamper on_read) {
     Link result = link();
-    result.reports = std::make_unique<TamperingTransport>(
-        std::move(result.reports), std::move(on_write), std::move(on_read));
+    result.reports = std::make_unique<TamperingTransport>(std::move(result.reports),
+                                                          std::move(on_write), std::move(on_read));
     return result;
   }
   std::shared_ptr<ManualClock> clock;
@@ -159,10 +159,10 @@ TEST(Unit, UnknownCommandsAndWrongLengthsAreRefusedByCode) {
        {Command::identify, Command::get_filter, Command::get_time, Command::abort_write}) {
     EXPECT_EQ(ask(command, {1}), ReplyCode::bad_length);
   }
-  for (const Command command : {Command::read_page, Command::begin_write, Command::read_staged,
-                                Command::commit, Command::set_filter, Command::start_stream,
-                                Command::start_recording, Command::list_recording,
-                                Command::download, Command::write_staged}) {
+  for (const Command command :
+       {Command::read_page, Command::begin_write, Command::read_staged, Command::commit,
+        Command::set_filter, Command::start_stream, Command::start_recording,
+        Command::list_recording, Command::download, Command::write_staged}) {
     EXPECT_EQ(ask(command, {}), ReplyCode::bad_length);
   }
   EXPECT_EQ(ask(Command::set_filter, {2}), ReplyCode::bad_argument);
@@ -224,16 +224,15 @@ TEST(Unit, StreamsRawCountsInOrderWithTimeAndTemperature) {
 TEST(Unit, LostAndDuplicatedReportsAreSeen) {
   Bench bench;
   int samples_reports = 0;
-  auto unit = *Unit::open(bench.tampered([](Bytes&) { return 1; },
-                                         [&](Bytes& bytes) {
-                                           if (bytes[1] != 3) {
-                                             return 1;
-                                           }
-                                           ++samples_reports;
-                                           return samples_reports == 5   ? 0
-                                                  : samples_reports == 9 ? 2
-                                                                         : 1;
-                                         }));
+  auto unit =
+      *Unit::open(bench.tampered([](Bytes&) { return 1; },
+                                 [&](Bytes& bytes) {
+                                   if (bytes[1] != 3) {
+                                     return 1;
+                                   }
+                                   ++samples_reports;
+                                   return samples_reports == 5 ? 0 : samples_reports == 9 ? 2 : 1;
+                                 }));
   ASSERT_OK(unit->start_stream(100));
   std::set<std::uint32_t> seen;
   for (int i = 0; i < 30; ++i) {
@@ -315,13 +314,14 @@ TEST(Unit, DownloadSurvivesLossDamageAndRepetition) {
   Bench bench;
   Link link = bench.link();
   int block = 0;
-  link.bulk = std::make_unique<TamperingTransport>(std::move(link.bulk), nullptr, [&](Bytes& bytes) {
-    ++block;
-    if (block % 5 == 2) {
-      bytes[bytes.size() / 2] ^= 1;
-    }
-    return block % 7 == 3 ? 0 : block % 4 == 1 ? 2 : 1;
-  });
+  link.bulk =
+      std::make_unique<TamperingTransport>(std::move(link.bulk), nullptr, [&](Bytes& bytes) {
+        ++block;
+        if (block % 5 == 2) {
+          bytes[bytes.size() / 2] ^= 1;
+        }
+        return block % 7 == 3 ? 0 : block % 4 == 1 ? 2 : 1;
+      });
   auto unit = *Unit::open(std::move(link));
   const RecordingInfo info = record(bench, *unit, 600);
   MemoryEnv env;

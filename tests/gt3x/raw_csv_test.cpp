@@ -1,6 +1,8 @@
 #include "gt3x/raw_csv.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <fstream>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -167,6 +169,9 @@ TEST(RawCsv, AShortSecondIsFilledUp) {
   ASSERT_OK(text);
   EXPECT_EQ(rows_of(*text).size(), 90U);
   EXPECT_EQ(tally.filled, 2U);
+  Bytes ends_short = tests::made_log(1);
+  tests::append_second(ends_short, 1, 28);
+  EXPECT_EQ(rows_of(*csv_of(ends_short, tests::made_info())).size(), 58U);
 }
 
 TEST(RawCsv, Refuses) {
@@ -184,6 +189,30 @@ TEST(RawCsv, Refuses) {
   tests::append_second(nameless, 0);
   EXPECT_FAILS(csv_of(nameless, "Serial Number: X\r\nSample Rate: 30\r\n"), ErrorCode::bad_data);
   EXPECT_OK(csv_of(nameless, "Serial Number: X\r\nSample Rate: 30\r\n", {true, true}));
+}
+
+// Oracle: the vendor's calibrated CSV of the same .agdc, to the three decimals that we print.
+TEST(RawCsv, RawCountsOfAnAgdcBecomeG) {
+  SIXPOINT_NEED_SHARED("data/agdc/WRIST_rawLSB_032Hz_test.agdc");
+  auto recording =
+      Recording::open(posix_env().files, shared_file("data/agdc/WRIST_rawLSB_032Hz_test.agdc"));
+  ASSERT_OK(recording);
+  const auto text = csv_of(*recording);
+  ASSERT_OK(text);
+  const auto rows = rows_of(*text);
+  std::ifstream file(shared_file("data/agdc/WRIST_rawCalibrated_032Hz.csv"));
+  const auto wanted =
+      rows_of(std::string(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()));
+  ASSERT_EQ(rows.size(), wanted.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    PerAxis<double> ours{};
+    PerAxis<double> theirs{};
+    ASSERT_EQ(std::sscanf(rows[i].c_str(), "%lf,%lf,%lf", &ours[0], &ours[1], &ours[2]), 3);
+    ASSERT_EQ(std::sscanf(wanted[i].c_str(), "%lf,%lf,%lf", &theirs[0], &theirs[1], &theirs[2]), 3);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      ASSERT_NEAR(ours[axis], theirs[axis], 0.000501) << i;
+    }
+  }
 }
 
 // Every recording of the current form that we have can be exported; the oracle for the count is the

@@ -22,8 +22,7 @@ TEST(VirtualSettings, ReadsTheContractsExample) {
   EXPECT_EQ(truth.serial, "MOS2A45130007");
   EXPECT_EQ(truth.firmware, "1.5.0");
   EXPECT_EQ(to_iso8601(truth.calibrated), "2013-11-12T00:00:00Z");
-  EXPECT_EQ(truth.constants,
-            (StoredConstants{{311, 310, 287}, {-204, -216, -234}, {54, 47, 26}}));
+  EXPECT_EQ(truth.constants, (StoredConstants{{311, 310, 287}, {-204, -216, -234}, {54, 47, 26}}));
   EXPECT_EQ(truth.current.sensitivity_lsb_per_g, (PerAxis<double>{237.7, 251.8, 242.3}));
   EXPECT_EQ(truth.current.zero_lsb, (PerAxis<double>{49.9, 95.8, 60.8}));
   EXPECT_TRUE(settings->with_jig);
@@ -41,13 +40,31 @@ TEST(VirtualSettings, WhatIsLeftOutComesFromTheSeed) {
 }
 
 TEST(VirtualSettings, RefusesWhatItDoesNotKnow) {
-  for (const char* text :
-       {"speed=7", "seed", "seed=", "seed=-1", "seed=7x", "seed=1,seed=1", "serial=",
-        "serial=MOS 1", "serial=ABCDEFGHIJKLMNOPQ", "firmware=beta", "calibrated=yesterday",
-        "calibrated=1950-01-01", "positive_lsb=1/2", "positive_lsb=1/2/3/4", "positive_lsb=1/2/x",
-        "positive_lsb=1/2/3.5", "positive_lsb=1/2/9999", "true_zero_lsb=nan/1/1",
-        "true_sensitivity_lsb_per_g=0/1/1", "jig=yes", "pace=slow", "battery_mv=-3",
-        "temperature_c=hot", "positive_lsb=1/1/1,negative_lsb=1/1/1", "seed=7,,jig=auto"}) {
+  for (const char* text : {"speed=7",
+                           "seed",
+                           "seed=",
+                           "seed=-1",
+                           "seed=7x",
+                           "seed=1,seed=1",
+                           "serial=",
+                           "serial=MOS 1",
+                           "serial=ABCDEFGHIJKLMNOPQ",
+                           "firmware=beta",
+                           "calibrated=yesterday",
+                           "calibrated=1950-01-01",
+                           "positive_lsb=1/2",
+                           "positive_lsb=1/2/3/4",
+                           "positive_lsb=1/2/x",
+                           "positive_lsb=1/2/3.5",
+                           "positive_lsb=1/2/9999",
+                           "true_zero_lsb=nan/1/1",
+                           "true_sensitivity_lsb_per_g=0/1/1",
+                           "jig=yes",
+                           "pace=slow",
+                           "battery_mv=-3",
+                           "temperature_c=hot",
+                           "positive_lsb=1/1/1,negative_lsb=1/1/1",
+                           "seed=7,,jig=auto"}) {
     SCOPED_TRACE(text);
     EXPECT_FAILS(parse_virtual_settings(text, 1), ErrorCode::usage);
   }

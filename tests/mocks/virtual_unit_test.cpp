@@ -7,8 +7,8 @@
 #include "base/memory_env.h"
 #include "device/unit.h"
 #include "expect_result.h"
-#include "gt3x/recording.h"
 #include "gt3x/record.h"
+#include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
 #include "gt3x/samples.h"
 #include "mocks/in_process.h"
@@ -42,8 +42,12 @@ PerAxis<double> mean_of_stream(Bench& bench, int reports) {
   PerAxis<double> sum{};
   double count = 0;
   for (int i = 0; i < reports; ++i) {
-    const auto block = *bench.unit->next_samples(std::chrono::seconds(1));
-    for (const auto& counts : block->counts) {
+    const auto block = bench.unit->next_samples(std::chrono::seconds(1));
+    if (!block || !block->has_value()) {
+      ADD_FAILURE() << "the stream dried up";
+      return {};
+    }
+    for (const auto& counts : (*block)->counts) {
       for (std::size_t axis = 0; axis < kAxes; ++axis) {
         sum[axis] += counts[axis];
       }
@@ -141,7 +145,9 @@ TEST(VirtualUnit, RecordsUnderTheFirmwaresOwnFilter) {
       const double raw = truth.zero_lsb[axis] + up[axis] * truth.sensitivity_lsb_per_g[axis];
       const double stored = 256.0 * 2 * (raw - unit.constants.zero_lsb[axis]) /
                             (unit.constants.positive_lsb[axis] - unit.constants.negative_lsb[axis]);
-      EXPECT_NEAR(sum[axis] / count, stored, 0.4) << firmware << " axis " << axis;
+      // Rounding twice, to raw and to stored counts, leaves up to half a count that noise of
+      // this size does not average out; the rest is noise and seating.
+      EXPECT_NEAR(sum[axis] / count, stored, 0.6) << firmware << " axis " << axis;
     }
   }
 }
@@ -178,8 +184,7 @@ TEST(Inert, KeepsWhatItWasTold) {
   const auto clock = std::make_shared<ManualClock>();
   InertTransport transport(clock);
   transport.to_read.push_back(Bytes{1, 2, 3});
-  transport.to_read.push_back(
-      fail(ErrorCode::io, "as set", "test", "none needed"));
+  transport.to_read.push_back(fail(ErrorCode::io, "as set", "test", "none needed"));
   std::array<std::uint8_t, 64> buffer{};
   EXPECT_EQ(*transport.read(buffer, std::chrono::seconds(1)), 3U);
   EXPECT_FAILS(transport.read(buffer, std::chrono::seconds(1)), ErrorCode::io);

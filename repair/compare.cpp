@@ -1,0 +1,650 @@
+#include "repair/compare.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/time.h"
+#include "gt3x/recording.h"
+#include "gt3x/sample_reader.h"
+
+namespace sixpoint::repair {
+namespace {
+
+constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
+constexpr double kBlock_s = 60;
+constexpr std::size_t kMaxBlocks = 60;
+constexpr double kFineReach_s = 2;        // about the lag found to the second
+constexpr double kGoodCorrelation = 0.5;  // below, a minute does not fit at all
+constexpr double kRivalFactor = 0.85;     // peaks this close to a minute's best are rivals
+constexpr std::size_t kMaxRivals = 12;
+constexpr double kInlier_s = 0.03;
+constexpr double kSwellTrust_s = 0.2;  // standard error of the lag found from swelling and fading
+constexpr double kRivalLine = 0.8;     // a line with so much of the best one's votes is a rival
+constexpr double kMaxDrift_ppm = 100;  // a cold watch crystal is off by 35
+constexpr double kLongEnoughForDrift_s = 600;
+
+// What a second of magnitudes amounts to.
+struct Second {
+  float smallest_g = kMissing;
+  float largest_g = kMissing;
+  float sd_g = kMissing;
+};
+
+// Of the samples in [from_s, from_s + 1); missing where fewer than half are there.
+Second second_at(const Trace& trace, double from_s) {
+  const double first = std::ceil((from_s - trace.start_s()) * trace.rate_hz() - 1e-6);
+  const auto count = static_cast<std::size_t>(std::lround(trace.rate_hz()));
+  Second second;
+  if (first < 0 || first + static_cast<double>(count) > static_cast<double>(trace.size())) {
+    return second;
+  }
+  const auto begin = static_cast<std::size_t>(first);
+  std::size_t present = 0;
+  double sum = 0;
+  double square = 0;
+  float smallest = std::numeric_limits<float>::max();
+  float largest = 0;
+  for (std::size_t i = begin; i < begin + count; ++i) {
+    const float value = trace.magnitude_g(i);
+    if (std::isnan(value)) {
+      continue;
+    }
+    ++present;
+    sum += value;
+    square += static_cast<double>(value) * value;
+    smallest = std::min(smallest, value);
+    largest = std::max(largest, value);
+  }
+  if (2 * present < count || present == 0) {
+    return second;
+  }
+  const double mean = sum / static_cast<double>(present);
+  second.smallest_g = smallest;
+  second.largest_g = largest;
+  second.sd_g = static_cast<float>(
+      std::sqrt(std::max(0.0, square / static_cast<double>(present) - mean * mean)));
+  return second;
+}
+
+// Pearson's correlation of pairs given one by one; pairs with a missing value are left out.
+class Correlation {
+ public:
+  void add(double x, double y) {
+    if (std::isnan(x) || std::isnan(y)) {
+      return;
+    }
+    ++count_;
+    x_ += x;
+    y_ += y;
+    xx_ += x * x;
+    yy_ += y * y;
+    xy_ += x * y;
+  }
+  std::size_t count() const { return count_; }
+  double value() const {
+    const auto n = static_cast<double>(count_);
+    const double vx = xx_ - x_ * x_ / n;
+    const double vy = yy_ - y_ * y_ / n;
+    return count_ > 2 && vx > 0 && vy > 0 ? (xy_ - x_ * y_ / n) / std::sqrt(vx * vy) : 0;
+  }
+
+ private:
+  std::size_t count_ = 0;
+  double x_ = 0;
+  double y_ = 0;
+  double xx_ = 0;
+  double yy_ = 0;
+  double xy_ = 0;
+};
+
+// How much the second from each step on moves, for steps of hop_s from the whole second before the
+// trace's start. The logarithm lets rest and gentle motion have a say beside the wildest shaking.
+std::vector<float> motion_of(const Trace& trace, double hop_s) {
+  std::vector<float> motion;
+  const double start_s = std::floor(trace.start_s());
+  const auto steps = static_cast<std::size_t>((trace.end_s() - start_s) / hop_s);
+  motion.reserve(steps);
+  for (std::size_t i = 0; i < steps; ++i) {
+    motion.push_back(
+        std::log(second_at(trace, start_s + static_cast<double>(i) * hop_s).sd_g + 0.01F));
+  }
+  return motion;
+}
+
+// The lag at which the motions fit best, in steps of hop_s about `about_s`. Nothing where the best
+// is no fit.
+std::optional<double> motion_lag(const Trace& a, const Trace& b, double hop_s, double about_s,
+                                 double reach_s) {
+  const std::vector<float> motion_a = motion_of(a, hop_s);
+  const std::vector<float> motion_b = motion_of(b, hop_s);
+  const auto offset = static_cast<std::ptrdiff_t>(
+      std::llround((std::floor(a.start_s()) - std::floor(b.start_s()) + about_s) / hop_s));
+  const auto reach = static_cast<std::ptrdiff_t>(std::llround(reach_s / hop_s));
+  std::vector<double> values;
+  for (std::ptrdiff_t lag = -reach; lag <= reach; ++lag) {
+    Correlation correlation;
+    for (std::ptrdiff_t i = 0; i < std::ssize(motion_a); ++i) {
+      const std::ptrdiff_t j = i + offset + lag;
+      if (j >= 0 && j < std::ssize(motion_b)) {
+        correlation.add(motion_a[static_cast<std::size_t>(i)],
+                        motion_b[static_cast<std::size_t>(j)]);
+      }
+    }
+    // Few seconds in common correlate well by chance.
+    values.push_back(static_cast<double>(correlation.count()) * hop_s >= 10 ? correlation.value()
+                                                                            : 0);
+  }
+  const auto best = std::ranges::max_element(values);
+  if (*best < 0.2) {
+    return std::nullopt;
+  }
+  double at = static_cast<double>(best - values.begin());
+  if (best != values.begin() && best + 1 != values.end()) {
+    const double bend = *(best - 1) - 2 * *best + *(best + 1);
+    at += bend < 0 ? 0.5 * (*(best - 1) - *(best + 1)) / bend : 0;
+  }
+  return about_s + (at - static_cast<double>(reach)) * hop_s;
+}
+
+// By how the motion swells and fades, which no period can mislead: to some tenths of a second.
+std::optional<double> coarse_lag(const Trace& a, const Trace& b, double max_lag_s) {
+  const auto second = motion_lag(a, b, 1, 0, std::floor(max_lag_s));
+  if (!second) {
+    return std::nullopt;
+  }
+  const auto tenth = motion_lag(a, b, 0.1, std::round(*second), kFineReach_s);
+  return tenth ? tenth : second;
+}
+
+struct Block {
+  std::size_t begin = 0;  // into A
+  std::size_t end = 0;
+  double middle_s = 0;  // A's time
+  double motion_g = 0;
+};
+
+// The liveliest minutes of A, in order of time.
+std::vector<Block> lively_blocks(const Trace& a, const CompareOptions& options) {
+  const double length_s = std::min(kBlock_s, static_cast<double>(a.size()) / a.rate_hz());
+  const auto steps = std::max<std::size_t>(2, static_cast<std::size_t>(length_s * a.rate_hz()));
+  std::vector<Block> blocks;
+  for (std::size_t begin = 0; begin + steps <= a.size(); begin += steps) {
+    std::size_t present = 0;
+    double sum = 0;
+    double square = 0;
+    for (std::size_t i = begin; i < begin + steps; ++i) {
+      if (const double value = a.magnitude_g(i); !std::isnan(value)) {
+        ++present;
+        sum += value;
+        square += value * value;
+      }
+    }
+    if (10 * present < 9 * steps) {
+      continue;
+    }
+    const double mean = sum / static_cast<double>(present);
+    const double motion =
+        std::sqrt(std::max(0.0, square / static_cast<double>(present) - mean * mean));
+    if (motion * kMgPerG >= options.min_motion_mg) {
+      blocks.push_back({begin, begin + steps,
+                        a.start_s() + static_cast<double>(begin + steps / 2) / a.rate_hz(),
+                        motion});
+    }
+  }
+  std::ranges::sort(blocks, std::greater<>(), &Block::motion_g);
+  blocks.resize(std::min(blocks.size(), kMaxBlocks));
+  std::ranges::sort(blocks, std::less<>(), &Block::middle_s);
+  return blocks;
+}
+
+struct Candidate {
+  std::size_t block;
+  double lag_s;
+  double correlation;
+};
+
+double block_correlation(const Trace& a, const Trace& b, const Block& block, double lag_s) {
+  Correlation correlation;
+  for (std::size_t i = block.begin; i < block.end; ++i) {
+    correlation.add(a.magnitude_g(i),
+                    b.at(a.start_s() + static_cast<double>(i) / a.rate_hz() + lag_s));
+  }
+  return 2 * correlation.count() > block.end - block.begin ? correlation.value() : 0;
+}
+
+// Every lag at which this block fits about as well as it ever does.
+void add_candidates(const Trace& a, const Trace& b, const Block& block, std::size_t index,
+                    double about_s, std::vector<Candidate>& candidates) {
+  const double step_s = 1 / std::max(a.rate_hz(), b.rate_hz());
+  const auto reach = static_cast<int>(kFineReach_s / step_s);
+  std::vector<double> values;
+  for (int k = -reach; k <= reach; ++k) {
+    values.push_back(block_correlation(a, b, block, about_s + k * step_s));
+  }
+  const double best = *std::ranges::max_element(values);
+  if (best < kGoodCorrelation) {
+    return;
+  }
+  std::vector<Candidate> found;
+  for (std::size_t k = 1; k + 1 < values.size(); ++k) {
+    const double left = values[k - 1];
+    const double here = values[k];
+    const double right = values[k + 1];
+    if (here < kRivalFactor * best || here < left || here <= right) {
+      continue;
+    }
+    const double bend = left - 2 * here + right;
+    const double shift = bend < 0 ? 0.5 * (left - right) / bend : 0;
+    found.push_back({index, about_s + (static_cast<double>(k) - reach + shift) * step_s, here});
+  }
+  std::ranges::sort(found, std::greater<>(), &Candidate::correlation);
+  found.resize(std::min(found.size(), kMaxRivals));
+  candidates.insert(candidates.end(), found.begin(), found.end());
+}
+
+struct Line {
+  double lag_s = 0;  // at `middle_s`
+  double slope = 0;
+  double middle_s = 0;
+  double at(double time_s) const { return lag_s + slope * (time_s - middle_s); }
+};
+
+// The line that most blocks agree on: for every drift, lags corrected for it fall into bins; bins
+// near the lag that swelling and fading gave count for more. `rival_s` becomes the distance of the
+// next line that nearly as many agree on, 0 where there is none.
+Line vote(const std::vector<Candidate>& candidates, const std::vector<Block>& blocks,
+          double middle_s, bool with_drift, std::optional<double> about_s, double& rival_s) {
+  struct Best {
+    double votes = -1;
+    double slope = 0;
+  };
+  std::map<std::int64_t, Best> lines;
+  const double limit_ppm = with_drift ? kMaxDrift_ppm : 0;
+  for (double ppm = -limit_ppm; ppm <= limit_ppm; ppm += 2) {
+    std::map<std::int64_t, double> bins;
+    for (const Candidate& candidate : candidates) {
+      const double corrected =
+          candidate.lag_s - ppm * 1e-6 * (blocks[candidate.block].middle_s - middle_s);
+      bins[std::llround(corrected / kInlier_s)] += candidate.correlation;
+    }
+    for (const auto& [bin, votes] : bins) {
+      // The neighbouring bins have half a vote: agreement need not fall into the middle of a bin.
+      const auto neighbour = [&](std::int64_t other) {
+        const auto at = bins.find(other);
+        return at == bins.end() ? 0.0 : 0.5 * at->second;
+      };
+      const double off =
+          about_s ? (static_cast<double>(bin) * kInlier_s - *about_s) / kSwellTrust_s : 0;
+      // Of equal drifts the smaller one: real ones are.
+      const double total = (votes + neighbour(bin - 1) + neighbour(bin + 1)) *
+                           std::exp(-0.5 * off * off) * (1 - 1e-4 * std::abs(ppm));
+      if (Best& best = lines[bin]; total > best.votes) {
+        best = {total, ppm * 1e-6};
+      }
+    }
+  }
+  const auto best = std::ranges::max_element(
+      lines, [](const auto& x, const auto& y) { return x.second.votes < y.second.votes; });
+  rival_s = 0;
+  for (const auto& [bin, line] : lines) {
+    const double distance_s = static_cast<double>(std::abs(bin - best->first)) * kInlier_s;
+    if (distance_s > 3 * kInlier_s && line.votes > kRivalLine * best->second.votes) {
+      rival_s = std::max(rival_s, distance_s);
+    }
+  }
+  return {static_cast<double>(best->first) * kInlier_s, best->second.slope, middle_s};
+}
+
+// The lag of one block near `guess_s`, by least squares on the difference (Gauss-Newton), each
+// unit's own mean and gain apart. Nothing where it leaves the neighbourhood.
+std::optional<double> refined_lag(const Trace& a, const Trace& b, const Block& block,
+                                  double guess_s) {
+  const double half_step_s = 0.5 / b.rate_hz();
+  double lag_s = guess_s;
+  for (int round = 0; round < 8; ++round) {
+    // a = offset + gain * b(t + lag) + gain * b'(t + lag) * change: three unknowns, by their normal
+    // equations.
+    double n = 0, sb = 0, sd = 0, sa = 0, sbb = 0, sbd = 0, sdd = 0, sab = 0, sad = 0;
+    for (std::size_t i = block.begin; i < block.end; ++i) {
+      const double time_s = a.start_s() + static_cast<double>(i) / a.rate_hz() + lag_s;
+      const double va = a.magnitude_g(i);
+      const double vb = b.at(time_s);
+      const double d =
+          (b.at(time_s + half_step_s) - b.at(time_s - half_step_s)) / (2 * half_step_s);
+      if (std::isnan(va) || std::isnan(vb) || std::isnan(d)) {
+        continue;
+      }
+      n += 1, sb += vb, sd += d, sa += va, sbb += vb * vb, sbd += vb * d, sdd += d * d,
+          sab += va * vb, sad += va * d;
+    }
+    if (n < 10) {
+      return std::nullopt;
+    }
+    const double cbb = sbb - sb * sb / n;
+    const double cbd = sbd - sb * sd / n;
+    const double cdd = sdd - sd * sd / n;
+    const double cab = sab - sa * sb / n;
+    const double cad = sad - sa * sd / n;
+    const double determinant = cbb * cdd - cbd * cbd;
+    if (!(determinant > 1e-12 * cbb * cdd)) {
+      return std::nullopt;
+    }
+    const double gain = (cab * cdd - cad * cbd) / determinant;
+    const double gain_times_change = (cad * cbb - cab * cbd) / determinant;
+    if (!(gain > 0.1)) {
+      return std::nullopt;
+    }
+    const double change = std::clamp(gain_times_change / gain, -half_step_s, half_step_s);
+    lag_s += change;
+    if (std::abs(change) < 1e-7) {
+      break;
+    }
+  }
+  return std::abs(lag_s - guess_s) < 2 * kInlier_s ? std::optional(lag_s) : std::nullopt;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// A straight line through the blocks' lags; those far off (a block that fitted one period aside)
+// are left out.
+void fit_line(const std::vector<std::pair<double, double>>& points, bool with_drift, Line& line,
+              PairComparison& result) {
+  std::vector<double> distances;
+  for (const auto& [time_s, lag_s] : points) {
+    distances.push_back(lag_s - line.at(time_s));
+  }
+  const double centre = median(distances);
+  for (double& distance : distances) {
+    distance = std::abs(distance - centre);
+  }
+  // 1.4826: from the median of absolute deviations to a standard deviation, for normal scatter.
+  const double limit = std::max(1e-3, 4 * 1.4826 * median(distances));
+  // The lag is said for the middle of the minutes that it comes from, where it is known best.
+  double n = 0;
+  double time_sum = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (distances[i] <= limit) {
+      n += 1;
+      time_sum += points[i].first;
+    }
+  }
+  line.middle_s = time_sum / n;
+  double st = 0, sl = 0, stt = 0, stl = 0, sll = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (distances[i] > limit) {
+      continue;
+    }
+    const double t = points[i].first - line.middle_s;
+    const double l = points[i].second;
+    st += t, sl += l, stt += t * t, stl += t * l, sll += l * l;
+  }
+  const double ctt = stt - st * st / n;
+  const double ctl = stl - st * sl / n;
+  line.slope = with_drift && ctt > 0 ? ctl / ctt : 0;
+  line.lag_s = (sl - line.slope * st) / n;
+  const double rest = std::max(0.0, sll - sl * sl / n - line.slope * ctl);
+  result.minutes_used = static_cast<std::size_t>(n);
+  result.lag_uncertainty_s = n > 2 ? std::sqrt(rest / (n - 2) / n) : 0;
+}
+
+Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairComparison& result) {
+  Line line{0, 0, a.start_s()};
+  const std::vector<Block> blocks = lively_blocks(a, options);
+  if (blocks.empty()) {
+    result.remarks.emplace_back("nothing moved, so the clocks cannot be aligned; lag taken as 0");
+    return line;
+  }
+  const auto coarse = coarse_lag(a, b, options.max_lag_s);
+  if (!coarse && blocks.size() > 1) {
+    result.remarks.push_back(fmt::format(
+        "the motions do not fit at any lag up to {:.0f} s: were the units moved together?",
+        options.max_lag_s));
+    return line;
+  }
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    add_candidates(a, b, blocks[i], i, coarse.value_or(0), candidates);
+  }
+  if (candidates.empty()) {
+    result.remarks.emplace_back("no lively minute fits: were the units moved together?");
+    return line;
+  }
+  line.middle_s = (blocks.front().middle_s + blocks.back().middle_s) / 2;
+  const bool with_drift = blocks.back().middle_s - blocks.front().middle_s >= kLongEnoughForDrift_s;
+  double rival_s = 0;
+  line = vote(candidates, blocks, line.middle_s, with_drift, coarse, rival_s);
+  std::vector<std::pair<double, double>> points;
+  for (const Block& block : blocks) {
+    const auto lag = refined_lag(a, b, block, line.at(block.middle_s));
+    if (lag && block_correlation(a, b, block, *lag) >= kGoodCorrelation) {
+      points.emplace_back(block.middle_s, *lag);
+    }
+  }
+  if (!points.empty()) {
+    fit_line(points, with_drift && points.size() >= 4, line, result);
+    result.aligned = true;
+    if (rival_s > 0) {
+      result.lag_uncertainty_s = std::max(result.lag_uncertainty_s, rival_s);
+      result.remarks.push_back(fmt::format(
+          "the motion is periodic: the lag may be off by {:.2f} s, which the envelopes do not mind "
+          "but the RMS does",
+          rival_s));
+    }
+  }
+  return line;
+}
+
+Histogram histogram_of(const std::vector<float>& errors_mg, std::size_t bins) {
+  Histogram histogram;
+  if (errors_mg.empty() || bins == 0) {
+    return histogram;
+  }
+  std::vector<float> sizes;
+  sizes.reserve(errors_mg.size());
+  for (const float error : errors_mg) {
+    sizes.push_back(std::abs(error));
+  }
+  const auto at = sizes.begin() + static_cast<std::ptrdiff_t>((sizes.size() - 1) * 99 / 100);
+  std::ranges::nth_element(sizes, at);
+  // A round width that shows 99 of 100 errors, with a fifth to spare.
+  const double width =
+      std::max(1.0, std::ceil(2.4 * static_cast<double>(*at) / static_cast<double>(bins)));
+  const double first = -width * static_cast<double>(bins) / 2;
+  for (std::size_t i = 0; i <= bins; ++i) {
+    histogram.edges_mg.push_back(first + width * static_cast<double>(i));
+  }
+  histogram.counts.assign(bins, 0);
+  for (const float error : errors_mg) {
+    const double bin = std::floor((static_cast<double>(error) - first) / width);
+    ++histogram
+          .counts[static_cast<std::size_t>(std::clamp(bin, 0.0, static_cast<double>(bins - 1)))];
+  }
+  return histogram;
+}
+
+}  // namespace
+
+Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+  Trace trace;
+  trace.name_ = path;
+  trace.rate_hz_ = recording.info().sample_rate_hz().value_or(0);
+  if (!(trace.rate_hz_ >= 1)) {
+    return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all", path,
+                "download the recording from the unit again");
+  }
+  const auto rate = static_cast<std::uint64_t>(std::lround(trace.rate_hz_));
+  std::optional<std::uint32_t> start;
+  gt3x::SampleReader reader(recording);
+  for (;;) {
+    SIXPOINT_ASSIGN(const auto item, reader.next());
+    if (!item) {
+      break;
+    }
+    if (item->kind != gt3x::SampleItem::Kind::recorded || item->broke_order) {
+      continue;
+    }
+    if (item->type == gt3x::RecordType::activity3) {
+      return fail(ErrorCode::bad_data, "the recording holds raw counts, not g", path,
+                  "compare .gt3x recordings");
+    }
+    const auto scale = gt3x::accel_scale_lsb_per_g(recording.info(), item->parameters);
+    if (!scale) {
+      return fail(ErrorCode::bad_data, "the recording does not say how many LSB make one g", path,
+                  "check that this is a recording of a known unit");
+    }
+    if (!start) {
+      start = item->unix_time;
+      trace.start_s_ = item->unix_time;
+    }
+    const std::uint64_t first = (item->unix_time - *start) * rate;
+    const std::uint64_t count = std::min<std::uint64_t>(item->counts.size(), rate);
+    if (first + count > kMaxTraceSamples) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("the recording is longer than {} samples", kMaxTraceSamples), path,
+                  "compare recordings of hours, not of weeks");
+    }
+    trace.magnitude_g_.resize(first + count, kMissing);
+    for (std::size_t i = 0; i < count; ++i) {
+      double square = 0;
+      for (const std::int16_t value : item->counts[i]) {
+        square += static_cast<double>(value) * value;
+      }
+      trace.magnitude_g_[first + i] = static_cast<float>(std::sqrt(square) / *scale);
+    }
+  }
+  if (trace.magnitude_g_.empty()) {
+    return fail(ErrorCode::bad_data, "the recording holds no samples", path,
+                "check that the unit was started; download the recording again");
+  }
+  return trace;
+}
+
+Trace Trace::from_magnitudes(std::string name, double start_s, double rate_hz,
+                             std::vector<float> magnitudes_g) {
+  Trace trace;
+  trace.name_ = std::move(name);
+  trace.start_s_ = start_s;
+  trace.rate_hz_ = rate_hz;
+  trace.magnitude_g_ = std::move(magnitudes_g);
+  return trace;
+}
+
+double Trace::at(double time_s) const {
+  const double place = (time_s - start_s_) * rate_hz_;
+  const double floor = std::floor(place);
+  if (!(floor >= 1) || floor + 2 >= static_cast<double>(magnitude_g_.size())) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  // Catmull-Rom.
+  const auto i = static_cast<std::size_t>(floor);
+  const double u = place - floor;
+  const double p0 = magnitude_g_[i - 1];
+  const double p1 = magnitude_g_[i];
+  const double p2 = magnitude_g_[i + 1];
+  const double p3 = magnitude_g_[i + 2];
+  return p1 +
+         0.5 * u * (p2 - p0 + u * (2 * p0 - 5 * p1 + 4 * p2 - p3 + u * (3 * (p1 - p2) + p3 - p0)));
+}
+
+Result<PairComparison> compare(const Trace& a, const Trace& b, const CompareOptions& options) {
+  PairComparison result;
+  result.a = a.name();
+  result.b = b.name();
+  const Line line = align(a, b, options, result);
+  result.lag_s = line.lag_s;
+  result.lag_at_s = line.middle_s;
+  result.drift_ppm = line.slope * 1e6;
+
+  double square_mg2 = 0;
+  std::uint64_t samples = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double time_s = a.start_s() + static_cast<double>(i) / a.rate_hz();
+    const double difference = b.at(time_s + line.at(time_s)) - a.magnitude_g(i);
+    if (!std::isnan(difference)) {
+      square_mg2 += difference * difference * kMgPerG * kMgPerG;
+      ++samples;
+    }
+  }
+  if (samples == 0) {
+    return fail(ErrorCode::bad_data, "the two recordings have no moment in common",
+                a.name() + ", " + b.name(), "compare recordings of units that ran together");
+  }
+  result.overlap_s = static_cast<double>(samples) / a.rate_hz();
+  result.rms_mg = std::sqrt(square_mg2 / static_cast<double>(samples));
+
+  std::vector<float> errors_mg;
+  double sum = 0;
+  double square = 0;
+  for (double t = a.start_s(); t + 1 <= a.end_s(); t += 1) {
+    const Second mine = second_at(a, t);
+    const Second theirs = second_at(b, t + line.at(t));
+    if (std::isnan(mine.sd_g) || std::isnan(theirs.sd_g)) {
+      continue;
+    }
+    for (const float error :
+         {theirs.largest_g - mine.largest_g, theirs.smallest_g - mine.smallest_g}) {
+      const double error_mg = static_cast<double>(error) * kMgPerG;
+      errors_mg.push_back(static_cast<float>(error_mg));
+      sum += error_mg;
+      square += error_mg * error_mg;
+    }
+  }
+  result.envelope.errors = errors_mg.size();
+  if (!errors_mg.empty()) {
+    const auto n = static_cast<double>(errors_mg.size());
+    result.envelope.mean_mg = sum / n;
+    result.envelope.sd_mg =
+        std::sqrt(std::max(0.0, square / n - result.envelope.mean_mg * result.envelope.mean_mg));
+    result.histogram = histogram_of(errors_mg, options.histogram_bins);
+    for (float& error : errors_mg) {
+      error = std::abs(error);
+    }
+    const auto p95 =
+        errors_mg.begin() + static_cast<std::ptrdiff_t>((errors_mg.size() - 1) * 95 / 100);
+    std::ranges::nth_element(errors_mg, p95);
+    result.envelope.p95_mg = static_cast<double>(*p95);
+  }
+  return result;
+}
+
+std::string PairComparison::brief() const {
+  return fmt::format(
+      "{} and {}: lag {:.4f} s{}, RMS {:.1f} mg, envelopes {:+.1f} mg (sd {:.1f}, 95 % within "
+      "{:.1f}) over {:.0f} s",
+      a, b, lag_s, aligned ? "" : " (not aligned)", rms_mg, envelope.mean_mg, envelope.sd_mg,
+      envelope.p95_mg, overlap_s);
+}
+
+nlohmann::ordered_json PairComparison::to_json() const {
+  nlohmann::ordered_json json;
+  json["a"] = a;
+  json["b"] = b;
+  json["lag_s"] = lag_s;
+  json["lag_at"] =
+      to_iso8601(UtcTime(std::chrono::nanoseconds(std::llround(lag_at_s * 1e3) * 1'000'000)));
+  json["lag_uncertainty_s"] = lag_uncertainty_s;
+  json["drift_ppm"] = drift_ppm;
+  json["aligned"] = aligned;
+  json["minutes_used"] = minutes_used;
+  json["overlap_s"] = overlap_s;
+  json["rms_mg"] = rms_mg;
+  json["envelope_error_mg"] = {
+      {"mean", envelope.mean_mg}, {"sd", envelope.sd_mg}, {"p95", envelope.p95_mg}};
+  json["histogram"] = {{"edges_mg", histogram.edges_mg}, {"counts", histogram.counts}};
+  json["remarks"] = remarks;
+  return json;
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,118 @@
+// Two recordings of units that were moved together: how far apart are they? (paper, Results and
+// Figures 4-6)
+//
+// Two units on one shaker feel the same acceleration, but their clocks differ, their axes may point
+// elsewhere and their samples fall at other moments. So:
+//
+//  - Everything is done on the vector magnitude, which does not care how a unit lies.
+//  - Alignment in time: how the motion swells and fades (standard deviation within a second) is
+//    correlated first, to some tenths of a second; then up to 60 lively minutes are correlated to a
+//    fraction of a sample, each by itself; a straight line through their lags gives lag and drift.
+//    A minute of steady shaking fits at every period; therefore every good peak of every minute is
+//    a candidate, and the line wins that most of them agree on near the first lag.
+//  - Envelopes: per second the largest and the smallest magnitude, of each unit's own samples.
+//    Their differences are the errors of the paper's histograms; they do not depend on where within
+//    a vibration the samples fall.
+//  - RMS of the difference of the magnitudes, B interpolated (cubic) at the times of A's samples.
+//    At high frequencies it also holds what interpolation and the remaining lag cost.
+//
+// Comparisons are of hours: a recording may hold up to kMaxTraceSamples samples, which are kept in
+// memory (4 bytes each).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "base/env.h"
+#include "base/result.h"
+#include "gt3x/samples.h"
+
+namespace sixpoint::repair {
+
+inline constexpr std::uint64_t kMaxTraceSamples = 40'000'000;
+
+// The samples of one recording on a grid of equal steps; steps without a sample are missing.
+class Trace {
+ public:
+  // As gt3x::Recording and SampleReader have it; bad_data also for a recording without samples,
+  // without a rate or a scale, longer than kMaxTraceSamples, or of raw counts (.agdc).
+  static Result<Trace> load(FileSystem& files, const std::string& path);
+  // From g values at a fixed rate, for tests and for data from elsewhere. The grid begins at
+  // start_s and holds one step per element; a magnitude that is not finite is a missing sample.
+  static Trace from_magnitudes(std::string name, double start_s, double rate_hz,
+                               std::vector<float> magnitudes_g);
+
+  const std::string& name() const { return name_; }
+  double rate_hz() const { return rate_hz_; }
+  double start_s() const { return start_s_; }  // Unix time of step 0
+  double end_s() const { return start_s_ + static_cast<double>(magnitude_g_.size()) / rate_hz_; }
+  std::size_t size() const { return magnitude_g_.size(); }
+  float magnitude_g(std::size_t i) const { return magnitude_g_[i]; }  // NaN where missing
+  // Cubic between samples; NaN where one of the four about it is missing.
+  double at(double time_s) const;
+
+ private:
+  std::string name_;
+  double start_s_ = 0;
+  double rate_hz_ = 1;
+  std::vector<float> magnitude_g_;
+};
+
+struct CompareOptions {
+  // Clocks are set by the same computer when units are prepared; more than this is no common
+  // recording.
+  double max_lag_s = 120;
+  // A minute with less motion than this says nothing about time (twice the noise of two units).
+  double min_motion_mg = 20;
+  std::size_t histogram_bins = 50;
+};
+
+struct Envelopes {
+  double mean_mg = 0;  // of B - A
+  double sd_mg = 0;
+  double p95_mg = 0;  // 95th percentile of |B - A|
+  std::uint64_t errors = 0;
+};
+
+struct Histogram {
+  // Edges in ascending order, one more than counts. The outermost bins also hold what lies beyond.
+  std::vector<double> edges_mg;
+  std::vector<std::uint64_t> counts;
+};
+
+struct PairComparison {
+  std::string a;
+  std::string b;
+  // The same moment stands at time t in A and at t + lag_s in B, near lag_at_s (Unix time in A, the
+  // middle of the minutes used); away from there the lag changes by drift_ppm.
+  double lag_s = 0;
+  double lag_at_s = 0;
+  double drift_ppm = 0;
+  // Standard error of lag_s; where the motion is periodic, the distance of the next lag that fits
+  // nearly as well. 0 where it was not found.
+  double lag_uncertainty_s = 0;
+  bool aligned = false;  // false: nothing moved, or nothing fitted; then lag_s is 0
+  std::size_t minutes_used = 0;
+  double overlap_s = 0;  // seconds in which both have samples
+  double rms_mg = 0;
+  Envelopes envelope;
+  Histogram histogram;
+  std::vector<std::string> remarks;
+
+  std::string brief() const;
+  bool usable() const { return aligned && envelope.errors > 0; }
+  nlohmann::ordered_json to_json() const;  // the keys of the contract, and the others above
+};
+
+// bad_data where the two have no second in common.
+Result<PairComparison> compare(const Trace& a, const Trace& b, const CompareOptions& options = {});
+
+// A page that needs nothing else: per pair the magnitudes over the whole time (as envelopes), ten
+// lively seconds sample by sample, and the histogram of errors; after the paper's Figures 4-6.
+std::string compare_html(const std::vector<Trace>& traces,
+                         const std::vector<PairComparison>& pairs);
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Runs every command that a ```sh block of README.md or docs/*.md prints, in a scratch folder that
+# looks as the reader's would: build/sixpoint and an archive. A command ends with 0 unless the line
+# says "# exits with N". Commands of scripts/ have tests of their own (demo) or are what runs this (test).
+#   run_commands.sh SOURCE_FOLDER SIXPOINT_PROGRAM
+set -euo pipefail
+source_folder=$1
+program=$2
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+export HOME=$scratch/home SIXPOINT_SHARED=${SIXPOINT_SHARED:-$source_folder/../shared}
+failures=0
+run=0
+
+for document in "$source_folder"/README.md "$source_folder"/docs/*.md; do
+  folder=$scratch/$(basename "$document" .md)
+  mkdir -p "$folder/build" "$folder/archive"
+  ln -s "$program" "$folder/build/sixpoint"
+  cp "$source_folder/tests/docs/scenario.json" "$folder/S.json"
+  for day in 1 2; do
+    sed "s/\"seed\": 1/\"seed\": $day/" "$folder/S.json" >"$folder/day$day.json"
+    "$program" simulate --scenario "$folder/day$day.json" -o "$folder/archive/day$day.gt3x" \
+      >/dev/null 2>&1
+  done
+  # The lines of all sh blocks, continued lines joined.
+  mapfile -t commands < <(awk '/^```sh$/ { inside = 1; next } /^```/ { inside = 0 } inside' "$document" |
+    sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | grep -vE '^ *(#|$)' || true)
+  for command in "${commands[@]}"; do
+    case $command in
+      scripts/*) [ -x "$source_folder/${command%% *}" ] || { echo "FAILED: no $command"; failures=1; }
+        continue ;;
+    esac
+    expected=$(sed -n 's/.*# exits with \([0-9]*\).*/\1/p' <<<"$command")
+    status=0
+    output=$(cd "$folder" && bash -c "$command" </dev/null 2>&1) || status=$?
+    run=$((run + 1))
+    if [ "$status" -ne "${expected:-0}" ]; then
+      printf 'FAILED: %s: "%s" ended with %s, not with %s:\n%s\n' "$(basename "$document")" \
+        "$command" "$status" "${expected:-0}" "$output"
+      failures=1
+    fi
+  done
+done
+echo "$run commands of the documentation were run"
+[ "$run" -gt 10 ] || { echo "FAILED: fewer commands than the documentation prints"; failures=1; }
+exit "$failures"
