@@ -16,7 +16,8 @@ constexpr int kGrid = 16;                   // cells along a cube face: 90 / 16 
 constexpr double kNeighbourCosine = 0.978;  // 12 degrees
 constexpr double kTemperatureBin_c = 1.0;
 
-int cell_key(const PerAxis<double>& mean_g, int temperature_bin) {
+// Which of the 6 * kGrid * kGrid cells of a cube around the sphere; -1 for a zero vector.
+int cell_key(const PerAxis<double>& mean_g) {
   std::size_t face_axis = 0;
   for (std::size_t a = 1; a < kAxes; ++a) {
     if (std::abs(mean_g[a]) > std::abs(mean_g[face_axis])) {
@@ -27,14 +28,16 @@ int cell_key(const PerAxis<double>& mean_g, int temperature_bin) {
   if (length == 0) {
     return -1;
   }
-  // Angles, not tangents, so that cells are alike in size.
+  const double inverse = 1 / std::abs(length);
+  // Angles, not tangents, so that cells are alike in size; atan t on -1 .. 1 to 0.3 degrees is
+  // t (pi/4 + 0.273 (1 - |t|)) (Rajan and others 2006), which is monotonic and enough here.
   const auto slot = [&](std::size_t axis) {
-    const double angle = std::atan(mean_g[axis] / std::abs(length)) / M_PI_2 + 0.5;
+    const double t = mean_g[axis] * inverse;
+    const double angle = t * (M_PI_4 + 0.273 * (1 - std::abs(t))) / M_PI_2 + 0.5;
     return std::clamp(static_cast<int>(angle * kGrid), 0, kGrid - 1);
   };
   const int face = static_cast<int>(face_axis) * 2 + (length < 0 ? 1 : 0);
-  const int cell = (face * kGrid + slot((face_axis + 1) % 3)) * kGrid + slot((face_axis + 2) % 3);
-  return temperature_bin * 6 * kGrid * kGrid + cell;
+  return (face * kGrid + slot((face_axis + 1) % 3)) * kGrid + slot((face_axis + 2) % 3);
 }
 
 PerAxis<double> direction_of(const DirectionCell& cell, const Calibration& calibration) {
@@ -203,46 +206,52 @@ HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<doub
 std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::span<const char> used,
                                     std::vector<int>* cell_of_block) {
   std::vector<DirectionCell> cells;
-  std::unordered_map<int, int> number;
   if (cell_of_block != nullptr) {
     cell_of_block->assign(blocks.size(), -1);
   }
-  double reference_c = 0;
+  const double reference_c = blocks.empty() ? 0 : blocks.front().temperature_c.value_or(0);
+  const auto temperature_of = [&](const StillBlock& block) {
+    return block.temperature_c ? *block.temperature_c - reference_c : 0.0;
+  };
+  const auto bin_of = [&](const StillBlock& block) {
+    return static_cast<int>(
+        std::clamp(std::floor(temperature_of(block) / kTemperatureBin_c + 0.5), -200.0, 200.0));
+  };
+  int lowest_bin = 0;
+  int highest_bin = 0;
   for (const StillBlock& block : blocks) {
-    if (block.temperature_c) {
-      reference_c = *block.temperature_c;
-      break;
-    }
+    lowest_bin = std::min(lowest_bin, bin_of(block));
+    highest_bin = std::max(highest_bin, bin_of(block));
   }
+  constexpr int kKeys = 6 * kGrid * kGrid + 1;
+  std::vector<int> number(static_cast<std::size_t>((highest_bin - lowest_bin + 1) * kKeys), -1);
   std::vector<PerAxis<double>> square;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (!used.empty() && used[i] == 0) {
       continue;
     }
     const StillBlock& block = blocks[i];
-    const double temperature = block.temperature_c ? *block.temperature_c - reference_c : 0;
-    const int bin = static_cast<int>(
-        std::clamp(std::floor(temperature / kTemperatureBin_c + 0.5), -200.0, 200.0));
-    const int key = cell_key(block.mean_g, bin + 200);
-    const auto [found, fresh] = number.try_emplace(key, static_cast<int>(cells.size()));
-    if (fresh) {
+    int& found = number[static_cast<std::size_t>((bin_of(block) - lowest_bin) * kKeys +
+                                                 cell_key(block.mean_g) + 1)];
+    if (found < 0) {
+      found = static_cast<int>(cells.size());
       cells.emplace_back();
       cells.back().first_s = block.start_time_s;
       square.emplace_back();
     }
-    const auto k = static_cast<std::size_t>(found->second);
+    const auto k = static_cast<std::size_t>(found);
     DirectionCell& cell = cells[k];
     for (std::size_t a = 0; a < kAxes; ++a) {
       cell.mean_lsb[a] += block.mean_lsb[a];
       cell.variance_lsb2[a] += block.ramp_variance_lsb2[a];
       square[k][a] += block.mean_lsb[a] * block.mean_lsb[a];
     }
-    cell.temperature_c += temperature;
+    cell.temperature_c += temperature_of(block);
     cell.blocks += 1;
     cell.first_s = std::min(cell.first_s, block.start_time_s);
     cell.last_s = std::max(cell.last_s, block.start_time_s);
     if (cell_of_block != nullptr) {
-      (*cell_of_block)[i] = found->second;
+      (*cell_of_block)[i] = found;
     }
   }
   for (std::size_t k = 0; k < cells.size(); ++k) {
@@ -325,9 +334,29 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
 
   // Magnitude errors of all blocks, and what they say about scatter.
   std::vector<double> error_g(blocks.size());
+  double noise = 0;
+  const auto look_at_noise = [&]() {
+    std::size_t count = 0;
+    noise = 0;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const StillBlock& block = blocks[i];
+      if (used[i] == 0) {
+        continue;
+      }
+      ++count;
+      double variance = 0;
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const double s = out.fit.calibration.sensitivity_g_per_lsb[a];
+        const double along = out.fit.calibration.to_g(a, block.mean_lsb[a]) * s * block.sd_lsb[a];
+        variance += along * along;
+      }
+      noise += variance / std::max(1, block.samples);
+    }
+    noise /= static_cast<double>(std::max<std::size_t>(1, count));
+    out.noise_sd_mg = kMgPerG * std::sqrt(noise);
+  };
   const auto look = [&]() {
     std::vector<double> cell_sum(out.cells.size(), 0);
-    double noise = 0;
     std::size_t count = 0;
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       const StillBlock& block = blocks[i];
@@ -341,16 +370,8 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       }
       ++count;
       cell_sum[static_cast<std::size_t>(cell_of_block[i])] += error_g[i];
-      double variance = 0;
-      for (std::size_t a = 0; a < kAxes; ++a) {
-        const double s = out.fit.calibration.sensitivity_g_per_lsb[a];
-        const double along = out.fit.calibration.to_g(a, block.mean_lsb[a]) * s * block.sd_lsb[a];
-        variance += along * along;
-      }
-      noise += variance / std::max(1, block.samples);
     }
     out.blocks_used = count;
-    noise /= static_cast<double>(std::max<std::size_t>(1, count));
     double within = 0;
     double square = 0;
     double absolute = 0;
@@ -369,7 +390,6 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     // Few repeats say little about scatter; then it is at least what the samples' noise makes.
     block_g2 = std::max(freedom >= 20 ? pooled : std::max(pooled, noise), 1e-14);
     out.block_sd_mg = kMgPerG * std::sqrt(block_g2);
-    out.noise_sd_mg = kMgPerG * std::sqrt(noise);
     out.rms_mg = kMgPerG * std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count)));
     out.mean_error_mg = kMgPerG * absolute / static_cast<double>(std::max<std::size_t>(1, count));
   };
@@ -400,6 +420,7 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
   }
   SIXPOINT_CHECK(fit_once());
   least.starts = 1;
+  look_at_noise();
   double outlier_limit_g = 0;
   for (int round = 0; round < 6; ++round) {
     look();

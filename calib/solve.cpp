@@ -1,7 +1,6 @@
 #include "calib/solve.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -13,36 +12,6 @@ namespace sixpoint::calib {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// Blocks by the paper's letter where they do; with the noisy ones besides where the paper's
-// residual limit leaves a side with too few.
-std::vector<StillBlock> choose_blocks(std::span<const StillBlock> blocks, SolveReport& report) {
-  constexpr int kEnoughPerSide = 5;
-  std::vector<StillBlock> paper;
-  for (const StillBlock& block : blocks) {
-    if (!block.noisy) {
-      paper.push_back(block);
-    }
-  }
-  std::array<int, 6> count{};
-  for (const StillBlock& block : paper) {
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      count[2 * a] += block.mean_g[a] > kCoverageLimit_g ? 1 : 0;
-      count[2 * a + 1] += block.mean_g[a] < -kCoverageLimit_g ? 1 : 0;
-    }
-  }
-  if (*std::min_element(count.begin(), count.end()) >= kEnoughPerSide ||
-      paper.size() == blocks.size()) {
-    return paper;
-  }
-  report.noisy_points = blocks.size() - paper.size();
-  report.notes.push_back(
-      fmt::format("{} of {} still blocks exceed the paper's residual limit of 0.015 g by sensor "
-                  "noise alone and "
-                  "are used because the others do not suffice",
-                  report.noisy_points, blocks.size()));
-  return {blocks.begin(), blocks.end()};
-}
 
 PartialKnowledge know_partially(std::span<const StillBlock> blocks,
                                 const Calibration& file_constants, const SolveOptions& options) {
@@ -69,10 +38,12 @@ PartialKnowledge know_partially(std::span<const StillBlock> blocks,
 Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOptions& options) {
   report.statistical = fit.fit.standard_uncertainty();
   if (options.method == SolveMethod::genetic && report.search) {
-    // Its members wander about the answer; least squares' covariance knows nothing of that.
+    // Its members wander about the answer, and it may lie beside the minimum; least squares'
+    // covariance knows nothing of that.
+    const double apart_mg = difference_over_sphere(fit.six_parameters, *report.calibration).rms_mg;
+    const double wander_mg = std::hypot(report.search->wander_mg, apart_mg);
     for (std::size_t a = 0; a < kAxes; ++a) {
-      report.statistical.zero_mg[a] =
-          std::hypot(report.statistical.zero_mg[a], report.search->wander_mg);
+      report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], wander_mg);
       report.statistical.sensitivity_relative[a] = std::hypot(
           report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
     }
@@ -95,45 +66,11 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
   return {};
 }
 
-}  // namespace
-
-std::string_view to_string(SolveMethod method) {
-  return method == SolveMethod::genetic ? "ga" : "ls";
-}
-
-Result<SolveMethod> parse_solve_method(std::string_view text) {
-  if (text == "ls") {
-    return SolveMethod::least_squares;
-  }
-  if (text == "ga") {
-    return SolveMethod::genetic;
-  }
-  return fail(ErrorCode::usage, fmt::format("unknown method '{}'", text), "", "use 'ls' or 'ga'");
-}
-
-Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
-                                            const Calibration& file_constants,
-                                            const SolveOptions& options) {
-  SIXPOINT_CHECK(validate(file_constants));
-  if (!(options.gravity_g > 0.99 && options.gravity_g < 1.01) || !(options.gravity_sd_g >= 0)) {
-    return fail(ErrorCode::usage,
-                fmt::format("{} g is no gravity of this planet's surface", options.gravity_g),
-                "solve", "give local gravity in m/s2, or latitude and altitude");
-  }
-  for (const StillBlock& block : blocks) {
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      if (!std::isfinite(block.mean_g[a]) || !std::isfinite(block.mean_lsb[a]) ||
-          !std::isfinite(block.sd_lsb[a]) || !std::isfinite(block.ramp_variance_lsb2[a])) {
-        return fail(ErrorCode::bad_data, "a still block is not a finite number", "solve",
-                    "the recording is damaged");
-      }
-    }
-  }
+Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
+                                 const Calibration& file_constants, const SolveOptions& options) {
   SolveReport report;
   report.method = options.method;
   report.gravity_g = options.gravity_g;
-  report.points_found = blocks.size();
-  const std::vector<StillBlock> chosen = choose_blocks(blocks, report);
   report.points = chosen.size();
   report.coverage = coverage_of(chosen);
   report.verification.missing_directions = report.coverage.missing_directions();
@@ -197,15 +134,27 @@ Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
   report.residual_before_mg = cells_rms_mg(report.fit->cells, file_constants, options.gravity_g);
   report.verification = verify(chosen, file_constants, *report.calibration, *report.fit,
                                report.search, fit_options, options.limits);
-  if (options.method == SolveMethod::genetic && !report.search->settled) {
+  std::vector<std::string> doubts;
+  if (options.method == SolveMethod::genetic) {
+    doubts = report.search->reasons;
+    // Where it is not the same as least squares it must at least be within what is promised.
+    const double apart_mg =
+        difference_over_sphere(report.fit->fit.calibration, *report.calibration).worst_mg;
+    if (!(apart_mg <= options.limits.worst_direction_mg)) {
+      doubts.push_back(fmt::format(
+          "the genetic algorithm's answer is {:.1f} mg from least squares' in the worst direction "
+          "(limit {:.1f} mg)",
+          apart_mg, options.limits.worst_direction_mg));
+    }
+  }
+  if (!doubts.empty()) {
     if (report.verification.verified) {
       report.verification.reasons.clear();
     }
     report.verification.verified = false;
     report.verification.verdict = Verdict::not_verified;
-    report.verification.reasons.insert(report.verification.reasons.end(),
-                                       report.search->reasons.begin(),
-                                       report.search->reasons.end());
+    report.verification.reasons.insert(report.verification.reasons.end(), doubts.begin(),
+                                       doubts.end());
   }
   if (!(report.fit->fit.worst_direction_mg() <= options.limits.worst_direction_mg)) {
     report.partial = know_partially(chosen, file_constants, options);
@@ -231,6 +180,61 @@ Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
         "rounded to a unit's nine integers the constants are not good enough");
     report.stored.reset();
   }
+  return report;
+}
+
+}  // namespace
+
+std::string_view to_string(SolveMethod method) {
+  return method == SolveMethod::genetic ? "ga" : "ls";
+}
+
+Result<SolveMethod> parse_solve_method(std::string_view text) {
+  if (text == "ls") {
+    return SolveMethod::least_squares;
+  }
+  if (text == "ga") {
+    return SolveMethod::genetic;
+  }
+  return fail(ErrorCode::usage, fmt::format("unknown method '{}'", text), "", "use 'ls' or 'ga'");
+}
+
+Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
+                                            const Calibration& file_constants,
+                                            const SolveOptions& options) {
+  SIXPOINT_CHECK(validate(file_constants));
+  if (!(options.gravity_g > 0.99 && options.gravity_g < 1.01) || !(options.gravity_sd_g >= 0)) {
+    return fail(ErrorCode::usage,
+                fmt::format("{} g is no gravity of this planet's surface", options.gravity_g),
+                "solve", "give local gravity in m/s2, or latitude and altitude");
+  }
+  for (const StillBlock& block : blocks) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      if (!std::isfinite(block.mean_g[a]) || !std::isfinite(block.mean_lsb[a]) ||
+          !std::isfinite(block.sd_lsb[a]) || !std::isfinite(block.ramp_variance_lsb2[a])) {
+        return fail(ErrorCode::bad_data, "a still block is not a finite number", "solve",
+                    "the recording is damaged");
+      }
+    }
+  }
+  // By the paper's letter first; with the blocks that only sensor noise keeps from it where those
+  // do not suffice.
+  std::vector<StillBlock> paper;
+  for (const StillBlock& block : blocks) {
+    if (!block.noisy) {
+      paper.push_back(block);
+    }
+  }
+  SIXPOINT_ASSIGN(SolveReport report, solve_chosen(paper, file_constants, options));
+  if (!report.usable() && paper.size() < blocks.size()) {
+    SIXPOINT_ASSIGN(report, solve_chosen(blocks, file_constants, options));
+    report.noisy_points = blocks.size() - paper.size();
+    report.notes.push_back(fmt::format(
+        "{} of {} still blocks exceed the paper's residual limit of 0.015 g by sensor noise alone "
+        "and are used because the others do not suffice",
+        report.noisy_points, blocks.size()));
+  }
+  report.points_found = blocks.size();
   return report;
 }
 

@@ -211,7 +211,9 @@ std::string Verification::brief() const {
     line +=
         fmt::format(", {} unseen directions to {:.1f} mg", held_out_directions, *held_out_rms_mg);
   }
-  line += fmt::format(", still blocks within {:.1f} mg", applied_rms_mg);
+  if (directions > 0 && verdict != Verdict::incomplete) {
+    line += fmt::format(", still blocks within {:.1f} mg", applied_rms_mg);
+  }
   if (!reasons.empty()) {
     line += fmt::format(": {}", fmt::join(reasons, "; "));
   }

@@ -12,9 +12,13 @@ namespace sixpoint::cli {
   COMMAND(repair)                  \
   COMMAND(export)                  \
   COMMAND(compare)                 \
+  COMMAND(solve)                   \
+  COMMAND(jig)                     \
+  COMMAND(capture)                 \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
+  COMMAND(virtual)                 \
   COMMAND(simulate)
 // clang-format on
 

@@ -208,7 +208,8 @@ TEST_F(RepairCommand, RealFilesAreJudged) {
   SIXPOINT_NEED_SHARED("data/wgt3x-bt-affected");
   const auto answer = run({"scan", tests::shared_file("data"), "--json"});
   EXPECT_EQ(answer.exit_code, 1);
-  for (const Json& file : answer.json()["files"]) {
+  const Json json = answer.json();
+  for (const Json& file : json["files"]) {
     const std::string path = file["path"];
     EXPECT_EQ(file["verdict"],
               path.find("wgt3x-bt-affected") != std::string::npos ? "affected" : "not_affected")
