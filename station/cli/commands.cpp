@@ -18,8 +18,11 @@ namespace sixpoint::cli {
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
+  COMMAND(simulate)                \
+  COMMAND(doctor)                  \
   COMMAND(virtual)                 \
-  COMMAND(simulate)
+  COMMAND(station)                 \
+  COMMAND(archive)
 // clang-format on
 
 #define SIXPOINT_DECLARE(name) void add_##name(CLI::App& app, Context& context);
