@@ -105,7 +105,7 @@ double median(std::vector<double> values) {
 
 // The structural variance at which the cells' weighted squares add up to their degrees of freedom.
 double paule_mandel(const std::vector<double>& residual_g, const std::vector<double>& white_g2,
-                    const std::vector<double>& neighbours, int parameters) {
+                    int parameters) {
   const double freedom = static_cast<double>(residual_g.size()) - parameters;
   if (freedom < 1) {
     return 0;
@@ -113,7 +113,7 @@ double paule_mandel(const std::vector<double>& residual_g, const std::vector<dou
   const auto excess = [&](double structural_g2) {
     double sum = 0;
     for (std::size_t i = 0; i < residual_g.size(); ++i) {
-      sum += residual_g[i] * residual_g[i] / (white_g2[i] + structural_g2 * neighbours[i]);
+      sum += residual_g[i] * residual_g[i] / (white_g2[i] + structural_g2);
     }
     return sum - freedom;
   };
@@ -157,8 +157,8 @@ double predicted_sd_g(const LeastSquaresFit& fit, const DirectionCell& cell) {
 
 // Folds of whole neighbourhoods: five, or one each where there are few.
 HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<double>& sigma_g,
-                 const LeastSquaresFit& fit, const BlockFitOptions& options, FitModel model,
-                 int directions) {
+                 const std::vector<double>& weight_sigma_g, const LeastSquaresFit& fit,
+                 const BlockFitOptions& options, int directions) {
   constexpr int kFew = 15;
   constexpr double kPredictable_g = 0.005;
   const int folds = directions <= kFew ? directions : 5;
@@ -173,7 +173,7 @@ HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<doub
       }
     }
     LeastSquaresOptions least;
-    least.model = model;
+    least.model = fit.model;
     least.gravity_g = options.gravity_g;
     least.prior = options.prior;
     least.starts = 1;
@@ -189,7 +189,7 @@ HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<doub
       }
       const double residual =
           magnitude_g(*fold_fit, point_of(cells[i], sigma_g[i])) - options.gravity_g;
-      const double weight = 1 / (sigma_g[i] * sigma_g[i]);
+      const double weight = 1 / (weight_sigma_g[i] * weight_sigma_g[i]);
       square += weight * residual * residual;
       weights += weight;
       tested[static_cast<std::size_t>(cells[i].neighbourhood)] = 1;
@@ -302,7 +302,6 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
   LeastSquaresOptions least;
   least.gravity_g = options.gravity_g;
   least.prior = options.prior;
-  least.model = options.choose_model ? FitModel{} : options.model;
   Calibration from = start;
   std::vector<double> sigma_g;
   double structural_g2 = 9e-6;  // to begin with: every direction nearly equal
@@ -318,13 +317,30 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     from = out.fit.calibration;
     return {};
   };
-  const auto weigh = [&]() {
-    const auto neighbours = neighbours_of(out.cells, out.directions);
-    sigma_g.resize(out.cells.size());
-    for (std::size_t k = 0; k < out.cells.size(); ++k) {
-      sigma_g[k] =
-          std::sqrt(block_g2 / out.cells[k].blocks + structural_g2 * neighbours[k] + 1e-14);
+  const auto sigmas = [&](double structure_g2) {
+    std::vector<double> values;
+    values.reserve(out.cells.size());
+    for (const DirectionCell& cell : out.cells) {
+      values.push_back(std::sqrt(block_g2 / cell.blocks + structure_g2 + 1e-14));
     }
+    return values;
+  };
+  const auto weigh = [&]() { sigma_g = sigmas(structural_g2); };
+  // The misfit of cells next to each other is the same: it does not average out over them, and the
+  // covariance must not believe so.
+  const auto correlate = [&](LeastSquaresFit& fit, double structure_g2) -> Status {
+    const auto neighbours = neighbours_of(out.cells, out.directions);
+    std::vector<GravityPoint> points;
+    for (std::size_t k = 0; k < out.cells.size(); ++k) {
+      points.push_back(point_of(out.cells[k], std::sqrt(block_g2 / out.cells[k].blocks +
+                                                        structure_g2 * neighbours[k] + 1e-14)));
+    }
+    LeastSquaresOptions wide = least;
+    wide.model = fit.model;
+    wide.starts = 1;
+    SIXPOINT_ASSIGN(const LeastSquaresFit other, least_squares(points, fit.calibration, wide));
+    fit.covariance = other.covariance;
+    return {};
   };
   const auto merge = [&]() {
     out.cells = cells_of(blocks, used, &cell_of_block);
@@ -393,23 +409,27 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     out.rms_mg = kMgPerG * std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count)));
     out.mean_error_mg = kMgPerG * absolute / static_cast<double>(std::max<std::size_t>(1, count));
   };
-  std::vector<double> residual_g;
-  const auto look_at_cells = [&]() {
-    const auto neighbours = neighbours_of(out.cells, out.directions);
+  // What the cells' scatter says about the misfit of a model, as a variance.
+  const auto structure_of = [&](const LeastSquaresFit& fit, std::vector<double>& residual_g) {
     residual_g.clear();
     std::vector<double> white_g2;
     for (const DirectionCell& cell : out.cells) {
-      residual_g.push_back(magnitude_g(out.fit, point_of(cell, 1)) - options.gravity_g);
+      residual_g.push_back(magnitude_g(fit, point_of(cell, 1)) - options.gravity_g);
       white_g2.push_back(block_g2 / cell.blocks + 1e-14);
     }
-    out.redundancy = out.directions - least.model.parameters();
-    const double found = paule_mandel(residual_g, white_g2, neighbours, least.model.parameters());
+    const int redundancy = out.directions - fit.model.parameters();
+    const double found = paule_mandel(residual_g, white_g2, fit.model.parameters());
     const double assumed = std::pow(options.assumed_structural_mg / kMgPerG, 2);
-    const double freedom = std::max(0, out.redundancy);
+    const double freedom = std::max(0, redundancy);
     constexpr double kAssumedFreedom = 2;
-    structural_g2 = out.redundancy >= 30 ? found
-                                         : (freedom * found + kAssumedFreedom * assumed) /
-                                               (freedom + kAssumedFreedom);
+    return redundancy >= 30
+               ? found
+               : (freedom * found + kAssumedFreedom * assumed) / (freedom + kAssumedFreedom);
+  };
+  std::vector<double> residual_g;
+  const auto look_at_cells = [&]() {
+    out.redundancy = out.directions - out.fit.model.parameters();
+    structural_g2 = structure_of(out.fit, residual_g);
     out.structural_mg = kMgPerG * std::sqrt(structural_g2);
   };
 
@@ -418,8 +438,28 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
                 "least squares", "lay the unit still on each of its six sides for a minute");
   }
-  SIXPOINT_CHECK(fit_once());
+  // The basin from a part of the cells, the minimum from all of them.
+  {
+    constexpr std::size_t kForTheBasin = 256;
+    const std::size_t stride = 1 + out.cells.size() / kForTheBasin;
+    std::vector<GravityPoint> part;
+    for (std::size_t k = 0; k < out.cells.size(); k += stride) {
+      part.push_back(point_of(out.cells[k], sigma_g[k]));
+    }
+    LeastSquaresOptions basin = least;
+    basin.relative_step = 1e-6;
+    basin.relative_gradient = 1e-4;
+    SIXPOINT_ASSIGN(const LeastSquaresFit rough, least_squares(part, from, basin));
+    if (rough.converged) {
+      from = rough.calibration;
+    }
+    out.fit.starts = rough.starts;
+    out.fit.starts_in_basin = rough.starts_in_basin;
+  }
+  const int starts = out.fit.starts;
+  const int starts_in_basin = out.fit.starts_in_basin;
   least.starts = 1;
+  SIXPOINT_CHECK(fit_once());
   look_at_noise();
   double outlier_limit_g = 0;
   for (int round = 0; round < 6; ++round) {
@@ -459,43 +499,62 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     }
   }
 
-  out.six_parameters = out.fit.calibration;
-  if (options.choose_model) {
-    HeldOut best = hold_out(out.cells, sigma_g, out.fit, options, least.model, out.directions);
-    const FitModel base = least.model;
-    for (const FitModel candidate :
-         {FitModel{true, false}, FitModel{false, true}, FitModel{true, true}}) {
-      if (candidate.temperature && !(out.temperature_range_c >= 5)) {
-        continue;
-      }
-      // Cross-axis terms show between the axes: they need directions well away from them.
-      if (!best.valid() || out.directions < candidate.parameters() + 6) {
-        continue;
-      }
-      const HeldOut held =
-          hold_out(out.cells, sigma_g, out.fit, options, candidate, out.directions);
-      if (held.directions >= best.directions * 3 / 4 &&
-          held.rms_mg < options.model_gain * best.rms_mg) {
-        best = held;
-        least.model = candidate;
-      }
-    }
-    if (!(least.model == base)) {
-      for (int round = 0; round < 3; ++round) {
-        SIXPOINT_CHECK(fit_once());
-        look();
-        look_at_cells();
-        weigh();
-      }
-      SIXPOINT_CHECK(fit_once());
-    }
-  }
   look();
   look_at_cells();
-  const HeldOut held = hold_out(out.cells, sigma_g, out.fit, options, least.model, out.directions);
-  if (held.valid()) {
-    out.held_out_rms_mg = held.rms_mg;
-    out.held_out_directions = held.directions;
+  out.fit.starts = starts;
+  out.fit.starts_in_basin = starts_in_basin;
+  const HeldOut plain = hold_out(out.cells, sigma_g, sigma_g, out.fit, options, out.directions);
+  if (plain.valid()) {
+    out.held_out_rms_mg = plain.rms_mg;
+    out.held_out_directions = plain.directions;
+  }
+  double best_mg = plain.rms_mg;
+  for (const FitModel candidate :
+       {FitModel{true, false}, FitModel{false, true}, FitModel{true, true}}) {
+    if (!options.try_richer_models || !plain.valid() ||
+        (candidate.temperature && !(out.temperature_range_c >= 5)) ||
+        out.directions < candidate.parameters() + 3) {
+      continue;
+    }
+    BlockFit::Richer richer;
+    LeastSquaresOptions with_more = least;
+    with_more.model = candidate;
+    double structure_g2 = structural_g2;
+    std::vector<double> unused;
+    bool converged = true;
+    for (int round = 0; round < 3 && converged; ++round) {
+      const auto own_sigma_g = sigmas(structure_g2);
+      std::vector<GravityPoint> points;
+      for (std::size_t k = 0; k < out.cells.size(); ++k) {
+        points.push_back(point_of(out.cells[k], own_sigma_g[k]));
+      }
+      auto fit = least_squares(points, from, with_more);
+      converged = fit && fit->converged;
+      if (converged) {
+        richer.fit = *fit;
+        structure_g2 = structure_of(richer.fit, unused);
+      }
+    }
+    if (!converged) {
+      continue;
+    }
+    const HeldOut held =
+        hold_out(out.cells, sigmas(structure_g2), sigma_g, richer.fit, options, out.directions);
+    if (held.directions >= plain.directions * 3 / 4 && held.directions > 0 &&
+        held.rms_mg < options.model_gain * best_mg) {
+      best_mg = held.rms_mg;
+      richer.structural_mg = kMgPerG * std::sqrt(structure_g2);
+      richer.held_out_rms_mg = held.rms_mg;
+      richer.held_out_directions = held.directions;
+      SIXPOINT_CHECK(correlate(richer.fit, structure_g2));
+      out.richer = richer;
+    }
+  }
+  SIXPOINT_CHECK(correlate(out.fit, structural_g2));
+  if (out.richer) {
+    const double own = cells_rms_mg(out.cells, out.richer->fit.calibration, options.gravity_g);
+    const double plain_rms = cells_rms_mg(out.cells, out.fit.calibration, options.gravity_g);
+    out.richer_constants = own <= 1.1 * plain_rms;
   }
   for (std::size_t k = 0; k < out.cells.size(); ++k) {
     out.cell_residual_mg.push_back(kMgPerG * residual_g[k]);

@@ -186,8 +186,11 @@ Descent descend(const Problem& problem, const Vector& start) {
         sane ? problem.evaluate(moved, &moved_gradient, &moved_hessian) : HUGE_VAL;
     const bool small_step =
         sane && step.norm() <= problem.options.relative_step * (1 + out.theta.norm());
-    if (moved_cost <= out.cost || small_step) {
-      if (moved_cost <= out.cost) {
+    // Near the minimum the cost is flat to its last digit long before the gradient is.
+    const bool improves = moved_cost < out.cost || (sane && moved_cost <= out.cost * (1 + 1e-12) &&
+                                                    moved_gradient.norm() <= gradient.norm());
+    if (improves || small_step) {
+      if (improves) {
         out.theta = moved;
         out.cost = moved_cost;
         gradient = moved_gradient;
@@ -205,8 +208,8 @@ Descent descend(const Problem& problem, const Vector& start) {
         out.converged = true;
         break;
       }
-      if (small_step && moved_cost > out.cost) {
-        damping *= 10;
+      if (!improves) {
+        damping = std::max(damping * 10, 1e-12);
       }
     } else {
       damping = std::max(damping * 10, 1e-12);

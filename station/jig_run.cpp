@@ -343,14 +343,15 @@ void JigRun::finish_dwell() {
   for (double& sd_lsb : reading.sd_lsb) {
     sd_lsb = std::sqrt(sd_lsb);
   }
-  dwell_.clear();
 
   if (clipped) {
     refuse(reading.pose, "the sensor is at its limit (clipped)");
     return;
   }
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    if (reading.sd_lsb[axis] == 0) {
+    const auto first = dwell_.front().counts[axis];
+    if (std::all_of(dwell_.begin(), dwell_.end(),
+                    [&](const Sample& sample) { return sample.counts[axis] == first; })) {
       refuse(reading.pose, fmt::format("the {} axis does not change at all: the sensor is stuck",
                                        kAxisNames[axis]));
       return;

@@ -128,7 +128,7 @@ void print(Context& context, const Done& done) {
     return;
   }
   if (!report.refusal.empty()) {
-    context.people << fmt::format("sixpoint: {}\n", fmt::join(report.refusal, "; "));
+    context.log().error("{}", fmt::join(report.refusal, "; "));
     return;
   }
   context.out << fmt::format("{}: {}\n", printable(report.file), report.solved->brief());

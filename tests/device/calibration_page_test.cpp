@@ -35,8 +35,8 @@ TEST(CalibrationPage, LaysOutAsWritten) {
 // Oracle: a real unit's memory image: its CRC, made by the vendor's firmware, must hold.
 TEST(CalibrationPage, ReadsARealUnitsImage) {
   SIXPOINT_NEED_SHARED("data/nhanes/NEO1B34100019.gt3x");
-  auto recording =
-      gt3x::Recording::open(posix_env().files, tests::shared_file("data/nhanes/NEO1B34100019.gt3x"));
+  auto recording = gt3x::Recording::open(posix_env().files,
+                                         tests::shared_file("data/nhanes/NEO1B34100019.gt3x"));
   ASSERT_OK(recording);
   auto entry = recording->open_entry("eeprom.bin");
   ASSERT_OK(entry);
