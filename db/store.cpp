@@ -303,6 +303,7 @@ Result<std::vector<UnitRecord>> Store::units() {
                       "(SELECT count(*) FROM constants WHERE constants.serial = units.serial) "
                       "FROM units ORDER BY serial"));
   std::vector<UnitRecord> records;
+  records.reserve(rows.size());
   for (const Row& row : rows) {
     records.push_back({text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
                        static_cast<std::size_t>(integer_of(row[3]))});
