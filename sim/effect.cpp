@@ -72,6 +72,16 @@ Result<ParameterSet> complete_parameters(const EffectKind& kind, const Parameter
   return values;
 }
 
+std::vector<std::unique_ptr<Effect>> make_effects(const std::vector<EffectSpec>& specs,
+                                                  std::uint64_t seed) {
+  std::vector<std::unique_ptr<Effect>> effects;
+  effects.reserve(specs.size());
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    effects.push_back(specs[i].kind->make(specs[i].values, Random(seed, 100 + i)));
+  }
+  return effects;
+}
+
 Eigen::Matrix3d rotation_by_deg(const std::vector<double>& rotation_vector_deg) {
   const Eigen::Vector3d vector =
       Eigen::Vector3d(rotation_vector_deg[0], rotation_vector_deg[1], rotation_vector_deg[2]) *

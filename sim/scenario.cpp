@@ -404,14 +404,6 @@ std::unique_ptr<MotionSequence> Scenario::motion() const {
   return sequence;
 }
 
-std::vector<std::unique_ptr<Effect>> Scenario::make_effects() const {
-  std::vector<std::unique_ptr<Effect>> list;
-  for (std::size_t i = 0; i < effects.size(); ++i) {
-    list.push_back(effects[i].kind->make(effects[i].values, Random(seed, 100 + i)));
-  }
-  return list;
-}
-
 Result<Scenario> parse_scenario(std::string_view json) {
   const Json document = Json::parse(json, nullptr, false);
   if (document.is_discarded()) {

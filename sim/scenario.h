@@ -27,11 +27,6 @@ struct MotionSpec {
   std::uint64_t seed = 0;                                  // free_living
 };
 
-struct EffectSpec {
-  const EffectKind* kind = nullptr;
-  ParameterSet values;  // complete
-};
-
 struct Scenario {
   std::uint64_t seed = 1;
   UnitTruth unit;
@@ -48,7 +43,6 @@ struct Scenario {
 
   FilterConfiguration filter_in_force() const;
   std::unique_ptr<MotionSequence> motion() const;
-  std::vector<std::unique_ptr<Effect>> make_effects() const;
 };
 
 // Strict: unknown keys, wrong types and impossible values are `configuration`, with the key's path.
