@@ -63,8 +63,18 @@ struct Placement {
 };
 
 struct RecordingPlan {
+  struct Stretch {
+    std::uint64_t first_sample = 0;
+    std::uint64_t samples = 0;
+  };
   double rate_hz = 30;
-  std::uint64_t samples = 0;  // 0 = open end
+  std::uint64_t samples = 0;   // 0 = open end
+  std::vector<Stretch> rests;  // when the unit lies still; none = not known
+
+  // What an effect may spread itself over: an hour where the end is open.
+  std::uint64_t length() const {
+    return samples > 0 ? samples : static_cast<std::uint64_t>(3600 * rate_hz);
+  }
 };
 
 struct SimulatedBlock {

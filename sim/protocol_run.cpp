@@ -135,9 +135,15 @@ class Runner {
     if (with_times_) {
       record_.sample_time_s.resize(samples);
     }
+    RecordingPlan plan{run.rate_hz, samples, {}};
+    for (const ProtocolSegment& segment : run.segments) {
+      if (!segment.vibration) {
+        plan.rests.push_back({segment.first_sample, segment.samples});
+      }
+    }
     for (const auto& effect : effects_) {
       effect->on_digital(format_);
-      effect->on_recording({run.rate_hz, samples});
+      effect->on_recording(plan);
       run_in_ = run_in_ || effect->needs_run_in();
     }
   }
