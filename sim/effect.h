@@ -14,7 +14,7 @@
 //   sampling  on_sampling:  moves time_s
 //   stimulus  on_stimulus:  changes force_lab_g and rotation
 //   sensor    on_sensor:    changes sensed_g, without noise
-//             on_analog:    changes sensed_g with its noise: what the front end does
+//             on_analog:    changes sensed_g with its noise: the front end
 //   firmware  on_firmware:  changes stored
 // A block never spans a placement. Two callers drive these hooks: Simulator (simulator.h), a unit
 // in free motion, and run_protocol (protocol_run.h), a unit in a calibration protocol.

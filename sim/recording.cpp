@@ -64,6 +64,8 @@ class ScenarioLog final : public gt3x::ByteSource {
     options.stored_bits = scenario.wide ? 16 : 12;
     options.temperature_c = scenario.temperature_c;
     options.seed = scenario.seed;
+    options.plan = scenario.plan();
+    options.placements = scenario.placements();
     return options;
   }
 

@@ -288,12 +288,15 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
     for (const auto& [key, value] : parameters->items()) {
       const std::string where = effect.path("parameters") + "/" + key;
       std::vector<double>& numbers = given[key];
-      const Json list = value.is_array() ? value : Json::array({value});
-      for (const Json& item : list) {
-        if (!item.is_number() || list.size() > kAxes) {
-          return wrong(where, "this must be a number or three");
+      const Json rows = value.is_array() ? value : Json::array({value});
+      for (const Json& row : rows) {
+        const Json list = row.is_array() ? row : Json::array({row});
+        for (const Json& item : list) {
+          if (!item.is_number() || list.size() > kAxes || rows.size() > kAxes) {
+            return wrong(where, "this must be a number, three, or three rows of three");
+          }
+          numbers.push_back(item.get<double>());
         }
-        numbers.push_back(item.get<double>());
       }
     }
   }
@@ -376,9 +379,57 @@ FilterConfiguration Scenario::filter_in_force() const {
   return filter.value_or(filter_of_recording(unit.serial, unit.firmware, unit.calibrated));
 }
 
+namespace {
+
+Tone tone_under(Tone tone, const std::vector<std::unique_ptr<Effect>>& effects) {
+  for (const auto& effect : effects) {
+    effect->on_tone(tone);
+  }
+  return tone;
+}
+
+}  // namespace
+
+std::vector<Placement> Scenario::placements() const {
+  std::vector<Placement> list;
+  double at_s = 0;
+  const Eigen::Matrix3d* before = nullptr;
+  for (const MotionSpec& spec : motions) {
+    if (before != nullptr) {
+      at_s += turn_s;
+    }
+    // Free-living motion begins where it likes; for history it counts as the pose before it.
+    const Eigen::Matrix3d& pose =
+        spec.kind == MotionKind::free_living && before != nullptr ? *before : spec.rotation;
+    const bool same = before != nullptr && pose == *before;
+    list.push_back({at_s, pose, before == nullptr ? pose : *before, !same, same && turn_s == 0});
+    before = &pose;
+    at_s += spec.duration_s;
+  }
+  return list;
+}
+
+RecordingPlan Scenario::plan() const {
+  RecordingPlan plan;
+  plan.rate_hz = rate_hz;
+  double at_s = 0;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    at_s += i > 0 ? turn_s : 0;
+    const auto first = static_cast<std::uint64_t>(std::ceil(at_s * rate_hz));
+    at_s += motions[i].duration_s;
+    const auto end = static_cast<std::uint64_t>(std::floor(at_s * rate_hz));
+    if (motions[i].kind == MotionKind::still && end > first) {
+      plan.rests.push_back({first, end - first});
+    }
+  }
+  plan.samples = static_cast<std::uint64_t>(std::floor(at_s)) * static_cast<std::uint64_t>(rate_hz);
+  return plan;
+}
+
 std::unique_ptr<MotionSequence> Scenario::motion() const {
   auto sequence = std::make_unique<MotionSequence>();
   std::uint64_t turn_seed = seed;
+  const auto running = make_effects(effects, seed);
   for (const MotionSpec& spec : motions) {
     std::unique_ptr<Motion> next;
     switch (spec.kind) {
@@ -386,7 +437,7 @@ std::unique_ptr<MotionSequence> Scenario::motion() const {
         next = still(spec.rotation, gravity_g);
         break;
       case MotionKind::shaker:
-        next = shaker(spec.rotation, spec.tone, gravity_g);
+        next = shaker(spec.rotation, tone_under(spec.tone, running), gravity_g);
         break;
       case MotionKind::free_living:
         next = free_living(spec.duration_s, spec.seed, gravity_g);

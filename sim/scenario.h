@@ -42,7 +42,11 @@ struct Scenario {
   std::vector<EffectSpec> effects;
 
   FilterConfiguration filter_in_force() const;
+  // With the effects' answer to the shaker's tones.
   std::unique_ptr<MotionSequence> motion() const;
+  // What the simulator's effects need to know of the motion.
+  std::vector<Placement> placements() const;
+  RecordingPlan plan() const;
 };
 
 // Strict: unknown keys, wrong types and impossible values are `configuration`, with the key's path.
