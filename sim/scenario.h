@@ -1,4 +1,5 @@
-// A scenario: which unit goes through which motion, and what it records (docs/scenario.md).
+// A scenario: which unit goes through which motion or which protocol, and what it records
+// (docs/scenario.md).
 //
 // The same scenario gives the same recording, byte for byte, on every machine.
 #pragma once
@@ -13,6 +14,7 @@
 
 #include "sim/effect.h"
 #include "sim/motion.h"
+#include "sim/protocol_run.h"
 #include "sim/unit_truth.h"
 
 namespace sixpoint::sim {
@@ -36,9 +38,11 @@ struct Scenario {
   // None: the one that the unit's firmware chooses. Else that one, against the header.
   std::optional<FilterConfiguration> filter;
   double temperature_c = 25;
-  double gravity_g = 1;  // local gravity
-  double turn_s = 2;     // a hand's time from one motion to the next; 0 = no transition
-  std::vector<MotionSpec> motions;
+  double gravity_g = 1;             // local gravity
+  double turn_s = 2;                // a hand's time from one motion to the next; 0 = no transition
+  std::vector<MotionSpec> motions;  // empty where there is a protocol
+  // A bundle instead of a plain recording; complete, with the scenario's effects and seed.
+  std::optional<ProtocolRun> protocol;
   std::vector<EffectSpec> effects;
 
   FilterConfiguration filter_in_force() const;

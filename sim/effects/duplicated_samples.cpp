@@ -24,7 +24,7 @@ class DuplicatedSamples final : public Effect {
     for (std::size_t i = 0; i < block.size(); ++i) {
       // The first sample of a stretch has nothing to repeat.
       if (until_next_ == 0 && block.time_s[i] > block.clock_start_s) {
-        repeats_.push_back(i);
+        repeats_.push_back(block.first_sample + i);
         shift_s_ -= interval_s_;
         until_next_ = draw();
       } else if (until_next_ > 0) {
@@ -34,8 +34,12 @@ class DuplicatedSamples final : public Effect {
     }
   }
   void on_firmware(SimulatedBlock& block) override {
-    for (const std::size_t i : repeats_) {
-      block.stored[i] = i == 0 ? last_ : block.stored[i - 1];
+    for (const std::uint64_t index : repeats_) {
+      // A block may be a part of the one whose times were set.
+      if (index >= block.first_sample && index < block.first_sample + block.size()) {
+        const auto i = static_cast<std::size_t>(index - block.first_sample);
+        block.stored[i] = i == 0 ? last_ : block.stored[i - 1];
+      }
     }
     if (!block.stored.empty()) {
       last_ = block.stored.back();
@@ -59,7 +63,7 @@ class DuplicatedSamples final : public Effect {
   double clock_start_s_ = 0;
   double shift_s_ = 0;
   bool started_ = false;
-  std::vector<std::size_t> repeats_;
+  std::vector<std::uint64_t> repeats_;
   gt3x::Counts last_{};
 };
 
