@@ -38,6 +38,22 @@ Result<UtcTime> parse_iso8601(std::string_view text) {
   if (rest.ends_with('Z')) {
     rest.remove_suffix(1);
   }
+  // A fraction of a second: up to nine digits behind a point.
+  std::int64_t fraction_ns = 0;
+  if (const auto point = rest.find('.'); point != std::string_view::npos) {
+    const std::string_view digits = rest.substr(point + 1);
+    if (point != 19 || digits.empty() || digits.size() > 9) {
+      return wrong();
+    }
+    for (std::size_t i = 0; i < 9; ++i) {
+      const char digit = i < digits.size() ? digits[i] : '0';
+      if (digit < '0' || digit > '9') {
+        return wrong();
+      }
+      fraction_ns = fraction_ns * 10 + (digit - '0');
+    }
+    rest = rest.substr(0, point);
+  }
   // Field starts and widths of YYYY-MM-DD[THH:MM:SS].
   constexpr std::array<std::size_t, 6> kStart = {0, 5, 8, 11, 14, 17};
   constexpr std::array<std::size_t, 6> kWidth = {4, 2, 2, 2, 2, 2};
@@ -65,7 +81,8 @@ Result<UtcTime> parse_iso8601(std::string_view text) {
     return wrong();
   }
   return UtcTime(std::chrono::sys_days(date)) + std::chrono::hours(field[3]) +
-         std::chrono::minutes(field[4]) + std::chrono::seconds(field[5]);
+         std::chrono::minutes(field[4]) + std::chrono::seconds(field[5]) +
+         std::chrono::nanoseconds(fraction_ns);
 }
 
 }  // namespace sixpoint

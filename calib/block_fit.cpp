@@ -16,7 +16,8 @@ constexpr int kGrid = 16;                   // cells along a cube face: 90 / 16 
 constexpr double kNeighbourCosine = 0.978;  // 12 degrees
 constexpr double kTemperatureBin_c = 1.0;
 
-int cell_key(const PerAxis<double>& mean_g, int temperature_bin) {
+// Which of the 6 * kGrid * kGrid cells of a cube around the sphere; -1 for a zero vector.
+int cell_key(const PerAxis<double>& mean_g) {
   std::size_t face_axis = 0;
   for (std::size_t a = 1; a < kAxes; ++a) {
     if (std::abs(mean_g[a]) > std::abs(mean_g[face_axis])) {
@@ -27,14 +28,16 @@ int cell_key(const PerAxis<double>& mean_g, int temperature_bin) {
   if (length == 0) {
     return -1;
   }
-  // Angles, not tangents, so that cells are alike in size.
+  const double inverse = 1 / std::abs(length);
+  // Angles, not tangents, so that cells are alike in size; atan t on -1 .. 1 to 0.3 degrees is
+  // t (pi/4 + 0.273 (1 - |t|)) (Rajan and others 2006), which is monotonic and enough here.
   const auto slot = [&](std::size_t axis) {
-    const double angle = std::atan(mean_g[axis] / std::abs(length)) / M_PI_2 + 0.5;
+    const double t = mean_g[axis] * inverse;
+    const double angle = t * (M_PI_4 + 0.273 * (1 - std::abs(t))) / M_PI_2 + 0.5;
     return std::clamp(static_cast<int>(angle * kGrid), 0, kGrid - 1);
   };
   const int face = static_cast<int>(face_axis) * 2 + (length < 0 ? 1 : 0);
-  const int cell = (face * kGrid + slot((face_axis + 1) % 3)) * kGrid + slot((face_axis + 2) % 3);
-  return temperature_bin * 6 * kGrid * kGrid + cell;
+  return (face * kGrid + slot((face_axis + 1) % 3)) * kGrid + slot((face_axis + 2) % 3);
 }
 
 PerAxis<double> direction_of(const DirectionCell& cell, const Calibration& calibration) {
@@ -102,7 +105,7 @@ double median(std::vector<double> values) {
 
 // The structural variance at which the cells' weighted squares add up to their degrees of freedom.
 double paule_mandel(const std::vector<double>& residual_g, const std::vector<double>& white_g2,
-                    const std::vector<double>& neighbours, int parameters) {
+                    int parameters) {
   const double freedom = static_cast<double>(residual_g.size()) - parameters;
   if (freedom < 1) {
     return 0;
@@ -110,7 +113,7 @@ double paule_mandel(const std::vector<double>& residual_g, const std::vector<dou
   const auto excess = [&](double structural_g2) {
     double sum = 0;
     for (std::size_t i = 0; i < residual_g.size(); ++i) {
-      sum += residual_g[i] * residual_g[i] / (white_g2[i] + structural_g2 * neighbours[i]);
+      sum += residual_g[i] * residual_g[i] / (white_g2[i] + structural_g2);
     }
     return sum - freedom;
   };
@@ -154,8 +157,8 @@ double predicted_sd_g(const LeastSquaresFit& fit, const DirectionCell& cell) {
 
 // Folds of whole neighbourhoods: five, or one each where there are few.
 HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<double>& sigma_g,
-                 const LeastSquaresFit& fit, const BlockFitOptions& options, FitModel model,
-                 int directions) {
+                 const std::vector<double>& weight_sigma_g, const LeastSquaresFit& fit,
+                 const BlockFitOptions& options, int directions) {
   constexpr int kFew = 15;
   constexpr double kPredictable_g = 0.005;
   const int folds = directions <= kFew ? directions : 5;
@@ -170,7 +173,7 @@ HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<doub
       }
     }
     LeastSquaresOptions least;
-    least.model = model;
+    least.model = fit.model;
     least.gravity_g = options.gravity_g;
     least.prior = options.prior;
     least.starts = 1;
@@ -186,7 +189,7 @@ HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<doub
       }
       const double residual =
           magnitude_g(*fold_fit, point_of(cells[i], sigma_g[i])) - options.gravity_g;
-      const double weight = 1 / (sigma_g[i] * sigma_g[i]);
+      const double weight = 1 / (weight_sigma_g[i] * weight_sigma_g[i]);
       square += weight * residual * residual;
       weights += weight;
       tested[static_cast<std::size_t>(cells[i].neighbourhood)] = 1;
@@ -203,46 +206,52 @@ HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<doub
 std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::span<const char> used,
                                     std::vector<int>* cell_of_block) {
   std::vector<DirectionCell> cells;
-  std::unordered_map<int, int> number;
   if (cell_of_block != nullptr) {
     cell_of_block->assign(blocks.size(), -1);
   }
-  double reference_c = 0;
+  const double reference_c = blocks.empty() ? 0 : blocks.front().temperature_c.value_or(0);
+  const auto temperature_of = [&](const StillBlock& block) {
+    return block.temperature_c ? *block.temperature_c - reference_c : 0.0;
+  };
+  const auto bin_of = [&](const StillBlock& block) {
+    return static_cast<int>(
+        std::clamp(std::floor(temperature_of(block) / kTemperatureBin_c + 0.5), -200.0, 200.0));
+  };
+  int lowest_bin = 0;
+  int highest_bin = 0;
   for (const StillBlock& block : blocks) {
-    if (block.temperature_c) {
-      reference_c = *block.temperature_c;
-      break;
-    }
+    lowest_bin = std::min(lowest_bin, bin_of(block));
+    highest_bin = std::max(highest_bin, bin_of(block));
   }
+  constexpr std::size_t kKeys = 6 * kGrid * kGrid + 1;
+  std::vector<int> number(static_cast<std::size_t>(highest_bin - lowest_bin + 1) * kKeys, -1);
   std::vector<PerAxis<double>> square;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (!used.empty() && used[i] == 0) {
       continue;
     }
     const StillBlock& block = blocks[i];
-    const double temperature = block.temperature_c ? *block.temperature_c - reference_c : 0;
-    const int bin = static_cast<int>(
-        std::clamp(std::floor(temperature / kTemperatureBin_c + 0.5), -200.0, 200.0));
-    const int key = cell_key(block.mean_g, bin + 200);
-    const auto [found, fresh] = number.try_emplace(key, static_cast<int>(cells.size()));
-    if (fresh) {
+    int& found = number[static_cast<std::size_t>(bin_of(block) - lowest_bin) * kKeys +
+                        static_cast<std::size_t>(cell_key(block.mean_g) + 1)];
+    if (found < 0) {
+      found = static_cast<int>(cells.size());
       cells.emplace_back();
       cells.back().first_s = block.start_time_s;
       square.emplace_back();
     }
-    const auto k = static_cast<std::size_t>(found->second);
+    const auto k = static_cast<std::size_t>(found);
     DirectionCell& cell = cells[k];
     for (std::size_t a = 0; a < kAxes; ++a) {
       cell.mean_lsb[a] += block.mean_lsb[a];
       cell.variance_lsb2[a] += block.ramp_variance_lsb2[a];
       square[k][a] += block.mean_lsb[a] * block.mean_lsb[a];
     }
-    cell.temperature_c += temperature;
+    cell.temperature_c += temperature_of(block);
     cell.blocks += 1;
     cell.first_s = std::min(cell.first_s, block.start_time_s);
     cell.last_s = std::max(cell.last_s, block.start_time_s);
     if (cell_of_block != nullptr) {
-      (*cell_of_block)[i] = found->second;
+      (*cell_of_block)[i] = found;
     }
   }
   for (std::size_t k = 0; k < cells.size(); ++k) {
@@ -293,7 +302,6 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
   LeastSquaresOptions least;
   least.gravity_g = options.gravity_g;
   least.prior = options.prior;
-  least.model = options.choose_model ? FitModel{} : options.model;
   Calibration from = start;
   std::vector<double> sigma_g;
   double structural_g2 = 9e-6;  // to begin with: every direction nearly equal
@@ -309,13 +317,30 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     from = out.fit.calibration;
     return {};
   };
-  const auto weigh = [&]() {
-    const auto neighbours = neighbours_of(out.cells, out.directions);
-    sigma_g.resize(out.cells.size());
-    for (std::size_t k = 0; k < out.cells.size(); ++k) {
-      sigma_g[k] =
-          std::sqrt(block_g2 / out.cells[k].blocks + structural_g2 * neighbours[k] + 1e-14);
+  const auto sigmas = [&](double structure_g2) {
+    std::vector<double> values;
+    values.reserve(out.cells.size());
+    for (const DirectionCell& cell : out.cells) {
+      values.push_back(std::sqrt(block_g2 / cell.blocks + structure_g2 + 1e-14));
     }
+    return values;
+  };
+  const auto weigh = [&]() { sigma_g = sigmas(structural_g2); };
+  // The misfit of cells next to each other is the same: it does not average out over them, and the
+  // covariance must not believe so.
+  const auto correlate = [&](LeastSquaresFit& fit, double structure_g2) -> Status {
+    const auto neighbours = neighbours_of(out.cells, out.directions);
+    std::vector<GravityPoint> points;
+    for (std::size_t k = 0; k < out.cells.size(); ++k) {
+      points.push_back(point_of(out.cells[k], std::sqrt(block_g2 / out.cells[k].blocks +
+                                                        structure_g2 * neighbours[k] + 1e-14)));
+    }
+    LeastSquaresOptions wide = least;
+    wide.model = fit.model;
+    wide.starts = 1;
+    SIXPOINT_ASSIGN(const LeastSquaresFit other, least_squares(points, fit.calibration, wide));
+    fit.covariance = other.covariance;
+    return {};
   };
   const auto merge = [&]() {
     out.cells = cells_of(blocks, used, &cell_of_block);
@@ -325,9 +350,29 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
 
   // Magnitude errors of all blocks, and what they say about scatter.
   std::vector<double> error_g(blocks.size());
+  double noise = 0;
+  const auto look_at_noise = [&]() {
+    std::size_t count = 0;
+    noise = 0;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const StillBlock& block = blocks[i];
+      if (used[i] == 0) {
+        continue;
+      }
+      ++count;
+      double variance = 0;
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const double s = out.fit.calibration.sensitivity_g_per_lsb[a];
+        const double along = out.fit.calibration.to_g(a, block.mean_lsb[a]) * s * block.sd_lsb[a];
+        variance += along * along;
+      }
+      noise += variance / std::max(1, block.samples);
+    }
+    noise /= static_cast<double>(std::max<std::size_t>(1, count));
+    out.noise_sd_mg = kMgPerG * std::sqrt(noise);
+  };
   const auto look = [&]() {
     std::vector<double> cell_sum(out.cells.size(), 0);
-    double noise = 0;
     std::size_t count = 0;
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       const StillBlock& block = blocks[i];
@@ -341,16 +386,8 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       }
       ++count;
       cell_sum[static_cast<std::size_t>(cell_of_block[i])] += error_g[i];
-      double variance = 0;
-      for (std::size_t a = 0; a < kAxes; ++a) {
-        const double s = out.fit.calibration.sensitivity_g_per_lsb[a];
-        const double along = out.fit.calibration.to_g(a, block.mean_lsb[a]) * s * block.sd_lsb[a];
-        variance += along * along;
-      }
-      noise += variance / std::max(1, block.samples);
     }
     out.blocks_used = count;
-    noise /= static_cast<double>(std::max<std::size_t>(1, count));
     double within = 0;
     double square = 0;
     double absolute = 0;
@@ -369,27 +406,30 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     // Few repeats say little about scatter; then it is at least what the samples' noise makes.
     block_g2 = std::max(freedom >= 20 ? pooled : std::max(pooled, noise), 1e-14);
     out.block_sd_mg = kMgPerG * std::sqrt(block_g2);
-    out.noise_sd_mg = kMgPerG * std::sqrt(noise);
     out.rms_mg = kMgPerG * std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count)));
     out.mean_error_mg = kMgPerG * absolute / static_cast<double>(std::max<std::size_t>(1, count));
   };
-  std::vector<double> residual_g;
-  const auto look_at_cells = [&]() {
-    const auto neighbours = neighbours_of(out.cells, out.directions);
+  // What the cells' scatter says about the misfit of a model, as a variance.
+  const auto structure_of = [&](const LeastSquaresFit& fit, std::vector<double>& residual_g) {
     residual_g.clear();
     std::vector<double> white_g2;
     for (const DirectionCell& cell : out.cells) {
-      residual_g.push_back(magnitude_g(out.fit, point_of(cell, 1)) - options.gravity_g);
+      residual_g.push_back(magnitude_g(fit, point_of(cell, 1)) - options.gravity_g);
       white_g2.push_back(block_g2 / cell.blocks + 1e-14);
     }
-    out.redundancy = out.directions - least.model.parameters();
-    const double found = paule_mandel(residual_g, white_g2, neighbours, least.model.parameters());
+    const int redundancy = out.directions - fit.model.parameters();
+    const double found = paule_mandel(residual_g, white_g2, fit.model.parameters());
     const double assumed = std::pow(options.assumed_structural_mg / kMgPerG, 2);
-    const double freedom = std::max(0, out.redundancy);
+    const double freedom = std::max(0, redundancy);
     constexpr double kAssumedFreedom = 2;
-    structural_g2 = out.redundancy >= 30 ? found
-                                         : (freedom * found + kAssumedFreedom * assumed) /
-                                               (freedom + kAssumedFreedom);
+    return redundancy >= 30
+               ? found
+               : (freedom * found + kAssumedFreedom * assumed) / (freedom + kAssumedFreedom);
+  };
+  std::vector<double> residual_g;
+  const auto look_at_cells = [&]() {
+    out.redundancy = out.directions - out.fit.model.parameters();
+    structural_g2 = structure_of(out.fit, residual_g);
     out.structural_mg = kMgPerG * std::sqrt(structural_g2);
   };
 
@@ -398,13 +438,35 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
                 "least squares", "lay the unit still on each of its six sides for a minute");
   }
-  SIXPOINT_CHECK(fit_once());
+  // The basin from a part of the cells, the minimum from all of them.
+  {
+    constexpr std::size_t kForTheBasin = 256;
+    const std::size_t stride = 1 + out.cells.size() / kForTheBasin;
+    std::vector<GravityPoint> part;
+    for (std::size_t k = 0; k < out.cells.size(); k += stride) {
+      part.push_back(point_of(out.cells[k], sigma_g[k]));
+    }
+    LeastSquaresOptions basin = least;
+    basin.relative_step = 1e-6;
+    basin.relative_gradient = 1e-4;
+    SIXPOINT_ASSIGN(const LeastSquaresFit rough, least_squares(part, from, basin));
+    if (rough.converged) {
+      from = rough.calibration;
+    }
+    out.fit.starts = rough.starts;
+    out.fit.starts_in_basin = rough.starts_in_basin;
+  }
+  const int starts = out.fit.starts;
+  const int starts_in_basin = out.fit.starts_in_basin;
   least.starts = 1;
+  SIXPOINT_CHECK(fit_once());
+  look_at_noise();
   double outlier_limit_g = 0;
   for (int round = 0; round < 6; ++round) {
     look();
     look_at_cells();
     std::vector<double> sizes;
+    sizes.reserve(residual_g.size());
     for (const double residual : residual_g) {
       sizes.push_back(std::abs(residual));
     }
@@ -438,44 +500,58 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     }
   }
 
-  out.six_parameters = out.fit.calibration;
-  if (options.choose_model) {
-    HeldOut best = hold_out(out.cells, sigma_g, out.fit, options, least.model, out.directions);
-    const FitModel base = least.model;
-    for (const FitModel candidate :
-         {FitModel{true, false}, FitModel{false, true}, FitModel{true, true}}) {
-      if (candidate.temperature && !(out.temperature_range_c >= 5)) {
-        continue;
-      }
-      // Cross-axis terms show between the axes: they need directions well away from them.
-      if (!best.valid() || out.directions < candidate.parameters() + 6) {
-        continue;
-      }
-      const HeldOut held =
-          hold_out(out.cells, sigma_g, out.fit, options, candidate, out.directions);
-      if (held.directions >= best.directions * 3 / 4 &&
-          held.rms_mg < options.model_gain * best.rms_mg) {
-        best = held;
-        least.model = candidate;
-      }
-    }
-    if (!(least.model == base)) {
-      for (int round = 0; round < 3; ++round) {
-        SIXPOINT_CHECK(fit_once());
-        look();
-        look_at_cells();
-        weigh();
-      }
-      SIXPOINT_CHECK(fit_once());
-    }
-  }
   look();
   look_at_cells();
-  const HeldOut held = hold_out(out.cells, sigma_g, out.fit, options, least.model, out.directions);
-  if (held.valid()) {
-    out.held_out_rms_mg = held.rms_mg;
-    out.held_out_directions = held.directions;
+  out.fit.starts = starts;
+  out.fit.starts_in_basin = starts_in_basin;
+  const HeldOut plain = hold_out(out.cells, sigma_g, sigma_g, out.fit, options, out.directions);
+  if (plain.valid()) {
+    out.held_out_rms_mg = plain.rms_mg;
+    out.held_out_directions = plain.directions;
   }
+  double best_mg = plain.rms_mg;
+  for (const FitModel candidate :
+       {FitModel{true, false}, FitModel{false, true}, FitModel{true, true}}) {
+    if (!options.try_richer_models || !plain.valid() ||
+        (candidate.temperature && !(out.temperature_range_c >= 5)) ||
+        out.directions < candidate.parameters() + 3) {
+      continue;
+    }
+    BlockFit::Richer richer;
+    LeastSquaresOptions with_more = least;
+    with_more.model = candidate;
+    double structure_g2 = structural_g2;
+    std::vector<double> unused;
+    bool converged = true;
+    for (int round = 0; round < 3 && converged; ++round) {
+      const auto own_sigma_g = sigmas(structure_g2);
+      std::vector<GravityPoint> points;
+      for (std::size_t k = 0; k < out.cells.size(); ++k) {
+        points.push_back(point_of(out.cells[k], own_sigma_g[k]));
+      }
+      auto fit = least_squares(points, from, with_more);
+      converged = fit && fit->converged;
+      if (converged) {
+        richer.fit = *fit;
+        structure_g2 = structure_of(richer.fit, unused);
+      }
+    }
+    if (!converged) {
+      continue;
+    }
+    const HeldOut held =
+        hold_out(out.cells, sigmas(structure_g2), sigma_g, richer.fit, options, out.directions);
+    if (held.directions >= plain.directions * 3 / 4 && held.directions > 0 &&
+        held.rms_mg < options.model_gain * best_mg) {
+      best_mg = held.rms_mg;
+      richer.structural_mg = kMgPerG * std::sqrt(structure_g2);
+      richer.held_out_rms_mg = held.rms_mg;
+      richer.held_out_directions = held.directions;
+      SIXPOINT_CHECK(correlate(richer.fit, structure_g2));
+      out.richer = richer;
+    }
+  }
+  SIXPOINT_CHECK(correlate(out.fit, structural_g2));
   for (std::size_t k = 0; k < out.cells.size(); ++k) {
     out.cell_residual_mg.push_back(kMgPerG * residual_g[k]);
     out.cell_sigma_mg.push_back(kMgPerG * sigma_g[k]);

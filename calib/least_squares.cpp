@@ -186,8 +186,11 @@ Descent descend(const Problem& problem, const Vector& start) {
         sane ? problem.evaluate(moved, &moved_gradient, &moved_hessian) : HUGE_VAL;
     const bool small_step =
         sane && step.norm() <= problem.options.relative_step * (1 + out.theta.norm());
-    if (moved_cost <= out.cost || small_step) {
-      if (moved_cost <= out.cost) {
+    // Near the minimum the cost is flat to its last digit long before the gradient is.
+    const bool improves = moved_cost < out.cost || (sane && moved_cost <= out.cost * (1 + 1e-12) &&
+                                                    moved_gradient.norm() <= gradient.norm());
+    if (improves || small_step) {
+      if (improves) {
         out.theta = moved;
         out.cost = moved_cost;
         gradient = moved_gradient;
@@ -205,8 +208,8 @@ Descent descend(const Problem& problem, const Vector& start) {
         out.converged = true;
         break;
       }
-      if (small_step && moved_cost > out.cost) {
-        damping *= 10;
+      if (!improves) {
+        damping = std::max(damping * 10, 1e-12);
       }
     } else {
       damping = std::max(damping * 10, 1e-12);
@@ -264,11 +267,11 @@ Result<LeastSquaresFit> least_squares(std::span<const GravityPoint> points,
                                                              {0.1, -0.2, 0.3, 0.2}}};
   std::vector<Descent> descents;
   const int starts = std::clamp(options.starts, 1, static_cast<int>(kStarts.size()));
-  for (int k = 0; k < starts; ++k) {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(starts); ++k) {
     Vector theta = Vector::Zero(n);
-    for (int a = 0; a < 3; ++a) {
-      theta[a] = kStarts[static_cast<std::size_t>(k)][0];
-      theta[3 + a] = kStarts[static_cast<std::size_t>(k)][static_cast<std::size_t>(1 + a)];
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      theta[static_cast<Eigen::Index>(a)] = kStarts[k][0];
+      theta[static_cast<Eigen::Index>(3 + a)] = kStarts[k][1 + a];
     }
     descents.push_back(descend(problem, theta));
   }

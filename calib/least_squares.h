@@ -35,7 +35,7 @@ struct GravityPoint {
   double temperature_c = 0;         // above the reference temperature; used by that model only
 };
 
-// Six parameters always; the others where the evidence admits them (choose_model in solve.h).
+// Six parameters always; the others where the evidence admits them (fit_blocks in block_fit.h).
 struct FitModel {
   bool cross_axis = false;   // three symmetric terms xy, xz, yz
   bool temperature = false;  // three temperature coefficients of zero

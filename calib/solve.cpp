@@ -18,7 +18,7 @@ PartialKnowledge know_partially(std::span<const StillBlock> blocks,
   PartialKnowledge out;
   BlockFitOptions fit_options;
   fit_options.gravity_g = options.gravity_g;
-  fit_options.choose_model = false;
+  fit_options.try_richer_models = false;
   // As wide as the verification's range of a real sensor.
   fit_options.prior = CalibrationPrior{file_constants, {0.15, 0.15, 0.15}, {0.2, 0.2, 0.2}};
   out.zero_mg.fill(kMgPerG * 0.2);
@@ -36,12 +36,15 @@ PartialKnowledge know_partially(std::span<const StillBlock> blocks,
 }
 
 Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOptions& options) {
-  report.statistical = fit.fit.standard_uncertainty();
+  report.statistical = fit.best().standard_uncertainty();
   if (options.method == SolveMethod::genetic && report.search) {
-    // Its members wander about the answer; least squares' covariance knows nothing of that.
+    // Its members wander about the answer, and it may lie beside the minimum; least squares'
+    // covariance knows nothing of that.
+    const double apart_mg =
+        difference_over_sphere(fit.best().calibration, *report.calibration).rms_mg;
+    const double wander_mg = std::hypot(report.search->wander_mg, apart_mg);
     for (std::size_t a = 0; a < kAxes; ++a) {
-      report.statistical.zero_mg[a] =
-          std::hypot(report.statistical.zero_mg[a], report.search->wander_mg);
+      report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], wander_mg);
       report.statistical.sensitivity_relative[a] = std::hypot(
           report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
     }
@@ -92,7 +95,7 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
     report.partial = know_partially(chosen, file_constants, options);
     if (options.prior) {
       fit_options.prior = options.prior;
-      fit_options.choose_model = false;
+      fit_options.try_richer_models = false;
       auto fit = fit_blocks(chosen, options.prior->mean, fit_options);
       if (!fit) {
         return fail(fit.error());
@@ -124,7 +127,7 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   genetic_options.gravity_g = options.gravity_g;
   SIXPOINT_ASSIGN(report.search, genetic(chosen, file_constants, genetic_options));
   report.calibration = options.method == SolveMethod::genetic ? report.search->calibration
-                                                              : report.fit->fit.calibration;
+                                                              : report.fit->best().calibration;
   report.iterations = options.method == SolveMethod::genetic
                           ? static_cast<int>(report.search->fitness_mg.size())
                           : report.fit->fit.iterations;
@@ -132,30 +135,45 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   report.residual_before_mg = cells_rms_mg(report.fit->cells, file_constants, options.gravity_g);
   report.verification = verify(chosen, file_constants, *report.calibration, *report.fit,
                                report.search, fit_options, options.limits);
-  if (options.method == SolveMethod::genetic && !report.search->settled) {
+  std::vector<std::string> doubts;
+  if (options.method == SolveMethod::genetic) {
+    doubts = report.search->reasons;
+    // Where it is not the same as least squares it must at least be within what is promised.
+    const double apart_mg =
+        difference_over_sphere(report.fit->best().calibration, *report.calibration).worst_mg;
+    if (!(apart_mg <= options.limits.worst_direction_mg)) {
+      doubts.push_back(fmt::format(
+          "the genetic algorithm's answer is {:.1f} mg from least squares' in the worst direction "
+          "(limit {:.1f} mg)",
+          apart_mg, options.limits.worst_direction_mg));
+    }
+  }
+  if (!doubts.empty()) {
     if (report.verification.verified) {
       report.verification.reasons.clear();
     }
     report.verification.verified = false;
     report.verification.verdict = Verdict::not_verified;
-    report.verification.reasons.insert(report.verification.reasons.end(),
-                                       report.search->reasons.begin(),
-                                       report.search->reasons.end());
+    report.verification.reasons.insert(report.verification.reasons.end(), doubts.begin(),
+                                       doubts.end());
   }
-  if (!(report.fit->fit.worst_direction_mg() <= options.limits.worst_direction_mg)) {
+  if (!(report.verification.worst_direction_mg <= options.limits.worst_direction_mg)) {
     report.partial = know_partially(chosen, file_constants, options);
   }
   if (!report.fit->left_out_reason.empty()) {
     report.notes.push_back(report.fit->left_out_reason);
   }
-  if (report.fit->fit.model.cross_axis) {
-    const auto& c = report.fit->fit.cross_axis;
+  if (report.fit->richer && report.fit->richer->fit.model.cross_axis) {
+    const auto& c = report.fit->richer->fit.cross_axis;
     report.notes.push_back(fmt::format(
         "the data show cross-axis terms of {:+.2f} % (xy) {:+.2f} % (xz) {:+.2f} % (yz), which six "
-        "constants cannot correct",
-        100 * c[0], 100 * c[1], 100 * c[2]));
+        "constants cannot correct: unseen directions are predicted to {:.1f} mg with them, {:.1f} "
+        "mg without",
+        100 * c[0], 100 * c[1], 100 * c[2], report.fit->richer->held_out_rms_mg,
+        report.fit->held_out_rms_mg.value_or(0)));
   }
-  if (report.fit->temperature_range_c >= 10 && !report.fit->fit.model.temperature) {
+  if (report.fit->temperature_range_c >= 10 &&
+      !(report.fit->richer && report.fit->richer->fit.model.temperature)) {
     report.notes.push_back(
         fmt::format("the temperature changed by {:.0f} C; the constants hold for its mean",
                     report.fit->temperature_range_c));
@@ -288,9 +306,15 @@ Json to_json(const SolveReport& report) {
     least["blocks_left_out"] = fit.blocks_left_out;
     least["block_sd_mg"] = fit.block_sd_mg;
     least["structural_mg"] = fit.structural_mg;
-    least["cross_axis"] = fit.fit.model.cross_axis ? Json(fit.fit.cross_axis) : Json(nullptr);
-    least["zero_lsb_per_c"] =
-        fit.fit.model.temperature ? Json(fit.fit.zero_lsb_per_c) : Json(nullptr);
+    if (fit.richer) {
+      Json& richer = json["richer_model"];
+      const LeastSquaresFit& more = fit.richer->fit;
+      richer["sensitivity_g_per_lsb"] = more.calibration.sensitivity_g_per_lsb;
+      richer["zero_lsb"] = more.calibration.zero_lsb;
+      richer["cross_axis"] = more.model.cross_axis ? Json(more.cross_axis) : Json(nullptr);
+      richer["zero_lsb_per_c"] = more.model.temperature ? Json(more.zero_lsb_per_c) : Json(nullptr);
+      richer["held_out_rms_mg"] = fit.richer->held_out_rms_mg;
+    }
   }
   if (report.search) {
     Json& search = json["genetic"];

@@ -37,10 +37,9 @@ std::optional<double> halves_apart_mg(std::span<const StillBlock> blocks, const 
     halves[seen[k]++ * 2 < total[k] ? 0 : 1].push_back(blocks[i]);
   }
   BlockFitOptions plain = options;
-  plain.choose_model = false;
-  plain.model = {};
-  const auto first = fit_blocks(halves[0], fit.six_parameters, plain);
-  const auto second = fit_blocks(halves[1], fit.six_parameters, plain);
+  plain.try_richer_models = false;
+  const auto first = fit_blocks(halves[0], fit.fit.calibration, plain);
+  const auto second = fit_blocks(halves[1], fit.fit.calibration, plain);
   if (!first || !second || !first->fit.converged || !second->fit.converged) {
     return std::nullopt;
   }
@@ -104,13 +103,17 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
   Verification out;
   std::vector<std::string>& reasons = out.reasons;
   out.missing_directions = coverage_of(used).missing_directions();
-  out.held_out_rms_mg = fit.held_out_rms_mg;
-  out.held_out_directions = fit.held_out_directions;
+  // Whether the blocks are gravity is asked of the best model; what the six constants leave of it
+  // is asked by applied_rms_mg.
+  out.held_out_rms_mg =
+      fit.richer ? std::optional(fit.richer->held_out_rms_mg) : fit.held_out_rms_mg;
+  out.held_out_directions = fit.richer ? fit.richer->held_out_directions : fit.held_out_directions;
   out.directions = fit.directions;
   out.redundancy = fit.redundancy;
   out.applied_rms_mg = cells_rms_mg(fit.cells, chosen, options.gravity_g);
   out.repeatability_mg = fit.block_sd_mg;
-  out.worst_direction_mg = fit.fit.worst_direction_mg();
+  out.worst_direction_mg =
+      fit.richer ? fit.richer->fit.worst_direction_mg() : fit.fit.worst_direction_mg();
   if (!out.missing_directions.empty()) {
     out.verdict = Verdict::incomplete;
     reasons.push_back(fmt::format("no still block reaches beyond 0.3 g towards {}",
@@ -150,9 +153,13 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
   }
   if (search) {
     // The plain six-parameter problem is what both solve.
-    out.agreement_mg = difference_over_sphere(fit.six_parameters, search->calibration).rms_mg;
-    out.agreement_limit_mg =
-        std::max(limits.agreement_mg, 2 * std::hypot(out.worst_direction_mg, search->wander_mg));
+    out.agreement_mg = difference_over_sphere(fit.fit.calibration, search->calibration).rms_mg;
+    // Two error measures on data that six constants do not describe differ by about the misfit.
+    const double misfit_mg =
+        fit.richer ? 0.8 * cells_rms_mg(fit.cells, fit.fit.calibration, options.gravity_g) : 0;
+    const double uncertainty_mg = 2 * std::hypot(fit.fit.worst_direction_mg(), search->wander_mg);
+    out.agreement_limit_mg = std::min(limits.most_disagreement_mg,
+                                      std::max({limits.agreement_mg, uncertainty_mg, misfit_mg}));
     if (!(*out.agreement_mg <= out.agreement_limit_mg)) {
       reasons.push_back(fmt::format(
           "least squares and the genetic algorithm differ by {:.1f} mg (limit {:.1f} mg)",

@@ -14,6 +14,10 @@ if(SIXPOINT_SANITIZE)
     -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(sixpoint_warnings INTERFACE -fsanitize=address,undefined)
 endif()
+if(SIXPOINT_FUZZ)
+  # The rooms tell the fuzzer which ways were taken; without it, it flies blind.
+  target_compile_options(sixpoint_warnings INTERFACE -fsanitize=fuzzer-no-link)
+endif()
 
 function(sixpoint_room NAME)
   cmake_parse_arguments(ROOM "" "" "SOURCES;NEIGHBOURS;PRIVATE_NEIGHBOURS" ${ARGN})

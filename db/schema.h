@@ -27,7 +27,7 @@ struct Column {
 
 struct Table {
   std::string_view name;
-  std::vector<Column> columns;            // the first one is the key, unique
+  std::vector<Column> columns;                 // the first one is the key, unique
   std::vector<std::string_view> indexes = {};  // column lists, each becomes an index
 };
 

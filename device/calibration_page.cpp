@@ -24,7 +24,8 @@ tl::unexpected<Error> no_page(std::string what) {
 
 }  // namespace
 
-Result<Bytes> encode_calibration_page(const CalibrationPage& page) {
+Result<Bytes> encode_calibration_page(const CalibrationPage& page,
+                                      std::span<const std::uint8_t> before) {
   if (const Status valid = calib::validate(page.constants); !valid) {
     return fail(ErrorCode::configuration, valid.error().what, "calibration page",
                 "only constants of a finished calibration can be written");
@@ -53,6 +54,9 @@ Result<Bytes> encode_calibration_page(const CalibrationPage& page) {
       .put(static_cast<std::uint8_t>(time.seconds().count()));
   const Bytes section = writer.take();
   Bytes bytes(kPageBytes, 0xFF);
+  if (before.size() == kPageBytes) {
+    std::copy(before.begin(), before.end(), bytes.begin());
+  }
   std::copy(section.begin(), section.end(), bytes.begin() + kTune);
   const std::uint16_t crc = crc_ccitt(std::span(bytes).subspan(kTune, kCrc - kTune));
   bytes[kCrc] = static_cast<std::uint8_t>(crc >> 8U);

@@ -27,7 +27,11 @@ struct CalibrationPage {
 
 // configuration when a constant does not fit into its field or the firmware would divide by zero
 // (positive not above negative), or the date is outside the page's range.
-Result<Bytes> encode_calibration_page(const CalibrationPage& page);
+//
+// `before` is what the page holds now, or empty for a blank one: bytes outside the fields above are
+// kept, because real units keep other things there.
+Result<Bytes> encode_calibration_page(const CalibrationPage& page,
+                                      std::span<const std::uint8_t> before = {});
 
 // bad_data when length, pattern, CRC, constants or date do not hold.
 Result<CalibrationPage> decode_calibration_page(std::span<const std::uint8_t> bytes);

@@ -175,7 +175,8 @@ Result<CalibrationPage> Unit::read_calibration() {
 }
 
 Status Unit::write_calibration(const CalibrationPage& page) {
-  SIXPOINT_ASSIGN(const Bytes bytes, encode_calibration_page(page));
+  SIXPOINT_ASSIGN(const Bytes before, read_page());
+  SIXPOINT_ASSIGN(const Bytes bytes, encode_calibration_page(page, before));
   const std::uint16_t crc = crc_ccitt(bytes);
   SIXPOINT_CHECK(ask(Command::begin_write, PayloadWriter()
                                                .put(kCalibrationPage)

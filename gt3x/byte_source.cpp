@@ -14,7 +14,7 @@ Result<std::size_t> MemorySource::read(std::span<std::uint8_t> out) {
 }
 
 Result<Bytes> read_all(ByteSource& source, std::uint64_t limit) {
-  constexpr std::size_t kPiece = 64 * 1024;
+  constexpr std::size_t kPiece = std::size_t{64} * 1024;
   Bytes bytes;
   for (;;) {
     const std::size_t start = bytes.size();

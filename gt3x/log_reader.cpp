@@ -17,7 +17,7 @@ constexpr std::size_t kMaxZerosInChain = 16;
 // Times of neighbouring records: the clock may be set back by an hour, and idle sleep or a shelf
 // may last two weeks. What lies outside needs a second witness, the record behind it.
 constexpr std::int64_t kNearBack_s = 3600;
-constexpr std::int64_t kNearForward_s = 14 * 86400;
+constexpr std::int64_t kNearForward_s = std::int64_t{14} * 86400;
 
 bool near(std::uint32_t time, std::uint32_t reference) {
   const std::int64_t step = static_cast<std::int64_t>(time) - static_cast<std::int64_t>(reference);

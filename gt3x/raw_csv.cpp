@@ -16,7 +16,7 @@ namespace sixpoint::gt3x {
 namespace {
 
 constexpr std::uint64_t kLongestFill_s = 400ULL * 86'400;
-constexpr std::size_t kPiece = 64 * 1024;
+constexpr std::size_t kPiece = std::size_t{64} * 1024;
 
 std::string clock_text(UtcTime time) {
   const auto day = std::chrono::floor<std::chrono::days>(time);
@@ -193,7 +193,7 @@ std::int64_t round_to_mg(int count, double scale_lsb_per_g) {
   constexpr std::int64_t kUnits = 1 << 23;
   const auto scale = static_cast<std::int64_t>(std::llround(scale_lsb_per_g * kUnits));
   const std::int64_t magnitude = std::abs(static_cast<std::int64_t>(count));
-  const std::int64_t mg = (2 * 1000 * kUnits * magnitude + scale) / (2 * scale);
+  const std::int64_t mg = (std::int64_t{2000} * kUnits * magnitude + scale) / (2 * scale);
   return count < 0 ? -mg : mg;
 }
 

@@ -178,7 +178,7 @@ Status RecordingWriter::add(const std::string& name, std::unique_ptr<ByteSource>
 
 Status RecordingWriter::copy(Recording& from, const std::string& name) {
   SIXPOINT_ASSIGN(const auto source, from.open_entry(name));
-  Bytes piece(64 * 1024);
+  Bytes piece(std::size_t{64} * 1024);
   for (;;) {
     SIXPOINT_ASSIGN(const std::size_t count, source->read(piece));
     if (count == 0) {

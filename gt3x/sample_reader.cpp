@@ -229,7 +229,7 @@ struct SampleReader::State {
     const auto wanted = static_cast<std::size_t>(rate_hz);
     while (pending.size() < wanted && !activity_ended) {
       // 9 bytes are two samples; a whole number of them leaves no half sample between pieces.
-      Bytes piece(9 * 512);
+      Bytes piece(std::size_t{9} * 512);
       std::size_t filled = 0;
       while (filled < piece.size()) {
         SIXPOINT_ASSIGN(const std::size_t count, activity->read(std::span(piece).subspan(filled)));

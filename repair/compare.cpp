@@ -27,7 +27,7 @@ constexpr std::size_t kMaxRivals = 12;
 constexpr double kInlier_s = 0.03;
 constexpr double kSwellTrust_s = 0.2;  // standard error of the lag found from swelling and fading
 constexpr double kRivalLine = 0.8;     // a line with so much of the best one's votes is a rival
-constexpr double kMaxDrift_ppm = 100;  // a cold watch crystal is off by 35
+constexpr int kMaxDrift_ppm = 100;     // a cold watch crystal is off by 35
 constexpr double kLongEnoughForDrift_s = 600;
 
 // What a second of magnitudes amounts to.
@@ -193,9 +193,11 @@ std::vector<Block> lively_blocks(const Trace& a, const CompareOptions& options) 
     const double motion =
         std::sqrt(std::max(0.0, square / static_cast<double>(present) - mean * mean));
     if (motion * kMgPerG >= options.min_motion_mg) {
-      blocks.push_back({begin, begin + steps,
-                        a.start_s() + static_cast<double>(begin + steps / 2) / a.rate_hz(),
-                        motion});
+      blocks.push_back(
+          {begin, begin + steps,
+           a.start_s() +
+               (static_cast<double>(begin) + static_cast<double>(steps) / 2) / a.rate_hz(),
+           motion});
     }
   }
   std::ranges::sort(blocks, std::greater<>(), &Block::motion_g);
@@ -266,8 +268,8 @@ Line vote(const std::vector<Candidate>& candidates, const std::vector<Block>& bl
     double slope = 0;
   };
   std::map<std::int64_t, Best> lines;
-  const double limit_ppm = with_drift ? kMaxDrift_ppm : 0;
-  for (double ppm = -limit_ppm; ppm <= limit_ppm; ppm += 2) {
+  const int limit_ppm = with_drift ? kMaxDrift_ppm : 0;
+  for (int ppm = -limit_ppm; ppm <= limit_ppm; ppm += 2) {
     std::map<std::int64_t, double> bins;
     for (const Candidate& candidate : candidates) {
       const double corrected =
@@ -361,6 +363,7 @@ double median(std::vector<double> values) {
 void fit_line(const std::vector<std::pair<double, double>>& points, bool with_drift, Line& line,
               PairComparison& result) {
   std::vector<double> distances;
+  distances.reserve(points.size());
   for (const auto& [time_s, lag_s] : points) {
     distances.push_back(lag_s - line.at(time_s));
   }

@@ -30,10 +30,10 @@ void verify(const Options& options, Context& context) {
   }
   context.out << report->brief() << '\n';
   for (const std::string& finding : report->findings) {
-    context.people << "sixpoint: " << finding << '\n';
+    context.log().error(finding);
   }
   if (!report->ok) {
-    context.people << "sixpoint: keep this file, restore the last backup and compare the two\n";
+    context.log().error("keep this file, restore the last backup and compare the two");
   }
 }
 

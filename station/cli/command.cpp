@@ -5,6 +5,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <fmt/format.h>
+#include <spdlog/sinks/ostream_sink.h>
 
 namespace sixpoint::cli {
 
@@ -27,6 +28,15 @@ int badness(int code) {
 }
 
 }  // namespace
+
+spdlog::logger& Context::log() {
+  if (logger == nullptr) {
+    logger = std::make_shared<spdlog::logger>(
+        "sixpoint", std::make_shared<spdlog::sinks::ostream_sink_mt>(people, /*force_flush=*/true));
+    logger->set_pattern("sixpoint: %v");
+  }
+  return *logger;
+}
 
 void Context::worsen(int code) {
   if (badness(code) > badness(exit_code)) {
@@ -57,7 +67,7 @@ Json error_to_json(const Error& error) {
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 void report_error(Context& context, std::string_view command, const Error& error, bool json) {
-  context.people << "sixpoint: " << error.brief() << '\n';
+  context.log().error(error.brief());
   context.worsen(static_cast<int>(error.code));
   if (json) {
     Json answer = document(command);
@@ -113,18 +123,18 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
     if (error.get_exit_code() == 0) {  // --help, --version
       return app.exit(error, context.out, context.people);
     }
-    context.people << "sixpoint: " << error.what()
-                   << "; 'sixpoint --help' and 'sixpoint COMMAND --help' list what there is\n";
+    context.log().error("{}; 'sixpoint --help' and 'sixpoint COMMAND --help' list what there is",
+                        printable(error.what()));
     return static_cast<int>(ErrorCode::usage);
   } catch (const std::exception& error) {
     // A defect: libraries answer with Result. Said as such, never hidden.
-    context.people << "sixpoint: internal error: " << error.what()
-                   << "; please report it with the command line\n";
+    context.log().critical("internal error: {}; please report it with the command line",
+                           printable(error.what()));
     return static_cast<int>(ErrorCode::internal);
   }
   context.out.flush();
   if (!context.out) {
-    context.people << "sixpoint: standard output could not be written; free some space\n";
+    context.log().error("standard output could not be written; free some space");
     return static_cast<int>(ErrorCode::io);
   }
   return context.exit_code;

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <istream>
+#include <memory>
 #include <ostream>
 #include <string>
 #include <string_view>
@@ -14,6 +15,7 @@
 
 #include <CLI/App.hpp>
 #include <nlohmann/json.hpp>
+#include <spdlog/logger.h>
 
 #include "base/env.h"
 #include "base/error.h"
@@ -32,10 +34,15 @@ inline constexpr int kExitStopped = 3;
 struct Context {
   Env& env;
   std::ostream& out;     // data: what the command was asked for
-  std::ostream& people;  // progress, warnings, errors: spdlog and bars write here
+  std::ostream& people;  // prompts, progress, warnings, errors
   std::istream& in;
   bool people_at_terminal = false;  // bars and colours only when true
   int exit_code = 0;
+  std::shared_ptr<spdlog::logger> logger = nullptr;  // made by log() at its first use
+
+  // For warnings and errors: lines "sixpoint: ..." on `people`, through spdlog. What a person reads
+  // as part of the work (prompts, summaries, bars) goes to `people` as it is.
+  spdlog::logger& log();
 
   // Keeps the worse of two exit codes: 0 < 2 < 1 < 3 < 64 and above.
   void worsen(int code);

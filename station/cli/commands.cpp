@@ -3,8 +3,8 @@
 
 namespace sixpoint::cli {
 
-// In the order in which --help lists them: looking at files, mending them, measuring units, the store,
-// the simulator. add_NAME is defined in NAME.cpp.
+// In the order in which --help lists them: looking at files, mending them, measuring units, the
+// store, the simulator. add_NAME is defined in NAME.cpp.
 // clang-format off
 #define SIXPOINT_COMMANDS(COMMAND) \
   COMMAND(inspect)                 \
@@ -13,10 +13,16 @@ namespace sixpoint::cli {
   COMMAND(export)                  \
   COMMAND(compare)                 \
   COMMAND(solve)                   \
+  COMMAND(jig)                     \
+  COMMAND(capture)                 \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
-  COMMAND(simulate)
+  COMMAND(simulate)                \
+  COMMAND(doctor)                  \
+  COMMAND(virtual)                 \
+  COMMAND(station)                 \
+  COMMAND(archive)
 // clang-format on
 
 #define SIXPOINT_DECLARE(name) void add_##name(CLI::App& app, Context& context);

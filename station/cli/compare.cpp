@@ -50,8 +50,7 @@ Status run(const Options& options, Context& context) {
   }
   for (const repair::PairComparison& pair : pairs) {
     for (const std::string& remark : pair.remarks) {
-      context.people << "sixpoint: " << printable(pair.a) << ", " << printable(pair.b) << ": "
-                     << remark << '\n';
+      context.log().warn("{}, {}: {}", printable(pair.a), printable(pair.b), remark);
     }
   }
   return {};

@@ -59,7 +59,7 @@ Status run(const Options& options, Context& context) {
                                   tally.samples, tally.filled);
   }
   const auto warn = [&](const std::string& text) {
-    context.people << "sixpoint: " << printable(options.path) << ": " << text << '\n';
+    context.log().warn("{}: {}", printable(options.path), text);
   };
   if (tally.checksum_failures + tally.damaged_stretches > 0) {
     warn(fmt::format("{} records with a wrong checksum and {} damaged stretches were left out",

@@ -464,7 +464,7 @@ void add_inspect(CLI::App& app, Context& context) {
       print(context.out, *findings, options->path);
     }
     for (const std::string& warning : findings->warnings) {
-      context.people << "sixpoint: " << printable(options->path) << ": " << warning << '\n';
+      context.log().warn("{}: {}", printable(options->path), warning);
     }
     if (findings->problem) {
       report_error(context, "inspect", *findings->problem, false);

@@ -116,7 +116,7 @@ void run(const Options& options, Context& context) {
       continue;
     }
     if (found->empty()) {
-      context.people << "sixpoint: " << printable(path) << ": no .gt3x file below this folder\n";
+      context.log().warn("{}: no .gt3x file below this folder", printable(path));
     }
     for (const FoundFile& file : *found) {
       const std::string output = options.folder + "/" + file.relative;
@@ -165,8 +165,8 @@ void run(const Options& options, Context& context) {
     summary[status] = summary[status].get<int>() + 1;
     if (store && report.status == RepairStatus::repaired && !report.dry_run) {
       if (const auto kept = remember(context, *store, report); !kept) {
-        context.people << "sixpoint: the repair of " << printable(report.input)
-                       << " could not be written to the store: " << kept.error().brief() << '\n';
+        context.log().error("the repair of {} could not be written to the store: {}",
+                            printable(report.input), kept.error().brief());
         context.worsen(static_cast<int>(kept.error().code));
       }
     }

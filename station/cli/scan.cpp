@@ -126,8 +126,7 @@ void run(const Options& options, Context& context) {
       continue;
     }
     if (found->empty()) {
-      context.people << "sixpoint: " << printable(path)
-                     << ": no .gt3x, .agdc or .agd file below this folder\n";
+      context.log().warn("{}: no .gt3x, .agdc or .agd file below this folder", printable(path));
     }
     for (const FoundFile& file : *found) {
       places.push_back(answers.size());

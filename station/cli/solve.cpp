@@ -150,7 +150,7 @@ void tell(const std::string& path, const Options& options, const Outcome& outcom
   if (outcome.stored_id) {
     context.out << "  stored as " << *outcome.stored_id << '\n';
   } else if (options.save && !report.usable()) {
-    context.people << "sixpoint: nothing stored: only verified constants are kept\n";
+    context.log().warn("nothing stored: only verified constants are kept");
   }
 }
 
@@ -172,7 +172,7 @@ void run(const Options& options, Context& context) {
       if (options.files.size() == 1) {
         return report_error(context, "solve", outcome.error(), options.json);
       }
-      context.people << "sixpoint: " << outcome.error().brief() << '\n';
+      context.log().error(outcome.error().brief());
       context.worsen(static_cast<int>(outcome.error().code));
       all.push_back({{"file", path}, {"error", error_to_json(outcome.error())}});
       continue;

@@ -35,8 +35,8 @@ TEST(CalibrationPage, LaysOutAsWritten) {
 // Oracle: a real unit's memory image: its CRC, made by the vendor's firmware, must hold.
 TEST(CalibrationPage, ReadsARealUnitsImage) {
   SIXPOINT_NEED_SHARED("data/nhanes/NEO1B34100019.gt3x");
-  auto recording =
-      gt3x::Recording::open(posix_env().files, tests::shared_file("data/nhanes/NEO1B34100019.gt3x"));
+  auto recording = gt3x::Recording::open(posix_env().files,
+                                         tests::shared_file("data/nhanes/NEO1B34100019.gt3x"));
   ASSERT_OK(recording);
   auto entry = recording->open_entry("eeprom.bin");
   ASSERT_OK(entry);
@@ -49,10 +49,13 @@ TEST(CalibrationPage, ReadsARealUnitsImage) {
   EXPECT_EQ(page->constants.positive_lsb, (PerAxis<int>{242, 260, 238}));
   EXPECT_EQ(page->constants.negative_lsb, (PerAxis<int>{-304, -280, -300}));
   EXPECT_EQ(to_iso8601(page->calibrated), "2010-10-21T11:23:47Z");
-  // And what is written from it is the section of the image, byte for byte.
-  const auto written = encode_calibration_page(*page);
+  // And what is written over it is the image, byte for byte: whatever else the vendor keeps in the
+  // page stays.
+  const auto page_bytes = std::span(*image).first(kPageBytes);
+  const auto written = encode_calibration_page(*page, page_bytes);
   ASSERT_OK(written);
-  EXPECT_TRUE(std::equal(written->begin() + 256, written->end(), image->begin() + 256));
+  EXPECT_TRUE(std::equal(written->begin(), written->end(), page_bytes.begin(), page_bytes.end()));
+  EXPECT_NE(*encode_calibration_page(*page), *written) << "a blank page lacks them";
 }
 
 TEST(CalibrationPage, EveryFlippedByteOfTheSectionIsRefused) {

@@ -1,0 +1,56 @@
+// The customer's calibration file (the paper's second method): the unit records while it lies on
+// each of its six sides; the file is downloaded, checked and solved.
+//
+// Sequential, because a unit that records sends no live samples: what can be judged is judged on
+// the file afterwards, and says which sides to repeat.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/solve.h"
+#include "device/unit.h"
+
+namespace sixpoint::station {
+
+struct CaptureOptions {
+  std::string output;  // the .gt3x to make
+  int rate_hz = 30;    // what the customers' own recordings have
+  // A side needs three still blocks of 4 s, and at 30 Hz a noisy z axis loses half of them to the
+  // paper's second criterion.
+  double side_s = 40;
+  double turn_s = 5;  // for the hand, after the prompt
+  calib::SolveOptions solve;
+};
+
+// Told before each side; answers whether the unit lies there (false: the person gives up). A jig
+// that turns by itself is sent there afterwards.
+using SidePrompt = std::function<bool(device::Pose side, std::size_t number, std::size_t of)>;
+
+struct CaptureReport {
+  std::string serial;
+  std::string firmware;
+  calib::FilterConfiguration recording_filter = calib::FilterConfiguration::current;
+  // Why a recording of this unit cannot help, and what can; then nothing was recorded.
+  std::vector<std::string> refusal;
+  bool stopped = false;  // by the person; the recording was stopped and left in the unit
+  std::string file;
+  std::string file_sha256;
+  std::optional<calib::SolveReport> solved;
+
+  bool usable() const { return solved && solved->usable(); }
+};
+
+// A recording mends affected files only when it was made under `current`: not on a unit calibrated
+// before 2014-03-24 with firmware below 1.4.0 or from 1.8.0 on. Empty when it can help.
+std::vector<std::string> why_recording_cannot_help(const device::FilterState& filter,
+                                                   const std::string& serial,
+                                                   const std::string& firmware);
+
+// device_unavailable when the unit goes away; cannot_create when the file exists or cannot be made.
+Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,
+                                  const CaptureOptions& options, const SidePrompt& prompt);
+
+}  // namespace sixpoint::station

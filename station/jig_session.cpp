@@ -1,0 +1,476 @@
+#include "station/jig_session.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/sha256.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using calib::Calibration;
+using calib::FilterConfiguration;
+
+constexpr std::chrono::milliseconds kReadFor{250};
+// A unit without a readable page: the middle of what ADXL362 units hold. Enough to tell faces.
+constexpr double kNominal_lsb_per_g = 256;
+constexpr double kNominalZero_lsb = 40;
+
+double seconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+Calibration nominal() {
+  Calibration calibration;
+  calibration.sensitivity_g_per_lsb.fill(1 / kNominal_lsb_per_g);
+  calibration.zero_lsb.fill(kNominalZero_lsb);
+  return calibration;
+}
+
+// A returned unit of 2013-14: the firmware knows two configurations for it.
+bool has_two_filters(const std::string& serial,
+                     const std::optional<device::CalibrationPage>& page) {
+  constexpr std::int64_t kFilterChange_unix_s = 1'395'619'200;  // 2014-03-24
+  return serial.starts_with("MOS") &&
+         (!page || page->calibrated < from_unix_seconds(kFilterChange_unix_s));
+}
+
+class Session {
+ public:
+  Session(device::Unit& unit, device::Jig& jig, Env& env, const JigSessionOptions& options,
+          const JigTeller& tell)
+      : unit_(unit),
+        jig_(jig),
+        env_(env),
+        options_(options),
+        tell_(tell),
+        gravity_g_(options.gravity.g()) {}
+
+  Result<JigReport> run();
+
+ private:
+  Status prepare();
+  Status stream(JigRun& run);
+  Status handle(JigRun& run, const std::vector<JigAction>& actions);
+  void keep_raw(const device::SampleBlock& block);
+  Result<calib::SixPoseReport> solve(const std::vector<PoseReading>& faces,
+                                     const std::vector<PoseReading>& held_out) const;
+  Result<bool> judge_verification(const JigRun& run);
+  Status write_constants(JigRun& run);
+  Status conclude(const JigRun& run);
+
+  device::Unit& unit_;
+  device::Jig& jig_;
+  Env& env_;
+  const JigSessionOptions& options_;
+  const JigTeller& tell_;
+  double gravity_g_;
+  JigReport report_;
+  Calibration approximation_ = nominal();
+  bool ended_ = false;
+};
+
+Status Session::prepare() {
+  report_.started = env_.clock.now();
+  report_.serial = unit_.identity().serial;
+  report_.firmware = unit_.identity().firmware;
+  report_.jig = jig_.name();
+  report_.filter = options_.filter;
+  report_.gravity = options_.gravity;
+  const auto page = unit_.read_calibration();
+  if (page) {
+    report_.as_found = *page;
+    SIXPOINT_ASSIGN(approximation_, calib::calibration_from(page->constants));
+  } else if (page.error().code == ErrorCode::bad_data) {
+    report_.reasons.push_back("as found, the unit's constants were unreadable: " +
+                              page.error().what);
+  } else {
+    return fail(page.error());
+  }
+  if (options_.filter == FilterConfiguration::legacy &&
+      has_two_filters(report_.serial, report_.as_found)) {
+    return fail(ErrorCode::usage,
+                "a unit calibrated before 2014-03-24 must be measured under the filter 'current'",
+                report_.serial,
+                "leave out --filter: constants of 'legacy' would make its affected files worse");
+  }
+  return unit_.set_filter(options_.filter);
+}
+
+void Session::keep_raw(const device::SampleBlock& block) {
+  for (std::size_t i = 0; i < block.counts.size(); ++i) {
+    const auto& counts = block.counts[i];
+    fmt::format_to(
+        std::back_inserter(report_.raw_csv), "{},{},{},{},{:.2f}\n",
+        block.device_time_us + i * 1'000'000 / static_cast<std::uint64_t>(options_.run.rate_hz),
+        counts[0], counts[1], counts[2], block.temperature_c);
+  }
+}
+
+Status Session::stream(JigRun& run) {
+  SIXPOINT_CHECK(unit_.start_stream(options_.run.rate_hz));
+  Clock& clock = unit_.clock();
+  SIXPOINT_CHECK(handle(run, run.start(seconds(clock.elapsed()))));
+  double heard_s = seconds(clock.elapsed());
+  std::uint64_t lost = 0;
+  while (run.phase() != JigPhase::finished && !ended_) {
+    const auto block = unit_.next_samples(kReadFor);
+    if (!block) {
+      run.on_unit_gone();
+      return fail(block.error());
+    }
+    const double now_s = seconds(clock.elapsed());
+    if (*block) {
+      heard_s = now_s;
+      if ((*block)->filter != options_.filter) {
+        return fail(ErrorCode::io,
+                    fmt::format("the unit changed its filter to '{}' in mid-run",
+                                calib::to_string((*block)->filter)),
+                    report_.serial, "begin the run anew");
+      }
+      lost = std::min(lost, unit_.stream_statistics().lost_samples);  // a new stream counts anew
+      if (unit_.stream_statistics().lost_samples > lost) {
+        lost = unit_.stream_statistics().lost_samples;
+        SIXPOINT_CHECK(handle(run, run.on_loss()));
+      }
+      keep_raw(**block);
+      for (const device::RawCounts& counts : (*block)->counts) {
+        SIXPOINT_CHECK(handle(run, run.on_sample({now_s, counts, (*block)->temperature_c})));
+      }
+    } else if (now_s - heard_s > options_.silence_s) {
+      return fail(ErrorCode::device_unavailable, "the unit stopped sending samples",
+                  unit_.address(), "plug the unit in again and begin the run anew");
+    }
+    SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
+  }
+  report_.stream = unit_.stream_statistics();
+  return unit_.stop_stream();
+}
+
+Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
+  // A machine that asks twice at once means the last.
+  std::optional<Pose> place;
+  for (const JigAction& action : actions) {
+    if (tell_) {
+      tell_(action);
+    }
+    switch (action.kind) {
+      case JigAction::Kind::place:
+        place = action.pose;
+        break;
+      case JigAction::Kind::fit: {
+        SIXPOINT_ASSIGN(const calib::SixPoseReport first, solve(run.faces(), {}));
+        run.set_approximation(first.pair.calibration);
+        break;
+      }
+      case JigAction::Kind::write: {
+        SIXPOINT_ASSIGN(const bool verified, judge_verification(run));
+        if (!verified) {
+          ended_ = true;  // constants that failed are not written
+          return {};
+        }
+        return write_constants(run);
+      }
+      case JigAction::Kind::accepted:
+      case JigAction::Kind::refused:
+      case JigAction::Kind::dropped:
+      case JigAction::Kind::finished:
+        break;
+    }
+  }
+  return place ? jig_.go_to(*place) : Status{};
+}
+
+Result<calib::SixPoseReport> Session::solve(const std::vector<PoseReading>& faces,
+                                            const std::vector<PoseReading>& held_out) const {
+  const auto readings = [](const std::vector<PoseReading>& from) {
+    std::vector<calib::PoseReading> to;
+    to.reserve(from.size());
+    for (const PoseReading& reading : from) {
+      to.push_back({device::direction_of(reading.pose), reading.mean_lsb, reading.sd_lsb,
+                    reading.samples, reading.temperature_c});
+    }
+    return to;
+  };
+  calib::SixPoseOptions options;
+  options.gravity = options_.gravity;
+  return calib::solve_six_poses(readings(faces), readings(held_out), options);
+}
+
+// Solves, chooses by the readings that no solution has seen, and says whether they may be used.
+Result<bool> Session::judge_verification(const JigRun& run) {
+  report_.faces = run.faces();
+  if (report_.faces.size() < device::kPoses.size()) {
+    return false;
+  }
+  SIXPOINT_ASSIGN(report_.six, solve(run.faces(), run.verification()));
+  const calib::SixPoseSolution& best = report_.six->best();
+  report_.method = fmt::format("six_pose_{}", calib::to_string(report_.six->chosen));
+  report_.verification = judge(run.verification(), best.calibration, gravity_g_);
+  if (const auto rounded = calib::calibration_from(best.stored)) {
+    report_.rounded_residual_mg = judge(run.verification(), *rounded, gravity_g_).worst_mg;
+  }
+  for (PoseReading& face : report_.faces) {
+    for (const calib::PoseResidual& residual : report_.six->poses) {
+      if (!residual.held_out && residual.side == device::to_string(face.pose)) {
+        face.tilt_deg = residual.tilt_deg;
+      }
+    }
+  }
+  return report_.six->verified && report_.verification.worst_mg <= options_.residual_limit_mg;
+}
+
+Status Session::write_constants(JigRun& run) {
+  SIXPOINT_CHECK(unit_.stop_stream());
+  // The date is today's: from it the firmware concludes the filter, and these constants belong to
+  // `current`.
+  const device::CalibrationPage page{report_.six->best().stored,
+                                     std::chrono::floor<std::chrono::seconds>(env_.clock.now())};
+  const Status written_status = unit_.write_calibration(page);
+  SIXPOINT_ASSIGN(report_.as_left, unit_.read_calibration());
+  if (!written_status) {
+    ended_ = true;
+    report_.reasons.push_back(written_status.error().what);
+    return {};
+  }
+  report_.written = true;
+  SIXPOINT_ASSIGN(const Calibration written, calib::calibration_from(report_.as_left->constants));
+  run.set_approximation(written);
+  SIXPOINT_CHECK(unit_.set_filter(options_.filter));
+  SIXPOINT_CHECK(unit_.start_stream(options_.run.rate_hz));
+  return handle(run, run.on_written(seconds(unit_.clock().elapsed())));
+}
+
+Status Session::conclude(const JigRun& run) {
+  report_.ended = env_.clock.now();
+  report_.refusals = run.refusals();
+  SIXPOINT_ASSIGN(const bool verified, judge_verification(run));
+  if (!report_.as_left) {
+    report_.as_left = report_.as_found;
+  }
+  if (report_.as_found) {
+    if (const auto found = calib::calibration_from(report_.as_found->constants)) {
+      report_.as_found_residual_mg = judge(report_.faces, *found, gravity_g_).worst_mg;
+    }
+  }
+  switch (run.outcome()) {
+    case JigOutcome::stopped:
+      report_.verdict = JigVerdict::stopped;
+      report_.reasons.push_back("stopped by the operator");
+      return {};
+    case JigOutcome::timed_out:
+    case JigOutcome::too_many_refusals:
+    case JigOutcome::unit_gone:
+      report_.verdict = JigVerdict::inconclusive;
+      report_.reasons.push_back(
+          run.outcome() == JigOutcome::timed_out
+              ? "no pose was accepted in time; is the unit on the jig, and does the jig turn it?"
+              : "too many placements were refused; look at jig, seat and cable");
+      return {};
+    case JigOutcome::running:
+    case JigOutcome::complete:
+      break;
+  }
+  if (!verified) {
+    report_.verdict = JigVerdict::fail;
+    if (report_.six) {
+      report_.reasons.insert(report_.reasons.end(), report_.six->reasons.begin(),
+                             report_.six->reasons.end());
+    }
+    if (report_.verification.worst_mg > options_.residual_limit_mg) {
+      report_.reasons.push_back(fmt::format(
+          "on poses that were not fitted the constants are {:.1f} mg off, more than {:.1f}",
+          report_.verification.worst_mg, options_.residual_limit_mg));
+    }
+    return {};
+  }
+  report_.verdict = JigVerdict::pass;
+  if (report_.written) {
+    const auto left = calib::calibration_from(report_.as_left->constants);
+    report_.recheck = judge(run.recheck(), *left, gravity_g_);
+    if (report_.as_left->constants != report_.six->best().stored ||
+        report_.recheck.worst_mg > options_.residual_limit_mg) {
+      report_.verdict = JigVerdict::fail;
+      report_.reasons.push_back(fmt::format(
+          "with the constants that the unit now holds it is {:.1f} mg off, more than {:.1f}",
+          report_.recheck.worst_mg, options_.residual_limit_mg));
+    }
+  } else if (options_.run.write) {
+    report_.verdict = JigVerdict::fail;
+    report_.reasons.push_back("the constants were not written into the unit");
+  }
+  return {};
+}
+
+Result<JigReport> Session::run() {
+  SIXPOINT_CHECK(prepare());
+  JigRun machine(options_.run, approximation_);
+  report_.raw_csv = "device_time_us,x_lsb,y_lsb,z_lsb,temperature_c\n";
+  const Status streamed = stream(machine);
+  if (!streamed) {
+    // Whatever happened, leave the jig at rest.
+    static_cast<void>(jig_.stop());
+    return fail(streamed.error());
+  }
+  SIXPOINT_CHECK(conclude(machine));
+  return std::move(report_);
+}
+
+nlohmann::ordered_json to_json(const PoseReading& reading) {
+  nlohmann::ordered_json json;
+  json["pose"] = device::to_string(reading.pose);
+  json["mean_lsb"] = reading.mean_lsb;
+  json["sd_lsb"] = reading.sd_lsb;
+  json["samples"] = reading.samples;
+  json["temperature_c"] = reading.temperature_c;
+  json["tilt_deg"] = reading.tilt_deg;
+  return json;
+}
+
+nlohmann::ordered_json to_json(const JudgedPoses& judged) {
+  nlohmann::ordered_json json;
+  json["residual_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
+                                             : nlohmann::ordered_json(judged.worst_mg);
+  json["rms_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
+                                        : nlohmann::ordered_json(judged.rms_mg);
+  json["poses"] = nlohmann::ordered_json::array();
+  for (const JudgedPose& pose : judged.poses) {
+    nlohmann::ordered_json item = to_json(pose.reading);
+    item["magnitude_g"] = pose.magnitude_g;
+    item["error_mg"] = pose.error_mg;
+    json["poses"].push_back(std::move(item));
+  }
+  return json;
+}
+
+nlohmann::ordered_json to_json(const std::optional<device::CalibrationPage>& page) {
+  if (!page) {
+    return nullptr;
+  }
+  nlohmann::ordered_json json = calib::to_json(page->constants);
+  json["calibrated"] = to_iso8601(page->calibrated);
+  return json;
+}
+
+}  // namespace
+
+std::string_view to_string(JigVerdict verdict) {
+  switch (verdict) {
+    case JigVerdict::pass:
+      return "pass";
+    case JigVerdict::fail:
+      return "fail";
+    case JigVerdict::inconclusive:
+      return "inconclusive";
+    case JigVerdict::stopped:
+      return "stopped";
+  }
+  return "?";
+}
+
+JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& calibration,
+                  double gravity_g) {
+  JudgedPoses judged;
+  for (const PoseReading& reading : readings) {
+    const PerAxis<double> force_g = calibration.to_g(reading.mean_lsb);
+    JudgedPose pose;
+    pose.reading = reading;
+    pose.magnitude_g = std::hypot(force_g[0], force_g[1], force_g[2]);
+    pose.error_mg = (pose.magnitude_g - gravity_g) * kMgPerG;
+    judged.worst_mg = std::max(judged.worst_mg, std::abs(pose.error_mg));
+    judged.rms_mg += pose.error_mg * pose.error_mg / static_cast<double>(readings.size());
+    judged.poses.push_back(pose);
+  }
+  judged.rms_mg = std::sqrt(judged.rms_mg);
+  return judged;
+}
+
+std::string JigReport::brief() const {
+  std::string text = fmt::format("{} under '{}': {}", printable(serial), calib::to_string(filter),
+                                 to_string(verdict));
+  if (!verification.poses.empty()) {
+    text += fmt::format("; {:.1f} mg off on {} poses that were not fitted", verification.worst_mg,
+                        verification.poses.size());
+  }
+  for (const std::string& reason : reasons) {
+    text += "; " + reason;
+  }
+  return text;
+}
+
+nlohmann::ordered_json JigReport::to_json() const {
+  nlohmann::ordered_json json;
+  json["serial"] = serial;
+  json["firmware"] = firmware;
+  json["jig"] = jig;
+  json["filter"] = calib::to_string(filter);
+  json["verdict"] = to_string(verdict);
+  json["reasons"] = reasons;
+  json["started"] = to_iso8601(started);
+  json["ended"] = to_iso8601(ended);
+  json["gravity_m_per_s2"] = gravity.m_per_s2;
+  json["poses"] = nlohmann::ordered_json::array();
+  for (const PoseReading& face : faces) {
+    json["poses"].push_back(station::to_json(face));
+  }
+  if (six) {
+    json["constants"] = calib::to_json(six->best().calibration, six->best().stored);
+  } else {
+    json["constants"] = nullptr;
+  }
+  json["method"] = method;
+  json["as_found"] = station::to_json(as_found);
+  if (as_found) {
+    json["as_found"]["residual_mg"] = as_found_residual_mg;
+  }
+  json["as_left"] = station::to_json(as_left);
+  if (as_left) {
+    json["as_left"]["written"] = written;
+    json["as_left"]["residual_mg"] = written ? nlohmann::ordered_json(recheck.worst_mg)
+                                             : nlohmann::ordered_json(as_found_residual_mg);
+  }
+  json["verification"] = station::to_json(verification);
+  json["verification"]["residual_rounded_mg"] = rounded_residual_mg;
+  json["recheck"] = written ? station::to_json(recheck) : nlohmann::ordered_json(nullptr);
+  json["uncertainty"] =
+      six ? calib::to_json(six->best().uncertainty) : nlohmann::ordered_json(nullptr);
+  json["solutions"] = six ? calib::to_json(*six) : nlohmann::ordered_json(nullptr);
+  json["refusals"] = refusals;
+  json["stream"]["samples"] = stream.samples;
+  json["stream"]["lost_samples"] = stream.lost_samples;
+  json["stream"]["duplicate_reports"] = stream.duplicate_reports;
+  json["stream"]["damaged_reports"] = stream.damaged_reports;
+  return json;
+}
+
+calib::ConstantsRecord JigReport::record() const {
+  calib::ConstantsRecord record;
+  record.serial = serial;
+  record.filter = filter;
+  if (six) {
+    record.calibration = six->best().calibration;
+    record.stored = six->best().stored;
+    record.uncertainty = six->best().uncertainty;
+  }
+  record.method = method;
+  record.made_at = ended;
+  record.made_from.sha256 = to_hex(
+      sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
+  record.gravity_m_per_s2 = gravity.m_per_s2;
+  return record;
+}
+
+Result<JigReport> run_jig(device::Unit& unit, device::Jig& jig, Env& env,
+                          const JigSessionOptions& options, const JigTeller& tell) {
+  if (options.run.write && options.filter != FilterConfiguration::current) {
+    return fail(ErrorCode::usage, "only constants of the filter 'current' are written into units",
+                {}, "leave out --write or --filter");
+  }
+  return Session(unit, jig, env, options, tell).run();
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,97 @@
+// A jig run on a real link: the unit, the jig and the state machine (jig_run.h) brought together.
+//
+// Sets the filter configuration and checks it, streams, lets the machine ask for poses, computes
+// the constants from the six faces, judges them on readings that the fit has not seen, and, when
+// asked, writes them into the unit, reads them back and measures two poses again with what the unit
+// then holds. Stores nothing: the report carries all there is to store.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "base/env.h"
+#include "calib/constants.h"
+#include "calib/gravity.h"
+#include "calib/six_pose.h"
+#include "device/unit.h"
+#include "station/jig_run.h"
+
+namespace sixpoint::station {
+
+struct JigSessionOptions {
+  JigRunOptions run;
+  calib::FilterConfiguration filter = calib::FilterConfiguration::current;
+  calib::LocalGravity gravity = calib::gravity_unknown();  // where the jig stands
+  // Largest distance of a verification reading's magnitude from local gravity. A real sensor's six
+  // constants leave 4 to 8 mg (curvature, cross-axis); an affected one is off by 100 and more.
+  double residual_limit_mg = 10;
+  // Longest silence of a streaming unit before it is given up.
+  double silence_s = 3;
+};
+
+enum class JigVerdict { pass, fail, inconclusive, stopped };
+std::string_view to_string(JigVerdict verdict);
+
+// One reading judged by constants: magnitude against local gravity.
+struct JudgedPose {
+  PoseReading reading;
+  double magnitude_g = 0;
+  double error_mg = 0;
+};
+struct JudgedPoses {
+  std::vector<JudgedPose> poses;
+  double worst_mg = 0;
+  double rms_mg = 0;
+};
+JudgedPoses judge(const std::vector<PoseReading>& readings, const calib::Calibration& calibration,
+                  double gravity_g);
+
+struct JigReport {
+  std::string serial;
+  std::string firmware;
+  std::string jig;
+  calib::FilterConfiguration filter = calib::FilterConfiguration::current;
+  UtcTime started{};
+  UtcTime ended{};
+  JigVerdict verdict = JigVerdict::inconclusive;
+  std::vector<std::string> reasons;
+  calib::LocalGravity gravity;
+
+  std::vector<PoseReading> faces;
+  // The three solutions, the choice among them by unused readings, and the verdict on it.
+  std::optional<calib::SixPoseReport> six;
+  std::string method;  // "six_pose_letter" (Eq. 1-6 to the letter), "six_pose_pair" ...
+  JudgedPoses verification;
+  double rounded_residual_mg = 0;  // of the nine integers, on the same readings
+
+  std::optional<device::CalibrationPage> as_found;
+  double as_found_residual_mg = 0;  // of the page's constants, on the faces
+  std::optional<device::CalibrationPage>
+      as_left;  // as read back; as_found where nothing was written
+  bool written = false;
+  JudgedPoses recheck;  // with the constants that were read back
+  int refusals = 0;
+  device::StreamStatistics stream;
+  std::string raw_csv;  // every sample of the run: device_time_us,x,y,z,temperature_c
+
+  bool usable() const { return verdict == JigVerdict::pass; }
+  std::string brief() const;
+  // The contract's keys but `run`, `stored_id` and `certificate`.
+  nlohmann::ordered_json to_json() const;
+  // For the store. Only of a usable report.
+  calib::ConstantsRecord record() const;
+};
+
+// What a person is told while it runs.
+using JigTeller = std::function<void(const JigAction&)>;
+
+// usage where the wanted filter cannot help this unit; device_unavailable when the unit goes away;
+// otherwise a report, whatever its verdict.
+Result<JigReport> run_jig(device::Unit& unit, device::Jig& jig, Env& env,
+                          const JigSessionOptions& options, const JigTeller& tell);
+
+}  // namespace sixpoint::station
