@@ -18,7 +18,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kOrthonormal = 1e-3;  // protocols carry twelve digits; a tenth of a percent is a lie
+constexpr double kOrthonormal =
+    1e-3;  // protocols carry twelve digits; a tenth of a percent is a lie
 
 tl::unexpected<Error> bad(const std::string& where, std::string what) {
   return fail(ErrorCode::bad_data, std::move(what), where,
@@ -51,8 +52,9 @@ class Fields {
   }
   Eigen::Vector3d vector(const char* key) {
     const auto found = object_.find(key);
-    return found == object_.end() ? (complain(fmt::format("'{}' is missing", key)), Eigen::Vector3d::Zero())
-                                  : vector_of(*found, key);
+    return found == object_.end()
+               ? (complain(fmt::format("'{}' is missing", key)), Eigen::Vector3d::Zero())
+               : vector_of(*found, key);
   }
   Eigen::Matrix3d rotation(const char* key) {
     const auto found = object_.find(key);
@@ -64,9 +66,10 @@ class Fields {
     for (Eigen::Index row = 0; row < 3; ++row) {
       matrix.row(row) = vector_of((*found)[static_cast<std::size_t>(row)], key).transpose();
     }
-    if (!problem_ && (!((matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <
-                        kOrthonormal) ||
-                      matrix.determinant() < 0)) {
+    if (!problem_ &&
+        (!((matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <
+           kOrthonormal) ||
+         matrix.determinant() < 0)) {
       complain(fmt::format("'{}' is no rotation (its rows are not orthonormal)", key));
     }
     return matrix;
@@ -78,8 +81,8 @@ class Fields {
       const double t = in_range(key, found->get<double>(), -100, 200);
       return {t, t};
     }
-    if (found != object_.end() && found->is_array() && found->size() == 2 && (*found)[0].is_number() &&
-        (*found)[1].is_number()) {
+    if (found != object_.end() && found->is_array() && found->size() == 2 &&
+        (*found)[0].is_number() && (*found)[1].is_number()) {
       return {in_range(key, (*found)[0].get<double>(), -100, 200),
               in_range(key, (*found)[1].get<double>(), -100, 200)};
     }
@@ -150,7 +153,8 @@ Result<Segment> read_segment(const Json& json, const std::string& where) {
   segment.samples = fields.count("samples", std::size_t{1} << 40U);
   segment.host_start_s = fields.number("host_start_s", -1e9, 1e9);
   segment.rotation = fields.rotation("rotation");
-  std::tie(segment.temperature_start_c, segment.temperature_end_c) = fields.temperature("temperature_c");
+  std::tie(segment.temperature_start_c, segment.temperature_end_c) =
+      fields.temperature("temperature_c");
   if (kind == "still") {
     segment.kind = Segment::Kind::still;
   } else if (kind == "vibration") {
@@ -223,15 +227,16 @@ void read_temperature(FileSystem& files, const std::string& folder, Bundle& bund
     table = parse_two_columns(*bytes);
   }
   if (table.skipped > 0) {
-    bundle.losses.push_back(fmt::format("temperature.csv: {} lines hold no numbers and were passed over",
-                                        table.skipped));
+    bundle.losses.push_back(fmt::format(
+        "temperature.csv: {} lines hold no numbers and were passed over", table.skipped));
   }
   std::stable_sort(table.rows.begin(), table.rows.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::erase_if(table.rows, [](const auto& row) { return std::abs(row.second) > 200; });
   if (table.rows.size() < 2) {
     bundle.losses.emplace_back(
-        "temperature.csv is missing or empty: the commanded temperatures stand in for the unit's, effects of "
+        "temperature.csv is missing or empty: the commanded temperatures stand in for the unit's, "
+        "effects of "
         "temperature are told from effects of time less well");
     return;
   }
@@ -245,9 +250,9 @@ void read_temperature(FileSystem& files, const std::string& folder, Bundle& bund
   for (std::ptrdiff_t i = 0; i < rows; ++i) {
     const std::ptrdiff_t half = std::min({kHalf, i, rows - 1 - i});
     bundle.temperature.host_time_s.push_back(table.rows[static_cast<std::size_t>(i)].first);
-    bundle.temperature.temperature_c.push_back((sum[static_cast<std::size_t>(i + half + 1)] -
-                                                sum[static_cast<std::size_t>(i - half)]) /
-                                               static_cast<double>(2 * half + 1));
+    bundle.temperature.temperature_c.push_back(
+        (sum[static_cast<std::size_t>(i + half + 1)] - sum[static_cast<std::size_t>(i - half)]) /
+        static_cast<double>(2 * half + 1));
   }
 }
 
@@ -265,7 +270,8 @@ void read_host_clock(FileSystem& files, const std::string& folder, Bundle& bundl
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   if (table.rows.size() < 2) {
     bundle.losses.emplace_back(
-        "host_clock.csv is missing or empty: an error of the sample clock and lost or repeated samples show in "
+        "host_clock.csv is missing or empty: an error of the sample clock and lost or repeated "
+        "samples show in "
         "shaker tones only");
     return;
   }
@@ -301,9 +307,10 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
     }
   }
   if (damaged_s > 0) {
-    return bad(path, fmt::format("{} seconds of the recording are damaged, so that the protocol's sample "
-                                 "numbers no longer hold",
-                                 damaged_s));
+    return bad(path,
+               fmt::format("{} seconds of the recording are damaged, so that the protocol's sample "
+                           "numbers no longer hold",
+                           damaged_s));
   }
   if (const auto rate = recording.info().sample_rate_hz();
       rate && *rate > 0 && std::abs(*rate - bundle.rate_hz) > 0.5) {
@@ -323,7 +330,8 @@ void find_placements(Bundle& bundle) {
     if (i > 0) {
       const Segment& last = bundle.segments[i - 1];
       const double pause_s =
-          now.host_start_s - (last.host_start_s + static_cast<double>(last.samples) / bundle.rate_hz);
+          now.host_start_s -
+          (last.host_start_s + static_cast<double>(last.samples) / bundle.rate_hz);
       const bool same_pose = (now.rotation - last.rotation).cwiseAbs().maxCoeff() < 1e-6;
       const bool tones = now.kind == Segment::Kind::vibration && last.kind == now.kind &&
                          now.name == last.name && pause_s < kTonePause_s;
@@ -365,11 +373,13 @@ double Bundle::temperature_at(double host_time_s) const {
     }
   }
   const double share = std::clamp(
-      (host_time_s - segment->host_start_s) * rate_hz / static_cast<double>(segment->samples), 0.0, 1.0);
+      (host_time_s - segment->host_start_s) * rate_hz / static_cast<double>(segment->samples), 0.0,
+      1.0);
   return segment->temperature_start_c * (1 - share) + segment->temperature_end_c * share;
 }
 
-Result<Bundle> read_bundle(FileSystem& files, const std::string& folder, const BundleLimits& limits) {
+Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
+                           const BundleLimits& limits) {
   const std::string protocol_path = folder + "/protocol.json";
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, protocol_path));
   const Json protocol = Json::parse(text, nullptr, false);
@@ -420,10 +430,10 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder, const B
   }
   if (!bundle.protocol_serial.empty() && !bundle.header.serial.empty() &&
       bundle.protocol_serial != bundle.header.serial) {
-    bundle.losses.push_back(
-        fmt::format("the protocol is of unit {}, the recording's header names {}: headers are copied, but make "
-                    "sure that this is the right recording",
-                    bundle.protocol_serial, printable(bundle.header.serial, 100)));
+    bundle.losses.push_back(fmt::format(
+        "the protocol is of unit {}, the recording's header names {}: headers are copied, but make "
+        "sure that this is the right recording",
+        bundle.protocol_serial, printable(bundle.header.serial, 100)));
   }
   read_temperature(files, folder, bundle);
   read_host_clock(files, folder, bundle);

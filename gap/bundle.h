@@ -31,7 +31,7 @@ struct Segment {
   Kind kind = Kind::still;
   std::size_t first_sample = 0;
   std::size_t samples = 0;
-  double host_start_s = 0;  // since power-on
+  double host_start_s = 0;                                 // since power-on
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // laboratory (z up) to sensor
   double temperature_start_c = 0;                          // commanded
   double temperature_end_c = 0;

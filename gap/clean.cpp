@@ -175,7 +175,8 @@ void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
       // A wrapped sample lies far on the wrong side of where its known tone has it. Gain and offset
       // come from the samples inside +-1200 LSB whose neighbours are there too; phase by scanning.
       const double w = 2 * M_PI * segment.vibration->frequency_hz / bundle.rate_hz;
-      const double amplitude = along[e] * segment.vibration->amplitude_g * bundle.accel_scale_lsb_per_g;
+      const double amplitude =
+          along[e] * segment.vibration->amplitude_g * bundle.accel_scale_lsb_per_g;
       const double level = rest[e] * bundle.accel_scale_lsb_per_g;
       const std::size_t n = segment.samples;
       const auto at = [&](std::size_t i) {
@@ -245,7 +246,8 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
       any = true;
       for (std::size_t i = segment.first_sample; i < segment.first_sample + segment.samples; ++i) {
         if ((clean.flags[i] & kSampleWrapped) == 0) {
-          const int value = std::clamp<int>(bundle.samples.empty() ? 0 : clean.samples[i][axis], -2048, 2047);
+          const int value =
+              std::clamp<int>(bundle.samples.empty() ? 0 : clean.samples[i][axis], -2048, 2047);
           ++histogram[static_cast<std::size_t>(value + 2048)];
         }
       }
@@ -264,7 +266,8 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
       const std::size_t before = histogram[static_cast<std::size_t>(edge + step + 2048)];
       std::size_t inside = 0;  // the next 16 values
       for (int k = 2; k < 18; ++k) {
-        inside += histogram[static_cast<std::size_t>(std::clamp(edge + k * step, -2048, 2047) + 2048)];
+        inside +=
+            histogram[static_cast<std::size_t>(std::clamp(edge + k * step, -2048, 2047) + 2048)];
       }
       const bool full_scale = edge == kFullScaleHigh || edge == kFullScaleLow;
       if (full_scale) {
@@ -273,7 +276,7 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
       }
       // A sine piles up at its crest too, spread by noise of about one LSB: five values share it. A
       // plateau holds it all in one value (two, where rounding sits on the edge).
-      const std::size_t crest = std::max(at_edge, before) ;
+      const std::size_t crest = std::max(at_edge, before);
       if (crest >= 12 && crest > 3 * (inside / 4 + 1)) {
         clean.saturated = true;
         clean.plateau_lsb[axis][end] = edge;

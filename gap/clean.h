@@ -1,8 +1,8 @@
 // Discrete effects are found and undone in the samples first, before anything is averaged.
 //
 // A turned axis, a stretch of zeros or a held value ruins every mean that contains it, and none of
-// them needs a fit: each leaves marks that noise cannot make. What is found here is undone (axes) or
-// masked (zeros, held and clipped samples), so that the rest of the diagnosis sees what the unit
+// them needs a fit: each leaves marks that noise cannot make. What is found here is undone (axes)
+// or masked (zeros, held and clipped samples), so that the rest of the diagnosis sees what the unit
 // would have recorded without it.
 #pragma once
 
@@ -35,15 +35,16 @@ struct CleanSamples {
 
   bool axes_turned = false;
   Eigen::Matrix3i axis_matrix = Eigen::Matrix3i::Identity();  // maps the right axes to the stored
-  // How much worse, in g rms over the poses, the untouched axes fit than the best signed permutation.
+  // How much worse, in g rms over the poses, the untouched axes fit than the best signed
+  // permutation.
   double axes_gain_g = 0;
   bool axes_decidable = false;  // the poses tell every signed permutation from every other
   // Mean distance, in g, of the poses from what the protocol says, axes as decided.
   double pose_error_g = 0;
 
-  RunTally zeros;       // 10 samples and more with zero on all axes
-  RunTally held;        // a second and more of one value, not zero
-  RunTally stuck;       // runs of one value shorter than that, longer than chance allows
+  RunTally zeros;  // 10 samples and more with zero on all axes
+  RunTally held;   // a second and more of one value, not zero
+  RunTally stuck;  // runs of one value shorter than that, longer than chance allows
   std::size_t wrapped_samples = 0;
 
   // Values that pile up at one end of an axis inside the record's range.

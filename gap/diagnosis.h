@@ -43,7 +43,8 @@ struct GapSize {
   // sqrt(chi-square per number) before and after: mean, tone, spectrum, codes, timing.
   std::array<std::array<double, 2>, 5> by_feature{};
 };
-inline constexpr std::array<const char*, 5> kFeatureNames = {"mean", "tone", "spectrum", "codes", "timing"};
+inline constexpr std::array<const char*, 5> kFeatureNames = {"mean", "tone", "spectrum", "codes",
+                                                             "timing"};
 
 struct Location {
   int axis = 0;
@@ -72,8 +73,8 @@ struct UnitEstimate {
 // Series for the report page; kept small.
 struct Plots {
   std::vector<double> frequency_hz;
-  std::array<std::vector<double>, 3> noise_mg2;       // equivalent white variance
-  std::array<std::vector<double>, 3> noise_model_mg2; // nominal, or with the low-pass
+  std::array<std::vector<double>, 3> noise_mg2;        // equivalent white variance
+  std::array<std::vector<double>, 3> noise_model_mg2;  // nominal, or with the low-pass
   std::vector<double> step_s;
   std::vector<double> step_share;
   std::vector<double> step_model;

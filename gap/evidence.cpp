@@ -11,8 +11,8 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr int kNuisances = 2;       // groups: gain, offset
-constexpr std::size_t kLargest = 5; // effects at once in this model
+constexpr int kNuisances = 2;        // groups: gain, offset
+constexpr std::size_t kLargest = 5;  // effects at once in this model
 
 // Sizes of the kinds of scatter, log-uniform.
 std::vector<double> sizes_of(Scatter scatter) {
@@ -56,7 +56,7 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
           const double l = std::max(1e-3, a.seconds / tau);
           sum += 2 * (1 / l - (1 - std::exp(-l)) / (l * l));
         } else {
-          sum += std::exp(-gap_s / tau) * std::min(1.0, tau / std::max(1e-3, a.seconds)) ;
+          sum += std::exp(-gap_s / tau) * std::min(1.0, tau / std::max(1e-3, a.seconds));
         }
       }
       return sum * flicker_density_mg2(1);
@@ -108,7 +108,8 @@ bool in_catalogue(Scatter scatter) { return scatter <= Scatter::flicker; }
 EvidenceSearch::EvidenceSearch(const std::vector<Block>& blocks, EvidenceOptions options)
     : blocks_(blocks), options_(std::move(options)) {
   for (const ParameterGroup& group : parameter_groups()) {
-    if (group.effect == "gain" || group.effect == "offset" || !options_.allowed || options_.allowed(group.effect)) {
+    if (group.effect == "gain" || group.effect == "offset" || !options_.allowed ||
+        options_.allowed(group.effect)) {
       groups_.push_back(group);
     }
   }
@@ -122,7 +123,8 @@ EvidenceSearch::EvidenceSearch(const std::vector<Block>& blocks, EvidenceOptions
   }
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     rows_ += static_cast<int>(blocks[b].size());
-    row_block_.insert(row_block_.end(), static_cast<std::size_t>(blocks[b].size()), static_cast<int>(b));
+    row_block_.insert(row_block_.end(), static_cast<std::size_t>(blocks[b].size()),
+                      static_cast<int>(b));
   }
 }
 
@@ -165,9 +167,10 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
     y.segment(row, block.size()) = block.value_mg - base;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const ParameterGroup& group = groups_[g];
-      const bool shaped_alike = group.effect == "warm_up"      ? group.tau_s == at.warm_up_tau_s
-                                : group.effect == "hysteresis" ? group.by_sign == at.hysteresis_by_sign
-                                                               : true;
+      const bool shaped_alike = group.effect == "warm_up" ? group.tau_s == at.warm_up_tau_s
+                                : group.effect == "hysteresis"
+                                    ? group.by_sign == at.hysteresis_by_sign
+                                    : true;
       for (int i = 0; i < group.count; ++i) {
         ForwardState moved = at;
         double here = parameter(at, group.first + i);
@@ -182,9 +185,11 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
         }
         const Eigen::VectorXd from = shaped_alike ? base : predict(moved, block, options_.lsb_mg);
         const double step = group.effect == "truncation" ? 1.0 : 0.02 * group.prior_sd;
-        parameter(moved, group.first + i) = here + (group.effect == "truncation" && here > 0.5 ? -step : step);
+        parameter(moved, group.first + i) =
+            here + (group.effect == "truncation" && here > 0.5 ? -step : step);
         const double sign = group.effect == "truncation" && here > 0.5 ? -1 : 1;
-        const Eigen::VectorXd column = sign * (predict(moved, block, options_.lsb_mg) - from) / step;
+        const Eigen::VectorXd column =
+            sign * (predict(moved, block, options_.lsb_mg) - from) / step;
         const int c = group_column_[g] + i;
         x.block(row, c, block.size(), 1) = column;
         theta[c] = here;
@@ -197,9 +202,12 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
   const auto seat = [&](const Block& a, const Block& b, double sd_deg) -> Eigen::MatrixXd {
     return sd_deg * sd_deg * seating_lever(a) * seating_lever(b).transpose();
   };
-  const double seat_sd = scatter == Scatter::seating ? std::hypot(kNominalSeating_deg, size) : kNominalSeating_deg;
-  const bool dense = scatter != Scatter::nominal && scatter != Scatter::seating && scatter != Scatter::by_placement;
-  const double start_s = blocks_.empty() ? 0 : blocks_.front().middle_s - blocks_.front().seconds / 2;
+  const double seat_sd =
+      scatter == Scatter::seating ? std::hypot(kNominalSeating_deg, size) : kNominalSeating_deg;
+  const bool dense = scatter != Scatter::nominal && scatter != Scatter::seating &&
+                     scatter != Scatter::by_placement;
+  const double start_s =
+      blocks_.empty() ? 0 : blocks_.front().middle_s - blocks_.front().seconds / 2;
 
   const auto whiten_rows = [&](std::size_t first, std::size_t last, int first_row) {
     int size_rows = 0;
@@ -265,8 +273,9 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
     w.outside_nats = options_.record_nats(scatter, size);
   }
   if (scatter != Scatter::nominal) {
-    w.outside_nats += (in_catalogue(scatter) ? options_.log_prior_effect : options_.log_prior_unknown) -
-                      std::log(static_cast<double>(sizes_of(scatter).size()));
+    w.outside_nats +=
+        (in_catalogue(scatter) ? options_.log_prior_effect : options_.log_prior_unknown) -
+        std::log(static_cast<double>(sizes_of(scatter).size()));
   }
   return w;
 }
@@ -320,14 +329,16 @@ double EvidenceSearch::evidence_of(const Eigen::MatrixXd& a, const Eigen::Vector
     for (int i = 0; i < n; ++i) {
       posterior->mean[i] = mu[i] + sd[static_cast<std::size_t>(i)] * z[i];
       for (int j = 0; j < n; ++j) {
-        posterior->covariance(i, j) *= sd[static_cast<std::size_t>(i)] * sd[static_cast<std::size_t>(j)];
+        posterior->covariance(i, j) *=
+            sd[static_cast<std::size_t>(i)] * sd[static_cast<std::size_t>(j)];
       }
     }
   }
   return -llt.matrixLLT().diagonal().array().log().sum() + 0.5 * v.dot(z) - 0.5 * square;
 }
 
-double EvidenceSearch::evidence(const Whitened& w, const std::vector<int>& groups, Posterior* posterior) const {
+double EvidenceSearch::evidence(const Whitened& w, const std::vector<int>& groups,
+                                Posterior* posterior) const {
   Posterior own;
   double nats = evidence_of(w.a, w.b, w.yy, groups, &own) - w.half_log_det + w.outside_nats;
   // An estimate far outside what the effect can be is another thing.
@@ -352,8 +363,9 @@ double EvidenceSearch::log_prior(const std::vector<int>& groups) const {
   double sum = 0;
   for (const int g : groups) {
     const std::string& effect = groups_[static_cast<std::size_t>(g)].effect;
-    const auto shapes = std::count_if(groups_.begin(), groups_.end(),
-                                      [&](const ParameterGroup& other) { return other.effect == effect; });
+    const auto shapes =
+        std::count_if(groups_.begin(), groups_.end(),
+                      [&](const ParameterGroup& other) { return other.effect == effect; });
     sum += options_.log_prior_effect - std::log(static_cast<double>(shapes));
   }
   return sum;
@@ -362,16 +374,20 @@ double EvidenceSearch::log_prior(const std::vector<int>& groups) const {
 Subset EvidenceSearch::search(const Whitened& w, std::vector<Subset>& looked_at) const {
   const int count = static_cast<int>(groups_.size());
   const auto judge = [&](const std::vector<int>& groups) {
-    Subset subset{groups, evidence(w, groups, nullptr) + log_prior(groups)};
+    Subset subset;
+    subset.groups = groups;
+    subset.nats = evidence(w, groups, nullptr) + log_prior(groups);
     looked_at.push_back(subset);
     return subset;
   };
   const auto fits = [&](const std::vector<int>& groups, int g) {
     return std::none_of(groups.begin(), groups.end(), [&](int have) {
-      return groups_[static_cast<std::size_t>(have)].effect == groups_[static_cast<std::size_t>(g)].effect;
+      return groups_[static_cast<std::size_t>(have)].effect ==
+             groups_[static_cast<std::size_t>(g)].effect;
     });
   };
-  Subset best = judge({});
+  const std::vector<int> nothing;
+  Subset best = judge(nothing);
   // All singles and pairs exactly; larger ones from the best few.
   std::vector<Subset> beam = {best};
   for (int g = kNuisances; g < count; ++g) {
@@ -409,12 +425,14 @@ Subset EvidenceSearch::search(const Whitened& w, std::vector<Subset>& looked_at)
       break;
     }
     best = next.front();
-    beam.assign(next.begin(), next.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, next.size())));
+    beam.assign(next.begin(),
+                next.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, next.size())));
   }
   return best;
 }
 
-Fit EvidenceSearch::make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const {
+Fit EvidenceSearch::make_fit(const Whitened& w, const Subset& subset,
+                             const ForwardState& at) const {
   Fit fit;
   fit.subset = subset;
   fit.scatter = w.scatter;
@@ -445,7 +463,8 @@ Fit EvidenceSearch::make_fit(const Whitened& w, const Subset& subset, const Forw
   }
   fit.residual = w.y;
   for (std::size_t k = 0; k < fit.posterior.columns.size(); ++k) {
-    fit.residual -= w.x.col(fit.posterior.columns[k]) * fit.posterior.mean[static_cast<Eigen::Index>(k)];
+    fit.residual -=
+        w.x.col(fit.posterior.columns[k]) * fit.posterior.mean[static_cast<Eigen::Index>(k)];
   }
   fit.row_block = w.row_block;
   return fit;
@@ -474,7 +493,9 @@ void EvidenceSearch::run() {
       break;
     }
   }
-  nominal_ = make_fit(w, Subset{{}, evidence(w, {}, nullptr)}, at);
+  Subset nothing;
+  nothing.nats = evidence(w, nothing.groups, nullptr);
+  nominal_ = make_fit(w, nothing, at);
   best_known_ = fit;
   final_ = w;
   for (const Subset& s : looked_at) {
@@ -495,9 +516,11 @@ void EvidenceSearch::run() {
     return;
   }
   const ForwardState nominal_at = at;
-  for (const Scatter scatter : {Scatter::seating, Scatter::random_walk, Scatter::flicker, Scatter::by_pose,
-                                Scatter::by_placement, Scatter::by_temperature, Scatter::by_time}) {
-    if (in_catalogue(scatter) && options_.allowed && !options_.allowed(std::string(to_string(scatter)))) {
+  for (const Scatter scatter :
+       {Scatter::seating, Scatter::random_walk, Scatter::flicker, Scatter::by_pose,
+        Scatter::by_placement, Scatter::by_temperature, Scatter::by_time}) {
+    if (in_catalogue(scatter) && options_.allowed &&
+        !options_.allowed(std::string(to_string(scatter)))) {
       continue;
     }
     std::optional<Fit> best;
@@ -669,7 +692,8 @@ double EvidenceSearch::held_out_nats(const std::string& effect) const {
     Eigen::VectorXd b = final_.b;
     double yy = final_.yy;
     for (int row = 0; row < rows_; ++row) {
-      if (blocks_[static_cast<std::size_t>(row_block_[static_cast<std::size_t>(row)])].condition == fold) {
+      if (blocks_[static_cast<std::size_t>(row_block_[static_cast<std::size_t>(row)])].condition ==
+          fold) {
         const Eigen::VectorXd x = final_.x.row(row).transpose();
         a.noalias() -= x * x.transpose();
         b -= x * final_.y[row];
@@ -677,7 +701,8 @@ double EvidenceSearch::held_out_nats(const std::string& effect) const {
       }
     }
     const auto predictive = [&](const std::vector<int>& groups) {
-      return evidence_of(final_.a, final_.b, final_.yy, groups, nullptr) - evidence_of(a, b, yy, groups, nullptr);
+      return evidence_of(final_.a, final_.b, final_.yy, groups, nullptr) -
+             evidence_of(a, b, yy, groups, nullptr);
     };
     gain += predictive(with) - predictive(without);
   }
@@ -714,7 +739,8 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
     double yy = w.yy;
     std::vector<int> rows;
     for (int row = 0; row < rows_; ++row) {
-      if (blocks_[static_cast<std::size_t>(row_block_[static_cast<std::size_t>(row)])].condition == fold) {
+      if (blocks_[static_cast<std::size_t>(row_block_[static_cast<std::size_t>(row)])].condition ==
+          fold) {
         const Eigen::VectorXd x = w.x.row(row).transpose();
         a.noalias() -= x * x.transpose();
         b -= x * w.y[row];
@@ -737,10 +763,12 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
         }
         return r;
       };
-      const Block& block = blocks_[static_cast<std::size_t>(row_block_[static_cast<std::size_t>(row)])];
+      const Block& block =
+          blocks_[static_cast<std::size_t>(row_block_[static_cast<std::size_t>(row)])];
       const int i = within[static_cast<std::size_t>(row)];
       const Eigen::MatrixXd lever = seating_lever(block);
-      const double scale2 = block.white_mg2(i, i) + std::pow(kNominalSeating_deg, 2) * lever.row(i).squaredNorm();
+      const double scale2 =
+          block.white_mg2(i, i) + std::pow(kNominalSeating_deg, 2) * lever.row(i).squaredNorm();
       const double r0 = residual(nothing);
       const double r1 = residual(accepted);
       before += r0 * r0 * scale2;

@@ -16,7 +16,9 @@ Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
                     : Eigen::AngleAxisd(angle, vector_deg.normalized()).toRotationMatrix();
 }
 
-double sign_of_step(double step_g) { return std::abs(step_g) < 0.05 ? 0 : std::copysign(1.0, step_g); }
+double sign_of_step(double step_g) {
+  return std::abs(step_g) < 0.05 ? 0 : std::copysign(1.0, step_g);
+}
 
 }  // namespace
 
@@ -91,10 +93,11 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   const double half = block.seconds / (2 * s.warm_up_tau_s);
   const double decay =
       std::exp(-block.middle_s / s.warm_up_tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
-  Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + hours * s.drift_mg_per_h + decay * s.warm_up_mg;
+  Eigen::Vector3d slow_mg =
+      warm * s.tempco_mg_per_c + hours * s.drift_mg_per_h + decay * s.warm_up_mg;
   for (Eigen::Index a = 0; a < 3; ++a) {
-    slow_mg[a] += s.hysteresis_mg[a] *
-                  (s.hysteresis_by_sign ? sign_of_step(block.approach_g[a]) : 0.5 * block.approach_g[a]);
+    slow_mg[a] += s.hysteresis_mg[a] * (s.hysteresis_by_sign ? sign_of_step(block.approach_g[a])
+                                                             : 0.5 * block.approach_g[a]);
   }
   const Eigen::Vector3d sensitivity =
       Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c;
@@ -107,7 +110,8 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
     const Eigen::Vector3d u = rest + c1 * swing;
     for (Eigen::Index a = 0; a < 3; ++a) {
       const double v = u[a];
-      double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) * sensitivity[a] +
+      double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
+                     sensitivity[a] +
                  slow_mg[a];
       y = y * s.gain[a] + s.offset_mg[a];
       if (s.truncation != 0) {

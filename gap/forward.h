@@ -1,4 +1,5 @@
-// The forward model of one block of features: what the simulator would measure there, in closed form.
+// The forward model of one block of features: what the simulator would measure there, in closed
+// form.
 //
 // A block is a dwell (or a piece of a long one), or a tone. Its features are the mean per axis, and
 // for tones the amplitude in phase per axis and the second and third harmonic on the axis that is
@@ -38,14 +39,14 @@ struct ForwardState {
 
 // Groups of parameters that come and go together: an effect, or a nuisance.
 struct ParameterGroup {
-  std::string effect;    // catalogue name; "gain" and "offset" for the nuisances
-  int first = 0;         // position in the flat vector
+  std::string effect;  // catalogue name; "gain" and "offset" for the nuisances
+  int first = 0;       // position in the flat vector
   int count = 0;
-  double prior_sd = 1;   // of each, from the realistic sizes of the catalogue
+  double prior_sd = 1;  // of each, from the realistic sizes of the catalogue
   double prior_mean = 0;
-  double high = 0;       // an estimate beyond four times this is another thing
-  double tau_s = 0;      // warm_up's shape
-  bool by_sign = true;   // hysteresis' shape
+  double high = 0;      // an estimate beyond four times this is another thing
+  double tau_s = 0;     // warm_up's shape
+  bool by_sign = true;  // hysteresis' shape
 };
 inline constexpr int kForwardParameters = 37;
 // Every group, with each shape of warm_up and hysteresis as a group of its own.
@@ -58,21 +59,21 @@ double parameter(const ForwardState& state, int position);
 struct Block {
   std::size_t segment = 0;
   int placement = 0;
-  int condition = 0;          // for hold-out: what is left out together
+  int condition = 0;  // for hold-out: what is left out together
   bool tone = false;
-  int axis = 0;               // of tones
-  double middle_s = 0;        // host time
+  int axis = 0;         // of tones
+  double middle_s = 0;  // host time
   double seconds = 0;
   double temperature_c = 25;
   Eigen::Vector3d gravity_lab_g = Eigen::Vector3d::UnitZ();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
   Eigen::Vector3d vibration_lab_g = Eigen::Vector3d::Zero();  // amplitude, response included
-  bool harmonics = false;     // 8 features instead of 6
+  bool harmonics = false;                                     // 8 features instead of 6
   Eigen::Vector3d noise_mg = Eigen::Vector3d::Zero();         // of one sample, for truncation
 
-  Eigen::VectorXd value_mg;     // 3, 6 or 8: mean XYZ, in phase XYZ, second, third
-  Eigen::MatrixXd white_mg2;    // covariance of the noise
+  Eigen::VectorXd value_mg;   // 3, 6 or 8: mean XYZ, in phase XYZ, second, third
+  Eigen::MatrixXd white_mg2;  // covariance of the noise
   Eigen::Index size() const { return value_mg.size(); }
 };
 

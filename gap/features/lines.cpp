@@ -6,7 +6,6 @@
 #include <cmath>
 #include <complex>
 #include <optional>
-
 #include <unsupported/Eigen/FFT>
 
 namespace sixpoint::gap {
@@ -15,8 +14,8 @@ namespace {
 using Complex = std::complex<double>;
 using Vector3c = Eigen::Vector3cd;
 
-constexpr double kLowest_hz = 1;        // below it slow noise rules
-constexpr double kFalseLines = 1e-4;    // chance of one false line in a whole recording
+constexpr double kLowest_hz = 1;            // below it slow noise rules
+constexpr double kFalseLines = 1e-4;        // chance of one false line in a whole recording
 constexpr std::size_t kLongest = 1U << 17;  // 22 minutes at 100 Hz
 
 // A stretch at rest in one pose, mean removed, masked samples zero, in mg.
@@ -136,7 +135,8 @@ VectorFit fit_vector(const std::vector<Sight>& sights, bool in_lab) {
       }
       fit.nats += std::abs(overlap) - 0.5 * square;
       fit.chi += power - 2 * std::abs(overlap) + square;
-      const Complex align = std::abs(overlap) > 0 ? std::conj(overlap) / std::abs(overlap) : Complex(1);
+      const Complex align =
+          std::abs(overlap) > 0 ? std::conj(overlap) / std::abs(overlap) : Complex(1);
       a += rw * r;
       b += rw.cast<Complex>() * (s.amplitude * align);
     }
@@ -145,8 +145,8 @@ VectorFit fit_vector(const std::vector<Sight>& sights, bool in_lab) {
   return fit;
 }
 
-std::vector<Sight> sights_at(const Bundle& bundle, const std::vector<Stretch>& all, const NoiseSpectrum& noise,
-                             double frequency_hz) {
+std::vector<Sight> sights_at(const Bundle& bundle, const std::vector<Stretch>& all,
+                             const NoiseSpectrum& noise, double frequency_hz) {
   std::vector<Sight> sights;
   const double w = 2 * M_PI * frequency_hz / bundle.rate_hz;
   for (const Stretch& stretch : all) {
@@ -167,23 +167,24 @@ struct Peak {
   double nats = 0;  // above the threshold
 };
 
-double padded_power(Eigen::FFT<double>& fft, const Stretch& stretch, std::size_t length, std::size_t axis,
-                    std::vector<Complex>& out) {
+double padded_power(Eigen::FFT<double>& fft, const Stretch& stretch, std::size_t length,
+                    std::size_t axis, std::vector<Complex>& out) {
   std::vector<double> x = stretch.x[axis];
   x.resize(length, 0);
   fft.fwd(out, x);
   return static_cast<double>(stretch.samples);
 }
 
-// Sum over `set` of the whitened power per frequency; each term is exponential of mean 1 where there
-// is no line, so that the sum of m terms has a gamma law.
+// Sum over `set` of the whitened power per frequency; each term is exponential of mean 1 where
+// there is no line, so that the sum of m terms has a gamma law.
 struct PowerSum {
   std::vector<double> sum;
   double step_hz = 0;
   double terms = 0;
 };
 
-PowerSum power_sum(const Bundle& bundle, const std::vector<const Stretch*>& set, const NoiseSpectrum& noise) {
+PowerSum power_sum(const Bundle& bundle, const std::vector<const Stretch*>& set,
+                   const NoiseSpectrum& noise) {
   PowerSum power;
   std::size_t length = 2;
   for (const Stretch* s : set) {
@@ -224,7 +225,8 @@ PowerSum power_sum(const Bundle& bundle, const std::vector<const Stretch*>& set,
 // log of the upper tail of a gamma law of shape m, scale 1 (Chernoff's bound, exact enough here).
 double log_tail(double x, double m) { return x <= m ? 0 : -(x - m - m * std::log(x / m)); }
 
-std::optional<Peak> best_peak(const PowerSum& power, const std::vector<double>& taken_hz, double guard_hz) {
+std::optional<Peak> best_peak(const PowerSum& power, const std::vector<double>& taken_hz,
+                              double guard_hz) {
   std::optional<Peak> best;
   const auto first = static_cast<std::size_t>(std::ceil(kLowest_hz / power.step_hz));
   const double log_bins = std::log(static_cast<double>(power.sum.size()));
@@ -253,9 +255,9 @@ LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const Noi
   if (all.empty()) {
     return search;
   }
-  const auto longest = std::max_element(all.begin(), all.end(), [](const Stretch& a, const Stretch& b) {
-    return a.samples < b.samples;
-  });
+  const auto longest =
+      std::max_element(all.begin(), all.end(),
+                       [](const Stretch& a, const Stretch& b) { return a.samples < b.samples; });
   std::vector<const Stretch*> dwells;
   for (const Stretch& s : all) {
     if (static_cast<double>(s.samples) <= 30 * bundle.rate_hz) {

@@ -17,10 +17,10 @@ namespace sixpoint::gap {
 
 struct SpectralLine {
   double frequency_hz = 0;
-  double gain_nats = 0;            // log likelihood over no line, the better hypothesis
-  double lab_over_sensor_nats = 0; // positive: fixed in the laboratory
+  double gain_nats = 0;             // log likelihood over no line, the better hypothesis
+  double lab_over_sensor_nats = 0;  // positive: fixed in the laboratory
   bool in_lab = true;
-  bool decidable = false;          // seen in at least three different directions of gravity or yaws
+  bool decidable = false;  // seen in at least three different directions of gravity or yaws
   Eigen::Vector3d vector_mg = Eigen::Vector3d::Zero();  // in the frame chosen
   double sd_mg = 0;
   // Chi-square per degree of freedom of the dwells about the chosen hypothesis, in sd: a line that

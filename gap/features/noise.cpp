@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-
 #include <unsupported/Eigen/FFT>
 
 namespace sixpoint::gap {
@@ -16,7 +15,8 @@ bool lies_still(const Segment& segment) { return segment.kind != Segment::Kind::
 
 // The settling of a pose change is over after three seconds.
 std::size_t quiet_start(const Segment& segment, double rate_hz) {
-  return segment.starts_placement ? std::min(segment.samples, static_cast<std::size_t>(3 * rate_hz)) : 0;
+  return segment.starts_placement ? std::min(segment.samples, static_cast<std::size_t>(3 * rate_hz))
+                                  : 0;
 }
 
 }  // namespace
@@ -25,11 +25,13 @@ double NoiseSpectrum::variance_at(std::size_t axis, double at_hz) const {
   if (frequency_hz.empty()) {
     return 0;
   }
-  const auto middle = static_cast<std::ptrdiff_t>(std::lround((at_hz - frequency_hz.front()) / step_hz));
+  const auto middle =
+      static_cast<std::ptrdiff_t>(std::lround((at_hz - frequency_hz.front()) / step_hz));
   const auto last = static_cast<std::ptrdiff_t>(frequency_hz.size()) - 1;
   std::vector<double> near;
   for (std::ptrdiff_t k = middle - 4; k <= middle + 4; ++k) {
-    near.push_back(variance_mg2[axis][static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))]);
+    near.push_back(
+        variance_mg2[axis][static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))]);
   }
   std::nth_element(near.begin(), near.begin() + 4, near.end());
   return near[4];
@@ -45,7 +47,8 @@ NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean) {
   std::vector<double> window(length);
   double power = 0;
   for (std::size_t i = 0; i < length; ++i) {
-    window[i] = 0.5 - 0.5 * std::cos(2 * M_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(length));
+    window[i] = 0.5 - 0.5 * std::cos(2 * M_PI * (static_cast<double>(i) + 0.5) /
+                                     static_cast<double>(length));
     power += window[i] * window[i];
   }
   std::vector<std::size_t> starts;
@@ -53,7 +56,8 @@ NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean) {
     if (!lies_still(segment)) {
       continue;
     }
-    for (std::size_t i = quiet_start(segment, bundle.rate_hz); i + length <= segment.samples; i += length) {
+    for (std::size_t i = quiet_start(segment, bundle.rate_hz); i + length <= segment.samples;
+         i += length) {
       const std::size_t first = segment.first_sample + i;
       const bool clean_block =
           std::none_of(clean.flags.begin() + static_cast<std::ptrdiff_t>(first),
@@ -64,7 +68,8 @@ NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean) {
       }
     }
   }
-  const std::size_t stride = std::max<std::size_t>(1, (starts.size() + kMaxBlocks - 1) / kMaxBlocks);
+  const std::size_t stride =
+      std::max<std::size_t>(1, (starts.size() + kMaxBlocks - 1) / kMaxBlocks);
   const std::size_t low = 3;
   const std::size_t high = length / 2;
   for (auto& v : spectrum.variance_mg2) {
@@ -158,7 +163,8 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
           sum2[axis] += static_cast<double>(x[axis]) * x[axis];
           odd_here[axis] += (x[axis] & 1) != 0 ? 1 : 0;
         }
-        if (i >= first + 7 && (clean.flags[at - 7] & kUnusable) == 0 && (clean.flags[at - 1] & kUnusable) == 0) {
+        if (i >= first + 7 && (clean.flags[at - 7] & kUnusable) == 0 &&
+            (clean.flags[at - 1] & kUnusable) == 0) {
           pairs += 1;
           repeats += x == clean.samples[at - 1] ? 1 : 0;
           repeats_far += x == clean.samples[at - 7] ? 1 : 0;

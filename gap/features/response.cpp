@@ -73,7 +73,8 @@ class Search {
       const double sd = std::max(tone.residual_mg, noise.white_mg[axis]) *
                         std::sqrt(2 / static_cast<double>(tone.samples)) / seen;
       // A third-order term bends 1 g tones by up to 0.3 mg of 1 g.
-      ratios_.push_back({axis, segment.vibration->frequency_hz, std::log(seen / given), std::hypot(sd, 1e-4)});
+      ratios_.push_back(
+          {axis, segment.vibration->frequency_hz, std::log(seen / given), std::hypot(sd, 1e-4)});
     }
   }
 
@@ -102,15 +103,15 @@ class Search {
       for (int k = -6; k <= 6 && centre > 0; ++k) {
         const double corner = centre * (1 + k * (round == 0 ? 0.004 : 0.0006));
         if (corner < 0.495 * rate_hz_) {
-          try_low_pass(corner, response.low_pass.order, flat_fit.nats, flat_chi, best, response, white);
+          try_low_pass(corner, response.low_pass.order, flat_fit.nats, flat_chi, best, response,
+                       white);
         }
       }
     }
     // Corner and order are two numbers found on a grid of a few hundred.
     const double joint = response.low_pass.noise_nats + response.low_pass.tone_nats;
     const bool noise_agrees = response.low_pass.noise_nats > 5;
-    response.low_pass_significant =
-        options_.allow_low_pass && joint > 14 && noise_agrees;
+    response.low_pass_significant = options_.allow_low_pass && joint > 14 && noise_agrees;
     double base_chi = flat_chi;
     if (response.low_pass_significant) {
       for (std::size_t i = 0; i < ratios_.size(); ++i) {
@@ -121,10 +122,14 @@ class Search {
       const auto fit = noise_nats(response.low_pass.corner_hz, response.low_pass.order, own);
       response.noise_left_sd = fit.left_sd;
       response.white_mg = own;
-      const double up = noise_nats(response.low_pass.corner_hz * 1.01, response.low_pass.order, own).nats;
-      const double down = noise_nats(response.low_pass.corner_hz * 0.99, response.low_pass.order, own).nats;
-      const double curvature = (2 * fit.nats - up - down) / std::pow(0.01 * response.low_pass.corner_hz, 2);
-      response.low_pass.corner_sd_hz = curvature > 0 ? 1 / std::sqrt(curvature) : response.low_pass.corner_hz;
+      const double up =
+          noise_nats(response.low_pass.corner_hz * 1.01, response.low_pass.order, own).nats;
+      const double down =
+          noise_nats(response.low_pass.corner_hz * 0.99, response.low_pass.order, own).nats;
+      const double curvature =
+          (2 * fit.nats - up - down) / std::pow(0.01 * response.low_pass.corner_hz, 2);
+      response.low_pass.corner_sd_hz =
+          curvature > 0 ? 1 / std::sqrt(curvature) : response.low_pass.corner_hz;
     }
     double chi = base_chi;
     for (const bool base_excited : {true, false}) {
@@ -139,7 +144,8 @@ class Search {
       const double fine = round == 0 ? 0.005 : 0.001;
       for (int i = -4; i <= 4 && centre.frequency_hz > 0; ++i) {
         for (int k = -4; k <= 4; ++k) {
-          try_resonance({centre.frequency_hz * (1 + i * fine), centre.q * (1 + 4 * k * fine), centre.base_excited, 0},
+          try_resonance({centre.frequency_hz * (1 + i * fine), centre.q * (1 + 4 * k * fine),
+                         centre.base_excited, 0},
                         low_pass_log, base_chi, chi, response);
         }
       }
@@ -148,7 +154,8 @@ class Search {
     const double left = response.resonance_significant ? chi : base_chi;
     const double left_freedom = freedom - (response.low_pass_significant ? 1 : 0) -
                                 (response.resonance_significant ? 2 : 0);
-    response.tone_left_sd = left_freedom > 0 ? (left - left_freedom) / std::sqrt(2 * left_freedom) : 0;
+    response.tone_left_sd =
+        left_freedom > 0 ? (left - left_freedom) / std::sqrt(2 * left_freedom) : 0;
     return response;
   }
 
@@ -201,7 +208,8 @@ class Search {
     return order == 0 ? 1 : std::pow(low_pass_gain(f, corner_hz, order, rate_hz_), 2);
   }
   double log_low_pass(std::size_t i, double corner_hz, int order) const {
-    return std::log(std::max(1e-6, low_pass_gain(ratios_[i].frequency_hz, corner_hz, order, rate_hz_)));
+    return std::log(
+        std::max(1e-6, low_pass_gain(ratios_[i].frequency_hz, corner_hz, order, rate_hz_)));
   }
   double tone_freedom() const {
     std::array<bool, 3> seen{};
@@ -226,8 +234,8 @@ class Search {
     }
   }
 
-  void try_resonance(Resonance resonance, const std::vector<double>& low_pass_log, double base_chi, double& chi,
-                     Response& response) const {
+  void try_resonance(Resonance resonance, const std::vector<double>& low_pass_log, double base_chi,
+                     double& chi, Response& response) const {
     if (ratios_.empty()) {
       return;
     }
@@ -266,8 +274,8 @@ double resonance_gain(double frequency_hz, const Resonance& resonance) {
   return std::abs((resonance.base_excited ? 1.0 + damping : std::complex<double>(1)) / below);
 }
 
-Response find_response(const Bundle& bundle, const NoiseSpectrum& noise, const std::vector<ToneFit>& tones,
-                       const ResponseOptions& options) {
+Response find_response(const Bundle& bundle, const NoiseSpectrum& noise,
+                       const std::vector<ToneFit>& tones, const ResponseOptions& options) {
   return Search(bundle, noise, tones, options).run();
 }
 

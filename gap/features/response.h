@@ -1,8 +1,8 @@
 // Amplitude response over frequency: the shape of the noise's spectrum and of the tones.
 //
 // A lower anti-alias corner acts on signal and noise alike; a soft mount acts on the shaker's tones
-// only. Both are fitted on grids: Butterworth low-passes of order 1 to 8 as a sampled filter, and two
-// forms of a resonance (base excitation of a damped mount, and a plain second-order section).
+// only. Both are fitted on grids: Butterworth low-passes of order 1 to 8 as a sampled filter, and
+// two forms of a resonance (base excitation of a damped mount, and a plain second-order section).
 #pragma once
 
 #include <array>
@@ -30,8 +30,8 @@ struct Resonance {
 };
 
 struct Response {
-  LowPass low_pass;        // the best of its kind, whether wanted or not
-  Resonance resonance;     // best on top of the low-pass where that is significant
+  LowPass low_pass;     // the best of its kind, whether wanted or not
+  Resonance resonance;  // best on top of the low-pass where that is significant
   bool has_tones = false;
   // Per order: ratio of noise at the highest quarter of the band to the lowest, all axes.
   double noise_flat_sd = 0;  // chi-square of flat noise, in sd
@@ -53,7 +53,7 @@ struct ResponseOptions {
   std::vector<double> lines_hz;  // spectral lines: bins beside them are left out
 };
 
-Response find_response(const Bundle& bundle, const NoiseSpectrum& noise, const std::vector<ToneFit>& tones,
-                       const ResponseOptions& options);
+Response find_response(const Bundle& bundle, const NoiseSpectrum& noise,
+                       const std::vector<ToneFit>& tones, const ResponseOptions& options);
 
 }  // namespace sixpoint::gap

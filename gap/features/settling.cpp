@@ -2,11 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <cmath>
 
 namespace sixpoint::gap {
 
-StepResponse step_response(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise) {
+StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
+                           const NoiseSpectrum& noise) {
   StepResponse response;
   const auto length = static_cast<std::size_t>(3 * bundle.rate_hz);
   response.share.assign(length, 0);
@@ -24,10 +26,12 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean, cons
         continue;
       }
       const auto value = [&](std::size_t i) {
-        return 1000.0 * clean.samples[segment.first_sample + i][axis] / bundle.accel_scale_lsb_per_g;
+        return 1000.0 * clean.samples[segment.first_sample + i][axis] /
+               bundle.accel_scale_lsb_per_g;
       };
       const auto good = [&](std::size_t i) {
-        return (clean.flags[segment.first_sample + i] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0;
+        return (clean.flags[segment.first_sample + i] &
+                (kSampleZero | kSampleHeld | kSampleClipped)) == 0;
       };
       double rest = 0;
       double n = 0;
@@ -76,7 +80,8 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean, cons
       if (e < 1e-3) {
         break;
       }
-      const Eigen::Vector2d row(e * std::cos(2 * M_PI * f * at_s(i)), -e * std::sin(2 * M_PI * f * at_s(i)));
+      const Eigen::Vector2d row(e * std::cos(2 * M_PI * f * at_s(i)),
+                                -e * std::sin(2 * M_PI * f * at_s(i)));
       a += weight[i] * row * row.transpose();
       b += weight[i] * row * response.share[i];
     }
@@ -122,10 +127,10 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean, cons
     double n = 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(bundle.rate_hz); ++i) {
       if (weight[i] > 0) {
-        const double model = ringing ? std::exp(-at_s(i) / response.decay_s) *
-                                           response.amplitude *
-                                           std::cos(2 * M_PI * response.frequency_hz * at_s(i) + response.phase_rad)
-                                     : 0;
+        const double model =
+            ringing ? std::exp(-at_s(i) / response.decay_s) * response.amplitude *
+                          std::cos(2 * M_PI * response.frequency_hz * at_s(i) + response.phase_rad)
+                    : 0;
         chi += weight[i] * std::pow(response.share[i] - model, 2);
         n += 1;
       }

@@ -24,7 +24,8 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
   std::vector<Coefficient> coefficients;
   const auto second = static_cast<std::size_t>(bundle.rate_hz);
   for (const Segment& segment : bundle.segments) {
-    if (segment.kind == Segment::Kind::vibration || segment.kind == Segment::Kind::ramp || second < 10) {
+    if (segment.kind == Segment::Kind::vibration || segment.kind == Segment::Kind::ramp ||
+        second < 10) {
       continue;
     }
     const std::size_t skip = segment.starts_placement ? second : 0;

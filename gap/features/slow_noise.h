@@ -1,9 +1,10 @@
 // Noise slower than a second: 1/f and 1/f^2, from records that lie still at one temperature.
 //
-// Means over one second are turned by a cosine transform (DCT-II), which is the Karhunen-Loeve basis
-// of a random walk less its mean: coefficient k has the variance q^2 / (4 sin^2(k pi / 2K)), white
-// noise the same in all, and 1/f noise about F K / k. Coefficients are independent enough to multiply
-// their likelihoods. Long records lose a parabola first, so that drift is not taken for noise.
+// Means over one second are turned by a cosine transform (DCT-II), which is the Karhunen-Loeve
+// basis of a random walk less its mean: coefficient k has the variance q^2 / (4 sin^2(k pi / 2K)),
+// white noise the same in all, and 1/f noise about F K / k. Coefficients are independent enough to
+// multiply their likelihoods. Long records lose a parabola first, so that drift is not taken for
+// noise.
 #pragma once
 
 #include <vector>
@@ -17,8 +18,8 @@ namespace sixpoint::gap {
 struct SlowNoise {
   std::size_t coefficients = 0;
   // Log likelihood over white noise alone on the grid walk x flicker.
-  std::vector<double> walk_mg;     // mg per sqrt(s); first is 0
-  std::vector<double> flicker_mg;  // first is 0
+  std::vector<double> walk_mg;            // mg per sqrt(s); first is 0
+  std::vector<double> flicker_mg;         // first is 0
   std::vector<std::vector<double>> nats;  // [walk][flicker]
   // Power in the slow coefficients over that of the fast, in sd, at the best grid point: what is
   // left for something that neither explains.

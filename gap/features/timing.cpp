@@ -22,8 +22,10 @@ std::vector<std::vector<Stamp>> stamps_by_segment(const Bundle& bundle) {
       ++at;
     }
     for (; at < index.size() && index[at] < segment.first_sample + segment.samples; ++at) {
-      const double nominal_s = static_cast<double>(index[at] - segment.first_sample) / bundle.rate_hz;
-      stamps.push_back({nominal_s, bundle.host_clock.host_time_s[at] - segment.host_start_s - nominal_s});
+      const double nominal_s =
+          static_cast<double>(index[at] - segment.first_sample) / bundle.rate_hz;
+      stamps.push_back(
+          {nominal_s, bundle.host_clock.host_time_s[at] - segment.host_start_s - nominal_s});
     }
     if (stamps.size() >= 3) {
       all.push_back(std::move(stamps));
@@ -53,7 +55,8 @@ HostTiming host_timing(const Bundle& bundle) {
       for (std::size_t i = 0; i + 1 < stamps.size(); ++i) {
         const double dt = stamps[i + 1].nominal_s - stamps[i].nominal_s;
         if (dt > 0.5 && dt < 1.5) {
-          sum += std::polar(1.0, 2 * M_PI * (stamps[i + 1].residual_s - stamps[i].residual_s) / interval_s);
+          sum += std::polar(
+              1.0, 2 * M_PI * (stamps[i + 1].residual_s - stamps[i].residual_s) / interval_s);
         }
       }
     }
@@ -105,8 +108,8 @@ HostTiming host_timing(const Bundle& bundle) {
     }
     count += stamps.size();
     timing.packets += stamps.size() - 1;
-    timing.samples +=
-        static_cast<std::size_t>((stamps.back().nominal_s - stamps.front().nominal_s) * bundle.rate_hz);
+    timing.samples += static_cast<std::size_t>(
+        (stamps.back().nominal_s - stamps.front().nominal_s) * bundle.rate_hz);
   }
   const double fitted = sxx > 0 ? sxy / sxx : 0;
   double squares = 0;
@@ -127,7 +130,8 @@ HostTiming host_timing(const Bundle& bundle) {
   timing.scatter_ms = 1e3 * std::sqrt(squares / std::max(1.0, freedom));
   timing.clock_sd_ppm =
       sxx > 0 ? 1e6 * std::max(uniform_sd, timing.scatter_ms / 1e3) / std::sqrt(sxx) : 1e6;
-  // The variance of a uniform law's square is 0.8 of its own squared; the rms' is a quarter of that.
+  // The variance of a uniform law's square is 0.8 of its own squared; the rms' is a quarter of
+  // that.
   timing.scatter_sd_ms = 1e3 * uniform_sd * std::sqrt(0.8 / std::max(1.0, freedom)) / 2;
   return timing;
 }

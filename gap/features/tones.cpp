@@ -43,7 +43,8 @@ PieceFit fit_piece(const Sums& d) {
   return fit;
 }
 
-std::vector<Sums> prefix_sums(const std::vector<double>& y, const std::vector<std::uint8_t>& good, double w) {
+std::vector<Sums> prefix_sums(const std::vector<double>& y, const std::vector<std::uint8_t>& good,
+                              double w) {
   std::vector<Sums> sums(y.size() + 1);
   for (std::size_t i = 0; i < y.size(); ++i) {
     sums[i + 1] = sums[i];
@@ -71,7 +72,8 @@ double circle(double angle) { return std::remainder(angle, 2 * M_PI); }
 
 class ToneAnalysis {
  public:
-  ToneAnalysis(const Bundle& bundle, const CleanSamples& clean, std::size_t index, const ToneOptions& options)
+  ToneAnalysis(const Bundle& bundle, const CleanSamples& clean, std::size_t index,
+               const ToneOptions& options)
       : bundle_(bundle), clean_(clean), segment_(bundle.segments[index]), options_(options) {
     fit_.segment = index;
     const Eigen::Vector3d along = segment_.rotation * segment_.vibration->direction_lab;
@@ -93,7 +95,8 @@ class ToneAnalysis {
     if (fit_.samples < 100) {
       return fit_;
     }
-    w_ = 2 * M_PI * segment_.vibration->frequency_hz / bundle_.rate_hz / (1 + 1e-6 * options_.clock_ppm);
+    w_ = 2 * M_PI * segment_.vibration->frequency_hz / bundle_.rate_hz /
+         (1 + 1e-6 * options_.clock_ppm);
     if (std::sin(w_) == 0 || w_ >= M_PI) {
       return fit_;  // beyond half the sample rate nothing of this holds
     }
@@ -150,7 +153,7 @@ class ToneAnalysis {
   // The clock's error relative to the protocol that makes one unbroken tone fit best.
   double best_even_drift() {
     const auto n = static_cast<double>(y_.size());
-    const double reach = 0.006;                // beyond any clock of the catalogue
+    const double reach = 0.006;                      // beyond any clock of the catalogue
     const double step = 0.25 * 2 * M_PI / (n * w_);  // a quarter turn over the segment
     const auto half = static_cast<int>(std::ceil(reach / step));
     double best = 0;
@@ -179,8 +182,8 @@ class ToneAnalysis {
     return total;
   }
 
-  void split(const std::vector<Sums>& sums, std::size_t first, std::size_t last, std::vector<std::size_t>& cuts,
-             int depth) const {
+  void split(const std::vector<Sums>& sums, std::size_t first, std::size_t last,
+             std::vector<std::size_t>& cuts, int depth) const {
     if (last - first < 2 * kShortestPiece || depth > 12) {
       return;
     }
@@ -202,7 +205,8 @@ class ToneAnalysis {
     const double variance = std::max(noise2_, best / static_cast<double>(last - first));
     if (whole - best < 60 * variance) {
       // Two slips that undo each other within a period hide from a single cut: look at the halves.
-      if (whole > 3 * noise2_ * static_cast<double>(last - first) && last - first > 8 * kShortestPiece) {
+      if (whole > 3 * noise2_ * static_cast<double>(last - first) &&
+          last - first > 8 * kShortestPiece) {
         const std::size_t middle = (first + last) / 2;
         cuts.push_back(middle);
         split(sums, first, middle, cuts, depth + 1);
@@ -264,8 +268,8 @@ class ToneAnalysis {
         b_cross.col(static_cast<Eigen::Index>(k)) += cross * value_mg(i, k);
       }
     }
-    // Second and third harmonic fold onto one frequency at a fifth of the rate: a weak prior (50 mg)
-    // keeps an unlucky phase from making them infinite.
+    // Second and third harmonic fold onto one frequency at a fifth of the rate: a weak prior (50
+    // mg) keeps an unlucky phase from making them infinite.
     a(2, 2) += noise2_ / 2500;
     a(3, 3) += noise2_ / 2500;
     const Eigen::Matrix<double, 5, 5> inverse = a.inverse();
@@ -292,8 +296,8 @@ class ToneAnalysis {
         continue;
       }
       const double p = angle(i) + phase0;
-      const double r = y_[i] - (x[0] + x[1] * std::cos(p) + x[2] * std::cos(2 * p) + x[3] * std::cos(3 * p) +
-                                x[4] * std::sin(p));
+      const double r = y_[i] - (x[0] + x[1] * std::cos(p) + x[2] * std::cos(2 * p) +
+                                x[3] * std::cos(3 * p) + x[4] * std::sin(p));
       const double s2 = std::sin(p) * std::sin(p);
       squares += r * r;
       slope += r * r * s2;
@@ -354,7 +358,8 @@ class ToneAnalysis {
 
 }  // namespace
 
-std::vector<ToneFit> fit_tones(const Bundle& bundle, const CleanSamples& clean, const ToneOptions& options) {
+std::vector<ToneFit> fit_tones(const Bundle& bundle, const CleanSamples& clean,
+                               const ToneOptions& options) {
   std::vector<ToneFit> fits;
   for (std::size_t i = 0; i < bundle.segments.size(); ++i) {
     if (bundle.segments[i].vibration) {
