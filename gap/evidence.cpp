@@ -24,7 +24,7 @@ std::vector<double> sizes_of(Scatter scatter) {
     case Scatter::random_walk:
       return {0.03, 0.065, 0.12, 0.2, 0.3, 0.5};
     case Scatter::flicker:
-      return {0.12, 0.23, 0.4, 0.65, 1, 1.8};
+      return {0.035, 0.09, 0.18, 0.35, 0.7, 1.4};
     case Scatter::by_pose:
       return {0.4, 1.2, 4, 12, 40, 200};
     case Scatter::by_placement:
@@ -73,6 +73,9 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
       return 0;
   }
 }
+
+// Prior sd of a group's number.
+double sd_of(const ParameterGroup& group, int i) { return i >= 3 && group.curve_sd > 0 ? group.curve_sd : group.prior_sd; }
 
 double log_sum(double a, double b) {
   const double high = std::max(a, b);
@@ -184,7 +187,7 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
           here = 0;
         }
         const Eigen::VectorXd from = shaped_alike ? base : predict(moved, block, options_.lsb_mg);
-        const double step = group.effect == "truncation" ? 1.0 : 0.02 * group.prior_sd;
+        const double step = group.effect == "truncation" ? 1.0 : 0.02 * sd_of(group, i);
         parameter(moved, group.first + i) =
             here + (group.effect == "truncation" && here > 0.5 ? -step : step);
         const double sign = group.effect == "truncation" && here > 0.5 ? -1 : 1;
@@ -288,9 +291,10 @@ double EvidenceSearch::evidence_of(const Eigen::MatrixXd& a, const Eigen::Vector
   int n = 0;
   const auto add = [&](int g) {
     const auto& group = groups_[static_cast<std::size_t>(g)];
-    for (const int c : columns_of_[static_cast<std::size_t>(g)]) {
-      columns[static_cast<std::size_t>(n)] = c;
-      sd[static_cast<std::size_t>(n)] = group.prior_sd;
+    const auto& own = columns_of_[static_cast<std::size_t>(g)];
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      columns[static_cast<std::size_t>(n)] = own[k];
+      sd[static_cast<std::size_t>(n)] = sd_of(group, static_cast<int>(k));
       mean[static_cast<std::size_t>(n)] = group.prior_mean;
       ++n;
     }
@@ -348,7 +352,8 @@ double EvidenceSearch::evidence(const Whitened& w, const std::vector<int>& group
     for (int i = 0; i < group.count; ++i, ++at) {
       const double off = std::abs(own.mean[at] - group.prior_mean);
       const double sd = std::sqrt(own.covariance(at, at));
-      if (off - 3 * sd > (group.effect == "truncation" ? 1 : 4) * group.high) {
+      const double high = i >= 3 && group.curve_sd > 0 ? 10 * group.curve_sd : (group.effect == "truncation" ? 1 : 4) * group.high;
+      if (off - 3 * sd > high) {
         nats -= 1e6;
       }
     }
@@ -475,6 +480,38 @@ double EvidenceSearch::chi_sd(const Fit& fit) const {
   return n > 0 ? (fit.residual.squaredNorm() - n) / std::sqrt(2 * n) : 0;
 }
 
+// A time constant is no linear parameter: the chosen shape of warm_up moves to its likeliest value.
+void EvidenceSearch::polish_shapes(Fit& fit) {
+  for (const int g : fit.subset.groups) {
+    ParameterGroup& group = groups_[static_cast<std::size_t>(g)];
+    if (group.effect != "warm_up") {
+      continue;
+    }
+    double step = 1.25;
+    double best = -1e300;
+    for (int round = 0; round < 4; ++round) {
+      const double centre = group.tau_s;
+      double chosen = centre;
+      for (const double factor : {1 / step, 1.0, step}) {
+        group.tau_s = std::clamp(centre * factor, 20.0, 2000.0);
+        ForwardState at = fit.state;
+        at.warm_up_tau_s = group.tau_s;
+        const Whitened w = whiten(at, Scatter::nominal, 0);
+        const double nats = evidence(w, fit.subset.groups, nullptr);
+        if (nats > best) {
+          best = nats;
+          chosen = group.tau_s;
+        }
+      }
+      group.tau_s = chosen;
+      if (chosen == centre) {
+        step = std::sqrt(step);
+      }
+    }
+    fit.state.warm_up_tau_s = group.tau_s;
+  }
+}
+
 void EvidenceSearch::run() {
   ForwardState at = first_guess();
   // Nominal scatter first, relinearised about its own best explanation.
@@ -488,11 +525,13 @@ void EvidenceSearch::run() {
     const Fit next = make_fit(w, subset, at);
     const bool settled = round > 0 && next.subset.groups == fit.subset.groups;
     fit = next;
-    at = fit.state;
     if (settled && round >= 2) {
       break;
     }
+    polish_shapes(fit);
+    at = fit.state;
   }
+  at = fit.state;
   Subset nothing;
   nothing.nats = evidence(w, nothing.groups, nullptr);
   nominal_ = make_fit(w, nothing, at);
@@ -630,7 +669,7 @@ std::optional<EvidenceSearch::Estimate> EvidenceSearch::estimate(const std::stri
   const ParameterGroup& group = groups_[static_cast<std::size_t>(chosen)];
   for (std::size_t k = 0; k < posterior.columns.size(); ++k) {
     const int c = posterior.columns[k] - group_column_[static_cast<std::size_t>(chosen)];
-    if (c >= 0 && c < group.count) {
+    if (c >= 0 && c < std::min(3, group.count)) {
       const auto i = static_cast<Eigen::Index>(k);
       estimate.value.push_back(posterior.mean[i]);
       estimate.sd.push_back(std::sqrt(posterior.covariance(i, i)));
@@ -652,7 +691,7 @@ double EvidenceSearch::undetermined(const std::string& effect) const {
     Posterior posterior;
     evidence(final_, {g}, &posterior);
     double here = 0;
-    for (std::size_t k = 6; k < posterior.columns.size(); ++k) {
+    for (std::size_t k = 6; k < std::min<std::size_t>(9, posterior.columns.size()); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       here = std::max(here, std::sqrt(posterior.covariance(i, i)) / group.prior_sd);
     }
@@ -724,6 +763,7 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
   double tone_before = 0, tone_after = 0, mean_before = 0, mean_after = 0;
   int tones = 0;
   int n = 0;
+  int in_mg = 0;
   std::vector<int> within;
   int last_block = -1;
   int k = 0;
@@ -771,9 +811,12 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
           block.white_mg2(i, i) + std::pow(kNominalSeating_deg, 2) * lever.row(i).squaredNorm();
       const double r0 = residual(nothing);
       const double r1 = residual(accepted);
-      before += r0 * r0 * scale2;
-      after += r1 * r1 * scale2;
-      floor += scale2;
+      if (i < 6) {  // harmonics of folding tones are known too badly to count in mg
+        before += r0 * r0 * scale2;
+        after += r1 * r1 * scale2;
+        floor += scale2;
+        ++in_mg;
+      }
       before_w += r0 * r0;
       after_w += r1 * r1;
       const bool tone_row = i >= 3;
@@ -785,9 +828,9 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
   }
   const double dn = std::max(1, n);
   out.rows = n;
-  out.before_mg = std::sqrt(before / dn);
-  out.after_mg = std::sqrt(after / dn);
-  out.floor_mg = std::sqrt(floor / dn);
+  out.before_mg = std::sqrt(before / std::max(1, in_mg));
+  out.after_mg = std::sqrt(after / std::max(1, in_mg));
+  out.floor_mg = std::sqrt(floor / std::max(1, in_mg));
   out.before_sigma = std::sqrt(before_w / dn);
   out.after_sigma = std::sqrt(after_w / dn);
   const double dt = std::max(1, tones);

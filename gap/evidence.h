@@ -140,6 +140,7 @@ class EvidenceSearch {
   Fit make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const;
   double chi_sd(const Fit& fit) const;
   ForwardState first_guess() const;
+  void polish_shapes(Fit& fit);
 
   const std::vector<Block>& blocks_;
   EvidenceOptions options_;

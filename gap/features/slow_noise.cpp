@@ -17,7 +17,7 @@ struct Coefficient {
 
 }  // namespace
 
-double flicker_density_mg2(double flicker_mg) { return flicker_mg * flicker_mg / (2 * M_PI); }
+double flicker_density_mg2(double flicker_mg) { return flicker_mg * flicker_mg; }
 
 SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise) {
   SlowNoise slow;
@@ -82,7 +82,7 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
   }
   slow.coefficients = coefficients.size();
   slow.walk_mg = {0, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16, 0.2, 0.25, 0.3, 0.38, 0.5, 0.8};
-  slow.flicker_mg = {0, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.5, 0.65, 0.8, 1, 1.3, 1.8, 2.5};
+  slow.flicker_mg = {0, 0.02, 0.035, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5, 0.7, 1, 1.4, 2.2};
   slow.nats.assign(slow.walk_mg.size(), std::vector<double>(slow.flicker_mg.size(), 0));
   double base = 0;
   for (const Coefficient& c : coefficients) {

@@ -35,8 +35,7 @@ struct SlowNoise {
   Best best_both() const;
 };
 
-// Variance per Hz at 1 Hz for flicker noise of `flicker_mg`: power spectral density B^2 / (2 pi f),
-// one-sided (IEEE Std 952, bias instability coefficient B).
+// Power density at 1 Hz, one-sided, mg^2/Hz: `flicker_mg` is its square root, as in sim/effects.
 double flicker_density_mg2(double flicker_mg);
 
 SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise);
