@@ -270,7 +270,7 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
             histogram[static_cast<std::size_t>(std::clamp(edge + k * step, -2048, 2047) + 2048)];
       }
       // Turned axes change the sign of the limits.
-      const bool full_scale = std::abs(edge) >= kFullScaleHigh;
+      const bool full_scale = std::abs(edge) >= kFullScaleHigh - 3;  // a stuck bit ends it early
       if (full_scale) {
         clean.full_scale_samples += at_edge;
         continue;

@@ -88,7 +88,19 @@ class Diagnoser {
     judge_response();
     judge_settling();
     slow_ = slow_noise(bundle_, clean_, noise_);
-    blocks_ = make_blocks(bundle_, clean_, noise_, tones_, response_);
+    // Where the tones' amplitudes follow no response that is known, they would bend everything else.
+    if (response_.tone_left_sd > 20) {
+      for (ToneFit& tone : tones_) {
+        tone.usable = tone.usable && tone.clipped_share == 0;
+      }
+      auto aside = tones_;
+      for (ToneFit& tone : aside) {
+        tone.usable = false;
+      }
+      blocks_ = make_blocks(bundle_, clean_, noise_, aside, response_);
+    } else {
+      blocks_ = make_blocks(bundle_, clean_, noise_, tones_, response_);
+    }
     std::set<int> poses;
     for (const Block& block : blocks_) {
       const Eigen::Vector3d up = block.rotation.col(2);
@@ -524,6 +536,10 @@ class Diagnoser {
   void judge_lines() {
     lines_ = find_lines(bundle_, clean_, noise_);
     std::map<std::string, EffectFinding> by_name;
+    // Noise that comes and goes makes lines of its own in the dwells where it is loud.
+    if (codes_.spread_sd > 10) {
+      std::erase_if(lines_.lines, [](const SpectralLine& line) { return line.gain_nats < 60 && line.misfit_sd > 3; });
+    }
     for (const SpectralLine& line : lines_.lines) {
       const std::string name = line.in_lab ? "floor_vibration" : "electrical_line";
       const std::string other = line.in_lab ? "electrical_line" : "floor_vibration";
@@ -676,6 +692,10 @@ class Diagnoser {
       if (scatter == Scatter::random_walk) {
         return along(slow_.walk_mg, [&](std::size_t i) { return slow_.nats[i][0]; });
       }
+      if (scatter == Scatter::by_time || scatter == Scatter::by_time_fast) {
+        // Unknown in time: any spectrum that the records show.
+        return std::max({0.0, slow_.best_both().nats - 4, slow_.free_nats});
+      }
       if (scatter == Scatter::flicker) {
         return along(slow_.flicker_mg, [&](std::size_t i) { return slow_.nats[0][i]; });
       }
@@ -683,7 +703,7 @@ class Diagnoser {
     };
     search_.emplace(blocks_, options);
     search_->run();
-    const Fit& fit = search_->best_known();
+    const Fit& fit = search_->best();
 
     // What stays is judged against the best explanation; every linear effect becomes a candidate.
     std::set<std::string> names;
@@ -772,7 +792,7 @@ class Diagnoser {
   }
 
   void judge_nuisances() {
-    const ForwardState& s = search_->best_known().state;
+    const ForwardState& s = search_->best().state;
     double chi = 0;
     double nominal = 0;
     for (Eigen::Index a = 0; a < 3; ++a) {
@@ -838,7 +858,7 @@ class Diagnoser {
 
   // ---------------------------------------------------------------- what is left
   void judge_left_over() {
-    const Fit& fit = search_->best_known();
+    const Fit& fit = search_->best();
     const double n = static_cast<double>(fit.residual.size());
     const double p = static_cast<double>(fit.posterior.columns.size());
     test(chi_to_sd(fit.residual.squaredNorm(), n - p), "mean: dwells and tones together");
@@ -854,13 +874,10 @@ class Diagnoser {
     for (const auto& [name, group] : groups) {
       test(chi_to_sd(group[0], group[1]), fmt::format("mean: segment {}", name));
     }
-    if (const auto& other = search_->best_unknown()) {
-      const double gain = other->nats - fit.nats;
-      if (gain > 3) {
-        alarm(std::sqrt(2 * gain) + 3,
-              fmt::format("mean: scatter by {}", to_string(other->scatter)));
-      }
-      unknown_gain_ = gain;
+    if (search_->unknown_wins()) {
+      const double gain = search_->best_unknown()->nats - search_->best_known().nats;
+      alarm(std::sqrt(2 * gain) + 3,
+            fmt::format("mean: scatter by {}", to_string(search_->best_unknown()->scatter)));
     }
     // Slow noise that the catalogue was not asked for, or does not hold.
     const bool slow_accepted =
@@ -906,7 +923,7 @@ class Diagnoser {
         }
         const double expected = 1000 * h * s.vibration->amplitude_g *
                                 std::abs((s.rotation * s.vibration->direction_lab)[tone.axis]) *
-                                search_->best_known().state.gain[tone.axis];
+                                search_->best().state.gain[tone.axis];
         const double off = std::abs(tone.in_phase_mg[tone.axis] / expected - 1);
         test(
             off > 0.03 ? 20 * off / 0.03 : 0,
@@ -919,7 +936,7 @@ class Diagnoser {
     for (std::size_t a = 0; a < 3; ++a) {
       const double ratio = response_.white_mg[a] / kNominalNoise_mg[a];
       // Noise may be born before or behind the gain.
-      const double gain = search_->best_known().state.gain[static_cast<Eigen::Index>(a)];
+      const double gain = search_->best().state.gain[static_cast<Eigen::Index>(a)];
       const double low = (1 - kNoiseReach) * std::min(1.0, gain);
       const double high = (1 + kNoiseReach) * std::max(1.0, gain);
       if (ratio < low || ratio > high) {
@@ -1121,7 +1138,7 @@ class Diagnoser {
     std::map<std::pair<int, std::string>, Cell> cells;
     std::vector<Plots::Residual> plots;
     const Fit& nominal = search_->nominal();
-    const Fit& best = search_->best_known();
+    const Fit& best = search_->best();
     int last_block = -1;
     int k = 0;
     for (Eigen::Index row = 0; row < nominal.residual.size(); ++row) {
@@ -1282,7 +1299,6 @@ class Diagnoser {
   double jitter_s_ = 0;
   double clock_nats_ = 0;
   double nuisance_sd_ = 0;
-  double unknown_gain_ = 0;
   bool mismatch_ = false;
   bool few_poses_ = false;
 };

@@ -29,8 +29,10 @@ std::vector<double> sizes_of(Scatter scatter) {
       return {0.4, 1.2, 4, 12, 40, 200};
     case Scatter::by_placement:
       return {0.4, 1.2, 4, 12, 40};
+    case Scatter::by_session:
     case Scatter::by_temperature:
     case Scatter::by_time:
+    case Scatter::by_time_fast:
       return {0.5, 2, 8, 30};
   }
   return {};
@@ -63,12 +65,19 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
     }
     case Scatter::by_pose:
       return same_pose(a, b) ? 1 : 0;
-    case Scatter::by_placement:
-      return a.placement == b.placement ? 1 : 0;
+    case Scatter::by_placement: {
+      // Rectified vibration grows with the square of its amplitude.
+      const auto weight = [](const Block& block) { return 1 + block.vibration_lab_g.squaredNorm() / 4; };
+      return a.placement == b.placement ? weight(a) * weight(b) : 0;
+    }
+    case Scatter::by_session:
+      return a.session == b.session ? 1 : 0;
     case Scatter::by_temperature:
       return std::exp(-0.5 * std::pow((a.temperature_c - b.temperature_c) / 10, 2));
     case Scatter::by_time:
       return std::exp(-0.5 * std::pow(gap_s / 700, 2));
+    case Scatter::by_time_fast:
+      return std::exp(-0.5 * std::pow(gap_s / 90, 2));
     default:
       return 0;
   }
@@ -100,8 +109,12 @@ std::string_view to_string(Scatter scatter) {
       return "placement";
     case Scatter::by_temperature:
       return "temperature";
+    case Scatter::by_session:
+      return "session";
     case Scatter::by_time:
       return "time";
+    case Scatter::by_time_fast:
+      return "time, within minutes";
   }
   return "";
 }
@@ -225,8 +238,12 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
       int rj = ri;
       for (std::size_t j = i; j < last; ++j) {
         const Block& bj = blocks_[j];
-        if (bi.placement == bj.placement) {
-          const Eigen::MatrixXd c = seat(bi, bj, seat_sd);
+        const bool one_pose = scatter == Scatter::by_pose && same_pose(bi, bj);
+        if (bi.placement == bj.placement || one_pose) {
+          // What a pose brings with it may be a turn, too: 1 mg is a turn of 0.057 deg.
+          const double turn_deg = one_pose ? size / 17.45 : 0;
+          const Eigen::MatrixXd c =
+              seat(bi, bj, bi.placement == bj.placement ? std::hypot(seat_sd, turn_deg) : turn_deg);
           v.block(ri, rj, bi.size(), bj.size()) += c;
           if (i != j) {
             v.block(rj, ri, bj.size(), bi.size()) += c.transpose();
@@ -240,6 +257,10 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
               v(rj + a, ri + a) += c;
             }
           }
+        }
+        if (i == j && scatter == Scatter::by_placement && bi.tone) {
+          const double sd = size * bi.vibration_lab_g.norm();
+          v.block(ri, ri, bi.size(), bi.size()).diagonal().tail(bi.size() - 3).array() += sd * sd;
         }
         rj += static_cast<int>(bj.size());
       }
@@ -555,9 +576,11 @@ void EvidenceSearch::run() {
     return;
   }
   const ForwardState nominal_at = at;
+  Whitened final_unknown;
   for (const Scatter scatter :
        {Scatter::seating, Scatter::random_walk, Scatter::flicker, Scatter::by_pose,
-        Scatter::by_placement, Scatter::by_temperature, Scatter::by_time}) {
+        Scatter::by_placement, Scatter::by_session, Scatter::by_temperature,
+        Scatter::by_time, Scatter::by_time_fast}) {
     if (in_catalogue(scatter) && options_.allowed &&
         !options_.allowed(std::string(to_string(scatter)))) {
       continue;
@@ -599,7 +622,11 @@ void EvidenceSearch::run() {
       }
     } else if (!best_unknown_ || target.nats > best_unknown_->nats) {
       best_unknown_ = target;
+      final_unknown = std::move(*best_w);
     }
+  }
+  if (unknown_wins()) {
+    final_ = std::move(final_unknown);
   }
 }
 
@@ -607,9 +634,6 @@ double EvidenceSearch::probability(const std::string& effect) const {
   double with = -1e300;
   double without = -1e300;
   for (const State& state : states_) {
-    if (!in_catalogue(state.scatter)) {
-      continue;
-    }
     const bool has =
         to_string(state.scatter) == effect ||
         std::any_of(state.subset.groups.begin(), state.subset.groups.end(),
@@ -624,9 +648,6 @@ double EvidenceSearch::gain_nats(const std::string& effect) const {
   double with = -1e300;
   double without = -1e300;
   for (const State& state : states_) {
-    if (!in_catalogue(state.scatter)) {
-      continue;
-    }
     const bool has =
         to_string(state.scatter) == effect ||
         std::any_of(state.subset.groups.begin(), state.subset.groups.end(),
@@ -638,7 +659,7 @@ double EvidenceSearch::gain_nats(const std::string& effect) const {
 }
 
 std::optional<EvidenceSearch::Estimate> EvidenceSearch::estimate(const std::string& effect) const {
-  std::vector<int> base = best_known_.subset.groups;
+  std::vector<int> base = best().subset.groups;
   int chosen = -1;
   for (const int g : base) {
     if (groups_[static_cast<std::size_t>(g)].effect == effect) {
@@ -702,7 +723,7 @@ double EvidenceSearch::undetermined(const std::string& effect) const {
 }
 
 double EvidenceSearch::held_out_nats(const std::string& effect) const {
-  std::vector<int> with = best_known_.subset.groups;
+  std::vector<int> with = best().subset.groups;
   std::vector<int> without;
   for (const int g : with) {
     if (groups_[static_cast<std::size_t>(g)].effect != effect) {
@@ -753,7 +774,7 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
   if (rows_ == 0) {
     return out;
   }
-  const Whitened w = whiten(best_known_.state, Scatter::nominal, 0);
+  const Whitened w = whiten(best().state, Scatter::nominal, 0);
   int folds = 0;
   for (const Block& block : blocks_) {
     folds = std::max(folds, block.condition + 1);
@@ -794,7 +815,7 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
     Posterior nothing;
     Posterior accepted;
     evidence_of(a, b, yy, {}, &nothing);
-    evidence_of(a, b, yy, best_known_.subset.groups, &accepted);
+    evidence_of(a, b, yy, best().subset.groups, &accepted);
     for (const int row : rows) {
       const auto residual = [&](const Posterior& p) {
         double r = w.y[row];

@@ -61,6 +61,7 @@ double parameter(const ForwardState& state, int position);
 struct Block {
   std::size_t segment = 0;
   int placement = 0;
+  int session = 0;    // run of segments of one name
   int condition = 0;  // for hold-out: what is left out together
   bool tone = false;
   int axis = 0;         // of tones

@@ -3,7 +3,9 @@
 #include <Eigen/Core>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 namespace sixpoint::gap {
 namespace {
@@ -13,6 +15,7 @@ struct Coefficient {
   double white;    // variance of white noise in it
   double walk;     // variance per (mg per sqrt(s))^2
   double flicker;  // variance per mg^2/Hz at 1 Hz
+  int octave;      // of its period in seconds
 };
 
 }  // namespace
@@ -76,7 +79,8 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         c *= std::sqrt(2.0 / static_cast<double>(n));
         const double s2 = std::pow(std::sin(w / 2), 2);
         coefficients.push_back({c * c, white, (1 - 2.0 / 3.0 * s2) / (4 * s2),
-                                static_cast<double>(n) / static_cast<double>(k)});
+                                static_cast<double>(n) / static_cast<double>(k),
+                                static_cast<int>(std::floor(std::log2(2.0 * static_cast<double>(n) / static_cast<double>(k))))});
       }
     }
   }
@@ -87,6 +91,16 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
   double base = 0;
   for (const Coefficient& c : coefficients) {
     base += -0.5 * (std::log(c.white) + c.square / c.white);
+  }
+  std::map<int, std::array<double, 2>> octaves;  // sum of square over white, count
+  for (const Coefficient& c : coefficients) {
+    auto& octave = octaves[c.octave];
+    octave[0] += c.square / c.white;
+    octave[1] += 1;
+  }
+  for (const auto& [octave, sum] : octaves) {
+    const double ratio = std::max(1.0, sum[0] / sum[1]);
+    slow.free_nats += 0.5 * (sum[0] - sum[0] / ratio - sum[1] * std::log(ratio)) - 2;
   }
   double best = -1e300;
   for (std::size_t i = 0; i < slow.walk_mg.size(); ++i) {

@@ -21,6 +21,8 @@ struct SlowNoise {
   std::vector<double> walk_mg;            // mg per sqrt(s); first is 0
   std::vector<double> flicker_mg;         // first is 0
   std::vector<std::vector<double>> nats;  // [walk][flicker]
+  // Of a spectrum free in every octave, over white noise alone, less two nats an octave.
+  double free_nats = 0;
   // Power in the slow coefficients over that of the fast, in sd, at the best grid point: what is
   // left for something that neither explains.
   double misfit_sd = 0;

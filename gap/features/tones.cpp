@@ -343,6 +343,7 @@ class ToneAnalysis {
       crest_weight += 1 - s2;
     }
     fit_.residual_mg = std::sqrt(squares / std::max(1.0, static_cast<double>(fit_.samples) - 5));
+    fit_.frequency_sd_ppm *= std::max(1.0, fit_.residual_mg / std::sqrt(noise2_));
     fit_.on_slope_mg2 = slope / std::max(1.0, slope_weight);
     fit_.on_crest_mg2 = crest / std::max(1.0, crest_weight);
     fit_.usable = fit_.in_phase_mg[fit_.axis] > 0 && std::isfinite(fit_.residual_mg);
