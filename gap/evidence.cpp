@@ -67,7 +67,9 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
       return same_pose(a, b) ? 1 : 0;
     case Scatter::by_placement: {
       // Rectified vibration grows with the square of its amplitude.
-      const auto weight = [](const Block& block) { return 1 + block.vibration_lab_g.squaredNorm() / 4; };
+      const auto weight = [](const Block& block) {
+        return 1 + block.vibration_lab_g.squaredNorm() / 4;
+      };
       return a.placement == b.placement ? weight(a) * weight(b) : 0;
     }
     case Scatter::by_session:
@@ -84,7 +86,9 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
 }
 
 // Prior sd of a group's number.
-double sd_of(const ParameterGroup& group, int i) { return i >= 3 && group.curve_sd > 0 ? group.curve_sd : group.prior_sd; }
+double sd_of(const ParameterGroup& group, int i) {
+  return i >= 3 && group.curve_sd > 0 ? group.curve_sd : group.prior_sd;
+}
 
 double log_sum(double a, double b) {
   const double high = std::max(a, b);
@@ -373,7 +377,9 @@ double EvidenceSearch::evidence(const Whitened& w, const std::vector<int>& group
     for (int i = 0; i < group.count; ++i, ++at) {
       const double off = std::abs(own.mean[at] - group.prior_mean);
       const double sd = std::sqrt(own.covariance(at, at));
-      const double high = i >= 3 && group.curve_sd > 0 ? 10 * group.curve_sd : (group.effect == "truncation" ? 1 : 4) * group.high;
+      const double high = i >= 3 && group.curve_sd > 0
+                              ? 10 * group.curve_sd
+                              : (group.effect == "truncation" ? 1 : 4) * group.high;
       if (off - 3 * sd > high) {
         nats -= 1e6;
       }
@@ -577,10 +583,9 @@ void EvidenceSearch::run() {
   }
   const ForwardState nominal_at = at;
   Whitened final_unknown;
-  for (const Scatter scatter :
-       {Scatter::seating, Scatter::random_walk, Scatter::flicker, Scatter::by_pose,
-        Scatter::by_placement, Scatter::by_session, Scatter::by_temperature,
-        Scatter::by_time, Scatter::by_time_fast}) {
+  for (const Scatter scatter : {Scatter::seating, Scatter::random_walk, Scatter::flicker,
+                                Scatter::by_pose, Scatter::by_placement, Scatter::by_session,
+                                Scatter::by_temperature, Scatter::by_time, Scatter::by_time_fast}) {
     if (in_catalogue(scatter) && options_.allowed &&
         !options_.allowed(std::string(to_string(scatter)))) {
       continue;

@@ -96,8 +96,8 @@ class EvidenceSearch {
   void run();
 
   const Fit& best_known() const { return best_known_; }  // scatter of the catalogue only
-  // The explanation that stands: of the catalogue, unless an unknown kind of scatter is twenty times
-  // as likely.
+  // The explanation that stands: of the catalogue, unless an unknown kind of scatter is twenty
+  // times as likely.
   const Fit& best() const { return unknown_wins() ? *best_unknown_ : best_known_; }
   bool unknown_wins() const { return best_unknown_ && best_unknown_->nats > best_known_.nats + 3; }
   const std::optional<Fit>& best_unknown() const { return best_unknown_; }

@@ -95,8 +95,8 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   const double half = block.seconds / (2 * s.warm_up_tau_s);
   const double decay =
       std::exp(-block.middle_s / s.warm_up_tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
-  Eigen::Vector3d slow_mg =
-      warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 + hours * s.drift_mg_per_h + decay * s.warm_up_mg;
+  Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
+                            hours * s.drift_mg_per_h + decay * s.warm_up_mg;
   for (Eigen::Index a = 0; a < 3; ++a) {
     slow_mg[a] += s.hysteresis_mg[a] * (s.hysteresis_by_sign ? sign_of_step(block.approach_g[a])
                                                              : 0.5 * block.approach_g[a]);

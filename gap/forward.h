@@ -45,7 +45,7 @@ struct ParameterGroup {
   int count = 0;
   double prior_sd = 1;  // of each, from the realistic sizes of the catalogue
   double prior_mean = 0;
-  double curve_sd = 0;       // of the fourth number on: what bends the effect's main law
+  double curve_sd = 0;  // of the fourth number on: what bends the effect's main law
   double high = 0;      // an estimate beyond four times this is another thing
   double tau_s = 0;     // warm_up's shape
   bool by_sign = true;  // hysteresis' shape

@@ -103,7 +103,8 @@ class Search {
       for (const double k : {-1.0, 1.0}) {
         const double corner = centre * (1 + k * step);
         if (corner < 0.495 * rate_hz_) {
-          try_low_pass(corner, response.low_pass.order, flat_fit.nats, flat_chi, best, response, white);
+          try_low_pass(corner, response.low_pass.order, flat_fit.nats, flat_chi, best, response,
+                       white);
         }
       }
     }
@@ -140,12 +141,14 @@ class Search {
     }
     double step_f = 0.01;
     double step_q = 0.04;
-    for (int round = 0; round < 400 && step_f > 1e-8 && response.resonance.frequency_hz > 0; ++round) {
+    for (int round = 0; round < 400 && step_f > 1e-8 && response.resonance.frequency_hz > 0;
+         ++round) {
       const Resonance centre = response.resonance;
       const double before = chi;
       for (int i = -1; i <= 1; ++i) {
         for (int k = -1; k <= 1; ++k) {
-          try_resonance({centre.frequency_hz * (1 + i * step_f), centre.q * (1 + k * step_q), centre.base_excited, 0},
+          try_resonance({centre.frequency_hz * (1 + i * step_f), centre.q * (1 + k * step_q),
+                         centre.base_excited, 0},
                         low_pass_log, base_chi, chi, response);
         }
       }
@@ -156,7 +159,8 @@ class Search {
     }
     response.tone_flat_chi = base_chi;
     response.tone_left_chi = chi;
-    response.resonance_significant = options_.allow_resonance && response.resonance.tone_nats > 14 &&
+    response.resonance_significant = options_.allow_resonance &&
+                                     response.resonance.tone_nats > 14 &&
                                      chi - freedom < 0.02 * base_chi;
     const double left = response.resonance_significant ? chi : base_chi;
     const double left_freedom = freedom - (response.low_pass_significant ? 1 : 0) -

@@ -7,7 +7,9 @@
 namespace sixpoint::gap {
 
 double StepResponse::Mode::at(double t_s) const {
-  return amplitude == 0 ? 0 : amplitude * std::exp(-t_s / decay_s) * std::cos(2 * M_PI * frequency_hz * t_s + phase_rad);
+  return amplitude == 0 ? 0
+                        : amplitude * std::exp(-t_s / decay_s) *
+                              std::cos(2 * M_PI * frequency_hz * t_s + phase_rad);
 }
 
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,

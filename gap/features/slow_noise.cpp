@@ -80,7 +80,8 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         const double s2 = std::pow(std::sin(w / 2), 2);
         coefficients.push_back({c * c, white, (1 - 2.0 / 3.0 * s2) / (4 * s2),
                                 static_cast<double>(n) / static_cast<double>(k),
-                                static_cast<int>(std::floor(std::log2(2.0 * static_cast<double>(n) / static_cast<double>(k))))});
+                                static_cast<int>(std::floor(std::log2(2.0 * static_cast<double>(n) /
+                                                                      static_cast<double>(k))))});
       }
     }
   }

@@ -84,7 +84,8 @@ class ToneAnalysis {
     for (std::size_t i = 0; i < segment_.samples; ++i) {
       const std::uint8_t flags = clean.flags[segment_.first_sample + i];
       // What a move or a filter leaves at the start is not of the tone.
-      const bool quiet = static_cast<double>(i) >= (segment_.starts_placement ? 2 : 0.3) * bundle.rate_hz;
+      const bool quiet =
+          static_cast<double>(i) >= (segment_.starts_placement ? 2 : 0.3) * bundle.rate_hz;
       good_[i] = quiet && (flags & (kSampleZero | kSampleHeld | kSampleClipped)) == 0 ? 1 : 0;
       fit_.samples += good_[i];
       y_[i] = value_mg(i, static_cast<std::size_t>(fit_.axis));
@@ -169,8 +170,9 @@ class ToneAnalysis {
       for (std::size_t p = 0; p + 1 < cuts.size(); ++p) {
         pieces_squares += fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]).squares;
       }
-      const double variance =
-          std::max(noise2_, pieces_squares / std::max(1.0, sums.back().n - 3 * static_cast<double>(cuts.size() - 1)));
+      const double variance = std::max(
+          noise2_,
+          pieces_squares / std::max(1.0, sums.back().n - 3 * static_cast<double>(cuts.size() - 1)));
       for (std::size_t p = 1; p + 1 < cuts.size(); ++p) {
         const double apart = fit_piece(sums[cuts[p]] - sums[cuts[p - 1]]).squares +
                              fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]).squares;
