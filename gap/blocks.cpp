@@ -25,11 +25,16 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
   const Eigen::Vector3d white2(std::pow(noise.white_mg[0], 2), std::pow(noise.white_mg[1], 2),
                                std::pow(noise.white_mg[2], 2));
   std::size_t tone_at = 0;
+  int session = 0;
   for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
     const Segment& segment = bundle.segments[s];
     Block block;
     block.segment = s;
     block.placement = segment.placement;
+    if (s > 0 && segment.name != bundle.segments[s - 1].name) {
+      ++session;
+    }
+    block.session = session;
     block.gravity_lab_g = bundle.gravity_g * Eigen::Vector3d::UnitZ();
     block.rotation = segment.rotation;
     block.approach_g = segment.approach_g;

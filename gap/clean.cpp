@@ -269,7 +269,8 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
         inside +=
             histogram[static_cast<std::size_t>(std::clamp(edge + k * step, -2048, 2047) + 2048)];
       }
-      const bool full_scale = edge == kFullScaleHigh || edge == kFullScaleLow;
+      // Turned axes change the sign of the limits.
+      const bool full_scale = std::abs(edge) >= kFullScaleHigh - 3;  // a stuck bit ends it early
       if (full_scale) {
         clean.full_scale_samples += at_edge;
         continue;
@@ -289,7 +290,7 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
       const int value = clean.samples[i][axis];
       const auto& plateau = clean.plateau_lsb[axis];
       const bool wrapped = (clean.flags[i] & kSampleWrapped) != 0;
-      const bool at_limit = !wrapped && (value <= kFullScaleLow || value == kFullScaleHigh);
+      const bool at_limit = !wrapped && std::abs(value) >= kFullScaleHigh;
       const bool on_plateau = clean.saturated && ((plateau[1] > 0 && value >= plateau[1] - 1) ||
                                                   (plateau[0] < 0 && value <= plateau[0] + 1));
       if (at_limit || on_plateau) {

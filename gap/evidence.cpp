@@ -24,13 +24,15 @@ std::vector<double> sizes_of(Scatter scatter) {
     case Scatter::random_walk:
       return {0.03, 0.065, 0.12, 0.2, 0.3, 0.5};
     case Scatter::flicker:
-      return {0.12, 0.23, 0.4, 0.65, 1, 1.8};
+      return {0.035, 0.09, 0.18, 0.35, 0.7, 1.4};
     case Scatter::by_pose:
       return {0.4, 1.2, 4, 12, 40, 200};
     case Scatter::by_placement:
       return {0.4, 1.2, 4, 12, 40};
+    case Scatter::by_session:
     case Scatter::by_temperature:
     case Scatter::by_time:
+    case Scatter::by_time_fast:
       return {0.5, 2, 8, 30};
   }
   return {};
@@ -63,15 +65,29 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
     }
     case Scatter::by_pose:
       return same_pose(a, b) ? 1 : 0;
-    case Scatter::by_placement:
-      return a.placement == b.placement ? 1 : 0;
+    case Scatter::by_placement: {
+      // Rectified vibration grows with the square of its amplitude.
+      const auto weight = [](const Block& block) {
+        return 1 + block.vibration_lab_g.squaredNorm() / 4;
+      };
+      return a.placement == b.placement ? weight(a) * weight(b) : 0;
+    }
+    case Scatter::by_session:
+      return a.session == b.session ? 1 : 0;
     case Scatter::by_temperature:
       return std::exp(-0.5 * std::pow((a.temperature_c - b.temperature_c) / 10, 2));
     case Scatter::by_time:
       return std::exp(-0.5 * std::pow(gap_s / 700, 2));
+    case Scatter::by_time_fast:
+      return std::exp(-0.5 * std::pow(gap_s / 90, 2));
     default:
       return 0;
   }
+}
+
+// Prior sd of a group's number.
+double sd_of(const ParameterGroup& group, int i) {
+  return i >= 3 && group.curve_sd > 0 ? group.curve_sd : group.prior_sd;
 }
 
 double log_sum(double a, double b) {
@@ -97,8 +113,12 @@ std::string_view to_string(Scatter scatter) {
       return "placement";
     case Scatter::by_temperature:
       return "temperature";
+    case Scatter::by_session:
+      return "session";
     case Scatter::by_time:
       return "time";
+    case Scatter::by_time_fast:
+      return "time, within minutes";
   }
   return "";
 }
@@ -184,7 +204,7 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
           here = 0;
         }
         const Eigen::VectorXd from = shaped_alike ? base : predict(moved, block, options_.lsb_mg);
-        const double step = group.effect == "truncation" ? 1.0 : 0.02 * group.prior_sd;
+        const double step = group.effect == "truncation" ? 1.0 : 0.02 * sd_of(group, i);
         parameter(moved, group.first + i) =
             here + (group.effect == "truncation" && here > 0.5 ? -step : step);
         const double sign = group.effect == "truncation" && here > 0.5 ? -1 : 1;
@@ -222,8 +242,12 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
       int rj = ri;
       for (std::size_t j = i; j < last; ++j) {
         const Block& bj = blocks_[j];
-        if (bi.placement == bj.placement) {
-          const Eigen::MatrixXd c = seat(bi, bj, seat_sd);
+        const bool one_pose = scatter == Scatter::by_pose && same_pose(bi, bj);
+        if (bi.placement == bj.placement || one_pose) {
+          // What a pose brings with it may be a turn, too: 1 mg is a turn of 0.057 deg.
+          const double turn_deg = one_pose ? size / 17.45 : 0;
+          const Eigen::MatrixXd c =
+              seat(bi, bj, bi.placement == bj.placement ? std::hypot(seat_sd, turn_deg) : turn_deg);
           v.block(ri, rj, bi.size(), bj.size()) += c;
           if (i != j) {
             v.block(rj, ri, bj.size(), bi.size()) += c.transpose();
@@ -237,6 +261,10 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
               v(rj + a, ri + a) += c;
             }
           }
+        }
+        if (i == j && scatter == Scatter::by_placement && bi.tone) {
+          const double sd = size * bi.vibration_lab_g.norm();
+          v.block(ri, ri, bi.size(), bi.size()).diagonal().tail(bi.size() - 3).array() += sd * sd;
         }
         rj += static_cast<int>(bj.size());
       }
@@ -288,9 +316,10 @@ double EvidenceSearch::evidence_of(const Eigen::MatrixXd& a, const Eigen::Vector
   int n = 0;
   const auto add = [&](int g) {
     const auto& group = groups_[static_cast<std::size_t>(g)];
-    for (const int c : columns_of_[static_cast<std::size_t>(g)]) {
-      columns[static_cast<std::size_t>(n)] = c;
-      sd[static_cast<std::size_t>(n)] = group.prior_sd;
+    const auto& own = columns_of_[static_cast<std::size_t>(g)];
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      columns[static_cast<std::size_t>(n)] = own[k];
+      sd[static_cast<std::size_t>(n)] = sd_of(group, static_cast<int>(k));
       mean[static_cast<std::size_t>(n)] = group.prior_mean;
       ++n;
     }
@@ -348,7 +377,10 @@ double EvidenceSearch::evidence(const Whitened& w, const std::vector<int>& group
     for (int i = 0; i < group.count; ++i, ++at) {
       const double off = std::abs(own.mean[at] - group.prior_mean);
       const double sd = std::sqrt(own.covariance(at, at));
-      if (off - 3 * sd > (group.effect == "truncation" ? 1 : 4) * group.high) {
+      const double high = i >= 3 && group.curve_sd > 0
+                              ? 10 * group.curve_sd
+                              : (group.effect == "truncation" ? 1 : 4) * group.high;
+      if (off - 3 * sd > high) {
         nats -= 1e6;
       }
     }
@@ -475,6 +507,38 @@ double EvidenceSearch::chi_sd(const Fit& fit) const {
   return n > 0 ? (fit.residual.squaredNorm() - n) / std::sqrt(2 * n) : 0;
 }
 
+// A time constant is no linear parameter: the chosen shape of warm_up moves to its likeliest value.
+void EvidenceSearch::polish_shapes(Fit& fit) {
+  for (const int g : fit.subset.groups) {
+    ParameterGroup& group = groups_[static_cast<std::size_t>(g)];
+    if (group.effect != "warm_up") {
+      continue;
+    }
+    double step = 1.25;
+    double best = -1e300;
+    for (int round = 0; round < 4; ++round) {
+      const double centre = group.tau_s;
+      double chosen = centre;
+      for (const double factor : {1 / step, 1.0, step}) {
+        group.tau_s = std::clamp(centre * factor, 20.0, 2000.0);
+        ForwardState at = fit.state;
+        at.warm_up_tau_s = group.tau_s;
+        const Whitened w = whiten(at, Scatter::nominal, 0);
+        const double nats = evidence(w, fit.subset.groups, nullptr);
+        if (nats > best) {
+          best = nats;
+          chosen = group.tau_s;
+        }
+      }
+      group.tau_s = chosen;
+      if (chosen == centre) {
+        step = std::sqrt(step);
+      }
+    }
+    fit.state.warm_up_tau_s = group.tau_s;
+  }
+}
+
 void EvidenceSearch::run() {
   ForwardState at = first_guess();
   // Nominal scatter first, relinearised about its own best explanation.
@@ -488,11 +552,13 @@ void EvidenceSearch::run() {
     const Fit next = make_fit(w, subset, at);
     const bool settled = round > 0 && next.subset.groups == fit.subset.groups;
     fit = next;
-    at = fit.state;
     if (settled && round >= 2) {
       break;
     }
+    polish_shapes(fit);
+    at = fit.state;
   }
+  at = fit.state;
   Subset nothing;
   nothing.nats = evidence(w, nothing.groups, nullptr);
   nominal_ = make_fit(w, nothing, at);
@@ -516,9 +582,10 @@ void EvidenceSearch::run() {
     return;
   }
   const ForwardState nominal_at = at;
-  for (const Scatter scatter :
-       {Scatter::seating, Scatter::random_walk, Scatter::flicker, Scatter::by_pose,
-        Scatter::by_placement, Scatter::by_temperature, Scatter::by_time}) {
+  Whitened final_unknown;
+  for (const Scatter scatter : {Scatter::seating, Scatter::random_walk, Scatter::flicker,
+                                Scatter::by_pose, Scatter::by_placement, Scatter::by_session,
+                                Scatter::by_temperature, Scatter::by_time, Scatter::by_time_fast}) {
     if (in_catalogue(scatter) && options_.allowed &&
         !options_.allowed(std::string(to_string(scatter)))) {
       continue;
@@ -560,7 +627,11 @@ void EvidenceSearch::run() {
       }
     } else if (!best_unknown_ || target.nats > best_unknown_->nats) {
       best_unknown_ = target;
+      final_unknown = std::move(*best_w);
     }
+  }
+  if (unknown_wins()) {
+    final_ = std::move(final_unknown);
   }
 }
 
@@ -568,9 +639,6 @@ double EvidenceSearch::probability(const std::string& effect) const {
   double with = -1e300;
   double without = -1e300;
   for (const State& state : states_) {
-    if (!in_catalogue(state.scatter)) {
-      continue;
-    }
     const bool has =
         to_string(state.scatter) == effect ||
         std::any_of(state.subset.groups.begin(), state.subset.groups.end(),
@@ -585,9 +653,6 @@ double EvidenceSearch::gain_nats(const std::string& effect) const {
   double with = -1e300;
   double without = -1e300;
   for (const State& state : states_) {
-    if (!in_catalogue(state.scatter)) {
-      continue;
-    }
     const bool has =
         to_string(state.scatter) == effect ||
         std::any_of(state.subset.groups.begin(), state.subset.groups.end(),
@@ -599,7 +664,7 @@ double EvidenceSearch::gain_nats(const std::string& effect) const {
 }
 
 std::optional<EvidenceSearch::Estimate> EvidenceSearch::estimate(const std::string& effect) const {
-  std::vector<int> base = best_known_.subset.groups;
+  std::vector<int> base = best().subset.groups;
   int chosen = -1;
   for (const int g : base) {
     if (groups_[static_cast<std::size_t>(g)].effect == effect) {
@@ -630,7 +695,7 @@ std::optional<EvidenceSearch::Estimate> EvidenceSearch::estimate(const std::stri
   const ParameterGroup& group = groups_[static_cast<std::size_t>(chosen)];
   for (std::size_t k = 0; k < posterior.columns.size(); ++k) {
     const int c = posterior.columns[k] - group_column_[static_cast<std::size_t>(chosen)];
-    if (c >= 0 && c < group.count) {
+    if (c >= 0 && c < std::min(3, group.count)) {
       const auto i = static_cast<Eigen::Index>(k);
       estimate.value.push_back(posterior.mean[i]);
       estimate.sd.push_back(std::sqrt(posterior.covariance(i, i)));
@@ -652,7 +717,7 @@ double EvidenceSearch::undetermined(const std::string& effect) const {
     Posterior posterior;
     evidence(final_, {g}, &posterior);
     double here = 0;
-    for (std::size_t k = 6; k < posterior.columns.size(); ++k) {
+    for (std::size_t k = 6; k < std::min<std::size_t>(9, posterior.columns.size()); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       here = std::max(here, std::sqrt(posterior.covariance(i, i)) / group.prior_sd);
     }
@@ -663,7 +728,7 @@ double EvidenceSearch::undetermined(const std::string& effect) const {
 }
 
 double EvidenceSearch::held_out_nats(const std::string& effect) const {
-  std::vector<int> with = best_known_.subset.groups;
+  std::vector<int> with = best().subset.groups;
   std::vector<int> without;
   for (const int g : with) {
     if (groups_[static_cast<std::size_t>(g)].effect != effect) {
@@ -714,7 +779,7 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
   if (rows_ == 0) {
     return out;
   }
-  const Whitened w = whiten(best_known_.state, Scatter::nominal, 0);
+  const Whitened w = whiten(best().state, Scatter::nominal, 0);
   int folds = 0;
   for (const Block& block : blocks_) {
     folds = std::max(folds, block.condition + 1);
@@ -724,6 +789,7 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
   double tone_before = 0, tone_after = 0, mean_before = 0, mean_after = 0;
   int tones = 0;
   int n = 0;
+  int in_mg = 0;
   std::vector<int> within;
   int last_block = -1;
   int k = 0;
@@ -754,7 +820,7 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
     Posterior nothing;
     Posterior accepted;
     evidence_of(a, b, yy, {}, &nothing);
-    evidence_of(a, b, yy, best_known_.subset.groups, &accepted);
+    evidence_of(a, b, yy, best().subset.groups, &accepted);
     for (const int row : rows) {
       const auto residual = [&](const Posterior& p) {
         double r = w.y[row];
@@ -771,9 +837,12 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
           block.white_mg2(i, i) + std::pow(kNominalSeating_deg, 2) * lever.row(i).squaredNorm();
       const double r0 = residual(nothing);
       const double r1 = residual(accepted);
-      before += r0 * r0 * scale2;
-      after += r1 * r1 * scale2;
-      floor += scale2;
+      if (i < 6) {  // harmonics of folding tones are known too badly to count in mg
+        before += r0 * r0 * scale2;
+        after += r1 * r1 * scale2;
+        floor += scale2;
+        ++in_mg;
+      }
       before_w += r0 * r0;
       after_w += r1 * r1;
       const bool tone_row = i >= 3;
@@ -785,9 +854,9 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
   }
   const double dn = std::max(1, n);
   out.rows = n;
-  out.before_mg = std::sqrt(before / dn);
-  out.after_mg = std::sqrt(after / dn);
-  out.floor_mg = std::sqrt(floor / dn);
+  out.before_mg = std::sqrt(before / std::max(1, in_mg));
+  out.after_mg = std::sqrt(after / std::max(1, in_mg));
+  out.floor_mg = std::sqrt(floor / std::max(1, in_mg));
   out.before_sigma = std::sqrt(before_w / dn);
   out.after_sigma = std::sqrt(after_w / dn);
   const double dt = std::max(1, tones);

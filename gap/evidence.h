@@ -28,10 +28,12 @@ enum class Scatter {
   seating,
   random_walk,
   flicker,
-  by_pose,
-  by_placement,
+  by_pose,       // from here on what the catalogue has not
+  by_placement,  // and with the amplitude of tones
+  by_session,    // runs of segments of one name
   by_temperature,
-  by_time
+  by_time,
+  by_time_fast
 };
 std::string_view to_string(Scatter scatter);
 bool in_catalogue(Scatter scatter);
@@ -94,6 +96,10 @@ class EvidenceSearch {
   void run();
 
   const Fit& best_known() const { return best_known_; }  // scatter of the catalogue only
+  // The explanation that stands: of the catalogue, unless an unknown kind of scatter is twenty
+  // times as likely.
+  const Fit& best() const { return unknown_wins() ? *best_unknown_ : best_known_; }
+  bool unknown_wins() const { return best_unknown_ && best_unknown_->nats > best_known_.nats + 3; }
   const std::optional<Fit>& best_unknown() const { return best_unknown_; }
   // Nothing but nuisances, scatter nominal.
   const Fit& nominal() const { return nominal_; }
@@ -140,6 +146,7 @@ class EvidenceSearch {
   Fit make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const;
   double chi_sd(const Fit& fit) const;
   ForwardState first_guess() const;
+  void polish_shapes(Fit& fit);
 
   const std::vector<Block>& blocks_;
   EvidenceOptions options_;
@@ -159,7 +166,7 @@ class EvidenceSearch {
   Fit nominal_;
   Fit best_known_;
   std::optional<Fit> best_unknown_;
-  Whitened final_;  // at best_known_'s covariance and state
+  Whitened final_;  // at best()'s covariance and state
 };
 
 }  // namespace sixpoint::gap

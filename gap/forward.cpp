@@ -27,7 +27,7 @@ double& parameter(ForwardState& s, int position) {
     double* data;
     int count;
   };
-  const std::array<Span, 14> spans = {{{s.gain.data(), 3},
+  const std::array<Span, 15> spans = {{{s.gain.data(), 3},
                                        {s.offset_mg.data(), 3},
                                        {s.tilt_deg.data(), 2},
                                        {s.misalignment_deg.data(), 3},
@@ -36,6 +36,7 @@ double& parameter(ForwardState& s, int position) {
                                        {s.third_mg_per_g3.data(), 3},
                                        {s.hysteresis_mg.data(), 3},
                                        {s.tempco_mg_per_c.data(), 3},
+                                       {s.tempco_curve_mg_per_c2.data(), 3},
                                        {s.sensitivity_percent_per_c.data(), 3},
                                        {s.warm_up_mg.data(), 3},
                                        {s.drift_mg_per_h.data(), 3},
@@ -58,24 +59,25 @@ double parameter(const ForwardState& state, int position) {
 std::vector<ParameterGroup> parameter_groups() {
   // Nuisances are free here (sd of 0.3): their own priors, 2 % and 35 mg, are judged afterwards.
   // Effects: prior sd about the middle of the catalogue's realistic sizes, `high` their upper end.
+  // A zero bends over temperature by some hundredths of its slope per degree.
   std::vector<ParameterGroup> groups = {
-      {"gain", 0, 3, 0.3, 1, 10, 0, true},
-      {"offset", 3, 3, 300, 0, 1e4, 0, true},
-      {"tilt", 6, 2, 0.2, 0, 0.5, 0, true},
-      {"misalignment", 8, 3, 0.4, 0, 1, 0, true},
-      {"non_orthogonality", 11, 3, 0.006, 0, 0.015, 0, true},
-      {"second_order", 14, 3, 0.35, 0, 0.6, 0, true},
-      {"third_order", 17, 3, 0.05, 0, 0.08, 0, true},
-      {"offset_tempco", 23, 3, 0.5, 0, 1, 0, true},
-      {"sensitivity_tempco", 26, 3, 0.03, 0, 0.05, 0, true},
-      {"drift", 32, 3, 2.5, 0, 5, 0, true},
-      {"local_gravity", 35, 1, 0.0015, 0, 0.0027, 0, true},
-      {"truncation", 36, 1, 0.05, 1, 0.35, 0, true},
+      {"gain", 0, 3, 0.3, 1, 0, 10, 0, true},
+      {"offset", 3, 3, 300, 0, 0, 1e4, 0, true},
+      {"tilt", 6, 2, 0.2, 0, 0, 0.5, 0, true},
+      {"misalignment", 8, 3, 0.4, 0, 0, 1, 0, true},
+      {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0, true},
+      {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0, true},
+      {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0, true},
+      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0, true},
+      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0, true},
+      {"drift", 35, 3, 2.5, 0, 0, 5, 0, true},
+      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0, true},
+      {"truncation", 39, 1, 0.05, 1, 0, 0.35, 0, true},
   };
-  groups.push_back({"hysteresis", 20, 3, 1, 0, 2, 0, true});
-  groups.push_back({"hysteresis", 20, 3, 1, 0, 2, 0, false});
+  groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0, true});
+  groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0, false});
   for (const double tau_s : {75.0, 120.0, 180.0, 270.0, 400.0, 600.0}) {
-    groups.push_back({"warm_up", 29, 3, 4, 0, 10, tau_s, true});
+    groups.push_back({"warm_up", 32, 3, 4, 0, 0, 10, tau_s, true});
   }
   return groups;
 }
@@ -93,8 +95,8 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   const double half = block.seconds / (2 * s.warm_up_tau_s);
   const double decay =
       std::exp(-block.middle_s / s.warm_up_tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
-  Eigen::Vector3d slow_mg =
-      warm * s.tempco_mg_per_c + hours * s.drift_mg_per_h + decay * s.warm_up_mg;
+  Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
+                            hours * s.drift_mg_per_h + decay * s.warm_up_mg;
   for (Eigen::Index a = 0; a < 3; ++a) {
     slow_mg[a] += s.hysteresis_mg[a] * (s.hysteresis_by_sign ? sign_of_step(block.approach_g[a])
                                                              : 0.5 * block.approach_g[a]);

@@ -27,6 +27,7 @@ struct ForwardState {
   Eigen::Vector3d third_mg_per_g3 = Eigen::Vector3d::Zero();
   Eigen::Vector3d hysteresis_mg = Eigen::Vector3d::Zero();
   Eigen::Vector3d tempco_mg_per_c = Eigen::Vector3d::Zero();
+  Eigen::Vector3d tempco_curve_mg_per_c2 = Eigen::Vector3d::Zero();
   Eigen::Vector3d sensitivity_percent_per_c = Eigen::Vector3d::Zero();
   Eigen::Vector3d warm_up_mg = Eigen::Vector3d::Zero();
   Eigen::Vector3d drift_mg_per_h = Eigen::Vector3d::Zero();
@@ -44,11 +45,12 @@ struct ParameterGroup {
   int count = 0;
   double prior_sd = 1;  // of each, from the realistic sizes of the catalogue
   double prior_mean = 0;
+  double curve_sd = 0;  // of the fourth number on: what bends the effect's main law
   double high = 0;      // an estimate beyond four times this is another thing
   double tau_s = 0;     // warm_up's shape
   bool by_sign = true;  // hysteresis' shape
 };
-inline constexpr int kForwardParameters = 37;
+inline constexpr int kForwardParameters = 40;
 // Every group, with each shape of warm_up and hysteresis as a group of its own.
 std::vector<ParameterGroup> parameter_groups();
 inline constexpr double kReference_c = 25;
@@ -59,6 +61,7 @@ double parameter(const ForwardState& state, int position);
 struct Block {
   std::size_t segment = 0;
   int placement = 0;
+  int session = 0;    // run of segments of one name
   int condition = 0;  // for hold-out: what is left out together
   bool tone = false;
   int axis = 0;         // of tones

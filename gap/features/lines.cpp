@@ -15,7 +15,7 @@ using Complex = std::complex<double>;
 using Vector3c = Eigen::Vector3cd;
 
 constexpr double kLowest_hz = 1;            // below it slow noise rules
-constexpr double kFalseLines = 1e-4;        // chance of one false line in a whole recording
+constexpr double kFalseLines = 1e-3;        // chance of one false line in a whole recording
 constexpr std::size_t kLongest = 1U << 17;  // 22 minutes at 100 Hz
 
 // A stretch at rest in one pose, mean removed, masked samples zero, in mg.
@@ -167,25 +167,36 @@ struct Peak {
   double nats = 0;  // above the threshold
 };
 
-double padded_power(Eigen::FFT<double>& fft, const Stretch& stretch, std::size_t length,
-                    std::size_t axis, std::vector<Complex>& out) {
-  std::vector<double> x = stretch.x[axis];
-  x.resize(length, 0);
-  fft.fwd(out, x);
-  return static_cast<double>(stretch.samples);
-}
-
-// Sum over `set` of the whitened power per frequency; each term is exponential of mean 1 where
-// there is no line, so that the sum of m terms has a gamma law.
-struct PowerSum {
-  std::vector<double> sum;
+// Per frequency, how much of a line there is: the largest eigenvalue of the dwells' outer products,
+// turned back into the laboratory or left in the sensor. A line has one direction, noise all three,
+// so that this sees weaker lines than the sum of powers. Without a line the matrix follows
+// Wishart's law; its largest eigenvalue the shifted gamma law of Chiani (2014, beta = 2).
+struct LineScan {
+  std::vector<double> nats;  // -log of the chance, per frequency
   double step_hz = 0;
-  double terms = 0;
 };
 
-PowerSum power_sum(const Bundle& bundle, const std::vector<const Stretch*>& set,
-                   const NoiseSpectrum& noise) {
-  PowerSum power;
+constexpr double kChianiShape = 79.6595;
+constexpr double kChianiScale = 0.101037;
+constexpr double kChianiShift = 9.81961;
+
+// log of the upper tail of a gamma law of shape m, scale 1 (Chernoff's bound, exact enough here).
+double log_tail(double x, double m) { return x <= m ? 0 : -(x - m - m * std::log(x / m)); }
+
+double eigenvalue_nats(double largest, std::size_t looks) {
+  if (looks == 1) {
+    return -log_tail(largest, 3);  // one look: all power is in one direction
+  }
+  const double n = std::sqrt(static_cast<double>(looks));
+  const double m = std::sqrt(3.0);
+  const double centre = (n + m) * (n + m);
+  const double width = (n + m) * std::cbrt(1 / n + 1 / m);
+  return -log_tail(((largest - centre) / width + kChianiShift) / kChianiScale, kChianiShape);
+}
+
+LineScan scan(const Bundle& bundle, const std::vector<const Stretch*>& set,
+              const NoiseSpectrum& noise) {
+  LineScan out;
   std::size_t length = 2;
   for (const Stretch* s : set) {
     while (length < s->samples) {
@@ -193,8 +204,9 @@ PowerSum power_sum(const Bundle& bundle, const std::vector<const Stretch*>& set,
     }
   }
   length *= 2;  // half-bin steps: a line between two bins loses little
-  power.step_hz = bundle.rate_hz / static_cast<double>(length);
-  power.sum.assign(length / 2, 0);
+  const std::size_t half = length / 2;
+  out.step_hz = bundle.rate_hz / static_cast<double>(length);
+  out.nats.assign(half, 0);
   std::array<std::vector<double>, 3> level;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     // The noise level on a coarse grid: it is smooth, the bins are many.
@@ -203,35 +215,63 @@ PowerSum power_sum(const Bundle& bundle, const std::vector<const Stretch*>& set,
     for (std::size_t k = 0; k <= coarse; ++k) {
       grid[k] = noise.variance_at(axis, 0.5 * bundle.rate_hz * static_cast<double>(k) / coarse);
     }
-    level[axis].resize(length / 2);
-    for (std::size_t k = 0; k < length / 2; ++k) {
-      level[axis][k] = grid[k * 2 * coarse / length];
+    level[axis].resize(half);
+    for (std::size_t k = 0; k < half; ++k) {
+      level[axis][k] = grid[k * coarse / half];
     }
   }
   Eigen::FFT<double> fft;
-  std::vector<Complex> out;
+  std::array<std::vector<Complex>, 3> spectrum;
+  const bool one = set.size() == 1;
+  std::vector<Eigen::Matrix3cd> lab(one ? 0 : half, Eigen::Matrix3cd::Zero());
+  std::vector<Eigen::Matrix3cd> sensor(one ? 0 : half, Eigen::Matrix3cd::Zero());
   for (const Stretch* s : set) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double n = padded_power(fft, *s, length, axis, out);
-      for (std::size_t k = 0; k < length / 2; ++k) {
-        power.sum[k] += std::norm(out[k]) / (n * level[axis][k]);
-      }
+      std::vector<double> x = s->x[axis];
+      x.resize(length, 0);
+      fft.fwd(spectrum[axis], x);
     }
-    power.terms += 3;
+    const double scale = 1 / std::sqrt(static_cast<double>(s->samples));
+    const Eigen::Matrix3cd back = bundle.segments[s->segment].rotation.transpose().cast<Complex>();
+    for (std::size_t k = 0; k < half; ++k) {
+      Vector3c z;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        z[static_cast<Eigen::Index>(axis)] =
+            spectrum[axis][k] * (scale / std::sqrt(level[axis][k]));
+      }
+      if (one) {
+        out.nats[k] = eigenvalue_nats(z.squaredNorm(), 1);
+        continue;
+      }
+      sensor[k] += z * z.adjoint();
+      z = back * z;
+      lab[k] += z * z.adjoint();
+    }
   }
-  return power;
+  for (std::size_t k = 0; k < half && !one; ++k) {
+    // The trace bounds the eigenvalue: most bins need no decomposition.
+    const auto largest = [&](const Eigen::Matrix3cd& m) {
+      const double trace = m.trace().real();
+      if (trace < 3.0 * static_cast<double>(set.size())) {
+        return trace / 3;
+      }
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3cd> solver;
+      solver.computeDirect(m, Eigen::EigenvaluesOnly);
+      return solver.eigenvalues()[2];
+    };
+    const double most = std::max(largest(lab[k]), largest(sensor[k]));
+    out.nats[k] = eigenvalue_nats(most, set.size()) - std::log(2.0);  // two frames were tried
+  }
+  return out;
 }
 
-// log of the upper tail of a gamma law of shape m, scale 1 (Chernoff's bound, exact enough here).
-double log_tail(double x, double m) { return x <= m ? 0 : -(x - m - m * std::log(x / m)); }
-
-std::optional<Peak> best_peak(const PowerSum& power, const std::vector<double>& taken_hz,
+std::optional<Peak> best_peak(const LineScan& power, const std::vector<double>& taken_hz,
                               double guard_hz) {
   std::optional<Peak> best;
   const auto first = static_cast<std::size_t>(std::ceil(kLowest_hz / power.step_hz));
-  const double log_bins = std::log(static_cast<double>(power.sum.size()));
-  for (std::size_t k = first; k + 2 < power.sum.size(); ++k) {
-    const double nats = -log_tail(power.sum[k], power.terms) - log_bins + std::log(kFalseLines);
+  const double log_bins = std::log(static_cast<double>(power.nats.size()));
+  for (std::size_t k = first; k + 2 < power.nats.size(); ++k) {
+    const double nats = power.nats[k] - log_bins + std::log(kFalseLines);
     if (nats > 0 && (!best || nats > best->nats)) {
       const double f = static_cast<double>(k) * power.step_hz;
       const bool free = std::none_of(taken_hz.begin(), taken_hz.end(),
@@ -264,18 +304,18 @@ LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const Noi
       dwells.push_back(&s);
     }
   }
-  std::vector<PowerSum> powers;
+  std::vector<LineScan> powers;
   if (static_cast<double>(longest->samples) > 60 * bundle.rate_hz) {
-    powers.push_back(power_sum(bundle, {&*longest}, noise));
+    powers.push_back(scan(bundle, {&*longest}, noise));
   }
   if (!dwells.empty()) {
-    powers.push_back(power_sum(bundle, dwells, noise));
+    powers.push_back(scan(bundle, dwells, noise));
   }
   std::vector<double> taken;
   while (search.lines.size() < 4) {
     std::optional<Peak> peak;
-    const PowerSum* from = nullptr;
-    for (const PowerSum& power : powers) {
+    const LineScan* from = nullptr;
+    for (const LineScan& power : powers) {
       const auto found = best_peak(power, taken, 0.6);
       if (found && (!peak || found->nats > peak->nats)) {
         peak = found;

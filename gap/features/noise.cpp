@@ -122,6 +122,7 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
   CodeStatistics codes;
   std::array<double, 3> odd{};
   std::array<double, 3> parity_variance{};
+  std::array<double, 3> parity_grid{};
   double repeats = 0;
   double repeats_far = 0;
   double pairs = 0;
@@ -185,7 +186,8 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
         // By the sampling of Gaussian noise on the grid of integers the odd share is off by at most
         // exp(-pi^2 variance / 2), with the sign of where the mean lies.
         const double grid = std::exp(-M_PI * M_PI * variance / 2) * n * 2 / M_PI;
-        parity_variance[axis] += n / 4 + grid * grid;
+        parity_variance[axis] += n / 4;
+        parity_grid[axis] += grid;  // of one sign in the worst case
       }
       for (std::size_t i = first; i < first + piece; ++i) {
         const std::size_t at = segment.first_sample + i;
@@ -216,7 +218,8 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
   codes.outliers_expected = 3 * static_cast<double>(n_all) * 2e-9;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     codes.odd_share[axis] = 0.5 + odd[axis] / static_cast<double>(n_all);
-    codes.parity_sd[axis] = std::sqrt(parity_variance[axis]) / static_cast<double>(n_all);
+    codes.parity_sd[axis] =
+        (std::sqrt(parity_variance[axis]) + parity_grid[axis] / 2) / static_cast<double>(n_all);
   }
   if (pairs > 0) {
     codes.repeats = repeats / pairs;

@@ -98,10 +98,10 @@ class Search {
         try_low_pass(corner, order, flat_fit.nats, flat_chi, best, response, white);
       }
     }
-    for (int round = 0; round < 2; ++round) {
+    for (double step = 0.012; step > 1e-6 && response.low_pass.corner_hz > 0; step /= 2) {
       const double centre = response.low_pass.corner_hz;
-      for (int k = -6; k <= 6 && centre > 0; ++k) {
-        const double corner = centre * (1 + k * (round == 0 ? 0.004 : 0.0006));
+      for (const double k : {-1.0, 1.0}) {
+        const double corner = centre * (1 + k * step);
         if (corner < 0.495 * rate_hz_) {
           try_low_pass(corner, response.low_pass.order, flat_fit.nats, flat_chi, best, response,
                        white);
@@ -139,18 +139,29 @@ class Search {
         }
       }
     }
-    for (int round = 0; round < 2; ++round) {
+    double step_f = 0.01;
+    double step_q = 0.04;
+    for (int round = 0; round < 400 && step_f > 1e-8 && response.resonance.frequency_hz > 0;
+         ++round) {
       const Resonance centre = response.resonance;
-      const double fine = round == 0 ? 0.005 : 0.001;
-      for (int i = -4; i <= 4 && centre.frequency_hz > 0; ++i) {
-        for (int k = -4; k <= 4; ++k) {
-          try_resonance({centre.frequency_hz * (1 + i * fine), centre.q * (1 + 4 * k * fine),
+      const double before = chi;
+      for (int i = -1; i <= 1; ++i) {
+        for (int k = -1; k <= 1; ++k) {
+          try_resonance({centre.frequency_hz * (1 + i * step_f), centre.q * (1 + k * step_q),
                          centre.base_excited, 0},
                         low_pass_log, base_chi, chi, response);
         }
       }
+      if (chi >= before) {
+        step_f /= 2;
+        step_q /= 2;
+      }
     }
-    response.resonance_significant = options_.allow_resonance && response.resonance.tone_nats > 14;
+    response.tone_flat_chi = base_chi;
+    response.tone_left_chi = chi;
+    response.resonance_significant = options_.allow_resonance &&
+                                     response.resonance.tone_nats > 14 &&
+                                     chi - freedom < 0.02 * base_chi;
     const double left = response.resonance_significant ? chi : base_chi;
     const double left_freedom = freedom - (response.low_pass_significant ? 1 : 0) -
                                 (response.resonance_significant ? 2 : 0);

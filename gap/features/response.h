@@ -38,6 +38,8 @@ struct Response {
   double noise_left_sd = 0;  // ... of the low-pass
   double tone_flat_sd = 0;   // chi-square of flat tones
   double tone_left_sd = 0;   // ... less what is significant of low-pass and resonance
+  double tone_flat_chi = 0;
+  double tone_left_chi = 0;  // of the best resonance, whether it is accepted or not
   bool low_pass_significant = false;
   bool resonance_significant = false;
   std::array<double, 3> white_mg{};  // of one sample before rounding and filter

@@ -1,11 +1,16 @@
 #include "gap/features/settling.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <cmath>
 
 namespace sixpoint::gap {
+
+double StepResponse::Mode::at(double t_s) const {
+  return amplitude == 0 ? 0
+                        : amplitude * std::exp(-t_s / decay_s) *
+                              std::cos(2 * M_PI * frequency_hz * t_s + phase_rad);
+}
 
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
                            const NoiseSpectrum& noise) {
@@ -69,38 +74,69 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
   }
   const auto at_s = [&](std::size_t i) { return static_cast<double>(i) / bundle.rate_hz; };
   // Every frequency and decay on a grid; amplitude and phase in closed form.
-  double best_c = 0;
-  double best_s = 0;
-  Eigen::Matrix2d best_a = Eigen::Matrix2d::Identity();
-  const auto try_one = [&](double f, double decay) {
-    Eigen::Matrix2d a = Eigen::Matrix2d::Zero();
-    Eigen::Vector2d b = Eigen::Vector2d::Zero();
-    for (std::size_t i = 0; i < length; ++i) {
-      const double e = std::exp(-at_s(i) / decay);
-      if (e < 1e-3) {
-        break;
+  const auto fit_mode = [&](const std::vector<double>& data, double& gain_nats) {
+    StepResponse::Mode best;
+    gain_nats = 0;
+    const auto try_one = [&](double f, double decay) {
+      Eigen::Matrix2d a = Eigen::Matrix2d::Zero();
+      Eigen::Vector2d b = Eigen::Vector2d::Zero();
+      for (std::size_t i = 0; i < length; ++i) {
+        const double e = std::exp(-at_s(i) / decay);
+        if (e < 1e-3) {
+          break;
+        }
+        const double p = 2 * M_PI * f * at_s(i);
+        const Eigen::Vector2d row(e * std::cos(p), -e * std::sin(p));
+        a += weight[i] * row * row.transpose();
+        b += weight[i] * row * data[i];
       }
-      const Eigen::Vector2d row(e * std::cos(2 * M_PI * f * at_s(i)),
-                                -e * std::sin(2 * M_PI * f * at_s(i)));
-      a += weight[i] * row * row.transpose();
-      b += weight[i] * row * response.share[i];
+      a.diagonal().array() += 1e-9 * most;
+      const Eigen::Matrix2d inverse = a.inverse();
+      const Eigen::Vector2d x = inverse * b;
+      const double gain = 0.5 * b.dot(x);
+      if (gain > gain_nats) {
+        gain_nats = gain;
+        best = {x.norm(), std::sqrt(inverse.diagonal().maxCoeff()), f, decay,
+                std::atan2(x[1], x[0])};
+      }
+    };
+    for (const double decay : {0.1, 0.15, 0.2, 0.27, 0.36, 0.48, 0.65, 0.9}) {
+      for (double f = 2; f <= std::min(30.0, 0.4 * bundle.rate_hz); f += 0.25) {
+        try_one(f, decay);
+      }
     }
-    a.diagonal().array() += 1e-9 * most;
-    const Eigen::Vector2d x = a.ldlt().solve(b);
-    const double gain = 0.5 * b.dot(x);
-    if (gain > response.gain_nats) {
-      response.gain_nats = gain;
-      response.frequency_hz = f;
-      response.decay_s = decay;
-      best_c = x[0];
-      best_s = x[1];
-      best_a = a;
+    for (int round = 1; round <= 4; ++round) {
+      const double f0 = best.frequency_hz;
+      const double d0 = best.decay_s;
+      for (int i = -3; i <= 3; ++i) {
+        for (int k = -3; k <= 3; ++k) {
+          try_one(std::max(0.5, f0 + i * 0.08 / round), std::max(0.03, d0 * (1 + k * 0.1 / round)));
+        }
+      }
     }
+    return best;
   };
-  for (const double decay : {0.1, 0.15, 0.2, 0.27, 0.36, 0.48, 0.65, 0.9}) {
-    for (double f = 2; f <= std::min(20.0, 0.4 * bundle.rate_hz); f += 0.2) {
-      try_one(f, decay);
+  const auto less = [&](const StepResponse::Mode& mode) {
+    std::vector<double> data = response.share;
+    for (std::size_t i = 0; i < length; ++i) {
+      data[i] -= mode.at(at_s(i));
     }
+    return data;
+  };
+  response.mode = fit_mode(response.share, response.gain_nats);
+  StepResponse::Mode second = fit_mode(less(response.mode), response.second_nats);
+  if (response.second_nats > 20) {
+    // Each once more with the other taken off.
+    double nats = 0;
+    for (int round = 0; round < 2; ++round) {
+      response.mode = fit_mode(less(second), nats);
+      second = fit_mode(less(response.mode), nats);
+    }
+    response.second = second;
+  }
+  response.amplitude =
+      response.second.amplitude > 0 ? std::abs(response.model(0)) : response.mode.amplitude;
+  for (const double decay : {0.05, 0.1, 0.2, 0.4, 0.8}) {
     double a = 0;
     double b = 0;
     for (std::size_t i = 0; i < length; ++i) {
@@ -110,27 +146,12 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
     }
     response.plain_nats = std::max(response.plain_nats, 0.5 * b * b / a);
   }
-  for (int round = 1; round <= 3; ++round) {
-    const double f0 = response.frequency_hz;
-    const double d0 = response.decay_s;
-    for (int i = -4; i <= 4; ++i) {
-      for (int k = -4; k <= 4; ++k) {
-        try_one(std::max(0.5, f0 + i * 0.05 / round), std::max(0.03, d0 * (1 + k * 0.08 / round)));
-      }
-    }
-  }
-  response.amplitude = std::hypot(best_c, best_s);
-  response.phase_rad = std::atan2(best_s, best_c);
-  response.amplitude_sd = std::sqrt(best_a.inverse().diagonal().maxCoeff());
   const auto chi_over = [&](bool ringing) {
     double chi = 0;
     double n = 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(bundle.rate_hz); ++i) {
       if (weight[i] > 0) {
-        const double model =
-            ringing ? std::exp(-at_s(i) / response.decay_s) * response.amplitude *
-                          std::cos(2 * M_PI * response.frequency_hz * at_s(i) + response.phase_rad)
-                    : 0;
+        const double model = ringing ? response.model(at_s(i)) : 0;
         chi += weight[i] * std::pow(response.share[i] - model, 2);
         n += 1;
       }

@@ -3,7 +3,9 @@
 #include <Eigen/Core>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 namespace sixpoint::gap {
 namespace {
@@ -13,11 +15,12 @@ struct Coefficient {
   double white;    // variance of white noise in it
   double walk;     // variance per (mg per sqrt(s))^2
   double flicker;  // variance per mg^2/Hz at 1 Hz
+  int octave;      // of its period in seconds
 };
 
 }  // namespace
 
-double flicker_density_mg2(double flicker_mg) { return flicker_mg * flicker_mg / (2 * M_PI); }
+double flicker_density_mg2(double flicker_mg) { return flicker_mg * flicker_mg; }
 
 SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise) {
   SlowNoise slow;
@@ -76,17 +79,29 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         c *= std::sqrt(2.0 / static_cast<double>(n));
         const double s2 = std::pow(std::sin(w / 2), 2);
         coefficients.push_back({c * c, white, (1 - 2.0 / 3.0 * s2) / (4 * s2),
-                                static_cast<double>(n) / static_cast<double>(k)});
+                                static_cast<double>(n) / static_cast<double>(k),
+                                static_cast<int>(std::floor(std::log2(2.0 * static_cast<double>(n) /
+                                                                      static_cast<double>(k))))});
       }
     }
   }
   slow.coefficients = coefficients.size();
   slow.walk_mg = {0, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16, 0.2, 0.25, 0.3, 0.38, 0.5, 0.8};
-  slow.flicker_mg = {0, 0.08, 0.12, 0.17, 0.23, 0.3, 0.4, 0.5, 0.65, 0.8, 1, 1.3, 1.8, 2.5};
+  slow.flicker_mg = {0, 0.02, 0.035, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5, 0.7, 1, 1.4, 2.2};
   slow.nats.assign(slow.walk_mg.size(), std::vector<double>(slow.flicker_mg.size(), 0));
   double base = 0;
   for (const Coefficient& c : coefficients) {
     base += -0.5 * (std::log(c.white) + c.square / c.white);
+  }
+  std::map<int, std::array<double, 2>> octaves;  // sum of square over white, count
+  for (const Coefficient& c : coefficients) {
+    auto& octave = octaves[c.octave];
+    octave[0] += c.square / c.white;
+    octave[1] += 1;
+  }
+  for (const auto& [octave, sum] : octaves) {
+    const double ratio = std::max(1.0, sum[0] / sum[1]);
+    slow.free_nats += 0.5 * (sum[0] - sum[0] / ratio - sum[1] * std::log(ratio)) - 2;
   }
   double best = -1e300;
   for (std::size_t i = 0; i < slow.walk_mg.size(); ++i) {

@@ -21,6 +21,8 @@ struct SlowNoise {
   std::vector<double> walk_mg;            // mg per sqrt(s); first is 0
   std::vector<double> flicker_mg;         // first is 0
   std::vector<std::vector<double>> nats;  // [walk][flicker]
+  // Of a spectrum free in every octave, over white noise alone, less two nats an octave.
+  double free_nats = 0;
   // Power in the slow coefficients over that of the fast, in sd, at the best grid point: what is
   // left for something that neither explains.
   double misfit_sd = 0;
@@ -35,8 +37,7 @@ struct SlowNoise {
   Best best_both() const;
 };
 
-// Variance per Hz at 1 Hz for flicker noise of `flicker_mg`: power spectral density B^2 / (2 pi f),
-// one-sided (IEEE Std 952, bias instability coefficient B).
+// Power density at 1 Hz, one-sided, mg^2/Hz: `flicker_mg` is its square root, as in sim/effects.
 double flicker_density_mg2(double flicker_mg);
 
 SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise);

@@ -83,7 +83,10 @@ class ToneAnalysis {
     y_.resize(segment_.samples);
     for (std::size_t i = 0; i < segment_.samples; ++i) {
       const std::uint8_t flags = clean.flags[segment_.first_sample + i];
-      good_[i] = (flags & (kSampleZero | kSampleHeld | kSampleClipped)) == 0 ? 1 : 0;
+      // What a move or a filter leaves at the start is not of the tone.
+      const bool quiet =
+          static_cast<double>(i) >= (segment_.starts_placement ? 2 : 0.3) * bundle.rate_hz;
+      good_[i] = quiet && (flags & (kSampleZero | kSampleHeld | kSampleClipped)) == 0 ? 1 : 0;
       fit_.samples += good_[i];
       y_[i] = value_mg(i, static_cast<std::size_t>(fit_.axis));
       fit_.clipped_share += (flags & kSampleClipped) != 0 ? 1 : 0;
@@ -124,6 +127,7 @@ class ToneAnalysis {
       return;
     }
     std::sort(cuts.begin(), cuts.end());
+    merge(sums, cuts);
     steps_.assign(y_.size(), 0);
     int shift = 0;
     for (std::size_t p = 1; p + 1 < cuts.size(); ++p) {
@@ -141,12 +145,47 @@ class ToneAnalysis {
       }
       const double sd = std::sqrt(2 * noise2_ * (1 / before.n + 1 / after.n)) /
                         std::max(1e-9, 0.5 * (before.amplitude() + after.amplitude()));
+      if (std::abs(step) < 6 * sd) {
+        for (std::size_t i = cuts[p]; i < cuts[p + 1]; ++i) {
+          steps_[i] = shift;
+        }
+        continue;  // the level moved, not the phase
+      }
       const bool whole = best != 0 && best_miss < std::max(6 * sd, 0.12 * std::abs(w_));
       fit_.slips.push_back({cuts[p], whole ? best : 0});
       shift += whole ? best : 0;
       for (std::size_t i = cuts[p]; i < cuts[p + 1]; ++i) {
         steps_[i] = shift;
       }
+    }
+  }
+
+  // Takes back cuts that gain nothing against the noise that is there (the halves of split(), or
+  // scatter that the tone adds).
+  void merge(const std::vector<Sums>& sums, std::vector<std::size_t>& cuts) const {
+    while (cuts.size() > 2) {
+      double least = 1e300;
+      std::size_t at = 0;
+      double pieces_squares = 0;
+      for (std::size_t p = 0; p + 1 < cuts.size(); ++p) {
+        pieces_squares += fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]).squares;
+      }
+      const double variance = std::max(
+          noise2_,
+          pieces_squares / std::max(1.0, sums.back().n - 3 * static_cast<double>(cuts.size() - 1)));
+      for (std::size_t p = 1; p + 1 < cuts.size(); ++p) {
+        const double apart = fit_piece(sums[cuts[p]] - sums[cuts[p - 1]]).squares +
+                             fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]).squares;
+        const double gain = fit_piece(sums[cuts[p + 1]] - sums[cuts[p - 1]]).squares - apart;
+        if (gain < least) {
+          least = gain;
+          at = p;
+        }
+      }
+      if (least > 60 * variance) {
+        return;
+      }
+      cuts.erase(cuts.begin() + static_cast<std::ptrdiff_t>(at));
     }
   }
 
@@ -306,6 +345,7 @@ class ToneAnalysis {
       crest_weight += 1 - s2;
     }
     fit_.residual_mg = std::sqrt(squares / std::max(1.0, static_cast<double>(fit_.samples) - 5));
+    fit_.frequency_sd_ppm *= std::max(1.0, fit_.residual_mg / std::sqrt(noise2_));
     fit_.on_slope_mg2 = slope / std::max(1.0, slope_weight);
     fit_.on_crest_mg2 = crest / std::max(1.0, crest_weight);
     fit_.usable = fit_.in_phase_mg[fit_.axis] > 0 && std::isfinite(fit_.residual_mg);
