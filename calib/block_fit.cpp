@@ -223,16 +223,16 @@ std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::spa
     lowest_bin = std::min(lowest_bin, bin_of(block));
     highest_bin = std::max(highest_bin, bin_of(block));
   }
-  constexpr int kKeys = 6 * kGrid * kGrid + 1;
-  std::vector<int> number(static_cast<std::size_t>((highest_bin - lowest_bin + 1) * kKeys), -1);
+  constexpr std::size_t kKeys = 6 * kGrid * kGrid + 1;
+  std::vector<int> number(static_cast<std::size_t>(highest_bin - lowest_bin + 1) * kKeys, -1);
   std::vector<PerAxis<double>> square;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (!used.empty() && used[i] == 0) {
       continue;
     }
     const StillBlock& block = blocks[i];
-    int& found = number[static_cast<std::size_t>((bin_of(block) - lowest_bin) * kKeys +
-                                                 cell_key(block.mean_g) + 1)];
+    int& found = number[static_cast<std::size_t>(bin_of(block) - lowest_bin) * kKeys +
+                        static_cast<std::size_t>(cell_key(block.mean_g) + 1)];
     if (found < 0) {
       found = static_cast<int>(cells.size());
       cells.emplace_back();
@@ -466,6 +466,7 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     look();
     look_at_cells();
     std::vector<double> sizes;
+    sizes.reserve(residual_g.size());
     for (const double residual : residual_g) {
       sizes.push_back(std::abs(residual));
     }
@@ -551,11 +552,6 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     }
   }
   SIXPOINT_CHECK(correlate(out.fit, structural_g2));
-  if (out.richer) {
-    const double own = cells_rms_mg(out.cells, out.richer->fit.calibration, options.gravity_g);
-    const double plain_rms = cells_rms_mg(out.cells, out.fit.calibration, options.gravity_g);
-    out.richer_constants = own <= 1.1 * plain_rms;
-  }
   for (std::size_t k = 0; k < out.cells.size(); ++k) {
     out.cell_residual_mg.push_back(kMgPerG * residual_g[k]);
     out.cell_sigma_mg.push_back(kMgPerG * sigma_g[k]);

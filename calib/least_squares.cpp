@@ -267,11 +267,11 @@ Result<LeastSquaresFit> least_squares(std::span<const GravityPoint> points,
                                                              {0.1, -0.2, 0.3, 0.2}}};
   std::vector<Descent> descents;
   const int starts = std::clamp(options.starts, 1, static_cast<int>(kStarts.size()));
-  for (int k = 0; k < starts; ++k) {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(starts); ++k) {
     Vector theta = Vector::Zero(n);
-    for (int a = 0; a < 3; ++a) {
-      theta[a] = kStarts[static_cast<std::size_t>(k)][0];
-      theta[3 + a] = kStarts[static_cast<std::size_t>(k)][static_cast<std::size_t>(1 + a)];
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      theta[static_cast<Eigen::Index>(a)] = kStarts[k][0];
+      theta[static_cast<Eigen::Index>(3 + a)] = kStarts[k][1 + a];
     }
     descents.push_back(descend(problem, theta));
   }

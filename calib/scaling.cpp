@@ -18,9 +18,7 @@ double firmware_value(double twice_scale, int zero, int span, int raw) {
   return twice_scale * (raw - zero) / span;
 }
 
-std::size_t table_size(RecordWidth width) {
-  return static_cast<std::size_t>(highest_count(width) - lowest_count(width) + 1);
-}
+std::size_t table_size(RecordWidth width) { return width == RecordWidth::bits12 ? 4096 : 65536; }
 
 Status check_scale(double accel_scale) {
   if (!(accel_scale >= 1 && accel_scale <= 32768)) {

@@ -31,7 +31,7 @@ Line fit_line(const std::int16_t* values, int size, double sum_square_index) {
       chunk_moment += value * static_cast<std::int16_t>(i - begin);
     }
     sum += chunk_sum;
-    moment += 2 * chunk_moment + (2LL * begin - (size - 1)) * chunk_sum;
+    moment += 2 * static_cast<std::int64_t>(chunk_moment) + (2LL * begin - (size - 1)) * chunk_sum;
   }
   return {static_cast<double>(sum) / size, 0.5 * static_cast<double>(moment) / sum_square_index};
 }

@@ -76,7 +76,6 @@ void append_record(Bytes& out, RecordType type, std::uint32_t unix_time,
                    std::span<const std::uint8_t> payload) {
   const std::size_t size = std::min(payload.size(), kMaxPayload);
   const std::size_t start = out.size();
-  out.reserve(start + size + kRecordOverhead);
   out.push_back(kSeparator);
   out.push_back(static_cast<std::uint8_t>(type));
   for (int shift = 0; shift < 32; shift += 8) {

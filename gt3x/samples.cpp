@@ -10,7 +10,6 @@ constexpr PerAxis<std::size_t> kActivityOrder = {1, 0, 2};
 constexpr PerAxis<std::size_t> kActivity3Order = {0, 1, 2};
 
 void pack12(Bytes& payload, std::span<const Counts> samples, const PerAxis<std::size_t>& order) {
-  payload.reserve(payload.size() + (samples.size() * kAxes * 3 + 1) / 2);
   bool half = false;  // the last byte of the payload has four bits to spare
   for (const Counts& sample : samples) {
     for (const std::size_t axis : order) {
@@ -61,7 +60,6 @@ void append_activity3(Bytes& payload, std::span<const Counts> samples) {
 }
 
 void append_activity2(Bytes& payload, std::span<const Counts> samples) {
-  payload.reserve(payload.size() + samples.size() * kAxes * 2);
   for (const Counts& sample : samples) {
     for (const std::int16_t value : sample) {
       const auto bits = static_cast<std::uint16_t>(value);

@@ -166,7 +166,11 @@ Result<Survey> survey(FileSystem& files, const std::string& path,
   result.still_tally = still.tally();
   result.magnitude = magnitude_error(result.blocks);
   result.duration_s = static_cast<double>(result.samples) / result.rate_hz;
-  if (result.constants.empty() && !result.already_repaired) {
+  if (result.samples == 0) {
+    result.constants_problem =
+        Error{ErrorCode::bad_data, "the recording holds no samples", path,
+              "nothing can be learnt from it or mended; download it from the unit again"};
+  } else if (result.constants.empty() && !result.already_repaired) {
     result.constants_problem = Error{
         ErrorCode::bad_data, "the recording holds no complete set of constants (PARAMETERS)", path,
         "without them the scaling cannot be undone; download the recording from the unit again"};

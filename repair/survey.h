@@ -32,7 +32,8 @@ struct Survey {
   bool already_repaired = false;   // the mark is there
   // The constants that were in force for at least one sample, in order; usually one set.
   std::vector<StoredConstants> constants;
-  // Why they cannot be used (none in the file, or positive = negative), where that is so.
+  // Why they cannot be used (none in the file, positive = negative, or no samples to use them on),
+  // where that is so.
   std::optional<Error> constants_problem;
 
   std::uint64_t samples = 0;

@@ -36,7 +36,7 @@ class Section {
     }
     for (const auto& [key, value] : json.items()) {
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        return wrong(path + "/" + key, "this key is not known");
+        return wrong(fmt::format("{}/{}", path, key), "this key is not known");
       }
     }
     return Section(json, std::move(path));
@@ -409,7 +409,7 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
       return wrong(effect.path("parameters"), "this must be an object");
     }
     for (const auto& [key, value] : parameters->items()) {
-      const std::string where = effect.path("parameters") + "/" + key;
+      const std::string where = fmt::format("{}/{}", effect.path("parameters"), key);
       std::vector<double>& numbers = given[key];
       const Json rows = value.is_array() ? value : Json::array({value});
       for (const Json& row : rows) {

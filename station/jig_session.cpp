@@ -55,7 +55,7 @@ class Session {
  private:
   Status prepare();
   Status stream(JigRun& run);
-  Status handle(JigRun& run, std::vector<JigAction> actions);
+  Status handle(JigRun& run, const std::vector<JigAction>& actions);
   void keep_raw(const device::SampleBlock& block);
   Result<calib::SixPoseReport> solve(const std::vector<PoseReading>& faces,
                                      const std::vector<PoseReading>& held_out) const;
@@ -151,7 +151,7 @@ Status Session::stream(JigRun& run) {
   return unit_.stop_stream();
 }
 
-Status Session::handle(JigRun& run, std::vector<JigAction> actions) {
+Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
   // A machine that asks twice at once means the last.
   std::optional<Pose> place;
   for (const JigAction& action : actions) {
@@ -189,6 +189,7 @@ Result<calib::SixPoseReport> Session::solve(const std::vector<PoseReading>& face
                                             const std::vector<PoseReading>& held_out) const {
   const auto readings = [](const std::vector<PoseReading>& from) {
     std::vector<calib::PoseReading> to;
+    to.reserve(from.size());
     for (const PoseReading& reading : from) {
       to.push_back({device::direction_of(reading.pose), reading.mean_lsb, reading.sd_lsb,
                     reading.samples, reading.temperature_c});
@@ -382,7 +383,7 @@ JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& c
     pose.error_mg = (pose.magnitude_g - gravity_g) * kMgPerG;
     judged.worst_mg = std::max(judged.worst_mg, std::abs(pose.error_mg));
     judged.rms_mg += pose.error_mg * pose.error_mg / static_cast<double>(readings.size());
-    judged.poses.push_back(std::move(pose));
+    judged.poses.push_back(pose);
   }
   judged.rms_mg = std::sqrt(judged.rms_mg);
   return judged;

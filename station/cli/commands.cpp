@@ -18,8 +18,12 @@ namespace sixpoint::cli {
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
+  COMMAND(simulate)                \
+  COMMAND(doctor)                  \
   COMMAND(virtual)                 \
-  COMMAND(simulate)
+  COMMAND(station)                 \
+  COMMAND(archive)                 \
+  COMMAND(gap)
 // clang-format on
 
 #define SIXPOINT_DECLARE(name) void add_##name(CLI::App& app, Context& context);

@@ -270,6 +270,101 @@ TEST(Solve, JsonHasTheContractsKeys) {
   EXPECT_EQ(back->calibration, *report->calibration);
 }
 
+// A car: the engine's vibration and the road keep every block from being still, or, when they are
+// weak, scatter the magnitude.
+TEST(Solve, AMovingCarIsNotVerified) {
+  const SyntheticUnit unit = mismatched(14);
+  const auto reversal = Reversal::make({unit.positive, unit.negative, unit.zero}, unit.accel_scale,
+                                       RecordWidth::bits12);
+  ASSERT_OK(reversal);
+  for (const double shake_g : {0.03, 0.2}) {
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> road(0, shake_g);
+    auto finder = StillBlockFinder::make(*reversal, 30);
+    double time = 0;
+    for (const Vector& side : kSides) {
+      std::vector<Sample> samples;
+      double sway = 0;
+      for (int i = 0; i < 1800; ++i) {
+        sway = 0.95 * sway + 0.3 * road(random);  // slow enough to pass for still now and then
+        Vector g = side;
+        for (std::size_t a = 0; a < 3; ++a) {
+          g[a] += sway;
+        }
+        samples.push_back(tests::stored_sample(unit, tests::raw_sample(unit, g, random)));
+      }
+      finder->push(time, samples);
+      finder->break_run();
+      time += 100;
+    }
+    const auto report = solve_from_still_blocks(finder->finish(), file_constants(unit));
+    ASSERT_OK(report);
+    EXPECT_FALSE(report->verification.verified) << report->brief();
+  }
+}
+
+// 20 C from the first side to the last, at the ADXL362's typical 0.4 mg/C: either refused or within
+// what is stated.
+TEST(Solve, ATemperatureRampIsWithinTheStatedUncertainty) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SyntheticUnit unit = mismatched(seed);
+    unit.drift_mg_per_c = {-0.16, -0.40, 0.43};
+    std::vector<Vector> poses = kSides;
+    poses.insert(poses.end(), kSides.begin(), kSides.end());
+    const auto blocks = blocks_of(unit, poses, {30, 60, 5, 20}, seed);
+    const auto report = solve_from_still_blocks(blocks, file_constants(unit));
+    ASSERT_OK(report);
+    if (!report->verification.verified) {
+      continue;
+    }
+    // Against the zero at the middle of the ramp.
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double middle =
+          unit.zero_counts[a] + unit.drift_mg_per_c[a] * 10 / 1000 * unit.counts_per_g[a];
+      const double off_mg =
+          1000 * (report->calibration->zero_lsb[a] - middle) / unit.counts_per_g[a];
+      EXPECT_LT(std::abs(off_mg), 4 * report->uncertainty.zero_mg[a]) << seed;
+    }
+  }
+}
+
+// A side on which an axis is clipped gives no block, and is named.
+TEST(Solve, AClippedSideIsMissing) {
+  SyntheticUnit unit = mismatched(15);
+  // A recording at 2048 LSB/g: +1 g and more is the limit of 12 bits.
+  unit.accel_scale = 2048;
+  unit.zero = {0, 0, 0};
+  unit.positive = {250, 250, 250};
+  unit.negative = {-250, -250, -250};
+  unit.counts_per_g = {260, 230, 230};
+  unit.zero_counts = {20, 0, 0};
+  unit.noise_mg = 2;
+  const auto report =
+      solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 3}, 5), file_constants(unit));
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->verification.verified);
+  EXPECT_THAT(report->verification.missing_directions, testing::ElementsAre("+x"));
+}
+
+// Evidence for cross-axis terms is found where directions carry it, and reported.
+TEST(Solve, CrossAxisIsFoundByHeldOutError) {
+  SyntheticUnit unit = mismatched(16);
+  unit.cross_axis = {0.014, 0, 0};
+  std::mt19937_64 random(9);
+  std::vector<Vector> poses = kSides;
+  for (int i = 0; i < 30; ++i) {
+    poses.push_back(tests::random_direction(random));
+  }
+  const auto report =
+      solve_from_still_blocks(blocks_of(unit, poses, {30, 30}, 5), file_constants(unit));
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->verification.verified) << report->brief();
+  ASSERT_TRUE(report->fit->richer);
+  // The generator mixes g before the sensor; the fit unmixes after: the sign turns.
+  EXPECT_NEAR(report->fit->richer->fit.cross_axis[0], -0.014, 0.0015);
+  EXPECT_LT(report->fit->richer->held_out_rms_mg, 0.5 * *report->fit->held_out_rms_mg);
+}
+
 TEST(Solve, HostileNumbers) {
   const SyntheticUnit unit = mismatched(3);
   auto blocks = blocks_of(unit, kSides, {30, 60, 4}, 5);

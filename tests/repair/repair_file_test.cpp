@@ -271,8 +271,16 @@ TEST_F(RepairFile, AffectedFileWithoutConstantsIsBadData) {
   Bytes log;
   gt3x::append_record(log, gt3x::RecordType::parameters, made.start,
                       gt3x::encode_parameters(values));
+  const Bytes whole = made.log();
+  log.insert(
+      log.end(),
+      whole.begin() + static_cast<std::ptrdiff_t>(made.parameters().size() + gt3x::kRecordOverhead),
+      whole.end());
   ASSERT_OK(made.write(memory_.files, "in.gt3x", log));
-  EXPECT_EQ(repair().error->code, ErrorCode::bad_data);
+  const auto report = repair();
+  ASSERT_EQ(report.status, RepairStatus::failed);
+  EXPECT_EQ(report.error->code, ErrorCode::bad_data);
+  EXPECT_NE(report.error->what.find("constants"), std::string::npos);
 }
 
 // At every disk operation in turn the power goes: the original is whole, the output whole or
