@@ -119,6 +119,9 @@ Result<BundleReport> write_bundle(FileSystem& files, const std::string& folder,
   const auto rate = static_cast<std::size_t>(scenario.rate_hz);
   const std::size_t samples = record.counts.size();
   Bytes log = log_preamble(scenario.unit, scenario.start, scenario.rate_hz);
+  constexpr std::size_t kRecordOverhead = 16;
+  log.reserve(log.size() + samples * sizeof(gt3x::Counts) +
+              (samples / rate + 1) * kRecordOverhead);  // append_record grows a log to fit
   std::int64_t second = 0;
   for (std::size_t first = 0; first < samples; first += rate, ++second) {
     append_second(log, scenario.start + std::chrono::seconds(second),

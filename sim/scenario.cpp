@@ -143,8 +143,12 @@ Status parse_sensor(const Section& parent, std::string_view key,
   return section.axes("zero_lsb", zero, -2048, 2047);
 }
 
-Result<UnitTruth> parse_unit(const Json* json, std::uint64_t seed) {
+Result<UnitTruth> parse_unit(const Json* json, std::uint64_t seed, bool in_protocol) {
   UnitWishes wishes;
+  // A unit on a station's protocol has firmware of today, where nobody says otherwise.
+  if (in_protocol) {
+    wishes.firmware = "1.9.2";
+  }
   if (json == nullptr) {
     return draw_unit(seed, wishes);
   }
@@ -411,7 +415,7 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
       for (const Json& row : rows) {
         const Json list = row.is_array() ? row : Json::array({row});
         for (const Json& item : list) {
-          if (!item.is_number() || list.size() > kAxes || rows.size() > kAxes) {
+          if (!item.is_number() || numbers.size() == kAxes * kAxes) {
             return wrong(where, "this must be a number, three, or three rows of three");
           }
           numbers.push_back(item.get<double>());
@@ -522,7 +526,8 @@ Result<Scenario> parse_document(const Json& json) {
   }
   Scenario scenario;
   SIXPOINT_CHECK(top.seed("seed", scenario.seed));
-  SIXPOINT_ASSIGN(scenario.unit, parse_unit(top.find("unit"), scenario.seed));
+  SIXPOINT_ASSIGN(scenario.unit,
+                  parse_unit(top.find("unit"), scenario.seed, top.find("protocol") != nullptr));
   std::optional<UtcTime> start;
   SIXPOINT_CHECK(top.time("start", start));
   scenario.start = start.value_or(scenario.start);

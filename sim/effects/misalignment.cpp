@@ -1,4 +1,5 @@
-// The sensor's axes are rotated in the case.
+// The sensor's axes are rotated in the case: T turns the case's components into the sensor's, so the
+// axes themselves are turned by the inverse.
 #include "sim/effects/kinds.h"
 
 namespace sixpoint::sim {
@@ -11,7 +12,7 @@ class Misalignment final : public Effect {
       : turn_(rotation_by_deg(values.at("rotation_vector_deg"))) {}
   void on_sensor(SimulatedBlock& block) override {
     for (Eigen::Vector3d& sensed : block.sensed_g) {
-      sensed = turn_.transpose() * sensed;  // the axes turn, so components turn back
+      sensed = turn_ * sensed;
     }
   }
 

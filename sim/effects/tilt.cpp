@@ -16,11 +16,11 @@ class Tilt final : public Effect {
     }
     turn_ = rotation_by_deg({vector_deg[0], vector_deg[1], vector_deg[2]});
   }
-  // The base, and the unit with it, is turned by T in the laboratory; what maps the laboratory to
-  // the sensor gets the inverse on its right.
+  // T turns what acts on the unit, seen from the base: specific force f in the laboratory becomes
+  // T f. The base itself is turned by the inverse.
   void on_stimulus(SimulatedBlock& block) override {
     for (MotionState& motion : block.motion) {
-      motion.rotation = motion.rotation * turn_.transpose();
+      motion.rotation = motion.rotation * turn_;
     }
   }
 

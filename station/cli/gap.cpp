@@ -11,6 +11,7 @@
 #include "gap/bundle.h"
 #include "gap/diagnose.h"
 #include "station/cli/command.h"
+#include "station/cli/gap_challenge.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -107,6 +108,7 @@ void add_gap(CLI::App& app, Context& context) {
                                "write the augmented scenario to this file");
   diagnose_command->add_flag("--json", options->json, "one JSON document on standard output");
   diagnose_command->callback([options, &context] { run(*options, context); });
+  add_gap_challenge(*command, context);
 }
 
 }  // namespace sixpoint::cli

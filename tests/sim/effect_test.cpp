@@ -56,10 +56,10 @@ TEST(Effects, EveryEntryIsWhole) {
 
 // Oracle: closed forms.
 TEST(Effects, TiltTurnsGravityInTheLaboratory) {
-  // The base turned by +1 degree about lab x: the unit's y axis rises, so y feels +sin(1 degree).
+  // What acts is turned by +1 degree about lab x: up leans towards -y.
   const SimulatedBlock block = run("tilt", {{"rotation_vector_deg", {1, 0, 0}}}, {0, 0, 1});
   const double angle = std::acos(-1.0) / 180;
-  EXPECT_NEAR(block.true_g[0].y(), std::sin(angle), 1e-12);
+  EXPECT_NEAR(block.true_g[0].y(), -std::sin(angle), 1e-12);
   EXPECT_NEAR(block.true_g[0].z(), std::cos(angle), 1e-12);
 }
 

@@ -1,0 +1,409 @@
+#include "station/gap_trials.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "base/random.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using sim::Effect;
+using sim::EffectKind;
+using sim::EffectSpec;
+using sim::ParameterSet;
+using sim::SimulatedBlock;
+using sim::Stage;
+
+constexpr std::uint64_t kTrialStream = 0x74726961;
+
+// Effects outside the catalogue. Real ones, all of them; only the diagnosis has no name for them.
+
+// Random telegraph ("popcorn") noise of a bad contact or a trap in the front end.
+class Popcorn final : public Effect {
+ public:
+  Popcorn(const ParameterSet& values, Random random)
+      : g_(values.at("mg")[0] / kMgPerG), random_(random) {}
+  void on_sensor(SimulatedBlock& block) override {
+    constexpr double kMeanStay_s = 20;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      while (block.time_s[i] >= next_s_) {
+        next_s_ += -kMeanStay_s * std::log(1 - random_.uniform());
+        up_ = !up_;
+      }
+      block.sensed_g[i][0] += up_ ? g_ : 0;
+    }
+  }
+
+ private:
+  double g_;
+  Random random_;
+  double next_s_ = 0;
+  bool up_ = false;
+};
+
+// A knock moves the zero once and for all.
+class ZeroStep final : public Effect {
+ public:
+  ZeroStep(const ParameterSet& values, Random random)
+      : g_(values.at("mg")[0] / kMgPerG), share_(random.uniform(0.25, 0.75)) {}
+  void on_recording(const sim::RecordingPlan& plan) override {
+    at_ = static_cast<std::uint64_t>(share_ * static_cast<double>(plan.length()));
+  }
+  void on_sensor(SimulatedBlock& block) override {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (block.first_sample + i >= at_) {
+        block.sensed_g[i] += Eigen::Vector3d(g_, -g_, g_);
+      }
+    }
+  }
+
+ private:
+  double g_;
+  double share_;
+  std::uint64_t at_ = 0;
+};
+
+// The lowest bit of one axis never changes.
+class StuckBit final : public Effect {
+ public:
+  StuckBit(const ParameterSet& /*values*/, Random random)
+      : axis_(static_cast<std::size_t>(random.below(kAxes))) {}
+  void on_firmware(SimulatedBlock& block) override {
+    for (gt3x::Counts& counts : block.stored) {
+      counts[axis_] = static_cast<std::int16_t>(counts[axis_] & ~1);
+    }
+  }
+
+ private:
+  std::size_t axis_;
+};
+
+// Sensitivity that differs between the two directions of an axis.
+class Asymmetry final : public Effect {
+ public:
+  Asymmetry(const ParameterSet& values, Random /*random*/) : ratio_(values.at("mg")[0] / kMgPerG) {}
+  void on_sensor(SimulatedBlock& block) override {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      sensed.array() += ratio_ * sensed.array() * (sensed.array() * 20).tanh() * 0.5;
+      sensed[1] += ratio_ * sensed[0] * sensed[2];  // and a cross-axis product
+    }
+  }
+
+ private:
+  double ratio_;
+};
+
+// A machine that runs up and down: a line whose frequency wanders.
+class SweptLine final : public Effect {
+ public:
+  SweptLine(const ParameterSet& values, Random random)
+      : g_(values.at("mg")[0] / kMgPerG), phase_(random.uniform(0, 6)) {}
+  void on_stimulus(SimulatedBlock& block) override {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double t = block.time_s[i];
+      const double angle = 2 * std::numbers::pi * (14 * t - 4 * 60 / 6.3 * std::cos(6.3 * t / 60));
+      block.motion[i].force_lab_g.z() += g_ * std::sin(angle + phase_);
+    }
+  }
+
+ private:
+  double g_;
+  double phase_;
+};
+
+template <class T>
+EffectKind outside_kind(const char* name, Stage stage) {
+  return {name,
+          stage,
+          "outside the catalogue",
+          {{"mg", "mg", {2}, 0, 100, "drawn"}},
+          [](const ParameterSet& values, Random random) -> std::unique_ptr<Effect> {
+            return std::make_unique<T>(values, random);
+          }};
+}
+
+const std::vector<EffectKind>& outside_catalogue() {
+  static const std::vector<EffectKind> kKinds = {
+      outside_kind<Popcorn>("popcorn", Stage::sensor),
+      outside_kind<ZeroStep>("zero_step", Stage::sensor),
+      outside_kind<StuckBit>("stuck_bit", Stage::firmware),
+      outside_kind<Asymmetry>("asymmetry", Stage::sensor),
+      outside_kind<SweptLine>("swept_line", Stage::stimulus),
+  };
+  return kKinds;
+}
+
+class Drawing {
+ public:
+  Drawing(std::uint64_t seed, std::uint64_t index)
+      : random_(seed + 0x9E3779B97F4A7C15ULL * (index + 1), kTrialStream) {}
+
+  Random& random() { return random_; }
+
+  double severity() { return std::exp(random_.uniform(std::log(0.3), std::log(3.0))); }
+
+  double sign() { return random_.uniform() < 0.5 ? -1 : 1; }
+
+  // Three numbers whose largest is `size`, either sign.
+  std::vector<double> axes(double size) {
+    std::vector<double> numbers(kAxes);
+    double most = 0;
+    for (double& x : numbers) {
+      x = random_.uniform(-1, 1);
+      most = std::max(most, std::abs(x));
+    }
+    for (double& x : numbers) {
+      x *= size / std::max(most, 1e-6);
+    }
+    return numbers;
+  }
+
+  // What one effect of the catalogue consists of in this trial: mostly one, with a by-product where
+  // real ones have it.
+  Result<std::vector<EffectSpec>> effect(const std::string& name, double s) {
+    std::vector<EffectSpec> list;
+    const auto add = [&](const std::string& kind_name, const ParameterSet& given) -> Status {
+      SIXPOINT_ASSIGN(const EffectKind* kind, sim::find_effect(kind_name));
+      SIXPOINT_ASSIGN(ParameterSet values, sim::complete_parameters(*kind, given));
+      list.push_back({kind, std::move(values)});
+      return {};
+    };
+    if (name == "tilt") {
+      const double direction = random_.uniform(0, 2 * std::numbers::pi);
+      SIXPOINT_CHECK(
+          add(name, {{"rotation_vector_deg",
+                      {0.2 * s * std::cos(direction), 0.2 * s * std::sin(direction), 0}}}));
+    } else if (name == "seating") {
+      SIXPOINT_CHECK(add(name, {{"sd_deg", {0.1 * s}}}));
+    } else if (name == "settling") {
+      SIXPOINT_CHECK(add(name, {{"amplitude", {0.03 * s}},
+                                {"frequency_hz", {random_.uniform(3, 12)}},
+                                {"decay_s", {random_.uniform(0.2, 0.6)}},
+                                {"second_share", {random_.uniform(0, 0.35)}},
+                                {"second_ratio", {random_.uniform(1.7, 2.6)}}}));
+    } else if (name == "floor_vibration" || name == "electrical_line") {
+      const std::vector<double> vector_mg = axes(1.5 * s);
+      const double frequency_hz = random_.uniform(5, 30);
+      SIXPOINT_CHECK(add(name, {{"vector_mg", vector_mg}, {"frequency_hz", {frequency_hz}}}));
+      if (random_.uniform() < 0.5 && frequency_hz < 24) {
+        std::vector<double> harmonic = vector_mg;
+        for (double& x : harmonic) {
+          x *= 0.2;
+        }
+        SIXPOINT_CHECK(add(name, {{"vector_mg", harmonic}, {"frequency_hz", {2 * frequency_hz}}}));
+      }
+    } else if (name == "soft_mount") {
+      SIXPOINT_CHECK(add(
+          name, {{"frequency_hz", {random_.uniform(8, 25)}}, {"q", {random_.uniform(1.5, 4)}}}));
+    } else if (name == "local_gravity") {
+      SIXPOINT_CHECK(add(name, {{"ratio", {1 + sign() * std::min(0.0027, 0.0015 * s)}}}));
+    } else if (name == "misalignment") {
+      SIXPOINT_CHECK(add(name, {{"rotation_vector_deg", axes(0.4 * s)}}));
+    } else if (name == "non_orthogonality") {
+      SIXPOINT_CHECK(add(name, {{"yz_xz_xy", axes(0.005 * s)}}));
+    } else if (name == "second_order") {
+      SIXPOINT_CHECK(add(name, {{"mg_per_g2", axes(0.4 * s)}}));
+    } else if (name == "third_order") {
+      SIXPOINT_CHECK(add(name, {{"mg_per_g3", axes(0.04 * s)}}));
+    } else if (name == "hysteresis") {
+      SIXPOINT_CHECK(add(name, {{"mg", axes(0.8 * s)}}));
+    } else if (name == "offset_tempco") {
+      SIXPOINT_CHECK(add(name, {{"mg_per_c", axes(0.4 * s)}}));
+    } else if (name == "sensitivity_tempco") {
+      SIXPOINT_CHECK(add(name, {{"percent_per_c", axes(0.03 * s)}}));
+    } else if (name == "warm_up") {
+      const double tau_s = random_.uniform(120, 600);
+      const std::vector<double> mg = axes(4 * s);
+      std::vector<double> quick = mg;
+      for (double& x : quick) {
+        x *= random_.uniform(0, 0.2);
+      }
+      SIXPOINT_CHECK(add(name, {{"mg", mg}, {"tau_s", {tau_s}}}));
+      SIXPOINT_CHECK(add(name, {{"mg", quick}, {"tau_s", {tau_s / 4}}}));
+    } else if (name == "drift") {
+      const std::vector<double> mg_per_h = axes(3 * s);
+      if (random_.uniform() < 0.5) {
+        SIXPOINT_CHECK(add(name, {{"mg_per_h", mg_per_h}}));
+      } else {  // slows down over half a day
+        constexpr double kTau_h = 12;
+        std::vector<double> mg = mg_per_h;
+        for (double& x : mg) {
+          x *= -kTau_h;
+        }
+        SIXPOINT_CHECK(add("warm_up", {{"mg", mg}, {"tau_s", {kTau_h * 3600}}}));
+      }
+    } else if (name == "filter_mismatch") {
+      std::vector<double> offset_g(kAxes);
+      for (double& x : offset_g) {
+        x = sign() * random_.uniform(0.05, 0.2);
+      }
+      SIXPOINT_CHECK(add(
+          name, {{"gain", {1 - std::min(0.25, 0.12 * std::max(0.4, s))}}, {"offset_g", offset_g}}));
+    } else if (name == "bandwidth") {
+      SIXPOINT_CHECK(add(name, {{"corner_hz", {std::clamp(25 / std::sqrt(s), 12.5, 45.0)}},
+                                {"order", {2.0 * static_cast<double>(1 + random_.below(3))}}}));
+    } else if (name == "flicker") {
+      SIXPOINT_CHECK(add(name, {{"mg", {0.5 * s}}}));
+    } else if (name == "random_walk") {
+      SIXPOINT_CHECK(add(name, {{"mg_per_sqrt_s", {0.2 * s}}}));
+    } else if (name == "axis_rotation") {
+      SIXPOINT_CHECK(add(name, {{"matrix", turn()}}));
+    } else if (name == "clock_error") {
+      SIXPOINT_CHECK(add(name, {{"ppm", {sign() * 500 * s}}}));
+    } else if (name == "jitter") {
+      SIXPOINT_CHECK(add(name, {{"rms_ms", {0.7 * s}}}));
+    } else if (name == "dropped_samples" || name == "duplicated_samples") {
+      SIXPOINT_CHECK(add(name, {{"rate", {0.002 * s}}}));
+    } else if (name == "saturation") {
+      SIXPOINT_CHECK(add(name, {{"level_g", {random_.uniform(5, 7.5)}}}));
+    } else if (name == "idle_sleep") {
+      SIXPOINT_CHECK(add(name, {{"fraction", {0.05 * s}}}));
+    } else if (name == "charging_zeros") {
+      SIXPOINT_CHECK(add(name, {{"seconds", {std::max(2.0, 40 * s)}}}));
+    } else {
+      SIXPOINT_CHECK(add(name, {}));
+    }
+    return list;
+  }
+
+ private:
+  // A signed permutation without reflection that is not the identity.
+  std::vector<double> turn() {
+    for (;;) {
+      std::array<std::size_t, kAxes> order = {0, 1, 2};
+      for (std::size_t i = kAxes; i > 1; --i) {
+        std::swap(order[i - 1], order[static_cast<std::size_t>(random_.below(i))]);
+      }
+      Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+      for (std::size_t row = 0; row < kAxes; ++row) {
+        matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(order[row])) = sign();
+      }
+      if (matrix.determinant() > 0 && !matrix.isIdentity()) {
+        std::vector<double> rows;
+        for (Eigen::Index row = 0; row < 3; ++row) {
+          for (Eigen::Index column = 0; column < 3; ++column) {
+            rows.push_back(matrix(row, column));
+          }
+        }
+        return rows;
+      }
+    }
+  }
+
+  Random random_;
+};
+
+}  // namespace
+
+std::string_view to_string(TrialKind kind) {
+  switch (kind) {
+    case TrialKind::none:
+      return "none";
+    case TrialKind::single:
+      return "single";
+    case TrialKind::pair:
+      return "pair";
+    case TrialKind::outside:
+      return "outside";
+  }
+  return "?";
+}
+
+std::string_view family_of(std::string_view effect) {
+  static const std::map<std::string_view, std::string_view> kFamilies = {
+      {"tilt", "geometry"},
+      {"misalignment", "geometry"},
+      {"non_orthogonality", "geometry"},
+      {"second_order", "curvature"},
+      {"third_order", "curvature"},
+      {"wrap", "range"},
+      {"saturation", "range"},
+      {"truncation", "rounding"},
+      {"rounding_floor", "rounding"},
+      {"floor_vibration", "line"},
+      {"electrical_line", "line"},
+      {"clock_error", "timing"},
+      {"jitter", "timing"},
+      {"dropped_samples", "timing"},
+      {"duplicated_samples", "timing"},
+      {"soft_mount", "response"},
+      {"bandwidth", "response"},
+      {"flicker", "slow"},
+      {"random_walk", "slow"},
+      {"drift", "slow"},
+      {"warm_up", "slow"},
+      {"offset_tempco", "slow"},
+      {"seating", "repeat"},
+      {"hysteresis", "repeat"},
+      {"local_gravity", "gain"},
+      {"filter_mismatch", "gain"},
+      {"sensitivity_tempco", "gain"},
+      {"idle_sleep", "made up"},
+      {"charging_zeros", "made up"},
+  };
+  const auto found = kFamilies.find(effect);
+  return found == kFamilies.end() ? effect : found->second;
+}
+
+Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::StandardProtocol protocol,
+                            const TrialShares& shares, const std::vector<std::string>& only) {
+  Drawing drawing(seed, index);
+  Random& random = drawing.random();
+  GapTrial trial;
+
+  // The header is drawn without regard to the effects: headers lie.
+  constexpr std::array kFirmware = {"1.9.2", "1.9.1", "1.9.0", "1.8.0", "1.5.0"};
+  const std::string unit = fmt::format(
+      R"({{"serial": "MOS2{}{:08}", "firmware": "{}", "calibrated": "201{}-0{}-15T12:00:00Z"}})",
+      static_cast<char>('A' + random.below(5)), random.below(100'000'000),
+      kFirmware[random.below(kFirmware.size())], 4 + random.below(5), 5 + random.below(5));
+  SIXPOINT_ASSIGN(trial.scenario, sim::parse_scenario(fmt::format(
+                                      R"({{"seed": {}, "protocol": "{}", "unit": {}}})",
+                                      random.bits() >> 12U, to_string(protocol), unit)));
+
+  std::vector<std::string> names = only;
+  if (names.empty()) {
+    for (const EffectKind& kind : sim::effect_catalogue()) {
+      names.push_back(kind.name);
+    }
+  }
+  const double dice = random.uniform();
+  std::vector<EffectSpec>& effects = trial.scenario.protocol->effects;
+  if (dice < shares.none) {
+    trial.kind = TrialKind::none;
+    return trial;
+  }
+  if (dice < shares.none + shares.outside) {
+    trial.kind = TrialKind::outside;
+    const auto& kinds = outside_catalogue();
+    const EffectKind& kind = kinds[static_cast<std::size_t>(random.below(kinds.size()))];
+    const double severity = drawing.severity();
+    effects.push_back({&kind, {{"mg", {3 * severity}}}});
+    trial.effects.push_back({kind.name, severity});
+    return trial;
+  }
+  trial.kind = dice < shares.none + shares.outside + shares.pair && names.size() > 1
+                   ? TrialKind::pair
+                   : TrialKind::single;
+  while (trial.effects.size() < (trial.kind == TrialKind::pair ? 2U : 1U)) {
+    const std::string& name = names[static_cast<std::size_t>(random.below(names.size()))];
+    if (std::any_of(trial.effects.begin(), trial.effects.end(),
+                    [&](const TrialEffect& drawn) { return drawn.name == name; })) {
+      continue;
+    }
+    const double severity = drawing.severity();
+    SIXPOINT_ASSIGN(std::vector<EffectSpec> parts, drawing.effect(name, severity));
+    effects.insert(effects.end(), parts.begin(), parts.end());
+    trial.effects.push_back({name, severity});
+  }
+  return trial;
+}
+
+}  // namespace sixpoint::station
