@@ -20,7 +20,7 @@ std::string default_store() {
 
 CLI::Option* add_store_option(CLI::App& command, std::string& location) {
   return command.add_option("--store", location,
-                            "the store: an SQLite file (default: $SIXPOINT_STORE or " +
+                            "the store: an SQLite file or postgresql://... (default: $SIXPOINT_STORE or " +
                                 std::string("~/.local/share/sixpoint/store.db)"));
 }
 
