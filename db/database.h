@@ -67,8 +67,8 @@ class Database {
   virtual std::string table_options() const = 0;    // " STRICT" where the server knows it
   virtual const std::string& location() const = 0;  // for error messages; without a password
 
-  // Makes `path`, a file that is not there yet, a copy of the whole store as it is now, while others
-  // go on working; false where the server has no such means (and nothing was made).
+  // Makes `path`, a file that is not there yet, a copy of the whole store as it is now, while
+  // others go on working; false where the server has no such means (and nothing was made).
   virtual Result<bool> copy_to_file(const std::string& path) = 0;
 };
 
@@ -96,8 +96,8 @@ Result<std::unique_ptr<Database>> open_sqlite(const std::string& path);
 // may also come from PGPASSWORD or ~/.pgpass, which other users cannot see in the process list).
 // A connection that the server dropped is made anew by the next transaction. Errors:
 // device_unavailable where the server does not answer, went away or has no room; permission for a
-// wrong password or missing rights; no_input for a database that is not there; bad_data for one that
-// holds other tables. No message ever holds the password.
+// wrong password or missing rights; no_input for a database that is not there; bad_data for one
+// that holds other tables. No message ever holds the password.
 Result<std::unique_ptr<Database>> open_postgres(const std::string& location);
 
 }  // namespace sixpoint::db

@@ -73,9 +73,9 @@ class LineReader {
       buffer_.resize(searched + kChunk);
       SIXPOINT_ASSIGN(
           const std::size_t count,
-          file_->read_at(offset_, std::span(reinterpret_cast<std::uint8_t*>(buffer_.data()) +
-                                                searched,
-                                            kChunk)));
+          file_->read_at(
+              offset_,
+              std::span(reinterpret_cast<std::uint8_t*>(buffer_.data()) + searched, kChunk)));
       buffer_.resize(searched + count);
       offset_ += count;
       if (count == 0) {
@@ -100,7 +100,9 @@ class LineReader {
 };
 
 Result<Bytes> from_hex(const Json& json) {
-  const auto bad = [] { return fail(ErrorCode::bad_data, "no hexadecimal bytes", {}, "export again"); };
+  const auto bad = [] {
+    return fail(ErrorCode::bad_data, "no hexadecimal bytes", {}, "export again");
+  };
   if (!json.is_string()) {
     return bad();
   }
@@ -149,8 +151,8 @@ std::string row_line(const HistoryRow& row) {
     for (std::size_t i = 0; i < row.columns.size(); ++i) {
       if (const auto* text = std::get_if<std::string>(&row.columns[i])) {
         columns[std::string(row.table->columns[i].name)] = {
-            {"bytes", to_hex(std::span(reinterpret_cast<const std::uint8_t*>(text->data()),
-                                       text->size()))}};
+            {"bytes",
+             to_hex(std::span(reinterpret_cast<const std::uint8_t*>(text->data()), text->size()))}};
       }
     }
     return line.dump();
@@ -248,11 +250,12 @@ Status check_same(Database& database, const ImportedRow& row) {
            stored.back() == Value(row.hash);
   }
   if (!same) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("{} is not what the store has in its place: the file comes from another "
-                            "store, or one of the two was changed",
-                            name_of(row.view())),
-                {}, "import it into a new store, and run 'audit verify' on both");
+    return fail(
+        ErrorCode::bad_data,
+        fmt::format("{} is not what the store has in its place: the file comes from another "
+                    "store, or one of the two was changed",
+                    name_of(row.view())),
+        {}, "import it into a new store, and run 'audit verify' on both");
   }
   return {};
 }
@@ -270,11 +273,12 @@ Result<Header> to_header(const Json& line) {
                 "make the file with 'sixpoint store export'");
   }
   if (line["store_version"].get<std::int64_t>() > kSchemaVersion) {
-    return fail(ErrorCode::configuration,
-                fmt::format("the file is of a store of version {}, this program knows versions up to "
-                            "{}",
-                            line["store_version"].get<std::int64_t>(), kSchemaVersion),
-                {}, "use the sixpoint that made it, or a newer one");
+    return fail(
+        ErrorCode::configuration,
+        fmt::format("the file is of a store of version {}, this program knows versions up to "
+                    "{}",
+                    line["store_version"].get<std::int64_t>(), kSchemaVersion),
+        {}, "use the sixpoint that made it, or a newer one");
   }
   return Header{line["rows"].get<std::int64_t>(), line["head"].get<std::string>()};
 }
@@ -378,7 +382,8 @@ Result<ExchangeReport> export_json_lines(Store& store, FileSystem& files, const 
   SIXPOINT_CHECK(out.append(header.dump() + "\n"));
   SIXPOINT_CHECK(for_each_attachment(database, [&](const std::string& name, const Bytes& bytes) {
     ++report.attachments;
-    return out.append(fmt::format("{}\n", Json{{"attachment", name}, {"bytes", to_hex(bytes)}}.dump()));
+    return out.append(
+        fmt::format("{}\n", Json{{"attachment", name}, {"bytes", to_hex(bytes)}}.dump()));
   }));
   SIXPOINT_ASSIGN(auto history, HistoryReader::open(database));
   HistoryRow row;
@@ -430,8 +435,8 @@ Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::st
     }
     SIXPOINT_CHECK(out.commit());
   }
-  SIXPOINT_CHECK(for_each_attachment(
-      database, [&](const std::string& name, const Bytes& bytes) -> Status {
+  SIXPOINT_CHECK(
+      for_each_attachment(database, [&](const std::string& name, const Bytes& bytes) -> Status {
         // The name becomes a path: it must be the digest that it claims to be.
         if (to_hex(sha256(bytes)) != name) {
           return fail(ErrorCode::bad_data,
@@ -472,9 +477,10 @@ Result<ExchangeReport> import_json_lines(Store& store, FileSystem& files, const 
     }
     report.head = to_hex(writer.head().hash);
     if (report.rows >= before && report.head != header.head) {
-      return fail(ErrorCode::bad_data,
-                  fmt::format("the head that the file names does not belong to row {}", report.rows),
-                  {}, "export again");
+      return fail(
+          ErrorCode::bad_data,
+          fmt::format("the head that the file names does not belong to row {}", report.rows), {},
+          "export again");
     }
     if (report.added > 0 || report.attachments > 0) {
       SIXPOINT_CHECK(writer.finish());

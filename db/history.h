@@ -50,8 +50,8 @@ class HistoryWriter {
   const Head& head() const { return head_; }
   // Chains a new row to the end.
   Status append(const Table& table, std::span<const Value> columns);
-  // A row of another store, which must be the next one of this chain: bad_data where seq or hash say
-  // otherwise.
+  // A row of another store, which must be the next one of this chain: bad_data where seq or hash
+  // say otherwise.
   Status append_copy(const HistoryRow& row);
   Status add_attachment(const std::string& sha256, Bytes bytes);
   Status finish();

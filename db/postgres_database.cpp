@@ -1,9 +1,9 @@
 #include <map>
 #include <optional>
+#include <pqxx/pqxx>
 
 #include <fmt/format.h>
 #include <libpq-fe.h>
-#include <pqxx/pqxx>
 
 #include "db/database.h"
 
@@ -53,13 +53,19 @@ Result<Address> parse_address(const std::string& location) {
       given[option->keyword] = option->val;
     }
   }
+  // The rest of a password that was written with its @ or / as they are.
+  if (given["host"].find('@') != std::string::npos ||
+      given["dbname"].find_first_of("@/") != std::string::npos) {
+    return fail(ErrorCode::usage, "the address has an @ or a / too many",
+                "--store postgresql://...", "in a password, write @ as %40, / as %2F and : as %3A");
+  }
   Address address;
   address.password = given.contains("password") ? given["password"] : "";
   const auto part = [&](const char* key, const char* before) {
-    return given.contains(key) ? before + given[key] : std::string();
+    return !given[key].empty() ? before + given[key] : std::string();
   };
   address.shown = fmt::format("postgresql://{}{}{}{}", part("user", ""),
-                              part("host", given.contains("user") ? "@" : ""), part("port", ":"),
+                              part("host", !given["user"].empty() ? "@" : ""), part("port", ":"),
                               part("dbname", "/"));
   // A server that vanishes without a word must be noticed: connecting gives up after 10 s, and an
   // answer that does not come while the network is dead after 20 s.
@@ -71,6 +77,9 @@ Result<Address> parse_address(const std::string& location) {
   given.try_emplace("fallback_application_name", "sixpoint");
   given["client_encoding"] = "UTF8";
   for (const auto& [key, value] : given) {
+    if (value.empty()) {
+      continue;
+    }
     append_option(address.connection, key, value);
   }
   return address;
@@ -83,8 +92,8 @@ Result<std::optional<std::string>> to_parameter(const Value& value, const std::s
   }
   if (const auto* text = std::get_if<std::string>(&value)) {
     if (text->find('\0') != std::string::npos) {
-      return fail(ErrorCode::bad_data, "a text with a zero byte cannot be kept by PostgreSQL", where,
-                  "use an SQLite store for it");
+      return fail(ErrorCode::bad_data, "a text with a zero byte cannot be kept by PostgreSQL",
+                  where, "use an SQLite store for it");
     }
     return *text;
   }
@@ -92,6 +101,19 @@ Result<std::optional<std::string>> to_parameter(const Value& value, const std::s
     return fmt::format("\\x{:02x}", fmt::join(*bytes, ""));
   }
   return std::optional<std::string>();
+}
+
+// libpqxx 6 leaves the state out where it has a type of its own for it.
+std::string state_of(const pqxx::sql_error& exception) {
+  const auto is = [&]<class T>(const T*) { return dynamic_cast<const T*>(&exception) != nullptr; };
+  return !exception.sqlstate().empty()                                   ? exception.sqlstate()
+         : is(static_cast<const pqxx::insufficient_privilege*>(nullptr)) ? "42501"
+         : is(static_cast<const pqxx::integrity_constraint_violation*>(nullptr)) ? "23000"
+         : is(static_cast<const pqxx::data_exception*>(nullptr))                 ? "22000"
+         : is(static_cast<const pqxx::too_many_connections*>(nullptr))           ? "53300"
+         : is(static_cast<const pqxx::insufficient_resources*>(nullptr))         ? "53000"
+         : is(static_cast<const pqxx::plpgsql_raise*>(nullptr))                  ? "P0001"
+                                                                                 : "";
 }
 
 int hex_digit(char c) { return c <= '9' ? c - '0' : c - 'a' + 10; }
@@ -166,11 +188,10 @@ class PostgresDatabase final : public Database {
                   fmt::format("the database keeps texts as {}", text_of(encoding[0][0])),
                   address_.shown, "make a database with ENCODING 'UTF8'");
     }
-    SIXPOINT_ASSIGN(
-        const auto tables,
-        query("SELECT count(*), count(*) FILTER (WHERE tablename = 'sixpoint_schema') "
-              "FROM pg_tables WHERE schemaname = current_schema()",
-              {}));
+    SIXPOINT_ASSIGN(const auto tables,
+                    query("SELECT count(*), count(*) FILTER (WHERE tablename = 'sixpoint_schema') "
+                          "FROM pg_tables WHERE schemaname = current_schema()",
+                          {}));
     if (integer_of(tables[0][0]) > 0 && integer_of(tables[0][1]) == 0) {
       return fail(ErrorCode::bad_data, "the database has tables, but is no store of sixpoint",
                   address_.shown, "make an empty database for the store: createdb NAME");
@@ -402,7 +423,7 @@ class PostgresDatabase final : public Database {
 
   Error sql_error(const pqxx::sql_error& exception) const {
     const std::string what = fmt::format("the store answers: {}", said(exception));
-    const std::string& state = exception.sqlstate();
+    const std::string state = state_of(exception);
     const std::string& where = address_.shown;
     if (state.starts_with("08") || state.starts_with("57P") || state == "53300") {
       return gone(said(exception));
@@ -497,8 +518,7 @@ Result<std::unique_ptr<RowStream>> PostgresDatabase::stream(const std::string& s
                                                             std::span<const Value> parameters) {
   // The cursor ends with its transaction.
   const std::string name = fmt::format("sixpoint_rows_{}", ++cursors_);
-  SIXPOINT_CHECK(
-      execute(fmt::format("DECLARE {} NO SCROLL CURSOR FOR {}", name, sql), parameters));
+  SIXPOINT_CHECK(execute(fmt::format("DECLARE {} NO SCROLL CURSOR FOR {}", name, sql), parameters));
   return std::make_unique<PostgresRows>(*this, name);
 }
 

@@ -52,7 +52,9 @@ void bind(SQLite::Statement& statement, std::span<const Value> parameters) {
           if constexpr (std::is_same_v<T, std::monostate>) {
             statement.bind(name);
           } else if constexpr (std::is_same_v<T, Bytes>) {
-            statement.bind(name, value.data(), static_cast<int>(value.size()));
+            // A null pointer would be NULL; no bytes are bytes.
+            statement.bind(name, value.empty() ? static_cast<const void*>("") : value.data(),
+                           static_cast<int>(value.size()));
           } else {
             statement.bind(name, value);
           }

@@ -143,9 +143,10 @@ ConstantsRecord to_constants(const Row& row) {
 }
 
 RepairRecord to_repair(const Row& row) {
-  return {text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])), text_of(row[3]),
-          text_of(row[4]), text_of(row[5]), text_of(row[6]),             text_of(row[7]),
-          text_of(row[8]), text_of(row[9])};
+  return {text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
+          text_of(row[3]), text_of(row[4]), text_of(row[5]),
+          text_of(row[6]), text_of(row[7]), text_of(row[8]),
+          text_of(row[9])};
 }
 
 }  // namespace
@@ -195,8 +196,8 @@ struct Store::Impl {
 
   Status append_filter(HistoryWriter& writer, const std::string& filter) {
     return append(writer, "filter_configurations",
-                  std::vector<Value>{filter, std::string(filter == "legacy" ? kLegacyMeaning
-                                                                            : kCurrentMeaning)});
+                  std::vector<Value>{
+                      filter, std::string(filter == "legacy" ? kLegacyMeaning : kCurrentMeaning)});
   }
 };
 
@@ -345,8 +346,12 @@ Status Store::withdraw_constants(const std::string& id, const std::string& opera
   if (reason.empty()) {
     return fail(ErrorCode::usage, "a withdrawal needs a reason", {}, "say why");
   }
-  std::vector<Value> values = {to_ns(impl_->env.clock.now()), std::string("constants"), id,
-                               std::string("withdraw"),       operator_name,            reason};
+  std::vector<Value> values = {to_ns(impl_->env.clock.now()),
+                               std::string("constants"),
+                               id,
+                               std::string("withdraw"),
+                               operator_name,
+                               reason};
   values.insert(values.begin(), Value(identifier("corrections", values)));
   return impl_->in_transaction(
       [&](HistoryWriter& writer) { return impl_->append(writer, "corrections", values); });
@@ -443,11 +448,10 @@ Result<std::vector<RecallEntry>> Store::recall_list(const std::string& constants
 
 Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
   const std::vector<Value> parameters = {jig};
-  SIXPOINT_ASSIGN(
-      const auto rows,
-      impl_->database->query("SELECT serial, ended_ns, verdict FROM runs WHERE jig = $1 "
-                             "ORDER BY started_ns, seq",
-                             parameters));
+  SIXPOINT_ASSIGN(const auto rows, impl_->database->query(
+                                       "SELECT serial, ended_ns, verdict FROM runs WHERE jig = $1 "
+                                       "ORDER BY started_ns, seq",
+                                       parameters));
   std::map<std::string, JigUnit> units;
   for (const Row& row : rows) {
     JigUnit& unit = units[text_of(row[0])];
@@ -504,13 +508,12 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
 }
 
 Result<std::vector<DueUnit>> Store::units_due(UtcTime older_than) {
-  SIXPOINT_ASSIGN(
-      const auto rows,
-      impl_->database->query(
-          "SELECT serial, model, (SELECT max(made_at_ns) FROM constants "
-          "WHERE constants.serial = units.serial "
-          "AND NOT EXISTS (SELECT 1 FROM corrections WHERE about_table = 'constants' "
-          "AND about_id = constants.id AND action = 'withdraw')) FROM units"));
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->query(
+                      "SELECT serial, model, (SELECT max(made_at_ns) FROM constants "
+                      "WHERE constants.serial = units.serial "
+                      "AND NOT EXISTS (SELECT 1 FROM corrections WHERE about_table = 'constants' "
+                      "AND about_id = constants.id AND action = 'withdraw')) FROM units"));
   std::vector<DueUnit> due;
   for (const Row& row : rows) {
     DueUnit unit{text_of(row[0]), text_of(row[1]), std::nullopt};
@@ -560,8 +563,8 @@ Result<AuditReport> Store::audit() {
   SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(database));
 
   // Attachments are named by their content.
-  SIXPOINT_CHECK(for_each_attachment(
-      database, [&](const std::string& name, const Bytes& bytes) -> Status {
+  SIXPOINT_CHECK(
+      for_each_attachment(database, [&](const std::string& name, const Bytes& bytes) -> Status {
         if (to_hex(sha256(bytes)) != name) {
           find(fmt::format("attachment {} was changed", printable(name, 70)));
         }

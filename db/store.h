@@ -59,14 +59,14 @@ struct RunRecord {
   std::string jig;
   std::string verdict;
   std::string software;
-  std::string retest_of;  // a run's id, or empty
-  std::string document;   // JSON: the whole report
-  std::optional<UtcTime> jig_due = {};            // when the jig itself is due for calibration
-  std::string build = {};                         // commit or package version of the software
-  std::string limits = {};                        // JSON: the limits that the verdict used
-  std::optional<double> gravity_m_per_s2 = {};    // local gravity
-  std::optional<double> temperature_c = {};       // of the unit during the run
-  std::vector<std::string> codes = {};            // the verdict's reasons
+  std::string retest_of;                        // a run's id, or empty
+  std::string document;                         // JSON: the whole report
+  std::optional<UtcTime> jig_due = {};          // when the jig itself is due for calibration
+  std::string build = {};                       // commit or package version of the software
+  std::string limits = {};                      // JSON: the limits that the verdict used
+  std::optional<double> gravity_m_per_s2 = {};  // local gravity
+  std::optional<double> temperature_c = {};     // of the unit during the run
+  std::vector<std::string> codes = {};          // the verdict's reasons
 };
 
 // Raw data of a run, kept as it came.
@@ -155,16 +155,17 @@ class Store {
   // Errors as open_sqlite(), open_postgres() and migrate().
   static Result<Store> open(Env& env, const std::string& location);
 
-  // What the store is made of, for exchange.h and journal.h. Rows belong into it by this class only.
+  // What the store is made of, for exchange.h and journal.h. Rows belong into it by this class
+  // only.
   Database& database();
 
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
   ~Store();
 
-  // Adds the unit too when it is new (first seen at the record's own time). Returns the id. bad_data
-  // for an empty or unprintable serial, an unknown filter, a document that is no JSON, a text that is
-  // no UTF-8 or too long, a capture above 100 MiB.
+  // Adds the unit too when it is new (first seen at the record's own time). Returns the id.
+  // bad_data for an empty or unprintable serial, an unknown filter, a document that is no JSON, a
+  // text that is no UTF-8 or too long, a capture above 100 MiB.
   Result<std::string> add_constants(const ConstantsRecord& record, const std::string& model);
   Result<std::string> add_run(const RunRecord& run, const std::vector<Capture>& captures);
   Result<std::string> add_unit_write(const UnitWrite& write);

@@ -1,8 +1,7 @@
 // sixpoint store: moving, saving and asking the whole store.
-#include "db/exchange.h"
-
 #include <fmt/format.h>
 
+#include "db/exchange.h"
 #include "station/cli/command.h"
 #include "station/cli/store_option.h"
 
@@ -44,8 +43,7 @@ Answer import_store(const Options& options, Context& context) {
   // A missing input must not leave an empty store behind.
   SIXPOINT_CHECK(context.env.files.info(options.path));
   SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
-  SIXPOINT_ASSIGN(const auto report,
-                  db::import_json_lines(store, context.env.files, options.path));
+  SIXPOINT_ASSIGN(const auto report, db::import_json_lines(store, context.env.files, options.path));
   context.people << fmt::format("{}; {} were new\n", report.brief(), report.added);
   return exchange_json(report, options.path);
 }
@@ -138,8 +136,8 @@ Answer yield(const Options& options, Context& context) {
 
 Answer due(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-  SIXPOINT_ASSIGN(const auto units, store.units_due(context.env.clock.now() -
-                                                    std::chrono::hours(24) * options.days));
+  SIXPOINT_ASSIGN(const auto units,
+                  store.units_due(context.env.clock.now() - std::chrono::hours(24) * options.days));
   Json json = document("store");
   Json& list = json["units"] = Json::array();
   for (const auto& unit : units) {
