@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "db/hex.h"
 #include "db/history.h"
 
 namespace sixpoint::db {
@@ -99,30 +100,9 @@ class LineReader {
   std::int64_t number_ = 0;
 };
 
-Result<Bytes> from_hex(const Json& json) {
-  const auto bad = [] {
-    return fail(ErrorCode::bad_data, "no hexadecimal bytes", {}, "export again");
-  };
-  if (!json.is_string()) {
-    return bad();
-  }
-  const auto& text = json.get_ref<const std::string&>();
-  if (text.size() % 2 != 0) {
-    return bad();
-  }
-  const auto digit = [](char c) {
-    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-  };
-  Bytes bytes(text.size() / 2);
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    const int high = digit(text[2 * i]);
-    const int low = digit(text[2 * i + 1]);
-    if (high < 0 || low < 0) {
-      return bad();
-    }
-    bytes[i] = static_cast<std::uint8_t>(high * 16 + low);
-  }
-  return bytes;
+Result<Bytes> bytes_of(const Json& json) {
+  return from_hex(json.is_string() ? std::string_view(json.get_ref<const std::string&>())
+                                   : std::string_view("?"));
 }
 
 // Text that is no UTF-8 (early versions kept file names as they were) becomes {"bytes": hex}.
@@ -171,7 +151,7 @@ Result<Value> to_value(const Json& json, const Column& column) {
     return Value(json.get<std::string>());
   }
   if (column.type == ColumnType::text && json.is_object() && json.contains("bytes")) {
-    SIXPOINT_ASSIGN(const Bytes bytes, from_hex(json["bytes"]));
+    SIXPOINT_ASSIGN(const Bytes bytes, bytes_of(json["bytes"]));
     return Value(std::string(bytes.begin(), bytes.end()));
   }
   return fail(ErrorCode::bad_data, fmt::format("the column {} has no such value", column.name), {},
@@ -232,7 +212,7 @@ Result<ImportedRow> to_row(const Json& line) {
     return bad(fmt::format("row {} ({}) has columns that this program does not know", row.seq,
                            row.table->name));
   }
-  SIXPOINT_ASSIGN(row.hash, from_hex(line["hash"]));
+  SIXPOINT_ASSIGN(row.hash, bytes_of(line["hash"]));
   return row;
 }
 
@@ -285,7 +265,7 @@ Result<Header> to_header(const Json& line) {
 
 Status import_attachment(HistoryWriter& writer, const Json& line, ExchangeReport& report) {
   const Json& name = line["attachment"];
-  SIXPOINT_ASSIGN(Bytes bytes, from_hex(line.contains("bytes") ? line["bytes"] : Json(nullptr)));
+  SIXPOINT_ASSIGN(Bytes bytes, bytes_of(line.contains("bytes") ? line["bytes"] : Json(nullptr)));
   if (!name.is_string() || to_hex(sha256(bytes)) != name.get_ref<const std::string&>()) {
     return fail(ErrorCode::bad_data,
                 fmt::format("the attachment {} is not what its name says",

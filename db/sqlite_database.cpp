@@ -97,6 +97,19 @@ void read_row(SQLite::Statement& statement, Row& row) {
   }
 }
 
+// A compiled statement goes back to its start whether it succeeded or not: one that failed would
+// hold its locks and say the same error again at its next use.
+class Reset {
+ public:
+  explicit Reset(SQLite::Statement& statement) : statement_(statement) {}
+  Reset(const Reset&) = delete;
+  Reset& operator=(const Reset&) = delete;
+  ~Reset() { statement_.tryReset(); }
+
+ private:
+  SQLite::Statement& statement_;
+};
+
 class SqliteRows final : public RowStream {
  public:
   SqliteRows(SQLite::Database& database, const std::string& sql, std::span<const Value> parameters,
@@ -167,11 +180,10 @@ class SqliteDatabase final : public Database {
   Status execute(const std::string& sql, std::span<const Value> parameters) override {
     try {
       auto& statement = prepared(sql);
-      statement.reset();
+      const Reset reset(statement);
       bind(statement, parameters);
       while (statement.executeStep()) {
       }
-      statement.reset();
       return {};
     } catch (const SQLite::Exception& exception) {
       return fail(to_error(exception, path_));
@@ -191,13 +203,12 @@ class SqliteDatabase final : public Database {
                                  std::span<const Value> parameters) override {
     try {
       auto& statement = prepared(sql);
-      statement.reset();
+      const Reset reset(statement);
       bind(statement, parameters);
       std::vector<Row> rows;
       while (statement.executeStep()) {
         read_row(statement, rows.emplace_back());
       }
-      statement.reset();
       return rows;
     } catch (const SQLite::Exception& exception) {
       return fail(to_error(exception, path_));

@@ -51,20 +51,6 @@ bool is_storable(std::string_view text) {
   return true;
 }
 
-// The name of a file may be any bytes; it is evidence, so it is written down in a form that can be
-// kept rather than refused.
-std::string storable_path(std::string_view path) {
-  if (is_storable(path)) {
-    return std::string(path);
-  }
-  std::string text;
-  for (const char c : path) {
-    const auto byte = static_cast<unsigned char>(c);
-    text += byte >= 0x20 && byte < 0x7F ? std::string(1, c) : fmt::format("\\x{:02x}", byte);
-  }
-  return text;
-}
-
 Status check_texts(std::initializer_list<std::string_view> texts,
                    std::size_t limit = kLongestName) {
   for (const std::string_view text : texts) {
@@ -124,6 +110,79 @@ constexpr std::string_view kLegacyMeaning =
 constexpr std::string_view kCurrentMeaning =
     "the sensor's filter as firmware sets it since 2014-03-24";
 
+// The records as rows of their tables, checked, with their ids in front.
+Row with_id(std::string_view table, Row values) {
+  values.insert(values.begin(), Value(identifier(table, values)));
+  return values;
+}
+
+Result<Row> row_of(const ConstantsRecord& record) {
+  SIXPOINT_CHECK(check_serial(record.serial));
+  SIXPOINT_CHECK(check_filter(record.filter));
+  SIXPOINT_CHECK(check_json(record.document));
+  SIXPOINT_CHECK(check_texts({record.method, record.run_id}));
+  Row row = with_id("constants", {record.serial, record.filter, to_ns(record.made_at),
+                                  record.method, optional_text(record.run_id), record.document});
+  // Not part of the name: they are in the document, which is.
+  const auto document = nlohmann::ordered_json::parse(record.document);
+  row.push_back(member_of(document, "standard_uncertainty"));
+  row.push_back(member_of(document, "made_from"));
+  return row;
+}
+
+Status check_captures(const std::vector<Capture>& captures) {
+  for (const Capture& capture : captures) {
+    SIXPOINT_CHECK(check_texts({capture.name}));
+    if (capture.bytes.size() > kLargestCapture) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("the capture {} has {} bytes", printable(capture.name, 60),
+                              capture.bytes.size()),
+                  {}, fmt::format("the store keeps up to {} bytes", kLargestCapture));
+    }
+  }
+  return {};
+}
+
+Result<Row> row_of(const RunRecord& run) {
+  SIXPOINT_CHECK(check_serial(run.serial));
+  SIXPOINT_CHECK(check_filter(run.filter));
+  SIXPOINT_CHECK(check_json(run.document));
+  SIXPOINT_CHECK(check_texts({run.model, run.kind, run.operator_name, run.station, run.jig,
+                              run.verdict, run.software, run.retest_of, run.build}));
+  if (!run.limits.empty()) {
+    SIXPOINT_CHECK(check_json(run.limits));
+  }
+  for (const std::string& code : run.codes) {
+    SIXPOINT_CHECK(check_texts({code}, 10 * kLongestName));
+  }
+  return with_id(
+      "runs",
+      {run.serial, run.kind, run.filter, to_ns(run.started), to_ns(run.ended), run.operator_name,
+       run.station, run.jig, run.verdict, run.software, optional_text(run.retest_of), run.document,
+       run.jig_due ? Value(to_ns(*run.jig_due)) : Value(), optional_text(run.build),
+       optional_text(run.limits), number_text(run.gravity_m_per_s2), number_text(run.temperature_c),
+       run.codes.empty() ? Value() : Value(nlohmann::json(run.codes).dump())});
+}
+
+Result<Row> row_of(const UnitWrite& write) {
+  SIXPOINT_CHECK(check_serial(write.serial));
+  SIXPOINT_CHECK(check_texts({write.run_id}));
+  SIXPOINT_CHECK(check_texts({write.as_found, write.as_left, write.read_back}, kLargestDocument));
+  return with_id("unit_writes", {write.run_id, write.serial, to_ns(write.written), write.as_found,
+                                 write.as_left, write.read_back});
+}
+
+Result<Row> row_of(const RepairRecord& repair) {
+  SIXPOINT_CHECK(check_serial(repair.serial));
+  SIXPOINT_CHECK(check_json(repair.document));
+  SIXPOINT_CHECK(check_texts({repair.input_sha256, repair.output_sha256, repair.method,
+                              repair.constants_id, repair.software}));
+  return with_id("repairs", {repair.serial, to_ns(repair.made_at), storable_path(repair.input),
+                             repair.input_sha256, repair.output_sha256, repair.method,
+                             optional_text(repair.constants_id), repair.document,
+                             optional_text(repair.software)});
+}
+
 constexpr std::string_view kConstantsColumns =
     "constants.id, constants.made_at_ns, constants.serial, constants.filter, constants.method, "
     "constants.run_id, constants.document, constants.standard_uncertainty, constants.origin";
@@ -150,6 +209,20 @@ RepairRecord to_repair(const Row& row) {
 }
 
 }  // namespace
+
+// The name of a file may be any bytes; it is evidence, so it is written down in a form that can be
+// kept rather than refused.
+std::string storable_path(std::string_view path) {
+  if (is_storable(path)) {
+    return std::string(path);
+  }
+  std::string text;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    text += byte >= 0x20 && byte < 0x7F ? std::string(1, c) : fmt::format("\\x{:02x}", byte);
+  }
+  return text;
+}
 
 std::string AuditReport::brief() const {
   return ok ? fmt::format("{} rows, nothing touched, head {}", rows, head)
@@ -216,72 +289,42 @@ Result<Store> Store::open(Env& env, const std::string& location) {
 
 Database& Store::database() { return *impl_->database; }
 
+Result<std::string> id_of(const ConstantsRecord& record) {
+  SIXPOINT_ASSIGN(const auto row, row_of(record));
+  return text_of(row[0]);
+}
+
+Result<std::string> id_of(const RunRecord& run, const std::vector<Capture>& captures) {
+  SIXPOINT_CHECK(check_captures(captures));
+  SIXPOINT_ASSIGN(const auto row, row_of(run));
+  return text_of(row[0]);
+}
+
+Result<std::string> id_of(const UnitWrite& write) {
+  SIXPOINT_ASSIGN(const auto row, row_of(write));
+  return text_of(row[0]);
+}
+
+Result<std::string> id_of(const RepairRecord& repair) {
+  SIXPOINT_ASSIGN(const auto row, row_of(repair));
+  return text_of(row[0]);
+}
+
 Result<std::string> Store::add_constants(const ConstantsRecord& record, const std::string& model) {
-  SIXPOINT_CHECK(check_serial(record.serial));
-  SIXPOINT_CHECK(check_filter(record.filter));
-  SIXPOINT_CHECK(check_json(record.document));
-  SIXPOINT_CHECK(check_texts({record.method, record.run_id, model}));
-  std::vector<Value> values = {record.serial,
-                               record.filter,
-                               to_ns(record.made_at),
-                               record.method,
-                               optional_text(record.run_id),
-                               record.document};
-  const std::string id = identifier("constants", values);
-  values.insert(values.begin(), Value(id));
-  const auto document = nlohmann::ordered_json::parse(record.document);
-  values.push_back(member_of(document, "standard_uncertainty"));
-  values.push_back(member_of(document, "made_from"));
+  SIXPOINT_CHECK(check_texts({model}));
+  SIXPOINT_ASSIGN(const auto values, row_of(record));
   SIXPOINT_CHECK(impl_->in_transaction([&](HistoryWriter& writer) -> Status {
     SIXPOINT_CHECK(impl_->append_unit(writer, record.serial, model, record.made_at));
     SIXPOINT_CHECK(impl_->append_filter(writer, record.filter));
     return impl_->append(writer, "constants", values);
   }));
-  return id;
+  return text_of(values[0]);
 }
 
 Result<std::string> Store::add_run(const RunRecord& run, const std::vector<Capture>& captures) {
-  SIXPOINT_CHECK(check_serial(run.serial));
-  SIXPOINT_CHECK(check_filter(run.filter));
-  SIXPOINT_CHECK(check_json(run.document));
-  SIXPOINT_CHECK(check_texts({run.model, run.kind, run.operator_name, run.station, run.jig,
-                              run.verdict, run.software, run.retest_of, run.build}));
-  if (!run.limits.empty()) {
-    SIXPOINT_CHECK(check_json(run.limits));
-  }
-  for (const std::string& code : run.codes) {
-    SIXPOINT_CHECK(check_texts({code}, 10 * kLongestName));
-  }
-  for (const Capture& capture : captures) {
-    SIXPOINT_CHECK(check_texts({capture.name}));
-    if (capture.bytes.size() > kLargestCapture) {
-      return fail(ErrorCode::bad_data,
-                  fmt::format("the capture {} has {} bytes", printable(capture.name, 60),
-                              capture.bytes.size()),
-                  {}, fmt::format("the store keeps up to {} bytes", kLargestCapture));
-    }
-  }
-  std::vector<Value> values = {
-      run.serial,
-      run.kind,
-      run.filter,
-      to_ns(run.started),
-      to_ns(run.ended),
-      run.operator_name,
-      run.station,
-      run.jig,
-      run.verdict,
-      run.software,
-      optional_text(run.retest_of),
-      run.document,
-      run.jig_due ? Value(to_ns(*run.jig_due)) : Value(),
-      optional_text(run.build),
-      optional_text(run.limits),
-      number_text(run.gravity_m_per_s2),
-      number_text(run.temperature_c),
-      run.codes.empty() ? Value() : Value(nlohmann::json(run.codes).dump())};
-  const std::string id = identifier("runs", values);
-  values.insert(values.begin(), Value(id));
+  SIXPOINT_CHECK(check_captures(captures));
+  SIXPOINT_ASSIGN(const auto values, row_of(run));
+  const std::string id = text_of(values[0]);
   SIXPOINT_CHECK(impl_->in_transaction([&](HistoryWriter& writer) -> Status {
     SIXPOINT_CHECK(impl_->append_unit(writer, run.serial, run.model, run.started));
     SIXPOINT_CHECK(impl_->append_filter(writer, run.filter));
@@ -299,37 +342,17 @@ Result<std::string> Store::add_run(const RunRecord& run, const std::vector<Captu
 }
 
 Result<std::string> Store::add_unit_write(const UnitWrite& write) {
-  SIXPOINT_CHECK(check_serial(write.serial));
-  SIXPOINT_CHECK(check_texts({write.run_id}));
-  SIXPOINT_CHECK(check_texts({write.as_found, write.as_left, write.read_back}, kLargestDocument));
-  std::vector<Value> values = {write.run_id,   write.serial,  to_ns(write.written),
-                               write.as_found, write.as_left, write.read_back};
-  const std::string id = identifier("unit_writes", values);
-  values.insert(values.begin(), Value(id));
+  SIXPOINT_ASSIGN(const auto values, row_of(write));
   SIXPOINT_CHECK(impl_->in_transaction(
       [&](HistoryWriter& writer) { return impl_->append(writer, "unit_writes", values); }));
-  return id;
+  return text_of(values[0]);
 }
 
 Result<std::string> Store::add_repair(const RepairRecord& repair) {
-  SIXPOINT_CHECK(check_serial(repair.serial));
-  SIXPOINT_CHECK(check_json(repair.document));
-  SIXPOINT_CHECK(check_texts({repair.input_sha256, repair.output_sha256, repair.method,
-                              repair.constants_id, repair.software}));
-  std::vector<Value> values = {repair.serial,
-                               to_ns(repair.made_at),
-                               storable_path(repair.input),
-                               repair.input_sha256,
-                               repair.output_sha256,
-                               repair.method,
-                               optional_text(repair.constants_id),
-                               repair.document,
-                               optional_text(repair.software)};
-  const std::string id = identifier("repairs", values);
-  values.insert(values.begin(), Value(id));
+  SIXPOINT_ASSIGN(const auto values, row_of(repair));
   SIXPOINT_CHECK(impl_->in_transaction(
       [&](HistoryWriter& writer) { return impl_->append(writer, "repairs", values); }));
-  return id;
+  return text_of(values[0]);
 }
 
 Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,
@@ -394,6 +417,7 @@ Result<std::vector<UnitRecord>> Store::units() {
                       "(SELECT count(*) FROM constants WHERE constants.serial = units.serial) "
                       "FROM units"));
   std::vector<UnitRecord> records;
+  records.reserve(rows.size());
   for (const Row& row : rows) {
     records.push_back({text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
                        static_cast<std::size_t>(integer_of(row[3]))});
@@ -461,6 +485,7 @@ Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
     unit.last_verdict = text_of(row[2]);
   }
   std::vector<JigUnit> list;
+  list.reserve(units.size());
   for (auto& [serial, unit] : units) {
     list.push_back(std::move(unit));
   }
@@ -544,6 +569,7 @@ Result<std::vector<TrendPoint>> Store::trend(const std::string& serial) {
                       kConstantsColumns),
           parameters));
   std::vector<TrendPoint> points;
+  points.reserve(rows.size());
   for (const Row& row : rows) {
     constexpr std::size_t kNext = kConstantsColumnCount;
     points.push_back({to_constants(row), text_of(row[kNext]), text_of(row[kNext + 1]),

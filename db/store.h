@@ -149,6 +149,16 @@ struct AuditReport {
   nlohmann::ordered_json to_json() const;  // ok, rows, head, findings
 };
 
+// The id that the store gives to a record, and the same errors where it would refuse it by itself:
+// known without a store, so that records can be named while it is away (journal.h).
+Result<std::string> id_of(const ConstantsRecord& record);
+Result<std::string> id_of(const RunRecord& run, const std::vector<Capture>& captures);
+Result<std::string> id_of(const UnitWrite& write);
+Result<std::string> id_of(const RepairRecord& repair);
+
+// A file's name as the store keeps it: bytes that are no UTF-8 are written \xNN.
+std::string storable_path(std::string_view path);
+
 class Store {
  public:
   // `location`: a path of an SQLite file, which is made when it is not there, or postgresql://...

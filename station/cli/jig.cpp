@@ -31,6 +31,7 @@ struct Options {
 
 struct Done {
   station::JigReport report;
+  double residual_limit_mg = 0;  // that the verdict used
   std::string run_id;
   std::optional<std::string> constants_id;
 };
@@ -66,6 +67,16 @@ Status keep(Context& context, const Options& options, Done& done) {
   run.verdict = station::to_string(report.verdict);
   run.software = "sixpoint " SIXPOINT_VERSION;
   run.document = report.to_json().dump();
+  run.gravity_m_per_s2 = report.gravity.m_per_s2;
+  run.codes = report.reasons;
+  if (!report.faces.empty()) {
+    double sum_c = 0;
+    for (const station::PoseReading& face : report.faces) {
+      sum_c += face.temperature_c;
+    }
+    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
+  }
+  run.limits = Json{{"residual_mg", done.residual_limit_mg}}.dump();
   SIXPOINT_ASSIGN(
       done.run_id,
       store.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
@@ -135,6 +146,7 @@ Result<Done> run(Context& context, const Options& options) {
   };
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
+  done.residual_limit_mg = session.residual_limit_mg;
   SIXPOINT_CHECK(keep(context, options, done));
   return done;
 }

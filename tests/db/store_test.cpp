@@ -166,6 +166,8 @@ TEST_F(StoreTest, RefusesWhatItCannotKeep) {
   of_nothing.constants_id = "none";
   of_nothing.document = "{}";
   EXPECT_FAILS(store.add_repair(of_nothing), ErrorCode::bad_data);
+  of_nothing.constants_id = "";
+  EXPECT_OK(store.add_repair(of_nothing)) << "a refusal is not said again to the next";
   ASSERT_OK(store.add_constants(constants("O'Hara\"; DROP TABLE units;--", "current", 1), "w"));
   EXPECT_EQ(store.units()->front().serial, "O'Hara\"; DROP TABLE units;--");
 }
