@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "calib/gravity.h"
+#include "db/journal.h"
 #include "device/unit.h"
 #include "gt3x/model.h"
 #include "station/cli/command.h"
@@ -50,10 +51,11 @@ int exit_code_of(station::JigVerdict verdict) {
   return kExitFailed;
 }
 
-Status keep(Context& context, const Options& options, Done& done) {
+// Into the store, or into the journal, which takes the same.
+template <class Keeper>
+Status keep_in(Keeper& keeper, const Options& options, Done& done) {
   const station::JigReport& report = done.report;
   const std::string model(gt3x::model_of(report.serial));
-  SIXPOINT_ASSIGN(db::Store store, open_store(context, options.store));
   db::RunRecord run;
   run.serial = report.serial;
   run.model = model;
@@ -79,7 +81,7 @@ Status keep(Context& context, const Options& options, Done& done) {
   run.limits = Json{{"residual_mg", done.residual_limit_mg}}.dump();
   SIXPOINT_ASSIGN(
       done.run_id,
-      store.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
+      keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
   if (report.written) {
     db::UnitWrite write;
     write.run_id = done.run_id;
@@ -89,7 +91,7 @@ Status keep(Context& context, const Options& options, Done& done) {
         report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
     write.as_left = calib::to_json(report.six->best().stored).dump();
     write.read_back = calib::to_json(report.as_left->constants).dump();
-    SIXPOINT_CHECK(store.add_unit_write(write));
+    SIXPOINT_CHECK(keeper.add_unit_write(write));
   }
   if (report.usable()) {
     calib::ConstantsRecord constants = report.record();
@@ -101,8 +103,32 @@ Status keep(Context& context, const Options& options, Done& done) {
     row.method = constants.method;
     row.run_id = done.run_id;
     row.document = calib::to_json(constants).dump();
-    SIXPOINT_ASSIGN(done.constants_id, store.add_constants(row, model));
+    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, model));
   }
+  return {};
+}
+
+// A run is not lost because the server is away: it waits in the journal, which every later run and
+// 'sixpoint store catch-up' empties in order.
+Status keep(Context& context, const Options& options, Done& done) {
+  auto store = open_store(context, options.store);
+  if (!is_on_server(options.store)) {
+    return store ? keep_in(*store, options, done) : Status(fail(store.error()));
+  }
+  SIXPOINT_ASSIGN(auto journal,
+                  db::Journal::open(context.env.files, journal_folder(options.store)));
+  Status status = store ? Status() : Status(fail(store.error()));
+  if (status) {
+    const auto taken = journal.catch_up(*store);
+    status = taken ? keep_in(*store, options, done) : Status(fail(taken.error()));
+  }
+  if (status || status.error().code != ErrorCode::device_unavailable) {
+    return status;
+  }
+  // What the store did take before it went away is named the same, and stored once.
+  SIXPOINT_CHECK(keep_in(journal, options, done));
+  context.log().warn("{}; the run is kept in this station's journal and goes into the store later",
+                     status.error().brief());
   return {};
 }
 

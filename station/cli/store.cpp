@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "db/exchange.h"
+#include "db/journal.h"
 #include "station/cli/command.h"
 #include "station/cli/store_option.h"
 
@@ -53,6 +54,17 @@ Answer back_up(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const auto report, db::backup(store, context.env, options.path));
   context.people << report.brief() << '\n';
   return exchange_json(report, options.path);
+}
+
+Answer catch_up(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto journal,
+                  db::Journal::open(context.env.files, journal_folder(options.store)));
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const std::size_t taken, journal.catch_up(store));
+  context.people << fmt::format("{} entries of the journal are in the store now\n", taken);
+  Json json = document("store");
+  json["taken"] = taken;
+  return json;
 }
 
 Answer withdraw(const Options& options, Context& context) {
@@ -220,6 +232,8 @@ void add_store(CLI::App& app, Context& context) {
       options)
       ->add_option("-o,--output", options->path, "The copy")
       ->required();
+  add(*command, context, "catch-up", "Store what was measured while the store's server was away",
+      catch_up, options);
   auto* taken_back = add(*command, context, "withdraw",
                          "Constants apply no more; they stay in the history", withdraw, options);
   taken_back->add_option("id", options->id, "The constants' id ('sixpoint history')")->required();
