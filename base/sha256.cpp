@@ -38,6 +38,7 @@ Sha256Digest Sha256::finish() {
   Sha256Digest digest{};
   unsigned int size = 0;
   EVP_DigestFinal_ex(state_->context, digest.data(), &size);
+  EVP_DigestInit_ex(state_->context, nullptr, nullptr);
   return digest;
 }
 

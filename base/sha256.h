@@ -20,7 +20,7 @@ class Sha256 {
   ~Sha256();
   void update(std::span<const std::uint8_t> bytes);
   void update(std::string_view text);
-  Sha256Digest finish();  // once; the object is used up
+  Sha256Digest finish();  // and begins anew
 
  private:
   struct State;

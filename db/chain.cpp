@@ -4,8 +4,10 @@ namespace sixpoint::db {
 namespace {
 
 void put_integer(Bytes& out, std::uint64_t value) {
-  for (int shift = 56; shift >= 0; shift -= 8) {
-    out.push_back(static_cast<std::uint8_t>(value >> shift));
+  const std::size_t at = out.size();
+  out.resize(at + 8);
+  for (std::size_t i = 0; i < 8; ++i) {
+    out[at + i] = static_cast<std::uint8_t>(value >> (56 - 8 * i));
   }
 }
 
@@ -26,17 +28,44 @@ void put(Bytes& out, const Value& value) {
   }
 }
 
+// How many of the columns count: those of version 1, and added ones up to the last that is set.
+std::span<const Value> counted(const Table& table, std::span<const Value> columns,
+                               std::size_t skipped) {
+  std::size_t count = columns.size();
+  while (count > 0 && table.columns[count - 1 + skipped].since > table.since &&
+         std::holds_alternative<std::monostate>(columns[count - 1])) {
+    --count;
+  }
+  return columns.first(count);
+}
+
 }  // namespace
 
-Sha256Digest chain_hash(std::span<const std::uint8_t> previous, std::string_view table,
-                        std::int64_t seq, std::span<const Value> columns) {
-  Bytes bytes(previous.begin(), previous.end());
-  put_text(bytes, table);
-  put(bytes, Value(seq));
+Sha256Digest ChainHasher::finish(std::span<const Value> columns) {
   for (const Value& value : columns) {
-    put(bytes, value);
+    put(bytes_, value);
   }
-  return sha256(bytes);
+  sha256_.update(bytes_);
+  return sha256_.finish();
+}
+
+Sha256Digest ChainHasher::hash(std::span<const std::uint8_t> previous, const Table& table,
+                               std::int64_t seq, std::span<const Value> columns) {
+  bytes_.assign(previous.begin(), previous.end());
+  put_text(bytes_, table.name);
+  bytes_.push_back(1);
+  put_integer(bytes_, static_cast<std::uint64_t>(seq));
+  return finish(counted(table, columns, 0));
+}
+
+std::string ChainHasher::identifier(const Table& table,
+                                    std::span<const Value> columns_without_key) {
+  bytes_.clear();
+  put_text(bytes_, table.name);
+  bytes_.push_back(1);
+  put_integer(bytes_, 0);
+  const Sha256Digest digest = finish(counted(table, columns_without_key, 1));
+  return to_hex(std::span(digest).first(16));
 }
 
 }  // namespace sixpoint::db

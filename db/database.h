@@ -10,6 +10,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -22,6 +23,11 @@ namespace sixpoint::db {
 // JSON text that was written, so that both servers return the very same bytes and hashes agree.
 using Value = std::variant<std::monostate, std::int64_t, std::string, Bytes>;
 using Row = std::vector<Value>;
+
+// What a column holds, or the empty text and 0 where it is NULL or of another type.
+std::string text_of(const Value& value);
+std::int64_t integer_of(const Value& value);
+Value optional_text(const std::string& text);  // NULL for an empty text
 
 // Rows that come one at a time, so that ten million of them need no memory.
 class RowStream {
@@ -37,12 +43,19 @@ class Database {
 
   // Starts a transaction that no other writer can interleave with; waits for other writers.
   virtual Status begin_writing() = 0;
+  // Starts a transaction that sees the store as it is now, whatever others write meanwhile. It ends
+  // with roll_back().
+  virtual Status begin_reading() = 0;
   virtual Status commit() = 0;   // durable when it returns
   virtual void roll_back() = 0;  // does nothing outside a transaction
 
   virtual Status execute(const std::string& sql, std::span<const Value> parameters = {}) = 0;
+  // For long answers; inside a transaction, which must outlive the stream. Several may be open.
   virtual Result<std::unique_ptr<RowStream>> stream(const std::string& sql,
                                                     std::span<const Value> parameters = {}) = 0;
+  // All rows of a query that is known to be short. The statement is compiled once.
+  virtual Result<std::vector<Row>> query(const std::string& sql,
+                                         std::span<const Value> parameters = {}) = 0;
 
   // The version of the schema that the store has; 0 for an empty one.
   virtual Result<std::int64_t> schema_version() = 0;
@@ -54,13 +67,37 @@ class Database {
   virtual std::string table_options() const = 0;    // " STRICT" where the server knows it
   virtual const std::string& location() const = 0;  // for error messages; without a password
 
-  // All rows of a query that is known to be short.
-  Result<std::vector<Row>> query(const std::string& sql, std::span<const Value> parameters = {});
+  // Makes `path`, a file that is not there yet, a copy of the whole store as it is now, while
+  // others go on working; false where the server has no such means (and nothing was made).
+  virtual Result<bool> copy_to_file(const std::string& path) = 0;
+};
+
+// A transaction that is undone unless commit() was called.
+class Transaction {
+ public:
+  static Result<Transaction> writing(Database& database);
+  static Result<Transaction> reading(Database& database);
+  Transaction(Transaction&& other) noexcept;
+  Transaction& operator=(Transaction&&) = delete;
+  ~Transaction();
+  Status commit();
+
+ private:
+  explicit Transaction(Database& database) : database_(&database) {}
+  Database* database_;
 };
 
 // An SQLite file; made when it is not there. WAL mode, every commit synced, foreign keys on; a
 // writer waits up to 30 s for another. Errors: no_input or cannot_create for the path, permission
 // for a read-only place, bad_data for a file that is no store or is damaged, io for a full disk.
 Result<std::unique_ptr<Database>> open_sqlite(const std::string& path);
+
+// A PostgreSQL database (postgresql://user:password@host:port/name, as libpq takes it; a password
+// may also come from PGPASSWORD or ~/.pgpass, which other users cannot see in the process list).
+// A connection that the server dropped is made anew by the next transaction. Errors:
+// device_unavailable where the server does not answer, went away or has no room; permission for a
+// wrong password or missing rights; no_input for a database that is not there; bad_data for one
+// that holds other tables. No message ever holds the password.
+Result<std::unique_ptr<Database>> open_postgres(const std::string& location);
 
 }  // namespace sixpoint::db

@@ -7,6 +7,14 @@
 
 namespace sixpoint::db {
 
+namespace {
+
+Column added(std::string_view name, ColumnType type = ColumnType::text) {
+  return {.name = name, .type = type, .required = false, .since = 2};
+}
+
+}  // namespace
+
 const std::vector<Table>& tables() {
   static const std::vector<Table> kTables = {
       {"units",
@@ -25,7 +33,13 @@ const std::vector<Table>& tables() {
         {.name = "verdict"},
         {.name = "software"},
         {.name = "retest_of", .required = false, .references = "runs(id)"},
-        {.name = "document"}},
+        {.name = "document"},
+        added("jig_due_ns", ColumnType::integer),  // when the jig itself is due for calibration
+        added("build"),                            // of the software: commit or package version
+        added("limits"),                           // JSON: the limits that the verdict used
+        added("gravity_m_per_s2"),                 // local gravity, a JSON number
+        added("temperature_c"),                    // of the unit during the run, a JSON number
+        added("codes")},                           // JSON: the verdict's reasons, an array
        {"serial", "jig"}},
       {"captures",
        {{.name = "id"},
@@ -40,7 +54,9 @@ const std::vector<Table>& tables() {
         {"made_at_ns", ColumnType::integer},
         {.name = "method"},
         {.name = "run_id", .required = false, .references = "runs(id)"},
-        {.name = "document"}},
+        {.name = "document"},
+        added("standard_uncertainty"),  // JSON
+        added("origin")},               // JSON: the file or the run, with its SHA-256
        {"serial, filter, made_at_ns"}},
       {"unit_writes",
        {{.name = "id"},
@@ -60,7 +76,8 @@ const std::vector<Table>& tables() {
         {.name = "output_sha256"},
         {.name = "method"},
         {.name = "constants_id", .required = false, .references = "constants(id)"},
-        {.name = "document"}},
+        {.name = "document"},
+        added("software")},
        {"constants_id", "input_sha256", "output_sha256", "serial"}},
       {"corrections",
        {{.name = "id"},
@@ -71,64 +88,115 @@ const std::vector<Table>& tables() {
         {.name = "operator"},
         {.name = "reason"}},
        {"about_table, about_id"}},
+      {.name = "filter_configurations",
+       .columns = {{.name = "name", .since = 2}, {.name = "meaning", .since = 2}},
+       .since = 2},
   };
   return kTables;
 }
 
-const Table& table(std::string_view name) {
+const Table* find_table(std::string_view name) {
   const auto found = std::find_if(tables().begin(), tables().end(),
                                   [&](const Table& table) { return table.name == name; });
-  assert(found != tables().end());
+  return found == tables().end() ? nullptr : &*found;
+}
+
+const Table& table(std::string_view name) {
+  const Table* found = find_table(name);
+  assert(found != nullptr);
   return *found;
+}
+
+std::string column_list(const Table& table) {
+  std::string list = "seq";
+  for (const Column& column : table.columns) {
+    list += fmt::format(", {}", column.name);
+  }
+  return list + ", hash";
 }
 
 namespace {
 
-std::string create_statement(const Table& table, const Database& database) {
-  const std::string integer = database.integer_type();
-  std::string sql = fmt::format("CREATE TABLE {} (seq {} PRIMARY KEY", table.name, integer);
+std::string type_of(const Column& column, const Database& database) {
+  return column.type == ColumnType::integer ? database.integer_type() : std::string("TEXT");
+}
+
+// The table as its first version had it.
+std::vector<std::string> create_statements(const Table& table, const Database& database) {
+  std::string sql =
+      fmt::format("CREATE TABLE {} (seq {} PRIMARY KEY", table.name, database.integer_type());
   for (std::size_t i = 0; i < table.columns.size(); ++i) {
     const Column& column = table.columns[i];
-    sql += fmt::format(", {} {}{}{}", column.name,
-                       column.type == ColumnType::integer ? integer : "TEXT",
+    if (column.since > table.since) {
+      continue;
+    }
+    sql += fmt::format(", {} {}{}{}", column.name, type_of(column, database),
                        column.required ? " NOT NULL" : "", i == 0 ? " UNIQUE" : "");
     if (!column.references.empty()) {
       sql += fmt::format(" REFERENCES {}", column.references);
     }
   }
-  return sql + fmt::format(", hash {} NOT NULL){}", database.blob_type(), database.table_options());
+  std::vector<std::string> statements = {
+      sql + fmt::format(", hash {} NOT NULL){}", database.blob_type(), database.table_options())};
+  int number = 0;
+  for (const std::string_view columns : table.indexes) {
+    statements.push_back(
+        fmt::format("CREATE INDEX {0}_by_{1} ON {0} ({2})", table.name, ++number, columns));
+  }
+  for (std::string& statement : database.append_only_statements(std::string(table.name))) {
+    statements.push_back(std::move(statement));
+  }
+  return statements;
 }
 
-Status create_version_1(Database& database) {
+std::vector<std::string> version_1_statements(const Database& database) {
   const std::string blob = database.blob_type();
   const std::string options = database.table_options();
   const std::string integer = database.integer_type();
-  // One row: how many rows the history has and the hash of the last one. The only row that changes.
-  SIXPOINT_CHECK(
-      database.execute(fmt::format("CREATE TABLE head (one {} PRIMARY KEY CHECK (one = 1), rows {} "
-                                   "NOT NULL, hash {} NOT NULL){}",
-                                   integer, integer, blob, options)));
-  const std::vector<Value> genesis = {Bytes(32, 0)};
-  SIXPOINT_CHECK(database.execute("INSERT INTO head VALUES (1, 0, $1)", genesis));
-  // Attachments are named by their content, and rows of the history name them by it.
-  SIXPOINT_CHECK(database.execute(fmt::format(
-      "CREATE TABLE attachments (sha256 TEXT PRIMARY KEY, bytes {} NOT NULL){}", blob, options)));
-  std::vector<std::string> statements = database.append_only_statements("attachments");
+  std::vector<std::string> statements = {
+      // One row: how many rows the history has and the hash of the last one. The only row that
+      // changes.
+      fmt::format("CREATE TABLE head (one {} PRIMARY KEY CHECK (one = 1), rows {} NOT NULL, hash "
+                  "{} NOT NULL){}",
+                  integer, integer, blob, options),
+      // Attachments are named by their content, and rows of the history name them by it.
+      fmt::format("CREATE TABLE attachments (sha256 TEXT PRIMARY KEY, bytes {} NOT NULL){}", blob,
+                  options)};
+  for (std::string& statement : database.append_only_statements("attachments")) {
+    statements.push_back(std::move(statement));
+  }
+  return statements;
+}
+
+// From `version` - 1 to `version`: its tables, and its columns in older tables. Rows stay as they
+// are, and so do their hashes (chain.h).
+Status bring_to(std::int64_t version, Database& database) {
+  std::vector<std::string> statements;
+  if (version == 1) {
+    statements = version_1_statements(database);
+  }
   for (const Table& table : tables()) {
-    statements.push_back(create_statement(table, database));
-    int number = 0;
-    for (const std::string_view columns : table.indexes) {
-      statements.push_back(
-          fmt::format("CREATE INDEX {0}_by_{1} ON {0} ({2})", table.name, ++number, columns));
+    if (table.since == version) {
+      for (std::string& statement : create_statements(table, database)) {
+        statements.push_back(std::move(statement));
+      }
+      continue;
     }
-    for (std::string& statement : database.append_only_statements(std::string(table.name))) {
-      statements.push_back(std::move(statement));
+    for (const Column& column : table.columns) {
+      if (table.since < version && column.since == version) {
+        statements.push_back(fmt::format("ALTER TABLE {} ADD COLUMN {} {}", table.name, column.name,
+                                         type_of(column, database)));
+      }
     }
   }
   for (const std::string& statement : statements) {
     SIXPOINT_CHECK(database.execute(statement));
   }
-  return {};
+  if (version == 1) {
+    const std::vector<Value> genesis = {Bytes(32, 0)};
+    SIXPOINT_CHECK(database.execute("INSERT INTO head VALUES (1, 0, $1)", genesis));
+  }
+  return database.set_schema_version(version);
 }
 
 }  // namespace
@@ -144,21 +212,13 @@ Status migrate(Database& database) {
                             before, kSchemaVersion),
                 database.location(), "use the sixpoint that made it, or a newer one");
   }
-  SIXPOINT_CHECK(database.begin_writing());
-  const auto bring_up = [&]() -> Status {
-    // Another process may have done it while this one waited for the lock.
-    SIXPOINT_ASSIGN(const auto version, database.schema_version());
-    if (version < 1) {
-      SIXPOINT_CHECK(create_version_1(database));
-      SIXPOINT_CHECK(database.set_schema_version(1));
-    }
-    return database.commit();
-  };
-  Status status = bring_up();
-  if (!status) {
-    database.roll_back();
+  SIXPOINT_ASSIGN(auto transaction, Transaction::writing(database));
+  // Another process may have done it while this one waited for the lock.
+  SIXPOINT_ASSIGN(const auto version, database.schema_version());
+  for (std::int64_t next = version + 1; next <= kSchemaVersion; ++next) {
+    SIXPOINT_CHECK(bring_to(next, database));
   }
-  return status;
+  return transaction.commit();
 }
 
 }  // namespace sixpoint::db

@@ -4,6 +4,10 @@
 // Every table has, before its own columns, `seq` (the row's place in the whole store's history: 1,
 // 2, 3 ... over all tables together) and, after them, `hash` (the chain, see chain.h). Times are
 // nanoseconds since 1970 UTC. Columns named `document` hold JSON as it was written.
+//
+// Versions: 1 the first; 2 adds to a run the jig's due date, the build, the limits, local gravity,
+// temperature and codes, to constants their uncertainty and origin, to a repair the software, and
+// the filter configurations.
 #pragma once
 
 #include <string>
@@ -14,7 +18,7 @@
 
 namespace sixpoint::db {
 
-inline constexpr std::int64_t kSchemaVersion = 1;
+inline constexpr std::int64_t kSchemaVersion = 2;
 
 enum class ColumnType { integer, text };
 
@@ -23,16 +27,21 @@ struct Column {
   ColumnType type = ColumnType::text;
   bool required = true;
   std::string_view references = {};  // "table(column)" of a foreign key, or empty
+  std::int64_t since = 1;            // the version that has it first; added columns may be NULL
 };
 
 struct Table {
   std::string_view name;
   std::vector<Column> columns;                 // the first one is the key, unique
   std::vector<std::string_view> indexes = {};  // column lists, each becomes an index
+  std::int64_t since = 1;
 };
 
 const std::vector<Table>& tables();
-const Table& table(std::string_view name);  // a name that is in tables()
+const Table& table(std::string_view name);       // a name that is in tables()
+const Table* find_table(std::string_view name);  // nullptr where there is none
+// "seq, COLUMN, COLUMN ..., hash": how a whole row is asked for.
+std::string column_list(const Table& table);
 
 // Brings an empty store, or one of an earlier version, to kSchemaVersion in one transaction.
 // configuration error for a store of a newer version than this program knows.

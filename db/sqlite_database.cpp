@@ -1,5 +1,6 @@
 #include <map>
 
+#include <SQLiteCpp/Backup.h>
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
@@ -51,13 +52,24 @@ void bind(SQLite::Statement& statement, std::span<const Value> parameters) {
           if constexpr (std::is_same_v<T, std::monostate>) {
             statement.bind(name);
           } else if constexpr (std::is_same_v<T, Bytes>) {
-            statement.bind(name, value.data(), static_cast<int>(value.size()));
+            // A null pointer would be NULL; no bytes are bytes.
+            statement.bind(name, value.empty() ? static_cast<const void*>("") : value.data(),
+                           static_cast<int>(value.size()));
           } else {
             statement.bind(name, value);
           }
         },
         parameters[i]);
   }
+}
+
+// The T in `value`, put there first when it holds something else: its memory is used again.
+template <class T>
+T& storage(Value& value) {
+  if (auto* held = std::get_if<T>(&value)) {
+    return *held;
+  }
+  return value.emplace<T>();
 }
 
 void read_row(SQLite::Statement& statement, Row& row) {
@@ -74,16 +86,29 @@ void read_row(SQLite::Statement& statement, Row& row) {
         break;
       case SQLITE_BLOB: {
         const auto* begin = static_cast<const std::uint8_t*>(column.getBlob());
-        value = Bytes(begin, begin + column.getBytes());
+        storage<Bytes>(value).assign(begin, begin + column.getBytes());
         break;
       }
       default: {
         const char* begin = column.getText();
-        value = std::string(begin, static_cast<std::size_t>(column.getBytes()));
+        storage<std::string>(value).assign(begin, static_cast<std::size_t>(column.getBytes()));
       }
     }
   }
 }
+
+// A compiled statement goes back to its start whether it succeeded or not: one that failed would
+// hold its locks and say the same error again at its next use.
+class Reset {
+ public:
+  explicit Reset(SQLite::Statement& statement) : statement_(statement) {}
+  Reset(const Reset&) = delete;
+  Reset& operator=(const Reset&) = delete;
+  ~Reset() { statement_.tryReset(); }
+
+ private:
+  SQLite::Statement& statement_;
+};
 
 class SqliteRows final : public RowStream {
  public:
@@ -139,6 +164,12 @@ class SqliteDatabase final : public Database {
   }
 
   Status begin_writing() override { return run("BEGIN IMMEDIATE"); }
+  Status begin_reading() override {
+    SIXPOINT_CHECK(run("BEGIN"));
+    // The snapshot is taken by the first reading statement, so read something now.
+    SIXPOINT_CHECK(query("SELECT count(*) FROM sqlite_schema", {}));
+    return {};
+  }
   Status commit() override { return run("COMMIT"); }
   void roll_back() override {
     if (sqlite3_get_autocommit(database_.getHandle()) == 0) {
@@ -149,11 +180,10 @@ class SqliteDatabase final : public Database {
   Status execute(const std::string& sql, std::span<const Value> parameters) override {
     try {
       auto& statement = prepared(sql);
-      statement.reset();
+      const Reset reset(statement);
       bind(statement, parameters);
       while (statement.executeStep()) {
       }
-      statement.reset();
       return {};
     } catch (const SQLite::Exception& exception) {
       return fail(to_error(exception, path_));
@@ -166,6 +196,35 @@ class SqliteDatabase final : public Database {
       return std::make_unique<SqliteRows>(database_, sql, parameters, path_);
     } catch (const SQLite::Exception& exception) {
       return fail(to_error(exception, path_));
+    }
+  }
+
+  Result<std::vector<Row>> query(const std::string& sql,
+                                 std::span<const Value> parameters) override {
+    try {
+      auto& statement = prepared(sql);
+      const Reset reset(statement);
+      bind(statement, parameters);
+      std::vector<Row> rows;
+      while (statement.executeStep()) {
+        read_row(statement, rows.emplace_back());
+      }
+      return rows;
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path_));
+    }
+  }
+
+  Result<bool> copy_to_file(const std::string& path) override {
+    try {
+      SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout_ms);
+      copy.exec("PRAGMA synchronous=FULL");
+      SQLite::Backup backup(copy, database_);
+      // In one step: a copy in many steps begins again whenever another process writes.
+      backup.executeStep(-1);
+      return true;
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path));
     }
   }
 
@@ -222,20 +281,6 @@ class SqliteDatabase final : public Database {
 };
 
 }  // namespace
-
-Result<std::vector<Row>> Database::query(const std::string& sql,
-                                         std::span<const Value> parameters) {
-  SIXPOINT_ASSIGN(const auto rows, stream(sql, parameters));
-  std::vector<Row> all;
-  Row row;
-  while (true) {
-    SIXPOINT_ASSIGN(const bool more, rows->next(row));
-    if (!more) {
-      return all;
-    }
-    all.push_back(row);
-  }
-}
 
 Result<std::unique_ptr<Database>> open_sqlite(const std::string& path) {
   try {

@@ -1,11 +1,14 @@
 #include "db/store.h"
 
 #include <algorithm>
+#include <limits>
+#include <map>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "db/chain.h"
+#include "db/history.h"
 #include "db/schema.h"
 
 namespace sixpoint::db {
@@ -13,27 +16,57 @@ namespace {
 
 constexpr std::size_t kLongestName = 200;
 constexpr std::size_t kMostFindings = 20;
+// PostgreSQL takes 1 GiB, and an export writes twice as many hex digits on one line.
+constexpr std::size_t kLargestCapture = 100U << 20;
+constexpr std::size_t kLargestDocument = 64U << 20;
 
 std::int64_t to_ns(UtcTime time) { return time.time_since_epoch().count(); }
 UtcTime from_ns(std::int64_t ns) { return UtcTime(std::chrono::nanoseconds(ns)); }
 
-Value optional_text(const std::string& text) {
-  return text.empty() ? Value(std::monostate{}) : Value(text);
+// UTF-8 as RFC 3629 has it, without NUL: what both servers keep as it is.
+bool is_storable(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[i]);
+    const std::size_t length = lead == 0      ? 0
+                               : lead < 0x80  ? 1
+                               : lead < 0xC2  ? 0
+                               : lead < 0xE0  ? 2
+                               : lead < 0xF0  ? 3
+                               : lead <= 0xF4 ? 4
+                                              : 0;
+    if (length == 0 || i + length > text.size()) {
+      return false;
+    }
+    for (std::size_t k = 1; k < length; ++k) {
+      const auto byte = static_cast<unsigned char>(text[i + k]);
+      // The second byte rules out overlong forms, surrogates and what lies above U+10FFFF.
+      const unsigned low = k > 1 ? 0x80 : lead == 0xE0 ? 0xA0 : lead == 0xF0 ? 0x90 : 0x80;
+      const unsigned high = k > 1 ? 0xBF : lead == 0xED ? 0x9F : lead == 0xF4 ? 0x8F : 0xBF;
+      if (byte < low || byte > high) {
+        return false;
+      }
+    }
+    i += length;
+  }
+  return true;
 }
 
-std::string text_of(const Value& value) {
-  const auto* text = std::get_if<std::string>(&value);
-  return text == nullptr ? std::string() : *text;
-}
-
-std::int64_t integer_of(const Value& value) {
-  const auto* integer = std::get_if<std::int64_t>(&value);
-  return integer == nullptr ? 0 : *integer;
+Status check_texts(std::initializer_list<std::string_view> texts,
+                   std::size_t limit = kLongestName) {
+  for (const std::string_view text : texts) {
+    if (text.size() > limit || !is_storable(text)) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("'{}' cannot be kept as a text", printable(text, 40)), {},
+                  fmt::format("the store keeps up to {} bytes of UTF-8 there", limit));
+    }
+  }
+  return {};
 }
 
 // Serial numbers are keys for good: one that a person can't read or type is refused, not mangled.
 Status check_serial(const std::string& serial) {
-  if (serial.empty() || serial.size() > kLongestName || printable(serial) != serial) {
+  if (serial.empty() || serial.size() > kLongestName || printable(serial) != serial ||
+      !is_storable(serial)) {
     return fail(ErrorCode::bad_data, fmt::format("'{}' is no serial number", printable(serial, 40)),
                 {}, fmt::format("a serial number has 1 to {} printable characters", kLongestName));
   }
@@ -50,37 +83,146 @@ Status check_filter(const std::string& filter) {
 }
 
 Status check_json(const std::string& document) {
-  if (!nlohmann::json::accept(document)) {
+  if (document.size() > kLargestDocument || !nlohmann::json::accept(document)) {
     return fail(ErrorCode::bad_data, "the document is no JSON", {}, "please report this");
   }
   return {};
 }
 
-std::string column_list(const Table& table) {
-  std::string list = "seq";
-  for (const Column& column : table.columns) {
-    list += fmt::format(", {}", column.name);
-  }
-  return list + ", hash";
+std::string identifier(std::string_view name, std::span<const Value> values) {
+  return ChainHasher().identifier(table(name), values);
 }
 
-// The content's own name. `values` without the leading id.
-std::string identifier(std::string_view table, std::span<const Value> values) {
-  const Sha256Digest digest = chain_hash({}, table, 0, values);
-  return to_hex(std::span(digest).first(16));
+// A member of a JSON document as text, or NULL.
+Value member_of(const nlohmann::ordered_json& document, const char* key) {
+  if (!document.is_object() || !document.contains(key) || document[key].is_null()) {
+    return std::monostate{};
+  }
+  return document[key].dump();
+}
+
+Value number_text(const std::optional<double>& number) {
+  return number ? Value(nlohmann::json(*number).dump()) : Value(std::monostate{});
+}
+
+constexpr std::string_view kLegacyMeaning =
+    "the sensor's filter as firmware before 2014-03-24 set it";
+constexpr std::string_view kCurrentMeaning =
+    "the sensor's filter as firmware sets it since 2014-03-24";
+
+// The records as rows of their tables, checked, with their ids in front.
+Row with_id(std::string_view table, Row values) {
+  values.insert(values.begin(), Value(identifier(table, values)));
+  return values;
+}
+
+Result<Row> row_of(const ConstantsRecord& record) {
+  SIXPOINT_CHECK(check_serial(record.serial));
+  SIXPOINT_CHECK(check_filter(record.filter));
+  SIXPOINT_CHECK(check_json(record.document));
+  SIXPOINT_CHECK(check_texts({record.method, record.run_id}));
+  Row row = with_id("constants", {record.serial, record.filter, to_ns(record.made_at),
+                                  record.method, optional_text(record.run_id), record.document});
+  // Not part of the name: they are in the document, which is.
+  const auto document = nlohmann::ordered_json::parse(record.document);
+  row.push_back(member_of(document, "standard_uncertainty"));
+  row.push_back(member_of(document, "made_from"));
+  return row;
+}
+
+Status check_captures(const std::vector<Capture>& captures) {
+  for (const Capture& capture : captures) {
+    SIXPOINT_CHECK(check_texts({capture.name}));
+    if (capture.bytes.size() > kLargestCapture) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("the capture {} has {} bytes", printable(capture.name, 60),
+                              capture.bytes.size()),
+                  {}, fmt::format("the store keeps up to {} bytes", kLargestCapture));
+    }
+  }
+  return {};
+}
+
+Result<Row> row_of(const RunRecord& run) {
+  SIXPOINT_CHECK(check_serial(run.serial));
+  SIXPOINT_CHECK(check_filter(run.filter));
+  SIXPOINT_CHECK(check_json(run.document));
+  SIXPOINT_CHECK(check_texts({run.model, run.kind, run.operator_name, run.station, run.jig,
+                              run.verdict, run.software, run.retest_of, run.build}));
+  if (!run.limits.empty()) {
+    SIXPOINT_CHECK(check_json(run.limits));
+  }
+  for (const std::string& code : run.codes) {
+    SIXPOINT_CHECK(check_texts({code}, 10 * kLongestName));
+  }
+  return with_id(
+      "runs",
+      {run.serial, run.kind, run.filter, to_ns(run.started), to_ns(run.ended), run.operator_name,
+       run.station, run.jig, run.verdict, run.software, optional_text(run.retest_of), run.document,
+       run.jig_due ? Value(to_ns(*run.jig_due)) : Value(), optional_text(run.build),
+       optional_text(run.limits), number_text(run.gravity_m_per_s2), number_text(run.temperature_c),
+       run.codes.empty() ? Value() : Value(nlohmann::json(run.codes).dump())});
+}
+
+Result<Row> row_of(const UnitWrite& write) {
+  SIXPOINT_CHECK(check_serial(write.serial));
+  SIXPOINT_CHECK(check_texts({write.run_id}));
+  SIXPOINT_CHECK(check_texts({write.as_found, write.as_left, write.read_back}, kLargestDocument));
+  return with_id("unit_writes", {write.run_id, write.serial, to_ns(write.written), write.as_found,
+                                 write.as_left, write.read_back});
+}
+
+Result<Row> row_of(const RepairRecord& repair) {
+  SIXPOINT_CHECK(check_serial(repair.serial));
+  SIXPOINT_CHECK(check_json(repair.document));
+  SIXPOINT_CHECK(check_texts({repair.input_sha256, repair.output_sha256, repair.method,
+                              repair.constants_id, repair.software}));
+  return with_id("repairs", {repair.serial, to_ns(repair.made_at), storable_path(repair.input),
+                             repair.input_sha256, repair.output_sha256, repair.method,
+                             optional_text(repair.constants_id), repair.document,
+                             optional_text(repair.software)});
 }
 
 constexpr std::string_view kConstantsColumns =
-    "id, made_at_ns, serial, filter, method, run_id, document";
+    "constants.id, constants.made_at_ns, constants.serial, constants.filter, constants.method, "
+    "constants.run_id, constants.document, constants.standard_uncertainty, constants.origin";
+constexpr std::size_t kConstantsColumnCount = 9;
+constexpr std::string_view kRepairColumns =
+    "repairs.id, repairs.serial, repairs.made_at_ns, repairs.input, repairs.input_sha256, "
+    "repairs.output_sha256, repairs.method, repairs.constants_id, repairs.document, "
+    "repairs.software";
+constexpr std::size_t kRepairColumnCount = 10;
 
 ConstantsRecord to_constants(const Row& row) {
   return {text_of(row[0]), from_ns(integer_of(row[1])),
           text_of(row[2]), text_of(row[3]),
           text_of(row[4]), text_of(row[5]),
-          text_of(row[6])};
+          text_of(row[6]), text_of(row[7]),
+          text_of(row[8])};
+}
+
+RepairRecord to_repair(const Row& row) {
+  return {text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
+          text_of(row[3]), text_of(row[4]), text_of(row[5]),
+          text_of(row[6]), text_of(row[7]), text_of(row[8]),
+          text_of(row[9])};
 }
 
 }  // namespace
+
+// The name of a file may be any bytes; it is evidence, so it is written down in a form that can be
+// kept rather than refused.
+std::string storable_path(std::string_view path) {
+  if (is_storable(path)) {
+    return std::string(path);
+  }
+  std::string text;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    text += byte >= 0x20 && byte < 0x7F ? std::string(1, c) : fmt::format("\\x{:02x}", byte);
+  }
+  return text;
+}
 
 std::string AuditReport::brief() const {
   return ok ? fmt::format("{} rows, nothing touched, head {}", rows, head)
@@ -96,54 +238,39 @@ struct Store::Impl {
   Env& env;
   std::unique_ptr<Database> database;
 
-  // Runs `work` in one transaction; nothing of it stays when it fails.
+  // Runs `work(writer)` in one transaction; nothing of it stays when it fails.
   template <class Work>
   Status in_transaction(Work&& work) {
-    SIXPOINT_CHECK(database->begin_writing());
-    Status status = work();
-    if (status) {
-      status = database->commit();
+    SIXPOINT_ASSIGN(auto transaction, Transaction::writing(*database));
+    SIXPOINT_ASSIGN(auto writer, HistoryWriter::open(*database));
+    const std::int64_t before = writer.head().rows;
+    SIXPOINT_CHECK(work(writer));
+    if (writer.head().rows == before) {
+      return {};
     }
-    if (!status) {
-      database->roll_back();
-    }
-    return status;
+    SIXPOINT_CHECK(writer.finish());
+    return transaction.commit();
   }
 
-  // Appends one row to the history, inside a transaction. A row whose key is there is left alone
-  // when its content is the same.
-  Status append(std::string_view name, std::span<const Value> values) {
+  // Appends one row. A row whose key is there is left alone: its key names its content.
+  Status append(HistoryWriter& writer, std::string_view name, std::span<const Value> values) {
     const Table& into = table(name);
-    const std::vector<Value> key = {values[0]};
     SIXPOINT_ASSIGN(
         const auto there,
         database->query(fmt::format("SELECT seq FROM {} WHERE {} = $1", name, into.columns[0].name),
-                        key));
-    if (!there.empty()) {
-      return {};
-    }
-    SIXPOINT_ASSIGN(const auto head, database->query("SELECT rows, hash FROM head"));
-    if (head.size() != 1) {
-      return fail(ErrorCode::bad_data, "the head of the history is missing", database->location(),
-                  "restore the last backup");
-    }
-    const std::int64_t seq = integer_of(head[0][0]) + 1;
-    const Sha256Digest hash = chain_hash(std::get<Bytes>(head[0][1]), name, seq, values);
-    std::vector<Value> row = {Value(seq)};
-    row.insert(row.end(), values.begin(), values.end());
-    row.emplace_back(Bytes(hash.begin(), hash.end()));
-    std::string places;
-    for (std::size_t i = 1; i <= row.size(); ++i) {
-      places += fmt::format("{}${}", i == 1 ? "" : ", ", i);
-    }
-    SIXPOINT_CHECK(database->execute(
-        fmt::format("INSERT INTO {} ({}) VALUES ({})", name, column_list(into), places), row));
-    const std::vector<Value> new_head = {Value(seq), row.back()};
-    return database->execute("UPDATE head SET rows = $1, hash = $2 WHERE one = 1", new_head);
+                        values.first(1)));
+    return there.empty() ? writer.append(into, values) : Status();
   }
 
-  Status append_unit(const std::string& serial, const std::string& model) {
-    return append("units", std::vector<Value>{serial, model, to_ns(env.clock.now())});
+  Status append_unit(HistoryWriter& writer, const std::string& serial, const std::string& model,
+                     UtcTime seen) {
+    return append(writer, "units", std::vector<Value>{serial, model, to_ns(seen)});
+  }
+
+  Status append_filter(HistoryWriter& writer, const std::string& filter) {
+    return append(writer, "filter_configurations",
+                  std::vector<Value>{
+                      filter, std::string(filter == "legacy" ? kLegacyMeaning : kCurrentMeaning)});
   }
 };
 
@@ -153,68 +280,61 @@ Store& Store::operator=(Store&&) noexcept = default;
 Store::~Store() = default;
 
 Result<Store> Store::open(Env& env, const std::string& location) {
-  if (location.starts_with("postgresql://") || location.starts_with("postgres://")) {
-    return fail(ErrorCode::usage, "PostgreSQL stores are not built yet", {},
-                "name an SQLite file with --store");
-  }
-  SIXPOINT_ASSIGN(auto database, open_sqlite(location));
+  const bool postgres =
+      location.starts_with("postgresql://") || location.starts_with("postgres://");
+  SIXPOINT_ASSIGN(auto database, postgres ? open_postgres(location) : open_sqlite(location));
   SIXPOINT_CHECK(migrate(*database));
   return Store(std::unique_ptr<Impl>(new Impl{env, std::move(database)}));
 }
 
+Database& Store::database() { return *impl_->database; }
+
+Result<std::string> id_of(const ConstantsRecord& record) {
+  SIXPOINT_ASSIGN(const auto row, row_of(record));
+  return text_of(row[0]);
+}
+
+Result<std::string> id_of(const RunRecord& run, const std::vector<Capture>& captures) {
+  SIXPOINT_CHECK(check_captures(captures));
+  SIXPOINT_ASSIGN(const auto row, row_of(run));
+  return text_of(row[0]);
+}
+
+Result<std::string> id_of(const UnitWrite& write) {
+  SIXPOINT_ASSIGN(const auto row, row_of(write));
+  return text_of(row[0]);
+}
+
+Result<std::string> id_of(const RepairRecord& repair) {
+  SIXPOINT_ASSIGN(const auto row, row_of(repair));
+  return text_of(row[0]);
+}
+
 Result<std::string> Store::add_constants(const ConstantsRecord& record, const std::string& model) {
-  SIXPOINT_CHECK(check_serial(record.serial));
-  SIXPOINT_CHECK(check_filter(record.filter));
-  SIXPOINT_CHECK(check_json(record.document));
-  std::vector<Value> values = {record.serial,
-                               record.filter,
-                               to_ns(record.made_at),
-                               record.method,
-                               optional_text(record.run_id),
-                               record.document};
-  const std::string id = identifier("constants", values);
-  values.insert(values.begin(), Value(id));
-  SIXPOINT_CHECK(impl_->in_transaction([&]() -> Status {
-    SIXPOINT_CHECK(impl_->append_unit(record.serial, model));
-    return impl_->append("constants", values);
+  SIXPOINT_CHECK(check_texts({model}));
+  SIXPOINT_ASSIGN(const auto values, row_of(record));
+  SIXPOINT_CHECK(impl_->in_transaction([&](HistoryWriter& writer) -> Status {
+    SIXPOINT_CHECK(impl_->append_unit(writer, record.serial, model, record.made_at));
+    SIXPOINT_CHECK(impl_->append_filter(writer, record.filter));
+    return impl_->append(writer, "constants", values);
   }));
-  return id;
+  return text_of(values[0]);
 }
 
 Result<std::string> Store::add_run(const RunRecord& run, const std::vector<Capture>& captures) {
-  SIXPOINT_CHECK(check_serial(run.serial));
-  SIXPOINT_CHECK(check_filter(run.filter));
-  SIXPOINT_CHECK(check_json(run.document));
-  std::vector<Value> values = {run.serial,
-                               run.kind,
-                               run.filter,
-                               to_ns(run.started),
-                               to_ns(run.ended),
-                               run.operator_name,
-                               run.station,
-                               run.jig,
-                               run.verdict,
-                               run.software,
-                               optional_text(run.retest_of),
-                               run.document};
-  const std::string id = identifier("runs", values);
-  values.insert(values.begin(), Value(id));
-  SIXPOINT_CHECK(impl_->in_transaction([&]() -> Status {
-    SIXPOINT_CHECK(impl_->append_unit(run.serial, run.model));
-    SIXPOINT_CHECK(impl_->append("runs", values));
+  SIXPOINT_CHECK(check_captures(captures));
+  SIXPOINT_ASSIGN(const auto values, row_of(run));
+  const std::string id = text_of(values[0]);
+  SIXPOINT_CHECK(impl_->in_transaction([&](HistoryWriter& writer) -> Status {
+    SIXPOINT_CHECK(impl_->append_unit(writer, run.serial, run.model, run.started));
+    SIXPOINT_CHECK(impl_->append_filter(writer, run.filter));
+    SIXPOINT_CHECK(impl_->append(writer, "runs", values));
     for (const Capture& capture : captures) {
       const std::string hash = to_hex(sha256(capture.bytes));
-      const std::vector<Value> name = {hash};
-      SIXPOINT_ASSIGN(const auto there,
-                      impl_->database->query("SELECT 1 FROM attachments WHERE sha256 = $1", name));
-      if (there.empty()) {
-        const std::vector<Value> attachment = {hash, capture.bytes};
-        SIXPOINT_CHECK(
-            impl_->database->execute("INSERT INTO attachments VALUES ($1, $2)", attachment));
-      }
+      SIXPOINT_CHECK(writer.add_attachment(hash, capture.bytes));
       std::vector<Value> row = {id, capture.name, hash};
       row.insert(row.begin(), Value(identifier("captures", row)));
-      SIXPOINT_CHECK(impl_->append("captures", row));
+      SIXPOINT_CHECK(impl_->append(writer, "captures", row));
     }
     return {};
   }));
@@ -222,34 +342,23 @@ Result<std::string> Store::add_run(const RunRecord& run, const std::vector<Captu
 }
 
 Result<std::string> Store::add_unit_write(const UnitWrite& write) {
-  SIXPOINT_CHECK(check_serial(write.serial));
-  std::vector<Value> values = {write.run_id,   write.serial,  to_ns(write.written),
-                               write.as_found, write.as_left, write.read_back};
-  const std::string id = identifier("unit_writes", values);
-  values.insert(values.begin(), Value(id));
-  SIXPOINT_CHECK(impl_->in_transaction([&] { return impl_->append("unit_writes", values); }));
-  return id;
+  SIXPOINT_ASSIGN(const auto values, row_of(write));
+  SIXPOINT_CHECK(impl_->in_transaction(
+      [&](HistoryWriter& writer) { return impl_->append(writer, "unit_writes", values); }));
+  return text_of(values[0]);
 }
 
 Result<std::string> Store::add_repair(const RepairRecord& repair) {
-  SIXPOINT_CHECK(check_serial(repair.serial));
-  SIXPOINT_CHECK(check_json(repair.document));
-  std::vector<Value> values = {repair.serial,
-                               to_ns(repair.made_at),
-                               repair.input,
-                               repair.input_sha256,
-                               repair.output_sha256,
-                               repair.method,
-                               optional_text(repair.constants_id),
-                               repair.document};
-  const std::string id = identifier("repairs", values);
-  values.insert(values.begin(), Value(id));
-  SIXPOINT_CHECK(impl_->in_transaction([&] { return impl_->append("repairs", values); }));
-  return id;
+  SIXPOINT_ASSIGN(const auto values, row_of(repair));
+  SIXPOINT_CHECK(impl_->in_transaction(
+      [&](HistoryWriter& writer) { return impl_->append(writer, "repairs", values); }));
+  return text_of(values[0]);
 }
 
 Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,
                                  const std::string& reason) {
+  SIXPOINT_CHECK(check_texts({id, operator_name}));
+  SIXPOINT_CHECK(check_texts({reason}, 100 * kLongestName));
   const std::vector<Value> key = {id};
   SIXPOINT_ASSIGN(const auto there,
                   impl_->database->query("SELECT id FROM constants WHERE id = $1", key));
@@ -260,10 +369,15 @@ Status Store::withdraw_constants(const std::string& id, const std::string& opera
   if (reason.empty()) {
     return fail(ErrorCode::usage, "a withdrawal needs a reason", {}, "say why");
   }
-  std::vector<Value> values = {
-      to_ns(impl_->env.clock.now()), "constants", id, "withdraw", operator_name, reason};
+  std::vector<Value> values = {to_ns(impl_->env.clock.now()),
+                               std::string("constants"),
+                               id,
+                               std::string("withdraw"),
+                               operator_name,
+                               reason};
   values.insert(values.begin(), Value(identifier("corrections", values)));
-  return impl_->in_transaction([&] { return impl_->append("corrections", values); });
+  return impl_->in_transaction(
+      [&](HistoryWriter& writer) { return impl_->append(writer, "corrections", values); });
 }
 
 Result<std::optional<ConstantsRecord>> Store::constants_for(const std::string& serial,
@@ -301,31 +415,167 @@ Result<std::vector<UnitRecord>> Store::units() {
                   impl_->database->query(
                       "SELECT serial, model, first_seen_ns, "
                       "(SELECT count(*) FROM constants WHERE constants.serial = units.serial) "
-                      "FROM units ORDER BY serial"));
+                      "FROM units"));
   std::vector<UnitRecord> records;
   records.reserve(rows.size());
   for (const Row& row : rows) {
     records.push_back({text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
                        static_cast<std::size_t>(integer_of(row[3]))});
   }
+  // Here and not by the server, whose order depends on its locale.
+  std::sort(records.begin(), records.end(),
+            [](const UnitRecord& a, const UnitRecord& b) { return a.serial < b.serial; });
   return records;
 }
 
 Result<std::optional<RepairRecord>> Store::repair_of_output(const std::string& output_sha256) {
   const std::vector<Value> parameters = {output_sha256};
   SIXPOINT_ASSIGN(const auto rows,
-                  impl_->database->query(
-                      "SELECT id, serial, made_at_ns, input, input_sha256, output_sha256, method, "
-                      "constants_id, document FROM repairs WHERE output_sha256 = $1 "
-                      "ORDER BY seq DESC LIMIT 1",
-                      parameters));
+                  impl_->database->query(fmt::format("SELECT {} FROM repairs WHERE output_sha256 = "
+                                                     "$1 ORDER BY seq DESC LIMIT 1",
+                                                     kRepairColumns),
+                                         parameters));
   if (rows.empty()) {
     return std::nullopt;
   }
-  const Row& row = rows[0];
-  return RepairRecord{text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
-                      text_of(row[3]), text_of(row[4]), text_of(row[5]),
-                      text_of(row[6]), text_of(row[7]), text_of(row[8])};
+  return to_repair(rows[0]);
+}
+
+Result<std::vector<RecallEntry>> Store::recall_list(const std::string& constants_id) {
+  std::vector<Value> parameters;
+  std::string only;
+  if (!constants_id.empty()) {
+    parameters.emplace_back(constants_id);
+    only = " AND corrections.about_id = $1";
+  }
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->query(
+                      fmt::format("SELECT {}, corrections.made_at_ns, corrections.reason "
+                                  "FROM corrections "
+                                  "JOIN repairs ON repairs.constants_id = corrections.about_id "
+                                  "WHERE corrections.about_table = 'constants' "
+                                  "AND corrections.action = 'withdraw'{} "
+                                  "ORDER BY repairs.seq, corrections.seq",
+                                  kRepairColumns, only),
+                      parameters));
+  std::vector<RecallEntry> entries;
+  for (const Row& row : rows) {
+    RecallEntry entry{to_repair(row), from_ns(integer_of(row[kRepairColumnCount])),
+                      text_of(row[kRepairColumnCount + 1])};
+    // Constants may have been withdrawn twice, by two people: one line per file.
+    if (entries.empty() || entries.back().repair.id != entry.repair.id) {
+      entries.push_back(std::move(entry));
+    }
+  }
+  return entries;
+}
+
+Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
+  const std::vector<Value> parameters = {jig};
+  SIXPOINT_ASSIGN(const auto rows, impl_->database->query(
+                                       "SELECT serial, ended_ns, verdict FROM runs WHERE jig = $1 "
+                                       "ORDER BY started_ns, seq",
+                                       parameters));
+  std::map<std::string, JigUnit> units;
+  for (const Row& row : rows) {
+    JigUnit& unit = units[text_of(row[0])];
+    unit.serial = text_of(row[0]);
+    ++unit.runs;
+    unit.last_run = from_ns(integer_of(row[1]));
+    unit.last_verdict = text_of(row[2]);
+  }
+  std::vector<JigUnit> list;
+  list.reserve(units.size());
+  for (auto& [serial, unit] : units) {
+    list.push_back(std::move(unit));
+  }
+  return list;
+}
+
+double YieldReport::yield() const {
+  return units == 0 ? std::numeric_limits<double>::quiet_NaN()
+                    : static_cast<double>(passed) / static_cast<double>(units);
+}
+
+double YieldReport::first_pass_yield() const {
+  return units == 0 ? std::numeric_limits<double>::quiet_NaN()
+                    : static_cast<double>(passed_first_time) / static_cast<double>(units);
+}
+
+Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
+  const std::vector<Value> parameters = {to_ns(from), to_ns(to)};
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query("SELECT serial, verdict FROM runs WHERE kind = 'jig' "
+                             "AND started_ns >= $1 AND started_ns < $2 ORDER BY started_ns, seq",
+                             parameters));
+  struct Runs {
+    bool first_passed = false;
+    bool last_passed = false;
+  };
+  std::map<std::string, Runs> units;
+  for (const Row& row : rows) {
+    const bool passed = text_of(row[1]) == "pass";
+    const auto [unit, is_new] = units.try_emplace(text_of(row[0]));
+    if (is_new) {
+      unit->second.first_passed = passed;
+    }
+    unit->second.last_passed = passed;
+  }
+  YieldReport report;
+  report.runs = rows.size();
+  report.units = units.size();
+  for (const auto& [serial, runs] : units) {
+    report.passed += runs.last_passed ? 1 : 0;
+    report.passed_first_time += runs.first_passed ? 1 : 0;
+  }
+  return report;
+}
+
+Result<std::vector<DueUnit>> Store::units_due(UtcTime older_than) {
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->query(
+                      "SELECT serial, model, (SELECT max(made_at_ns) FROM constants "
+                      "WHERE constants.serial = units.serial "
+                      "AND NOT EXISTS (SELECT 1 FROM corrections WHERE about_table = 'constants' "
+                      "AND about_id = constants.id AND action = 'withdraw')) FROM units"));
+  std::vector<DueUnit> due;
+  for (const Row& row : rows) {
+    DueUnit unit{text_of(row[0]), text_of(row[1]), std::nullopt};
+    if (!std::holds_alternative<std::monostate>(row[2])) {
+      unit.last_constants = from_ns(integer_of(row[2]));
+    }
+    if (!unit.last_constants || *unit.last_constants < older_than) {
+      due.push_back(std::move(unit));
+    }
+  }
+  // The longest overdue first; nullopt sorts before every time.
+  std::sort(due.begin(), due.end(), [](const DueUnit& a, const DueUnit& b) {
+    return std::tie(a.last_constants, a.serial) < std::tie(b.last_constants, b.serial);
+  });
+  return due;
+}
+
+Result<std::vector<TrendPoint>> Store::trend(const std::string& serial) {
+  const std::vector<Value> parameters = {serial};
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query(
+          fmt::format("SELECT {}, runs.jig, runs.station, runs.verdict, "
+                      "(SELECT count(*) FROM corrections WHERE about_table = 'constants' "
+                      "AND about_id = constants.id AND action = 'withdraw') "
+                      "FROM constants LEFT JOIN runs ON runs.id = constants.run_id "
+                      "WHERE constants.serial = $1 ORDER BY constants.made_at_ns, constants.seq",
+                      kConstantsColumns),
+          parameters));
+  std::vector<TrendPoint> points;
+  points.reserve(rows.size());
+  for (const Row& row : rows) {
+    constexpr std::size_t kNext = kConstantsColumnCount;
+    points.push_back({to_constants(row), text_of(row[kNext]), text_of(row[kNext + 1]),
+                      text_of(row[kNext + 2]), integer_of(row[kNext + 3]) > 0});
+  }
+  return points;
 }
 
 Result<AuditReport> Store::audit() {
@@ -336,75 +586,43 @@ Result<AuditReport> Store::audit() {
     }
   };
   Database& database = *impl_->database;
+  SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(database));
 
   // Attachments are named by their content.
-  {
-    SIXPOINT_ASSIGN(const auto rows, database.stream("SELECT sha256, bytes FROM attachments"));
-    Row row;
-    while (true) {
-      SIXPOINT_ASSIGN(const bool more, rows->next(row));
-      if (!more) {
-        break;
-      }
-      const auto* bytes = std::get_if<Bytes>(&row[1]);
-      if (bytes == nullptr || to_hex(sha256(*bytes)) != text_of(row[0])) {
-        find(fmt::format("attachment {} was changed", text_of(row[0])));
-      }
-    }
-  }
+  SIXPOINT_CHECK(
+      for_each_attachment(database, [&](const std::string& name, const Bytes& bytes) -> Status {
+        if (to_hex(sha256(bytes)) != name) {
+          find(fmt::format("attachment {} was changed", printable(name, 70)));
+        }
+        return {};
+      }));
 
-  // All tables are read in step, always the row with the lowest seq next.
-  struct Cursor {
-    std::string_view table;
-    std::unique_ptr<RowStream> rows;
-    Row row;
-    bool more = false;
-  };
-  std::vector<Cursor> cursors;
-  for (const Table& table : tables()) {
-    SIXPOINT_ASSIGN(auto rows, database.stream(fmt::format("SELECT {} FROM {} ORDER BY seq",
-                                                           column_list(table), table.name)));
-    Cursor cursor{table.name, std::move(rows), {}, false};
-    SIXPOINT_ASSIGN(cursor.more, cursor.rows->next(cursor.row));
-    cursors.push_back(std::move(cursor));
-  }
+  SIXPOINT_ASSIGN(auto history, HistoryReader::open(database));
+  ChainHasher hasher;
   Bytes previous(32, 0);
   std::int64_t expected = 1;
+  HistoryRow row;
   while (true) {
-    Cursor* first = nullptr;
-    for (Cursor& cursor : cursors) {
-      if (cursor.more &&
-          (first == nullptr || integer_of(cursor.row[0]) < integer_of(first->row[0]))) {
-        first = &cursor;
-      }
-    }
-    if (first == nullptr) {
+    SIXPOINT_ASSIGN(const bool more, history.next(row));
+    if (!more) {
       break;
     }
-    const std::int64_t seq = integer_of(first->row[0]);
-    if (seq != expected) {
-      find(seq > expected ? fmt::format("rows {} to {} are missing", expected, seq - 1)
-                          : fmt::format("row {} is there twice", seq));
+    if (row.seq != expected) {
+      find(row.seq > expected ? fmt::format("rows {} to {} are missing", expected, row.seq - 1)
+                              : fmt::format("row {} is there twice", row.seq));
     }
-    const auto* stored = std::get_if<Bytes>(&first->row.back());
-    const auto columns = std::span<const Value>(first->row).subspan(1, first->row.size() - 2);
-    const Sha256Digest hash = chain_hash(previous, first->table, seq, columns);
-    if (stored == nullptr ||
-        !std::equal(hash.begin(), hash.end(), stored->begin(), stored->end())) {
-      find(fmt::format("row {} ({} {}) does not fit the chain: it, or one before it, was changed",
-                       seq, first->table, text_of(first->row[1])));
+    const Sha256Digest hash = hasher.hash(previous, *row.table, row.seq, row.columns);
+    if (!std::equal(hash.begin(), hash.end(), row.hash.begin(), row.hash.end())) {
+      find(fmt::format("{} does not fit the chain: it, or one before it, was changed",
+                       name_of(row)));
     }
     // Go on from what is written, so that one changed row is one finding and not all that follow.
-    if (stored != nullptr) {
-      previous = *stored;
-    }
-    expected = seq + 1;
+    previous.assign(row.hash.begin(), row.hash.end());
+    expected = row.seq + 1;
     ++report.rows;
-    SIXPOINT_ASSIGN(first->more, first->rows->next(first->row));
   }
-  SIXPOINT_ASSIGN(const auto head, database.query("SELECT rows, hash FROM head"));
-  const auto* head_hash = head.size() == 1 ? std::get_if<Bytes>(&head[0][1]) : nullptr;
-  if (head_hash == nullptr || integer_of(head[0][0]) != expected - 1 || *head_hash != previous) {
+  const auto head = read_head(database);
+  if (!head || head->rows != expected - 1 || head->hash != previous) {
     find("the head does not name the last row: rows at the end were removed or added");
   }
   report.head = to_hex(previous);

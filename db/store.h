@@ -33,6 +33,9 @@ struct ConstantsRecord {
   std::string method;    // "jig", "ls", "ga" ...
   std::string run_id;    // the run that made them, or empty
   std::string document;  // JSON in the form of constants.json (docs/constants-file.md)
+  // JSON, filled by the store from the document's `standard_uncertainty` and `made_from`.
+  std::string standard_uncertainty = {};
+  std::string origin = {};
 };
 
 struct UnitRecord {
@@ -56,8 +59,14 @@ struct RunRecord {
   std::string jig;
   std::string verdict;
   std::string software;
-  std::string retest_of;  // a run's id, or empty
-  std::string document;   // JSON: readings, limits used, gravity, temperature, codes
+  std::string retest_of;                        // a run's id, or empty
+  std::string document;                         // JSON: the whole report
+  std::optional<UtcTime> jig_due = {};          // when the jig itself is due for calibration
+  std::string build = {};                       // commit or package version of the software
+  std::string limits = {};                      // JSON: the limits that the verdict used
+  std::optional<double> gravity_m_per_s2 = {};  // local gravity
+  std::optional<double> temperature_c = {};     // of the unit during the run
+  std::vector<std::string> codes = {};          // the verdict's reasons
 };
 
 // Raw data of a run, kept as it came.
@@ -85,6 +94,48 @@ struct RepairRecord {
   std::string method;
   std::string constants_id;  // empty where the constants came from outside the store
   std::string document;
+  std::string software = {};
+};
+
+// A file that was mended with constants that were withdrawn later or before: mend it again.
+struct RecallEntry {
+  RepairRecord repair;
+  UtcTime withdrawn_at;
+  std::string reason;
+};
+
+// A unit that was on a jig.
+struct JigUnit {
+  std::string serial;
+  std::size_t runs = 0;
+  UtcTime last_run;
+  std::string last_verdict;
+};
+
+// Of the jig runs that started in a period.
+struct YieldReport {
+  std::size_t runs = 0;
+  std::size_t units = 0;
+  std::size_t passed = 0;             // units whose last run passed
+  std::size_t passed_first_time = 0;  // units whose first run passed
+  double yield() const;               // NaN where there were no units
+  double first_pass_yield() const;
+};
+
+// A unit whose newest constants (of any configuration, not withdrawn) are old, or that has none.
+struct DueUnit {
+  std::string serial;
+  std::string model;
+  std::optional<UtcTime> last_constants;
+};
+
+// One calibration of a check unit, for its control chart.
+struct TrendPoint {
+  ConstantsRecord constants;
+  std::string jig;
+  std::string station;
+  std::string verdict;
+  bool withdrawn = false;
 };
 
 struct AuditReport {
@@ -98,18 +149,33 @@ struct AuditReport {
   nlohmann::ordered_json to_json() const;  // ok, rows, head, findings
 };
 
+// The id that the store gives to a record, and the same errors where it would refuse it by itself:
+// known without a store, so that records can be named while it is away (journal.h).
+Result<std::string> id_of(const ConstantsRecord& record);
+Result<std::string> id_of(const RunRecord& run, const std::vector<Capture>& captures);
+Result<std::string> id_of(const UnitWrite& write);
+Result<std::string> id_of(const RepairRecord& repair);
+
+// A file's name as the store keeps it: bytes that are no UTF-8 are written \xNN.
+std::string storable_path(std::string_view path);
+
 class Store {
  public:
-  // `location`: a path of an SQLite file, which is made when it is not there. Errors as
-  // open_sqlite() and migrate(); usage for a kind of location that this program has no code for.
+  // `location`: a path of an SQLite file, which is made when it is not there, or postgresql://...
+  // Errors as open_sqlite(), open_postgres() and migrate().
   static Result<Store> open(Env& env, const std::string& location);
+
+  // What the store is made of, for exchange.h and journal.h. Rows belong into it by this class
+  // only.
+  Database& database();
 
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
   ~Store();
 
-  // Adds the unit too when it is new. Returns the id. bad_data for an empty or unprintable serial,
-  // an unknown filter, or a document that is no JSON.
+  // Adds the unit too when it is new (first seen at the record's own time). Returns the id.
+  // bad_data for an empty or unprintable serial, an unknown filter, a document that is no JSON, a
+  // text that is no UTF-8 or too long, a capture above 100 MiB.
   Result<std::string> add_constants(const ConstantsRecord& record, const std::string& model);
   Result<std::string> add_run(const RunRecord& run, const std::vector<Capture>& captures);
   Result<std::string> add_unit_write(const UnitWrite& write);
@@ -129,6 +195,15 @@ class Store {
   // The repair that made a file of this hash, if one did.
   Result<std::optional<RepairRecord>> repair_of_output(const std::string& output_sha256);
 
+  // What people ask (docs/store.md has the statements).
+  // Files mended with constants that are withdrawn; `constants_id` empty: with any of them.
+  Result<std::vector<RecallEntry>> recall_list(const std::string& constants_id = {});
+  Result<std::vector<JigUnit>> units_of_jig(const std::string& jig);
+  Result<YieldReport> yield(UtcTime from, UtcTime to);
+  Result<std::vector<DueUnit>> units_due(UtcTime older_than);
+  Result<std::vector<TrendPoint>> trend(const std::string& serial);
+
+  // Reads everything, as it is at this moment, while others go on writing.
   Result<AuditReport> audit();
 
  private:

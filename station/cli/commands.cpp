@@ -18,6 +18,7 @@ namespace sixpoint::cli {
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
+  COMMAND(store)                   \
   COMMAND(simulate)                \
   COMMAND(doctor)                  \
   COMMAND(virtual)                 \

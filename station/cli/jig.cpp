@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "calib/gravity.h"
+#include "db/journal.h"
 #include "device/unit.h"
 #include "gt3x/model.h"
 #include "station/cli/command.h"
@@ -31,6 +32,7 @@ struct Options {
 
 struct Done {
   station::JigReport report;
+  double residual_limit_mg = 0;  // that the verdict used
   std::string run_id;
   std::optional<std::string> constants_id;
 };
@@ -49,10 +51,11 @@ int exit_code_of(station::JigVerdict verdict) {
   return kExitFailed;
 }
 
-Status keep(Context& context, const Options& options, Done& done) {
+// Into the store, or into the journal, which takes the same.
+template <class Keeper>
+Status keep_in(Keeper& keeper, const Options& options, Done& done) {
   const station::JigReport& report = done.report;
   const std::string model(gt3x::model_of(report.serial));
-  SIXPOINT_ASSIGN(db::Store store, open_store(context, options.store));
   db::RunRecord run;
   run.serial = report.serial;
   run.model = model;
@@ -66,9 +69,19 @@ Status keep(Context& context, const Options& options, Done& done) {
   run.verdict = station::to_string(report.verdict);
   run.software = "sixpoint " SIXPOINT_VERSION;
   run.document = report.to_json().dump();
+  run.gravity_m_per_s2 = report.gravity.m_per_s2;
+  run.codes = report.reasons;
+  if (!report.faces.empty()) {
+    double sum_c = 0;
+    for (const station::PoseReading& face : report.faces) {
+      sum_c += face.temperature_c;
+    }
+    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
+  }
+  run.limits = Json{{"residual_mg", done.residual_limit_mg}}.dump();
   SIXPOINT_ASSIGN(
       done.run_id,
-      store.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
+      keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
   if (report.written) {
     db::UnitWrite write;
     write.run_id = done.run_id;
@@ -78,7 +91,7 @@ Status keep(Context& context, const Options& options, Done& done) {
         report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
     write.as_left = calib::to_json(report.six->best().stored).dump();
     write.read_back = calib::to_json(report.as_left->constants).dump();
-    SIXPOINT_CHECK(store.add_unit_write(write));
+    SIXPOINT_CHECK(keeper.add_unit_write(write));
   }
   if (report.usable()) {
     calib::ConstantsRecord constants = report.record();
@@ -90,8 +103,32 @@ Status keep(Context& context, const Options& options, Done& done) {
     row.method = constants.method;
     row.run_id = done.run_id;
     row.document = calib::to_json(constants).dump();
-    SIXPOINT_ASSIGN(done.constants_id, store.add_constants(row, model));
+    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, model));
   }
+  return {};
+}
+
+// A run is not lost because the server is away: it waits in the journal, which every later run and
+// 'sixpoint store catch-up' empties in order.
+Status keep(Context& context, const Options& options, Done& done) {
+  auto store = open_store(context, options.store);
+  if (!is_on_server(options.store)) {
+    return store ? keep_in(*store, options, done) : Status(fail(store.error()));
+  }
+  SIXPOINT_ASSIGN(auto journal,
+                  db::Journal::open(context.env.files, journal_folder(options.store)));
+  Status status = store ? Status() : Status(fail(store.error()));
+  if (status) {
+    const auto taken = journal.catch_up(*store);
+    status = taken ? keep_in(*store, options, done) : Status(fail(taken.error()));
+  }
+  if (status || status.error().code != ErrorCode::device_unavailable) {
+    return status;
+  }
+  // What the store did take before it went away is named the same, and stored once.
+  SIXPOINT_CHECK(keep_in(journal, options, done));
+  context.log().warn("{}; the run is kept in this station's journal and goes into the store later",
+                     status.error().brief());
   return {};
 }
 
@@ -135,6 +172,7 @@ Result<Done> run(Context& context, const Options& options) {
   };
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
+  done.residual_limit_mg = session.residual_limit_mg;
   SIXPOINT_CHECK(keep(context, options, done));
   return done;
 }

@@ -1,21 +1,19 @@
 #include "db/store.h"
 
-#include <fstream>
+#include <atomic>
+#include <cmath>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <sqlite3.h>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "temporary_folder.h"
+#include "place.h"
 
 namespace sixpoint::db {
 namespace {
-
-using tests::TemporaryFolder;
 
 ConstantsRecord constants(const std::string& serial, const std::string& filter, std::int64_t time_s,
                           const std::string& document = "{}") {
@@ -31,31 +29,15 @@ ConstantsRecord constants(const std::string& serial, const std::string& filter, 
 class StoreTest : public testing::Test {
  protected:
   Store open() {
-    auto store = Store::open(memory_.env, path());
+    auto store = Store::open(memory_.env, location());
     if (!store) {
       throw std::runtime_error(store.error().brief());
     }
     return *std::move(store);
   }
-  std::string path() const { return folder_ / "store.db"; }
+  std::string location() const { return place_->location("main"); }
 
-  // Another program's hand in the file: triggers off, then the statement.
-  void tamper(const std::string& sql) {
-    sqlite3* handle = nullptr;
-    ASSERT_EQ(sqlite3_open(path().c_str(), &handle), SQLITE_OK);
-    std::string all = "PRAGMA foreign_keys=OFF;";
-    for (const char* table : {"units", "constants", "attachments"}) {
-      for (const char* change : {"update", "delete"}) {
-        all += std::string("DROP TRIGGER ") + table + "_no_" + change + ";";
-      }
-    }
-    char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(handle, (all + sql).c_str(), nullptr, nullptr, &message), SQLITE_OK)
-        << message;
-    sqlite3_close(handle);
-  }
-
-  TemporaryFolder folder_;
+  std::unique_ptr<tests::Place> place_ = tests::make_place();
   MemoryEnv memory_;
 };
 
@@ -120,7 +102,7 @@ TEST_F(StoreTest, RunsKeepTheirCaptures) {
   const auto audit = store.audit();
   ASSERT_OK(audit);
   EXPECT_TRUE(audit->ok) << audit->brief();
-  EXPECT_EQ(audit->rows, 5) << "unit, run, two captures, constants";
+  EXPECT_EQ(audit->rows, 6) << "unit, filter, run, two captures, constants";
 }
 
 TEST_F(StoreTest, AuditFindsWhatWasTouched) {
@@ -139,17 +121,21 @@ TEST_F(StoreTest, AuditFindsWhatWasTouched) {
     EXPECT_TRUE(audit->ok);
     EXPECT_EQ(audit->head.size(), 64U);
   };
-  for (const char* change :
-       {"UPDATE constants SET document = '{\"a\":1}' WHERE seq = 3",
-        "UPDATE constants SET made_at_ns = 7 WHERE seq = 4", "DELETE FROM constants WHERE seq = 3",
-        "DELETE FROM constants WHERE seq = 6",
-        "UPDATE constants SET seq = 100 WHERE seq = 2; UPDATE constants SET seq = 2 WHERE seq = 3; "
-        "UPDATE constants SET seq = 3 WHERE seq = 100",
-        "UPDATE units SET serial = 'X' WHERE seq = 1", "UPDATE attachments SET bytes = x'00'",
-        "UPDATE head SET rows = 3", "UPDATE constants SET filter = 'legacy' WHERE seq = 2"}) {
-    std::filesystem::remove(path());
+  for (const std::string& change : std::vector<std::string>{
+           "UPDATE constants SET document = '{\"a\":1}' WHERE seq = 3",
+           "UPDATE constants SET made_at_ns = 7 WHERE seq = 4",
+           "DELETE FROM constants WHERE seq = 3", "DELETE FROM constants WHERE seq = 7",
+           "UPDATE constants SET seq = 100 WHERE seq = 3; UPDATE constants SET seq = 3 WHERE seq = "
+           "4; "
+           "UPDATE constants SET seq = 4 WHERE seq = 100",
+           "UPDATE units SET serial = 'X' WHERE seq = 1",
+           "UPDATE attachments SET bytes = " + place_->empty_bytes(), "UPDATE head SET rows = 3",
+           "UPDATE constants SET filter = 'legacy' WHERE seq = 3",
+           "UPDATE runs SET temperature_c = '21' WHERE serial = 'MOS2A1'",
+           "UPDATE constants SET origin = '{}' WHERE seq = 4"}) {
+    place_->erase("main");
     fill();
-    tamper(change);
+    place_->tamper("main", change);
     const auto audit = open().audit();
     ASSERT_OK(audit);
     EXPECT_FALSE(audit->ok) << change;
@@ -162,13 +148,9 @@ TEST_F(StoreTest, TheDatabaseItselfRefusesToChangeHistory) {
     Store store = open();
     ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 100), "w"));
   }
-  sqlite3* handle = nullptr;
-  ASSERT_EQ(sqlite3_open(path().c_str(), &handle), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(handle, "UPDATE constants SET serial='X'", nullptr, nullptr, nullptr),
-            SQLITE_CONSTRAINT);
-  EXPECT_EQ(sqlite3_exec(handle, "DELETE FROM constants", nullptr, nullptr, nullptr),
-            SQLITE_CONSTRAINT);
-  sqlite3_close(handle);
+  EXPECT_TRUE(place_->statements("main", "SELECT 1"));
+  EXPECT_FALSE(place_->statements("main", "UPDATE constants SET serial='X'"));
+  EXPECT_FALSE(place_->statements("main", "DELETE FROM constants"));
 }
 
 TEST_F(StoreTest, RefusesWhatItCannotKeep) {
@@ -179,27 +161,175 @@ TEST_F(StoreTest, RefusesWhatItCannotKeep) {
                ErrorCode::bad_data);
   EXPECT_FAILS(store.add_constants(constants("MOS", "new", 1), "w"), ErrorCode::bad_data);
   EXPECT_FAILS(store.add_constants(constants("MOS", "current", 1, "{"), "w"), ErrorCode::bad_data);
+  RepairRecord of_nothing;
+  of_nothing.serial = "MOS";
+  of_nothing.constants_id = "none";
+  of_nothing.document = "{}";
+  EXPECT_FAILS(store.add_repair(of_nothing), ErrorCode::bad_data);
+  of_nothing.constants_id = "";
+  EXPECT_OK(store.add_repair(of_nothing)) << "a refusal is not said again to the next";
   ASSERT_OK(store.add_constants(constants("O'Hara\"; DROP TABLE units;--", "current", 1), "w"));
   EXPECT_EQ(store.units()->front().serial, "O'Hara\"; DROP TABLE units;--");
 }
 
-TEST_F(StoreTest, OpensOnlyStores) {
-  std::ofstream(path()) << "this is a text file, long enough to be looked at as a database header "
-                           "of one hundred bytes and more";
-  EXPECT_FAILS(Store::open(memory_.env, path()), ErrorCode::bad_data);
-  EXPECT_FAILS(Store::open(memory_.env, folder_ / "none/store.db"), ErrorCode::cannot_create);
-  const std::string other = folder_ / "other.db";
-  sqlite3* handle = nullptr;
-  ASSERT_EQ(sqlite3_open(other.c_str(), &handle), SQLITE_OK);
-  sqlite3_exec(handle, "CREATE TABLE mine (a)", nullptr, nullptr, nullptr);
-  sqlite3_close(handle);
-  EXPECT_FAILS(Store::open(memory_.env, other), ErrorCode::bad_data);
-  ASSERT_OK(open_sqlite(folder_ / "newer.db").value()->set_schema_version(99));
-  EXPECT_FAILS(Store::open(memory_.env, folder_ / "newer.db"), ErrorCode::configuration);
+TEST_F(StoreTest, KeepsOddTextsAsTheyAre) {
+  Store store = open();
+  const std::string odd = "Zo\u00eb '; -- \\x41 $1 \U0001F600 \"\n\t";
+  RunRecord run;
+  run.serial = "MOS2A1";
+  run.filter = "current";
+  run.operator_name = odd;
+  run.document = R"({"text":"\u0000\\"})";
+  ASSERT_OK(store.add_run(run, {{odd, Bytes{0, 1, 255, '\\', '\''}}}));
+  const auto rows = store.database().query("SELECT operator, document FROM runs");
+  EXPECT_EQ(text_of((*rows)[0][0]), odd);
+  EXPECT_EQ(text_of((*rows)[0][1]), run.document);
+  run.operator_name = std::string("a\0b", 3);
+  EXPECT_FAILS(store.add_run(run, {}), ErrorCode::bad_data);
+  for (const char* broken : {"\xff", "\xc0\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe2\x82"}) {
+    run.operator_name = broken;
+    EXPECT_FAILS(store.add_run(run, {}), ErrorCode::bad_data);
+  }
+  RepairRecord repair;
+  repair.serial = "MOS2A1";
+  repair.input = "/data/\xff\xfe.gt3x";
+  repair.document = "{}";
+  ASSERT_OK(store.add_repair(repair));
+  const auto kept = store.repair_of_output("");
+  ASSERT_TRUE(kept->has_value());
+  EXPECT_EQ((*kept)->input, "/data/\\xff\\xfe.gt3x") << "a file's name is evidence: escaped";
+  EXPECT_TRUE(store.audit()->ok);
+}
+
+TEST_F(StoreTest, KeepsWhatARunWasJudgedBy) {
+  Store store = open();
+  RunRecord run;
+  run.serial = "MOS2A1";
+  run.filter = "current";
+  run.document = "{}";
+  const auto plain = store.add_run(run, {});
+  run.jig_due = from_unix_seconds(1'500'000'000);
+  run.build = "e21f353";
+  run.limits = R"({"residual_mg":5})";
+  run.gravity_m_per_s2 = 9.8101;
+  run.temperature_c = 22.5;
+  run.codes = {"tilted", "moved"};
+  run.retest_of = plain.value();
+  ASSERT_OK(store.add_run(run, {}));
+  auto record = constants("MOS2A1", "current", 5);
+  record.document =
+      R"({"standard_uncertainty":{"zero_mg":[1,1,1]},"made_from":{"sha256":"ab"},"z":1})";
+  ASSERT_OK(store.add_constants(record, "w"));
+  const auto rows = store.database().query(
+      "SELECT jig_due_ns, build, limits, gravity_m_per_s2, temperature_c, codes, retest_of FROM "
+      "runs "
+      "WHERE build IS NOT NULL");
+  ASSERT_EQ(rows->size(), 1U);
+  EXPECT_EQ(rows->front(),
+            (Row{std::int64_t{1'500'000'000'000'000'000}, "e21f353", R"({"residual_mg":5})",
+                 "9.8101", "22.5", R"(["tilted","moved"])", plain.value()}));
+  const auto history = store.history("MOS2A1");
+  EXPECT_EQ(history->front().standard_uncertainty, R"({"zero_mg":[1,1,1]})");
+  EXPECT_EQ(history->front().origin, R"({"sha256":"ab"})");
+}
+
+TEST_F(StoreTest, AnswersWhatPeopleAsk) {
+  Store store = open();
+  const auto run = [&](const std::string& serial, const std::string& verdict, std::int64_t time_s,
+                       const std::string& jig = "J1") {
+    RunRecord record;
+    record.serial = serial;
+    record.kind = "jig";
+    record.filter = "current";
+    record.jig = jig;
+    record.verdict = verdict;
+    record.started = from_unix_seconds(time_s);
+    record.ended = from_unix_seconds(time_s + 60);
+    record.document = "{}";
+    return store.add_run(record, {}).value();
+  };
+  // A passes at once, B at its second run, C never; D is of another time and jig.
+  const auto first = run("A", "pass", 1000);
+  run("B", "fail", 1100);
+  run("C", "fail", 1200);
+  run("B", "pass", 1300);
+  run("D", "pass", 9000, "J2");
+  const auto yield = store.yield(from_unix_seconds(0), from_unix_seconds(5000));
+  ASSERT_OK(yield);
+  EXPECT_EQ(yield->runs, 4U);
+  EXPECT_EQ(yield->units, 3U);
+  EXPECT_DOUBLE_EQ(yield->yield(), 2.0 / 3);
+  EXPECT_DOUBLE_EQ(yield->first_pass_yield(), 1.0 / 3);
+  EXPECT_TRUE(std::isnan(store.yield(from_unix_seconds(0), from_unix_seconds(1))->yield()));
+
+  const auto of_jig = store.units_of_jig("J1");
+  ASSERT_EQ(of_jig->size(), 3U);
+  EXPECT_EQ((*of_jig)[1].serial, "B");
+  EXPECT_EQ((*of_jig)[1].runs, 2U);
+  EXPECT_EQ((*of_jig)[1].last_verdict, "pass");
+  EXPECT_EQ((*of_jig)[1].last_run, from_unix_seconds(1360));
+
+  auto of_a = constants("A", "current", 1060);
+  of_a.run_id = first;
+  const auto old_set = store.add_constants(of_a, "w").value();
+  const auto new_set = store.add_constants(constants("A", "current", 4000), "w").value();
+  ASSERT_OK(store.add_constants(constants("B", "current", 1360), "w"));
+  RepairRecord repair;
+  repair.document = "{}";
+  repair.serial = "A";
+  for (const auto& [input, id] :
+       {std::pair("one", old_set), {"two", new_set}, {"three", old_set}}) {
+    repair.input = input;
+    repair.constants_id = id;
+    ASSERT_OK(store.add_repair(repair));
+  }
+  EXPECT_TRUE(store.recall_list()->empty());
+  ASSERT_OK(store.withdraw_constants(old_set, "Ada", "jig out of level"));
+  ASSERT_OK(store.withdraw_constants(old_set, "Bob", "again"));
+  const auto recall = store.recall_list();
+  ASSERT_EQ(recall->size(), 2U);
+  EXPECT_EQ((*recall)[0].repair.input, "one");
+  EXPECT_EQ((*recall)[1].repair.input, "three");
+  EXPECT_EQ((*recall)[1].reason, "jig out of level");
+  EXPECT_EQ(store.recall_list(old_set)->size(), 2U);
+  EXPECT_TRUE(store.recall_list(new_set)->empty());
+
+  const auto trend = store.trend("A");
+  ASSERT_EQ(trend->size(), 2U);
+  EXPECT_EQ((*trend)[0].jig, "J1");
+  EXPECT_TRUE((*trend)[0].withdrawn);
+  EXPECT_EQ((*trend)[1].jig, "");
+  EXPECT_FALSE((*trend)[1].withdrawn);
+
+  // C and D have no constants, B's are old, A's new ones are not.
+  const auto due = store.units_due(from_unix_seconds(2000));
+  ASSERT_EQ(due->size(), 3U);
+  EXPECT_EQ((*due)[0].serial, "C");
+  EXPECT_FALSE((*due)[0].last_constants.has_value());
+  EXPECT_EQ((*due)[1].serial, "D");
+  EXPECT_EQ((*due)[2].serial, "B");
+}
+
+TEST_F(StoreTest, AnAuditSeesOneMomentWhileOthersWrite) {
+  Store store = open();
+  std::atomic<bool> stop = false;
+  std::thread writer([&] {
+    MemoryEnv env;
+    auto other = Store::open(env.env, place_->location("main"));
+    for (int i = 0; !stop; ++i) {
+      static_cast<void>(other->add_constants(constants("MOS", "current", i), "w"));
+    }
+  });
+  for (int i = 0; i < 20; ++i) {
+    const auto audit = store.audit();
+    EXPECT_TRUE(audit && audit->ok) << (audit ? audit->brief() : audit.error().brief());
+  }
+  stop = true;
+  writer.join();
 }
 
 TEST_F(StoreTest, ManyWritersLoseNothing) {
-  { open(); }
+  place_->location("main");
   constexpr int kWriters = 4;
   constexpr int kRows = 25;
   std::vector<std::thread> writers;
@@ -207,7 +337,7 @@ TEST_F(StoreTest, ManyWritersLoseNothing) {
   for (int writer = 0; writer < kWriters; ++writer) {
     writers.emplace_back([&, writer] {
       MemoryEnv env;
-      auto store = Store::open(env.env, path());
+      auto store = Store::open(env.env, location());
       for (int i = 0; store && i < kRows; ++i) {
         const auto id =
             store->add_constants(constants("MOS" + std::to_string(writer), "current", i), "w");
@@ -223,7 +353,7 @@ TEST_F(StoreTest, ManyWritersLoseNothing) {
   EXPECT_THAT(failures, testing::Each(testing::IsEmpty()));
   const auto audit = open().audit();
   EXPECT_TRUE(audit->ok) << audit->brief();
-  EXPECT_EQ(audit->rows, kWriters * (kRows + 1));
+  EXPECT_EQ(audit->rows, kWriters * (kRows + 1) + 1) << "units and constants, and the one filter";
 }
 
 }  // namespace

@@ -198,7 +198,7 @@ TEST_F(RepairCommand, StoreCommandsAnswerByContract) {
   const auto audit = run({"audit", "verify", "--store", path, "--json"});
   EXPECT_EQ(audit.exit_code, 0);
   EXPECT_EQ(audit.json()["ok"], true);
-  EXPECT_EQ(audit.json()["rows"], 3) << "unit, constants, repair";
+  EXPECT_EQ(audit.json()["rows"], 4) << "unit, filter, constants, repair";
   EXPECT_EQ(audit.json()["head"].get<std::string>().size(), 64U);
   EXPECT_EQ(run({"history", "NONE", "--store", path}).exit_code, 66);
   EXPECT_EQ(run({"units", "--store", folder_ / "none.db"}).exit_code, 66);

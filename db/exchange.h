@@ -1,0 +1,45 @@
+// Moving whole stores: out as text, in again on either server, and a copy while others work.
+//
+// JSON Lines: the first line names the format, how many rows there are and the head of the chain;
+// then every row in order, each attachment before the first row of the file. docs/store.md has the
+// keys. The head of the store that imported it is the same: nothing is lost on the way.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "db/store.h"
+
+namespace sixpoint::db {
+
+struct ExchangeReport {
+  std::int64_t rows = 0;   // in the store or file that was read
+  std::int64_t added = 0;  // import: rows that the store did not have yet
+  std::int64_t attachments = 0;
+  std::string head;  // hex SHA-256 of the last row
+
+  std::string brief() const;
+  nlohmann::ordered_json to_json() const;  // rows, added, attachments, head
+};
+
+// The store as it is now, into `path` (whole or not at all).
+Result<ExchangeReport> export_json_lines(Store& store, FileSystem& files, const std::string& path);
+
+// One file TABLE.csv per table into `folder`, which is made, and attachments/SHA256 (RFC 4180,
+// UTF-8, a header line; NULL is an empty field, an empty text is ""). For spreadsheets and
+// statistics; import takes JSON Lines only.
+Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::string& folder);
+
+// Continues `store` with the rows of `path` in one transaction. The rows that both have must be the
+// same: then the file may hold more, or no more, than the store. bad_data, naming the row, for
+// another chain, a changed, missing or reordered row, a file that ends early; configuration for a
+// file of a newer version. Nothing of a refused file stays.
+Result<ExchangeReport> import_json_lines(Store& store, FileSystem& files, const std::string& path);
+
+// A store in an SQLite file `path` (replaced whole or not at all) with the same rows and head, made
+// while others go on writing: by SQLite's online backup, or row by row from PostgreSQL. The path is
+// one of the real disk. It is read back and its chain is checked before it takes its name.
+Result<ExchangeReport> backup(Store& store, Env& env, const std::string& path);
+
+}  // namespace sixpoint::db

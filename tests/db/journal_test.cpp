@@ -1,0 +1,169 @@
+#include "db/journal.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "place.h"
+
+namespace sixpoint::db {
+namespace {
+
+class JournalTest : public testing::Test {
+ protected:
+  Store open_store(const std::string& name) {
+    return Store::open(memory_.env, place_->location(name)).value();
+  }
+  Journal open_journal() { return Journal::open(memory_.files, "journal").value(); }
+
+  static RunRecord run(int number) {
+    RunRecord run;
+    run.serial = "MOS2A1";
+    run.kind = "jig";
+    run.filter = "current";
+    run.operator_name = "Zoë";
+    run.started = from_unix_seconds(number);
+    run.document = "{}";
+    run.temperature_c = 21.3;
+    run.codes = {"tilted"};
+    run.jig_due = from_unix_seconds(99);
+    return run;
+  }
+  static ConstantsRecord constants(int number, const std::string& run_id) {
+    ConstantsRecord record;
+    record.serial = "MOS2A1";
+    record.filter = "current";
+    record.made_at = from_unix_seconds(number);
+    record.run_id = run_id;
+    record.document = R"({"made_from":{"n":1}})";
+    return record;
+  }
+
+  std::unique_ptr<tests::Place> place_ = tests::make_place();
+  MemoryEnv memory_;
+};
+
+// One unit's work, into anything that has the store's four functions.
+template <class Target>
+std::vector<std::string> work(Target& target, const std::vector<RunRecord>& runs,
+                              ConstantsRecord (*constants)(int, const std::string&)) {
+  std::vector<std::string> ids;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    ids.push_back(
+        target.add_run(runs[i], {{"raw", Bytes{1, 2, static_cast<std::uint8_t>(i)}}}).value());
+    ids.push_back(
+        target.add_unit_write({ids.back(), "MOS2A1", from_unix_seconds(5), "null", "{}", "{}"})
+            .value());
+    ids.push_back(
+        target.add_constants(constants(static_cast<int>(i), ids[ids.size() - 2]), "w").value());
+    RepairRecord repair;
+    repair.serial = "MOS2A1";
+    repair.input = "/a/\xff.gt3x";
+    repair.constants_id = ids.back();
+    repair.document = "{}";
+    ids.push_back(target.add_repair(repair).value());
+  }
+  return ids;
+}
+
+TEST_F(JournalTest, CaughtUpTheStoreIsAsIfItsServerHadNeverBeenAway) {
+  const std::vector<RunRecord> runs = {run(1), run(2), run(3)};
+  Store direct = open_store("direct");
+  const auto expected = work(direct, runs, constants);
+  Journal journal = open_journal();
+  EXPECT_EQ(work(journal, runs, constants), expected) << "the same ids";
+  EXPECT_EQ(journal.pending().value(), expected.size());
+  memory_.files.lose_power();
+  Journal later = open_journal();
+  Store store = open_store("late");
+  const auto taken = later.catch_up(store);
+  ASSERT_OK(taken);
+  EXPECT_EQ(*taken, expected.size());
+  EXPECT_EQ(later.pending().value(), 0U);
+  EXPECT_EQ(store.audit()->head, direct.audit()->head) << "every row the same, in the same order";
+  EXPECT_EQ(later.catch_up(store).value(), 0U);
+}
+
+TEST_F(JournalTest, APowerCutAtAnyOperationLosesAndDoublesNothing) {
+  const std::vector<RunRecord> runs = {run(1), run(2)};
+  Store direct = open_store("direct");
+  work(direct, runs, constants);
+  const auto head = direct.audit()->head;
+  const auto rows = direct.audit()->rows;
+  std::size_t stops = 0;
+  // While entries are written: what was acknowledged is there, and only that or one more.
+  for (std::size_t stop = 0;; ++stop, ++stops) {
+    MemoryEnv machine;
+    auto journal = Journal::open(machine.files, "journal");
+    machine.files.fail_after(stop);
+    std::size_t acknowledged = 0;
+    for (int i = 0; i < 3; ++i) {
+      acknowledged += journal->add_run(run(i), {{"raw", Bytes{9}}}) ? 1 : 0;
+    }
+    machine.files.lose_power();
+    machine.files.stop_failing();
+    auto again = Journal::open(machine.files, "journal");
+    const auto pending = again->pending();
+    ASSERT_OK(pending);
+    EXPECT_GE(*pending, acknowledged);
+    EXPECT_LE(*pending, acknowledged + 1);
+    if (acknowledged == 3) {
+      break;
+    }
+  }
+  EXPECT_GT(stops, 10U);
+  // While the store catches up: after the next try it has everything once, in order.
+  Store store = open_store("late");
+  for (std::size_t stop = 0;; ++stop) {
+    MemoryEnv machine;
+    auto journal = Journal::open(machine.files, "journal");
+    work(*journal, runs, constants);
+    machine.files.fail_after(stop);
+    const bool whole = journal->catch_up(store).has_value();
+    machine.files.lose_power();
+    machine.files.stop_failing();
+    auto again = Journal::open(machine.files, "journal");
+    ASSERT_OK(again->catch_up(store));
+    EXPECT_EQ(again->pending().value(), 0U);
+    EXPECT_EQ(store.audit()->head, head) << stop;
+    EXPECT_EQ(store.audit()->rows, rows);
+    if (whole) {
+      EXPECT_GT(stop, 10U);
+      break;
+    }
+  }
+}
+
+TEST_F(JournalTest, KeepsTheOrderWhenAnEntryIsDamagedOrRefused) {
+  Journal journal = open_journal();
+  ASSERT_OK(journal.add_constants(constants(1, ""), "w"));
+  auto of_no_run = constants(2, "no such run");
+  ASSERT_OK(journal.add_constants(of_no_run, "w"));
+  ASSERT_OK(journal.add_constants(constants(3, ""), "w"));
+  Store store = open_store("main");
+  EXPECT_FAILS(journal.catch_up(store), ErrorCode::bad_data);
+  EXPECT_EQ(journal.pending().value(), 2U) << "the refused one and the one behind it";
+  EXPECT_EQ(store.history("MOS2A1")->size(), 1U);
+  auto broken = constants(4, "");
+  broken.document = "{";
+  EXPECT_FAILS(journal.add_constants(broken, "w"), ErrorCode::bad_data);
+  EXPECT_EQ(journal.pending().value(), 2U) << "what the store would refuse is refused at once";
+
+  const auto names = memory_.files.list("journal");
+  ASSERT_OK(memory_.files.remove("journal/" + names->front()));
+  auto damaged = memory_.files.create("journal/" + names->front());
+  const std::string text = R"({"schema":"sixpoint/journal-entry/1","record":"{}","sha256":"00"})";
+  ASSERT_OK((*damaged)->write_at(
+      0, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  const auto refused = journal.catch_up(store);
+  EXPECT_FAILS(refused, ErrorCode::bad_data);
+  EXPECT_THAT(refused.error().brief(), testing::HasSubstr(names->front()));
+  ASSERT_OK(memory_.files.remove("journal/" + names->front()));
+  const auto rest = journal.catch_up(store);
+  ASSERT_OK(rest);
+  EXPECT_EQ(*rest, 1U);
+}
+
+}  // namespace
+}  // namespace sixpoint::db

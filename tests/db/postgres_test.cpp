@@ -1,0 +1,185 @@
+// What only a store on a server can meet: wrong passwords, servers that are away or vanish.
+#include <array>
+#include <atomic>
+#include <set>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/memory_env.h"
+#include "base/random.h"
+#include "db/exchange.h"
+#include "db/store.h"
+#include "expect_result.h"
+#include "place.h"
+#include "postgres_server.h"
+
+namespace sixpoint::db {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using tests::server;
+
+ConstantsRecord constants(int number) {
+  ConstantsRecord record;
+  record.made_at = from_unix_seconds(number);
+  record.serial = "MOS2A1";
+  record.filter = "current";
+  record.document = "{}";
+  return record;
+}
+
+class PostgresStoreTest : public testing::Test {
+ protected:
+  std::string location() { return place_->location("main"); }
+  std::unique_ptr<tests::Place> place_ = tests::make_place();
+  MemoryEnv memory_;
+};
+
+TEST_F(PostgresStoreTest, SaysWhatIsWrongAndNeverThePassword) {
+  const auto refused = [&](const std::string& where, ErrorCode code) {
+    const auto store = Store::open(memory_.env, where);
+    EXPECT_FAILS(store, code);
+    if (!store) {
+      EXPECT_THAT(store.error().brief(), Not(HasSubstr("s3cret"))) << where;
+      EXPECT_THAT(store.error().brief(), Not(HasSubstr("%2Fp"))) << where;
+      EXPECT_THAT(store.error().brief(), Not(HasSubstr("pw@"))) << where;
+    }
+  };
+  location();
+  refused(server().location("store_none"), ErrorCode::no_input);
+  refused(server().location("postgres", "s3cret wrong"), ErrorCode::permission);
+  refused("postgresql://station:s3cret@127.0.0.1:1/x", ErrorCode::device_unavailable);
+  refused("postgresql://station:s3cret@/pw@127.0.0.1:port/x", ErrorCode::usage);
+  refused("postgresql://station:s3cret%zz@127.0.0.1/x", ErrorCode::usage);
+  refused("postgresql://127.0.0.1:1/x?password=s3cret&nonsense=1", ErrorCode::usage);
+  auto database = open_postgres(location());
+  ASSERT_OK(database);
+  EXPECT_THAT((*database)->location(), Not(HasSubstr("s3cret")));
+}
+
+TEST_F(PostgresStoreTest, OpensOnlyStores) {
+  const std::string foreign = place_->location("foreign");
+  ASSERT_TRUE(place_->statements("foreign", "CREATE TABLE mine (a int)"));
+  EXPECT_FAILS(Store::open(memory_.env, foreign), ErrorCode::bad_data);
+  const std::string newer = place_->location("newer");
+  { ASSERT_OK(Store::open(memory_.env, newer)); }
+  ASSERT_TRUE(place_->statements("newer", "UPDATE sixpoint_schema SET version = 99"));
+  EXPECT_FAILS(Store::open(memory_.env, newer), ErrorCode::configuration);
+}
+
+TEST_F(PostgresStoreTest, ARefusalByRightsIsNamedSo) {
+  { ASSERT_OK(Store::open(memory_.env, location())); }
+  place_->tamper("main", "REVOKE INSERT ON units FROM station");
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  EXPECT_FAILS(store->add_constants(constants(1), "w"), ErrorCode::permission);
+  place_->tamper("main", "GRANT INSERT ON units TO station");
+  EXPECT_OK(store->add_constants(constants(1), "w"));
+}
+
+TEST_F(PostgresStoreTest, AServerThatVanishesInMidTransactionLosesOnlyThatTransaction) {
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  ASSERT_OK(store->add_constants(constants(1), "w"));
+  Database& database = store->database();
+  ASSERT_OK(database.begin_writing());
+  ASSERT_OK(database.execute("INSERT INTO attachments VALUES ('x', '')"));
+  server().kill();
+  const auto status = database.execute("INSERT INTO attachments VALUES ('y', '')");
+  EXPECT_FAILS(status, ErrorCode::device_unavailable);
+  EXPECT_THAT(status.error().brief(), Not(HasSubstr("s3cret")));
+  database.roll_back();
+  EXPECT_FAILS(store->add_constants(constants(2), "w"), ErrorCode::device_unavailable);
+  server().start();
+  EXPECT_OK(store->add_constants(constants(2), "w")) << "the same store goes on";
+  EXPECT_EQ(store->history("MOS2A1")->size(), 2U);
+  const auto audit = store->audit();
+  EXPECT_TRUE(audit->ok) << audit->brief();
+}
+
+// Killed like in a power cut while several stations write: what was acknowledged is there.
+// SIXPOINT_KILLS sets how often.
+TEST_F(PostgresStoreTest, KilledAtRandomMomentsItKeepsEveryAcknowledgedRow) {
+  { ASSERT_OK(Store::open(memory_.env, location())); }
+  const char* wanted = std::getenv("SIXPOINT_SERVER_KILLS");
+  const int kills = wanted == nullptr ? 5 : std::atoi(wanted);
+  constexpr int kWriters = 3;
+  Random random(9);
+  std::array<std::vector<int>, kWriters> acknowledged;
+  std::array<int, kWriters> next{};
+  for (int kill = 0; kill < kills; ++kill) {
+    std::atomic<int> open_writers = 0;
+    std::vector<std::thread> writers;
+    for (int writer = 0; writer < kWriters; ++writer) {
+      writers.emplace_back([&, writer] {
+        const auto w = static_cast<std::size_t>(writer);
+        MemoryEnv env;
+        auto store = Store::open(env.env, place_->location("main"));
+        ++open_writers;
+        while (store) {
+          const int number = 1'000'000 * writer + next[w]++;
+          if (!store->add_constants(constants(number), "w")) {
+            break;
+          }
+          acknowledged[w].push_back(number);
+        }
+      });
+    }
+    while (open_writers < kWriters) {
+      std::this_thread::yield();
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(random.below(60)));
+    server().kill();
+    for (std::thread& writer : writers) {
+      writer.join();
+    }
+    server().start();
+    auto store = Store::open(memory_.env, location());
+    ASSERT_OK(store);
+    const auto audit = store->audit();
+    ASSERT_OK(audit);
+    ASSERT_TRUE(audit->ok) << audit->brief();
+    const auto history = store->history("MOS2A1");
+    std::set<std::int64_t> stored;
+    for (const auto& record : *history) {
+      EXPECT_TRUE(stored.insert(to_unix_seconds(record.made_at)).second) << "doubled";
+    }
+    for (const auto& numbers : acknowledged) {
+      for (const int number : numbers) {
+        ASSERT_TRUE(stored.contains(number)) << number << " was acknowledged before kill " << kill;
+      }
+    }
+  }
+  EXPECT_GT(acknowledged[0].size() + acknowledged[1].size() + acknowledged[2].size(),
+            static_cast<std::size_t>(kills));
+}
+
+TEST_F(PostgresStoreTest, MovesToAFileAndBackWithTheSameHead) {
+  sixpoint::tests::TemporaryFolder folder;
+  auto on_server = Store::open(memory_.env, location());
+  ASSERT_OK(on_server);
+  for (int i = 0; i < 2500; ++i) {
+    ASSERT_OK(on_server->add_constants(constants(i), "w"));
+  }
+  RunRecord run;
+  run.serial = "Zoë";
+  run.filter = "legacy";
+  run.document = R"({"text":"\u0000 ü"})";
+  ASSERT_OK(on_server->add_run(run, {{"raw", Bytes{0, 255}}}));
+  const auto head = on_server->audit()->head;
+  ASSERT_OK(export_json_lines(*on_server, memory_.files, "a.jsonl"));
+  auto in_file = Store::open(memory_.env, folder / "store.db");
+  ASSERT_OK(import_json_lines(*in_file, memory_.files, "a.jsonl"));
+  EXPECT_EQ(in_file->audit()->head, head);
+  ASSERT_OK(export_json_lines(*in_file, memory_.files, "b.jsonl"));
+  auto back = Store::open(memory_.env, place_->location("back"));
+  ASSERT_OK(import_json_lines(*back, memory_.files, "b.jsonl"));
+  EXPECT_EQ(back->audit()->head, head);
+  EXPECT_EQ(*read_file(memory_.files, "a.jsonl"), *read_file(memory_.files, "b.jsonl"));
+}
+
+}  // namespace
+}  // namespace sixpoint::db
