@@ -82,4 +82,4 @@ x'74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d');
 INSERT INTO head VALUES (1, 3,
 x'74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d');
 )sql"
-// clang-format on
+    // clang-format on

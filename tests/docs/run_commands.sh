@@ -17,6 +17,7 @@ for document in "$source_folder"/README.md "$source_folder"/docs/*.md; do
   mkdir -p "$folder/build" "$folder/archive"
   ln -s "$program" "$folder/build/sixpoint"
   cp "$source_folder/tests/docs/scenario.json" "$folder/S.json"
+  echo '{"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production"}' >"$folder/bundle.json"
   for day in 1 2; do
     sed "s/\"seed\": 1/\"seed\": $day/" "$folder/S.json" >"$folder/day$day.json"
     "$program" simulate --scenario "$folder/day$day.json" -o "$folder/archive/day$day.gt3x" \
