@@ -1,7 +1,9 @@
 #include "sim/effect.h"
 
 #include <cmath>
+#include <fstream>
 #include <set>
+#include <sstream>
 
 #include <gtest/gtest.h>
 
@@ -52,6 +54,21 @@ TEST(Effects, EveryEntryIsWhole) {
   EXPECT_FAILS(complete_parameters(tilt, {{"rotation_vector_deg", {1}}}), ErrorCode::configuration);
   EXPECT_FAILS(complete_parameters(tilt, {{"rotation_vector_deg", {1, 2, NAN}}}),
                ErrorCode::configuration);
+}
+
+TEST(Effects, TheManualListsEveryEffectAndParameter) {
+  std::ifstream file(std::string(SIXPOINT_SOURCE_DIR) + "/docs/scenario.md");
+  std::stringstream manual;
+  manual << file.rdbuf();
+  for (const EffectKind& kind : effect_catalogue()) {
+    const std::size_t row = manual.str().find("| `" + kind.name + "` |");
+    ASSERT_NE(row, std::string::npos) << kind.name;
+    const std::string line = manual.str().substr(row, manual.str().find('\n', row) - row);
+    for (const Parameter& parameter : kind.parameters) {
+      EXPECT_NE(line.find("`" + parameter.name + "` ("), std::string::npos)
+          << kind.name << "." << parameter.name;
+    }
+  }
 }
 
 // Oracle: closed forms.
