@@ -53,7 +53,8 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
     case Scatter::flicker: {
       // Ornstein-Uhlenbeck processes a factor e apart add up to 1/f.
       double sum = 0;
-      for (double tau = 0.5; tau < 3e4; tau *= M_E) {
+      for (int k = 0; k < 11; ++k) {
+        const double tau = 0.5 * std::exp(k);
         if (same) {
           const double l = std::max(1e-3, a.seconds / tau);
           sum += 2 * (1 / l - (1 - std::exp(-l)) / (l * l));
@@ -136,6 +137,7 @@ EvidenceSearch::EvidenceSearch(const std::vector<Block>& blocks, EvidenceOptions
   for (const ParameterGroup& group : groups_) {
     group_column_.push_back(columns_);
     std::vector<int> columns;
+    columns.reserve(static_cast<std::size_t>(group.count));
     for (int i = 0; i < group.count; ++i) {
       columns.push_back(columns_++);
     }
