@@ -93,8 +93,9 @@ class Search {
     double best = 0;
     std::vector<double> low_pass_log(ratios_.size(), 0);
     for (const int order : {4, 2, 1, 3, 6, 8}) {
-      double corner = 4;
-      for (; corner < 0.492 * rate_hz_; corner *= 1.025) {
+      const auto corners = static_cast<int>(std::log(0.492 * rate_hz_ / 4) / std::log(1.025));
+      for (int k = 0; k <= corners; ++k) {
+        const double corner = 4 * std::pow(1.025, k);
         try_low_pass(corner, order, flat_fit.nats, flat_chi, best, response, white);
       }
     }
