@@ -38,6 +38,7 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
     block.gravity_lab_g = bundle.gravity_g * Eigen::Vector3d::UnitZ();
     block.rotation = segment.rotation;
     block.approach_g = segment.approach_g;
+    block.held_sign = segment.held_sign;
     block.noise_mg = white2.cwiseSqrt();
     if (segment.vibration) {
       const ToneFit& tone = tones[tone_at++];

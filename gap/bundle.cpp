@@ -325,6 +325,7 @@ void find_placements(Bundle& bundle) {
   constexpr double kTonePause_s = 5;  // three seconds, and what the host's clock adds
   Eigen::Vector3d pose_before = bundle.gravity_in_sensor(bundle.segments.front());
   int placement = -1;
+  Eigen::Vector3d held = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < bundle.segments.size(); ++i) {
     Segment& now = bundle.segments[i];
     if (i > 0) {
@@ -341,11 +342,16 @@ void find_placements(Bundle& bundle) {
       ++placement;
       const Eigen::Vector3d pose = bundle.gravity_in_sensor(now);
       now.approach_g = pose - pose_before;
+      for (Eigen::Index a = 0; a < 3; ++a) {
+        held[a] =
+            std::abs(now.approach_g[a]) > 0.05 ? std::copysign(1.0, now.approach_g[a]) : held[a];
+      }
       pose_before = pose;
     } else {
       now.approach_g = bundle.segments[i - 1].approach_g;
     }
     now.placement = placement;
+    now.held_sign = held;
   }
 }
 

@@ -43,6 +43,9 @@ struct Segment {
   bool starts_placement = true;
   // Specific force now less that of the pose before, sensor's frame, g: how it was approached.
   Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
+  // Per axis the sign of its last step, 0 before the first: a step that leaves an axis where it was
+  // leaves this, too.
+  Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();
 };
 
 struct TemperatureLog {

@@ -57,6 +57,12 @@ void find_runs(const Bundle& bundle, CleanSamples& clean) {
   }
 }
 
+// Histogram bin of a stored count.
+std::size_t bin_of(int value) {
+  const std::ptrdiff_t bin = std::clamp(value, kFullScaleLow, kFullScaleHigh);
+  return static_cast<std::size_t>(bin - kFullScaleLow);
+}
+
 double median_of(std::vector<int>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -248,7 +254,7 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
         if ((clean.flags[i] & kSampleWrapped) == 0) {
           const int value =
               std::clamp<int>(bundle.samples.empty() ? 0 : clean.samples[i][axis], -2048, 2047);
-          ++histogram[static_cast<std::size_t>(value + 2048)];
+          ++histogram[bin_of(value)];
         }
       }
     }
@@ -259,15 +265,14 @@ void find_plateaus(const Bundle& bundle, CleanSamples& clean) {
       const bool high = end == 1;
       int edge = high ? kFullScaleHigh : kFullScaleLow;
       const int step = high ? -1 : 1;
-      while (edge != 0 && histogram[static_cast<std::size_t>(edge + 2048)] == 0) {
+      while (edge != 0 && histogram[bin_of(edge)] == 0) {
         edge += step;
       }
-      const std::size_t at_edge = histogram[static_cast<std::size_t>(edge + 2048)];
-      const std::size_t before = histogram[static_cast<std::size_t>(edge + step + 2048)];
+      const std::size_t at_edge = histogram[bin_of(edge)];
+      const std::size_t before = histogram[bin_of(edge + step)];
       std::size_t inside = 0;  // the next 16 values
       for (int k = 2; k < 18; ++k) {
-        inside +=
-            histogram[static_cast<std::size_t>(std::clamp(edge + k * step, -2048, 2047) + 2048)];
+        inside += histogram[bin_of(edge + k * step)];
       }
       // Turned axes change the sign of the limits.
       const bool full_scale = std::abs(edge) >= kFullScaleHigh - 3;  // a stuck bit ends it early

@@ -90,6 +90,14 @@ std::string Diagnosis::brief() const {
           "leave {:.2f} mg)",
           gap.before_mg, gap.floor_mg);
     case Verdict::explained:
+      if (first != nullptr && effects.size() == 1 && gap.closed_fraction == 0 &&
+          (first->name == "seating" || first->name == "random_walk" || first->name == "flicker")) {
+        return fmt::format(
+            "{} explains the gap of {:.2f} mg, which is irreducible: it can't be predicted for "
+            "what "
+            "was not yet measured{}",
+            names, gap.before_mg, advice);
+      }
       return fmt::format("{} explains the gap: {:.2f} mg -> {:.2f} mg (floor {:.2f} mg){}", names,
                          gap.before_mg, gap.after_mg, gap.floor_mg, advice);
     case Verdict::partly_explained:

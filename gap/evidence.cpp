@@ -53,7 +53,8 @@ double kernel(Scatter scatter, const Block& a, const Block& b, double start_s) {
     case Scatter::flicker: {
       // Ornstein-Uhlenbeck processes a factor e apart add up to 1/f.
       double sum = 0;
-      for (double tau = 0.5; tau < 3e4; tau *= M_E) {
+      for (int k = 0; k < 11; ++k) {
+        const double tau = 0.5 * std::exp(k);
         if (same) {
           const double l = std::max(1e-3, a.seconds / tau);
           sum += 2 * (1 / l - (1 - std::exp(-l)) / (l * l));
@@ -136,6 +137,7 @@ EvidenceSearch::EvidenceSearch(const std::vector<Block>& blocks, EvidenceOptions
   for (const ParameterGroup& group : groups_) {
     group_column_.push_back(columns_);
     std::vector<int> columns;
+    columns.reserve(static_cast<std::size_t>(group.count));
     for (int i = 0; i < group.count; ++i) {
       columns.push_back(columns_++);
     }
@@ -187,10 +189,9 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
     y.segment(row, block.size()) = block.value_mg - base;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const ParameterGroup& group = groups_[g];
-      const bool shaped_alike = group.effect == "warm_up" ? group.tau_s == at.warm_up_tau_s
-                                : group.effect == "hysteresis"
-                                    ? group.by_sign == at.hysteresis_by_sign
-                                    : true;
+      const bool shaped_alike = group.effect == "warm_up"      ? group.tau_s == at.warm_up_tau_s
+                                : group.effect == "hysteresis" ? group.shape == at.hysteresis_shape
+                                                               : true;
       for (int i = 0; i < group.count; ++i) {
         ForwardState moved = at;
         double here = parameter(at, group.first + i);
@@ -200,7 +201,7 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
             parameter(moved, group.first + k) = 0;
           }
           moved.warm_up_tau_s = group.tau_s > 0 ? group.tau_s : moved.warm_up_tau_s;
-          moved.hysteresis_by_sign = group.by_sign;
+          moved.hysteresis_shape = group.shape;
           here = 0;
         }
         const Eigen::VectorXd from = shaped_alike ? base : predict(moved, block, options_.lsb_mg);
@@ -487,7 +488,7 @@ Fit EvidenceSearch::make_fit(const Whitened& w, const Subset& subset,
       fit.state.warm_up_tau_s = group.tau_s;
     }
     if (group.effect == "hysteresis") {
-      fit.state.hysteresis_by_sign = group.by_sign;
+      fit.state.hysteresis_shape = group.shape;
     }
     if (g >= kNuisances) {
       fit.groups.push_back(group);
@@ -595,21 +596,46 @@ void EvidenceSearch::run() {
     ForwardState here = scatter == Scatter::nominal ? nominal_at : first_guess();
     int falling = 0;
     double last = -1e300;
-    for (const double size : sizes_of(scatter)) {
+    std::vector<std::array<double, 2>> tried;  // size, nats
+    const auto try_size = [&](double size) {
       Whitened trial = whiten(here, scatter, size);
       looked_at.clear();
       const Subset subset = search(trial, looked_at);
       for (const Subset& s : looked_at) {
         states_.push_back({scatter, size, s});
       }
+      tried.push_back({size, subset.nats});
       if (!best || subset.nats > best->nats) {
         best = make_fit(trial, subset, here);
         best_w = std::move(trial);
       }
-      falling = subset.nats < last ? falling + 1 : 0;
-      last = subset.nats;
+      return subset.nats;
+    };
+    for (const double size : sizes_of(scatter)) {
+      const double nats = try_size(size);
+      falling = nats < last ? falling + 1 : 0;
+      last = nats;
       if (falling >= 2) {
         break;
+      }
+    }
+    // Between the grid's points: the vertex of a parabola over the size's logarithm.
+    if (in_catalogue(scatter) && best && best->nats > best_known_.nats) {
+      for (int round = 0; round < 2; ++round) {
+        std::sort(tried.begin(), tried.end());
+        for (std::size_t i = 1; i + 1 < tried.size(); ++i) {
+          if (tried[i][1] >= tried[i - 1][1] && tried[i][1] >= tried[i + 1][1]) {
+            const double a = std::log(tried[i][0] / tried[i - 1][0]);
+            const double b = std::log(tried[i + 1][0] / tried[i][0]);
+            const double down = (tried[i][1] - tried[i - 1][1]) / a;
+            const double up = (tried[i + 1][1] - tried[i][1]) / b;
+            if (down > up) {
+              const double move = (down * b + up * a) / (down - up) / 2;
+              try_size(tried[i][0] * std::exp(std::clamp(move, -a, b)));
+            }
+            break;
+          }
+        }
       }
     }
     if (!best) {
@@ -702,7 +728,6 @@ std::optional<EvidenceSearch::Estimate> EvidenceSearch::estimate(const std::stri
     }
   }
   estimate.tau_s = group.tau_s;
-  estimate.by_sign = group.by_sign;
   return estimate;
 }
 

@@ -113,7 +113,6 @@ class EvidenceSearch {
     std::vector<double> value;
     std::vector<double> sd;
     double tau_s = 0;
-    bool by_sign = true;
   };
   std::optional<Estimate> estimate(const std::string& effect) const;
   // How well this effect's parameters would be known: sd over prior sd of the worst, 1 = not at

@@ -61,23 +61,24 @@ std::vector<ParameterGroup> parameter_groups() {
   // Effects: prior sd about the middle of the catalogue's realistic sizes, `high` their upper end.
   // A zero bends over temperature by some hundredths of its slope per degree.
   std::vector<ParameterGroup> groups = {
-      {"gain", 0, 3, 0.3, 1, 0, 10, 0, true},
-      {"offset", 3, 3, 300, 0, 0, 1e4, 0, true},
-      {"tilt", 6, 2, 0.2, 0, 0, 0.5, 0, true},
-      {"misalignment", 8, 3, 0.4, 0, 0, 1, 0, true},
-      {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0, true},
-      {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0, true},
-      {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0, true},
-      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0, true},
-      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0, true},
-      {"drift", 35, 3, 2.5, 0, 0, 5, 0, true},
-      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0, true},
-      {"truncation", 39, 1, 0.05, 1, 0, 0.35, 0, true},
+      {"gain", 0, 3, 0.3, 1, 0, 10, 0, 1},
+      {"offset", 3, 3, 300, 0, 0, 1e4, 0, 1},
+      {"tilt", 6, 2, 0.2, 0, 0, 0.5, 0, 1},
+      {"misalignment", 8, 3, 0.4, 0, 0, 1, 0, 1},
+      {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0, 1},
+      {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0, 1},
+      {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0, 1},
+      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0, 1},
+      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0, 1},
+      {"drift", 35, 3, 2.5, 0, 0, 5, 0, 1},
+      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0, 1},
+      {"truncation", 39, 1, 0.05, 1, 0, 0.35, 0, 1},
   };
-  groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0, true});
-  groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0, false});
+  for (const int shape : {1, 0, 2}) {
+    groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0, shape});
+  }
   for (const double tau_s : {75.0, 120.0, 180.0, 270.0, 400.0, 600.0}) {
-    groups.push_back({"warm_up", 32, 3, 4, 0, 0, 10, tau_s, true});
+    groups.push_back({"warm_up", 32, 3, 4, 0, 0, 10, tau_s, 1});
   }
   return groups;
 }
@@ -98,8 +99,10 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
                             hours * s.drift_mg_per_h + decay * s.warm_up_mg;
   for (Eigen::Index a = 0; a < 3; ++a) {
-    slow_mg[a] += s.hysteresis_mg[a] * (s.hysteresis_by_sign ? sign_of_step(block.approach_g[a])
-                                                             : 0.5 * block.approach_g[a]);
+    slow_mg[a] +=
+        s.hysteresis_mg[a] * (s.hysteresis_shape == 0   ? 0.5 * block.approach_g[a]
+                              : s.hysteresis_shape == 1 ? sign_of_step(block.approach_g[a])
+                                                        : block.held_sign[a]);
   }
   const Eigen::Vector3d sensitivity =
       Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c;

@@ -35,7 +35,7 @@ struct ForwardState {
   double truncation = 0;  // 1: toward zero instead of nearest
   // Shape of effects that are not linear in their parameters.
   double warm_up_tau_s = 300;
-  bool hysteresis_by_sign = true;  // else in proportion to the step
+  int hysteresis_shape = 1;  // 0: in proportion to the step; 1: its sign; 2: of the axis' last step
 };
 
 // Groups of parameters that come and go together: an effect, or a nuisance.
@@ -48,7 +48,7 @@ struct ParameterGroup {
   double curve_sd = 0;  // of the fourth number on: what bends the effect's main law
   double high = 0;      // an estimate beyond four times this is another thing
   double tau_s = 0;     // warm_up's shape
-  bool by_sign = true;  // hysteresis' shape
+  int shape = 1;        // hysteresis'
 };
 inline constexpr int kForwardParameters = 40;
 // Every group, with each shape of warm_up and hysteresis as a group of its own.
@@ -71,6 +71,7 @@ struct Block {
   Eigen::Vector3d gravity_lab_g = Eigen::Vector3d::UnitZ();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
+  Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();        // of each axis' last step
   Eigen::Vector3d vibration_lab_g = Eigen::Vector3d::Zero();  // amplitude, response included
   bool harmonics = false;                                     // 8 features instead of 6
   Eigen::Vector3d noise_mg = Eigen::Vector3d::Zero();         // of one sample, for truncation

@@ -93,12 +93,15 @@ class Search {
     double best = 0;
     std::vector<double> low_pass_log(ratios_.size(), 0);
     for (const int order : {4, 2, 1, 3, 6, 8}) {
-      double corner = 4;
-      for (; corner < 0.492 * rate_hz_; corner *= 1.025) {
+      const auto corners = static_cast<int>(std::log(0.492 * rate_hz_ / 4) / std::log(1.025));
+      for (int k = 0; k <= corners; ++k) {
+        const double corner = 4 * std::pow(1.025, k);
         try_low_pass(corner, order, flat_fit.nats, flat_chi, best, response, white);
       }
     }
-    for (double step = 0.012; step > 1e-6 && response.low_pass.corner_hz > 0; step /= 2) {
+    double step = 0.024;
+    for (int halving = 0; halving < 14 && response.low_pass.corner_hz > 0; ++halving) {
+      step /= 2;
       const double centre = response.low_pass.corner_hz;
       for (const double k : {-1.0, 1.0}) {
         const double corner = centre * (1 + k * step);
@@ -133,8 +136,11 @@ class Search {
     }
     double chi = base_chi;
     for (const bool base_excited : {true, false}) {
-      for (double f0 = 4; f0 < 0.5 * rate_hz_; f0 *= 1.02) {
-        for (double q = 0.7; q < 10; q *= 1.08) {
+      const auto frequencies = static_cast<int>(std::log(0.5 * rate_hz_ / 4) / std::log(1.02));
+      for (int i = 0; i < frequencies; ++i) {
+        const double f0 = 4 * std::pow(1.02, i);
+        for (int k = 0; k < 35; ++k) {
+          const double q = 0.7 * std::pow(1.08, k);
           try_resonance({f0, q, base_excited, 0}, low_pass_log, base_chi, chi, response);
         }
       }

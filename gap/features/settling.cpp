@@ -101,8 +101,9 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
       }
     };
     for (const double decay : {0.1, 0.15, 0.2, 0.27, 0.36, 0.48, 0.65, 0.9}) {
-      for (double f = 2; f <= std::min(30.0, 0.4 * bundle.rate_hz); f += 0.25) {
-        try_one(f, decay);
+      const auto frequencies = static_cast<int>(4 * (std::min(30.0, 0.4 * bundle.rate_hz) - 2));
+      for (int k = 0; k <= frequencies; ++k) {
+        try_one(2 + 0.25 * k, decay);
       }
     }
     for (int round = 1; round <= 4; ++round) {

@@ -48,35 +48,57 @@ HostTiming host_timing(const Bundle& bundle) {
 
   // The rate first, blind to slips: each difference of stamps as an angle on the circle of one
   // sample interval. Packets of about a second only, so that the circle means the same for all.
+  bool jittery = false;
   double slope = 0;  // host seconds per nominal second, less 1
   if (timing.slips_visible) {
     std::complex<double> sum = 0;
+    double pairs = 0;
     for (const auto& stamps : segments) {
       for (std::size_t i = 0; i + 1 < stamps.size(); ++i) {
         const double dt = stamps[i + 1].nominal_s - stamps[i].nominal_s;
         if (dt > 0.5 && dt < 1.5) {
+          pairs += 1;
           sum += std::polar(
               1.0, 2 * M_PI * (stamps[i + 1].residual_s - stamps[i].residual_s) / interval_s);
         }
       }
     }
     slope = std::arg(sum) / (2 * M_PI) * interval_s;
+    // How narrow the angles are: two uniform stamps give the square of a sinc, jitter less.
+    const double width = 2 * M_PI * kHostStamp_s / interval_s;
+    jittery = pairs > 0 && std::abs(sum) / pairs < 0.93 * std::pow(std::sin(width) / width, 2) -
+                                                       2 / std::sqrt(2 * pairs);
   }
   const auto slips_with = [&](double rate_error, bool apply) {
     double total = 0;
     for (auto& stamps : segments) {
-      double shift = 0;
-      double last = stamps.front().residual_s;
+      // A median of three: one late stamp goes and comes back, a slip stays.
+      std::vector<double> level(stamps.size());
+      for (std::size_t i = 0; i < stamps.size(); ++i) {
+        level[i] = stamps[i].residual_s;
+        if (i > 0 && i + 1 < stamps.size()) {
+          const double a = stamps[i - 1].residual_s;
+          const double b = stamps[i + 1].residual_s;
+          level[i] = std::max(std::min(a, b), std::min(std::max(a, b), level[i]));
+        }
+      }
+      if (jittery) {  // nothing holds the first and the last stamp against one that is late
+        level.front() = level[1];
+        level.back() = level[level.size() - 2];
+      }
+      std::vector<double> steps(stamps.size(), 0);
       for (std::size_t i = 1; i < stamps.size(); ++i) {
-        const double now = stamps[i].residual_s;
         const double dt = stamps[i].nominal_s - stamps[i - 1].nominal_s;
-        const double steps = std::round((now - last - rate_error * dt) / interval_s);
-        last = now;
-        total += std::abs(steps);
+        steps[i] = std::round((level[i] - level[i - 1] - rate_error * dt) / interval_s);
+      }
+      double shift = 0;
+      for (std::size_t i = 1; i < stamps.size(); ++i) {
+        total += std::abs(steps[i]);
         if (apply) {
-          shift += steps * interval_s;
+          shift += steps[i] * interval_s;
           stamps[i].residual_s -= shift;
-          (steps > 0 ? timing.lost : timing.repeated) += static_cast<std::size_t>(std::abs(steps));
+          (steps[i] > 0 ? timing.lost : timing.repeated) +=
+              static_cast<std::size_t>(std::abs(steps[i]));
         }
       }
     }

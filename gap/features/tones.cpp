@@ -259,7 +259,6 @@ class ToneAnalysis {
   }
 
   void fit_all() {
-    const auto axis = static_cast<std::size_t>(fit_.axis);
     // Phase first, then everything in phase with it.
     double phase0 = 0;
     for (int round = 0; round < 2; ++round) {
@@ -349,7 +348,6 @@ class ToneAnalysis {
     fit_.on_slope_mg2 = slope / std::max(1.0, slope_weight);
     fit_.on_crest_mg2 = crest / std::max(1.0, crest_weight);
     fit_.usable = fit_.in_phase_mg[fit_.axis] > 0 && std::isfinite(fit_.residual_mg);
-    (void)axis;
   }
 
   // Gauss-Newton on the frequency: the sine's amplitude grows with n where it is off.

@@ -10,6 +10,8 @@
 #include "base/atomic_file.h"
 #include "gap/bundle.h"
 #include "gap/diagnose.h"
+#include "gap/plain.h"
+#include "gap/report_html.h"
 #include "station/cli/command.h"
 #include "station/cli/gap_challenge.h"
 
@@ -39,6 +41,13 @@ Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
   gap::DiagnoseOptions how;
   how.without = std::set<std::string>(options.without.begin(), options.without.end());
   how.seed = options.seed;
+  SIXPOINT_ASSIGN(const FileInfo info, context.env.files.info(options.bundle));
+  if (!info.is_folder) {
+    SIXPOINT_ASSIGN(gap::Diagnosis plain,
+                    gap::diagnose_plain(context.env.files, options.bundle, how));
+    plain.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
+    return plain;
+  }
   SIXPOINT_ASSIGN(const gap::Bundle bundle, gap::read_bundle(context.env.files, options.bundle));
   SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, gap::diagnose(bundle, how));
   diagnosis.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
@@ -73,6 +82,12 @@ void run(const Options& options, Context& context) {
     return report_error(context, "gap-diagnose", diagnosis.error(), options.json);
   }
   context.worsen(exit_code_of(*diagnosis));
+  if (!options.html.empty()) {
+    if (auto status = write_file(context.env.files, options.html, gap::report_html(*diagnosis));
+        !status) {
+      return report_error(context, "gap-diagnose", status.error(), options.json);
+    }
+  }
   if (!options.scenario.empty()) {
     if (auto status = write_file(context.env.files, options.scenario,
                                  gap::augmented_scenario(*diagnosis).dump(2) + "\n");
@@ -99,10 +114,13 @@ void add_gap(CLI::App& app, Context& context) {
   auto* diagnose_command =
       command->add_subcommand("diagnose", "which effect explains a recording of a known protocol");
   diagnose_command
-      ->add_option("BUNDLE", options->bundle, "folder with recording.gt3x and protocol.json")
+      ->add_option("BUNDLE", options->bundle,
+                   "folder with recording.gt3x and protocol.json, or a plain recording")
       ->required();
   diagnose_command->add_option("--without", options->without, "effects taken out of the catalogue")
       ->delimiter(',');
+  diagnose_command->add_option("--html", options->html,
+                               "write the report as one page to this file");
   diagnose_command->add_option("--seed", options->seed, "seed of the augmented scenario");
   diagnose_command->add_option("--scenario", options->scenario,
                                "write the augmented scenario to this file");

@@ -1,0 +1,100 @@
+#include "gap/clean.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/made_bundle.h"
+
+namespace sixpoint::gap {
+namespace {
+
+TEST(Clean, TurnedAxesAreFoundAndTurnedBack) {
+  const Bundle right = tests::made_production({});
+  for (const auto& rows : {std::array<int, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1},
+                           std::array<int, 9>{0, 1, 0, 0, 0, -1, -1, 0, 0},
+                           std::array<int, 9>{-1, 0, 0, 0, 1, 0, 0, 0, 1}}) {
+    const Eigen::Matrix3i m =
+        Eigen::Map<const Eigen::Matrix<int, 3, 3, Eigen::RowMajor>>(rows.data());
+    Bundle turned = right;
+    for (gt3x::Counts& x : turned.samples) {
+      const Eigen::Vector3i stored = m * Eigen::Vector3i(x[0], x[1], x[2]);
+      for (std::size_t a = 0; a < 3; ++a) {
+        x[a] = static_cast<std::int16_t>(stored[static_cast<Eigen::Index>(a)]);
+      }
+    }
+    const CleanSamples clean = clean_samples(turned);
+    EXPECT_TRUE(clean.axes_turned);
+    EXPECT_EQ(clean.axis_matrix, m);
+    EXPECT_EQ(clean.samples, right.samples);
+  }
+  EXPECT_FALSE(clean_samples(right).axes_turned);
+  EXPECT_TRUE(clean_samples(right).axes_decidable);
+}
+
+TEST(Clean, ZerosAndHoldsAreMaskedToTheSample) {
+  Bundle bundle = tests::made_production({});
+  std::fill(bundle.samples.begin() + 2500, bundle.samples.begin() + 2800, gt3x::Counts{});
+  std::fill(bundle.samples.begin() + 7000, bundle.samples.begin() + 7150, bundle.samples[7000]);
+  const CleanSamples clean = clean_samples(bundle);
+  EXPECT_EQ(clean.zeros.samples, 300U);
+  EXPECT_EQ(clean.zeros.segments, (std::vector<std::size_t>{2}));
+  EXPECT_EQ(clean.held.runs, 1U);
+  EXPECT_NEAR(static_cast<double>(clean.held.samples), 150, 3)
+      << "a neighbour may be equal by chance";
+  EXPECT_EQ(clean.flags[2499], kSampleGood);
+  EXPECT_EQ(clean.flags[2500], kSampleZero);
+}
+
+TEST(Clean, NominalRecordingHasNoMarks) {
+  const CleanSamples clean = clean_samples(tests::made_production({}));
+  EXPECT_EQ(clean.zeros.runs + clean.held.runs + clean.stuck.runs, 0U);
+  EXPECT_FALSE(clean.saturated);
+  EXPECT_EQ(clean.wrapped_samples, 0U);
+}
+
+// A tone of 11 g along Z behind the six faces.
+Bundle with_high_tone(double limit_g, bool wraps) {
+  Bundle bundle = tests::made_production({});
+  Segment tone;
+  tone.name = "shaker_high";
+  tone.kind = Segment::Kind::vibration;
+  tone.first_sample = bundle.samples.size();
+  tone.samples = 500;
+  tone.host_start_s = 1000;
+  tone.placement = 99;
+  tone.vibration = Vibration{Eigen::Vector3d::UnitZ(), 19.3, 11};
+  for (std::size_t n = 0; n < tone.samples; ++n) {
+    const double z = std::clamp(1 + 11 * std::cos(2 * M_PI * 0.193 * static_cast<double>(n) + 0.7),
+                                -limit_g, limit_g);
+    long count = std::lround(256 * z);
+    count = wraps ? ((count + 2048) % 4096 + 4096) % 4096 - 2048 : std::clamp(count, -2048L, 2047L);
+    bundle.samples.push_back({0, 0, static_cast<std::int16_t>(count)});
+  }
+  bundle.segments.push_back(tone);
+  return bundle;
+}
+
+TEST(Clean, SaturationWrapAndFullScaleAreToldApart) {
+  const CleanSamples full = clean_samples(with_high_tone(100, false));
+  EXPECT_FALSE(full.saturated);
+  EXPECT_EQ(full.wrapped_samples, 0U);
+  EXPECT_GT(full.full_scale_samples, 100U);
+
+  const CleanSamples saturated = clean_samples(with_high_tone(6, false));
+  EXPECT_TRUE(saturated.saturated);
+  EXPECT_EQ(saturated.plateau_lsb[2][1], 1536);
+  EXPECT_EQ(saturated.plateau_lsb[2][0], -1536);
+
+  const Bundle wrapped = with_high_tone(100, true);
+  const CleanSamples undone = clean_samples(wrapped);
+  EXPECT_FALSE(undone.saturated);
+  EXPECT_GT(undone.wrapped_samples, 100U);
+  // Undone means: the tone again, 12 g at its crest.
+  int highest = 0;
+  for (std::size_t i = 18'000; i < undone.samples.size(); ++i) {
+    highest = std::max<int>(highest, undone.samples[i][2]);
+  }
+  EXPECT_NEAR(highest, 12 * 256, 40);
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

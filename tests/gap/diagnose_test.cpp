@@ -1,0 +1,140 @@
+#include "gap/diagnose.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "expect_result.h"
+#include "gap/catalogue.h"
+#include "gap/made_bundle.h"
+#include "gap/report_html.h"
+
+namespace sixpoint::gap {
+namespace {
+
+const NamedValue* parameter_of(const Diagnosis& d, const std::string& effect,
+                               const std::string& name) {
+  for (const EffectFinding& e : d.effects) {
+    for (const NamedValue& p : e.parameters) {
+      if (e.name == effect && p.name == name) {
+        return &p;
+      }
+    }
+  }
+  return nullptr;
+}
+
+TEST(Diagnose, NothingMissingNoAlarm) {
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    tests::MadeUnit unit;
+    unit.seed = seed;
+    const auto d = diagnose(tests::made_production(unit));
+    ASSERT_OK(d);
+    EXPECT_EQ(d->verdict, Verdict::no_gap) << seed << ": " << d->brief();
+    EXPECT_TRUE(d->effects.empty());
+    EXPECT_FALSE(d->unknown.present);
+    EXPECT_LT(d->gap.before_mg, 0.35);
+  }
+}
+
+TEST(Diagnose, MisalignmentIsNamedAndMeasured) {
+  const Eigen::Vector3d turn_deg(0.3, -0.2, 0.4);
+  const auto bundle = tests::made_production({}, [&](const Segment& s, double) {
+    const Eigen::Vector3d r = turn_deg * M_PI / 180;
+    return Eigen::Vector3d(Eigen::AngleAxisd(r.norm(), r.normalized()) * s.rotation.col(2));
+  });
+  const auto d = diagnose(bundle);
+  ASSERT_OK(d);
+  EXPECT_EQ(d->verdict, Verdict::explained);
+  ASSERT_FALSE(d->effects.empty());
+  EXPECT_EQ(d->effects.front().name, "misalignment");
+  EXPECT_GT(d->effects.front().held_out_gain_nats, 10);
+  EXPECT_GT(d->gap.closed_fraction, 0.9);
+  const NamedValue* p = parameter_of(*d, "misalignment", "rotation_vector_deg");
+  ASSERT_NE(p, nullptr);
+  for (std::size_t a = 0; a < 3; ++a) {
+    EXPECT_NEAR(p->value[a], turn_deg[static_cast<Eigen::Index>(a)], 4 * p->sd[a] + 0.005);
+  }
+  // With the true effect out of the catalogue the answer stays honest.
+  DiagnoseOptions strip;
+  strip.without = {"misalignment"};
+  const auto honest = diagnose(bundle, strip);
+  ASSERT_OK(honest);
+  EXPECT_TRUE(honest->unknown.present) << honest->brief();
+  for (const EffectFinding& e : honest->effects) {
+    EXPECT_NE(e.name, "misalignment");
+  }
+}
+
+TEST(Diagnose, DocumentHasEveryKey) {
+  const auto d = diagnose(tests::made_production({}));
+  ASSERT_OK(d);
+  const auto json = d->to_json();
+  for (const char* key : {"verdict", "effects", "candidates", "unknown", "not_observable", "gap",
+                          "where", "next_segments", "augmented_scenario", "seconds"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+  EXPECT_EQ(json["candidates"].size(), catalogue().size());
+  EXPECT_EQ(json["gap"]["after"]["interval_mg"].size(), 2U);
+  for (const char* key : {"mean", "tone", "spectrum", "codes", "timing"}) {
+    EXPECT_TRUE(json["gap"]["by_feature"].contains(key)) << key;
+  }
+  bool gravity = false;
+  bool floor = false;
+  for (const auto& entry : json["not_observable"]) {
+    gravity = gravity || entry["name"] == "local_gravity";
+    floor = floor || entry["name"] == "rounding_floor";
+  }
+  EXPECT_TRUE(gravity) << "not separable from gain without a shaker";
+  EXPECT_TRUE(floor) << "never separable from offset";
+}
+
+TEST(Diagnose, UnknownNameInWithoutIsUsage) {
+  DiagnoseOptions options;
+  options.without = {"gremlins"};
+  EXPECT_FAILS(diagnose(tests::made_production({}), options), ErrorCode::usage);
+}
+
+TEST(Diagnose, RecordingsThatSayNothingAreInconclusive) {
+  Bundle constant = tests::made_production({});
+  std::fill(constant.samples.begin(), constant.samples.end(), gt3x::Counts{1, 2, 256});
+  Bundle clipped = tests::made_production({});
+  std::fill(clipped.samples.begin(), clipped.samples.end(), gt3x::Counts{2047, 2047, 2047});
+  Bundle zeros = tests::made_production({});
+  std::fill(zeros.samples.begin(), zeros.samples.end(), gt3x::Counts{});
+  for (const Bundle* bundle : {&constant, &clipped, &zeros}) {
+    const auto d = diagnose(*bundle);
+    ASSERT_OK(d);
+    EXPECT_FALSE(d->usable());
+    EXPECT_NE(d->verdict, Verdict::no_gap);
+    EXPECT_NE(d->verdict, Verdict::explained);
+  }
+}
+
+TEST(Diagnose, NoTemperatureAndNoHostClockAreBorne) {
+  Bundle bundle = tests::made_production({});
+  bundle.temperature = {};
+  bundle.host_clock = {};
+  const auto d = diagnose(bundle);
+  ASSERT_OK(d);
+  EXPECT_EQ(d->verdict, Verdict::no_gap) << d->brief();
+  bool clock = false;
+  for (const auto& [name, segment] : d->not_observable) {
+    clock = clock || name == "clock_error";
+  }
+  EXPECT_TRUE(clock);
+}
+
+TEST(ReportHtml, OnePageWithTheSentenceAndNothingFromOutside) {
+  Bundle bundle = tests::made_production({});
+  bundle.protocol_serial = "<script>alert(1)</script>";
+  const auto d = diagnose(bundle);
+  ASSERT_OK(d);
+  const std::string page = report_html(*d);
+  EXPECT_NE(page.find("no gap"), std::string::npos);
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_EQ(page.find("<script"), std::string::npos);
+  EXPECT_EQ(page.find("http"), std::string::npos) << "the page must need nothing else";
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

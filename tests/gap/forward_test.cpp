@@ -1,0 +1,110 @@
+// The forward model against closed forms.
+#include "gap/forward.h"
+
+#include <gtest/gtest.h>
+
+namespace sixpoint::gap {
+namespace {
+
+Block dwell(const Eigen::Matrix3d& rotation) {
+  Block block;
+  block.rotation = rotation;
+  block.value_mg = Eigen::VectorXd::Zero(3);
+  block.middle_s = 1800;
+  block.seconds = 10;
+  return block;
+}
+
+Block tone(double amplitude_g) {
+  Block block;
+  block.tone = true;
+  block.axis = 2;
+  block.harmonics = true;
+  block.vibration_lab_g = amplitude_g * Eigen::Vector3d::UnitZ();
+  block.value_mg = Eigen::VectorXd::Zero(8);
+  return block;
+}
+
+constexpr double kLsb_mg = 1000.0 / 256;
+
+TEST(Forward, GainOffsetDriftAndTemperature) {
+  ForwardState s;
+  s.gain = {1.1, 1, 1};
+  s.offset_mg = {5, 0, 0};
+  s.drift_mg_per_h = {4, 0, 0};
+  s.tempco_mg_per_c = {0.5, 0, 0};
+  Block block = dwell(Eigen::Matrix3d::Identity());
+  block.temperature_c = 35;
+  const Eigen::VectorXd y = predict(s, block, kLsb_mg);
+  EXPECT_NEAR(y[0], 1.1 * (2 + 5) + 5, 1e-9);
+  EXPECT_NEAR(y[2], 1000, 1e-9);
+}
+
+TEST(Forward, TiltTurnsGravityInTheLaboratory) {
+  ForwardState s;
+  s.tilt_deg = {0.1, 0};
+  // Turned by 0.1 deg about x: z leans to -y by sin 0.1 deg.
+  const Eigen::VectorXd y = predict(s, dwell(Eigen::Matrix3d::Identity()), kLsb_mg);
+  EXPECT_NEAR(y[1], -1000 * std::sin(0.1 * M_PI / 180), 1e-6);
+  EXPECT_NEAR(y[2], 1000 * std::cos(0.1 * M_PI / 180), 1e-6);
+}
+
+TEST(Forward, CubicMakesCompressionAndThirdHarmonic) {
+  ForwardState s;
+  s.third_mg_per_g3 = {0, 0, 0.08};
+  Block block = tone(6);
+  block.gravity_lab_g.setZero();
+  const Eigen::VectorXd y = predict(s, block, kLsb_mg);
+  EXPECT_NEAR(y[5], 6000 + 0.75 * 0.08 * 216, 1e-6);  // (3/4) K A^3
+  EXPECT_NEAR(y[7], 0.25 * 0.08 * 216, 1e-6);         // (1/4) K A^3
+  EXPECT_NEAR(y[6], 0, 1e-9);
+}
+
+TEST(Forward, SquareRectifies) {
+  ForwardState s;
+  s.second_mg_per_g2 = {0, 0, 0.4};
+  const Eigen::VectorXd y = predict(s, tone(2), kLsb_mg);
+  EXPECT_NEAR(y[2], 1000 + 0.4 * (1 + 2), 1e-6);  // g^2 + A^2 / 2
+  EXPECT_NEAR(y[5], 2000 + 2 * 0.4 * 2, 1e-6);    // 2 K g A
+  EXPECT_NEAR(y[6], 0.4 * 2, 1e-6);               // K A^2 / 2
+}
+
+TEST(Forward, TruncationFollowsTheErrorFunction) {
+  ForwardState s;
+  s.truncation = 1;
+  s.offset_mg = {2, 0, 0};
+  Block block = dwell(Eigen::Matrix3d::Identity());
+  block.noise_mg = {4, 4, 5};
+  const Eigen::VectorXd y = predict(s, block, kLsb_mg);
+  EXPECT_NEAR(y[0], 2 - kLsb_mg / 2 * std::erf(2 / (4 * M_SQRT2)), 1e-9);
+  EXPECT_NEAR(y[2], 1000 - kLsb_mg / 2, 1e-9);
+}
+
+TEST(Forward, SeatingLeverIsTheDerivativeOfASmallTurn) {
+  const Block block = tone(0.5);
+  const Eigen::MatrixXd lever = seating_lever(block);
+  ForwardState s;
+  const double small = 1e-4;
+  for (int k = 0; k < 3; ++k) {
+    s.misalignment_deg = small * Eigen::Vector3d::Unit(k);
+    const Eigen::VectorXd change =
+        (predict(s, block, kLsb_mg) - predict({}, block, kLsb_mg)) / small;
+    EXPECT_NEAR((change.head<6>() - lever.col(k).head<6>()).norm(), 0, 0.01);
+  }
+}
+
+TEST(Forward, EveryParameterHasItsPlace) {
+  ForwardState s;
+  for (int p = 0; p < kForwardParameters; ++p) {
+    parameter(s, p) = 100 + p;
+  }
+  for (int p = 0; p < kForwardParameters; ++p) {
+    EXPECT_EQ(parameter(s, p), 100 + p) << p;
+  }
+  for (const ParameterGroup& group : parameter_groups()) {
+    EXPECT_LE(group.first + group.count, kForwardParameters) << group.effect;
+  }
+}
+
+}  // namespace
+}  // namespace sixpoint::gap
