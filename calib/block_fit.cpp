@@ -552,11 +552,6 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     }
   }
   SIXPOINT_CHECK(correlate(out.fit, structural_g2));
-  if (out.richer) {
-    const double own = cells_rms_mg(out.cells, out.richer->fit.calibration, options.gravity_g);
-    const double plain_rms = cells_rms_mg(out.cells, out.fit.calibration, options.gravity_g);
-    out.richer_constants = own <= 1.1 * plain_rms;
-  }
   for (std::size_t k = 0; k < out.cells.size(); ++k) {
     out.cell_residual_mg.push_back(kMgPerG * residual_g[k]);
     out.cell_sigma_mg.push_back(kMgPerG * sigma_g[k]);

@@ -40,7 +40,8 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
   if (options.method == SolveMethod::genetic && report.search) {
     // Its members wander about the answer, and it may lie beside the minimum; least squares'
     // covariance knows nothing of that.
-    const double apart_mg = difference_over_sphere(fit.fit.calibration, *report.calibration).rms_mg;
+    const double apart_mg =
+        difference_over_sphere(fit.best().calibration, *report.calibration).rms_mg;
     const double wander_mg = std::hypot(report.search->wander_mg, apart_mg);
     for (std::size_t a = 0; a < kAxes; ++a) {
       report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], wander_mg);
@@ -139,7 +140,7 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
     doubts = report.search->reasons;
     // Where it is not the same as least squares it must at least be within what is promised.
     const double apart_mg =
-        difference_over_sphere(report.fit->fit.calibration, *report.calibration).worst_mg;
+        difference_over_sphere(report.fit->best().calibration, *report.calibration).worst_mg;
     if (!(apart_mg <= options.limits.worst_direction_mg)) {
       doubts.push_back(fmt::format(
           "the genetic algorithm's answer is {:.1f} mg from least squares' in the worst direction "

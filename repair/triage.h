@@ -49,6 +49,7 @@ struct FirmwareVersion {
   int major_number = 0;
   int minor_number = 0;
   int patch = 0;
+  // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the zero inside <=> for a pointer
   auto operator<=>(const FirmwareVersion&) const = default;
 };
 std::optional<FirmwareVersion> parse_firmware(std::string_view text);

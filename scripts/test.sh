@@ -33,6 +33,11 @@ run_ctest() {
 scripts/install_packages.sh build test
 source scripts/build_environment.sh
 
+if [ -z "$label" ]; then
+  step "Format"
+  scripts/check_format.sh
+fi
+
 step "Release build (g++)"
 configure release -DSIXPOINT_TESTS=ON -DSIXPOINT_BENCH=ON
 cmake --build build -- --quiet
@@ -41,9 +46,6 @@ if [ -n "$label" ]; then
   run_ctest build -L "^$label\$"
   exit
 fi
-
-step "Format"
-scripts/check_format.sh
 
 step "Tests"
 run_ctest build

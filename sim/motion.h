@@ -30,12 +30,6 @@ std::unique_ptr<Motion> still(const Eigen::Matrix3d& rotation, double gravity_g 
 std::unique_ptr<Motion> turn(const Eigen::Matrix3d& from, const Eigen::Matrix3d& to,
                              double duration_s, std::uint64_t seed, double gravity_g = 1);
 
-struct Tone {
-  Eigen::Vector3d direction_lab = Eigen::Vector3d::UnitX();
-  double frequency_hz = 5;
-  double amplitude_g = 0.5;
-  double phase_rad = 0;
-};
 std::unique_ptr<Motion> shaker(const Eigen::Matrix3d& rotation, const Tone& tone,
                                double gravity_g = 1);
 

@@ -40,7 +40,8 @@ class ScenarioLog final : public gt3x::ByteSource {
         report_(report),
         truth_(truth),
         motion_(scenario.motion()),
-        simulator_(scenario.unit, options_of(scenario), *motion_, scenario.make_effects()),
+        simulator_(scenario.unit, options_of(scenario), *motion_,
+                   make_effects(scenario.effects, scenario.seed)),
         pending_(log_preamble(scenario.unit, scenario.start, scenario.rate_hz)) {}
 
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
@@ -63,6 +64,8 @@ class ScenarioLog final : public gt3x::ByteSource {
     options.stored_bits = scenario.wide ? 16 : 12;
     options.temperature_c = scenario.temperature_c;
     options.seed = scenario.seed;
+    options.plan = scenario.plan();
+    options.placements = scenario.placements();
     return options;
   }
 

@@ -8,7 +8,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/random.h"
 #include "sim/firmware.h"
+#include "sim/standard_protocol.h"
 
 namespace sixpoint::sim {
 
@@ -149,7 +151,7 @@ Result<UnitTruth> parse_unit(const Json* json, std::uint64_t seed) {
   SIXPOINT_ASSIGN(const Section unit,
                   Section::of(*json, "/unit",
                               {"seed", "serial", "firmware", "calibrated", "constants", "sensor",
-                               "noise_mg", "accel_scale_lsb_per_g"}));
+                               "noise_mg", "accel_scale_lsb_per_g", "gain", "offset_g"}));
   SIXPOINT_CHECK(unit.seed("seed", seed));
   SIXPOINT_CHECK(unit.text("serial", wishes.serial, 16));
   SIXPOINT_CHECK(unit.text("firmware", wishes.firmware, 12));
@@ -239,6 +241,123 @@ Result<Eigen::Matrix3d> parse_rotation(const Section& motion, const std::string&
   return rotation;
 }
 
+// What a unit is in a protocol: gain and offset of what it stores, and its noise.
+constexpr std::uint64_t kNuisanceStream = 0x6E756973;
+
+void draw_nuisances(ProtocolRun& run, std::uint64_t seed) {
+  Random random(seed, kNuisanceStream);
+  const auto normal = [&] { return std::clamp(random.normal(), -2.5, 2.5); };
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    run.gain[axis] = 1 + 0.02 * normal();
+    run.offset_g[axis] = 0.035 * normal();
+    run.noise_mg[axis] *= random.uniform(0.95, 1.05);
+  }
+}
+
+Status parse_segment_temperature(const Section& section, std::array<double, 2>& commanded_c) {
+  const Json* json = section.find("temperature_c");
+  if (json == nullptr) {
+    return {};
+  }
+  const Json list = json->is_array() ? *json : Json::array({*json, *json});
+  if (list.size() != 2 || !list[0].is_number() || !list[1].is_number() ||
+      !(std::abs(list[0].get<double>()) <= 200) || !(std::abs(list[1].get<double>()) <= 200)) {
+    return wrong(section.path("temperature_c"), "this must be a number or [start, end], in C");
+  }
+  commanded_c = {list[0].get<double>(), list[1].get<double>()};
+  return {};
+}
+
+Result<ProtocolSegment> parse_segment(const Json& json, const std::string& path) {
+  SIXPOINT_ASSIGN(const Section section,
+                  Section::of(json, path,
+                              {"name", "kind", "first_sample", "samples", "host_start_s",
+                               "rotation", "temperature_c", "vibration"}));
+  ProtocolSegment segment;
+  std::optional<std::string> name;
+  std::optional<std::string> kind;
+  SIXPOINT_CHECK(section.text("name", name, 60));
+  SIXPOINT_CHECK(section.text("kind", kind, 20));
+  const auto parsed = parse_segment_kind(kind.value_or("still"));
+  if (!parsed) {
+    return wrong(section.path("kind"), "this must be still, vibration, ramp or soak");
+  }
+  segment.name = name.value_or(*kind);
+  segment.kind = *parsed;
+  SIXPOINT_CHECK(section.seed("first_sample", segment.first_sample));
+  SIXPOINT_CHECK(section.seed("samples", segment.samples));
+  SIXPOINT_CHECK(section.number("host_start_s", segment.host_start_s, 0, kLongest_s));
+  SIXPOINT_ASSIGN(segment.rotation, parse_rotation(section, path));
+  SIXPOINT_CHECK(parse_segment_temperature(section, segment.commanded_c));
+  if (const Json* vibration = section.find("vibration"); vibration != nullptr) {
+    SIXPOINT_ASSIGN(const Section tone_section,
+                    Section::of(*vibration, section.path("vibration"),
+                                {"direction_lab", "frequency_hz", "amplitude_g", "phase_rad"}));
+    Tone tone;
+    tone.direction_lab = Eigen::Vector3d::UnitZ();
+    std::optional<PerAxis<double>> direction;
+    SIXPOINT_CHECK(tone_section.axes("direction_lab", direction, -1e6, 1e6));
+    if (direction) {
+      tone.direction_lab = {(*direction)[0], (*direction)[1], (*direction)[2]};
+    }
+    if (tone.direction_lab.norm() < 1e-6) {
+      return wrong(tone_section.path("direction_lab"), "this must have a direction");
+    }
+    SIXPOINT_CHECK(tone_section.number("frequency_hz", tone.frequency_hz, 0, 1000));
+    SIXPOINT_CHECK(tone_section.number("amplitude_g", tone.amplitude_g, 0, 100));
+    SIXPOINT_CHECK(tone_section.number("phase_rad", tone.phase_rad, -100, 100));
+    segment.vibration = tone;
+  }
+  return segment;
+}
+
+// "production", "engineering", or segments as protocol.json of a bundle has them.
+Result<std::vector<ProtocolSegment>> parse_segments(const Json& json, std::uint64_t seed,
+                                                    double rate_hz) {
+  constexpr std::uint64_t kMostSamples = 20'000'000;
+  if (json.is_string()) {
+    const auto standard = parse_standard_protocol(json.get_ref<const std::string&>());
+    if (!standard) {
+      return wrong("/protocol", "this must be production, engineering, or a list of segments");
+    }
+    return draw_protocol(*standard, seed, rate_hz);
+  }
+  if (!json.is_array() || json.empty() || json.size() > kMostMotions) {
+    return wrong("/protocol", "this must be production, engineering, or a list of segments");
+  }
+  std::vector<ProtocolSegment> segments;
+  std::uint64_t end = 0;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const std::string path = fmt::format("/protocol/{}", i);
+    SIXPOINT_ASSIGN(ProtocolSegment segment, parse_segment(json[i], path));
+    if (segment.first_sample != end || segment.samples == 0 ||
+        segment.samples > kMostSamples - end) {
+      return wrong(path + "/first_sample",
+                   "each segment begins where the one before ends; 20 million samples at most");
+    }
+    end += segment.samples;
+    segments.push_back(std::move(segment));
+  }
+  return segments;
+}
+
+Status parse_temperature(const Json& json, std::vector<TemperaturePoint>& points) {
+  constexpr std::size_t kMostPoints = 1'000'000;
+  if (!json.is_array() || json.size() > kMostPoints) {
+    return wrong("/temperature", "this must be a list of [host_time_s, temperature_c]");
+  }
+  for (const Json& item : json) {
+    if (!item.is_array() || item.size() != 2 || !item[0].is_number() || !item[1].is_number() ||
+        !(std::abs(item[1].get<double>()) <= 200) ||
+        (!points.empty() && !(item[0].get<double>() > points.back().host_time_s))) {
+      return wrong("/temperature",
+                   "this must be a list of [host_time_s, temperature_c], times rising");
+    }
+    points.push_back({item[0].get<double>(), item[1].get<double>()});
+  }
+  return {};
+}
+
 Result<MotionSpec> parse_motion(const Json& json, const std::string& path, std::uint64_t seed) {
   SIXPOINT_ASSIGN(const Section motion,
                   Section::of(json, path,
@@ -288,12 +407,15 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
     for (const auto& [key, value] : parameters->items()) {
       const std::string where = fmt::format("{}/{}", effect.path("parameters"), key);
       std::vector<double>& numbers = given[key];
-      const Json list = value.is_array() ? value : Json::array({value});
-      for (const Json& item : list) {
-        if (!item.is_number() || list.size() > kAxes) {
-          return wrong(where, "this must be a number or three");
+      const Json rows = value.is_array() ? value : Json::array({value});
+      for (const Json& row : rows) {
+        const Json list = row.is_array() ? row : Json::array({row});
+        for (const Json& item : list) {
+          if (!item.is_number() || list.size() > kAxes || rows.size() > kAxes) {
+            return wrong(where, "this must be a number, three, or three rows of three");
+          }
+          numbers.push_back(item.get<double>());
         }
-        numbers.push_back(item.get<double>());
       }
     }
   }
@@ -301,11 +423,98 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
   return spec;
 }
 
+Status parse_motions(const Section& top, Scenario& scenario) {
+  const Json* motions = top.find("motions");
+  if (motions == nullptr || !motions->is_array() || motions->empty() ||
+      motions->size() > kMostMotions) {
+    return wrong("/motions", "this must be a list of at least one motion");
+  }
+  double total_s = 0;
+  for (std::size_t i = 0; i < motions->size(); ++i) {
+    SIXPOINT_ASSIGN(
+        const MotionSpec spec,
+        parse_motion((*motions)[i], fmt::format("/motions/{}", i), scenario.seed + 1000 + i));
+    total_s += spec.duration_s + scenario.turn_s;
+    scenario.motions.push_back(spec);
+  }
+  if (total_s > kLongest_s) {
+    return wrong("/motions", "together they last longer than 400 days");
+  }
+  return {};
+}
+
+Status parse_effects(const Section& top, Scenario& scenario) {
+  if (const Json* effects = top.find("effects"); effects != nullptr) {
+    if (!effects->is_array() || effects->size() > 1000) {
+      return wrong("/effects", "this must be a list");
+    }
+    for (std::size_t i = 0; i < effects->size(); ++i) {
+      SIXPOINT_ASSIGN(EffectSpec spec, parse_effect((*effects)[i], fmt::format("/effects/{}", i)));
+      scenario.effects.push_back(std::move(spec));
+    }
+  }
+  return {};
+}
+
+Status parse_protocol(const Section& top, Scenario& scenario) {
+  for (const std::string_view key : {"motions", "record", "filter", "temperature_c", "turn_s"}) {
+    if (top.find(key) != nullptr) {
+      return wrong(top.path(key), "this has no place beside a protocol");
+    }
+  }
+  scenario.wide = true;
+  ProtocolRun run;
+  run.rate_hz = scenario.rate_hz;
+  run.accel_scale_lsb_per_g = scenario.unit.accel_scale_lsb_per_g;
+  run.gravity_g = scenario.gravity_g;
+  run.effects = scenario.effects;
+  run.seed = scenario.seed;
+  run.contiguous_segments_follow = true;
+  draw_nuisances(run, scenario.seed);
+  if (const Json* json = top.find("unit"); json != nullptr) {
+    // Its keys were checked when the unit was read.
+    SIXPOINT_ASSIGN(const Section unit,
+                    Section::of(*json, "/unit",
+                                {"seed", "serial", "firmware", "calibrated", "constants", "sensor",
+                                 "noise_mg", "accel_scale_lsb_per_g", "gain", "offset_g"}));
+    if (unit.find("sensor") != nullptr) {
+      return wrong(unit.path("sensor"), "beside a protocol the unit has gain and offset_g instead");
+    }
+    std::uint64_t unit_seed = scenario.seed;
+    SIXPOINT_CHECK(unit.seed("seed", unit_seed));
+    if (unit_seed != scenario.seed) {
+      run.noise_mg = ProtocolRun().noise_mg;
+      draw_nuisances(run, unit_seed);
+    }
+    const auto wish = [&unit](std::string_view key, PerAxis<double>& value, double low,
+                              double high) -> Status {
+      std::optional<PerAxis<double>> wished;
+      SIXPOINT_CHECK(unit.axes(key, wished, low, high));
+      value = wished.value_or(value);
+      return {};
+    };
+    SIXPOINT_CHECK(wish("gain", run.gain, -10, 10));
+    SIXPOINT_CHECK(wish("offset_g", run.offset_g, -10, 10));
+    SIXPOINT_CHECK(wish("noise_mg", run.noise_mg, 0, 1000));
+  }
+  SIXPOINT_CHECK(top.number("seating_sd_deg", run.seating_sd_deg, 0, 10));
+  SIXPOINT_ASSIGN(run.segments, parse_segments(*top.find("protocol"), scenario.seed, run.rate_hz));
+  if (const Json* temperature = top.find("temperature"); temperature != nullptr) {
+    SIXPOINT_CHECK(parse_temperature(*temperature, run.temperature));
+  }
+  if (run.temperature.empty()) {
+    run.temperature = unit_temperature(run.segments, run.rate_hz);
+  }
+  scenario.protocol = std::move(run);
+  return {};
+}
+
 Result<Scenario> parse_document(const Json& json) {
   SIXPOINT_ASSIGN(const Section top,
                   Section::of(json, "",
                               {"schema", "seed", "unit", "start", "rate_hz", "record", "filter",
-                               "temperature_c", "gravity_g", "turn_s", "motions", "effects"}));
+                               "temperature_c", "gravity_g", "turn_s", "motions", "effects",
+                               "protocol", "temperature", "seating_sd_deg"}));
   std::optional<std::string> schema;
   SIXPOINT_CHECK(top.text("schema", schema, 60));
   if (schema && *schema != "sixpoint/scenario/1") {
@@ -317,7 +526,8 @@ Result<Scenario> parse_document(const Json& json) {
   std::optional<UtcTime> start;
   SIXPOINT_CHECK(top.time("start", start));
   scenario.start = start.value_or(scenario.start);
-  double rate_hz = scenario.rate_hz;
+  const Json* protocol = top.find("protocol");
+  double rate_hz = protocol == nullptr ? scenario.rate_hz : 100;
   SIXPOINT_CHECK(top.number("rate_hz", rate_hz, 1, 1000));
   if (rate_hz != std::floor(rate_hz)) {
     return wrong("/rate_hz", "this must be a whole number");
@@ -342,31 +552,17 @@ Result<Scenario> parse_document(const Json& json) {
   SIXPOINT_CHECK(top.number("gravity_g", scenario.gravity_g, 0, 10));
   SIXPOINT_CHECK(top.number("turn_s", scenario.turn_s, 0, 3600));
 
-  const Json* motions = top.find("motions");
-  if (motions == nullptr || !motions->is_array() || motions->empty() ||
-      motions->size() > kMostMotions) {
-    return wrong("/motions", "this must be a list of at least one motion");
+  SIXPOINT_CHECK(parse_effects(top, scenario));
+  if (protocol != nullptr) {
+    SIXPOINT_CHECK(parse_protocol(top, scenario));
+    return scenario;
   }
-  double total_s = 0;
-  for (std::size_t i = 0; i < motions->size(); ++i) {
-    SIXPOINT_ASSIGN(
-        const MotionSpec spec,
-        parse_motion((*motions)[i], fmt::format("/motions/{}", i), scenario.seed + 1000 + i));
-    total_s += spec.duration_s + scenario.turn_s;
-    scenario.motions.push_back(spec);
-  }
-  if (total_s > kLongest_s) {
-    return wrong("/motions", "together they last longer than 400 days");
-  }
-  if (const Json* effects = top.find("effects"); effects != nullptr) {
-    if (!effects->is_array() || effects->size() > 1000) {
-      return wrong("/effects", "this must be a list");
-    }
-    for (std::size_t i = 0; i < effects->size(); ++i) {
-      SIXPOINT_ASSIGN(EffectSpec spec, parse_effect((*effects)[i], fmt::format("/effects/{}", i)));
-      scenario.effects.push_back(std::move(spec));
+  for (const std::string_view key : {"temperature", "seating_sd_deg"}) {
+    if (top.find(key) != nullptr) {
+      return wrong(top.path(key), "this needs a protocol");
     }
   }
+  SIXPOINT_CHECK(parse_motions(top, scenario));
   return scenario;
 }
 
@@ -376,9 +572,57 @@ FilterConfiguration Scenario::filter_in_force() const {
   return filter.value_or(filter_of_recording(unit.serial, unit.firmware, unit.calibrated));
 }
 
+namespace {
+
+Tone tone_under(Tone tone, const std::vector<std::unique_ptr<Effect>>& effects) {
+  for (const auto& effect : effects) {
+    effect->on_tone(tone);
+  }
+  return tone;
+}
+
+}  // namespace
+
+std::vector<Placement> Scenario::placements() const {
+  std::vector<Placement> list;
+  double at_s = 0;
+  const Eigen::Matrix3d* before = nullptr;
+  for (const MotionSpec& spec : motions) {
+    if (before != nullptr) {
+      at_s += turn_s;
+    }
+    // Free-living motion begins where it likes; for history it counts as the pose before it.
+    const Eigen::Matrix3d& pose =
+        spec.kind == MotionKind::free_living && before != nullptr ? *before : spec.rotation;
+    const bool same = before != nullptr && pose == *before;
+    list.push_back({at_s, pose, before == nullptr ? pose : *before, !same, same && turn_s == 0});
+    before = &pose;
+    at_s += spec.duration_s;
+  }
+  return list;
+}
+
+RecordingPlan Scenario::plan() const {
+  RecordingPlan plan;
+  plan.rate_hz = rate_hz;
+  double at_s = 0;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    at_s += i > 0 ? turn_s : 0;
+    const auto first = static_cast<std::uint64_t>(std::ceil(at_s * rate_hz));
+    at_s += motions[i].duration_s;
+    const auto end = static_cast<std::uint64_t>(std::floor(at_s * rate_hz));
+    if (motions[i].kind == MotionKind::still && end > first) {
+      plan.rests.push_back({first, end - first});
+    }
+  }
+  plan.samples = static_cast<std::uint64_t>(std::floor(at_s)) * static_cast<std::uint64_t>(rate_hz);
+  return plan;
+}
+
 std::unique_ptr<MotionSequence> Scenario::motion() const {
   auto sequence = std::make_unique<MotionSequence>();
   std::uint64_t turn_seed = seed;
+  const auto running = make_effects(effects, seed);
   for (const MotionSpec& spec : motions) {
     std::unique_ptr<Motion> next;
     switch (spec.kind) {
@@ -386,7 +630,7 @@ std::unique_ptr<MotionSequence> Scenario::motion() const {
         next = still(spec.rotation, gravity_g);
         break;
       case MotionKind::shaker:
-        next = shaker(spec.rotation, spec.tone, gravity_g);
+        next = shaker(spec.rotation, tone_under(spec.tone, running), gravity_g);
         break;
       case MotionKind::free_living:
         next = free_living(spec.duration_s, spec.seed, gravity_g);
@@ -402,14 +646,6 @@ std::unique_ptr<MotionSequence> Scenario::motion() const {
     sequence->add(std::move(next), spec.duration_s);
   }
   return sequence;
-}
-
-std::vector<std::unique_ptr<Effect>> Scenario::make_effects() const {
-  std::vector<std::unique_ptr<Effect>> list;
-  for (std::size_t i = 0; i < effects.size(); ++i) {
-    list.push_back(effects[i].kind->make(effects[i].values, Random(seed, 100 + i)));
-  }
-  return list;
 }
 
 Result<Scenario> parse_scenario(std::string_view json) {

@@ -1,4 +1,5 @@
-// A scenario: which unit goes through which motion, and what it records (docs/scenario.md).
+// A scenario: which unit goes through which motion or which protocol, and what it records
+// (docs/scenario.md).
 //
 // The same scenario gives the same recording, byte for byte, on every machine.
 #pragma once
@@ -13,6 +14,7 @@
 
 #include "sim/effect.h"
 #include "sim/motion.h"
+#include "sim/protocol_run.h"
 #include "sim/unit_truth.h"
 
 namespace sixpoint::sim {
@@ -27,11 +29,6 @@ struct MotionSpec {
   std::uint64_t seed = 0;                                  // free_living
 };
 
-struct EffectSpec {
-  const EffectKind* kind = nullptr;
-  ParameterSet values;  // complete
-};
-
 struct Scenario {
   std::uint64_t seed = 1;
   UnitTruth unit;
@@ -41,14 +38,19 @@ struct Scenario {
   // None: the one that the unit's firmware chooses. Else that one, against the header.
   std::optional<FilterConfiguration> filter;
   double temperature_c = 25;
-  double gravity_g = 1;  // local gravity
-  double turn_s = 2;     // a hand's time from one motion to the next; 0 = no transition
-  std::vector<MotionSpec> motions;
+  double gravity_g = 1;             // local gravity
+  double turn_s = 2;                // a hand's time from one motion to the next; 0 = no transition
+  std::vector<MotionSpec> motions;  // empty where there is a protocol
+  // A bundle instead of a plain recording; complete, with the scenario's effects and seed.
+  std::optional<ProtocolRun> protocol;
   std::vector<EffectSpec> effects;
 
   FilterConfiguration filter_in_force() const;
+  // With the effects' answer to the shaker's tones.
   std::unique_ptr<MotionSequence> motion() const;
-  std::vector<std::unique_ptr<Effect>> make_effects() const;
+  // What the simulator's effects need to know of the motion.
+  std::vector<Placement> placements() const;
+  RecordingPlan plan() const;
 };
 
 // Strict: unknown keys, wrong types and impossible values are `configuration`, with the key's path.

@@ -10,7 +10,7 @@ PerAxis<int> Sensor::read(const Eigen::Vector3d& sensed_g) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const double lsb =
         truth_.sensitivity_lsb_per_g[axis] * sensed_g[static_cast<Eigen::Index>(axis)] +
-        truth_.zero_lsb[axis] + noise_lsb_[axis] * noise_.normal();
+        truth_.zero_lsb[axis];
     raw[axis] = static_cast<int>(std::round(std::clamp(lsb, -2048.0, 2047.0)));
   }
   return raw;

@@ -8,21 +8,27 @@
 
 namespace sixpoint::sim {
 
-// Noise is white and Gaussian, drawn at every sample; readings are rounded to the nearest count and
-// clipped to the ADXL362's 12 bits. One object belongs to one thread.
+// Noise is white and Gaussian, drawn at every sample, and felt before the front end does what it
+// does (Effect::on_analog); readings are rounded to the nearest count and clipped to the ADXL362's
+// 12 bits. One object belongs to one thread.
 class Sensor {
  public:
   Sensor(const UnitTruth& unit, FilterConfiguration filter, Random noise)
       : truth_(unit.sensor(filter)), noise_(noise) {
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      noise_lsb_[axis] = unit.noise_mg[axis] / kMgPerG * truth_.sensitivity_lsb_per_g[axis];
+      noise_g_[axis] = unit.noise_mg[axis] / kMgPerG;
+    }
+  }
+  void add_noise(Eigen::Vector3d& sensed_g) {
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      sensed_g[static_cast<Eigen::Index>(axis)] += noise_g_[axis] * noise_.normal();
     }
   }
   PerAxis<int> read(const Eigen::Vector3d& sensed_g);
 
  private:
   SensorTruth truth_;
-  PerAxis<double> noise_lsb_{};
+  PerAxis<double> noise_g_{};
   Random noise_;
 };
 

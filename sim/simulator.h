@@ -19,8 +19,15 @@ struct SimulatorOptions {
   double start_s = 0;  // of the first sample on the motion's time scale
   double temperature_c = 25;
   std::uint64_t seed = 1;  // of noise and random effects
+  // What effects with history need to know; times on the motion's time scale. Empty: the unit lies
+  // in its first pose from the start.
+  RecordingPlan plan;                 // its rate is not read: rate_hz above holds
+  std::vector<Placement> placements;  // in the order of time
 };
 
+// Placements divide blocks for the effects, not for the caller. What the shaker does to the unit
+// (Effect::on_tone) belongs to the motion: Scenario::motion() asks the effects for it.
+//
 // One object belongs to one thread. `motion` must outlive it.
 class Simulator {
  public:
@@ -37,12 +44,17 @@ class Simulator {
   }
 
  private:
+  // The block's samples have their times; everything else follows.
+  void make(SimulatedBlock& block);
+
   SimulatorOptions options_;
   Motion& motion_;
   std::vector<std::unique_ptr<Effect>> effects_;
   Sensor sensor_;
   FirmwareScaler firmware_;
   std::uint64_t done_ = 0;
+  std::size_t next_placement_ = 0;
+  SimulatedBlock part_;
 };
 
 }  // namespace sixpoint::sim

@@ -13,7 +13,7 @@ inline constexpr std::uint32_t kStart = 1'428'588'240;
 inline std::vector<Counts> samples_of(std::uint32_t second, std::size_t rate = 30) {
   std::vector<Counts> samples(rate);
   for (std::size_t i = 0; i < rate; ++i) {
-    const int value = static_cast<int>((second * 131 + i * 17) % 3000) - 1500;
+    const int value = static_cast<int>((std::size_t{second} * 131 + i * 17) % 3000) - 1500;
     samples[i] = {static_cast<std::int16_t>(value), static_cast<std::int16_t>(-value / 2),
                   static_cast<std::int16_t>(256 + static_cast<int>(i))};
   }

@@ -10,7 +10,7 @@ class ClockError final : public Effect {
   explicit ClockError(const ParameterSet& values) : factor_(1 / (1 + values.at("ppm")[0] * 1e-6)) {}
   void on_sampling(SimulatedBlock& block) override {
     for (double& time_s : block.time_s) {
-      time_s *= factor_;
+      time_s = block.clock_start_s + (time_s - block.clock_start_s) * factor_;
     }
   }
 

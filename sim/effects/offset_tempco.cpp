@@ -5,8 +5,6 @@ namespace sixpoint::sim {
 
 namespace {
 
-constexpr double kReference_c = 25;
-
 class OffsetTempco final : public Effect {
  public:
   explicit OffsetTempco(const ParameterSet& values) : mg_per_c_(values.at("mg_per_c")) {}
@@ -14,7 +12,7 @@ class OffsetTempco final : public Effect {
     const Eigen::Vector3d g_per_c =
         Eigen::Vector3d(mg_per_c_[0], mg_per_c_[1], mg_per_c_[2]) / kMgPerG;
     for (std::size_t i = 0; i < block.size(); ++i) {
-      block.sensed_g[i] += g_per_c * (block.temperature_c[i] - kReference_c);
+      block.sensed_g[i] += g_per_c * (block.temperature_c[i] - kReferenceTemperature_c);
     }
   }
 

@@ -8,8 +8,14 @@ namespace {
 
 class Tilt final : public Effect {
  public:
-  explicit Tilt(const ParameterSet& values)
-      : turn_(rotation_by_deg(values.at("rotation_vector_deg"))) {}
+  explicit Tilt(const ParameterSet& values) {
+    Eigen::Vector3d vector_deg = vector_of(values, "rotation_vector_deg");
+    const double angle_deg = values.at("angle_deg")[0];
+    if (angle_deg > 0 && vector_deg.norm() > 0) {
+      vector_deg *= angle_deg / vector_deg.norm();
+    }
+    turn_ = rotation_by_deg({vector_deg[0], vector_deg[1], vector_deg[2]});
+  }
   // The base, and the unit with it, is turned by T in the laboratory; what maps the laboratory to
   // the sensor gets the inverse on its right.
   void on_stimulus(SimulatedBlock& block) override {
@@ -33,7 +39,13 @@ EffectKind tilt_kind() {
             {0.2, 0, 0},
             -0.5,
             0.5,
-            "a machinist's level on a laboratory bench: 0.05 to 0.5 degree"}},
+            "a machinist's level on a laboratory bench: 0.05 to 0.5 degree"},
+           {"angle_deg",
+            "deg",
+            {0},
+            0,
+            5,
+            "0 = the length of the vector; else the vector says the direction only"}},
           [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
             return std::make_unique<Tilt>(values);
           }};

@@ -23,7 +23,8 @@ namespace sixpoint::cli {
   COMMAND(doctor)                  \
   COMMAND(virtual)                 \
   COMMAND(station)                 \
-  COMMAND(archive)
+  COMMAND(archive)                 \
+  COMMAND(gap)
 // clang-format on
 
 #define SIXPOINT_DECLARE(name) void add_##name(CLI::App& app, Context& context);

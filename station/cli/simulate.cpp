@@ -1,10 +1,11 @@
-// sixpoint simulate: a recording from the simulator.
+// sixpoint simulate: a recording or a bundle from the simulator.
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "sim/bundle_writer.h"
 #include "sim/firmware.h"
 #include "sim/recording.h"
 #include "station/cli/command.h"
@@ -34,11 +35,40 @@ Result<std::string> sha256_of_file(FileSystem& files, const std::string& path) {
   }
 }
 
+// Keys of the answer that both forms have.
+Result<Json> answer(Context& context, const sim::Scenario& scenario, const std::string& recording) {
+  Json json = document("simulate");
+  json["file"] = recording;
+  SIXPOINT_ASSIGN(json["sha256"], sha256_of_file(context.env.files, recording));
+  json["serial"] = scenario.unit.serial;
+  json["firmware"] = scenario.unit.firmware;
+  return json;
+}
+
+Result<Json> simulate_bundle(Context& context, const Options& options,
+                             const sim::Scenario& scenario) {
+  if (!options.truth.empty()) {
+    return fail(ErrorCode::usage, "--truth does not go with a protocol", {},
+                "the scenario itself is the truth of a bundle");
+  }
+  SIXPOINT_ASSIGN(const sim::BundleReport report,
+                  sim::write_bundle(context.env.files, options.output, scenario));
+  SIXPOINT_ASSIGN(Json json, answer(context, scenario, options.output + "/recording.gt3x"));
+  json["bundle"] = options.output;
+  json["segments"] = report.segments;
+  json["samples"] = report.samples;
+  json["duration_s"] = report.duration_s;
+  return json;
+}
+
 Result<Json> simulate(Context& context, const Options& options) {
   FileSystem& files = context.env.files;
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.scenario));
   SIXPOINT_ASSIGN(const sim::Scenario scenario,
                   sim::parse_scenario({reinterpret_cast<const char*>(text.data()), text.size()}));
+  if (scenario.protocol) {
+    return simulate_bundle(context, options, scenario);
+  }
 
   std::optional<AtomicFile> truth_file;
   sim::TruthSink truth;
@@ -63,11 +93,7 @@ Result<Json> simulate(Context& context, const Options& options) {
     SIXPOINT_CHECK(truth_file->commit());
   }
 
-  Json json = document("simulate");
-  json["file"] = options.output;
-  SIXPOINT_ASSIGN(json["sha256"], sha256_of_file(files, options.output));
-  json["serial"] = scenario.unit.serial;
-  json["firmware"] = scenario.unit.firmware;
+  SIXPOINT_ASSIGN(Json json, answer(context, scenario, options.output));
   json["filter"]["in_force"] = calib::to_string(scenario.filter_in_force());
   json["filter"]["constants_measured_under"] =
       calib::to_string(sim::filter_of_constants(scenario.unit.serial, scenario.unit.calibrated));
@@ -83,20 +109,23 @@ Result<Json> simulate(Context& context, const Options& options) {
 void add_simulate(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
-      "simulate", "make a recording from a scenario; the same scenario gives the same bytes");
+      "simulate",
+      "make a recording or a bundle from a scenario; the same scenario gives the same bytes");
   command->add_option("--scenario", options->scenario, "what happens (docs/scenario.md)")
       ->required();
-  command->add_option("-o,--output", options->output, "the .gt3x file to make")->required();
+  command
+      ->add_option("-o,--output", options->output, "the .gt3x file to make, or the bundle's folder")
+      ->required();
   command->add_option("--truth", options->truth, "also write the true motion in g, as CSV");
   command->add_flag("--json", options->json, "answer as JSON");
   command->callback([options, &context] {
-    const Result<Json> answer = simulate(context, *options);
-    if (!answer) {
-      report_error(context, "simulate", answer.error(), options->json);
+    const Result<Json> done = simulate(context, *options);
+    if (!done) {
+      report_error(context, "simulate", done.error(), options->json);
     } else if (options->json) {
-      print_json(context, *answer);
+      print_json(context, *done);
     } else {
-      const Json& json = *answer;
+      const Json& json = *done;
       context.out << fmt::format(
           "{}: {} samples, {:.0f} s, unit {} with firmware {}\n", options->output,
           json["samples"].get<std::uint64_t>(), json["duration_s"].get<double>(),

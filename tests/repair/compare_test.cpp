@@ -116,7 +116,7 @@ TEST(Compare, GapsAreLeftOut) {
 TEST(Compare, SaysWhenItCannotAlign) {
   const auto rest = [](const std::string& name, std::uint64_t seed) {
     Random random(seed);
-    std::vector<float> values(30 * 300);
+    std::vector<float> values(std::size_t{30} * 300);
     for (float& value : values) {
       value = static_cast<float>(1 + 0.002 * random.normal());
     }

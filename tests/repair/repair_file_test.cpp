@@ -272,10 +272,10 @@ TEST_F(RepairFile, AffectedFileWithoutConstantsIsBadData) {
   gt3x::append_record(log, gt3x::RecordType::parameters, made.start,
                       gt3x::encode_parameters(values));
   const Bytes whole = made.log();
-  log.insert(log.end(),
-             whole.begin() + static_cast<std::ptrdiff_t>(made.parameters().size() +
-                                                         gt3x::kRecordOverhead),
-             whole.end());
+  log.insert(
+      log.end(),
+      whole.begin() + static_cast<std::ptrdiff_t>(made.parameters().size() + gt3x::kRecordOverhead),
+      whole.end());
   ASSERT_OK(made.write(memory_.files, "in.gt3x", log));
   const auto report = repair();
   ASSERT_EQ(report.status, RepairStatus::failed);

@@ -39,7 +39,8 @@ TEST(Effects, EveryEntryIsWhole) {
       EXPECT_FALSE(parameter.unit.empty());
       EXPECT_FALSE(parameter.source.empty());
       EXPECT_LT(parameter.low, parameter.high);
-      EXPECT_TRUE(parameter.default_value.size() == 1 || parameter.default_value.size() == 3);
+      EXPECT_TRUE(parameter.default_value.size() == 1 || parameter.default_value.size() == 3 ||
+                  parameter.default_value.size() == 9);
     }
     const auto values = complete_parameters(kind, {});
     ASSERT_OK(values);
@@ -82,7 +83,7 @@ TEST(Effects, ClockErrorComesEarly) {
 
 TEST(Effects, ChargingStoresZeros) {
   const SimulatedBlock block =
-      run("charging_zeros", {{"start_s", {0.5}}, {"duration_s", {1}}}, {0, 0, 1});
+      run("charging_zeros", {{"start_s", {0.5}}, {"seconds", {1}}}, {0, 0, 1});
   EXPECT_NE(block.stored[49], (gt3x::Counts{}));
   EXPECT_EQ(block.stored[50], (gt3x::Counts{}));
   EXPECT_EQ(block.stored[149], (gt3x::Counts{}));

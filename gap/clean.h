@@ -1,0 +1,59 @@
+// Discrete effects are found and undone in the samples first, before anything is averaged.
+//
+// A turned axis, a stretch of zeros or a held value ruins every mean that contains it, and none of
+// them needs a fit: each leaves marks that noise cannot make. What is found here is undone (axes)
+// or masked (zeros, held and clipped samples), so that the rest of the diagnosis sees what the unit
+// would have recorded without it.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "gap/bundle.h"
+
+namespace sixpoint::gap {
+
+enum SampleFlag : std::uint8_t {
+  kSampleGood = 0,
+  kSampleZero = 1,     // within a run of zeros on all axes
+  kSampleHeld = 2,     // within a run that repeats one value exactly
+  kSampleClipped = 4,  // an axis at the end of its range, or on the plateau of a saturation
+  kSampleWrapped = 8,  // an axis came back by 4096 LSB; undone in the samples
+};
+
+struct RunTally {
+  std::size_t runs = 0;
+  std::size_t samples = 0;
+  std::vector<std::size_t> segments;  // in which they lie, ascending
+};
+
+struct CleanSamples {
+  std::vector<gt3x::Counts> samples;  // axes turned back, wraps undone
+  std::vector<std::uint8_t> flags;    // SampleFlag, one per sample
+
+  bool axes_turned = false;
+  Eigen::Matrix3i axis_matrix = Eigen::Matrix3i::Identity();  // maps the right axes to the stored
+  // How much worse, in g rms over the poses, the untouched axes fit than the best signed
+  // permutation.
+  double axes_gain_g = 0;
+  bool axes_decidable = false;  // the poses tell every signed permutation from every other
+  // Mean distance, in g, of the poses from what the protocol says, axes as decided.
+  double pose_error_g = 0;
+
+  RunTally zeros;  // 10 samples and more with zero on all axes
+  RunTally held;   // a second and more of one value, not zero
+  RunTally stuck;  // runs of one value shorter than that, longer than chance allows
+  std::size_t wrapped_samples = 0;
+
+  // Values that pile up at one end of an axis inside the record's range.
+  bool saturated = false;
+  std::array<std::array<double, 2>, 3> plateau_lsb{};  // per axis low, high; 0 where none
+  std::size_t plateau_samples = 0;
+  std::size_t full_scale_samples = 0;  // at the record's own limits: nothing wrong
+};
+
+CleanSamples clean_samples(const Bundle& bundle);
+
+}  // namespace sixpoint::gap

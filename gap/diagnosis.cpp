@@ -1,0 +1,190 @@
+#include "gap/diagnosis.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "gap/catalogue.h"
+
+namespace sixpoint::gap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json values(const std::vector<double>& list) {
+  if (list.size() == 1) {
+    return finite(list.front());
+  }
+  Json json = Json::array();
+  if (list.size() == 9) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      json.push_back(Json::array(
+          {finite(list[3 * row]), finite(list[3 * row + 1]), finite(list[3 * row + 2])}));
+    }
+    return json;
+  }
+  for (const double value : list) {
+    json.push_back(finite(value));
+  }
+  return json;
+}
+
+Json finding_json(const EffectFinding& finding) {
+  Json json;
+  json["name"] = finding.name;
+  json["probability"] = finite(finding.probability);
+  json["evidence_nats"] = finite(finding.nats);
+  json["parameters"] = Json::object();
+  json["standard_uncertainty"] = Json::object();
+  for (const NamedValue& parameter : finding.parameters) {
+    json["parameters"][parameter.name] = values(parameter.value);
+    if (!parameter.sd.empty()) {
+      json["standard_uncertainty"][parameter.name] = values(parameter.sd);
+    }
+  }
+  json["held_out_gain_nats"] = finite(finding.held_out_gain_nats);
+  json["outside_datasheet"] = finding.outside_datasheet;
+  json["confounded_with"] = finding.confounded_with;
+  return json;
+}
+
+}  // namespace
+
+std::string_view to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::no_gap:
+      return "no_gap";
+    case Verdict::explained:
+      return "explained";
+    case Verdict::partly_explained:
+      return "partly_explained";
+    case Verdict::unexplained:
+      return "unexplained";
+  }
+  return "";
+}
+
+std::string Diagnosis::brief() const {
+  if (inconclusive) {
+    return fmt::format("nothing can be said: {}",
+                       losses.empty() ? "too little data" : losses.back());
+  }
+  std::string names;
+  for (const EffectFinding& effect : effects) {
+    names += (names.empty() ? "" : " and ") + effect.name;
+    for (std::size_t i = 0; i < effect.confounded_with.size(); ++i) {
+      names += (i == 0 ? " (or " : ", ") + effect.confounded_with[i];
+    }
+    names += effect.confounded_with.empty() ? "" : ")";
+  }
+  const CatalogueEntry* first = effects.empty() ? nullptr : find_entry(effects.front().name);
+  const std::string advice = first == nullptr ? "" : fmt::format("; {}", first->advice);
+  switch (verdict) {
+    case Verdict::no_gap:
+      return fmt::format(
+          "no gap: the nominal simulator explains the recording ({:.2f} mg, noise and seating "
+          "leave {:.2f} mg)",
+          gap.before_mg, gap.floor_mg);
+    case Verdict::explained:
+      return fmt::format("{} explains the gap: {:.2f} mg -> {:.2f} mg (floor {:.2f} mg){}", names,
+                         gap.before_mg, gap.after_mg, gap.floor_mg, advice);
+    case Verdict::partly_explained:
+      return fmt::format(
+          "{} explains a part of the gap ({:.2f} mg -> {:.2f} mg), and something unknown is left: "
+          "{}",
+          names, gap.before_mg, gap.after_mg, unknown.where.empty() ? "" : unknown.where.front());
+    case Verdict::unexplained:
+      return fmt::format("there is a gap that nothing in the catalogue explains: {}",
+                         unknown.where.empty() ? "" : unknown.where.front());
+  }
+  return "";
+}
+
+Json augmented_scenario(const Diagnosis& diagnosis) {
+  Json json;
+  json["schema"] = "sixpoint/scenario/1";
+  json["seed"] = diagnosis.seed;
+  json["protocol"] = diagnosis.protocol == "production" ? "production" : "engineering";
+  json["unit"]["serial"] = diagnosis.serial;
+  json["unit"]["gain"] = diagnosis.unit.gain;
+  json["unit"]["offset_g"] = diagnosis.unit.offset_g;
+  json["unit"]["noise_mg"] = diagnosis.unit.noise_mg;
+  json["effects"] = Json::array();
+  for (const EffectFinding& effect : diagnosis.effects) {
+    Json entry;
+    entry["name"] = effect.name;
+    entry["parameters"] = Json::object();
+    for (const NamedValue& parameter : effect.parameters) {
+      const bool derived =
+          (effect.name == "tilt" && parameter.name == "angle_deg") || parameter.name == "order";
+      if (!derived) {
+        entry["parameters"][parameter.name] = values(parameter.value);
+      }
+    }
+    json["effects"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+Json Diagnosis::to_json() const {
+  Json json;
+  json["bundle"] = bundle;
+  json["serial"] = serial;
+  json["firmware"] = firmware;
+  json["protocol"] = protocol;
+  json["verdict"] = to_string(verdict);
+  json["inconclusive"] = inconclusive;
+  json["brief"] = brief();
+  json["effects"] = Json::array();
+  for (const EffectFinding& effect : effects) {
+    json["effects"].push_back(finding_json(effect));
+  }
+  json["candidates"] = Json::array();
+  for (const EffectFinding& candidate : candidates) {
+    json["candidates"].push_back(finding_json(candidate));
+  }
+  json["unknown"]["present"] = unknown.present;
+  json["unknown"]["probability"] = finite(unknown.probability);
+  json["unknown"]["where"] = unknown.where;
+  json["not_observable"] = Json::array();
+  for (const auto& [name, segment] : not_observable) {
+    json["not_observable"].push_back({{"name", name}, {"needs_segment", segment}});
+  }
+  json["gap"]["before"] = {{"rms_mg", finite(gap.before_mg)}, {"sigma", finite(gap.before_sigma)}};
+  json["gap"]["after"] = {
+      {"rms_mg", finite(gap.after_mg)},
+      {"sigma", finite(gap.after_sigma)},
+      {"interval_mg", {finite(gap.after_interval_mg[0]), finite(gap.after_interval_mg[1])}}};
+  json["gap"]["floor_mg"] = finite(gap.floor_mg);
+  json["gap"]["closed_fraction"] = finite(gap.closed_fraction);
+  for (std::size_t i = 0; i < kFeatureNames.size(); ++i) {
+    json["gap"]["by_feature"][kFeatureNames[i]] = {{"before_sigma", finite(gap.by_feature[i][0])},
+                                                   {"after_sigma", finite(gap.by_feature[i][1])}};
+  }
+  json["where"] = Json::array();
+  for (const Location& location : where) {
+    json["where"].push_back({{"axis", std::string(1, "XYZ"[location.axis])},
+                             {"segment", location.segment},
+                             {"factor", location.factor},
+                             {"residual_mg", finite(location.residual_mg)},
+                             {"sigma", finite(location.sigma)}});
+  }
+  json["next_segments"] = Json::array();
+  for (const NextSegment& next : next_segments) {
+    json["next_segments"].push_back({{"name", next.name},
+                                     {"minutes", next.minutes},
+                                     {"expected_nats", finite(next.expected_nats)},
+                                     {"separates", next.separates}});
+  }
+  json["augmented_scenario"] = augmented_scenario(*this);
+  json["unit"] = {{"gain", unit.gain}, {"offset_g", unit.offset_g}, {"noise_mg", unit.noise_mg}};
+  json["losses"] = losses;
+  json["seconds"] = finite(seconds);
+  return json;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,130 @@
+// The answer: where simulator and recording part, which effect explains it, how much is left.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace sixpoint::gap {
+
+// One number, three (per axis, or a vector), or a matrix of nine in rows.
+struct NamedValue {
+  std::string name;
+  std::vector<double> value;
+  std::vector<double> sd;  // empty where there is none
+};
+
+struct EffectFinding {
+  std::string name;
+  double probability = 0;
+  double nats = 0;  // evidence for it over its absence, prior included
+  std::vector<NamedValue> parameters;
+  double held_out_gain_nats = 0;
+  bool outside_datasheet = false;
+  std::vector<std::string> confounded_with;
+};
+
+struct UnknownFinding {
+  bool present = false;
+  double probability = 0;
+  std::vector<std::string> where;  // most striking first, in words
+};
+
+struct GapSize {
+  double before_mg = 0, before_sigma = 0;
+  double after_mg = 0, after_sigma = 0;
+  std::array<double, 2> after_interval_mg{};
+  double floor_mg = 0;
+  double closed_fraction = 0;
+  // sqrt(chi-square per number) before and after: mean, tone, spectrum, codes, timing.
+  std::array<std::array<double, 2>, 5> by_feature{};
+};
+inline constexpr std::array<const char*, 5> kFeatureNames = {"mean", "tone", "spectrum", "codes",
+                                                             "timing"};
+
+struct Location {
+  int axis = 0;
+  std::string segment;
+  std::string factor;  // pose, yaw, temperature, frequency, amplitude, time
+  double residual_mg = 0;
+  double sigma = 0;
+};
+
+struct NextSegment {
+  std::string name;
+  double minutes = 0;
+  double expected_nats = 0;
+  std::vector<std::string> separates;
+};
+
+enum class Verdict { no_gap, explained, partly_explained, unexplained };
+std::string_view to_string(Verdict verdict);
+
+struct UnitEstimate {
+  std::array<double, 3> gain{1, 1, 1};
+  std::array<double, 3> offset_g{};
+  std::array<double, 3> noise_mg{};
+};
+
+// Series for the report page; kept small.
+struct Plots {
+  std::vector<double> frequency_hz;
+  std::array<std::vector<double>, 3> noise_mg2;        // equivalent white variance
+  std::array<std::vector<double>, 3> noise_model_mg2;  // nominal, or with the low-pass
+  std::vector<double> step_s;
+  std::vector<double> step_share;
+  std::vector<double> step_model;
+  struct Tone {
+    int axis;
+    double frequency_hz;
+    double amplitude_g;
+    double ratio;  // to the nominal amplitude
+    double model;
+  };
+  std::vector<Tone> tones;
+  struct Residual {
+    int axis;
+    std::string segment;
+    int index;  // of the segment
+    double temperature_c;
+    double minutes;
+    double before_mg, before_sigma, after_mg, after_sigma;
+  };
+  std::vector<Residual> residuals;
+};
+
+struct Diagnosis {
+  std::string bundle;
+  std::string protocol;  // production, engineering, or other
+  std::string serial, firmware;
+  Verdict verdict = Verdict::no_gap;
+  bool inconclusive = false;  // too little data to say anything
+  std::vector<EffectFinding> effects;
+  std::vector<EffectFinding> candidates;
+  UnknownFinding unknown;
+  std::vector<std::pair<std::string, std::string>> not_observable;  // effect, segment
+  GapSize gap;
+  std::vector<Location> where;
+  std::vector<NextSegment> next_segments;
+  UnitEstimate unit;
+  std::vector<std::string> losses;
+  std::uint64_t seed = 0;
+  double seconds = 0;
+  Plots plots;
+
+  // One sentence for a technician.
+  std::string brief() const;
+  // Whether the answer can be acted on: something was decided.
+  bool usable() const { return !inconclusive; }
+  // The document of gap.md, "The answer", without `schema`.
+  nlohmann::ordered_json to_json() const;
+};
+
+// Settings with which `sixpoint simulate` reproduces the recording, gaps and all.
+nlohmann::ordered_json augmented_scenario(const Diagnosis& diagnosis);
+
+}  // namespace sixpoint::gap

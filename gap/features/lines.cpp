@@ -1,0 +1,348 @@
+#include "gap/features/lines.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <optional>
+#include <unsupported/Eigen/FFT>
+
+namespace sixpoint::gap {
+namespace {
+
+using Complex = std::complex<double>;
+using Vector3c = Eigen::Vector3cd;
+
+constexpr double kLowest_hz = 1;            // below it slow noise rules
+constexpr double kFalseLines = 1e-4;        // chance of one false line in a whole recording
+constexpr std::size_t kLongest = 1U << 17;  // 22 minutes at 100 Hz
+
+// A stretch at rest in one pose, mean removed, masked samples zero, in mg.
+struct Stretch {
+  std::size_t segment = 0;
+  std::size_t samples = 0;
+  std::array<std::vector<double>, 3> x;
+};
+
+std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) {
+  std::vector<Stretch> all;
+  for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
+    const Segment& segment = bundle.segments[s];
+    if (segment.kind == Segment::Kind::vibration || segment.kind == Segment::Kind::ramp) {
+      continue;
+    }
+    const std::size_t skip =
+        segment.starts_placement ? static_cast<std::size_t>(3 * bundle.rate_hz) : 0;
+    if (segment.samples < skip + static_cast<std::size_t>(4 * bundle.rate_hz)) {
+      continue;
+    }
+    Stretch stretch;
+    stretch.segment = s;
+    stretch.samples = std::min(segment.samples - skip, kLongest);
+    std::size_t good = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      auto& x = stretch.x[axis];
+      x.assign(stretch.samples, 0);
+      double mean = 0;
+      good = 0;
+      for (std::size_t i = 0; i < stretch.samples; ++i) {
+        const std::size_t at = segment.first_sample + skip + i;
+        if ((clean.flags[at] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0) {
+          x[i] = 1000.0 * clean.samples[at][axis] / bundle.accel_scale_lsb_per_g;
+          mean += x[i];
+          ++good;
+        }
+      }
+      mean /= static_cast<double>(std::max<std::size_t>(1, good));
+      for (std::size_t i = 0; i < stretch.samples; ++i) {
+        const std::size_t at = segment.first_sample + skip + i;
+        if ((clean.flags[at] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0) {
+          x[i] -= mean;
+        }
+      }
+    }
+    if (good * 10 >= stretch.samples * 9) {
+      all.push_back(std::move(stretch));
+    }
+  }
+  return all;
+}
+
+Vector3c amplitude_at(const Stretch& stretch, double w) {
+  Vector3c sum = Vector3c::Zero();
+  const Complex turn = std::polar(1.0, -w);
+  Complex phase = 1;
+  for (std::size_t i = 0; i < stretch.samples; ++i) {
+    sum[0] += phase * stretch.x[0][i];
+    sum[1] += phase * stretch.x[1][i];
+    sum[2] += phase * stretch.x[2][i];
+    phase *= turn;
+    if ((i & 1023U) == 1023U) {
+      phase /= std::abs(phase);
+    }
+  }
+  return sum * (2.0 / static_cast<double>(stretch.samples));
+}
+
+// One dwell's complex amplitude, its weights and its pose.
+struct Sight {
+  Vector3c amplitude;
+  Eigen::Vector3d weight;  // 1 / variance of the real part
+  Eigen::Matrix3d rotation;
+};
+
+// Maximum likelihood of one vector seen in all dwells, each with its own phase.
+struct VectorFit {
+  Vector3c vector = Vector3c::Zero();
+  double nats = 0;
+  double chi = 0;
+};
+
+VectorFit fit_vector(const std::vector<Sight>& sights, bool in_lab) {
+  const auto to_sensor = [&](const Sight& s) -> Eigen::Matrix3d {
+    return in_lab ? s.rotation : Eigen::Matrix3d::Identity();
+  };
+  Eigen::Matrix3cd outer = Eigen::Matrix3cd::Zero();
+  for (const Sight& s : sights) {
+    const Vector3c back = to_sensor(s).transpose().cast<Complex>() * s.amplitude;
+    outer += s.weight.mean() * back * back.adjoint();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3cd> solver(outer);
+  VectorFit fit;
+  fit.vector = solver.eigenvectors().col(2);
+  double weight = 0;
+  for (const Sight& s : sights) {
+    weight += s.weight.mean();
+  }
+  fit.vector *= std::sqrt(std::max(0.0, solver.eigenvalues()[2]) / std::max(1e-300, weight));
+  for (int round = 0; round < 25; ++round) {
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+    Vector3c b = Vector3c::Zero();
+    fit.nats = 0;
+    fit.chi = 0;
+    for (const Sight& s : sights) {
+      const Eigen::Matrix3d r = to_sensor(s);
+      const Eigen::Matrix3d rw = r.transpose() * s.weight.asDiagonal();
+      const Vector3c predicted = r.cast<Complex>() * fit.vector;
+      Complex overlap = 0;
+      double square = 0;
+      double power = 0;
+      for (Eigen::Index k = 0; k < 3; ++k) {
+        overlap += std::conj(predicted[k]) * s.weight[k] * s.amplitude[k];
+        square += s.weight[k] * std::norm(predicted[k]);
+        power += s.weight[k] * std::norm(s.amplitude[k]);
+      }
+      fit.nats += std::abs(overlap) - 0.5 * square;
+      fit.chi += power - 2 * std::abs(overlap) + square;
+      const Complex align =
+          std::abs(overlap) > 0 ? std::conj(overlap) / std::abs(overlap) : Complex(1);
+      a += rw * r;
+      b += rw.cast<Complex>() * (s.amplitude * align);
+    }
+    fit.vector = a.inverse().cast<Complex>() * b;
+  }
+  return fit;
+}
+
+std::vector<Sight> sights_at(const Bundle& bundle, const std::vector<Stretch>& all,
+                             const NoiseSpectrum& noise, double frequency_hz) {
+  std::vector<Sight> sights;
+  const double w = 2 * M_PI * frequency_hz / bundle.rate_hz;
+  for (const Stretch& stretch : all) {
+    Sight sight;
+    sight.amplitude = amplitude_at(stretch, w);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sight.weight[static_cast<Eigen::Index>(axis)] =
+          static_cast<double>(stretch.samples) / (2 * noise.variance_at(axis, frequency_hz));
+    }
+    sight.rotation = bundle.segments[stretch.segment].rotation;
+    sights.push_back(sight);
+  }
+  return sights;
+}
+
+struct Peak {
+  double frequency_hz = 0;
+  double nats = 0;  // above the threshold
+};
+
+double padded_power(Eigen::FFT<double>& fft, const Stretch& stretch, std::size_t length,
+                    std::size_t axis, std::vector<Complex>& out) {
+  std::vector<double> x = stretch.x[axis];
+  x.resize(length, 0);
+  fft.fwd(out, x);
+  return static_cast<double>(stretch.samples);
+}
+
+// Sum over `set` of the whitened power per frequency; each term is exponential of mean 1 where
+// there is no line, so that the sum of m terms has a gamma law.
+struct PowerSum {
+  std::vector<double> sum;
+  double step_hz = 0;
+  double terms = 0;
+};
+
+PowerSum power_sum(const Bundle& bundle, const std::vector<const Stretch*>& set,
+                   const NoiseSpectrum& noise) {
+  PowerSum power;
+  std::size_t length = 2;
+  for (const Stretch* s : set) {
+    while (length < s->samples) {
+      length *= 2;
+    }
+  }
+  length *= 2;  // half-bin steps: a line between two bins loses little
+  power.step_hz = bundle.rate_hz / static_cast<double>(length);
+  power.sum.assign(length / 2, 0);
+  std::array<std::vector<double>, 3> level;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // The noise level on a coarse grid: it is smooth, the bins are many.
+    const std::size_t coarse = 400;
+    std::vector<double> grid(coarse + 1);
+    for (std::size_t k = 0; k <= coarse; ++k) {
+      grid[k] = noise.variance_at(axis, 0.5 * bundle.rate_hz * static_cast<double>(k) / coarse);
+    }
+    level[axis].resize(length / 2);
+    for (std::size_t k = 0; k < length / 2; ++k) {
+      level[axis][k] = grid[k * 2 * coarse / length];
+    }
+  }
+  Eigen::FFT<double> fft;
+  std::vector<Complex> out;
+  for (const Stretch* s : set) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double n = padded_power(fft, *s, length, axis, out);
+      for (std::size_t k = 0; k < length / 2; ++k) {
+        power.sum[k] += std::norm(out[k]) / (n * level[axis][k]);
+      }
+    }
+    power.terms += 3;
+  }
+  return power;
+}
+
+// log of the upper tail of a gamma law of shape m, scale 1 (Chernoff's bound, exact enough here).
+double log_tail(double x, double m) { return x <= m ? 0 : -(x - m - m * std::log(x / m)); }
+
+std::optional<Peak> best_peak(const PowerSum& power, const std::vector<double>& taken_hz,
+                              double guard_hz) {
+  std::optional<Peak> best;
+  const auto first = static_cast<std::size_t>(std::ceil(kLowest_hz / power.step_hz));
+  const double log_bins = std::log(static_cast<double>(power.sum.size()));
+  for (std::size_t k = first; k + 2 < power.sum.size(); ++k) {
+    const double nats = -log_tail(power.sum[k], power.terms) - log_bins + std::log(kFalseLines);
+    if (nats > 0 && (!best || nats > best->nats)) {
+      const double f = static_cast<double>(k) * power.step_hz;
+      const bool free = std::none_of(taken_hz.begin(), taken_hz.end(),
+                                     [&](double t) { return std::abs(t - f) < guard_hz; });
+      if (free) {
+        best = Peak{f, nats};
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise) {
+  LineSearch search;
+  if (!noise.usable()) {
+    return search;
+  }
+  const auto all = stretches(bundle, clean);
+  if (all.empty()) {
+    return search;
+  }
+  const auto longest =
+      std::max_element(all.begin(), all.end(),
+                       [](const Stretch& a, const Stretch& b) { return a.samples < b.samples; });
+  std::vector<const Stretch*> dwells;
+  for (const Stretch& s : all) {
+    if (static_cast<double>(s.samples) <= 30 * bundle.rate_hz) {
+      dwells.push_back(&s);
+    }
+  }
+  std::vector<PowerSum> powers;
+  if (static_cast<double>(longest->samples) > 60 * bundle.rate_hz) {
+    powers.push_back(power_sum(bundle, {&*longest}, noise));
+  }
+  if (!dwells.empty()) {
+    powers.push_back(power_sum(bundle, dwells, noise));
+  }
+  std::vector<double> taken;
+  while (search.lines.size() < 4) {
+    std::optional<Peak> peak;
+    const PowerSum* from = nullptr;
+    for (const PowerSum& power : powers) {
+      const auto found = best_peak(power, taken, 0.6);
+      if (found && (!peak || found->nats > peak->nats)) {
+        peak = found;
+        from = &power;
+      }
+    }
+    if (!peak) {
+      break;
+    }
+    // Refine where the found peak was seen.
+    double f = peak->frequency_hz;
+    const std::vector<Stretch>* set = &all;
+    double best = -1;
+    for (int round = 0; round < 2; ++round) {
+      const double step = from->step_hz / (round == 0 ? 4 : 20);
+      const double centre = f;
+      for (int k = -4; k <= 4; ++k) {
+        const double candidate = centre + k * step;
+        double sum = 0;
+        const double w = 2 * M_PI * candidate / bundle.rate_hz;
+        for (const Stretch& s : *set) {
+          if (from == powers.data() && powers.size() > 1 && &s != &*longest) {
+            continue;
+          }
+          sum += amplitude_at(s, w).squaredNorm() * static_cast<double>(s.samples);
+        }
+        if (sum > best) {
+          best = sum;
+          f = candidate;
+        }
+      }
+    }
+    SpectralLine line;
+    line.frequency_hz = f;
+    const auto sights = sights_at(bundle, all, noise, f);
+    const VectorFit lab = fit_vector(sights, true);
+    const VectorFit sensor = fit_vector(sights, false);
+    line.lab_over_sensor_nats = lab.nats - sensor.nats;
+    line.in_lab = line.lab_over_sensor_nats > 0;
+    const VectorFit& chosen = line.in_lab ? lab : sensor;
+    line.gain_nats = chosen.nats;
+    // Turn the common phase so that the vector is as real as can be.
+    Complex square = 0;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      square += chosen.vector[k] * chosen.vector[k];
+    }
+    const Complex turn = std::polar(1.0, -0.5 * std::arg(square));
+    line.vector_mg = (chosen.vector * turn).real();
+    double weight = 0;
+    for (const Sight& s : sights) {
+      weight += s.weight.mean();
+    }
+    line.sd_mg = 1 / std::sqrt(weight);
+    const double freedom = static_cast<double>(sights.size()) * 5 - 5;
+    line.misfit_sd = (chosen.chi - freedom) / std::sqrt(2 * std::max(1.0, freedom));
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const Sight& s : sights) {
+      spread += (s.rotation - sights.front().rotation).cwiseAbs();
+    }
+    line.decidable = spread.maxCoeff() > 0.5 && std::abs(line.lab_over_sensor_nats) > 3;
+    search.lines.push_back(line);
+    taken.push_back(f);
+    taken.push_back(bundle.rate_hz / 2 - std::abs(bundle.rate_hz / 2 - f));
+  }
+  std::sort(search.lines.begin(), search.lines.end(),
+            [](const SpectralLine& a, const SpectralLine& b) { return a.gain_nats > b.gain_nats; });
+  return search;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,38 @@
+// Lines in the spectrum of still records, and whose they are: the laboratory's or the sensor's.
+//
+// A line that turns with the unit (a vector fixed in the sensor's frame) is electrical; one whose
+// direction stays in the room is vibration of the floor. Each dwell has a phase of its own, so that
+// only vectors are compared, never phases; both hypotheses have the same number of unknowns, and
+// their likelihoods are compared directly.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "gap/bundle.h"
+#include "gap/clean.h"
+#include "gap/features/noise.h"
+
+namespace sixpoint::gap {
+
+struct SpectralLine {
+  double frequency_hz = 0;
+  double gain_nats = 0;             // log likelihood over no line, the better hypothesis
+  double lab_over_sensor_nats = 0;  // positive: fixed in the laboratory
+  bool in_lab = true;
+  bool decidable = false;  // seen in at least three different directions of gravity or yaws
+  Eigen::Vector3d vector_mg = Eigen::Vector3d::Zero();  // in the frame chosen
+  double sd_mg = 0;
+  // Chi-square per degree of freedom of the dwells about the chosen hypothesis, in sd: a line that
+  // comes and goes, or that neither frame holds.
+  double misfit_sd = 0;
+};
+
+struct LineSearch {
+  std::vector<SpectralLine> lines;  // strongest first, at most four
+  double threshold_nats = 0;        // of the weakest line that would have been found
+};
+
+LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise);
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,47 @@
+// The unit's noise: its spectrum, its spread from dwell to dwell, and what its numbers look like.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "gap/bundle.h"
+#include "gap/clean.h"
+
+namespace sixpoint::gap {
+
+// Mean periodogram (Hann window, blocks of 2 s, mean removed) over everything that lies still, as
+// equivalent white variance: white noise of variance s^2 has the value s^2 in every bin.
+struct NoiseSpectrum {
+  double step_hz = 0.5;
+  std::size_t blocks = 0;
+  std::vector<double> frequency_hz;                 // from 1.5 Hz to half the rate
+  std::array<std::vector<double>, 3> variance_mg2;  // per axis and frequency
+  std::array<double, 3> white_mg{};                 // sd of one sample, median over 1.5 to 8 Hz
+  bool usable() const { return blocks >= 10; }
+  double variance_at(std::size_t axis, double frequency_hz) const;
+};
+NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean);
+
+// Numbers that should be plain: odd and even values alike, repeats no more often than chance, no
+// value far out, equal noise in every dwell.
+struct CodeStatistics {
+  std::size_t samples = 0;
+  std::array<double, 3> odd_share{};  // about 0.5
+  std::array<double, 3> parity_sd{};  // of odd_share, by chance and by the means' grid
+  double repeats = 0;                 // share of samples equal to the one before on all axes
+  double repeats_far = 0;             // ... to the one seven before
+  double repeats_excess_sd = 0;       // (repeats - repeats_far) in standard deviations
+  std::size_t outliers = 0;           // beyond 6 sd of their dwell
+  double outliers_expected = 0;
+  // Scatter of the dwells' variances against chance: chi-square per degree of freedom, in sd; and
+  // the worst dwell.
+  double spread_sd = 0;
+  std::size_t worst_segment = 0;
+  double worst_ratio = 1;
+  double kurtosis_sd = 0;           // excess kurtosis over its standard deviation
+  double cross_correlation_sd = 0;  // largest correlation between two axes' noise, in sd
+};
+CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean);
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,282 @@
+#include "gap/features/response.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+namespace sixpoint::gap {
+namespace {
+
+struct Bin {
+  std::size_t axis;
+  double frequency_hz;
+  double variance;
+};
+
+struct Ratio {
+  std::size_t axis;
+  double frequency_hz;
+  double log_amplitude;  // over what the protocol says
+  double sd;
+};
+
+double axis_free_chi(const std::vector<Ratio>& ratios, const std::vector<double>& log_gain) {
+  std::array<double, 3> w{};
+  std::array<double, 3> wy{};
+  std::array<double, 3> wyy{};
+  for (std::size_t i = 0; i < ratios.size(); ++i) {
+    const double d = ratios[i].log_amplitude - log_gain[i];
+    const double weight = 1 / (ratios[i].sd * ratios[i].sd);
+    w[ratios[i].axis] += weight;
+    wy[ratios[i].axis] += weight * d;
+    wyy[ratios[i].axis] += weight * d * d;
+  }
+  double chi = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (w[a] > 0) {
+      chi += wyy[a] - wy[a] * wy[a] / w[a];
+    }
+  }
+  return chi;
+}
+
+class Search {
+ public:
+  Search(const Bundle& bundle, const NoiseSpectrum& noise, const std::vector<ToneFit>& tones,
+         const ResponseOptions& options)
+      : rate_hz_(bundle.rate_hz), options_(options) {
+    const double lsb_mg = 1000 / bundle.accel_scale_lsb_per_g;
+    rounding_ = lsb_mg * lsb_mg / 12;
+    effective_ = static_cast<double>(noise.blocks) / 1.9;  // Hann: neighbouring bins share
+    for (std::size_t axis = 0; axis < 3 && noise.usable(); ++axis) {
+      for (std::size_t k = 0; k < noise.frequency_hz.size(); ++k) {
+        const double f = noise.frequency_hz[k];
+        const bool beside_line = std::any_of(options.lines_hz.begin(), options.lines_hz.end(),
+                                             [&](double l) { return std::abs(l - f) < 2.1; });
+        if (f >= 2 && !beside_line) {
+          bins_.push_back({axis, f, noise.variance_mg2[axis][k]});
+        }
+      }
+    }
+    for (const ToneFit& tone : tones) {
+      const Segment& segment = bundle.segments[tone.segment];
+      if (!tone.usable || tone.clipped_share > 0 || segment.vibration->amplitude_g > 1.5) {
+        continue;  // small tones only: the large ones also show curvature of third order
+      }
+      const auto axis = static_cast<std::size_t>(tone.axis);
+      const Eigen::Vector3d along = segment.rotation * segment.vibration->direction_lab;
+      const double given = 1000 * std::abs(along[tone.axis]) * segment.vibration->amplitude_g;
+      const double seen = tone.in_phase_mg[tone.axis];
+      if (!(given > 0) || !(seen > 0)) {
+        continue;
+      }
+      const double sd = std::max(tone.residual_mg, noise.white_mg[axis]) *
+                        std::sqrt(2 / static_cast<double>(tone.samples)) / seen;
+      // A third-order term bends 1 g tones by up to 0.3 mg of 1 g.
+      ratios_.push_back(
+          {axis, segment.vibration->frequency_hz, std::log(seen / given), std::hypot(sd, 1e-4)});
+    }
+  }
+
+  Response run() {
+    Response response;
+    response.has_tones = !ratios_.empty();
+    std::array<double, 3> white{};
+    const auto flat_fit = noise_nats(0, 0, white);
+    response.noise_flat_sd = flat_fit.left_sd;
+    response.noise_left_sd = flat_fit.left_sd;
+    response.white_mg = white;
+    const std::vector<double> none(ratios_.size(), 0);
+    const double flat_chi = axis_free_chi(ratios_, none);
+    const double freedom = tone_freedom();
+    response.tone_flat_sd = freedom > 0 ? (flat_chi - freedom) / std::sqrt(2 * freedom) : 0;
+    double best = 0;
+    std::vector<double> low_pass_log(ratios_.size(), 0);
+    for (const int order : {4, 2, 1, 3, 6, 8}) {
+      double corner = 4;
+      for (; corner < 0.492 * rate_hz_; corner *= 1.025) {
+        try_low_pass(corner, order, flat_fit.nats, flat_chi, best, response, white);
+      }
+    }
+    for (int round = 0; round < 2; ++round) {
+      const double centre = response.low_pass.corner_hz;
+      for (int k = -6; k <= 6 && centre > 0; ++k) {
+        const double corner = centre * (1 + k * (round == 0 ? 0.004 : 0.0006));
+        if (corner < 0.495 * rate_hz_) {
+          try_low_pass(corner, response.low_pass.order, flat_fit.nats, flat_chi, best, response,
+                       white);
+        }
+      }
+    }
+    // Corner and order are two numbers found on a grid of a few hundred.
+    const double joint = response.low_pass.noise_nats + response.low_pass.tone_nats;
+    const bool noise_agrees = response.low_pass.noise_nats > 5;
+    response.low_pass_significant = options_.allow_low_pass && joint > 14 && noise_agrees;
+    double base_chi = flat_chi;
+    if (response.low_pass_significant) {
+      for (std::size_t i = 0; i < ratios_.size(); ++i) {
+        low_pass_log[i] = log_low_pass(i, response.low_pass.corner_hz, response.low_pass.order);
+      }
+      base_chi = axis_free_chi(ratios_, low_pass_log);
+      std::array<double, 3> own{};
+      const auto fit = noise_nats(response.low_pass.corner_hz, response.low_pass.order, own);
+      response.noise_left_sd = fit.left_sd;
+      response.white_mg = own;
+      const double up =
+          noise_nats(response.low_pass.corner_hz * 1.01, response.low_pass.order, own).nats;
+      const double down =
+          noise_nats(response.low_pass.corner_hz * 0.99, response.low_pass.order, own).nats;
+      const double curvature =
+          (2 * fit.nats - up - down) / std::pow(0.01 * response.low_pass.corner_hz, 2);
+      response.low_pass.corner_sd_hz =
+          curvature > 0 ? 1 / std::sqrt(curvature) : response.low_pass.corner_hz;
+    }
+    double chi = base_chi;
+    for (const bool base_excited : {true, false}) {
+      for (double f0 = 4; f0 < 0.5 * rate_hz_; f0 *= 1.02) {
+        for (double q = 0.7; q < 10; q *= 1.08) {
+          try_resonance({f0, q, base_excited, 0}, low_pass_log, base_chi, chi, response);
+        }
+      }
+    }
+    for (int round = 0; round < 2; ++round) {
+      const Resonance centre = response.resonance;
+      const double fine = round == 0 ? 0.005 : 0.001;
+      for (int i = -4; i <= 4 && centre.frequency_hz > 0; ++i) {
+        for (int k = -4; k <= 4; ++k) {
+          try_resonance({centre.frequency_hz * (1 + i * fine), centre.q * (1 + 4 * k * fine),
+                         centre.base_excited, 0},
+                        low_pass_log, base_chi, chi, response);
+        }
+      }
+    }
+    response.resonance_significant = options_.allow_resonance && response.resonance.tone_nats > 14;
+    const double left = response.resonance_significant ? chi : base_chi;
+    const double left_freedom = freedom - (response.low_pass_significant ? 1 : 0) -
+                                (response.resonance_significant ? 2 : 0);
+    response.tone_left_sd =
+        left_freedom > 0 ? (left - left_freedom) / std::sqrt(2 * left_freedom) : 0;
+    return response;
+  }
+
+ private:
+  struct NoiseFit {
+    double nats = 0;
+    double left_sd = 0;
+  };
+
+  // Whittle's likelihood, the white level of each axis in closed iteration.
+  NoiseFit noise_nats(double corner_hz, int order, std::array<double, 3>& white_mg) const {
+    NoiseFit fit;
+    double chi = 0;
+    std::vector<double> h2(bins_.size());
+    for (std::size_t i = 0; i < bins_.size(); ++i) {
+      h2[i] = gain2(bins_[i].frequency_hz, corner_hz, order);
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double s2 = 16;
+      for (int round = 0; round < 8; ++round) {
+        double up = 0;
+        double down = 0;
+        for (std::size_t i = 0; i < bins_.size(); ++i) {
+          const Bin& bin = bins_[i];
+          if (bin.axis == axis) {
+            const double h = h2[i];
+            const double p = s2 * h + rounding_;
+            up += h * (bin.variance - rounding_) / (p * p);
+            down += h * h / (p * p);
+          }
+        }
+        s2 = down > 0 ? std::max(0.01, up / down) : s2;
+      }
+      white_mg[axis] = std::sqrt(s2);
+      for (std::size_t i = 0; i < bins_.size(); ++i) {
+        const Bin& bin = bins_[i];
+        if (bin.axis == axis) {
+          const double p = s2 * h2[i] + rounding_;
+          fit.nats -= effective_ * (std::log(p) + bin.variance / p);
+          chi += effective_ * std::pow(bin.variance / p - 1, 2);
+        }
+      }
+    }
+    const auto n = static_cast<double>(bins_.size());
+    fit.left_sd = n > 3 ? (chi - n + 3) / std::sqrt(2 * n) : 0;
+    return fit;
+  }
+
+  double gain2(double f, double corner_hz, int order) const {
+    return order == 0 ? 1 : std::pow(low_pass_gain(f, corner_hz, order, rate_hz_), 2);
+  }
+  double log_low_pass(std::size_t i, double corner_hz, int order) const {
+    return std::log(
+        std::max(1e-6, low_pass_gain(ratios_[i].frequency_hz, corner_hz, order, rate_hz_)));
+  }
+  double tone_freedom() const {
+    std::array<bool, 3> seen{};
+    for (const Ratio& r : ratios_) {
+      seen[r.axis] = true;
+    }
+    return static_cast<double>(ratios_.size()) -
+           static_cast<double>(std::count(seen.begin(), seen.end(), true));
+  }
+
+  void try_low_pass(double corner, int order, double flat_nats, double flat_chi, double& best,
+                    Response& response, std::array<double, 3>& white) const {
+    const double noise = noise_nats(corner, order, white).nats - flat_nats;
+    std::vector<double> log_gain(ratios_.size());
+    for (std::size_t i = 0; i < ratios_.size(); ++i) {
+      log_gain[i] = log_low_pass(i, corner, order);
+    }
+    const double tone = 0.5 * (flat_chi - axis_free_chi(ratios_, log_gain));
+    if (noise + tone > best) {
+      best = noise + tone;
+      response.low_pass = {corner, 0, order, noise, tone};
+    }
+  }
+
+  void try_resonance(Resonance resonance, const std::vector<double>& low_pass_log, double base_chi,
+                     double& chi, Response& response) const {
+    if (ratios_.empty()) {
+      return;
+    }
+    std::vector<double> log_gain = low_pass_log;
+    for (std::size_t i = 0; i < ratios_.size(); ++i) {
+      log_gain[i] += std::log(std::max(1e-6, resonance_gain(ratios_[i].frequency_hz, resonance)));
+    }
+    const double c = axis_free_chi(ratios_, log_gain);
+    if (c < chi) {
+      chi = c;
+      response.resonance = resonance;
+      response.resonance.tone_nats = 0.5 * (base_chi - c);
+    }
+  }
+
+  double rate_hz_;
+  ResponseOptions options_;
+  double rounding_ = 0;
+  double effective_ = 0;
+  std::vector<Bin> bins_;
+  std::vector<Ratio> ratios_;
+};
+
+}  // namespace
+
+double low_pass_gain(double frequency_hz, double corner_hz, int order, double rate_hz) {
+  const double f = std::min(frequency_hz, 0.499 * rate_hz);
+  const double r = std::tan(M_PI * f / rate_hz) / std::tan(M_PI * corner_hz / rate_hz);
+  return 1 / std::sqrt(1 + std::pow(r, 2 * order));
+}
+
+double resonance_gain(double frequency_hz, const Resonance& resonance) {
+  const double r = frequency_hz / resonance.frequency_hz;
+  const std::complex<double> damping(0, r / resonance.q);
+  const std::complex<double> below = 1 - r * r + damping;
+  return std::abs((resonance.base_excited ? 1.0 + damping : std::complex<double>(1)) / below);
+}
+
+Response find_response(const Bundle& bundle, const NoiseSpectrum& noise,
+                       const std::vector<ToneFit>& tones, const ResponseOptions& options) {
+  return Search(bundle, noise, tones, options).run();
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,59 @@
+// Amplitude response over frequency: the shape of the noise's spectrum and of the tones.
+//
+// A lower anti-alias corner acts on signal and noise alike; a soft mount acts on the shaker's tones
+// only. Both are fitted on grids: Butterworth low-passes of order 1 to 8 as a sampled filter, and
+// two forms of a resonance (base excitation of a damped mount, and a plain second-order section).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "gap/bundle.h"
+#include "gap/features/noise.h"
+#include "gap/features/tones.h"
+
+namespace sixpoint::gap {
+
+struct LowPass {
+  double corner_hz = 0;
+  double corner_sd_hz = 0;
+  int order = 0;
+  double noise_nats = 0;  // over flat noise
+  double tone_nats = 0;   // over flat tones
+};
+
+struct Resonance {
+  double frequency_hz = 0;
+  double q = 0;
+  bool base_excited = true;
+  double tone_nats = 0;
+};
+
+struct Response {
+  LowPass low_pass;     // the best of its kind, whether wanted or not
+  Resonance resonance;  // best on top of the low-pass where that is significant
+  bool has_tones = false;
+  // Per order: ratio of noise at the highest quarter of the band to the lowest, all axes.
+  double noise_flat_sd = 0;  // chi-square of flat noise, in sd
+  double noise_left_sd = 0;  // ... of the low-pass
+  double tone_flat_sd = 0;   // chi-square of flat tones
+  double tone_left_sd = 0;   // ... less what is significant of low-pass and resonance
+  bool low_pass_significant = false;
+  bool resonance_significant = false;
+  std::array<double, 3> white_mg{};  // of one sample before rounding and filter
+};
+
+// |H|, of a Butterworth low-pass designed by the bilinear transform.
+double low_pass_gain(double frequency_hz, double corner_hz, int order, double rate_hz);
+double resonance_gain(double frequency_hz, const Resonance& resonance);
+
+struct ResponseOptions {
+  bool allow_low_pass = true;
+  bool allow_resonance = true;
+  std::vector<double> lines_hz;  // spectral lines: bins beside them are left out
+};
+
+Response find_response(const Bundle& bundle, const NoiseSpectrum& noise,
+                       const std::vector<ToneFit>& tones, const ResponseOptions& options);
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,33 @@
+// The mean response to a pose change: every dwell's first seconds, weighted by the step it
+// followed.
+#pragma once
+
+#include <vector>
+
+#include "gap/bundle.h"
+#include "gap/clean.h"
+#include "gap/features/noise.h"
+
+namespace sixpoint::gap {
+
+struct StepResponse {
+  bool usable = false;        // at least two steps of 0.2 g
+  std::vector<double> share;  // per sample: deviation from the rest of the dwell, share of the step
+  double sd = 0;              // of one sample of `share`
+  // a exp(-t/decay) cos(2 pi f t + phase), the likeliest.
+  double amplitude = 0;
+  double amplitude_sd = 0;
+  double frequency_hz = 0;
+  double decay_s = 0;
+  double phase_rad = 0;
+  double gain_nats = 0;   // over nothing
+  double plain_nats = 0;  // of the best a exp(-t/decay) without ringing, over nothing
+  // Chi-square of `share` (first second) less the ringing, in sd over its mean.
+  double left_sd = 0;
+  double left_without_sd = 0;  // ... with nothing taken off
+};
+
+StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
+                           const NoiseSpectrum& noise);
+
+}  // namespace sixpoint::gap

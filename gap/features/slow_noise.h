@@ -1,0 +1,44 @@
+// Noise slower than a second: 1/f and 1/f^2, from records that lie still at one temperature.
+//
+// Means over one second are turned by a cosine transform (DCT-II), which is the Karhunen-Loeve
+// basis of a random walk less its mean: coefficient k has the variance q^2 / (4 sin^2(k pi / 2K)),
+// white noise the same in all, and 1/f noise about F K / k. Coefficients are independent enough to
+// multiply their likelihoods. Long records lose a parabola first, so that drift is not taken for
+// noise.
+#pragma once
+
+#include <vector>
+
+#include "gap/bundle.h"
+#include "gap/clean.h"
+#include "gap/features/noise.h"
+
+namespace sixpoint::gap {
+
+struct SlowNoise {
+  std::size_t coefficients = 0;
+  // Log likelihood over white noise alone on the grid walk x flicker.
+  std::vector<double> walk_mg;            // mg per sqrt(s); first is 0
+  std::vector<double> flicker_mg;         // first is 0
+  std::vector<std::vector<double>> nats;  // [walk][flicker]
+  // Power in the slow coefficients over that of the fast, in sd, at the best grid point: what is
+  // left for something that neither explains.
+  double misfit_sd = 0;
+
+  struct Best {
+    double walk_mg = 0;
+    double flicker_mg = 0;
+    double nats = 0;
+  };
+  Best best_walk() const;     // flicker 0
+  Best best_flicker() const;  // walk 0
+  Best best_both() const;
+};
+
+// Variance per Hz at 1 Hz for flicker noise of `flicker_mg`: power spectral density B^2 / (2 pi f),
+// one-sided (IEEE Std 952, bias instability coefficient B).
+double flicker_density_mg2(double flicker_mg);
+
+SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise);
+
+}  // namespace sixpoint::gap

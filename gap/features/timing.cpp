@@ -1,0 +1,139 @@
+#include "gap/features/timing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+namespace sixpoint::gap {
+namespace {
+
+struct Stamp {
+  double nominal_s;   // since the segment's start, by the nominal rate
+  double residual_s;  // host's less nominal
+};
+
+std::vector<std::vector<Stamp>> stamps_by_segment(const Bundle& bundle) {
+  std::vector<std::vector<Stamp>> all;
+  const auto& index = bundle.host_clock.sample_index;
+  std::size_t at = 0;
+  for (const Segment& segment : bundle.segments) {
+    std::vector<Stamp> stamps;
+    while (at < index.size() && index[at] < segment.first_sample) {
+      ++at;
+    }
+    for (; at < index.size() && index[at] < segment.first_sample + segment.samples; ++at) {
+      const double nominal_s =
+          static_cast<double>(index[at] - segment.first_sample) / bundle.rate_hz;
+      stamps.push_back(
+          {nominal_s, bundle.host_clock.host_time_s[at] - segment.host_start_s - nominal_s});
+    }
+    if (stamps.size() >= 3) {
+      all.push_back(std::move(stamps));
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+HostTiming host_timing(const Bundle& bundle) {
+  HostTiming timing;
+  auto segments = stamps_by_segment(bundle);
+  timing.usable = !segments.empty();
+  if (!timing.usable) {
+    return timing;
+  }
+  const double interval_s = 1 / bundle.rate_hz;
+  timing.slips_visible = interval_s > 4 * kHostStamp_s;
+
+  // The rate first, blind to slips: each difference of stamps as an angle on the circle of one
+  // sample interval. Packets of about a second only, so that the circle means the same for all.
+  double slope = 0;  // host seconds per nominal second, less 1
+  if (timing.slips_visible) {
+    std::complex<double> sum = 0;
+    for (const auto& stamps : segments) {
+      for (std::size_t i = 0; i + 1 < stamps.size(); ++i) {
+        const double dt = stamps[i + 1].nominal_s - stamps[i].nominal_s;
+        if (dt > 0.5 && dt < 1.5) {
+          sum += std::polar(
+              1.0, 2 * M_PI * (stamps[i + 1].residual_s - stamps[i].residual_s) / interval_s);
+        }
+      }
+    }
+    slope = std::arg(sum) / (2 * M_PI) * interval_s;
+  }
+  const auto slips_with = [&](double rate_error, bool apply) {
+    double total = 0;
+    for (auto& stamps : segments) {
+      double shift = 0;
+      double last = stamps.front().residual_s;
+      for (std::size_t i = 1; i < stamps.size(); ++i) {
+        const double now = stamps[i].residual_s;
+        const double dt = stamps[i].nominal_s - stamps[i - 1].nominal_s;
+        const double steps = std::round((now - last - rate_error * dt) / interval_s);
+        last = now;
+        total += std::abs(steps);
+        if (apply) {
+          shift += steps * interval_s;
+          stamps[i].residual_s -= shift;
+          (steps > 0 ? timing.lost : timing.repeated) += static_cast<std::size_t>(std::abs(steps));
+        }
+      }
+    }
+    return total;
+  };
+  if (timing.slips_visible) {
+    // Near half an interval a second the circle is ambiguous: the fewer slips the better.
+    const double other = slope > 0 ? slope - interval_s : slope + interval_s;
+    if (std::abs(other) < 0.0065 && slips_with(other, false) < slips_with(slope, false)) {
+      slope = other;
+    }
+    slips_with(slope, true);
+  }
+  double sxx = 0;
+  double sxy = 0;
+  std::size_t count = 0;
+  for (const auto& stamps : segments) {
+    double mean_t = 0;
+    double mean_r = 0;
+    for (const Stamp& s : stamps) {
+      mean_t += s.nominal_s;
+      mean_r += s.residual_s;
+    }
+    mean_t /= static_cast<double>(stamps.size());
+    mean_r /= static_cast<double>(stamps.size());
+    for (const Stamp& s : stamps) {
+      sxx += (s.nominal_s - mean_t) * (s.nominal_s - mean_t);
+      sxy += (s.nominal_s - mean_t) * (s.residual_s - mean_r);
+    }
+    count += stamps.size();
+    timing.packets += stamps.size() - 1;
+    timing.samples += static_cast<std::size_t>(
+        (stamps.back().nominal_s - stamps.front().nominal_s) * bundle.rate_hz);
+  }
+  const double fitted = sxx > 0 ? sxy / sxx : 0;
+  double squares = 0;
+  for (const auto& stamps : segments) {
+    double mean = 0;
+    for (const Stamp& s : stamps) {
+      mean += s.residual_s - fitted * s.nominal_s;
+    }
+    mean /= static_cast<double>(stamps.size());
+    for (const Stamp& s : stamps) {
+      const double r = s.residual_s - fitted * s.nominal_s - mean;
+      squares += r * r;
+    }
+  }
+  const auto freedom = static_cast<double>(count - segments.size() - 1);
+  const double uniform_sd = kHostStamp_s / std::sqrt(3.0);
+  timing.clock_ppm = 1e6 * (1 / (1 + fitted) - 1);
+  timing.scatter_ms = 1e3 * std::sqrt(squares / std::max(1.0, freedom));
+  timing.clock_sd_ppm =
+      sxx > 0 ? 1e6 * std::max(uniform_sd, timing.scatter_ms / 1e3) / std::sqrt(sxx) : 1e6;
+  // The variance of a uniform law's square is 0.8 of its own squared; the rms' is a quarter of
+  // that.
+  timing.scatter_sd_ms = 1e3 * uniform_sd * std::sqrt(0.8 / std::max(1.0, freedom)) / 2;
+  return timing;
+}
+
+}  // namespace sixpoint::gap

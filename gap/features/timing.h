@@ -1,0 +1,33 @@
+// What the host's clock says about the unit's: its rate, and lost or repeated samples.
+//
+// The host stamps each one-second packet within +-2 ms, uniform. Inside a segment the stamps grow
+// by (samples) / (rate * (1 + error)); a lost sample moves all later stamps by one sample interval
+// forward, a repeated one backward. An interval of 8 ms and more exceeds what two stamps can be
+// wrong together, so that every slip is read off exactly.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "gap/bundle.h"
+
+namespace sixpoint::gap {
+
+inline constexpr double kHostStamp_s = 0.002;  // half width of the host's error
+
+struct HostTiming {
+  bool usable = false;         // at least three packets in one segment
+  bool slips_visible = false;  // the sample interval exceeds the stamps' errors
+  double clock_ppm = 0;        // positive: the sample clock runs fast
+  double clock_sd_ppm = 0;
+  std::size_t lost = 0;  // samples, summed over packets that miss some
+  std::size_t repeated = 0;
+  std::size_t packets = 0;   // pairs of stamps looked at
+  std::size_t samples = 0;   // between them
+  double scatter_ms = 0;     // rms of the stamps about the line, slips taken out
+  double scatter_sd_ms = 0;  // of the above where stamps are uniform +-2 ms
+};
+
+HostTiming host_timing(const Bundle& bundle);
+
+}  // namespace sixpoint::gap

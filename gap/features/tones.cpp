@@ -1,0 +1,372 @@
+#include "gap/features/tones.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace sixpoint::gap {
+namespace {
+
+constexpr std::size_t kShortestPiece = 10;  // three unknowns and some to test them
+
+// Sums over samples up to an index: enough to fit 1, cos, sin on any stretch.
+struct Sums {
+  double n = 0, c = 0, s = 0, cc = 0, cs = 0, ss = 0, y = 0, yc = 0, ys = 0, yy = 0;
+  Sums operator-(const Sums& o) const {
+    return {n - o.n,   c - o.c, s - o.s,   cc - o.cc, cs - o.cs,
+            ss - o.ss, y - o.y, yc - o.yc, ys - o.ys, yy - o.yy};
+  }
+};
+
+struct PieceFit {
+  Eigen::Vector3d x = Eigen::Vector3d::Zero();  // level, cos, sin
+  double squares = 0;
+  double n = 0;
+  double phase() const { return std::atan2(-x[2], x[1]); }  // of a cos(wt + phase)
+  double amplitude() const { return std::hypot(x[1], x[2]); }
+};
+
+PieceFit fit_piece(const Sums& d) {
+  PieceFit fit;
+  fit.n = d.n;
+  if (d.n < 5) {
+    fit.squares = d.yy;
+    return fit;
+  }
+  Eigen::Matrix3d a;
+  a << d.n, d.c, d.s, d.c, d.cc, d.cs, d.s, d.cs, d.ss;
+  a.diagonal().array() += 1e-9 * d.n;
+  const Eigen::Vector3d b(d.y, d.yc, d.ys);
+  fit.x = a.inverse() * b;
+  fit.squares = std::max(0.0, d.yy - b.dot(fit.x));
+  return fit;
+}
+
+std::vector<Sums> prefix_sums(const std::vector<double>& y, const std::vector<std::uint8_t>& good,
+                              double w) {
+  std::vector<Sums> sums(y.size() + 1);
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    sums[i + 1] = sums[i];
+    if (good[i] == 0) {
+      continue;
+    }
+    const double c = std::cos(w * static_cast<double>(i));
+    const double s = std::sin(w * static_cast<double>(i));
+    Sums& to = sums[i + 1];
+    to.n += 1;
+    to.c += c;
+    to.s += s;
+    to.cc += c * c;
+    to.cs += c * s;
+    to.ss += s * s;
+    to.y += y[i];
+    to.yc += y[i] * c;
+    to.ys += y[i] * s;
+    to.yy += y[i] * y[i];
+  }
+  return sums;
+}
+
+double circle(double angle) { return std::remainder(angle, 2 * M_PI); }
+
+class ToneAnalysis {
+ public:
+  ToneAnalysis(const Bundle& bundle, const CleanSamples& clean, std::size_t index,
+               const ToneOptions& options)
+      : bundle_(bundle), clean_(clean), segment_(bundle.segments[index]), options_(options) {
+    fit_.segment = index;
+    const Eigen::Vector3d along = segment_.rotation * segment_.vibration->direction_lab;
+    along.cwiseAbs().maxCoeff(&fit_.axis);
+    noise2_ = std::pow(options.noise_mg[static_cast<std::size_t>(fit_.axis)], 2);
+    good_.resize(segment_.samples);
+    y_.resize(segment_.samples);
+    for (std::size_t i = 0; i < segment_.samples; ++i) {
+      const std::uint8_t flags = clean.flags[segment_.first_sample + i];
+      good_[i] = (flags & (kSampleZero | kSampleHeld | kSampleClipped)) == 0 ? 1 : 0;
+      fit_.samples += good_[i];
+      y_[i] = value_mg(i, static_cast<std::size_t>(fit_.axis));
+      fit_.clipped_share += (flags & kSampleClipped) != 0 ? 1 : 0;
+    }
+    fit_.clipped_share /= static_cast<double>(segment_.samples);
+  }
+
+  ToneFit run() {
+    if (fit_.samples < 100) {
+      return fit_;
+    }
+    w_ = 2 * M_PI * segment_.vibration->frequency_hz / bundle_.rate_hz /
+         (1 + 1e-6 * options_.clock_ppm);
+    if (std::sin(w_) == 0 || w_ >= M_PI) {
+      return fit_;  // beyond half the sample rate nothing of this holds
+    }
+    find_slips();
+    fit_all();
+    return fit_;
+  }
+
+ private:
+  double value_mg(std::size_t i, std::size_t axis) const {
+    return 1000.0 * clean_.samples[segment_.first_sample + i][axis] / bundle_.accel_scale_lsb_per_g;
+  }
+
+  void find_slips() {
+    const auto sums = prefix_sums(y_, good_, w_);
+    std::vector<std::size_t> cuts = {0, y_.size()};
+    split(sums, 0, y_.size(), cuts, 0);
+    // A tone off its frequency drifts evenly; cut into pieces it would look like a row of slips.
+    const double cost_cut = cost(sums, cuts);
+    const double even = best_even_drift();
+    if (cuts.size() > 2 && even_cost_ + 12 * noise2_ < cost_cut) {
+      w_ *= 1 + even;
+      cuts = {0, y_.size()};
+      steps_.assign(y_.size(), 0);
+      return;
+    }
+    std::sort(cuts.begin(), cuts.end());
+    steps_.assign(y_.size(), 0);
+    int shift = 0;
+    for (std::size_t p = 1; p + 1 < cuts.size(); ++p) {
+      const PieceFit before = fit_piece(sums[cuts[p]] - sums[cuts[p - 1]]);
+      const PieceFit after = fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]);
+      const double step = circle(after.phase() - before.phase());
+      int best = 0;
+      double best_miss = std::abs(step);
+      for (const int k : {1, -1, 2, -2, 3, -3, 4, -4}) {
+        const double miss = std::abs(circle(step - k * w_));
+        if (miss < 0.6 * best_miss) {  // the smaller number wins unless clearly worse
+          best = k;
+          best_miss = miss;
+        }
+      }
+      const double sd = std::sqrt(2 * noise2_ * (1 / before.n + 1 / after.n)) /
+                        std::max(1e-9, 0.5 * (before.amplitude() + after.amplitude()));
+      const bool whole = best != 0 && best_miss < std::max(6 * sd, 0.12 * std::abs(w_));
+      fit_.slips.push_back({cuts[p], whole ? best : 0});
+      shift += whole ? best : 0;
+      for (std::size_t i = cuts[p]; i < cuts[p + 1]; ++i) {
+        steps_[i] = shift;
+      }
+    }
+  }
+
+  // The clock's error relative to the protocol that makes one unbroken tone fit best.
+  double best_even_drift() {
+    const auto n = static_cast<double>(y_.size());
+    const double reach = 0.006;                      // beyond any clock of the catalogue
+    const double step = 0.25 * 2 * M_PI / (n * w_);  // a quarter turn over the segment
+    const auto half = static_cast<int>(std::ceil(reach / step));
+    double best = 0;
+    even_cost_ = fit_piece(prefix_sums(y_, good_, w_).back()).squares;
+    for (int round = 0; round < 3; ++round) {
+      const double centre = best;
+      const double grid = step / std::pow(8.0, round);
+      for (int k = -(round == 0 ? half : 8); k <= (round == 0 ? half : 8); ++k) {
+        const double e = centre + k * grid;
+        const double squares = fit_piece(prefix_sums(y_, good_, w_ * (1 + e)).back()).squares;
+        if (squares < even_cost_) {
+          even_cost_ = squares;
+          best = e;
+        }
+      }
+    }
+    return best;
+  }
+
+  double cost(const std::vector<Sums>& sums, std::vector<std::size_t> cuts) const {
+    std::sort(cuts.begin(), cuts.end());
+    double total = 0;
+    for (std::size_t p = 0; p + 1 < cuts.size(); ++p) {
+      total += fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]).squares + 8 * noise2_;
+    }
+    return total;
+  }
+
+  void split(const std::vector<Sums>& sums, std::size_t first, std::size_t last,
+             std::vector<std::size_t>& cuts, int depth) const {
+    if (last - first < 2 * kShortestPiece || depth > 12) {
+      return;
+    }
+    const double whole = fit_piece(sums[last] - sums[first]).squares;
+    if (whole < noise2_ * (static_cast<double>(last - first) + 40)) {
+      return;
+    }
+    double best = whole;
+    std::size_t at = first;
+    for (std::size_t c = first + kShortestPiece; c + kShortestPiece <= last; ++c) {
+      const double squares =
+          fit_piece(sums[c] - sums[first]).squares + fit_piece(sums[last] - sums[c]).squares;
+      if (squares < best) {
+        best = squares;
+        at = c;
+      }
+    }
+    // Of white residuals the best cut gains about 25 times their variance at most.
+    const double variance = std::max(noise2_, best / static_cast<double>(last - first));
+    if (whole - best < 60 * variance) {
+      // Two slips that undo each other within a period hide from a single cut: look at the halves.
+      if (whole > 3 * noise2_ * static_cast<double>(last - first) &&
+          last - first > 8 * kShortestPiece) {
+        const std::size_t middle = (first + last) / 2;
+        cuts.push_back(middle);
+        split(sums, first, middle, cuts, depth + 1);
+        split(sums, middle, last, cuts, depth + 1);
+      }
+      return;
+    }
+    cuts.push_back(at);
+    split(sums, first, at, cuts, depth + 1);
+    split(sums, at, last, cuts, depth + 1);
+  }
+
+  void fit_all() {
+    const auto axis = static_cast<std::size_t>(fit_.axis);
+    // Phase first, then everything in phase with it.
+    double phase0 = 0;
+    for (int round = 0; round < 2; ++round) {
+      Sums total;
+      for (std::size_t i = 0; i < y_.size(); ++i) {
+        if (good_[i] == 0) {
+          continue;
+        }
+        const double p = angle(i);
+        const double c = std::cos(p);
+        const double s = std::sin(p);
+        total.n += 1;
+        total.c += c;
+        total.s += s;
+        total.cc += c * c;
+        total.cs += c * s;
+        total.ss += s * s;
+        total.y += y_[i];
+        total.yc += y_[i] * c;
+        total.ys += y_[i] * s;
+        total.yy += y_[i] * y_[i];
+      }
+      const PieceFit first = fit_piece(total);
+      phase0 = first.phase();
+      if (round == 0) {
+        refine_frequency(phase0, first.amplitude());
+      }
+    }
+    Eigen::Matrix<double, 5, 5> a = Eigen::Matrix<double, 5, 5>::Zero();
+    Eigen::Matrix<double, 5, 1> b = Eigen::Matrix<double, 5, 1>::Zero();
+    Eigen::Matrix3d a_cross = Eigen::Matrix3d::Zero();
+    Eigen::Matrix3d b_cross = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      if (good_[i] == 0) {
+        continue;
+      }
+      const double p = angle(i) + phase0;
+      Eigen::Matrix<double, 5, 1> row;
+      row << 1, std::cos(p), std::cos(2 * p), std::cos(3 * p), std::sin(p);
+      a += row * row.transpose();
+      b += row * y_[i];
+      const Eigen::Vector3d cross(1, row[1], row[4]);
+      a_cross += cross * cross.transpose();
+      for (std::size_t k = 0; k < 3; ++k) {
+        b_cross.col(static_cast<Eigen::Index>(k)) += cross * value_mg(i, k);
+      }
+    }
+    // Second and third harmonic fold onto one frequency at a fifth of the rate: a weak prior (50
+    // mg) keeps an unlucky phase from making them infinite.
+    a(2, 2) += noise2_ / 2500;
+    a(3, 3) += noise2_ / 2500;
+    const Eigen::Matrix<double, 5, 5> inverse = a.inverse();
+    const Eigen::Matrix<double, 5, 1> x = inverse * b;
+    const Eigen::Matrix3d x_cross = a_cross.inverse() * b_cross;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      fit_.level_mg[k] = x_cross(0, k);
+      fit_.in_phase_mg[k] = x_cross(1, k);
+      fit_.quadrature_mg[k] = x_cross(2, k);
+    }
+    fit_.level_mg[fit_.axis] = x[0];
+    fit_.in_phase_mg[fit_.axis] = x[1];
+    fit_.quadrature_mg[fit_.axis] = 0;
+    fit_.second_mg = x[2];
+    fit_.third_mg = x[3];
+    fit_.covariance_shape = inverse.topLeftCorner<4, 4>();
+    double squares = 0;
+    double slope = 0;
+    double slope_weight = 0;
+    double crest = 0;
+    double crest_weight = 0;
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      if (good_[i] == 0) {
+        continue;
+      }
+      const double p = angle(i) + phase0;
+      const double r = y_[i] - (x[0] + x[1] * std::cos(p) + x[2] * std::cos(2 * p) +
+                                x[3] * std::cos(3 * p) + x[4] * std::sin(p));
+      const double s2 = std::sin(p) * std::sin(p);
+      squares += r * r;
+      slope += r * r * s2;
+      slope_weight += s2;
+      crest += r * r * (1 - s2);
+      crest_weight += 1 - s2;
+    }
+    fit_.residual_mg = std::sqrt(squares / std::max(1.0, static_cast<double>(fit_.samples) - 5));
+    fit_.on_slope_mg2 = slope / std::max(1.0, slope_weight);
+    fit_.on_crest_mg2 = crest / std::max(1.0, crest_weight);
+    fit_.usable = fit_.in_phase_mg[fit_.axis] > 0 && std::isfinite(fit_.residual_mg);
+    (void)axis;
+  }
+
+  // Gauss-Newton on the frequency: the sine's amplitude grows with n where it is off.
+  void refine_frequency(double phase0, double amplitude) {
+    if (!(amplitude > 0)) {
+      return;
+    }
+    Eigen::Matrix4d a = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d b = Eigen::Vector4d::Zero();
+    const double middle = 0.5 * static_cast<double>(y_.size());
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      if (good_[i] == 0) {
+        continue;
+      }
+      const double p = angle(i) + phase0;
+      const double n = static_cast<double>(i) - middle;
+      const Eigen::Vector4d row(1, std::cos(p), std::sin(p), -amplitude * std::sin(p) * n * w_);
+      a += row * row.transpose();
+      b += row * y_[i];
+    }
+    const Eigen::Matrix4d inverse = a.inverse();
+    const Eigen::Vector4d x = inverse * b;
+    const double e = x[3];  // relative change of frequency
+    const double nominal = 2 * M_PI * segment_.vibration->frequency_hz / bundle_.rate_hz;
+    fit_.frequency_sd_ppm = 1e6 * std::sqrt(noise2_ * inverse(3, 3));
+    if (std::isfinite(e) && std::abs(e) < 0.01) {
+      w_ *= 1 + e;
+    }
+    fit_.frequency_ppm = 1e6 * (w_ / nominal - 1);
+  }
+
+  double angle(std::size_t i) const { return w_ * (static_cast<double>(i) + steps_[i]); }
+
+  const Bundle& bundle_;
+  const CleanSamples& clean_;
+  const Segment& segment_;
+  ToneOptions options_;
+  ToneFit fit_;
+  std::vector<double> y_;
+  std::vector<std::uint8_t> good_;
+  std::vector<int> steps_;
+  double noise2_ = 16;
+  double w_ = 0;
+  double even_cost_ = 0;
+};
+
+}  // namespace
+
+std::vector<ToneFit> fit_tones(const Bundle& bundle, const CleanSamples& clean,
+                               const ToneOptions& options) {
+  std::vector<ToneFit> fits;
+  for (std::size_t i = 0; i < bundle.segments.size(); ++i) {
+    if (bundle.segments[i].vibration) {
+      fits.push_back(ToneAnalysis(bundle, clean, i, options).run());
+    }
+  }
+  return fits;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,157 @@
+#include "gap/forward.h"
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+
+namespace sixpoint::gap {
+namespace {
+
+constexpr int kPhases = 24;
+constexpr double kRadPerDeg = M_PI / 180;
+
+Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
+  const double angle = vector_deg.norm() * kRadPerDeg;
+  return angle == 0 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
+                    : Eigen::AngleAxisd(angle, vector_deg.normalized()).toRotationMatrix();
+}
+
+double sign_of_step(double step_g) {
+  return std::abs(step_g) < 0.05 ? 0 : std::copysign(1.0, step_g);
+}
+
+}  // namespace
+
+double& parameter(ForwardState& s, int position) {
+  struct Span {
+    double* data;
+    int count;
+  };
+  const std::array<Span, 14> spans = {{{s.gain.data(), 3},
+                                       {s.offset_mg.data(), 3},
+                                       {s.tilt_deg.data(), 2},
+                                       {s.misalignment_deg.data(), 3},
+                                       {s.cross.data(), 3},
+                                       {s.second_mg_per_g2.data(), 3},
+                                       {s.third_mg_per_g3.data(), 3},
+                                       {s.hysteresis_mg.data(), 3},
+                                       {s.tempco_mg_per_c.data(), 3},
+                                       {s.sensitivity_percent_per_c.data(), 3},
+                                       {s.warm_up_mg.data(), 3},
+                                       {s.drift_mg_per_h.data(), 3},
+                                       {&s.gravity_ratio, 1},
+                                       {&s.truncation, 1}}};
+  for (const Span& span : spans) {
+    if (position < span.count) {
+      return span.data[position];
+    }
+    position -= span.count;
+  }
+  return s.truncation;
+}
+
+double parameter(const ForwardState& state, int position) {
+  ForwardState copy = state;
+  return parameter(copy, position);
+}
+
+std::vector<ParameterGroup> parameter_groups() {
+  // Nuisances are free here (sd of 0.3): their own priors, 2 % and 35 mg, are judged afterwards.
+  // Effects: prior sd about the middle of the catalogue's realistic sizes, `high` their upper end.
+  std::vector<ParameterGroup> groups = {
+      {"gain", 0, 3, 0.3, 1, 10, 0, true},
+      {"offset", 3, 3, 300, 0, 1e4, 0, true},
+      {"tilt", 6, 2, 0.2, 0, 0.5, 0, true},
+      {"misalignment", 8, 3, 0.4, 0, 1, 0, true},
+      {"non_orthogonality", 11, 3, 0.006, 0, 0.015, 0, true},
+      {"second_order", 14, 3, 0.35, 0, 0.6, 0, true},
+      {"third_order", 17, 3, 0.05, 0, 0.08, 0, true},
+      {"offset_tempco", 23, 3, 0.5, 0, 1, 0, true},
+      {"sensitivity_tempco", 26, 3, 0.03, 0, 0.05, 0, true},
+      {"drift", 32, 3, 2.5, 0, 5, 0, true},
+      {"local_gravity", 35, 1, 0.0015, 0, 0.0027, 0, true},
+      {"truncation", 36, 1, 0.05, 1, 0.35, 0, true},
+  };
+  groups.push_back({"hysteresis", 20, 3, 1, 0, 2, 0, true});
+  groups.push_back({"hysteresis", 20, 3, 1, 0, 2, 0, false});
+  for (const double tau_s : {75.0, 120.0, 180.0, 270.0, 400.0, 600.0}) {
+    groups.push_back({"warm_up", 29, 3, 4, 0, 10, tau_s, true});
+  }
+  return groups;
+}
+
+Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg) {
+  const Eigen::Matrix3d tilt = turn(Eigen::Vector3d(s.tilt_deg[0], s.tilt_deg[1], 0));
+  Eigen::Matrix3d cross;
+  cross << 1, s.cross[2], s.cross[1], s.cross[2], 1, s.cross[0], s.cross[1], s.cross[0], 1;
+  const Eigen::Matrix3d chain = cross * turn(s.misalignment_deg) * block.rotation * tilt;
+  const Eigen::Vector3d rest = chain * (block.gravity_lab_g * (1 + s.gravity_ratio));
+  const Eigen::Vector3d swing = chain * block.vibration_lab_g;
+  const double warm = block.temperature_c - kReference_c;
+  const double hours = block.middle_s / 3600;
+  // Mean of exp(-t/tau) over the block.
+  const double half = block.seconds / (2 * s.warm_up_tau_s);
+  const double decay =
+      std::exp(-block.middle_s / s.warm_up_tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
+  Eigen::Vector3d slow_mg =
+      warm * s.tempco_mg_per_c + hours * s.drift_mg_per_h + decay * s.warm_up_mg;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    slow_mg[a] += s.hysteresis_mg[a] * (s.hysteresis_by_sign ? sign_of_step(block.approach_g[a])
+                                                             : 0.5 * block.approach_g[a]);
+  }
+  const Eigen::Vector3d sensitivity =
+      Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c;
+
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(block.size());
+  const int phases = block.tone ? kPhases : 1;
+  for (int k = 0; k < phases; ++k) {
+    const double p = 2 * M_PI * k / phases;
+    const double c1 = block.tone ? std::cos(p) : 0;
+    const Eigen::Vector3d u = rest + c1 * swing;
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      const double v = u[a];
+      double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
+                     sensitivity[a] +
+                 slow_mg[a];
+      y = y * s.gain[a] + s.offset_mg[a];
+      if (s.truncation != 0) {
+        const double sigma = std::max(0.3 * lsb_mg, block.noise_mg[a]);
+        y -= s.truncation * 0.5 * lsb_mg * std::erf(y / (sigma * M_SQRT2));
+      }
+      out[a] += y / phases;
+      if (block.tone) {
+        out[3 + a] += 2 * y * c1 / phases;
+        if (block.harmonics && a == block.axis) {
+          out[6] += 2 * y * std::cos(2 * p) / phases;
+          out[7] += 2 * y * std::cos(3 * p) / phases;
+        }
+      }
+    }
+  }
+  if (block.tone) {
+    // In phase with the axis that is moved most: its amplitude is positive by definition.
+    const double sign = swing[block.axis] < 0 ? -1 : 1;
+    out.segment<3>(3) *= sign;
+    if (block.harmonics) {
+      out[7] *= sign;
+    }
+  }
+  return out;
+}
+
+Eigen::MatrixXd seating_lever(const Block& block) {
+  Eigen::MatrixXd lever = Eigen::MatrixXd::Zero(block.size(), 3);
+  const Eigen::Vector3d rest = block.rotation * block.gravity_lab_g;
+  const Eigen::Vector3d swing = block.rotation * block.vibration_lab_g;
+  const double sign = block.tone && swing[block.axis] < 0 ? -1 : 1;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(k) * (1000 * kRadPerDeg);
+    lever.block<3, 1>(0, k) = axis.cross(rest);
+    if (block.tone) {
+      lever.block<3, 1>(3, k) = sign * axis.cross(swing);
+    }
+  }
+  return lever;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,86 @@
+// The forward model of one block of features: what the simulator would measure there, in closed
+// form.
+//
+// A block is a dwell (or a piece of a long one), or a tone. Its features are the mean per axis, and
+// for tones the amplitude in phase per axis and the second and third harmonic on the axis that is
+// moved most. The model goes through the same chain as sim/ in the same order - stimulus, sensor,
+// digital - on 24 phases of one period, and projects: exact for the polynomials it holds.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gap/bundle.h"
+
+namespace sixpoint::gap {
+
+// Parameters by position. Units: see kParameters in forward.cpp (mg, deg, shares, percent).
+struct ForwardState {
+  Eigen::Vector3d gain = Eigen::Vector3d::Ones();
+  Eigen::Vector3d offset_mg = Eigen::Vector3d::Zero();
+  Eigen::Vector2d tilt_deg = Eigen::Vector2d::Zero();
+  Eigen::Vector3d misalignment_deg = Eigen::Vector3d::Zero();
+  Eigen::Vector3d cross = Eigen::Vector3d::Zero();  // yz xz xy
+  Eigen::Vector3d second_mg_per_g2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d third_mg_per_g3 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d hysteresis_mg = Eigen::Vector3d::Zero();
+  Eigen::Vector3d tempco_mg_per_c = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sensitivity_percent_per_c = Eigen::Vector3d::Zero();
+  Eigen::Vector3d warm_up_mg = Eigen::Vector3d::Zero();
+  Eigen::Vector3d drift_mg_per_h = Eigen::Vector3d::Zero();
+  double gravity_ratio = 0;
+  double truncation = 0;  // 1: toward zero instead of nearest
+  // Shape of effects that are not linear in their parameters.
+  double warm_up_tau_s = 300;
+  bool hysteresis_by_sign = true;  // else in proportion to the step
+};
+
+// Groups of parameters that come and go together: an effect, or a nuisance.
+struct ParameterGroup {
+  std::string effect;  // catalogue name; "gain" and "offset" for the nuisances
+  int first = 0;       // position in the flat vector
+  int count = 0;
+  double prior_sd = 1;  // of each, from the realistic sizes of the catalogue
+  double prior_mean = 0;
+  double high = 0;      // an estimate beyond four times this is another thing
+  double tau_s = 0;     // warm_up's shape
+  bool by_sign = true;  // hysteresis' shape
+};
+inline constexpr int kForwardParameters = 37;
+// Every group, with each shape of warm_up and hysteresis as a group of its own.
+std::vector<ParameterGroup> parameter_groups();
+inline constexpr double kReference_c = 25;
+
+double& parameter(ForwardState& state, int position);
+double parameter(const ForwardState& state, int position);
+
+struct Block {
+  std::size_t segment = 0;
+  int placement = 0;
+  int condition = 0;  // for hold-out: what is left out together
+  bool tone = false;
+  int axis = 0;         // of tones
+  double middle_s = 0;  // host time
+  double seconds = 0;
+  double temperature_c = 25;
+  Eigen::Vector3d gravity_lab_g = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
+  Eigen::Vector3d vibration_lab_g = Eigen::Vector3d::Zero();  // amplitude, response included
+  bool harmonics = false;                                     // 8 features instead of 6
+  Eigen::Vector3d noise_mg = Eigen::Vector3d::Zero();         // of one sample, for truncation
+
+  Eigen::VectorXd value_mg;   // 3, 6 or 8: mean XYZ, in phase XYZ, second, third
+  Eigen::MatrixXd white_mg2;  // covariance of the noise
+  Eigen::Index size() const { return value_mg.size(); }
+};
+
+// Predicted features, as long as block.value_mg. `lsb_mg` is the width of a stored count.
+Eigen::VectorXd predict(const ForwardState& state, const Block& block, double lsb_mg);
+
+// d(features)/d(small rotation of the unit in its seat, sensor's frame), mg per degree: size x 3.
+Eigen::MatrixXd seating_lever(const Block& block);
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,112 @@
+// sixpoint gap diagnose BUNDLE: where simulator and recording part, and which effect explains it.
+#include <chrono>
+#include <memory>
+#include <set>
+#include <string>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "base/atomic_file.h"
+#include "gap/bundle.h"
+#include "gap/diagnose.h"
+#include "station/cli/command.h"
+
+namespace sixpoint::cli {
+namespace {
+
+struct Options {
+  std::string bundle;
+  std::vector<std::string> without;
+  std::string html;
+  std::string scenario;
+  std::uint64_t seed = 0;
+  bool json = false;
+};
+
+int exit_code_of(const gap::Diagnosis& diagnosis) {
+  if (!diagnosis.usable()) {
+    return kExitInconclusive;
+  }
+  return diagnosis.verdict == gap::Verdict::no_gap || diagnosis.verdict == gap::Verdict::explained
+             ? kExitPassed
+             : kExitFailed;
+}
+
+Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
+  const auto start = context.env.clock.elapsed();
+  gap::DiagnoseOptions how;
+  how.without = std::set<std::string>(options.without.begin(), options.without.end());
+  how.seed = options.seed;
+  SIXPOINT_ASSIGN(const gap::Bundle bundle, gap::read_bundle(context.env.files, options.bundle));
+  SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, gap::diagnose(bundle, how));
+  diagnosis.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
+  return diagnosis;
+}
+
+void tell(const gap::Diagnosis& d, Context& context) {
+  context.out << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
+  for (const gap::EffectFinding& effect : d.effects) {
+    context.out << fmt::format("  {:<20} p {:.3f}  held out {:+.1f} nats", effect.name,
+                               effect.probability, effect.held_out_gain_nats);
+    for (const gap::NamedValue& p : effect.parameters) {
+      context.out << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
+    }
+    context.out << (effect.outside_datasheet ? "  (outside the datasheet)\n" : "\n");
+  }
+  for (const std::string& where : d.unknown.where) {
+    context.out << "  unknown: " << printable(where, 300) << '\n';
+  }
+  for (const gap::NextSegment& next : d.next_segments) {
+    context.out << fmt::format("  next: {} ({:.0f} min) would show {}\n", next.name, next.minutes,
+                               fmt::join(next.separates, ", "));
+  }
+  for (const std::string& loss : d.losses) {
+    context.people << "sixpoint: " << printable(loss, 1000) << '\n';
+  }
+}
+
+void run(const Options& options, Context& context) {
+  const auto diagnosis = diagnose(options, context);
+  if (!diagnosis) {
+    return report_error(context, "gap-diagnose", diagnosis.error(), options.json);
+  }
+  context.worsen(exit_code_of(*diagnosis));
+  if (!options.scenario.empty()) {
+    if (auto status = write_file(context.env.files, options.scenario,
+                                 gap::augmented_scenario(*diagnosis).dump(2) + "\n");
+        !status) {
+      return report_error(context, "gap-diagnose", status.error(), options.json);
+    }
+  }
+  if (options.json) {
+    Json json = document("gap-diagnose");
+    json.update(diagnosis->to_json());
+    print_json(context, json);
+  } else {
+    tell(*diagnosis, context);
+  }
+}
+
+}  // namespace
+
+void add_gap(CLI::App& app, Context& context) {
+  auto* command =
+      app.add_subcommand("gap", "simulator against recording: where they part, and why");
+  command->require_subcommand(1);
+  auto options = std::make_shared<Options>();
+  auto* diagnose_command =
+      command->add_subcommand("diagnose", "which effect explains a recording of a known protocol");
+  diagnose_command
+      ->add_option("BUNDLE", options->bundle, "folder with recording.gt3x and protocol.json")
+      ->required();
+  diagnose_command->add_option("--without", options->without, "effects taken out of the catalogue")
+      ->delimiter(',');
+  diagnose_command->add_option("--seed", options->seed, "seed of the augmented scenario");
+  diagnose_command->add_option("--scenario", options->scenario,
+                               "write the augmented scenario to this file");
+  diagnose_command->add_flag("--json", options->json, "one JSON document on standard output");
+  diagnose_command->callback([options, &context] { run(*options, context); });
+}
+
+}  // namespace sixpoint::cli

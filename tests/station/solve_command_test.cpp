@@ -1,0 +1,159 @@
+// solve by its contract: keys, exit codes, what is stored and what is not.
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "base/random.h"
+#include "calib/constants.h"
+#include "expect_result.h"
+#include "repair/made_recording.h"
+#include "run_command.h"
+#include "shared_data.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::ElementsAre;
+using testing::UnorderedElementsAre;
+using tests::MadeRecording;
+using tests::run_command;
+
+constexpr PerAxis<double> kSensitivity = {0.0042, 0.00405, 0.0043};
+constexpr PerAxis<double> kZero = {90.5, 50.25, 88};
+
+// A minute on each of the sides named by `sides` ("+x" is 0 ... "-z" is 5), a few degrees askew.
+MadeRecording sides_recording(const std::vector<int>& sides, unsigned rate_hz = 30,
+                              int seconds = 60, std::uint64_t seed = 5) {
+  MadeRecording made;
+  made.rate_hz = rate_hz;
+  Random random(seed);
+  for (const int side : sides) {
+    PerAxis<double> up = {0.03 * random.normal(), 0.03 * random.normal(), 0.03 * random.normal()};
+    up[static_cast<std::size_t>(side / 2)] = side % 2 == 0 ? 1 : -1;
+    const double length = std::sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]);
+    for (int i = 0; i < seconds * static_cast<int>(rate_hz); ++i) {
+      const bool turning = i < 3 * static_cast<int>(rate_hz);
+      PerAxis<int> raw{};
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const double g = up[a] / length + (turning ? 0.3 : 0.0045) * random.normal();
+        raw[a] = static_cast<int>(std::lround(g / kSensitivity[a] + kZero[a]));
+      }
+      made.raw.push_back(raw);
+    }
+  }
+  return made;
+}
+
+class SolveCommand : public testing::Test {
+ protected:
+  tests::Answer run(const std::vector<std::string>& arguments) {
+    return run_command(posix_env(), arguments);
+  }
+  std::string write(const MadeRecording& made, const std::string& name) {
+    const std::string path = folder_ / name;
+    EXPECT_OK(made.write(posix_env().files, path));
+    return path;
+  }
+  tests::TemporaryFolder folder_;
+};
+
+TEST_F(SolveCommand, SixSidesAreSolvedStoredAndWritten) {
+  for (const unsigned rate : {30U, 60U, 100U}) {
+    const std::string path =
+        write(sides_recording({0, 1, 2, 3, 4, 5}, rate), "six" + std::to_string(rate) + ".gt3x");
+    const std::string store = folder_ / ("s" + std::to_string(rate) + ".db");
+    const std::string output = folder_ / ("c" + std::to_string(rate) + ".json");
+    const auto answer = run({"solve", path, "--json", "--save", "--store", store, "-o", output});
+    ASSERT_EQ(answer.exit_code, 0) << answer.out << answer.people;
+    const Json json = answer.json();
+    EXPECT_EQ(json["schema"], "sixpoint/solve/1");
+    for (const char* key : {"serial", "filter", "method", "constants", "standard_uncertainty",
+                            "points", "coverage_g", "residual_mg", "verified", "verdict", "reasons",
+                            "missing_directions", "iterations", "seconds", "stored_id"}) {
+      EXPECT_TRUE(json.contains(key)) << key;
+    }
+    EXPECT_EQ(json["serial"], "MOS2A45130450");
+    EXPECT_EQ(json["filter"], "current");
+    EXPECT_TRUE(json["verified"].get<bool>());
+    EXPECT_TRUE(json["missing_directions"].empty());
+    EXPECT_GT(json["residual_mg"]["before"].get<double>(), 50);
+    EXPECT_LT(json["residual_mg"]["after"].get<double>(), 1);
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      // Oracle: the constants that the recording was made with. 0.5 mg, and 0.05 %.
+      const double s = json["constants"]["sensitivity_g_per_lsb"][a].get<double>();
+      EXPECT_NEAR(s / kSensitivity[a], 1, 5e-4);
+      EXPECT_NEAR((json["constants"]["zero_lsb"][a].get<double>() - kZero[a]) * s, 0, 5e-4);
+    }
+    std::ifstream file(output);
+    const std::string text((std::istreambuf_iterator<char>(file)),
+                           std::istreambuf_iterator<char>());
+    const auto record = calib::parse_constants_record(text);
+    ASSERT_OK(record);
+    EXPECT_EQ(record->made_from.sha256.size(), 64U);
+    const auto history = run({"history", "MOS2A45130450", "--json", "--store", store});
+    ASSERT_EQ(history.exit_code, 0);
+    EXPECT_EQ(history.json()["constants"][0]["id"], json["stored_id"]);
+  }
+}
+
+TEST_F(SolveCommand, GeneticAlgorithmIsReproducible) {
+  const std::string path = write(sides_recording({0, 1, 2, 3, 4, 5}), "six.gt3x");
+  const auto one = run({"solve", path, "--method", "ga", "--seed", "7", "--json"});
+  const auto two = run({"solve", path, "--method", "ga", "--seed", "7", "--json"});
+  ASSERT_EQ(one.exit_code, 0) << one.out;
+  EXPECT_EQ(one.json()["method"], "ga");
+  EXPECT_EQ(one.json()["constants"], two.json()["constants"]);
+}
+
+TEST_F(SolveCommand, MissingSidesAreNamedAndNothingIsStored) {
+  const std::string path = write(sides_recording({0, 1, 2, 4}), "four.gt3x");
+  const std::string store = folder_ / "store.db";
+  const std::string output = folder_ / "constants.json";
+  const auto answer = run({"solve", path, "--json", "--save", "--store", store, "-o", output});
+  EXPECT_EQ(answer.exit_code, 1);
+  const Json json = answer.json();
+  EXPECT_FALSE(json["verified"].get<bool>());
+  EXPECT_TRUE(json["stored_id"].is_null());
+  EXPECT_TRUE(json["constants"].is_null());
+  EXPECT_THAT(json["missing_directions"].get<std::vector<std::string>>(),
+              UnorderedElementsAre("-y", "-z"));
+  EXPECT_FALSE(std::filesystem::exists(output));
+  const auto with_prior = run({"solve", path, "--json", "--prior", "population"});
+  EXPECT_EQ(with_prior.exit_code, 1);
+  EXPECT_TRUE(with_prior.json()["from_prior"].get<bool>());
+  EXPECT_EQ(with_prior.json()["verdict"], "rests_on_prior");
+}
+
+TEST_F(SolveCommand, UsageAndBadInput) {
+  const std::string path = write(sides_recording({0}), "one.gt3x");
+  EXPECT_EQ(run({"solve", path, "--method", "magic"}).exit_code, 64);
+  EXPECT_EQ(run({"solve", path, "--gravity", "1.62"}).exit_code, 64);
+  EXPECT_EQ(run({"solve", path, "--prior", "hope"}).exit_code, 64);
+  EXPECT_EQ(run({"solve"}).exit_code, 64);
+  const auto missing = run({"solve", folder_ / "none.gt3x", "--json"});
+  EXPECT_EQ(missing.exit_code, 66);
+  EXPECT_TRUE(missing.json().contains("error"));
+  MadeRecording broken = sides_recording({0, 1});
+  broken.constants.negative_lsb[1] = broken.constants.positive_lsb[1];
+  EXPECT_EQ(run({"solve", write(broken, "broken.gt3x")}).exit_code, 65);
+}
+
+// The honest answer about the two really affected units.
+TEST_F(SolveCommand, AffectedUnitsOwnStillPeriodsDoNotSuffice) {
+  SIXPOINT_NEED_SHARED("data/wgt3x-bt-affected/MOS2A45130450.gt3x");
+  const auto one =
+      run({"solve", tests::shared_file("data/wgt3x-bt-affected/MOS2A45130450.gt3x"), "--json"});
+  EXPECT_EQ(one.exit_code, 1);
+  EXPECT_THAT(one.json()["missing_directions"].get<std::vector<std::string>>(),
+              ElementsAre("+x", "-x", "+y", "-y", "+z"));
+  const auto two =
+      run({"solve", tests::shared_file("data/wgt3x-bt-affected/MOS2A45130451.gt3x"), "--json"});
+  EXPECT_EQ(two.exit_code, 1);
+  EXPECT_THAT(two.json()["missing_directions"].get<std::vector<std::string>>(),
+              ElementsAre("+x", "-x", "+y", "-y"));
+}
+
+}  // namespace
+}  // namespace sixpoint::cli
