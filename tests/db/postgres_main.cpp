@@ -5,6 +5,11 @@
 
 #include "postgres_server.h"
 
+// libpqxx 6.4 forgets one result of libpq, about 2 kB, whenever a server vanishes under a prepared
+// statement; LeakSanitizer would blame the tests that kill the server.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libpqxx-6"; }
+
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   if (const std::string missing = sixpoint::db::tests::PostgresServer::missing();

@@ -330,7 +330,7 @@ TEST_F(StoreTest, AnAuditSeesOneMomentWhileOthersWrite) {
 
 TEST_F(StoreTest, ManyWritersLoseNothing) {
   place_->location("main");
-  constexpr int kWriters = 4;
+  constexpr int kWriters = 16;
   constexpr int kRows = 25;
   std::vector<std::thread> writers;
   std::vector<std::string> failures(kWriters);
