@@ -1,5 +1,5 @@
-// The sensor's axes are rotated in the case: T turns the case's components into the sensor's, so the
-// axes themselves are turned by the inverse.
+// The sensor's axes are rotated in the case: T turns the case's components into the sensor's, so
+// the axes themselves are turned by the inverse.
 #include "sim/effects/kinds.h"
 
 namespace sixpoint::sim {
