@@ -286,7 +286,7 @@ Result<ProtocolSegment> parse_segment(const Json& json, const std::string& path)
   if (!parsed) {
     return wrong(section.path("kind"), "this must be still, vibration, ramp or soak");
   }
-  segment.name = name.value_or(*kind);
+  segment.name = name.value_or(std::string(to_string(*parsed)));
   segment.kind = *parsed;
   SIXPOINT_CHECK(section.seed("first_sample", segment.first_sample));
   SIXPOINT_CHECK(section.seed("samples", segment.samples));

@@ -50,7 +50,7 @@ class Drawing {
   }
   void pause(double from_s, double to_s) { at_s_ += random_.uniform(from_s, to_s); }
 
-  void poses(const std::string& name, std::vector<Eigen::Matrix3d> list, double from_s,
+  void poses(const std::string& name, const std::vector<Eigen::Matrix3d>& list, double from_s,
              double to_s) {
     for (const Eigen::Matrix3d& rotation : list) {
       if (!segments_.empty()) {
@@ -225,7 +225,9 @@ std::vector<TemperaturePoint> unit_temperature(const std::vector<ProtocolSegment
   double left_c = segments.front().commanded_c[0];
   double unit_c = left_c;
   const double last_s = std::min(kMost_s, end_of(segments.back()) + 1);
-  for (double time_s = 0.5; time_s <= last_s; time_s += 1) {
+  const auto seconds = static_cast<std::size_t>(std::max(0.0, last_s));
+  for (std::size_t second = 0; second < seconds; ++second) {
+    const double time_s = static_cast<double>(second) + 0.5;
     while (next < segments.size() && end_of(segments[next]) <= time_s) {
       left_s = end_of(segments[next]);
       left_c = segments[next].commanded_c[1];

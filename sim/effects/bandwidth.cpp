@@ -17,7 +17,7 @@ struct Section {
   Eigen::Array3d s2 = Eigen::Array3d::Zero();
 
   Eigen::Array3d step(const Eigen::Array3d& in) {
-    const Eigen::Array3d out = b0 * in + s1;
+    Eigen::Array3d out = b0 * in + s1;
     s1 = b1 * in - a1 * out + s2;
     s2 = b2 * in - a2 * out;
     return out;

@@ -258,6 +258,7 @@ struct Share {
 
 struct Scores {
   Share first;             // single: the first one named is right
+  Share exact;             // single: it alone was named, and nothing called unknown
   Share first_observable;  // ... where the diagnosis does not say that this protocol can't show it
   Share first_large;       // ... and the severity is at least 1
   Share family;            // single: the family is right, where observable
@@ -321,6 +322,7 @@ Scores score(const std::vector<Outcome>& outcomes, bool strip) {
       const std::string& name = outcome.truth.front().name;
       const bool observable = !outcome.not_observable.contains(name);
       scores.first.count(outcome.first_right());
+      scores.exact.count(outcome.first_right() && outcome.named.size() == 1 && !outcome.unknown);
       auto& effect = scores.by_effect[name];
       effect.blind += outcome.honestly_blind() ? 1 : 0;
       if (observable) {
@@ -354,6 +356,7 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
   json["strip"] = options.strip;
   Json& result = json["scores"];
   result["single_first_right"] = scores.first.to_json();
+  result["single_alone_and_right"] = scores.exact.to_json();
   result["single_first_right_observable"] = scores.first_observable.to_json();
   result["single_first_right_observable_severity_1"] = scores.first_large.to_json();
   result["single_family_right"] = scores.family.to_json();
@@ -408,6 +411,7 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
 // What people read: the same lines on the terminal and in the page.
 std::vector<std::pair<std::string, std::string>> lines(const Scores& scores) {
   return {{"one effect: first-named right", scores.first.text()},
+          {"  ... and nothing else named", scores.exact.text()},
           {"  ... where this protocol can show it", scores.first_observable.text()},
           {"  ... and at least of typical size", scores.first_large.text()},
           {"  ... right family", scores.family.text()},

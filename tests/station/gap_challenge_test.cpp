@@ -1,0 +1,118 @@
+// gap challenge: trials, and scores of a diagnosis of which everything is known.
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "expect_result.h"
+#include "run_command.h"
+#include "station/gap_trials.h"
+#include "temporary_folder.h"
+
+namespace sixpoint {
+namespace {
+
+using station::TrialKind;
+
+TEST(GapTrials, SameSeedSameTrialAndEveryEffectComesUp) {
+  std::set<std::string> seen;
+  std::array<int, 4> kinds{};
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const auto trial = station::draw_trial(7, i, sim::StandardProtocol::production, {});
+    ASSERT_OK(trial);
+    ++kinds[static_cast<std::size_t>(trial->kind)];
+    const auto again = station::draw_trial(7, i, sim::StandardProtocol::production, {});
+    ASSERT_EQ(trial->effects.size(), again->effects.size());
+    for (std::size_t k = 0; k < trial->effects.size(); ++k) {
+      EXPECT_EQ(trial->effects[k].name, again->effects[k].name);
+      EXPECT_GE(trial->effects[k].severity, 0.3);
+      EXPECT_LE(trial->effects[k].severity, 3.0);
+      seen.insert(trial->effects[k].name);
+      EXPECT_EQ(static_cast<bool>(sim::find_effect(trial->effects[k].name)),
+                trial->kind != TrialKind::outside);
+    }
+    EXPECT_EQ(trial->effects.empty(), trial->kind == TrialKind::none);
+    if (i < 40) {
+      EXPECT_EQ(*sim::run_protocol(*trial->scenario.protocol),
+                *sim::run_protocol(*again->scenario.protocol));
+    }
+  }
+  for (const sim::EffectKind& kind : sim::effect_catalogue()) {
+    EXPECT_TRUE(seen.contains(kind.name)) << kind.name;
+  }
+  for (const int count : kinds) {
+    EXPECT_GT(count, 30);
+  }
+}
+
+class GapChallenge : public ::testing::Test {
+ protected:
+  // A program that gives the same answer to everything.
+  std::string program(const std::string& answer) {
+    const std::string path = (folder_ / "diagnose.sh");
+    std::ofstream(path) << "#!/bin/sh\necho \"$@\" >>" << (folder_ / "calls") << "\n" << answer;
+    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+    return path;
+  }
+  tests::Answer challenge(const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"gap",    "challenge", "--protocol", "production",
+                                          "--seed", "3",         "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return tests::run_command(posix_env(), arguments);
+  }
+  tests::TemporaryFolder folder_;
+};
+
+TEST_F(GapChallenge, ScoresAnAnswerThatIsAlwaysTilt) {
+  const std::string path = program(
+      R"(echo '{"verdict": "explained", "effects": [{"name": "tilt", "probability": 0.95}],
+        "candidates": [{"name": "tilt", "probability": 0.95}], "unknown": {"present": false},
+        "not_observable": []}')");
+  const auto all_tilt = challenge({"--program", path, "--trials", "5", "--effects", "tilt",
+                                   "--none", "0", "--outside", "0", "--pairs", "0"});
+  EXPECT_EQ(all_tilt.exit_code, 0) << all_tilt.people;
+  EXPECT_EQ(all_tilt.json()["scores"]["single_first_right"]["right"], 5);
+  EXPECT_NEAR(all_tilt.json()["scores"]["expected_calibration_error"].get<double>(), 0.05, 1e-9);
+  const auto none = challenge({"--program", path, "--trials", "5", "--none", "1"});
+  EXPECT_EQ(none.json()["scores"]["none_alarms"]["right"], 5);
+  const auto outside =
+      challenge({"--program", path, "--trials", "5", "--none", "0", "--outside", "1"});
+  EXPECT_EQ(outside.json()["scores"]["withheld_confidently_wrong"]["right"], 5);
+  EXPECT_EQ(outside.json()["scores"]["withheld_honest"]["right"], 0);
+}
+
+TEST_F(GapChallenge, StripTakesTheTruthAwayAndTheBundleKeepsIt) {
+  const std::string path =
+      program(R"(echo '{"verdict": "unexplained", "effects": [], "unknown": {"present": true}}')");
+  const auto stripped = challenge(
+      {"--program", path, "--trials", "3", "--effects", "drift", "--none", "0", "--outside", "0",
+       "--pairs", "0", "--strip", "--keep", (folder_ / "kept"), "--html", (folder_ / "page.html")});
+  EXPECT_EQ(stripped.exit_code, 0) << stripped.people;
+  EXPECT_EQ(stripped.json()["scores"]["withheld_honest"]["right"], 3);
+  std::ifstream calls((folder_ / "calls"));
+  std::string line;
+  while (std::getline(calls, line)) {
+    EXPECT_NE(line.find("--without drift"), std::string::npos) << line;
+  }
+  // What the diagnosis sees holds no trace of the truth.
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator((folder_ / "kept") + "/000000")) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    EXPECT_EQ(text.find("drift"), std::string::npos) << entry.path();
+  }
+  EXPECT_TRUE(std::filesystem::exists((folder_ / "page.html")));
+}
+
+TEST_F(GapChallenge, AProgramThatFailsIsCounted) {
+  const auto crashed = challenge({"--program", program("exit 70"), "--trials", "2"});
+  EXPECT_EQ(crashed.exit_code, 1);
+  EXPECT_EQ(crashed.json()["scores"]["failures"]["right"], 2);
+  EXPECT_EQ(challenge({"--program", program("echo nonsense"), "--trials", "2"}).exit_code, 1);
+  EXPECT_EQ(challenge({"--protocol", "sideways"}).exit_code, 64);
+  EXPECT_EQ(challenge({"--effects", "gremlins"}).exit_code, 78);
+}
+
+}  // namespace
+}  // namespace sixpoint
