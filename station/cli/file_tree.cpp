@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include <fmt/format.h>
+
 namespace sixpoint::cli {
 namespace {
 
@@ -17,8 +19,8 @@ Status walk(FileSystem& files, const std::string& folder, const std::string& rel
   }
   SIXPOINT_ASSIGN(const auto names, files.list(folder));
   for (const std::string& name : names) {
-    const std::string path = folder + "/" + name;
-    const std::string below = relative.empty() ? name : relative + "/" + name;
+    const std::string path = fmt::format("{}/{}", folder, name);
+    const std::string below = relative.empty() ? name : fmt::format("{}/{}", relative, name);
     const auto info = files.info(path);
     if (!info) {
       continue;  // a dangling link, or gone since
