@@ -32,24 +32,10 @@ struct Options {
 
 struct Done {
   station::JigReport report;
-  double residual_limit_mg = 0;  // that the verdict used
+  std::string retest_of;
   std::string run_id;
   std::optional<std::string> constants_id;
 };
-
-int exit_code_of(station::JigVerdict verdict) {
-  switch (verdict) {
-    case station::JigVerdict::pass:
-      return kExitPassed;
-    case station::JigVerdict::fail:
-      return kExitFailed;
-    case station::JigVerdict::inconclusive:
-      return kExitInconclusive;
-    case station::JigVerdict::stopped:
-      return kExitStopped;
-  }
-  return kExitFailed;
-}
 
 // Into the store, or into the journal, which takes the same.
 template <class Keeper>
@@ -70,7 +56,9 @@ Status keep_in(Keeper& keeper, const Options& options, Done& done) {
   run.software = "sixpoint " SIXPOINT_VERSION;
   run.document = report.to_json().dump();
   run.gravity_m_per_s2 = report.gravity.m_per_s2;
-  run.codes = report.reasons;
+  run.codes = report.codes;
+  run.jig_due = report.jig_due;
+  run.retest_of = done.retest_of;
   if (!report.faces.empty()) {
     double sum_c = 0;
     for (const station::PoseReading& face : report.faces) {
@@ -78,7 +66,7 @@ Status keep_in(Keeper& keeper, const Options& options, Done& done) {
     }
     run.temperature_c = sum_c / static_cast<double>(report.faces.size());
   }
-  run.limits = Json{{"residual_mg", done.residual_limit_mg}}.dump();
+  run.limits = station::to_json(report.limits).dump();
   SIXPOINT_ASSIGN(
       done.run_id,
       keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
@@ -172,7 +160,6 @@ Result<Done> run(Context& context, const Options& options) {
   };
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
-  done.residual_limit_mg = session.residual_limit_mg;
   SIXPOINT_CHECK(keep(context, options, done));
   return done;
 }
@@ -239,7 +226,7 @@ void add_jig(CLI::App& app, Context& context) {
       report_error(context, "jig", done.error(), options->json);
       return;
     }
-    context.worsen(exit_code_of(done->report.verdict));
+    context.worsen(station::exit_code_of(done->report.verdict));
     if (options->json) {
       print_json(context, to_json(*done));
     } else {
