@@ -36,46 +36,22 @@ struct Options {
 
 struct Done {
   station::JigReport report;
-<<<<<<< HEAD
-  std::string retest_of;
-=======
->>>>>>> store
   std::string run_id;
   std::optional<std::string> constants_id;
   Result<db::Kept> kept = db::Kept{};
 };
 
-<<<<<<< HEAD
-// Into the store, or into the journal, which takes the same.
-template <class Keeper>
-Status keep_in(Keeper& keeper, const Options& options, Done& done) {
-  const station::JigReport& report = done.report;
-  const std::string model(gt3x::model_of(report.serial));
-=======
-int exit_code_of(station::JigVerdict verdict) {
-  switch (verdict) {
-    case station::JigVerdict::pass:
-      return kExitPassed;
-    case station::JigVerdict::fail:
-      return kExitFailed;
-    case station::JigVerdict::inconclusive:
-      return kExitInconclusive;
-    case station::JigVerdict::stopped:
-      return kExitStopped;
-  }
-  return kExitFailed;
-}
-
 // The limits that the verdict used, whole: a verdict is nothing without them.
 Json limits_of(const station::JigSessionOptions& session) {
-  return {{"residual_mg", session.residual_limit_mg},
-          {"tilt_deg", session.run.tilt_limit_deg},
-          {"moved_mg", session.run.moved_mg},
-          {"still_factor", session.run.still_factor},
-          {"moved_factor", session.run.moved_factor},
-          {"first_noise_mg", session.run.first_noise_limit_mg},
-          {"dwell_s", session.run.dwell_s},
-          {"rate_hz", session.run.rate_hz}};
+  Json json = station::to_json(session.limits);
+  json["run"] = {{"tilt_deg", session.run.tilt_limit_deg},
+                 {"moved_mg", session.run.moved_mg},
+                 {"still_factor", session.run.still_factor},
+                 {"moved_factor", session.run.moved_factor},
+                 {"first_noise_mg", session.run.first_noise_limit_mg},
+                 {"dwell_s", session.run.dwell_s},
+                 {"rate_hz", session.run.rate_hz}};
+  return json;
 }
 
 // What is known before the unit is measured; refused here, it costs no one a run.
@@ -83,7 +59,6 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
                                     const station::JigSessionOptions& session,
                                     const std::string& serial, const std::string& jig,
                                     Result<db::Store>& store) {
->>>>>>> store
   db::RunRecord run;
   run.serial = serial;
   run.model = gt3x::model_of(serial);
@@ -91,20 +66,6 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
   run.filter = calib::to_string(session.filter);
   run.operator_name = options.operator_name;
   run.station = options.station;
-<<<<<<< HEAD
-  run.jig = report.jig;
-  run.verdict = station::to_string(report.verdict);
-  run.software = "sixpoint " SIXPOINT_VERSION;
-  run.document = report.to_json().dump();
-  run.gravity_m_per_s2 = report.gravity.m_per_s2;
-  run.codes = report.codes;
-  run.jig_due = report.jig_due;
-  run.retest_of = done.retest_of;
-  if (!report.faces.empty()) {
-    double sum_c = 0;
-    for (const station::PoseReading& face : report.faces) {
-      sum_c += face.temperature_c;
-=======
   run.jig = options.jig_id.empty() ? jig : options.jig_id;
   run.software = station::software_name();
   run.build = station::software_build();
@@ -119,12 +80,8 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
     run.jig_due = *due;
     if (*due < context.env.clock.now()) {
       context.log().warn("the jig was due for its own calibration on {}", to_iso8601(*due));
->>>>>>> store
     }
   }
-<<<<<<< HEAD
-  run.limits = station::to_json(report.limits).dump();
-=======
   if (!options.retest_of.empty()) {
     // In the journal a run that refers to none would block all that come after it.
     if (!store) {
@@ -151,7 +108,6 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
 Status add_records(db::Keeper& keeper, const Options& options, const db::RunRecord& run,
                    Done& done) {
   const station::JigReport& report = done.report;
->>>>>>> store
   SIXPOINT_ASSIGN(
       done.run_id,
       keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
@@ -187,9 +143,7 @@ void complete(db::RunRecord& run, const station::JigReport& report) {
   run.verdict = station::to_string(report.verdict);
   // The unit's own words may hold anything; a run is kept whatever they are.
   run.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
-  for (const std::string& reason : report.reasons) {
-    run.codes.push_back(db::storable_path(printable(reason, 1500)));
-  }
+  run.codes = report.codes;
   if (!report.faces.empty()) {
     double sum_c = 0;
     for (const station::PoseReading& face : report.faces) {
@@ -247,14 +201,10 @@ Result<Done> run(Context& context, const Options& options) {
                                              jig.name(), store));
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
-<<<<<<< HEAD
-  SIXPOINT_CHECK(keep(context, options, done));
-=======
   complete(record, done.report);
   done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) {
     return add_records(keeper, options, record, done);
   });
->>>>>>> store
   return done;
 }
 
@@ -333,16 +283,12 @@ void add_jig(CLI::App& app, Context& context) {
       report_error(context, "jig", done.error(), options->json);
       return;
     }
-<<<<<<< HEAD
     context.worsen(station::exit_code_of(done->report.verdict));
-=======
-    context.worsen(exit_code_of(done->report.verdict));
     if (!done->kept) {
       // The report below is then the only copy.
       context.log().error("{}", done->kept.error().brief());
       context.worsen(static_cast<int>(done->kept.error().code));
     }
->>>>>>> store
     if (options->json) {
       print_json(context, to_json(*done));
     } else {

@@ -207,9 +207,10 @@ TEST(JigVerdict, EveryQuantityIsJudgedAndInTheReport) {
 TEST(JigVerdict, AUnitBeyondItsLimitsFailsAndIsNotWritten) {
   sim::UnitWishes wishes;
   wishes.current_sensitivity_lsb_per_g = {240, 240, 240};
-  wishes.current_zero_lsb = {0, 240 * 0.75, 0};
+  wishes.current_zero_lsb = {0, 240 * 0.35, 0};
   Bench bench(3, wishes);
   JigSessionOptions options;
+  options.limits = with("[zero_offset_mg]\nhigh = 300\n");
   options.run.write = true;
   const auto report = bench.run(options);
   ASSERT_OK(report);
@@ -259,7 +260,7 @@ TEST(JigVerdict, NoWrongPassAtTheLimits) {
   int conditional = 0;
   for (int i = 0; i < kUnits; ++i) {
     const double sensitivity = random.uniform(215, 260);
-    const double beyond_mg = random.uniform(-4, 4);
+    const double beyond_mg = random.uniform(-2, 2);
     sim::UnitWishes wishes;
     wishes.current_sensitivity_lsb_per_g = {sensitivity, sensitivity, sensitivity};
     const double zero_lsb = (700 + beyond_mg) / kMgPerG * sensitivity;
