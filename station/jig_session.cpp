@@ -660,6 +660,8 @@ JigReport interrupted_report(const JigResume& resume, const std::string& serial,
   report.started = resume.started;
   report.ended = ended;
   report.verdict = JigVerdict::inconclusive;
+  report.codes = {"unit_gone"};
+  report.limits = options.limits;
   report.reasons.push_back(reason);
   report.faces = resume.progress.faces;
   report.as_found = resume.as_found;

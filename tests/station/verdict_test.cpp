@@ -266,6 +266,9 @@ TEST(JigVerdict, NoWrongPassAtTheLimits) {
     const double zero_lsb = (700 + beyond_mg) / kMgPerG * sensitivity;
     wishes.current_zero_lsb = {20, 20, 20};
     (*wishes.current_zero_lsb)[static_cast<std::size_t>(i % 3)] = i % 2 == 0 ? zero_lsb : -zero_lsb;
+    // The page knows about it, or the faces would not be recognised.
+    wishes.legacy_sensitivity_lsb_per_g = wishes.current_sensitivity_lsb_per_g;
+    wishes.legacy_zero_lsb = wishes.current_zero_lsb;
     Bench bench(1000 + static_cast<std::uint64_t>(i), wishes);
     const auto report = bench.run(options);
     ASSERT_OK(report);
@@ -282,8 +285,8 @@ TEST(JigVerdict, NoWrongPassAtTheLimits) {
         << beyond_mg << " mg: " << report->brief();
   }
   EXPECT_GT(truly_outside, kUnits / 4);
-  EXPECT_GT(passed, kUnits / 10);
-  EXPECT_GT(conditional, kUnits / 20);
+  EXPECT_GT(passed, kUnits / 6);
+  EXPECT_GT(conditional, kUnits / 10);
 }
 
 }  // namespace
