@@ -8,10 +8,12 @@ build_packages=(
   ca-certificates ccache cmake g++ git ninja-build pkg-config
   libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev libspdlog-dev libsqlite3-dev
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
+  libboost-dev libhpdf-dev libqrencode-dev libtomlplusplus-dev
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
+  poppler-utils zbar-tools
 )
 
 wanted=()
