@@ -575,14 +575,17 @@ Result<std::vector<StationEvent>> Store::station_events(const std::string& stati
   return events;
 }
 
-Status Store::for_each_jig_run(const RunFilter& filter,
-                               const std::function<Status(const RunRecord&)>& visit) {
+Status Store::for_each_run(const RunFilter& filter,
+                           const std::function<Status(const RunRecord&)>& visit) {
   std::vector<Value> parameters;
-  std::string where = "kind = 'jig'";
+  std::string where = "seq > 0";
   const auto only = [&](std::string_view condition, Value value) {
     parameters.push_back(std::move(value));
     where += fmt::format(" AND {} ${}", condition, parameters.size());
   };
+  if (!filter.kind.empty()) {
+    only("kind =", filter.kind);
+  }
   if (!filter.serial.empty()) {
     only("serial =", filter.serial);
   }

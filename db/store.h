@@ -127,6 +127,7 @@ struct StationEvent {
 
 // Which runs are asked for; what is empty does not matter.
 struct RunFilter {
+  std::string kind = "jig";
   std::string serial;
   std::string station;
   std::optional<UtcTime> from = {};  // started then or later
@@ -256,10 +257,10 @@ class Store final : public Keeper {
   Result<std::string> add_station_event(const StationEvent& event);
   // Oldest first; of all stations with an empty `station`.
   Result<std::vector<StationEvent>> station_events(const std::string& station = {});
-  // Jig runs, oldest first, one at a time: a year of them does not fit into memory. `model` is left
+  // Runs, oldest first, one at a time: a year of them does not fit into memory. `model` is left
   // empty. An error of `visit` ends it.
-  Status for_each_jig_run(const RunFilter& filter,
-                          const std::function<Status(const RunRecord&)>& visit);
+  Status for_each_run(const RunFilter& filter,
+                      const std::function<Status(const RunRecord&)>& visit);
 
   // Which constants apply to a file of `serial` recorded under `filter`: the newest by made_at,
   // among equals the last one stored, whose last correction is no withdrawal. Nothing where there

@@ -104,28 +104,6 @@ std::vector<Certificate::Pose> read_poses(const Json* list) {
   return poses;
 }
 
-std::vector<JudgedQuantity> read_quantities(const Json* list) {
-  std::vector<JudgedQuantity> quantities;
-  for (const Json& item : list != nullptr ? *list : Json::array()) {
-    const Document from(item);
-    JudgedQuantity quantity;
-    quantity.name = from.text("name");
-    if (find_quantity(quantity.name) == nullptr) {
-      continue;  // of a later program
-    }
-    quantity.axis = from.text("axis");
-    quantity.value = from.number("value").value_or(NAN);
-    quantity.expanded_uncertainty = from.number("expanded_uncertainty").value_or(NAN);
-    quantity.low = from.number("low");
-    quantity.high = from.number("high");
-    quantity.guard_band = from.number("guard_band").value_or(NAN);
-    quantity.verdict = parse_jig_verdict(from.text("verdict")).value_or(JigVerdict::inconclusive);
-    quantity.code = from.text("code");
-    quantities.push_back(std::move(quantity));
-  }
-  return quantities;
-}
-
 Json constants_to_json(const std::optional<Certificate::Constants>& constants) {
   if (!constants) {
     return nullptr;
@@ -195,7 +173,9 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
   out.verdict = *verdict;
   out.codes = run.codes;
   out.reasons = document.texts("reasons");
-  out.quantities = read_quantities(document.list("quantities"));
+  if (const Json* quantities = document.list("quantities")) {
+    out.quantities = quantities_from_json(*quantities);
+  }
   const Document limits = document.in("limits");
   out.limits_source = limits.text("source");
   out.limits_sha256 = limits.text("sha256");
