@@ -19,6 +19,7 @@ constexpr double kBottom_mm = 272;  // the footer stands below
 constexpr double kText_pt = 9;
 constexpr double kSmall_pt = 7.5;
 constexpr double kLine_mm = 4.6;
+constexpr double kRow_mm = 4.25;  // of a table
 constexpr double kGrey = 0.4;
 constexpr std::string_view kDash = "\u2013";
 
@@ -249,7 +250,7 @@ class Sheet {
              const std::vector<std::vector<std::string>>& rows) {
     table_head(columns);
     for (std::size_t row = 0; row < rows.size(); ++row) {
-      if (y_mm_ + kLine_mm > kBottom_mm) {
+      if (y_mm_ + kRow_mm > kBottom_mm) {
         pdf_.add_page();
         y_mm_ = kTop_mm;
         table_head(columns);
@@ -261,7 +262,7 @@ class Sheet {
         x_mm += columns[i].width_mm;
       }
       pdf_.line(kLeft_mm, y_mm_ + 1.3, x_mm, y_mm_ + 1.3, 0.1, 0.8);
-      y_mm_ += kLine_mm;
+      y_mm_ += kRow_mm;
     }
     y_mm_ += 0.6;
   }
@@ -533,7 +534,7 @@ class Sheet {
   }
 
   void statements() {
-    section("Statements", 24);
+    section("Statements", 46);  // and the signatures, which do not stand alone
     paragraph(
         "This is not an accredited calibration. The station is not accredited to ISO/IEC 17025, "
         "and "
@@ -546,8 +547,8 @@ class Sheet {
   }
 
   void signatures() {
-    need(24);
-    y_mm_ += 16;
+    need(20);
+    y_mm_ += 13;
     const double half_mm = (kRight_mm - kLeft_mm - 12) / 2;
     for (const double x_mm : {kLeft_mm, kLeft_mm + half_mm + 12}) {
       pdf_.line(x_mm, y_mm_, x_mm + half_mm, y_mm_, 0.2);
