@@ -62,7 +62,7 @@ std::string text_of_file(const std::string& path) {
 }
 
 pid_t spawn(const std::vector<std::string>& words, const std::string& log, bool dies_with_us,
-            const std::string& full_disk_flag = {}) {
+            [[maybe_unused]] const std::string& full_disk_flag = {}) {
   std::vector<char*> arguments;
   for (const std::string& word : words) {
     arguments.push_back(const_cast<char*>(word.c_str()));
@@ -166,6 +166,20 @@ void PostgresServer::start() {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   throw std::runtime_error("the server does not start: " + text_of_file(folder_ / "log"));
+}
+
+std::string PostgresServer::make_database(const std::string& name) {
+  PGconn* connection = ::PQconnectdb(superuser("postgres").c_str());
+  PGresult* result =
+      ::PQexec(connection, ("CREATE DATABASE \"" + name + "\" OWNER station").c_str());
+  const bool good = ::PQresultStatus(result) == PGRES_COMMAND_OK;
+  const std::string words = ::PQerrorMessage(connection);
+  ::PQclear(result);
+  ::PQfinish(connection);
+  if (!good) {
+    throw std::runtime_error("cannot make the database: " + words);
+  }
+  return location(name);
 }
 
 void PostgresServer::fill_disk(bool full) {
