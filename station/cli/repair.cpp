@@ -1,4 +1,5 @@
 // sixpoint repair PATH... -o OUTDIR: mends affected files; the originals stay as they are.
+#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
@@ -82,7 +83,24 @@ Result<std::optional<db::Kept>> remember(Context& context, const std::string& lo
         continue;
       }
     }
-    records.push_back(record_of(context, report));
+    db::RepairRecord record = record_of(context, report);
+    if (report.resumed && !record.constants_id.empty()) {
+      // The mark may name constants of another store.
+      const auto known = store->history(report.serial);
+      const bool here =
+          known && std::any_of(known->begin(), known->end(), [&](const auto& constants) {
+            return constants.id == record.constants_id;
+          });
+      record.constants_id = here ? record.constants_id : "";
+    }
+    // One file with a serial number that no store keeps must not stand in the way of the others.
+    if (const auto id = db::id_of(record); !id) {
+      context.log().error("{}: mended, but the store cannot keep it: {}", printable(report.input),
+                          id.error().brief());
+      context.worsen(static_cast<int>(id.error().code));
+      continue;
+    }
+    records.push_back(std::move(record));
   }
   if (records.empty()) {
     return std::nullopt;
