@@ -153,6 +153,9 @@ class UmockdevBus::Impl {
   Impl() : testbed_(umockdev_testbed_new()) {
     gchar* root = umockdev_testbed_get_root_dir(testbed_);
     root_ = root;
+    // mkdtemp() lets nobody else in; a test may want to be somebody else, and then be refused by
+    // the nodes as on a real machine. (Who listens to events makes a socket there.)
+    ::chmod(root, 0777);
     g_free(root);
     pump_ = std::thread([this] { pump(); });
   }
@@ -770,8 +773,10 @@ std::string UmockdevBus::Impl::describe(Socket& socket, const std::string& path)
         "E: HID_NAME={} {}\nE: HID_PHYS=usb-{}/input0\nE: HID_UNIQ={}\nH: report_descriptor={}\n\n",
         hid, d.vendor_id(), d.product_id(), string_at(d, d.device[14]), string_at(d, d.device[15]),
         nodes.port, d.serial(), hex(d.hid.at(interface.number)));
-    text += fmt::format("P: {}\nE: DEVNAME={}\nE: SUBSYSTEM=hidraw\nE: MAJOR=241\nE: MINOR={}\n\n",
-                        raw, nodes.hidraw_node, nodes.hidraw_node.substr(11));
+    text += fmt::format(
+        "P: {}\nE: DEVNAME={}\nE: SUBSYSTEM=hidraw\nE: MAJOR=241\nE: MINOR={}\n"
+        "L: device=../../../0003:{}.{:04X}\n\n",
+        raw, nodes.hidraw_node, nodes.hidraw_node.substr(11), ids, nodes.address);
     socket.paths.push_back(hid);
     socket.paths.push_back(raw);
   }
@@ -867,6 +872,10 @@ Result<PluggedNodes> UmockdevBus::Impl::plug_in(std::shared_ptr<UsbDevice> devic
     return fail(ErrorCode::internal, "umockdev does not take the handlers", port,
                 "report this as a defect of the program");
   }
+  // Whoever may open a node may talk to its handler.
+  for (const std::string& node : {plugged.nodes.usb_node, plugged.nodes.hidraw_node}) {
+    ::chmod((root_ + "/ioctl" + node).c_str(), 0777);
+  }
   GError* error = nullptr;
   if (umockdev_testbed_add_from_string(testbed_, description.c_str(), &error) == FALSE) {
     const std::string what = error == nullptr ? "" : error->message;
@@ -928,6 +937,14 @@ void UmockdevBus::Impl::allow(const std::string& port, bool allowed) {
 
 UmockdevBus::UmockdevBus(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 UmockdevBus::~UmockdevBus() = default;
+
+Result<PluggedNodes> UmockdevBus::plug_in(std::shared_ptr<UsbDevice> device, std::string port) {
+  return impl_->plug_in(std::move(device), std::move(port));
+}
+
+void UmockdevBus::unplug(const std::string& port) { impl_->unplug(port); }
+
+void UmockdevBus::allow(const std::string& port, bool allowed) { impl_->allow(port, allowed); }
 
 std::string UmockdevBus::missing() {
   // umockdev_in_mock_environment() would answer false before the first testbed, and keep saying so.
