@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/hidraw.h>
@@ -946,17 +947,36 @@ void UmockdevBus::unplug(const std::string& port) { impl_->unplug(port); }
 
 void UmockdevBus::allow(const std::string& port, bool allowed) { impl_->allow(port, allowed); }
 
-std::string UmockdevBus::missing() {
-  // umockdev_in_mock_environment() would answer false before the first testbed, and keep saying so.
+namespace {
+
+constexpr const char* kPreload = "libumockdev-preload.so.0";
+
+// umockdev_in_mock_environment() would answer false before the first testbed, and keep saying so.
+bool is_preloaded() {
   const char* preload = ::getenv("LD_PRELOAD");
-  return preload != nullptr && std::strstr(preload, "libumockdev-preload") != nullptr
-             ? std::string()
-             : "not started with umockdev's preload library (Debian package umockdev)";
+  return preload != nullptr && std::strstr(preload, kPreload) != nullptr;
+}
+
+}  // namespace
+
+std::string UmockdevBus::enter(char** argv) {
+  if (is_preloaded()) {
+    return {};
+  }
+  if (::dlopen(kPreload, RTLD_LAZY | RTLD_LOCAL) == nullptr) {
+    return fmt::format("{} is missing; install the Debian package umockdev", kPreload);
+  }
+  const char* before = ::getenv("LD_PRELOAD");
+  const std::string all = before == nullptr ? kPreload : fmt::format("{}:{}", before, kPreload);
+  ::setenv("LD_PRELOAD", all.c_str(), 1);
+  ::execv("/proc/self/exe", argv);
+  return "this program cannot start itself again with umockdev's preload library";
 }
 
 Result<std::unique_ptr<UmockdevBus>> UmockdevBus::make() {
-  if (const std::string why = missing(); !why.empty()) {
-    return fail(ErrorCode::configuration, why, {}, "apt-get install umockdev");
+  if (!is_preloaded()) {
+    return fail(ErrorCode::configuration, "this process lacks umockdev's preload library", {},
+                "call UmockdevBus::enter() first, or start the program with umockdev-wrapper");
   }
   return std::unique_ptr<UmockdevBus>(new UmockdevBus(std::make_unique<Impl>()));
 }

@@ -6,6 +6,7 @@
 // answers is what Linux 6.1 answers, as far as is known; the same tests run in qemu, where the
 // kernel itself answers.
 //
+//   if (const auto why = UmockdevBus::enter(argv); !why.empty()) { ... return 77; }
 //   SIXPOINT_ASSIGN(auto bus, UmockdevBus::make());
 //   SIXPOINT_ASSIGN(auto nodes, bus->plug_in(device));
 //   ... HotplugWatch, TransportRegistry::open("hid:SERIAL"), a child process ...
@@ -36,9 +37,10 @@ struct PluggedNodes {
 
 class UmockdevBus {
  public:
-  // Exit code 77 of a test that cannot run, and the line that says why: empty when it can. Asks
-  // whether this process was started with the preload library.
-  static std::string missing();
+  // Starts this program again with the preload library; to be called first in main(). Returns when
+  // the process has it, with an empty string, or when it cannot be had, with a line that names the
+  // package (a test then ends with 77).
+  static std::string enter(char** argv);
 
   static Result<std::unique_ptr<UmockdevBus>> make();
   ~UmockdevBus();
