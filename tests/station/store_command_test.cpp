@@ -353,7 +353,8 @@ TEST_F(RefusingStore, WithoutAnyFolderTheReportIsStillPrinted) {
     ::setrlimit(RLIMIT_FSIZE, &limit);
     const auto answer = jig(path("a.db"));
     const bool good = answer.exit_code == 74 && answer.json()["verdict"] == "pass" &&
-                      answer.json()["poses"].size() == 6 && answer.json()["error"]["code"] == "io" &&
+                      answer.json()["poses"].size() == 6 &&
+                      answer.json()["error"]["code"] == "io" &&
                       answer.people.find("could not be kept anywhere") != std::string::npos;
     ::_exit(good ? 0 : 1);
   }
