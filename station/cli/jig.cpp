@@ -30,6 +30,7 @@ struct Options {
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
+  double dwell_s = station::JigRunOptions{}.dwell_s;
   bool write = false;
   bool json = false;
 };
@@ -177,6 +178,7 @@ Result<Done> run(Context& context, const Options& options) {
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_at(*options.latitude_deg, options.altitude_m));
   }
   session.run.write = options.write;
+  session.run.dwell_s = options.dwell_s;
 
   const device::TransportRegistry devices = station::known_devices();
   SIXPOINT_ASSIGN(device::Link link,
@@ -288,6 +290,9 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");
   command->add_option("--altitude", options->altitude_m, "... and metres above sea level");
+  command->add_option("--dwell", options->dwell_s, "seconds that each pose is measured for")
+      ->check(CLI::Range(0.5, 600.0))
+      ->capture_default_str();
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);

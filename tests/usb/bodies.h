@@ -1,0 +1,18 @@
+// The USB tests, for any carrier: each body uses gtest's assertions and leaves nothing plugged in.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "usb/bench.h"
+
+namespace sixpoint::tests {
+
+struct UsbBody {
+  const char* name;  // CamelCase, as a gtest name
+  void (*run)(UsbBench& bench);
+};
+
+const std::vector<UsbBody>& usb_bodies();
+
+}  // namespace sixpoint::tests
