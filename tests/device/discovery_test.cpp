@@ -1,5 +1,5 @@
-// What of discovery needs no bus: addresses, and a unit that is not the one that was found. The rest
-// runs over umockdev and in qemu (tests/usb).
+// What of discovery needs no bus: addresses, and a unit that is not the one that was found. The
+// rest runs over umockdev and in qemu (tests/usb).
 #include "device/discovery.h"
 
 #include <gtest/gtest.h>
@@ -15,12 +15,11 @@ namespace {
 TEST(Discovery, ASerialThatNobodyHasIsUnavailable) {
   TransportRegistry registry;
   register_usb(registry);
-  MemoryEnv env;
   for (const char* address : {"hid:NO-SUCH-UNIT", "usb:NO-SUCH-UNIT"}) {
-    EXPECT_FAILS(registry.open(address, env), ErrorCode::device_unavailable);
+    EXPECT_FAILS(registry.open(address, posix_env()), ErrorCode::device_unavailable);
   }
   // Bytes from a command line reach no terminal as they are.
-  const auto refused = registry.open("hid:\x1b[2J\n", env);
+  const auto refused = registry.open("hid:\x1b[2J\n", posix_env());
   EXPECT_FAILS(refused, ErrorCode::device_unavailable);
   EXPECT_EQ(refused.error().what.find('\x1b'), std::string::npos);
 }
