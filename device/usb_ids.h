@@ -2,7 +2,8 @@
 //
 // 0x1209 is pid.codes' vendor id, and 0x0001 to 0x0010 its product ids for private testing: nobody
 // may ship hardware under them. Whoever builds devices changes these constants and the same numbers
-// in packaging/udev/60-sixpoint-detect.rules (a test holds the two together); docs/devices says how.
+// in packaging/udev/60-sixpoint-detect.rules (a test holds the two together); docs/devices says
+// how.
 #pragma once
 
 #include <array>

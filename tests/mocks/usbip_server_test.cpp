@@ -349,7 +349,8 @@ TEST(UsbipSession, MakesAPeerWaitThatDoesNotFetchItsAnswers) {
 
 TEST(UsbipServer, ATakenPortIsSaid) {
   Bench bench;
-  EXPECT_FAILS(UsbipServer::listen({}, {.port = bench.server->port(), .limits = {}}), ErrorCode::io);
+  EXPECT_FAILS(UsbipServer::listen({}, {.port = bench.server->port(), .limits = {}}),
+               ErrorCode::io);
 }
 
 }  // namespace
