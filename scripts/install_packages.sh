@@ -9,12 +9,14 @@ build_packages=(
   libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev libspdlog-dev libsqlite3-dev
   libhidapi-dev libudev-dev libusb-1.0-0-dev
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
+  libboost-dev libhpdf-dev libqrencode-dev libtomlplusplus-dev
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
   libumockdev-dev umockdev
   busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils
+  poppler-utils zbar-tools
 )
 
 wanted=()
