@@ -18,15 +18,17 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostText = 200;       // of names and serial numbers that come in
-constexpr std::size_t kMostListed = 2000;    // files of one folder
+constexpr std::size_t kMostText = 200;     // of names and serial numbers that come in
+constexpr std::size_t kMostListed = 2000;  // files of one folder
 constexpr std::chrono::seconds kHeartbeat{5};
 
 std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-ApiAnswer answer(int status, const Json& json) { return {status, "application/json", dump(json), {}}; }
+ApiAnswer answer(int status, const Json& json) {
+  return {status, "application/json", dump(json), {}};
+}
 
 ApiAnswer refusal(int status, std::string_view code, std::string_view what,
                   std::string_view hint = "") {
@@ -80,8 +82,8 @@ ApiAnswer refusal(const LaneRefusal& why) {
 bool same_secret(std::string_view a, std::string_view b) {
   unsigned differ = a.size() == b.size() ? 0U : 1U;
   for (std::size_t i = 0; i < b.size(); ++i) {
-    differ |= static_cast<unsigned char>(i < a.size() ? a[i] : 0) ^
-              static_cast<unsigned char>(b[i]);
+    differ |=
+        static_cast<unsigned char>(i < a.size() ? a[i] : 0) ^ static_cast<unsigned char>(b[i]);
   }
   return differ == 0;
 }
@@ -233,9 +235,8 @@ Json Api::state() const {
   json["schema"] = "sixpoint/station/1";
   json["station"] = options_.station;
   json["version"] = options_.version;
-  json["time_ms"] = std::chrono::duration<double, std::milli>(
-                        parts_.env.clock.now().time_since_epoch())
-                        .count();
+  json["time_ms"] =
+      std::chrono::duration<double, std::milli>(parts_.env.clock.now().time_since_epoch()).count();
   json["virtual_hands"] = Json::array();
   json["lanes"] = Json::array();
   for (std::size_t lane = 1; lane <= parts_.lanes.size(); ++lane) {
@@ -451,10 +452,10 @@ ApiAnswer Api::hand(std::size_t lane, const Json& body) {
 
 // A path that the page named, below the folder that this station may touch.
 Result<std::string> Api::inside(const std::string& relative) const {
-  const bool plain =
-      relative.size() < 1000 && !relative.starts_with('/') &&
-      std::none_of(relative.begin(), relative.end(),
-                   [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == '\\'; });
+  const bool plain = relative.size() < 1000 && !relative.starts_with('/') &&
+                     std::none_of(relative.begin(), relative.end(), [](char c) {
+                       return static_cast<unsigned char>(c) < 0x20 || c == '\\';
+                     });
   std::string_view rest = relative;
   bool up = false;
   while (!rest.empty()) {
@@ -517,9 +518,10 @@ ApiAnswer Api::check_file(const Json& body) {
   json["firmware"] = printable(check->firmware, 40);
   json["usable"] = check->usable();
   json["refusal"] = check->refusal;
-  json["reasons"] = check->solved ? check->solved->verification.reasons : std::vector<std::string>{};
-  json["repeat_sides"] = check->solved ? Json(check->solved->verification.missing_directions)
-                                       : Json::array();
+  json["reasons"] =
+      check->solved ? check->solved->verification.reasons : std::vector<std::string>{};
+  json["repeat_sides"] =
+      check->solved ? Json(check->solved->verification.missing_directions) : Json::array();
   json["solved"] = check->solved ? calib::to_json(*check->solved) : Json(nullptr);
   json["constants_file"] = nullptr;
   json["stored_id"] = nullptr;
@@ -590,9 +592,7 @@ void add_event(std::string& text, std::string_view name, const Json& data) {
 }  // namespace
 
 EventStream::EventStream(Api& api)
-    : api_(api),
-      seen_changes_(api.parts_.lanes.size()),
-      next_reading_(api.parts_.lanes.size()) {}
+    : api_(api), seen_changes_(api.parts_.lanes.size()), next_reading_(api.parts_.lanes.size()) {}
 EventStream::~EventStream() { --api_.streams_; }
 
 std::string EventStream::next() {
@@ -628,7 +628,9 @@ std::string EventStream::next() {
     lane["host_ms"] = trace.host_ms;
     Json& flat = lane["mg"] = Json::array();
     for (const auto& force_mg : trace.force_mg) {
-      flat.insert(flat.end(), force_mg.begin(), force_mg.end());
+      for (const std::int16_t mg : force_mg) {
+        flat.push_back(mg);
+      }
     }
     lane["live"] = lanes.live(i + 1);
     live["lanes"].push_back(std::move(lane));

@@ -126,9 +126,8 @@ RepairJob::~RepairJob() = default;
 Status RepairJob::start(const RepairOrder& order) {
   SIXPOINT_ASSIGN(auto found, cli::find_files(impl_->env.files, order.folder, {".gt3x"}));
   // What an earlier job made lies below the folder when the output does: not mended again.
-  std::erase_if(found, [&](const cli::FoundFile& file) {
-    return file.path.starts_with(order.output + "/");
-  });
+  std::erase_if(
+      found, [&](const cli::FoundFile& file) { return file.path.starts_with(order.output + "/"); });
   const std::lock_guard lock(impl_->mutex);
   if (impl_->state == "running") {
     return fail(ErrorCode::usage, "files are being mended already", {}, "wait, or cancel that job");
@@ -147,9 +146,10 @@ Status RepairJob::start(const RepairOrder& order) {
   impl_->summary = Json::object();
   impl_->files = Json::array();
   ++impl_->changes;
-  impl_->thread = std::jthread([this, order, found = std::move(found)](const std::stop_token& stop) {
-    impl_->work(stop, order, found);
-  });
+  impl_->thread =
+      std::jthread([this, order, found = std::move(found)](const std::stop_token& stop) {
+        impl_->work(stop, order, found);
+      });
   return {};
 }
 

@@ -86,6 +86,11 @@ void Server::Impl::stream(httplib::Response& response) {
 void Server::Impl::set_up() {
   server.set_payload_max_length(options.most_body_bytes);
   server.set_tcp_nodelay(true);
+  // The library would share the port with another station (SO_REUSEPORT), and each would get half.
+  server.set_socket_options([](socket_t socket) {
+    const int yes = 1;
+    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  });
   server.set_read_timeout(options.request_time_out_s);
   server.set_write_timeout(options.request_time_out_s);
   server.set_keep_alive_timeout(2);
@@ -118,10 +123,10 @@ void Server::Impl::set_up() {
   server.Post(".*", [this](const httplib::Request& from, httplib::Response& response) {
     give(api.handle(request_of(from)), response);
   });
-  server.set_exception_handler(
-      [](const httplib::Request& /*from*/, httplib::Response& response, std::exception& /*error*/) {
-        give(refused(500, "internal", "a defect of this program"), response);
-      });
+  server.set_exception_handler([](const httplib::Request& /*from*/, httplib::Response& response,
+                                  std::exception_ptr /*error*/) {
+    give(refused(500, "internal", "a defect of this program"), response);
+  });
   server.set_error_handler([](const httplib::Request& /*from*/, httplib::Response& response) {
     if (response.body.empty()) {
       const int status = response.status;
