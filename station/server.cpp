@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <httplib.h>
+#include <sys/socket.h>
 
 namespace sixpoint::station {
 
@@ -42,6 +43,12 @@ ApiAnswer refused(int status, std::string_view code, std::string_view what) {
           {{"X-Content-Type-Options", "nosniff"}, {"Cache-Control", "no-store"}}};
 }
 
+// The library lets five connections wait to be accepted; a burst of pages would wait for seconds.
+class PatientServer : public httplib::Server {
+ public:
+  void widen_backlog() { ::listen(svr_sock_, 256); }
+};
+
 }  // namespace
 
 struct Server::Impl {
@@ -54,7 +61,7 @@ struct Server::Impl {
   Env& env;
   Api& api;
   ServerOptions options;
-  httplib::Server server;
+  PatientServer server;
   int port = 0;
   std::atomic<bool> stopping{false};
 };
@@ -94,7 +101,8 @@ void Server::Impl::set_up() {
   server.set_read_timeout(options.request_time_out_s);
   server.set_write_timeout(options.request_time_out_s);
   server.set_keep_alive_timeout(2);
-  server.set_keep_alive_max_count(1000);
+  // One request per connection: a page that was refused must not hold a thread any longer.
+  server.set_keep_alive_max_count(1);
   server.new_task_queue = [this] { return new httplib::ThreadPool(options.threads); };
   // Before the body is read: who may not ask, does not send either.
   server.set_pre_routing_handler([this](const httplib::Request& from, httplib::Response& response) {
@@ -153,6 +161,7 @@ Result<std::unique_ptr<Server>> Server::open(Env& env, Api& api, const ServerOpt
                 fmt::format("{}:{}", options.bind, options.port),
                 "another station may be running; choose another --port");
   }
+  impl->server.widen_backlog();
   api.set_port(impl->port);
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }

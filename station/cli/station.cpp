@@ -1,10 +1,12 @@
 // sixpoint station: serves the technician's page.
+#include <algorithm>
 #include <csignal>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
@@ -153,6 +155,13 @@ Status serve(Context& context, const Options& options) {
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+  // A burst of pages must not take the descriptors that samples and store need.
+  rlimit descriptors{};
+  if (getrlimit(RLIMIT_NOFILE, &descriptors) == 0) {
+    descriptors.rlim_cur = std::min<rlim_t>(descriptors.rlim_max, 8192);
+    setrlimit(RLIMIT_NOFILE, &descriptors);
+  }
 
   mocks::VirtualBench bench;
   device::TransportRegistry devices = station::known_devices();
