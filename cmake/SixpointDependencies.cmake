@@ -24,3 +24,4 @@ find_package(Boost 1.74 REQUIRED)  # Boost.Math, headers only
 find_library(SIXPOINT_HPDF hpdf REQUIRED)
 find_path(SIXPOINT_HPDF_INCLUDE hpdf.h REQUIRED)
 find_path(SIXPOINT_TOML_INCLUDE toml++/toml.h REQUIRED)
+pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib)
