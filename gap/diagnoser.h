@@ -105,6 +105,8 @@ class Diagnoser {
   void judge_nuisances();
 
   // judge_left_over.cpp
+  // Variance that the accepted slow noise has within this time.
+  double slow_variance_mg2(double seconds) const;
   void judge_left_over();
 
   // measure_gap.cpp
@@ -129,6 +131,7 @@ class Diagnoser {
   double worst_sd_ = 0;
   double extra_mg2_ = 0;
   double jitter_s_ = 0;
+  bool step_there_ = false;  // something follows the moves that is not accepted as settling
   bool mismatch_ = false;
   bool few_poses_ = false;
 };

@@ -107,7 +107,8 @@ void Diagnoser::judge_means() {
   scatter(Scatter::random_walk);
   scatter(Scatter::flicker);
   if (allowed("rounding_floor")) {
-    find({"rounding_floor", 0, -0.7, {}, 0, false, {"offset"}});
+    // Nothing can tell it from an offset of half an LSB: what is known is the prior.
+    find({"rounding_floor", 0, kLogPrior, {}, 0, false, {"offset"}});
   }
   judge_nuisances();
 }

@@ -56,9 +56,12 @@ void Diagnoser::judge_response() {
   }
   options.allow_low_pass = allowed("bandwidth");
   options.allow_resonance = allowed("soft_mount");
+  // Tones without slips know their amplitude best; where hardly any is whole, all of them.
+  const auto whole_ones =
+      std::count_if(tones_.begin(), tones_.end(), [](const ToneFit& t) { return t.slips.empty(); });
   std::vector<ToneFit> whole;
   for (const ToneFit& tone : tones_) {
-    if (tone.slips.empty()) {
+    if (tone.slips.empty() || 2 * whole_ones < std::ssize(tones_)) {
       whole.push_back(tone);
     }
   }
@@ -76,15 +79,14 @@ void Diagnoser::judge_response() {
           {}});
     for (const ToneFit& tone : whole) {
       const Segment& s = bundle_.segments[tone.segment];
-      const double h =
-          low_pass_gain(s.vibration->frequency_hz, l.corner_hz, l.order, bundle_.rate_hz);
+      const double h = l.tone_gain(s.vibration->frequency_hz, bundle_.rate_hz);
       extra_mg2_ += std::pow(707 * s.vibration->amplitude_g * (1 - h), 2) / 3 /
                     static_cast<double>(bundle_.segments.size());
     }
   } else if (allowed("bandwidth")) {
     find({"bandwidth",
           0,
-          std::min(-0.5, low_nats - 14 + kLogPrior),
+          std::min(kLogPrior, low_nats - 14 + kLogPrior),
           {{"corner_hz", {response_.low_pass.corner_hz}, {}}},
           low_nats - 14,
           false,
@@ -95,7 +97,7 @@ void Diagnoser::judge_response() {
     const double nats = r.tone_nats - 10 + kLogPrior;
     find({"soft_mount",
           0,
-          response_.resonance_significant ? nats : std::min(-0.5, nats),
+          response_.resonance_significant ? nats : std::min(kLogPrior, nats),
           {{"frequency_hz", {r.frequency_hz}, {0.01 * r.frequency_hz}}, {"q", {r.q}, {0.03 * r.q}}},
           r.tone_nats - 3,
           false,
@@ -110,14 +112,17 @@ void Diagnoser::judge_response() {
       }
     }
   }
-  test(response_.tone_left_sd, "tone: the amplitude depends on frequency");
   for (std::size_t a = 0; a < 3; ++a) {
     out_.unit.noise_mg[a] = response_.white_mg[a];
   }
 }
 
 void Diagnoser::judge_settling() {
-  step_ = step_response(bundle_, clean_, noise_);
+  double line_power_mg2 = 0;
+  for (const SpectralLine& line : lines_.lines) {
+    line_power_mg2 += line.vector_mg.squaredNorm() / 2;
+  }
+  step_ = step_response(bundle_, clean_, noise_, line_power_mg2);
   if (!step_.usable) {
     return;
   }
@@ -138,13 +143,11 @@ void Diagnoser::judge_settling() {
   if (there && rings && allowed("settling")) {
     find(std::move(f));
     extra_mg2_ += std::pow(1000 * step_.amplitude, 2) * mode.decay_s / 4 / 10 * 0.6;
-    test(step_.left_sd, "transient: the seconds after a move");
   } else {
     if (!there && allowed("settling")) {
       find(std::move(f));
     }
-    test(std::max(step_.left_without_sd, there ? std::sqrt(2 * step_.gain_nats) : 0.0),
-         "transient: the seconds after a move");
+    step_there_ = there;
   }
 }
 

@@ -46,7 +46,9 @@ void Diagnoser::judge_discrete() {
        static_cast<double>(clean_.zeros.samples) / bundle_.rate_hz, "zero on all axes");
   hold("idle_sleep", clean_.held, "fraction", share(clean_.held.samples, n),
        "one value repeated for a second and more");
-  if (clean_.stuck.samples > 0) {
+  // A hold that ends at a segment's end is a short run of its own.
+  if (clean_.stuck.samples > 0 &&
+      (clean_.held.runs == 0 || clean_.stuck.runs > 1 + clean_.held.runs / 5)) {
     alarm(20, fmt::format("codes: {} short runs of one value", clean_.stuck.runs));
   }
   if (clean_.wrapped_samples > 3) {
@@ -98,14 +100,22 @@ void Diagnoser::judge_codes() {
     alarm(10 + std::sqrt(static_cast<double>(codes_.outliers)),
           fmt::format("codes: {} samples far outside the noise", codes_.outliers));
   }
+  // What slow noise adds to the variance of seven seconds is itself random.
+  const double white = *std::min_element(noise_.white_mg.begin(), noise_.white_mg.end());
+  const double slow = slow_variance_mg2(7);
+  const double wider = std::pow(slow / (white * white + slow), 2) * 3.5 * bundle_.rate_hz;
   if (!line && !format && !coloured) {
-    test(codes_.spread_sd - 0.5,
-         fmt::format("codes: the noise changes from dwell to dwell (worst: {})",
-                     bundle_.segments[codes_.worst_segment].name));
-    test(codes_.kurtosis_sd - 1, "codes: the noise is not Gaussian");
+    const double spread =
+        codes_.spread_freedom > 0
+            ? (codes_.spread_sd - wider * std::sqrt(codes_.spread_freedom / 2)) / (1 + wider)
+            : 0;
+    test(spread - 0.5, fmt::format("codes: the noise changes from dwell to dwell (worst: {})",
+                                   bundle_.segments[codes_.worst_segment].name));
+    test(codes_.kurtosis_sd / (1 + wider) - 1, "codes: the noise is not Gaussian");
   }
   if (!line) {
-    test(std::abs(codes_.cross_correlation_sd) - 0.5, "codes: the noise of two axes goes together");
+    test(std::abs(codes_.cross_correlation_sd) / std::sqrt(1 + wider) - 0.5,
+         "codes: the noise of two axes goes together");
   }
   if (!coloured && !accepted("duplicated_samples") && !line) {
     test(codes_.repeats_excess_sd - 0.5, "codes: values repeat more often than chance");

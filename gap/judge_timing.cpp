@@ -104,7 +104,9 @@ void Diagnoser::judge_timing() {
   const std::size_t looked = by_host ? timing_.samples : tone_samples;
   const auto slips = [&](const char* name, std::size_t count, const char* words) {
     const double rate = share(count, looked);
-    const double nats = count == 0 ? -2.0 : 12.0 * static_cast<double>(count) + kLogPrior;
+    // Where every slip would have been seen, none is the answer.
+    const double nats = count == 0 ? (by_host ? -9.0 : kLogPrior - 1)
+                                   : 12.0 * static_cast<double>(count) + kLogPrior;
     if (count > 0 && !allowed(name)) {
       alarm(30, fmt::format("timing: {} samples {}", count, words));
     } else if (looked > 0) {

@@ -144,10 +144,7 @@ void Diagnoser::measure_gap() {
   for (std::size_t a = 0; a < 3; ++a) {
     const double rounding = std::pow(1000 / bundle_.accel_scale_lsb_per_g, 2) / 12;
     for (const double f : noise_.frequency_hz) {
-      const double h = response_.low_pass_significant
-                           ? low_pass_gain(f, response_.low_pass.corner_hz,
-                                           response_.low_pass.order, bundle_.rate_hz)
-                           : 1;
+      const double h = response_.noise_gain(f, bundle_.rate_hz);
       out_.plots.noise_model_mg2[a].push_back(std::pow(response_.white_mg[a] * h, 2) + rounding);
     }
   }
@@ -162,14 +159,7 @@ void Diagnoser::measure_gap() {
       continue;
     }
     const Segment& s = bundle_.segments[tone.segment];
-    double h = 1;
-    if (response_.low_pass_significant) {
-      h *= low_pass_gain(s.vibration->frequency_hz, response_.low_pass.corner_hz,
-                         response_.low_pass.order, bundle_.rate_hz);
-    }
-    if (response_.resonance_significant) {
-      h *= resonance_gain(s.vibration->frequency_hz, response_.resonance);
-    }
+    const double h = response_.tone_gain(s.vibration->frequency_hz, bundle_.rate_hz);
     const double gain = best.state.gain[tone.axis] * 1000 * s.vibration->amplitude_g;
     out_.plots.tones.push_back({tone.axis, s.vibration->frequency_hz, s.vibration->amplitude_g,
                                 gain > 0 ? tone.in_phase_mg[tone.axis] / gain : 0, h});

@@ -14,8 +14,10 @@ namespace {
 using Complex = std::complex<double>;
 using Vector3c = Eigen::Vector3cd;
 
-constexpr double kLowest_hz = 1;            // below it slow noise rules
-constexpr double kFalseLines = 1e-3;        // chance of one false line in a whole recording
+constexpr double kLowest_hz = 3;  // below it slow noise rules; vibration of floors is faster
+// Chance of one false line in a whole recording. One false alarm in a hundred recordings is what
+// the whole diagnosis is allowed; some ten kinds of decision share it evenly.
+constexpr double kFalseLines = 1e-3;
 constexpr std::size_t kLongest = 1U << 17;  // 22 minutes at 100 Hz
 
 // A stretch at rest in one pose, mean removed, masked samples zero, in mg.

@@ -13,7 +13,7 @@ double StepResponse::Mode::at(double t_s) const {
 }
 
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
-                           const NoiseSpectrum& noise) {
+                           const NoiseSpectrum& noise, double line_power_mg2) {
   StepResponse response;
   const auto length = static_cast<std::size_t>(3 * bundle.rate_hz);
   response.share.assign(length, 0);
@@ -26,7 +26,7 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double step_mg = 1000 * segment.approach_g[static_cast<Eigen::Index>(axis)];
-      const double variance = noise.white_mg[axis] * noise.white_mg[axis];
+      const double variance = noise.white_mg[axis] * noise.white_mg[axis] + line_power_mg2;
       if (std::abs(step_mg) < 100 || !(variance > 0)) {
         continue;
       }

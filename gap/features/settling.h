@@ -36,7 +36,8 @@ struct StepResponse {
   double left_without_sd = 0;  // ... with nothing taken off
 };
 
+// `line_power_mg2`: mean square of spectral lines, which is noise to a step.
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
-                           const NoiseSpectrum& noise);
+                           const NoiseSpectrum& noise, double line_power_mg2 = 0);
 
 }  // namespace sixpoint::gap
