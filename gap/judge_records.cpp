@@ -31,7 +31,7 @@ void Diagnoser::judge_lines() {
       }
     }
     const std::string chosen = allowed(name) ? name : other;
-    EffectFinding f{chosen, 0, line.gain_nats - 15 + kLogPrior, {}, line.gain_nats - 6, false, {}};
+    EffectFinding f{chosen, 0, line.gain_nats - 15 + kLogPrior, {}, line.held_out_nats, false, {}};
     f.parameters.push_back({"vector_mg",
                             {line.vector_mg[0], line.vector_mg[1], line.vector_mg[2]},
                             {line.sd_mg, line.sd_mg, line.sd_mg}});
@@ -74,7 +74,7 @@ void Diagnoser::judge_response() {
           low_nats - 10 + kLogPrior,
           {{"corner_hz", {l.corner_hz}, {std::max(l.corner_sd_hz, 1e-3 * l.corner_hz)}},
            {"order", {static_cast<double>(l.order)}, {}}},
-          low_nats - 2,
+          l.held_out_nats,
           false,
           {}});
     for (const ToneFit& tone : whole) {
@@ -88,7 +88,7 @@ void Diagnoser::judge_response() {
           0,
           std::min(kLogPrior, low_nats - 14 + kLogPrior),
           {{"corner_hz", {response_.low_pass.corner_hz}, {}}},
-          low_nats - 14,
+          0,
           false,
           {}});
   }
@@ -99,7 +99,7 @@ void Diagnoser::judge_response() {
           0,
           response_.resonance_significant ? nats : std::min(kLogPrior, nats),
           {{"frequency_hz", {r.frequency_hz}, {0.01 * r.frequency_hz}}, {"q", {r.q}, {0.03 * r.q}}},
-          r.tone_nats - 3,
+          response_.resonance_significant ? r.held_out_nats : 0.0,
           false,
           {}});
     if (response_.resonance_significant) {
@@ -133,7 +133,10 @@ void Diagnoser::judge_settling() {
   const double relative = sd / std::max(1e-9, mode.amplitude);
   const double nats = step_.gain_nats - 2 * std::log1p(0.03 / sd) - std::log(60.0) + kLogPrior;
   const bool rings = step_.gain_nats > step_.plain_nats + 3;
-  EffectFinding f{"settling", 0, nats, {}, step_.gain_nats - 4, false, {}};
+  EffectFinding f{"settling", 0, nats, {}, 0, false, {}};
+  if (nats > kAccept) {
+    f.held_out_gain_nats = held_out_step_nats(bundle_, clean_, noise_, line_power_mg2);
+  }
   f.parameters.push_back({"amplitude", {step_.amplitude}, {sd}});
   f.parameters.push_back({"frequency_hz",
                           {mode.frequency_hz},

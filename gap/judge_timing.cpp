@@ -92,7 +92,7 @@ void Diagnoser::judge_timing() {
             0,
             nats,
             {{"ppm", {ppm}, {std::hypot(sd, 1.5)}}},
-            nats - kLogPrior - 1,
+            timing_.usable ? timing_.clock_held_out_nats : nats - kLogPrior - 1,
             std::abs(ppm) > 200,
             {}});
     }

@@ -172,11 +172,17 @@ class Search {
     }
     response.tone_flat_chi = base_chi;
     response.tone_left_chi = chi;
+    if (response.low_pass_significant) {
+      response.low_pass.held_out_nats = held_out_low_pass(response.low_pass);
+    }
     // A mount's form is not known to the last per cent: nine tenths of what is there must go.
     const Resonance& mount = response.resonance;
     const bool can_be = mount.frequency_hz > 4 && mount.frequency_hz < 45 && mount.q < 8;
     response.resonance_significant = options_.allow_resonance && mount.tone_nats > 14 && can_be &&
                                      chi - freedom < 0.1 * (base_chi - freedom);
+    if (response.resonance_significant) {
+      response.resonance.held_out_nats = held_out_resonance(response.resonance, low_pass_log);
+    }
     const double left = response.resonance_significant ? chi : base_chi;
     const double left_freedom = freedom - (response.low_pass_significant ? 1 : 0) -
                                 (response.resonance_significant ? 2 : 0);
@@ -200,7 +206,8 @@ class Search {
   };
 
   // Whittle's likelihood, the white level of each axis in closed iteration.
-  NoiseFit noise_nats(const LowPass& low_pass, std::array<double, 3>& white_mg) const {
+  NoiseFit noise_nats(const LowPass& low_pass, std::array<double, 3>& white_mg,
+                      int only = -1) const {
     NoiseFit fit;
     double chi = 0;
     std::vector<double> h2(bins_.size());
@@ -210,6 +217,9 @@ class Search {
                   : std::pow(low_pass.noise_gain(bins_[i].frequency_hz, rate_hz_), 2);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (only >= 0 && axis != static_cast<std::size_t>(only)) {
+        continue;
+      }
       double s2 = 16;
       for (int round = 0; round < 8; ++round) {
         double up = 0;
@@ -241,6 +251,11 @@ class Search {
     const auto n = static_cast<double>(bins_.size());
     fit.left_sd = n > 3 ? (chi - n + 3) / std::sqrt(2 * n) : 0;
     return fit;
+  }
+
+  double axis_noise_nats(const LowPass& low_pass, int axis) const {
+    std::array<double, 3> white{};
+    return noise_nats(low_pass, white, axis).nats;
   }
 
   double log_low_pass(std::size_t i, const LowPass& low_pass) const {
@@ -289,6 +304,134 @@ class Search {
       response.resonance = resonance;
       response.resonance.tone_nats = 0.5 * (base_chi - c);
     }
+  }
+
+  static constexpr int kFolds = 4;
+
+  // Tones by frequency, in order of appearance.
+  std::vector<int> folds() const {
+    std::vector<double> frequencies;
+    std::vector<int> fold;
+    for (const Ratio& r : ratios_) {
+      const auto at = std::find(frequencies.begin(), frequencies.end(), r.frequency_hz);
+      fold.push_back(static_cast<int>(at - frequencies.begin()) % kFolds);
+      if (at == frequencies.end()) {
+        frequencies.push_back(r.frequency_hz);
+      }
+    }
+    return fold;
+  }
+
+  // Chi-square of the tones of one fold about the level that the others set on their axis.
+  double unseen_chi(const std::vector<double>& log_gain, const std::vector<int>& fold,
+                    int left_out) const {
+    std::array<double, 3> w{};
+    std::array<double, 3> wy{};
+    for (std::size_t i = 0; i < ratios_.size(); ++i) {
+      if (fold[i] != left_out) {
+        const double weight = 1 / (ratios_[i].sd * ratios_[i].sd);
+        w[ratios_[i].axis] += weight;
+        wy[ratios_[i].axis] += weight * (ratios_[i].log_amplitude - log_gain[i]);
+      }
+    }
+    double chi = 0;
+    for (std::size_t i = 0; i < ratios_.size(); ++i) {
+      const std::size_t axis = ratios_[i].axis;
+      if (fold[i] == left_out && w[axis] > 0) {
+        const double d = ratios_[i].log_amplitude - log_gain[i] - wy[axis] / w[axis];
+        chi += d * d / (ratios_[i].sd * ratios_[i].sd + 1 / w[axis]);
+      }
+    }
+    return chi;
+  }
+
+  double seen_chi(const std::vector<double>& log_gain, const std::vector<int>& fold,
+                  int left_out) const {
+    std::vector<Ratio> seen;
+    std::vector<double> gain;
+    for (std::size_t i = 0; i < ratios_.size(); ++i) {
+      if (fold[i] != left_out) {
+        seen.push_back(ratios_[i]);
+        gain.push_back(log_gain[i]);
+      }
+    }
+    return axis_free_chi(seen, gain);
+  }
+
+  double held_out_low_pass(const LowPass& found) const {
+    std::vector<double> log_gain(ratios_.size());
+    const std::vector<double> flat(ratios_.size(), 0);
+    const auto set = [&](const LowPass& low_pass) {
+      for (std::size_t i = 0; i < ratios_.size(); ++i) {
+        log_gain[i] = log_low_pass(i, low_pass);
+      }
+    };
+    const std::vector<int> fold = folds();
+    double nats = 0;
+    for (int k = 0; k < (ratios_.empty() ? 3 : kFolds); ++k) {
+      LowPass best = found;
+      double least = 1e300;
+      for (int i = -12; i <= 12; ++i) {
+        LowPass low_pass = found;
+        low_pass.corner_hz = std::min(found.corner_hz * (1 + 0.01 * i), 0.495 * rate_hz_);
+        double cost = 0;
+        if (ratios_.empty()) {
+          for (int axis = 0; axis < 3; ++axis) {
+            cost -= axis == k ? 0 : axis_noise_nats(low_pass, axis);
+          }
+        } else {
+          std::array<double, 3> white{};
+          set(low_pass);
+          cost = 0.5 * seen_chi(log_gain, fold, k) - noise_nats(low_pass, white).nats;
+        }
+        if (cost < least) {
+          least = cost;
+          best = low_pass;
+        }
+      }
+      if (ratios_.empty()) {
+        nats += axis_noise_nats(best, k) - axis_noise_nats({}, k);
+      } else {
+        set(best);
+        nats += 0.5 * (unseen_chi(flat, fold, k) - unseen_chi(log_gain, fold, k));
+      }
+    }
+    return nats;
+  }
+
+  double held_out_resonance(const Resonance& found, const std::vector<double>& base) const {
+    std::vector<double> log_gain(ratios_.size());
+    const std::vector<int> fold = folds();
+    double nats = 0;
+    for (int k = 0; k < kFolds; ++k) {
+      Resonance best = found;
+      double least = 1e300;
+      for (double step = 0.06; step > 2e-4; step /= 1.6) {
+        const Resonance centre = best;
+        for (int i = -2; i <= 2; ++i) {
+          for (int j = -2; j <= 2; ++j) {
+            Resonance trial = centre;
+            trial.frequency_hz *= 1 + i * step;
+            trial.q *= 1 + 2 * j * step;
+            for (std::size_t n = 0; n < ratios_.size(); ++n) {
+              log_gain[n] = base[n] + std::log(std::max(
+                                          1e-6, resonance_gain(ratios_[n].frequency_hz, trial)));
+            }
+            const double cost = seen_chi(log_gain, fold, k);
+            if (cost < least) {
+              least = cost;
+              best = trial;
+            }
+          }
+        }
+      }
+      for (std::size_t n = 0; n < ratios_.size(); ++n) {
+        log_gain[n] =
+            base[n] + std::log(std::max(1e-6, resonance_gain(ratios_[n].frequency_hz, best)));
+      }
+      nats += 0.5 * (unseen_chi(base, fold, k) - unseen_chi(log_gain, fold, k));
+    }
+    return nats;
   }
 
   double rate_hz_;

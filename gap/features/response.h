@@ -27,6 +27,9 @@ struct LowPass {
   double noise_nats = 0;  // over flat noise
   double tone_nats = 0;   // over flat tones
   LowPassForm form = LowPassForm::sampled;
+  // Log predictive likelihood over flat: tones of frequencies that were left out; without tones the
+  // noise of one axis, from the corner that the other two show.
+  double held_out_nats = 0;
 
   // |H| of tones and of noise.
   double tone_gain(double frequency_hz, double rate_hz) const;
@@ -40,6 +43,7 @@ struct Resonance {
   double q = 0;
   ResonanceForm form = ResonanceForm::base_excited;
   double tone_nats = 0;
+  double held_out_nats = 0;  // as above
 };
 
 struct Response {

@@ -155,7 +155,11 @@ HostTiming host_timing(const Bundle& bundle) {
   double sxx = 0;
   double sxy = 0;
   std::size_t count = 0;
+  std::array<double, 2> half_xx{};
+  std::array<double, 2> half_xy{};
+  std::size_t segment_number = 0;
   for (const auto& stamps : segments) {
+    const std::size_t half = segment_number++ % 2;
     double mean_t = 0;
     double mean_r = 0;
     for (const Stamp& s : stamps) {
@@ -167,6 +171,8 @@ HostTiming host_timing(const Bundle& bundle) {
     for (const Stamp& s : stamps) {
       sxx += (s.nominal_s - mean_t) * (s.nominal_s - mean_t);
       sxy += (s.nominal_s - mean_t) * (s.residual_s - mean_r);
+      half_xx[half] += (s.nominal_s - mean_t) * (s.nominal_s - mean_t);
+      half_xy[half] += (s.nominal_s - mean_t) * (s.residual_s - mean_r);
     }
     count += stamps.size();
     timing.packets += stamps.size() - 1;
@@ -188,6 +194,15 @@ HostTiming host_timing(const Bundle& bundle) {
   }
   const auto freedom = static_cast<double>(count - segments.size() - 1);
   const double uniform_sd = kHostStamp_s / std::sqrt(3.0);
+  if (half_xx[0] > 0 && half_xx[1] > 0) {
+    for (std::size_t half = 0; half < 2; ++half) {
+      const double seen = half_xy[half] / half_xx[half];
+      const double unseen = half_xy[1 - half] / half_xx[1 - half];
+      const double variance = uniform_sd * uniform_sd / half_xx[1 - half];
+      timing.clock_held_out_nats +=
+          0.5 * (unseen * unseen - (unseen - seen) * (unseen - seen)) / variance;
+    }
+  }
   timing.clock_ppm = 1e6 * (1 / (1 + fitted) - 1);
   timing.scatter_ms = 1e3 * std::sqrt(squares / std::max(1.0, freedom));
   timing.clock_sd_ppm =
