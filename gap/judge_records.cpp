@@ -142,7 +142,14 @@ void Diagnoser::judge_settling() {
                           {mode.frequency_hz},
                           {relative / (2 * M_PI * std::max(0.03, mode.decay_s))}});
   f.parameters.push_back({"decay_s", {mode.decay_s}, {2 * relative * mode.decay_s}});
-  const bool there = nats > kAccept;
+  // A line has a phase of its own in every dwell; what is left of it in their mean rings on at its
+  // frequency.
+  const bool is_line =
+      mode.amplitude < 4.5 * step_.sd &&
+      std::any_of(lines_.lines.begin(), lines_.lines.end(), [&](const SpectralLine& line) {
+        return std::abs(line.frequency_hz - mode.frequency_hz) < 2.5;
+      });
+  const bool there = nats > kAccept && !is_line;
   if (there && rings && allowed("settling")) {
     find(std::move(f));
     extra_mg2_ += std::pow(1000 * step_.amplitude, 2) * mode.decay_s / 4 / 10 * 0.6;

@@ -72,9 +72,11 @@ class Search {
       }
       const double sd = std::max(tone.residual_mg, noise.white_mg[axis]) *
                         std::sqrt(2 / static_cast<double>(tone.samples)) / seen;
+      // Each slip costs a piece at its edges, known to a sample.
+      const double slipped = 0.01 * std::sqrt(static_cast<double>(tone.slips.size()));
       // A third-order term bends 1 g tones by up to 0.3 mg of 1 g.
-      ratios_.push_back(
-          {axis, segment.vibration->frequency_hz, std::log(seen / given), std::hypot(sd, 1e-4)});
+      ratios_.push_back({axis, segment.vibration->frequency_hz, std::log(seen / given),
+                         std::hypot(sd, 1e-4, slipped)});
     }
   }
 
