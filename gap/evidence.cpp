@@ -589,6 +589,11 @@ std::optional<Fit> EvidenceSearch::fit_step(const Whitened& nominal, const Forwa
     for (std::size_t c = 0; c < posterior.columns.size(); ++c) {
       left -= nominal.x.col(posterior.columns[c]) * posterior.mean[static_cast<Eigen::Index>(c)];
     }
+    Eigen::MatrixXd used(rows_, posterior.mean.size());
+    for (std::size_t c = 0; c < posterior.columns.size(); ++c) {
+      used.col(static_cast<Eigen::Index>(c)) = nominal.x.col(posterior.columns[c]);
+    }
+    Eigen::MatrixXd later_used = Eigen::MatrixXd::Zero(used.cols(), 3);
     double most = -1e300;
     const Start* chosen = nullptr;
     Eigen::VectorXd size;
@@ -604,6 +609,12 @@ std::optional<Fit> EvidenceSearch::fit_step(const Whitened& nominal, const Forwa
       b.head<3>() += later_b;
       const Eigen::Matrix3d here = a.topLeftCorner<3, 3>();
       const Eigen::Vector3d here_b = b.head<3>();
+      // What the subset's parameters would take over from the step.
+      Eigen::MatrixXd cross =
+          used.middleRows(start.first, start.end - start.first).transpose() * start.own;
+      cross.leftCols<3>() += later_used;
+      const Eigen::MatrixXd here_used = cross.leftCols<3>();
+      a -= cross.transpose() * posterior.covariance * cross;
       a.diagonal().array() += 1 / (kPrior_mg * kPrior_mg);
       const Eigen::LLT<Eigen::MatrixXd> llt(a);
       const Eigen::VectorXd x = llt.solve(b);
@@ -618,6 +629,7 @@ std::optional<Fit> EvidenceSearch::fit_step(const Whitened& nominal, const Forwa
       if (start.whole) {
         later = here;
         later_b = here_b;
+        later_used = here_used;
       }
     }
     w.y = nominal.y;
