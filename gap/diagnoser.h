@@ -111,6 +111,7 @@ class Diagnoser {
 
   // measure_gap.cpp
   void measure_gap();
+  void plot_allan();
 
   const Bundle& bundle_;
   const DiagnoseOptions& options_;

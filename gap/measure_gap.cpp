@@ -139,6 +139,7 @@ void Diagnoser::measure_gap() {
     out_.where.resize(20);
   }
   out_.plots.residuals = std::move(plots);
+  plot_allan();
   out_.plots.frequency_hz = noise_.frequency_hz;
   out_.plots.noise_mg2 = noise_.variance_mg2;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -163,6 +164,63 @@ void Diagnoser::measure_gap() {
     const double gain = best.state.gain[tone.axis] * 1000 * s.vibration->amplitude_g;
     out_.plots.tones.push_back({tone.axis, s.vibration->frequency_hz, s.vibration->amplitude_g,
                                 gain > 0 ? tone.in_phase_mg[tone.axis] / gain : 0, h});
+  }
+}
+
+// Overlapping estimate over means of one second (IEEE 1139); masked seconds repeat the last.
+void Diagnoser::plot_allan() {
+  const Segment* longest = nullptr;
+  for (const Segment& segment : bundle_.segments) {
+    if (segment.kind == Segment::Kind::still &&
+        (longest == nullptr || segment.samples > longest->samples)) {
+      longest = &segment;
+    }
+  }
+  const auto second = static_cast<std::size_t>(bundle_.rate_hz);
+  if (longest == nullptr || second == 0 || longest->samples < 60 * second) {
+    return;
+  }
+  const Fit& fit = search_->best();
+  const std::size_t count = longest->samples / second;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> sum = {0};
+    double last = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      double total = 0;
+      double n = 0;
+      for (std::size_t i = 0; i < second; ++i) {
+        const std::size_t at = longest->first_sample + k * second + i;
+        if ((clean_.flags[at] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0) {
+          total += 1000.0 * clean_.samples[at][axis] / bundle_.accel_scale_lsb_per_g;
+          n += 1;
+        }
+      }
+      last = n > 0 ? total / n : last;
+      sum.push_back(sum.back() + last);
+    }
+    for (std::size_t m = 1; 4 * m <= count; m *= 2) {
+      double square = 0;
+      double n = 0;
+      for (std::size_t i = 0; i + 2 * m < sum.size(); ++i) {
+        const double d = (sum[i + 2 * m] - 2 * sum[i + m] + sum[i]) / static_cast<double>(m);
+        square += d * d;
+        n += 1;
+      }
+      const auto tau = static_cast<double>(m);
+      const double white = std::pow(response_.white_mg[axis], 2) / (tau * bundle_.rate_hz);
+      double slow = 0;
+      if (fit.scatter == Scatter::flicker) {
+        slow = 2 * std::log(2.0) * flicker_density_mg2(fit.scatter_size);
+      } else if (fit.scatter == Scatter::random_walk) {
+        slow = fit.scatter_size * fit.scatter_size * tau / 3;
+      }
+      if (axis == 0) {
+        out_.plots.allan_s.push_back(tau);
+      }
+      out_.plots.allan_mg[axis].push_back(std::sqrt(square / std::max(1.0, 2 * n)));
+      out_.plots.allan_nominal_mg[axis].push_back(std::sqrt(white));
+      out_.plots.allan_model_mg[axis].push_back(std::sqrt(white + slow));
+    }
   }
 }
 

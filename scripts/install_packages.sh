@@ -6,7 +6,7 @@ set -euo pipefail
 
 build_packages=(
   ca-certificates ccache cmake g++ git ninja-build pkg-config
-  libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev libspdlog-dev libsqlite3-dev
+  libcairo2-dev libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev librsvg2-dev libspdlog-dev libsqlite3-dev
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
 )
 test_packages=(
