@@ -49,6 +49,8 @@ class VirtualUnit {
   void take_report(std::span<const std::uint8_t> report, nanoseconds now);
   std::optional<device::Report> next_report(nanoseconds now);
   std::optional<Bytes> next_bulk(nanoseconds now);
+  // Counts the requests to download: a new one ends what is on its way.
+  std::uint64_t downloads() const { return downloads_; }
   // When the next report comes by itself; none when nothing will without being asked.
   std::optional<nanoseconds> next_due() const;
 
@@ -60,11 +62,18 @@ class VirtualUnit {
   void cut_power(nanoseconds now);
   void restore_power(nanoseconds now);
 
+  // The host is gone (cable, bus reset): the stream, a download and an open page write end, replies
+  // that nobody fetched are forgotten. A recording goes on.
+  void host_gone();
+
   const sim::UnitTruth& truth() const { return options_.truth; }
   PageMemory& memory() { return memory_; }
   void set_battery_mv(std::uint16_t battery_mv) { options_.battery_mv = battery_mv; }
   sim::FilterConfiguration recording_filter() const;
-  // What a recording holds, as it would be downloaded; for tests.
+  // Puts a recording into the flash as if the unit had made it; configuration where it does not
+  // fit.
+  Status keep_recording(Bytes image, UtcTime start);
+  // What each recording holds, as it would be downloaded.
   const std::vector<Bytes>& recordings() const { return images_; }
 
  private:
@@ -96,6 +105,7 @@ class VirtualUnit {
   device::ReplyCode start_stream(int rate_hz, nanoseconds now);
   device::ReplyCode commit(std::uint16_t crc, Bytes& payload, nanoseconds now);
   void finish_recording(nanoseconds now);
+  void keep(Bytes image, UtcTime start);
   void load_page();
   std::uint64_t device_time_us(nanoseconds at) const;
   double seconds_on(nanoseconds at) const;
@@ -111,6 +121,7 @@ class VirtualUnit {
   std::optional<RecordingRun> recording_;
   std::optional<Staged> staged_;
   std::optional<Download> download_;
+  std::uint64_t downloads_ = 0;
   std::deque<device::Report> replies_;
   std::optional<device::Message> last_request_;
   device::Report last_reply_{};

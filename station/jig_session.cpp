@@ -141,8 +141,16 @@ Status Session::come_back(JigRun& run, const Error& error) {
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error);
     if (!again) {
-      gone_ = error.what;
-      return handle(run, run.on_unit_gone());
+      unit_ = nullptr;  // whoever kept them let go of them
+      jig_ = nullptr;
+    }
+    if (!again && again.error().code != ErrorCode::device_unavailable) {
+      return fail(again.error());  // whoever drives the run ends it himself
+    }
+    if (!again) {
+      gone_ = again.error().what;
+      const auto word = hooks_.words ? hooks_.words() : std::nullopt;
+      return handle(run, word == OperatorWord::stop ? run.on_operator(*word) : run.on_unit_gone());
     }
     unit_ = again->unit;
     jig_ = again->jig;
@@ -183,6 +191,9 @@ Status Session::stream(JigRun& run) {
         return fail(block.error());
       }
       SIXPOINT_CHECK(come_back(run, block.error()));
+      if (unit_ == nullptr) {
+        break;
+      }
       heard_s = seconds(unit_->clock().elapsed());
       lost = 0;
       continue;
@@ -213,9 +224,13 @@ Status Session::stream(JigRun& run) {
     }
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
+  if (unit_ == nullptr) {
+    return {};
+  }
   report_.stream = unit_->stream_statistics();
   report_.stream.lost_samples += lost_before_;
-  if (run.outcome() == JigOutcome::unit_gone) {
+  if (run.outcome() == JigOutcome::unit_gone || run.outcome() == JigOutcome::stopped) {
+    static_cast<void>(unit_->stop_stream());  // it may be gone
     return {};
   }
   const Status stopped = unit_->stop_stream();
@@ -428,7 +443,9 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
   const Status streamed = stream(machine);
   if (!streamed) {
     // Whatever happened, leave the jig at rest.
-    static_cast<void>(jig_->stop());
+    if (jig_ != nullptr) {
+      static_cast<void>(jig_->stop());
+    }
     return fail(streamed.error());
   }
   SIXPOINT_CHECK(conclude(machine));

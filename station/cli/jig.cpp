@@ -7,13 +7,12 @@
 #include "base/atomic_file.h"
 #include "calib/gravity.h"
 #include "device/unit.h"
-#include "gt3x/model.h"
 #include "station/certificate.h"
 #include "station/cli/command.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
-#include "station/software.h"
+#include "station/run_records.h"
 #include "station/station_records.h"
 
 namespace sixpoint::cli {
@@ -37,6 +36,7 @@ struct Options {
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
+  double dwell_s = station::JigRunOptions{}.dwell_s;
   bool write = false;
   bool json = false;
 };
@@ -50,37 +50,18 @@ struct Done {
   Result<db::Kept> kept = db::Kept{};
 };
 
-// The limits that the verdict used, whole: a verdict is nothing without them.
-Json limits_of(const station::JigSessionOptions& session) {
-  Json json = station::to_json(session.limits);
-  json["run"] = {{"tilt_deg", session.run.tilt_limit_deg},
-                 {"moved_mg", session.run.moved_mg},
-                 {"still_factor", session.run.still_factor},
-                 {"moved_factor", session.run.moved_factor},
-                 {"first_noise_mg", session.run.first_noise_limit_mg},
-                 {"dwell_s", session.run.dwell_s},
-                 {"rate_hz", session.run.rate_hz}};
-  return json;
-}
-
 // What is known before the unit is measured; refused here, it costs no one a run.
 Result<db::RunRecord> record_before(Context& context, const Options& options,
                                     const station::JigSessionOptions& session,
                                     const std::string& serial, const std::string& jig,
                                     Result<db::Store>& store) {
-  db::RunRecord run;
-  run.serial = serial;
-  run.model = gt3x::model_of(serial);
-  run.kind = options.study.empty() ? "jig" : station::kStudyKind;
-  run.filter = calib::to_string(session.filter);
+  db::RunRecord run =
+      station::run_record_before(session, serial, options.jig_id.empty() ? jig : options.jig_id);
+  if (!options.study.empty()) {
+    run.kind = station::kStudyKind;
+  }
   run.operator_name = options.operator_name;
   run.station = options.station;
-  run.jig = options.jig_id.empty() ? jig : options.jig_id;
-  run.software = station::software_name();
-  run.build = station::software_build();
-  run.limits = limits_of(session).dump();
-  run.gravity_m_per_s2 = session.gravity.m_per_s2;
-  run.document = "{}";
   if (!options.jig_due.empty()) {
     const auto due = parse_iso8601(options.jig_due);
     if (!due) {
@@ -112,58 +93,6 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
   }
   SIXPOINT_CHECK(db::id_of(run, {}));
   return run;
-}
-
-Status add_records(db::Keeper& keeper, const Options& options, const db::RunRecord& run,
-                   Done& done) {
-  const station::JigReport& report = done.report;
-  SIXPOINT_ASSIGN(
-      done.run_id,
-      keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
-  if (report.written) {
-    db::UnitWrite write;
-    write.run_id = done.run_id;
-    write.serial = report.serial;
-    write.written = report.ended;
-    write.as_found =
-        report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
-    write.as_left = calib::to_json(report.six->best().stored).dump();
-    write.read_back = calib::to_json(report.as_left->constants).dump();
-    SIXPOINT_CHECK(keeper.add_unit_write(write));
-  }
-  if (report.usable() && options.study.empty()) {
-    calib::ConstantsRecord constants = report.record();
-    constants.made_from.station = options.station;
-    db::ConstantsRecord row;
-    row.made_at = report.ended;
-    row.serial = report.serial;
-    row.filter = calib::to_string(report.filter);
-    row.method = constants.method;
-    row.run_id = done.run_id;
-    row.document = calib::to_json(constants).dump();
-    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, run.model));
-  }
-  return {};
-}
-
-void complete(db::RunRecord& run, const station::JigReport& report, const std::string& study) {
-  run.started = report.started;
-  run.ended = report.ended;
-  run.verdict = station::to_string(report.verdict);
-  // The unit's own words may hold anything; a run is kept whatever they are.
-  Json document = report.to_json();
-  if (!study.empty()) {
-    document["study"] = study;
-  }
-  run.document = document.dump(-1, ' ', false, Json::error_handler_t::replace);
-  run.codes = report.codes;
-  if (!report.faces.empty()) {
-    double sum_c = 0;
-    for (const station::PoseReading& face : report.faces) {
-      sum_c += face.temperature_c;
-    }
-    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
-  }
 }
 
 Status check_outputs(const Options& options) {
@@ -220,6 +149,7 @@ Result<Done> run(Context& context, const Options& options) {
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_at(*options.latitude_deg, options.altitude_m));
   }
   session.run.write = options.write;
+  session.run.dwell_s = options.dwell_s;
 
   const device::TransportRegistry devices = station::known_devices();
   SIXPOINT_ASSIGN(device::Link link,
@@ -270,9 +200,12 @@ Result<Done> run(Context& context, const Options& options) {
   }
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
-  complete(record, done.report, options.study);
-  done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) {
-    return add_records(keeper, options, record, done);
+  station::complete_run_record(record, done.report, options.study);
+  done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
+    SIXPOINT_ASSIGN(const auto stored, station::add_run_records(keeper, done.report, record));
+    done.run_id = stored.run_id;
+    done.constants_id = stored.constants_id;
+    return {};
   });
   record.id = done.run_id;
   if (done.kept) {
@@ -347,6 +280,9 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");
   command->add_option("--altitude", options->altitude_m, "... and metres above sea level");
+  command->add_option("--dwell", options->dwell_s, "seconds that each pose is measured for")
+      ->check(CLI::Range(0.5, 600.0))
+      ->capture_default_str();
   command->add_option("--limits", options->limits,
                       "a TOML file of limits (docs/limits.md); else the built-in ones");
   command->add_option("--certificate", options->certificate,
