@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/memory_env.h"
+#include "mocks/scaled_clock.h"
 #include "mocks/virtual_jig.h"
 #include "mocks/virtual_settings.h"
 
@@ -96,16 +96,14 @@ device::Link link_to(std::shared_ptr<PluggedUnit> plugged, bool with_jig) {
 }
 
 void register_virtual(device::TransportRegistry& registry) {
-  registry.add(
-      "virtual", "virtual:seed=7,jig=auto",
-      [](std::string_view rest, Env& env) -> Result<device::Link> {
-        SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(rest, env.seed));
-        std::shared_ptr<Clock> clock = settings.real_time
-                                           ? device::borrow_clock(env.clock)
-                                           : std::make_shared<ManualClock>(env.clock.now());
-        return link_to(std::make_shared<PluggedUnit>(std::move(settings.unit), std::move(clock)),
-                       settings.with_jig);
-      });
+  registry.add("virtual", "virtual:seed=7,jig=auto",
+               [](std::string_view rest, Env& env) -> Result<device::Link> {
+                 SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(rest, env.seed));
+                 std::shared_ptr<Clock> clock = clock_of(settings, env.clock);
+                 return link_to(
+                     std::make_shared<PluggedUnit>(std::move(settings.unit), std::move(clock)),
+                     settings.with_jig);
+               });
 }
 
 }  // namespace sixpoint::mocks

@@ -64,16 +64,16 @@ void put_endpoint(Bytes& out, std::uint8_t address, UsbEndpoint::Type type, std:
 }
 
 // What info.txt and log.bin of one recording are, in a folder of the volume.
-Status add_recording(std::vector<FatFile>& files, const std::string& folder, const Bytes& image,
-                     UtcTime modified) {
+Status add_recording(std::vector<FatFile>& files, const std::string& folder, const Bytes& image) {
   MemoryFiles disk;
   SIXPOINT_ASSIGN(auto file, disk.create("recording.gt3x"));
   SIXPOINT_CHECK(file->write_at(0, image));
   SIXPOINT_ASSIGN(gt3x::Recording recording, gt3x::Recording::open(disk, "recording.gt3x"));
+  const UtcTime start = recording.info().start().value_or(UtcTime{});
   for (const char* name : {"info.txt", "log.bin"}) {
     SIXPOINT_ASSIGN(auto entry, recording.open_entry(name));
     SIXPOINT_ASSIGN(Bytes content, gt3x::read_all(*entry, kLongestLog));
-    files.push_back({folder + name, std::make_shared<const Bytes>(std::move(content)), modified});
+    files.push_back({folder + name, std::make_shared<const Bytes>(std::move(content)), start});
   }
   return {};
 }
@@ -117,8 +117,7 @@ Result<FatImage> unit_volume(const VirtualUnit& unit) {
   const UtcTime date = unit.truth().calibrated;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const bool newest = i + 1 == images.size();
-    SIXPOINT_CHECK(
-        add_recording(files, newest ? "" : fmt::format("REC{:05}/", i + 1), images[i], date));
+    SIXPOINT_CHECK(add_recording(files, newest ? "" : fmt::format("REC{:05}/", i + 1), images[i]));
   }
   if (images.empty()) {
     const std::string info =

@@ -22,6 +22,8 @@ struct CaptureOptions {
   // paper's second criterion.
   double side_s = 40;
   double turn_s = 5;  // for the hand, after the prompt
+  // Asked several times a second while the unit rests; true ends the recording. May be empty.
+  std::function<bool()> cancelled;
   calib::SolveOptions solve;
 };
 

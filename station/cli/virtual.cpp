@@ -1,6 +1,7 @@
 // sixpoint virtual: virtual units for a desktop, over USB/IP.
 #include <csignal>
 #include <memory>
+#include <set>
 #include <thread>
 
 #include <fmt/format.h>
@@ -52,6 +53,15 @@ Status apply_scenario(Context& context, const std::string& path, mocks::VirtualS
   settings.unit.seed = scenario.seed;
   settings.unit.temperature_c = scenario.temperature_c;
   settings.unit.gravity_g = scenario.gravity_g;
+  double duration_s = 0;
+  for (const sim::MotionSpec& motion : scenario.motions) {
+    duration_s += motion.duration_s;
+  }
+  // A sample has 36 bits at least.
+  if (duration_s * scenario.rate_hz * 4.5 > static_cast<double>(settings.unit.flash_bytes)) {
+    return fail(ErrorCode::configuration, "the recording does not fit into the unit's flash", path,
+                "make the scenario shorter");
+  }
   MemoryFiles disk;
   SIXPOINT_CHECK(sim::write_recording(disk, "recording.gt3x", scenario));
   SIXPOINT_ASSIGN(recording, read_file(disk, "recording.gt3x", settings.unit.flash_bytes));
@@ -75,14 +85,20 @@ Result<Bench> make_bench(Context& context, const Options& options) {
 
   Bench bench;
   const auto clock = device::borrow_clock(context.env.clock);
+  std::set<std::string> serials;
+  std::uint64_t next_seed = first.unit.seed;
   for (int i = 0; i < options.count; ++i) {
     mocks::VirtualUnitOptions unit = first.unit;
     if (i > 0) {
-      // The others are units of their own, by the seeds that follow.
-      unit.seed = first.unit.seed + static_cast<std::uint64_t>(i);
+      // The others are units of their own, by the seeds that follow; no two of one serial number.
       sim::UnitWishes wishes;
       wishes.firmware = first.unit.truth.firmware;
-      unit.truth = sim::draw_unit(unit.seed, wishes);
+      do {
+        unit.seed = ++next_seed;
+        unit.truth = sim::draw_unit(unit.seed, wishes);
+      } while (!serials.insert(unit.truth.serial).second);
+    } else {
+      serials.insert(unit.truth.serial);
     }
     bench.units.push_back(unit.truth);
     auto plugged = std::make_shared<mocks::PluggedUnit>(std::move(unit), clock);

@@ -177,7 +177,8 @@ TEST(Kernel, MountsTheVolumeWithTheRecording) {
   EXPECT_NE(read_all("/mnt/info.txt").find("Serial Number: " + unit.serial), std::string::npos);
   // 10 min of records of 9 + 450 bytes, byte for byte those of the recording: it is stored in its
   // archive as it is.
-  const std::string log = read_all("/mnt/log.bin");
+  const std::string text = read_all("/mnt/log.bin");
+  const Bytes log(text.begin(), text.end());
   EXPECT_GT(log.size(), 600U * 459U);
   const Bytes& image = unit.unit->unit.recordings().front();
   EXPECT_NE(std::search(image.begin(), image.end(), log.begin(), log.end()), image.end());

@@ -33,5 +33,5 @@ for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1/serial ] && break; sleep 0
 echo "== the program ends and takes its units along"
 kill -INT $server
 wait $server
-for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-' || break; sleep 0.1; done
-! ls /sys/bus/usb/devices | grep '^1-'
+for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
+! ls /sys/bus/usb/devices | grep '^1-[1-9]'

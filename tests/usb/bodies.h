@@ -1,7 +1,7 @@
 // The USB tests, for any carrier: each body uses gtest's assertions and leaves nothing plugged in.
 #pragma once
 
-#include <string>
+#include <ostream>
 #include <vector>
 
 #include "usb/bench.h"
@@ -14,5 +14,8 @@ struct UsbBody {
 };
 
 const std::vector<UsbBody>& usb_bodies();
+
+// For gtest, which would print the pointers.
+inline void PrintTo(const UsbBody& body, std::ostream* out) { *out << body.name; }
 
 }  // namespace sixpoint::tests

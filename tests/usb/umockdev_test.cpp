@@ -124,13 +124,13 @@ TEST_F(Misbehaving, AStalledBulkEndpointIsClearedAndTheDownloadGoesOn) {
   EXPECT_EQ(stalls, 0);
 }
 
-TEST_F(Misbehaving, AStalledCommandIsAnIoError) {
+TEST_F(Misbehaving, AStalledReportIsAnIoError) {
   wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
     return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::stall()) : std::nullopt;
   };
   auto link = open();
   ASSERT_OK(link);
-  EXPECT_FAILS(device::Unit::open(std::move(*link)), ErrorCode::io);
+  EXPECT_FAILS(link->reports->write(Bytes(64), seconds(1)), ErrorCode::io);
 }
 
 // A device that takes no report holds a hidraw write for five seconds; the program does not wait.
