@@ -1,4 +1,4 @@
-#include "device/unit.h"
+#include "device/wire_unit.h"
 
 #include <algorithm>
 #include <vector>
@@ -57,7 +57,7 @@ Result<std::unique_ptr<Unit>> Unit::open(Link link, UnitOptions options) {
   return unit;
 }
 
-Result<Identity> Unit::identify() {
+Result<Identity> WireUnit::identify() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::identify));
   SIXPOINT_ASSIGN(Identity identity, decode_identity(payload));
   if (identity.serial != identity_.serial) {
@@ -69,14 +69,14 @@ Result<Identity> Unit::identify() {
   return identity;
 }
 
-void Unit::cancel() {
+void WireUnit::cancel() {
   link_.reports->cancel();
   if (link_.bulk) {
     link_.bulk->cancel();
   }
 }
 
-Result<std::optional<Message>> Unit::receive(nanoseconds time_out) {
+Result<std::optional<Message>> WireUnit::receive(nanoseconds time_out) {
   // One byte more than a report, so that a longer one is seen to be too long.
   std::array<std::uint8_t, kReportBytes + 1> buffer{};
   SIXPOINT_ASSIGN(const std::size_t count, link_.reports->read(buffer, time_out));
@@ -91,7 +91,7 @@ Result<std::optional<Message>> Unit::receive(nanoseconds time_out) {
   return std::optional<Message>(std::move(*message));
 }
 
-void Unit::take_samples(const Message& message) {
+void WireUnit::take_samples(const Message& message) {
   if (!streaming_) {
     return;  // was under way when the stream stopped
   }
@@ -116,7 +116,7 @@ void Unit::take_samples(const Message& message) {
   waiting_.push_back(std::move(*block));
 }
 
-Result<Bytes> Unit::ask(Command command, Bytes payload, bool first) {
+Result<Bytes> WireUnit::ask(Command command, Bytes payload, bool first) {
   if (first) {
     sequence_ = 0;
   } else {
@@ -150,7 +150,7 @@ Result<Bytes> Unit::ask(Command command, Bytes payload, bool first) {
               "unplug the unit and plug it in again");
 }
 
-Result<Bytes> Unit::read_page() {
+Result<Bytes> WireUnit::read_page() {
   Bytes page;
   while (page.size() < kPageBytes) {
     const auto length =
@@ -169,12 +169,12 @@ Result<Bytes> Unit::read_page() {
   return page;
 }
 
-Result<CalibrationPage> Unit::read_calibration() {
+Result<CalibrationPage> WireUnit::read_calibration() {
   SIXPOINT_ASSIGN(const Bytes page, read_page());
   return decode_calibration_page(page);
 }
 
-Status Unit::write_calibration(const CalibrationPage& page) {
+Status WireUnit::write_calibration(const CalibrationPage& page) {
   SIXPOINT_ASSIGN(const Bytes before, read_page());
   SIXPOINT_ASSIGN(const Bytes bytes, encode_calibration_page(page, before));
   const std::uint16_t crc = crc_ccitt(bytes);
@@ -217,12 +217,12 @@ Status Unit::write_calibration(const CalibrationPage& page) {
   return {};
 }
 
-Result<FilterState> Unit::filter() {
+Result<FilterState> WireUnit::filter() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::get_filter));
   return decode_filter(payload);
 }
 
-Status Unit::set_filter(FilterConfiguration filter) {
+Status WireUnit::set_filter(FilterConfiguration filter) {
   SIXPOINT_CHECK(ask(Command::set_filter, PayloadWriter()
                                               .put(static_cast<std::uint8_t>(
                                                   filter == FilterConfiguration::legacy ? 0 : 1))
@@ -237,7 +237,7 @@ Status Unit::set_filter(FilterConfiguration filter) {
   return {};
 }
 
-Status Unit::start_stream(int rate_hz) {
+Status WireUnit::start_stream(int rate_hz) {
   waiting_.clear();
   statistics_ = {};
   next_index_ = 0;
@@ -249,7 +249,7 @@ Status Unit::start_stream(int rate_hz) {
   return {};
 }
 
-Result<std::optional<SampleBlock>> Unit::next_samples(nanoseconds time_out) {
+Result<std::optional<SampleBlock>> WireUnit::next_samples(nanoseconds time_out) {
   const nanoseconds deadline = link_.clock->elapsed() + time_out;
   for (nanoseconds left = time_out; waiting_.empty() && left > nanoseconds::zero();
        left = deadline - link_.clock->elapsed()) {
@@ -266,7 +266,7 @@ Result<std::optional<SampleBlock>> Unit::next_samples(nanoseconds time_out) {
   return block;
 }
 
-Status Unit::stop_stream() {
+Status WireUnit::stop_stream() {
   const auto answer = ask(Command::stop_stream);
   streaming_ = false;
   waiting_.clear();
@@ -274,7 +274,7 @@ Status Unit::stop_stream() {
   return {};
 }
 
-Result<std::uint16_t> Unit::start_recording(int rate_hz, UtcTime now) {
+Result<std::uint16_t> WireUnit::start_recording(int rate_hz, UtcTime now) {
   SIXPOINT_ASSIGN(
       const Bytes payload,
       ask(Command::start_recording, PayloadWriter()
@@ -289,7 +289,7 @@ Result<std::uint16_t> Unit::start_recording(int rate_hz, UtcTime now) {
   return id;
 }
 
-Result<std::uint16_t> Unit::stop_recording() {
+Result<std::uint16_t> WireUnit::stop_recording() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::stop_recording));
   PayloadReader reader(payload);
   const auto id = reader.get<std::uint16_t>();
@@ -299,7 +299,7 @@ Result<std::uint16_t> Unit::stop_recording() {
   return id;
 }
 
-Result<std::vector<RecordingInfo>> Unit::recordings() {
+Result<std::vector<RecordingInfo>> WireUnit::recordings() {
   std::vector<RecordingInfo> list;
   std::size_t count = 0;
   do {
@@ -318,7 +318,7 @@ Result<std::vector<RecordingInfo>> Unit::recordings() {
   return list;
 }
 
-Status Unit::download_from(const RecordingInfo& recording, std::uint64_t& offset,
+Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& offset,
                            WritableFile& file, Sha256& hash,
                            const std::function<void(std::uint64_t)>& progress) {
   // What an ended request left in the pipe is drained by the offset check below.
@@ -372,7 +372,7 @@ Status Unit::download_from(const RecordingInfo& recording, std::uint64_t& offset
   return {};
 }
 
-Status Unit::download(const RecordingInfo& recording, FileSystem& files, const std::string& path,
+Status WireUnit::download(const RecordingInfo& recording, FileSystem& files, const std::string& path,
                       const std::function<void(std::uint64_t)>& progress) {
   if (!link_.bulk) {
     return fail(ErrorCode::device_unavailable, "this device offers no download", link_.address,
