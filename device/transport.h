@@ -43,6 +43,9 @@ struct Link {
   // Time-outs and waits use this clock and no other. It is the machine's for hardware; a unit in
   // software brings its own, on which a minute passes at once. Never null.
   std::shared_ptr<Clock> clock;
+  // The serial number that the device gave outside of the protocol (USB descriptor); empty where
+  // there is none. Unit::open() refuses a unit that calls itself otherwise.
+  std::string serial = {};
   std::unique_ptr<Jig> jig;  // a jig that is part of the device (virtual units); mostly null
 };
 

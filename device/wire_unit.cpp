@@ -54,6 +54,11 @@ Result<std::unique_ptr<Unit>> Unit::open(Link link, UnitOptions options) {
   std::unique_ptr<Unit> unit(new Unit(std::move(link), options));
   SIXPOINT_ASSIGN(const Bytes payload, unit->ask(Command::identify, {}, true));
   SIXPOINT_ASSIGN(unit->identity_, decode_identity(payload));
+  if (!unit->link_.serial.empty() && unit->link_.serial != unit->identity_.serial) {
+    return nonsense(unit->link_.address,
+                    fmt::format("the unit is {} by its USB descriptor and {} by its own word",
+                                printable(unit->link_.serial, 80), unit->identity_.serial));
+  }
   return unit;
 }
 
@@ -340,12 +345,15 @@ Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& of
       return nonsense(link_.address, "the unit offers another length than its list says");
     }
     while (offset < end) {
-      SIXPOINT_ASSIGN(const std::size_t count, link_.bulk->read(buffer, options_.bulk_time_out));
-      if (count == 0) {
-        break;  // ask again from here
+      const Result<std::size_t> count = link_.bulk->read(buffer, options_.bulk_time_out);
+      if (!count && count.error().code != ErrorCode::io) {
+        return fail(count.error());
+      }
+      if (!count || *count == 0) {
+        break;  // a failed transfer or none: ask again from here
       }
       const Result<BulkBlock> block =
-          decode_bulk(std::span(buffer).first(std::min(count, buffer.size())));
+          decode_bulk(std::span(buffer).first(std::min(*count, buffer.size())));
       if (!block || block->recording != recording.id) {
         break;
       }

@@ -7,11 +7,13 @@ set -euo pipefail
 build_packages=(
   ca-certificates ccache cmake g++ git ninja-build pkg-config
   libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev libspdlog-dev libsqlite3-dev
+  libhidapi-dev libudev-dev libusb-1.0-0-dev
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
+  libumockdev-dev umockdev
 )
 
 wanted=()

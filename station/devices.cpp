@@ -1,5 +1,6 @@
 #include "station/devices.h"
 
+#include "device/discovery.h"
 #include "mocks/in_process.h"
 
 namespace sixpoint::station {
@@ -7,6 +8,7 @@ namespace sixpoint::station {
 device::TransportRegistry known_devices() {
   device::TransportRegistry registry;
   mocks::register_virtual(registry);
+  device::register_usb(registry);
   return registry;
 }
 
