@@ -119,6 +119,7 @@ void FaultInjector::pass(VirtualUnit& unit, FaultChannel channel, FaultDirection
     switch (fault.kind) {
       case FaultKind::stall:
         stalled = true;
+        copies = fault.count == 0 ? 0 : copies;  // an endpoint that never recovers
         break;
       case FaultKind::delay:
         due += from_seconds(*fault.seconds);
@@ -149,6 +150,7 @@ void FaultInjector::pass(VirtualUnit& unit, FaultChannel channel, FaultDirection
   }
   for (const Fault* fault : of_unit) {
     strike_unit(*fault, unit, now);
+    advance(unit, now);
   }
 }
 
@@ -184,7 +186,6 @@ void FaultInjector::strike_unit(const Fault& fault, VirtualUnit& unit, nanosecon
       break;
     case FaultKind::reenumerate:
       leave(0);
-      come_back(unit, now);
       break;
     case FaultKind::unplug:
       leave(fault.seconds);
@@ -197,7 +198,6 @@ void FaultInjector::strike_unit(const Fault& fault, VirtualUnit& unit, nanosecon
       other.seed = random_.bits();
       other.truth = sim::draw_unit(other.seed, wishes);
       other_unit_ = std::move(other);
-      advance(unit, now);
       break;
     }
     case FaultKind::full_flash:
@@ -231,22 +231,33 @@ void FaultInjector::strike_unit(const Fault& fault, VirtualUnit& unit, nanosecon
 }
 
 void FaultInjector::advance(VirtualUnit& unit, nanoseconds now) {
-  for (State& state : states_) {
-    const Fault& fault = state.fault;
-    if (!is_of_transfer(fault.kind) && fault.at.time_s && !state.done &&
-        now - start_ >= from_seconds(*fault.at.time_s)) {
-      state.done = true;
-      strike_unit(fault, unit, now);
-    }
-  }
   if (power_back_after_ && !unit.is_powered()) {
     plugged_ = false;
     reports_.clear();
     blocks_.clear();
     back_at_ = now + *std::exchange(power_back_after_, std::nullopt);
   }
-  if (back_at_ && now >= *back_at_) {
-    come_back(unit, now);
+  // In the order of their times, each at its own: nobody may have asked for long.
+  for (;;) {
+    State* next = nullptr;
+    nanoseconds next_at = back_at_.value_or(nanoseconds::max());
+    for (State& state : states_) {
+      const Fault& fault = state.fault;
+      if (!is_of_transfer(fault.kind) && fault.at.time_s && !state.done &&
+          start_ + from_seconds(*fault.at.time_s) < next_at) {
+        next = &state;
+        next_at = start_ + from_seconds(*fault.at.time_s);
+      }
+    }
+    if (next_at > now) {
+      return;
+    }
+    if (next != nullptr) {
+      next->done = true;
+      strike_unit(next->fault, unit, next_at);
+    } else {
+      come_back(unit, next_at);
+    }
   }
 }
 
@@ -327,7 +338,8 @@ CableEvent FaultInjector::read_bulk(VirtualUnit& unit, nanoseconds now) {
 }
 
 std::optional<nanoseconds> FaultInjector::next_due(const VirtualUnit& unit) const {
-  std::optional<nanoseconds> due = unit.next_due();
+  // What waits here comes before what the unit has next.
+  std::optional<nanoseconds> due = reports_.empty() ? unit.next_due() : std::nullopt;
   const auto earlier = [&due](nanoseconds time) { due = due ? std::min(*due, time) : time; };
   if (!reports_.empty()) {
     earlier(reports_.front().due);

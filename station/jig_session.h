@@ -31,6 +31,13 @@ struct JigSessionOptions {
   double residual_limit_mg = 10;
   // Longest silence of a streaming unit before it is given up.
   double silence_s = 3;
+  // An error in mid-run ends in a report with `ended_by`, so that what was measured can be kept;
+  // without it, in the error alone.
+  bool keep_interrupted = false;
+  // How often a jig that turns by itself is asked how it is.
+  double jig_poll_s = 0.25;
+  // So many tilted placements in a row that the jig calls exact: it does not stand where it says.
+  int jig_disagreements = 3;
 };
 
 enum class JigVerdict { pass, fail, inconclusive, stopped };
@@ -59,6 +66,8 @@ struct JigReport {
   UtcTime ended{};
   JigVerdict verdict = JigVerdict::inconclusive;
   std::vector<std::string> reasons;
+  // Why the run ended early, where it did; the verdict is inconclusive then.
+  std::optional<Error> ended_by;
   calib::LocalGravity gravity;
 
   std::vector<PoseReading> faces;
