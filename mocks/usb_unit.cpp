@@ -158,7 +158,7 @@ std::optional<std::chrono::nanoseconds> UsbUnit::next_due() const {
 
 void UsbUnit::on_reset() {
   const std::lock_guard lock(plugged_->mutex);
-  plugged_->unit.host_gone();
+  plugged_->unit.lose_cable();
   bulk_.clear();
   storage_.reset();
 }

@@ -23,6 +23,10 @@ struct CaptureOptions {
   double side_s = 40;
   double turn_s = 5;  // for the hand, after the prompt
   calib::SolveOptions solve;
+  // A unit that was unplugged to be turned goes on recording: how long it is waited for at the end,
+  // and how often a broken download is gone on with.
+  double replug_patience_s = 60;
+  int downloads = 5;
 };
 
 // Told before each side; answers whether the unit lies there (false: the person gives up). A jig
@@ -39,6 +43,8 @@ struct CaptureReport {
   std::string file;
   std::string file_sha256;
   std::optional<calib::SolveReport> solved;
+  // What went wrong on the way and was got over, or explains what is missing.
+  std::vector<std::string> notes;
 
   bool usable() const { return solved && solved->usable(); }
 };

@@ -1,5 +1,7 @@
 #include "station/devices.h"
 
+#include <fmt/format.h>
+
 #include "device/discovery.h"
 #include "mocks/in_process.h"
 
@@ -10,6 +12,29 @@ device::TransportRegistry known_devices() {
   mocks::register_virtual(registry);
   device::register_usb(registry);
   return registry;
+}
+
+device::UnitRegistry known_units() {
+  device::UnitRegistry registry(known_devices());
+  return registry;
+}
+
+std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
+    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell) {
+  static constexpr std::chrono::seconds kPatience{30};
+  static constexpr int kMostReturns = 5;
+  return [&unit, &jig, tell = std::move(tell), returns = 0](
+             const Error& gone) mutable -> Result<UnitOnJig> {
+    if (++returns > kMostReturns) {
+      return fail(ErrorCode::device_unavailable,
+                  fmt::format("the unit went away {} times", returns), gone.where,
+                  "look at its cable and battery, then begin anew");
+    }
+    tell(fmt::format("{}: waiting {} s for it to come back", gone.what, kPatience.count()));
+    SIXPOINT_CHECK(unit.reconnect(kPatience));
+    tell("it is back; the run goes on");
+    return UnitOnJig{&unit, &jig};
+  };
 }
 
 std::string with_jig(std::string_view device, std::string_view jig) {

@@ -5,11 +5,22 @@
 #include <string_view>
 
 #include "device/transport.h"
+#include "device/unit_registry.h"
+#include "station/jig_session.h"
 
 namespace sixpoint::station {
 
 // Every scheme this program was built with.
 device::TransportRegistry known_devices();
+
+// The same, and the devices that bring a protocol of their own.
+device::UnitRegistry known_units();
+
+// JigHooks::reopen for one unit that stays the same object: waits for it to come back, tells people,
+// and gives up after half a minute, when another unit comes, or when it goes away for the sixth
+// time. `unit` and `jig` outlive what is returned.
+std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
+    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell);
 
 // A device string with the jig asked for: `--jig virtual` on "virtual:seed=7" is
 // "virtual:seed=7,jig=auto", and `--jig manual` takes a jig away. Other devices stay as they are.

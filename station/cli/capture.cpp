@@ -62,10 +62,9 @@ Status keep(Context& context, const Options& options, Done& done) {
 }
 
 Result<Done> run(Context& context, const Options& options) {
-  const device::TransportRegistry devices = station::known_devices();
-  SIXPOINT_ASSIGN(device::Link link,
-                  devices.open(station::with_jig(options.device, options.jig), context.env));
-  SIXPOINT_ASSIGN(const auto unit, device::Unit::open(std::move(link)));
+  SIXPOINT_ASSIGN(const auto unit,
+                  station::known_units().open(station::with_jig(options.device, options.jig),
+                                              context.env));
   device::ManualJig by_hand;
   device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
 
@@ -120,6 +119,7 @@ Json to_json(const Done& done) {
     json["verdict"] = done.report.stopped ? "stopped" : "refused";
     json["reasons"] = done.report.refusal;
   }
+  json["notes"] = done.report.notes;
   json["file"] = done.report.file.empty() ? Json(nullptr) : Json(done.report.file);
   json["sha256"] = done.report.file_sha256.empty() ? Json(nullptr) : Json(done.report.file_sha256);
   json["stored_id"] = done.stored_id ? Json(*done.stored_id) : Json(nullptr);
@@ -129,6 +129,9 @@ Json to_json(const Done& done) {
 
 void print(Context& context, const Done& done) {
   const station::CaptureReport& report = done.report;
+  for (const std::string& note : report.notes) {
+    context.people << "note: " << note << '\n';
+  }
   if (report.stopped) {
     context.people << "stopped; the recording so far stays in the unit\n";
     return;

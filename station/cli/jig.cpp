@@ -180,10 +180,15 @@ Result<Done> run(Context& context, const Options& options) {
   session.run.write = options.write;
   session.run.dwell_s = options.dwell_s;
 
-  const device::TransportRegistry devices = station::known_devices();
-  SIXPOINT_ASSIGN(device::Link link,
-                  devices.open(station::with_jig(options.device, options.jig), context.env));
-  SIXPOINT_ASSIGN(const auto unit, device::Unit::open(std::move(link)));
+  session.keep_interrupted = true;
+
+  SIXPOINT_ASSIGN(const auto unit,
+                  station::known_units().open(station::with_jig(options.device, options.jig),
+                                              context.env));
+  if (!unit->abilities().streams || !unit->abilities().holds_constants) {
+    return fail(ErrorCode::usage, "this unit offers files and no live samples", unit->address(),
+                "calibrate it by a file: 'sixpoint capture'");
+  }
   device::ManualJig by_hand;
   device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
 
@@ -216,8 +221,13 @@ Result<Done> run(Context& context, const Options& options) {
   }
   SIXPOINT_ASSIGN(auto record, record_before(context, options, session, unit->identity().serial,
                                              jig.name(), store));
+  station::JigHooks hooks;
+  hooks.tell = tell;
+  hooks.reopen = station::wait_for_unit(*unit, jig, [&context](const std::string& text) {
+    context.people << text << '\n' << std::flush;
+  });
   Done done;
-  SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
+  SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
   complete(record, done.report);
   done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) {
     return add_records(keeper, options, record, done);
@@ -231,6 +241,9 @@ Json to_json(const Done& done) {
   const Json report = done.report.to_json();
   for (const auto& [key, value] : report.items()) {
     json[key] = value;
+  }
+  if (done.report.ended_by) {
+    json["error"] = error_to_json(*done.report.ended_by);
   }
   json["stored_id"] = done.constants_id ? Json(*done.constants_id) : Json(nullptr);
   json["certificate"] = nullptr;
@@ -303,7 +316,12 @@ void add_jig(CLI::App& app, Context& context) {
       report_error(context, "jig", done.error(), options->json);
       return;
     }
-    context.worsen(exit_code_of(done->report.verdict));
+    const std::optional<Error>& ended_by = done->report.ended_by;
+    if (ended_by) {
+      context.log().error("{}", ended_by->brief());
+    }
+    context.worsen(ended_by ? static_cast<int>(ended_by->code)
+                            : exit_code_of(done->report.verdict));
     if (!done->kept) {
       // The report below is then the only copy.
       context.log().error("{}", done->kept.error().brief());
