@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "device/discovery.h"
+#include "device/session_replay.h"
 #include "mocks/in_process.h"
 
 namespace sixpoint::station {
@@ -11,6 +12,7 @@ device::TransportRegistry known_devices() {
   device::TransportRegistry registry;
   mocks::register_virtual(registry);
   device::register_usb(registry);
+  device::register_replay(registry);
   return registry;
 }
 

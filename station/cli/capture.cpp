@@ -10,6 +10,7 @@
 #include "gt3x/model.h"
 #include "station/capture_run.h"
 #include "station/cli/command.h"
+#include "station/cli/record_option.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 
@@ -23,6 +24,7 @@ struct Options {
   std::string output;
   std::string constants_file;
   std::string store;
+  std::string record;
   std::optional<double> gravity_m_per_s2;
   int rate_hz = 30;
   double side_s = 40;
@@ -56,10 +58,11 @@ Status keep(Context& context, const Options& options, Done& done) {
   return {};
 }
 
-Result<Done> run(Context& context, const Options& options) {
+Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
   SIXPOINT_ASSIGN(const auto unit,
-                  station::known_units().open(station::with_jig(options.device, options.jig),
-                                              context.env));
+                  station::known_units().open(
+                      station::with_jig(options.device, options.jig), context.env,
+                      [&recorder](device::Link& link) { recorder.attach(link); }));
   device::ManualJig by_hand;
   device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
 
@@ -181,9 +184,12 @@ void add_capture(CLI::App& app, Context& context) {
       ->check(CLI::Range(10.0, 3600.0))
       ->capture_default_str();
   add_store_option(*command, options->store);
+  add_record_option(*command, options->record);
   command->add_flag("--json", options->json, "answer as JSON");
   command->callback([options, &context] {
-    const Result<Done> done = run(context, *options);
+    device::SessionRecorder recorder;
+    const Result<Done> done = run(context, *options, recorder);
+    save_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "capture", done.error(), options->json);
       return;

@@ -20,6 +20,7 @@ namespace sixpoint::cli {
   COMMAND(audit)                   \
   COMMAND(store)                   \
   COMMAND(simulate)                \
+  COMMAND(session)                 \
   COMMAND(doctor)                  \
   COMMAND(virtual)                 \
   COMMAND(station)                 \

@@ -8,6 +8,7 @@
 #include "device/unit.h"
 #include "gt3x/model.h"
 #include "station/cli/command.h"
+#include "station/cli/record_option.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
@@ -23,6 +24,7 @@ struct Options {
   std::string station;
   std::string filter = "current";
   std::string store;
+  std::string record;
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
@@ -132,7 +134,7 @@ Status keep(Context& context, const Options& options, Done& done) {
   return {};
 }
 
-Result<Done> run(Context& context, const Options& options) {
+Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
   station::JigSessionOptions session;
   SIXPOINT_ASSIGN(session.filter, calib::parse_filter_configuration(options.filter));
   if (options.gravity_m_per_s2) {
@@ -145,8 +147,9 @@ Result<Done> run(Context& context, const Options& options) {
   session.keep_interrupted = true;
 
   SIXPOINT_ASSIGN(const auto unit,
-                  station::known_units().open(station::with_jig(options.device, options.jig),
-                                              context.env));
+                  station::known_units().open(
+                      station::with_jig(options.device, options.jig), context.env,
+                      [&recorder](device::Link& link) { recorder.attach(link); }));
   if (!unit->abilities().streams || !unit->abilities().holds_constants) {
     return fail(ErrorCode::usage, "this unit offers files and no live samples", unit->address(),
                 "calibrate it by a file: 'sixpoint capture'");
@@ -245,9 +248,12 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);
+  add_record_option(*command, options->record);
   command->add_flag("--json", options->json, "answer as JSON");
   command->callback([options, &context] {
-    const Result<Done> done = run(context, *options);
+    device::SessionRecorder recorder;
+    const Result<Done> done = run(context, *options, recorder);
+    save_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "jig", done.error(), options->json);
       return;
