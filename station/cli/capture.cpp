@@ -63,8 +63,10 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
                   station::known_units().open(
                       station::with_jig(options.device, options.jig), context.env,
                       [&recorder](device::Link& link) { recorder.attach(link); }));
-  device::ManualJig by_hand;
-  device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
+  std::unique_ptr<device::Jig> own_jig;
+  SIXPOINT_ASSIGN(device::Jig* const chosen,
+                  station::choose_jig(options.jig, *unit, context.env, own_jig));
+  device::Jig& jig = *chosen;
 
   station::CaptureOptions capture;
   capture.rate_hz = options.rate_hz;
@@ -99,7 +101,12 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
     return static_cast<bool>(std::getline(context.in, line)) && line != "q";
   };
   Done done;
-  SIXPOINT_ASSIGN(done.report, station::run_capture(*unit, jig, context.env, capture, prompt));
+  if (unit->abilities().records_on_command) {
+    SIXPOINT_ASSIGN(done.report, station::run_capture(*unit, jig, context.env, capture, prompt));
+  } else {
+    context.people << "this unit offers files only: the recording that it holds is taken\n";
+    SIXPOINT_ASSIGN(done.report, station::run_file_capture(*unit, context.env, capture));
+  }
   if (done.report.usable()) {
     SIXPOINT_CHECK(keep(context, options, done));
   }
@@ -170,8 +177,8 @@ void add_capture(CLI::App& app, Context& context) {
       ->add_option("--device", options->device,
                    "the unit, for example virtual:seed=7 (docs/virtual.md)")
       ->required();
-  command->add_option("--jig", options->jig, "manual (a person turns the unit) or virtual")
-      ->check(CLI::IsMember({"manual", "virtual"}));
+  command->add_option("--jig", options->jig,
+                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
   command->add_option("-o,--output", options->output,
                       "the .gt3x to make (default: SERIAL-calibration-DAY.gt3x)");
   command->add_option("--constants", options->constants_file,

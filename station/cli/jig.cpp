@@ -154,8 +154,10 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
     return fail(ErrorCode::usage, "this unit offers files and no live samples", unit->address(),
                 "calibrate it by a file: 'sixpoint capture'");
   }
-  device::ManualJig by_hand;
-  device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
+  std::unique_ptr<device::Jig> own_jig;
+  SIXPOINT_ASSIGN(device::Jig* const chosen,
+                  station::choose_jig(options.jig, *unit, context.env, own_jig));
+  device::Jig& jig = *chosen;
 
   context.people << fmt::format("unit {} with firmware {}; jig: {}\n",
                                 printable(unit->identity().serial),
@@ -234,8 +236,8 @@ void add_jig(CLI::App& app, Context& context) {
       ->add_option("--device", options->device,
                    "the unit, for example virtual:seed=7 (docs/virtual.md)")
       ->required();
-  command->add_option("--jig", options->jig, "manual (a person turns the unit) or virtual")
-      ->check(CLI::IsMember({"manual", "virtual"}));
+  command->add_option("--jig", options->jig,
+                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
   command->add_option("--operator", options->operator_name, "who runs it, for the record");
   command->add_option("--station", options->station, "where it is run, for the record");
   command->add_option("--filter", options->filter, "filter configuration: current or legacy")
