@@ -1,6 +1,7 @@
 #include "device/discovery.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <map>
 #include <memory>
@@ -8,9 +9,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <libudev.h>
+#include <unistd.h>
 
 #include "device/bulk_transport.h"
 #include "device/hid_transport.h"
+#include "device/usb_errors.h"
 
 namespace sixpoint::device {
 
@@ -184,6 +187,16 @@ Result<AttachedDevice> find_device(const DiscoveryFilter& filter, Clock& clock) 
     }
     clock.sleep(kStep);
   }
+}
+
+Status check_access(const AttachedDevice& device) {
+  for (const std::string& node : {device.usb_node, device.hidraw_node}) {
+    const bool wanted = !node.empty() || !device.complete();
+    if (wanted && ::access(node.c_str(), R_OK | W_OK) != 0) {
+      return usb_error(errno, "cannot use the device", node.empty() ? device.port : node);
+    }
+  }
+  return {};
 }
 
 Result<Link> open_monitor(const AttachedDevice& monitor, Env& env) {

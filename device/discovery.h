@@ -47,6 +47,10 @@ Result<std::vector<AttachedDevice>> attached_devices(const DiscoveryFilter& filt
 // say that serial, usage when the serial is empty and there are several.
 Result<AttachedDevice> find_device(const DiscoveryFilter& filter, Clock& clock);
 
+// Whether this process may use the device's nodes, without opening them. permission names the udev
+// rules; device_unavailable when a node is not there.
+Status check_access(const AttachedDevice& device);
+
 // Opens both channels of a monitor. The claimed bulk interface is what keeps a second program out.
 Result<Link> open_monitor(const AttachedDevice& monitor, Env& env);
 

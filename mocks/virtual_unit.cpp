@@ -190,11 +190,7 @@ void VirtualUnit::cut_power(nanoseconds now) {
     finish_recording(now);
   }
   powered_ = false;
-  stream_.reset();
-  staged_.reset();
-  download_.reset();
-  replies_.clear();
-  last_request_.reset();
+  lose_cable();
 }
 
 void VirtualUnit::restore_power(nanoseconds now) {
@@ -451,6 +447,7 @@ Message VirtualUnit::answer(const Message& request, nanoseconds now) {
         return refuse(ReplyCode::bad_argument);
       }
       const std::uint64_t promised = std::min<std::uint64_t>(length, size - offset);
+      ++downloads_;
       download_ = Download{id, offset, offset + promised};
       reply.payload = PayloadWriter().put(promised).take();
       return reply;
@@ -636,10 +633,23 @@ void VirtualUnit::finish_recording(nanoseconds now) {
       writer->commit()) {
     image = read_file(files, name, options_.flash_bytes * 2).value_or(Bytes{});
   }
+  keep(std::move(image), run.start_time);
+}
+
+Status VirtualUnit::keep_recording(Bytes image, UtcTime start) {
+  if (image.size() > flash_left()) {
+    return fail(ErrorCode::configuration, "the recording does not fit into the unit's flash",
+                options_.truth.serial, "make the scenario shorter");
+  }
+  keep(std::move(image), start);
+  return {};
+}
+
+void VirtualUnit::keep(Bytes image, UtcTime start) {
   device::RecordingInfo info;
   info.id = static_cast<std::uint16_t>(images_.size() + 1);
   info.bytes = image.size();
-  info.start_unix_time = static_cast<std::uint32_t>(to_unix_seconds(run.start_time));
+  info.start_unix_time = static_cast<std::uint32_t>(to_unix_seconds(start));
   info.sha256 = sha256(image);
   images_.push_back(std::move(image));
   infos_.push_back(info);

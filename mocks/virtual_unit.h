@@ -49,6 +49,8 @@ class VirtualUnit {
   void take_report(std::span<const std::uint8_t> report, nanoseconds now);
   std::optional<device::Report> next_report(nanoseconds now);
   std::optional<Bytes> next_bulk(nanoseconds now);
+  // Counts the requests to download: a new one ends what is on its way.
+  std::uint64_t downloads() const { return downloads_; }
   // When the next report comes by itself; none when nothing will without being asked.
   std::optional<nanoseconds> next_due() const;
 
@@ -62,8 +64,8 @@ class VirtualUnit {
   void restore_power(nanoseconds now);
 
   bool is_powered() const { return powered_; }
-  // The cable is gone: stream, staged page, kept reply and download end; a recording goes on, for
-  // the unit has a battery.
+  // The host is gone (cable, bus reset): stream, staged page, kept reply and download end; a
+  // recording goes on, for the unit has a battery.
   void lose_cable();
 
   // What may go wrong inside (fault_plan.h).
@@ -80,7 +82,10 @@ class VirtualUnit {
   PageMemory& memory() { return memory_; }
   void set_battery_mv(std::uint16_t battery_mv) { options_.battery_mv = battery_mv; }
   sim::FilterConfiguration recording_filter() const;
-  // What a recording holds, as it would be downloaded; for tests.
+  // Puts a recording into the flash as if the unit had made it; configuration where it does not
+  // fit.
+  Status keep_recording(Bytes image, UtcTime start);
+  // What each recording holds, as it would be downloaded.
   const std::vector<Bytes>& recordings() const { return images_; }
 
  private:
@@ -117,6 +122,7 @@ class VirtualUnit {
   device::ReplyCode start_stream(int rate_hz, nanoseconds now);
   device::ReplyCode commit(std::uint16_t crc, Bytes& payload, nanoseconds now);
   void finish_recording(nanoseconds now);
+  void keep(Bytes image, UtcTime start);
   void load_page();
   std::uint64_t device_time_us(nanoseconds at) const;
   nanoseconds jumped_until(nanoseconds at) const;
@@ -133,6 +139,7 @@ class VirtualUnit {
   std::optional<RecordingRun> recording_;
   std::optional<Staged> staged_;
   std::optional<Download> download_;
+  std::uint64_t downloads_ = 0;
   std::deque<device::Report> replies_;
   std::optional<device::Message> last_request_;
   device::Report last_reply_{};

@@ -14,6 +14,7 @@ test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
   libumockdev-dev umockdev
+  busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils
 )
 
 wanted=()

@@ -34,6 +34,7 @@ struct Options {
 struct Done {
   station::CaptureReport report;
   std::optional<std::string> stored_id;
+  std::optional<db::Kept> kept;
 };
 
 Status keep(Context& context, const Options& options, Done& done) {
@@ -46,15 +47,19 @@ Status keep(Context& context, const Options& options, Done& done) {
     SIXPOINT_CHECK(write_file(context.env.files, options.constants_file,
                               calib::to_json(record).dump(2) + "\n"));
   }
-  SIXPOINT_ASSIGN(db::Store store, open_store(context, options.store));
   db::ConstantsRecord row;
   row.made_at = record.made_at;
   row.serial = record.serial;
   row.filter = calib::to_string(record.filter);
   row.method = record.method;
   row.document = calib::to_json(record).dump();
-  SIXPOINT_ASSIGN(done.stored_id,
-                  store.add_constants(row, std::string(gt3x::model_of(record.serial))));
+  auto store = open_store(context, options.store);
+  SIXPOINT_ASSIGN(
+      done.kept, keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
+        SIXPOINT_ASSIGN(done.stored_id,
+                        keeper.add_constants(row, std::string(gt3x::model_of(record.serial))));
+        return {};
+      }));
   return {};
 }
 
@@ -128,6 +133,7 @@ Json to_json(const Done& done) {
   json["file"] = done.report.file.empty() ? Json(nullptr) : Json(done.report.file);
   json["sha256"] = done.report.file_sha256.empty() ? Json(nullptr) : Json(done.report.file_sha256);
   json["stored_id"] = done.stored_id ? Json(*done.stored_id) : Json(nullptr);
+  json["kept"] = done.kept ? kept_to_json(*done.kept) : Json(nullptr);
   return json;
 }
 

@@ -21,6 +21,7 @@ namespace sixpoint::cli {
   COMMAND(store)                   \
   COMMAND(simulate)                \
   COMMAND(session)                 \
+  COMMAND(devices)                 \
   COMMAND(doctor)                  \
   COMMAND(virtual)                 \
   COMMAND(station)                 \

@@ -2,7 +2,10 @@
 #include <filesystem>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include "device/discovery.h"
+#include "device/usb_errors.h"
 #include "station/cli/command.h"
 #include "station/cli/store_option.h"
 
@@ -50,12 +53,44 @@ Check check_disk(const std::string& folder) {
                       space.available >> 20)};
 }
 
+// A machine without USB is no defect: it mends files and drives virtual units.
 Check check_usb() {
   std::error_code error;
-  const bool there = std::filesystem::is_directory("/dev/bus/usb", error);
-  return {"usb", true,
-          there ? "this version drives virtual units only; USB is not built yet"
-                : "no USB on this machine, and this version drives virtual units only"};
+  if (!std::filesystem::is_directory("/dev/bus/usb", error)) {
+    return {"usb", true, "no USB on this machine; virtual units work"};
+  }
+  device::DiscoveryFilter every;
+  every.product_ids.clear();
+  const auto attached = device::attached_devices(every);
+  if (!attached) {
+    return {"usb", false, attached.error().brief()};
+  }
+  for (const device::AttachedDevice& one : *attached) {
+    if (const Status access = device::check_access(one); !access) {
+      return {"usb", false, access.error().brief()};
+    }
+  }
+  return {"usb", true, fmt::format("{} of our devices plugged in", attached->size())};
+}
+
+Check check_udev_rules() {
+  std::error_code none;
+  const bool needed = ::geteuid() != 0 && std::filesystem::is_directory("/dev/bus/usb", none);
+  for (const char* rules : {device::kDetectionRules, device::kAccessRules}) {
+    bool found = false;
+    for (const char* folder : {"/etc/udev/rules.d/", "/run/udev/rules.d/", "/usr/lib/udev/rules.d/",
+                               "/lib/udev/rules.d/"}) {
+      std::error_code error;
+      found = found || std::filesystem::exists(std::string(folder) + rules, error);
+    }
+    if (!found) {
+      return {"udev", !needed,
+              fmt::format("{} is not installed: without it only root can use units; it lies in "
+                          "packaging/udev",
+                          rules)};
+    }
+  }
+  return {"udev", true, "detection and access rules are installed"};
 }
 
 void run(const Options& options, Context& context) {
@@ -64,6 +99,7 @@ void run(const Options& options, Context& context) {
       check_store(options, context),
       check_disk("."),
       check_usb(),
+      check_udev_rules(),
   };
   Json json = document("doctor");
   json["checks"] = Json::array();

@@ -1,10 +1,10 @@
 // sixpoint jig: the technician's six-orientation run, in the terminal.
+#include <algorithm>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "calib/gravity.h"
-#include "db/journal.h"
 #include "device/unit.h"
 #include "gt3x/model.h"
 #include "station/cli/command.h"
@@ -12,6 +12,7 @@
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
+#include "station/software.h"
 
 namespace sixpoint::cli {
 
@@ -20,6 +21,9 @@ namespace {
 struct Options {
   std::string device;
   std::string jig;
+  std::string jig_id;
+  std::string jig_due;
+  std::string retest_of;
   std::string operator_name;
   std::string station;
   std::string filter = "current";
@@ -28,15 +32,16 @@ struct Options {
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
+  double dwell_s = station::JigRunOptions{}.dwell_s;
   bool write = false;
   bool json = false;
 };
 
 struct Done {
   station::JigReport report;
-  double residual_limit_mg = 0;  // that the verdict used
   std::string run_id;
   std::optional<std::string> constants_id;
+  Result<db::Kept> kept = db::Kept{};
 };
 
 int exit_code_of(station::JigVerdict verdict) {
@@ -53,34 +58,72 @@ int exit_code_of(station::JigVerdict verdict) {
   return kExitFailed;
 }
 
-// Into the store, or into the journal, which takes the same.
-template <class Keeper>
-Status keep_in(Keeper& keeper, const Options& options, Done& done) {
-  const station::JigReport& report = done.report;
-  const std::string model(gt3x::model_of(report.serial));
+// The limits that the verdict used, whole: a verdict is nothing without them.
+Json limits_of(const station::JigSessionOptions& session) {
+  return {{"residual_mg", session.residual_limit_mg},
+          {"tilt_deg", session.run.tilt_limit_deg},
+          {"moved_mg", session.run.moved_mg},
+          {"still_factor", session.run.still_factor},
+          {"moved_factor", session.run.moved_factor},
+          {"first_noise_mg", session.run.first_noise_limit_mg},
+          {"dwell_s", session.run.dwell_s},
+          {"rate_hz", session.run.rate_hz}};
+}
+
+// What is known before the unit is measured; refused here, it costs no one a run.
+Result<db::RunRecord> record_before(Context& context, const Options& options,
+                                    const station::JigSessionOptions& session,
+                                    const std::string& serial, const std::string& jig,
+                                    Result<db::Store>& store) {
   db::RunRecord run;
-  run.serial = report.serial;
-  run.model = model;
+  run.serial = serial;
+  run.model = gt3x::model_of(serial);
   run.kind = "jig";
-  run.filter = calib::to_string(report.filter);
-  run.started = report.started;
-  run.ended = report.ended;
+  run.filter = calib::to_string(session.filter);
   run.operator_name = options.operator_name;
   run.station = options.station;
-  run.jig = report.jig;
-  run.verdict = station::to_string(report.verdict);
-  run.software = "sixpoint " SIXPOINT_VERSION;
-  run.document = report.to_json().dump();
-  run.gravity_m_per_s2 = report.gravity.m_per_s2;
-  run.codes = report.reasons;
-  if (!report.faces.empty()) {
-    double sum_c = 0;
-    for (const station::PoseReading& face : report.faces) {
-      sum_c += face.temperature_c;
+  run.jig = options.jig_id.empty() ? jig : options.jig_id;
+  run.software = station::software_name();
+  run.build = station::software_build();
+  run.limits = limits_of(session).dump();
+  run.gravity_m_per_s2 = session.gravity.m_per_s2;
+  run.document = "{}";
+  if (!options.jig_due.empty()) {
+    const auto due = parse_iso8601(options.jig_due);
+    if (!due) {
+      return fail(ErrorCode::usage, due.error().what, "--jig-due", "write it as 2027-03-31");
     }
-    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
+    run.jig_due = *due;
+    if (*due < context.env.clock.now()) {
+      context.log().warn("the jig was due for its own calibration on {}", to_iso8601(*due));
+    }
   }
-  run.limits = Json{{"residual_mg", done.residual_limit_mg}}.dump();
+  if (!options.retest_of.empty()) {
+    // In the journal a run that refers to none would block all that come after it.
+    if (!store) {
+      return fail(store.error());
+    }
+    SIXPOINT_ASSIGN(const auto history, store->unit_history(serial));
+    const auto earlier = std::find_if(
+        history.runs.rbegin(), history.runs.rend(), [&](const db::RunRecord& candidate) {
+          return candidate.kind == "jig" &&
+                 (options.retest_of == "last" || options.retest_of == candidate.id);
+        });
+    if (earlier == history.runs.rend()) {
+      return fail(ErrorCode::no_input,
+                  fmt::format("the store has no such jig run of unit {}", printable(serial)),
+                  "--retest-of " + printable(options.retest_of, 60),
+                  "'sixpoint history SERIAL' lists its runs; or leave the option out");
+    }
+    run.retest_of = earlier->id;
+  }
+  SIXPOINT_CHECK(db::id_of(run, {}));
+  return run;
+}
+
+Status add_records(db::Keeper& keeper, const Options& options, const db::RunRecord& run,
+                   Done& done) {
+  const station::JigReport& report = done.report;
   SIXPOINT_ASSIGN(
       done.run_id,
       keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
@@ -105,33 +148,27 @@ Status keep_in(Keeper& keeper, const Options& options, Done& done) {
     row.method = constants.method;
     row.run_id = done.run_id;
     row.document = calib::to_json(constants).dump();
-    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, model));
+    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, run.model));
   }
   return {};
 }
 
-// A run is not lost because the server is away: it waits in the journal, which every later run and
-// 'sixpoint store catch-up' empties in order.
-Status keep(Context& context, const Options& options, Done& done) {
-  auto store = open_store(context, options.store);
-  if (!is_on_server(options.store)) {
-    return store ? keep_in(*store, options, done) : Status(fail(store.error()));
+void complete(db::RunRecord& run, const station::JigReport& report) {
+  run.started = report.started;
+  run.ended = report.ended;
+  run.verdict = station::to_string(report.verdict);
+  // The unit's own words may hold anything; a run is kept whatever they are.
+  run.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
+  for (const std::string& reason : report.reasons) {
+    run.codes.push_back(db::storable_path(printable(reason, 1500)));
   }
-  SIXPOINT_ASSIGN(auto journal,
-                  db::Journal::open(context.env.files, journal_folder(options.store)));
-  Status status = store ? Status() : Status(fail(store.error()));
-  if (status) {
-    const auto taken = journal.catch_up(*store);
-    status = taken ? keep_in(*store, options, done) : Status(fail(taken.error()));
+  if (!report.faces.empty()) {
+    double sum_c = 0;
+    for (const station::PoseReading& face : report.faces) {
+      sum_c += face.temperature_c;
+    }
+    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
   }
-  if (status || status.error().code != ErrorCode::device_unavailable) {
-    return status;
-  }
-  // What the store did take before it went away is named the same, and stored once.
-  SIXPOINT_CHECK(keep_in(journal, options, done));
-  context.log().warn("{}; the run is kept in this station's journal and goes into the store later",
-                     status.error().brief());
-  return {};
 }
 
 Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
@@ -143,6 +180,7 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_at(*options.latitude_deg, options.altitude_m));
   }
   session.run.write = options.write;
+  session.run.dwell_s = options.dwell_s;
 
   session.keep_interrupted = true;
 
@@ -180,6 +218,14 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
     }
     context.people << std::flush;
   };
+  // Opened before the work, so that what nobody can store is said now; a store that is away or
+  // refuses is no reason not to measure.
+  auto store = open_store(context, options.store);
+  if (!store && store.error().code == ErrorCode::usage) {
+    return fail(store.error());
+  }
+  SIXPOINT_ASSIGN(auto record, record_before(context, options, session, unit->identity().serial,
+                                             jig.name(), store));
   station::JigHooks hooks;
   hooks.tell = tell;
   hooks.reopen = station::wait_for_unit(*unit, jig, [&context](const std::string& text) {
@@ -187,8 +233,10 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   });
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
-  done.residual_limit_mg = session.residual_limit_mg;
-  SIXPOINT_CHECK(keep(context, options, done));
+  complete(record, done.report);
+  done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) {
+    return add_records(keeper, options, record, done);
+  });
   return done;
 }
 
@@ -204,6 +252,10 @@ Json to_json(const Done& done) {
   }
   json["stored_id"] = done.constants_id ? Json(*done.constants_id) : Json(nullptr);
   json["certificate"] = nullptr;
+  json["kept"] = done.kept ? kept_to_json(*done.kept) : Json(nullptr);
+  if (!done.kept) {
+    json["error"] = error_to_json(done.kept.error());
+  }
   return json;
 }
 
@@ -219,6 +271,9 @@ void print(Context& context, const Done& done) {
                                  best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
                                  best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
     }
+  }
+  if (!done.kept) {
+    return;
   }
   context.out << fmt::format("run {}\n", done.run_id);
   if (done.constants_id) {
@@ -238,6 +293,12 @@ void add_jig(CLI::App& app, Context& context) {
       ->required();
   command->add_option("--jig", options->jig,
                       "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
+  command->add_option("--jig-id", options->jig_id,
+                      "the jig's own number, for the record (which units were on it?)");
+  command->add_option("--jig-due", options->jig_due,
+                      "when the jig itself is due for calibration (2027-03-31), for the record");
+  command->add_option("--retest-of", options->retest_of,
+                      "the run that this one repeats: its id, or 'last' for the unit's last one");
   command->add_option("--operator", options->operator_name, "who runs it, for the record");
   command->add_option("--station", options->station, "where it is run, for the record");
   command->add_option("--filter", options->filter, "filter configuration: current or legacy")
@@ -247,6 +308,9 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");
   command->add_option("--altitude", options->altitude_m, "... and metres above sea level");
+  command->add_option("--dwell", options->dwell_s, "seconds that each pose is measured for")
+      ->check(CLI::Range(0.5, 600.0))
+      ->capture_default_str();
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);
@@ -266,6 +330,11 @@ void add_jig(CLI::App& app, Context& context) {
     }
     context.worsen(ended_by ? static_cast<int>(ended_by->code)
                             : exit_code_of(done->report.verdict));
+    if (!done->kept) {
+      // The report below is then the only copy.
+      context.log().error("{}", done->kept.error().brief());
+      context.worsen(static_cast<int>(done->kept.error().code));
+    }
     if (options->json) {
       print_json(context, to_json(*done));
     } else {

@@ -9,6 +9,7 @@
 #include "station/cli/file_tree.h"
 #include "station/cli/store_option.h"
 #include "station/cli/workers.h"
+#include "station/software.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -48,7 +49,7 @@ RepairReport failed(const std::string& input, const Error& error) {
 }
 
 // What the store is told about a file that was mended.
-Status remember(Context& context, db::Store& store, const RepairReport& report) {
+db::RepairRecord record_of(Context& context, const RepairReport& report) {
   db::RepairRecord record;
   record.serial = report.serial;
   record.made_at = context.env.clock.now();
@@ -58,8 +59,45 @@ Status remember(Context& context, db::Store& store, const RepairReport& report) 
   record.method = report.method;
   record.constants_id = report.constants_id;
   record.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
-  SIXPOINT_CHECK(store.add_repair(record));
-  return {};
+  record.software = station::software_name();
+  if (const std::string build = station::software_build(); !build.empty()) {
+    record.software += fmt::format(" ({})", build);
+  }
+  return record;
+}
+
+// Tells the store about all files that were mended. A file of an earlier run (--resume) is told
+// only when that run ended before it could say so. Nothing where there was nothing to say.
+Result<std::optional<db::Kept>> remember(Context& context, const std::string& location,
+                                         std::optional<db::Store>& store,
+                                         const std::vector<RepairReport>& reports) {
+  std::vector<db::RepairRecord> records;
+  for (const RepairReport& report : reports) {
+    if (report.status != RepairStatus::repaired || report.dry_run) {
+      continue;
+    }
+    if (report.resumed) {
+      const auto known = store->repair_of_output(report.output_sha256);
+      if (known && *known && (*known)->input_sha256 == report.input_sha256) {
+        continue;
+      }
+    }
+    records.push_back(record_of(context, report));
+  }
+  if (records.empty()) {
+    return std::nullopt;
+  }
+  Result<db::Store> taken = *std::move(store);
+  store.reset();
+  std::size_t acknowledged = 0;
+  SIXPOINT_ASSIGN(auto kept,
+                  keep_records(context, location, taken, [&](db::Keeper& keeper) -> Status {
+                    for (; acknowledged < records.size(); ++acknowledged) {
+                      SIXPOINT_CHECK(keeper.add_repair(records[acknowledged]));
+                    }
+                    return {};
+                  }));
+  return kept;
 }
 
 Result<repair::ConstantsFinderOptions> sources(const Options& options, Context& context,
@@ -163,12 +201,19 @@ void run(const Options& options, Context& context) {
     context.worsen(exit_code_of(report));
     const std::string status(to_string(report.status));
     summary[status] = summary[status].get<int>() + 1;
-    if (store && report.status == RepairStatus::repaired && !report.dry_run) {
-      if (const auto kept = remember(context, *store, report); !kept) {
-        context.log().error("the repair of {} could not be written to the store: {}",
-                            printable(report.input), kept.error().brief());
-        context.worsen(static_cast<int>(kept.error().code));
-      }
+  }
+  Json kept_json(nullptr);
+  if (store) {
+    const auto kept = remember(context, options.store, store, reports);
+    if (!kept) {
+      context.log().error(
+          "the files are mended, but the store does not know: {}; run it again "
+          "with --resume",
+          kept.error().brief());
+      context.worsen(static_cast<int>(kept.error().code));
+      kept_json = {{"in", nullptr}, {"error", error_to_json(kept.error())}};
+    } else if (*kept) {
+      kept_json = kept_to_json(**kept);
     }
   }
   if (options.json) {
@@ -178,6 +223,7 @@ void run(const Options& options, Context& context) {
       json["files"].push_back(report.to_json());
     }
     json["summary"] = summary;
+    json["kept"] = kept_json;
     return print_json(context, json);
   }
   for (const RepairReport& report : reports) {
