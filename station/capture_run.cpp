@@ -67,7 +67,14 @@ Result<bool> go_round(device::Unit& unit, device::Jig& jig, const CaptureOptions
       return false;
     }
     SIXPOINT_CHECK(jig.go_to(side));
-    unit.clock().sleep(from_seconds(options.turn_s + options.side_s));
+    const auto until = unit.clock().elapsed() + from_seconds(options.turn_s + options.side_s);
+    for (auto now = unit.clock().elapsed(); now < until; now = unit.clock().elapsed()) {
+      if (options.cancelled && options.cancelled()) {
+        return false;
+      }
+      unit.clock().sleep(
+          std::min<std::chrono::nanoseconds>(until - now, std::chrono::milliseconds(200)));
+    }
   }
   return true;
 }

@@ -22,6 +22,8 @@ struct CaptureOptions {
   // paper's second criterion.
   double side_s = 40;
   double turn_s = 5;  // for the hand, after the prompt
+  // Asked several times a second while the unit rests; true ends the recording. May be empty.
+  std::function<bool()> cancelled;
   calib::SolveOptions solve;
   // A unit that was unplugged to be turned goes on recording: how long it is waited for at the end,
   // and how often a broken download is gone on with.
