@@ -21,7 +21,6 @@ namespace sixpoint::device {
 namespace {
 
 using std::chrono::nanoseconds;
-using std::chrono::steady_clock;
 
 // Whole packets of both speeds, so that a device cannot overrun a transfer that has room for it.
 constexpr std::size_t kTransferBytes = (kBulkBlockBytes + 511) / 512 * 512;

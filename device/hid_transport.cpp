@@ -70,7 +70,7 @@ void end_thread(Shared& shared) {
   shared.changed.notify_all();
 }
 
-void read_reports(const std::shared_ptr<Shared>& shared, Handle handle, std::string node,
+void read_reports(const std::shared_ptr<Shared>& shared, Handle handle, const std::string& node,
                   HidTransportOptions options) {
   // One byte more than a report, so that a longer one is seen to be too long.
   std::array<std::uint8_t, kReportBytes + 1> buffer{};

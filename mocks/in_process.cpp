@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/memory_env.h"
+#include "mocks/scaled_clock.h"
 #include "mocks/virtual_jig.h"
 #include "mocks/virtual_settings.h"
 
@@ -137,9 +137,7 @@ void register_virtual(device::TransportRegistry& registry) {
       "virtual", "virtual:seed=7,jig=auto",
       [](std::string_view rest, Env& env) -> Result<device::Link> {
         SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(rest, env.seed));
-        std::shared_ptr<Clock> clock = settings.real_time
-                                           ? device::borrow_clock(env.clock)
-                                           : std::make_shared<ManualClock>(env.clock.now());
+        std::shared_ptr<Clock> clock = clock_of(settings, env.clock);
         FaultPlan plan;
         if (!settings.faults_file.empty()) {
           SIXPOINT_ASSIGN(plan, read_fault_plan(env.files, settings.faults_file));

@@ -67,6 +67,13 @@ class VirtualUnit::Hand final : public sim::Motion {
                       sim::turn(from.rotation, pose_, duration_s, random_.bits(), gravity_g_)});
   }
 
+  void stop(double now_s) {
+    sim::MotionState state;
+    at(now_s, state);
+    pose_ = state.rotation;
+    turns_.push_back({now_s, 0, sim::still(pose_, gravity_g_)});
+  }
+
   bool is_turning(double now_s) const {
     return now_s < turns_.back().start_s + turns_.back().duration_s;
   }
@@ -175,6 +182,8 @@ void VirtualUnit::turn_to(const Eigen::Vector3d& up, nanoseconds now, double dur
 }
 
 bool VirtualUnit::is_turning(nanoseconds now) const { return hand_->is_turning(seconds(now)); }
+
+void VirtualUnit::stop_turning(nanoseconds now) { hand_->stop(seconds(now)); }
 
 void VirtualUnit::cut_power(nanoseconds now) {
   if (recording_) {

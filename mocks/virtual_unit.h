@@ -57,6 +57,7 @@ class VirtualUnit {
   // The hand or the jig. A turn takes `duration_s`; `tilt_deg` is how far the pose ends off.
   void turn_to(const Eigen::Vector3d& up, nanoseconds now, double duration_s, double tilt_deg = 0);
   bool is_turning(nanoseconds now) const;
+  void stop_turning(nanoseconds now);  // it stays as it is at that moment
 
   // Power. What is in RAM is lost: stream, staged page, kept reply, filter. A recording ends.
   void cut_power(nanoseconds now);

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "base/sha256.h"
 #include "gt3x/recording.h"
 #include "repair/constants_finder.h"
 #include "repair/survey.h"
@@ -66,7 +67,14 @@ Result<bool> go_round(device::Unit& unit, device::Jig& jig, const CaptureOptions
       return false;
     }
     SIXPOINT_CHECK(jig.go_to(side));
-    unit.clock().sleep(from_seconds(options.turn_s + options.side_s));
+    const auto until = unit.clock().elapsed() + from_seconds(options.turn_s + options.side_s);
+    for (auto now = unit.clock().elapsed(); now < until; now = unit.clock().elapsed()) {
+      if (options.cancelled && options.cancelled()) {
+        return false;
+      }
+      unit.clock().sleep(
+          std::min<std::chrono::nanoseconds>(until - now, std::chrono::milliseconds(200)));
+    }
   }
   return true;
 }
@@ -83,6 +91,42 @@ Status note_oddities(FileSystem& files, const std::string& path, CaptureReport& 
         fmt::format("the sensor repeated the very same readings for {} s: it is frozen",
                     oddities.repeated_s));
   }
+  return {};
+}
+
+Result<std::string> hash_of(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const auto file, files.open(path));
+  Sha256 hash;
+  Bytes piece(1U << 20U);
+  for (std::uint64_t offset = 0;;) {
+    SIXPOINT_ASSIGN(const std::size_t count, file->read_at(offset, piece));
+    if (count == 0) {
+      return to_hex(hash.finish());
+    }
+    hash.update(std::span<const std::uint8_t>(piece).first(count));
+    offset += count;
+  }
+}
+
+// The file is there: what it says about itself, and its constants.
+Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<double> wanted_s,
+                       CaptureReport& report) {
+  SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(env.files, options.output));
+  if (survey.facts.serial != report.serial) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the recording is of {}", printable(survey.facts.serial, 40)),
+                options.output, "another unit was plugged in; begin anew");
+  }
+  if (wanted_s && survey.duration_s < *wanted_s - kShort_s) {
+    report.notes.push_back(
+        fmt::format("the recording holds {:.0f} s of {:.0f}: is the unit's memory full, or its "
+                    "battery empty?",
+                    survey.duration_s, *wanted_s));
+  }
+  SIXPOINT_CHECK(note_oddities(env.files, options.output, report));
+  const auto begin = env.clock.elapsed();
+  SIXPOINT_ASSIGN(report.solved, repair::solve_survey(options.output, survey, options.solve));
+  report.solved->seconds = std::chrono::duration<double>(env.clock.elapsed() - begin).count();
   return {};
 }
 
@@ -116,6 +160,32 @@ std::vector<std::string> why_recording_cannot_help(const device::FilterState& fi
                       printable(serial, 40), printable(firmware, 40)),
           "install a firmware from 1.4.0 to 1.7.0 on this unit and capture again, or measure it on "
           "the jig ('sixpoint jig' sets the filter itself)"};
+}
+
+Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
+                                       const CaptureOptions& options) {
+  CaptureReport report;
+  report.serial = unit.identity().serial;
+  report.firmware = unit.identity().firmware;
+  SIXPOINT_ASSIGN(const auto recordings, unit.recordings());
+  if (recordings.empty()) {
+    return fail(ErrorCode::bad_data, "the unit holds no recording", unit.address(),
+                "let it record while it lies on each of its six sides for a minute");
+  }
+  SIXPOINT_CHECK(unit.download(recordings.back(), env.files, options.output));
+  report.file = options.output;
+  SIXPOINT_ASSIGN(report.file_sha256, hash_of(env.files, options.output));
+  SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(env.files, options.output));
+  if (const auto filter = repair::filter_in_force(survey.facts)) {
+    report.recording_filter = *filter;
+    report.refusal =
+        why_recording_cannot_help({*filter, *filter}, report.serial, report.firmware);
+    if (!report.refusal.empty()) {
+      return report;
+    }
+  }
+  SIXPOINT_CHECK(check_and_solve(env, options, std::nullopt, report));
+  return report;
 }
 
 Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,
@@ -175,22 +245,7 @@ Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env
   report.file = options.output;
   report.file_sha256 = to_hex(made->sha256);
 
-  SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(env.files, options.output));
-  if (survey.facts.serial != report.serial) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("the recording is of {}", printable(survey.facts.serial, 40)),
-                options.output, "another unit was plugged in; begin anew");
-  }
-  if (survey.duration_s < wanted_s - kShort_s) {
-    report.notes.push_back(
-        fmt::format("the recording holds {:.0f} s of {:.0f}: is the unit's memory full, or its "
-                    "battery empty?",
-                    survey.duration_s, wanted_s));
-  }
-  SIXPOINT_CHECK(note_oddities(env.files, options.output, report));
-  const auto begin = env.clock.elapsed();
-  SIXPOINT_ASSIGN(report.solved, repair::solve_survey(options.output, survey, options.solve));
-  report.solved->seconds = std::chrono::duration<double>(env.clock.elapsed() - begin).count();
+  SIXPOINT_CHECK(check_and_solve(env, options, wanted_s, report));
   return report;
 }
 

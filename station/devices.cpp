@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include "device/discovery.h"
+#include "device/drive/drive_unit.h"
+#include "device/session_replay.h"
 #include "mocks/in_process.h"
+#include "mocks/virtual_hid_jig.h"
 
 namespace sixpoint::station {
 
@@ -11,12 +14,30 @@ device::TransportRegistry known_devices() {
   device::TransportRegistry registry;
   mocks::register_virtual(registry);
   device::register_usb(registry);
+  device::register_replay(registry);
   return registry;
 }
 
 device::UnitRegistry known_units() {
   device::UnitRegistry registry(known_devices());
+  device::register_drive(registry);
   return registry;
+}
+
+Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& env,
+                                std::unique_ptr<device::Jig>& own) {
+  if ((name.empty() || name == "virtual") && unit.jig() != nullptr) {
+    return unit.jig();
+  }
+  if (name.empty() || name == "manual") {
+    own = std::make_unique<device::ManualJig>();
+    return own.get();
+  }
+  device::JigRegistry registry;
+  device::register_hid_jig(registry);
+  mocks::register_virtual_hid_jig(registry);
+  SIXPOINT_ASSIGN(own, registry.open(name, env, unit));
+  return own.get();
 }
 
 std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
@@ -55,7 +76,7 @@ std::string with_jig(std::string_view device, std::string_view jig) {
     }
   }
   settings += settings.empty() ? "" : ",";
-  return std::string(kScheme) + settings + (jig == "virtual" ? "jig=auto" : "jig=none");
+  return std::string(kScheme) + settings + (jig.starts_with("virtual") ? "jig=auto" : "jig=none");
 }
 
 }  // namespace sixpoint::station

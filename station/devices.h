@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "device/jig_registry.h"
 #include "device/transport.h"
 #include "device/unit_registry.h"
 #include "station/jig_session.h"
@@ -15,6 +16,13 @@ device::TransportRegistry known_devices();
 
 // The same, and the devices that bring a protocol of their own.
 device::UnitRegistry known_units();
+
+// The jig that a person named: "" the one that is part of the device, or else a person; "manual";
+// "virtual" the one that is part of a virtual unit; or an address such as hid:SERIAL or
+// virtual:lie_deg=8 (device/jig_registry.h). `own` keeps what had to be opened. usage where the name
+// is none.
+Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& env,
+                                std::unique_ptr<device::Jig>& own);
 
 // JigHooks::reopen for one unit that stays the same object: waits for it to come back, tells people,
 // and gives up after half a minute, when another unit comes, or when it goes away for the sixth

@@ -97,6 +97,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
   report_.jig = jig_->name();
   report_.filter = options_.filter;
   report_.gravity = options_.gravity;
+  report_.limits = options_.limits;
   const auto page = unit_->read_calibration();
   if (page) {
     report_.as_found = *page;
@@ -160,8 +161,17 @@ Status Session::come_back(JigRun& run, const Error& error) {
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error);
     if (!again) {
+      report_.stream = unit_->stream_statistics();
+      unit_ = nullptr;  // whoever kept them let go of them
+      jig_ = nullptr;
+    }
+    if (!again && again.error().code != ErrorCode::device_unavailable) {
+      return fail(again.error());  // whoever drives the run ends it himself
+    }
+    if (!again) {
       gone_ = again.error();
-      return handle(run, run.on_unit_gone());
+      const auto word = hooks_.words ? hooks_.words() : std::nullopt;
+      return handle(run, word == OperatorWord::stop ? run.on_operator(*word) : run.on_unit_gone());
     }
     unit_ = again->unit;
     jig_ = again->jig;
@@ -245,9 +255,12 @@ void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
   report_.faces = run.faces();
-  report_.stream = unit_->stream_statistics();
+  if (unit_ != nullptr) {
+    report_.stream = unit_->stream_statistics();
+  }
   say_what_is_left();
   report_.verdict = JigVerdict::inconclusive;
+  report_.codes = {error.code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted"};
   report_.reasons.push_back(error.what);
   report_.ended_by = error;
 }
@@ -271,6 +284,9 @@ Status Session::stream(JigRun& run) {
         return fail(block.error());
       }
       SIXPOINT_CHECK(come_back(run, block.error()));
+      if (unit_ == nullptr) {
+        break;
+      }
       heard_s = seconds(unit_->clock().elapsed());
       lost = 0;
       continue;
@@ -307,11 +323,15 @@ Status Session::stream(JigRun& run) {
     SIXPOINT_CHECK(ask_jig(now_s));
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
+  if (unit_ == nullptr) {
+    return {};
+  }
   report_.stream = unit_->stream_statistics();
   report_.stream.lost_samples += lost_before_;
   report_.stream.clock_jumps += clock_jumps_before_;
   report_.stream.clock_jumped_s += clock_jumped_before_s_;
-  if (run.outcome() == JigOutcome::unit_gone) {
+  if (run.outcome() == JigOutcome::unit_gone || run.outcome() == JigOutcome::stopped) {
+    static_cast<void>(unit_->stop_stream());  // it may be gone
     return {};
   }
   const Status stopped = unit_->stop_stream();
@@ -373,6 +393,13 @@ Result<calib::SixPoseReport> Session::solve(const std::vector<PoseReading>& face
   };
   calib::SixPoseOptions options;
   options.gravity = options_.gravity;
+  // Ranges and residuals are judged by the limits, with their guard bands; the solver only says
+  // whether the readings contradict each other.
+  options.gain_range = HUGE_VAL;
+  options.zero_range_g = HUGE_VAL;
+  options.held_out_mg = HUGE_VAL;
+  options.most_sd_mg = std::max(options.most_sd_mg, 2 * *options_.limits.of("noise_mg").high);
+  options.most_tilt_deg = std::max(options.most_tilt_deg, 2 * *options_.limits.of("tilt_deg").high);
   return calib::solve_six_poses(readings(faces), readings(held_out), options);
 }
 
@@ -396,7 +423,14 @@ Result<bool> Session::judge_verification(const JigRun& run) {
       }
     }
   }
-  return report_.six->verified && report_.verification.worst_mg <= options_.residual_limit_mg;
+  const double left_mg = report_.verification.rms_mg;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    report_.combined.sensitivity_relative[axis] =
+        std::hypot(best.uncertainty.sensitivity_relative[axis], left_mg / kMgPerG);
+    report_.combined.zero_mg[axis] = std::hypot(best.uncertainty.zero_mg[axis], left_mg);
+  }
+  return report_.six->verified &&
+         judge_quantities(measured_quantities(report_), options_.limits).usable();
 }
 
 Status Session::write_constants(JigRun& run) {
@@ -438,7 +472,7 @@ Status Session::write_constants(JigRun& run) {
 Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
-  SIXPOINT_ASSIGN(const bool verified, judge_verification(run));
+  SIXPOINT_CHECK(judge_verification(run));
   say_what_is_left();
   if (report_.as_found) {
     if (const auto found = calib::calibration_from(report_.as_found->constants)) {
@@ -454,10 +488,12 @@ Status Session::conclude(const JigRun& run) {
   switch (run.outcome()) {
     case JigOutcome::sensor_stuck:
       report_.verdict = JigVerdict::fail;
+      report_.codes = {"sensor_stuck"};
       report_.reasons.push_back(last_words_);
       return {};
     case JigOutcome::stopped:
       report_.verdict = JigVerdict::stopped;
+      report_.codes = {"stopped"};
       report_.reasons.push_back("stopped by the operator");
       return {};
     case JigOutcome::timed_out:
@@ -467,6 +503,9 @@ Status Session::conclude(const JigRun& run) {
       if (run.outcome() == JigOutcome::unit_gone) {
         report_.ended_by = gone_;
       }
+      report_.codes = {run.outcome() == JigOutcome::timed_out           ? "time_out"
+                       : run.outcome() == JigOutcome::too_many_refusals ? "too_many_refusals"
+                                                                        : "unit_gone"};
       report_.reasons.push_back(
           run.outcome() == JigOutcome::timed_out
               ? "no pose was accepted in time; is the unit on the jig, and does the jig turn it?"
@@ -485,34 +524,34 @@ Status Session::conclude(const JigRun& run) {
     case JigOutcome::complete:
       break;
   }
-  if (!verified) {
-    report_.verdict = JigVerdict::fail;
-    if (report_.six) {
-      report_.reasons.insert(report_.reasons.end(), report_.six->reasons.begin(),
-                             report_.six->reasons.end());
-    }
-    if (report_.verification.worst_mg > options_.residual_limit_mg) {
-      report_.reasons.push_back(fmt::format(
-          "on poses that were not fitted the constants are {:.1f} mg off, more than {:.1f}",
-          report_.verification.worst_mg, options_.residual_limit_mg));
-    }
-    return {};
-  }
-  report_.verdict = JigVerdict::pass;
   if (report_.written) {
     const auto left = calib::calibration_from(report_.as_left->constants);
     report_.recheck = judge(run.recheck(), *left, gravity_g_);
-    if (report_.as_left->constants != report_.six->best().stored ||
-        report_.recheck.worst_mg > options_.residual_limit_mg) {
-      report_.verdict = JigVerdict::fail;
-      report_.reasons.push_back(fmt::format(
-          "with the constants that the unit now holds it is {:.1f} mg off, more than {:.1f}",
-          report_.recheck.worst_mg, options_.residual_limit_mg));
-    }
-  } else if (options_.run.write) {
-    report_.verdict = JigVerdict::fail;
-    report_.reasons.push_back("the constants were not written into the unit");
   }
+  Verdict judged = judge_quantities(measured_quantities(report_), options_.limits);
+  const auto worse = [&](JigVerdict verdict, const char* code) {
+    judged.verdict = verdict;
+    judged.codes.emplace_back(code);
+  };
+  if (!report_.six || !report_.six->missing_directions.empty()) {
+    worse(JigVerdict::inconclusive, "missing_pose");
+  } else if (!report_.six->verified) {
+    worse(JigVerdict::fail, "not_verified");
+    judged.reasons.insert(judged.reasons.end(), report_.six->reasons.begin(),
+                          report_.six->reasons.end());
+  }
+  if (report_.written && report_.as_left->constants != report_.six->best().stored) {
+    worse(JigVerdict::fail, "read_back_differs");
+    judged.reasons.emplace_back("the unit does not hold what was written");
+  } else if (!report_.written && options_.run.write && judged.usable()) {
+    worse(JigVerdict::fail, "write_refused");
+    judged.reasons.emplace_back("the constants were not written into the unit");
+  }
+  apply_retest(judged, options_.retest);
+  report_.verdict = judged.verdict;
+  report_.codes = std::move(judged.codes);
+  report_.quantities = std::move(judged.quantities);
+  report_.reasons.insert(report_.reasons.end(), judged.reasons.begin(), judged.reasons.end());
   return {};
 }
 
@@ -533,7 +572,9 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
   const Status streamed = stream(machine);
   if (!streamed) {
     // Whatever happened, leave the jig at rest.
-    static_cast<void>(jig_->stop());
+    if (jig_ != nullptr) {
+      static_cast<void>(jig_->stop());
+    }
     if (!options_.keep_interrupted) {
       return fail(streamed.error());
     }
@@ -587,6 +628,24 @@ nlohmann::ordered_json json_of(const JudgedPoses& judged) {
   return json;
 }
 
+// Standard uncertainties under the contract's names, then what they are made of and expanded to.
+nlohmann::ordered_json uncertainty_to_json(const JigReport& report) {
+  const double coverage = report.limits.decision.coverage_factor;
+  nlohmann::ordered_json json = calib::to_json(report.combined);
+  PerAxis<double> sensitivity_percent{};
+  PerAxis<double> zero_mg{};
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    sensitivity_percent[axis] = 100 * coverage * report.combined.sensitivity_relative[axis];
+    zero_mg[axis] = coverage * report.combined.zero_mg[axis];
+  }
+  json["coverage_factor"] = coverage;
+  json["expanded"] = {{"sensitivity_percent", sensitivity_percent}, {"zero_mg", zero_mg}};
+  json["budget"] = {{"noise_tilt_gravity", calib::to_json(report.six->best().uncertainty)},
+                    {"gravity_relative", report.gravity.sd_g() / report.gravity.g()},
+                    {"unused_poses_rms_mg", report.verification.rms_mg}};
+  return json;
+}
+
 nlohmann::ordered_json json_of(const std::optional<device::CalibrationPage>& page) {
   if (!page) {
     return nullptr;
@@ -597,20 +656,6 @@ nlohmann::ordered_json json_of(const std::optional<device::CalibrationPage>& pag
 }
 
 }  // namespace
-
-std::string_view to_string(JigVerdict verdict) {
-  switch (verdict) {
-    case JigVerdict::pass:
-      return "pass";
-    case JigVerdict::fail:
-      return "fail";
-    case JigVerdict::inconclusive:
-      return "inconclusive";
-    case JigVerdict::stopped:
-      return "stopped";
-  }
-  return "?";
-}
 
 JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& calibration,
                   double gravity_g) {
@@ -649,10 +694,13 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["jig"] = jig;
   json["filter"] = calib::to_string(filter);
   json["verdict"] = to_string(verdict);
+  json["codes"] = codes;
   json["reasons"] = reasons;
   json["started"] = to_iso8601(started);
   json["ended"] = to_iso8601(ended);
   json["gravity_m_per_s2"] = gravity.m_per_s2;
+  json["gravity_standard_uncertainty_m_per_s2"] = gravity.standard_uncertainty_m_per_s2;
+  json["raw_sha256"] = raw_sha256();
   json["poses"] = nlohmann::ordered_json::array();
   for (const PoseReading& face : faces) {
     json["poses"].push_back(json_of(face));
@@ -676,8 +724,12 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["verification"] = json_of(verification);
   json["verification"]["residual_rounded_mg"] = rounded_residual_mg;
   json["recheck"] = written ? json_of(recheck) : nlohmann::ordered_json(nullptr);
-  json["uncertainty"] =
-      six ? calib::to_json(six->best().uncertainty) : nlohmann::ordered_json(nullptr);
+  json["uncertainty"] = six ? uncertainty_to_json(*this) : nlohmann::ordered_json(nullptr);
+  json["limits"] = station::to_json(limits);
+  json["quantities"] = nlohmann::ordered_json::array();
+  for (const JudgedQuantity& quantity : quantities) {
+    json["quantities"].push_back(station::to_json(quantity));
+  }
   json["solutions"] = six ? calib::to_json(*six) : nlohmann::ordered_json(nullptr);
   json["refusals"] = refusals;
   json["stream"]["samples"] = stream.samples;
@@ -689,6 +741,11 @@ nlohmann::ordered_json JigReport::to_json() const {
   return json;
 }
 
+std::string JigReport::raw_sha256() const {
+  return to_hex(
+      sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
+}
+
 calib::ConstantsRecord JigReport::record() const {
   calib::ConstantsRecord record;
   record.serial = serial;
@@ -696,12 +753,11 @@ calib::ConstantsRecord JigReport::record() const {
   if (six) {
     record.calibration = six->best().calibration;
     record.stored = six->best().stored;
-    record.uncertainty = six->best().uncertainty;
+    record.uncertainty = combined;
   }
   record.method = method;
   record.made_at = ended;
-  record.made_from.sha256 = to_hex(
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
+  record.made_from.sha256 = raw_sha256();
   record.gravity_m_per_s2 = gravity.m_per_s2;
   return record;
 }
@@ -756,6 +812,8 @@ JigReport interrupted_report(const JigResume& resume, const std::string& serial,
   report.started = resume.started;
   report.ended = ended;
   report.verdict = JigVerdict::inconclusive;
+  report.codes = {"unit_gone"};
+  report.limits = options.limits;
   report.reasons.push_back(reason);
   report.faces = resume.progress.faces;
   report.as_found = resume.as_found;

@@ -19,6 +19,8 @@
 #include "calib/six_pose.h"
 #include "device/unit.h"
 #include "station/jig_run.h"
+#include "station/limits.h"
+#include "station/verdict.h"
 
 namespace sixpoint::station {
 
@@ -26,9 +28,8 @@ struct JigSessionOptions {
   JigRunOptions run;
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   calib::LocalGravity gravity = calib::gravity_unknown();  // where the jig stands
-  // Largest distance of a verification reading's magnitude from local gravity. A real sensor's six
-  // constants leave 4 to 8 mg (curvature, cross-axis); an affected one is off by 100 and more.
-  double residual_limit_mg = 10;
+  Limits limits = default_limits();
+  RetestState retest;  // what the unit's earlier runs demand (verdict.h)
   // Longest silence of a streaming unit before it is given up.
   double silence_s = 3;
   // An error in mid-run ends in a report with `ended_by`, so that what was measured can be kept;
@@ -39,9 +40,6 @@ struct JigSessionOptions {
   // So many tilted placements in a row that the jig calls exact: it does not stand where it says.
   int jig_disagreements = 3;
 };
-
-enum class JigVerdict { pass, fail, inconclusive, stopped };
-std::string_view to_string(JigVerdict verdict);
 
 // One reading judged by constants: magnitude against local gravity.
 struct JudgedPose {
@@ -65,7 +63,10 @@ struct JigReport {
   UtcTime started{};
   UtcTime ended{};
   JigVerdict verdict = JigVerdict::inconclusive;
-  std::vector<std::string> reasons;
+  std::vector<std::string> codes;    // of verdict.h's catalogue; empty for a pass
+  std::vector<std::string> reasons;  // for people
+  Limits limits;
+  std::vector<JudgedQuantity> quantities;  // empty where the run did not get that far
   // Why the run ended early, where it did; the verdict is inconclusive then.
   std::optional<Error> ended_by;
   calib::LocalGravity gravity;
@@ -75,6 +76,9 @@ struct JigReport {
   std::optional<calib::SixPoseReport> six;
   std::string method;  // "six_pose_letter" (Eq. 1-6 to the letter), "six_pose_pair" ...
   JudgedPoses verification;
+  // Standard uncertainty of the chosen constants: noise, tilt and gravity as the fit has them, and
+  // what the constants leave on unused poses.
+  calib::ConstantsUncertainty combined;
   double rounded_residual_mg = 0;  // of the nine integers, on the same readings
 
   std::optional<device::CalibrationPage> as_found;
@@ -87,10 +91,11 @@ struct JigReport {
   device::StreamStatistics stream;
   std::string raw_csv;  // every sample of the run: device_time_us,x,y,z,temperature_c
 
-  bool usable() const { return verdict == JigVerdict::pass; }
+  bool usable() const { return is_passed(verdict); }
   std::string brief() const;
   // The contract's keys but `run`, `stored_id` and `certificate`.
   nlohmann::ordered_json to_json() const;
+  std::string raw_sha256() const;  // of raw_csv, which the store keeps
   // For the store. Only of a usable report.
   calib::ConstantsRecord record() const;
 };
