@@ -196,7 +196,7 @@ Status Session::come_back(JigRun& run, const Error& error) {
 
 // A jig that is in trouble ends the run: nothing that it turns from here on means anything.
 Status Session::ask_jig(double now_s) {
-  if (!jig_->turns_by_itself() ||
+  if (jig_ == nullptr || !jig_->turns_by_itself() ||
       (jig_asked_s_ && now_s - *jig_asked_s_ < options_.jig_poll_s)) {
     return {};
   }
@@ -211,7 +211,7 @@ Status Session::ask_jig(double now_s) {
 }
 
 Status Session::compare_with_jig(const JigAction& action) {
-  if (!jig_->turns_by_itself()) {
+  if (jig_ == nullptr || !jig_->turns_by_itself()) {
     return {};
   }
   const bool tilted = action.kind == JigAction::Kind::refused && action.text.starts_with("tilted");
