@@ -419,10 +419,10 @@ Result<std::string> Store::correct(const Correction& correction) {
   const bool of_constants = correction.action == "withdraw" || correction.action == "reinstate";
   if ((!of_constants && correction.action != "note") ||
       (of_constants && correction.table != "constants")) {
-    return fail(ErrorCode::usage,
-                fmt::format("no correction '{}' of {}", printable(correction.action, 60),
-                            correction.table),
-                {}, "constants are withdrawn and reinstated; any row can have a note");
+    return fail(
+        ErrorCode::usage,
+        fmt::format("no correction '{}' of {}", printable(correction.action, 60), correction.table),
+        {}, "constants are withdrawn and reinstated; any row can have a note");
   }
   if (correction.reason.empty()) {
     return fail(ErrorCode::usage, "a correction needs a reason", {}, "say why");
@@ -437,9 +437,9 @@ Result<std::string> Store::correct(const Correction& correction) {
                 fmt::format("no {} '{}'", correction.table, printable(correction.row_id, 60)),
                 impl_->database->location(), "'sixpoint history SERIAL' lists them");
   }
-  const Row values = with_id(
-      "corrections", {to_ns(impl_->env.clock.now()), correction.table, correction.row_id,
-                      correction.action, correction.operator_name, correction.reason});
+  const Row values =
+      with_id("corrections", {to_ns(impl_->env.clock.now()), correction.table, correction.row_id,
+                              correction.action, correction.operator_name, correction.reason});
   SIXPOINT_CHECK(impl_->in_transaction(
       [&](HistoryWriter& writer) { return impl_->append(writer, "corrections", values); }));
   return text_of(values[0]);
@@ -492,9 +492,9 @@ Result<UnitHistory> Store::unit_history(const std::string& serial) {
   SIXPOINT_CHECK(read(kRunColumns, "runs", all.runs, to_run));
   SIXPOINT_CHECK(read("run_id, serial, written_ns, as_found, as_left, read_back", "unit_writes",
                       all.writes, [](const Row& row) {
-                        return UnitWrite{text_of(row[0]), text_of(row[1]),
-                                         from_ns(integer_of(row[2])), text_of(row[3]),
-                                         text_of(row[4]), text_of(row[5])};
+                        return UnitWrite{
+                            text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
+                            text_of(row[3]), text_of(row[4]), text_of(row[5])};
                       }));
   SIXPOINT_CHECK(read(kRepairColumns, "repairs", all.repairs, to_repair));
   SIXPOINT_ASSIGN(
@@ -512,22 +512,106 @@ Result<UnitHistory> Store::unit_history(const std::string& serial) {
           parameters));
   for (const Row& row : rows) {
     all.corrections.push_back({text_of(row[0]), from_ns(integer_of(row[1])), text_of(row[2]),
-                               text_of(row[3]), text_of(row[4]), text_of(row[5]),
-                               text_of(row[6])});
+                               text_of(row[3]), text_of(row[4]), text_of(row[5]), text_of(row[6])});
   }
   return all;
 }
 
 Result<RunRecord> Store::run(const std::string& id) {
   const std::vector<Value> parameters = {id};
-  SIXPOINT_ASSIGN(const auto rows, impl_->database->query(
-                                       fmt::format("SELECT {} FROM runs WHERE id = $1", kRunColumns),
-                                       parameters));
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->query(
+                      fmt::format("SELECT {} FROM runs WHERE id = $1", kRunColumns), parameters));
   if (rows.empty()) {
     return fail(ErrorCode::no_input, fmt::format("no run '{}'", printable(id, 60)),
                 impl_->database->location(), "'sixpoint history SERIAL' lists the runs of a unit");
   }
   return to_run(rows[0]);
+}
+
+Result<std::string> Store::add_station_event(const StationEvent& event) {
+  SIXPOINT_CHECK(check_texts({event.station, event.operator_name}));
+  SIXPOINT_CHECK(check_texts({event.reason}, 100 * kLongestName));
+  const bool about_unit =
+      event.action == "check_unit" || event.action == "check_unit_end" || event.action == "release";
+  if (!about_unit && event.action != "sign" && event.action != "sign_new_baseline") {
+    return fail(ErrorCode::usage,
+                fmt::format("nothing at a station is called '{}'", printable(event.action, 60)), {},
+                "please report this");
+  }
+  if (about_unit) {
+    SIXPOINT_CHECK(check_serial(event.serial));
+  }
+  if (event.operator_name.empty() || event.reason.empty()) {
+    return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
+                "say who decides, and why");
+  }
+  const Row values =
+      with_id("station_events", {to_ns(impl_->env.clock.now()), event.station, event.serial,
+                                 event.action, event.operator_name, event.reason});
+  SIXPOINT_CHECK(impl_->in_transaction(
+      [&](HistoryWriter& writer) { return impl_->append(writer, "station_events", values); }));
+  return text_of(values[0]);
+}
+
+Result<std::vector<StationEvent>> Store::station_events(const std::string& station) {
+  std::vector<Value> parameters;
+  if (!station.empty()) {
+    parameters.emplace_back(station);
+  }
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query(
+          fmt::format("SELECT id, made_at_ns, station, serial, action, operator, reason "
+                      "FROM station_events {} ORDER BY seq",
+                      station.empty() ? "" : "WHERE station = $1"),
+          parameters));
+  std::vector<StationEvent> events;
+  events.reserve(rows.size());
+  for (const Row& row : rows) {
+    events.push_back({text_of(row[0]), from_ns(integer_of(row[1])), text_of(row[2]),
+                      text_of(row[3]), text_of(row[4]), text_of(row[5]), text_of(row[6])});
+  }
+  return events;
+}
+
+Status Store::for_each_run(const RunFilter& filter,
+                           const std::function<Status(const RunRecord&)>& visit) {
+  std::vector<Value> parameters;
+  std::string where = "seq > 0";
+  const auto only = [&](std::string_view condition, Value value) {
+    parameters.push_back(std::move(value));
+    where += fmt::format(" AND {} ${}", condition, parameters.size());
+  };
+  if (!filter.kind.empty()) {
+    only("kind =", filter.kind);
+  }
+  if (!filter.serial.empty()) {
+    only("serial =", filter.serial);
+  }
+  if (!filter.station.empty()) {
+    only("station =", filter.station);
+  }
+  if (filter.from) {
+    only("started_ns >=", to_ns(*filter.from));
+  }
+  if (filter.to) {
+    only("started_ns <", to_ns(*filter.to));
+  }
+  SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(*impl_->database));
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->stream(fmt::format("SELECT {} FROM runs WHERE {} "
+                                                      "ORDER BY started_ns, seq",
+                                                      kRunColumns, where),
+                                          parameters));
+  Row row;
+  while (true) {
+    SIXPOINT_ASSIGN(const bool more, rows->next(row));
+    if (!more) {
+      return {};
+    }
+    SIXPOINT_CHECK(visit(to_run(row)));
+  }
 }
 
 Result<std::optional<ConstantsRecord>> Store::constants_for(const std::string& serial,
@@ -596,13 +680,13 @@ Result<std::vector<RecallEntry>> Store::recall_list(const std::string& constants
     parameters.emplace_back(constants_id);
     only = " AND w.about_id = $1";
   }
-  SIXPOINT_ASSIGN(const auto rows,
-                  impl_->database->query(
-                      fmt::format("SELECT {}, w.made_at_ns, w.reason FROM corrections w "
-                                  "JOIN repairs ON repairs.constants_id = w.about_id "
-                                  "WHERE {}{} ORDER BY repairs.seq, w.seq",
-                                  kRepairColumns, kStillWithdrawn, only),
-                      parameters));
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query(fmt::format("SELECT {}, w.made_at_ns, w.reason FROM corrections w "
+                                         "JOIN repairs ON repairs.constants_id = w.about_id "
+                                         "WHERE {}{} ORDER BY repairs.seq, w.seq",
+                                         kRepairColumns, kStillWithdrawn, only),
+                             parameters));
   std::vector<RecallEntry> entries;
   for (const Row& row : rows) {
     RecallEntry entry{to_repair(row), from_ns(integer_of(row[kRepairColumnCount])),
@@ -637,6 +721,11 @@ Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
   return list;
 }
 
+// The verdicts after which the constants are used.
+static bool is_passed(std::string_view verdict) {
+  return verdict == "pass" || verdict == "conditional_pass";
+}
+
 double YieldReport::yield() const {
   return units == 0 ? std::numeric_limits<double>::quiet_NaN()
                     : static_cast<double>(passed) / static_cast<double>(units);
@@ -661,7 +750,7 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
   std::map<std::string, Runs> units;
   std::size_t retests = 0;
   for (const Row& row : rows) {
-    const bool passed = text_of(row[1]) == "pass";
+    const bool passed = is_passed(text_of(row[1]));
     const auto [unit, is_new] = units.try_emplace(text_of(row[0]));
     if (is_new) {
       unit->second.first_passed = passed;
@@ -681,11 +770,11 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
 }
 
 Result<std::vector<DueUnit>> Store::units_due(UtcTime older_than) {
-  SIXPOINT_ASSIGN(const auto rows,
-                  impl_->database->query(
-                      "SELECT serial, model, (SELECT max(made_at_ns) FROM constants "
-                      "WHERE constants.serial = units.serial AND " +
-                      not_withdrawn() + ") FROM units"));
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query("SELECT serial, model, (SELECT max(made_at_ns) FROM constants "
+                             "WHERE constants.serial = units.serial AND " +
+                             not_withdrawn() + ") FROM units"));
   std::vector<DueUnit> due;
   for (const Row& row : rows) {
     DueUnit unit{text_of(row[0]), text_of(row[1]), std::nullopt};
@@ -783,9 +872,10 @@ Result<AuditReport> Store::audit(const std::string& earlier_head) {
     find("the head does not name the last row: rows at the end were removed or added");
   }
   if (!met) {
-    find(fmt::format("the head {} that was written down is no row of this chain: the history was "
-                     "written anew, or this is another store",
-                     printable(earlier_head, 70)));
+    find(
+        fmt::format("the head {} that was written down is no row of this chain: the history was "
+                    "written anew, or this is another store",
+                    printable(earlier_head, 70)));
   }
   report.head = to_hex(previous);
   report.ok = report.findings.empty();

@@ -8,11 +8,13 @@ build_packages=(
   ca-certificates ccache cmake g++ git ninja-build pkg-config
   libcli11-dev libcpp-httplib-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev libspdlog-dev libsqlite3-dev
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
+  libboost-dev libhpdf-dev libqrencode-dev libtomlplusplus-dev
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
   chromium tmux
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
+  poppler-utils zbar-tools
 )
 
 # The page's tests need Node; a machine that has it from elsewhere keeps it (its package has npm inside

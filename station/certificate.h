@@ -30,16 +30,15 @@ struct Certificate {
   UtcTime ended{};
   std::string operator_name;
   std::string station;
-  std::string software;  // name and version, and the build where it is known
-  std::string method;
+  std::string software;    // name and version, and the build where it is known
   std::string raw_sha256;  // of the samples that the store keeps
 
-  std::string jig;
-  std::string jig_serial;
+  std::string jig;  // its number, or its kind where that was not given
   std::optional<UtcTime> jig_due;
 
   JigVerdict verdict = JigVerdict::inconclusive;
   std::vector<std::string> codes;
+  std::vector<std::string> reasons;
   std::vector<JudgedQuantity> quantities;
   std::string limits_source;
   std::string limits_sha256;
@@ -54,6 +53,7 @@ struct Certificate {
   std::optional<Constants> as_left;
   bool written = false;
 
+  std::string method;  // "six_pose_pair" ...
   PerAxis<double> sensitivity_g_per_lsb{};
   PerAxis<double> zero_lsb{};
   PerAxis<double> sensitivity_expanded_percent{};
@@ -72,8 +72,6 @@ struct Certificate {
   std::vector<Pose> poses;
   std::vector<Pose> verification;
 
-  double temperature_c = 0;
-  double temperature_change_c = 0;
   double gravity_m_per_s2 = 0;
   double gravity_standard_uncertainty_m_per_s2 = 0;
 

@@ -4,6 +4,7 @@
 
 #include "gt3x/model.h"
 #include "station/software.h"
+#include "station/station_records.h"
 
 namespace sixpoint::station {
 
@@ -42,12 +43,16 @@ db::RunRecord run_record_before(const JigSessionOptions& session, const std::str
   return run;
 }
 
-void complete_run_record(db::RunRecord& run, const JigReport& report) {
+void complete_run_record(db::RunRecord& run, const JigReport& report, const std::string& study) {
   run.started = report.started;
   run.ended = report.ended;
   run.verdict = to_string(report.verdict);
   // The unit's own words may hold anything; a run is kept whatever they are.
-  run.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
+  Json document = report.to_json();
+  if (!study.empty()) {
+    document["study"] = study;
+  }
+  run.document = document.dump(-1, ' ', false, Json::error_handler_t::replace);
   run.codes = report.codes;
   if (!report.faces.empty()) {
     double sum_c = 0;
@@ -75,7 +80,7 @@ Result<StoredRun> add_run_records(db::Keeper& keeper, const JigReport& report,
     write.read_back = calib::to_json(report.as_left->constants).dump();
     SIXPOINT_CHECK(keeper.add_unit_write(write));
   }
-  if (report.usable()) {
+  if (report.usable() && run.kind != kStudyKind) {
     calib::ConstantsRecord constants = report.record();
     constants.made_from.station = run.station;
     db::ConstantsRecord row;

@@ -69,7 +69,8 @@ struct AnovaRow {
 };
 
 struct GageOptions {
-  // The interaction is pooled into repeatability above this (AIAG MSA, 4th edition, III.B.3).
+  // The interaction is pooled into repeatability above this: where it is plainly chance. Both the
+  // textbook's 0.05 and this pool the AIAG example (p = 0.97).
   double pool_above_p = 0.25;
   std::optional<double> tolerance;  // width of the specification, for %GRR of tolerance
   double study_factor = 6;          // study variation in standard deviations

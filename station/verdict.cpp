@@ -276,6 +276,35 @@ nlohmann::ordered_json to_json(const JudgedQuantity& quantity) {
   return json;
 }
 
+std::vector<JudgedQuantity> quantities_from_json(const nlohmann::ordered_json& json) {
+  const auto text = [](const nlohmann::ordered_json& item, const char* key) {
+    return item.contains(key) && item[key].is_string() ? item[key].get<std::string>()
+                                                       : std::string();
+  };
+  const auto number = [](const nlohmann::ordered_json& item, const char* key) {
+    return item.contains(key) && item[key].is_number() ? std::optional(item[key].get<double>())
+                                                       : std::nullopt;
+  };
+  std::vector<JudgedQuantity> quantities;
+  for (const auto& item : json.is_array() ? json : nlohmann::ordered_json::array()) {
+    if (!item.is_object() || find_quantity(text(item, "name")) == nullptr) {
+      continue;
+    }
+    JudgedQuantity quantity;
+    quantity.name = text(item, "name");
+    quantity.axis = text(item, "axis");
+    quantity.value = number(item, "value").value_or(NAN);
+    quantity.expanded_uncertainty = number(item, "expanded_uncertainty").value_or(NAN);
+    quantity.low = number(item, "low");
+    quantity.high = number(item, "high");
+    quantity.guard_band = number(item, "guard_band").value_or(NAN);
+    quantity.verdict = parse_jig_verdict(text(item, "verdict")).value_or(JigVerdict::inconclusive);
+    quantity.code = text(item, "code");
+    quantities.push_back(std::move(quantity));
+  }
+  return quantities;
+}
+
 // --- the budget (docs/verdicts.md has it in words) ---
 
 std::vector<Measured> measured_quantities(const JigReport& report) {

@@ -71,6 +71,8 @@ struct Verdict {
   bool usable() const { return is_passed(verdict); }
 };
 nlohmann::ordered_json to_json(const JudgedQuantity& quantity);
+// Of a run's document; what is no quantity of this program is left out.
+std::vector<JudgedQuantity> quantities_from_json(const nlohmann::ordered_json& json);
 
 // One quantity against its limits. A value that is not finite is inconclusive. An uncertainty that
 // is judged and too large makes the run inconclusive, not the unit bad.

@@ -15,6 +15,13 @@ namespace sixpoint::cli {
   COMMAND(solve)                   \
   COMMAND(jig)                     \
   COMMAND(capture)                 \
+  COMMAND(limits)                  \
+  COMMAND(certificate)             \
+  COMMAND(check_unit)              \
+  COMMAND(station_lock)            \
+  COMMAND(retest)                  \
+  COMMAND(statistics)              \
+  COMMAND(gage_rr)                 \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \

@@ -1,16 +1,22 @@
 // sixpoint jig: the technician's six-orientation run, in the terminal.
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include "base/atomic_file.h"
 #include "calib/gravity.h"
 #include "device/unit.h"
+#include "station/certificate.h"
 #include "station/cli/command.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
 #include "station/run_records.h"
+#include "station/station_records.h"
 
 namespace sixpoint::cli {
 
@@ -25,6 +31,10 @@ struct Options {
   std::string operator_name;
   std::string station;
   std::string filter = "current";
+  std::string limits;
+  std::string study;
+  std::string certificate;
+  std::string label;
   std::string store;
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
@@ -37,6 +47,8 @@ struct Done {
   station::JigReport report;
   std::string run_id;
   std::optional<std::string> constants_id;
+  bool certified = false;
+  bool labelled = false;
   Result<db::Kept> kept = db::Kept{};
 };
 
@@ -47,6 +59,9 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
                                     Result<db::Store>& store) {
   db::RunRecord run =
       station::run_record_before(session, serial, options.jig_id.empty() ? jig : options.jig_id);
+  if (!options.study.empty()) {
+    run.kind = station::kStudyKind;
+  }
   run.operator_name = options.operator_name;
   run.station = options.station;
   if (!options.jig_due.empty()) {
@@ -82,8 +97,74 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
   return run;
 }
 
+Status check_outputs(const Options& options) {
+  const std::string& path = options.certificate;
+  if (!path.empty() && !path.ends_with(".pdf") && !path.ends_with(".json")) {
+    return fail(ErrorCode::usage, "a certificate is a .pdf or a .json", path,
+                "end the file's name with one of them");
+  }
+  if (!options.label.empty() && !options.write) {
+    return fail(ErrorCode::usage, "a label says that the unit holds what was measured", "--label",
+                "add --write, which writes the constants and reads them back");
+  }
+  if (!options.study.empty() &&
+      (options.operator_name.empty() || !options.certificate.empty() || options.write)) {
+    return fail(ErrorCode::usage, "a gage study compares operators and changes no unit", "--study",
+                "name the --operator, and leave out --write and --certificate");
+  }
+  return {};
+}
+
+// Certificate and label from the record as it is stored, so that they can be made again from there.
+// A run without a result has none; what cannot be made is said and is no reason to lose the run.
+void make_papers(Context& context, const Options& options, const db::RunRecord& run, Done& done) {
+  const auto settle = [&](const Status& made, bool& flag) {
+    flag = made.has_value();
+    if (!made) {
+      context.log().error("{}", made.error().brief());
+      if (made.error().code != ErrorCode::bad_data) {
+        context.worsen(static_cast<int>(made.error().code));
+      }
+    }
+  };
+  if (!options.certificate.empty()) {
+    settle(station::write_certificate(context.env.files, options.certificate, run), done.certified);
+  }
+  if (!options.label.empty()) {
+    const auto label = station::label_zpl(run);
+    settle(
+        label ? write_file(context.env.files, options.label, *label) : Status(fail(label.error())),
+        done.labelled);
+  }
+}
+
+// What the operator typed since the last call, without waiting: a line that begins with u or s.
+std::optional<station::OperatorWord> terminal_word() {
+  pollfd keyboard{STDIN_FILENO, POLLIN, 0};
+  if (poll(&keyboard, 1, 0) <= 0 || (keyboard.revents & POLLIN) == 0) {
+    return std::nullopt;
+  }
+  std::array<char, 80> line{};
+  if (read(STDIN_FILENO, line.data(), line.size()) <= 0) {
+    return std::nullopt;
+  }
+  switch (line[0]) {
+    case 'u':
+      return station::OperatorWord::undo;
+    case 's':
+    case 'q':
+      return station::OperatorWord::stop;
+    default:
+      return std::nullopt;
+  }
+}
+
 Result<Done> run(Context& context, const Options& options) {
+  SIXPOINT_CHECK(check_outputs(options));
   station::JigSessionOptions session;
+  if (!options.limits.empty()) {
+    SIXPOINT_ASSIGN(session.limits, station::read_limits(context.env.files, options.limits));
+  }
   SIXPOINT_ASSIGN(session.filter, calib::parse_filter_configuration(options.filter));
   if (options.gravity_m_per_s2) {
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_entered(*options.gravity_m_per_s2));
@@ -126,21 +207,42 @@ Result<Done> run(Context& context, const Options& options) {
   if (!store && store.error().code == ErrorCode::usage) {
     return fail(store.error());
   }
+  if (store && options.study.empty()) {
+    SIXPOINT_ASSIGN(session.retest, station::may_start(*store, unit->identity().serial,
+                                                       options.station, session.limits));
+  } else if (!store) {
+    context.log().warn(
+        "the store does not answer: whether the station is locked and how often the "
+        "unit failed is not known");
+  }
   SIXPOINT_ASSIGN(auto record, record_before(context, options, session, unit->identity().serial,
                                              jig.name(), store));
+  if (record.retest_of.empty()) {
+    record.retest_of = session.retest.retest_of;
+  }
   Done done;
-  SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
-  station::complete_run_record(record, done.report);
+  station::JigHooks hooks;
+  hooks.tell = tell;
+  if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
+    context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
+    hooks.words = terminal_word;
+  }
+  SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
+  station::complete_run_record(record, done.report, options.study);
   done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
     SIXPOINT_ASSIGN(const auto stored, station::add_run_records(keeper, done.report, record));
     done.run_id = stored.run_id;
     done.constants_id = stored.constants_id;
     return {};
   });
+  record.id = done.run_id;
+  if (done.kept) {
+    make_papers(context, options, record, done);
+  }
   return done;
 }
 
-Json to_json(const Done& done) {
+Json to_json(const Options& options, const Done& done) {
   Json json = document("jig");
   json["run"] = done.run_id;
   const Json report = done.report.to_json();
@@ -148,7 +250,8 @@ Json to_json(const Done& done) {
     json[key] = value;
   }
   json["stored_id"] = done.constants_id ? Json(*done.constants_id) : Json(nullptr);
-  json["certificate"] = nullptr;
+  json["certificate"] = done.certified ? Json(options.certificate) : Json(nullptr);
+  json["label"] = done.labelled ? Json(options.label) : Json(nullptr);
   json["kept"] = done.kept ? kept_to_json(*done.kept) : Json(nullptr);
   if (!done.kept) {
     json["error"] = error_to_json(done.kept.error());
@@ -205,6 +308,14 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");
   command->add_option("--altitude", options->altitude_m, "... and metres above sea level");
+  command->add_option("--limits", options->limits,
+                      "a TOML file of limits (docs/limits.md); else the built-in ones");
+  command->add_option("--certificate", options->certificate,
+                      "the calibration certificate: a .pdf or .json to make");
+  command->add_option("--label", options->label,
+                      "a label for the unit, as ZPL; after a read-back only (--write)");
+  command->add_option("--study", options->study,
+                      "this run belongs to a gage study of that name (sixpoint gage-rr)");
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);
@@ -222,7 +333,7 @@ void add_jig(CLI::App& app, Context& context) {
       context.worsen(static_cast<int>(done->kept.error().code));
     }
     if (options->json) {
-      print_json(context, to_json(*done));
+      print_json(context, to_json(*options, *done));
     } else {
       print(context, *done);
     }

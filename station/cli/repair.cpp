@@ -206,9 +206,10 @@ void run(const Options& options, Context& context) {
   if (store) {
     const auto kept = remember(context, options.store, store, reports);
     if (!kept) {
-      context.log().error("the files are mended, but the store does not know: {}; run it again "
-                          "with --resume",
-                          kept.error().brief());
+      context.log().error(
+          "the files are mended, but the store does not know: {}; run it again "
+          "with --resume",
+          kept.error().brief());
       context.worsen(static_cast<int>(kept.error().code));
       kept_json = {{"in", nullptr}, {"error", error_to_json(kept.error())}};
     } else if (*kept) {

@@ -112,13 +112,11 @@ Result<Outcome> solve_one(const std::string& path, const Options& options,
     row.method = record.method;
     row.document = calib::to_json(record).dump();
     auto store = open_store(context, options.store);
-    SIXPOINT_ASSIGN(outcome.kept, keep_records(context, options.store, store,
-                                               [&](db::Keeper& keeper) -> Status {
-                                                 SIXPOINT_ASSIGN(
-                                                     outcome.stored_id,
-                                                     keeper.add_constants(row, survey.model));
-                                                 return {};
-                                               }));
+    SIXPOINT_ASSIGN(outcome.kept,
+                    keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
+                      SIXPOINT_ASSIGN(outcome.stored_id, keeper.add_constants(row, survey.model));
+                      return {};
+                    }));
   }
   return outcome;
 }

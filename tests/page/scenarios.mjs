@@ -288,6 +288,30 @@ const scenarios = {
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 
+  // The papers of a run that wrote its constants into the unit.
+  async certificate() {
+    const station = await h.station(['virtual:seed=15,serial=MOS2A45130015,jig=auto']);
+    const page = await h.open(station.url);
+    await page.getByLabel('Your name').fill('Ada');
+    await page.getByLabel('Write the constants into the unit').check();
+    await start(page);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Stored as run/).waitFor();
+    await h.shot(page, 'certificate-1-links');
+    const fetched = async (name) => {
+      const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name }).click()]);
+      return readFileSync(await download.path());
+    };
+    const pdf = await fetched('Certificate (PDF)');
+    check(pdf.subarray(0, 5).toString() === '%PDF-' && pdf.length > 5000, 'a PDF comes');
+    const json = JSON.parse((await fetched('Certificate (JSON)')).toString());
+    check(json.serial === 'MOS2A45130015' && json.operator === 'Ada', `it is this unit's: ${json.serial}, ${json.operator}`);
+    const label = (await fetched('Label (ZPL)')).toString();
+    check(label.includes('^XA') && label.includes('MOS2A45130015'), 'a label comes after the read-back');
+    const report = JSON.parse((await fetched('Report (JSON)')).toString());
+    check(report.as_left.written === true && report.recheck.poses.length === 2, 'written, read back and measured again');
+  },
+
   // Another person's page sees the run and may not touch it, until it takes it over.
   async operators() {
     const station = await h.station(['virtual:seed=14,pace=10']);
