@@ -101,7 +101,9 @@ void spoil(Fault fault, std::size_t axis, const sim::SensorTruth& truth, std::ui
       change_lsb = 0.12 * force_g[(axis + 1) % kAxes] * lsb_per_g;
       break;
     case Fault::second_order:
-      change_lsb = 0.06 * force_g[axis] * force_g[axis] * lsb_per_g;
+      // Below 0.07 g per g2 six sides cannot tell it from a case that stands askew by 4 degrees,
+      // which the limits allow; real sensors have 0.0006.
+      change_lsb = 0.15 * force_g[axis] * force_g[axis] * lsb_per_g;
       break;
     case Fault::clipping:
       counts[axis] = std::clamp<std::int16_t>(
@@ -122,7 +124,7 @@ void spoil(Fault fault, std::size_t axis, const sim::SensorTruth& truth, std::ui
 }
 
 device::Link link_with(const std::shared_ptr<mocks::PluggedUnit>& plugged, Fault fault,
-                       std::size_t axis, Random& random, int& lost) {
+                       std::size_t axis, Random& random, int& lost, std::uint64_t& samples) {
   device::Link link = mocks::link_to(plugged, false);
   link.reports = std::make_unique<mocks::TamperingTransport>(
       std::move(link.reports), nullptr, [&, fault, axis, plugged](Bytes& bytes) {
@@ -138,9 +140,8 @@ device::Link link_with(const std::shared_ptr<mocks::PluggedUnit>& plugged, Fault
         if (fault == Fault::none || !block) {
           return 1;
         }
-        std::uint64_t sample = block->first_index;
         for (device::RawCounts& counts : block->counts) {
-          spoil(fault, axis, plugged->unit.truth().current, sample++, random, counts);
+          spoil(fault, axis, plugged->unit.truth().current, samples++, random, counts);
         }
         const device::Report report = device::encode(device::encode_samples(*block));
         bytes.assign(report.begin(), report.end());
@@ -168,6 +169,7 @@ int run(int units) {
         random.uniform(0, 1) < 0.3 ? static_cast<Fault>(1 + random.below(7)) : Fault::none;
     const auto axis = static_cast<std::size_t>(random.below(kAxes));
     MemoryEnv env;
+    std::uint64_t samples = 0;  // over all replugs
     mocks::VirtualUnitOptions options;
     options.seed = seed;
     options.truth = sim::draw_unit(seed);
@@ -175,7 +177,7 @@ int run(int units) {
     const auto clock = std::make_shared<ManualClock>();
     const auto plugged = std::make_shared<mocks::PluggedUnit>(options, clock);
     Hand hand(plugged, random);
-    auto unit = device::Unit::open(link_with(plugged, fault, axis, random, lost)).value();
+    auto unit = device::Unit::open(link_with(plugged, fault, axis, random, lost, samples)).value();
     JigHooks hooks;
     std::chrono::steady_clock::time_point last_accepted{};
     hooks.tell = [&](const JigAction& action) {
@@ -191,7 +193,7 @@ int run(int units) {
         plugged->unit.restore_power(clock->elapsed());
         plugged->unplugged = false;
       }
-      unit = device::Unit::open(link_with(plugged, fault, axis, random, lost)).value();
+      unit = device::Unit::open(link_with(plugged, fault, axis, random, lost, samples)).value();
       return UnitOnJig{unit.get(), &hand};
     };
     const auto report = run_jig({unit.get(), &hand}, env.env, {}, hooks);
@@ -203,6 +205,8 @@ int run(int units) {
     wrong_pass += fault != Fault::none && passed ? 1 : 0;
     if (report) {
       refusals += report->refusals;
+    }
+    if (report && report->verification.poses.size() == 8) {
       verdict_ms.push_back(std::chrono::duration<double, std::milli>(
                                std::chrono::steady_clock::now() - last_accepted)
                                .count());
