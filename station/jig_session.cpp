@@ -81,8 +81,8 @@ class Session {
   Calibration approximation_ = nominal();
   bool ended_ = false;
   bool write_unknown_ = false;  // a write was begun, and the page not read since
-  std::optional<Error> gone_;  // why the unit was given up
-  std::string last_words_;     // what the machine said when it ended
+  std::optional<Error> gone_;   // why the unit was given up
+  std::string last_words_;      // what the machine said when it ended
   std::optional<double> jig_asked_s_;
   int jig_disagreements_ = 0;
   std::uint64_t clock_jumps_before_ = 0;
