@@ -397,7 +397,58 @@ void efficiency(int units, unsigned seed) {
   std::fflush(stdout);
 }
 
-// Anything between six good sides and a hopeless file: how often is a wrong answer called verified?
+// Anything between six good sides and a hopeless file.
+struct Mixed {
+  Unit unit;
+  double bad = 0;
+  std::vector<StillBlock> blocks;
+};
+Mixed mixed_unit(unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  Mixed mixed;
+  mixed.unit = make_unit(random);
+  Unit& unit = mixed.unit;
+  mixed.bad = uniform(random);
+  const double bad = mixed.bad;
+  if (bad < 0.3) {
+    unit.sway_mg = 20 * uniform(random);
+  }
+  if (uniform(random) < 0.5) {
+    unit.cross = {0.01 * uniform(random), -0.01 * uniform(random), 0.01 * uniform(random)};
+  }
+  unit.drift_mg = {3 * uniform(random), 3 * uniform(random), 3 * uniform(random)};
+  const int poses = 1 + static_cast<int>(uniform(random) * 40);
+  const double reach = 0.2 + 0.8 * uniform(random);
+  for (int k = 0; k < poses + 6; ++k) {
+    Vector up{};
+    if (k < 6) {
+      if (bad >= 0.8 && k == 0) {
+        continue;
+      }
+      up[static_cast<std::size_t>(k / 2)] = k % 2 == 0 ? 1 : -1;
+      up = near(up, 0.1 * uniform(random), random);
+      if (bad > 0.6) {
+        up = any_direction(random);
+      }
+    } else {
+      up = any_direction(random);
+      if (bad < 0.5) {
+        for (std::size_t a = 0; a < 3; ++a) {
+          up[a] = std::clamp(up[a], -reach, reach);
+        }
+        up = normalised(up);
+      }
+    }
+    const int repeat = 1 + static_cast<int>(20 * uniform(random));
+    for (int j = 0; j < repeat; ++j) {
+      mixed.blocks.push_back(block_at(unit, up, 600.0 * k + 4 * j, random));
+    }
+  }
+  return mixed;
+}
+
+// How often is a wrong answer called verified?
 void confidence(int units, unsigned seed, SolveMethod method) {
   int verified = 0;
   int wrong = 0;
@@ -405,45 +456,7 @@ void confidence(int units, unsigned seed, SolveMethod method) {
   int compared = 0;
   double largest = 0;
   for (int i = 0; i < units; ++i) {
-    std::mt19937_64 random(seed + static_cast<unsigned>(i));
-    std::uniform_real_distribution<double> uniform(0, 1);
-    Unit unit = make_unit(random);
-    const double bad = uniform(random);
-    if (bad < 0.3) {
-      unit.sway_mg = 20 * uniform(random);
-    }
-    if (uniform(random) < 0.5) {
-      unit.cross = {0.01 * uniform(random), -0.01 * uniform(random), 0.01 * uniform(random)};
-    }
-    unit.drift_mg = {3 * uniform(random), 3 * uniform(random), 3 * uniform(random)};
-    const int poses = 1 + static_cast<int>(uniform(random) * 40);
-    const double reach = 0.2 + 0.8 * uniform(random);
-    std::vector<StillBlock> blocks;
-    for (int k = 0; k < poses + 6; ++k) {
-      Vector up{};
-      if (k < 6) {
-        if (bad >= 0.8 && k == 0) {
-          continue;
-        }
-        up[static_cast<std::size_t>(k / 2)] = k % 2 == 0 ? 1 : -1;
-        up = near(up, 0.1 * uniform(random), random);
-        if (bad > 0.6) {
-          up = any_direction(random);
-        }
-      } else {
-        up = any_direction(random);
-        if (bad < 0.5) {
-          for (std::size_t a = 0; a < 3; ++a) {
-            up[a] = std::clamp(up[a], -reach, reach);
-          }
-          up = normalised(up);
-        }
-      }
-      const int repeat = 1 + static_cast<int>(20 * uniform(random));
-      for (int j = 0; j < repeat; ++j) {
-        blocks.push_back(block_at(unit, up, 600.0 * k + 4 * j, random));
-      }
-    }
+    const auto [unit, bad, blocks] = mixed_unit(seed + static_cast<unsigned>(i));
     SolveOptions options;
     options.method = method;
     const auto report = solve_from_still_blocks(blocks, stored_of(unit), options);

@@ -338,8 +338,40 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     LeastSquaresOptions wide = least;
     wide.model = fit.model;
     wide.starts = 1;
+    // What the six leave out is not only scatter: a cross-axis term bends all directions at once,
+    // and where these are few it hides in the sensitivities with next to no residual. It is put to
+    // the data as far as they can tell, and by the prior where they cannot.
+    const bool alias = !fit.model.cross_axis && options.cross_axis_sd > 0;
+    if (alias) {
+      wide.model.cross_axis = true;
+      wide.cross_axis_sd = options.cross_axis_sd;
+    }
     SIXPOINT_ASSIGN(const LeastSquaresFit other, least_squares(points, fit.calibration, wide));
-    fit.covariance = other.covariance;
+    if (!alias) {
+      fit.covariance = other.covariance;
+      return {};
+    }
+    const auto kept = [&](std::size_t i) { return i < 6 ? i : i + 3; };
+    const auto parameters = static_cast<std::size_t>(fit.model.parameters());
+    for (std::size_t i = 0; i < parameters; ++i) {
+      for (std::size_t j = 0; j < parameters; ++j) {
+        fit.covariance[i * kMaxParameters + j] = other.covariance_at(kept(i), kept(j));
+      }
+    }
+    // The estimate stays the plain one; how far it lies from the centre of that is error as well.
+    std::array<double, 6> apart{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      apart[a] = other.calibration.sensitivity_g_per_lsb[a] /
+                     fit.calibration.sensitivity_g_per_lsb[a] -
+                 1;
+      apart[3 + a] = fit.calibration.sensitivity_g_per_lsb[a] *
+                     (other.calibration.zero_lsb[a] - fit.calibration.zero_lsb[a]);
+    }
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) {
+        fit.covariance[i * kMaxParameters + j] += apart[i] * apart[j];
+      }
+    }
     return {};
   };
   const auto merge = [&]() {
