@@ -70,9 +70,9 @@ struct BlockFit {
   double block_sd_mg = 0;       // scatter of blocks within one direction
   double noise_sd_mg = 0;       // what the samples' own noise explains of it
   double structural_mg = 0;
-  int directions = 0;  // more than 12 degrees apart
-  int redundancy = 0;  // directions - 6: what is left to contradict the fit
-  double reference_temperature_c = 0;
+  int directions = 0;                  // more than 12 degrees apart
+  int redundancy = 0;                  // directions - 6: what is left to contradict the fit
+  double reference_temperature_c = 0;  // mean of the blocks
   double temperature_range_c = 0;
   double rms_mg = 0;         // of the blocks used
   double mean_error_mg = 0;  // mean absolute error of the blocks used
