@@ -251,6 +251,7 @@ Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples
     segment.rotation = rotation_of(reading.pose);
     segment.temperature_start_c = samples.temperature_c[found[k].first];
     segment.temperature_end_c = segment.temperature_start_c;
+    segment.settled = true;
     segment.pose = static_cast<int>(reading.pose);
     segment.placement = static_cast<int>(k);
     const Eigen::Vector3d pose = segment.rotation.col(2);

@@ -35,7 +35,7 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         second < 10) {
       continue;
     }
-    const std::size_t skip = segment.starts_placement ? second : 0;
+    const std::size_t skip = segment.may_ring() ? second : 0;
     const std::size_t blocks = segment.samples > skip ? (segment.samples - skip) / second : 0;
     if (blocks < 6) {
       continue;
