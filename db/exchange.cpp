@@ -423,10 +423,11 @@ Status import_attachment_files(FileSystem& files, const std::string& folder, His
   }
   SIXPOINT_ASSIGN(const auto names, files.list(place));
   for (const std::string& name : names) {
-    SIXPOINT_ASSIGN(Bytes bytes, read_file(files, place + "/" + name, kLongestLine / 2));
+    const std::string path = fmt::format("{}/{}", place, name);
+    SIXPOINT_ASSIGN(Bytes bytes, read_file(files, path, kLongestLine / 2));
     if (to_hex(sha256(bytes)) != name) {
-      return fail(ErrorCode::bad_data, "the attachment is not what its name says",
-                  place + "/" + name, "export again");
+      return fail(ErrorCode::bad_data, "the attachment is not what its name says", path,
+                  "export again");
     }
     ++report.attachments;
     SIXPOINT_CHECK(writer.add_attachment(name, std::move(bytes)));

@@ -529,6 +529,91 @@ Result<RunRecord> Store::run(const std::string& id) {
   return to_run(rows[0]);
 }
 
+Result<std::string> Store::add_station_event(const StationEvent& event) {
+  SIXPOINT_CHECK(check_texts({event.station, event.operator_name}));
+  SIXPOINT_CHECK(check_texts({event.reason}, 100 * kLongestName));
+  const bool about_unit =
+      event.action == "check_unit" || event.action == "check_unit_end" || event.action == "release";
+  if (!about_unit && event.action != "sign" && event.action != "sign_new_baseline") {
+    return fail(ErrorCode::usage,
+                fmt::format("nothing at a station is called '{}'", printable(event.action, 60)), {},
+                "please report this");
+  }
+  if (about_unit) {
+    SIXPOINT_CHECK(check_serial(event.serial));
+  }
+  if (event.operator_name.empty() || event.reason.empty()) {
+    return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
+                "say who decides, and why");
+  }
+  const Row values =
+      with_id("station_events", {to_ns(impl_->env.clock.now()), event.station, event.serial,
+                                 event.action, event.operator_name, event.reason});
+  SIXPOINT_CHECK(impl_->in_transaction(
+      [&](HistoryWriter& writer) { return impl_->append(writer, "station_events", values); }));
+  return text_of(values[0]);
+}
+
+Result<std::vector<StationEvent>> Store::station_events(const std::string& station) {
+  std::vector<Value> parameters;
+  if (!station.empty()) {
+    parameters.emplace_back(station);
+  }
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query(
+          fmt::format("SELECT id, made_at_ns, station, serial, action, operator, reason "
+                      "FROM station_events {} ORDER BY seq",
+                      station.empty() ? "" : "WHERE station = $1"),
+          parameters));
+  std::vector<StationEvent> events;
+  events.reserve(rows.size());
+  for (const Row& row : rows) {
+    events.push_back({text_of(row[0]), from_ns(integer_of(row[1])), text_of(row[2]),
+                      text_of(row[3]), text_of(row[4]), text_of(row[5]), text_of(row[6])});
+  }
+  return events;
+}
+
+Status Store::for_each_run(const RunFilter& filter,
+                           const std::function<Status(const RunRecord&)>& visit) {
+  std::vector<Value> parameters;
+  std::string where = "seq > 0";
+  const auto only = [&](std::string_view condition, Value value) {
+    parameters.push_back(std::move(value));
+    where += fmt::format(" AND {} ${}", condition, parameters.size());
+  };
+  if (!filter.kind.empty()) {
+    only("kind =", filter.kind);
+  }
+  if (!filter.serial.empty()) {
+    only("serial =", filter.serial);
+  }
+  if (!filter.station.empty()) {
+    only("station =", filter.station);
+  }
+  if (filter.from) {
+    only("started_ns >=", to_ns(*filter.from));
+  }
+  if (filter.to) {
+    only("started_ns <", to_ns(*filter.to));
+  }
+  SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(*impl_->database));
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->stream(fmt::format("SELECT {} FROM runs WHERE {} "
+                                                      "ORDER BY started_ns, seq",
+                                                      kRunColumns, where),
+                                          parameters));
+  Row row;
+  while (true) {
+    SIXPOINT_ASSIGN(const bool more, rows->next(row));
+    if (!more) {
+      return {};
+    }
+    SIXPOINT_CHECK(visit(to_run(row)));
+  }
+}
+
 Result<std::optional<ConstantsRecord>> Store::constants_for(const std::string& serial,
                                                             const std::string& filter) {
   const std::vector<Value> parameters = {serial, filter};
@@ -577,9 +662,11 @@ Result<std::vector<UnitRecord>> Store::units() {
 
 Result<std::optional<RepairRecord>> Store::repair_of_output(const std::string& output_sha256) {
   const std::vector<Value> parameters = {output_sha256};
+  // "+ 0": a planner without statistics would rather walk back along seq through millions of rows
+  // than sort the one or two that the hash has.
   SIXPOINT_ASSIGN(const auto rows,
                   impl_->database->query(fmt::format("SELECT {} FROM repairs WHERE output_sha256 = "
-                                                     "$1 ORDER BY seq DESC LIMIT 1",
+                                                     "$1 ORDER BY seq + 0 DESC LIMIT 1",
                                                      kRepairColumns),
                                          parameters));
   if (rows.empty()) {
@@ -636,6 +723,11 @@ Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
   return list;
 }
 
+// The verdicts after which the constants are used.
+static bool is_passed(std::string_view verdict) {
+  return verdict == "pass" || verdict == "conditional_pass";
+}
+
 double YieldReport::yield() const {
   return units == 0 ? std::numeric_limits<double>::quiet_NaN()
                     : static_cast<double>(passed) / static_cast<double>(units);
@@ -660,7 +752,7 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
   std::map<std::string, Runs> units;
   std::size_t retests = 0;
   for (const Row& row : rows) {
-    const bool passed = text_of(row[1]) == "pass";
+    const bool passed = is_passed(text_of(row[1]));
     const auto [unit, is_new] = units.try_emplace(text_of(row[0]));
     if (is_new) {
       unit->second.first_passed = passed;

@@ -11,6 +11,7 @@
 // A Store belongs to one thread; several processes may work on one file at once.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -108,6 +109,29 @@ struct Correction {
   std::string action;
   std::string operator_name;
   std::string reason;
+};
+
+// What people decided at a station.
+struct StationEvent {
+  std::string id;  // filled by the store
+  UtcTime made_at{};
+  std::string station;
+  std::string serial;  // the unit that it is about; empty for the station itself
+  // "check_unit": this unit watches the station from now on. "check_unit_end": no more. "sign": an
+  // engineer has looked at what the check units say. "sign_new_baseline": and what they said before
+  // is no measure any more. "release": this unit may be measured again after too many failures.
+  std::string action;
+  std::string operator_name;
+  std::string reason;
+};
+
+// Which runs are asked for; what is empty does not matter.
+struct RunFilter {
+  std::string kind = "jig";
+  std::string serial;
+  std::string station;
+  std::optional<UtcTime> from = {};  // started then or later
+  std::optional<UtcTime> to = {};    // started before
 };
 
 // Everything that the store holds about one unit, each list oldest first.
@@ -228,6 +252,15 @@ class Store final : public Keeper {
   // From now on constants_for() passes over them. They stay in the history.
   Status withdraw_constants(const std::string& id, const std::string& operator_name,
                             const std::string& reason);
+
+  // usage for an unknown action, one without its unit, or without operator or reason.
+  Result<std::string> add_station_event(const StationEvent& event);
+  // Oldest first; of all stations with an empty `station`.
+  Result<std::vector<StationEvent>> station_events(const std::string& station = {});
+  // Runs, oldest first, one at a time: a year of them does not fit into memory. `model` is left
+  // empty. An error of `visit` ends it.
+  Status for_each_run(const RunFilter& filter,
+                      const std::function<Status(const RunRecord&)>& visit);
 
   // Which constants apply to a file of `serial` recorded under `filter`: the newest by made_at,
   // among equals the last one stored, whose last correction is no withdrawal. Nothing where there

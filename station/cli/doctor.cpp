@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "db/journal.h"
 #include "device/discovery.h"
 #include "device/usb_errors.h"
 #include "station/cli/command.h"
@@ -40,6 +41,23 @@ Check check_store(const Options& options, Context& context) {
     return {"store", false, audit.error().brief()};
   }
   return {"store", audit->ok, audit->brief()};
+}
+
+// What was measured and is not in the store yet.
+Check check_journal(const Options& options, Context& context) {
+  const std::string folder = journal_folder(options.store);
+  if (!context.env.files.info(folder)) {
+    return {"journal", true, "nothing waits for the store"};
+  }
+  auto journal = db::Journal::open(context.env.files, folder);
+  const auto pending = journal ? journal->pending() : Result<std::size_t>(fail(journal.error()));
+  if (!pending) {
+    return {"journal", false, pending.error().brief()};
+  }
+  return {"journal", *pending == 0,
+          *pending == 0 ? std::string("nothing waits for the store")
+                        : fmt::format("{} entries wait in {}: run 'sixpoint store catch-up'",
+                                      *pending, folder)};
 }
 
 Check check_disk(const std::string& folder) {
@@ -97,6 +115,7 @@ void run(const Options& options, Context& context) {
   const std::vector<Check> checks = {
       {"version", true, "sixpoint " SIXPOINT_VERSION},
       check_store(options, context),
+      check_journal(options, context),
       check_disk("."),
       check_usb(),
       check_udev_rules(),

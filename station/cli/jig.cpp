@@ -1,17 +1,23 @@
 // sixpoint jig: the technician's six-orientation run, in the terminal.
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include "base/atomic_file.h"
 #include "calib/gravity.h"
 #include "device/unit.h"
-#include "gt3x/model.h"
+#include "station/certificate.h"
 #include "station/cli/command.h"
+#include "station/cli/record_option.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
-#include "station/software.h"
+#include "station/run_records.h"
+#include "station/station_records.h"
 
 namespace sixpoint::cli {
 
@@ -26,7 +32,12 @@ struct Options {
   std::string operator_name;
   std::string station;
   std::string filter = "current";
+  std::string limits;
+  std::string study;
+  std::string certificate;
+  std::string label;
   std::string store;
+  std::string record;
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
@@ -39,53 +50,23 @@ struct Done {
   station::JigReport report;
   std::string run_id;
   std::optional<std::string> constants_id;
+  bool certified = false;
+  bool labelled = false;
   Result<db::Kept> kept = db::Kept{};
 };
-
-int exit_code_of(station::JigVerdict verdict) {
-  switch (verdict) {
-    case station::JigVerdict::pass:
-      return kExitPassed;
-    case station::JigVerdict::fail:
-      return kExitFailed;
-    case station::JigVerdict::inconclusive:
-      return kExitInconclusive;
-    case station::JigVerdict::stopped:
-      return kExitStopped;
-  }
-  return kExitFailed;
-}
-
-// The limits that the verdict used, whole: a verdict is nothing without them.
-Json limits_of(const station::JigSessionOptions& session) {
-  return {{"residual_mg", session.residual_limit_mg},
-          {"tilt_deg", session.run.tilt_limit_deg},
-          {"moved_mg", session.run.moved_mg},
-          {"still_factor", session.run.still_factor},
-          {"moved_factor", session.run.moved_factor},
-          {"first_noise_mg", session.run.first_noise_limit_mg},
-          {"dwell_s", session.run.dwell_s},
-          {"rate_hz", session.run.rate_hz}};
-}
 
 // What is known before the unit is measured; refused here, it costs no one a run.
 Result<db::RunRecord> record_before(Context& context, const Options& options,
                                     const station::JigSessionOptions& session,
                                     const std::string& serial, const std::string& jig,
                                     Result<db::Store>& store) {
-  db::RunRecord run;
-  run.serial = serial;
-  run.model = gt3x::model_of(serial);
-  run.kind = "jig";
-  run.filter = calib::to_string(session.filter);
+  db::RunRecord run =
+      station::run_record_before(session, serial, options.jig_id.empty() ? jig : options.jig_id);
+  if (!options.study.empty()) {
+    run.kind = station::kStudyKind;
+  }
   run.operator_name = options.operator_name;
   run.station = options.station;
-  run.jig = options.jig_id.empty() ? jig : options.jig_id;
-  run.software = station::software_name();
-  run.build = station::software_build();
-  run.limits = limits_of(session).dump();
-  run.gravity_m_per_s2 = session.gravity.m_per_s2;
-  run.document = "{}";
   if (!options.jig_due.empty()) {
     const auto due = parse_iso8601(options.jig_due);
     if (!due) {
@@ -119,58 +100,74 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
   return run;
 }
 
-Status add_records(db::Keeper& keeper, const Options& options, const db::RunRecord& run,
-                   Done& done) {
-  const station::JigReport& report = done.report;
-  SIXPOINT_ASSIGN(
-      done.run_id,
-      keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
-  if (report.written) {
-    db::UnitWrite write;
-    write.run_id = done.run_id;
-    write.serial = report.serial;
-    write.written = report.ended;
-    write.as_found =
-        report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
-    write.as_left = calib::to_json(report.six->best().stored).dump();
-    write.read_back = calib::to_json(report.as_left->constants).dump();
-    SIXPOINT_CHECK(keeper.add_unit_write(write));
+Status check_outputs(const Options& options) {
+  const std::string& path = options.certificate;
+  if (!path.empty() && !path.ends_with(".pdf") && !path.ends_with(".json")) {
+    return fail(ErrorCode::usage, "a certificate is a .pdf or a .json", path,
+                "end the file's name with one of them");
   }
-  if (report.usable()) {
-    calib::ConstantsRecord constants = report.record();
-    constants.made_from.station = options.station;
-    db::ConstantsRecord row;
-    row.made_at = report.ended;
-    row.serial = report.serial;
-    row.filter = calib::to_string(report.filter);
-    row.method = constants.method;
-    row.run_id = done.run_id;
-    row.document = calib::to_json(constants).dump();
-    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, run.model));
+  if (!options.label.empty() && !options.write) {
+    return fail(ErrorCode::usage, "a label says that the unit holds what was measured", "--label",
+                "add --write, which writes the constants and reads them back");
+  }
+  if (!options.study.empty() &&
+      (options.operator_name.empty() || !options.certificate.empty() || options.write)) {
+    return fail(ErrorCode::usage, "a gage study compares operators and changes no unit", "--study",
+                "name the --operator, and leave out --write and --certificate");
   }
   return {};
 }
 
-void complete(db::RunRecord& run, const station::JigReport& report) {
-  run.started = report.started;
-  run.ended = report.ended;
-  run.verdict = station::to_string(report.verdict);
-  // The unit's own words may hold anything; a run is kept whatever they are.
-  run.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
-  for (const std::string& reason : report.reasons) {
-    run.codes.push_back(db::storable_path(printable(reason, 1500)));
-  }
-  if (!report.faces.empty()) {
-    double sum_c = 0;
-    for (const station::PoseReading& face : report.faces) {
-      sum_c += face.temperature_c;
+// Certificate and label from the record as it is stored, so that they can be made again from there.
+// A run without a result has none; what cannot be made is said and is no reason to lose the run.
+void make_papers(Context& context, const Options& options, const db::RunRecord& run, Done& done) {
+  const auto settle = [&](const Status& made, bool& flag) {
+    flag = made.has_value();
+    if (!made) {
+      context.log().error("{}", made.error().brief());
+      if (made.error().code != ErrorCode::bad_data) {
+        context.worsen(static_cast<int>(made.error().code));
+      }
     }
-    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
+  };
+  if (!options.certificate.empty()) {
+    settle(station::write_certificate(context.env.files, options.certificate, run), done.certified);
+  }
+  if (!options.label.empty()) {
+    const auto label = station::label_zpl(run);
+    settle(
+        label ? write_file(context.env.files, options.label, *label) : Status(fail(label.error())),
+        done.labelled);
   }
 }
 
-Result<Done> run(Context& context, const Options& options) {
+// What the operator typed since the last call, without waiting: a line that begins with u or s.
+std::optional<station::OperatorWord> terminal_word() {
+  pollfd keyboard{STDIN_FILENO, POLLIN, 0};
+  if (poll(&keyboard, 1, 0) <= 0 || (keyboard.revents & POLLIN) == 0) {
+    return std::nullopt;
+  }
+  std::array<char, 80> line{};
+  if (read(STDIN_FILENO, line.data(), line.size()) <= 0) {
+    return std::nullopt;
+  }
+  switch (line[0]) {
+    case 'u':
+      return station::OperatorWord::undo;
+    case 's':
+    case 'q':
+      return station::OperatorWord::stop;
+    default:
+      return std::nullopt;
+  }
+}
+
+Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(check_outputs(options));
   station::JigSessionOptions session;
+  if (!options.limits.empty()) {
+    SIXPOINT_ASSIGN(session.limits, station::read_limits(context.env.files, options.limits));
+  }
   SIXPOINT_ASSIGN(session.filter, calib::parse_filter_configuration(options.filter));
   if (options.gravity_m_per_s2) {
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_entered(*options.gravity_m_per_s2));
@@ -180,12 +177,19 @@ Result<Done> run(Context& context, const Options& options) {
   session.run.write = options.write;
   session.run.dwell_s = options.dwell_s;
 
-  const device::TransportRegistry devices = station::known_devices();
-  SIXPOINT_ASSIGN(device::Link link,
-                  devices.open(station::with_jig(options.device, options.jig), context.env));
-  SIXPOINT_ASSIGN(const auto unit, device::Unit::open(std::move(link)));
-  device::ManualJig by_hand;
-  device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
+  session.keep_interrupted = true;
+
+  SIXPOINT_ASSIGN(const auto unit, station::known_units().open(
+                                       station::with_jig(options.device, options.jig), context.env,
+                                       [&recorder](device::Link& link) { recorder.attach(link); }));
+  if (!unit->abilities().streams || !unit->abilities().holds_constants) {
+    return fail(ErrorCode::usage, "this unit offers files and no live samples", unit->address(),
+                "calibrate it by a file: 'sixpoint capture'");
+  }
+  std::unique_ptr<device::Jig> own_jig;
+  SIXPOINT_ASSIGN(device::Jig* const chosen,
+                  station::choose_jig(options.jig, *unit, context.env, own_jig));
+  device::Jig& jig = *chosen;
 
   context.people << fmt::format("unit {} with firmware {}; jig: {}\n",
                                 printable(unit->identity().serial),
@@ -214,26 +218,57 @@ Result<Done> run(Context& context, const Options& options) {
   if (!store && store.error().code == ErrorCode::usage) {
     return fail(store.error());
   }
+  if (store && options.study.empty()) {
+    SIXPOINT_ASSIGN(session.retest, station::may_start(*store, unit->identity().serial,
+                                                       options.station, session.limits));
+  } else if (!store) {
+    context.log().warn(
+        "the store does not answer: whether the station is locked and how often the "
+        "unit failed is not known");
+  }
   SIXPOINT_ASSIGN(auto record, record_before(context, options, session, unit->identity().serial,
                                              jig.name(), store));
-  Done done;
-  SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
-  complete(record, done.report);
-  done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) {
-    return add_records(keeper, options, record, done);
+  if (record.retest_of.empty()) {
+    record.retest_of = session.retest.retest_of;
+  }
+  station::JigHooks hooks;
+  hooks.tell = tell;
+  hooks.reopen = station::wait_for_unit(*unit, jig, [&context](const std::string& text) {
+    context.people << text << '\n' << std::flush;
   });
+  if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
+    context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
+    hooks.words = terminal_word;
+  }
+  Done done;
+  SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
+  station::complete_run_record(record, done.report, options.study);
+  done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
+    SIXPOINT_ASSIGN(const auto stored, station::add_run_records(keeper, done.report, record));
+    done.run_id = stored.run_id;
+    done.constants_id = stored.constants_id;
+    return {};
+  });
+  record.id = done.run_id;
+  if (done.kept) {
+    make_papers(context, options, record, done);
+  }
   return done;
 }
 
-Json to_json(const Done& done) {
+Json to_json(const Options& options, const Done& done) {
   Json json = document("jig");
   json["run"] = done.run_id;
   const Json report = done.report.to_json();
   for (const auto& [key, value] : report.items()) {
     json[key] = value;
   }
+  if (done.report.ended_by) {
+    json["error"] = error_to_json(*done.report.ended_by);
+  }
   json["stored_id"] = done.constants_id ? Json(*done.constants_id) : Json(nullptr);
-  json["certificate"] = nullptr;
+  json["certificate"] = done.certified ? Json(options.certificate) : Json(nullptr);
+  json["label"] = done.labelled ? Json(options.label) : Json(nullptr);
   json["kept"] = done.kept ? kept_to_json(*done.kept) : Json(nullptr);
   if (!done.kept) {
     json["error"] = error_to_json(done.kept.error());
@@ -273,8 +308,8 @@ void add_jig(CLI::App& app, Context& context) {
       ->add_option("--device", options->device,
                    "the unit, for example virtual:seed=7 (docs/virtual.md)")
       ->required();
-  command->add_option("--jig", options->jig, "manual (a person turns the unit) or virtual")
-      ->check(CLI::IsMember({"manual", "virtual"}));
+  command->add_option("--jig", options->jig,
+                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
   command->add_option("--jig-id", options->jig_id,
                       "the jig's own number, for the record (which units were on it?)");
   command->add_option("--jig-due", options->jig_due,
@@ -293,24 +328,40 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--dwell", options->dwell_s, "seconds that each pose is measured for")
       ->check(CLI::Range(0.5, 600.0))
       ->capture_default_str();
+  command->add_option("--limits", options->limits,
+                      "a TOML file of limits (docs/limits.md); else the built-in ones");
+  command->add_option("--certificate", options->certificate,
+                      "the calibration certificate: a .pdf or .json to make");
+  command->add_option("--label", options->label,
+                      "a label for the unit, as ZPL; after a read-back only (--write)");
+  command->add_option("--study", options->study,
+                      "this run belongs to a gage study of that name (sixpoint gage-rr)");
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);
+  add_record_option(*command, options->record);
   command->add_flag("--json", options->json, "answer as JSON");
   command->callback([options, &context] {
-    const Result<Done> done = run(context, *options);
+    device::SessionRecorder recorder;
+    const Result<Done> done = run(context, *options, recorder);
+    save_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "jig", done.error(), options->json);
       return;
     }
-    context.worsen(exit_code_of(done->report.verdict));
+    const std::optional<Error>& ended_by = done->report.ended_by;
+    if (ended_by) {
+      context.log().error("{}", ended_by->brief());
+    }
+    context.worsen(ended_by ? static_cast<int>(ended_by->code)
+                            : station::exit_code_of(done->report.verdict));
     if (!done->kept) {
       // The report below is then the only copy.
       context.log().error("{}", done->kept.error().brief());
       context.worsen(static_cast<int>(done->kept.error().code));
     }
     if (options->json) {
-      print_json(context, to_json(*done));
+      print_json(context, to_json(*options, *done));
     } else {
       print(context, *done);
     }

@@ -62,7 +62,7 @@ std::string text_of_file(const std::string& path) {
 }
 
 pid_t spawn(const std::vector<std::string>& words, const std::string& log, bool dies_with_us,
-            const std::string& full_disk_flag = {}) {
+            [[maybe_unused]] const std::string& full_disk_flag = {}) {
   std::vector<char*> arguments;
   for (const std::string& word : words) {
     arguments.push_back(const_cast<char*>(word.c_str()));
@@ -81,7 +81,7 @@ pid_t spawn(const std::vector<std::string>& words, const std::string& log, bool 
   }
 #ifdef SIXPOINT_FULL_DISK_PRELOAD
   if (!full_disk_flag.empty()) {
-    ::setenv("LD_PRELOAD", SIXPOINT_FULL_DISK_PRELOAD, 1);
+    ::setenv("LD_PRELOAD", (full_disk_flag + ".so").c_str(), 1);
     ::setenv("SIXPOINT_FULL_DISK", full_disk_flag.c_str(), 1);
   }
 #endif
@@ -146,6 +146,12 @@ PostgresServer::PostgresServer() : port_(free_port()) {
 PostgresServer::~PostgresServer() { kill(); }
 
 void PostgresServer::start() {
+#ifdef SIXPOINT_FULL_DISK_PRELOAD
+  // A copy that the server's user can read, wherever the build lies.
+  std::filesystem::copy_file(SIXPOINT_FULL_DISK_PRELOAD, folder_ / "full.so",
+                             std::filesystem::copy_options::skip_existing);
+  std::filesystem::permissions(folder_ / "full.so", std::filesystem::perms(0755));
+#endif
   const std::string options[] = {folder_ / "data", std::to_string(port_), folder_.path()};
   pid_ = spawn({programs() + "postgres", "-D", options[0], "-p", options[1], "-k", options[2], "-c",
                 "listen_addresses=127.0.0.1", "-c", "fsync=on", "-c", "max_connections=60"},
@@ -166,6 +172,20 @@ void PostgresServer::start() {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   throw std::runtime_error("the server does not start: " + text_of_file(folder_ / "log"));
+}
+
+std::string PostgresServer::make_database(const std::string& name) {
+  PGconn* connection = ::PQconnectdb(superuser("postgres").c_str());
+  PGresult* result =
+      ::PQexec(connection, ("CREATE DATABASE \"" + name + "\" OWNER station").c_str());
+  const bool good = ::PQresultStatus(result) == PGRES_COMMAND_OK;
+  const std::string words = ::PQerrorMessage(connection);
+  ::PQclear(result);
+  ::PQfinish(connection);
+  if (!good) {
+    throw std::runtime_error("cannot make the database: " + words);
+  }
+  return location(name);
 }
 
 void PostgresServer::fill_disk(bool full) {

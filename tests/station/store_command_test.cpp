@@ -342,6 +342,68 @@ TEST_F(RefusingStore, ADamagedEntryOfTheJournalLosesNoLaterRun) {
   EXPECT_THAT(answer.people, HasSubstr(first));
   expect_in_journal(path("a.db"), answer);
   EXPECT_EQ(run({"store", "catch-up", "--store", path("a.db")}).exit_code, 65);
+  const auto doctor = run({"doctor", "--store", path("a.db"), "--json"});
+  EXPECT_EQ(doctor.exit_code, 1);
+  EXPECT_THAT(doctor.out, HasSubstr("entries wait in"));
+}
+
+// The store is there when the files are mended, and gone or damaged when it should be told.
+TEST_F(RefusingStore, ARepairThatTheStoreDoesNotTakeIsJournalledAndResumedOnce) {
+  const std::string store = path("a.db");
+  EXPECT_EQ(jig(store).exit_code, 0);
+  std::filesystem::create_directory(path("archive"));
+  for (const char* name : {"a", "b"}) {
+    std::ofstream(path("s.json")) << R"({"schema": "sixpoint/scenario/1", "seed": )"
+                                  << (name[0] - 'a') << R"(, "unit": {
+        "serial": "MOS2A45130007", "firmware": "1.5.0", "calibrated": "2013-11-12T14:32:13Z"},
+        "motions": [{"kind": "free_living", "duration_s": 900}]})";
+    ASSERT_EQ(run({"simulate", "--scenario", path("s.json"), "-o",
+                   path(std::string("archive/") + name + ".gt3x")})
+                  .exit_code,
+              0);
+  }
+  const auto repair = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"repair",  path("archive"), "-o",    path("mended"),
+                                      "--store", store,           "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  };
+  // Somebody else's statement in front of it: the store refuses every repair.
+  statements("a.db",
+             "CREATE TRIGGER full BEFORE INSERT ON repairs BEGIN SELECT RAISE(ABORT, 'no'); END");
+  const auto refused = repair({});
+  EXPECT_EQ(refused.exit_code, 65) << refused.people;
+  EXPECT_EQ(refused.json()["summary"]["repaired"], 2);
+  EXPECT_EQ(refused.json()["kept"]["in"], "journal");
+  auto journal = db::Journal::open(posix_env().files, cli::journal_folder(store)).value();
+  EXPECT_EQ(journal.pending().value(), 2U);
+  statements("a.db", "DROP TRIGGER full");
+  EXPECT_EQ(run({"store", "catch-up", "--store", store}).exit_code, 0);
+  EXPECT_EQ(journal.pending().value(), 0U);
+  // Again: what the store knows is not told twice.
+  const auto again = repair({"--resume"});
+  EXPECT_EQ(again.exit_code, 0) << again.people;
+  EXPECT_EQ(again.json()["summary"]["repaired"], 2);
+  const auto history = run({"history", "MOS2A45130007", "--store", store, "--json"}).json();
+  ASSERT_EQ(history["repairs"].size(), 2U);
+  EXPECT_EQ(history["repairs"][0]["constants"], history["constants"][0]["id"]);
+  EXPECT_THAT(history["repairs"][0]["software"].get<std::string>(),
+              testing::StartsWith(station::software_name()));
+}
+
+TEST_F(RefusingStore, CaptureAndSolveKeepTheirConstantsInTheJournal) {
+  const std::string away = "postgresql://station@127.0.0.1:1/plant";
+  auto journal = db::Journal::open(posix_env().files, cli::journal_folder(away)).value();
+  const auto capture = run({"capture", "--device", kDevice, "--jig", "virtual", "-o",
+                            path("c.gt3x"), "--store", away, "--json"});
+  EXPECT_EQ(capture.exit_code, 0) << capture.people;
+  EXPECT_EQ(capture.json()["kept"]["in"], "journal");
+  EXPECT_EQ(journal.pending().value(), 1U);
+  const auto solve = run({"solve", path("c.gt3x"), "--save", "--store", path("c.gt3x"), "--json"});
+  EXPECT_EQ(solve.exit_code, 65) << "a recording is no store";
+  EXPECT_EQ(solve.json()["kept"]["in"], "journal");
+  EXPECT_FALSE(solve.json()["stored_id"].is_null());
+  EXPECT_THAT(solve.people, HasSubstr("nothing is lost"));
 }
 
 TEST_F(RefusingStore, WithoutAnyFolderTheReportIsStillPrinted) {
