@@ -25,25 +25,6 @@ constexpr std::uint8_t kSetReport = 0x09;
 constexpr std::uint16_t kInputReport = 0x0100;
 constexpr std::uint16_t kOutputReport = 0x0200;
 
-const Bytes& hid_report_descriptor() {
-  // One input and one output report of 64 bytes, without an id, on a vendor's usage page.
-  static const Bytes kDescriptor = {
-      0x06, 0x00, 0xFF,  // usage page 0xFF00
-      0x09, 0x01,        // usage 1
-      0xA1, 0x01,        // collection (application)
-      0x15, 0x00,        //   logical minimum 0
-      0x26, 0xFF, 0x00,  //   logical maximum 255
-      0x75, 0x08,        //   report size 8
-      0x95, 0x40,        //   report count 64
-      0x09, 0x01,        //   usage 1
-      0x81, 0x02,        //   input (data, variable, absolute)
-      0x09, 0x01,        //   usage 1
-      0x91, 0x02,        //   output (data, variable, absolute)
-      0xC0,              // end collection
-  };
-  return kDescriptor;
-}
-
 void put16(Bytes& out, std::size_t value) {
   out.push_back(static_cast<std::uint8_t>(value & 0xFFU));
   out.push_back(static_cast<std::uint8_t>((value >> 8U) & 0xFFU));
@@ -79,6 +60,24 @@ Status add_recording(std::vector<FatFile>& files, const std::string& folder, con
 }
 
 }  // namespace
+
+const Bytes& hid_report_descriptor() {
+  static const Bytes kDescriptor = {
+      0x06, 0x00, 0xFF,  // usage page 0xFF00
+      0x09, 0x01,        // usage 1
+      0xA1, 0x01,        // collection (application)
+      0x15, 0x00,        //   logical minimum 0
+      0x26, 0xFF, 0x00,  //   logical maximum 255
+      0x75, 0x08,        //   report size 8
+      0x95, 0x40,        //   report count 64
+      0x09, 0x01,        //   usage 1
+      0x81, 0x02,        //   input (data, variable, absolute)
+      0x09, 0x01,        //   usage 1
+      0x91, 0x02,        //   output (data, variable, absolute)
+      0xC0,              // end collection
+  };
+  return kDescriptor;
+}
 
 UsbDescriptors unit_descriptors(const sim::UnitTruth& truth) {
   UsbDescriptors usb;

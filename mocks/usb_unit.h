@@ -17,6 +17,9 @@
 
 namespace sixpoint::mocks {
 
+// One input and one output report of 64 bytes, without an id, on a vendor's usage page.
+const Bytes& hid_report_descriptor();
+
 UsbDescriptors unit_descriptors(const sim::UnitTruth& truth);
 
 // What a file manager sees of the unit; configuration when the recordings do not fit.

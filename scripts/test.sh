@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 label=""
 case "${1:-}" in
   "") ;;
-  --label) label=${2:?"--label needs a name: unit, usb, docs"} ;;
+  --label) label=${2:?"--label needs a name: unit, usb, system, docs"} ;;
   *) echo "usage: scripts/test.sh [--label L]" >&2; exit 64 ;;
 esac
 jobs=$(nproc)

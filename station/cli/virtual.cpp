@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "base/memory_env.h"
-#include "device/usb_ids.h"
+#include "mocks/usb_jig.h"
 #include "mocks/usb_unit.h"
 #include "mocks/usbip_server.h"
 #include "mocks/virtual_settings.h"
@@ -35,8 +35,13 @@ struct Options {
 };
 
 struct Bench {
+  struct Entry {
+    std::string kind;
+    std::string serial;
+    std::string firmware;  // of units
+  };
   std::vector<std::shared_ptr<mocks::UsbDevice>> devices;
-  std::vector<sim::UnitTruth> units;
+  std::vector<Entry> entries;  // as devices
 };
 
 // The unit of a scenario, with what it recorded in its memory.
@@ -91,6 +96,7 @@ Result<Bench> make_bench(Context& context, const Options& options) {
 
   Bench bench;
   const auto clock = device::borrow_clock(context.env.clock);
+  std::shared_ptr<mocks::PluggedUnit> turned;
   std::set<std::string> serials;
   std::uint64_t next_seed = first.unit.seed;
   for (int i = 0; i < options.count; ++i) {
@@ -106,13 +112,21 @@ Result<Bench> make_bench(Context& context, const Options& options) {
     } else {
       serials.insert(unit.truth.serial);
     }
-    bench.units.push_back(unit.truth);
+    bench.entries.push_back({"unit", unit.truth.serial, unit.truth.firmware});
     auto plugged = std::make_shared<mocks::PluggedUnit>(std::move(unit),
                                                         i == 0 ? plan : mocks::FaultPlan{}, clock);
     if (i == 0 && !recording.empty()) {
       SIXPOINT_CHECK(plugged->unit.keep_recording(std::move(recording), start));
     }
+    if (i == 0) {
+      turned = plugged;
+    }
     bench.devices.push_back(std::make_shared<mocks::UsbUnit>(std::move(plugged)));
+  }
+  if (options.jig) {
+    const mocks::VirtualHidJigOptions jig;
+    bench.devices.push_back(std::make_shared<mocks::UsbJig>(jig, std::move(turned), clock));
+    bench.entries.push_back({"jig", jig.serial, {}});
   }
   return bench;
 }
@@ -122,19 +136,24 @@ void tell(Context& context, const Options& options, const Bench& bench, std::uin
     Json json = document("virtual");
     json["usbip"] = {{"host", "127.0.0.1"}, {"port", port}};
     json["devices"] = Json::array();
-    for (std::size_t i = 0; i < bench.units.size(); ++i) {
-      json["devices"].push_back({{"busid", fmt::format("1-{}", i + 1)},
-                                 {"kind", "unit"},
-                                 {"serial", bench.units[i].serial},
-                                 {"firmware", bench.units[i].firmware},
-                                 {"vendor_id", fmt::format("{:04x}", device::kUsbVendorId)},
-                                 {"product_id", fmt::format("{:04x}", device::kMonitorProductId)}});
+    for (std::size_t i = 0; i < bench.entries.size(); ++i) {
+      const Bench::Entry& entry = bench.entries[i];
+      const mocks::UsbDescriptors& usb = bench.devices[i]->descriptors();
+      Json device = {
+          {"busid", fmt::format("1-{}", i + 1)}, {"kind", entry.kind}, {"serial", entry.serial}};
+      if (!entry.firmware.empty()) {
+        device["firmware"] = entry.firmware;
+      }
+      device["vendor_id"] = fmt::format("{:04x}", usb.vendor_id());
+      device["product_id"] = fmt::format("{:04x}", usb.product_id());
+      json["devices"].push_back(std::move(device));
     }
     print_json(context, json);
   } else {
-    for (std::size_t i = 0; i < bench.units.size(); ++i) {
-      context.out << fmt::format("1-{}  unit {}  firmware {}\n", i + 1, bench.units[i].serial,
-                                 bench.units[i].firmware);
+    for (std::size_t i = 0; i < bench.entries.size(); ++i) {
+      const Bench::Entry& entry = bench.entries[i];
+      context.out << fmt::format("1-{}  {} {}{}{}\n", i + 1, entry.kind, entry.serial,
+                                 entry.firmware.empty() ? "" : "  firmware ", entry.firmware);
     }
     context.out << fmt::format("listening on 127.0.0.1:{}\n", port);
   }
@@ -148,10 +167,6 @@ void tell(Context& context, const Options& options, const Bench& bench, std::uin
 }
 
 Status serve(Context& context, const Options& options) {
-  if (options.jig) {
-    return fail(ErrorCode::usage, "a virtual jig cannot be offered over USB/IP yet", "--jig",
-                "turn a unit with 'sixpoint jig --device virtual:seed=7,jig=auto'");
-  }
   SIXPOINT_ASSIGN(const Bench bench, make_bench(context, options));
   mocks::UsbipServerOptions how;
   how.port = static_cast<std::uint16_t>(options.port);
@@ -184,7 +199,8 @@ Status serve(Context& context, const Options& options) {
 
 void add_virtual(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("virtual", "offer virtual units over USB/IP until Ctrl-C");
+  CLI::App* command =
+      app.add_subcommand("virtual", "offer virtual units, and a jig, over USB/IP until Ctrl-C");
   command
       ->add_option("--usbip", options->port,
                    "TCP port on 127.0.0.1; 0 = any that is free (it is printed)")

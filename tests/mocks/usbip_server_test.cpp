@@ -347,6 +347,46 @@ TEST(UsbipSession, MakesAPeerWaitThatDoesNotFetchItsAnswers) {
   EXPECT_TRUE(session.wants_input());
 }
 
+// A plan swaps the unit: the session ends as by the cable, and after the plan's second another unit
+// is at the same bus id, with descriptors of its own.
+TEST(UsbipSession, AFaultPlanSwapsTheUnit) {
+  const auto clock = std::make_shared<ManualClock>();
+  VirtualUnitOptions options;
+  options.truth = sim::draw_unit(7);
+  auto plan = parse_fault_plan(R"({"schema": "sixpoint/faults/1", "faults": [
+      {"fault": "swap", "at_report": 2, "seconds": 1, "serial": "MOS2B99990009"}]})");
+  ASSERT_OK(plan);
+  const auto unit = std::make_shared<UsbUnit>(std::make_shared<PluggedUnit>(options, *plan, clock));
+  UsbipBus bus({unit});
+  Data import = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'};
+  import.resize(40, 0);
+  const Data in = submit_header(1, 1, 1, 64, 0);
+  {
+    UsbipSession session(bus);
+    session.receive(import);
+    for (std::uint16_t i = 1; i <= 2; ++i) {
+      Data out = submit_header(1, 0, 1, 64, 0);
+      const Data report = request_report(device::Command::get_filter, i);
+      out.insert(out.end(), report.begin(), report.end());
+      session.receive(out);
+      session.receive(in);
+      EXPECT_EQ(session.is_over(), i == 2) << i;
+    }
+    const auto output = session.output();
+    const Data status(output.end() - 28, output.end() - 24);
+    EXPECT_EQ(UsbipClient::get(status, 0, 4), 0xFFFFFFFFU - 107) << "ESHUTDOWN";
+  }
+  const auto import_status = [&] {
+    UsbipSession session(bus);
+    session.receive(import);
+    return session.output()[7];
+  };
+  EXPECT_EQ(import_status(), 4) << "nothing is there yet";
+  clock->sleep(std::chrono::seconds(2));
+  EXPECT_EQ(import_status(), 0);
+  EXPECT_EQ(unit->descriptors().serial(), "MOS2B99990009");
+}
+
 TEST(UsbipServer, ATakenPortIsSaid) {
   Bench bench;
   EXPECT_FAILS(UsbipServer::listen({}, {.port = bench.server->port(), .limits = {}}),

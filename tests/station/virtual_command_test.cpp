@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include "device/hid_jig.h"
+#include "device/protocol.h"
 #include "mocks/usbip_client.h"
 #include "run_command.h"
 #include "temporary_folder.h"
@@ -119,6 +121,42 @@ TEST(VirtualCommand, TheSameSeedIsTheSameBench) {
   };
   EXPECT_EQ(serials("5"), serials("5"));
   EXPECT_NE(serials("5"), serials("6"));
+}
+
+// The jig turns the first unit: what its stream reads is the other way round afterwards.
+TEST(VirtualCommand, TheJigTurnsTheFirstUnit) {
+  Served served({"--jig"});
+  ASSERT_EQ(served.document["devices"].size(), 2U);
+  EXPECT_EQ(served.document["devices"][1]["kind"], "jig");
+  EXPECT_EQ(served.document["devices"][1]["product_id"], "0002");
+  auto jig = served.connect();
+  ASSERT_EQ(jig.import("1-2"), 0U);
+  EXPECT_EQ(jig.control(0x80, 6, 0x0200, 0, 255).data.size(), 41U);
+  const auto ask = [](UsbipClient& client, std::uint16_t sequence, std::uint8_t command,
+                      Bytes payload) {
+    const auto report = device::encode({device::ReportKind::request, sequence,
+                                        static_cast<device::Command>(command),
+                                        device::ReplyCode::ok, std::move(payload)});
+    EXPECT_EQ(client.out(1, Data(report.begin(), report.end())).status, 0);
+    return device::decode(client.in(1, 64).data);
+  };
+  auto unit = served.connect();
+  ASSERT_EQ(unit.import("1-1"), 0U);
+  const auto reading = [&](std::uint16_t sequence) {
+    EXPECT_TRUE(ask(unit, sequence, 10, {100, 0}).has_value());
+    const auto block = device::decode_samples(*device::decode(unit.in(1, 64).data));
+    const int z_lsb = block->counts.front()[2];
+    unit.control(0x00, 9, 1, 0, 0);  // ends the stream
+    return z_lsb;
+  };
+  const int before_lsb = reading(1);
+  using device::JigCommand;
+  EXPECT_EQ(ask(jig, 1, static_cast<std::uint8_t>(JigCommand::go_to),
+                {static_cast<std::uint8_t>(device::Pose::minus_z)})
+                ->code,
+            device::ReplyCode::ok);
+  posix_env().clock.sleep(std::chrono::seconds(3));
+  EXPECT_LT(reading(2), before_lsb - 300) << "2 g are about 500 LSB";
 }
 
 // The oracle is the recording that `simulate` makes of the same scenario: info.txt and log.bin are
