@@ -13,7 +13,7 @@ failures=0
 run=0
 
 for document in "$source_folder"/README.md "$source_folder"/docs/*.md "$source_folder"/docs/devices/*.md; do
-  folder=$scratch/$(basename "$document" .md)
+  folder=$scratch/$(tr / _ <<<"${document#"$source_folder"/}")
   mkdir -p "$folder/build" "$folder/archive"
   ln -s "$program" "$folder/build/sixpoint"
   cp "$source_folder/tests/docs/scenario.json" "$folder/S.json"
