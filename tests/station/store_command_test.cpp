@@ -265,7 +265,7 @@ TEST_F(StoreCommandTest, AJigRunIsStoredWithWhatItWasJudgedBy) {
   EXPECT_EQ(run_1["build"], station::software_build().empty()
                                 ? cli::Json(nullptr)
                                 : cli::Json(station::software_build()));
-  EXPECT_EQ(run_1["limits"]["residual_mg"], 10);
+  EXPECT_EQ(run_1["limits"]["limits"]["verification_residual_mg"]["high"], 10);
   EXPECT_EQ(run_1["limits_sha256"], run_2["limits_sha256"]);
   EXPECT_EQ(run_1["limits_sha256"].get<std::string>().size(), 64U);
   EXPECT_TRUE(run_1["temperature_c"].is_number());
