@@ -1,5 +1,6 @@
 // The USB tests over umockdev, and what only this carrier can do: devices that misbehave, and the
 // installed program as a child process.
+#include <array>
 #include <atomic>
 
 #include <gtest/gtest.h>
@@ -247,15 +248,33 @@ class Technician {
  public:
   explicit Technician(BenchUnit& unit) : unit_(unit) {}
   void hear(const std::string& line) {
-    constexpr std::string_view kPrompt = "turn the unit to ";
-    if (!line.starts_with(kPrompt)) {
+    // "turn the unit to +x: ...", "lay the unit on -z ...", "take the unit off, ... turn it to +y
+    // ..."
+    constexpr std::array<std::string_view, 3> kPrompts = {"turn the unit to ", "lay the unit on ",
+                                                          "turn it to "};
+    const bool off_first = line.starts_with("take the unit off");
+    for (const std::string_view prompt : kPrompts) {
+      const std::size_t at = line.find(prompt);
+      if (at == std::string::npos) {
+        continue;
+      }
+      const auto pose = device::parse_pose(line.substr(at + prompt.size(), 2));
+      if (!pose) {
+        continue;
+      }
+      turn(*pose, off_first);
       return;
     }
-    const auto pose = device::parse_pose(line.substr(kPrompt.size(), 2));
-    ASSERT_OK(pose);
-    const auto up = device::direction_of(*pose);
+  }
+  void turn(device::Pose pose, bool off_first) {
+    const auto up = device::direction_of(pose);
     const std::lock_guard lock(unit_.unit->mutex);
-    unit_.unit->unit.turn_to({up[0], up[1], up[2]}, unit_.clock->elapsed(), 0.3);
+    auto now = unit_.clock->elapsed();
+    if (off_first) {
+      unit_.unit->unit.turn_to({up[1], up[2], up[0]}, now, 0.3);
+      now += milliseconds(500);
+    }
+    unit_.unit->unit.turn_to({up[0], up[1], up[2]}, now, 0.3);
     ++turns;
   }
   int turns = 0;
