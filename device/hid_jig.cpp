@@ -20,8 +20,8 @@ tl::unexpected<Error> nonsense(std::string what) {
 }
 
 bool is_plain(const std::string& text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(),
-                                      [](char c) { return c > 0x20 && c < 0x7F; });
+  return !text.empty() &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c > 0x20 && c < 0x7F; });
 }
 
 }  // namespace
@@ -111,9 +111,7 @@ Result<std::unique_ptr<HidJig>> HidJig::open(Link link, HidJigOptions options) {
   return jig;
 }
 
-std::string HidJig::name() const {
-  return fmt::format("{} {}", identity_.model, identity_.serial);
-}
+std::string HidJig::name() const { return fmt::format("{} {}", identity_.model, identity_.serial); }
 
 Result<Bytes> HidJig::ask(JigCommand command, Bytes payload) {
   const std::lock_guard lock(mutex_);

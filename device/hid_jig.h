@@ -13,8 +13,20 @@
 
 namespace sixpoint::device {
 
-enum class JigCommand : std::uint8_t { identify = 64, go_to = 65, state = 66, stop = 67, clear = 68 };
-enum class JigMotion : std::uint8_t { unknown = 0, standing = 1, turning = 2, stopped = 3, fault = 4 };
+enum class JigCommand : std::uint8_t {
+  identify = 64,
+  go_to = 65,
+  state = 66,
+  stop = 67,
+  clear = 68
+};
+enum class JigMotion : std::uint8_t {
+  unknown = 0,
+  standing = 1,
+  turning = 2,
+  stopped = 3,
+  fault = 4
+};
 enum class JigFault : std::uint8_t {
   none = 0,
   overcurrent = 1,
@@ -39,8 +51,8 @@ Result<JigIdentity> decode_jig_identity(std::span<const std::uint8_t> payload);
 
 struct JigState {
   JigMotion motion = JigMotion::unknown;
-  std::optional<Pose> pose;  // where it stands, or where it turns to
-  double angle_off_deg = 0;  // from that pose, by the jig's encoder; in steps of 0.001
+  std::optional<Pose> pose;      // where it stands, or where it turns to
+  double angle_off_deg = 0;      // from that pose, by the jig's encoder; in steps of 0.001
   double uncertainty_deg = 0.1;  // of the angle, standard
   JigFault fault = JigFault::none;
 };

@@ -9,8 +9,8 @@ namespace sixpoint::device {
 class JigRegistry {
  public:
   // `unit` is the one that will lie in the jig; a jig in software has to know it.
-  using Opener = std::function<Result<std::unique_ptr<Jig>>(std::string_view rest, Env& env,
-                                                            Unit& unit)>;
+  using Opener =
+      std::function<Result<std::unique_ptr<Jig>>(std::string_view rest, Env& env, Unit& unit)>;
   void add(std::string scheme, std::string example, Opener opener);
   // usage when the string names no known kind; device_unavailable and so on as its opener says.
   Result<std::unique_ptr<Jig>> open(std::string_view address, Env& env, Unit& unit) const;

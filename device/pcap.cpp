@@ -78,8 +78,7 @@ std::optional<SessionTransfer> transfer_of(const Packet& packet) {
 
 }  // namespace
 
-Result<Session> session_from_pcap(std::span<const std::uint8_t> bytes,
-                                  const PcapOptions& options) {
+Result<Session> session_from_pcap(std::span<const std::uint8_t> bytes, const PcapOptions& options) {
   if (bytes.size() < kFileHeader_bytes) {
     return broken("this is no capture: it is too short");
   }
@@ -113,9 +112,9 @@ Result<Session> session_from_pcap(std::span<const std::uint8_t> bytes,
       return;
     }
     start = start.value_or(packet.time);
-    transfer->time = std::max(packet.time - *start, session.transfers.empty()
-                                                        ? std::chrono::nanoseconds::zero()
-                                                        : session.transfers.back().time);
+    transfer->time =
+        std::max(packet.time - *start, session.transfers.empty() ? std::chrono::nanoseconds::zero()
+                                                                 : session.transfers.back().time);
     session.transfers.push_back(std::move(*transfer));
   };
 
@@ -170,7 +169,8 @@ Result<Session> session_from_pcap(std::span<const std::uint8_t> bytes,
     }
   }
   if (session.transfers.empty()) {
-    return broken("the capture holds no transfer of a unit; name it with --bus and --device-number");
+    return broken(
+        "the capture holds no transfer of a unit; name it with --bus and --device-number");
   }
   session.device = fmt::format("usb bus {} device {}", bus.value_or(0), device.value_or(0));
   session.started = UtcTime(*start);

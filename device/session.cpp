@@ -19,8 +19,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kSchema = "sixpoint/session/1";
 constexpr const char* kHeadName = "session.json";
 constexpr const char* kTransfersName = "transfers.jsonl";
-// A jig run is half a megabyte; a download of a month at 100 Hz, in hexadecimal, two gigabytes, which
-// is more than a session is for.
+// A jig run is half a megabyte; a download of a month at 100 Hz, in hexadecimal, two gigabytes,
+// which is more than a session is for.
 constexpr std::uint64_t kMostFile_bytes = 128ULL << 20U;
 constexpr std::uint64_t kMostText_bytes = 512ULL << 20U;
 constexpr std::size_t kMostTransferBytes = 1U << 20U;
@@ -105,8 +105,9 @@ Result<SessionTransfer> parse_line(std::string_view line, const std::string& whe
   }
   transfer.bytes = std::move(*bytes);
   if (const std::string error = text("error"); !error.empty()) {
-    const auto* const code = std::find_if(kTransferErrors.begin(), kTransferErrors.end(),
-                                          [&](ErrorCode known) { return to_string(known) == error; });
+    const auto* const code =
+        std::find_if(kTransferErrors.begin(), kTransferErrors.end(),
+                     [&](ErrorCode known) { return to_string(known) == error; });
     if (code == kTransferErrors.end()) {
       return broken("a transfer with no known error", where);
     }
@@ -150,8 +151,7 @@ Result<std::string> entry_of(zip_t& zip, const char* name, const std::string& pa
 }
 
 std::string hash_of(std::string_view text) {
-  return to_hex(
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
 }
 
 }  // namespace
@@ -173,8 +173,9 @@ std::string to_lines(const std::vector<SessionTransfer>& transfers) {
       text += '"';
     }
     if (transfer.error) {
-      text += fmt::format(R"(,"error":"{}","what":{})", to_string(transfer.error->code),
-                          Json(transfer.error->what).dump(-1, ' ', false, Json::error_handler_t::replace));
+      text += fmt::format(
+          R"(,"error":"{}","what":{})", to_string(transfer.error->code),
+          Json(transfer.error->what).dump(-1, ' ', false, Json::error_handler_t::replace));
     }
     text += "}\n";
   }
@@ -249,8 +250,8 @@ Status write_session(FileSystem& files, const std::string& path, const Session& 
   Bytes piece(1U << 20U);
   zip_int64_t count = 0;
   while ((count = zip_source_read(target, piece.data(), piece.size())) > 0) {
-    SIXPOINT_CHECK(out.append(std::span<const std::uint8_t>(piece).first(
-        static_cast<std::size_t>(count))));
+    SIXPOINT_CHECK(
+        out.append(std::span<const std::uint8_t>(piece).first(static_cast<std::size_t>(count))));
   }
   zip_source_close(target);
   return out.commit();
@@ -261,8 +262,7 @@ Result<Session> read_session(FileSystem& files, const std::string& path) {
   zip_error_t error;
   zip_error_init(&error);
   zip_source_t* source = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);
-  zip_t* opened =
-      source == nullptr ? nullptr : zip_open_from_source(source, ZIP_RDONLY, &error);
+  zip_t* opened = source == nullptr ? nullptr : zip_open_from_source(source, ZIP_RDONLY, &error);
   if (opened == nullptr) {
     zip_source_free(source);
     zip_error_fini(&error);
@@ -286,9 +286,10 @@ Result<Session> read_session(FileSystem& files, const std::string& path) {
   session.truncated = member("truncated") == true;
   SIXPOINT_ASSIGN(const std::string lines, entry_of(*zip, kTransfersName, path));
   if (member("sha256") != hash_of(lines)) {
-    return broken("the session was changed after it was recorded: its transfers do not have the "
-                  "hash that session.json names",
-                  path);
+    return broken(
+        "the session was changed after it was recorded: its transfers do not have the "
+        "hash that session.json names",
+        path);
   }
   auto transfers = parse_lines(lines);
   if (!transfers) {

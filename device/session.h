@@ -1,4 +1,5 @@
-// A recorded session: every transfer between a program and a device, with its time (docs/sessions.md).
+// A recorded session: every transfer between a program and a device, with its time
+// (docs/sessions.md).
 //
 // A session file is a zip of session.json (what it is, and the SHA-256 of the rest) and
 // transfers.jsonl, one line per transfer. session_recorder.h makes one, session_replay.h plays one

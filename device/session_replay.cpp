@@ -317,24 +317,22 @@ Link replay_link(Session session, SessionMatch match) {
 }
 
 void register_replay(TransportRegistry& registry) {
-  registry.add("replay", "replay:session.zip",
-               [](std::string_view rest, Env& env) -> Result<Link> {
-                 constexpr std::string_view kMatch = ",match=";
-                 SessionMatch match = SessionMatch::strict;
-                 if (const std::size_t at = rest.rfind(kMatch); at != std::string_view::npos) {
-                   const std::string_view word = rest.substr(at + kMatch.size());
-                   if (word != "key" && word != "strict") {
-                     return fail(ErrorCode::usage,
-                                 fmt::format("match={} is neither strict nor key",
-                                             printable(word, 40)),
-                                 {}, "docs/sessions.md describes both");
-                   }
-                   match = word == "key" ? SessionMatch::by_key : SessionMatch::strict;
-                   rest = rest.substr(0, at);
-                 }
-                 SIXPOINT_ASSIGN(Session session, read_session(env.files, std::string(rest)));
-                 return replay_link(std::move(session), match);
-               });
+  registry.add("replay", "replay:session.zip", [](std::string_view rest, Env& env) -> Result<Link> {
+    constexpr std::string_view kMatch = ",match=";
+    SessionMatch match = SessionMatch::strict;
+    if (const std::size_t at = rest.rfind(kMatch); at != std::string_view::npos) {
+      const std::string_view word = rest.substr(at + kMatch.size());
+      if (word != "key" && word != "strict") {
+        return fail(ErrorCode::usage,
+                    fmt::format("match={} is neither strict nor key", printable(word, 40)), {},
+                    "docs/sessions.md describes both");
+      }
+      match = word == "key" ? SessionMatch::by_key : SessionMatch::strict;
+      rest = rest.substr(0, at);
+    }
+    SIXPOINT_ASSIGN(Session session, read_session(env.files, std::string(rest)));
+    return replay_link(std::move(session), match);
+  });
 }
 
 }  // namespace sixpoint::device

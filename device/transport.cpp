@@ -25,8 +25,7 @@ Result<Link> TransportRegistry::open(std::string_view address, Env& env) const {
   if (link) {
     link->address = std::string(address);
     if (!link->reopen) {
-      link->reopen = [opener = entry->second.opener,
-                      rest = std::string(address.substr(colon + 1)),
+      link->reopen = [opener = entry->second.opener, rest = std::string(address.substr(colon + 1)),
                       &env] { return opener(rest, env); };
     }
   }

@@ -46,8 +46,8 @@ struct Link {
   // The serial number that the device gave outside of the protocol (USB descriptor); empty where
   // there is none. Unit::open() refuses a unit that calls itself otherwise.
   std::string serial = {};
-  // Opens the same place again, after the device went away; whoever is there now answers, which need
-  // not be the same unit. TransportRegistry::open() fills it in where the opener did not.
+  // Opens the same place again, after the device went away; whoever is there now answers, which
+  // need not be the same unit. TransportRegistry::open() fills it in where the opener did not.
   std::function<Result<Link>()> reopen = {};
   std::unique_ptr<Jig> jig;  // a jig that is part of the device (virtual units); mostly null
 };

@@ -61,10 +61,10 @@ struct StreamStatistics {
 
 // What a unit can be asked for.
 struct UnitAbilities {
-  bool streams = false;              // live samples, filter configuration
-  bool holds_constants = false;      // a calibration page that can be read and written
-  bool records_on_command = false;   // start_recording(), stop_recording()
-  bool offers_recordings = false;    // recordings(), download()
+  bool streams = false;             // live samples, filter configuration
+  bool holds_constants = false;     // a calibration page that can be read and written
+  bool records_on_command = false;  // start_recording(), stop_recording()
+  bool offers_recordings = false;   // recordings(), download()
 };
 
 class Unit {

@@ -51,9 +51,8 @@ tl::unexpected<Error> nonsense(const std::string& where, std::string what) {
 
 tl::unexpected<Error> swapped(const std::string& where, const std::string& was,
                               const std::string& is) {
-  return fail(ErrorCode::device_unavailable,
-              fmt::format("the unit was {} and is now {}", was, is), where,
-              "put the first unit back, or begin anew with this one");
+  return fail(ErrorCode::device_unavailable, fmt::format("the unit was {} and is now {}", was, is),
+              where, "put the first unit back, or begin anew with this one");
 }
 
 }  // namespace
@@ -173,8 +172,7 @@ void WireUnit::take_samples(const Message& message) {
   if (last_block_) {
     // Report sequence and sample index must agree on whether something is missing. A block in which
     // they do not is a damaged one, however well its CRC fits.
-    const bool follows =
-        block->sequence == static_cast<std::uint16_t>(last_block_->sequence + 1U);
+    const bool follows = block->sequence == static_cast<std::uint16_t>(last_block_->sequence + 1U);
     if (follows != (ahead == 0)) {
       ++statistics_.damaged_reports;
       return;
@@ -189,10 +187,9 @@ void WireUnit::take_samples(const Message& message) {
     const double expected_s =
         static_cast<std::uint32_t>(block->first_index - last_block_->first_index) /
         static_cast<double>(rate_hz_);
-    const double passed_s =
-        static_cast<double>(
-            static_cast<std::int64_t>(block->device_time_us - last_block_->device_time_us)) *
-        1e-6;
+    const double passed_s = static_cast<double>(static_cast<std::int64_t>(
+                                block->device_time_us - last_block_->device_time_us)) *
+                            1e-6;
     if (std::abs(passed_s - expected_s) > 0.05 + 0.05 * expected_s) {
       ++statistics_.clock_jumps;
       statistics_.clock_jumped_s += passed_s - expected_s;
@@ -421,8 +418,8 @@ Result<std::vector<RecordingInfo>> WireUnit::recordings() {
 }
 
 Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& offset,
-                           WritableFile& file, Sha256& hash,
-                           const std::function<void(std::uint64_t)>& progress) {
+                               WritableFile& file, Sha256& hash,
+                               const std::function<void(std::uint64_t)>& progress) {
   // What an ended request left in the pipe is drained by the offset check below.
   constexpr std::uint64_t kPerRequest = 64ULL << 20U;
   std::vector<std::uint8_t> buffer(kBulkBlockBytes + 1);
@@ -477,8 +474,9 @@ Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& of
   return {};
 }
 
-Status WireUnit::download(const RecordingInfo& recording, FileSystem& files, const std::string& path,
-                      const std::function<void(std::uint64_t)>& progress) {
+Status WireUnit::download(const RecordingInfo& recording, FileSystem& files,
+                          const std::string& path,
+                          const std::function<void(std::uint64_t)>& progress) {
   if (!link_.bulk) {
     return fail(ErrorCode::device_unavailable, "this device offers no download", link_.address,
                 "connect the unit by USB");

@@ -1,8 +1,8 @@
 // A unit of the project's own protocol (docs/protocol.md), over any pair of channels.
 //
 // Requests that got lost are repeated with the same sequence, which a unit executes once; so are
-// transfers that failed. Nothing else is repeated here: whether a whole transaction may be, is known
-// to who began it.
+// transfers that failed. Nothing else is repeated here: whether a whole transaction may be, is
+// known to who began it.
 #pragma once
 
 #include <atomic>
@@ -17,9 +17,7 @@ class WireUnit final : public Unit {
  public:
   static Result<std::unique_ptr<Unit>> open(Link link, UnitOptions options);
 
-  UnitAbilities abilities() const override {
-    return {true, true, true, link_.bulk != nullptr};
-  }
+  UnitAbilities abilities() const override { return {true, true, true, link_.bulk != nullptr}; }
   const Identity& identity() const override { return identity_; }
   Clock& clock() override { return *link_.clock; }
   Jig* jig() override { return link_.jig.get(); }

@@ -115,7 +115,7 @@ Result<Fault> read_fault(const Json& json, const std::string& path) {
     return wrong(path, "this must be an object");
   }
   constexpr std::array<std::string_view, 16> kKeys = {
-      "fault", "at_report", "at_byte", "at_s", "channel",    "direction", "of",      "count",
+      "fault", "at_report", "at_byte", "at_s", "channel",    "direction", "of",     "count",
       "every", "seconds",   "bytes",   "bit",  "battery_mv", "axis",      "serial", "byte"};
   for (const auto& [key, value] : json.items()) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
@@ -136,9 +136,10 @@ Result<Fault> read_fault(const Json& json, const std::string& path) {
       1) {
     return wrong(path, "a fault needs exactly one of at_report, at_byte and at_s");
   }
-  SIXPOINT_CHECK(in.choice("channel", fault.channel,
-                           std::array<std::pair<FaultChannel, std::string_view>, 2>{
-                               {{FaultChannel::reports, "reports"}, {FaultChannel::bulk, "bulk"}}}));
+  SIXPOINT_CHECK(
+      in.choice("channel", fault.channel,
+                std::array<std::pair<FaultChannel, std::string_view>, 2>{
+                    {{FaultChannel::reports, "reports"}, {FaultChannel::bulk, "bulk"}}}));
   SIXPOINT_CHECK(in.choice(
       "direction", fault.direction,
       std::array<std::pair<FaultDirection, std::string_view>, 2>{
@@ -148,8 +149,8 @@ Result<Fault> read_fault(const Json& json, const std::string& path) {
                                {{FaultSubject::any, "any"},
                                 {FaultSubject::replies, "replies"},
                                 {FaultSubject::samples, "samples"}}}));
-  if (fault.channel == FaultChannel::bulk && (fault.direction == FaultDirection::to_unit ||
-                                              fault.subject != FaultSubject::any)) {
+  if (fault.channel == FaultChannel::bulk &&
+      (fault.direction == FaultDirection::to_unit || fault.subject != FaultSubject::any)) {
     return wrong(path, "on the bulk channel there are blocks from the unit only");
   }
   if (fault.direction == FaultDirection::to_unit && fault.subject != FaultSubject::any) {
@@ -163,9 +164,9 @@ Result<Fault> read_fault(const Json& json, const std::string& path) {
   SIXPOINT_CHECK(in.whole("bit", fault.bit, 0, 7));
   SIXPOINT_CHECK(in.whole("byte", fault.byte, 0, 1U << 20U));
   SIXPOINT_CHECK(in.whole("battery_mv", fault.battery_mv, 0, 65'535));
-  SIXPOINT_CHECK(in.choice("axis", fault.axis,
-                           std::array<std::pair<std::size_t, std::string_view>, 3>{
-                               {{0U, "x"}, {1U, "y"}, {2U, "z"}}}));
+  SIXPOINT_CHECK(in.choice(
+      "axis", fault.axis,
+      std::array<std::pair<std::size_t, std::string_view>, 3>{{{0U, "x"}, {1U, "y"}, {2U, "z"}}}));
   if (const Json* serial = in.find("serial")) {
     if (!serial->is_string() || serial->get_ref<const std::string&>().empty() ||
         serial->get_ref<const std::string&>().size() > 16 ||

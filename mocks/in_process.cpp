@@ -22,9 +22,7 @@ tl::unexpected<Error> stalled() {
 class InProcess final : public device::Transport {
  public:
   InProcess(std::shared_ptr<PluggedUnit> plugged, bool bulk)
-      : plugged_(std::move(plugged)),
-        bulk_(bulk),
-        enumeration_(plugged_->faults.enumeration()) {}
+      : plugged_(std::move(plugged)), bulk_(bulk), enumeration_(plugged_->faults.enumeration()) {}
 
   Status write(std::span<const std::uint8_t> bytes, nanoseconds /*time_out*/) override {
     const std::lock_guard lock(plugged_->mutex);
@@ -60,8 +58,8 @@ class InProcess final : public device::Transport {
           return gone();
         }
         FaultInjector& faults = plugged_->faults;
-        const CableEvent event = bulk_ ? faults.read_bulk(plugged_->unit, now)
-                                       : faults.read_report(plugged_->unit, now);
+        const CableEvent event =
+            bulk_ ? faults.read_bulk(plugged_->unit, now) : faults.read_report(plugged_->unit, now);
         switch (event.kind) {
           case CableEvent::Kind::data:
             return copy(event.bytes, out);
@@ -133,19 +131,18 @@ device::Link link_to(std::shared_ptr<PluggedUnit> plugged, bool with_jig) {
 }
 
 void register_virtual(device::TransportRegistry& registry) {
-  registry.add(
-      "virtual", "virtual:seed=7,jig=auto",
-      [](std::string_view rest, Env& env) -> Result<device::Link> {
-        SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(rest, env.seed));
-        std::shared_ptr<Clock> clock = clock_of(settings, env.clock);
-        FaultPlan plan;
-        if (!settings.faults_file.empty()) {
-          SIXPOINT_ASSIGN(plan, read_fault_plan(env.files, settings.faults_file));
-        }
-        return link_to(std::make_shared<PluggedUnit>(std::move(settings.unit), std::move(plan),
-                                                     std::move(clock)),
-                       settings.with_jig);
-      });
+  registry.add("virtual", "virtual:seed=7,jig=auto",
+               [](std::string_view rest, Env& env) -> Result<device::Link> {
+                 SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(rest, env.seed));
+                 std::shared_ptr<Clock> clock = clock_of(settings, env.clock);
+                 FaultPlan plan;
+                 if (!settings.faults_file.empty()) {
+                   SIXPOINT_ASSIGN(plan, read_fault_plan(env.files, settings.faults_file));
+                 }
+                 return link_to(std::make_shared<PluggedUnit>(std::move(settings.unit),
+                                                              std::move(plan), std::move(clock)),
+                                settings.with_jig);
+               });
 }
 
 }  // namespace sixpoint::mocks

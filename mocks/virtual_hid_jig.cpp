@@ -130,9 +130,9 @@ VirtualHidJig::VirtualHidJig(VirtualHidJigOptions options, VirtualJig* physics)
 device::JigState VirtualHidJig::state(nanoseconds now) {
   if (motion_ == JigMotion::turning) {
     // Its own encoder sees the turn, whatever pose it really ends in.
-    const bool there = physics_ == nullptr ? now - turned_at_ >= kTurnByItself
-                                           : physics_->report().value_or(device::JigReport{}).pose
-                                                 .has_value();
+    const bool there = physics_ == nullptr
+                           ? now - turned_at_ >= kTurnByItself
+                           : physics_->report().value_or(device::JigReport{}).pose.has_value();
     motion_ = there ? JigMotion::standing : JigMotion::turning;
   }
   device::JigState state;
@@ -210,8 +210,7 @@ void VirtualHidJig::take_report(std::span<const std::uint8_t> report, nanosecond
     return;
   }
   // The sequence rule of docs/protocol.md, but for a stop, which is always done.
-  if (last_request_ != *request ||
-      static_cast<JigCommand>(request->command) == JigCommand::stop) {
+  if (last_request_ != *request || static_cast<JigCommand>(request->command) == JigCommand::stop) {
     last_reply_ = device::encode(answer(*request, now));
     last_request_ = std::move(*request);
   }

@@ -19,7 +19,7 @@ struct VirtualSettings {
   bool with_jig = false;
   bool real_time = false;
   std::string faults_file;  // empty: nothing goes wrong
-  int pace = 1;  // times the machine's clock, where it is real_time
+  int pace = 1;             // times the machine's clock, where it is real_time
 };
 
 // usage on an unknown key, a key given twice, or a value that no unit can have.

@@ -139,8 +139,7 @@ nanoseconds VirtualUnit::jumped_until(nanoseconds at) const {
 
 std::uint64_t VirtualUnit::device_time_us(nanoseconds at) const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(
-      0,
-      std::chrono::floor<std::chrono::microseconds>(at - power_on_ + jumped_until(at)).count()));
+      0, std::chrono::floor<std::chrono::microseconds>(at - power_on_ + jumped_until(at)).count()));
 }
 
 void VirtualUnit::lose_cable() {
@@ -456,8 +455,8 @@ Message VirtualUnit::answer(const Message& request, nanoseconds now) {
       if (wrong_length()) {
         return refuse(ReplyCode::bad_length);
       }
-      const UtcTime calendar = clock_set_to_ + (now - clock_set_at_) +
-                               (jumped_until(now) - jumped_until(clock_set_at_));
+      const UtcTime calendar =
+          clock_set_to_ + (now - clock_set_at_) + (jumped_until(now) - jumped_until(clock_set_at_));
       reply.payload = PayloadWriter()
                           .put(device_time_us(now))
                           .put(static_cast<std::uint32_t>(to_unix_seconds(calendar)))

@@ -23,8 +23,8 @@ std::chrono::nanoseconds from_seconds(double time_s) {
 constexpr double kShort_s = 5;
 
 struct Oddities {
-  double jumped_s = 0;    // how far the times of the seconds are off one another, summed up
-  int repeated_s = 0;     // the longest stretch of seconds with the very same samples
+  double jumped_s = 0;  // how far the times of the seconds are off one another, summed up
+  int repeated_s = 0;   // the longest stretch of seconds with the very same samples
 };
 
 // What a clock or a sensor that failed leaves in a recording.
@@ -87,9 +87,8 @@ Status note_oddities(FileSystem& files, const std::string& path, CaptureReport& 
                     oddities.jumped_s));
   }
   if (oddities.repeated_s > kShort_s) {
-    report.notes.push_back(
-        fmt::format("the sensor repeated the very same readings for {} s: it is frozen",
-                    oddities.repeated_s));
+    report.notes.push_back(fmt::format(
+        "the sensor repeated the very same readings for {} s: it is frozen", oddities.repeated_s));
   }
   return {};
 }
@@ -178,8 +177,7 @@ Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
   SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(env.files, options.output));
   if (const auto filter = repair::filter_in_force(survey.facts)) {
     report.recording_filter = *filter;
-    report.refusal =
-        why_recording_cannot_help({*filter, *filter}, report.serial, report.firmware);
+    report.refusal = why_recording_cannot_help({*filter, *filter}, report.serial, report.firmware);
     if (!report.refusal.empty()) {
       return report;
     }
@@ -209,18 +207,17 @@ Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env
   const Result<bool> round = go_round(unit, jig, options, prompt);
   // First of all: a unit left recording runs empty. Perhaps it is another by now: ask.
   SIXPOINT_CHECK(with_the_same_unit(unit, options, report, [&] { return unit.identify(); }));
-  const auto stopped = with_the_same_unit(unit, options, report, [&]() -> Result<std::uint16_t> {
-    return unit.stop_recording();
-  });
-  const double wanted_s =
-      std::chrono::duration<double>(unit.clock().now() - started).count();
+  const auto stopped = with_the_same_unit(
+      unit, options, report, [&]() -> Result<std::uint16_t> { return unit.stop_recording(); });
+  const double wanted_s = std::chrono::duration<double>(unit.clock().now() - started).count();
   if (!stopped) {
     if (stopped.error().code != ErrorCode::io) {
       return fail(stopped.error());
     }
     // It is not recording any more: what there is, is in its list.
-    report.notes.push_back("the unit had stopped recording by itself: it started anew, or its "
-                           "battery or memory gave out");
+    report.notes.push_back(
+        "the unit had stopped recording by itself: it started anew, or its "
+        "battery or memory gave out");
   }
   SIXPOINT_CHECK(round);
   if (!*round) {
@@ -228,9 +225,8 @@ Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env
     return report;
   }
 
-  SIXPOINT_ASSIGN(const auto recordings, with_the_same_unit(unit, options, report, [&] {
-                    return unit.recordings();
-                  }));
+  SIXPOINT_ASSIGN(const auto recordings,
+                  with_the_same_unit(unit, options, report, [&] { return unit.recordings(); }));
   const device::RecordingInfo* made = nullptr;
   for (const device::RecordingInfo& recording : recordings) {
     made = recording.id == id ? &recording : made;
@@ -239,9 +235,8 @@ Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env
     return fail(ErrorCode::io, "the unit does not list the recording it made", report.serial,
                 "plug the unit in again and repeat");
   }
-  SIXPOINT_CHECK(with_the_same_unit(unit, options, report, [&] {
-    return unit.download(*made, env.files, options.output);
-  }));
+  SIXPOINT_CHECK(with_the_same_unit(
+      unit, options, report, [&] { return unit.download(*made, env.files, options.output); }));
   report.file = options.output;
   report.file_sha256 = to_hex(made->sha256);
 

@@ -57,8 +57,8 @@ std::vector<std::string> why_recording_cannot_help(const device::FilterState& fi
                                                    const std::string& serial,
                                                    const std::string& firmware);
 
-// For a unit that takes no commands: the recording that it holds, made while somebody laid it on its
-// sides, is copied, checked and solved. bad_data where it holds none.
+// For a unit that takes no commands: the recording that it holds, made while somebody laid it on
+// its sides, is copied, checked and solved. bad_data where it holds none.
 Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env, const CaptureOptions& options);
 
 // device_unavailable when the unit goes away; cannot_create when the file exists or cannot be made.

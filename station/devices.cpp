@@ -44,8 +44,8 @@ std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
     device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell) {
   static constexpr std::chrono::seconds kPatience{30};
   static constexpr int kMostReturns = 5;
-  return [&unit, &jig, tell = std::move(tell), returns = 0](
-             const Error& gone) mutable -> Result<UnitOnJig> {
+  return [&unit, &jig, tell = std::move(tell),
+          returns = 0](const Error& gone) mutable -> Result<UnitOnJig> {
     if (++returns > kMostReturns) {
       return fail(ErrorCode::device_unavailable,
                   fmt::format("the unit went away {} times", returns), gone.where,

@@ -230,8 +230,8 @@ class JigRun {
   PerAxis<std::int64_t> sum_square_{};
   PerAxis<double> own_noise_mg_{};  // the least seen; 0 = not known yet
   int still_samples_ = 0;
-  device::RawCounts repeated_{};         // the counts that came last
-  PerAxis<int> repeats_{};               // and how often in a row
+  device::RawCounts repeated_{};  // the counts that came last
+  PerAxis<int> repeats_{};        // and how often in a row
   PerAxis<double> dwell_start_lsb_{};
   PerAxis<double> left_lsb_{};  // where the unit lay when it was told to leave
   std::vector<Sample> dwell_;

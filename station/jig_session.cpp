@@ -81,8 +81,8 @@ class Session {
   Calibration approximation_ = nominal();
   bool ended_ = false;
   bool write_unknown_ = false;  // a write was begun, and the page not read since
-  std::optional<Error> gone_;  // why the unit was given up
-  std::string last_words_;     // what the machine said when it ended
+  std::optional<Error> gone_;   // why the unit was given up
+  std::string last_words_;      // what the machine said when it ended
   std::optional<double> jig_asked_s_;
   int jig_disagreements_ = 0;
   std::uint64_t clock_jumps_before_ = 0;
@@ -155,13 +155,13 @@ void Session::keep_raw(const device::SampleBlock& block) {
 
 // Waits for the unit and goes on with it. Ends the run when it does not come back.
 Status Session::come_back(JigRun& run, const Error& error) {
+  report_.stream = unit_->stream_statistics();  // before whoever keeps the unit lets go of it
   lost_before_ += unit_->stream_statistics().lost_samples;
   clock_jumps_before_ += unit_->stream_statistics().clock_jumps;
   clock_jumped_before_s_ += unit_->stream_statistics().clock_jumped_s;
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error);
     if (!again) {
-      report_.stream = unit_->stream_statistics();
       unit_ = nullptr;  // whoever kept them let go of them
       jig_ = nullptr;
     }

@@ -46,8 +46,8 @@ Result<std::string> work_on(Session session, SessionWork work) {
       const SidePrompt yes = [](device::Pose, std::size_t, std::size_t) { return true; };
       SIXPOINT_ASSIGN(const CaptureReport report,
                       run_capture(*unit, jig, memory.env, options, yes));
-      return fmt::format("{} {} {}", report.serial,
-                         report.usable() ? "usable" : "not usable", fmt::join(report.refusal, "; "));
+      return fmt::format("{} {} {}", report.serial, report.usable() ? "usable" : "not usable",
+                         fmt::join(report.refusal, "; "));
     }
   }
   return std::string();
@@ -76,8 +76,7 @@ class Minimiser {
   MinimiseReport run() {
     std::vector<Part> exchanges;
     for (std::size_t i = 0; i < session_.transfers.size(); ++i) {
-      if (exchanges.empty() ||
-          session_.transfers[i].kind != SessionTransfer::Kind::from_device) {
+      if (exchanges.empty() || session_.transfers[i].kind != SessionTransfer::Kind::from_device) {
         exchanges.emplace_back();
       }
       exchanges.back().push_back(i);
@@ -113,10 +112,10 @@ class Minimiser {
       for (std::size_t begin = 0; begin < parts.size() && replays_ < options_.most_replays;
            begin += size) {
         std::vector<Part> rest(parts.begin(), parts.begin() + static_cast<std::ptrdiff_t>(begin));
-        rest.insert(rest.end(),
-                    parts.begin() +
-                        static_cast<std::ptrdiff_t>(std::min(begin + size, parts.size())),
-                    parts.end());
+        rest.insert(
+            rest.end(),
+            parts.begin() + static_cast<std::ptrdiff_t>(std::min(begin + size, parts.size())),
+            parts.end());
         if (same(rest)) {
           parts = std::move(rest);
           pieces = std::max<std::size_t>(pieces - 1, 2);

@@ -172,8 +172,7 @@ Status DriveUnit::download(const RecordingInfo& recording, FileSystem& files,
   SIXPOINT_ASSIGN(auto log, env_.files.open(path_of(kLogName)));
   const auto hash = std::make_shared<Sha256>();
   SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
-  SIXPOINT_CHECK(
-      writer.add(kLogName, std::make_unique<LogSource>(std::move(log), hash, progress)));
+  SIXPOINT_CHECK(writer.add(kLogName, std::make_unique<LogSource>(std::move(log), hash, progress)));
   SIXPOINT_CHECK(writer.add(kInfoName, std::move(info)));
   SIXPOINT_CHECK(writer.commit());
   const Status same = [&]() -> Status {

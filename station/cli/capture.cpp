@@ -64,10 +64,9 @@ Status keep(Context& context, const Options& options, Done& done) {
 }
 
 Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
-  SIXPOINT_ASSIGN(const auto unit,
-                  station::known_units().open(
-                      station::with_jig(options.device, options.jig), context.env,
-                      [&recorder](device::Link& link) { recorder.attach(link); }));
+  SIXPOINT_ASSIGN(const auto unit, station::known_units().open(
+                                       station::with_jig(options.device, options.jig), context.env,
+                                       [&recorder](device::Link& link) { recorder.attach(link); }));
   std::unique_ptr<device::Jig> own_jig;
   SIXPOINT_ASSIGN(device::Jig* const chosen,
                   station::choose_jig(options.jig, *unit, context.env, own_jig));

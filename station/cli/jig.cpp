@@ -155,10 +155,9 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
 
   session.keep_interrupted = true;
 
-  SIXPOINT_ASSIGN(const auto unit,
-                  station::known_units().open(
-                      station::with_jig(options.device, options.jig), context.env,
-                      [&recorder](device::Link& link) { recorder.attach(link); }));
+  SIXPOINT_ASSIGN(const auto unit, station::known_units().open(
+                                       station::with_jig(options.device, options.jig), context.env,
+                                       [&recorder](device::Link& link) { recorder.attach(link); }));
   if (!unit->abilities().streams || !unit->abilities().holds_constants) {
     return fail(ErrorCode::usage, "this unit offers files and no live samples", unit->address(),
                 "calibrate it by a file: 'sixpoint capture'");

@@ -1,11 +1,12 @@
 // sixpoint session: recorded sessions are shown, made small, and made of USB captures.
+#include "device/session.h"
+
 #include <map>
 
 #include <fmt/format.h>
 
 #include "device/pcap.h"
 #include "device/protocol.h"
-#include "device/session.h"
 #include "station/cli/command.h"
 #include "station/session_minimiser.h"
 
@@ -28,10 +29,9 @@ Json summary_of(const device::Session& session) {
   json["started"] = to_iso8601(session.started);
   json["transfers"] = session.transfers.size();
   json["truncated"] = session.truncated;
-  json["duration_s"] =
-      session.transfers.empty()
-          ? 0.0
-          : std::chrono::duration<double>(session.transfers.back().time).count();
+  json["duration_s"] = session.transfers.empty()
+                           ? 0.0
+                           : std::chrono::duration<double>(session.transfers.back().time).count();
   std::map<std::string, std::size_t> commands;
   std::size_t samples = 0;
   std::size_t blocks = 0;
@@ -140,9 +140,9 @@ void add_session(CLI::App& app, Context& context) {
   small->add_option("--replays", options->most_replays, "replays to try at most")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  CLI::App* pcap = add(*command, context, options, "from-pcap",
-                       "a session of what tcpdump or Wireshark captured of usbmon", "CAPTURE",
-                       from_pcap);
+  CLI::App* pcap =
+      add(*command, context, options, "from-pcap",
+          "a session of what tcpdump or Wireshark captured of usbmon", "CAPTURE", from_pcap);
   pcap->add_option("-o,--output", options->output, "the session to make")->required();
   pcap->add_option("--bus", options->bus, "of this bus only");
   pcap->add_option("--device-number", options->device_number, "of this device on the bus only")

@@ -160,8 +160,8 @@ TEST(HidJig, ASilentOrHostileJigIsRefused) {
     return HidJig::open(std::move(link));
   };
   const auto answer = [](const Message& request, Bytes payload) {
-    const Report report = encode({ReportKind::reply, request.sequence, request.command,
-                                  ReplyCode::ok, std::move(payload)});
+    const Report report = encode(
+        {ReportKind::reply, request.sequence, request.command, ReplyCode::ok, std::move(payload)});
     return Bytes(report.begin(), report.end());
   };
   EXPECT_FAILS(open_with([](const Message&) { return Bytes(64, 0xFF); }),

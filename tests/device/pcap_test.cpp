@@ -64,7 +64,7 @@ class Capture {
 Capture captured(const Session& session, std::uint32_t link_type, bool big) {
   Capture capture(link_type, big);
   std::int64_t time_us = 1'600'000'000'000'000;
-  capture.add('S', 2, 0x80, 1, time_us, {1, 2, 3});   // control, of a hub
+  capture.add('S', 2, 0x80, 1, time_us, {1, 2, 3});    // control, of a hub
   capture.add('C', 1, 0x81, 4, time_us, Bytes(8, 7));  // a mouse
   for (const SessionTransfer& transfer : session.transfers) {
     time_us = 1'600'000'000'000'000 + transfer.time.count() / 1000;
@@ -114,8 +114,8 @@ TEST(Pcap, RefusesWhatIsNoCaptureOfAUnit) {
     const auto made = session_from_pcap(std::span(whole).first(size), {});
     if (made) {
       ASSERT_LE(made->transfers.size(), all.transfers.size());
-      EXPECT_TRUE(std::equal(made->transfers.begin(), made->transfers.end(),
-                             all.transfers.begin()));
+      EXPECT_TRUE(
+          std::equal(made->transfers.begin(), made->transfers.end(), all.transfers.begin()));
     }
   }
 }

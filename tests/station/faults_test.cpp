@@ -43,9 +43,8 @@ class Faults : public testing::TestWithParam<Row> {
     return std::string(kUnit) + ",faults=" + path("f.json");
   }
   Json stored_constants() {
-    const auto history =
-        tests::run_command(posix_env(), {"history", "MOS2A45130007", "--store", path("s.db"),
-                                         "--json"});
+    const auto history = tests::run_command(
+        posix_env(), {"history", "MOS2A45130007", "--store", path("s.db"), "--json"});
     const Json json = Json::parse(history.out, nullptr, false);
     return json.is_object() && json.contains("constants") ? json["constants"] : Json::array();
   }
@@ -56,8 +55,8 @@ class JigFaults : public Faults {};
 
 TEST_P(JigFaults, DoesWhatTheTableSays) {
   const Row& row = GetParam();
-  std::vector<std::string> arguments = {"jig", "--device", device(row.fault), "--store",
-                                        path("s.db"), "--json"};
+  std::vector<std::string> arguments = {"jig",     "--device",   device(row.fault),
+                                        "--store", path("s.db"), "--json"};
   if (row.writes) {
     arguments.emplace_back("--write");
   }
@@ -71,9 +70,8 @@ TEST_P(JigFaults, DoesWhatTheTableSays) {
     const double sensitivity[] = {237.7, 251.8, 242.3};
     const double zero[] = {49.9, 95.8, 60.8};
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      EXPECT_NEAR(
-          1 / constants[0]["constants"]["sensitivity_g_per_lsb"][axis].get<double>(),
-          sensitivity[axis], 0.3);
+      EXPECT_NEAR(1 / constants[0]["constants"]["sensitivity_g_per_lsb"][axis].get<double>(),
+                  sensitivity[axis], 0.3);
       EXPECT_NEAR(constants[0]["constants"]["zero_lsb"][axis].get<double>(), zero[axis], 0.3);
     }
   } else {
@@ -91,8 +89,9 @@ INSTANTIATE_TEST_SUITE_P(
     Table, JigFaults,
     testing::Values(
         Row{"stall", R"({"fault": "stall", "at_report": 5, "every": 40})", 0, "\"pass\""},
-        Row{"stall_out", R"({"fault": "stall", "direction": "to_unit", "at_report": 2, "every": 3})",
-            0, "\"pass\""},
+        Row{"stall_out",
+            R"({"fault": "stall", "direction": "to_unit", "at_report": 2, "every": 3})", 0,
+            "\"pass\""},
         Row{"stall_for_good", R"({"fault": "stall", "at_s": 20, "count": 0})", 69,
             "did not come back"},
         Row{"short_delay", R"({"fault": "delay", "seconds": 0.25, "at_report": 3, "every": 50})", 0,
@@ -101,8 +100,9 @@ INSTANTIATE_TEST_SUITE_P(
             "\"pass\""},
         Row{"longer_delay", R"({"fault": "delay", "seconds": 2, "of": "replies", "at_report": 4})",
             69, "does not answer"},
-        Row{"short_packet", R"({"fault": "short_packet", "bytes": 20, "at_report": 3, "every": 400})",
-            0, "\"pass\""},
+        Row{"short_packet",
+            R"({"fault": "short_packet", "bytes": 20, "at_report": 3, "every": 400})", 0,
+            "\"pass\""},
         Row{"garbage", R"({"fault": "garbage", "at_report": 3, "every": 400})", 0, "\"pass\""},
         Row{"bit_flip", R"({"fault": "bit_flip", "at_byte": 1000, "bit": 6, "every": 400})", 0,
             "\"pass\""},
@@ -146,9 +146,9 @@ class CaptureFaults : public Faults {};
 
 TEST_P(CaptureFaults, DoesWhatTheTableSays) {
   const Row& row = GetParam();
-  const auto answer = tests::run_command(
-      posix_env(), {"capture", "--device", device(row.fault), "--store", path("s.db"), "-o",
-                    path("c.gt3x"), "--json"});
+  const auto answer =
+      tests::run_command(posix_env(), {"capture", "--device", device(row.fault), "--store",
+                                       path("s.db"), "-o", path("c.gt3x"), "--json"});
   EXPECT_EQ(answer.exit_code, row.exit_code) << answer.people << answer.out;
   EXPECT_THAT(answer.people + answer.out, HasSubstr(row.says));
   EXPECT_EQ(stored_constants().size(), row.exit_code == 0 ? 1U : 0U);
@@ -161,17 +161,18 @@ INSTANTIATE_TEST_SUITE_P(
     Table, CaptureFaults,
     testing::Values(
         Row{"bulk_stall", R"({"fault": "stall", "channel": "bulk", "at_report": 1})", 0, ""},
-        Row{"bulk_short", R"({"fault": "short_packet", "bytes": 100, "channel": "bulk", "at_report": 2})",
-            0, ""},
+        Row{"bulk_short",
+            R"({"fault": "short_packet", "bytes": 100, "channel": "bulk", "at_report": 2})", 0, ""},
         Row{"bulk_garbage", R"({"fault": "garbage", "channel": "bulk", "at_report": 1})", 0, ""},
         Row{"bulk_bit_flip", R"({"fault": "bit_flip", "channel": "bulk", "at_byte": 5000})", 0, ""},
         Row{"bulk_bad_crc", R"({"fault": "bad_crc", "channel": "bulk", "at_report": 2})", 0, ""},
         Row{"bulk_lost", R"({"fault": "lost", "channel": "bulk", "at_report": 1})", 0, ""},
-        Row{"bulk_duplicate", R"({"fault": "duplicate", "channel": "bulk", "at_report": 1})", 0, ""},
-        Row{"bulk_wrong_offset", R"({"fault": "wrong_sequence", "channel": "bulk", "at_report": 1})",
-            0, ""},
-        Row{"bulk_delay", R"({"fault": "delay", "seconds": 0.8, "channel": "bulk", "at_report": 1})",
-            0, ""},
+        Row{"bulk_duplicate", R"({"fault": "duplicate", "channel": "bulk", "at_report": 1})", 0,
+            ""},
+        Row{"bulk_wrong_offset",
+            R"({"fault": "wrong_sequence", "channel": "bulk", "at_report": 1})", 0, ""},
+        Row{"bulk_delay",
+            R"({"fault": "delay", "seconds": 0.8, "channel": "bulk", "at_report": 1})", 0, ""},
         Row{"bulk_dead", R"({"fault": "lost", "channel": "bulk", "at_report": 1, "count": 0})", 69,
             "the download stopped"},
         Row{"unplug_in_download",
@@ -205,8 +206,8 @@ TEST_F(Faults, PowerLossAtAnyByteOfAWriteEndsWithAWholePage) {
     plan.faults.push_back(fault);
     mocks::VirtualUnitOptions options;
     options.truth = sim::draw_unit(7);
-    const auto plugged = std::make_shared<mocks::PluggedUnit>(options, plan,
-                                                              std::make_shared<ManualClock>());
+    const auto plugged =
+        std::make_shared<mocks::PluggedUnit>(options, plan, std::make_shared<ManualClock>());
     const auto unit = *device::Unit::open(mocks::link_to(plugged, true));
     station::JigSessionOptions session;
     session.run.write = true;
@@ -225,9 +226,9 @@ TEST_F(Faults, PowerLossAtAnyByteOfAWriteEndsWithAWholePage) {
 TEST_F(Faults, PlansThatAreWrongAreRefused) {
   const auto run = [&](const std::string& plan) {
     std::ofstream(path("bad.json")) << plan;
-    return tests::run_command(posix_env(), {"jig", "--device",
-                                            std::string(kUnit) + ",faults=" + path("bad.json"),
-                                            "--store", path("s.db")});
+    return tests::run_command(
+        posix_env(), {"jig", "--device", std::string(kUnit) + ",faults=" + path("bad.json"),
+                      "--store", path("s.db")});
   };
   EXPECT_EQ(run("{}").exit_code, 78);
   EXPECT_EQ(run("[").exit_code, 78);

@@ -79,9 +79,8 @@ TEST_F(OtherDevices, AUnitWithoutCommandsIsCalibratedByItsFile) {
   mocks::VirtualDriveOptions options;
   options.unit.truth = sim::draw_unit(7);
   ASSERT_OK(mocks::make_virtual_drive(posix_env().files, path("usb"), options));
-  const auto answer =
-      run({"capture", "--device", "drive:" + path("usb"), "--store", path("s.db"), "-o",
-           path("c.gt3x"), "--constants", path("c.json"), "--json"});
+  const auto answer = run({"capture", "--device", "drive:" + path("usb"), "--store", path("s.db"),
+                           "-o", path("c.gt3x"), "--constants", path("c.json"), "--json"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   EXPECT_EQ(answer.json()["serial"], options.unit.truth.serial);
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -116,8 +115,8 @@ TEST_F(OtherDevices, AFileThatCannotHelpIsRefused) {
   half.unit.truth = sim::draw_unit(7);
   half.sides = 3;
   ASSERT_OK(mocks::make_virtual_drive(posix_env().files, path("half"), half));
-  const auto missing = run({"capture", "--device", "drive:" + path("half"), "--store",
-                            path("s.db"), "-o", path("d.gt3x"), "--json"});
+  const auto missing = run({"capture", "--device", "drive:" + path("half"), "--store", path("s.db"),
+                            "-o", path("d.gt3x"), "--json"});
   EXPECT_EQ(missing.exit_code, 2);
   EXPECT_EQ(missing.json()["missing_directions"].size(), 3U);
 }

@@ -21,8 +21,8 @@ class SessionCommand : public testing::Test {
     return tests::run_command(posix_env(), arguments);
   }
   tests::Answer jig(const std::string& device, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"jig", "--device", device, "--store", path("s.db"),
-                                          "--json"};
+    std::vector<std::string> arguments = {"jig",     "--device",   device,
+                                          "--store", path("s.db"), "--json"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
@@ -56,8 +56,8 @@ TEST_F(SessionCommand, AReplayedJigRunGivesTheSameConstants) {
 TEST_F(SessionCommand, AReplayedCaptureGivesTheSameFile) {
   const auto capture = [&](const std::string& device, const std::string& output,
                            const std::string& record) {
-    std::vector<std::string> arguments = {"capture", "--device", device,        "--store",
-                                          path("s.db"), "-o",    path(output)};
+    std::vector<std::string> arguments = {"capture",    "--device", device,      "--store",
+                                          path("s.db"), "-o",       path(output)};
     if (!record.empty()) {
       arguments.insert(arguments.end(), {"--record", path(record)});
     }
@@ -73,8 +73,8 @@ TEST_F(SessionCommand, AReplayedCaptureGivesTheSameFile) {
 TEST_F(SessionCommand, AFailedRunIsReplayedAsItFailed) {
   std::ofstream(path("f.json"))
       << R"({"schema": "sixpoint/faults/1", "faults": [{"fault": "unplug", "at_s": 25}]})";
-  const auto first = jig("virtual:seed=7,jig=auto,faults=" + path("f.json"),
-                         {"--record", path("f.zip")});
+  const auto first =
+      jig("virtual:seed=7,jig=auto,faults=" + path("f.json"), {"--record", path("f.zip")});
   EXPECT_EQ(first.exit_code, 69);
   const auto again = jig("replay:" + path("f.zip"));
   EXPECT_EQ(again.exit_code, 69) << again.people;
@@ -110,8 +110,8 @@ TEST_F(SessionCommand, ATamperedSessionIsAClearError) {
 // Oracle: the outcome of the whole session.
 TEST_F(SessionCommand, TheMinimiserKeepsTheOutcome) {
   ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--record", path("r.zip")}).exit_code, 0);
-  const auto answer = run({"session", "minimise", path("r.zip"), "-o", path("m.zip"), "--doing",
-                           "identify"});
+  const auto answer =
+      run({"session", "minimise", path("r.zip"), "-o", path("m.zip"), "--doing", "identify"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   const auto whole = *device::read_session(posix_env().files, path("r.zip"));
   const auto small = *device::read_session(posix_env().files, path("m.zip"));
