@@ -420,8 +420,10 @@ Result<std::vector<RecordingInfo>> WireUnit::recordings() {
 Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& offset,
                                WritableFile& file, Sha256& hash,
                                const std::function<void(std::uint64_t)>& progress) {
-  // What an ended request left in the pipe is drained by the offset check below.
   constexpr std::uint64_t kPerRequest = 64ULL << 20U;
+  // An ended request leaves blocks in the pipe, and in the transfers that a carrier keeps under
+  // way: so many are dropped before the first block of the new one must have come.
+  constexpr int kStaleBlocks = 64;
   std::vector<std::uint8_t> buffer(kBulkBlockBytes + 1);
   int without_progress = 0;
   while (offset < recording.bytes) {
@@ -438,6 +440,7 @@ Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& of
     if (reader.get<std::uint64_t>() != length || !reader.ok()) {
       return nonsense(link_.address, "the unit offers another length than its list says");
     }
+    int stale = 0;
     while (offset < end) {
       const Result<std::size_t> count = link_.bulk->read(buffer, options_.bulk_time_out);
       if (!count && count.error().code != ErrorCode::io) {
@@ -448,13 +451,11 @@ Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& of
       }
       const Result<BulkBlock> block =
           decode_bulk(std::span(buffer).first(std::min(*count, buffer.size())));
-      if (!block || block->recording != recording.id) {
-        break;
-      }
-      if (block->offset + block->content.size() <= offset) {
-        continue;  // of the request before
-      }
-      if (block->offset != offset || block->content.size() > end - offset) {
+      if (!block || block->recording != recording.id || block->offset != offset ||
+          block->content.size() > end - offset) {
+        if (offset == begin && ++stale <= kStaleBlocks) {
+          continue;
+        }
         break;
       }
       SIXPOINT_CHECK(file.write_at(offset, block->content));

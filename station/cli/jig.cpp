@@ -1,8 +1,11 @@
 // sixpoint jig: the technician's six-orientation run, in the terminal.
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
 #include "base/atomic_file.h"
 #include "calib/gravity.h"
@@ -138,6 +141,27 @@ void make_papers(Context& context, const Options& options, const db::RunRecord& 
   }
 }
 
+// What the operator typed since the last call, without waiting: a line that begins with u or s.
+std::optional<station::OperatorWord> terminal_word() {
+  pollfd keyboard{STDIN_FILENO, POLLIN, 0};
+  if (poll(&keyboard, 1, 0) <= 0 || (keyboard.revents & POLLIN) == 0) {
+    return std::nullopt;
+  }
+  std::array<char, 80> line{};
+  if (read(STDIN_FILENO, line.data(), line.size()) <= 0) {
+    return std::nullopt;
+  }
+  switch (line[0]) {
+    case 'u':
+      return station::OperatorWord::undo;
+    case 's':
+    case 'q':
+      return station::OperatorWord::stop;
+    default:
+      return std::nullopt;
+  }
+}
+
 Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(check_outputs(options));
   station::JigSessionOptions session;
@@ -212,6 +236,10 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   hooks.reopen = station::wait_for_unit(*unit, jig, [&context](const std::string& text) {
     context.people << text << '\n' << std::flush;
   });
+  if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
+    context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
+    hooks.words = terminal_word;
+  }
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
   station::complete_run_record(record, done.report, options.study);
