@@ -218,13 +218,16 @@ Result<FilterState> decode_filter(std::span<const std::uint8_t> payload) {
   return state;
 }
 
+// Absolute zero: what claims to be colder is no temperature.
+constexpr double kColdest_c = -273.15;
+
 Message encode_samples(const SampleBlock& block) {
   PayloadWriter writer;
   const std::size_t count = std::min(block.counts.size(), kSamplesPerReport);
   writer.put(block.first_index)
       .put(block.device_time_us)
       .put(static_cast<std::int16_t>(
-          std::lround(std::clamp(block.temperature_c, -300.0, 300.0) * 100)))
+          std::lround(std::clamp(block.temperature_c, kColdest_c, 327.67) * 100)))
       .put(to_byte(block.filter))
       .put(static_cast<std::uint8_t>(count));
   for (std::size_t i = 0; i < count; ++i) {
@@ -245,6 +248,9 @@ Result<SampleBlock> decode_samples(const Message& message) {
   block.first_index = reader.get<std::uint32_t>();
   block.device_time_us = reader.get<std::uint64_t>();
   block.temperature_c = reader.get<std::int16_t>() / 100.0;
+  if (block.temperature_c < kColdest_c) {
+    return damaged("a samples report is colder than anything");
+  }
   const auto filter = reader.get<std::uint8_t>();
   const auto count = reader.get<std::uint8_t>();
   if (!reader.ok() || count == 0 || count > kSamplesPerReport ||

@@ -36,7 +36,7 @@ class RecordedTransport final : public Transport {
       : inner_(std::move(inner)), channel_(channel), log_(std::move(log)) {}
 
   Status write(std::span<const std::uint8_t> bytes, nanoseconds time_out) override {
-    const Status status = inner_->write(bytes, time_out);
+    Status status = inner_->write(bytes, time_out);
     SessionTransfer transfer{Kind::to_device, channel_, {}, Bytes(bytes.begin(), bytes.end()), {}};
     if (!status) {
       transfer.error = status.error();
@@ -45,7 +45,7 @@ class RecordedTransport final : public Transport {
     return status;
   }
   Result<std::size_t> read(std::span<std::uint8_t> out, nanoseconds time_out) override {
-    const Result<std::size_t> count = inner_->read(out, time_out);
+    Result<std::size_t> count = inner_->read(out, time_out);
     if (!count) {
       log_->add({Kind::from_device, channel_, {}, {}, count.error()});
     } else if (*count > 0) {

@@ -2,7 +2,7 @@
 //
 // A scheme of the TransportRegistry leads to a link on which the project's own protocol is spoken
 // (wire_unit.h). A scheme that is added here brings its own Unit: this is where a vendor's protocol
-// joins, with one line and one folder (docs/devices/README.md).
+// joins, with one line and one folder (docs/devices/devices.md).
 #pragma once
 
 #include "device/unit.h"

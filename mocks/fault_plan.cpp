@@ -119,7 +119,7 @@ Result<Fault> read_fault(const Json& json, const std::string& path) {
       "every", "seconds",   "bytes",   "bit",  "battery_mv", "axis",      "serial", "byte"};
   for (const auto& [key, value] : json.items()) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
-      return wrong(path + "/" + key, "this key is not known");
+      return wrong(fmt::format("{}/{}", path, key), "this key is not known");
     }
   }
   const Reader in(json, path);

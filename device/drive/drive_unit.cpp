@@ -175,7 +175,7 @@ Status DriveUnit::download(const RecordingInfo& recording, FileSystem& files,
   SIXPOINT_CHECK(writer.add(kLogName, std::make_unique<LogSource>(std::move(log), hash, progress)));
   SIXPOINT_CHECK(writer.add(kInfoName, std::move(info)));
   SIXPOINT_CHECK(writer.commit());
-  const Status same = [&]() -> Status {
+  Status same = [&]() -> Status {
     SIXPOINT_CHECK(identify());
     if (hash->finish() != recording.sha256) {
       return fail(ErrorCode::bad_data, "log.bin changed while it was read", address_,

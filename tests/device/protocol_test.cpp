@@ -182,5 +182,17 @@ TEST(Protocol, RandomBytesNeverPassAndNeverCrash) {
   EXPECT_EQ(accepted, 0);
 }
 
+// Found by the fuzzer: the field can say -325 degrees.
+TEST(Samples, ColderThanAbsoluteZeroIsDamage) {
+  SampleBlock block;
+  block.counts.push_back({1, 2, 3});
+  block.temperature_c = -273.15;
+  EXPECT_OK(decode_samples(encode_samples(block)));
+  Message message = encode_samples(block);
+  message.payload[12] = 0xFF;
+  message.payload[13] = 0x80;
+  EXPECT_FAILS(decode_samples(message), ErrorCode::bad_data);
+}
+
 }  // namespace
 }  // namespace sixpoint::device
