@@ -125,7 +125,7 @@ class Sheet {
       std::string word(text.substr(0, end));
       text.remove_prefix(std::min(text.size(), end + 1));
       std::string& last = lines.back();
-      const std::string joined = last.empty() ? word : last + " " + word;
+      const std::string joined = last.empty() ? word : fmt::format("{} {}", last, word);
       if (width(joined, font, size_pt) <= room_mm) {
         last = joined;
         continue;
