@@ -160,7 +160,12 @@ Result<UsbConfiguration> parse_configuration(std::span<const std::uint8_t> bytes
 }
 
 StandardUsbDevice::StandardUsbDevice(UsbDescriptors descriptors, std::shared_ptr<Clock> clock)
-    : descriptors_(std::move(descriptors)), clock_(std::move(clock)) {
+    : clock_(std::move(clock)) {
+  describe(std::move(descriptors));
+}
+
+void StandardUsbDevice::describe(UsbDescriptors descriptors) {
+  descriptors_ = std::move(descriptors);
   auto parsed = parse_configuration(descriptors_.configuration);
   if (!parsed || descriptors_.device.size() != 18) {
     std::abort();  // the precondition
@@ -170,7 +175,7 @@ StandardUsbDevice::StandardUsbDevice(UsbDescriptors descriptors, std::shared_ptr
 
 UsbAnswer StandardUsbDevice::control(const SetupPacket& setup, std::span<const std::uint8_t> data) {
   const std::lock_guard lock(mutex_);
-  if (!plugged_) {
+  if (!plugged_ || !is_on_bus()) {
     return UsbAnswer::gone();
   }
   if (!setup.device_to_host() && data.size() != setup.length) {
@@ -366,7 +371,7 @@ std::optional<UsbAnswer> StandardUsbDevice::hid_request(const SetupPacket& setup
 
 UsbAnswer StandardUsbDevice::out(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) {
   const std::lock_guard lock(mutex_);
-  if (!plugged_) {
+  if (!plugged_ || !is_on_bus()) {
     return UsbAnswer::gone();
   }
   const UsbEndpoint* target = configuration_.endpoint(endpoint);
@@ -379,7 +384,7 @@ UsbAnswer StandardUsbDevice::out(std::uint8_t endpoint, std::span<const std::uin
 
 UsbAnswer StandardUsbDevice::in(std::uint8_t endpoint, std::size_t max_length) {
   const std::lock_guard lock(mutex_);
-  if (!plugged_) {
+  if (!plugged_ || !is_on_bus()) {
     return UsbAnswer::gone();
   }
   const UsbEndpoint* source = configuration_.endpoint(endpoint);
@@ -392,7 +397,7 @@ UsbAnswer StandardUsbDevice::in(std::uint8_t endpoint, std::size_t max_length) {
 
 bool StandardUsbDevice::is_plugged() const {
   const std::lock_guard lock(mutex_);
-  return plugged_;
+  return plugged_ && is_on_bus();
 }
 
 void StandardUsbDevice::reset() {

@@ -155,6 +155,10 @@ class StandardUsbDevice : public UsbDevice {
   // Bus reset, SET_CONFIGURATION, the cable pulled or put back.
   virtual void on_reset() {}
   virtual void on_plug(bool /*plugged*/) {}
+  // False while the device is off the bus for a reason of its own.
+  virtual bool is_on_bus() const { return true; }
+  // Only from on_reset(): what the host will find from now on.
+  void describe(UsbDescriptors descriptors);
   // False keeps it halted, as mass storage does until its reset recovery.
   virtual bool may_clear_halt(std::uint8_t /*endpoint*/) { return true; }
 

@@ -136,6 +136,7 @@ UsbUnit::UsbUnit(std::shared_ptr<PluggedUnit> plugged)
       plugged_(std::move(plugged)),
       bulk_(kBulkPacketBytes),
       storage_({.product = "Activity monitor", .serial = plugged_->unit.truth().serial}) {
+  enumeration_seen_ = plugged_->faults.enumeration();
   show_recordings();
 }
 
@@ -153,12 +154,21 @@ void UsbUnit::show_recordings() {
 
 std::optional<std::chrono::nanoseconds> UsbUnit::next_due() const {
   const std::lock_guard lock(plugged_->mutex);
-  return plugged_->unit.next_due();
+  return plugged_->faults.next_due(plugged_->unit);
 }
 
 void UsbUnit::on_reset() {
   const std::lock_guard lock(plugged_->mutex);
-  plugged_->unit.host_gone();
+  plugged_->unit.lose_cable();
+  plugged_->faults.advance(plugged_->unit, plugged_->clock->elapsed());
+  if (enumeration_seen_ != plugged_->faults.enumeration()) {
+    enumeration_seen_ = plugged_->faults.enumeration();
+    describe(unit_descriptors(plugged_->unit.truth()));
+    storage_ =
+        MassStorage({.product = "Activity monitor", .serial = plugged_->unit.truth().serial});
+    recordings_shown_.reset();
+    show_recordings();
+  }
   bulk_.clear();
   storage_.reset();
 }
@@ -166,6 +176,13 @@ void UsbUnit::on_reset() {
 void UsbUnit::on_plug(bool plugged) {
   const std::lock_guard lock(plugged_->mutex);
   plugged_->unplugged = !plugged;
+}
+
+bool UsbUnit::is_on_bus() const {
+  const std::lock_guard lock(plugged_->mutex);
+  FaultInjector& faults = plugged_->faults;
+  faults.advance(plugged_->unit, plugged_->clock->elapsed());
+  return faults.plugged() && faults.enumeration() == enumeration_seen_;
 }
 
 bool UsbUnit::may_clear_halt(std::uint8_t endpoint) {
@@ -181,38 +198,59 @@ UsbAnswer UsbUnit::own_request(const SetupPacket& setup, std::span<const std::ui
   if (setup.index == device::kHidInterface) {
     if (setup.request_type == kClassRequestOut && setup.request == kSetReport &&
         setup.value == kOutputReport && data.size() == device::kReportBytes) {
-      take_reports(data);
-      return UsbAnswer::done();
+      return take_reports(data);
     }
     if (setup.request_type == kClassRequestIn && setup.request == kGetReport &&
         setup.value == kInputReport) {
-      return UsbAnswer::done(Bytes(last_report_.begin(), last_report_.end()));
+      return UsbAnswer::done(last_report_);
     }
   }
   return UsbAnswer::stall();
 }
 
-void UsbUnit::take_reports(std::span<const std::uint8_t> bytes) {
+namespace {
+
+UsbAnswer answer_of(CableEvent event) {
+  switch (event.kind) {
+    case CableEvent::Kind::data:
+      return UsbAnswer::done(std::move(event.bytes));
+    case CableEvent::Kind::stalled:
+      return UsbAnswer::stall();
+    case CableEvent::Kind::gone:
+      return UsbAnswer::gone();
+    case CableEvent::Kind::nothing:
+      break;
+  }
+  return UsbAnswer::nothing_yet();
+}
+
+}  // namespace
+
+UsbAnswer UsbUnit::take_reports(std::span<const std::uint8_t> bytes) {
   const std::lock_guard lock(plugged_->mutex);
   const auto now = plugged_->clock->elapsed();
   while (!bytes.empty()) {
     const std::size_t length = std::min(bytes.size(), device::kReportBytes);
-    plugged_->unit.take_report(bytes.first(length), now);
+    CableEvent event = plugged_->faults.write_report(plugged_->unit, bytes.first(length), now);
+    if (event.kind == CableEvent::Kind::stalled || event.kind == CableEvent::Kind::gone) {
+      return answer_of(std::move(event));
+    }
     bytes = bytes.subspan(length);
   }
+  return UsbAnswer::done();
 }
 
 UsbAnswer UsbUnit::give_report(std::size_t max_length) {
   const std::lock_guard lock(plugged_->mutex);
-  const auto report = plugged_->unit.next_report(plugged_->clock->elapsed());
-  if (!report) {
-    return UsbAnswer::nothing_yet();
+  UsbAnswer answer =
+      answer_of(plugged_->faults.read_report(plugged_->unit, plugged_->clock->elapsed()));
+  if (answer.kind == UsbAnswer::Kind::done) {
+    last_report_ = answer.bytes;
+    if (max_length < answer.bytes.size()) {
+      return {UsbAnswer::Kind::overflow, {}};
+    }
   }
-  last_report_ = *report;
-  if (max_length < report->size()) {
-    return {UsbAnswer::Kind::overflow, {}};
-  }
-  return UsbAnswer::done(Bytes(report->begin(), report->end()));
+  return answer;
 }
 
 UsbAnswer UsbUnit::of_storage(UsbAnswer answer, std::uint8_t endpoint) {
@@ -229,8 +267,7 @@ UsbAnswer UsbUnit::of_storage(UsbAnswer answer, std::uint8_t endpoint) {
 UsbAnswer UsbUnit::take(const UsbEndpoint& endpoint, std::span<const std::uint8_t> bytes) {
   switch (endpoint.address) {
     case device::kHidOutEndpoint:
-      take_reports(bytes);
-      return UsbAnswer::done();
+      return take_reports(bytes);
     case device::kStorageOutEndpoint: {
       if (storage_.is_idle()) {
         const std::lock_guard lock(plugged_->mutex);
@@ -260,9 +297,11 @@ UsbAnswer UsbUnit::give(const UsbEndpoint& endpoint, std::size_t max_length) {
       download_of_bulk_ = unit.downloads();
     }
     if (bulk_.empty()) {
-      if (auto block = unit.next_bulk(plugged_->clock->elapsed())) {
-        bulk_.put(*std::move(block));
+      UsbAnswer answer = answer_of(plugged_->faults.read_bulk(unit, plugged_->clock->elapsed()));
+      if (answer.kind != UsbAnswer::Kind::done) {
+        return answer;
       }
+      bulk_.put(std::move(answer.bytes));
     }
   }
   return bulk_.next(max_length);

@@ -3,6 +3,10 @@
 //
 // The volume shows the newest recording as info.txt and log.bin, and older ones the same way in
 // REC00001, REC00002 ... A unit that has recorded nothing shows an empty recording of itself.
+//
+// The unit's fault plan (PluggedUnit::faults) acts on what the endpoints of interfaces 0 and 1
+// carry. A unit that left the bus by its plan answers `gone` until the host has reset its port: by
+// then it may be another one, with other descriptors (swap).
 #pragma once
 
 #include <memory>
@@ -33,9 +37,10 @@ class UsbUnit final : public StandardUsbDevice {
   UsbAnswer give(const UsbEndpoint& endpoint, std::size_t max_length) override;
   void on_reset() override;
   void on_plug(bool plugged) override;
+  bool is_on_bus() const override;
   bool may_clear_halt(std::uint8_t endpoint) override;
 
-  void take_reports(std::span<const std::uint8_t> bytes);
+  UsbAnswer take_reports(std::span<const std::uint8_t> bytes);
   UsbAnswer give_report(std::size_t max_length);
   UsbAnswer of_storage(UsbAnswer answer, std::uint8_t endpoint);
   void show_recordings();
@@ -45,7 +50,8 @@ class UsbUnit final : public StandardUsbDevice {
   std::uint64_t download_of_bulk_ = 0;  // to which request what is in bulk_ belongs
   MassStorage storage_;
   std::optional<std::size_t> recordings_shown_;
-  device::Report last_report_{};
+  Bytes last_report_ = Bytes(device::kReportBytes, std::uint8_t{0});
+  std::uint32_t enumeration_seen_ = 0;  // of the fault plan
 };
 
 }  // namespace sixpoint::mocks

@@ -192,7 +192,13 @@ void UsbipSession::put_device(const UsbipBus::Port& port) {
 }
 
 void UsbipSession::list_devices() {
-  const auto offered = [](const UsbipBus::Port& port) { return port.device->is_plugged(); };
+  // A device that nobody uses and that came back to the bus is found anew, as a hub would.
+  const auto offered = [](const UsbipBus::Port& port) {
+    if (!port.in_use) {
+      port.device->bus_reset();
+    }
+    return port.device->is_plugged();
+  };
   put_operation(output_, kReplyDeviceList, kOk);
   const std::size_t count_at = output_.size();
   put32(output_, 0);
@@ -216,6 +222,9 @@ void UsbipSession::list_devices() {
 
 void UsbipSession::import(std::string_view busid) {
   UsbipBus::Port* port = bus_.find(busid);
+  if (port != nullptr && !port->in_use) {
+    port->device->bus_reset();
+  }
   if (port == nullptr || !port->device->is_plugged() || port->in_use) {
     put_operation(output_, kReplyImport, port != nullptr && port->in_use ? kBusy : kNoDevice);
     end();
@@ -223,7 +232,6 @@ void UsbipSession::import(std::string_view busid) {
   }
   port_ = port;
   port_->in_use = true;
-  port_->device->bus_reset();
   port_->device->control(kConfigure, {});
   put_operation(output_, kReplyImport, kOk);
   put_device(*port_);

@@ -718,7 +718,24 @@ void Lanes::Lane::run(const std::stop_token& stop, const Order& order,
     state.write = order.start.write;
     state.filter = session.filter;
   }
-  const RunLabels labels{state.operator_name, state.station};
+  if (shared_.options.may_start) {
+    const std::lock_guard lock(shared_.store);
+    if (auto retest = shared_.options.may_start(state.serial); retest) {
+      session.retest = *std::move(retest);
+    } else if (!left) {
+      // The station is locked, or the unit failed too often: an engineer decides.
+      const std::lock_guard own(mutex_);
+      result_ = Json{{"kind", "jig"},
+                     {"serial", state.serial},
+                     {"verdict", "refused"},
+                     {"reasons", Json::array({retest.error().what, retest.error().hint})},
+                     {"stored", false}};
+      set_state(LaneState::done, retest.error().brief());
+      changed();
+      return;
+    }
+  }
+  const RunLabels labels{state.operator_name, state.station, session.retest.retest_of};
   auto last_accepted = env_.clock.elapsed();
 
   JigHooks hooks;
@@ -915,7 +932,7 @@ void Lanes::Lane::close_interrupted(const UnfinishedRun& left, const std::string
   session.filter = left.filter;
   conclude(interrupted_report(left.resume, left.serial, left.firmware, session, env_.clock.now(),
                               reason),
-           {left.operator_name, left.station});
+           {left.operator_name, left.station, {}});
 }
 
 void Lanes::Lane::capture(const std::stop_token& stop, const Order& order) {

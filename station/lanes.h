@@ -31,6 +31,7 @@ inline constexpr std::size_t kMostLanes = 16;
 struct RunLabels {
   std::string operator_name;
   std::string station;
+  std::string retest_of;  // the run that this one repeats, or empty
 };
 struct KeptRun {
   std::string run_id;
@@ -39,6 +40,9 @@ struct KeptRun {
 };
 // Puts a run into the store. Called from any lane's thread, one at a time.
 using RunKeeper = std::function<Result<KeptRun>(const JigReport&, const RunLabels&)>;
+// Before a run: whether this unit may be measured now and what its earlier runs demand. An error is
+// told to the operator and nothing is measured. May be empty.
+using StartGate = std::function<Result<RetestState>(const std::string& serial)>;
 // Keeps the constants of a calibration file; answers with their id in the store.
 using CaptureKeeper = std::function<Result<std::string>(const CaptureReport&)>;
 
@@ -47,6 +51,7 @@ struct LanesOptions {
   std::string state_folder;          // of this station; made when it is not there
   std::string station;               // its name, for the record
   JigSessionOptions session;
+  StartGate may_start;
   // A calibration file: rate, seconds per side, folder.
   CaptureOptions capture;
   std::string capture_folder = ".";

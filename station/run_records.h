@@ -20,7 +20,7 @@ struct StoredRun {
   std::string run_id;
   std::optional<std::string> constants_id;  // of a usable report that is no study
 };
-// The run with its samples, what was written into the unit, and the constants.
+// The run with its samples, what was written into the unit, and the constants (none of a study).
 Result<StoredRun> add_run_records(db::Keeper& keeper, const JigReport& report,
                                   const db::RunRecord& run);
 

@@ -27,6 +27,7 @@ namespace sixpoint::cli {
   COMMAND(audit)                   \
   COMMAND(store)                   \
   COMMAND(simulate)                \
+  COMMAND(session)                 \
   COMMAND(devices)                 \
   COMMAND(doctor)                  \
   COMMAND(virtual)                 \

@@ -135,7 +135,7 @@ Result<repair::ConstantsFinderOptions> sources(const Options& options, Context& 
   const bool only_scan = options.scan && options.store.empty() && options.calibration_file.empty();
   if (!options.store.empty()) {
     SIXPOINT_ASSIGN(store, open_existing_store(context, options.store));
-  } else if (!only_scan && context.env.files.info(default_store())) {
+  } else if (!only_scan && store_exists(context, "")) {
     SIXPOINT_ASSIGN(store, open_existing_store(context, ""));
   }
   finder.store = store ? &*store : nullptr;

@@ -14,6 +14,7 @@
 #include "gt3x/model.h"
 #include "mocks/virtual_bench.h"
 #include "station/api.h"
+#include "station/certificate.h"
 #include "station/cli/command.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
@@ -21,6 +22,7 @@
 #include "station/run_records.h"
 #include "station/server.h"
 #include "station/software.h"
+#include "station/station_records.h"
 
 namespace sixpoint::cli {
 
@@ -65,6 +67,7 @@ Result<station::KeptRun> keep_run(Context& context, const Options& options,
   db::RunRecord run = station::run_record_before(session, report.serial, report.jig);
   run.operator_name = labels.operator_name;
   run.station = labels.station;
+  run.retest_of = labels.retest_of;
   station::complete_run_record(run, report);
   auto store = open_store(context, options.store);
   station::StoredRun stored;
@@ -104,11 +107,24 @@ Result<station::RunDocument> document_of(Context& context, const Options& option
                                          const std::string& run_id, const std::string& kind) {
   SIXPOINT_ASSIGN(db::Store store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const db::RunRecord run, store.run(run_id));
+  const auto as_text = [](const Bytes& bytes) { return std::string(bytes.begin(), bytes.end()); };
   if (kind == "report.json") {
     return station::RunDocument{"application/json", run.document};
   }
+  if (kind == "label.zpl") {
+    SIXPOINT_ASSIGN(auto label, station::label_zpl(run));
+    return station::RunDocument{"text/plain; charset=utf-8", std::move(label)};
+  }
+  if (kind == "certificate.pdf" || kind == "certificate.json") {
+    SIXPOINT_ASSIGN(const auto certificate, station::certificate_of(run));
+    if (kind == "certificate.json") {
+      return station::RunDocument{"application/json", certificate.to_json().dump(2) + "\n"};
+    }
+    SIXPOINT_ASSIGN(const Bytes pdf, station::certificate_pdf(certificate));
+    return station::RunDocument{"application/pdf", as_text(pdf)};
+  }
   return fail(ErrorCode::no_input, "a run has no such document", printable(kind, 40),
-              "ask for report.json");
+              "ask for report.json, certificate.pdf, certificate.json or label.zpl");
 }
 
 Result<station::LanesOptions> lanes_options(Context& context, const Options& options) {
@@ -169,6 +185,13 @@ Status serve(Context& context, const Options& options) {
   // The command's own streams and exit code belong to one thread at a time.
   std::mutex context_mutex;
   const station::JigSessionOptions session = lanes_asked.session;
+  lanes_asked.may_start = [&](const std::string& serial) -> Result<station::RetestState> {
+    const std::lock_guard lock(context_mutex);
+    auto store = open_store(context, options.store);
+    // A store that is away is no reason not to measure (keep_records() has a journal).
+    return store ? station::may_start(*store, serial, options.station, session.limits)
+                 : Result<station::RetestState>(station::RetestState{});
+  };
   const station::CaptureKeeper capture_keeper = [&](const station::CaptureReport& report) {
     const std::lock_guard lock(context_mutex);
     return keep_capture(context, options, report);

@@ -83,6 +83,12 @@ Result<Bench> make_bench(Context& context, const Options& options) {
     SIXPOINT_CHECK(apply_scenario(context, options.scenario, first, recording, start));
   }
 
+  mocks::FaultPlan plan;
+  const std::string& plan_file = options.faults.empty() ? first.faults_file : options.faults;
+  if (!plan_file.empty()) {
+    SIXPOINT_ASSIGN(plan, mocks::read_fault_plan(context.env.files, plan_file));
+  }
+
   Bench bench;
   const auto clock = device::borrow_clock(context.env.clock);
   std::set<std::string> serials;
@@ -101,7 +107,8 @@ Result<Bench> make_bench(Context& context, const Options& options) {
       serials.insert(unit.truth.serial);
     }
     bench.units.push_back(unit.truth);
-    auto plugged = std::make_shared<mocks::PluggedUnit>(std::move(unit), clock);
+    auto plugged = std::make_shared<mocks::PluggedUnit>(std::move(unit),
+                                                        i == 0 ? plan : mocks::FaultPlan{}, clock);
     if (i == 0 && !recording.empty()) {
       SIXPOINT_CHECK(plugged->unit.keep_recording(std::move(recording), start));
     }
@@ -144,10 +151,6 @@ Status serve(Context& context, const Options& options) {
   if (options.jig) {
     return fail(ErrorCode::usage, "a virtual jig cannot be offered over USB/IP yet", "--jig",
                 "turn a unit with 'sixpoint jig --device virtual:seed=7,jig=auto'");
-  }
-  if (!options.faults.empty()) {
-    return fail(ErrorCode::usage, "fault plans cannot be given to units over USB/IP yet",
-                "--faults", "leave the option out");
   }
   SIXPOINT_ASSIGN(const Bench bench, make_bench(context, options));
   mocks::UsbipServerOptions how;
@@ -196,7 +199,8 @@ void add_virtual(CLI::App& app, Context& context) {
   command->add_option("--device", options->device,
                       "settings of the first unit: virtual:... (docs/virtual.md)");
   command->add_flag("--jig", options->jig, "offer a virtual jig that turns the first unit, too");
-  command->add_option("--faults", options->faults, "a fault plan");
+  command->add_option("--faults", options->faults,
+                      "what goes wrong with the first unit, and when (docs/faults.md)");
   command->add_flag("--json", options->json, "what is offered, as JSON");
   command->callback([options, seed, &context] {
     options->has_seed = seed->count() > 0;

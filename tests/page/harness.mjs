@@ -26,10 +26,10 @@ export function folder() {
 }
 
 // Starts `sixpoint station` on a free port; answers with its address and a way to end it.
-export async function station(devices, { home = folder(), extra = [] } = {}) {
+export async function station(devices, { home = folder(), port = 0 } = {}) {
   const child = spawn(program, [
-    'station', '--port', '0', '--store', join(home, 'store.db'), '--state', join(home, 'state'), '--files', home,
-    '--station', 'Bench 1', ...extra, ...devices.flatMap((device) => ['--device', device]),
+    'station', '--port', String(port), '--store', join(home, 'store.db'), '--state', join(home, 'state'), '--files', home,
+    '--station', 'Bench 1', ...devices.flatMap((device) => ['--device', device]),
   ], { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, HOME: home, XDG_DATA_HOME: home } });
   let said = '';
   child.stderr.on('data', (data) => { said += data; });

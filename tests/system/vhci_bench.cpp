@@ -91,10 +91,14 @@ Status VhciBench::plug_in(BenchUnit& unit, const std::string& port) {
   SIXPOINT_ASSIGN(plug->server,
                   mocks::UsbipServer::listen({unit.device}, {.port = 0, .limits = {}}));
   plug->thread = std::thread([server = plug->server.get()] { (void)server->run(); });
-  const int socket = import(plug->server->port());
-  // A port is free again a moment after its device is gone.
+  // A unit that its fault plan took off the bus comes back in its time; a port is free again a
+  // moment after its device is gone.
+  int socket = -1;
   bool attached = false;
-  for (int i = 0; i < 500 && !attached; ++i) {
+  for (int i = 0; i < 1000 && !attached; ++i) {
+    if (socket < 0) {
+      socket = import(plug->server->port());
+    }
     std::ofstream attach(std::string(kController) + "attach");
     constexpr int kDeviceId = 0x10002;
     constexpr int kHighSpeed = 3;

@@ -33,7 +33,7 @@ export function TraceChart({ lane }: { lane: number }) {
     const plot = new uPlot({
       width: Math.max(200, box.clientWidth), height: 190, legend: { show: false }, cursor: { show: false },
       scales: { x: { time: false, range: [-KEPT / 100, 0] }, y: { range: [-1.35, 1.35] } },
-      axes: [{ font: '14px sans-serif', size: 26 }, { font: '14px sans-serif', size: 40 }],
+      axes: [{ font: '14px sans-serif', size: 26, space: 90 }, { font: '14px sans-serif', size: 40, splits: () => [-1, -0.5, 0, 0.5, 1] }],
       series: [{}, ...AXES.map((axis) => ({ stroke: axis.colour, width: 2, dash: axis.dash, points: { show: false } }))],
     }, [x, ...lines] as unknown as uPlot.AlignedData, box);
     const resize = new ResizeObserver(() => plot.setSize({ width: Math.max(200, box.clientWidth), height: 190 }));
