@@ -218,10 +218,20 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   if (!store && store.error().code == ErrorCode::usage) {
     return fail(store.error());
   }
-  if (store && options.study.empty()) {
-    SIXPOINT_ASSIGN(session.retest, station::may_start(*store, unit->identity().serial,
-                                                       options.station, session.limits));
-  } else if (!store) {
+  const auto allowed = [&]() -> Result<station::RetestState> {
+    if (!store) {
+      return fail(store.error());
+    }
+    return options.study.empty() ? station::may_start(*store, unit->identity().serial,
+                                                      options.station, session.limits)
+                                 : station::RetestState{};
+  }();
+  if (allowed) {
+    session.retest = *allowed;
+  } else if (store && allowed.error().code == ErrorCode::configuration) {
+    return fail(allowed.error());
+  } else {
+    // A store that answers wrongly or not at all is no reason not to measure.
     context.log().warn(
         "the store does not answer: whether the station is locked and how often the "
         "unit failed is not known");

@@ -13,6 +13,7 @@
 #include "base/random.h"
 #include "db/exchange.h"
 #include "db/keeping.h"
+#include "db/schema.h"
 #include "db/store.h"
 #include "expect_result.h"
 #include "place.h"
@@ -103,39 +104,57 @@ TEST_F(PostgresStoreTest, AServerThatVanishesInMidTransactionLosesOnlyThatTransa
   EXPECT_TRUE(audit->ok) << audit->brief();
 }
 
-// No program ever wrote version 1 on PostgreSQL (that came with version 2); the tables of version 1
-// are those of the SQLite text with the other server's types, the rows and hashes the same.
-TEST_F(PostgresStoreTest, BringsAStoreOfVersion1UpToDateAndItsHashesHold) {
-  std::string sql =
-#include "store_version_1.sql.inc"
-      ;
+// The tables of an early version are those of its SQLite text with the other server's types, the
+// rows and hashes the same. (No program ever wrote version 1 on PostgreSQL.)
+std::string for_postgres(std::string sql, int version) {
   const auto replace = [&](const char* pattern, const char* with) {
     sql = std::regex_replace(sql, std::regex(pattern), with);
   };
   replace("PRAGMA[^;]*;", "");
   replace("CREATE TRIGGER[^;]*;\\s*END;", "");
-  replace("\\) STRICT", ")");
+  replace("\\)\\s+STRICT", ")");
   replace("INTEGER", "BIGINT");
   replace("BLOB", "BYTEA");
   replace("x'([0-9a-f]*)'", "'\\x$1'");
-  sql +=
-      "CREATE TABLE sixpoint_schema (one BIGINT PRIMARY KEY CHECK (one = 1), version BIGINT NOT "
-      "NULL); INSERT INTO sixpoint_schema VALUES (1, 1);";
-  location();
-  ASSERT_TRUE(place_->statements("main", sql)) << sql;
-  auto store = Store::open(memory_.env, location());
-  ASSERT_OK(store);
-  auto audit = store->audit();
-  ASSERT_OK(audit);
-  EXPECT_TRUE(audit->ok) << audit->brief();
-  EXPECT_EQ(audit->rows, 3);
-  EXPECT_EQ(audit->head, "74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d")
-      << "as Python's hashlib computed it for the SQLite store of version 1";
-  EXPECT_EQ(store->constants_for("MOS2A1", "legacy").value()->document, R"({"n":1})");
-  ASSERT_OK(store->add_constants(constants(7), "w"));
-  EXPECT_EQ(store->unit_history("MOS2A1")->runs.size(), 1U);
-  EXPECT_TRUE(store->audit()->ok);
-  EXPECT_EQ(store->database().schema_version().value(), 2);
+  return sql +
+         "CREATE TABLE sixpoint_schema (one BIGINT PRIMARY KEY CHECK (one = 1), version BIGINT NOT "
+         "NULL); INSERT INTO sixpoint_schema VALUES (1, " +
+         std::to_string(version) + ");";
+}
+
+TEST_F(PostgresStoreTest, BringsStoresOfEveryVersionUpToDateAndTheirHashesHold) {
+  // The heads are those that Python's hashlib computed for the SQLite stores.
+  const struct {
+    const char* sql;
+    const char* head;
+    const char* filter;
+  } versions[] = {
+      {
+#include "store_version_1.sql.inc"
+          , "74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d", "legacy"},
+      {
+#include "store_version_2.sql.inc"
+          , "b88f65e21c3f51132480dc74ef7f68d9c281037c02b63880f9e4a018855351dd", "current"}};
+  int version = 0;
+  for (const auto& early : versions) {
+    ++version;
+    SCOPED_TRACE(version);
+    const std::string name = "version_" + std::to_string(version);
+    const std::string where = place_->location(name);
+    ASSERT_TRUE(place_->statements(name, for_postgres(early.sql, version)));
+    auto store = Store::open(memory_.env, where);
+    ASSERT_OK(store);
+    const auto audit = store->audit();
+    ASSERT_OK(audit);
+    EXPECT_TRUE(audit->ok) << audit->brief();
+    EXPECT_EQ(audit->head, early.head);
+    EXPECT_TRUE(store->constants_for("MOS2A1", early.filter)->has_value());
+    EXPECT_EQ(store->unit_history("MOS2A1")->runs.size(), 1U);
+    ASSERT_OK(store->add_constants(constants(7), "w"));
+    EXPECT_TRUE(store->audit()->ok);
+    EXPECT_EQ(store->database().schema_version().value(), kSchemaVersion);
+  }
+  EXPECT_EQ(version, kSchemaVersion - 1) << "every earlier version has its text";
 }
 
 TEST_F(PostgresStoreTest, AFullDiskLosesNothingThatWasAcknowledged) {
