@@ -13,7 +13,8 @@ failures=0
 run=0
 
 for document in "$source_folder"/README.md "$source_folder"/docs/*.md "$source_folder"/docs/devices/*.md; do
-  folder=$scratch/$(basename "$document" .md)
+  relative=${document#"$source_folder"/}  # two documents may have one name
+  folder=$scratch/${relative%.md}
   mkdir -p "$folder/build" "$folder/archive"
   ln -s "$program" "$folder/build/sixpoint"
   cp "$source_folder/tests/docs/scenario.json" "$folder/S.json"
