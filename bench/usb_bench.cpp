@@ -3,8 +3,9 @@
 //   2. sixteen units at 100 Hz over umockdev, in real time, through hidapi
 //   3. a download through device::Unit against plain libusb_bulk_transfer of the same bytes
 //   4. from plugging in to identified
+//   5. closing a unit in mid-stream, threads and all
 //   usb_bench [SECONDS]      of part 2; 20 when left out
-// 2 to 4 need umockdev, and count the mock's own work, too.
+// 2 to 5 need umockdev, and count the mock's own work, too.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -259,6 +260,28 @@ void plug_to_identified(mocks::UmockdevBus& bus) {
              times_s[times_s.size() / 2], times_s.back());
 }
 
+void closing(mocks::UmockdevBus& bus) {
+  const auto clock = device::borrow_clock(posix_env().clock);
+  const auto nodes = need(bus.plug_in(std::make_shared<mocks::UsbUnit>(make_unit(98, clock))));
+  const auto attached = need(device::attached_devices()).front();
+  std::vector<double> times_s;
+  for (int i = 0; i < 20; ++i) {
+    device::Link link = need(device::open_monitor(attached, posix_env()));
+    Bytes buffer(device::kBulkBlockBytes);
+    need(link.bulk->read(buffer, milliseconds(1)));  // its thread runs, its transfers wait
+    auto unit = need(device::Unit::open(std::move(link)));
+    need(unit->start_stream(kRate_hz));
+    need(unit->next_samples(seconds(2)));
+    const auto start = steady_clock::now();
+    unit.reset();
+    times_s.push_back(since_s(start));
+  }
+  std::sort(times_s.begin(), times_s.end());
+  fmt::print("closing in mid-stream, 20 times: median {:.0f} ms, worst {:.0f} ms (bound 100)\n",
+             times_s[times_s.size() / 2] * 1e3, times_s.back() * 1e3);
+  bus.unplug(nodes.port);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -270,6 +293,7 @@ int main(int argc, char** argv) {
   }
   const auto bus = need(mocks::UmockdevBus::make());
   plug_to_identified(*bus);
+  closing(*bus);
   download(*bus);
   over_umockdev(*bus, argc > 1 ? std::max(1.0, std::atof(argv[1])) : 20);
   return 0;

@@ -125,7 +125,7 @@ class BulkTransport final : public Transport {
         std::unique_lock lock(mutex_);
         cancel_transfers();
         // The kernel gives cancelled transfers back at once, or the device is gone and it does too.
-        changed_.wait_for(lock, std::chrono::milliseconds(80), [&] { return under_way() == 0; });
+        changed_.wait_for(lock, std::chrono::milliseconds(40), [&] { return under_way() == 0; });
       }
       finished_ = true;
       libusb_interrupt_event_handler(context_);

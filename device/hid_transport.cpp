@@ -130,7 +130,7 @@ class HidTransport final : public Transport {
       std::unique_lock lock(shared_->mutex);
       shared_->stop = true;
       shared_->changed.notify_all();
-      all_ended = shared_->changed.wait_for(lock, std::chrono::milliseconds(90),
+      all_ended = shared_->changed.wait_for(lock, std::chrono::milliseconds(50),
                                             [&] { return shared_->ended == 2; });
     }
     for (std::thread& thread : threads_) {

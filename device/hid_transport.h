@@ -2,7 +2,7 @@
 //
 // Two threads per device: one reads all the time, so that no report is lost while the program
 // computes (hidraw keeps only 64), one writes, because a hidraw write cannot be interrupted and a
-// device that takes nothing holds it for seconds. Destruction takes less than 100 ms, whatever the
+// device that takes nothing holds it for seconds. Destruction takes less than 60 ms, whatever the
 // device does.
 #pragma once
 

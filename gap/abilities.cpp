@@ -112,6 +112,9 @@ void Diagnoser::list_not_observable() {
                name != "random_walk" && name != "flicker") {
       missing = search_->undetermined(name) > 0.35;
     }
+    if (name == "filter_mismatch") {
+      missing = missing || options_.uncalibrated;
+    }
     if (name == "axis_rotation") {
       missing = !clean_.axes_decidable;
     }

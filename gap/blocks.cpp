@@ -93,9 +93,8 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
     }
     const auto piece = static_cast<std::size_t>(kPiece_s * bundle.rate_hz);
     const std::size_t skip =
-        segment.starts_placement
-            ? std::min(segment.samples / 4, static_cast<std::size_t>(bundle.rate_hz))
-            : 0;
+        segment.may_ring() ? std::min(segment.samples / 4, static_cast<std::size_t>(bundle.rate_hz))
+                           : 0;
     for (std::size_t first = skip; first < segment.samples; first += piece) {
       std::size_t last = std::min(segment.samples, first + piece);
       if (segment.samples - last < piece / 4) {

@@ -42,6 +42,9 @@ struct Segment {
   int pose = 0;  // equal rotations have equal numbers, counted in order of appearance
   int placement = 0;
   bool starts_placement = true;
+  bool settled = false;  // at rest from its first sample on, as a jig's readings are
+  // Samples at the start may still ring from the move.
+  bool may_ring() const { return starts_placement && !settled; }
   // Specific force now less that of the pose before, sensor's frame, g: how it was approached.
   Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
   // Per axis the sign of its last step, 0 before the first: a step that leaves an axis where it was

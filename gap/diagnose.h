@@ -17,7 +17,9 @@ namespace sixpoint::gap {
 
 struct DiagnoseOptions {
   std::set<std::string> without;  // effects taken out of the catalogue
-  std::uint64_t seed = 0;         // goes into the augmented scenario
+  // Raw counts of a unit that is not calibrated yet: gains and offsets are its own, and no finding.
+  bool uncalibrated = false;
+  std::uint64_t seed = 0;  // goes into the augmented scenario
 };
 
 // usage for a name in `without` that the catalogue has not.

@@ -81,6 +81,7 @@ std::string Diagnosis::brief() const {
     }
     names += effect.confounded_with.empty() ? "" : ")";
   }
+  const bool plural = effects.size() > 1;
   const CatalogueEntry* first = effects.empty() ? nullptr : find_entry(effects.front().name);
   const std::string advice = first == nullptr ? "" : fmt::format("; {}", first->advice);
   switch (verdict) {
@@ -98,13 +99,14 @@ std::string Diagnosis::brief() const {
             "was not yet measured{}",
             names, gap.before_mg, advice);
       }
-      return fmt::format("{} explains the gap: {:.2f} mg -> {:.2f} mg (floor {:.2f} mg){}", names,
-                         gap.before_mg, gap.after_mg, gap.floor_mg, advice);
+      return fmt::format("{} explain{} the gap: {:.2f} mg -> {:.2f} mg (floor {:.2f} mg){}", names,
+                         plural ? "" : "s", gap.before_mg, gap.after_mg, gap.floor_mg, advice);
     case Verdict::partly_explained:
       return fmt::format(
-          "{} explains a part of the gap ({:.2f} mg -> {:.2f} mg), and something unknown is left: "
+          "{} explain{} a part of the gap ({:.2f} mg -> {:.2f} mg), and something unknown is left: "
           "{}",
-          names, gap.before_mg, gap.after_mg, unknown.where.empty() ? "" : unknown.where.front());
+          names, plural ? "" : "s", gap.before_mg, gap.after_mg,
+          unknown.where.empty() ? "" : unknown.where.front());
     case Verdict::unexplained:
       return fmt::format("there is a gap that nothing in the catalogue explains: {}",
                          unknown.where.empty() ? "" : unknown.where.front());

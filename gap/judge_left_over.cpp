@@ -54,6 +54,7 @@ void Diagnoser::judge_left_over() {
     alarm(std::sqrt(2 * best.nats), "spectrum: slow noise inside the dwells");
   }
   test(slow_.jump_sd - 1, "mean: the zero jumps within records");
+  test(slow_.axis_sd - 1, "spectrum: wander of one axis inside the dwells");
   test(slow_.misfit_sd, "spectrum: wander inside the dwells");
   // 1/f noise lifts the lowest bins.
   if (!accepted("flicker")) {

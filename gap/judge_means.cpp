@@ -146,7 +146,7 @@ void Diagnoser::judge_nuisances() {
     chi += g * g + o * o;
     nominal += -0.5 * (g * g + o * o) - std::log(kGainSd) - std::log(kOffsetSd_mg);
   }
-  if (few_poses_) {
+  if (few_poses_ || options_.uncalibrated) {
     return;
   }
   // The wrong mode: a common gain anywhere in 0.78..0.97, the unit's own 2 % about it, and

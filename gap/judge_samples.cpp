@@ -87,6 +87,9 @@ void Diagnoser::judge_discrete() {
 }
 
 void Diagnoser::judge_codes() {
+  if (codes_.samples == 0) {
+    return;
+  }
   const bool line = !lines_.lines.empty();
   const bool format = accepted("truncation");
   const bool coloured = response_.low_pass_significant;

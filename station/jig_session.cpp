@@ -155,13 +155,15 @@ void Session::keep_raw(const device::SampleBlock& block) {
 
 // Waits for the unit and goes on with it. Ends the run when it does not come back.
 Status Session::come_back(JigRun& run, const Error& error) {
-  lost_before_ += unit_->stream_statistics().lost_samples;
-  clock_jumps_before_ += unit_->stream_statistics().clock_jumps;
-  clock_jumped_before_s_ += unit_->stream_statistics().clock_jumped_s;
+  // reopen() may let go of the unit.
+  const device::StreamStatistics until_now = unit_->stream_statistics();
+  lost_before_ += until_now.lost_samples;
+  clock_jumps_before_ += until_now.clock_jumps;
+  clock_jumped_before_s_ += until_now.clock_jumped_s;
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error);
     if (!again) {
-      report_.stream = unit_->stream_statistics();
+      report_.stream = until_now;
       unit_ = nullptr;  // whoever kept them let go of them
       jig_ = nullptr;
     }

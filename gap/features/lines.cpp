@@ -34,8 +34,7 @@ std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) 
     if (segment.kind == Segment::Kind::vibration || segment.kind == Segment::Kind::ramp) {
       continue;
     }
-    const std::size_t skip =
-        segment.starts_placement ? static_cast<std::size_t>(3 * bundle.rate_hz) : 0;
+    const std::size_t skip = segment.may_ring() ? static_cast<std::size_t>(3 * bundle.rate_hz) : 0;
     if (segment.samples < skip + static_cast<std::size_t>(4 * bundle.rate_hz)) {
       continue;
     }

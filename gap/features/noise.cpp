@@ -15,8 +15,7 @@ bool lies_still(const Segment& segment) { return segment.kind != Segment::Kind::
 
 // The settling of a pose change is over after three seconds.
 std::size_t quiet_start(const Segment& segment, double rate_hz) {
-  return segment.starts_placement ? std::min(segment.samples, static_cast<std::size_t>(3 * rate_hz))
-                                  : 0;
+  return segment.may_ring() ? std::min(segment.samples, static_cast<std::size_t>(3 * rate_hz)) : 0;
 }
 
 }  // namespace
@@ -144,7 +143,7 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
       continue;
     }
     const std::size_t from = quiet_start(segment, bundle.rate_hz);
-    const auto piece = static_cast<std::size_t>(7 * bundle.rate_hz);
+    const auto piece = static_cast<std::size_t>((segment.settled ? 5 : 7) * bundle.rate_hz);
     // Long records in pieces, so that slow wander does not pass for noise; every fourth is enough.
     const std::size_t hop = segment.samples > 4 * piece ? 4 * piece : piece;
     for (std::size_t first = from; first + piece <= segment.samples; first += hop) {

@@ -22,7 +22,7 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
   std::vector<double> weight(length, 0);
   std::size_t steps = 0;
   for (const Segment& segment : bundle.segments) {
-    if (segment.kind == Segment::Kind::vibration || !segment.starts_placement ||
+    if (segment.kind == Segment::Kind::vibration || !segment.may_ring() ||
         segment.samples < 2 * length || segment.approach_g.cwiseAbs().maxCoeff() < 0.2 ||
         (use && !use(segment))) {
       continue;

@@ -16,6 +16,7 @@ struct Coefficient {
   double walk;     // variance per (mg per sqrt(s))^2
   double flicker;  // variance per mg^2/Hz at 1 Hz
   int octave;      // of its period in seconds
+  std::size_t axis;
 };
 
 }  // namespace
@@ -34,7 +35,7 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         second < 10) {
       continue;
     }
-    const std::size_t skip = segment.starts_placement ? second : 0;
+    const std::size_t skip = segment.may_ring() ? second : 0;
     const std::size_t blocks = segment.samples > skip ? (segment.samples - skip) / second : 0;
     if (blocks < 6) {
       continue;
@@ -93,7 +94,8 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         coefficients.push_back({c * c, white, (1 - 2.0 / 3.0 * s2) / (4 * s2),
                                 static_cast<double>(n) / static_cast<double>(k),
                                 static_cast<int>(std::floor(std::log2(2.0 * static_cast<double>(n) /
-                                                                      static_cast<double>(k))))});
+                                                                      static_cast<double>(k)))),
+                                axis});
       }
     }
   }
@@ -141,6 +143,19 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         best = sum;
         const auto n = static_cast<double>(coefficients.size());
         slow.misfit_sd = (chi - n) / std::sqrt(2 * n);
+        slow.axis_sd = 0;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          double own = 0;
+          double count = 0;
+          for (const Coefficient& c : coefficients) {
+            if (c.axis == axis) {
+              own += c.square / (c.white + q2 * c.walk + density * c.flicker);
+              count += 1;
+            }
+          }
+          slow.axis_sd = count > 20 ? std::max(slow.axis_sd, (own - count) / std::sqrt(2 * count))
+                                    : slow.axis_sd;
+        }
       }
     }
   }

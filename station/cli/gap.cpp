@@ -15,12 +15,17 @@
 #include "gap/report_sheet.h"
 #include "station/cli/command.h"
 #include "station/cli/gap_challenge.h"
+#include "station/cli/gap_trends.h"
+#include "station/cli/store_option.h"
+#include "station/jig_bundle.h"
 
 namespace sixpoint::cli {
 namespace {
 
 struct Options {
   std::string bundle;
+  std::string run;
+  std::string store;
   std::vector<std::string> without;
   std::string html;
   std::string png;
@@ -44,6 +49,16 @@ Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
   gap::DiagnoseOptions how;
   how.without = std::set<std::string>(options.without.begin(), options.without.end());
   how.seed = options.seed;
+  if (!options.run.empty()) {
+    SIXPOINT_ASSIGN(db::Store store, open_existing_store(context, options.store));
+    SIXPOINT_ASSIGN(const station::StoredRun run, station::stored_run(store, options.run));
+    SIXPOINT_ASSIGN(const std::string samples, station::samples_of_run(store, run.id));
+    SIXPOINT_ASSIGN(const gap::Bundle bundle, station::bundle_of_run(run, samples));
+    how.uncalibrated = true;
+    SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, gap::diagnose(bundle, how));
+    diagnosis.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
+    return diagnosis;
+  }
   SIXPOINT_ASSIGN(const FileInfo info, context.env.files.info(options.bundle));
   if (!info.is_folder) {
     SIXPOINT_ASSIGN(gap::Diagnosis plain,
@@ -130,10 +145,12 @@ void add_gap(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   auto* diagnose_command =
       command->add_subcommand("diagnose", "which effect explains a recording of a known protocol");
-  diagnose_command
-      ->add_option("BUNDLE", options->bundle,
-                   "folder with recording.gt3x and protocol.json, or a plain recording")
-      ->required();
+  CLI::Option* bundle = diagnose_command->add_option(
+      "BUNDLE", options->bundle,
+      "folder with recording.gt3x and protocol.json, or a plain recording");
+  diagnose_command->add_option("--run", options->run, "a stored jig run instead of a bundle")
+      ->excludes(bundle);
+  add_store_option(*diagnose_command, options->store);
   diagnose_command->add_option("--without", options->without, "effects taken out of the catalogue")
       ->delimiter(',');
   diagnose_command->add_option("--html", options->html,
@@ -144,8 +161,14 @@ void add_gap(CLI::App& app, Context& context) {
   diagnose_command->add_option("--scenario", options->scenario,
                                "write the augmented scenario to this file");
   diagnose_command->add_flag("--json", options->json, "one JSON document on standard output");
-  diagnose_command->callback([options, &context] { run(*options, context); });
+  diagnose_command->callback([options, &context] {
+    if (options->bundle.empty() && options->run.empty()) {
+      throw CLI::RequiredError("BUNDLE or --run");
+    }
+    run(*options, context);
+  });
   add_gap_challenge(*command, context);
+  add_gap_trends(*command, context);
 }
 
 }  // namespace sixpoint::cli

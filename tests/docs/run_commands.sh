@@ -13,8 +13,8 @@ failures=0
 run=0
 
 for document in "$source_folder"/README.md "$source_folder"/docs/*.md "$source_folder"/docs/devices/*.md; do
-  relative=${document#"$source_folder"/}  # two documents may have one name
-  folder=$scratch/${relative%.md}
+  name=${document#"$source_folder"/}
+  folder=$scratch/${name//\//_}
   mkdir -p "$folder/build" "$folder/archive"
   ln -s "$program" "$folder/build/sixpoint"
   cp "$source_folder/tests/docs/scenario.json" "$folder/S.json"

@@ -1,0 +1,285 @@
+#include "station/jig_bundle.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "device/jig.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kMostSamples = 2'000'000;  // five hours at 100 Hz
+
+// A turn that brings gravity's reaction onto the pose's axis. The report knows no yaw.
+Eigen::Matrix3d rotation_of(device::Pose pose) {
+  const PerAxis<double> up = device::direction_of(pose);
+  const Eigen::Vector3d direction(up[0], up[1], up[2]);
+  if (direction.z() < -0.5) {
+    return Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  }
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction).toRotationMatrix();
+}
+
+struct Samples {
+  std::vector<double> device_time_s;
+  std::vector<gt3x::Counts> counts;
+  std::vector<double> temperature_c;
+};
+
+// One "time,x,y,z,temperature" line.
+bool read_line(std::string_view line, Samples& samples) {
+  std::array<double, 5> number{};
+  for (std::size_t k = 0; k < number.size(); ++k) {
+    const std::size_t comma = std::min(line.find(','), line.size());
+    const auto [end, error] = std::from_chars(line.data(), line.data() + comma, number[k]);
+    if (error != std::errc() || end != line.data() + comma || !std::isfinite(number[k])) {
+      return false;
+    }
+    line.remove_prefix(std::min(comma + 1, line.size()));
+  }
+  gt3x::Counts counts{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (std::abs(number[axis + 1]) > std::numeric_limits<std::int16_t>::max() / 2.0) {
+      return false;
+    }
+    counts[axis] = static_cast<std::int16_t>(number[axis + 1]);
+  }
+  samples.device_time_s.push_back(number[0] * 1e-6);
+  samples.counts.push_back(counts);
+  samples.temperature_c.push_back(number[4]);
+  return true;
+}
+
+Result<Samples> read_samples(std::string_view csv) {
+  Samples samples;
+  std::size_t number = 0;
+  while (!csv.empty()) {
+    const std::size_t end = std::min(csv.find('\n'), csv.size());
+    if (++number > 1 && end > 0 && !read_line(csv.substr(0, end), samples)) {
+      return fail(ErrorCode::bad_data, "the capture holds a line that is no sample",
+                  fmt::format("line {}", number));
+    }
+    if (samples.counts.size() > kMostSamples) {
+      return fail(ErrorCode::bad_data, "the capture is longer than a jig run can be",
+                  "samples.csv");
+    }
+    csv.remove_prefix(std::min(end + 1, csv.size()));
+  }
+  return samples;
+}
+
+struct Reading {
+  std::string name;
+  device::Pose pose = device::Pose::plus_z;
+  std::array<std::int64_t, 3> sum{};
+  std::size_t samples = 0;
+};
+
+Status add_readings(const Json& list, const char* name, std::vector<Reading>& readings) {
+  if (!list.is_array()) {
+    return {};
+  }
+  for (const Json& item : list) {
+    Reading reading;
+    reading.name = name;
+    const bool whole = item.is_object() && item.contains("pose") && item["pose"].is_string() &&
+                       item.contains("samples") && item["samples"].is_number_unsigned() &&
+                       item.contains("mean_lsb") && item["mean_lsb"].is_array() &&
+                       item["mean_lsb"].size() == 3;
+    if (!whole) {
+      return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name);
+    }
+    SIXPOINT_ASSIGN(reading.pose, device::parse_pose(item["pose"].get<std::string>()));
+    reading.samples = item["samples"].get<std::size_t>();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Json& mean = item["mean_lsb"][axis];
+      if (!mean.is_number() || reading.samples > kMostSamples) {
+        return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name);
+      }
+      reading.sum[axis] = std::llround(mean.get<double>() * static_cast<double>(reading.samples));
+    }
+    readings.push_back(std::move(reading));
+  }
+  return {};
+}
+
+Result<StoredRun> run_of(const db::Row& row) {
+  if (row.size() != 6) {
+    return fail(ErrorCode::internal, "the store answered with another table", "runs");
+  }
+  return StoredRun{db::text_of(row[0]), db::text_of(row[1]), db::text_of(row[2]),
+                   db::text_of(row[3]), db::text_of(row[4]), db::text_of(row[5])};
+}
+
+constexpr const char* kColumns = "SELECT id, serial, kind, station, jig, document FROM runs";
+
+}  // namespace
+
+Result<std::vector<StoredRun>> stored_jig_runs(db::Store& store) {
+  SIXPOINT_ASSIGN(const auto rows, store.database().query(fmt::format(
+                                       "{} WHERE kind = 'jig' ORDER BY started_ns, id", kColumns)));
+  std::vector<StoredRun> runs;
+  for (const db::Row& row : rows) {
+    SIXPOINT_ASSIGN(StoredRun run, run_of(row));
+    runs.push_back(std::move(run));
+  }
+  return runs;
+}
+
+Result<StoredRun> stored_run(db::Store& store, const std::string& id) {
+  // Bounds of the prefix: what follows a run's hex digits sorts before 'g'.
+  const std::array<db::Value, 2> bounds = {db::Value(id), db::Value(id + "g")};
+  SIXPOINT_ASSIGN(const auto rows,
+                  store.database().query(
+                      fmt::format("{} WHERE id >= $1 AND id < $2 ORDER BY id", kColumns), bounds));
+  if (rows.size() != 1 || id.empty()) {
+    return fail(ErrorCode::no_input,
+                rows.empty() ? "the store holds no run of this id"
+                             : "more than one run begins with this id",
+                printable(id, 80), "'sixpoint gap trends' lists the jig runs by unit");
+  }
+  return run_of(rows.front());
+}
+
+Result<std::string> samples_of_run(db::Store& store, const std::string& id) {
+  const std::array<db::Value, 1> parameters = {db::Value(id)};
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      store.database().query("SELECT attachments.bytes FROM captures JOIN attachments ON "
+                             "attachments.sha256 = captures.sha256 WHERE captures.run_id = $1 AND "
+                             "captures.name = 'samples.csv'",
+                             parameters));
+  const Bytes* bytes =
+      rows.size() == 1 && rows[0].size() == 1 ? std::get_if<Bytes>(rows[0].data()) : nullptr;
+  if (bytes == nullptr) {
+    return fail(ErrorCode::no_input, "the run kept no samples", printable(id, 80));
+  }
+  return std::string(bytes->begin(), bytes->end());
+}
+
+Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples_csv) {
+  const Json report = Json::parse(run.document, nullptr, false);
+  if (!report.is_object() || !report.contains("poses")) {
+    return fail(ErrorCode::bad_data, "the run's document is no jig report", run.id);
+  }
+  std::vector<Reading> readings;
+  SIXPOINT_CHECK(add_readings(report["poses"], "faces", readings));
+  if (report.contains("verification") && report["verification"].is_object() &&
+      report["verification"].contains("poses")) {
+    SIXPOINT_CHECK(add_readings(report["verification"]["poses"], "reseat", readings));
+  }
+  SIXPOINT_ASSIGN(const Samples samples, read_samples(samples_csv));
+  const std::size_t count = samples.counts.size();
+  std::vector<std::array<std::int64_t, 3>> sums(count + 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sums[i + 1][axis] = sums[i][axis] + samples.counts[i][axis];
+    }
+  }
+  struct Found {
+    const Reading* reading;
+    std::size_t first;
+  };
+  std::vector<Found> found;
+  for (const Reading& reading : readings) {
+    for (std::size_t i = 0; reading.samples > 0 && i + reading.samples <= count; ++i) {
+      const auto& a = sums[i];
+      const auto& b = sums[i + reading.samples];
+      if (b[0] - a[0] == reading.sum[0] && b[1] - a[1] == reading.sum[1] &&
+          b[2] - a[2] == reading.sum[2]) {
+        found.push_back({&reading, i});
+        break;
+      }
+    }
+  }
+  if (found.size() < readings.size() || readings.size() < 6) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("{} of the report's {} readings are in the samples", found.size(),
+                            readings.size()),
+                run.id, "a jig run has six at least");
+  }
+  std::sort(found.begin(), found.end(),
+            [](const Found& a, const Found& b) { return a.first < b.first; });
+
+  gap::Bundle bundle;
+  bundle.path = "run " + run.id;
+  bundle.protocol_serial = run.serial;
+  bundle.header.serial = run.serial;
+  if (report.contains("firmware") && report["firmware"].is_string()) {
+    bundle.header.firmware = report["firmware"].get<std::string>();
+  }
+  const double span_s = samples.device_time_s.back() - samples.device_time_s.front();
+  // Between the first two samples of a block the unit's own clock is exact to a microsecond.
+  bundle.rate_hz = count > 1 && samples.device_time_s[1] > samples.device_time_s[0]
+                       ? std::round(1 / (samples.device_time_s[1] - samples.device_time_s[0]))
+                       : 100;
+  if (!(bundle.rate_hz >= 10 && bundle.rate_hz <= 400) || !(span_s > 0)) {
+    return fail(ErrorCode::bad_data, "the capture's times are no sample clock's", run.id);
+  }
+  // The middle of each axis, from its two faces.
+  std::array<double, 3> middle{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double sum = 0;
+    double n = 0;
+    for (const Reading& reading : readings) {
+      if (reading.name == "faces" && device::axis_of(reading.pose) == axis) {
+        sum += static_cast<double>(reading.sum[axis]) / static_cast<double>(reading.samples);
+        n += 1;
+      }
+    }
+    middle[axis] = n == 2 ? std::round(sum / 2) : 0;
+  }
+  Eigen::Vector3d pose_before = Eigen::Vector3d::Zero();
+  Eigen::Vector3d held = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const Reading& reading = *found[k].reading;
+    gap::Segment segment;
+    segment.name = reading.name;
+    segment.first_sample = bundle.samples.size();
+    segment.samples = reading.samples;
+    segment.host_start_s = samples.device_time_s[found[k].first] - samples.device_time_s.front();
+    segment.rotation = rotation_of(reading.pose);
+    segment.temperature_start_c = samples.temperature_c[found[k].first];
+    segment.temperature_end_c = segment.temperature_start_c;
+    segment.settled = true;
+    segment.pose = static_cast<int>(reading.pose);
+    segment.placement = static_cast<int>(k);
+    const Eigen::Vector3d pose = segment.rotation.col(2);
+    segment.approach_g = k == 0 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(pose - pose_before);
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      held[a] = std::abs(segment.approach_g[a]) > 0.05 ? std::copysign(1.0, segment.approach_g[a])
+                                                       : held[a];
+    }
+    segment.held_sign = held;
+    pose_before = pose;
+    for (std::size_t i = 0; i < reading.samples; ++i) {
+      gt3x::Counts counts = samples.counts[found[k].first + i];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        counts[axis] = static_cast<std::int16_t>(counts[axis] - std::lround(middle[axis]));
+      }
+      bundle.samples.push_back(counts);
+    }
+    bundle.segments.push_back(std::move(segment));
+  }
+  for (std::size_t i = 0; i < count; i += std::max<std::size_t>(1, count / 2000)) {
+    bundle.temperature.host_time_s.push_back(samples.device_time_s[i] -
+                                             samples.device_time_s.front());
+    bundle.temperature.temperature_c.push_back(samples.temperature_c[i]);
+  }
+  bundle.losses.push_back(
+      "a jig run holds raw counts and no host clock: the filter mismatch and the sample clock "
+      "can't be judged, and truncation only by chance");
+  return bundle;
+}
+
+}  // namespace sixpoint::station
