@@ -125,7 +125,7 @@ class Sheet {
       std::string word(text.substr(0, end));
       text.remove_prefix(std::min(text.size(), end + 1));
       std::string& last = lines.back();
-      const std::string joined = last.empty() ? word : last + " " + word;
+      const std::string joined = last.empty() ? word : fmt::format("{} {}", last, word);
       if (width(joined, font, size_pt) <= room_mm) {
         last = joined;
         continue;
@@ -261,7 +261,7 @@ class Sheet {
             PdfFont::regular, 8.5);
         x_mm += columns[i].width_mm;
       }
-      pdf_.line(kLeft_mm, y_mm_ + 1.3, x_mm, y_mm_ + 1.3, 0.1, 0.8);
+      pdf_.line(kLeft_mm, y_mm_ + 1.15, x_mm, y_mm_ + 1.15, 0.1, 0.8);
       y_mm_ += kRow_mm;
     }
     y_mm_ += 0.6;
@@ -327,7 +327,7 @@ class Sheet {
       pdf_.text(kLeft_mm + 62, at_mm, line, PdfFont::regular, kText_pt);
       at_mm += kLine_mm;
     }
-    y_mm_ += height_mm - 1;
+    y_mm_ += height_mm + 0.6;
     for (const std::string& reason : certificate_.reasons) {
       y_mm_ += 1;
       paragraph("\u2022 " + reason, kSmall_pt + 0.5);

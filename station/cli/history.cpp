@@ -58,12 +58,18 @@ Json to_json(const db::RunRecord& run) {
                {"software", run.software},
                {"build", text_or_null(run.build)},
                {"limits", json_in(run.limits)}};
-  // Two runs were judged alike when this is the same.
-  json["limits_sha256"] =
-      run.limits.empty()
-          ? Json(nullptr)
-          : Json(to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(run.limits.data()),
-                                         run.limits.size()))));
+  // Two runs were judged alike when this is the same: the limits file's own hash, which earlier
+  // versions did not keep.
+  const Json& limits = json["limits"];
+  if (limits.is_object() && limits.contains("sha256")) {
+    json["limits_sha256"] = Json(limits["sha256"]);
+  } else {
+    json["limits_sha256"] =
+        run.limits.empty()
+            ? Json(nullptr)
+            : Json(to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(run.limits.data()),
+                                           run.limits.size()))));
+  }
   json["gravity_m_per_s2"] = run.gravity_m_per_s2 ? Json(*run.gravity_m_per_s2) : Json(nullptr);
   json["temperature_c"] = run.temperature_c ? Json(*run.temperature_c) : Json(nullptr);
   return json;
