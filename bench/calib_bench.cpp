@@ -261,61 +261,10 @@ struct Statistics {
   double mean() const { return count > 0 ? sum / count : 0; }
 };
 
-template <class Wear>
-void accuracy(const char* name, int units, unsigned seed, double rate_hz, double drift_mg,
-              double wanted_mean, double wanted_worst, const Wear& wear) {
-  Statistics mean;
-  Statistics worst;
-  Statistics baseline;
-  Statistics plain;
-  Statistics time;
-  std::size_t blocks_seen = 0;
-  int failed = 0;
-  int cross = 0;
-  for (int i = 0; i < units; ++i) {
-    std::mt19937_64 random(seed + static_cast<unsigned>(i));
-    Unit unit = make_unit(random);
-    unit.rate_hz = rate_hz;
-    if (drift_mg > 0) {
-      unit.cross = {0.004, -0.002, 0.002};
-      unit.drift_mg = {drift_mg / 2, -drift_mg / 2, drift_mg / 2};
-      unit.sway_mg = 2;
-    }
-    const auto blocks = wear(unit, random);
-    blocks_seen += blocks.size();
-    const auto start = Clock::now();
-    const auto fit = fit_blocks(blocks, stored_of(unit));
-    time.add(1000 * seconds_since(start));
-    if (!fit || !fit->fit.converged) {
-      ++failed;
-      continue;
-    }
-    if (fit->richer) {
-      ++cross;
-      plain.add(sphere_error(unit, fit->fit.calibration).mean_mg);
-    }
-    const SphereError error = sphere_error(unit, fit->best().calibration);
-    mean.add(error.mean_mg);
-    worst.add(error.worst_mg);
-    if (i < 50) {
-      baseline.add(sphere_error(unit, closest_point(unit, blocks)).mean_mg);
-    }
-  }
-  std::printf(
-      "%-34s mean %.4f mg (wanted %.3f), worst direction %.4f mg on average, %.4f at most%s; "
-      "cross-axis admitted %d (six parameters alone: %.4f mg); failed %d; closest-point baseline "
-      "%.4f mg, ratio "
-      "%.1f; LS %.1f ms "
-      "(%zu blocks), at most %.1f ms\n",
-      name, mean.mean(), wanted_mean, worst.mean(), worst.worst,
-      wanted_worst > 0 ? (" (wanted " + std::to_string(wanted_worst) + ")").c_str() : "", cross,
-      plain.mean(), failed, baseline.mean(), baseline.mean() / mean.mean(), time.mean(),
-      blocks_seen / static_cast<std::size_t>(units), time.worst);
-  std::fflush(stdout);
-}
-
-// 6 x 6 information matrix at the truth, inverted by Gauss-Jordan: the Cramer-Rao bound.
-std::array<double, 6> cramer_rao(std::span<const Vector> directions, double sigma_g) {
+// The covariance at the Cramer-Rao bound: the information of the directions at the truth, relative
+// sensitivity X Y Z and zero in g X Y Z, inverted by Gauss-Jordan.
+using Matrix6 = std::array<std::array<double, 6>, 6>;
+Matrix6 cramer_rao(std::span<const Vector> directions, double sigma_g) {
   double m[6][12] = {};
   for (const Vector& up : directions) {
     // d|q| / d(relative sensitivity) = up^2, d|q| / d(zero in g) = -up.
@@ -344,11 +293,123 @@ std::array<double, 6> cramer_rao(std::span<const Vector> directions, double sigm
       }
     }
   }
-  std::array<double, 6> out{};
-  for (int i = 0; i < 6; ++i) {
-    out[static_cast<std::size_t>(i)] = std::sqrt(m[i][6 + i]);
+  Matrix6 out{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) {
+      out[i][j] = m[i][6 + j];
+    }
   }
   return out;
+}
+
+// The constants that an estimator exactly at the bound would have given: the truth and one normal
+// draw of that covariance.
+Calibration drawn_at_bound(const Unit& unit, const Matrix6& covariance, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  Matrix6 root{};
+  std::array<double, 6> white{};
+  std::array<double, 6> off{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    white[i] = normal(random);
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = covariance[i][j];
+      for (std::size_t k = 0; k < j; ++k) {
+        sum -= root[i][k] * root[j][k];
+      }
+      root[i][j] = i == j ? std::sqrt(sum) : sum / root[j][j];
+      off[i] += root[i][j] * white[j];
+    }
+  }
+  Calibration out;
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.sensitivity_g_per_lsb[a] = (1 + off[a]) / unit.counts_per_g[a];
+    out.zero_lsb[a] = unit.zero[a] + off[3 + a] * unit.counts_per_g[a];
+  }
+  return out;
+}
+
+std::vector<Vector> directions_of(const Unit& unit, std::span<const StillBlock> blocks) {
+  std::vector<Vector> out;
+  out.reserve(blocks.size());
+  for (const StillBlock& block : blocks) {
+    Vector up{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      up[a] = (block.mean_lsb[a] - unit.zero[a]) / unit.counts_per_g[a];
+    }
+    out.push_back(normalised(up));
+  }
+  return out;
+}
+
+template <class Wear>
+void accuracy(const char* name, int units, unsigned seed, double rate_hz, double drift_mg,
+              double wanted_mean, double wanted_worst, const Wear& wear) {
+  Statistics mean;
+  Statistics worst;
+  Statistics baseline;
+  Statistics plain;
+  Statistics time;
+  Statistics bound_mean;
+  Statistics bound_worst;
+  std::size_t blocks_seen = 0;
+  int failed = 0;
+  int cross = 0;
+  for (int i = 0; i < units; ++i) {
+    std::mt19937_64 random(seed + static_cast<unsigned>(i));
+    Unit unit = make_unit(random);
+    unit.rate_hz = rate_hz;
+    if (drift_mg > 0) {
+      unit.cross = {0.004, -0.002, 0.002};
+      unit.drift_mg = {drift_mg / 2, -drift_mg / 2, drift_mg / 2};
+      unit.sway_mg = 2;
+    }
+    const auto blocks = wear(unit, random);
+    blocks_seen += blocks.size();
+    const auto start = Clock::now();
+    const auto fit = fit_blocks(blocks, stored_of(unit));
+    time.add(1000 * seconds_since(start));
+    if (!fit || !fit->fit.converged) {
+      ++failed;
+      continue;
+    }
+    if (fit->richer) {
+      ++cross;
+      plain.add(sphere_error(unit, fit->fit.calibration).mean_mg);
+    }
+    const SphereError error = sphere_error(unit, fit->best().calibration);
+    mean.add(error.mean_mg);
+    worst.add(error.worst_mg);
+    if (drift_mg == 0) {
+      // White noise alone: the bound is known, and what one draw at it would have been off.
+      const double sigma_g = unit.noise_mg / 1000 / std::sqrt(4 * unit.rate_hz);
+      const SphereError bound = sphere_error(
+          unit, drawn_at_bound(unit, cramer_rao(directions_of(unit, blocks), sigma_g), random));
+      bound_mean.add(bound.mean_mg);
+      bound_worst.add(bound.worst_mg);
+    }
+    if (i < 50) {
+      baseline.add(sphere_error(unit, closest_point(unit, blocks)).mean_mg);
+    }
+  }
+  std::printf(
+      "%-34s mean %.4f mg (wanted %.3f), worst direction %.4f mg on average, %.4f at most%s; "
+      "cross-axis admitted %d (six parameters alone: %.4f mg); failed %d; closest-point baseline "
+      "%.4f mg, ratio "
+      "%.1f; LS %.1f ms "
+      "(%zu blocks), at most %.1f ms\n",
+      name, mean.mean(), wanted_mean, worst.mean(), worst.worst,
+      wanted_worst > 0 ? (" (wanted " + std::to_string(wanted_worst) + ")").c_str() : "", cross,
+      plain.mean(), failed, baseline.mean(), baseline.mean() / mean.mean(), time.mean(),
+      blocks_seen / static_cast<std::size_t>(units), time.worst);
+  if (bound_mean.count > 0) {
+    std::printf(
+        "%-34s at the Cramer-Rao bound of the same data: mean %.4f mg (ratio %.2f), worst "
+        "direction "
+        "%.4f mg on average (ratio %.2f), %.4f at most (ratio %.2f)\n",
+        "", bound_mean.mean(), mean.mean() / bound_mean.mean(), bound_worst.mean(),
+        worst.mean() / bound_worst.mean(), bound_worst.worst, worst.worst / bound_worst.worst);
+  }
+  std::fflush(stdout);
 }
 
 void efficiency(int units, unsigned seed) {
@@ -379,8 +440,8 @@ void efficiency(int units, unsigned seed) {
           fit->fit.calibration.sensitivity_g_per_lsb[a] * unit.counts_per_g[a] - 1;
       const double zero_off_g =
           (fit->fit.calibration.zero_lsb[a] - unit.zero[a]) / unit.counts_per_g[a];
-      square[a] += std::pow(gain_off / bound[a], 2) / units;
-      square[3 + a] += std::pow(zero_off_g / bound[3 + a], 2) / units;
+      square[a] += gain_off * gain_off / bound[a][a] / units;
+      square[3 + a] += zero_off_g * zero_off_g / bound[3 + a][3 + a] / units;
       inside += std::abs(gain_off) < 1.96 * stated.sensitivity_relative[a] ? 1 : 0;
       inside += std::abs(1000 * zero_off_g) < 1.96 * stated.zero_mg[a] ? 1 : 0;
       all += 2;
@@ -397,7 +458,58 @@ void efficiency(int units, unsigned seed) {
   std::fflush(stdout);
 }
 
-// Anything between six good sides and a hopeless file: how often is a wrong answer called verified?
+// Anything between six good sides and a hopeless file.
+struct Mixed {
+  Unit unit;
+  double bad = 0;
+  std::vector<StillBlock> blocks;
+};
+Mixed mixed_unit(unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  Mixed mixed;
+  mixed.unit = make_unit(random);
+  Unit& unit = mixed.unit;
+  mixed.bad = uniform(random);
+  const double bad = mixed.bad;
+  if (bad < 0.3) {
+    unit.sway_mg = 20 * uniform(random);
+  }
+  if (uniform(random) < 0.5) {
+    unit.cross = {0.01 * uniform(random), -0.01 * uniform(random), 0.01 * uniform(random)};
+  }
+  unit.drift_mg = {3 * uniform(random), 3 * uniform(random), 3 * uniform(random)};
+  const int poses = 1 + static_cast<int>(uniform(random) * 40);
+  const double reach = 0.2 + 0.8 * uniform(random);
+  for (int k = 0; k < poses + 6; ++k) {
+    Vector up{};
+    if (k < 6) {
+      if (bad >= 0.8 && k == 0) {
+        continue;
+      }
+      up[static_cast<std::size_t>(k / 2)] = k % 2 == 0 ? 1 : -1;
+      up = near(up, 0.1 * uniform(random), random);
+      if (bad > 0.6) {
+        up = any_direction(random);
+      }
+    } else {
+      up = any_direction(random);
+      if (bad < 0.5) {
+        for (std::size_t a = 0; a < 3; ++a) {
+          up[a] = std::clamp(up[a], -reach, reach);
+        }
+        up = normalised(up);
+      }
+    }
+    const int repeat = 1 + static_cast<int>(20 * uniform(random));
+    for (int j = 0; j < repeat; ++j) {
+      mixed.blocks.push_back(block_at(unit, up, 600.0 * k + 4 * j, random));
+    }
+  }
+  return mixed;
+}
+
+// How often is a wrong answer called verified?
 void confidence(int units, unsigned seed, SolveMethod method) {
   int verified = 0;
   int wrong = 0;
@@ -405,45 +517,7 @@ void confidence(int units, unsigned seed, SolveMethod method) {
   int compared = 0;
   double largest = 0;
   for (int i = 0; i < units; ++i) {
-    std::mt19937_64 random(seed + static_cast<unsigned>(i));
-    std::uniform_real_distribution<double> uniform(0, 1);
-    Unit unit = make_unit(random);
-    const double bad = uniform(random);
-    if (bad < 0.3) {
-      unit.sway_mg = 20 * uniform(random);
-    }
-    if (uniform(random) < 0.5) {
-      unit.cross = {0.01 * uniform(random), -0.01 * uniform(random), 0.01 * uniform(random)};
-    }
-    unit.drift_mg = {3 * uniform(random), 3 * uniform(random), 3 * uniform(random)};
-    const int poses = 1 + static_cast<int>(uniform(random) * 40);
-    const double reach = 0.2 + 0.8 * uniform(random);
-    std::vector<StillBlock> blocks;
-    for (int k = 0; k < poses + 6; ++k) {
-      Vector up{};
-      if (k < 6) {
-        if (bad >= 0.8 && k == 0) {
-          continue;
-        }
-        up[static_cast<std::size_t>(k / 2)] = k % 2 == 0 ? 1 : -1;
-        up = near(up, 0.1 * uniform(random), random);
-        if (bad > 0.6) {
-          up = any_direction(random);
-        }
-      } else {
-        up = any_direction(random);
-        if (bad < 0.5) {
-          for (std::size_t a = 0; a < 3; ++a) {
-            up[a] = std::clamp(up[a], -reach, reach);
-          }
-          up = normalised(up);
-        }
-      }
-      const int repeat = 1 + static_cast<int>(20 * uniform(random));
-      for (int j = 0; j < repeat; ++j) {
-        blocks.push_back(block_at(unit, up, 600.0 * k + 4 * j, random));
-      }
-    }
+    const auto [unit, bad, blocks] = mixed_unit(seed + static_cast<unsigned>(i));
     SolveOptions options;
     options.method = method;
     const auto report = solve_from_still_blocks(blocks, stored_of(unit), options);

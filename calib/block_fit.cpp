@@ -133,6 +133,19 @@ double paule_mandel(const std::vector<double>& residual_g, const std::vector<dou
   return 0.5 * (low + high);
 }
 
+// Of the blocks that have one: what constants without temperature terms hold for.
+double mean_temperature_c(std::span<const StillBlock> blocks) {
+  double sum = 0;
+  double count = 0;
+  for (const StillBlock& block : blocks) {
+    if (block.temperature_c && std::isfinite(*block.temperature_c)) {
+      sum += *block.temperature_c;
+      count += 1;
+    }
+  }
+  return count > 0 ? sum / count : 0;
+}
+
 struct HeldOut {
   double rms_mg = 0;
   int directions = 0;  // that could be predicted at all
@@ -209,7 +222,7 @@ std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::spa
   if (cell_of_block != nullptr) {
     cell_of_block->assign(blocks.size(), -1);
   }
-  const double reference_c = blocks.empty() ? 0 : blocks.front().temperature_c.value_or(0);
+  const double reference_c = mean_temperature_c(blocks);
   const auto temperature_of = [&](const StillBlock& block) {
     return block.temperature_c ? *block.temperature_c - reference_c : 0.0;
   };
@@ -295,7 +308,7 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     }
   }
   out.temperature_range_c = all_have_temperature ? warmest - coldest : 0;
-  out.reference_temperature_c = blocks.front().temperature_c.value_or(0);
+  out.reference_temperature_c = mean_temperature_c(blocks);
 
   std::vector<char> used(blocks.size(), 1);
   std::vector<int> cell_of_block;
@@ -338,8 +351,39 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     LeastSquaresOptions wide = least;
     wide.model = fit.model;
     wide.starts = 1;
+    // What the six leave out is not only scatter: a cross-axis term bends all directions at once,
+    // and where these are few it hides in the sensitivities with next to no residual. It is put to
+    // the data as far as they can tell, and by the prior where they cannot.
+    const bool alias = !fit.model.cross_axis && options.cross_axis_sd > 0;
+    if (alias) {
+      wide.model.cross_axis = true;
+      wide.cross_axis_sd = options.cross_axis_sd;
+    }
     SIXPOINT_ASSIGN(const LeastSquaresFit other, least_squares(points, fit.calibration, wide));
-    fit.covariance = other.covariance;
+    if (!alias) {
+      fit.covariance = other.covariance;
+      return {};
+    }
+    const auto kept = [&](std::size_t i) { return i < 6 ? i : i + 3; };
+    const auto parameters = static_cast<std::size_t>(fit.model.parameters());
+    for (std::size_t i = 0; i < parameters; ++i) {
+      for (std::size_t j = 0; j < parameters; ++j) {
+        fit.covariance[i * kMaxParameters + j] = other.covariance_at(kept(i), kept(j));
+      }
+    }
+    // The estimate stays the plain one; how far it lies from the centre of that is error as well.
+    std::array<double, 6> apart{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      apart[a] =
+          other.calibration.sensitivity_g_per_lsb[a] / fit.calibration.sensitivity_g_per_lsb[a] - 1;
+      apart[3 + a] = fit.calibration.sensitivity_g_per_lsb[a] *
+                     (other.calibration.zero_lsb[a] - fit.calibration.zero_lsb[a]);
+    }
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) {
+        fit.covariance[i * kMaxParameters + j] += apart[i] * apart[j];
+      }
+    }
     return {};
   };
   const auto merge = [&]() {

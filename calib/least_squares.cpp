@@ -120,6 +120,16 @@ struct Problem {
     if (options.prior) {
       cost += add_prior(theta, gradient, hessian);
     }
+    if (options.model.cross_axis && options.cross_axis_sd > 0) {
+      const double weight = 1 / (options.cross_axis_sd * options.cross_axis_sd);
+      for (Eigen::Index i = 6; i < 9; ++i) {
+        cost += weight * theta[i] * theta[i];
+        if (gradient != nullptr) {
+          (*gradient)[i] += weight * theta[i];
+          (*hessian)(i, i) += weight;
+        }
+      }
+    }
     return cost;
   }
 
@@ -186,8 +196,11 @@ Descent descend(const Problem& problem, const Vector& start) {
         sane ? problem.evaluate(moved, &moved_gradient, &moved_hessian) : HUGE_VAL;
     const bool small_step =
         sane && step.norm() <= problem.options.relative_step * (1 + out.theta.norm());
-    // Near the minimum the cost is flat to its last digit long before the gradient is.
-    const bool improves = moved_cost < out.cost || (sane && moved_cost <= out.cost * (1 + 1e-12) &&
+    // Near the minimum the cost is flat to its last digit long before the gradient is. Its last
+    // digit is that of a magnitude of 1 g, not of the residual, which six directions for six
+    // constants leave thousands of times smaller.
+    const double rounding = 1e-12 * out.cost + 2e-15 * std::sqrt(out.cost * weights);
+    const bool improves = moved_cost < out.cost || (sane && moved_cost <= out.cost + rounding &&
                                                     moved_gradient.norm() <= gradient.norm());
     if (improves || small_step) {
       if (improves) {
@@ -224,7 +237,8 @@ Descent descend(const Problem& problem, const Vector& start) {
 Status check(std::span<const GravityPoint> points, const Calibration& start,
              const LeastSquaresOptions& options) {
   SIXPOINT_CHECK(validate(start));
-  const auto needed = static_cast<std::size_t>(options.model.parameters());
+  const bool held = options.model.cross_axis && options.cross_axis_sd > 0;
+  const auto needed = static_cast<std::size_t>(options.model.parameters() - (held ? 3 : 0));
   if (!options.prior && points.size() < needed) {
     return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
                 "least squares", "lay the unit still on more of its sides");
@@ -332,7 +346,8 @@ Result<LeastSquaresFit> least_squares(std::span<const GravityPoint> points,
           covariance(i, j);
     }
   }
-  fit.degrees_of_freedom = static_cast<int>(points.size()) - n + (options.prior ? 6 : 0);
+  fit.degrees_of_freedom = static_cast<int>(points.size()) - n + (options.prior ? 6 : 0) +
+                           (options.model.cross_axis && options.cross_axis_sd > 0 ? 3 : 0);
   double square = 0;
   for (const GravityPoint& point : points) {
     const double residual = magnitude_g(fit, point) - options.gravity_g;

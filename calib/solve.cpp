@@ -172,6 +172,20 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
         100 * c[0], 100 * c[1], 100 * c[2], report.fit->richer->held_out_rms_mg,
         report.fit->held_out_rms_mg.value_or(0)));
   }
+  if (report.fit->richer && report.fit->richer->fit.model.temperature) {
+    const LeastSquaresFit& more = report.fit->richer->fit;
+    report.notes.push_back(
+        fmt::format("the data show zeros that drift by {:+.2f} {:+.2f} {:+.2f} mg/C (X Y Z), which "
+                    "six constants "
+                    "cannot follow: they hold at {:.1f} C; unseen directions are predicted to "
+                    "{:.1f} mg with the "
+                    "drift, {:.1f} mg without",
+                    kMgPerG * more.calibration.sensitivity_g_per_lsb[0] * more.zero_lsb_per_c[0],
+                    kMgPerG * more.calibration.sensitivity_g_per_lsb[1] * more.zero_lsb_per_c[1],
+                    kMgPerG * more.calibration.sensitivity_g_per_lsb[2] * more.zero_lsb_per_c[2],
+                    report.fit->reference_temperature_c, report.fit->richer->held_out_rms_mg,
+                    report.fit->held_out_rms_mg.value_or(0)));
+  }
   if (report.fit->temperature_range_c >= 10 &&
       !(report.fit->richer && report.fit->richer->fit.model.temperature)) {
     report.notes.push_back(
@@ -313,6 +327,8 @@ Json to_json(const SolveReport& report) {
       richer["zero_lsb"] = more.calibration.zero_lsb;
       richer["cross_axis"] = more.model.cross_axis ? Json(more.cross_axis) : Json(nullptr);
       richer["zero_lsb_per_c"] = more.model.temperature ? Json(more.zero_lsb_per_c) : Json(nullptr);
+      richer["reference_temperature_c"] =
+          more.model.temperature ? Json(fit.reference_temperature_c) : Json(nullptr);
       richer["held_out_rms_mg"] = fit.richer->held_out_rms_mg;
     }
   }
@@ -325,6 +341,15 @@ Json to_json(const SolveReport& report) {
     search["trend_mg"] = report.search->trend_mg;
     search["constants"]["sensitivity_g_per_lsb"] = report.search->calibration.sensitivity_g_per_lsb;
     search["constants"]["zero_lsb"] = report.search->calibration.zero_lsb;
+  }
+  if (report.temperature) {
+    const TemperatureDrift& drift = *report.temperature;
+    Json& temperature = json["temperature"];
+    temperature["low_c"] = drift.low_c;
+    temperature["high_c"] = drift.high_c;
+    temperature["zero_mg_per_c"] = drift.zero_mg_per_c;
+    temperature["standard_uncertainty_mg_per_c"] = drift.standard_uncertainty_mg_per_c;
+    temperature["blocks"] = drift.blocks;
   }
   if (report.partial) {
     Json& partial = json["partial"];

@@ -22,6 +22,7 @@
 #include "calib/coverage.h"
 #include "calib/genetic.h"
 #include "calib/still_blocks.h"
+#include "calib/temperature_drift.h"
 #include "calib/verify.h"
 
 namespace sixpoint::calib {
@@ -78,6 +79,9 @@ struct SolveReport {
   std::optional<BlockFit> fit;
   std::optional<GeneticResult> search;
   std::optional<PartialKnowledge> partial;
+  // Filled by the caller where the recording holds temperatures and the unit was left lying while
+  // they changed. Reported, not applied: six constants have no place for it.
+  std::optional<TemperatureDrift> temperature;
   double gravity_g = 1.0;
   int iterations = 0;
   bool from_prior = false;

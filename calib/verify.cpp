@@ -112,8 +112,10 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
   out.redundancy = fit.redundancy;
   out.applied_rms_mg = cells_rms_mg(fit.cells, chosen, options.gravity_g);
   out.repeatability_mg = fit.block_sd_mg;
+  // Where the constants are not least squares' own, how far they are from these is error as well.
   out.worst_direction_mg =
-      fit.richer ? fit.richer->fit.worst_direction_mg() : fit.fit.worst_direction_mg();
+      std::hypot(fit.best().worst_direction_mg(),
+                 difference_over_sphere(fit.best().calibration, chosen).worst_mg);
   if (!out.missing_directions.empty()) {
     out.verdict = Verdict::incomplete;
     reasons.push_back(fmt::format("no still block reaches beyond 0.3 g towards {}",

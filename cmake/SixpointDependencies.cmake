@@ -12,7 +12,18 @@ find_package(CLI11 2.1 REQUIRED)
 find_package(SQLite3 3.40 REQUIRED)
 find_package(SQLiteCpp 3.2 REQUIRED)
 pkg_check_modules(libzip REQUIRED IMPORTED_TARGET libzip)
+# hidapi-hidraw and hidapi-libusb export the same symbols: only the former is linked anywhere.
+pkg_check_modules(hidapi_hidraw REQUIRED IMPORTED_TARGET hidapi-hidraw)
+pkg_check_modules(libusb REQUIRED IMPORTED_TARGET libusb-1.0)
+pkg_check_modules(libudev REQUIRED IMPORTED_TARGET libudev)
 pkg_check_modules(libpq REQUIRED IMPORTED_TARGET libpq)
 pkg_check_modules(libpqxx REQUIRED IMPORTED_TARGET libpqxx)
+pkg_check_modules(libqrencode REQUIRED IMPORTED_TARGET libqrencode)
+find_package(Boost 1.74 REQUIRED)  # Boost.Math, headers only
+# libharu brings no package file of its own.
+find_library(SIXPOINT_HPDF hpdf REQUIRED)
+find_path(SIXPOINT_HPDF_INCLUDE hpdf.h REQUIRED)
+find_path(SIXPOINT_TOML_INCLUDE toml++/toml.h REQUIRED)
+pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib)
 pkg_check_modules(librsvg REQUIRED IMPORTED_TARGET librsvg-2.0)
 pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo-pdf)

@@ -18,8 +18,10 @@ constexpr std::string_view kFormat = "sixpoint/journal-entry/1";
 constexpr std::uint64_t kLargestEntry = 1ULL << 30;
 
 std::int64_t to_ns(UtcTime time) { return time.time_since_epoch().count(); }
+// Throws for a number with a fraction or beyond 64 bits, which get() would convert at any price.
 UtcTime time_of(const Json& json) {
-  return UtcTime(std::chrono::nanoseconds(json.get<std::int64_t>()));
+  return UtcTime(std::chrono::nanoseconds(
+      json.is_number_integer() ? json.get<std::int64_t>() : json.get_ref<const std::int64_t&>()));
 }
 
 template <class T>

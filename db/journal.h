@@ -17,16 +17,17 @@
 
 namespace sixpoint::db {
 
-class Journal {
+class Journal final : public Keeper {
  public:
   // Makes the folder when it is not there.
   static Result<Journal> open(FileSystem& files, const std::string& folder);
 
   // Durable when they return. The same ids as the store will give.
-  Result<std::string> add_constants(const ConstantsRecord& record, const std::string& model);
-  Result<std::string> add_run(const RunRecord& run, const std::vector<Capture>& captures);
-  Result<std::string> add_unit_write(const UnitWrite& write);
-  Result<std::string> add_repair(const RepairRecord& repair);
+  Result<std::string> add_constants(const ConstantsRecord& record,
+                                    const std::string& model) override;
+  Result<std::string> add_run(const RunRecord& run, const std::vector<Capture>& captures) override;
+  Result<std::string> add_unit_write(const UnitWrite& write) override;
+  Result<std::string> add_repair(const RepairRecord& repair) override;
 
   Result<std::size_t> pending();
 

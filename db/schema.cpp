@@ -91,6 +91,16 @@ const std::vector<Table>& tables() {
       {.name = "filter_configurations",
        .columns = {{.name = "name", .since = 2}, {.name = "meaning", .since = 2}},
        .since = 2},
+      {.name = "station_events",
+       .columns = {{.name = "id", .since = 3},
+                   {.name = "made_at_ns", .type = ColumnType::integer, .since = 3},
+                   {.name = "station", .since = 3},
+                   {.name = "serial", .since = 3},  // the unit that it is about, or empty
+                   {.name = "action", .since = 3},  // StationEvent in store.h
+                   {.name = "operator", .since = 3},
+                   {.name = "reason", .since = 3}},
+       .indexes = {"station", "serial"},
+       .since = 3},
   };
   return kTables;
 }

@@ -7,7 +7,7 @@
 //
 // Versions: 1 the first; 2 adds to a run the jig's due date, the build, the limits, local gravity,
 // temperature and codes, to constants their uncertainty and origin, to a repair the software, and
-// the filter configurations.
+// the filter configurations; 3 adds the station's events.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@
 
 namespace sixpoint::db {
 
-inline constexpr std::int64_t kSchemaVersion = 2;
+inline constexpr std::int64_t kSchemaVersion = 3;
 
 enum class ColumnType { integer, text };
 

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "db/chain.h"
+#include "db/hex.h"
 #include "db/history.h"
 #include "db/schema.h"
 
@@ -193,12 +194,61 @@ constexpr std::string_view kRepairColumns =
     "repairs.software";
 constexpr std::size_t kRepairColumnCount = 10;
 
+constexpr std::string_view kRunColumns =
+    "id, serial, kind, filter, started_ns, ended_ns, operator, station, jig, verdict, software, "
+    "retest_of, document, jig_due_ns, build, limits, gravity_m_per_s2, temperature_c, codes";
+
+// The withdrawals w that nobody has taken back; of one set of constants, and of any.
+constexpr std::string_view kStillWithdrawn =
+    "w.about_table = 'constants' AND w.action = 'withdraw' AND NOT EXISTS (SELECT 1 FROM "
+    "corrections r WHERE r.about_table = 'constants' AND r.about_id = w.about_id "
+    "AND r.action = 'reinstate' AND r.seq > w.seq)";
+std::string not_withdrawn() {
+  return fmt::format(
+      "NOT EXISTS (SELECT 1 FROM corrections w WHERE w.about_id = constants.id AND {})",
+      kStillWithdrawn);
+}
+
 ConstantsRecord to_constants(const Row& row) {
   return {text_of(row[0]), from_ns(integer_of(row[1])),
           text_of(row[2]), text_of(row[3]),
           text_of(row[4]), text_of(row[5]),
           text_of(row[6]), text_of(row[7]),
           text_of(row[8])};
+}
+
+std::optional<double> number_of(const Value& value) {
+  const auto json = nlohmann::json::parse(text_of(value), nullptr, false);
+  return json.is_number() ? std::optional(json.get<double>()) : std::nullopt;
+}
+
+RunRecord to_run(const Row& row) {
+  RunRecord run;
+  run.id = text_of(row[0]);
+  run.serial = text_of(row[1]);
+  run.kind = text_of(row[2]);
+  run.filter = text_of(row[3]);
+  run.started = from_ns(integer_of(row[4]));
+  run.ended = from_ns(integer_of(row[5]));
+  run.operator_name = text_of(row[6]);
+  run.station = text_of(row[7]);
+  run.jig = text_of(row[8]);
+  run.verdict = text_of(row[9]);
+  run.software = text_of(row[10]);
+  run.retest_of = text_of(row[11]);
+  run.document = text_of(row[12]);
+  if (!std::holds_alternative<std::monostate>(row[13])) {
+    run.jig_due = from_ns(integer_of(row[13]));
+  }
+  run.build = text_of(row[14]);
+  run.limits = text_of(row[15]);
+  run.gravity_m_per_s2 = number_of(row[16]);
+  run.temperature_c = number_of(row[17]);
+  const auto codes = nlohmann::json::parse(text_of(row[18]), nullptr, false);
+  for (const auto& code : codes.is_array() ? codes : nlohmann::json::array()) {
+    run.codes.push_back(code.is_string() ? code.get<std::string>() : code.dump());
+  }
+  return run;
 }
 
 RepairRecord to_repair(const Row& row) {
@@ -332,8 +382,7 @@ Result<std::string> Store::add_run(const RunRecord& run, const std::vector<Captu
     for (const Capture& capture : captures) {
       const std::string hash = to_hex(sha256(capture.bytes));
       SIXPOINT_CHECK(writer.add_attachment(hash, capture.bytes));
-      std::vector<Value> row = {id, capture.name, hash};
-      row.insert(row.begin(), Value(identifier("captures", row)));
+      const Row row = with_id("captures", {id, capture.name, hash});
       SIXPOINT_CHECK(impl_->append(writer, "captures", row));
     }
     return {};
@@ -355,29 +404,214 @@ Result<std::string> Store::add_repair(const RepairRecord& repair) {
   return text_of(values[0]);
 }
 
-Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,
-                                 const std::string& reason) {
-  SIXPOINT_CHECK(check_texts({id, operator_name}));
-  SIXPOINT_CHECK(check_texts({reason}, 100 * kLongestName));
-  const std::vector<Value> key = {id};
+Result<std::string> Store::correct(const Correction& correction) {
+  SIXPOINT_CHECK(check_texts({correction.row_id, correction.operator_name}));
+  SIXPOINT_CHECK(check_texts({correction.reason}, 100 * kLongestName));
+  const Table* about = find_table(correction.table);
+  if (about == nullptr) {
+    std::string names;
+    for (const Table& known : tables()) {
+      names += fmt::format(" {}", known.name);
+    }
+    return fail(ErrorCode::usage, fmt::format("no table '{}'", printable(correction.table, 60)), {},
+                "there are:" + names);
+  }
+  const bool of_constants = correction.action == "withdraw" || correction.action == "reinstate";
+  if ((!of_constants && correction.action != "note") ||
+      (of_constants && correction.table != "constants")) {
+    return fail(
+        ErrorCode::usage,
+        fmt::format("no correction '{}' of {}", printable(correction.action, 60), correction.table),
+        {}, "constants are withdrawn and reinstated; any row can have a note");
+  }
+  if (correction.reason.empty()) {
+    return fail(ErrorCode::usage, "a correction needs a reason", {}, "say why");
+  }
+  const std::vector<Value> key = {correction.row_id};
   SIXPOINT_ASSIGN(const auto there,
-                  impl_->database->query("SELECT id FROM constants WHERE id = $1", key));
+                  impl_->database->query(fmt::format("SELECT seq FROM {} WHERE {} = $1",
+                                                     about->name, about->columns[0].name),
+                                         key));
   if (there.empty()) {
-    return fail(ErrorCode::no_input, fmt::format("no constants '{}'", printable(id, 60)),
+    return fail(ErrorCode::no_input,
+                fmt::format("no {} '{}'", correction.table, printable(correction.row_id, 60)),
                 impl_->database->location(), "'sixpoint history SERIAL' lists them");
   }
-  if (reason.empty()) {
-    return fail(ErrorCode::usage, "a withdrawal needs a reason", {}, "say why");
+  const Row values =
+      with_id("corrections", {to_ns(impl_->env.clock.now()), correction.table, correction.row_id,
+                              correction.action, correction.operator_name, correction.reason});
+  SIXPOINT_CHECK(impl_->in_transaction(
+      [&](HistoryWriter& writer) { return impl_->append(writer, "corrections", values); }));
+  return text_of(values[0]);
+}
+
+Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,
+                                 const std::string& reason) {
+  Correction correction;
+  correction.table = "constants";
+  correction.row_id = id;
+  correction.action = "withdraw";
+  correction.operator_name = operator_name;
+  correction.reason = reason;
+  SIXPOINT_CHECK(correct(correction));
+  return {};
+}
+
+bool UnitHistory::empty() const {
+  return constants.empty() && runs.empty() && writes.empty() && repairs.empty() &&
+         corrections.empty();
+}
+
+bool UnitHistory::is_withdrawn(const std::string& constants_id) const {
+  bool withdrawn = false;
+  for (const Correction& correction : corrections) {
+    if (correction.table == "constants" && correction.row_id == constants_id &&
+        correction.action != "note") {
+      withdrawn = correction.action == "withdraw";
+    }
   }
-  std::vector<Value> values = {to_ns(impl_->env.clock.now()),
-                               std::string("constants"),
-                               id,
-                               std::string("withdraw"),
-                               operator_name,
-                               reason};
-  values.insert(values.begin(), Value(identifier("corrections", values)));
-  return impl_->in_transaction(
-      [&](HistoryWriter& writer) { return impl_->append(writer, "corrections", values); });
+  return withdrawn;
+}
+
+Result<UnitHistory> Store::unit_history(const std::string& serial) {
+  // One moment: a run and the constants that it made belong together.
+  SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(*impl_->database));
+  const std::vector<Value> parameters = {serial};
+  UnitHistory all;
+  const auto read = [&](std::string_view columns, std::string_view table, auto& into,
+                        auto convert) -> Status {
+    SIXPOINT_ASSIGN(const auto rows,
+                    impl_->database->query(fmt::format("SELECT {} FROM {} WHERE serial = $1 "
+                                                       "ORDER BY seq",
+                                                       columns, table),
+                                           parameters));
+    std::transform(rows.begin(), rows.end(), std::back_inserter(into), convert);
+    return {};
+  };
+  SIXPOINT_CHECK(read(kConstantsColumns, "constants", all.constants, to_constants));
+  SIXPOINT_CHECK(read(kRunColumns, "runs", all.runs, to_run));
+  SIXPOINT_CHECK(read("run_id, serial, written_ns, as_found, as_left, read_back", "unit_writes",
+                      all.writes, [](const Row& row) {
+                        return UnitWrite{
+                            text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
+                            text_of(row[3]), text_of(row[4]), text_of(row[5])};
+                      }));
+  SIXPOINT_CHECK(read(kRepairColumns, "repairs", all.repairs, to_repair));
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query(
+          "SELECT id, made_at_ns, about_table, about_id, action, operator, reason FROM corrections "
+          "WHERE (about_table = 'units' AND about_id = $1) "
+          "OR (about_table = 'constants' AND about_id IN (SELECT id FROM constants WHERE serial = "
+          "$1)) "
+          "OR (about_table = 'runs' AND about_id IN (SELECT id FROM runs WHERE serial = $1)) "
+          "OR (about_table = 'unit_writes' AND about_id IN (SELECT id FROM unit_writes WHERE "
+          "serial = $1)) "
+          "OR (about_table = 'repairs' AND about_id IN (SELECT id FROM repairs WHERE serial = $1)) "
+          "ORDER BY seq",
+          parameters));
+  for (const Row& row : rows) {
+    all.corrections.push_back({text_of(row[0]), from_ns(integer_of(row[1])), text_of(row[2]),
+                               text_of(row[3]), text_of(row[4]), text_of(row[5]), text_of(row[6])});
+  }
+  return all;
+}
+
+Result<RunRecord> Store::run(const std::string& id) {
+  const std::vector<Value> parameters = {id};
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->query(
+                      fmt::format("SELECT {} FROM runs WHERE id = $1", kRunColumns), parameters));
+  if (rows.empty()) {
+    return fail(ErrorCode::no_input, fmt::format("no run '{}'", printable(id, 60)),
+                impl_->database->location(), "'sixpoint history SERIAL' lists the runs of a unit");
+  }
+  return to_run(rows[0]);
+}
+
+Result<std::string> Store::add_station_event(const StationEvent& event) {
+  SIXPOINT_CHECK(check_texts({event.station, event.operator_name}));
+  SIXPOINT_CHECK(check_texts({event.reason}, 100 * kLongestName));
+  const bool about_unit =
+      event.action == "check_unit" || event.action == "check_unit_end" || event.action == "release";
+  if (!about_unit && event.action != "sign" && event.action != "sign_new_baseline") {
+    return fail(ErrorCode::usage,
+                fmt::format("nothing at a station is called '{}'", printable(event.action, 60)), {},
+                "please report this");
+  }
+  if (about_unit) {
+    SIXPOINT_CHECK(check_serial(event.serial));
+  }
+  if (event.operator_name.empty() || event.reason.empty()) {
+    return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
+                "say who decides, and why");
+  }
+  const Row values =
+      with_id("station_events", {to_ns(impl_->env.clock.now()), event.station, event.serial,
+                                 event.action, event.operator_name, event.reason});
+  SIXPOINT_CHECK(impl_->in_transaction(
+      [&](HistoryWriter& writer) { return impl_->append(writer, "station_events", values); }));
+  return text_of(values[0]);
+}
+
+Result<std::vector<StationEvent>> Store::station_events(const std::string& station) {
+  std::vector<Value> parameters;
+  if (!station.empty()) {
+    parameters.emplace_back(station);
+  }
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query(
+          fmt::format("SELECT id, made_at_ns, station, serial, action, operator, reason "
+                      "FROM station_events {} ORDER BY seq",
+                      station.empty() ? "" : "WHERE station = $1"),
+          parameters));
+  std::vector<StationEvent> events;
+  events.reserve(rows.size());
+  for (const Row& row : rows) {
+    events.push_back({text_of(row[0]), from_ns(integer_of(row[1])), text_of(row[2]),
+                      text_of(row[3]), text_of(row[4]), text_of(row[5]), text_of(row[6])});
+  }
+  return events;
+}
+
+Status Store::for_each_run(const RunFilter& filter,
+                           const std::function<Status(const RunRecord&)>& visit) {
+  std::vector<Value> parameters;
+  std::string where = "seq > 0";
+  const auto only = [&](std::string_view condition, Value value) {
+    parameters.push_back(std::move(value));
+    where += fmt::format(" AND {} ${}", condition, parameters.size());
+  };
+  if (!filter.kind.empty()) {
+    only("kind =", filter.kind);
+  }
+  if (!filter.serial.empty()) {
+    only("serial =", filter.serial);
+  }
+  if (!filter.station.empty()) {
+    only("station =", filter.station);
+  }
+  if (filter.from) {
+    only("started_ns >=", to_ns(*filter.from));
+  }
+  if (filter.to) {
+    only("started_ns <", to_ns(*filter.to));
+  }
+  SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(*impl_->database));
+  SIXPOINT_ASSIGN(const auto rows,
+                  impl_->database->stream(fmt::format("SELECT {} FROM runs WHERE {} "
+                                                      "ORDER BY started_ns, seq",
+                                                      kRunColumns, where),
+                                          parameters));
+  Row row;
+  while (true) {
+    SIXPOINT_ASSIGN(const bool more, rows->next(row));
+    if (!more) {
+      return {};
+    }
+    SIXPOINT_CHECK(visit(to_run(row)));
+  }
 }
 
 Result<std::optional<ConstantsRecord>> Store::constants_for(const std::string& serial,
@@ -386,11 +620,9 @@ Result<std::optional<ConstantsRecord>> Store::constants_for(const std::string& s
   SIXPOINT_ASSIGN(
       const auto rows,
       impl_->database->query(
-          fmt::format("SELECT {} FROM constants WHERE serial = $1 AND filter = $2 "
-                      "AND NOT EXISTS (SELECT 1 FROM corrections WHERE about_table = 'constants' "
-                      "AND about_id = constants.id AND action = 'withdraw') "
+          fmt::format("SELECT {} FROM constants WHERE serial = $1 AND filter = $2 AND {} "
                       "ORDER BY made_at_ns DESC, seq DESC LIMIT 1",
-                      kConstantsColumns),
+                      kConstantsColumns, not_withdrawn()),
           parameters));
   if (rows.empty()) {
     return std::nullopt;
@@ -430,9 +662,11 @@ Result<std::vector<UnitRecord>> Store::units() {
 
 Result<std::optional<RepairRecord>> Store::repair_of_output(const std::string& output_sha256) {
   const std::vector<Value> parameters = {output_sha256};
+  // "+ 0": a planner without statistics would rather walk back along seq through millions of rows
+  // than sort the one or two that the hash has.
   SIXPOINT_ASSIGN(const auto rows,
                   impl_->database->query(fmt::format("SELECT {} FROM repairs WHERE output_sha256 = "
-                                                     "$1 ORDER BY seq DESC LIMIT 1",
+                                                     "$1 ORDER BY seq + 0 DESC LIMIT 1",
                                                      kRepairColumns),
                                          parameters));
   if (rows.empty()) {
@@ -446,18 +680,15 @@ Result<std::vector<RecallEntry>> Store::recall_list(const std::string& constants
   std::string only;
   if (!constants_id.empty()) {
     parameters.emplace_back(constants_id);
-    only = " AND corrections.about_id = $1";
+    only = " AND w.about_id = $1";
   }
-  SIXPOINT_ASSIGN(const auto rows,
-                  impl_->database->query(
-                      fmt::format("SELECT {}, corrections.made_at_ns, corrections.reason "
-                                  "FROM corrections "
-                                  "JOIN repairs ON repairs.constants_id = corrections.about_id "
-                                  "WHERE corrections.about_table = 'constants' "
-                                  "AND corrections.action = 'withdraw'{} "
-                                  "ORDER BY repairs.seq, corrections.seq",
-                                  kRepairColumns, only),
-                      parameters));
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query(fmt::format("SELECT {}, w.made_at_ns, w.reason FROM corrections w "
+                                         "JOIN repairs ON repairs.constants_id = w.about_id "
+                                         "WHERE {}{} ORDER BY repairs.seq, w.seq",
+                                         kRepairColumns, kStillWithdrawn, only),
+                             parameters));
   std::vector<RecallEntry> entries;
   for (const Row& row : rows) {
     RecallEntry entry{to_repair(row), from_ns(integer_of(row[kRepairColumnCount])),
@@ -492,6 +723,11 @@ Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
   return list;
 }
 
+// The verdicts after which the constants are used.
+static bool is_passed(std::string_view verdict) {
+  return verdict == "pass" || verdict == "conditional_pass";
+}
+
 double YieldReport::yield() const {
   return units == 0 ? std::numeric_limits<double>::quiet_NaN()
                     : static_cast<double>(passed) / static_cast<double>(units);
@@ -506,7 +742,7 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
   const std::vector<Value> parameters = {to_ns(from), to_ns(to)};
   SIXPOINT_ASSIGN(
       const auto rows,
-      impl_->database->query("SELECT serial, verdict FROM runs WHERE kind = 'jig' "
+      impl_->database->query("SELECT serial, verdict, retest_of FROM runs WHERE kind = 'jig' "
                              "AND started_ns >= $1 AND started_ns < $2 ORDER BY started_ns, seq",
                              parameters));
   struct Runs {
@@ -514,16 +750,19 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
     bool last_passed = false;
   };
   std::map<std::string, Runs> units;
+  std::size_t retests = 0;
   for (const Row& row : rows) {
-    const bool passed = text_of(row[1]) == "pass";
+    const bool passed = is_passed(text_of(row[1]));
     const auto [unit, is_new] = units.try_emplace(text_of(row[0]));
     if (is_new) {
       unit->second.first_passed = passed;
     }
     unit->second.last_passed = passed;
+    retests += std::holds_alternative<std::monostate>(row[2]) ? 0 : 1;
   }
   YieldReport report;
   report.runs = rows.size();
+  report.retests = retests;
   report.units = units.size();
   for (const auto& [serial, runs] : units) {
     report.passed += runs.last_passed ? 1 : 0;
@@ -533,12 +772,11 @@ Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
 }
 
 Result<std::vector<DueUnit>> Store::units_due(UtcTime older_than) {
-  SIXPOINT_ASSIGN(const auto rows,
-                  impl_->database->query(
-                      "SELECT serial, model, (SELECT max(made_at_ns) FROM constants "
-                      "WHERE constants.serial = units.serial "
-                      "AND NOT EXISTS (SELECT 1 FROM corrections WHERE about_table = 'constants' "
-                      "AND about_id = constants.id AND action = 'withdraw')) FROM units"));
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      impl_->database->query("SELECT serial, model, (SELECT max(made_at_ns) FROM constants "
+                             "WHERE constants.serial = units.serial AND " +
+                             not_withdrawn() + ") FROM units"));
   std::vector<DueUnit> due;
   for (const Row& row : rows) {
     DueUnit unit{text_of(row[0]), text_of(row[1]), std::nullopt};
@@ -562,11 +800,10 @@ Result<std::vector<TrendPoint>> Store::trend(const std::string& serial) {
       const auto rows,
       impl_->database->query(
           fmt::format("SELECT {}, runs.jig, runs.station, runs.verdict, "
-                      "(SELECT count(*) FROM corrections WHERE about_table = 'constants' "
-                      "AND about_id = constants.id AND action = 'withdraw') "
+                      "CASE WHEN {} THEN 0 ELSE 1 END "
                       "FROM constants LEFT JOIN runs ON runs.id = constants.run_id "
                       "WHERE constants.serial = $1 ORDER BY constants.made_at_ns, constants.seq",
-                      kConstantsColumns),
+                      kConstantsColumns, not_withdrawn()),
           parameters));
   std::vector<TrendPoint> points;
   points.reserve(rows.size());
@@ -578,8 +815,18 @@ Result<std::vector<TrendPoint>> Store::trend(const std::string& serial) {
   return points;
 }
 
-Result<AuditReport> Store::audit() {
+Result<AuditReport> Store::audit(const std::string& earlier_head) {
   AuditReport report;
+  Bytes wanted;
+  if (!earlier_head.empty()) {
+    const auto bytes = from_hex(earlier_head);
+    if (!bytes || bytes->size() != 32) {
+      return fail(ErrorCode::usage, "the head is no hash", printable(earlier_head, 70),
+                  "give the 64 digits that an earlier 'audit verify' printed");
+    }
+    wanted = *bytes;
+  }
+  bool met = earlier_head.empty() || wanted == Bytes(32, 0);
   const auto find = [&](std::string finding) {
     if (report.findings.size() < kMostFindings) {
       report.findings.push_back(std::move(finding));
@@ -618,12 +865,19 @@ Result<AuditReport> Store::audit() {
     }
     // Go on from what is written, so that one changed row is one finding and not all that follow.
     previous.assign(row.hash.begin(), row.hash.end());
+    met = met || previous == wanted;
     expected = row.seq + 1;
     ++report.rows;
   }
   const auto head = read_head(database);
   if (!head || head->rows != expected - 1 || head->hash != previous) {
     find("the head does not name the last row: rows at the end were removed or added");
+  }
+  if (!met) {
+    find(
+        fmt::format("the head {} that was written down is no row of this chain: the history was "
+                    "written anew, or this is another store",
+                    printable(earlier_head, 70)));
   }
   report.head = to_hex(previous);
   report.ok = report.findings.empty();

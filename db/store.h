@@ -11,6 +11,7 @@
 // A Store belongs to one thread; several processes may work on one file at once.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -97,6 +98,55 @@ struct RepairRecord {
   std::string software = {};
 };
 
+// A later word about a row: nothing is changed, this row is added.
+struct Correction {
+  std::string id;  // filled by the store
+  UtcTime made_at{};
+  std::string table;   // about which row: its table ...
+  std::string row_id;  // ... and its key
+  // "withdraw": constants apply no more. "reinstate": they apply again. "note": what is wrong or
+  // missing there, in words.
+  std::string action;
+  std::string operator_name;
+  std::string reason;
+};
+
+// What people decided at a station.
+struct StationEvent {
+  std::string id;  // filled by the store
+  UtcTime made_at{};
+  std::string station;
+  std::string serial;  // the unit that it is about; empty for the station itself
+  // "check_unit": this unit watches the station from now on. "check_unit_end": no more. "sign": an
+  // engineer has looked at what the check units say. "sign_new_baseline": and what they said before
+  // is no measure any more. "release": this unit may be measured again after too many failures.
+  std::string action;
+  std::string operator_name;
+  std::string reason;
+};
+
+// Which runs are asked for; what is empty does not matter.
+struct RunFilter {
+  std::string kind = "jig";
+  std::string serial;
+  std::string station;
+  std::optional<UtcTime> from = {};  // started then or later
+  std::optional<UtcTime> to = {};    // started before
+};
+
+// Everything that the store holds about one unit, each list oldest first.
+struct UnitHistory {
+  std::vector<ConstantsRecord> constants;  // withdrawn sets included
+  std::vector<RunRecord> runs;
+  std::vector<UnitWrite> writes;
+  std::vector<RepairRecord> repairs;    // of this unit's files
+  std::vector<Correction> corrections;  // about any of these rows
+
+  bool empty() const;
+  // The last word about these constants is "withdraw".
+  bool is_withdrawn(const std::string& constants_id) const;
+};
+
 // A file that was mended with constants that were withdrawn later or before: mend it again.
 struct RecallEntry {
   RepairRecord repair;
@@ -115,6 +165,7 @@ struct JigUnit {
 // Of the jig runs that started in a period.
 struct YieldReport {
   std::size_t runs = 0;
+  std::size_t retests = 0;  // of them, that name the run which they repeat
   std::size_t units = 0;
   std::size_t passed = 0;             // units whose last run passed
   std::size_t passed_first_time = 0;  // units whose first run passed
@@ -159,7 +210,20 @@ Result<std::string> id_of(const RepairRecord& repair);
 // A file's name as the store keeps it: bytes that are no UTF-8 are written \xNN.
 std::string storable_path(std::string_view path);
 
-class Store {
+// What takes records for good: the store, or the journal in its stead (journal.h, keeping.h).
+// Each answers with the id, which is the same from both.
+class Keeper {
+ public:
+  virtual ~Keeper() = default;
+  virtual Result<std::string> add_constants(const ConstantsRecord& record,
+                                            const std::string& model) = 0;
+  virtual Result<std::string> add_run(const RunRecord& run,
+                                      const std::vector<Capture>& captures) = 0;
+  virtual Result<std::string> add_unit_write(const UnitWrite& write) = 0;
+  virtual Result<std::string> add_repair(const RepairRecord& repair) = 0;
+};
+
+class Store final : public Keeper {
  public:
   // `location`: a path of an SQLite file, which is made when it is not there, or postgresql://...
   // Errors as open_sqlite(), open_postgres() and migrate().
@@ -171,26 +235,43 @@ class Store {
 
   Store(Store&&) noexcept;
   Store& operator=(Store&&) noexcept;
-  ~Store();
+  ~Store() override;
 
   // Adds the unit too when it is new (first seen at the record's own time). Returns the id.
   // bad_data for an empty or unprintable serial, an unknown filter, a document that is no JSON, a
   // text that is no UTF-8 or too long, a capture above 100 MiB.
-  Result<std::string> add_constants(const ConstantsRecord& record, const std::string& model);
-  Result<std::string> add_run(const RunRecord& run, const std::vector<Capture>& captures);
-  Result<std::string> add_unit_write(const UnitWrite& write);
-  Result<std::string> add_repair(const RepairRecord& repair);
+  Result<std::string> add_constants(const ConstantsRecord& record,
+                                    const std::string& model) override;
+  Result<std::string> add_run(const RunRecord& run, const std::vector<Capture>& captures) override;
+  Result<std::string> add_unit_write(const UnitWrite& write) override;
+  Result<std::string> add_repair(const RepairRecord& repair) override;
 
+  // Adds a correction, made now. no_input where there is no such row; usage without a reason, for
+  // another action, or for one that does not fit the table (only constants are withdrawn).
+  Result<std::string> correct(const Correction& correction);
   // From now on constants_for() passes over them. They stay in the history.
   Status withdraw_constants(const std::string& id, const std::string& operator_name,
                             const std::string& reason);
 
+  // usage for an unknown action, one without its unit, or without operator or reason.
+  Result<std::string> add_station_event(const StationEvent& event);
+  // Oldest first; of all stations with an empty `station`.
+  Result<std::vector<StationEvent>> station_events(const std::string& station = {});
+  // Runs, oldest first, one at a time: a year of them does not fit into memory. `model` is left
+  // empty. An error of `visit` ends it.
+  Status for_each_run(const RunFilter& filter,
+                      const std::function<Status(const RunRecord&)>& visit);
+
   // Which constants apply to a file of `serial` recorded under `filter`: the newest by made_at,
-  // among equals the last one stored, that has not been withdrawn. Nothing where there are none.
+  // among equals the last one stored, whose last correction is no withdrawal. Nothing where there
+  // are none.
   Result<std::optional<ConstantsRecord>> constants_for(const std::string& serial,
                                                        const std::string& filter);
   // The whole history, oldest first, withdrawn sets included.
   Result<std::vector<ConstantsRecord>> history(const std::string& serial);
+  Result<UnitHistory> unit_history(const std::string& serial);
+  // no_input where there is none.
+  Result<RunRecord> run(const std::string& id);
   Result<std::vector<UnitRecord>> units();
   // The repair that made a file of this hash, if one did.
   Result<std::optional<RepairRecord>> repair_of_output(const std::string& output_sha256);
@@ -203,8 +284,10 @@ class Store {
   Result<std::vector<DueUnit>> units_due(UtcTime older_than);
   Result<std::vector<TrendPoint>> trend(const std::string& serial);
 
-  // Reads everything, as it is at this moment, while others go on writing.
-  Result<AuditReport> audit();
+  // Reads everything, as it is at this moment, while others go on writing. With the hex hash of an
+  // earlier head, also whether that is still a row of the chain: only so is a history found out
+  // that was written anew from end to end.
+  Result<AuditReport> audit(const std::string& earlier_head = {});
 
  private:
   struct Impl;

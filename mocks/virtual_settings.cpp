@@ -129,10 +129,12 @@ Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint6
       }
       settings.with_jig = value == "auto";
     } else if (key == "pace") {
-      if (value != "fast" && value != "real") {
-        return wrong(key, value, "fast or real");
+      const auto factor = number_of<int>(value);
+      if (value != "fast" && value != "real" && !(factor && *factor >= 2 && *factor <= 100)) {
+        return wrong(key, value, "fast, real or 2 to 100");
       }
-      settings.real_time = value == "real";
+      settings.real_time = value != "fast";
+      settings.pace = factor.value_or(1);
     } else if (key == "battery_mv") {
       const auto number = number_of<std::uint16_t>(value);
       if (!number) {
@@ -145,6 +147,11 @@ Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint6
         return wrong(key, value, "a temperature such as 24.5");
       }
       settings.unit.temperature_c = *number;
+    } else if (key == "faults") {
+      if (value.empty()) {
+        return wrong(key, value, "the file of a fault plan (docs/faults.md)");
+      }
+      settings.faults_file = std::string(value);
     } else {
       return wrong(key, value, "a setting of virtual units");
     }

@@ -32,14 +32,28 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
         "the recording was mended already; its counts no longer come from the unit's constants",
         path, "use the original recording");
   }
-  if (survey.constants_problem.has_value()) {
+  calib::Calibration file_constants;
+  if (survey.raw_counts && survey.raw_calibration) {
+    file_constants = *survey.raw_calibration;
+  } else if (survey.constants_problem.has_value()) {
     return fail(*survey.constants_problem);
+  } else {
+    SIXPOINT_ASSIGN(file_constants, calib::calibration_from(survey.constants.front()));
   }
-  SIXPOINT_ASSIGN(const auto file_constants, calib::calibration_from(survey.constants.front()));
   SIXPOINT_ASSIGN(auto report,
                   calib::solve_from_still_blocks(survey.blocks, file_constants, options));
   report.serial = survey.facts.serial;
   report.filter = filter_in_force(survey.facts);
+  report.temperature =
+      calib::temperature_drift(survey.resting, report.calibration.value_or(file_constants));
+  if (report.temperature) {
+    const calib::TemperatureDrift& drift = *report.temperature;
+    report.notes.push_back(fmt::format(
+        "left lying from {:.0f} to {:.0f} C, the zeros drift by {:+.2f} {:+.2f} {:+.2f} mg/C (X Y "
+        "Z)",
+        drift.low_c, drift.high_c, drift.zero_mg_per_c[0], drift.zero_mg_per_c[1],
+        drift.zero_mg_per_c[2]));
+  }
   return report;
 }
 

@@ -50,8 +50,8 @@ Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& c
   return mark;
 }
 
-// The input_sha256 of a mended file's mark; nothing where there is no such file or mark.
-std::optional<std::string> made_from(FileSystem& files, const std::string& path) {
+// The mark of a mended file; nothing where there is no such file or mark.
+std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
   auto recording = gt3x::Recording::open(files, path);
   if (!recording || !recording->has_entry(kRepairMark)) {
     return std::nullopt;
@@ -64,11 +64,12 @@ std::optional<std::string> made_from(FileSystem& files, const std::string& path)
   if (!bytes) {
     return std::nullopt;
   }
-  const auto mark = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
-  if (!mark.is_object() || !mark.contains("input_sha256") || !mark["input_sha256"].is_string()) {
-    return std::nullopt;
-  }
-  return mark["input_sha256"].get<std::string>();
+  auto mark = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
+  return mark.is_object() ? std::optional(std::move(mark)) : std::nullopt;
+}
+
+std::string text_in(const Json& mark, const char* key) {
+  return mark.contains(key) && mark[key].is_string() ? mark[key].get<std::string>() : "";
 }
 
 // The writer owns its source and drops it at commit(); the log's tally is wanted after that.
@@ -244,8 +245,13 @@ class Repair {
     }
 
     if (env_.files.info(output_)) {
-      if (options_.resume && made_from(env_.files, output_) == report_.input_sha256) {
+      const auto mark = options_.resume ? mark_in(env_.files, output_) : std::nullopt;
+      if (mark && text_in(*mark, "input_sha256") == report_.input_sha256) {
         report_.reasons.emplace_back("mended by an earlier run");
+        report_.resumed = true;
+        // What was used then, whatever would be chosen today.
+        report_.method = text_in(*mark, "method");
+        report_.constants_id = text_in(*mark, "constants_id");
         report_.output = output_;
         SIXPOINT_ASSIGN(const auto mended, survey(env_.files, output_, options_.still));
         if (mended.magnitude.blocks > 0) {

@@ -72,6 +72,7 @@ struct RepairReport {
   std::optional<double> still_error_before_mg;  // mean of |magnitude - 1 g| over still blocks
   std::optional<double> still_error_after_mg;
   bool rotation_undone = false;
+  bool resumed = false;  // mended by an earlier run; method and constants are those of its mark
   std::string constants_id;
   std::string input_sha256;
   std::string output_sha256;

@@ -34,6 +34,7 @@ Status StillScan::start(Result<calib::Reversal> reversal) {
   close_finder();
   reversal_ = std::make_unique<calib::Reversal>(*std::move(reversal));
   SIXPOINT_ASSIGN(finder_, calib::StillBlockFinder::make(*reversal_, rate_hz_, options_));
+  finder_->set_temperature(temperature_c_);
   return {};
 }
 
@@ -58,6 +59,11 @@ void StillScan::push(std::uint32_t unix_time, std::span<const gt3x::Counts> samp
 void StillScan::break_run() {
   finder_->break_run();
   last_time_.reset();
+}
+
+void StillScan::set_temperature(std::optional<double> celsius) {
+  temperature_c_ = celsius;
+  finder_->set_temperature(celsius);
 }
 
 void StillScan::close_finder() {

@@ -38,6 +38,8 @@ class StillScan {
   // One record's samples in the firmware's order of axes, right way round; X Y Z.
   void push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples);
   void break_run();
+  // Holds for the blocks that end after it (.agdc).
+  void set_temperature(std::optional<double> celsius);
 
   // Finishes. Blocks in order of time; mean_lsb are raw counts whatever constants were in force:
   // means of the recovered integers, or, where the file's counts cannot have come from integers
@@ -60,6 +62,7 @@ class StillScan {
   std::unique_ptr<calib::Reversal> reversal_;  // at a fixed address: the finder keeps a pointer
   std::optional<calib::StillBlockFinder> finder_;
   std::optional<std::uint32_t> last_time_;
+  std::optional<double> temperature_c_;
   std::vector<calib::StillBlock> blocks_;
   std::vector<PerAxis<double>> affine_lsb_;  // of each block, what the straight line makes of it
   calib::PlausibilityTally plausibility_;

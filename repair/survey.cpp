@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/agdc.h"
+#include "gt3x/byte_source.h"
 #include "gt3x/model.h"
 #include "gt3x/parameters.h"
 #include "gt3x/recording.h"
@@ -13,6 +15,7 @@ namespace sixpoint::repair {
 namespace {
 
 constexpr double kUsualScale_lsb_per_g = 256;
+constexpr double kHum_g = 0.04;  // standard deviation under a climate chamber's fan
 
 bool at_limit(const gt3x::Counts& sample) {
   return std::any_of(sample.begin(), sample.end(), [](std::int16_t count) {
@@ -50,6 +53,49 @@ Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& record
       }
     }
   }
+}
+
+// A small entry of an .agdc file; empty where it is missing or too large.
+std::string text_of(gt3x::Recording& recording, const std::string& name) {
+  if (!recording.has_entry(name)) {
+    return {};
+  }
+  auto source = recording.open_entry(name);
+  if (!source) {
+    return {};
+  }
+  const auto bytes = gt3x::read_all(**source, 1U << 20U);
+  return bytes ? std::string(bytes->begin(), bytes->end()) : std::string();
+}
+
+// What an .agdc file says about its raw counts.
+std::optional<calib::Calibration> raw_calibration_of(gt3x::Recording& recording, double rate_hz) {
+  const auto calibration = gt3x::parse_agdc_calibration(text_of(recording, "calibration.json"),
+                                                        static_cast<int>(rate_hz));
+  if (!calibration || calibration->already_applied) {
+    return std::nullopt;
+  }
+  if (calibration->constants) {
+    if (const auto six_point = calib::calibration_from(*calibration->constants)) {
+      return *six_point;
+    }
+  }
+  calib::Calibration out;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    out.sensitivity_g_per_lsb[a] = calibration->sensitivity_g_per_lsb[a][a];
+    out.zero_lsb[a] = calibration->offset_lsb[a];
+  }
+  return calib::validate(out) ? std::optional(out) : std::nullopt;
+}
+
+std::optional<double> celsius_of(const gt3x::Record& record,
+                                 const gt3x::TemperatureCalibration& thermometer) {
+  const auto reading = gt3x::parse_temperature(record.payload);
+  if (!reading || !reading->accelerometer_adc) {
+    return std::nullopt;
+  }
+  const double celsius = thermometer.accelerometer_c(*reading->accelerometer_adc);
+  return std::isfinite(celsius) && std::abs(celsius) < 200 ? std::optional(celsius) : std::nullopt;
 }
 
 FileFacts facts_of(const gt3x::Info& info) {
@@ -114,6 +160,15 @@ Result<Survey> survey(FileSystem& files, const std::string& path,
     use_constants(*first);
   }
 
+  std::optional<gt3x::TemperatureCalibration> thermometer;
+  if (auto parsed =
+          gt3x::parse_temperature_calibration(text_of(recording, "temperature_calibration.json"))) {
+    thermometer = *parsed;
+  }
+  std::optional<StillScan> raw_still;
+  std::optional<StillScan> raw_resting;
+  calib::StillBlockOptions humming = options;
+  humming.noisy_sd_g = kHum_g;
   SIXPOINT_ASSIGN(auto log, recording.open_log());
   std::vector<gt3x::Counts> samples;
   while (true) {
@@ -127,6 +182,10 @@ Result<Survey> survey(FileSystem& files, const std::string& path,
       // Zero bytes between records are legal and part nothing.
       if (item->kind != gt3x::LogItem::Kind::stray) {
         still.break_run();
+        if (raw_still) {
+          raw_still->break_run();
+          raw_resting->break_run();
+        }
       }
       continue;
     }
@@ -155,6 +214,29 @@ Result<Survey> survey(FileSystem& files, const std::string& path,
         undo_rotation(samples);
       }
       still.push(record.unix_time, samples);
+    } else if (record.is(gt3x::RecordType::activity3) && record.payload.size() > 1) {
+      if (!raw_still) {
+        result.raw_counts = true;
+        result.raw_calibration = raw_calibration_of(recording, result.rate_hz);
+        SIXPOINT_ASSIGN(raw_still, StillScan::make(result.rate_hz, kUsualScale_lsb_per_g, options));
+        SIXPOINT_ASSIGN(raw_resting,
+                        StillScan::make(result.rate_hz, kUsualScale_lsb_per_g, humming));
+      }
+      gt3x::unpack_activity3(record.payload, samples);
+      result.samples += samples.size();
+      raw_still->push(record.unix_time, samples);
+      raw_resting->push(record.unix_time, samples);
+    } else if (record.is(gt3x::RecordType::temperature)) {
+      if (thermometer && raw_still) {
+        const auto celsius = celsius_of(record, *thermometer);
+        raw_still->set_temperature(celsius);
+        raw_resting->set_temperature(celsius);
+      }
+    } else if (record.is(gt3x::RecordType::activity3)) {
+      if (raw_still) {
+        raw_still->break_run();  // USB
+        raw_resting->break_run();
+      }
     } else if (record.is(gt3x::RecordType::activity) || record.is(gt3x::RecordType::activity2) ||
                (record.is(gt3x::RecordType::event) && record.payload.size() == 1)) {
       still.break_run();  // USB, idle sleep
@@ -164,12 +246,30 @@ Result<Survey> survey(FileSystem& files, const std::string& path,
   result.blocks = still.finish();
   result.plausibility = still.plausibility();
   result.still_tally = still.tally();
+  if (raw_still) {
+    result.blocks = raw_still->finish();
+    result.resting = raw_resting->finish();
+    result.plausibility = raw_still->plausibility();
+    result.still_tally = raw_still->tally();
+    for (calib::StillBlock& block : result.blocks) {
+      if (result.raw_calibration) {
+        block.mean_g = result.raw_calibration->to_g(block.mean_lsb);
+      }
+    }
+  }
   result.magnitude = magnitude_error(result.blocks);
   result.duration_s = static_cast<double>(result.samples) / result.rate_hz;
   if (result.samples == 0) {
     result.constants_problem =
         Error{ErrorCode::bad_data, "the recording holds no samples", path,
               "nothing can be learnt from it or mended; download it from the unit again"};
+  } else if (result.raw_counts) {
+    result.constants_problem =
+        Error{ErrorCode::bad_data,
+              result.raw_calibration
+                  ? "the recording holds raw counts, which no constants have been applied to"
+                  : "the recording holds raw counts and no calibration.json that fits them",
+              path, "nothing has to be mended in it"};
   } else if (result.constants.empty() && !result.already_repaired) {
     result.constants_problem = Error{
         ErrorCode::bad_data, "the recording holds no complete set of constants (PARAMETERS)", path,

@@ -32,6 +32,11 @@ struct Survey {
   bool already_repaired = false;   // the mark is there
   // The constants that were in force for at least one sample, in order; usually one set.
   std::vector<StoredConstants> constants;
+  // An .agdc file's samples are raw counts, which nothing has to be undone for and nothing can be
+  // mended in; this is what its calibration.json makes of them (the six-point form, else offset and
+  // the diagonal of the matrix).
+  bool raw_counts = false;
+  std::optional<calib::Calibration> raw_calibration;
   // Why they cannot be used (none in the file, positive = negative, or no samples to use them on),
   // where that is so.
   std::optional<Error> constants_problem;
@@ -45,6 +50,9 @@ struct Survey {
   gt3x::LogStatistics log;
 
   std::vector<calib::StillBlock> blocks;
+  // Of a recording with temperatures: also the blocks at rest while something hums (a climate
+  // chamber's fan), which are no still blocks and whose means still show how zeros drift.
+  std::vector<calib::StillBlock> resting;
   calib::PlausibilityTally plausibility;
   calib::StillBlockTally still_tally;
   MagnitudeError magnitude;  // of the file as it is, by its own scale

@@ -6,13 +6,26 @@ set -euo pipefail
 
 build_packages=(
   ca-certificates ccache cmake g++ git ninja-build pkg-config
-  libcairo2-dev libcli11-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev librsvg2-dev libspdlog-dev libsqlite3-dev
+  libcli11-dev libcpp-httplib-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev
+  libspdlog-dev libsqlite3-dev libhidapi-dev libudev-dev libusb-1.0-0-dev
+  libcairo2-dev librsvg2-dev
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
+  libboost-dev libhpdf-dev libqrencode-dev libtomlplusplus-dev
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
+  chromium tmux
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
+  libumockdev-dev umockdev
+  busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils
+  poppler-utils zbar-tools
 )
+
+# The page's tests need Node; a machine that has it from elsewhere keeps it (its package has npm inside
+# and does not go together with Debian's).
+if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
+  test_packages+=(nodejs npm)
+fi
 
 wanted=()
 for group in "${@:-build}"; do

@@ -39,12 +39,39 @@ std::string_view to_string(JigPhase phase) {
       return "measuring";
     case JigPhase::verifying:
       return "verifying";
+    case JigPhase::reseating:
+      return "reseating";
     case JigPhase::writing:
       return "writing";
     case JigPhase::rechecking:
       return "rechecking";
     case JigPhase::finished:
       return "finished";
+  }
+  return "?";
+}
+
+Result<JigPhase> parse_jig_phase(std::string_view text) {
+  for (const JigPhase phase : {JigPhase::measuring, JigPhase::verifying, JigPhase::reseating,
+                               JigPhase::writing, JigPhase::rechecking, JigPhase::finished}) {
+    if (to_string(phase) == text) {
+      return phase;
+    }
+  }
+  return fail(ErrorCode::bad_data,
+              fmt::format("'{}' is no phase of a jig run", printable(text, 40)));
+}
+
+std::string_view to_string(JigStillness stillness) {
+  switch (stillness) {
+    case JigStillness::moving:
+      return "moving";
+    case JigStillness::settling:
+      return "settling";
+    case JigStillness::dwelling:
+      return "dwelling";
+    case JigStillness::leaving:
+      return "leaving";
   }
   return "?";
 }
@@ -63,13 +90,15 @@ std::string_view to_string(JigOutcome outcome) {
       return "stopped";
     case JigOutcome::unit_gone:
       return "unit_gone";
+    case JigOutcome::sensor_stuck:
+      return "sensor_stuck";
   }
   return "?";
 }
 
 double dwell_budget_s(const JigRunOptions& options) {
   const std::size_t poses = device::kPoses.size() + options.verification.size() +
-                            (options.write ? options.recheck.size() : 0);
+                            options.reseat.size() + (options.write ? options.recheck.size() : 0);
   return static_cast<double>(poses) * (options.window_s + options.settle_s + options.dwell_s);
 }
 
@@ -78,27 +107,124 @@ JigRun::JigRun(JigRunOptions options, const calib::Calibration& approximation)
       approximation_(approximation),
       open_(device::kPoses.begin(), device::kPoses.end()) {}
 
+void JigRun::resume(const JigProgress& progress) {
+  phase_ = progress.phase == JigPhase::finished ? JigPhase::reseating : progress.phase;
+  faces_ = progress.faces;
+  reversed_ = progress.reversed;
+  reseat_ = progress.reseat;
+  recheck_ = progress.recheck;
+  refusals_ = progress.refusals;
+  open_ = wanted_in(phase_);
+  for (const PoseReading& reading : readings_of_phase()) {
+    std::erase(open_, reading.pose);
+  }
+}
+
+JigProgress JigRun::progress() const {
+  return {phase_, faces_, reversed_, reseat_, recheck_, refusals_};
+}
+
+std::vector<PoseReading> JigRun::verification() const {
+  std::vector<PoseReading> readings = reversed_;
+  readings.insert(readings.end(), reseat_.begin(), reseat_.end());
+  return readings;
+}
+
+JigLive JigRun::live() const {
+  JigLive live;
+  live.stillness = state_;
+  if (!recent_.empty()) {
+    live.face = nearest_face(approximation_.to_g(window().mean_lsb));
+  }
+  live.dwell_fraction = std::min(
+      1.0, static_cast<double>(dwell_.size()) / std::max(1.0, options_.dwell_s * options_.rate_hz));
+  return live;
+}
+
 std::vector<JigAction> JigRun::start(double now_s) {
   now_s_ = now_s;
   last_progress_s_ = now_s;
-  ask_next();
+  if (phase_ != JigPhase::measuring) {
+    actions_.push_back({JigAction::Kind::fit, Pose::plus_z, "all six faces are taken"});
+  }
+  if (phase_ == JigPhase::writing) {
+    actions_.push_back({JigAction::Kind::write, Pose::plus_z, "writing the constants"});
+  } else if (open_.empty()) {
+    next_phase();
+  } else {
+    ask_next();
+  }
   return std::exchange(actions_, {});
 }
 
-std::vector<PoseReading>& JigRun::readings_of_phase() {
-  return phase_ == JigPhase::measuring   ? faces_
-         : phase_ == JigPhase::verifying ? verification_
-                                         : recheck_;
+const std::vector<PoseReading>& JigRun::readings_of(JigPhase phase) const {
+  return phase == JigPhase::measuring   ? faces_
+         : phase == JigPhase::verifying ? reversed_
+         : phase == JigPhase::reseating ? reseat_
+                                        : recheck_;
+}
+
+const std::vector<Pose>& JigRun::wanted_in(JigPhase phase) const {
+  static const std::vector<Pose> kAll(device::kPoses.begin(), device::kPoses.end());
+  static const std::vector<Pose> kNone;
+  switch (phase) {
+    case JigPhase::measuring:
+      return kAll;
+    case JigPhase::verifying:
+      return options_.verification;
+    case JigPhase::reseating:
+      return options_.reseat;
+    case JigPhase::rechecking:
+      return options_.recheck;
+    case JigPhase::writing:
+    case JigPhase::finished:
+      break;
+  }
+  return kNone;
+}
+
+// Would a reading of `pose`, reached from `from`, be another side of approach than the first one?
+bool JigRun::from_other_side(Pose pose, Pose from) const {
+  return pose != from && std::none_of(faces_.begin(), faces_.end(), [&](const PoseReading& face) {
+           return face.pose == pose && face.from == from;
+         });
 }
 
 void JigRun::ask_next() {
-  if (!open_.empty()) {
-    actions_.push_back(
-        {JigAction::Kind::place, open_.front(),
-         fmt::format("turn the unit to {}: its {} axis points {}", device::to_string(open_.front()),
-                     kAxisNames[device::axis_of(open_.front())],
-                     device::sign_of(open_.front()) > 0 ? "up" : "down")});
+  if (open_.empty()) {
+    return;
   }
+  detour_.reset();
+  const auto describe = [](Pose pose) {
+    return fmt::format("{}: its {} axis points {}", device::to_string(pose),
+                       kAxisNames[device::axis_of(pose)],
+                       device::sign_of(pose) > 0 ? "up" : "down");
+  };
+  if (phase_ == JigPhase::verifying && last_face_) {
+    // First a face that lies well from here; where there is none, one to come from.
+    const auto good = std::find_if(open_.begin(), open_.end(),
+                                   [&](Pose pose) { return from_other_side(pose, *last_face_); });
+    if (good != open_.end()) {
+      std::rotate(open_.begin(), good, good + 1);
+    } else {
+      for (const Pose by_way_of : device::kPoses) {
+        if (by_way_of != *last_face_ && from_other_side(open_.front(), by_way_of)) {
+          detour_ = by_way_of;
+          actions_.push_back({JigAction::Kind::place, by_way_of,
+                              fmt::format("lay the unit on {} for a moment, so that it comes to {} "
+                                          "from another side",
+                                          describe(by_way_of), device::to_string(open_.front()))});
+          return;
+        }
+      }
+    }
+  }
+  actions_.push_back(
+      {JigAction::Kind::place, open_.front(),
+       fmt::format("{} {}",
+                   phase_ == JigPhase::reseating ? "take the unit off, put it back and turn it to"
+                                                 : "turn the unit to",
+                   describe(open_.front()))});
 }
 
 void JigRun::finish(JigOutcome outcome, std::string text) {
@@ -147,9 +273,32 @@ std::vector<JigAction> JigRun::on_loss() {
   return std::exchange(actions_, {});
 }
 
+bool JigRun::is_stuck(const device::RawCounts& counts) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    repeats_[axis] = counts[axis] == repeated_[axis] ? repeats_[axis] + 1 : 0;
+    // At its limit a sensor repeats itself for another reason, which finish_dwell() names.
+    if (repeats_[axis] > static_cast<int>(options_.stuck_s * options_.rate_hz) &&
+        counts[axis] > kRawMin && counts[axis] < kRawMax) {
+      const bool all = std::all_of(repeats_.begin(), repeats_.end(),
+                                   [&](int repeats) { return repeats >= repeats_[axis] / 2; });
+      finish(JigOutcome::sensor_stuck,
+             all ? fmt::format("the sensor is frozen: no axis has changed for {:.0f} s",
+                               options_.stuck_s)
+                 : fmt::format("the sensor's {} axis is stuck: it has read {} for {:.0f} s",
+                               kAxisNames[axis], counts[axis], options_.stuck_s));
+      return true;
+    }
+  }
+  repeated_ = counts;
+  return false;
+}
+
 std::vector<JigAction> JigRun::on_sample(const Sample& sample) {
   now_s_ = sample.time_s;
   if (phase_ == JigPhase::finished || phase_ == JigPhase::writing) {
+    return std::exchange(actions_, {});
+  }
+  if (is_stuck(sample.counts)) {
     return std::exchange(actions_, {});
   }
   recent_.push_back(sample.counts);
@@ -246,13 +395,39 @@ void JigRun::begin_dwell() {
                                   face.angle_deg, device::to_string(face.pose)));
     return;
   }
-  if (std::find(open_.begin(), open_.end(), face.pose) == open_.end()) {
-    refuse(face.pose, fmt::format("{} is done already", device::to_string(face.pose)));
+  if (last_face_ != face.pose) {
+    came_from_ = std::exchange(last_face_, face.pose);
+  }
+  if (detour_ == face.pose) {
+    leave();
+    ask_next();
+    return;
+  }
+  if (const std::string reason = why_not_open(face.pose); !reason.empty()) {
+    refuse(face.pose, reason);
     return;
   }
   dwell_.clear();
   dwell_start_lsb_ = now.mean_lsb;
   state_ = State::dwelling;
+}
+
+// Empty when a reading of this face is wanted now.
+std::string JigRun::why_not_open(Pose pose) const {
+  if (std::find(open_.begin(), open_.end(), pose) == open_.end()) {
+    for (const PoseReading& reading : readings_of_phase()) {
+      if (reading.pose == pose) {
+        return fmt::format("{} is done already", device::to_string(pose));
+      }
+    }
+    return fmt::format("wrong face: this is {}, wanted is {}", device::to_string(pose),
+                       device::to_string(open_.front()));
+  }
+  if (phase_ == JigPhase::verifying && came_from_ && !from_other_side(pose, *came_from_)) {
+    return fmt::format("{} was reached from {} in the first round too; come from another face",
+                       device::to_string(pose), device::to_string(*came_from_));
+  }
+  return {};
 }
 
 std::optional<double> JigRun::level_lsb(std::size_t axis, Pose except) const {
@@ -325,6 +500,7 @@ void JigRun::finish_dwell() {
   reading.pose = nearest_face(approximation_.to_g(dwell_start_lsb_)).pose;
   reading.samples = static_cast<int>(dwell_.size());
   reading.start_s = dwell_.front().time_s;
+  reading.from = came_from_;
   const auto n = static_cast<double>(dwell_.size());
   bool clipped = false;
   for (const Sample& sample : dwell_) {
@@ -421,6 +597,10 @@ void JigRun::next_phase() {
       open_ = options_.verification;
       break;
     case JigPhase::verifying:
+      phase_ = JigPhase::reseating;
+      open_ = options_.reseat;
+      break;
+    case JigPhase::reseating:
       if (options_.write) {
         phase_ = JigPhase::writing;
         actions_.push_back({JigAction::Kind::write, Pose::plus_z, "writing the constants"});
@@ -464,11 +644,21 @@ std::vector<JigAction> JigRun::on_operator(OperatorWord word) {
     finish(JigOutcome::stopped, "stopped by the operator");
     return std::exchange(actions_, {});
   }
+  if (phase_ == JigPhase::writing) {
+    return {};
+  }
+  // The last reading of a phase can be taken back too; what was written stays written.
+  if (readings_of_phase().empty() &&
+      (phase_ == JigPhase::verifying || phase_ == JigPhase::reseating)) {
+    phase_ = phase_ == JigPhase::verifying ? JigPhase::measuring : JigPhase::verifying;
+    open_.clear();
+  }
   std::vector<PoseReading>& readings = readings_of_phase();
-  if (!readings.empty() && phase_ != JigPhase::writing) {
+  if (!readings.empty()) {
     const Pose pose = readings.back().pose;
     readings.pop_back();
     open_.insert(open_.begin(), pose);
+    last_refused_.reset();
     leave();
     actions_.push_back(
         {JigAction::Kind::dropped, pose, fmt::format("{} is taken back", device::to_string(pose))});
@@ -484,6 +674,15 @@ std::vector<JigAction> JigRun::on_time(double now_s) {
            fmt::format("nothing was accepted for {:.0f} s", options_.pose_time_out_s));
   }
   return std::exchange(actions_, {});
+}
+
+std::vector<JigAction> JigRun::on_unit_back(double now_s) {
+  now_s_ = now_s;
+  last_progress_s_ = now_s;
+  state_ = State::moving;
+  last_face_.reset();
+  came_from_.reset();
+  return on_loss();
 }
 
 std::vector<JigAction> JigRun::on_unit_gone() {

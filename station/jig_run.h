@@ -5,8 +5,13 @@
 // person, write the constants, done). It neither waits nor reads nor prints: the terminal, the page
 // and the tests drive the same machine. One thread at a time.
 //
-// Phases: measuring (six faces, any order) -> verifying (repeats that the fit has not seen) ->
-// [writing -> rechecking (with what the unit then holds)] -> finished.
+// Phases, which are the production protocol of `gap/`: measuring (`faces`: six, any order) ->
+// verifying (`faces_reversed`: six again, each reached from another face than before, so that what
+// depends on the side of approach shows) -> reseating (`reseat`: two taken off and put back) ->
+// [writing -> rechecking (with what the unit then holds)] -> finished. The fit sees the first six
+// readings only; the eight others judge it.
+//
+// resume() starts a machine with what an earlier one had accepted: the program was restarted.
 //
 // A pose is recognised from the readings by the unit's own constants, which may be off by 20 % and
 // 0.2 g. Stillness is judged by the unit's own noise, with hysteresis. Tilt is judged by the two
@@ -24,6 +29,7 @@
 
 #include "base/constants.h"
 #include "base/measure.h"
+#include "base/result.h"
 #include "calib/constants.h"
 #include "device/jig.h"
 #include "device/protocol.h"
@@ -34,8 +40,9 @@ using device::Pose;
 
 struct JigRunOptions {
   int rate_hz = 100;
-  // Mean of 6 s: noise of 5.5 mg falls to 0.2 mg, below the 0.17 mg per 0.01 degree of seating. Six
-  // faces and three repeats then cost a minute of dwell, of the three that production allows.
+  // Mean of 6 s: noise of 5.5 mg falls to 0.2 mg, below the 0.17 mg per 0.01 degree of seating.
+  // Fourteen placements, and two after a write, then cost two minutes of dwell, of the three that
+  // production allows.
   double dwell_s = 6;
   double settle_s = 0.5;  // still for this long before the dwell: straps and jigs ring that long
   double window_s = 1;    // over which noise is judged
@@ -51,9 +58,16 @@ struct JigRunOptions {
   // So many in a row, or five times as many in all, end the run: something is wrong that
   // patience does not mend.
   int refusals_in_row = 8;
-  std::vector<Pose> verification = {Pose::plus_z, Pose::minus_x, Pose::plus_y};
+  // The first round backwards, its last face last: asked for in this order, every face is reached
+  // from another one than in the first round.
+  std::vector<Pose> verification = {Pose::plus_y,  Pose::minus_x, Pose::plus_x,
+                                    Pose::minus_z, Pose::plus_z,  Pose::minus_y};
+  std::vector<Pose> reseat = {Pose::plus_z, Pose::minus_x};
   std::vector<Pose> recheck = {Pose::minus_z, Pose::plus_x};  // after a write
   bool write = false;
+  // An axis that repeats one count for so long is stuck: a working one has noise of a count, and a
+  // turn falls into the time of every pose.
+  double stuck_s = 15;
 };
 
 struct Sample {
@@ -70,11 +84,25 @@ struct PoseReading {
   double temperature_c = 0;
   double start_s = 0;
   double tilt_deg = 0;  // by the level axes, against what was known when it was taken
+  // The face it lay on before; none where that was not seen.
+  std::optional<Pose> from = {};
 };
 
-enum class JigPhase { measuring, verifying, writing, rechecking, finished };
-enum class JigOutcome { running, complete, timed_out, too_many_refusals, stopped, unit_gone };
+enum class JigPhase { measuring, verifying, reseating, writing, rechecking, finished };
+enum class JigOutcome {
+  running,
+  complete,
+  timed_out,
+  too_many_refusals,
+  stopped,
+  unit_gone,
+  sensor_stuck,
+};
+// What the unit is doing: still counts from a second without movement on.
+enum class JigStillness { moving, settling, dwelling, leaving };
 std::string_view to_string(JigPhase phase);
+std::string_view to_string(JigStillness stillness);
+Result<JigPhase> parse_jig_phase(std::string_view text);  // bad_data when it is none
 std::string_view to_string(JigOutcome outcome);
 
 struct JigAction {
@@ -101,17 +129,40 @@ NearestFace nearest_face(const PerAxis<double>& force_g);
 
 enum class OperatorWord { undo, stop };
 
+// What a run has so far: all that a later program needs to go on.
+struct JigProgress {
+  JigPhase phase = JigPhase::measuring;
+  std::vector<PoseReading> faces;
+  std::vector<PoseReading> reversed;
+  std::vector<PoseReading> reseat;
+  std::vector<PoseReading> recheck;
+  int refusals = 0;
+};
+
+// For the page: where the unit lies now.
+struct JigLive {
+  JigStillness stillness = JigStillness::moving;
+  std::optional<NearestFace> face;  // none before the first second of samples
+  double dwell_fraction = 0;        // of the reading under way
+};
+
 class JigRun {
  public:
   // `approximation`: the unit's stored constants, or nominal ones where it has none.
   JigRun(JigRunOptions options, const calib::Calibration& approximation);
+
+  // Before start(): goes on where another machine was. A write that was under way is done anew.
+  void resume(const JigProgress& progress);
+  JigProgress progress() const;
 
   std::vector<JigAction> start(double now_s);
   std::vector<JigAction> on_sample(const Sample& sample);
   std::vector<JigAction> on_loss();  // samples were lost: a reading under way begins anew
   std::vector<JigAction> on_operator(OperatorWord word);
   std::vector<JigAction> on_time(double now_s);
-  std::vector<JigAction> on_unit_gone();
+  std::vector<JigAction> on_unit_gone();  // for good
+  // It was away and is back: it may have been turned meanwhile, and nobody was slow.
+  std::vector<JigAction> on_unit_back(double now_s);
   std::vector<JigAction> on_written(double now_s);
   // Better knowledge of the unit, from the six faces: tilt is judged against it from here on.
   void set_approximation(const calib::Calibration& calibration) { approximation_ = calibration; }
@@ -120,18 +171,26 @@ class JigRun {
   JigOutcome outcome() const { return outcome_; }
   const std::vector<Pose>& open_poses() const { return open_; }
   const std::vector<PoseReading>& faces() const { return faces_; }
-  const std::vector<PoseReading>& verification() const { return verification_; }
+  std::vector<PoseReading> verification() const;  // both sides of approach, then the reseated
   const std::vector<PoseReading>& recheck() const { return recheck_; }
   int refusals() const { return refusals_; }
+  JigLive live() const;
 
  private:
-  enum class State { moving, settling, dwelling, leaving };
+  using State = JigStillness;
   struct Window {
     PerAxis<double> mean_lsb{};
     PerAxis<double> sd_mg{};
   };
 
-  std::vector<PoseReading>& readings_of_phase();
+  const std::vector<PoseReading>& readings_of(JigPhase phase) const;
+  const std::vector<PoseReading>& readings_of_phase() const { return readings_of(phase_); }
+  std::vector<PoseReading>& readings_of_phase() {
+    return const_cast<std::vector<PoseReading>&>(readings_of(phase_));
+  }
+  const std::vector<Pose>& wanted_in(JigPhase phase) const;
+  std::string why_not_open(Pose pose) const;
+  bool from_other_side(Pose pose, Pose from) const;
   double g_per_lsb(std::size_t axis) const { return approximation_.sensitivity_g_per_lsb[axis]; }
   Window window() const;
   bool is_still(const Window& window, bool already) const;
@@ -142,6 +201,7 @@ class JigRun {
   void ask_next();
   void next_phase();
   void finish(JigOutcome outcome, std::string text);
+  bool is_stuck(const device::RawCounts& counts);
   // Reading of a level axis in the accepted poses; nothing where there is none yet.
   std::optional<double> level_lsb(std::size_t axis, Pose except) const;
   double tilt_of(const PoseReading& reading) const;
@@ -155,8 +215,12 @@ class JigRun {
   State state_ = State::moving;
   std::vector<Pose> open_;
   std::vector<PoseReading> faces_;
-  std::vector<PoseReading> verification_;
+  std::vector<PoseReading> reversed_;
+  std::vector<PoseReading> reseat_;
   std::vector<PoseReading> recheck_;
+  std::optional<Pose> detour_;     // asked for only to come from there
+  std::optional<Pose> last_face_;  // where it lay still last
+  std::optional<Pose> came_from_;  // and before that
   std::optional<PoseReading> last_refused_;
   int refusals_ = 0;
   int refusals_in_row_ = 0;
@@ -166,6 +230,8 @@ class JigRun {
   PerAxis<std::int64_t> sum_square_{};
   PerAxis<double> own_noise_mg_{};  // the least seen; 0 = not known yet
   int still_samples_ = 0;
+  device::RawCounts repeated_{};  // the counts that came last
+  PerAxis<int> repeats_{};        // and how often in a row
   PerAxis<double> dwell_start_lsb_{};
   PerAxis<double> left_lsb_{};  // where the unit lay when it was told to leave
   std::vector<Sample> dwell_;

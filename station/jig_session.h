@@ -19,6 +19,8 @@
 #include "calib/six_pose.h"
 #include "device/unit.h"
 #include "station/jig_run.h"
+#include "station/limits.h"
+#include "station/verdict.h"
 
 namespace sixpoint::station {
 
@@ -26,15 +28,18 @@ struct JigSessionOptions {
   JigRunOptions run;
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   calib::LocalGravity gravity = calib::gravity_unknown();  // where the jig stands
-  // Largest distance of a verification reading's magnitude from local gravity. A real sensor's six
-  // constants leave 4 to 8 mg (curvature, cross-axis); an affected one is off by 100 and more.
-  double residual_limit_mg = 10;
+  Limits limits = default_limits();
+  RetestState retest;  // what the unit's earlier runs demand (verdict.h)
   // Longest silence of a streaming unit before it is given up.
   double silence_s = 3;
+  // An error in mid-run ends in a report with `ended_by`, so that what was measured can be kept;
+  // without it, in the error alone.
+  bool keep_interrupted = false;
+  // How often a jig that turns by itself is asked how it is.
+  double jig_poll_s = 0.25;
+  // So many tilted placements in a row that the jig calls exact: it does not stand where it says.
+  int jig_disagreements = 3;
 };
-
-enum class JigVerdict { pass, fail, inconclusive, stopped };
-std::string_view to_string(JigVerdict verdict);
 
 // One reading judged by constants: magnitude against local gravity.
 struct JudgedPose {
@@ -58,7 +63,12 @@ struct JigReport {
   UtcTime started{};
   UtcTime ended{};
   JigVerdict verdict = JigVerdict::inconclusive;
-  std::vector<std::string> reasons;
+  std::vector<std::string> codes;    // of verdict.h's catalogue; empty for a pass
+  std::vector<std::string> reasons;  // for people
+  Limits limits;
+  std::vector<JudgedQuantity> quantities;  // empty where the run did not get that far
+  // Why the run ended early, where it did; the verdict is inconclusive then.
+  std::optional<Error> ended_by;
   calib::LocalGravity gravity;
 
   std::vector<PoseReading> faces;
@@ -66,6 +76,9 @@ struct JigReport {
   std::optional<calib::SixPoseReport> six;
   std::string method;  // "six_pose_letter" (Eq. 1-6 to the letter), "six_pose_pair" ...
   JudgedPoses verification;
+  // Standard uncertainty of the chosen constants: noise, tilt and gravity as the fit has them, and
+  // what the constants leave on unused poses.
+  calib::ConstantsUncertainty combined;
   double rounded_residual_mg = 0;  // of the nine integers, on the same readings
 
   std::optional<device::CalibrationPage> as_found;
@@ -78,10 +91,11 @@ struct JigReport {
   device::StreamStatistics stream;
   std::string raw_csv;  // every sample of the run: device_time_us,x,y,z,temperature_c
 
-  bool usable() const { return verdict == JigVerdict::pass; }
+  bool usable() const { return is_passed(verdict); }
   std::string brief() const;
   // The contract's keys but `run`, `stored_id` and `certificate`.
   nlohmann::ordered_json to_json() const;
+  std::string raw_sha256() const;  // of raw_csv, which the store keeps
   // For the store. Only of a usable report.
   calib::ConstantsRecord record() const;
 };
@@ -89,9 +103,51 @@ struct JigReport {
 // What a person is told while it runs.
 using JigTeller = std::function<void(const JigAction&)>;
 
+// A unit and what turns it; both belong to somebody who keeps them until the next reopen().
+struct UnitOnJig {
+  device::Unit* unit = nullptr;
+  device::Jig* jig = nullptr;
+};
+
+// What an earlier program had of this run.
+struct JigResume {
+  JigProgress progress;
+  UtcTime started{};
+  std::optional<device::CalibrationPage> as_found;
+  std::optional<device::CalibrationPage> written;  // what the run wrote into the unit, if it did
+  std::string raw_csv;                             // with its headline
+};
+
+// Whoever drives the run hangs in here; all called on the run's own thread, all may be empty.
+struct JigHooks {
+  JigTeller tell;
+  // After every block of samples: for traces and live pictures.
+  std::function<void(const device::SampleBlock&, const JigRun&)> samples;
+  // Rows as they are added to the raw data, the headline first: for a disk.
+  std::function<void(std::string_view rows)> raw;
+  // After every action: for a disk, so that the run can be resumed.
+  std::function<void(const JigReport&, const JigRun&)> progress;
+  // What the operator said since the last call; asked after every block.
+  std::function<std::optional<OperatorWord>()> words;
+  // The unit went away. Waits until it is back and answers with it, opened anew, or gives up.
+  // Where this is empty, the run ends with the error; otherwise with a report that is inconclusive.
+  std::function<Result<UnitOnJig>(const Error&)> reopen;
+};
+
 // usage where the wanted filter cannot help this unit; device_unavailable when the unit goes away;
 // otherwise a report, whatever its verdict.
 Result<JigReport> run_jig(device::Unit& unit, device::Jig& jig, Env& env,
                           const JigSessionOptions& options, const JigTeller& tell);
+Result<JigReport> run_jig(UnitOnJig on_jig, Env& env, const JigSessionOptions& options,
+                          const JigHooks& hooks, const std::optional<JigResume>& resume = {});
+
+// The report of a run that ended with its program and whose unit did not come back: inconclusive,
+// with all that was measured.
+JigReport interrupted_report(const JigResume& resume, const std::string& serial,
+                             const std::string& firmware, const JigSessionOptions& options,
+                             UtcTime ended, const std::string& reason);
+
+nlohmann::ordered_json to_json(const JigProgress& progress);
+Result<JigProgress> parse_jig_progress(const nlohmann::ordered_json& json);  // bad_data
 
 }  // namespace sixpoint::station

@@ -15,11 +15,20 @@ namespace sixpoint::cli {
   COMMAND(solve)                   \
   COMMAND(jig)                     \
   COMMAND(capture)                 \
+  COMMAND(limits)                  \
+  COMMAND(certificate)             \
+  COMMAND(check_unit)              \
+  COMMAND(station_lock)            \
+  COMMAND(retest)                  \
+  COMMAND(statistics)              \
+  COMMAND(gage_rr)                 \
   COMMAND(units)                   \
   COMMAND(history)                 \
   COMMAND(audit)                   \
   COMMAND(store)                   \
   COMMAND(simulate)                \
+  COMMAND(session)                 \
+  COMMAND(devices)                 \
   COMMAND(doctor)                  \
   COMMAND(virtual)                 \
   COMMAND(station)                 \

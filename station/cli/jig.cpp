@@ -1,16 +1,23 @@
 // sixpoint jig: the technician's six-orientation run, in the terminal.
+#include <algorithm>
+#include <array>
 #include <memory>
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include "base/atomic_file.h"
 #include "calib/gravity.h"
-#include "db/journal.h"
 #include "device/unit.h"
-#include "gt3x/model.h"
+#include "station/certificate.h"
 #include "station/cli/command.h"
+#include "station/cli/record_option.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
+#include "station/run_records.h"
+#include "station/station_records.h"
 
 namespace sixpoint::cli {
 
@@ -19,121 +26,148 @@ namespace {
 struct Options {
   std::string device;
   std::string jig;
+  std::string jig_id;
+  std::string jig_due;
+  std::string retest_of;
   std::string operator_name;
   std::string station;
   std::string filter = "current";
+  std::string limits;
+  std::string study;
+  std::string certificate;
+  std::string label;
   std::string store;
+  std::string record;
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
+  double dwell_s = station::JigRunOptions{}.dwell_s;
   bool write = false;
   bool json = false;
 };
 
 struct Done {
   station::JigReport report;
-  double residual_limit_mg = 0;  // that the verdict used
   std::string run_id;
   std::optional<std::string> constants_id;
+  bool certified = false;
+  bool labelled = false;
+  Result<db::Kept> kept = db::Kept{};
 };
 
-int exit_code_of(station::JigVerdict verdict) {
-  switch (verdict) {
-    case station::JigVerdict::pass:
-      return kExitPassed;
-    case station::JigVerdict::fail:
-      return kExitFailed;
-    case station::JigVerdict::inconclusive:
-      return kExitInconclusive;
-    case station::JigVerdict::stopped:
-      return kExitStopped;
+// What is known before the unit is measured; refused here, it costs no one a run.
+Result<db::RunRecord> record_before(Context& context, const Options& options,
+                                    const station::JigSessionOptions& session,
+                                    const std::string& serial, const std::string& jig,
+                                    Result<db::Store>& store) {
+  db::RunRecord run =
+      station::run_record_before(session, serial, options.jig_id.empty() ? jig : options.jig_id);
+  if (!options.study.empty()) {
+    run.kind = station::kStudyKind;
   }
-  return kExitFailed;
-}
-
-// Into the store, or into the journal, which takes the same.
-template <class Keeper>
-Status keep_in(Keeper& keeper, const Options& options, Done& done) {
-  const station::JigReport& report = done.report;
-  const std::string model(gt3x::model_of(report.serial));
-  db::RunRecord run;
-  run.serial = report.serial;
-  run.model = model;
-  run.kind = "jig";
-  run.filter = calib::to_string(report.filter);
-  run.started = report.started;
-  run.ended = report.ended;
   run.operator_name = options.operator_name;
   run.station = options.station;
-  run.jig = report.jig;
-  run.verdict = station::to_string(report.verdict);
-  run.software = "sixpoint " SIXPOINT_VERSION;
-  run.document = report.to_json().dump();
-  run.gravity_m_per_s2 = report.gravity.m_per_s2;
-  run.codes = report.reasons;
-  if (!report.faces.empty()) {
-    double sum_c = 0;
-    for (const station::PoseReading& face : report.faces) {
-      sum_c += face.temperature_c;
+  if (!options.jig_due.empty()) {
+    const auto due = parse_iso8601(options.jig_due);
+    if (!due) {
+      return fail(ErrorCode::usage, due.error().what, "--jig-due", "write it as 2027-03-31");
     }
-    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
+    run.jig_due = *due;
+    if (*due < context.env.clock.now()) {
+      context.log().warn("the jig was due for its own calibration on {}", to_iso8601(*due));
+    }
   }
-  run.limits = Json{{"residual_mg", done.residual_limit_mg}}.dump();
-  SIXPOINT_ASSIGN(
-      done.run_id,
-      keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
-  if (report.written) {
-    db::UnitWrite write;
-    write.run_id = done.run_id;
-    write.serial = report.serial;
-    write.written = report.ended;
-    write.as_found =
-        report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
-    write.as_left = calib::to_json(report.six->best().stored).dump();
-    write.read_back = calib::to_json(report.as_left->constants).dump();
-    SIXPOINT_CHECK(keeper.add_unit_write(write));
+  if (!options.retest_of.empty()) {
+    // In the journal a run that refers to none would block all that come after it.
+    if (!store) {
+      return fail(store.error());
+    }
+    SIXPOINT_ASSIGN(const auto history, store->unit_history(serial));
+    const auto earlier = std::find_if(
+        history.runs.rbegin(), history.runs.rend(), [&](const db::RunRecord& candidate) {
+          return candidate.kind == "jig" &&
+                 (options.retest_of == "last" || options.retest_of == candidate.id);
+        });
+    if (earlier == history.runs.rend()) {
+      return fail(ErrorCode::no_input,
+                  fmt::format("the store has no such jig run of unit {}", printable(serial)),
+                  "--retest-of " + printable(options.retest_of, 60),
+                  "'sixpoint history SERIAL' lists its runs; or leave the option out");
+    }
+    run.retest_of = earlier->id;
   }
-  if (report.usable()) {
-    calib::ConstantsRecord constants = report.record();
-    constants.made_from.station = options.station;
-    db::ConstantsRecord row;
-    row.made_at = report.ended;
-    row.serial = report.serial;
-    row.filter = calib::to_string(report.filter);
-    row.method = constants.method;
-    row.run_id = done.run_id;
-    row.document = calib::to_json(constants).dump();
-    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, model));
+  SIXPOINT_CHECK(db::id_of(run, {}));
+  return run;
+}
+
+Status check_outputs(const Options& options) {
+  const std::string& path = options.certificate;
+  if (!path.empty() && !path.ends_with(".pdf") && !path.ends_with(".json")) {
+    return fail(ErrorCode::usage, "a certificate is a .pdf or a .json", path,
+                "end the file's name with one of them");
+  }
+  if (!options.label.empty() && !options.write) {
+    return fail(ErrorCode::usage, "a label says that the unit holds what was measured", "--label",
+                "add --write, which writes the constants and reads them back");
+  }
+  if (!options.study.empty() &&
+      (options.operator_name.empty() || !options.certificate.empty() || options.write)) {
+    return fail(ErrorCode::usage, "a gage study compares operators and changes no unit", "--study",
+                "name the --operator, and leave out --write and --certificate");
   }
   return {};
 }
 
-// A run is not lost because the server is away: it waits in the journal, which every later run and
-// 'sixpoint store catch-up' empties in order.
-Status keep(Context& context, const Options& options, Done& done) {
-  auto store = open_store(context, options.store);
-  if (!is_on_server(options.store)) {
-    return store ? keep_in(*store, options, done) : Status(fail(store.error()));
+// Certificate and label from the record as it is stored, so that they can be made again from there.
+// A run without a result has none; what cannot be made is said and is no reason to lose the run.
+void make_papers(Context& context, const Options& options, const db::RunRecord& run, Done& done) {
+  const auto settle = [&](const Status& made, bool& flag) {
+    flag = made.has_value();
+    if (!made) {
+      context.log().error("{}", made.error().brief());
+      if (made.error().code != ErrorCode::bad_data) {
+        context.worsen(static_cast<int>(made.error().code));
+      }
+    }
+  };
+  if (!options.certificate.empty()) {
+    settle(station::write_certificate(context.env.files, options.certificate, run), done.certified);
   }
-  SIXPOINT_ASSIGN(auto journal,
-                  db::Journal::open(context.env.files, journal_folder(options.store)));
-  Status status = store ? Status() : Status(fail(store.error()));
-  if (status) {
-    const auto taken = journal.catch_up(*store);
-    status = taken ? keep_in(*store, options, done) : Status(fail(taken.error()));
+  if (!options.label.empty()) {
+    const auto label = station::label_zpl(run);
+    settle(
+        label ? write_file(context.env.files, options.label, *label) : Status(fail(label.error())),
+        done.labelled);
   }
-  if (status || status.error().code != ErrorCode::device_unavailable) {
-    return status;
-  }
-  // What the store did take before it went away is named the same, and stored once.
-  SIXPOINT_CHECK(keep_in(journal, options, done));
-  context.log().warn("{}; the run is kept in this station's journal and goes into the store later",
-                     status.error().brief());
-  return {};
 }
 
-Result<Done> run(Context& context, const Options& options) {
+// What the operator typed since the last call, without waiting: a line that begins with u or s.
+std::optional<station::OperatorWord> terminal_word() {
+  pollfd keyboard{STDIN_FILENO, POLLIN, 0};
+  if (poll(&keyboard, 1, 0) <= 0 || (keyboard.revents & POLLIN) == 0) {
+    return std::nullopt;
+  }
+  std::array<char, 80> line{};
+  if (read(STDIN_FILENO, line.data(), line.size()) <= 0) {
+    return std::nullopt;
+  }
+  switch (line[0]) {
+    case 'u':
+      return station::OperatorWord::undo;
+    case 's':
+    case 'q':
+      return station::OperatorWord::stop;
+    default:
+      return std::nullopt;
+  }
+}
+
+Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(check_outputs(options));
   station::JigSessionOptions session;
+  if (!options.limits.empty()) {
+    SIXPOINT_ASSIGN(session.limits, station::read_limits(context.env.files, options.limits));
+  }
   SIXPOINT_ASSIGN(session.filter, calib::parse_filter_configuration(options.filter));
   if (options.gravity_m_per_s2) {
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_entered(*options.gravity_m_per_s2));
@@ -141,13 +175,21 @@ Result<Done> run(Context& context, const Options& options) {
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_at(*options.latitude_deg, options.altitude_m));
   }
   session.run.write = options.write;
+  session.run.dwell_s = options.dwell_s;
 
-  const device::TransportRegistry devices = station::known_devices();
-  SIXPOINT_ASSIGN(device::Link link,
-                  devices.open(station::with_jig(options.device, options.jig), context.env));
-  SIXPOINT_ASSIGN(const auto unit, device::Unit::open(std::move(link)));
-  device::ManualJig by_hand;
-  device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
+  session.keep_interrupted = true;
+
+  SIXPOINT_ASSIGN(const auto unit, station::known_units().open(
+                                       station::with_jig(options.device, options.jig), context.env,
+                                       [&recorder](device::Link& link) { recorder.attach(link); }));
+  if (!unit->abilities().streams || !unit->abilities().holds_constants) {
+    return fail(ErrorCode::usage, "this unit offers files and no live samples", unit->address(),
+                "calibrate it by a file: 'sixpoint capture'");
+  }
+  std::unique_ptr<device::Jig> own_jig;
+  SIXPOINT_ASSIGN(device::Jig* const chosen,
+                  station::choose_jig(options.jig, *unit, context.env, own_jig));
+  device::Jig& jig = *chosen;
 
   context.people << fmt::format("unit {} with firmware {}; jig: {}\n",
                                 printable(unit->identity().serial),
@@ -170,22 +212,77 @@ Result<Done> run(Context& context, const Options& options) {
     }
     context.people << std::flush;
   };
+  // Opened before the work, so that what nobody can store is said now; a store that is away or
+  // refuses is no reason not to measure.
+  auto store = open_store(context, options.store);
+  if (!store && store.error().code == ErrorCode::usage) {
+    return fail(store.error());
+  }
+  const auto allowed = [&]() -> Result<station::RetestState> {
+    if (!store) {
+      return fail(store.error());
+    }
+    return options.study.empty() ? station::may_start(*store, unit->identity().serial,
+                                                      options.station, session.limits)
+                                 : station::RetestState{};
+  }();
+  if (allowed) {
+    session.retest = *allowed;
+  } else if (store && allowed.error().code == ErrorCode::configuration) {
+    return fail(allowed.error());
+  } else {
+    // A store that answers wrongly or not at all is no reason not to measure.
+    context.log().warn(
+        "the store does not answer: whether the station is locked and how often the "
+        "unit failed is not known");
+  }
+  SIXPOINT_ASSIGN(auto record, record_before(context, options, session, unit->identity().serial,
+                                             jig.name(), store));
+  if (record.retest_of.empty()) {
+    record.retest_of = session.retest.retest_of;
+  }
+  station::JigHooks hooks;
+  hooks.tell = tell;
+  hooks.reopen = station::wait_for_unit(*unit, jig, [&context](const std::string& text) {
+    context.people << text << '\n' << std::flush;
+  });
+  if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
+    context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
+    hooks.words = terminal_word;
+  }
   Done done;
-  SIXPOINT_ASSIGN(done.report, station::run_jig(*unit, jig, context.env, session, tell));
-  done.residual_limit_mg = session.residual_limit_mg;
-  SIXPOINT_CHECK(keep(context, options, done));
+  SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
+  station::complete_run_record(record, done.report, options.study);
+  done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
+    SIXPOINT_ASSIGN(const auto stored, station::add_run_records(keeper, done.report, record));
+    done.run_id = stored.run_id;
+    done.constants_id = stored.constants_id;
+    return {};
+  });
+  record.id = done.run_id;
+  if (done.kept) {
+    make_papers(context, options, record, done);
+  }
   return done;
 }
 
-Json to_json(const Done& done) {
+Json to_json(const Options& options, const Done& done) {
   Json json = document("jig");
   json["run"] = done.run_id;
   const Json report = done.report.to_json();
   for (const auto& [key, value] : report.items()) {
     json[key] = value;
   }
+  if (done.report.ended_by) {
+    json["error"] = error_to_json(*done.report.ended_by);
+  }
   json["stored_id"] = done.constants_id ? Json(*done.constants_id) : Json(nullptr);
-  json["certificate"] = nullptr;
+  json["certificate"] = done.certified ? Json(options.certificate) : Json(nullptr);
+  json["label"] = done.labelled ? Json(options.label) : Json(nullptr);
+  json["kept"] = done.kept ? kept_to_json(*done.kept) : Json(nullptr);
+  if (!done.kept) {
+    json["error"] = error_to_json(done.kept.error());
+  }
   return json;
 }
 
@@ -201,6 +298,9 @@ void print(Context& context, const Done& done) {
                                  best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
                                  best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
     }
+  }
+  if (!done.kept) {
+    return;
   }
   context.out << fmt::format("run {}\n", done.run_id);
   if (done.constants_id) {
@@ -218,8 +318,14 @@ void add_jig(CLI::App& app, Context& context) {
       ->add_option("--device", options->device,
                    "the unit, for example virtual:seed=7 (docs/virtual.md)")
       ->required();
-  command->add_option("--jig", options->jig, "manual (a person turns the unit) or virtual")
-      ->check(CLI::IsMember({"manual", "virtual"}));
+  command->add_option("--jig", options->jig,
+                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
+  command->add_option("--jig-id", options->jig_id,
+                      "the jig's own number, for the record (which units were on it?)");
+  command->add_option("--jig-due", options->jig_due,
+                      "when the jig itself is due for calibration (2027-03-31), for the record");
+  command->add_option("--retest-of", options->retest_of,
+                      "the run that this one repeats: its id, or 'last' for the unit's last one");
   command->add_option("--operator", options->operator_name, "who runs it, for the record");
   command->add_option("--station", options->station, "where it is run, for the record");
   command->add_option("--filter", options->filter, "filter configuration: current or legacy")
@@ -229,19 +335,43 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");
   command->add_option("--altitude", options->altitude_m, "... and metres above sea level");
+  command->add_option("--dwell", options->dwell_s, "seconds that each pose is measured for")
+      ->check(CLI::Range(0.5, 600.0))
+      ->capture_default_str();
+  command->add_option("--limits", options->limits,
+                      "a TOML file of limits (docs/limits.md); else the built-in ones");
+  command->add_option("--certificate", options->certificate,
+                      "the calibration certificate: a .pdf or .json to make");
+  command->add_option("--label", options->label,
+                      "a label for the unit, as ZPL; after a read-back only (--write)");
+  command->add_option("--study", options->study,
+                      "this run belongs to a gage study of that name (sixpoint gage-rr)");
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);
+  add_record_option(*command, options->record);
   command->add_flag("--json", options->json, "answer as JSON");
   command->callback([options, &context] {
-    const Result<Done> done = run(context, *options);
+    device::SessionRecorder recorder;
+    const Result<Done> done = run(context, *options, recorder);
+    save_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "jig", done.error(), options->json);
       return;
     }
-    context.worsen(exit_code_of(done->report.verdict));
+    const std::optional<Error>& ended_by = done->report.ended_by;
+    if (ended_by) {
+      context.log().error("{}", ended_by->brief());
+    }
+    context.worsen(ended_by ? static_cast<int>(ended_by->code)
+                            : station::exit_code_of(done->report.verdict));
+    if (!done->kept) {
+      // The report below is then the only copy.
+      context.log().error("{}", done->kept.error().brief());
+      context.worsen(static_cast<int>(done->kept.error().code));
+    }
     if (options->json) {
-      print_json(context, to_json(*done));
+      print_json(context, to_json(*options, *done));
     } else {
       print(context, *done);
     }

@@ -1,4 +1,5 @@
 // sixpoint repair PATH... -o OUTDIR: mends affected files; the originals stay as they are.
+#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
@@ -9,6 +10,7 @@
 #include "station/cli/file_tree.h"
 #include "station/cli/store_option.h"
 #include "station/cli/workers.h"
+#include "station/software.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -48,7 +50,7 @@ RepairReport failed(const std::string& input, const Error& error) {
 }
 
 // What the store is told about a file that was mended.
-Status remember(Context& context, db::Store& store, const RepairReport& report) {
+db::RepairRecord record_of(Context& context, const RepairReport& report) {
   db::RepairRecord record;
   record.serial = report.serial;
   record.made_at = context.env.clock.now();
@@ -58,8 +60,61 @@ Status remember(Context& context, db::Store& store, const RepairReport& report) 
   record.method = report.method;
   record.constants_id = report.constants_id;
   record.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
-  SIXPOINT_CHECK(store.add_repair(record));
-  return {};
+  record.software = station::software_name();
+  if (const std::string build = station::software_build(); !build.empty()) {
+    record.software += fmt::format(" ({})", build);
+  }
+  return record;
+}
+
+// Tells the store about all files that were mended. A file of an earlier run (--resume) is told
+// only when that run ended before it could say so. Nothing where there was nothing to say.
+Result<std::optional<db::Kept>> remember(Context& context, const std::string& location,
+                                         db::Store store,
+                                         const std::vector<RepairReport>& reports) {
+  std::vector<db::RepairRecord> records;
+  for (const RepairReport& report : reports) {
+    if (report.status != RepairStatus::repaired || report.dry_run) {
+      continue;
+    }
+    if (report.resumed) {
+      const auto known = store.repair_of_output(report.output_sha256);
+      if (known && *known && (*known)->input_sha256 == report.input_sha256) {
+        continue;
+      }
+    }
+    db::RepairRecord record = record_of(context, report);
+    if (report.resumed && !record.constants_id.empty()) {
+      // The mark may name constants of another store.
+      const auto known = store.history(report.serial);
+      const bool here =
+          known && std::any_of(known->begin(), known->end(), [&](const auto& constants) {
+            return constants.id == record.constants_id;
+          });
+      record.constants_id = here ? record.constants_id : "";
+    }
+    // One file with a serial number that no store keeps must not stand in the way of the others.
+    if (const auto id = db::id_of(record); !id) {
+      context.log().error("{}: mended, but the store cannot keep it: {}", printable(report.input),
+                          id.error().brief());
+      context.worsen(static_cast<int>(id.error().code));
+      continue;
+    }
+    records.push_back(std::move(record));
+  }
+  if (records.empty()) {
+    return std::nullopt;
+  }
+  Result<db::Store> taken = std::move(store);
+  std::size_t acknowledged = 0;
+  SIXPOINT_ASSIGN(auto kept,
+                  keep_records(context, location, taken, [&](db::Keeper& keeper) -> Status {
+                    for (; acknowledged < records.size(); ++acknowledged) {
+                      SIXPOINT_CHECK(keeper.add_repair(records[acknowledged]));
+                    }
+                    return {};
+                  }));
+  return kept;
 }
 
 Result<repair::ConstantsFinderOptions> sources(const Options& options, Context& context,
@@ -80,7 +135,7 @@ Result<repair::ConstantsFinderOptions> sources(const Options& options, Context& 
   const bool only_scan = options.scan && options.store.empty() && options.calibration_file.empty();
   if (!options.store.empty()) {
     SIXPOINT_ASSIGN(store, open_existing_store(context, options.store));
-  } else if (!only_scan && context.env.files.info(default_store())) {
+  } else if (!only_scan && store_exists(context, "")) {
     SIXPOINT_ASSIGN(store, open_existing_store(context, ""));
   }
   finder.store = store ? &*store : nullptr;
@@ -163,12 +218,19 @@ void run(const Options& options, Context& context) {
     context.worsen(exit_code_of(report));
     const std::string status(to_string(report.status));
     summary[status] = summary[status].get<int>() + 1;
-    if (store && report.status == RepairStatus::repaired && !report.dry_run) {
-      if (const auto kept = remember(context, *store, report); !kept) {
-        context.log().error("the repair of {} could not be written to the store: {}",
-                            printable(report.input), kept.error().brief());
-        context.worsen(static_cast<int>(kept.error().code));
-      }
+  }
+  Json kept_json(nullptr);
+  if (store) {
+    const auto kept = remember(context, options.store, *std::move(store), reports);
+    if (!kept) {
+      context.log().error(
+          "the files are mended, but the store does not know: {}; run it again "
+          "with --resume",
+          kept.error().brief());
+      context.worsen(static_cast<int>(kept.error().code));
+      kept_json = {{"in", nullptr}, {"error", error_to_json(kept.error())}};
+    } else if (*kept) {
+      kept_json = kept_to_json(**kept);
     }
   }
   if (options.json) {
@@ -178,6 +240,7 @@ void run(const Options& options, Context& context) {
       json["files"].push_back(report.to_json());
     }
     json["summary"] = summary;
+    json["kept"] = kept_json;
     return print_json(context, json);
   }
   for (const RepairReport& report : reports) {

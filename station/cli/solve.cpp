@@ -71,6 +71,7 @@ Result<calib::SolveOptions> solve_options(const Options& options) {
 struct Outcome {
   calib::SolveReport report;
   std::optional<std::string> stored_id;
+  std::optional<db::Kept> kept;
 };
 
 Result<Outcome> solve_one(const std::string& path, const Options& options,
@@ -104,14 +105,18 @@ Result<Outcome> solve_one(const std::string& path, const Options& options,
         write_file(context.env.files, options.output, calib::to_json(record).dump(2) + "\n"));
   }
   if (options.save && outcome.report.usable()) {
-    SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
     db::ConstantsRecord row;
     row.made_at = record.made_at;
     row.serial = record.serial;
     row.filter = calib::to_string(record.filter);
     row.method = record.method;
     row.document = calib::to_json(record).dump();
-    SIXPOINT_ASSIGN(outcome.stored_id, store.add_constants(row, survey.model));
+    auto store = open_store(context, options.store);
+    SIXPOINT_ASSIGN(outcome.kept,
+                    keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
+                      SIXPOINT_ASSIGN(outcome.stored_id, keeper.add_constants(row, survey.model));
+                      return {};
+                    }));
   }
   return outcome;
 }
@@ -186,6 +191,9 @@ void run(const Options& options, Context& context) {
     answer["file"] = path;
     answer.update(calib::to_json(outcome->report));
     answer["stored_id"] = outcome->stored_id ? Json(*outcome->stored_id) : Json(nullptr);
+    if (outcome->kept) {
+      answer["kept"] = kept_to_json(*outcome->kept);
+    }
     if (options.files.size() == 1) {
       return print_json(context, answer);
     }

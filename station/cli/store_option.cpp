@@ -1,6 +1,7 @@
 #include "station/cli/store_option.h"
 
 #include <cstdlib>
+#include <filesystem>
 #include <span>
 
 #include "base/sha256.h"
@@ -30,21 +31,77 @@ std::string default_store() {
   return data_folder() + "/store.db";
 }
 
-bool is_on_server(const std::string& location) {
-  return (location.empty() ? default_store() : location).find("://") != std::string::npos;
+namespace {
+
+bool is_on_server(const std::string& place) { return place.find("://") != std::string::npos; }
+
+// One name per store, whatever the folder from which it is named.
+std::string journal_name(const std::string& location) {
+  const std::string place = location.empty() ? default_store() : location;
+  std::string name;
+  if (is_on_server(place)) {
+    // What follows the password, so that a changed password finds the same journal and none is
+    // written to the disk.
+    const std::size_t at = place.rfind('@');
+    name = at == std::string::npos ? place.substr(place.find("://") + 3) : place.substr(at + 1);
+  } else {
+    std::error_code error;
+    const auto whole = std::filesystem::weakly_canonical(place, error);
+    name = error ? place : whole.string();
+  }
+  const auto digest =
+      sha256(std::span(reinterpret_cast<const std::uint8_t*>(name.data()), name.size()));
+  return to_hex(std::span(digest).first(8));
 }
 
+}  // namespace
+
 std::string journal_folder(const std::string& location) {
-  const std::string place = location.empty() ? default_store() : location;
-  // Named by what follows the password, so that a changed password finds the same journal and none
-  // is written to the disk.
-  const std::size_t at = place.rfind('@');
-  const std::string_view server = at == std::string::npos
-                                      ? std::string_view(place).substr(place.find("://") + 3)
-                                      : std::string_view(place).substr(at + 1);
-  const auto digest =
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(server.data()), server.size()));
-  return data_folder() + "/journal/" + to_hex(std::span(digest).first(8));
+  return data_folder() + "/journal/" + journal_name(location);
+}
+
+Result<db::Kept> keep_records(Context& context, const std::string& location,
+                              Result<db::Store>& store,
+                              const std::function<Status(db::Keeper&)>& work) {
+  db::KeepingPlaces places;
+  places.journal = journal_folder(location);
+  const std::string name = "/sixpoint-journal-" + journal_name(location);
+  places.last_resorts.push_back("." + name);
+  std::error_code error;
+  if (const auto folder = std::filesystem::temp_directory_path(error); !error) {
+    places.last_resorts.push_back(folder.string() + name);
+  }
+  auto kept = db::keep(context.env.files, store, places, work);
+  if (!kept || kept->in_store()) {
+    if (kept && kept->caught_up > 0) {
+      context.log().info("{} entries of this station's journal are in the store now",
+                         kept->caught_up);
+    }
+    return kept;
+  }
+  context.log().warn("{}", kept->refusal->brief());
+  if (kept->last_resort) {
+    context.worsen(static_cast<int>(ErrorCode::io));
+    context.log().warn(
+        "nothing is lost: it is kept in {}; when there is space again, store it with 'sixpoint "
+        "store catch-up --journal {}'",
+        kept->folder, kept->folder);
+    return kept;
+  }
+  if (kept->refusal->code != ErrorCode::device_unavailable) {
+    context.worsen(static_cast<int>(kept->refusal->code));
+  }
+  context.log().warn(
+      "nothing is lost: it is kept in this station's journal {}, and goes into the store before "
+      "the next one, or with 'sixpoint store catch-up'",
+      kept->folder);
+  return kept;
+}
+
+Json kept_to_json(const db::Kept& kept) {
+  return {{"in", kept.in_store() ? "store" : "journal"},
+          {"folder", kept.in_store() ? Json(nullptr) : Json(kept.folder)},
+          {"error", kept.refusal ? error_to_json(*kept.refusal) : Json(nullptr)}};
 }
 
 CLI::Option* add_store_option(CLI::App& command, std::string& location) {
@@ -54,17 +111,27 @@ CLI::Option* add_store_option(CLI::App& command, std::string& location) {
           std::string("~/.local/share/sixpoint/store.db)"));
 }
 
-Result<db::Store> open_store(Context& context, const std::string& location) {
+bool store_exists(Context& context, const std::string& location) {
+  const std::string path = location.empty() ? default_store() : location;
+  return is_on_server(path) || context.env.files.info(path).has_value();
+}
+
+Result<std::string> place_of_new_store(Context& context, const std::string& location) {
   const std::string path = location.empty() ? default_store() : location;
   if (location.empty() && !is_on_server(path)) {
     SIXPOINT_CHECK(context.env.files.make_folders(folder_of(path)));
   }
+  return path;
+}
+
+Result<db::Store> open_store(Context& context, const std::string& location) {
+  SIXPOINT_ASSIGN(const std::string path, place_of_new_store(context, location));
   return db::Store::open(context.env, path);
 }
 
 Result<db::Store> open_existing_store(Context& context, const std::string& location) {
   const std::string path = location.empty() ? default_store() : location;
-  if (path.find("://") == std::string::npos && !context.env.files.info(path)) {
+  if (!store_exists(context, location)) {
     return fail(
         ErrorCode::no_input, "there is no store", path,
         "name one with --store, or make one with 'sixpoint jig' or 'sixpoint solve --save'");

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
@@ -163,6 +164,26 @@ TEST_F(JournalTest, KeepsTheOrderWhenAnEntryIsDamagedOrRefused) {
   const auto rest = journal.catch_up(store);
   ASSERT_OK(rest);
   EXPECT_EQ(*rest, 1U);
+}
+
+// Found by the fuzzer: a time that fits no 64 bits, under a checksum that holds.
+TEST_F(JournalTest, ATimeBeyondAllTimesIsRefused) {
+  Journal journal = open_journal();
+  const std::string record =
+      R"({"kind":"constants","model":"w","serial":"MOS2A1","filter":"current","made_at_ns":1e80,)"
+      R"("method":"ls","run_id":"","document":"{}"})";
+  const std::string line = nlohmann::json{
+      {"record", record},
+      {"sha256",
+       to_hex(sha256(std::span(
+           reinterpret_cast<const std::uint8_t*>(record.data()),
+           record.size())))}}.dump();
+  auto file = memory_.files.create("journal/0000000001-x.json");
+  ASSERT_OK((*file)->write_at(
+      0, std::span(reinterpret_cast<const std::uint8_t*>(line.data()), line.size())));
+  Store store = open_store("main");
+  EXPECT_FAILS(journal.catch_up(store), ErrorCode::bad_data);
+  EXPECT_EQ(store.audit()->rows, 0);
 }
 
 }  // namespace

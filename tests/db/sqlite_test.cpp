@@ -12,6 +12,7 @@
 
 #include "base/memory_env.h"
 #include "base/random.h"
+#include "db/schema.h"
 #include "db/store.h"
 #include "expect_result.h"
 #include "temporary_folder.h"
@@ -79,6 +80,25 @@ TEST_F(SqliteStoreTest, BringsAStoreOfVersion1UpToDateAndItsHashesHold) {
   audit = store->audit();
   EXPECT_TRUE(audit->ok) << audit->brief();
   EXPECT_EQ(audit->rows, 5) << "and the filter configuration, and the constants";
+  EXPECT_TRUE(open()->audit()->ok);
+}
+
+TEST_F(SqliteStoreTest, BringsAStoreOfVersion2UpToDateAndItsHashesHold) {
+  run_sql(
+#include "store_version_2.sql.inc"
+  );
+  auto store = open();
+  ASSERT_OK(store);
+  const auto audit = store->audit();
+  ASSERT_OK(audit);
+  EXPECT_TRUE(audit->ok) << audit->brief();
+  EXPECT_EQ(audit->rows, 5);
+  EXPECT_EQ(audit->head, "b88f65e21c3f51132480dc74ef7f68d9c281037c02b63880f9e4a018855351dd");
+  const auto history = store->unit_history("MOS2A1");
+  EXPECT_EQ(history->runs.front().build, "e21f353");
+  EXPECT_EQ(history->repairs.front().input, "O'Hara.gt3x");
+  EXPECT_EQ(store->database().schema_version().value(), kSchemaVersion);
+  ASSERT_OK(store->add_constants(constants(7), "w"));
   EXPECT_TRUE(open()->audit()->ok);
 }
 

@@ -226,7 +226,7 @@ TEST(JigReportJson, HasTheContractsKeys) {
     EXPECT_TRUE(json["poses"][0].contains(key)) << key;
   }
   EXPECT_TRUE(json["verification"].contains("residual_mg"));
-  EXPECT_EQ(json["verification"]["poses"].size(), 3U);
+  EXPECT_EQ(json["verification"]["poses"].size(), 8U);
 }
 
 // --- capture ---

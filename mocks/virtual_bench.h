@@ -1,0 +1,46 @@
+// Virtual units that stay on the bench when a program lets go of them, and the hand that turns
+// them.
+//
+// The `virtual:` scheme of in_process.h makes a new unit at every opening. A bench keeps one per
+// device string: it can be closed and opened again as after a replug, turned, knocked, pulled out
+// and swapped while a station works with it. For practice without hardware, and for tests of
+// everything above the wire.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "device/jig.h"
+#include "mocks/in_process.h"
+
+namespace sixpoint::mocks {
+
+// Safe to use from several threads. Outlives the registry that it was registered in.
+class VirtualBench {
+ public:
+  // Registers "virtual:" so that it opens the bench's units. Unplugged ones answer
+  // device_unavailable.
+  void register_in(device::TransportRegistry& registry);
+
+  // What a hand does to the unit of a device string ("virtual:..."). usage where the bench has none
+  // such: it was never opened.
+  Status turn(const std::string& device, device::Pose pose, double tilt_deg = 0);
+  Status lean(const std::string& device);                       // on an edge: between two faces
+  Status knock(const std::string& device);                      // moves it a little and back
+  Status set_plugged(const std::string& device, bool plugged);  // its RAM is lost, as by the cable
+  // Pulls it out and plugs another in, which has this seed and serial number.
+  Status swap(const std::string& device, std::uint64_t seed, const std::string& serial);
+  bool has(const std::string& device) const;
+
+ private:
+  struct Place;
+  Result<std::shared_ptr<PluggedUnit>> unit_of(const std::string& device) const;
+
+  mutable std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<Place>> places_;
+};
+
+}  // namespace sixpoint::mocks

@@ -1,0 +1,95 @@
+// The calibration certificate of a jig run (docs/certificate.md), and the label for the unit.
+//
+// Both are made from what the store keeps of a run and from nothing else, so that they can be made
+// again years later: the same record gives the same bytes. The date of issue is that of the run.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "base/constants.h"
+#include "base/env.h"
+#include "base/result.h"
+#include "db/store.h"
+#include "station/verdict.h"
+
+namespace sixpoint::station {
+
+// The content of a certificate; what is not known is empty and is said to be "not stated".
+struct Certificate {
+  std::string run;  // the run's id, the certificate's number
+  std::string serial;
+  std::string model;
+  std::string firmware;
+  std::string filter;
+  UtcTime started{};
+  UtcTime ended{};
+  std::string operator_name;
+  std::string station;
+  std::string software;    // name and version, and the build where it is known
+  std::string raw_sha256;  // of the samples that the store keeps
+
+  std::string jig;  // its number, or its kind where that was not given
+  std::optional<UtcTime> jig_due;
+
+  JigVerdict verdict = JigVerdict::inconclusive;
+  std::vector<std::string> codes;
+  std::vector<std::string> reasons;
+  std::vector<JudgedQuantity> quantities;
+  std::string limits_source;
+  std::string limits_sha256;
+  DecisionRule decision;
+
+  struct Constants {
+    StoredConstants stored;
+    std::string calibrated;  // the page's date
+    std::optional<double> residual_mg;
+  };
+  std::optional<Constants> as_found;
+  std::optional<Constants> as_left;
+  bool written = false;
+
+  std::string method;  // "six_pose_pair" ...
+  PerAxis<double> sensitivity_g_per_lsb{};
+  PerAxis<double> zero_lsb{};
+  PerAxis<double> sensitivity_expanded_percent{};
+  PerAxis<double> zero_expanded_mg{};
+  StoredConstants measured;  // the nine integers
+
+  struct Pose {
+    std::string pose;
+    PerAxis<double> mean_lsb{};
+    PerAxis<double> sd_lsb{};
+    int samples = 0;
+    double temperature_c = 0;
+    double tilt_deg = 0;
+    std::optional<double> error_mg;  // of verification poses
+  };
+  std::vector<Pose> poses;
+  std::vector<Pose> verification;
+
+  double gravity_m_per_s2 = 0;
+  double gravity_standard_uncertainty_m_per_s2 = 0;
+
+  nlohmann::ordered_json to_json() const;  // "sixpoint/certificate/1"
+};
+
+// bad_data where the record is no complete jig run: one that was stopped or is inconclusive has no
+// result to certify (a failed one has).
+Result<Certificate> certificate_of(const db::RunRecord& run);
+// A PDF of A4 pages: text that can be searched, a QR code "sixpoint:SERIAL:RUN". Characters that
+// the fonts lack are written as \u{...}.
+Result<Bytes> certificate_pdf(const Certificate& certificate);
+// By the ending of `path`, .pdf or .json; usage for another one.
+Status write_certificate(FileSystem& files, const std::string& path, const db::RunRecord& run);
+
+// ZPL II for a label of 50 x 25 mm at 203 dpi: serial, date, verdict, run, QR code.
+// bad_data unless the unit passed, its constants were written and what it answered was what was
+// written: a label without that would be a lie.
+Result<std::string> label_zpl(const db::RunRecord& run);
+
+}  // namespace sixpoint::station

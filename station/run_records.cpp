@@ -1,0 +1,98 @@
+#include "station/run_records.h"
+
+#include <nlohmann/json.hpp>
+
+#include "gt3x/model.h"
+#include "station/software.h"
+#include "station/station_records.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// The limits that the verdict used, whole: a verdict is nothing without them.
+Json limits_of(const JigSessionOptions& session) {
+  Json json = to_json(session.limits);
+  json["run"] = {{"tilt_deg", session.run.tilt_limit_deg},
+                 {"moved_mg", session.run.moved_mg},
+                 {"still_factor", session.run.still_factor},
+                 {"moved_factor", session.run.moved_factor},
+                 {"first_noise_mg", session.run.first_noise_limit_mg},
+                 {"dwell_s", session.run.dwell_s},
+                 {"rate_hz", session.run.rate_hz}};
+  return json;
+}
+
+}  // namespace
+
+db::RunRecord run_record_before(const JigSessionOptions& session, const std::string& serial,
+                                const std::string& jig) {
+  db::RunRecord run;
+  run.serial = serial;
+  run.model = gt3x::model_of(serial);
+  run.kind = "jig";
+  run.filter = calib::to_string(session.filter);
+  run.jig = jig;
+  run.software = software_name();
+  run.build = software_build();
+  run.limits = limits_of(session).dump();
+  run.gravity_m_per_s2 = session.gravity.m_per_s2;
+  run.document = "{}";
+  return run;
+}
+
+void complete_run_record(db::RunRecord& run, const JigReport& report, const std::string& study) {
+  run.started = report.started;
+  run.ended = report.ended;
+  run.verdict = to_string(report.verdict);
+  // The unit's own words may hold anything; a run is kept whatever they are.
+  Json document = report.to_json();
+  if (!study.empty()) {
+    document["study"] = study;
+  }
+  run.document = document.dump(-1, ' ', false, Json::error_handler_t::replace);
+  run.codes = report.codes;
+  if (!report.faces.empty()) {
+    double sum_c = 0;
+    for (const PoseReading& face : report.faces) {
+      sum_c += face.temperature_c;
+    }
+    run.temperature_c = sum_c / static_cast<double>(report.faces.size());
+  }
+}
+
+Result<StoredRun> add_run_records(db::Keeper& keeper, const JigReport& report,
+                                  const db::RunRecord& run) {
+  StoredRun done;
+  SIXPOINT_ASSIGN(
+      done.run_id,
+      keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
+  if (report.written) {
+    db::UnitWrite write;
+    write.run_id = done.run_id;
+    write.serial = report.serial;
+    write.written = report.ended;
+    write.as_found =
+        report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
+    write.as_left = calib::to_json(report.six->best().stored).dump();
+    write.read_back = calib::to_json(report.as_left->constants).dump();
+    SIXPOINT_CHECK(keeper.add_unit_write(write));
+  }
+  if (report.usable() && run.kind != kStudyKind) {
+    calib::ConstantsRecord constants = report.record();
+    constants.made_from.station = run.station;
+    db::ConstantsRecord row;
+    row.made_at = report.ended;
+    row.serial = report.serial;
+    row.filter = calib::to_string(report.filter);
+    row.method = constants.method;
+    row.run_id = done.run_id;
+    row.document = calib::to_json(constants).dump();
+    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, run.model));
+  }
+  return done;
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,276 @@
+#include "station/station_records.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// What a check unit's charts show; all else follows from these.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kCharted = {{
+    {"sensitivity_deviation_percent", "x"},
+    {"sensitivity_deviation_percent", "y"},
+    {"sensitivity_deviation_percent", "z"},
+    {"zero_offset_mg", "x"},
+    {"zero_offset_mg", "y"},
+    {"zero_offset_mg", "z"},
+}};
+
+std::set<std::string> check_units_of(const std::vector<db::StationEvent>& events) {
+  std::set<std::string> units;
+  for (const db::StationEvent& event : events) {
+    if (event.action == "check_unit") {
+      units.insert(event.serial);
+    } else if (event.action == "check_unit_end") {
+      units.erase(event.serial);
+    }
+  }
+  return units;
+}
+
+std::optional<double> value_in(const RunSummary& run, std::string_view name,
+                               std::string_view axis) {
+  for (const JudgedQuantity& quantity : run.quantities) {
+    if (quantity.name == name && quantity.axis == axis && std::isfinite(quantity.value)) {
+      return quantity.value;
+    }
+  }
+  return std::nullopt;
+}
+
+bool is_signature(const db::StationEvent& event) {
+  return event.action == "sign" || event.action == "sign_new_baseline";
+}
+
+}  // namespace
+
+RunSummary summary_of(const db::RunRecord& run) {
+  RunSummary out;
+  out.id = run.id;
+  out.serial = run.serial;
+  out.station = run.station;
+  out.jig = run.jig;
+  out.operator_name = run.operator_name;
+  out.started = run.started;
+  out.seconds = std::chrono::duration<double>(run.ended - run.started).count();
+  out.verdict = parse_jig_verdict(run.verdict).value_or(JigVerdict::inconclusive);
+  out.codes = run.codes;
+  const Json json = Json::parse(run.document, nullptr, false);
+  if (json.is_object() && json.contains("firmware") && json["firmware"].is_string()) {
+    out.firmware = json["firmware"].get<std::string>();
+  }
+  if (json.is_object() && json.contains("quantities")) {
+    out.quantities = quantities_from_json(json["quantities"]);
+  }
+  return out;
+}
+
+Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter& filter) {
+  SIXPOINT_ASSIGN(const auto events, store.station_events());
+  const std::set<std::string> check_units = check_units_of(events);
+  std::vector<RunSummary> out;
+  SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
+    if (!check_units.contains(run.serial)) {
+      out.push_back(summary_of(run));
+    }
+    return {};
+  }));
+  return out;
+}
+
+Result<StationState> station_state(db::Store& store, const std::string& station,
+                                   const CheckUnitPolicy& policy) {
+  SIXPOINT_ASSIGN(const auto events, store.station_events());
+  StationState state;
+  state.station = station;
+  const std::set<std::string> units = check_units_of(events);
+  state.check_units.assign(units.begin(), units.end());
+  std::optional<UtcTime> baseline_from;
+  for (const db::StationEvent& event : events) {
+    if (event.station == station && is_signature(event)) {
+      state.signature = event;
+      if (event.action == "sign_new_baseline") {
+        baseline_from = event.made_at;
+      }
+    }
+  }
+  for (const std::string& serial : state.check_units) {
+    std::vector<RunSummary> runs;
+    db::RunFilter filter;
+    filter.serial = serial;
+    filter.from = baseline_from;
+    SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
+      if (run.station == station) {
+        runs.push_back(summary_of(run));
+      }
+      return {};
+    }));
+    for (const auto& [name, axis] : kCharted) {
+      CheckUnitChart chart;
+      chart.serial = serial;
+      std::vector<double> values;
+      std::size_t signed_up_to = 0;
+      for (const RunSummary& run : runs) {
+        if (const auto value = value_in(run, name, axis)) {
+          values.push_back(*value);
+          chart.times.push_back(run.started);
+          if (state.signature && run.started <= state.signature->made_at) {
+            signed_up_to = values.size();
+          }
+        }
+      }
+      if (values.empty()) {
+        continue;
+      }
+      chart.chart = control_chart(fmt::format("{} {}", name, axis), std::move(values),
+                                  static_cast<std::size_t>(policy.baseline_runs),
+                                  name == "zero_offset_mg" ? policy.least_sigma_zero_mg
+                                                           : policy.least_sigma_sensitivity_percent,
+                                  signed_up_to);
+      const ChartSignal* last = nullptr;
+      for (const ChartSignal& signal : chart.chart.signals) {
+        if (std::find(policy.locking_rules.begin(), policy.locking_rules.end(), signal.rule) !=
+            policy.locking_rules.end()) {
+          last = &signal;
+        }
+      }
+      if (last != nullptr) {
+        state.locked = true;
+        state.reasons.push_back(fmt::format(
+            "check unit {}, {}: {} on {}", serial, chart.chart.name, nelson_rule(last->rule),
+            to_iso8601(std::chrono::floor<std::chrono::seconds>(chart.times[last->point]))));
+      }
+      state.charts.push_back(std::move(chart));
+    }
+  }
+  return state;
+}
+
+std::string StationState::brief() const {
+  const std::string name = station.empty() ? "the station without a name" : "station " + station;
+  if (!locked) {
+    return fmt::format("{} is open; {} check units", name, check_units.size());
+  }
+  std::string text = fmt::format("{} is locked", name);
+  for (const std::string& reason : reasons) {
+    text += "; " + reason;
+  }
+  return text;
+}
+
+Json StationState::to_json() const {
+  Json json;
+  json["station"] = station;
+  json["locked"] = locked;
+  json["reasons"] = reasons;
+  json["check_units"] = check_units;
+  json["signature"] = nullptr;
+  if (signature) {
+    json["signature"] = {{"made_at", to_iso8601(signature->made_at)},
+                         {"operator", signature->operator_name},
+                         {"reason", signature->reason},
+                         {"new_baseline", signature->action == "sign_new_baseline"}};
+  }
+  json["charts"] = Json::array();
+  for (const CheckUnitChart& chart : charts) {
+    Json item = {{"serial", chart.serial}};
+    item.update(chart.chart.to_json());
+    item["times"] = Json::array();
+    for (const UtcTime time : chart.times) {
+      item["times"].push_back(to_iso8601(time));
+    }
+    json["charts"].push_back(std::move(item));
+  }
+  return json;
+}
+
+Result<RetestState> unit_retest_state(db::Store& store, const std::string& serial,
+                                      const RetestPolicy& policy) {
+  SIXPOINT_ASSIGN(const auto events, store.station_events());
+  std::vector<EarlierRun> earlier;
+  std::vector<UtcTime> ended;
+  db::RunFilter filter;
+  filter.serial = serial;
+  SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
+    earlier.push_back({run.id, parse_jig_verdict(run.verdict).value_or(JigVerdict::inconclusive),
+                       run.codes, false});
+    ended.push_back(run.ended);
+    return {};
+  }));
+  for (const db::StationEvent& event : events) {
+    if (event.action == "release" && event.serial == serial) {
+      const auto after = std::upper_bound(ended.begin(), ended.end(), event.made_at);
+      if (after != ended.begin()) {
+        earlier[static_cast<std::size_t>(after - ended.begin()) - 1].released_after = true;
+      }
+    }
+  }
+  return retest_state(earlier, policy);
+}
+
+Result<RetestState> may_start(db::Store& store, const std::string& serial,
+                              const std::string& station, const Limits& limits) {
+  SIXPOINT_ASSIGN(const auto events, store.station_events());
+  const std::set<std::string> check_units = check_units_of(events);
+  if (check_units.contains(serial)) {
+    return RetestState{};  // the one that is measured to find out
+  }
+  if (!check_units.empty()) {
+    SIXPOINT_ASSIGN(const StationState state, station_state(store, station, limits.check_unit));
+    if (state.locked) {
+      return fail(ErrorCode::configuration, state.brief(), {},
+                  fmt::format("measure a check unit again; then an engineer signs: sixpoint "
+                              "station-lock sign --station '{}' --operator NAME --reason WHY",
+                              station));
+    }
+  }
+  SIXPOINT_ASSIGN(RetestState state, unit_retest_state(store, serial, limits.retest));
+  if (!state.may_start) {
+    return fail(ErrorCode::configuration, state.reason, printable(serial, 60),
+                fmt::format("an engineer looks at it; then: sixpoint retest {} --release "
+                            "--operator NAME --reason WHY",
+                            printable(serial, 60)));
+  }
+  return state;
+}
+
+Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::string& study,
+                                               const std::string& quantity,
+                                               const std::string& axis) {
+  if (find_quantity(quantity) == nullptr) {
+    return fail(ErrorCode::usage, fmt::format("'{}' is not measured", printable(quantity, 60)), {},
+                "'sixpoint limits print' shows what is");
+  }
+  std::vector<GageReading> readings;
+  bool known = false;
+  db::RunFilter filter;
+  filter.kind = kStudyKind;
+  SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
+    const Json json = Json::parse(run.document, nullptr, false);
+    if (!json.is_object() || !json.contains("study") || json["study"] != study) {
+      return {};
+    }
+    known = true;
+    if (const auto value = value_in(summary_of(run), quantity, axis)) {
+      readings.push_back({run.serial, run.operator_name, *value});
+    }
+    return {};
+  }));
+  if (!known) {
+    return fail(ErrorCode::no_input,
+                fmt::format("the store has no runs of the study '{}'", printable(study, 60)), {},
+                "measure them with 'sixpoint jig --study NAME --operator WHO'");
+  }
+  return readings;
+}
+
+}  // namespace sixpoint::station

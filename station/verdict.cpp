@@ -1,0 +1,471 @@
+#include "station/verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "station/jig_session.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+constexpr std::array<std::pair<JigVerdict, std::string_view>, 6> kVerdictNames = {{
+    {JigVerdict::pass, "pass"},
+    {JigVerdict::conditional_pass, "conditional_pass"},
+    {JigVerdict::conditional_fail, "conditional_fail"},
+    {JigVerdict::fail, "fail"},
+    {JigVerdict::inconclusive, "inconclusive"},
+    {JigVerdict::stopped, "stopped"},
+}};
+
+// Which of two verdicts a run has that has both.
+int severity(JigVerdict verdict) {
+  switch (verdict) {
+    case JigVerdict::pass:
+      return 0;
+    case JigVerdict::conditional_pass:
+      return 1;
+    case JigVerdict::inconclusive:
+      return 2;
+    case JigVerdict::conditional_fail:
+      return 3;
+    case JigVerdict::fail:
+      return 4;
+    case JigVerdict::stopped:
+      return 5;
+  }
+  return 5;
+}
+
+std::string shown(double value, std::string_view unit) {
+  return unit == "%" || unit.empty() || unit == "\u00b0"
+             ? fmt::format("{:.3g}{}{}", value, unit == "%" ? " " : "", unit)
+             : fmt::format("{:.4g} {}", value, unit);
+}
+
+std::string sentence(const JudgedQuantity& judged) {
+  const QuantityInfo& info = *find_quantity(judged.name);
+  const bool below =
+      judged.low && (!judged.high || judged.value - *judged.low < *judged.high - judged.value);
+  const double limit = below ? *judged.low : judged.high.value_or(NAN);
+  const std::string axis = judged.axis.empty() ? "" : fmt::format(", {}", judged.axis);
+  switch (judged.verdict) {
+    case JigVerdict::pass:
+      return {};
+    case JigVerdict::inconclusive:
+      return std::isfinite(judged.value)
+                 ? fmt::format("{}{}: {} is more than {}; measured too coarsely to judge the unit",
+                               info.title, axis, shown(judged.value, info.unit),
+                               shown(limit, info.unit))
+                 : fmt::format("{}{}: no number", info.title, axis);
+    case JigVerdict::conditional_pass:
+      return fmt::format("{}{}: {} is within {} by less than the guard band of {}", info.title,
+                         axis, shown(judged.value, info.unit), shown(limit, info.unit),
+                         shown(judged.guard_band, info.unit));
+    case JigVerdict::conditional_fail:
+      return fmt::format("{}{}: {} is beyond {} by less than the guard band of {}", info.title,
+                         axis, shown(judged.value, info.unit), shown(limit, info.unit),
+                         shown(judged.guard_band, info.unit));
+    case JigVerdict::fail:
+    case JigVerdict::stopped:
+      break;
+  }
+  return fmt::format("{}{}: {} is {} {}", info.title, axis, shown(judged.value, info.unit),
+                     below ? "below" : "above", shown(limit, info.unit));
+}
+
+bool is_uncertainty(std::string_view name) { return name.find("_uncertainty_") != name.npos; }
+
+}  // namespace
+
+std::string_view to_string(JigVerdict verdict) {
+  for (const auto& [value, name] : kVerdictNames) {
+    if (value == verdict) {
+      return name;
+    }
+  }
+  return "?";
+}
+
+std::optional<JigVerdict> parse_jig_verdict(std::string_view text) {
+  for (const auto& [value, name] : kVerdictNames) {
+    if (name == text) {
+      return value;
+    }
+  }
+  return std::nullopt;
+}
+
+int exit_code_of(JigVerdict verdict) {
+  switch (verdict) {
+    case JigVerdict::pass:
+    case JigVerdict::conditional_pass:
+      return 0;
+    case JigVerdict::conditional_fail:
+    case JigVerdict::fail:
+      return 1;
+    case JigVerdict::inconclusive:
+      return 2;
+    case JigVerdict::stopped:
+      return 3;
+  }
+  return 1;
+}
+
+const std::vector<FailureCode>& failure_codes() {
+  static const std::vector<FailureCode> kCodes = {
+      {"sensitivity_low", "an axis gives more counts per g than the limits allow",
+       "a stronger sensor than the type has, or poses mixed up by hand",
+       "Repeat the run once. If it stays, send the unit to repair."},
+      {"sensitivity_high", "an axis gives fewer counts per g than the limits allow",
+       "a damaged sensor, or the wrong filter configuration",
+       "Check that the run was under 'current' and repeat once. If it stays, send the unit to "
+       "repair."},
+      {"zero_low", "zero offset is too far below zero", "a shock bent the sensor, or water got in",
+       "Repeat once after ten minutes on the bench. If it stays, send the unit to repair."},
+      {"zero_high", "zero offset is too far above zero", "a shock bent the sensor, or water got in",
+       "Repeat once after ten minutes on the bench. If it stays, send the unit to repair."},
+      {"noise_high", "samples scatter too much while the unit lies still",
+       "the bench trembles, the unit is loose on the jig, or the sensor is broken",
+       "Stop what shakes the bench, seat the unit anew and repeat."},
+      {"cross_axis", "the sensor's axes are not square to each other within limits",
+       "the unit sat askew, or the sensor came loose on its board",
+       "Clean the seats of jig and unit, repeat. If it stays, send the unit to repair."},
+      {"temperature_low", "the unit is colder than the limits allow", "it came in from the cold",
+       "Leave it on the bench for an hour and repeat."},
+      {"temperature_high", "the unit is warmer than the limits allow",
+       "it charged, or lay in the sun", "Leave it on the bench for an hour and repeat."},
+      {"temperature_unsteady", "the unit's temperature changed during the run",
+       "it charged, was held in the hand, or came in from the cold",
+       "Leave it on the bench for an hour and repeat."},
+      {"tilt_high", "a pose lies too far from the jig's direction",
+       "the unit was not seated, or dirt lies in the seat", "Clean the seats and repeat."},
+      {"fit_residual_high", "the constants do not even fit the poses they come from",
+       "the unit moved during a pose, or its sensor is not linear",
+       "Repeat once. If it stays, send the unit to repair."},
+      {"verification_residual_high", "the constants are wrong on poses that were not fitted",
+       "the unit moved or changed during the run, or its sensor is not linear",
+       "Repeat once. If it stays, send the unit to repair."},
+      {"rounded_residual_high", "the nine integers are wrong where the constants are not",
+       "sensitivity so low that a count is large", "Send the unit to repair."},
+      {"recheck_residual_high", "with what it now holds the unit reads wrong",
+       "the unit keeps other numbers than it was given, or was turned during the recheck",
+       "Repeat with --write. If it stays, keep the unit back: its memory is faulty."},
+      {"uncertainty_high", "the result is too uncertain to judge the unit",
+       "local gravity is not stated, or the poses disagree with each other",
+       "State --latitude and --altitude, clean the seats and repeat."},
+      {"samples_lost", "too many samples did not arrive", "a bad cable, hub or port",
+       "Change the cable or the port and repeat."},
+      {"not_verified", "readings contradict each other", "the unit moved, or was put in wrong",
+       "The reasons name the pose. Repeat."},
+      {"missing_pose", "not all six poses were measured", "the run ended early", "Repeat."},
+      {"write_refused", "the unit did not take the constants", "its battery is low",
+       "Charge the unit and repeat with --write."},
+      {"read_back_differs", "the unit holds other constants than it was given",
+       "its memory is worn", "Keep the unit back: its memory is faulty."},
+      {"time_out", "no pose was accepted in time",
+       "the unit is not on the jig, or the jig is stuck", "Look at jig and unit, repeat."},
+      {"too_many_refusals", "too many placements were refused",
+       "dirt in the seat, a loose cable that pulls, a bench that trembles",
+       "Look at jig, seat and cable, repeat."},
+      {"stopped", "the operator stopped the run", "", "Repeat."},
+      {"unit_gone", "the unit went away", "the cable was pulled, or the battery is empty",
+       "Plug it in and repeat."},
+      {"sensor_stuck", "the sensor repeats itself: an axis is stuck, or all are frozen",
+       "the sensor is broken, or its supply", "Keep the unit back: its sensor is faulty."},
+      {"interrupted", "the run ended on an error", "the unit, the jig or a cable failed",
+       "See to what the message names, repeat."},
+      {"retest", "a unit that failed needs more passes in a row", "it failed before",
+       "Measure it again."},
+  };
+  return kCodes;
+}
+
+const FailureCode* find_failure_code(std::string_view code) {
+  const auto found = std::find_if(failure_codes().begin(), failure_codes().end(),
+                                  [&](const FailureCode& other) { return other.code == code; });
+  return found == failure_codes().end() ? nullptr : &*found;
+}
+
+JudgedQuantity judge_quantity(const Measured& measured, const Limits& limits) {
+  const QuantityInfo& info = *find_quantity(measured.name);
+  const Limit& limit = limits.of(measured.name);
+  JudgedQuantity judged;
+  judged.name = measured.name;
+  judged.axis = measured.axis;
+  judged.value = measured.value;
+  judged.expanded_uncertainty = limits.decision.coverage_factor * measured.standard_uncertainty;
+  judged.low = limit.low;
+  judged.high = limit.high;
+  judged.guard_band =
+      std::max(limits.decision.guard_factor * judged.expanded_uncertainty, limit.guard_band);
+  if (!std::isfinite(measured.value) || !std::isfinite(judged.expanded_uncertainty)) {
+    judged.verdict = JigVerdict::inconclusive;
+    judged.code = "not_verified";
+    return judged;
+  }
+  // How far inside the nearer limit.
+  const double above_low = limit.low ? measured.value - *limit.low : HUGE_VAL;
+  const double below_high = limit.high ? *limit.high - measured.value : HUGE_VAL;
+  const double inside = std::min(above_low, below_high);
+  if (inside >= judged.guard_band) {
+    return judged;
+  }
+  judged.code = above_low < below_high ? info.code_low : info.code_high;
+  judged.verdict = inside >= 0                   ? JigVerdict::conditional_pass
+                   : -inside < judged.guard_band ? JigVerdict::conditional_fail
+                                                 : JigVerdict::fail;
+  if (inside < 0 && is_uncertainty(measured.name)) {
+    judged.verdict = JigVerdict::inconclusive;
+  }
+  return judged;
+}
+
+Verdict judge_quantities(const std::vector<Measured>& measured, const Limits& limits) {
+  Verdict verdict;
+  verdict.verdict = measured.empty() ? JigVerdict::inconclusive : JigVerdict::pass;
+  for (const Measured& one : measured) {
+    verdict.quantities.push_back(judge_quantity(one, limits));
+  }
+  std::vector<const JudgedQuantity*> worst_first;
+  for (const JudgedQuantity& judged : verdict.quantities) {
+    if (judged.verdict != JigVerdict::pass) {
+      worst_first.push_back(&judged);
+    }
+  }
+  std::stable_sort(worst_first.begin(), worst_first.end(),
+                   [](const JudgedQuantity* a, const JudgedQuantity* b) {
+                     return severity(a->verdict) > severity(b->verdict);
+                   });
+  for (const JudgedQuantity* judged : worst_first) {
+    if (severity(judged->verdict) > severity(verdict.verdict)) {
+      verdict.verdict = judged->verdict;
+    }
+    if (std::find(verdict.codes.begin(), verdict.codes.end(), judged->code) ==
+        verdict.codes.end()) {
+      verdict.codes.push_back(judged->code);
+    }
+    verdict.reasons.push_back(sentence(*judged));
+  }
+  return verdict;
+}
+
+std::string Verdict::brief() const {
+  std::string text(to_string(verdict));
+  for (const std::string& reason : reasons) {
+    text += "; " + reason;
+  }
+  return text;
+}
+
+nlohmann::ordered_json to_json(const JudgedQuantity& quantity) {
+  const auto number = [](double value) {
+    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+  };
+  nlohmann::ordered_json json;
+  json["name"] = quantity.name;
+  json["axis"] = quantity.axis;
+  json["value"] = number(quantity.value);
+  json["expanded_uncertainty"] = number(quantity.expanded_uncertainty);
+  json["low"] = quantity.low ? number(*quantity.low) : nlohmann::ordered_json(nullptr);
+  json["high"] = quantity.high ? number(*quantity.high) : nlohmann::ordered_json(nullptr);
+  json["guard_band"] = number(quantity.guard_band);
+  json["verdict"] = to_string(quantity.verdict);
+  json["code"] = quantity.code;
+  return json;
+}
+
+std::vector<JudgedQuantity> quantities_from_json(const nlohmann::ordered_json& json) {
+  const auto text = [](const nlohmann::ordered_json& item, const char* key) {
+    return item.contains(key) && item[key].is_string() ? item[key].get<std::string>()
+                                                       : std::string();
+  };
+  const auto number = [](const nlohmann::ordered_json& item, const char* key) {
+    return item.contains(key) && item[key].is_number() ? std::optional(item[key].get<double>())
+                                                       : std::nullopt;
+  };
+  std::vector<JudgedQuantity> quantities;
+  for (const auto& item : json.is_array() ? json : nlohmann::ordered_json::array()) {
+    if (!item.is_object() || find_quantity(text(item, "name")) == nullptr) {
+      continue;
+    }
+    JudgedQuantity quantity;
+    quantity.name = text(item, "name");
+    quantity.axis = text(item, "axis");
+    quantity.value = number(item, "value").value_or(NAN);
+    quantity.expanded_uncertainty = number(item, "expanded_uncertainty").value_or(NAN);
+    quantity.low = number(item, "low");
+    quantity.high = number(item, "high");
+    quantity.guard_band = number(item, "guard_band").value_or(NAN);
+    quantity.verdict = parse_jig_verdict(text(item, "verdict")).value_or(JigVerdict::inconclusive);
+    quantity.code = text(item, "code");
+    quantities.push_back(std::move(quantity));
+  }
+  return quantities;
+}
+
+// --- the budget (docs/verdicts.md has it in words) ---
+
+std::vector<Measured> measured_quantities(const JigReport& report) {
+  if (!report.six || !report.six->missing_directions.empty() || report.faces.empty()) {
+    return {};
+  }
+  constexpr double kNominal_g_per_lsb = 0.004;  // ADXL362 at its range of 8 g
+  // What six samples of a second and quantisation leave of a mean, whatever the noise.
+  constexpr double kFloor_mg = 0.2;
+  constexpr double kThermometer_c = 1;  // the sensor's own, adjusted at one temperature
+  constexpr double kStep_c = 0.065;     // of it (ADXL362 datasheet)
+  constexpr double kRadian = M_PI / 180;
+  constexpr double kSeating_rad = 0.02 * kRadian;  // a careful hand on a clean jig, twice
+  const calib::SixPoseSolution& best = report.six->best();
+  const auto count = static_cast<double>(report.faces.size());
+
+  std::vector<Measured> measured;
+  PerAxis<double> noise_mg{};
+  double samples = 0;
+  double coldest_c = HUGE_VAL;
+  double warmest_c = -HUGE_VAL;
+  double mean_c = 0;
+  double tilt_deg = 0;
+  for (const PoseReading& face : report.faces) {
+    samples += face.samples;
+    mean_c += face.temperature_c / count;
+    tilt_deg = std::max(tilt_deg, face.tilt_deg);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const double sd_mg =
+          kMgPerG * face.sd_lsb[axis] * best.calibration.sensitivity_g_per_lsb[axis];
+      noise_mg[axis] += sd_mg * sd_mg / count;
+    }
+  }
+  double worst_noise_mg = 0;
+  for (double& noise : noise_mg) {
+    noise = std::sqrt(noise);
+    worst_noise_mg = std::max(worst_noise_mg, noise);
+  }
+  const auto see = [&](double temperature_c) {
+    coldest_c = std::min(coldest_c, temperature_c);
+    warmest_c = std::max(warmest_c, temperature_c);
+  };
+  for (const PoseReading& face : report.faces) {
+    see(face.temperature_c);
+  }
+  for (const JudgedPose& pose : report.verification.poses) {
+    see(pose.reading.temperature_c);
+  }
+  const double mean_noise_mg =
+      std::hypot(kFloor_mg, worst_noise_mg / std::sqrt(std::max(1.0, samples / count)));
+
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const double ratio = best.calibration.sensitivity_g_per_lsb[axis] / kNominal_g_per_lsb;
+    measured.push_back({"sensitivity_deviation_percent", std::string(kAxisNames[axis]),
+                        100 * (ratio - 1),
+                        100 * ratio * report.combined.sensitivity_relative[axis]});
+  }
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    measured.push_back(
+        {"zero_offset_mg", std::string(kAxisNames[axis]),
+         kMgPerG * best.calibration.zero_lsb[axis] * best.calibration.sensitivity_g_per_lsb[axis],
+         report.combined.zero_mg[axis]});
+  }
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    measured.push_back({"noise_mg", std::string(kAxisNames[axis]), noise_mg[axis],
+                        noise_mg[axis] / std::sqrt(2 * std::max(1.0, samples - count))});
+  }
+  // Scatter of the seating from what level readings disagree by: 6 degrees of freedom in six poses,
+  // for which Student's factor for 95.45 % is 2.52 where the coverage factor says 2.
+  const calib::VectorSolution& vector = report.six->vector;
+  double square = 0;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const double residual_g =
+        vector.residual_lsb[axis] * best.calibration.sensitivity_g_per_lsb[axis];
+    square += residual_g * residual_g * count / std::max(1, vector.degrees_of_freedom);
+  }
+  constexpr double kStudent = 2.52 / 2;
+  constexpr std::array<std::string_view, 3> kPairs = {"xy", "xz", "yz"};
+  for (std::size_t pair = 0; pair < kPairs.size(); ++pair) {
+    measured.push_back({"cross_axis_percent", std::string(kPairs[pair]),
+                        100 * vector.cross_axis[pair],
+                        100 * std::hypot(kSeating_rad, kStudent * std::sqrt(square))});
+  }
+  measured.push_back({"temperature_c", "", mean_c, kThermometer_c});
+  measured.push_back({"temperature_change_c", "", warmest_c - coldest_c, kStep_c});
+  measured.push_back({"tilt_deg", "", tilt_deg, mean_noise_mg / kMgPerG / kRadian});
+  measured.push_back({"fit_residual_mg", "", best.own_rms_mg, mean_noise_mg / std::sqrt(count)});
+  measured.push_back({"verification_residual_mg", "", report.verification.worst_mg, mean_noise_mg});
+  measured.push_back({"rounded_residual_mg", "", report.rounded_residual_mg, mean_noise_mg});
+  if (report.written) {
+    measured.push_back({"recheck_residual_mg", "", report.recheck.worst_mg, mean_noise_mg});
+  }
+  const double coverage = report.limits.decision.coverage_factor;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    measured.push_back({"sensitivity_uncertainty_percent", std::string(kAxisNames[axis]),
+                        100 * coverage * report.combined.sensitivity_relative[axis], 0});
+  }
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    measured.push_back({"zero_uncertainty_mg", std::string(kAxisNames[axis]),
+                        coverage * report.combined.zero_mg[axis], 0});
+  }
+  const auto sent =
+      static_cast<double>(report.stream.samples) + static_cast<double>(report.stream.lost_samples);
+  measured.push_back({"lost_samples_percent", "",
+                      sent > 0 ? 100 * static_cast<double>(report.stream.lost_samples) / sent : 0,
+                      0});
+  return measured;
+}
+
+// --- retest policy ---
+
+RetestState retest_state(const std::vector<EarlierRun>& earlier, const RetestPolicy& policy) {
+  RetestState state;
+  int passes = 0;
+  bool failed = false;  // and has not counted as passed since
+  const EarlierRun* last_judged = nullptr;
+  for (const EarlierRun& run : earlier) {
+    if (is_passed(run.verdict)) {
+      ++passes;
+      state.failures_in_row = 0;
+      if (passes >= policy.passes_after_failure) {
+        failed = false;
+      }
+      last_judged = &run;
+    } else if (run.verdict == JigVerdict::fail || run.verdict == JigVerdict::conditional_fail) {
+      passes = 0;
+      failed = true;
+      ++state.failures_in_row;
+      last_judged = &run;
+    }
+    if (run.released_after) {
+      state.failures_in_row = 0;
+    }
+  }
+  if (failed) {
+    state.passes_needed = policy.passes_after_failure - passes;
+    state.retest_of = last_judged->id;
+  }
+  if (state.failures_in_row >= policy.most_failures) {
+    state.may_start = false;
+    state.reason = fmt::format("the unit failed {} times in a row, as often as the limits allow",
+                               state.failures_in_row);
+  }
+  return state;
+}
+
+void apply_retest(Verdict& verdict, const RetestState& state) {
+  if (verdict.verdict != JigVerdict::pass && verdict.verdict != JigVerdict::conditional_pass) {
+    return;
+  }
+  if (state.passes_needed > 1) {
+    verdict.verdict = JigVerdict::conditional_pass;
+    verdict.codes.emplace_back("retest");
+    verdict.reasons.push_back(
+        fmt::format("the unit failed before; it counts as passed after {} more in a row",
+                    state.passes_needed - 1));
+  }
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,211 @@
+// One lane in front, and all lanes as cards.
+import { useEffect, useState } from 'preact/hooks';
+import { LiveBox, PosePicture } from './box';
+import { S } from './strings';
+import { ask, client, type Refusal } from './station';
+import { Spark, TraceChart } from './traces';
+import { POSES, type Lane, type Live, type Pose, type Result, type State } from './types';
+
+const BUSY = ['running', 'unit_away', 'wrong_unit', 'resuming', 'capturing'];
+
+export function ResultBox({ result }: { result: Result }) {
+  const good = result.verdict === 'pass' || result.verdict === 'conditional_pass';
+  return (
+    <section class={good ? 'result good' : 'result bad'} aria-label={S.verdicts[result.verdict]}>
+      <p class="verdict"><b aria-hidden="true">{S.verdictSigns[result.verdict] ?? '?'}</b> {S.verdicts[result.verdict] ?? result.verdict}</p>
+      <p>{result.serial}</p>
+      {typeof result.residual_mg === 'number' && <p>{S.residual(result.residual_mg, result.as_found_residual_mg ?? null)}</p>}
+      {result.reasons.map((reason) => <p>{reason}</p>)}
+      {result.repeat_sides && result.repeat_sides.length > 0 && <p>{S.files.repeat(result.repeat_sides)}</p>}
+      {result.kind === 'jig' && <p>{S.stored(result)}</p>}
+      {result.kind === 'capture' && result.stored && <p>{S.files.saved(`${result.file}.constants.json`)}</p>}
+      {result.run && result.stored && (
+        <p class="links">
+          <a href={`/api/runs/${result.run}/certificate.pdf`} download>{S.documents.certificate}</a>
+          <a href={`/api/runs/${result.run}/certificate.json`} download>{S.documents.json}</a>
+          {result.written && good && <a href={`/api/runs/${result.run}/label.zpl`} download>{S.documents.label}</a>}
+          <a href={`/api/runs/${result.run}/report.json`} download>{S.documents.report}</a>
+        </p>
+      )}
+    </section>
+  );
+}
+
+// For practice without hardware: what a hand does to a real unit, buttons do to a virtual one.
+export function VirtualHand({ lane, setProblem }: { lane: number; setProblem: (problem: Refusal | null) => void }) {
+  const [tilt, setTilt] = useState(false);
+  const hand = async (body: object) => {
+    const answer = await ask(`/api/lanes/${lane}/hand`, body);
+    setProblem(answer.ok ? null : answer.error);
+  };
+  return (
+    <section class="hand" aria-label={S.hand.title}>
+      <h3>{S.hand.title}</h3>
+      <div class="buttons">
+        {POSES.map((pose) => (
+          <button type="button" onClick={() => { void hand({ do: 'turn', pose, tilt_deg: tilt ? 7.2 : 0 }); setTilt(false); }}>{S.face(pose)}</button>
+        ))}
+        <label class="check"><input type="checkbox" checked={tilt} onChange={(event) => setTilt(event.currentTarget.checked)} /> {S.hand.tilt}</label>
+        <button type="button" onClick={() => hand({ do: 'lean' })}>{S.hand.lean}</button>
+        <button type="button" onClick={() => hand({ do: 'knock' })}>{S.hand.knock}</button>
+        <button type="button" onClick={() => hand({ do: 'unplug' })}>{S.hand.unplug}</button>
+        <button type="button" onClick={() => hand({ do: 'plug' })}>{S.hand.plug}</button>
+        <button type="button" onClick={() => hand({ do: 'swap' })}>{S.hand.swap}</button>
+      </div>
+    </section>
+  );
+}
+
+function nowText(live: Live | undefined): string {
+  return live?.face ? S.nowFace(live.face, live.angle_deg ?? 0) : S.nowUnknown;
+}
+
+function Placements({ lane }: { lane: Lane }) {
+  const run = lane.run!;
+  return (
+    <section class="placements" aria-label={S.takenPoses}>
+      <p>{S.placements(run.taken.length, run.of)} · {S.phase[run.phase]}</p>
+      <ol>
+        {Array.from({ length: run.of }, (_, i) => {
+          const taken = run.taken[i];
+          return taken
+            ? <li class="taken" title={S.rounds[taken.round]}><b aria-hidden="true">✔</b>{S.face(taken.pose)}</li>
+            : <li aria-hidden="true">·</li>;
+        })}
+      </ol>
+    </section>
+  );
+}
+
+export function CaptureSteps({ lane, say }: { lane: Lane; say: (word: string, body?: object) => void }) {
+  const [now, setNow] = useState(Date.now());
+  useEffect(() => {
+    const timer = setInterval(() => setNow(Date.now()), 250);
+    return () => clearInterval(timer);
+  }, []);
+  const capture = lane.capture!;
+  const left = Math.max(0, Math.ceil((capture.until_ms - now) / 1000));
+  return (
+    <div class="capture">
+      <p>{S.files.sideOf(capture.number, capture.of)}</p>
+      {capture.side && !capture.placed && (
+        <button type="button" class="primary" onClick={() => say('placed')}>{S.files.placed}</button>
+      )}
+      {capture.placed && <p class="count" role="timer">{left > 0 ? S.files.rest(left) : S.files.next}</p>}
+    </div>
+  );
+}
+
+export function LaneView({ lane, live, operator, virtual, setProblem }: {
+  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; setProblem: (problem: Refusal | null) => void;
+}) {
+  const [write, setWrite] = useState(false);
+  const [sure, setSure] = useState(false);
+  const busy = BUSY.includes(lane.state);
+  const mine = !busy || lane.client === client || lane.client === '';
+  const say = async (word: string, body: object = {}) => {
+    const answer = await ask(`/api/lanes/${lane.lane}/${word}`, body);
+    setProblem(answer.ok ? null : answer.error);
+  };
+  const start = async () => {
+    const answer = await ask('/api/run', { lane: lane.lane, operator, write });
+    setProblem(answer.ok ? null : answer.error);
+  };
+  useEffect(() => {
+    const press = (event: KeyboardEvent) => {
+      if (event.key === 'Backspace' && lane.state === 'running' && mine && !(event.target instanceof HTMLInputElement)) {
+        event.preventDefault();
+        void say('undo');
+      }
+    };
+    window.addEventListener('keydown', press);
+    return () => window.removeEventListener('keydown', press);
+  }, [lane.state, mine]);
+  useEffect(() => setSure(false), [lane.state]);
+
+  const wanted: Pose | null = lane.state === 'running' ? lane.run?.wanted ?? null : lane.capture?.side ?? null;
+  const shown = lane.state === 'running' ? live?.stillness : undefined;
+  const refusal = lane.state === 'running' ? lane.run?.last_refusal : '';
+  return (
+    <section class={`lane state-${lane.state}`} aria-labelledby="lane-title">
+      <h2 id="lane-title">{S.lane(lane.lane)} <small>{lane.unit ? S.unit(lane.unit.serial, lane.unit.firmware) : lane.device}</small></h2>
+      <p class="prompt" role="status" aria-live="polite">{S.prompt(lane)}</p>
+      {(lane.state === 'wrong_unit' || lane.state === 'unit_away') && <p class="notice bad"><b aria-hidden="true">⚠ </b>{lane.message}</p>}
+      {lane.scan && <p class={lane.scan.matches ? 'notice good' : 'notice bad'}><b aria-hidden="true">{lane.scan.matches ? '✔ ' : '✖ '}</b>{S.scanned(lane.scan.serial, lane.scan.matches)}</p>}
+      <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal)}</p>
+
+      {(lane.state === 'done' || lane.state === 'idle') && lane.result && <ResultBox result={lane.result} />}
+      <div class="pictures">
+        {wanted && (
+          <figure><figcaption>{S.wantedTitle}: <b>{S.poseText(wanted)}</b></figcaption><PosePicture pose={wanted} /></figure>
+        )}
+        {lane.state !== 'absent' && lane.state !== 'unit_away' && (
+          <figure><figcaption>{S.nowTitle} <b>{nowText(live)}</b></figcaption><LiveBox lane={lane.lane} text={nowText(live)} /></figure>
+        )}
+      </div>
+      {lane.state === 'running' && lane.run && (
+        <>
+          <div class={`still still-${shown}`}>
+            <span>{shown ? S.stillness[shown] : ''}</span>
+            <progress max={1} value={shown === 'dwelling' ? live?.dwell ?? 0 : 0} aria-label={S.stillness.dwelling} />
+          </div>
+          <Placements lane={lane} />
+        </>
+      )}
+      {lane.state === 'capturing' && <CaptureSteps lane={lane} say={say} />}
+
+      <div class="buttons">
+        {(lane.state === 'idle' || lane.state === 'done') && (
+          <>
+            <button type="button" class="primary" onClick={start}>{lane.result?.kind === 'jig' ? S.again : S.start}</button>
+            <label class="check"><input type="checkbox" checked={write} onChange={(event) => setWrite(event.currentTarget.checked)} /> {S.write}</label>
+          </>
+        )}
+        {busy && mine && lane.state === 'running' && (
+          <button type="button" onClick={() => say('undo')} disabled={!lane.run?.taken.length}>{S.undoKey}</button>
+        )}
+        {busy && mine && !sure && <button type="button" onClick={() => setSure(true)}>{S.stop}</button>}
+        {busy && mine && sure && (
+          <span class="sure" role="group" aria-label={S.stopSure}>{S.stopSure}{' '}
+            <button type="button" class="danger" onClick={() => say('stop')}>{S.stopYes}</button>{' '}
+            <button type="button" onClick={() => setSure(false)}>{S.stopNo}</button>
+          </span>
+        )}
+        {busy && !mine && (
+          <span>{S.held(lane.operator)} <button type="button" onClick={() => say('take', { operator })}>{S.takeOver}</button></span>
+        )}
+      </div>
+      {lane.state !== 'absent' && lane.state !== 'capturing' && <TraceChart lane={lane.lane} />}
+      {virtual && <VirtualHand lane={lane.lane} setProblem={setProblem} />}
+    </section>
+  );
+}
+
+export function LaneCards({ state, chosen, follow, setFollow, choose }: {
+  state: State; chosen: number; follow: boolean; setFollow: (on: boolean) => void; choose: (lane: number) => void;
+}) {
+  return (
+    <section class="cards" aria-label={S.lanes}>
+      <label class="check"><input type="checkbox" checked={follow} onChange={(event) => setFollow(event.currentTarget.checked)} /> {S.follow}</label>
+      <ul>
+        {state.lanes.map((lane) => {
+          const place = state.queue.indexOf(lane.lane);
+          const verdict = lane.state === 'done' && lane.result ? lane.result.verdict : '';
+          return (
+            <li>
+              <button type="button" class={`card state-${lane.state} verdict-${verdict}`} aria-current={chosen === lane.lane ? 'true' : undefined} onClick={() => choose(lane.lane)}>
+                <span class="number">{lane.lane}</span>
+                <span class="what">
+                  <b>{verdict ? `${S.verdictSigns[verdict]} ${S.verdicts[verdict]}` : lane.state === 'running' && lane.run ? S.placements(lane.run.taken.length, lane.run.of).split(' pl')[0] : S.states[lane.state]}</b>
+                  <span>{lane.unit?.serial ?? '–'}</span>
+                  <span class="next">{place === 0 ? '☞ ' : ''}{place >= 0 && lane.run?.wanted ? S.prompt(lane) : place >= 0 ? S.states[lane.state] : ' '}</span>
+                </span>
+                <Spark lane={lane.lane} />
+              </button>
+            </li>
+          );
+        })}
+      </ul>
+    </section>
+  );
+}

@@ -1,0 +1,135 @@
+// What every scenario uses: a station of its own, a browser, and a few checks that fail loudly.
+import { spawn } from 'node:child_process';
+import { mkdirSync, mkdtempSync, rmSync, readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+export const source = join(dirname(fileURLToPath(import.meta.url)), '..', '..');
+const require = createRequire(join(source, 'station', 'web', 'package.json'));
+const { chromium } = require('playwright-core');
+export const axeSource = readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
+
+export const [scenario, program, shots] = process.argv.slice(2);
+mkdirSync(shots, { recursive: true });
+
+const cleanups = [];
+export async function clean() {
+  for (const cleanup of cleanups.reverse()) await cleanup();
+}
+
+export function folder() {
+  const path = mkdtempSync(join(tmpdir(), 'sixpoint-page-'));
+  cleanups.push(() => rmSync(path, { recursive: true, force: true }));
+  return path;
+}
+
+// Starts `sixpoint station` on a free port; answers with its address and a way to end it.
+export async function station(devices, { home = folder(), port = 0 } = {}) {
+  const child = spawn(program, [
+    'station', '--port', String(port), '--store', join(home, 'store.db'), '--state', join(home, 'state'), '--files', home,
+    '--station', 'Bench 1', ...devices.flatMap((device) => ['--device', device]),
+  ], { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, HOME: home, XDG_DATA_HOME: home } });
+  let said = '';
+  child.stderr.on('data', (data) => { said += data; });
+  const ended = new Promise((resolve) => child.once('exit', (code, signal) => resolve(code ?? signal)));
+  const url = await new Promise((resolve, reject) => {
+    let text = '';
+    child.stdout.on('data', (data) => {
+      text += data;
+      if (text.includes('\n')) resolve(text.trim().split('\n')[0]);
+    });
+    child.once('exit', () => reject(new Error(`the station ended: ${said}`)));
+  });
+  const end = async (signal = 'SIGTERM') => {
+    child.kill(signal);
+    return ended;
+  };
+  cleanups.push(() => end('SIGKILL'));
+  const api = async (path, body) => {
+    const answer = await fetch(new URL(path, url), body === undefined ? {} : { method: 'POST', body: JSON.stringify(body) });
+    return { status: answer.status, json: await answer.json().catch(() => null) };
+  };
+  return { url, home, end, api, pid: child.pid };
+}
+
+let browser;
+export async function open(url, { width = 1500, height = 1000 } = {}) {
+  if (!browser) {
+    browser = await chromium.launch({
+      executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+      args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+        '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+    });
+    cleanups.push(() => browser.close());
+  }
+  const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true });
+  const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
+  const problems = [];
+  page.on('pageerror', (error) => problems.push(`page error: ${error.message}`));
+  page.on('console', (message) => {
+    // A refused command is an answer like any other; the browser notes it as an error of its own.
+    if (message.type() === 'error' && !/status of (4|5)\d\d|ERR_CONNECTION|ERR_INCOMPLETE/.test(message.text())) problems.push(message.text());
+  });
+  page.problems = problems;
+  await page.goto(url);
+  await page.getByText('Bench 1').first().waitFor();
+  return page;
+}
+
+export async function shot(page, name) {
+  await page.screenshot({ path: join(shots, `${name}.png`), fullPage: true });
+}
+
+export function check(condition, what) {
+  if (!condition) throw new Error(`not so: ${what}`);
+}
+
+export async function until(what, test, seconds = 60) {
+  const end = Date.now() + seconds * 1000;
+  for (;;) {
+    const answer = await test();
+    if (answer) return answer;
+    if (Date.now() > end) throw new Error(`never came: ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 40));
+  }
+}
+
+// Serious and critical findings of axe; none is allowed. The page forbids foreign scripts, so axe comes in by
+// the debugger and not by a script element.
+export async function axe(page) {
+  await page.evaluate(axeSource);
+  const result = await page.evaluate(() => window.axe.run(document, { resultTypes: ['violations'] }));
+  const text = result.violations.map((each) => `${each.id} (${each.impact}): ${each.nodes.map((node) => node.target.join(' ') + ' ' + (node.any[0]?.message ?? '')).join('; ')}`);
+  check(result.violations.length === 0, `axe finds nothing, but: ${text.join('\n')}`);
+  check(result.passes === undefined || result.testEngine.name === 'axe-core', 'axe ran');
+}
+
+// The technician: looks at what the page wants in the biggest words and turns the (virtual) unit there.
+export async function turnAsAsked(page) {
+  const prompt = page.locator('.prompt');
+  const text = await until('a wanted side', async () => {
+    const now = (await prompt.textContent()) ?? '';
+    return /[+−][XYZ] side up/.test(now) ? now : null;
+  });
+  const face = text.match(/[+−][XYZ]/)[0];
+  await page.locator('.hand').getByRole('button', { name: face, exact: true }).click();
+  return face;
+}
+
+// Placements, as many as the page counts.
+export async function taken(page) {
+  return page.locator('.placements li.taken').count();
+}
+export async function place(page, count) {
+  while (await taken(page) < count) {
+    const before = await taken(page);
+    const asked = await page.locator('.prompt').textContent();
+    await turnAsAsked(page);
+    await until('the pose is taken', async () =>
+      (await taken(page)) > before || (await page.locator('.result').count()) > 0 || (await page.locator('.prompt').textContent()) !== asked);
+    if (await page.locator('.result').count()) return;
+  }
+}

@@ -1,0 +1,346 @@
+// The page in a real browser, against virtual units:  node scenarios.mjs SCENARIO PROGRAM SCREENSHOTS
+import { execFileSync } from 'node:child_process';
+import { existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import * as h from './harness.mjs';
+
+const { check, until } = h;
+const button = (page, name) => page.getByRole('button', { name, exact: true });
+const start = (page) => button(page, 'Start the measurement').click();
+const prompt = (page) => page.locator('.prompt').first().textContent();
+const refusal = (page, text) => page.locator('.refusal', { hasText: text }).waitFor();
+
+const scenarios = {
+  // From the first look to the verdict, as a technician does it.
+  async whole() {
+    const station = await h.station(['virtual:seed=7,pace=10']);
+    const page = await h.open(station.url);
+    await button(page, 'Start the measurement').waitFor();
+    await h.axe(page);
+    await h.shot(page, 'whole-1-ready');
+    await page.getByLabel('Your name').fill('Ada');
+    await start(page);
+    await h.place(page, 3);
+    await h.turnAsAsked(page);
+    await page.locator('.still-dwelling').waitFor();
+    await h.shot(page, 'whole-2-measuring');
+    await h.axe(page);
+    await h.place(page, 14);
+    await page.locator('.result').waitFor();
+    check((await page.locator('.result .verdict').textContent()).includes('Pass'), 'the verdict is a pass');
+    await page.getByText(/Stored as run [0-9a-f]{12}/).waitFor();
+    await h.shot(page, 'whole-3-verdict');
+    await h.axe(page);
+    const lane = (await station.api('/api/lanes/1')).json;
+    check(lane.operator === 'Ada', 'the operator is in the record');
+    check(lane.run.taken.length === 14, 'fourteen placements');
+    check(lane.result.residual_mg < 3, `the constants fit unseen placements: ${lane.result.residual_mg} mg`);
+    const report = (await station.api(`/api/runs/${lane.result.run}/report.json`)).json;
+    check(report.serial === lane.unit.serial && report.verification.poses.length === 8, 'the store has the whole report');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // Without a mouse: Tab to the button, Enter, Backspace to undo.
+  async keyboard() {
+    const station = await h.station(['virtual:seed=8,pace=10', 'virtual:seed=9,serial=MOS2A45130009,pace=10']);
+    const page = await h.open(station.url);
+    const reach = async (name) => {
+      for (let i = 0; i < 60; ++i) {
+        await page.keyboard.press('Tab');
+        if (await page.evaluate((text) => document.activeElement?.textContent === text, name)) return;
+      }
+      throw new Error(`Tab does not reach '${name}'`);
+    };
+    await button(page, 'Start the measurement').waitFor();
+    // A scanner types a serial number and Enter, wherever the focus is: its lane comes to the front.
+    await page.keyboard.type('MOS2A45130009', { delay: 5 });
+    await page.keyboard.press('Enter');
+    await page.getByText('Label MOS2A45130009: matches').waitFor();
+    await page.keyboard.type('MOS2A45139999', { delay: 5 });
+    await page.keyboard.press('Enter');
+    await page.getByText('no lane holds a unit MOS2A45139999').waitFor();
+    await h.shot(page, 'keyboard-1-scan');
+    await reach('OK');
+    await page.keyboard.press('Enter');
+    await page.evaluate(() => document.activeElement?.blur());
+    await page.keyboard.press('ArrowRight');
+    await page.getByRole('heading', { name: /^Lane 1/ }).waitFor();
+    await reach('Start the measurement');
+    await page.keyboard.press('Enter');
+    await until('it runs', async () => /side up/.test(await prompt(page)));
+    for (let done = 0; done < 2; ++done) {
+      const face = (await prompt(page)).match(/[+−][XYZ]/)[0];
+      await reach(face);
+      await page.keyboard.press('Enter');
+      await until('taken', async () => (await h.taken(page)) > done);
+    }
+    await page.keyboard.press('Backspace');
+    await until('taken back', async () => (await h.taken(page)) === 1);
+    await reach('Stop this run');
+    const ring = await page.evaluate(() => getComputedStyle(document.activeElement).outlineWidth);
+    check(parseFloat(ring) >= 3, `the focus is plainly seen (${ring})`);
+    await h.shot(page, 'keyboard-2-focus');
+    await page.keyboard.press('Enter');
+    await reach('Yes, stop');
+    await page.keyboard.press('Enter');
+    await page.locator('.result .verdict', { hasText: 'Stopped' }).waitFor();
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // A slip of each kind is refused with its reason, and the run ends well all the same.
+  async slips() {
+    const station = await h.station(['virtual:seed=11,pace=10']);
+    const page = await h.open(station.url);
+    const hand = (name) => page.locator('.hand').getByRole('button', { name, exact: true }).click();
+    await start(page);
+    await h.place(page, 3);
+    await h.turnAsAsked(page);
+    await page.locator('.still-dwelling').waitFor();
+    await hand('Knock');
+    await refusal(page, 'moved during the reading');
+    await h.shot(page, 'slips-1-moved');
+    await h.axe(page);
+    await hand('+Z');
+    await refusal(page, 'is done already');
+    await hand('Lean on an edge');
+    await refusal(page, 'lies on none of its six faces');
+    await h.shot(page, 'slips-2-edge');
+    await page.getByLabel('next one tilted 7.2°').check();
+    await h.turnAsAsked(page);
+    await refusal(page, /Not taken: tilted \d+\.\d degrees/);
+    await h.shot(page, 'slips-3-tilted');
+    await h.place(page, 5);
+    await button(page, 'Undo the last one (Backspace)').click();
+    await until('undone', async () => (await h.taken(page)) === 4);
+    await h.place(page, 13);
+    // One of two is left to be put back: another face is the wrong one.
+    const wanted = (await prompt(page)).match(/[+−][XYZ]/)[0];
+    await hand(wanted === '+Y' ? '−Y' : '+Y');
+    await refusal(page, 'wrong face');
+    await h.shot(page, 'slips-4-wrong-face');
+    await h.place(page, 14);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    check((await station.api('/api/lanes/1')).json.result.refusals >= 5, 'the slips are in the record');
+  },
+
+  // Pulled out and put back: the run goes on. Another unit in its place: nothing is mixed.
+  async replug() {
+    const station = await h.station(['virtual:seed=12,serial=MOS2A45130012,pace=10']);
+    const page = await h.open(station.url);
+    const hand = (name) => page.locator('.hand').getByRole('button', { name, exact: true }).click();
+    await start(page);
+    await h.place(page, 4);
+    await hand('Unplug');
+    const pulled = Date.now();
+    await page.getByText('The unit is unplugged: plug it in again').waitFor();
+    console.log(`unplugging was on the page after ${Date.now() - pulled} ms`);
+    await h.shot(page, 'replug-1-unplugged');
+    await h.axe(page);
+    await hand('Plug in');
+    await until('it goes on', async () => /[+−][XYZ] side up/.test(await prompt(page)));
+    check((await h.taken(page)) === 4, 'what was taken is still there');
+    await h.place(page, 6);
+    await hand('Swap for another');
+    await page.getByText('Another unit is plugged in').waitFor();
+    await page.getByText('put MOS2A45130012 back').first().waitFor();
+    await h.shot(page, 'replug-2-another');
+    await button(page, 'Stop this run').click();
+    await button(page, 'Yes, stop').click();
+    await page.locator('.result .verdict', { hasText: 'Stopped' }).waitFor();
+    const lane = (await station.api('/api/lanes/1')).json;
+    check(lane.result.serial === 'MOS2A45130012', 'the run is the first unit\'s');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // The page is loaded anew, and the program is killed and started again, in mid-run.
+  async reload() {
+    const home = h.folder();
+    const devices = ['virtual:seed=13,pace=10'];
+    const first = await h.station(devices, { home });
+    let page = await h.open(first.url);
+    await page.getByLabel('Your name').fill('Ada');
+    await start(page);
+    await h.place(page, 3);
+    await page.reload();
+    await until('the page knows the run', async () => (await h.taken(page)) === 3);
+    check(await button(page, 'Stop this run').isVisible(), 'it is still the same person\'s run');
+    await h.place(page, 8);
+    await until('on the disk', () => existsSync(join(home, 'state')));
+    await first.end('SIGKILL');
+    await page.getByText('The station does not answer').waitFor();
+    await h.shot(page, 'reload-1-station-gone');
+    const second = await h.station(devices, { home, port: new URL(first.url).port });
+    await page.getByText('The station does not answer').waitFor({ state: 'detached' });
+    await until('the run goes on', async () => (await h.taken(page)) >= 8);
+    await h.shot(page, 'reload-2-goes-on');
+    await h.place(page, 14);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Stored as run/).waitFor();
+    check((await second.api('/api/lanes/1')).json.operator === 'Ada', 'the operator survives too');
+  },
+
+  // One person, sixteen units, one session.
+  async sixteen() {
+    const devices = Array.from({ length: 16 }, (_, i) => `virtual:seed=${100 + i},pace=8`);
+    const station = await h.station(devices);
+    const page = await h.open(station.url, { width: 1900, height: 1050 });
+    await page.locator('.card').nth(15).waitFor();
+    for (let lane = 1; lane <= 16; ++lane) {
+      await until('ready', async () => (await station.api(`/api/lanes/${lane}`)).json.state === 'idle');
+      check((await station.api('/api/run', { lane, operator: 'Ada' })).status === 202, 'started');
+    }
+    const began = Date.now();
+    let pictures = 0;
+    const done = new Map(); // lane -> the question that was answered last
+    await until('all sixteen are done', async () => {
+      const view = await page.evaluate(() => ({
+        lane: document.querySelector('#lane-title')?.textContent?.match(/Lane (\d+)/)?.[1],
+        prompt: document.querySelector('.prompt')?.textContent,
+        still: document.querySelector('.still')?.className ?? '',
+        taken: document.querySelectorAll('.placements li.taken').length,
+        refusal: document.querySelector('.refusal')?.textContent ?? '',
+        finished: [...document.querySelectorAll('.card')].filter((card) => /verdict-./.test(card.className)).length,
+      }));
+      const face = view.prompt?.match(/[+−][XYZ]/)?.[0];
+      const question = `${face} ${view.taken} ${view.refusal}`;
+      if (face && !/dwelling|settling/.test(view.still) && done.get(view.lane) !== question) {
+        done.set(view.lane, question);
+        await page.locator('.hand').getByRole('button', { name: face, exact: true }).click();
+        if (++pictures === 100) {
+          await h.shot(page, 'sixteen-1-at-work');
+          await h.axe(page);
+        }
+      }
+      return view.finished === 16;
+    }, 240);
+    console.log(`sixteen units in ${((Date.now() - began) / 1000).toFixed(0)} s at eight times the real pace`);
+    await h.shot(page, 'sixteen-2-done');
+    for (let lane = 1; lane <= 16; ++lane) {
+      const json = (await station.api(`/api/lanes/${lane}`)).json;
+      check(json.result.verdict === 'pass', `lane ${lane} passes: ${JSON.stringify(json.result)}`);
+    }
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // The customer: calibration file, its check, and the archive mended.
+  async files() {
+    const home = h.folder();
+    const constants = 'positive_lsb=311/310/287,negative_lsb=-204/-216/-234,zero_lsb=54/47/26';
+    const truth = 'true_sensitivity_lsb_per_g=237.7/251.8/242.3,true_zero_lsb=49.9/95.8/60.8';
+    const unit = `virtual:seed=7,serial=MOS2A45130007,firmware=1.5.0,calibrated=2013-11-12,${constants},${truth},pace=60`;
+    mkdirSync(join(home, 'archive'));
+    for (const day of [1, 2]) {
+      const scenario = JSON.parse(readFileSync(join(h.source, 'tests/docs/scenario.json'), 'utf8'));
+      scenario.seed = day;
+      writeFileSync(join(home, `s${day}.json`), JSON.stringify(scenario));
+      execFileSync(h.program, ['simulate', '--scenario', join(home, `s${day}.json`), '-o', join(home, 'archive', `day${day}.gt3x`)]);
+    }
+    const station = await h.station([unit, 'virtual:seed=7,firmware=1.8.0,pace=60'], { home });
+    const page = await h.open(station.url);
+    await button(page, 'My files').click();
+    await h.axe(page);
+    await button(page, 'Start recording').click();
+    const capture = page.locator('section', { hasText: '1. Record' }).first();
+    for (let side = 1; side <= 6; ++side) {
+      await page.getByText(`Side ${side} of 6`).waitFor();
+      const face = (await capture.locator('.prompt').textContent()).match(/[+−][XYZ]/)[0];
+      await capture.locator('.hand').getByRole('button', { name: face, exact: true }).click();
+      if (side === 2) await h.shot(page, 'files-1-side');
+      await button(page, 'It lies there').click();
+      await until('the next side, or the end', async () =>
+        (await capture.locator('.result').count()) > 0 || (await button(page, 'It lies there').count()) > 0);
+    }
+    await capture.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Constants saved in/).first().waitFor();
+    // The file that was just made, as one that somebody brought.
+    await page.getByRole('button', { name: 'Check', exact: true }).click();
+    await page.getByText('This file can be used: every side is in it.').waitFor();
+    await h.shot(page, 'files-2-checked');
+    await h.axe(page);
+    // A recording in which two sides were forgotten.
+    const partial = JSON.parse(readFileSync(join(h.source, 'tests/docs/scenario.json'), 'utf8'));
+    partial.motions = ['+z', '-z', '+x', '-x'].map((pose) => ({ kind: 'still', duration_s: 40, pose }));
+    writeFileSync(join(home, 'partial.json'), JSON.stringify(partial));
+    execFileSync(h.program, ['simulate', '--scenario', join(home, 'partial.json'), '-o', join(home, 'partial.gt3x')]);
+    await page.reload();
+    await page.locator('#check-title').waitFor();
+    await page.locator('section', { has: page.locator('#check-title') }).locator('select').selectOption('partial.gt3x');
+    await page.getByRole('button', { name: 'Check', exact: true }).click();
+    await page.locator('.result.bad .verdict.small').waitFor();
+    const missing = await page.locator('.sides .missing').allTextContents();
+    check(missing.some((text) => text.includes('+Y: ✖ repeat')) && missing.length >= 2, `the forgotten sides are named: ${missing}`);
+    await h.shot(page, 'files-3-not-usable');
+    // Repair.
+    await page.getByLabel('Folder with recordings').selectOption('archive');
+    await page.getByLabel('Folder for mended files').fill('mended');
+    await button(page, 'Repair my files').click();
+    await page.getByText('Done. 2 of 2 files, 2 repaired').waitFor();
+    await h.shot(page, 'files-4-repaired');
+    await h.axe(page);
+    check(existsSync(join(home, 'mended', 'day1.gt3x')), 'the mended file is there');
+    const job = (await station.api('/api/job')).json;
+    check(job.files.every((file) => file.status === 'repaired'), 'all are repaired');
+    // A unit whose recording cannot help is refused, with what can.
+    await capture.locator('select').selectOption('2');
+    await button(page, 'Start recording').click();
+    await page.getByText('install a firmware from 1.4.0 to 1.7.0').first().waitFor();
+    await h.shot(page, 'files-5-refused');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // The papers of a run that wrote its constants into the unit.
+  async certificate() {
+    const station = await h.station(['virtual:seed=15,serial=MOS2A45130015,jig=auto']);
+    const page = await h.open(station.url);
+    await page.getByLabel('Your name').fill('Ada');
+    await page.getByLabel('Write the constants into the unit').check();
+    await start(page);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Stored as run/).waitFor();
+    await h.shot(page, 'certificate-1-links');
+    const fetched = async (name) => {
+      const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name }).click()]);
+      return readFileSync(await download.path());
+    };
+    const pdf = await fetched('Certificate (PDF)');
+    check(pdf.subarray(0, 5).toString() === '%PDF-' && pdf.length > 5000, 'a PDF comes');
+    const json = JSON.parse((await fetched('Certificate (JSON)')).toString());
+    check(json.serial === 'MOS2A45130015' && json.operator === 'Ada', `it is this unit's: ${json.serial}, ${json.operator}`);
+    const label = (await fetched('Label (ZPL)')).toString();
+    check(label.includes('^XA') && label.includes('MOS2A45130015'), 'a label comes after the read-back');
+    const report = JSON.parse((await fetched('Report (JSON)')).toString());
+    check(report.as_left.written === true && report.recheck.poses.length === 2, 'written, read back and measured again');
+  },
+
+  // Another person's page sees the run and may not touch it, until it takes it over.
+  async operators() {
+    const station = await h.station(['virtual:seed=14,pace=10']);
+    const ada = await h.open(station.url);
+    await ada.getByLabel('Your name').fill('Ada');
+    await start(ada);
+    await h.place(ada, 1);
+    const bob = await h.open(station.url);
+    await bob.getByLabel('Your name').fill('Bob');
+    await bob.getByText('Ada is at work on this lane.').waitFor();
+    check((await button(bob, 'Stop this run').count()) === 0, 'Bob cannot stop it');
+    await h.shot(bob, 'operators-1-held');
+    await h.axe(bob);
+    await button(bob, 'Take this lane over').click();
+    await button(bob, 'Stop this run').waitFor();
+    await ada.getByText('Bob is at work on this lane.').waitFor();
+    await button(bob, 'Stop this run').click();
+    await button(bob, 'Yes, stop').click();
+    await ada.locator('.result .verdict', { hasText: 'Stopped' }).waitFor();
+  },
+};
+
+try {
+  if (!scenarios[h.scenario]) throw new Error(`there is no scenario '${h.scenario}'; there are: ${Object.keys(scenarios).join(' ')}`);
+  await scenarios[h.scenario]();
+  console.log(`${h.scenario}: done`);
+} catch (error) {
+  console.error(error.stack ?? error);
+  process.exitCode = 1;
+} finally {
+  await h.clean();
+}

@@ -1,0 +1,126 @@
+#include "station/limits.h"
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+
+namespace sixpoint::station {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Limits, TheBuiltInOnesAreCompleteAndInThemselvesConsistent) {
+  const Limits limits = default_limits();
+  ASSERT_EQ(limits.limits.size(), quantities().size());
+  for (const QuantityInfo& info : quantities()) {
+    const Limit& limit = limits.of(info.name);
+    EXPECT_TRUE(limit.low || limit.high) << info.name;
+    EXPECT_FALSE(info.reason.empty()) << info.name;
+    EXPECT_FALSE(info.high && info.code_high.empty()) << info.name;
+    EXPECT_FALSE(info.low && info.code_low.empty()) << info.name;
+  }
+  EXPECT_EQ(limits.sha256.size(), 64U);
+}
+
+TEST(Limits, WhatIsPrintedIsRead) {
+  Limits limits = default_limits();
+  limits.decision.guard_factor = 0.5;
+  limits.retest.most_failures = 7;
+  limits.check_unit.locking_rules = {1};
+  limits.limits[1].low = -0.1;
+  limits.limits[1].guard_band = 1e-3;
+  const auto read = parse_limits(to_toml(limits), "again.toml");
+  ASSERT_OK(read);
+  auto before = to_json(limits);
+  auto after = to_json(*read);
+  before.erase("source");
+  before.erase("sha256");
+  after.erase("source");
+  after.erase("sha256");
+  EXPECT_EQ(before, after);
+  // The built-in limits' hash is that of what is printed, so that both name the same thing.
+  EXPECT_EQ(parse_limits(to_toml(default_limits()), "x")->sha256, default_limits().sha256);
+}
+
+TEST(Limits, WhatIsLeftOutKeepsItsValue) {
+  const auto limits = parse_limits("[zero_offset_mg]\nhigh = 100\n", "l.toml");
+  ASSERT_OK(limits);
+  EXPECT_EQ(limits->of("zero_offset_mg").high, 100);
+  EXPECT_EQ(limits->of("zero_offset_mg").low, default_limits().of("zero_offset_mg").low);
+  EXPECT_EQ(limits->of("noise_mg").high, default_limits().of("noise_mg").high);
+  EXPECT_NE(limits->sha256, default_limits().sha256);
+}
+
+struct BadFile {
+  const char* name;
+  const char* text;
+  const char* where;
+  const char* what;
+};
+class BadLimits : public testing::TestWithParam<BadFile> {};
+
+TEST_P(BadLimits, AreRefusedWithTheLine) {
+  const auto limits = parse_limits(GetParam().text, "l.toml");
+  ASSERT_FALSE(limits);
+  EXPECT_EQ(limits.error().code, ErrorCode::configuration);
+  EXPECT_EQ(limits.error().where, GetParam().where);
+  EXPECT_THAT(limits.error().what, HasSubstr(GetParam().what));
+  EXPECT_FALSE(limits.error().hint.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, BadLimits,
+    testing::Values(
+        BadFile{"LowAboveHigh", "[zero_offset_mg]\nhigh = 5\nlow = 6\n", "l.toml:3",
+                "not below high"},
+        BadFile{"LowIsHigh", "[zero_offset_mg]\nhigh = 5\nlow = 5\n", "l.toml:3", "not below high"},
+        BadFile{"LowAboveTheBuiltInHigh", "\n[zero_offset_mg]\nlow = 900\n", "l.toml:3",
+                "not below high 700"},
+        BadFile{"GuardBandBigger", "[zero_offset_mg]\nlow=-1\nhigh=1\nguard_band=1\n", "l.toml:4",
+                "leaves nothing"},
+        BadFile{"GuardBandBiggerOneSided", "[noise_mg]\nguard_band = 10\n", "l.toml:2",
+                "leaves nothing"},
+        BadFile{"UnknownTable", "[noise_mg]\nhigh=3\n[nois_mg]\nhigh = 3\n", "l.toml:3",
+                "'nois_mg' is nothing"},
+        BadFile{"UnknownEmptyTable", "[nois_mg]\n", "l.toml:1", "'nois_mg' is nothing"},
+        BadFile{"UnknownKey", "[noise_mg]\nhigh = 3\nhihg = 3\n", "l.toml:3", "unknown key 'hihg'"},
+        BadFile{"NoLow", "[noise_mg]\nlow = 3\n", "l.toml:2", "no 'low' limit"},
+        BadFile{"NotATable", "noise_mg = 3\n", "l.toml:1", "no table"},
+        BadFile{"Text", "[noise_mg]\nhigh = \"3\"\n", "l.toml:2", "no number"},
+        BadFile{"Bool", "[noise_mg]\nhigh = true\n", "l.toml:2", "no number"},
+        BadFile{"Negative", "[noise_mg]\nhigh = -3\n", "l.toml:2", "outside 0 to"},
+        BadFile{"NegativeGuardBand", "[zero_offset_mg]\nguard_band = -1\n", "l.toml:2", "outside"},
+        BadFile{"NaN", "[noise_mg]\nhigh = nan\n", "l.toml:2", "outside"},
+        BadFile{"Infinite", "[noise_mg]\nhigh = inf\n", "l.toml:2", "outside"},
+        BadFile{"HalfARun", "[retest]\nmost_failures = 1.5\n", "l.toml:2", "no whole number"},
+        BadFile{"NoRun", "[retest]\nmost_failures = 0\n", "l.toml:2", "outside"},
+        BadFile{"ARuleThatIsNone", "[check_unit]\nlocking_rules = [1, 9]\n", "l.toml:2", "outside"},
+        BadFile{"RulesNoList", "[check_unit]\nlocking_rules = 1\n", "l.toml:2", "no list"},
+        BadFile{"UnknownDecision", "[decision]\nfactor = 1\n", "l.toml:2", "unknown key"},
+        BadFile{"Twice", "[noise_mg]\nhigh = 3\n[noise_mg]\nhigh = 3\n", "l.toml:3", "no TOML"},
+        BadFile{"NoToml", "\n\n[noise_mg\n", "l.toml:3", "no TOML"},
+        BadFile{"Binary", "\x01\x02\x03", "l.toml:1", "no TOML"}),
+    [](const auto& one) { return one.param.name; });
+
+TEST(Limits, AFileIsNamedWithoutItsFolderAndAHugeOneIsRefused) {
+  MemoryEnv env;
+  const auto put = [&](const std::string& path, const std::string& text) {
+    auto file = env.files.create(path);
+    ASSERT_OK(file);
+    ASSERT_OK((*file)->write_at(
+        0, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+    ASSERT_OK((*file)->close());
+  };
+  put("l.toml", "[noise_mg]\nhigh = 3\n");
+  const auto limits = read_limits(env.files, "l.toml");
+  ASSERT_OK(limits);
+  EXPECT_EQ(limits->source, "l.toml");
+  put("huge.toml", std::string(2U << 20U, '#'));
+  EXPECT_FAILS(read_limits(env.files, "huge.toml"), ErrorCode::configuration);
+  EXPECT_FAILS(read_limits(env.files, "none.toml"), ErrorCode::no_input);
+}
+
+}  // namespace
+}  // namespace sixpoint::station
