@@ -57,7 +57,8 @@ std::string_view to_string(Owner owner) {
 
 Result<SkewPattern> skew_of_run(const StoredRun& run) {
   const auto wrong = [&] {
-    return fail(ErrorCode::bad_data, "the run's report holds no six faces", run.id);
+    return fail(ErrorCode::bad_data, "the run's report holds no six faces", run.id,
+                "leave this run out, or measure the unit again");
   };
   const auto report = nlohmann::json::parse(run.document, nullptr, false);
   if (!report.is_object() || !report.contains("poses") || !report["poses"].is_array()) {

@@ -18,6 +18,7 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr const char* kDamaged = "'sixpoint audit verify' says whether the store was changed";
 constexpr std::size_t kMostSamples = 2'000'000;  // five hours at 100 Hz
 
 // A turn that brings gravity's reaction onto the pose's axis. The report knows no yaw.
@@ -67,7 +68,7 @@ Result<Samples> read_samples(std::string_view csv) {
     const std::size_t end = std::min(csv.find('\n'), csv.size());
     if (++number > 1 && end > 0 && !read_line(csv.substr(0, end), samples)) {
       return fail(ErrorCode::bad_data, "the capture holds a line that is no sample",
-                  fmt::format("line {}", number));
+                  fmt::format("line {}", number), kDamaged);
     }
     if (samples.counts.size() > kMostSamples) {
       return fail(ErrorCode::bad_data, "the capture is longer than a jig run can be",
@@ -97,14 +98,16 @@ Status add_readings(const Json& list, const char* name, std::vector<Reading>& re
                        item.contains("mean_lsb") && item["mean_lsb"].is_array() &&
                        item["mean_lsb"].size() == 3;
     if (!whole) {
-      return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name);
+      return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name,
+                  kDamaged);
     }
     SIXPOINT_ASSIGN(reading.pose, device::parse_pose(item["pose"].get<std::string>()));
     reading.samples = item["samples"].get<std::size_t>();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const Json& mean = item["mean_lsb"][axis];
       if (!mean.is_number() || reading.samples > kMostSamples) {
-        return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name);
+        return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name,
+                    kDamaged);
       }
       reading.sum[axis] = std::llround(mean.get<double>() * static_cast<double>(reading.samples));
     }
@@ -115,7 +118,7 @@ Status add_readings(const Json& list, const char* name, std::vector<Reading>& re
 
 Result<StoredRun> run_of(const db::Row& row) {
   if (row.size() != 6) {
-    return fail(ErrorCode::internal, "the store answered with another table", "runs");
+    return fail(ErrorCode::internal, "the store answered with another table", "runs", kDamaged);
   }
   return StoredRun{db::text_of(row[0]), db::text_of(row[1]), db::text_of(row[2]),
                    db::text_of(row[3]), db::text_of(row[4]), db::text_of(row[5])};
@@ -162,7 +165,8 @@ Result<std::string> samples_of_run(db::Store& store, const std::string& id) {
   const Bytes* bytes =
       rows.size() == 1 && rows[0].size() == 1 ? std::get_if<Bytes>(rows[0].data()) : nullptr;
   if (bytes == nullptr) {
-    return fail(ErrorCode::no_input, "the run kept no samples", printable(id, 80));
+    return fail(ErrorCode::no_input, "the run kept no samples", printable(id, 80),
+                "runs of kind 'jig' keep them");
   }
   return std::string(bytes->begin(), bytes->end());
 }
@@ -170,7 +174,7 @@ Result<std::string> samples_of_run(db::Store& store, const std::string& id) {
 Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples_csv) {
   const Json report = Json::parse(run.document, nullptr, false);
   if (!report.is_object() || !report.contains("poses")) {
-    return fail(ErrorCode::bad_data, "the run's document is no jig report", run.id);
+    return fail(ErrorCode::bad_data, "the run's document is no jig report", run.id, kDamaged);
   }
   std::vector<Reading> readings;
   SIXPOINT_CHECK(add_readings(report["poses"], "faces", readings));
@@ -224,7 +228,7 @@ Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples
                        ? std::round(1 / (samples.device_time_s[1] - samples.device_time_s[0]))
                        : 100;
   if (!(bundle.rate_hz >= 10 && bundle.rate_hz <= 400) || !(span_s > 0)) {
-    return fail(ErrorCode::bad_data, "the capture's times are no sample clock's", run.id);
+    return fail(ErrorCode::bad_data, "the capture's times are no sample clock's", run.id, kDamaged);
   }
   // The middle of each axis, from its two faces.
   std::array<double, 3> middle{};

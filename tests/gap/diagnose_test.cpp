@@ -7,6 +7,7 @@
 #include "gap/catalogue.h"
 #include "gap/made_bundle.h"
 #include "gap/report_html.h"
+#include "gap/report_sheet.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -134,6 +135,38 @@ TEST(ReportHtml, OnePageWithTheSentenceAndNothingFromOutside) {
   EXPECT_NE(page.find("<svg"), std::string::npos);
   EXPECT_EQ(page.find("<script"), std::string::npos);
   EXPECT_EQ(page.find("http"), std::string::npos) << "the page must need nothing else";
+}
+
+TEST(ReportSheet, PictureAndPaper) {
+  Bundle bundle = tests::made_production({});
+  bundle.protocol_serial = "<A&B>";
+  const auto d = diagnose(bundle);
+  ASSERT_OK(d);
+  const std::string svg = report_sheet(*d);
+  EXPECT_NE(svg.find("no gap"), std::string::npos);
+  EXPECT_NE(svg.find("&lt;A&amp;B&gt;"), std::string::npos);
+  const auto png = sheet_png(svg);
+  ASSERT_OK(png);
+  EXPECT_EQ(std::string(png->begin() + 1, png->begin() + 4), "PNG");
+  const auto pdf = sheet_pdf(svg);
+  ASSERT_OK(pdf);
+  EXPECT_EQ(std::string(pdf->begin(), pdf->begin() + 5), "%PDF-");
+  EXPECT_FAILS(sheet_png("no drawing"), ErrorCode::internal);
+}
+
+// A zero that moved once is in no catalogue; random walk, drift and warming up must not pass for
+// it.
+TEST(Diagnose, AZeroThatMovedOnceIsUnknown) {
+  for (const double step_mg : {3.0, 8.0}) {
+    const Bundle bundle = tests::made_production({}, [&](const Segment& segment, double) {
+      const Eigen::Vector3d moved = Eigen::Vector3d(1, -0.4, 0.7) * step_mg / 1000;
+      return Eigen::Vector3d(segment.rotation.col(2) +
+                             (segment.placement >= 8 ? moved : Eigen::Vector3d::Zero()));
+    });
+    const auto d = diagnose(bundle);
+    ASSERT_OK(d);
+    EXPECT_TRUE(d->unknown.present) << step_mg << ": " << d->brief();
+  }
 }
 
 }  // namespace

@@ -157,6 +157,37 @@ TEST(SlowNoise, WalkIsFoundAndSized) {
   EXPECT_LT(slow_noise(still, still_clean, noise_spectrum(still, still_clean)).best_both().nats, 5);
 }
 
+// Telegraph noise of 2 mg against a walk of the same power: only the first has jumps.
+TEST(SlowNoise, JumpsAreNoWalk) {
+  const auto jump_sd = [](bool telegraph) {
+    Bundle bundle = tests::made_production({});
+    Segment still = bundle.segments.front();
+    bundle.segments.clear();
+    bundle.samples.clear();
+    still.first_sample = 0;
+    still.samples = 100'000;
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> uniform;
+    double level_mg = 0;
+    for (std::size_t i = 0; i < still.samples; ++i) {
+      if (telegraph) {
+        level_mg = uniform(random) < 1.0 / 2500 ? 2 - level_mg : level_mg;
+      } else {
+        level_mg += 0.02 * normal(random);
+      }
+      const double mg = 100 + level_mg + 3.9 * normal(random);
+      bundle.samples.push_back({static_cast<std::int16_t>(std::lround(mg * 0.256)),
+                                static_cast<std::int16_t>(std::lround(mg * 0.256)), 256});
+    }
+    bundle.segments.push_back(still);
+    const CleanSamples clean = clean_samples(bundle);
+    return slow_noise(bundle, clean, noise_spectrum(bundle, clean)).jump_sd;
+  };
+  EXPECT_GT(jump_sd(true), 8);
+  EXPECT_LT(jump_sd(false), 4);
+}
+
 TEST(Response, ClosedForms) {
   EXPECT_NEAR(low_pass_gain(20, 20, 4, 100), M_SQRT1_2, 1e-12);
   EXPECT_NEAR(low_pass_gain(1, 30, 4, 100), 1, 1e-6);
@@ -165,6 +196,15 @@ TEST(Response, ClosedForms) {
   EXPECT_NEAR(resonance_gain(12, Resonance{12, 3, ResonanceForm::base_excited, 0}), std::sqrt(10.0),
               1e-12);  // sqrt(1 + Q^2)
   EXPECT_NEAR(resonance_gain(0.01, plain), 1, 1e-5);
+  EXPECT_NEAR(resonance_gain(12, Resonance{12, 3, ResonanceForm::peak, 0}), 3, 1e-12);
+  LowPass analogue;
+  analogue.corner_hz = 20;
+  analogue.order = 2;
+  analogue.form = LowPassForm::analogue;
+  EXPECT_NEAR(analogue.tone_gain(20, 100), M_SQRT1_2, 1e-12);
+  // What lies beyond half the rate comes back: at half of it twice the power.
+  EXPECT_NEAR(std::pow(analogue.noise_gain(50, 100), 2),
+              2 / (1 + std::pow(2.5, 4)) + 1 / (1 + std::pow(7.5, 4)), 1e-12);
 }
 
 }  // namespace

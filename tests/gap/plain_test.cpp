@@ -3,11 +3,17 @@
 
 #include <cstdio>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include "base/memory_env.h"
 #include "expect_result.h"
+#include "gt3x/recording.h"
+#include "gt3x/recording_writer.h"
+#include "gt3x/sample_reader.h"
 #include "shared_data.h"
+#include "sim/recording.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -102,6 +108,68 @@ TEST(Plain, XsensLengthsGiveTheFactorysScalesAndCrossTerms) {
   }
   EXPECT_GT(fit->cross.cwiseAbs().maxCoeff(), 0.003);
   EXPECT_LT(fit->residual, 0.02);
+}
+
+// Semi-synthetic: a mismatch of known size put into a real recording of a unit that has none. What
+// the recording really holds - wear, movement, its own constants - stays.
+TEST(Plain, KnownMismatchInARealRecordingIsFoundAndMeasured) {
+  const char* name = "data/wgt3x-bt/MOS2E39180594.gt3x";
+  SIXPOINT_NEED_SHARED(name);
+  auto recording = gt3x::Recording::open(posix_env().files, tests::shared_file(name));
+  ASSERT_OK(recording);
+  const int rate_hz =
+      static_cast<int>(std::lround(recording->info().sample_rate_hz().value_or(30)));
+  std::vector<std::pair<UtcTime, std::vector<gt3x::Counts>>> seconds;
+  gt3x::SampleReader reader(*recording);
+  for (auto item = reader.next(); item && *item; item = reader.next()) {
+    if ((*item)->kind == gt3x::SampleItem::Kind::recorded) {
+      seconds.emplace_back(
+          from_unix_seconds((*item)->unix_time),
+          std::vector<gt3x::Counts>((*item)->counts.begin(), (*item)->counts.end()));
+    }
+  }
+  ASSERT_GT(seconds.size(), 300U);
+  const double scale = recording->info().accel_scale_lsb_per_g().value_or(256);
+  struct Case {
+    double gain;
+    std::array<double, 3> offset_g;
+    bool there;
+  };
+  int right = 0;
+  const std::vector<Case> cases = {{1, {0, 0, 0}, false},
+                                   {0.8, {0.15, -0.1, 0.2}, true},
+                                   {0.86, {-0.12, 0.18, -0.1}, true},
+                                   {0.92, {0.1, 0.1, -0.15}, true},
+                                   {0.95, {-0.2, -0.15, 0.1}, true}};
+  for (const Case& c : cases) {
+    MemoryEnv memory;
+    const sim::UnitTruth unit;
+    Bytes log = sim::log_preamble(unit, seconds.front().first, rate_hz);
+    for (const auto& [time, counts] : seconds) {
+      std::vector<gt3x::Counts> changed = counts;
+      for (gt3x::Counts& count : changed) {
+        for (std::size_t a = 0; a < 3; ++a) {
+          count[a] = static_cast<std::int16_t>(
+              std::clamp(std::lround(c.gain * count[a] + c.offset_g[a] * scale), -2048L, 2047L));
+        }
+      }
+      sim::append_second(log, time, changed, true);
+    }
+    auto writer = gt3x::RecordingWriter::create(memory.files, "made.gt3x");
+    ASSERT_OK(writer);
+    ASSERT_OK(writer->add("log.bin", std::move(log)));
+    gt3x::Info info = sim::recording_info(unit, seconds.front().first,
+                                          seconds.back().first + std::chrono::seconds(1), rate_hz);
+    info.set("Acceleration Scale", fmt::format("{}", scale));
+    ASSERT_OK(writer->add("info.txt", info.serialise()));
+    ASSERT_OK(writer->commit());
+    const auto d = diagnose_plain(memory.files, "made.gt3x");
+    ASSERT_OK(d);
+    const EffectFinding* found = accepted(*d, "filter_mismatch");
+    EXPECT_EQ(found != nullptr, c.there) << c.gain << ": " << d->brief();
+    right += (found != nullptr) == c.there ? 1 : 0;
+  }
+  EXPECT_EQ(right, 5);
 }
 
 TEST(Plain, TooFewPositionsAreRefused) {

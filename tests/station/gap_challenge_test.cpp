@@ -105,6 +105,26 @@ TEST_F(GapChallenge, StripTakesTheTruthAwayAndTheBundleKeepsIt) {
   EXPECT_TRUE(std::filesystem::exists((folder_ / "page.html")));
 }
 
+// The real diagnosis on trials that it never saw. The bounds are far below what it reaches
+// (docs/gap.md): chance must not break the test.
+TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRun) {
+  const auto production =
+      challenge({"--program", SIXPOINT_BINARY_DIR "/sixpoint", "--trials", "60"}).json();
+  const auto& scores = production["scores"];
+  EXPECT_EQ(scores["failures"]["right"], 0);
+  EXPECT_LE(scores["none_alarms"]["right"].get<int>(), 1);
+  EXPECT_GE(scores["single_first_right_observable"]["share"].get<double>(), 0.8);
+  EXPECT_LE(scores["expected_calibration_error"].get<double>(), 0.05);
+  const auto engineering =
+      tests::run_command(posix_env(),
+                         {"gap", "challenge", "--program", SIXPOINT_BINARY_DIR "/sixpoint",
+                          "--trials", "12", "--protocol", "engineering", "--seed", "5", "--json"})
+          .json();
+  EXPECT_EQ(engineering["scores"]["failures"]["right"], 0);
+  EXPECT_LE(engineering["scores"]["withheld_confidently_wrong"]["right"].get<int>(), 1);
+  EXPECT_GE(engineering["scores"]["single_first_right_observable"]["share"].get<double>(), 0.8);
+}
+
 TEST_F(GapChallenge, AProgramThatFailsIsCounted) {
   const auto crashed = challenge({"--program", program("exit 70"), "--trials", "2"});
   EXPECT_EQ(crashed.exit_code, 1);
