@@ -190,6 +190,10 @@ std::string write_agdc(FileSystem& files, const std::string& path, const PerAxis
     calibration[std::string("positiveZeroGOffset") + names[a] + "_32"] = zero + 250;
     calibration[std::string("negativeZeroGOffset") + names[a] + "_32"] = zero - 250;
     calibration[std::string("zeroGOffset") + names[a] + "_32"] = zero + 8;
+    calibration[std::string("offset") + names[a] + "_32"] = zero + 8;
+    for (std::size_t b = a; b < kAxes; ++b) {
+      calibration[std::string("sensitivity") + names[a] + names[b] + "_32"] = a == b ? 25'000 : 0;
+    }
   }
   const Json thermometer = {{"mcuTempLow", 970},   {"mcuTempHigh", 1075}, {"adxlTempLow", 68},
                             {"adxlTempHigh", 536}, {"tempLow", 10},       {"tempHigh", 40}};
