@@ -1,7 +1,10 @@
 // The store at its size: how fast rows come in, one file's constants are found, the recall list is
 // made and the chain is verified; what many writers do to each other.
 //
-//   store_bench [--constants N] [--repairs N] [--store PLACE] [--writers N --seconds S]
+//   store_bench [--constants N] [--repairs N] [--store PLACE] [--writers N] [--seconds S]
+//               [--postgres 1]
+//
+// --postgres 1 starts a PostgreSQL of its own on loopback, with fsync on, and measures on that.
 //
 // Baselines, named in the output: for the audit, a full scan of the same tables by SQLite's own
 // library, and SHA-256 alone over as many bytes; for the writers, one writer alone.
@@ -19,6 +22,7 @@
 #include "base/env.h"
 #include "base/random.h"
 #include "db/history.h"
+#include "db/postgres_server.h"
 #include "db/store.h"
 
 namespace {
@@ -208,6 +212,7 @@ int main(int argc, char** argv) {
   int writers = 16;
   int seconds = 10;
   std::string place;
+  std::unique_ptr<db::tests::PostgresServer> server;
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string_view name = argv[i];
     const auto number = std::strtoull(argv[i + 1], nullptr, 10);
@@ -219,6 +224,13 @@ int main(int argc, char** argv) {
       writers = static_cast<int>(number);
     } else if (name == "--seconds") {
       seconds = static_cast<int>(number);
+    } else if (name == "--postgres" && number == 1) {
+      if (const std::string missing = db::tests::PostgresServer::missing(); !missing.empty()) {
+        std::cerr << missing << '\n';
+        return 1;
+      }
+      server = std::make_unique<db::tests::PostgresServer>();
+      place = server->make_database("filled");
     } else if (name == "--store") {
       place = argv[i + 1];
     }
@@ -242,6 +254,8 @@ int main(int argc, char** argv) {
   }
   if (own) {
     place = folder + "/writers.db";
+  } else if (server != nullptr) {
+    place = server->make_database("writers");
   }
   const double one = write_for(place, 1, std::max(1, seconds / 4));
   const double many = write_for(place, writers, seconds);

@@ -26,8 +26,8 @@ function(sixpoint_room NAME)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${NAME} ${view}/${NAME} SYMBOLIC)
   add_library(sixpoint_${NAME} STATIC ${ROOM_SOURCES})
   add_library(sixpoint::${NAME} ALIAS sixpoint_${NAME})
-  target_include_directories(sixpoint_${NAME} PUBLIC ${view})
+  target_include_directories(sixpoint_${NAME} PUBLIC $<BUILD_INTERFACE:${view}>)
   target_link_libraries(sixpoint_${NAME}
     PUBLIC ${ROOM_NEIGHBOURS}
-    PRIVATE ${ROOM_PRIVATE_NEIGHBOURS} sixpoint_warnings)
+    PRIVATE ${ROOM_PRIVATE_NEIGHBOURS} $<BUILD_INTERFACE:sixpoint_warnings>)
 endfunction()

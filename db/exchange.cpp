@@ -1,11 +1,15 @@
 #include "db/exchange.h"
 
 #include <algorithm>
+#include <charconv>
+#include <functional>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "db/csv.h"
 #include "db/hex.h"
 #include "db/history.h"
 
@@ -14,6 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr const char* kCsvHeader = "store.json";
 constexpr std::string_view kFormat = "sixpoint/store-export/1";
 // The largest capture of store.cpp in hex digits, and its name.
 constexpr std::size_t kLongestLine = 256U << 20;
@@ -241,9 +246,17 @@ Status check_same(Database& database, const ImportedRow& row) {
 }
 
 struct Header {
+  std::int64_t store_version = 0;
   std::int64_t rows = 0;
   std::string head;
 };
+
+Json header_of(const Head& head) {
+  return {{"schema", kFormat},
+          {"store_version", kSchemaVersion},
+          {"rows", head.rows},
+          {"head", to_hex(head.hash)}};
+}
 
 Result<Header> to_header(const Json& line) {
   if (!line.contains("schema") || line["schema"] != kFormat || !line.contains("store_version") ||
@@ -260,7 +273,8 @@ Result<Header> to_header(const Json& line) {
                     line["store_version"].get<std::int64_t>(), kSchemaVersion),
         {}, "use the sixpoint that made it, or a newer one");
   }
-  return Header{line["rows"].get<std::int64_t>(), line["head"].get<std::string>()};
+  return Header{line["store_version"].get<std::int64_t>(), line["rows"].get<std::int64_t>(),
+                line["head"].get<std::string>()};
 }
 
 Status import_attachment(HistoryWriter& writer, const Json& line, ExchangeReport& report) {
@@ -274,26 +288,6 @@ Status import_attachment(HistoryWriter& writer, const Json& line, ExchangeReport
   }
   ++report.attachments;
   return writer.add_attachment(name.get<std::string>(), std::move(bytes));
-}
-
-Status import_line(Database& database, HistoryWriter& writer, std::string_view text,
-                   ExchangeReport& report) {
-  SIXPOINT_ASSIGN(const Json line, parse_line(text));
-  if (line.contains("attachment")) {
-    return import_attachment(writer, line, report);
-  }
-  SIXPOINT_ASSIGN(const ImportedRow row, to_row(line));
-  ++report.rows;
-  if (row.seq != report.rows) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("{} stands where row {} should", name_of(row.view()), report.rows), {},
-                "rows are missing or out of order: export again");
-  }
-  if (row.seq <= writer.head().rows) {
-    return check_same(database, row);
-  }
-  ++report.added;
-  return writer.append_copy(row.view());
 }
 
 Status copy_rows(Database& from, Database& to, ExchangeReport& report) {
@@ -317,25 +311,216 @@ Status copy_rows(Database& from, Database& to, ExchangeReport& report) {
   return writing.commit();
 }
 
-std::string csv_field(const Value& value) {
+std::string field_of(const Value& value) {
   if (const auto* integer = std::get_if<std::int64_t>(&value)) {
     return std::to_string(*integer);
   }
   const auto* text = std::get_if<std::string>(&value);
-  if (text == nullptr) {
-    return "";
-  }
-  if (!text->empty() && text->find_first_of(",\"\r\n") == std::string::npos) {
-    return *text;
-  }
-  std::string quoted = "\"";
-  for (const char c : *text) {
-    quoted += c;
-    if (c == '"') {
-      quoted += c;
+  return csv_field(text == nullptr ? std::nullopt : std::optional(*text));
+}
+
+// A table's CSV file, read in the order of its rows.
+class CsvTable {
+ public:
+  static Result<CsvTable> open(FileSystem& files, const std::string& folder, const Table& table) {
+    const std::string path = fmt::format("{}/{}.csv", folder, table.name);
+    SIXPOINT_ASSIGN(auto reader, CsvReader::open(files, path));
+    CsvTable made(std::move(reader), table);
+    SIXPOINT_ASSIGN(const bool any, made.reader_.next(made.record_));
+    if (!any || made.record_.size() < 2 || made.record_.front() != "seq" ||
+        made.record_.back() != "hash") {
+      return made.bad("the first line does not name the columns seq ... hash");
     }
+    for (std::size_t i = 1; i + 1 < made.record_.size(); ++i) {
+      const std::string name = made.record_[i].value_or("");
+      const auto found = std::find_if(table.columns.begin(), table.columns.end(),
+                                      [&](const Column& column) { return column.name == name; });
+      const auto index = static_cast<std::size_t>(found - table.columns.begin());
+      if (found == table.columns.end() ||
+          std::find(made.columns_.begin(), made.columns_.end(), index) != made.columns_.end()) {
+        return made.bad(fmt::format("the column '{}' is not known here", printable(name, 60)));
+      }
+      made.columns_.push_back(index);
+    }
+    SIXPOINT_CHECK(made.advance());
+    return made;
   }
-  return quoted + '"';
+
+  bool at_end() const { return !more_; }
+  const ImportedRow& row() const { return row_; }
+  Status advance() {
+    SIXPOINT_ASSIGN(more_, reader_.next(record_));
+    return more_ ? convert() : Status();
+  }
+  std::string where() const {
+    return fmt::format("{}, record {}", reader_.path(), reader_.number());
+  }
+
+ private:
+  CsvTable(CsvReader reader, const Table& table) : reader_(std::move(reader)) {
+    row_.table = &table;
+  }
+  tl::unexpected<Error> bad(std::string what) const {
+    return fail(ErrorCode::bad_data, std::move(what), where(), "export again");
+  }
+  static std::optional<std::int64_t> integer_in(const std::string& text) {
+    std::int64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && end == text.data() + text.size() && !text.empty()
+               ? std::optional(number)
+               : std::nullopt;
+  }
+  Status convert() {
+    if (record_.size() != columns_.size() + 2) {
+      return bad(
+          fmt::format("the record has {} fields, not {}", record_.size(), columns_.size() + 2));
+    }
+    const auto seq = integer_in(record_.front().value_or(""));
+    if (!seq) {
+      return bad("seq is no number");
+    }
+    row_.seq = *seq;
+    row_.columns.assign(row_.table->columns.size(), Value());
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      const auto& text = record_[i + 1];
+      Value& value = row_.columns[columns_[i]];
+      if (text && row_.table->columns[columns_[i]].type == ColumnType::integer) {
+        const auto number = integer_in(*text);
+        if (!number) {
+          return bad(fmt::format("'{}' is no number", printable(*text, 60)));
+        }
+        value = *number;
+      } else if (text) {
+        value = *text;
+      }
+    }
+    for (std::size_t i = 0; i < row_.columns.size(); ++i) {
+      if (row_.table->columns[i].required &&
+          std::holds_alternative<std::monostate>(row_.columns[i])) {
+        return bad(fmt::format("the column {} is empty", row_.table->columns[i].name));
+      }
+    }
+    auto hash = from_hex(record_.back().value_or("?"));
+    if (!hash) {
+      return bad("hash is no hash");
+    }
+    row_.hash = *std::move(hash);
+    return {};
+  }
+
+  CsvReader reader_;
+  CsvRecord record_;
+  std::vector<std::size_t> columns_;  // of the table, in the order of the file
+  ImportedRow row_;
+  bool more_ = false;
+};
+
+Status import_attachment_files(FileSystem& files, const std::string& folder, HistoryWriter& writer,
+                               ExchangeReport& report) {
+  const std::string place = folder + "/attachments";
+  if (!files.info(place)) {
+    return {};  // missing ones are found by the rows that name them
+  }
+  SIXPOINT_ASSIGN(const auto names, files.list(place));
+  for (const std::string& name : names) {
+    const std::string path = fmt::format("{}/{}", place, name);
+    SIXPOINT_ASSIGN(Bytes bytes, read_file(files, path, kLongestLine / 2));
+    if (to_hex(sha256(bytes)) != name) {
+      return fail(ErrorCode::bad_data, "the attachment is not what its name says", path,
+                  "export again");
+    }
+    ++report.attachments;
+    SIXPOINT_CHECK(writer.add_attachment(name, std::move(bytes)));
+  }
+  return {};
+}
+
+// Makes `path` a store that `fill` filled, whole or not at all: under another name first.
+Result<ExchangeReport> make_store_file(
+    Env& env, const std::string& path,
+    const std::function<Result<ExchangeReport>(const std::string& temporary)>& fill) {
+  const std::string temporary = fmt::format("{}/.{}.tmp", folder_of(path), file_name_of(path));
+  const auto remove = [&] {
+    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+      if (env.files.info(temporary + suffix)) {
+        static_cast<void>(env.files.remove(temporary + suffix));
+      }
+    }
+  };
+  remove();
+  // Afterwards the store is closed: SQLite has synced it and removed its own files beside it.
+  auto report = fill(temporary);
+  if (!report) {
+    remove();
+    return report;
+  }
+  if (Status placed = env.files.rename(temporary, path); !placed) {
+    remove();
+    return fail(std::move(placed).error());
+  }
+  SIXPOINT_CHECK(env.files.sync_folder(folder_of(path)));
+  return report;
+}
+
+// Continues `database` by `rows(importer)`, in one transaction.
+class Importer {
+ public:
+  Importer(Database& database, HistoryWriter& writer) : database_(database), writer_(writer) {}
+  Status add(const ImportedRow& row) {
+    ++report_.rows;
+    if (row.seq != report_.rows) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("{} stands where row {} should", name_of(row.view()), report_.rows),
+                  {}, "rows are missing or out of order: export again");
+    }
+    if (row.seq <= writer_.head().rows) {
+      return check_same(database_, row);
+    }
+    ++report_.added;
+    return writer_.append_copy(row.view());
+  }
+  HistoryWriter& writer() { return writer_; }
+  ExchangeReport& report() { return report_; }
+
+ private:
+  Database& database_;
+  HistoryWriter& writer_;
+  ExchangeReport report_;
+};
+
+Result<ExchangeReport> import_rows(Database& database, const Header& header,
+                                   const std::function<Status(Importer&)>& rows) {
+  SIXPOINT_ASSIGN(auto transaction, Transaction::writing(database));
+  SIXPOINT_ASSIGN(auto writer, HistoryWriter::open(database));
+  const std::int64_t before = writer.head().rows;
+  Importer importer(database, writer);
+  SIXPOINT_CHECK(rows(importer));
+  ExchangeReport report = importer.report();
+  if (report.rows != header.rows) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the file ends after row {} of {}", report.rows, header.rows), {},
+                "it was cut off: copy it again, or export again");
+  }
+  report.head = to_hex(writer.head().hash);
+  if (report.rows >= before && report.head != header.head) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the head that the file names does not belong to row {}", report.rows),
+                {}, "export again");
+  }
+  if (report.added > 0 || report.attachments > 0) {
+    SIXPOINT_CHECK(writer.finish());
+    SIXPOINT_CHECK(transaction.commit());
+  }
+  return report;
+}
+
+Status import_line(Importer& importer, std::string_view text) {
+  SIXPOINT_ASSIGN(const Json line, parse_line(text));
+  if (line.contains("attachment")) {
+    return import_attachment(importer.writer(), line, importer.report());
+  }
+  SIXPOINT_ASSIGN(const ImportedRow row, to_row(line));
+  return importer.add(row);
 }
 
 }  // namespace
@@ -355,11 +540,7 @@ Result<ExchangeReport> export_json_lines(Store& store, FileSystem& files, const 
   SIXPOINT_ASSIGN(auto out, BufferedFile::create(files, path));
   ExchangeReport report;
   report.head = to_hex(head.hash);
-  const Json header = {{"schema", kFormat},
-                       {"store_version", kSchemaVersion},
-                       {"rows", head.rows},
-                       {"head", report.head}};
-  SIXPOINT_CHECK(out.append(header.dump() + "\n"));
+  SIXPOINT_CHECK(out.append(header_of(head).dump() + "\n"));
   SIXPOINT_CHECK(for_each_attachment(database, [&](const std::string& name, const Bytes& bytes) {
     ++report.attachments;
     return out.append(
@@ -387,6 +568,12 @@ Result<ExchangeReport> export_json_lines(Store& store, FileSystem& files, const 
 Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::string& folder) {
   Database& database = store.database();
   SIXPOINT_CHECK(files.make_folders(folder + "/attachments"));
+  // Written last: a folder without it is no whole export.
+  const std::string header_path = folder + "/" + kCsvHeader;
+  if (files.info(header_path)) {
+    SIXPOINT_CHECK(files.remove(header_path));
+    SIXPOINT_CHECK(files.sync_folder(folder));
+  }
   SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(database));
   SIXPOINT_ASSIGN(const Head head, read_head(database));
   ExchangeReport report;
@@ -407,7 +594,7 @@ Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::st
       }
       line.clear();
       for (std::size_t i = 0; i + 1 < row.size(); ++i) {
-        line += csv_field(row[i]) + ",";
+        line += field_of(row[i]) + ",";
       }
       const auto* hash = std::get_if<Bytes>(&row.back());
       SIXPOINT_CHECK(out.append(line + (hash == nullptr ? "" : to_hex(*hash)) + "\r\n"));
@@ -428,6 +615,54 @@ Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::st
         SIXPOINT_CHECK(out.append(bytes));
         return out.commit();
       }));
+  SIXPOINT_CHECK(write_file(files, header_path, header_of(head).dump(2) + "\n"));
+  return report;
+}
+
+Result<ExchangeReport> import_csv(Store& store, FileSystem& files, const std::string& folder) {
+  const std::string header_path = folder + "/" + kCsvHeader;
+  SIXPOINT_ASSIGN(const Bytes text, read_file(files, header_path, 1U << 16));
+  const auto first =
+      parse_line(std::string_view(reinterpret_cast<const char*>(text.data()), text.size()));
+  const auto header = first ? to_header(*first) : Result<Header>(fail(first.error()));
+  if (!header) {
+    Error error = header.error();
+    error.where = header_path;
+    return fail(std::move(error));
+  }
+  std::vector<CsvTable> all;
+  for (const Table& table : tables()) {
+    if (table.since > header->store_version &&
+        !files.info(fmt::format("{}/{}.csv", folder, table.name))) {
+      continue;
+    }
+    SIXPOINT_ASSIGN(auto opened, CsvTable::open(files, folder, table));
+    all.push_back(std::move(opened));
+  }
+  std::string where = folder;
+  auto report = import_rows(store.database(), *header, [&](Importer& importer) -> Status {
+    SIXPOINT_CHECK(import_attachment_files(files, folder, importer.writer(), importer.report()));
+    while (true) {
+      CsvTable* next = nullptr;
+      for (CsvTable& table : all) {
+        if (!table.at_end() && (next == nullptr || table.row().seq < next->row().seq)) {
+          next = &table;
+        }
+      }
+      if (next == nullptr) {
+        where = folder;
+        return {};
+      }
+      where = next->where();
+      SIXPOINT_CHECK(importer.add(next->row()));
+      SIXPOINT_CHECK(next->advance());
+    }
+  });
+  if (!report && (report.error().where.empty() || report.error().code == ErrorCode::bad_data)) {
+    Error error = std::move(report).error();
+    error.where = where;
+    return fail(std::move(error));
+  }
   return report;
 }
 
@@ -439,34 +674,15 @@ Result<ExchangeReport> import_json_lines(Store& store, FileSystem& files, const 
     SIXPOINT_ASSIGN(const bool any, lines.next(text));
     SIXPOINT_ASSIGN(const Json first, parse_line(any ? text : "{}"));
     SIXPOINT_ASSIGN(const Header header, to_header(first));
-    SIXPOINT_ASSIGN(auto transaction, Transaction::writing(database));
-    SIXPOINT_ASSIGN(auto writer, HistoryWriter::open(database));
-    const std::int64_t before = writer.head().rows;
-    ExchangeReport report;
-    while (true) {
-      SIXPOINT_ASSIGN(const bool more, lines.next(text));
-      if (!more) {
-        break;
+    return import_rows(database, header, [&](Importer& importer) -> Status {
+      while (true) {
+        SIXPOINT_ASSIGN(const bool more, lines.next(text));
+        if (!more) {
+          return {};
+        }
+        SIXPOINT_CHECK(import_line(importer, text));
       }
-      SIXPOINT_CHECK(import_line(database, writer, text, report));
-    }
-    if (report.rows != header.rows) {
-      return fail(ErrorCode::bad_data,
-                  fmt::format("the file ends after row {} of {}", report.rows, header.rows), {},
-                  "it was cut off: copy it again, or export again");
-    }
-    report.head = to_hex(writer.head().hash);
-    if (report.rows >= before && report.head != header.head) {
-      return fail(
-          ErrorCode::bad_data,
-          fmt::format("the head that the file names does not belong to row {}", report.rows), {},
-          "export again");
-    }
-    if (report.added > 0 || report.attachments > 0) {
-      SIXPOINT_CHECK(writer.finish());
-      SIXPOINT_CHECK(transaction.commit());
-    }
-    return report;
+    });
   };
   auto report = import();
   if (!report) {
@@ -484,16 +700,7 @@ Result<ExchangeReport> backup(Store& store, Env& env, const std::string& path) {
     return fail(ErrorCode::cannot_create, "a store is at work there", path,
                 "choose another name for the backup");
   }
-  const std::string temporary = fmt::format("{}/.{}.tmp", folder_of(path), file_name_of(path));
-  const auto remove = [&] {
-    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
-      if (env.files.info(temporary + suffix)) {
-        static_cast<void>(env.files.remove(temporary + suffix));
-      }
-    }
-  };
-  remove();
-  const auto make = [&]() -> Result<ExchangeReport> {
+  return make_store_file(env, path, [&](const std::string& temporary) -> Result<ExchangeReport> {
     ExchangeReport report;
     SIXPOINT_ASSIGN(const bool copied, store.database().copy_to_file(temporary));
     // Opening makes a new store where PostgreSQL had no means of its own; both are then checked.
@@ -512,20 +719,22 @@ Result<ExchangeReport> backup(Store& store, Env& env, const std::string& path) {
     SIXPOINT_ASSIGN(const auto count, copy.database().query("SELECT count(*) FROM attachments"));
     report.attachments = integer_of(count[0][0]);
     return report;
-  };
-  // The copy is closed here: SQLite has synced it and removed its own files beside it.
-  auto report = make();
-  if (!report) {
-    remove();
+  });
+}
+
+Result<ExchangeReport> import_into_new_file(Env& env, const std::string& input,
+                                            const std::string& path) {
+  SIXPOINT_ASSIGN(const FileInfo info, env.files.info(input));
+  return make_store_file(env, path, [&](const std::string& temporary) -> Result<ExchangeReport> {
+    SIXPOINT_ASSIGN(auto store, Store::open(env, temporary));
+    SIXPOINT_ASSIGN(const auto report, info.is_folder ? import_csv(store, env.files, input)
+                                                      : import_json_lines(store, env.files, input));
+    if (env.files.info(path)) {
+      return fail(ErrorCode::cannot_create, "another program made a store there meanwhile", path,
+                  "import again: it continues a store that has the beginning of the same chain");
+    }
     return report;
-  }
-  Status placed = env.files.rename(temporary, path);
-  if (!placed) {
-    remove();
-    return fail(std::move(placed).error());
-  }
-  SIXPOINT_CHECK(env.files.sync_folder(folder_of(path)));
-  return report;
+  });
 }
 
 }  // namespace sixpoint::db

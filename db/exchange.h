@@ -27,8 +27,8 @@ struct ExchangeReport {
 Result<ExchangeReport> export_json_lines(Store& store, FileSystem& files, const std::string& path);
 
 // One file TABLE.csv per table into `folder`, which is made, and attachments/SHA256 (RFC 4180,
-// UTF-8, a header line; NULL is an empty field, an empty text is ""). For spreadsheets and
-// statistics; import takes JSON Lines only.
+// UTF-8, a header line; NULL is an empty field, an empty text is ""). Last store.json, the first
+// line of a JSON Lines export, which says how many rows there must be and their head.
 Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::string& folder);
 
 // Continues `store` with the rows of `path` in one transaction. The rows that both have must be the
@@ -36,6 +36,14 @@ Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::st
 // another chain, a changed, missing or reordered row, a file that ends early; configuration for a
 // file of a newer version. Nothing of a refused file stays.
 Result<ExchangeReport> import_json_lines(Store& store, FileSystem& files, const std::string& path);
+
+// The same of a folder that export_csv() wrote.
+Result<ExchangeReport> import_csv(Store& store, FileSystem& files, const std::string& folder);
+
+// Makes `path`, where nothing is yet, an SQLite store of what `input` (a file of JSON Lines or a
+// folder of CSV) holds: whole or not at all. The path is one of the real disk.
+Result<ExchangeReport> import_into_new_file(Env& env, const std::string& input,
+                                            const std::string& path);
 
 // A store in an SQLite file `path` (replaced whole or not at all) with the same rows and head, made
 // while others go on writing: by SQLite's online backup, or row by row from PostgreSQL. The path is

@@ -138,12 +138,31 @@ class SqliteDatabase final : public Database {
  public:
   explicit SqliteDatabase(const std::string& path)
       : database_(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout_ms),
-        path_(path) {
-    database_.exec("PRAGMA journal_mode=WAL");
-    database_.exec("PRAGMA synchronous=FULL");
-    database_.exec("PRAGMA foreign_keys=ON");
-    // Views and triggers of a file from elsewhere must not run functions of ours.
-    database_.exec("PRAGMA trusted_schema=OFF");
+        path_(path) {}
+
+  Status prepare() {
+    const auto read_only = [&](const std::string& what) {
+      return fail(ErrorCode::permission, what, path_,
+                  "make the file and its folder writable for this user; a store on a read-only "
+                  "disk is read from a copy elsewhere");
+    };
+    if (sqlite3_db_readonly(database_.getHandle(), "main") == 1) {
+      return read_only("the store may only be read here");
+    }
+    try {
+      database_.exec("PRAGMA journal_mode=WAL");
+      database_.exec("PRAGMA synchronous=FULL");
+      database_.exec("PRAGMA foreign_keys=ON");
+      // Views and triggers of a file from elsewhere must not run functions of ours.
+      database_.exec("PRAGMA trusted_schema=OFF");
+    } catch (const SQLite::Exception& exception) {
+      // The file itself was opened: it is the files beside it that cannot be made.
+      if (exception.getErrorCode() == SQLITE_CANTOPEN) {
+        return read_only("nothing can be written beside the store");
+      }
+      return fail(to_error(exception, path_));
+    }
+    return check_owner();
   }
 
   // Ours, empty, or somebody else's file that must not be touched.
@@ -285,7 +304,7 @@ class SqliteDatabase final : public Database {
 Result<std::unique_ptr<Database>> open_sqlite(const std::string& path) {
   try {
     auto database = std::make_unique<SqliteDatabase>(path);
-    SIXPOINT_CHECK(database->check_owner());
+    SIXPOINT_CHECK(database->prepare());
     return database;
   } catch (const SQLite::Exception& exception) {
     return fail(to_error(exception, path));

@@ -662,9 +662,11 @@ Result<std::vector<UnitRecord>> Store::units() {
 
 Result<std::optional<RepairRecord>> Store::repair_of_output(const std::string& output_sha256) {
   const std::vector<Value> parameters = {output_sha256};
+  // "+ 0": a planner without statistics would rather walk back along seq through millions of rows
+  // than sort the one or two that the hash has.
   SIXPOINT_ASSIGN(const auto rows,
                   impl_->database->query(fmt::format("SELECT {} FROM repairs WHERE output_sha256 = "
-                                                     "$1 ORDER BY seq DESC LIMIT 1",
+                                                     "$1 ORDER BY seq + 0 DESC LIMIT 1",
                                                      kRepairColumns),
                                          parameters));
   if (rows.empty()) {

@@ -47,7 +47,7 @@ PerAxis<double> direction_of(Pose pose) {
 }
 
 Status ManualJig::go_to(Pose /*pose*/) { return {}; }
-Result<JigReport> ManualJig::report() { return JigReport{std::nullopt, 0.5, {}}; }
+Result<JigReport> ManualJig::report() { return JigReport{std::nullopt, 0, 0.5, {}}; }
 Status ManualJig::stop() { return {}; }
 
 }  // namespace sixpoint::device

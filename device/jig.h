@@ -27,6 +27,7 @@ PerAxis<double> direction_of(Pose pose);  // specific force at rest, in g
 
 struct JigReport {
   std::optional<Pose> pose;  // where it stands; none while it moves or does not know
+  double angle_off_deg = 0;  // from that pose, as the jig itself measures it
   double angle_uncertainty_deg = 0.1;
   std::string fault;  // empty while all is well
 };

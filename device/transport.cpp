@@ -24,6 +24,10 @@ Result<Link> TransportRegistry::open(std::string_view address, Env& env) const {
   Result<Link> link = entry->second.opener(address.substr(colon + 1), env);
   if (link) {
     link->address = std::string(address);
+    if (!link->reopen) {
+      link->reopen = [opener = entry->second.opener, rest = std::string(address.substr(colon + 1)),
+                      &env] { return opener(rest, env); };
+    }
   }
   return link;
 }

@@ -43,6 +43,12 @@ struct Link {
   // Time-outs and waits use this clock and no other. It is the machine's for hardware; a unit in
   // software brings its own, on which a minute passes at once. Never null.
   std::shared_ptr<Clock> clock;
+  // The serial number that the device gave outside of the protocol (USB descriptor); empty where
+  // there is none. Unit::open() refuses a unit that calls itself otherwise.
+  std::string serial = {};
+  // Opens the same place again, after the device went away; whoever is there now answers, which
+  // need not be the same unit. TransportRegistry::open() fills it in where the opener did not.
+  std::function<Result<Link>()> reopen = {};
   std::unique_ptr<Jig> jig;  // a jig that is part of the device (virtual units); mostly null
 };
 
@@ -56,7 +62,7 @@ class TransportRegistry {
   // Replaces an opener of the same scheme. `example` is shown to people.
   void add(std::string scheme, std::string example, Opener opener);
   // usage when the string has no known scheme or its rest is malformed; device_unavailable,
-  // permission or no_input when it cannot be reached.
+  // permission or no_input when it cannot be reached. `env` outlives the link.
   Result<Link> open(std::string_view address, Env& env) const;
   std::vector<std::string> examples() const;
 

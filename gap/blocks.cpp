@@ -49,13 +49,7 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
       block.tone = true;
       block.axis = tone.axis;
       const double f = segment.vibration->frequency_hz;
-      double h = 1;
-      if (response.low_pass_significant) {
-        h *= low_pass_gain(f, response.low_pass.corner_hz, response.low_pass.order, bundle.rate_hz);
-      }
-      if (response.resonance_significant) {
-        h *= resonance_gain(f, response.resonance);
-      }
+      const double h = response.tone_gain(f, bundle.rate_hz);
       block.vibration_lab_g = h * segment.vibration->amplitude_g * segment.vibration->direction_lab;
       block.harmonics = segment.vibration->amplitude_g * h > 0.5;
       block.value_mg.resize(block.harmonics ? 8 : 6);
@@ -81,6 +75,11 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
           block.white_mg2(rows[i], rows[j]) = variance * tone.covariance_shape(ti, tj);
         }
       }
+      // The response's form is known so well only, and never better than three thousandths of what
+      // it takes off or adds.
+      const double form_mg =
+          std::hypot(response.tone_form_share, 0.003 * std::log(h)) * tone.in_phase_mg[tone.axis];
+      block.white_mg2(3 + tone.axis, 3 + tone.axis) += form_mg * form_mg;
       if (block.harmonics) {
         block.value_mg[6] = tone.second_mg;
         block.value_mg[7] = tone.third_mg;

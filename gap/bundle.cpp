@@ -322,10 +322,12 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
 
 void find_placements(Bundle& bundle) {
   constexpr double kNoPause_s = 0.05;
+  constexpr double kClockReach = 0.012;
   constexpr double kTonePause_s = 5;  // three seconds, and what the host's clock adds
   Eigen::Vector3d pose_before = bundle.gravity_in_sensor(bundle.segments.front());
   int placement = -1;
   Eigen::Vector3d held = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Matrix3d> poses;
   for (std::size_t i = 0; i < bundle.segments.size(); ++i) {
     Segment& now = bundle.segments[i];
     if (i > 0) {
@@ -336,7 +338,17 @@ void find_placements(Bundle& bundle) {
       const bool same_pose = (now.rotation - last.rotation).cwiseAbs().maxCoeff() < 1e-6;
       const bool tones = now.kind == Segment::Kind::vibration && last.kind == now.kind &&
                          now.name == last.name && pause_s < kTonePause_s;
-      now.starts_placement = !(same_pose && (std::abs(pause_s) < kNoPause_s || tones));
+      // A sample clock that is off, or lost samples, make a pause where there was none.
+      const double no_pause_s =
+          kNoPause_s + kClockReach * static_cast<double>(last.samples) / bundle.rate_hz;
+      now.starts_placement = !(same_pose && (std::abs(pause_s) < no_pause_s || tones));
+    }
+    const auto seen = std::find_if(poses.begin(), poses.end(), [&](const Eigen::Matrix3d& pose) {
+      return (now.rotation - pose).cwiseAbs().maxCoeff() < 1e-6;
+    });
+    now.pose = static_cast<int>(seen - poses.begin());
+    if (seen == poses.end()) {
+      poses.push_back(now.rotation);
     }
     if (now.starts_placement) {
       ++placement;

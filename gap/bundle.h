@@ -39,6 +39,7 @@ struct Segment {
 
   // Derived by the reader. Segments of one placement were recorded without taking the unit up:
   // one follows the other without a pause, or they are tones of one shaker axis.
+  int pose = 0;  // equal rotations have equal numbers, counted in order of appearance
   int placement = 0;
   bool starts_placement = true;
   // Specific force now less that of the pose before, sensor's frame, g: how it was approached.

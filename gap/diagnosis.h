@@ -75,6 +75,10 @@ struct Plots {
   std::vector<double> frequency_hz;
   std::array<std::vector<double>, 3> noise_mg2;        // equivalent white variance
   std::array<std::vector<double>, 3> noise_model_mg2;  // nominal, or with the low-pass
+  // Allan deviation of the longest still record: measured, of white noise alone, with the accepted
+  // slow noise.
+  std::vector<double> allan_s;
+  std::array<std::vector<double>, 3> allan_mg, allan_nominal_mg, allan_model_mg;
   std::vector<double> step_s;
   std::vector<double> step_share;
   std::vector<double> step_model;

@@ -33,7 +33,8 @@ enum class Scatter {
   by_session,    // runs of segments of one name
   by_temperature,
   by_time,
-  by_time_fast
+  by_time_fast,
+  step  // the zero moved once, between two placements
 };
 std::string_view to_string(Scatter scatter);
 bool in_catalogue(Scatter scatter);
@@ -144,6 +145,7 @@ class EvidenceSearch {
   double log_prior(const std::vector<int>& groups) const;
   Fit make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const;
   double chi_sd(const Fit& fit) const;
+  std::optional<Fit> fit_step(const Whitened& nominal, const ForwardState& at) const;
   ForwardState first_guess() const;
   void polish_shapes(Fit& fit);
 

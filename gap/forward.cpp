@@ -7,7 +7,8 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr int kPhases = 24;
+constexpr int kPhases = 24;            // exact for polynomials of third order and their projections
+constexpr int kPhasesTruncated = 720;  // the step about zero is some LSB wide in a swing of 256
 constexpr double kRadPerDeg = M_PI / 180;
 
 Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
@@ -108,7 +109,7 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
       Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c;
 
   Eigen::VectorXd out = Eigen::VectorXd::Zero(block.size());
-  const int phases = block.tone ? kPhases : 1;
+  const int phases = !block.tone ? 1 : s.truncation != 0 ? kPhasesTruncated : kPhases;
   for (int k = 0; k < phases; ++k) {
     const double p = 2 * M_PI * k / phases;
     const double c1 = block.tone ? std::cos(p) : 0;

@@ -15,18 +15,32 @@ tl::unexpected<Error> gone() {
               "plug it in again");
 }
 
+tl::unexpected<Error> stalled() {
+  return fail(ErrorCode::io, "the endpoint stalled", "virtual unit", "try again");
+}
+
 class InProcess final : public device::Transport {
  public:
   InProcess(std::shared_ptr<PluggedUnit> plugged, bool bulk)
-      : plugged_(std::move(plugged)), bulk_(bulk) {}
+      : plugged_(std::move(plugged)), bulk_(bulk), enumeration_(plugged_->faults.enumeration()) {}
 
   Status write(std::span<const std::uint8_t> bytes, nanoseconds /*time_out*/) override {
     const std::lock_guard lock(plugged_->mutex);
-    if (plugged_->unplugged || plugged_->cancelled) {
+    const nanoseconds now = plugged_->clock->elapsed();
+    if (is_gone(now)) {
       return gone();
     }
-    if (!bulk_) {
-      plugged_->unit.take_report(bytes, plugged_->clock->elapsed());
+    if (bulk_) {
+      return {};
+    }
+    switch (plugged_->faults.write_report(plugged_->unit, bytes, now).kind) {
+      case CableEvent::Kind::gone:
+        return gone();
+      case CableEvent::Kind::stalled:
+        return stalled();
+      case CableEvent::Kind::nothing:
+      case CableEvent::Kind::data:
+        break;
     }
     return {};
   }
@@ -40,19 +54,23 @@ class InProcess final : public device::Transport {
       nanoseconds wake = std::min(deadline, now + kLongestSleep);
       {
         const std::lock_guard lock(plugged_->mutex);
-        if (plugged_->unplugged || plugged_->cancelled) {
+        if (is_gone(now)) {
           return gone();
         }
-        if (bulk_) {
-          if (const auto block = plugged_->unit.next_bulk(now)) {
-            return copy(*block, out);
-          }
-        } else {
-          if (const auto report = plugged_->unit.next_report(now)) {
-            return copy(*report, out);
-          }
-          wake = std::min(wake, plugged_->unit.next_due().value_or(wake));
+        FaultInjector& faults = plugged_->faults;
+        const CableEvent event =
+            bulk_ ? faults.read_bulk(plugged_->unit, now) : faults.read_report(plugged_->unit, now);
+        switch (event.kind) {
+          case CableEvent::Kind::data:
+            return copy(event.bytes, out);
+          case CableEvent::Kind::stalled:
+            return stalled();
+          case CableEvent::Kind::gone:
+            return gone();
+          case CableEvent::Kind::nothing:
+            break;
         }
+        wake = std::min(wake, faults.next_due(plugged_->unit).value_or(wake));
       }
       if (now >= deadline) {
         return 0;
@@ -77,8 +95,15 @@ class InProcess final : public device::Transport {
     return bytes.size();
   }
 
+  bool is_gone(nanoseconds now) {
+    plugged_->faults.advance(plugged_->unit, now);
+    return plugged_->unplugged || plugged_->cancelled || !plugged_->faults.plugged() ||
+           plugged_->faults.enumeration() != enumeration_;
+  }
+
   std::shared_ptr<PluggedUnit> plugged_;
   bool bulk_;
+  std::uint32_t enumeration_;  // the one that this channel belongs to
 };
 
 }  // namespace
@@ -89,6 +114,16 @@ device::Link link_to(std::shared_ptr<PluggedUnit> plugged, bool with_jig) {
   link.clock = plugged->clock;
   link.reports = std::make_unique<InProcess>(plugged, false);
   link.bulk = std::make_unique<InProcess>(plugged, true);
+  link.reopen = [plugged]() -> Result<device::Link> {
+    {
+      const std::lock_guard lock(plugged->mutex);
+      plugged->faults.advance(plugged->unit, plugged->clock->elapsed());
+      if (plugged->unplugged || !plugged->faults.plugged()) {
+        return gone();
+      }
+    }
+    return link_to(plugged, false);
+  };
   if (with_jig) {
     link.jig = std::make_unique<VirtualJig>(std::move(plugged));
   }
@@ -100,9 +135,13 @@ void register_virtual(device::TransportRegistry& registry) {
                [](std::string_view rest, Env& env) -> Result<device::Link> {
                  SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(rest, env.seed));
                  std::shared_ptr<Clock> clock = clock_of(settings, env.clock);
-                 return link_to(
-                     std::make_shared<PluggedUnit>(std::move(settings.unit), std::move(clock)),
-                     settings.with_jig);
+                 FaultPlan plan;
+                 if (!settings.faults_file.empty()) {
+                   SIXPOINT_ASSIGN(plan, read_fault_plan(env.files, settings.faults_file));
+                 }
+                 return link_to(std::make_shared<PluggedUnit>(std::move(settings.unit),
+                                                              std::move(plan), std::move(clock)),
+                                settings.with_jig);
                });
 }
 

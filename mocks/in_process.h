@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "device/transport.h"
+#include "mocks/fault_injector.h"
 #include "mocks/virtual_unit.h"
 
 namespace sixpoint::mocks {
@@ -16,10 +17,15 @@ namespace sixpoint::mocks {
 struct PluggedUnit {
   PluggedUnit(VirtualUnitOptions options, std::shared_ptr<Clock> link_clock)
       : clock(std::move(link_clock)), unit(std::move(options), clock->elapsed()) {}
+  PluggedUnit(VirtualUnitOptions options, FaultPlan plan, std::shared_ptr<Clock> link_clock)
+      : PluggedUnit(std::move(options), std::move(link_clock)) {
+    faults = FaultInjector(std::move(plan), clock->elapsed());
+  }
 
   std::shared_ptr<Clock> clock;
   std::mutex mutex;  // guards what follows
   VirtualUnit unit;
+  FaultInjector faults;
   bool unplugged = false;  // every transfer answers device_unavailable
   bool cancelled = false;
 };

@@ -29,6 +29,14 @@ Result<device::JigReport> VirtualJig::report() {
   return report;
 }
 
-Status VirtualJig::stop() { return {}; }
+Status VirtualJig::stop() {
+  const std::lock_guard lock(plugged_->mutex);
+  const auto now = plugged_->clock->elapsed();
+  if (plugged_->unit.is_turning(now)) {
+    plugged_->unit.stop_turning(now);
+    pose_.reset();  // somewhere in between
+  }
+  return {};
+}
 
 }  // namespace sixpoint::mocks

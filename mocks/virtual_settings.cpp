@@ -147,6 +147,11 @@ Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint6
         return wrong(key, value, "a temperature such as 24.5");
       }
       settings.unit.temperature_c = *number;
+    } else if (key == "faults") {
+      if (value.empty()) {
+        return wrong(key, value, "the file of a fault plan (docs/faults.md)");
+      }
+      settings.faults_file = std::string(value);
     } else {
       return wrong(key, value, "a setting of virtual units");
     }

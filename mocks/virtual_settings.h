@@ -4,7 +4,7 @@
 //   memory holds, a/b/c), true_sensitivity_lsb_per_g, true_zero_lsb (what the sensor is under
 //   `current`, a/b/c), jig (auto: a virtual jig turns the unit; none), pace (fast: time passes as
 //   it is waited for; real: the machine's clock; 2 to 100: so many times the machine's clock),
-//   battery_mv, temperature_c.
+//   battery_mv, temperature_c, faults (a fault plan's file, whose name holds no comma).
 // What is left out comes from the seed, or is the default of VirtualUnitOptions.
 #pragma once
 
@@ -18,7 +18,8 @@ struct VirtualSettings {
   VirtualUnitOptions unit;
   bool with_jig = false;
   bool real_time = false;
-  int pace = 1;  // times the machine's clock, where it is real_time
+  std::string faults_file;  // empty: nothing goes wrong
+  int pace = 1;             // times the machine's clock, where it is real_time
 };
 
 // usage on an unknown key, a key given twice, or a value that no unit can have.

@@ -67,6 +67,13 @@ class VirtualUnit::Hand final : public sim::Motion {
                       sim::turn(from.rotation, pose_, duration_s, random_.bits(), gravity_g_)});
   }
 
+  void stop(double now_s) {
+    sim::MotionState state;
+    at(now_s, state);
+    pose_ = state.rotation;
+    turns_.push_back({now_s, 0, sim::still(pose_, gravity_g_)});
+  }
+
   bool is_turning(double now_s) const {
     return now_s < turns_.back().start_s + turns_.back().duration_s;
   }
@@ -122,9 +129,42 @@ sim::FilterConfiguration VirtualUnit::recording_filter() const {
 
 double VirtualUnit::seconds_on(nanoseconds at) const { return seconds(at - power_on_); }
 
+nanoseconds VirtualUnit::jumped_until(nanoseconds at) const {
+  nanoseconds sum{0};
+  for (const ClockJump& jump : clock_jumps_) {
+    sum += jump.at <= at ? jump.by : nanoseconds::zero();
+  }
+  return sum;
+}
+
 std::uint64_t VirtualUnit::device_time_us(nanoseconds at) const {
   return static_cast<std::uint64_t>(std::max<std::int64_t>(
-      0, std::chrono::floor<std::chrono::microseconds>(at - power_on_).count()));
+      0, std::chrono::floor<std::chrono::microseconds>(at - power_on_ + jumped_until(at)).count()));
+}
+
+void VirtualUnit::lose_cable() {
+  stream_.reset();
+  staged_.reset();
+  download_.reset();
+  replies_.clear();
+  last_request_.reset();
+}
+
+void VirtualUnit::freeze_sensor(const PerAxis<bool>& axes, nanoseconds now) {
+  frozen_ = axes;
+  frozen_since_ = now;
+  frozen_counts_known_ = false;
+}
+
+void VirtualUnit::jump_clock(nanoseconds jump, nanoseconds now) {
+  clock_jumps_.push_back({now, jump});
+}
+
+void VirtualUnit::spoil_page() {
+  if (auto page = memory_.read()) {
+    (*page)[device::kPageBytes - 1] ^= 0x5A;
+    static_cast<void>(memory_.write(*page));
+  }
 }
 
 std::uint64_t VirtualUnit::flash_left() const {
@@ -142,21 +182,20 @@ void VirtualUnit::turn_to(const Eigen::Vector3d& up, nanoseconds now, double dur
 
 bool VirtualUnit::is_turning(nanoseconds now) const { return hand_->is_turning(seconds(now)); }
 
+void VirtualUnit::stop_turning(nanoseconds now) { hand_->stop(seconds(now)); }
+
 void VirtualUnit::cut_power(nanoseconds now) {
   if (recording_) {
     finish_recording(now);
   }
   powered_ = false;
-  stream_.reset();
-  staged_.reset();
-  download_.reset();
-  replies_.clear();
-  last_request_.reset();
+  lose_cable();
 }
 
 void VirtualUnit::restore_power(nanoseconds now) {
   powered_ = true;
   power_on_ = now;
+  clock_jumps_.clear();
   memory_.restore_power();
   load_page();
 }
@@ -354,7 +393,7 @@ Message VirtualUnit::answer(const Message& request, nanoseconds now) {
       if (options_.battery_mv < kLowBattery_mv) {
         return refuse(ReplyCode::battery_low);
       }
-      if (flash_left() < (64U << 10U)) {
+      if (flash_full_since_ || flash_left() < (64U << 10U)) {
         return refuse(ReplyCode::storage_full);
       }
       clock_set_to_ = from_unix_seconds(unix_time);
@@ -407,6 +446,7 @@ Message VirtualUnit::answer(const Message& request, nanoseconds now) {
         return refuse(ReplyCode::bad_argument);
       }
       const std::uint64_t promised = std::min<std::uint64_t>(length, size - offset);
+      ++downloads_;
       download_ = Download{id, offset, offset + promised};
       reply.payload = PayloadWriter().put(promised).take();
       return reply;
@@ -415,7 +455,8 @@ Message VirtualUnit::answer(const Message& request, nanoseconds now) {
       if (wrong_length()) {
         return refuse(ReplyCode::bad_length);
       }
-      const UtcTime calendar = clock_set_to_ + (now - clock_set_at_);
+      const UtcTime calendar =
+          clock_set_to_ + (now - clock_set_at_) + (jumped_until(now) - jumped_until(clock_set_at_));
       reply.payload = PayloadWriter()
                           .put(device_time_us(now))
                           .put(static_cast<std::uint32_t>(to_unix_seconds(calendar)))
@@ -509,6 +550,17 @@ std::optional<device::Report> VirtualUnit::next_report(nanoseconds now) {
     block.counts.push_back({static_cast<std::int16_t>(raw[0]), static_cast<std::int16_t>(raw[1]),
                             static_cast<std::int16_t>(raw[2])});
   }
+  if (frozen_ != PerAxis<bool>{} && *due >= frozen_since_) {
+    if (!frozen_counts_known_) {
+      frozen_counts_ = block.counts.front();
+      frozen_counts_known_ = true;
+    }
+    for (device::RawCounts& counts : block.counts) {
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        counts[axis] = frozen_[axis] ? frozen_counts_[axis] : counts[axis];
+      }
+    }
+  }
   return device::encode(device::encode_samples(block));
 }
 
@@ -535,7 +587,8 @@ void VirtualUnit::finish_recording(nanoseconds now) {
   const std::uint64_t bytes_per_s = 9 + (rate * 36 + 7) / 8;
   constexpr std::uint64_t kArchiveOverhead = 4096;
   const std::uint64_t room = flash_left();
-  const auto lasted_s = static_cast<std::uint64_t>(std::max(0.0, seconds(now - run.start)));
+  const nanoseconds end_of_room = std::min(now, flash_full_since_.value_or(now));
+  const auto lasted_s = static_cast<std::uint64_t>(std::max(0.0, seconds(end_of_room - run.start)));
   const std::uint64_t whole_s =
       std::min(lasted_s, room > kArchiveOverhead ? (room - kArchiveOverhead) / bytes_per_s : 0);
 
@@ -548,9 +601,22 @@ void VirtualUnit::finish_recording(nanoseconds now) {
   sim::Simulator simulator(options_.truth, options, *hand_);
   Bytes log = sim::log_preamble(options_.truth, run.start_time, run.rate_hz);
   sim::SimulatedBlock block;
+  std::optional<gt3x::Counts> frozen;
   for (std::uint64_t second = 0; second < whole_s; ++second) {
     simulator.next(rate, block);
-    sim::append_second(log, run.start_time + std::chrono::seconds(second), block.stored, false);
+    const nanoseconds at = run.start + std::chrono::seconds(second);
+    if (frozen_ != PerAxis<bool>{} && at >= frozen_since_) {
+      frozen = frozen.value_or(block.stored.front());
+      for (gt3x::Counts& counts : block.stored) {
+        for (std::size_t axis = 0; axis < kAxes; ++axis) {
+          counts[axis] = frozen_[axis] ? (*frozen)[axis] : counts[axis];
+        }
+      }
+    }
+    const auto jumped =
+        std::chrono::floor<std::chrono::seconds>(jumped_until(at) - jumped_until(run.start));
+    sim::append_second(log, run.start_time + std::chrono::seconds(second) + jumped, block.stored,
+                       false);
   }
   const UtcTime end = run.start_time + std::chrono::seconds(whole_s);
 
@@ -566,10 +632,23 @@ void VirtualUnit::finish_recording(nanoseconds now) {
       writer->commit()) {
     image = read_file(files, name, options_.flash_bytes * 2).value_or(Bytes{});
   }
+  keep(std::move(image), run.start_time);
+}
+
+Status VirtualUnit::keep_recording(Bytes image, UtcTime start) {
+  if (image.size() > flash_left()) {
+    return fail(ErrorCode::configuration, "the recording does not fit into the unit's flash",
+                options_.truth.serial, "make the scenario shorter");
+  }
+  keep(std::move(image), start);
+  return {};
+}
+
+void VirtualUnit::keep(Bytes image, UtcTime start) {
   device::RecordingInfo info;
   info.id = static_cast<std::uint16_t>(images_.size() + 1);
   info.bytes = image.size();
-  info.start_unix_time = static_cast<std::uint32_t>(to_unix_seconds(run.start_time));
+  info.start_unix_time = static_cast<std::uint32_t>(to_unix_seconds(start));
   info.sha256 = sha256(image);
   images_.push_back(std::move(image));
   infos_.push_back(info);

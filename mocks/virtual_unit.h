@@ -49,22 +49,43 @@ class VirtualUnit {
   void take_report(std::span<const std::uint8_t> report, nanoseconds now);
   std::optional<device::Report> next_report(nanoseconds now);
   std::optional<Bytes> next_bulk(nanoseconds now);
+  // Counts the requests to download: a new one ends what is on its way.
+  std::uint64_t downloads() const { return downloads_; }
   // When the next report comes by itself; none when nothing will without being asked.
   std::optional<nanoseconds> next_due() const;
 
   // The hand or the jig. A turn takes `duration_s`; `tilt_deg` is how far the pose ends off.
   void turn_to(const Eigen::Vector3d& up, nanoseconds now, double duration_s, double tilt_deg = 0);
   bool is_turning(nanoseconds now) const;
+  void stop_turning(nanoseconds now);  // it stays as it is at that moment
 
   // Power. What is in RAM is lost: stream, staged page, kept reply, filter. A recording ends.
   void cut_power(nanoseconds now);
   void restore_power(nanoseconds now);
 
+  bool is_powered() const { return powered_; }
+  // The host is gone (cable, bus reset): stream, staged page, kept reply and download end; a
+  // recording goes on, for the unit has a battery.
+  void lose_cable();
+
+  // What may go wrong inside (fault_plan.h).
+  // The flash is full at `now`: a recording that runs ends there, and none begins.
+  void fill_flash(nanoseconds now) { flash_full_since_ = now; }
+  // From `now` on these axes repeat the reading that they have then.
+  void freeze_sensor(const PerAxis<bool>& axes, nanoseconds now);
+  // Device time and calendar jump by `jump`, which may be negative.
+  void jump_clock(nanoseconds jump, nanoseconds now);
+  // The page in force is whole as memory goes, and its own CRC does not fit its content.
+  void spoil_page();
+
   const sim::UnitTruth& truth() const { return options_.truth; }
   PageMemory& memory() { return memory_; }
   void set_battery_mv(std::uint16_t battery_mv) { options_.battery_mv = battery_mv; }
   sim::FilterConfiguration recording_filter() const;
-  // What a recording holds, as it would be downloaded; for tests.
+  // Puts a recording into the flash as if the unit had made it; configuration where it does not
+  // fit.
+  Status keep_recording(Bytes image, UtcTime start);
+  // What each recording holds, as it would be downloaded.
   const std::vector<Bytes>& recordings() const { return images_; }
 
  private:
@@ -92,12 +113,19 @@ class VirtualUnit {
     std::uint64_t end;
   };
 
+  struct ClockJump {
+    nanoseconds at;
+    nanoseconds by;
+  };
+
   device::Message answer(const device::Message& request, nanoseconds now);
   device::ReplyCode start_stream(int rate_hz, nanoseconds now);
   device::ReplyCode commit(std::uint16_t crc, Bytes& payload, nanoseconds now);
   void finish_recording(nanoseconds now);
+  void keep(Bytes image, UtcTime start);
   void load_page();
   std::uint64_t device_time_us(nanoseconds at) const;
+  nanoseconds jumped_until(nanoseconds at) const;
   double seconds_on(nanoseconds at) const;
   std::uint64_t flash_left() const;
 
@@ -111,6 +139,7 @@ class VirtualUnit {
   std::optional<RecordingRun> recording_;
   std::optional<Staged> staged_;
   std::optional<Download> download_;
+  std::uint64_t downloads_ = 0;
   std::deque<device::Report> replies_;
   std::optional<device::Message> last_request_;
   device::Report last_reply_{};
@@ -118,6 +147,12 @@ class VirtualUnit {
   std::vector<device::RecordingInfo> infos_;
   UtcTime clock_set_to_ = from_unix_seconds(1'400'000'000);
   nanoseconds clock_set_at_{0};
+  std::optional<nanoseconds> flash_full_since_;
+  std::vector<ClockJump> clock_jumps_;  // since power-on
+  PerAxis<bool> frozen_{};
+  nanoseconds frozen_since_{0};
+  PerAxis<std::int16_t> frozen_counts_{};  // of the stream; filled by the first reading
+  bool frozen_counts_known_ = false;
   std::uint64_t runs_ = 0;  // of streams and recordings: each has its own noise
 };
 

@@ -6,7 +6,9 @@ set -euo pipefail
 
 build_packages=(
   ca-certificates ccache cmake g++ git ninja-build pkg-config
-  libcli11-dev libcpp-httplib-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev libspdlog-dev libsqlite3-dev
+  libcli11-dev libcpp-httplib-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev
+  libspdlog-dev libsqlite3-dev libhidapi-dev libudev-dev libusb-1.0-0-dev
+  libcairo2-dev librsvg2-dev
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
   libboost-dev libhpdf-dev libqrencode-dev libtomlplusplus-dev
 )
@@ -14,6 +16,8 @@ test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
   chromium tmux
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
+  libumockdev-dev umockdev
+  busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils
   poppler-utils zbar-tools
 )
 

@@ -25,6 +25,10 @@ struct CaptureOptions {
   // Asked several times a second while the unit rests; true ends the recording. May be empty.
   std::function<bool()> cancelled;
   calib::SolveOptions solve;
+  // A unit that was unplugged to be turned goes on recording: how long it is waited for at the end,
+  // and how often a broken download is gone on with.
+  double replug_patience_s = 60;
+  int downloads = 5;
 };
 
 // Told before each side; answers whether the unit lies there (false: the person gives up). A jig
@@ -41,6 +45,8 @@ struct CaptureReport {
   std::string file;
   std::string file_sha256;
   std::optional<calib::SolveReport> solved;
+  // What went wrong on the way and was got over, or explains what is missing.
+  std::vector<std::string> notes;
 
   bool usable() const { return solved && solved->usable(); }
 };
@@ -50,6 +56,10 @@ struct CaptureReport {
 std::vector<std::string> why_recording_cannot_help(const device::FilterState& filter,
                                                    const std::string& serial,
                                                    const std::string& firmware);
+
+// For a unit that takes no commands: the recording that it holds, made while somebody laid it on
+// its sides, is copied, checked and solved. bad_data where it holds none.
+Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env, const CaptureOptions& options);
 
 // device_unavailable when the unit goes away; cannot_create when the file exists or cannot be made.
 Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,

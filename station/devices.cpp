@@ -1,13 +1,61 @@
 #include "station/devices.h"
 
+#include <fmt/format.h>
+
+#include "device/discovery.h"
+#include "device/drive/drive_unit.h"
+#include "device/session_replay.h"
 #include "mocks/in_process.h"
+#include "mocks/virtual_hid_jig.h"
 
 namespace sixpoint::station {
 
 device::TransportRegistry known_devices() {
   device::TransportRegistry registry;
   mocks::register_virtual(registry);
+  device::register_usb(registry);
+  device::register_replay(registry);
   return registry;
+}
+
+device::UnitRegistry known_units() {
+  device::UnitRegistry registry(known_devices());
+  device::register_drive(registry);
+  return registry;
+}
+
+Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& env,
+                                std::unique_ptr<device::Jig>& own) {
+  if ((name.empty() || name == "virtual") && unit.jig() != nullptr) {
+    return unit.jig();
+  }
+  if (name.empty() || name == "manual") {
+    own = std::make_unique<device::ManualJig>();
+    return own.get();
+  }
+  device::JigRegistry registry;
+  device::register_hid_jig(registry);
+  mocks::register_virtual_hid_jig(registry);
+  SIXPOINT_ASSIGN(own, registry.open(name, env, unit));
+  return own.get();
+}
+
+std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
+    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell) {
+  static constexpr std::chrono::seconds kPatience{30};
+  static constexpr int kMostReturns = 5;
+  return [&unit, &jig, tell = std::move(tell),
+          returns = 0](const Error& gone) mutable -> Result<UnitOnJig> {
+    if (++returns > kMostReturns) {
+      return fail(ErrorCode::device_unavailable,
+                  fmt::format("the unit went away {} times", returns), gone.where,
+                  "look at its cable and battery, then begin anew");
+    }
+    tell(fmt::format("{}: waiting {} s for it to come back", gone.what, kPatience.count()));
+    SIXPOINT_CHECK(unit.reconnect(kPatience));
+    tell("it is back; the run goes on");
+    return UnitOnJig{&unit, &jig};
+  };
 }
 
 std::string with_jig(std::string_view device, std::string_view jig) {
@@ -28,7 +76,7 @@ std::string with_jig(std::string_view device, std::string_view jig) {
     }
   }
   settings += settings.empty() ? "" : ",";
-  return std::string(kScheme) + settings + (jig == "virtual" ? "jig=auto" : "jig=none");
+  return std::string(kScheme) + settings + (jig.starts_with("virtual") ? "jig=auto" : "jig=none");
 }
 
 }  // namespace sixpoint::station

@@ -347,6 +347,9 @@ std::string_view family_of(std::string_view effect) {
       {"sensitivity_tempco", "gain"},
       {"idle_sleep", "made up"},
       {"charging_zeros", "made up"},
+      // Outside the catalogue, but near enough to one of its families to be acted on alike.
+      {"swept_line", "line"},
+      {"asymmetry", "curvature"},
   };
   const auto found = kFamilies.find(effect);
   return found == kFamilies.end() ? effect : found->second;

@@ -90,6 +90,8 @@ std::string_view to_string(JigOutcome outcome) {
       return "stopped";
     case JigOutcome::unit_gone:
       return "unit_gone";
+    case JigOutcome::sensor_stuck:
+      return "sensor_stuck";
   }
   return "?";
 }
@@ -271,9 +273,32 @@ std::vector<JigAction> JigRun::on_loss() {
   return std::exchange(actions_, {});
 }
 
+bool JigRun::is_stuck(const device::RawCounts& counts) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    repeats_[axis] = counts[axis] == repeated_[axis] ? repeats_[axis] + 1 : 0;
+    // At its limit a sensor repeats itself for another reason, which finish_dwell() names.
+    if (repeats_[axis] > static_cast<int>(options_.stuck_s * options_.rate_hz) &&
+        counts[axis] > kRawMin && counts[axis] < kRawMax) {
+      const bool all = std::all_of(repeats_.begin(), repeats_.end(),
+                                   [&](int repeats) { return repeats >= repeats_[axis] / 2; });
+      finish(JigOutcome::sensor_stuck,
+             all ? fmt::format("the sensor is frozen: no axis has changed for {:.0f} s",
+                               options_.stuck_s)
+                 : fmt::format("the sensor's {} axis is stuck: it has read {} for {:.0f} s",
+                               kAxisNames[axis], counts[axis], options_.stuck_s));
+      return true;
+    }
+  }
+  repeated_ = counts;
+  return false;
+}
+
 std::vector<JigAction> JigRun::on_sample(const Sample& sample) {
   now_s_ = sample.time_s;
   if (phase_ == JigPhase::finished || phase_ == JigPhase::writing) {
+    return std::exchange(actions_, {});
+  }
+  if (is_stuck(sample.counts)) {
     return std::exchange(actions_, {});
   }
   recent_.push_back(sample.counts);

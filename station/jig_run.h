@@ -65,6 +65,9 @@ struct JigRunOptions {
   std::vector<Pose> reseat = {Pose::plus_z, Pose::minus_x};
   std::vector<Pose> recheck = {Pose::minus_z, Pose::plus_x};  // after a write
   bool write = false;
+  // An axis that repeats one count for so long is stuck: a working one has noise of a count, and a
+  // turn falls into the time of every pose.
+  double stuck_s = 15;
 };
 
 struct Sample {
@@ -86,7 +89,15 @@ struct PoseReading {
 };
 
 enum class JigPhase { measuring, verifying, reseating, writing, rechecking, finished };
-enum class JigOutcome { running, complete, timed_out, too_many_refusals, stopped, unit_gone };
+enum class JigOutcome {
+  running,
+  complete,
+  timed_out,
+  too_many_refusals,
+  stopped,
+  unit_gone,
+  sensor_stuck,
+};
 // What the unit is doing: still counts from a second without movement on.
 enum class JigStillness { moving, settling, dwelling, leaving };
 std::string_view to_string(JigPhase phase);
@@ -190,6 +201,7 @@ class JigRun {
   void ask_next();
   void next_phase();
   void finish(JigOutcome outcome, std::string text);
+  bool is_stuck(const device::RawCounts& counts);
   // Reading of a level axis in the accepted poses; nothing where there is none yet.
   std::optional<double> level_lsb(std::size_t axis, Pose except) const;
   double tilt_of(const PoseReading& reading) const;
@@ -218,6 +230,8 @@ class JigRun {
   PerAxis<std::int64_t> sum_square_{};
   PerAxis<double> own_noise_mg_{};  // the least seen; 0 = not known yet
   int still_samples_ = 0;
+  device::RawCounts repeated_{};  // the counts that came last
+  PerAxis<int> repeats_{};        // and how often in a row
   PerAxis<double> dwell_start_lsb_{};
   PerAxis<double> left_lsb_{};  // where the unit lay when it was told to leave
   std::vector<Sample> dwell_;

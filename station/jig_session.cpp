@@ -17,6 +17,7 @@ using calib::FilterConfiguration;
 
 constexpr std::chrono::milliseconds kReadFor{250};
 constexpr std::string_view kRawHeadline = "device_time_us,x_lsb,y_lsb,z_lsb,temperature_c\n";
+constexpr int kWritable_mv = 3300;  // docs/protocol.md, code 7
 // A unit without a readable page: the middle of what ADXL362 units hold. Enough to tell faces.
 constexpr double kNominal_lsb_per_g = 256;
 constexpr double kNominalZero_lsb = 40;
@@ -55,6 +56,11 @@ class Session {
  private:
   Status prepare(const std::optional<JigResume>& resume);
   Status come_back(JigRun& run, const Error& error);
+  Status ask_jig(double now_s);
+  // What the jig says about a placement that the unit has judged.
+  Status compare_with_jig(const JigAction& action);
+  void say_what_is_left();
+  void keep_interrupted(const JigRun& run, const Error& error);
   void keep_rows(std::string_view rows);
   Status stream(JigRun& run);
   Status handle(JigRun& run, const std::vector<JigAction>& actions);
@@ -74,7 +80,13 @@ class Session {
   JigReport report_;
   Calibration approximation_ = nominal();
   bool ended_ = false;
-  std::string gone_;  // why the unit was given up
+  bool write_unknown_ = false;  // a write was begun, and the page not read since
+  std::optional<Error> gone_;   // why the unit was given up
+  std::string last_words_;      // what the machine said when it ended
+  std::optional<double> jig_asked_s_;
+  int jig_disagreements_ = 0;
+  std::uint64_t clock_jumps_before_ = 0;
+  double clock_jumped_before_s_ = 0;
   std::uint64_t lost_before_ = 0;
 };
 
@@ -113,6 +125,12 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
                 report_.serial,
                 "leave out --filter: constants of 'legacy' would make its affected files worse");
   }
+  if (options_.run.write && unit_->identity().battery_mv < kWritable_mv) {
+    return fail(ErrorCode::io,
+                fmt::format("the unit's battery has {} mV; below {} mV it takes no constants",
+                            unit_->identity().battery_mv, kWritable_mv),
+                report_.serial, "charge the unit, or leave out --write");
+  }
   return unit_->set_filter(options_.filter);
 }
 
@@ -138,9 +156,12 @@ void Session::keep_raw(const device::SampleBlock& block) {
 // Waits for the unit and goes on with it. Ends the run when it does not come back.
 Status Session::come_back(JigRun& run, const Error& error) {
   lost_before_ += unit_->stream_statistics().lost_samples;
+  clock_jumps_before_ += unit_->stream_statistics().clock_jumps;
+  clock_jumped_before_s_ += unit_->stream_statistics().clock_jumped_s;
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error);
     if (!again) {
+      report_.stream = unit_->stream_statistics();
       unit_ = nullptr;  // whoever kept them let go of them
       jig_ = nullptr;
     }
@@ -148,7 +169,7 @@ Status Session::come_back(JigRun& run, const Error& error) {
       return fail(again.error());  // whoever drives the run ends it himself
     }
     if (!again) {
-      gone_ = again.error().what;
+      gone_ = again.error();
       const auto word = hooks_.words ? hooks_.words() : std::nullopt;
       return handle(run, word == OperatorWord::stop ? run.on_operator(*word) : run.on_unit_gone());
     }
@@ -173,11 +194,83 @@ Status Session::come_back(JigRun& run, const Error& error) {
   return run.open_poses().empty() ? Status{} : jig_->go_to(run.open_poses().front());
 }
 
+// A jig that is in trouble ends the run: nothing that it turns from here on means anything.
+Status Session::ask_jig(double now_s) {
+  if (jig_ == nullptr || !jig_->turns_by_itself() ||
+      (jig_asked_s_ && now_s - *jig_asked_s_ < options_.jig_poll_s)) {
+    return {};
+  }
+  jig_asked_s_ = now_s;
+  SIXPOINT_ASSIGN(const device::JigReport jig, jig_->report());
+  if (!jig.fault.empty()) {
+    return fail(ErrorCode::device_unavailable,
+                fmt::format("the jig stopped: {}", printable(jig.fault, 120)), jig_->name(),
+                "see to the jig, then begin the run anew");
+  }
+  return {};
+}
+
+Status Session::compare_with_jig(const JigAction& action) {
+  if (jig_ == nullptr || !jig_->turns_by_itself()) {
+    return {};
+  }
+  const bool tilted = action.kind == JigAction::Kind::refused && action.text.starts_with("tilted");
+  if (action.kind != JigAction::Kind::accepted && !tilted) {
+    return {};
+  }
+  SIXPOINT_ASSIGN(const device::JigReport jig, jig_->report());
+  if (!jig.pose) {
+    return {};  // it does not claim to know
+  }
+  if (*jig.pose != action.pose) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the jig says it stands at {} and the unit reads {}",
+                            device::to_string(*jig.pose), device::to_string(action.pose)),
+                jig_->name(), "look how the unit is seated, and whether the jig turns truly");
+  }
+  jig_disagreements_ = tilted ? jig_disagreements_ + 1 : 0;
+  if (jig_disagreements_ >= options_.jig_disagreements) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the jig says it stands at {} to {:.2g} degrees, and the unit was {} "
+                            "time after time",
+                            device::to_string(*jig.pose), jig.angle_uncertainty_deg, action.text),
+                jig_->name(), "look how the unit is seated, and whether the jig turns truly");
+  }
+  return {};
+}
+
+void Session::say_what_is_left() {
+  if (write_unknown_) {
+    report_.as_left.reset();
+    report_.reasons.emplace_back(
+        "the unit went away while its constants were written: it holds the old ones or the new "
+        "ones, whole; measure it again to know which");
+  } else if (!report_.as_left) {
+    report_.as_left = report_.as_found;
+  }
+}
+
+// What was measured until the error; nothing of it is judged.
+void Session::keep_interrupted(const JigRun& run, const Error& error) {
+  report_.ended = env_.clock.now();
+  report_.refusals = run.refusals();
+  report_.faces = run.faces();
+  if (unit_ != nullptr) {
+    report_.stream = unit_->stream_statistics();
+  }
+  say_what_is_left();
+  report_.verdict = JigVerdict::inconclusive;
+  report_.codes = {error.code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted"};
+  report_.reasons.push_back(error.what);
+  report_.ended_by = error;
+}
+
 Status Session::stream(JigRun& run) {
   SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
   SIXPOINT_CHECK(handle(run, run.start(seconds(unit_->clock().elapsed()))));
   double heard_s = seconds(unit_->clock().elapsed());
   std::uint64_t lost = 0;
+  std::uint64_t clock_jumps = 0;
   while (run.phase() != JigPhase::finished && !ended_) {
     auto block = unit_->next_samples(kReadFor);
     const double now_s = seconds(unit_->clock().elapsed());
@@ -211,6 +304,11 @@ Status Session::stream(JigRun& run) {
         lost = unit_->stream_statistics().lost_samples;
         SIXPOINT_CHECK(handle(run, run.on_loss()));
       }
+      clock_jumps = std::min(clock_jumps, unit_->stream_statistics().clock_jumps);
+      if (unit_->stream_statistics().clock_jumps > clock_jumps) {
+        clock_jumps = unit_->stream_statistics().clock_jumps;
+        SIXPOINT_CHECK(handle(run, run.on_loss()));  // no reading goes across it
+      }
       keep_raw(**block);
       for (const device::RawCounts& counts : (*block)->counts) {
         SIXPOINT_CHECK(handle(run, run.on_sample({now_s, counts, (*block)->temperature_c})));
@@ -222,6 +320,7 @@ Status Session::stream(JigRun& run) {
     while (const auto word = hooks_.words ? hooks_.words() : std::nullopt) {
       SIXPOINT_CHECK(handle(run, run.on_operator(*word)));
     }
+    SIXPOINT_CHECK(ask_jig(now_s));
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
   if (unit_ == nullptr) {
@@ -229,6 +328,8 @@ Status Session::stream(JigRun& run) {
   }
   report_.stream = unit_->stream_statistics();
   report_.stream.lost_samples += lost_before_;
+  report_.stream.clock_jumps += clock_jumps_before_;
+  report_.stream.clock_jumped_s += clock_jumped_before_s_;
   if (run.outcome() == JigOutcome::unit_gone || run.outcome() == JigOutcome::stopped) {
     static_cast<void>(unit_->stop_stream());  // it may be gone
     return {};
@@ -264,8 +365,12 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
       }
       case JigAction::Kind::accepted:
       case JigAction::Kind::refused:
+        SIXPOINT_CHECK(compare_with_jig(action));
+        break;
       case JigAction::Kind::dropped:
+        break;
       case JigAction::Kind::finished:
+        last_words_ = action.text;
         break;
     }
   }
@@ -332,20 +437,25 @@ Status Session::write_constants(JigRun& run) {
   static_cast<void>(unit_->stop_stream());  // a unit that is gone says so below
   // The date is today's: from it the firmware concludes the filter, and these constants belong to
   // `current`.
-  const device::CalibrationPage page{report_.six->best().stored,
-                                     std::chrono::floor<std::chrono::seconds>(env_.clock.now())};
+  const device::CalibrationPage page{
+      report_.six->best().stored, std::chrono::floor<std::chrono::seconds>(unit_->clock().now())};
+  write_unknown_ = true;
   Status written_status = unit_->write_calibration(page);
-  // Pulled out in mid-write: the unit holds the old page or the new one. Written anew, once.
-  if (!written_status && written_status.error().code == ErrorCode::device_unavailable &&
-      hooks_.reopen) {
-    SIXPOINT_CHECK(come_back(run, written_status.error()));
-    if (run.phase() == JigPhase::finished) {
-      return {};
+  // Whatever came between, the unit holds the old page or the new one: the whole is repeated, once.
+  if (!written_status) {
+    if (written_status.error().code == ErrorCode::device_unavailable && hooks_.reopen) {
+      SIXPOINT_CHECK(come_back(run, written_status.error()));
+      if (run.phase() == JigPhase::finished) {
+        return {};
+      }
+      SIXPOINT_CHECK(unit_->stop_stream());
     }
-    SIXPOINT_CHECK(unit_->stop_stream());
-    written_status = unit_->write_calibration(page);
+    if (written_status.error().code != ErrorCode::device_unavailable || hooks_.reopen) {
+      written_status = unit_->write_calibration(page);
+    }
   }
   SIXPOINT_ASSIGN(report_.as_left, unit_->read_calibration());
+  write_unknown_ = false;
   if (!written_status) {
     ended_ = true;
     report_.reasons.push_back(written_status.error().what);
@@ -363,15 +473,24 @@ Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
   SIXPOINT_CHECK(judge_verification(run));
-  if (!report_.as_left) {
-    report_.as_left = report_.as_found;
-  }
+  say_what_is_left();
   if (report_.as_found) {
     if (const auto found = calib::calibration_from(report_.as_found->constants)) {
       report_.as_found_residual_mg = judge(report_.faces, *found, gravity_g_).worst_mg;
     }
   }
+  if (report_.stream.clock_jumps > 0) {
+    report_.reasons.push_back(
+        fmt::format("the unit's clock jumped by {:+.3f} s in mid-run ({} times); constants do not "
+                    "depend on it, recordings of this unit may",
+                    report_.stream.clock_jumped_s, report_.stream.clock_jumps));
+  }
   switch (run.outcome()) {
+    case JigOutcome::sensor_stuck:
+      report_.verdict = JigVerdict::fail;
+      report_.codes = {"sensor_stuck"};
+      report_.reasons.push_back(last_words_);
+      return {};
     case JigOutcome::stopped:
       report_.verdict = JigVerdict::stopped;
       report_.codes = {"stopped"};
@@ -381,6 +500,9 @@ Status Session::conclude(const JigRun& run) {
     case JigOutcome::too_many_refusals:
     case JigOutcome::unit_gone:
       report_.verdict = JigVerdict::inconclusive;
+      if (run.outcome() == JigOutcome::unit_gone) {
+        report_.ended_by = gone_;
+      }
       report_.codes = {run.outcome() == JigOutcome::timed_out           ? "time_out"
                        : run.outcome() == JigOutcome::too_many_refusals ? "too_many_refusals"
                                                                         : "unit_gone"};
@@ -388,8 +510,15 @@ Status Session::conclude(const JigRun& run) {
           run.outcome() == JigOutcome::timed_out
               ? "no pose was accepted in time; is the unit on the jig, and does the jig turn it?"
           : run.outcome() == JigOutcome::unit_gone
-              ? fmt::format("the unit went away in mid-run and did not come back ({})", gone_)
+              ? fmt::format("the unit went away in mid-run and did not come back ({})",
+                            gone_ ? gone_->what : std::string())
               : "too many placements were refused; look at jig, seat and cable");
+      if (run.outcome() == JigOutcome::timed_out && report_.stream.lost_samples > 0) {
+        report_.reasons.push_back(
+            fmt::format("{} samples were lost or damaged on the way, and every reading begins anew "
+                        "then: look at the cable",
+                        report_.stream.lost_samples));
+      }
       return {};
     case JigOutcome::running:
     case JigOutcome::complete:
@@ -446,7 +575,11 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
     if (jig_ != nullptr) {
       static_cast<void>(jig_->stop());
     }
-    return fail(streamed.error());
+    if (!options_.keep_interrupted) {
+      return fail(streamed.error());
+    }
+    keep_interrupted(machine, streamed.error());
+    return std::move(report_);
   }
   SIXPOINT_CHECK(conclude(machine));
   return std::move(report_);
@@ -603,6 +736,8 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["stream"]["lost_samples"] = stream.lost_samples;
   json["stream"]["duplicate_reports"] = stream.duplicate_reports;
   json["stream"]["damaged_reports"] = stream.damaged_reports;
+  json["stream"]["failed_transfers"] = stream.failed_transfers;
+  json["stream"]["clock_jumps"] = stream.clock_jumps;
   return json;
 }
 

@@ -32,6 +32,13 @@ struct JigSessionOptions {
   RetestState retest;  // what the unit's earlier runs demand (verdict.h)
   // Longest silence of a streaming unit before it is given up.
   double silence_s = 3;
+  // An error in mid-run ends in a report with `ended_by`, so that what was measured can be kept;
+  // without it, in the error alone.
+  bool keep_interrupted = false;
+  // How often a jig that turns by itself is asked how it is.
+  double jig_poll_s = 0.25;
+  // So many tilted placements in a row that the jig calls exact: it does not stand where it says.
+  int jig_disagreements = 3;
 };
 
 // One reading judged by constants: magnitude against local gravity.
@@ -60,6 +67,8 @@ struct JigReport {
   std::vector<std::string> reasons;  // for people
   Limits limits;
   std::vector<JudgedQuantity> quantities;  // empty where the run did not get that far
+  // Why the run ended early, where it did; the verdict is inconclusive then.
+  std::optional<Error> ended_by;
   calib::LocalGravity gravity;
 
   std::vector<PoseReading> faces;

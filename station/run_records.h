@@ -12,13 +12,13 @@ namespace sixpoint::station {
 // What is known before the unit is measured; the document is still empty.
 db::RunRecord run_record_before(const JigSessionOptions& session, const std::string& serial,
                                 const std::string& jig);
-// What the report adds; `study` names the gage study that the run belongs to, if it does.
+// What the report adds; `study` names the gage study that a run of kStudyKind belongs to.
 void complete_run_record(db::RunRecord& run, const JigReport& report,
                          const std::string& study = {});
 
 struct StoredRun {
   std::string run_id;
-  std::optional<std::string> constants_id;  // of a usable report
+  std::optional<std::string> constants_id;  // of a usable report that is no study
 };
 // The run with its samples, what was written into the unit, and the constants (none of a study).
 Result<StoredRun> add_run_records(db::Keeper& keeper, const JigReport& report,

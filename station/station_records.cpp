@@ -136,14 +136,18 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
                                   name == "zero_offset_mg" ? policy.least_sigma_zero_mg
                                                            : policy.least_sigma_sensitivity_percent,
                                   signed_up_to);
+      const ChartSignal* last = nullptr;
       for (const ChartSignal& signal : chart.chart.signals) {
         if (std::find(policy.locking_rules.begin(), policy.locking_rules.end(), signal.rule) !=
             policy.locking_rules.end()) {
-          state.locked = true;
-          state.reasons.push_back(fmt::format("check unit {}, {}: {} on {}", serial,
-                                              chart.chart.name, nelson_rule(signal.rule),
-                                              to_iso8601(chart.times[signal.point])));
+          last = &signal;
         }
+      }
+      if (last != nullptr) {
+        state.locked = true;
+        state.reasons.push_back(fmt::format(
+            "check unit {}, {}: {} on {}", serial, chart.chart.name, nelson_rule(last->rule),
+            to_iso8601(std::chrono::floor<std::chrono::seconds>(chart.times[last->point]))));
       }
       state.charts.push_back(std::move(chart));
     }

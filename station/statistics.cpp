@@ -486,7 +486,9 @@ std::optional<Capability> capability(const std::vector<double>& values, std::opt
     square += (value - out.mean) * (value - out.mean);
   }
   out.sd = std::sqrt(square / (n - 1));
-  if (!(out.sd > 0) || !std::isfinite(out.sd)) {
+  // Below that it is the arithmetic's scatter and not the units'.
+  constexpr double kLeastRelative = 1e-12;
+  if (!(out.sd > kLeastRelative * std::abs(out.mean)) || !std::isfinite(out.sd)) {
     return std::nullopt;
   }
   const double tail = (1 - confidence) / 2;

@@ -88,6 +88,7 @@ constexpr std::string_view kStyle =
     "#bbb;margin-top:2em}"
     "table{border-collapse:collapse;width:100%}th,td{text-align:left;padding:.25em .6em;"
     "border-bottom:1px solid #ddd;vertical-align:top}td{font-variant-numeric:tabular-nums}"
+    "th{font-weight:600}.bars td:first-of-type{white-space:nowrap}"
     "small{color:#555}.locked{background:#fbe9e7;border-left:6px solid #b71c1c;padding:.6em 1em}"
     ".open{background:#eef5ee;border-left:6px solid #2e7d32;padding:.6em 1em}"
     "svg text{font:11px sans-serif;fill:#333}";
@@ -147,7 +148,7 @@ std::string chart_svg(const CheckUnitChart& one) {
     svg += fmt::format(
         "<rect x={:.1f} y={:.1f} width={:.1f} height={:.1f} fill='#f1f1f1'/>"
         "<text x={:.1f} y={:.1f}>baseline</text>\n",
-        kLeft, kTop, edge - kLeft, kBottom - kTop, kLeft + 4, kBottom - 5);
+        kLeft, kTop, edge - kLeft, kBottom - kTop, kLeft + 4, kBottom + 12);
     level(y(chart.upper), chart.upper, "+3\u03c3", "stroke-dasharray='6 4'");
     level(y(chart.centre), chart.centre, "mean", "");
     level(y(chart.lower), chart.lower, "\u22123\u03c3", "stroke-dasharray='6 4'");

@@ -176,6 +176,10 @@ const std::vector<FailureCode>& failure_codes() {
       {"stopped", "the operator stopped the run", "", "Repeat."},
       {"unit_gone", "the unit went away", "the cable was pulled, or the battery is empty",
        "Plug it in and repeat."},
+      {"sensor_stuck", "the sensor repeats itself: an axis is stuck, or all are frozen",
+       "the sensor is broken, or its supply", "Keep the unit back: its sensor is faulty."},
+      {"interrupted", "the run ended on an error", "the unit, the jig or a cable failed",
+       "See to what the message names, repeat."},
       {"retest", "a unit that failed needs more passes in a row", "it failed before",
        "Measure it again."},
   };

@@ -14,8 +14,10 @@ namespace {
 using Complex = std::complex<double>;
 using Vector3c = Eigen::Vector3cd;
 
-constexpr double kLowest_hz = 1;            // below it slow noise rules
-constexpr double kFalseLines = 1e-3;        // chance of one false line in a whole recording
+constexpr double kLowest_hz = 3;  // below it slow noise rules; vibration of floors is faster
+// Chance of one false line in a whole recording. One false alarm in a hundred recordings is what
+// the whole diagnosis is allowed; some ten kinds of decision share it evenly.
+constexpr double kFalseLines = 1e-3;
 constexpr std::size_t kLongest = 1U << 17;  // 22 minutes at 100 Hz
 
 // A stretch at rest in one pose, mean removed, masked samples zero, in mg.
@@ -90,6 +92,7 @@ struct Sight {
   Vector3c amplitude;
   Eigen::Vector3d weight;  // 1 / variance of the real part
   Eigen::Matrix3d rotation;
+  int pose = 0;
 };
 
 // Maximum likelihood of one vector seen in all dwells, each with its own phase.
@@ -145,6 +148,45 @@ VectorFit fit_vector(const std::vector<Sight>& sights, bool in_lab) {
   return fit;
 }
 
+// log of the modified Bessel function I0 (Abramowitz and Stegun 9.8.1, 9.8.2): what a phase that is
+// not known leaves of the exponential.
+double log_bessel(double x) {
+  if (x < 3.75) {
+    const double t = x * x / 14.0625;
+    return std::log(
+        1 + t * (3.5156229 +
+                 t * (3.0899424 +
+                      t * (1.2067492 + t * (0.2659732 + t * (0.0360768 + t * 0.0045813))))));
+  }
+  return x - 0.5 * std::log(2 * M_PI * x) + std::log1p(1 / (8 * x));
+}
+
+double held_out_line_nats(const std::vector<Sight>& sights, bool in_lab) {
+  std::array<std::vector<Sight>, 2> half;
+  for (const Sight& s : sights) {
+    half[static_cast<std::size_t>(s.pose % 2)].push_back(s);
+  }
+  if (half[0].empty() || half[1].empty()) {
+    return 0;
+  }
+  double nats = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Vector3c vector = fit_vector(half[k], in_lab).vector;
+    for (const Sight& s : half[1 - k]) {
+      const Eigen::Matrix3d turn = in_lab ? s.rotation : Eigen::Matrix3d::Identity();
+      const Vector3c predicted = turn.cast<Complex>() * vector;
+      Complex overlap = 0;
+      double square = 0;
+      for (Eigen::Index a = 0; a < 3; ++a) {
+        overlap += std::conj(predicted[a]) * s.weight[a] * s.amplitude[a];
+        square += s.weight[a] * std::norm(predicted[a]);
+      }
+      nats += log_bessel(std::abs(overlap)) - 0.5 * square;
+    }
+  }
+  return nats;
+}
+
 std::vector<Sight> sights_at(const Bundle& bundle, const std::vector<Stretch>& all,
                              const NoiseSpectrum& noise, double frequency_hz) {
   std::vector<Sight> sights;
@@ -157,6 +199,7 @@ std::vector<Sight> sights_at(const Bundle& bundle, const std::vector<Stretch>& a
           static_cast<double>(stretch.samples) / (2 * noise.variance_at(axis, frequency_hz));
     }
     sight.rotation = bundle.segments[stretch.segment].rotation;
+    sight.pose = bundle.segments[stretch.segment].pose;
     sights.push_back(sight);
   }
   return sights;
@@ -357,6 +400,7 @@ LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const Noi
     line.in_lab = line.lab_over_sensor_nats > 0;
     const VectorFit& chosen = line.in_lab ? lab : sensor;
     line.gain_nats = chosen.nats;
+    line.held_out_nats = held_out_line_nats(sights, line.in_lab);
     // Turn the common phase so that the vector is as real as can be.
     Complex square = 0;
     for (Eigen::Index k = 0; k < 3; ++k) {

@@ -26,6 +26,8 @@ struct SpectralLine {
   // Chi-square per degree of freedom of the dwells about the chosen hypothesis, in sd: a line that
   // comes and goes, or that neither frame holds.
   double misfit_sd = 0;
+  // Log predictive likelihood over no line: each half of the poses from the vector of the other.
+  double held_out_nats = 0;
 };
 
 struct LineSearch {

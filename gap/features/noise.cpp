@@ -263,6 +263,7 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
       }
     }
   }
+  codes.spread_freedom = freedom;
   codes.spread_sd = (chi - freedom) / std::sqrt(2 * std::max(1.0, freedom));
   return codes;
 }

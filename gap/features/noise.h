@@ -37,6 +37,7 @@ struct CodeStatistics {
   // Scatter of the dwells' variances against chance: chi-square per degree of freedom, in sd; and
   // the worst dwell.
   double spread_sd = 0;
+  double spread_freedom = 0;
   std::size_t worst_segment = 0;
   double worst_ratio = 1;
   double kurtosis_sd = 0;           // excess kurtosis over its standard deviation

@@ -1,8 +1,9 @@
 // Amplitude response over frequency: the shape of the noise's spectrum and of the tones.
 //
 // A lower anti-alias corner acts on signal and noise alike; a soft mount acts on the shaker's tones
-// only. Both are fitted on grids: Butterworth low-passes of order 1 to 8 as a sampled filter, and
-// two forms of a resonance (base excitation of a damped mount, and a plain second-order section).
+// only. Both are fitted on grids: Butterworth low-passes of order 1 to 8, sampled or analogue, and
+// three forms of a resonance (base excitation of a damped mount, a plain second-order section, a
+// peak upon a flat response).
 #pragma once
 
 #include <array>
@@ -14,19 +15,35 @@
 
 namespace sixpoint::gap {
 
+// How the filter was made: as a sampled filter (bilinear transform); in front of the sampler, as
+// the tones see it, while the noise is the sampled filter's; in front of the sampler altogether,
+// what lies beyond half the rate folded back into the noise.
+enum class LowPassForm { sampled, mixed, analogue };
+
 struct LowPass {
   double corner_hz = 0;
   double corner_sd_hz = 0;
   int order = 0;
   double noise_nats = 0;  // over flat noise
   double tone_nats = 0;   // over flat tones
+  LowPassForm form = LowPassForm::sampled;
+  // Log predictive likelihood over flat: tones of frequencies that were left out; without tones the
+  // noise of one axis, from the corner that the other two show.
+  double held_out_nats = 0;
+
+  // |H| of tones and of noise.
+  double tone_gain(double frequency_hz, double rate_hz) const;
+  double noise_gain(double frequency_hz, double rate_hz) const;
 };
+
+enum class ResonanceForm { base_excited, second_order, peak };
 
 struct Resonance {
   double frequency_hz = 0;
   double q = 0;
-  bool base_excited = true;
+  ResonanceForm form = ResonanceForm::base_excited;
   double tone_nats = 0;
+  double held_out_nats = 0;  // as above
 };
 
 struct Response {
@@ -42,7 +59,13 @@ struct Response {
   double tone_left_chi = 0;  // of the best resonance, whether it is accepted or not
   bool low_pass_significant = false;
   bool resonance_significant = false;
+  // What is left of the tones' amplitudes beyond noise, as a share: how well the form is known.
+  double tone_form_share = 0;
   std::array<double, 3> white_mg{};  // of one sample before rounding and filter
+
+  // |H| of a tone and of noise by what is significant; 1 where nothing is.
+  double tone_gain(double frequency_hz, double rate_hz) const;
+  double noise_gain(double frequency_hz, double rate_hz) const;
 };
 
 // |H|, of a Butterworth low-pass designed by the bilinear transform.

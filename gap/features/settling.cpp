@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 
 namespace sixpoint::gap {
@@ -13,7 +14,8 @@ double StepResponse::Mode::at(double t_s) const {
 }
 
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
-                           const NoiseSpectrum& noise) {
+                           const NoiseSpectrum& noise, double line_power_mg2,
+                           const std::function<bool(const Segment&)>& use) {
   StepResponse response;
   const auto length = static_cast<std::size_t>(3 * bundle.rate_hz);
   response.share.assign(length, 0);
@@ -21,12 +23,13 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
   std::size_t steps = 0;
   for (const Segment& segment : bundle.segments) {
     if (segment.kind == Segment::Kind::vibration || !segment.starts_placement ||
-        segment.samples < 2 * length || segment.approach_g.cwiseAbs().maxCoeff() < 0.2) {
+        segment.samples < 2 * length || segment.approach_g.cwiseAbs().maxCoeff() < 0.2 ||
+        (use && !use(segment))) {
       continue;
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double step_mg = 1000 * segment.approach_g[static_cast<Eigen::Index>(axis)];
-      const double variance = noise.white_mg[axis] * noise.white_mg[axis];
+      const double variance = noise.white_mg[axis] * noise.white_mg[axis] + line_power_mg2;
       if (std::abs(step_mg) < 100 || !(variance > 0)) {
         continue;
       }
@@ -162,6 +165,30 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
   response.left_sd = chi_over(true);
   response.left_without_sd = chi_over(false);
   return response;
+}
+
+double held_out_step_nats(const Bundle& bundle, const CleanSamples& clean,
+                          const NoiseSpectrum& noise, double line_power_mg2) {
+  std::array<StepResponse, 2> half;
+  for (int k = 0; k < 2; ++k) {
+    half[static_cast<std::size_t>(k)] =
+        step_response(bundle, clean, noise, line_power_mg2,
+                      [&](const Segment& segment) { return segment.pose % 2 == k; });
+  }
+  if (!half[0].usable || !half[1].usable) {
+    return 0;
+  }
+  double nats = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const StepResponse& seen = half[k];
+    const StepResponse& unseen = half[1 - k];
+    for (std::size_t i = 0; i < unseen.share.size(); ++i) {
+      const double model = seen.model(static_cast<double>(i) / bundle.rate_hz);
+      nats += 0.5 * (std::pow(unseen.share[i], 2) - std::pow(unseen.share[i] - model, 2)) /
+              (unseen.sd * unseen.sd);
+    }
+  }
+  return nats;
 }
 
 }  // namespace sixpoint::gap

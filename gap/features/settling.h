@@ -2,6 +2,7 @@
 // followed.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "gap/bundle.h"
@@ -36,7 +37,15 @@ struct StepResponse {
   double left_without_sd = 0;  // ... with nothing taken off
 };
 
+// `use`: which segments count (empty: all). `line_power_mg2`: mean square of spectral lines, which
+// is noise to a step.
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
-                           const NoiseSpectrum& noise);
+                           const NoiseSpectrum& noise, double line_power_mg2 = 0,
+                           const std::function<bool(const Segment&)>& use = {});
+
+// Log likelihood over nothing of dwells in one half of the poses, predicted from the ringing fitted
+// to the other half; both halves added.
+double held_out_step_nats(const Bundle& bundle, const CleanSamples& clean,
+                          const NoiseSpectrum& noise, double line_power_mg2 = 0);
 
 }  // namespace sixpoint::gap

@@ -25,6 +25,9 @@ double flicker_density_mg2(double flicker_mg) { return flicker_mg * flicker_mg; 
 SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise) {
   SlowNoise slow;
   std::vector<Coefficient> coefficients;
+  // Per axis and width: count, squares, fourth powers of differences between neighbouring means.
+  constexpr std::array<Eigen::Index, 2> kWidths_s = {3, 8};
+  std::array<std::array<std::array<double, 3>, 2>, 3> moments{};
   const auto second = static_cast<std::size_t>(bundle.rate_hz);
   for (const Segment& segment : bundle.segments) {
     if (segment.kind == Segment::Kind::vibration || segment.kind == Segment::Kind::ramp ||
@@ -56,6 +59,15 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
         continue;
       }
       const auto n = y.size();
+      for (std::size_t k = 0; k < kWidths_s.size(); ++k) {
+        const Eigen::Index width = kWidths_s[k];
+        for (Eigen::Index i = 2; i + 2 * width <= n; i += width) {  // the ringing of a move is over
+          const double d = y.segment(i + width, width).mean() - y.segment(i, width).mean();
+          moments[axis][k][0] += 1;
+          moments[axis][k][1] += d * d;
+          moments[axis][k][2] += d * d * d * d;
+        }
+      }
       y.array() -= y.mean();
       Eigen::Index first = 1;
       if (n >= 60) {
@@ -82,6 +94,15 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
                                 static_cast<double>(n) / static_cast<double>(k),
                                 static_cast<int>(std::floor(std::log2(2.0 * static_cast<double>(n) /
                                                                       static_cast<double>(k))))});
+      }
+    }
+  }
+  for (const auto& widths : moments) {
+    for (const auto& [count, squares, fourths] : widths) {
+      if (count > 30) {
+        const double excess = fourths * count / (squares * squares) - 3;
+        // Neighbouring differences share a mean: a third more scatter than independent ones.
+        slow.jump_sd = std::max(slow.jump_sd, excess / std::sqrt(32 / count));
       }
     }
   }

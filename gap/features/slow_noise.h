@@ -26,6 +26,9 @@ struct SlowNoise {
   // Power in the slow coefficients over that of the fast, in sd, at the best grid point: what is
   // left for something that neither explains.
   double misfit_sd = 0;
+  // Excess kurtosis of the differences between means of neighbouring 3 s and 8 s, the worst axis,
+  // in sd. Walks and 1/f noise are Gaussian; a zero that jumps is not.
+  double jump_sd = 0;
 
   struct Best {
     double walk_mg = 0;

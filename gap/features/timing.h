@@ -20,7 +20,8 @@ struct HostTiming {
   bool slips_visible = false;  // the sample interval exceeds the stamps' errors
   double clock_ppm = 0;        // positive: the sample clock runs fast
   double clock_sd_ppm = 0;
-  std::size_t lost = 0;  // samples, summed over packets that miss some
+  double clock_held_out_nats = 0;  // each half of the segments predicted from the rate of the other
+  std::size_t lost = 0;            // samples, summed over packets that miss some
   std::size_t repeated = 0;
   std::size_t packets = 0;   // pairs of stamps looked at
   std::size_t samples = 0;   // between them

@@ -10,6 +10,7 @@ namespace {
 
 struct Options {
   std::string store;
+  std::string head;
   bool json = false;
 };
 
@@ -18,7 +19,7 @@ void verify(const Options& options, Context& context) {
   if (!store) {
     return report_error(context, "audit", store.error(), options.json);
   }
-  const auto report = store->audit();
+  const auto report = store->audit(options.head);
   if (!report) {
     return report_error(context, "audit", report.error(), options.json);
   }
@@ -46,6 +47,8 @@ void add_audit(CLI::App& app, Context& context) {
       command->add_subcommand("verify", "Find any row that was changed, removed or moved");
   auto options = std::make_shared<Options>();
   add_store_option(*verify_command, options->store);
+  verify_command->add_option("--head", options->head,
+                             "A head that was written down earlier: is it still in the chain?");
   verify_command->add_flag("--json", options->json, "One JSON document on stdout");
   verify_command->callback([options, &context] { verify(*options, context); });
 }

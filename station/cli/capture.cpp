@@ -10,6 +10,7 @@
 #include "gt3x/model.h"
 #include "station/capture_run.h"
 #include "station/cli/command.h"
+#include "station/cli/record_option.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 
@@ -23,6 +24,7 @@ struct Options {
   std::string output;
   std::string constants_file;
   std::string store;
+  std::string record;
   std::optional<double> gravity_m_per_s2;
   int rate_hz = 30;
   double side_s = 40;
@@ -61,13 +63,14 @@ Status keep(Context& context, const Options& options, Done& done) {
   return {};
 }
 
-Result<Done> run(Context& context, const Options& options) {
-  const device::TransportRegistry devices = station::known_devices();
-  SIXPOINT_ASSIGN(device::Link link,
-                  devices.open(station::with_jig(options.device, options.jig), context.env));
-  SIXPOINT_ASSIGN(const auto unit, device::Unit::open(std::move(link)));
-  device::ManualJig by_hand;
-  device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
+Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_ASSIGN(const auto unit, station::known_units().open(
+                                       station::with_jig(options.device, options.jig), context.env,
+                                       [&recorder](device::Link& link) { recorder.attach(link); }));
+  std::unique_ptr<device::Jig> own_jig;
+  SIXPOINT_ASSIGN(device::Jig* const chosen,
+                  station::choose_jig(options.jig, *unit, context.env, own_jig));
+  device::Jig& jig = *chosen;
 
   station::CaptureOptions capture;
   capture.rate_hz = options.rate_hz;
@@ -102,7 +105,12 @@ Result<Done> run(Context& context, const Options& options) {
     return static_cast<bool>(std::getline(context.in, line)) && line != "q";
   };
   Done done;
-  SIXPOINT_ASSIGN(done.report, station::run_capture(*unit, jig, context.env, capture, prompt));
+  if (unit->abilities().records_on_command) {
+    SIXPOINT_ASSIGN(done.report, station::run_capture(*unit, jig, context.env, capture, prompt));
+  } else {
+    context.people << "this unit offers files only: the recording that it holds is taken\n";
+    SIXPOINT_ASSIGN(done.report, station::run_file_capture(*unit, context.env, capture));
+  }
   if (done.report.usable()) {
     SIXPOINT_CHECK(keep(context, options, done));
   }
@@ -120,6 +128,7 @@ Json to_json(const Done& done) {
     json["verdict"] = done.report.stopped ? "stopped" : "refused";
     json["reasons"] = done.report.refusal;
   }
+  json["notes"] = done.report.notes;
   json["file"] = done.report.file.empty() ? Json(nullptr) : Json(done.report.file);
   json["sha256"] = done.report.file_sha256.empty() ? Json(nullptr) : Json(done.report.file_sha256);
   json["stored_id"] = done.stored_id ? Json(*done.stored_id) : Json(nullptr);
@@ -129,6 +138,9 @@ Json to_json(const Done& done) {
 
 void print(Context& context, const Done& done) {
   const station::CaptureReport& report = done.report;
+  for (const std::string& note : report.notes) {
+    context.people << "note: " << note << '\n';
+  }
   if (report.stopped) {
     context.people << "stopped; the recording so far stays in the unit\n";
     return;
@@ -170,8 +182,8 @@ void add_capture(CLI::App& app, Context& context) {
       ->add_option("--device", options->device,
                    "the unit, for example virtual:seed=7 (docs/virtual.md)")
       ->required();
-  command->add_option("--jig", options->jig, "manual (a person turns the unit) or virtual")
-      ->check(CLI::IsMember({"manual", "virtual"}));
+  command->add_option("--jig", options->jig,
+                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
   command->add_option("-o,--output", options->output,
                       "the .gt3x to make (default: SERIAL-calibration-DAY.gt3x)");
   command->add_option("--constants", options->constants_file,
@@ -184,9 +196,12 @@ void add_capture(CLI::App& app, Context& context) {
       ->check(CLI::Range(10.0, 3600.0))
       ->capture_default_str();
   add_store_option(*command, options->store);
+  add_record_option(*command, options->record);
   command->add_flag("--json", options->json, "answer as JSON");
   command->callback([options, &context] {
-    const Result<Done> done = run(context, *options);
+    device::SessionRecorder recorder;
+    const Result<Done> done = run(context, *options, recorder);
+    save_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "capture", done.error(), options->json);
       return;

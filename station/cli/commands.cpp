@@ -27,6 +27,8 @@ namespace sixpoint::cli {
   COMMAND(audit)                   \
   COMMAND(store)                   \
   COMMAND(simulate)                \
+  COMMAND(session)                 \
+  COMMAND(devices)                 \
   COMMAND(doctor)                  \
   COMMAND(virtual)                 \
   COMMAND(station)                 \

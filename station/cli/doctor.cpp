@@ -2,7 +2,11 @@
 #include <filesystem>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include "db/journal.h"
+#include "device/discovery.h"
+#include "device/usb_errors.h"
 #include "station/cli/command.h"
 #include "station/cli/store_option.h"
 
@@ -39,6 +43,23 @@ Check check_store(const Options& options, Context& context) {
   return {"store", audit->ok, audit->brief()};
 }
 
+// What was measured and is not in the store yet.
+Check check_journal(const Options& options, Context& context) {
+  const std::string folder = journal_folder(options.store);
+  if (!context.env.files.info(folder)) {
+    return {"journal", true, "nothing waits for the store"};
+  }
+  auto journal = db::Journal::open(context.env.files, folder);
+  const auto pending = journal ? journal->pending() : Result<std::size_t>(fail(journal.error()));
+  if (!pending) {
+    return {"journal", false, pending.error().brief()};
+  }
+  return {"journal", *pending == 0,
+          *pending == 0 ? std::string("nothing waits for the store")
+                        : fmt::format("{} entries wait in {}: run 'sixpoint store catch-up'",
+                                      *pending, folder)};
+}
+
 Check check_disk(const std::string& folder) {
   std::error_code error;
   const auto space = std::filesystem::space(folder, error);
@@ -50,20 +71,54 @@ Check check_disk(const std::string& folder) {
                       space.available >> 20)};
 }
 
+// A machine without USB is no defect: it mends files and drives virtual units.
 Check check_usb() {
   std::error_code error;
-  const bool there = std::filesystem::is_directory("/dev/bus/usb", error);
-  return {"usb", true,
-          there ? "this version drives virtual units only; USB is not built yet"
-                : "no USB on this machine, and this version drives virtual units only"};
+  if (!std::filesystem::is_directory("/dev/bus/usb", error)) {
+    return {"usb", true, "no USB on this machine; virtual units work"};
+  }
+  device::DiscoveryFilter every;
+  every.product_ids.clear();
+  const auto attached = device::attached_devices(every);
+  if (!attached) {
+    return {"usb", false, attached.error().brief()};
+  }
+  for (const device::AttachedDevice& one : *attached) {
+    if (const Status access = device::check_access(one); !access) {
+      return {"usb", false, access.error().brief()};
+    }
+  }
+  return {"usb", true, fmt::format("{} of our devices plugged in", attached->size())};
+}
+
+Check check_udev_rules() {
+  std::error_code none;
+  const bool needed = ::geteuid() != 0 && std::filesystem::is_directory("/dev/bus/usb", none);
+  for (const char* rules : {device::kDetectionRules, device::kAccessRules}) {
+    bool found = false;
+    for (const char* folder : {"/etc/udev/rules.d/", "/run/udev/rules.d/", "/usr/lib/udev/rules.d/",
+                               "/lib/udev/rules.d/"}) {
+      std::error_code error;
+      found = found || std::filesystem::exists(std::string(folder) + rules, error);
+    }
+    if (!found) {
+      return {"udev", !needed,
+              fmt::format("{} is not installed: without it only root can use units; it lies in "
+                          "packaging/udev",
+                          rules)};
+    }
+  }
+  return {"udev", true, "detection and access rules are installed"};
 }
 
 void run(const Options& options, Context& context) {
   const std::vector<Check> checks = {
       {"version", true, "sixpoint " SIXPOINT_VERSION},
       check_store(options, context),
+      check_journal(options, context),
       check_disk("."),
       check_usb(),
+      check_udev_rules(),
   };
   Json json = document("doctor");
   json["checks"] = Json::array();

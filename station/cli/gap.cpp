@@ -12,6 +12,7 @@
 #include "gap/diagnose.h"
 #include "gap/plain.h"
 #include "gap/report_html.h"
+#include "gap/report_sheet.h"
 #include "station/cli/command.h"
 #include "station/cli/gap_challenge.h"
 
@@ -22,6 +23,8 @@ struct Options {
   std::string bundle;
   std::vector<std::string> without;
   std::string html;
+  std::string png;
+  std::string pdf;
   std::string scenario;
   std::uint64_t seed = 0;
   bool json = false;
@@ -76,24 +79,38 @@ void tell(const gap::Diagnosis& d, Context& context) {
   }
 }
 
+std::string_view as_text(const Bytes& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, Context& context) {
+  FileSystem& files = context.env.files;
+  if (!options.html.empty()) {
+    SIXPOINT_CHECK(write_file(files, options.html, gap::report_html(diagnosis)));
+  }
+  if (!options.png.empty()) {
+    SIXPOINT_ASSIGN(const Bytes png, gap::sheet_png(gap::report_sheet(diagnosis)));
+    SIXPOINT_CHECK(write_file(files, options.png, as_text(png)));
+  }
+  if (!options.pdf.empty()) {
+    SIXPOINT_ASSIGN(const Bytes pdf, gap::sheet_pdf(gap::report_sheet(diagnosis)));
+    SIXPOINT_CHECK(write_file(files, options.pdf, as_text(pdf)));
+  }
+  if (!options.scenario.empty()) {
+    SIXPOINT_CHECK(
+        write_file(files, options.scenario, gap::augmented_scenario(diagnosis).dump(2) + "\n"));
+  }
+  return {};
+}
+
 void run(const Options& options, Context& context) {
   const auto diagnosis = diagnose(options, context);
   if (!diagnosis) {
     return report_error(context, "gap-diagnose", diagnosis.error(), options.json);
   }
   context.worsen(exit_code_of(*diagnosis));
-  if (!options.html.empty()) {
-    if (auto status = write_file(context.env.files, options.html, gap::report_html(*diagnosis));
-        !status) {
-      return report_error(context, "gap-diagnose", status.error(), options.json);
-    }
-  }
-  if (!options.scenario.empty()) {
-    if (auto status = write_file(context.env.files, options.scenario,
-                                 gap::augmented_scenario(*diagnosis).dump(2) + "\n");
-        !status) {
-      return report_error(context, "gap-diagnose", status.error(), options.json);
-    }
+  if (const Status written = write_reports(options, *diagnosis, context); !written) {
+    return report_error(context, "gap-diagnose", written.error(), options.json);
   }
   if (options.json) {
     Json json = document("gap-diagnose");
@@ -121,6 +138,8 @@ void add_gap(CLI::App& app, Context& context) {
       ->delimiter(',');
   diagnose_command->add_option("--html", options->html,
                                "write the report as one page to this file");
+  diagnose_command->add_option("--png", options->png, "write the report as one sheet, PNG");
+  diagnose_command->add_option("--pdf", options->pdf, "write the report as one sheet, PDF");
   diagnose_command->add_option("--seed", options->seed, "seed of the augmented scenario");
   diagnose_command->add_option("--scenario", options->scenario,
                                "write the augmented scenario to this file");

@@ -12,6 +12,7 @@
 #include "device/unit.h"
 #include "station/certificate.h"
 #include "station/cli/command.h"
+#include "station/cli/record_option.h"
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
@@ -36,9 +37,11 @@ struct Options {
   std::string certificate;
   std::string label;
   std::string store;
+  std::string record;
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
+  double dwell_s = station::JigRunOptions{}.dwell_s;
   bool write = false;
   bool json = false;
 };
@@ -159,7 +162,7 @@ std::optional<station::OperatorWord> terminal_word() {
   }
 }
 
-Result<Done> run(Context& context, const Options& options) {
+Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(check_outputs(options));
   station::JigSessionOptions session;
   if (!options.limits.empty()) {
@@ -172,13 +175,21 @@ Result<Done> run(Context& context, const Options& options) {
     SIXPOINT_ASSIGN(session.gravity, calib::gravity_at(*options.latitude_deg, options.altitude_m));
   }
   session.run.write = options.write;
+  session.run.dwell_s = options.dwell_s;
 
-  const device::TransportRegistry devices = station::known_devices();
-  SIXPOINT_ASSIGN(device::Link link,
-                  devices.open(station::with_jig(options.device, options.jig), context.env));
-  SIXPOINT_ASSIGN(const auto unit, device::Unit::open(std::move(link)));
-  device::ManualJig by_hand;
-  device::Jig& jig = unit->jig() != nullptr ? *unit->jig() : static_cast<device::Jig&>(by_hand);
+  session.keep_interrupted = true;
+
+  SIXPOINT_ASSIGN(const auto unit, station::known_units().open(
+                                       station::with_jig(options.device, options.jig), context.env,
+                                       [&recorder](device::Link& link) { recorder.attach(link); }));
+  if (!unit->abilities().streams || !unit->abilities().holds_constants) {
+    return fail(ErrorCode::usage, "this unit offers files and no live samples", unit->address(),
+                "calibrate it by a file: 'sixpoint capture'");
+  }
+  std::unique_ptr<device::Jig> own_jig;
+  SIXPOINT_ASSIGN(device::Jig* const chosen,
+                  station::choose_jig(options.jig, *unit, context.env, own_jig));
+  device::Jig& jig = *chosen;
 
   context.people << fmt::format("unit {} with firmware {}; jig: {}\n",
                                 printable(unit->identity().serial),
@@ -220,13 +231,16 @@ Result<Done> run(Context& context, const Options& options) {
   if (record.retest_of.empty()) {
     record.retest_of = session.retest.retest_of;
   }
-  Done done;
   station::JigHooks hooks;
   hooks.tell = tell;
+  hooks.reopen = station::wait_for_unit(*unit, jig, [&context](const std::string& text) {
+    context.people << text << '\n' << std::flush;
+  });
   if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
     context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
     hooks.words = terminal_word;
   }
+  Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
   station::complete_run_record(record, done.report, options.study);
   done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
@@ -248,6 +262,9 @@ Json to_json(const Options& options, const Done& done) {
   const Json report = done.report.to_json();
   for (const auto& [key, value] : report.items()) {
     json[key] = value;
+  }
+  if (done.report.ended_by) {
+    json["error"] = error_to_json(*done.report.ended_by);
   }
   json["stored_id"] = done.constants_id ? Json(*done.constants_id) : Json(nullptr);
   json["certificate"] = done.certified ? Json(options.certificate) : Json(nullptr);
@@ -291,8 +308,8 @@ void add_jig(CLI::App& app, Context& context) {
       ->add_option("--device", options->device,
                    "the unit, for example virtual:seed=7 (docs/virtual.md)")
       ->required();
-  command->add_option("--jig", options->jig, "manual (a person turns the unit) or virtual")
-      ->check(CLI::IsMember({"manual", "virtual"}));
+  command->add_option("--jig", options->jig,
+                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
   command->add_option("--jig-id", options->jig_id,
                       "the jig's own number, for the record (which units were on it?)");
   command->add_option("--jig-due", options->jig_due,
@@ -308,6 +325,9 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");
   command->add_option("--altitude", options->altitude_m, "... and metres above sea level");
+  command->add_option("--dwell", options->dwell_s, "seconds that each pose is measured for")
+      ->check(CLI::Range(0.5, 600.0))
+      ->capture_default_str();
   command->add_option("--limits", options->limits,
                       "a TOML file of limits (docs/limits.md); else the built-in ones");
   command->add_option("--certificate", options->certificate,
@@ -319,14 +339,22 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_flag("--write", options->write,
                     "write the constants into the unit, read them back and measure again");
   add_store_option(*command, options->store);
+  add_record_option(*command, options->record);
   command->add_flag("--json", options->json, "answer as JSON");
   command->callback([options, &context] {
-    const Result<Done> done = run(context, *options);
+    device::SessionRecorder recorder;
+    const Result<Done> done = run(context, *options, recorder);
+    save_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "jig", done.error(), options->json);
       return;
     }
-    context.worsen(station::exit_code_of(done->report.verdict));
+    const std::optional<Error>& ended_by = done->report.ended_by;
+    if (ended_by) {
+      context.log().error("{}", ended_by->brief());
+    }
+    context.worsen(ended_by ? static_cast<int>(ended_by->code)
+                            : station::exit_code_of(done->report.verdict));
     if (!done->kept) {
       // The report below is then the only copy.
       context.log().error("{}", done->kept.error().brief());

@@ -20,11 +20,6 @@ void add_not_built(CLI::App& app, Context& context, const std::string& name,
 
 }  // namespace
 
-void add_virtual(CLI::App& app, Context& context) {
-  add_not_built(app, context, "virtual", "Offer virtual units over USB/IP",
-                "use a virtual unit inside a command: --device virtual:seed=7,jig=auto");
-}
-
 void add_archive(CLI::App& app, Context& context) {
   add_not_built(app, context, "archive", "Mend an archive on a cluster",
                 "use 'sixpoint repair --jobs N', one folder at a time");

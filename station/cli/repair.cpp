@@ -1,4 +1,5 @@
 // sixpoint repair PATH... -o OUTDIR: mends affected files; the originals stay as they are.
+#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
@@ -69,7 +70,7 @@ db::RepairRecord record_of(Context& context, const RepairReport& report) {
 // Tells the store about all files that were mended. A file of an earlier run (--resume) is told
 // only when that run ended before it could say so. Nothing where there was nothing to say.
 Result<std::optional<db::Kept>> remember(Context& context, const std::string& location,
-                                         std::optional<db::Store>& store,
+                                         db::Store store,
                                          const std::vector<RepairReport>& reports) {
   std::vector<db::RepairRecord> records;
   for (const RepairReport& report : reports) {
@@ -77,18 +78,34 @@ Result<std::optional<db::Kept>> remember(Context& context, const std::string& lo
       continue;
     }
     if (report.resumed) {
-      const auto known = store->repair_of_output(report.output_sha256);
+      const auto known = store.repair_of_output(report.output_sha256);
       if (known && *known && (*known)->input_sha256 == report.input_sha256) {
         continue;
       }
     }
-    records.push_back(record_of(context, report));
+    db::RepairRecord record = record_of(context, report);
+    if (report.resumed && !record.constants_id.empty()) {
+      // The mark may name constants of another store.
+      const auto known = store.history(report.serial);
+      const bool here =
+          known && std::any_of(known->begin(), known->end(), [&](const auto& constants) {
+            return constants.id == record.constants_id;
+          });
+      record.constants_id = here ? record.constants_id : "";
+    }
+    // One file with a serial number that no store keeps must not stand in the way of the others.
+    if (const auto id = db::id_of(record); !id) {
+      context.log().error("{}: mended, but the store cannot keep it: {}", printable(report.input),
+                          id.error().brief());
+      context.worsen(static_cast<int>(id.error().code));
+      continue;
+    }
+    records.push_back(std::move(record));
   }
   if (records.empty()) {
     return std::nullopt;
   }
-  Result<db::Store> taken = *std::move(store);
-  store.reset();
+  Result<db::Store> taken = std::move(store);
   std::size_t acknowledged = 0;
   SIXPOINT_ASSIGN(auto kept,
                   keep_records(context, location, taken, [&](db::Keeper& keeper) -> Status {
@@ -118,7 +135,7 @@ Result<repair::ConstantsFinderOptions> sources(const Options& options, Context& 
   const bool only_scan = options.scan && options.store.empty() && options.calibration_file.empty();
   if (!options.store.empty()) {
     SIXPOINT_ASSIGN(store, open_existing_store(context, options.store));
-  } else if (!only_scan && context.env.files.info(default_store())) {
+  } else if (!only_scan && store_exists(context, "")) {
     SIXPOINT_ASSIGN(store, open_existing_store(context, ""));
   }
   finder.store = store ? &*store : nullptr;
@@ -204,7 +221,7 @@ void run(const Options& options, Context& context) {
   }
   Json kept_json(nullptr);
   if (store) {
-    const auto kept = remember(context, options.store, store, reports);
+    const auto kept = remember(context, options.store, *std::move(store), reports);
     if (!kept) {
       context.log().error(
           "the files are mended, but the store does not know: {}; run it again "

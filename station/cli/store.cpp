@@ -13,6 +13,8 @@ struct Options {
   std::string store;
   std::string path;
   std::string id;
+  std::string table = "constants";
+  std::string journal;
   std::string operator_name;
   std::string reason;
   std::string from;
@@ -42,9 +44,17 @@ Answer export_store(const Options& options, Context& context) {
 
 Answer import_store(const Options& options, Context& context) {
   // A missing input must not leave an empty store behind.
-  SIXPOINT_CHECK(context.env.files.info(options.path));
-  SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
-  SIXPOINT_ASSIGN(const auto report, db::import_json_lines(store, context.env.files, options.path));
+  SIXPOINT_ASSIGN(const FileInfo input, context.env.files.info(options.path));
+  db::ExchangeReport report;
+  if (store_exists(context, options.store)) {
+    SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
+    SIXPOINT_ASSIGN(report, input.is_folder
+                                ? db::import_csv(store, context.env.files, options.path)
+                                : db::import_json_lines(store, context.env.files, options.path));
+  } else {
+    SIXPOINT_ASSIGN(const std::string path, place_of_new_store(context, options.store));
+    SIXPOINT_ASSIGN(report, db::import_into_new_file(context.env, options.path, path));
+  }
   context.people << fmt::format("{}; {} were new\n", report.brief(), report.added);
   return exchange_json(report, options.path);
 }
@@ -57,25 +67,60 @@ Answer back_up(const Options& options, Context& context) {
 }
 
 Answer catch_up(const Options& options, Context& context) {
-  SIXPOINT_ASSIGN(auto journal,
-                  db::Journal::open(context.env.files, journal_folder(options.store)));
+  const std::string folder =
+      options.journal.empty() ? journal_folder(options.store) : options.journal;
+  if (!options.journal.empty()) {
+    SIXPOINT_CHECK(context.env.files.info(folder));
+  }
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-  SIXPOINT_ASSIGN(const std::size_t taken, journal.catch_up(store));
+  std::size_t taken = 0;
+  if (context.env.files.info(folder)) {
+    SIXPOINT_ASSIGN(auto journal, db::Journal::open(context.env.files, folder));
+    SIXPOINT_ASSIGN(taken, journal.catch_up(store));
+  }
   context.people << fmt::format("{} entries of the journal are in the store now\n", taken);
   Json json = document("store");
   json["taken"] = taken;
   return json;
 }
 
-Answer withdraw(const Options& options, Context& context) {
+// A new row about an old one: withdraw, reinstate, note.
+Answer correct(const Options& options, Context& context, const std::string& action) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-  SIXPOINT_CHECK(store.withdraw_constants(options.id, options.operator_name, options.reason));
+  db::Correction correction;
+  correction.table = options.table;
+  correction.row_id = options.id;
+  correction.action = action;
+  correction.operator_name = options.operator_name;
+  correction.reason = options.reason;
+  SIXPOINT_ASSIGN(const std::string id, store.correct(correction));
+  Json json = document("store");
+  json["correction"] = id;
+  json["action"] = action;
+  json["about"] = {{"table", options.table}, {"id", options.id}};
+  return json;
+}
+
+Answer withdraw(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(Json json, correct(options, context, "withdraw"));
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto recall, store.recall_list(options.id));
   context.people << fmt::format("withdrawn; {} files were mended with these constants\n",
                                 recall.size());
-  Json json = document("store");
   json["withdrawn"] = options.id;
   json["recall"] = recall.size();
+  return json;
+}
+
+Answer reinstate(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(Json json, correct(options, context, "reinstate"));
+  context.people << "these constants apply again\n";
+  return json;
+}
+
+Answer note(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(Json json, correct(options, context, "note"));
+  context.people << fmt::format("noted about {} {}\n", options.table, printable(options.id));
   return json;
 }
 
@@ -90,7 +135,9 @@ Answer recall(const Options& options, Context& context) {
                      {"mended_at", to_iso8601(entry.repair.made_at)},
                      {"input_sha256", entry.repair.input_sha256},
                      {"output_sha256", entry.repair.output_sha256},
+                     {"method", entry.repair.method},
                      {"constants", entry.repair.constants_id},
+                     {"software", entry.repair.software},
                      {"withdrawn_at", to_iso8601(entry.withdrawn_at)},
                      {"reason", entry.reason}});
     if (!options.json) {
@@ -134,14 +181,16 @@ Answer yield(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const auto report, store.yield(from, to));
   Json json = document("store");
   json["runs"] = report.runs;
+  json["retests"] = report.retests;
   json["units"] = report.units;
   json["passed"] = report.passed;
   json["passed_first_time"] = report.passed_first_time;
   json["yield"] = number(report.yield());
   json["first_pass_yield"] = number(report.first_pass_yield());
   if (!options.json) {
-    context.out << fmt::format("{} units in {} runs: {} passed, {} of them at the first run\n",
-                               report.units, report.runs, report.passed, report.passed_first_time);
+    context.out << fmt::format(
+        "{} units in {} runs ({} retests): {} passed, {} of them at the first run\n", report.units,
+        report.runs, report.retests, report.passed, report.passed_first_time);
   }
   return json;
 }
@@ -226,19 +275,33 @@ void add_store(CLI::App& app, Context& context) {
   out->add_flag("--csv", options->csv, "One CSV file per table instead of JSON Lines");
   add(*command, context, "import", "Continue a store with the rows of an export", import_store,
       options)
-      ->add_option("file", options->path, "JSON Lines from 'store export'")
+      ->add_option("file", options->path, "What 'store export' wrote: JSON Lines, or a CSV folder")
       ->required();
   add(*command, context, "backup", "Copy the store into an SQLite file while others work", back_up,
       options)
       ->add_option("-o,--output", options->path, "The copy")
       ->required();
-  add(*command, context, "catch-up", "Store what was measured while the store's server was away",
-      catch_up, options);
+  add(*command, context, "catch-up", "Store what the store did not take when it was measured",
+      catch_up, options)
+      ->add_option("--journal", options->journal,
+                   "The folder of a journal that was written elsewhere (default: this station's)");
   auto* taken_back = add(*command, context, "withdraw",
                          "Constants apply no more; they stay in the history", withdraw, options);
   taken_back->add_option("id", options->id, "The constants' id ('sixpoint history')")->required();
-  taken_back->add_option("--reason", options->reason, "Why")->required();
-  taken_back->add_option("--operator", options->operator_name, "Who says so")->required();
+  auto* given_back =
+      add(*command, context, "reinstate", "Withdrawn constants apply again", reinstate, options);
+  given_back->add_option("id", options->id, "The constants' id ('sixpoint history')")->required();
+  auto* noted =
+      add(*command, context, "note", "Add what is wrong or missing in a row", note, options);
+  noted
+      ->add_option("table", options->table,
+                   "The row's table: units, runs, constants, unit_writes, repairs ...")
+      ->required();
+  noted->add_option("id", options->id, "The row's id; of a unit its serial number")->required();
+  for (CLI::App* correction : {taken_back, given_back, noted}) {
+    correction->add_option("--reason", options->reason, "Why, or what")->required();
+    correction->add_option("--operator", options->operator_name, "Who says so")->required();
+  }
   add(*command, context, "recall", "Files mended with constants that were withdrawn", recall,
       options)
       ->add_option("id", options->id, "Only these constants");

@@ -111,17 +111,27 @@ CLI::Option* add_store_option(CLI::App& command, std::string& location) {
           std::string("~/.local/share/sixpoint/store.db)"));
 }
 
-Result<db::Store> open_store(Context& context, const std::string& location) {
+bool store_exists(Context& context, const std::string& location) {
+  const std::string path = location.empty() ? default_store() : location;
+  return is_on_server(path) || context.env.files.info(path).has_value();
+}
+
+Result<std::string> place_of_new_store(Context& context, const std::string& location) {
   const std::string path = location.empty() ? default_store() : location;
   if (location.empty() && !is_on_server(path)) {
     SIXPOINT_CHECK(context.env.files.make_folders(folder_of(path)));
   }
+  return path;
+}
+
+Result<db::Store> open_store(Context& context, const std::string& location) {
+  SIXPOINT_ASSIGN(const std::string path, place_of_new_store(context, location));
   return db::Store::open(context.env, path);
 }
 
 Result<db::Store> open_existing_store(Context& context, const std::string& location) {
   const std::string path = location.empty() ? default_store() : location;
-  if (!is_on_server(path) && !context.env.files.info(path)) {
+  if (!store_exists(context, location)) {
     return fail(
         ErrorCode::no_input, "there is no store", path,
         "name one with --store, or make one with 'sixpoint jig' or 'sixpoint solve --save'");

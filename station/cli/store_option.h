@@ -22,6 +22,11 @@ Result<db::Store> open_store(Context& context, const std::string& location);
 // For reading only: no_input where there is no store yet, instead of an empty new one.
 Result<db::Store> open_existing_store(Context& context, const std::string& location);
 
+// Is there something already? A database on a server always is.
+bool store_exists(Context& context, const std::string& location);
+// The path of a store that is to be made; makes the folder of the default one.
+Result<std::string> place_of_new_store(Context& context, const std::string& location);
+
 // Where a station keeps what it measured when the store at `location` did not take it: journal/ in
 // $XDG_DATA_HOME/sixpoint (~/.local/share/sixpoint), one folder per store.
 std::string journal_folder(const std::string& location);

@@ -29,11 +29,8 @@ class PostgresPlace final : public Place {
     }
   }
   std::string location(const std::string& name) override {
-    if (made_.insert(name).second &&
-        !run(server().superuser("postgres"), "CREATE DATABASE " + own(name) + " OWNER station")) {
-      throw std::runtime_error("cannot make the database " + own(name));
-    }
-    return server().location(own(name));
+    return made_.insert(name).second ? server().make_database(own(name))
+                                     : server().location(own(name));
   }
   void erase(const std::string& name) override {
     drop(name);

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -21,7 +22,21 @@
 namespace sixpoint::db::tests {
 namespace {
 
-constexpr const char* kPrograms = "/usr/lib/postgresql/15/bin/";
+// Debian keeps the server's programs out of PATH, a folder per version; the newest. Empty where
+// there is none.
+std::string programs() {
+  std::string newest;
+  int newest_version = 0;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator("/usr/lib/postgresql", error)) {
+    const int version = std::atoi(entry.path().filename().c_str());
+    if (version > newest_version && std::filesystem::exists(entry.path() / "bin/initdb")) {
+      newest_version = version;
+      newest = entry.path() / "bin/";
+    }
+  }
+  return newest;
+}
 
 int free_port() {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
@@ -46,7 +61,8 @@ std::string text_of_file(const std::string& path) {
   return text.str();
 }
 
-pid_t spawn(const std::vector<std::string>& words, const std::string& log, bool dies_with_us) {
+pid_t spawn(const std::vector<std::string>& words, const std::string& log, bool dies_with_us,
+            [[maybe_unused]] const std::string& full_disk_flag = {}) {
   std::vector<char*> arguments;
   for (const std::string& word : words) {
     arguments.push_back(const_cast<char*>(word.c_str()));
@@ -63,6 +79,12 @@ pid_t spawn(const std::vector<std::string>& words, const std::string& log, bool 
   if (dies_with_us) {
     ::prctl(PR_SET_PDEATHSIG, SIGQUIT);
   }
+#ifdef SIXPOINT_FULL_DISK_PRELOAD
+  if (!full_disk_flag.empty()) {
+    ::setenv("LD_PRELOAD", (full_disk_flag + ".so").c_str(), 1);
+    ::setenv("SIXPOINT_FULL_DISK", full_disk_flag.c_str(), 1);
+  }
+#endif
   const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
   ::dup2(out, STDOUT_FILENO);
   ::dup2(out, STDERR_FILENO);
@@ -80,7 +102,7 @@ bool answers(const std::string& location) {
 }  // namespace
 
 std::string PostgresServer::missing() {
-  if (!std::filesystem::exists(std::string(kPrograms) + "initdb")) {
+  if (programs().empty()) {
     return "Debian's package 'postgresql' is not installed";
   }
   if (::geteuid() == 0 && unprivileged() == nullptr) {
@@ -90,7 +112,7 @@ std::string PostgresServer::missing() {
 }
 
 int PostgresServer::run(const std::string& program, const std::string& arguments) const {
-  std::vector<std::string> words = {kPrograms + program};
+  std::vector<std::string> words = {programs() + program};
   std::istringstream split(arguments);
   for (std::string word; split >> word;) {
     words.push_back(word);
@@ -124,11 +146,16 @@ PostgresServer::PostgresServer() : port_(free_port()) {
 PostgresServer::~PostgresServer() { kill(); }
 
 void PostgresServer::start() {
+#ifdef SIXPOINT_FULL_DISK_PRELOAD
+  // A copy that the server's user can read, wherever the build lies.
+  std::filesystem::copy_file(SIXPOINT_FULL_DISK_PRELOAD, folder_ / "full.so",
+                             std::filesystem::copy_options::skip_existing);
+  std::filesystem::permissions(folder_ / "full.so", std::filesystem::perms(0755));
+#endif
   const std::string options[] = {folder_ / "data", std::to_string(port_), folder_.path()};
-  pid_ = spawn(
-      {std::string(kPrograms) + "postgres", "-D", options[0], "-p", options[1], "-k", options[2],
-       "-c", "listen_addresses=127.0.0.1", "-c", "fsync=on", "-c", "max_connections=60"},
-      folder_ / "log", true);
+  pid_ = spawn({programs() + "postgres", "-D", options[0], "-p", options[1], "-k", options[2], "-c",
+                "listen_addresses=127.0.0.1", "-c", "fsync=on", "-c", "max_connections=60"},
+               folder_ / "log", true, folder_ / "full");
   for (int i = 0; i < 600; ++i) {
     if (answers(superuser("postgres"))) {
       return;
@@ -145,6 +172,28 @@ void PostgresServer::start() {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   throw std::runtime_error("the server does not start: " + text_of_file(folder_ / "log"));
+}
+
+std::string PostgresServer::make_database(const std::string& name) {
+  PGconn* connection = ::PQconnectdb(superuser("postgres").c_str());
+  PGresult* result =
+      ::PQexec(connection, ("CREATE DATABASE \"" + name + "\" OWNER station").c_str());
+  const bool good = ::PQresultStatus(result) == PGRES_COMMAND_OK;
+  const std::string words = ::PQerrorMessage(connection);
+  ::PQclear(result);
+  ::PQfinish(connection);
+  if (!good) {
+    throw std::runtime_error("cannot make the database: " + words);
+  }
+  return location(name);
+}
+
+void PostgresServer::fill_disk(bool full) {
+  if (full) {
+    std::ofstream(folder_ / "full") << "full";
+  } else {
+    std::filesystem::remove(folder_ / "full");
+  }
 }
 
 void PostgresServer::kill() {

@@ -21,7 +21,9 @@ class PostgresServer {
   ~PostgresServer();
 
   void start();
-  void kill();  // SIGKILL to the server and all its processes, as a power cut would
+  void kill();                // SIGKILL to the server and all its processes, as a power cut would
+  void fill_disk(bool full);  // no table grows any more, or all do again
+  std::string make_database(const std::string& name);  // empty; its location
   // As the user `station`, with a password, over TCP on 127.0.0.1.
   std::string location(const std::string& database, const std::string& password = kPassword) const;
   // As the superuser, over a socket in the temporary folder.

@@ -1,6 +1,8 @@
 // What only a store on a server can meet: wrong passwords, servers that are away or vanish.
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <regex>
 #include <set>
 #include <thread>
 
@@ -10,6 +12,7 @@
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "db/exchange.h"
+#include "db/keeping.h"
 #include "db/store.h"
 #include "expect_result.h"
 #include "place.h"
@@ -100,8 +103,108 @@ TEST_F(PostgresStoreTest, AServerThatVanishesInMidTransactionLosesOnlyThatTransa
   EXPECT_TRUE(audit->ok) << audit->brief();
 }
 
+// No program ever wrote version 1 on PostgreSQL (that came with version 2); the tables of version 1
+// are those of the SQLite text with the other server's types, the rows and hashes the same.
+TEST_F(PostgresStoreTest, BringsAStoreOfVersion1UpToDateAndItsHashesHold) {
+  std::string sql =
+#include "store_version_1.sql.inc"
+      ;
+  const auto replace = [&](const char* pattern, const char* with) {
+    sql = std::regex_replace(sql, std::regex(pattern), with);
+  };
+  replace("PRAGMA[^;]*;", "");
+  replace("CREATE TRIGGER[^;]*;\\s*END;", "");
+  replace("\\) STRICT", ")");
+  replace("INTEGER", "BIGINT");
+  replace("BLOB", "BYTEA");
+  replace("x'([0-9a-f]*)'", "'\\x$1'");
+  sql +=
+      "CREATE TABLE sixpoint_schema (one BIGINT PRIMARY KEY CHECK (one = 1), version BIGINT NOT "
+      "NULL); INSERT INTO sixpoint_schema VALUES (1, 1);";
+  location();
+  ASSERT_TRUE(place_->statements("main", sql)) << sql;
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  auto audit = store->audit();
+  ASSERT_OK(audit);
+  EXPECT_TRUE(audit->ok) << audit->brief();
+  EXPECT_EQ(audit->rows, 3);
+  EXPECT_EQ(audit->head, "74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d")
+      << "as Python's hashlib computed it for the SQLite store of version 1";
+  EXPECT_EQ(store->constants_for("MOS2A1", "legacy").value()->document, R"({"n":1})");
+  ASSERT_OK(store->add_constants(constants(7), "w"));
+  EXPECT_EQ(store->unit_history("MOS2A1")->runs.size(), 1U);
+  EXPECT_TRUE(store->audit()->ok);
+  EXPECT_EQ(store->database().schema_version().value(), 2);
+}
+
+TEST_F(PostgresStoreTest, AFullDiskLosesNothingThatWasAcknowledged) {
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  Random random(3);
+  const auto add_run = [&](int number) {
+    RunRecord run;
+    run.serial = "MOS2A1";
+    run.filter = "current";
+    run.started = from_unix_seconds(number);
+    run.document = "{}";
+    Bytes capture(300'000);  // that no server packs
+    std::generate(capture.begin(), capture.end(),
+                  [&] { return static_cast<std::uint8_t>(random.below(256)); });
+    return store->add_run(run, {{"raw", capture}});
+  };
+  ASSERT_OK(add_run(1));
+  server().fill_disk(true);
+  const auto refused = add_run(2);
+  server().fill_disk(false);
+  EXPECT_FAILS(refused, ErrorCode::io);
+  EXPECT_THAT(refused.error().brief(), HasSubstr("No space left"));
+  EXPECT_EQ(store->unit_history("MOS2A1")->runs.size(), 1U);
+  ASSERT_OK(add_run(3)) << "the same store goes on";
+  EXPECT_EQ(store->unit_history("MOS2A1")->runs.size(), 2U);
+  const auto audit = store->audit();
+  ASSERT_OK(audit);
+  EXPECT_TRUE(audit->ok) << audit->brief();
+}
+
+TEST_F(PostgresStoreTest, AWrongPasswordOrAServerThatIsAwayLosesNoRun) {
+  auto direct = Store::open(memory_.env, location());
+  ASSERT_OK(direct);
+  const KeepingPlaces places{"journal", {}};
+  int number = 0;
+  const auto keep_one = [&](Result<Store> store) {
+    return keep(memory_.files, store, places, [&](Keeper& keeper) -> Status {
+      SIXPOINT_CHECK(keeper.add_constants(constants(++number), "w"));
+      return {};
+    });
+  };
+  std::string wrong = location();
+  wrong.replace(wrong.find("s3cret"), 6, "public");
+  const auto first = keep_one(Store::open(memory_.env, wrong));
+  ASSERT_OK(first);
+  EXPECT_EQ(first->refusal->code, ErrorCode::permission);
+  EXPECT_THAT(first->refusal->brief(), Not(HasSubstr("public/")));
+  // Open when the server vanishes.
+  auto open_store = Store::open(memory_.env, location());
+  server().kill();
+  const auto second = keep_one(std::move(open_store));
+  server().start();
+  ASSERT_OK(second);
+  EXPECT_EQ(second->refusal->code, ErrorCode::device_unavailable);
+  const auto third = keep_one(Store::open(memory_.env, location()));
+  ASSERT_OK(third);
+  EXPECT_TRUE(third->in_store());
+  EXPECT_EQ(third->caught_up, 2U);
+  const auto history = direct->history("MOS2A1");
+  ASSERT_OK(history);
+  ASSERT_EQ(history->size(), 3U);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ((*history)[static_cast<std::size_t>(i)].made_at, from_unix_seconds(i + 1));
+  }
+}
+
 // Killed like in a power cut while several stations write: what was acknowledged is there.
-// SIXPOINT_KILLS sets how often.
+// SIXPOINT_SERVER_KILLS sets how often.
 TEST_F(PostgresStoreTest, KilledAtRandomMomentsItKeepsEveryAcknowledgedRow) {
   { ASSERT_OK(Store::open(memory_.env, location())); }
   const char* wanted = std::getenv("SIXPOINT_SERVER_KILLS");

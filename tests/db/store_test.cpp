@@ -86,6 +86,88 @@ TEST_F(StoreTest, WithdrawnConstantsAreHistoryButApplyNoMore) {
   EXPECT_FAILS(store.withdraw_constants("nonsense", "Ada", "x"), ErrorCode::no_input);
 }
 
+TEST_F(StoreTest, ACorrectionIsANewRowWithAReason) {
+  Store store = open();
+  const auto id = store.add_constants(constants("MOS2A1", "current", 100, "1"), "w").value();
+  RepairRecord repair;
+  repair.serial = "MOS2A1";
+  repair.input = "a.gt3x";
+  repair.constants_id = id;
+  repair.document = "{}";
+  ASSERT_OK(store.add_repair(repair));
+  RunRecord run;
+  run.serial = "MOS2A1";
+  run.filter = "current";
+  run.document = "{}";
+  const auto run_id = store.add_run(run, {}).value();
+
+  const auto word = [](const std::string& table, const std::string& row, const std::string& action,
+                       const std::string& reason) {
+    Correction correction;
+    correction.table = table;
+    correction.row_id = row;
+    correction.action = action;
+    correction.operator_name = "Ada";
+    correction.reason = reason;
+    return correction;
+  };
+  ASSERT_OK(store.correct(word("constants", id, "withdraw", "wrong unit")));
+  EXPECT_FALSE(store.constants_for("MOS2A1", "current")->has_value());
+  EXPECT_EQ(store.recall_list()->size(), 1U);
+  EXPECT_TRUE(store.unit_history("MOS2A1")->is_withdrawn(id));
+  memory_.clock.sleep(std::chrono::seconds(1));
+  ASSERT_OK(store.correct(word("constants", id, "reinstate", "it was the right one")));
+  EXPECT_TRUE(store.constants_for("MOS2A1", "current")->has_value());
+  EXPECT_TRUE(store.recall_list()->empty());
+  EXPECT_FALSE(store.trend("MOS2A1")->front().withdrawn);
+  EXPECT_FALSE(store.unit_history("MOS2A1")->is_withdrawn(id));
+  memory_.clock.sleep(std::chrono::seconds(1));
+  ASSERT_OK(store.correct(word("constants", id, "withdraw", "no, the wrong one")));
+  EXPECT_FALSE(store.constants_for("MOS2A1", "current")->has_value());
+  ASSERT_EQ(store.recall_list()->size(), 1U);
+  EXPECT_EQ(store.recall_list()->front().reason, "no, the wrong one");
+  ASSERT_OK(store.correct(word("runs", run_id, "note", "the operator was Zoë")));
+  ASSERT_OK(store.correct(word("units", "MOS2A1", "note", "returned in 2015")));
+
+  const auto history = store.unit_history("MOS2A1");
+  ASSERT_OK(history);
+  EXPECT_EQ(history->constants.size(), 1U);
+  EXPECT_EQ(history->runs.size(), 1U);
+  EXPECT_EQ(history->repairs.size(), 1U);
+  ASSERT_EQ(history->corrections.size(), 5U);
+  EXPECT_EQ(history->corrections[3].table, "runs");
+  EXPECT_EQ(history->corrections[3].reason, "the operator was Zoë");
+  EXPECT_TRUE(store.unit_history("MOS2A2")->empty());
+
+  EXPECT_FAILS(store.correct(word("constants", "none", "withdraw", "x")), ErrorCode::no_input);
+  EXPECT_FAILS(store.correct(word("runs", run_id, "withdraw", "x")), ErrorCode::usage);
+  EXPECT_FAILS(store.correct(word("runs", run_id, "erase", "x")), ErrorCode::usage);
+  EXPECT_FAILS(store.correct(word("runs", run_id, "note", "")), ErrorCode::usage);
+  EXPECT_FAILS(store.correct(word("head; DROP TABLE runs", "1", "note", "x")), ErrorCode::usage);
+  EXPECT_TRUE(store.audit()->ok);
+}
+
+TEST_F(StoreTest, AHeadThatWasWrittenDownFindsAHistoryThatWasWrittenAnew) {
+  std::string written_down;
+  {
+    Store store = open();
+    ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 100, "1"), "w"));
+    written_down = store.audit()->head;
+    ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 200, "2"), "w"));
+    EXPECT_TRUE(store.audit(written_down)->ok);
+    EXPECT_TRUE(store.audit(std::string(64, '0'))->ok) << "the head of an empty store";
+    EXPECT_FAILS(store.audit("no head"), ErrorCode::usage);
+  }
+  place_->erase("main");
+  Store forged = open();
+  ASSERT_OK(forged.add_constants(constants("MOS2A1", "current", 100, "1.1"), "w"));
+  ASSERT_OK(forged.add_constants(constants("MOS2A1", "current", 200, "2"), "w"));
+  EXPECT_TRUE(forged.audit()->ok) << "the chain alone cannot know";
+  const auto audit = forged.audit(written_down);
+  ASSERT_OK(audit);
+  EXPECT_FALSE(audit->ok);
+}
+
 TEST_F(StoreTest, RunsKeepTheirCaptures) {
   Store store = open();
   RunRecord run;
@@ -228,6 +310,19 @@ TEST_F(StoreTest, KeepsWhatARunWasJudgedBy) {
   EXPECT_EQ(rows->front(),
             (Row{std::int64_t{1'500'000'000'000'000'000}, "e21f353", R"({"residual_mg":5})",
                  "9.8101", "22.5", R"(["tilted","moved"])", plain.value()}));
+  const auto read = store.unit_history("MOS2A1")->runs;
+  ASSERT_EQ(read.size(), 2U);
+  EXPECT_FALSE(read[0].jig_due.has_value());
+  EXPECT_FALSE(read[0].temperature_c.has_value());
+  EXPECT_EQ(read[1].jig_due, run.jig_due);
+  EXPECT_EQ(read[1].build, run.build);
+  EXPECT_EQ(read[1].limits, run.limits);
+  EXPECT_EQ(read[1].gravity_m_per_s2, run.gravity_m_per_s2);
+  EXPECT_EQ(read[1].temperature_c, run.temperature_c);
+  EXPECT_EQ(read[1].codes, run.codes);
+  EXPECT_EQ(read[1].retest_of, plain.value());
+  EXPECT_EQ(store.run(read[1].id)->build, run.build);
+  EXPECT_FAILS(store.run("none"), ErrorCode::no_input);
   const auto history = store.history("MOS2A1");
   EXPECT_EQ(history->front().standard_uncertainty, R"({"zero_mg":[1,1,1]})");
   EXPECT_EQ(history->front().origin, R"({"sha256":"ab"})");

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs every command that a ```sh block of README.md or docs/*.md prints, in a scratch folder that
+# Runs every command that a ```sh block of README.md, docs/*.md or docs/devices/*.md prints, in a scratch folder that
 # looks as the reader's would: build/sixpoint and an archive. A command ends with 0 unless the line
 # says "# exits with N". Commands of scripts/ have tests of their own (demo) or are what runs this (test).
 #   run_commands.sh SOURCE_FOLDER SIXPOINT_PROGRAM
@@ -12,7 +12,7 @@ export HOME=$scratch/home SIXPOINT_SHARED=${SIXPOINT_SHARED:-$source_folder/../s
 failures=0
 run=0
 
-for document in "$source_folder"/README.md "$source_folder"/docs/*.md; do
+for document in "$source_folder"/README.md "$source_folder"/docs/*.md "$source_folder"/docs/devices/*.md; do
   folder=$scratch/$(basename "$document" .md)
   mkdir -p "$folder/build" "$folder/archive"
   ln -s "$program" "$folder/build/sixpoint"

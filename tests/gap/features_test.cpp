@@ -160,9 +160,9 @@ TEST(SlowNoise, WalkIsFoundAndSized) {
 TEST(Response, ClosedForms) {
   EXPECT_NEAR(low_pass_gain(20, 20, 4, 100), M_SQRT1_2, 1e-12);
   EXPECT_NEAR(low_pass_gain(1, 30, 4, 100), 1, 1e-6);
-  const Resonance plain{12, 3, false, 0};
+  const Resonance plain{12, 3, ResonanceForm::second_order, 0};
   EXPECT_NEAR(resonance_gain(12, plain), 3, 1e-12);  // Q at resonance
-  EXPECT_NEAR(resonance_gain(12, Resonance{12, 3, true, 0}), std::sqrt(10.0),
+  EXPECT_NEAR(resonance_gain(12, Resonance{12, 3, ResonanceForm::base_excited, 0}), std::sqrt(10.0),
               1e-12);  // sqrt(1 + Q^2)
   EXPECT_NEAR(resonance_gain(0.01, plain), 1, 1e-5);
 }

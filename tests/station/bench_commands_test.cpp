@@ -1,4 +1,4 @@
-// simulate, jig, capture, virtual by their contract, on the real disk.
+// simulate, jig, capture by their contract, on the real disk.
 #include <fstream>
 
 #include <gmock/gmock.h>
@@ -136,7 +136,6 @@ TEST_F(BenchCommands, SimulateMakesTheSameBytes) {
   EXPECT_EQ(
       run_command({"simulate", "--scenario", path("s.json"), "-o", path("no/c.gt3x")}).exit_code,
       73);
-  EXPECT_EQ(run_command({"virtual", "--usbip", "3240"}).exit_code, 64);
 }
 
 }  // namespace

@@ -217,5 +217,40 @@ TEST_F(RepairCommand, RealFilesAreJudged) {
   }
 }
 
+// Serial numbers of files come from outside: quotes are kept as they are, and one that no store
+// keeps does not stand in the way of the others.
+TEST_F(RepairCommand, OddSerialNumbersAreMendedAndKeptOrNamed) {
+  const std::string quoted = "MOS\"';-- \\\\ %s";
+  const std::string place = folder_ / "odd";
+  MadeRecording made = half_hour();
+  made.serial = quoted;
+  ASSERT_OK(files_.make_folders(place));
+  ASSERT_OK(made.write(files_, place + "/quoted.gt3x"));
+  made.serial = "MOS" + std::string(10'000, 'x');
+  ASSERT_OK(made.write(files_, place + "/long.gt3x"));
+  made.serial = "MOS2A\x07\x1b[31m";
+  ASSERT_OK(made.write(files_, place + "/control.gt3x"));
+  const std::string store = folder_ / "store.db";
+  {
+    // Made by the first use, and empty.
+    ASSERT_OK(db::Store::open(posix_env(), store));
+  }
+  const auto answer = run({"repair", place, "-o", out_, "--scan", "--store", store, "--json"});
+  EXPECT_EQ(answer.exit_code, 65) << answer.people;
+  EXPECT_EQ(answer.json()["summary"]["repaired"], 3) << answer.out;
+  EXPECT_EQ(answer.json()["kept"]["in"], "store");
+  EXPECT_THAT(answer.people, HasSubstr("long.gt3x: mended, but the store cannot keep it"));
+  EXPECT_THAT(answer.people, HasSubstr("control.gt3x: mended, but the store cannot keep it"));
+  EXPECT_THAT(answer.people, testing::Not(HasSubstr("\x1b")));
+  const auto history = run({"history", quoted, "--store", store, "--json"});
+  EXPECT_EQ(history.exit_code, 0) << history.people;
+  EXPECT_EQ(history.json()["repairs"].size(), 1U);
+  const auto nothing = run({"history", made.serial, "--store", store});
+  EXPECT_EQ(nothing.exit_code, 66);
+  EXPECT_THAT(nothing.people, testing::Not(HasSubstr("\x1b")));
+  EXPECT_LT(run({"history", std::string(10'000, 'x'), "--store", store}).people.size(), 2000U);
+  EXPECT_EQ(run({"audit", "verify", "--store", store}).exit_code, 0);
+}
+
 }  // namespace
 }  // namespace sixpoint::cli

@@ -1,6 +1,7 @@
-#include "device/unit.h"
+#include "device/wire_unit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
@@ -48,42 +49,104 @@ tl::unexpected<Error> nonsense(const std::string& where, std::string what) {
               "plug the unit in again; if it stays, the unit or its firmware is faulty");
 }
 
+tl::unexpected<Error> swapped(const std::string& where, const std::string& was,
+                              const std::string& is) {
+  return fail(ErrorCode::device_unavailable, fmt::format("the unit was {} and is now {}", was, is),
+              where, "put the first unit back, or begin anew with this one");
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Unit>> Unit::open(Link link, UnitOptions options) {
-  std::unique_ptr<Unit> unit(new Unit(std::move(link), options));
-  SIXPOINT_ASSIGN(const Bytes payload, unit->ask(Command::identify, {}, true));
-  SIXPOINT_ASSIGN(unit->identity_, decode_identity(payload));
-  return unit;
+  return WireUnit::open(std::move(link), options);
 }
 
-Result<Identity> Unit::identify() {
+Result<std::unique_ptr<Unit>> WireUnit::open(Link link, UnitOptions options) {
+  std::unique_ptr<WireUnit> unit(new WireUnit(std::move(link), options));
+  SIXPOINT_CHECK(unit->introduce({}));
+  return std::unique_ptr<Unit>(std::move(unit));
+}
+
+Status WireUnit::introduce(const std::string& expected) {
+  SIXPOINT_ASSIGN(const Bytes payload, ask(Command::identify, {}, true));
+  SIXPOINT_ASSIGN(const Identity identity, decode_identity(payload));
+  if (!link_.serial.empty() && link_.serial != identity.serial) {
+    return nonsense(link_.address,
+                    fmt::format("the unit is {} by its USB descriptor and {} by its own word",
+                                printable(link_.serial, 80), identity.serial));
+  }
+  identity_is_another_ = !expected.empty() && identity.serial != expected;
+  if (identity_is_another_) {
+    return swapped(link_.address, expected, identity.serial);
+  }
+  identity_ = identity;
+  return {};
+}
+
+Status WireUnit::reconnect(nanoseconds patience) {
+  const nanoseconds deadline = link_.clock->elapsed() + patience;
+  const std::string serial = identity_.serial;
+  streaming_ = false;
+  // Perhaps it only started anew, and the cable is as it was.
+  Status answer = introduce(serial);
+  while (!answer && !identity_is_another_ && link_.reopen && !cancelled_) {
+    if (link_.clock->elapsed() >= deadline) {
+      return fail(ErrorCode::device_unavailable,
+                  fmt::format("the unit {} went away and did not come back within {:.0f} s", serial,
+                              std::chrono::duration<double>(patience).count()),
+                  link_.address, "plug it in again and begin anew");
+    }
+    link_.clock->sleep(options_.reopen_interval);
+    Result<Link> again = link_.reopen();
+    if (!again) {
+      continue;
+    }
+    {
+      const std::lock_guard lock(channels_mutex_);
+      link_.reports = std::move(again->reports);
+      link_.bulk = std::move(again->bulk);
+      link_.serial = std::move(again->serial);
+    }
+    answer = introduce(serial);
+  }
+  return answer;
+}
+
+Result<Identity> WireUnit::identify() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::identify));
   SIXPOINT_ASSIGN(Identity identity, decode_identity(payload));
   if (identity.serial != identity_.serial) {
-    return fail(ErrorCode::device_unavailable,
-                fmt::format("the unit was {} and is now {}", identity_.serial, identity.serial),
-                link_.address, "put the first unit back, or begin anew with this one");
+    return swapped(link_.address, identity_.serial, identity.serial);
   }
   identity_ = identity;
   return identity;
 }
 
-void Unit::cancel() {
+void WireUnit::cancel() {
+  cancelled_ = true;
+  const std::lock_guard lock(channels_mutex_);
   link_.reports->cancel();
   if (link_.bulk) {
     link_.bulk->cancel();
   }
 }
 
-Result<std::optional<Message>> Unit::receive(nanoseconds time_out) {
+Result<std::optional<Message>> WireUnit::receive(nanoseconds time_out) {
   // One byte more than a report, so that a longer one is seen to be too long.
   std::array<std::uint8_t, kReportBytes + 1> buffer{};
-  SIXPOINT_ASSIGN(const std::size_t count, link_.reports->read(buffer, time_out));
-  if (count == 0) {
+  const Result<std::size_t> count = link_.reports->read(buffer, time_out);
+  if (!count) {
+    if (count.error().code != ErrorCode::io) {
+      return fail(count.error());
+    }
+    ++statistics_.failed_transfers;
+    link_.clock->sleep(options_.after_failure);
     return std::nullopt;
   }
-  Result<Message> message = decode(std::span(buffer).first(std::min(count, buffer.size())));
+  if (*count == 0) {
+    return std::nullopt;
+  }
+  Result<Message> message = decode(std::span(buffer).first(std::min(*count, buffer.size())));
   if (!message || message->kind == ReportKind::request) {
     ++statistics_.damaged_reports;
     return std::nullopt;
@@ -91,7 +154,7 @@ Result<std::optional<Message>> Unit::receive(nanoseconds time_out) {
   return std::optional<Message>(std::move(*message));
 }
 
-void Unit::take_samples(const Message& message) {
+void WireUnit::take_samples(const Message& message) {
   if (!streaming_) {
     return;  // was under way when the stream stopped
   }
@@ -106,17 +169,40 @@ void Unit::take_samples(const Message& message) {
     ++statistics_.duplicate_reports;
     return;
   }
+  if (last_block_) {
+    // Report sequence and sample index must agree on whether something is missing. A block in which
+    // they do not is a damaged one, however well its CRC fits.
+    const bool follows = block->sequence == static_cast<std::uint16_t>(last_block_->sequence + 1U);
+    if (follows != (ahead == 0)) {
+      ++statistics_.damaged_reports;
+      return;
+    }
+  }
   if (waiting_.size() >= options_.waiting_blocks) {
     ++statistics_.overflowed_blocks;
     return;  // shows as lost samples when the next block is taken
   }
+  if (last_block_ && rate_hz_ > 0) {
+    // Crystals are off by 0.01 %, resonators by 2; what is more is no drift.
+    const double expected_s =
+        static_cast<std::uint32_t>(block->first_index - last_block_->first_index) /
+        static_cast<double>(rate_hz_);
+    const double passed_s = static_cast<double>(static_cast<std::int64_t>(
+                                block->device_time_us - last_block_->device_time_us)) *
+                            1e-6;
+    if (std::abs(passed_s - expected_s) > 0.05 + 0.05 * expected_s) {
+      ++statistics_.clock_jumps;
+      statistics_.clock_jumped_s += passed_s - expected_s;
+    }
+  }
+  last_block_ = LastBlock{block->first_index, block->sequence, block->device_time_us};
   statistics_.lost_samples += static_cast<std::uint64_t>(ahead);
   statistics_.samples += block->counts.size();
   next_index_ = block->first_index + static_cast<std::uint32_t>(block->counts.size());
   waiting_.push_back(std::move(*block));
 }
 
-Result<Bytes> Unit::ask(Command command, Bytes payload, bool first) {
+Result<Bytes> WireUnit::ask(Command command, Bytes payload, bool first) {
   if (first) {
     sequence_ = 0;
   } else {
@@ -127,7 +213,16 @@ Result<Bytes> Unit::ask(Command command, Bytes payload, bool first) {
   const nanoseconds patience =
       command == Command::commit ? options_.commit_time_out : options_.reply_time_out;
   for (int attempt = 0; attempt < options_.attempts; ++attempt) {
-    SIXPOINT_CHECK(link_.reports->write(report, patience));
+    const Status written = link_.reports->write(report, patience);
+    if (!written) {
+      if (written.error().code != ErrorCode::io) {
+        return fail(written.error());
+      }
+      // A transfer that failed may be repeated like one that got lost.
+      ++statistics_.failed_transfers;
+      link_.clock->sleep(options_.after_failure);
+      continue;
+    }
     const nanoseconds deadline = link_.clock->elapsed() + patience;
     for (nanoseconds left = patience; left > nanoseconds::zero();
          left = deadline - link_.clock->elapsed()) {
@@ -150,7 +245,7 @@ Result<Bytes> Unit::ask(Command command, Bytes payload, bool first) {
               "unplug the unit and plug it in again");
 }
 
-Result<Bytes> Unit::read_page() {
+Result<Bytes> WireUnit::read_page() {
   Bytes page;
   while (page.size() < kPageBytes) {
     const auto length =
@@ -169,12 +264,14 @@ Result<Bytes> Unit::read_page() {
   return page;
 }
 
-Result<CalibrationPage> Unit::read_calibration() {
+Result<CalibrationPage> WireUnit::read_calibration() {
   SIXPOINT_ASSIGN(const Bytes page, read_page());
   return decode_calibration_page(page);
 }
 
-Status Unit::write_calibration(const CalibrationPage& page) {
+Status WireUnit::write_calibration(const CalibrationPage& page) {
+  // Constants of one unit in another would be the worst that can happen here.
+  SIXPOINT_CHECK(identify());
   SIXPOINT_ASSIGN(const Bytes before, read_page());
   SIXPOINT_ASSIGN(const Bytes bytes, encode_calibration_page(page, before));
   const std::uint16_t crc = crc_ccitt(bytes);
@@ -217,12 +314,12 @@ Status Unit::write_calibration(const CalibrationPage& page) {
   return {};
 }
 
-Result<FilterState> Unit::filter() {
+Result<FilterState> WireUnit::filter() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::get_filter));
   return decode_filter(payload);
 }
 
-Status Unit::set_filter(FilterConfiguration filter) {
+Status WireUnit::set_filter(FilterConfiguration filter) {
   SIXPOINT_CHECK(ask(Command::set_filter, PayloadWriter()
                                               .put(static_cast<std::uint8_t>(
                                                   filter == FilterConfiguration::legacy ? 0 : 1))
@@ -237,10 +334,12 @@ Status Unit::set_filter(FilterConfiguration filter) {
   return {};
 }
 
-Status Unit::start_stream(int rate_hz) {
+Status WireUnit::start_stream(int rate_hz) {
   waiting_.clear();
   statistics_ = {};
   next_index_ = 0;
+  last_block_.reset();
+  rate_hz_ = rate_hz;
   streaming_ = true;
   const auto answer =
       ask(Command::start_stream, PayloadWriter().put(static_cast<std::uint16_t>(rate_hz)).take());
@@ -249,7 +348,7 @@ Status Unit::start_stream(int rate_hz) {
   return {};
 }
 
-Result<std::optional<SampleBlock>> Unit::next_samples(nanoseconds time_out) {
+Result<std::optional<SampleBlock>> WireUnit::next_samples(nanoseconds time_out) {
   const nanoseconds deadline = link_.clock->elapsed() + time_out;
   for (nanoseconds left = time_out; waiting_.empty() && left > nanoseconds::zero();
        left = deadline - link_.clock->elapsed()) {
@@ -266,7 +365,7 @@ Result<std::optional<SampleBlock>> Unit::next_samples(nanoseconds time_out) {
   return block;
 }
 
-Status Unit::stop_stream() {
+Status WireUnit::stop_stream() {
   const auto answer = ask(Command::stop_stream);
   streaming_ = false;
   waiting_.clear();
@@ -274,7 +373,7 @@ Status Unit::stop_stream() {
   return {};
 }
 
-Result<std::uint16_t> Unit::start_recording(int rate_hz, UtcTime now) {
+Result<std::uint16_t> WireUnit::start_recording(int rate_hz, UtcTime now) {
   SIXPOINT_ASSIGN(
       const Bytes payload,
       ask(Command::start_recording, PayloadWriter()
@@ -289,7 +388,7 @@ Result<std::uint16_t> Unit::start_recording(int rate_hz, UtcTime now) {
   return id;
 }
 
-Result<std::uint16_t> Unit::stop_recording() {
+Result<std::uint16_t> WireUnit::stop_recording() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(Command::stop_recording));
   PayloadReader reader(payload);
   const auto id = reader.get<std::uint16_t>();
@@ -299,7 +398,7 @@ Result<std::uint16_t> Unit::stop_recording() {
   return id;
 }
 
-Result<std::vector<RecordingInfo>> Unit::recordings() {
+Result<std::vector<RecordingInfo>> WireUnit::recordings() {
   std::vector<RecordingInfo> list;
   std::size_t count = 0;
   do {
@@ -318,11 +417,13 @@ Result<std::vector<RecordingInfo>> Unit::recordings() {
   return list;
 }
 
-Status Unit::download_from(const RecordingInfo& recording, std::uint64_t& offset,
-                           WritableFile& file, Sha256& hash,
-                           const std::function<void(std::uint64_t)>& progress) {
-  // What an ended request left in the pipe is drained by the offset check below.
+Status WireUnit::download_from(const RecordingInfo& recording, std::uint64_t& offset,
+                               WritableFile& file, Sha256& hash,
+                               const std::function<void(std::uint64_t)>& progress) {
   constexpr std::uint64_t kPerRequest = 64ULL << 20U;
+  // An ended request leaves blocks in the pipe, and in the transfers that a carrier keeps under
+  // way: so many are dropped before the first block of the new one must have come.
+  constexpr int kStaleBlocks = 64;
   std::vector<std::uint8_t> buffer(kBulkBlockBytes + 1);
   int without_progress = 0;
   while (offset < recording.bytes) {
@@ -339,20 +440,22 @@ Status Unit::download_from(const RecordingInfo& recording, std::uint64_t& offset
     if (reader.get<std::uint64_t>() != length || !reader.ok()) {
       return nonsense(link_.address, "the unit offers another length than its list says");
     }
+    int stale = 0;
     while (offset < end) {
-      SIXPOINT_ASSIGN(const std::size_t count, link_.bulk->read(buffer, options_.bulk_time_out));
-      if (count == 0) {
-        break;  // ask again from here
+      const Result<std::size_t> count = link_.bulk->read(buffer, options_.bulk_time_out);
+      if (!count && count.error().code != ErrorCode::io) {
+        return fail(count.error());
+      }
+      if (!count || *count == 0) {
+        break;  // a failed transfer or none: ask again from here
       }
       const Result<BulkBlock> block =
-          decode_bulk(std::span(buffer).first(std::min(count, buffer.size())));
-      if (!block || block->recording != recording.id) {
-        break;
-      }
-      if (block->offset + block->content.size() <= offset) {
-        continue;  // of the request before
-      }
-      if (block->offset != offset || block->content.size() > end - offset) {
+          decode_bulk(std::span(buffer).first(std::min(*count, buffer.size())));
+      if (!block || block->recording != recording.id || block->offset != offset ||
+          block->content.size() > end - offset) {
+        if (offset == begin && ++stale <= kStaleBlocks) {
+          continue;
+        }
         break;
       }
       SIXPOINT_CHECK(file.write_at(offset, block->content));
@@ -372,8 +475,9 @@ Status Unit::download_from(const RecordingInfo& recording, std::uint64_t& offset
   return {};
 }
 
-Status Unit::download(const RecordingInfo& recording, FileSystem& files, const std::string& path,
-                      const std::function<void(std::uint64_t)>& progress) {
+Status WireUnit::download(const RecordingInfo& recording, FileSystem& files,
+                          const std::string& path,
+                          const std::function<void(std::uint64_t)>& progress) {
   if (!link_.bulk) {
     return fail(ErrorCode::device_unavailable, "this device offers no download", link_.address,
                 "connect the unit by USB");

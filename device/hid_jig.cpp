@@ -1,0 +1,199 @@
+#include "device/hid_jig.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "device/payload.h"
+
+namespace sixpoint::device {
+
+namespace {
+
+using std::chrono::nanoseconds;
+
+constexpr std::uint8_t kNoPose = 255;
+
+tl::unexpected<Error> nonsense(std::string what) {
+  return fail(ErrorCode::bad_data, std::move(what), "jig",
+              "switch the jig off and on; if it stays, the jig or its firmware is faulty");
+}
+
+bool is_plain(const std::string& text) {
+  return !text.empty() &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c > 0x20 && c < 0x7F; });
+}
+
+}  // namespace
+
+std::string_view to_string(JigFault fault) {
+  switch (fault) {
+    case JigFault::none:
+      return "none";
+    case JigFault::overcurrent:
+      return "the motor draws too much current";
+    case JigFault::encoder:
+      return "the angle encoder contradicts itself";
+    case JigFault::obstructed:
+      return "something is in the way";
+    case JigFault::door_open:
+      return "the door is open";
+    case JigFault::not_homed:
+      return "it does not know where it stands";
+    case JigFault::supply_low:
+      return "its supply voltage is too low";
+  }
+  return "a fault of no known code";
+}
+
+Bytes encode_jig_identity(const JigIdentity& identity) {
+  return PayloadWriter()
+      .put(identity.version)
+      .put(identity.serial, 16)
+      .put(identity.firmware, 12)
+      .put(identity.model, 12)
+      .take();
+}
+
+Result<JigIdentity> decode_jig_identity(std::span<const std::uint8_t> payload) {
+  PayloadReader in(payload);
+  JigIdentity identity;
+  identity.version = in.get<std::uint8_t>();
+  identity.serial = in.text(16);
+  identity.firmware = in.text(12);
+  identity.model = in.text(12);
+  if (!in.ok() || identity.version == 0 || !is_plain(identity.serial) ||
+      !is_plain(identity.firmware) || !is_plain(identity.model)) {
+    return nonsense("the jig does not say who it is");
+  }
+  return identity;
+}
+
+Bytes encode_jig_state(const JigState& state) {
+  return PayloadWriter()
+      .put(static_cast<std::uint8_t>(state.motion))
+      .put(state.pose ? static_cast<std::uint8_t>(*state.pose) : kNoPose)
+      .put(static_cast<std::int32_t>(std::lround(state.angle_off_deg * 1000)))
+      .put(static_cast<std::uint16_t>(std::lround(state.uncertainty_deg * 1000)))
+      .put(static_cast<std::uint8_t>(state.fault))
+      .take();
+}
+
+Result<JigState> decode_jig_state(std::span<const std::uint8_t> payload) {
+  PayloadReader in(payload);
+  const auto motion = in.get<std::uint8_t>();
+  const auto pose = in.get<std::uint8_t>();
+  const auto angle_mdeg = in.get<std::int32_t>();
+  const auto uncertainty_mdeg = in.get<std::uint16_t>();
+  const auto fault = in.get<std::uint8_t>();
+  if (!in.ok() || motion > static_cast<std::uint8_t>(JigMotion::fault) ||
+      (pose >= kPoses.size() && pose != kNoPose) || std::abs(std::int64_t{angle_mdeg}) > 180'000) {
+    return nonsense("the jig's state cannot be");
+  }
+  JigState state;
+  state.motion = static_cast<JigMotion>(motion);
+  if (pose != kNoPose) {
+    state.pose = static_cast<Pose>(pose);
+  }
+  state.angle_off_deg = angle_mdeg / 1000.0;
+  state.uncertainty_deg = uncertainty_mdeg / 1000.0;
+  state.fault = static_cast<JigFault>(fault);
+  if (state.motion == JigMotion::standing && !state.pose) {
+    return nonsense("the jig stands, and in no pose");
+  }
+  return state;
+}
+
+Result<std::unique_ptr<HidJig>> HidJig::open(Link link, HidJigOptions options) {
+  std::unique_ptr<HidJig> jig(new HidJig(std::move(link), options));
+  SIXPOINT_ASSIGN(const Bytes payload, jig->ask(JigCommand::identify));
+  SIXPOINT_ASSIGN(jig->identity_, decode_jig_identity(payload));
+  return jig;
+}
+
+std::string HidJig::name() const { return fmt::format("{} {}", identity_.model, identity_.serial); }
+
+Result<Bytes> HidJig::ask(JigCommand command, Bytes payload) {
+  const std::lock_guard lock(mutex_);
+  return ask_locked(command, std::move(payload), false);
+}
+
+Result<Bytes> HidJig::ask_locked(JigCommand command, Bytes payload, bool urgent) {
+  sequence_ = sequence_ == 0xFFFF ? std::uint16_t{1} : static_cast<std::uint16_t>(sequence_ + 1);
+  const auto number = static_cast<Command>(command);
+  const Report report =
+      encode({ReportKind::request, sequence_, number, ReplyCode::ok, std::move(payload)});
+  std::array<std::uint8_t, kReportBytes + 1> buffer{};
+  for (int attempt = 0; attempt < options_.attempts; ++attempt) {
+    const Status written = link_.reports->write(report, options_.reply_time_out);
+    if (!written && written.error().code != ErrorCode::io) {
+      return fail(written.error());
+    }
+    const nanoseconds deadline = link_.clock->elapsed() + options_.reply_time_out;
+    for (nanoseconds left = options_.reply_time_out; left > nanoseconds::zero();
+         left = deadline - link_.clock->elapsed()) {
+      if (!urgent && stopping_ > 0) {
+        return fail(ErrorCode::device_unavailable, "the jig was stopped", link_.address,
+                    "see to the jig, then begin anew");
+      }
+      const auto count = link_.reports->read(buffer, std::min(left, options_.slice));
+      if (!count) {
+        if (count.error().code != ErrorCode::io) {
+          return fail(count.error());
+        }
+        link_.clock->sleep(std::chrono::milliseconds(5));  // a failed transfer takes time too
+        continue;
+      }
+      const auto reply = decode(std::span(buffer).first(std::min(*count, buffer.size())));
+      if (*count == 0 || !reply || reply->kind != ReportKind::reply ||
+          reply->sequence != sequence_ || reply->command != number) {
+        continue;
+      }
+      if (reply->code != ReplyCode::ok) {
+        return fail(ErrorCode::device_unavailable,
+                    fmt::format("the jig refused: {}", to_string(reply->code)), link_.address,
+                    "see to the jig, then begin anew");
+      }
+      return reply->payload;
+    }
+  }
+  return fail(ErrorCode::device_unavailable, "the jig does not answer", link_.address,
+              "look at its cable and its supply");
+}
+
+Status HidJig::go_to(Pose pose) {
+  const std::lock_guard lock(mutex_);
+  // Ends an emergency stop; a fault stays until a person has seen to it.
+  SIXPOINT_CHECK(ask_locked(JigCommand::clear, {}, false));
+  SIXPOINT_CHECK(ask_locked(JigCommand::go_to,
+                            PayloadWriter().put(static_cast<std::uint8_t>(pose)).take(), false));
+  return {};
+}
+
+Result<JigReport> HidJig::report() {
+  SIXPOINT_ASSIGN(const Bytes payload, ask(JigCommand::state));
+  SIXPOINT_ASSIGN(const JigState state, decode_jig_state(payload));
+  JigReport report;
+  if (state.motion == JigMotion::standing) {
+    report.pose = state.pose;
+  }
+  report.angle_off_deg = state.angle_off_deg;
+  report.angle_uncertainty_deg = state.uncertainty_deg;
+  if (state.motion == JigMotion::fault) {
+    report.fault = to_string(state.fault);
+  } else if (state.motion == JigMotion::stopped) {
+    report.fault = "emergency stop";
+  }
+  return report;
+}
+
+Status HidJig::stop() {
+  ++stopping_;
+  const std::lock_guard lock(mutex_);
+  const auto answer = ask_locked(JigCommand::stop, {}, true);
+  --stopping_;
+  SIXPOINT_CHECK(answer);
+  return {};
+}
+
+}  // namespace sixpoint::device

@@ -1,0 +1,121 @@
+#include "device/hotplug.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+
+#include <libudev.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+namespace sixpoint::device {
+
+using std::chrono::nanoseconds;
+using std::chrono::steady_clock;
+
+struct HotplugWatch::Monitor {
+  ~Monitor() {
+    if (monitor != nullptr) {
+      udev_monitor_unref(monitor);
+    }
+    if (context != nullptr) {
+      udev_unref(context);
+    }
+    if (cancel_fd >= 0) {
+      ::close(cancel_fd);
+    }
+  }
+  udev* context = nullptr;
+  udev_monitor* monitor = nullptr;
+  int cancel_fd = -1;
+  bool cancelled = false;
+};
+
+HotplugWatch::HotplugWatch(DiscoveryFilter filter, std::unique_ptr<Monitor> monitor)
+    : filter_(std::move(filter)), monitor_(std::move(monitor)) {}
+
+HotplugWatch::~HotplugWatch() = default;
+
+Result<std::unique_ptr<HotplugWatch>> HotplugWatch::start(DiscoveryFilter filter) {
+  auto monitor = std::make_unique<Monitor>();
+  monitor->cancel_fd = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  monitor->context = udev_new();
+  if (monitor->context == nullptr || monitor->cancel_fd < 0) {
+    return fail(ErrorCode::io, "udev does not answer", "/sys", "is /sys mounted?");
+  }
+  // "udev": events come when udevd is done with the device, and its access policy is in force.
+  monitor->monitor = udev_monitor_new_from_netlink(monitor->context, "udev");
+  if (monitor->monitor == nullptr ||
+      udev_monitor_filter_add_match_subsystem_devtype(monitor->monitor, "usb", "usb_device") < 0 ||
+      udev_monitor_filter_add_match_subsystem_devtype(monitor->monitor, "hidraw", nullptr) < 0 ||
+      udev_monitor_enable_receiving(monitor->monitor) < 0) {
+    return fail(ErrorCode::io, "udev's events cannot be received", "netlink",
+                "does this machine or container allow netlink sockets?");
+  }
+  std::unique_ptr<HotplugWatch> watch(new HotplugWatch(std::move(filter), std::move(monitor)));
+  SIXPOINT_CHECK(watch->look());
+  return watch;
+}
+
+Status HotplugWatch::look() {
+  SIXPOINT_ASSIGN(auto now, attached_devices(filter_));
+  now.erase(std::remove_if(now.begin(), now.end(),
+                           [](const AttachedDevice& device) { return !device.complete(); }),
+            now.end());
+  const auto is_in = [](const std::vector<AttachedDevice>& list, const AttachedDevice& device) {
+    return std::find(list.begin(), list.end(), device) != list.end();
+  };
+  for (const AttachedDevice& device : known_) {
+    if (!is_in(now, device)) {
+      events_.push_back({HotplugEvent::Kind::left, device});
+    }
+  }
+  for (const AttachedDevice& device : now) {
+    if (!is_in(known_, device)) {
+      events_.push_back({HotplugEvent::Kind::arrived, device});
+    }
+  }
+  known_ = std::move(now);
+  return {};
+}
+
+Result<std::optional<HotplugEvent>> HotplugWatch::next(nanoseconds time_out) {
+  // Without events (no udevd in a container) a look every second finds what changed.
+  constexpr nanoseconds kLook = std::chrono::seconds(1);
+  const auto deadline = steady_clock::now() + time_out;
+  while (events_.empty() && !monitor_->cancelled) {
+    const nanoseconds left = deadline - steady_clock::now();
+    if (left <= nanoseconds::zero()) {
+      return std::nullopt;
+    }
+    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(std::min(left, kLook));
+    std::array<pollfd, 2> wake = {
+        {{udev_monitor_get_fd(monitor_->monitor), POLLIN, 0}, {monitor_->cancel_fd, POLLIN, 0}}};
+    if (::poll(wake.data(), wake.size(), static_cast<int>(wait.count())) < 0 && errno != EINTR) {
+      return fail(ErrorCode::io, "udev's events cannot be received", "netlink", "try again");
+    }
+    if (wake[1].revents != 0) {
+      monitor_->cancelled = true;
+      break;
+    }
+    // Events that came together make one look.
+    while (udev_device* device = udev_monitor_receive_device(monitor_->monitor)) {
+      udev_device_unref(device);
+    }
+    SIXPOINT_CHECK(look());
+  }
+  if (monitor_->cancelled || events_.empty()) {
+    return std::nullopt;
+  }
+  std::optional<HotplugEvent> event(std::move(events_.front()));
+  events_.pop_front();
+  return event;
+}
+
+void HotplugWatch::cancel() {
+  const std::uint64_t one = 1;
+  static_cast<void>(::write(monitor_->cancel_fd, &one, sizeof(one)));
+}
+
+}  // namespace sixpoint::device

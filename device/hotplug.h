@@ -1,0 +1,52 @@
+// Devices that come and go.
+//
+//   SIXPOINT_ASSIGN(auto watch, HotplugWatch::start());
+//   SIXPOINT_ASSIGN(auto event, watch->next(std::chrono::seconds(1)));
+//
+// What is plugged in at the start is reported as arrived first. After that the kernel's events only
+// say when to look; what is reported is the difference between two looks, so that a lost event, or
+// a machine without udevd, costs a second and nothing else. A device that comes back under another
+// node, and another device in the same port, are one departure and one arrival.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "device/discovery.h"
+
+namespace sixpoint::device {
+
+struct HotplugEvent {
+  enum class Kind { arrived, left };
+  Kind kind = Kind::arrived;
+  AttachedDevice device;  // as it was seen last
+};
+
+// One thread at a time, except cancel().
+class HotplugWatch {
+ public:
+  static Result<std::unique_ptr<HotplugWatch>> start(DiscoveryFilter filter = {});
+  ~HotplugWatch();
+  HotplugWatch(const HotplugWatch&) = delete;
+  HotplugWatch& operator=(const HotplugWatch&) = delete;
+
+  // A device has arrived when all its nodes are there (AttachedDevice::complete). Empty when
+  // nothing happened in time (real time), or after cancel().
+  Result<std::optional<HotplugEvent>> next(std::chrono::nanoseconds time_out);
+  // Ends a next() that waits, and all later ones.
+  void cancel();
+
+ private:
+  struct Monitor;
+  HotplugWatch(DiscoveryFilter filter, std::unique_ptr<Monitor> monitor);
+  Status look();
+
+  DiscoveryFilter filter_;
+  std::unique_ptr<Monitor> monitor_;
+  std::vector<AttachedDevice> known_;
+  std::deque<HotplugEvent> events_;
+};
+
+}  // namespace sixpoint::device

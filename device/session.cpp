@@ -1,0 +1,304 @@
+#include "device/session.h"
+
+#include <algorithm>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <zip.h>
+
+#include "base/atomic_file.h"
+#include "base/sha256.h"
+
+namespace sixpoint::device {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSchema = "sixpoint/session/1";
+constexpr const char* kHeadName = "session.json";
+constexpr const char* kTransfersName = "transfers.jsonl";
+// A jig run is half a megabyte; a download of a month at 100 Hz, in hexadecimal, two gigabytes,
+// which is more than a session is for.
+constexpr std::uint64_t kMostFile_bytes = 128ULL << 20U;
+constexpr std::uint64_t kMostText_bytes = 512ULL << 20U;
+constexpr std::size_t kMostTransferBytes = 1U << 20U;
+
+tl::unexpected<Error> broken(std::string what, const std::string& where) {
+  return fail(ErrorCode::bad_data, std::move(what), where,
+              "record the session again; docs/sessions.md describes the form");
+}
+
+std::optional<std::uint8_t> digit_of(char c) {
+  if (c >= '0' && c <= '9') {
+    return static_cast<std::uint8_t>(c - '0');
+  }
+  if (c >= 'a' && c <= 'f') {
+    return static_cast<std::uint8_t>(c - 'a' + 10);
+  }
+  return std::nullopt;
+}
+
+std::optional<Bytes> from_hex(std::string_view text) {
+  if (text.size() % 2 != 0 || text.size() / 2 > kMostTransferBytes) {
+    return std::nullopt;
+  }
+  Bytes bytes(text.size() / 2);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const auto high = digit_of(text[2 * i]);
+    const auto low = digit_of(text[2 * i + 1]);
+    if (!high || !low) {
+      return std::nullopt;
+    }
+    bytes[i] = static_cast<std::uint8_t>((*high << 4U) | *low);
+  }
+  return bytes;
+}
+
+void append_hex(std::string& text, const Bytes& bytes) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  for (const std::uint8_t byte : bytes) {
+    text += kDigits[byte >> 4U];
+    text += kDigits[byte & 0xFU];
+  }
+}
+
+constexpr std::array<ErrorCode, 5> kTransferErrors = {ErrorCode::device_unavailable, ErrorCode::io,
+                                                      ErrorCode::bad_data, ErrorCode::permission,
+                                                      ErrorCode::internal};
+
+Result<SessionTransfer> parse_line(std::string_view line, const std::string& where) {
+  const Json json = Json::parse(line, nullptr, false);
+  if (!json.is_object()) {
+    return broken("this line is no transfer", where);
+  }
+  const auto text = [&json](const char* key) -> std::string {
+    const auto found = json.find(key);
+    return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  SessionTransfer transfer;
+  const auto time = json.find("t_ns");
+  if (time == json.end() || !time->is_number_integer() || time->get<std::int64_t>() < 0) {
+    return broken("a transfer without its time", where);
+  }
+  transfer.time = std::chrono::nanoseconds(time->get<std::int64_t>());
+  const std::string kind = text("kind");
+  if (kind == "out") {
+    transfer.kind = SessionTransfer::Kind::to_device;
+  } else if (kind == "in") {
+    transfer.kind = SessionTransfer::Kind::from_device;
+  } else if (kind == "reopened") {
+    transfer.kind = SessionTransfer::Kind::reopened;
+  } else {
+    return broken("a transfer of no known kind", where);
+  }
+  const std::string channel = text("channel");
+  if (channel != "reports" && channel != "bulk" &&
+      !(channel.empty() && transfer.kind == SessionTransfer::Kind::reopened)) {
+    return broken("a transfer on no known channel", where);
+  }
+  transfer.channel = channel == "bulk" ? SessionChannel::bulk : SessionChannel::reports;
+  auto bytes = from_hex(text("hex"));
+  if (!bytes) {
+    return broken("a transfer whose bytes are not hexadecimal, or too many", where);
+  }
+  transfer.bytes = std::move(*bytes);
+  if (const std::string error = text("error"); !error.empty()) {
+    const auto* const code =
+        std::find_if(kTransferErrors.begin(), kTransferErrors.end(),
+                     [&](ErrorCode known) { return to_string(known) == error; });
+    if (code == kTransferErrors.end()) {
+      return broken("a transfer with no known error", where);
+    }
+    transfer.error = Error{*code, printable(text("what"), 400), "replayed session",
+                           "it was so when the session was recorded"};
+  }
+  return transfer;
+}
+
+struct CloseZip {
+  void operator()(zip_t* zip) const { zip_discard(zip); }
+};
+
+Result<std::string> entry_of(zip_t& zip, const char* name, const std::string& path) {
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  if (zip_stat(&zip, name, 0, &stat) != 0 || (stat.valid & ZIP_STAT_SIZE) == 0) {
+    return broken(fmt::format("this is no session: it holds no {}", name), path);
+  }
+  if (stat.size > kMostText_bytes) {
+    return broken("the session is larger than any that is made", path);
+  }
+  zip_file_t* file = zip_fopen(&zip, name, 0);
+  if (file == nullptr) {
+    return broken(fmt::format("{} cannot be read", name), path);
+  }
+  // Grown as it comes: what the archive says about its size is only said.
+  std::string text;
+  std::array<char, 65'536> piece{};
+  zip_int64_t count = 0;
+  while ((count = zip_fread(file, piece.data(), piece.size())) > 0 &&
+         text.size() <= kMostText_bytes) {
+    text.append(piece.data(), static_cast<std::size_t>(count));
+  }
+  const bool failed = count != 0;
+  zip_fclose(file);
+  if (failed) {
+    return broken(fmt::format("{} is damaged", name), path);
+  }
+  return text;
+}
+
+std::string hash_of(std::string_view text) {
+  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+}
+
+}  // namespace
+
+std::string to_lines(const std::vector<SessionTransfer>& transfers) {
+  std::string text;
+  for (const SessionTransfer& transfer : transfers) {
+    fmt::format_to(std::back_inserter(text), R"({{"t_ns":{},"kind":"{}")", transfer.time.count(),
+                   transfer.kind == SessionTransfer::Kind::to_device     ? "out"
+                   : transfer.kind == SessionTransfer::Kind::from_device ? "in"
+                                                                         : "reopened");
+    if (transfer.kind != SessionTransfer::Kind::reopened) {
+      text += transfer.channel == SessionChannel::bulk ? R"(,"channel":"bulk")"
+                                                       : R"(,"channel":"reports")";
+    }
+    if (!transfer.bytes.empty()) {
+      text += R"(,"hex":")";
+      append_hex(text, transfer.bytes);
+      text += '"';
+    }
+    if (transfer.error) {
+      text += fmt::format(
+          R"(,"error":"{}","what":{})", to_string(transfer.error->code),
+          Json(transfer.error->what).dump(-1, ' ', false, Json::error_handler_t::replace));
+    }
+    text += "}\n";
+  }
+  return text;
+}
+
+Result<std::vector<SessionTransfer>> parse_lines(std::string_view text) {
+  std::vector<SessionTransfer> transfers;
+  std::size_t number = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    ++number;
+    if (end > 0) {
+      SIXPOINT_ASSIGN(SessionTransfer transfer,
+                      parse_line(text.substr(0, end), fmt::format("transfer {}", number)));
+      if (!transfers.empty() && transfer.time < transfers.back().time) {
+        return broken("time goes back", fmt::format("transfer {}", number));
+      }
+      transfers.push_back(std::move(transfer));
+    }
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return transfers;
+}
+
+Status write_session(FileSystem& files, const std::string& path, const Session& session) {
+  const std::string lines = to_lines(session.transfers);
+  Json head;
+  head["schema"] = kSchema;
+  head["device"] = printable(session.device);
+  head["started"] = to_iso8601(session.started);
+  head["transfers"] = session.transfers.size();
+  head["truncated"] = session.truncated;
+  head["sha256"] = hash_of(lines);
+  const std::string head_text = head.dump(2) + "\n";
+
+  zip_error_t error;
+  zip_error_init(&error);
+  zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, &error);
+  if (target == nullptr) {
+    return fail(ErrorCode::internal, "no memory for the session", path, "close other programs");
+  }
+  zip_source_keep(target);  // outlives the archive, to be read afterwards
+  const std::unique_ptr<zip_source_t, void (*)(zip_source_t*)> kept(target, &zip_source_free);
+  zip_t* zip = zip_open_from_source(target, ZIP_TRUNCATE, &error);
+  if (zip == nullptr) {
+    zip_source_free(target);
+    return fail(ErrorCode::internal, "the session's archive cannot be begun", path,
+                "report this as a defect of the program");
+  }
+  const auto add = [&](const char* name, const std::string& text) {
+    zip_source_t* source = zip_source_buffer(zip, text.data(), text.size(), 0);
+    const zip_int64_t index =
+        source == nullptr ? -1 : zip_file_add(zip, name, source, ZIP_FL_ENC_UTF_8);
+    if (index < 0) {
+      zip_source_free(source);
+      return false;
+    }
+    // One fixed time: the same session gives the same bytes.
+    return zip_file_set_mtime(zip, static_cast<zip_uint64_t>(index), 1'395'619'200, 0) == 0;
+  };
+  if (!add(kHeadName, head_text) || !add(kTransfersName, lines) || zip_close(zip) != 0) {
+    zip_discard(zip);
+    return fail(ErrorCode::internal, "the session's archive cannot be made", path,
+                "report this as a defect of the program");
+  }
+  SIXPOINT_ASSIGN(auto out, AtomicFile::create(files, path));
+  if (zip_source_open(target) != 0) {
+    return fail(ErrorCode::internal, "the session's archive cannot be read back", path,
+                "report this as a defect of the program");
+  }
+  Bytes piece(1U << 20U);
+  zip_int64_t count = 0;
+  while ((count = zip_source_read(target, piece.data(), piece.size())) > 0) {
+    SIXPOINT_CHECK(
+        out.append(std::span<const std::uint8_t>(piece).first(static_cast<std::size_t>(count))));
+  }
+  zip_source_close(target);
+  return out.commit();
+}
+
+Result<Session> read_session(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, kMostFile_bytes));
+  zip_error_t error;
+  zip_error_init(&error);
+  zip_source_t* source = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);
+  zip_t* opened = source == nullptr ? nullptr : zip_open_from_source(source, ZIP_RDONLY, &error);
+  if (opened == nullptr) {
+    zip_source_free(source);
+    zip_error_fini(&error);
+    return broken("this is no session: it is no zip archive", path);
+  }
+  const std::unique_ptr<zip_t, CloseZip> zip(opened);
+  SIXPOINT_ASSIGN(const std::string head_text, entry_of(*zip, kHeadName, path));
+  const Json head = Json::parse(head_text, nullptr, false);
+  const auto member = [&head](const char* key) {
+    return head.is_object() && head.contains(key) ? head[key] : Json();
+  };
+  if (member("schema") != kSchema) {
+    return broken("this is no session of a version that this program reads", path);
+  }
+  Session session;
+  session.device = member("device").is_string() ? member("device").get<std::string>() : "";
+  if (!member("started").is_string()) {
+    return broken("the session does not say when it began", path);
+  }
+  SIXPOINT_ASSIGN(session.started, parse_iso8601(member("started").get<std::string>()));
+  session.truncated = member("truncated") == true;
+  SIXPOINT_ASSIGN(const std::string lines, entry_of(*zip, kTransfersName, path));
+  if (member("sha256") != hash_of(lines)) {
+    return broken(
+        "the session was changed after it was recorded: its transfers do not have the "
+        "hash that session.json names",
+        path);
+  }
+  auto transfers = parse_lines(lines);
+  if (!transfers) {
+    Error what = std::move(transfers).error();
+    what.where = path + ", " + what.where;
+    return fail(std::move(what));
+  }
+  session.transfers = std::move(*transfers);
+  return session;
+}
+
+}  // namespace sixpoint::device

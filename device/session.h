@@ -1,0 +1,58 @@
+// A recorded session: every transfer between a program and a device, with its time
+// (docs/sessions.md).
+//
+// A session file is a zip of session.json (what it is, and the SHA-256 of the rest) and
+// transfers.jsonl, one line per transfer. session_recorder.h makes one, session_replay.h plays one
+// back, pcap.h makes one of a USB capture.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/env.h"
+#include "base/time.h"
+
+namespace sixpoint::device {
+
+enum class SessionChannel : std::uint8_t { reports, bulk };
+
+struct SessionTransfer {
+  enum class Kind : std::uint8_t {
+    to_device,    // a write
+    from_device,  // a read that gave something; a time-out is no transfer
+    reopened,     // the device was opened again after it went away; bytes are empty
+  };
+  Kind kind = Kind::to_device;
+  SessionChannel channel = SessionChannel::reports;
+  std::chrono::nanoseconds time{0};  // since the session's start
+  Bytes bytes;
+  std::optional<Error> error;  // what it ended with instead
+
+  bool operator==(const SessionTransfer& other) const {
+    return kind == other.kind && channel == other.channel && time == other.time &&
+           bytes == other.bytes && error.has_value() == other.error.has_value() &&
+           (!error || error->code == other.error->code);
+  }
+};
+
+struct Session {
+  std::string device;  // as it was addressed; of a capture: its place on the bus
+  UtcTime started{};
+  bool truncated = false;  // it went on, but was not kept
+  std::vector<SessionTransfer> transfers;
+};
+
+// Whole or not at all (base/atomic_file.h).
+Status write_session(FileSystem& files, const std::string& path, const Session& session);
+
+// no_input; bad_data when it is no session, is damaged, or was changed after it was made (hash).
+Result<Session> read_session(FileSystem& files, const std::string& path);
+
+// The text of transfers.jsonl, and back: bad_data with the line's number.
+std::string to_lines(const std::vector<SessionTransfer>& transfers);
+Result<std::vector<SessionTransfer>> parse_lines(std::string_view text);
+
+}  // namespace sixpoint::device

@@ -1,0 +1,338 @@
+#include "device/session_replay.h"
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <mutex>
+
+#include <fmt/format.h>
+
+#include "base/memory_env.h"
+#include "device/protocol.h"
+
+namespace sixpoint::device {
+
+namespace {
+
+using std::chrono::nanoseconds;
+using Kind = SessionTransfer::Kind;
+
+// What a request is compared by.
+Bytes masked(std::span<const std::uint8_t> bytes) {
+  Bytes copy(bytes.begin(), bytes.end());
+  const Result<Message> message = decode(bytes);
+  if (message && message->kind == ReportKind::request &&
+      message->command == Command::start_recording && message->payload.size() == 6) {
+    Message without_time = *message;
+    std::fill(without_time.payload.begin() + 2, without_time.payload.end(), std::uint8_t{0});
+    const Report report = encode(without_time);
+    copy.assign(report.begin(), report.end());
+  }
+  return copy;
+}
+
+std::string key_of(std::span<const std::uint8_t> bytes) {
+  const Bytes whole = masked(bytes);
+  const Result<Message> message = decode(whole);
+  if (!message) {
+    return {whole.begin(), whole.end()};
+  }
+  std::string key(1, static_cast<char>(message->command));
+  key.append(message->payload.begin(), message->payload.end());
+  return key;
+}
+
+std::string name_of(std::span<const std::uint8_t> bytes) {
+  const Result<Message> message = decode(bytes);
+  return message ? fmt::format("'{}'", to_string(message->command))
+                 : fmt::format("{} bytes that are no request", bytes.size());
+}
+
+class Player {
+ public:
+  Player(Session session, SessionMatch match)
+      : session_(std::move(session)),
+        match_(match),
+        clock_(std::make_shared<ManualClock>(session_.started)),
+        consumed_(session_.transfers.size(), false) {
+    if (match_ == SessionMatch::by_key) {
+      for (std::size_t i = 0; i < session_.transfers.size(); ++i) {
+        const SessionTransfer& transfer = session_.transfers[i];
+        if (transfer.kind == Kind::to_device && !transfer.error) {
+          answers_[key_of(transfer.bytes)].push_back(i);
+        }
+      }
+    }
+  }
+
+  std::shared_ptr<Clock> clock() const { return clock_; }
+
+  Status write(std::span<const std::uint8_t> bytes) {
+    const std::lock_guard lock(mutex_);
+    if (cancelled_) {
+      return ended();
+    }
+    if (diverged_) {
+      return fail(*diverged_);
+    }
+    Status status = match_ == SessionMatch::strict ? write_strictly(bytes) : write_by_key(bytes);
+    if (!status && status.error().code == ErrorCode::bad_data) {
+      diverged_ = status.error();
+    }
+    return status;
+  }
+
+  Result<std::size_t> read(SessionChannel channel, std::span<std::uint8_t> out,
+                           nanoseconds time_out) {
+    const std::lock_guard lock(mutex_);
+    if (cancelled_) {
+      return ended();
+    }
+    if (diverged_) {
+      return fail(*diverged_);
+    }
+    return match_ == SessionMatch::strict ? read_strictly(channel, out, time_out)
+                                          : read_by_key(channel, out, time_out);
+  }
+
+  // Whether the device came back, when it was looked for then.
+  Status reopen() {
+    const std::lock_guard lock(mutex_);
+    const std::size_t next = next_step();
+    if (match_ == SessionMatch::by_key || next == session_.transfers.size() ||
+        session_.transfers[next].kind != Kind::reopened) {
+      return ended();
+    }
+    const SessionTransfer& transfer = session_.transfers[next];
+    consume(next);
+    advance_to(transfer.time);
+    return transfer.error ? Status(fail(*transfer.error)) : Status{};
+  }
+
+  void cancel() {
+    const std::lock_guard lock(mutex_);
+    cancelled_ = true;
+  }
+
+ private:
+  struct Held {
+    nanoseconds due;
+    SessionTransfer transfer;
+  };
+
+  static tl::unexpected<Error> ended() {
+    return fail(ErrorCode::device_unavailable, "the recorded session ends here", "replayed session",
+                "record a longer one, or use match=key");
+  }
+
+  void advance_to(nanoseconds time) {
+    if (const nanoseconds now = clock_->elapsed(); time > now) {
+      clock_->sleep(time - now);
+    }
+  }
+
+  void consume(std::size_t index) {
+    consumed_[index] = true;
+    while (first_ < consumed_.size() && consumed_[first_]) {
+      ++first_;
+    }
+  }
+
+  // The next write or reopening.
+  std::size_t next_step() {
+    step_ = std::max(step_, first_);
+    while (step_ < session_.transfers.size() &&
+           (consumed_[step_] || session_.transfers[step_].kind == Kind::from_device)) {
+      ++step_;
+    }
+    return step_;
+  }
+
+  Status write_strictly(std::span<const std::uint8_t> bytes) {
+    std::size_t next = next_step();
+    if (next == session_.transfers.size()) {
+      return ended();
+    }
+    const SessionTransfer& transfer = session_.transfers[next];
+    if (transfer.kind == Kind::reopened || masked(transfer.bytes) != masked(bytes)) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("the program sends {} where the session has {}", name_of(bytes),
+                              transfer.kind == Kind::reopened ? "the device opened again"
+                                                              : name_of(transfer.bytes)),
+                  fmt::format("replayed session, transfer {}", next + 1),
+                  "use the options of the recording, or match=key");
+    }
+    consume(next);
+    advance_to(transfer.time);
+    return transfer.error ? Status(fail(*transfer.error)) : Status{};
+  }
+
+  Result<std::size_t> read_strictly(SessionChannel channel, std::span<std::uint8_t> out,
+                                    nanoseconds time_out) {
+    const std::size_t end = next_step();
+    const nanoseconds until = clock_->elapsed() + time_out;
+    std::size_t& cursor = cursors_[static_cast<std::size_t>(channel)];
+    for (cursor = std::max(cursor, first_); cursor < end; ++cursor) {
+      const SessionTransfer& transfer = session_.transfers[cursor];
+      if (consumed_[cursor] || transfer.kind != Kind::from_device || transfer.channel != channel) {
+        continue;
+      }
+      if (transfer.time > until) {
+        break;
+      }
+      const std::size_t index = cursor;
+      consume(index);
+      advance_to(transfer.time);
+      return give(transfer, out);
+    }
+    if (first_ == session_.transfers.size()) {
+      return ended();
+    }
+    advance_to(until);
+    return 0;
+  }
+
+  Status write_by_key(std::span<const std::uint8_t> bytes) {
+    const auto found = answers_.find(key_of(bytes));
+    if (found == answers_.end()) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("the session has no answer to {} with this content", name_of(bytes)),
+                  "replayed session", "record a session in which it is asked");
+    }
+    std::deque<std::size_t>& uses = found->second;
+    const std::size_t index = uses.front();
+    if (uses.size() > 1) {
+      uses.pop_front();  // the last answers again and again
+    }
+    const SessionTransfer& request = session_.transfers[index];
+    const Result<Message> asked = decode(bytes);
+    const Result<Message> recorded = decode(request.bytes);
+    const nanoseconds now = clock_->elapsed();
+    for (std::size_t i = index + 1; i < session_.transfers.size(); ++i) {
+      const SessionTransfer& transfer = session_.transfers[i];
+      if (transfer.kind != Kind::from_device) {
+        break;
+      }
+      Held held{now + (transfer.time - request.time), transfer};
+      const Result<Message> reply = decode(transfer.bytes);
+      if (reply && asked && recorded && reply->kind == ReportKind::reply &&
+          reply->sequence == recorded->sequence) {
+        Message renewed = *reply;
+        renewed.sequence = asked->sequence;
+        const Report report = encode(renewed);
+        held.transfer.bytes.assign(report.begin(), report.end());
+      }
+      held_[static_cast<std::size_t>(transfer.channel)].push_back(std::move(held));
+    }
+    return {};
+  }
+
+  Result<std::size_t> read_by_key(SessionChannel channel, std::span<std::uint8_t> out,
+                                  nanoseconds time_out) {
+    const nanoseconds until = clock_->elapsed() + time_out;
+    std::deque<Held>& held = held_[static_cast<std::size_t>(channel)];
+    if (held.empty() || held.front().due > until) {
+      advance_to(until);
+      return 0;
+    }
+    const Held next = std::move(held.front());
+    held.pop_front();
+    advance_to(next.due);
+    return give(next.transfer, out);
+  }
+
+  static Result<std::size_t> give(const SessionTransfer& transfer, std::span<std::uint8_t> out) {
+    if (transfer.error) {
+      return fail(*transfer.error);
+    }
+    const std::size_t count = std::min(out.size(), transfer.bytes.size());
+    std::copy_n(transfer.bytes.begin(), count, out.begin());
+    return count;
+  }
+
+  Session session_;
+  SessionMatch match_;
+  std::shared_ptr<ManualClock> clock_;
+  std::mutex mutex_;
+  bool cancelled_ = false;
+  // Where the program left the recording: from there on every answer would be a guess.
+  std::optional<Error> diverged_;
+  // strict
+  std::vector<bool> consumed_;
+  std::size_t first_ = 0;  // all before it are consumed
+  std::size_t step_ = 0;
+  std::array<std::size_t, 2> cursors_{};
+  // by_key
+  std::map<std::string, std::deque<std::size_t>> answers_;
+  std::array<std::deque<Held>, 2> held_;
+};
+
+class ReplayedTransport final : public Transport {
+ public:
+  ReplayedTransport(std::shared_ptr<Player> player, SessionChannel channel)
+      : player_(std::move(player)), channel_(channel) {}
+  Status write(std::span<const std::uint8_t> bytes, nanoseconds /*time_out*/) override {
+    return player_->write(bytes);
+  }
+  Result<std::size_t> read(std::span<std::uint8_t> out, nanoseconds time_out) override {
+    return player_->read(channel_, out, time_out);
+  }
+  void cancel() override { player_->cancel(); }
+
+ private:
+  std::shared_ptr<Player> player_;
+  SessionChannel channel_;
+};
+
+// Whoever turned the unit then: it turns again as it did, and nobody is asked for it.
+class ReplayedJig final : public Jig {
+ public:
+  std::string name() const override { return "replayed session"; }
+  bool turns_by_itself() const override { return true; }
+  Status go_to(Pose /*pose*/) override { return {}; }
+  Result<JigReport> report() override { return JigReport{}; }
+  Status stop() override { return {}; }
+};
+
+Link link_to(const std::shared_ptr<Player>& player, bool with_bulk) {
+  Link link;
+  link.address = "replay:";
+  link.clock = player->clock();
+  link.reports = std::make_unique<ReplayedTransport>(player, SessionChannel::reports);
+  if (with_bulk) {
+    link.bulk = std::make_unique<ReplayedTransport>(player, SessionChannel::bulk);
+  }
+  link.jig = std::make_unique<ReplayedJig>();
+  link.reopen = [player, with_bulk]() -> Result<Link> {
+    SIXPOINT_CHECK(player->reopen());
+    return link_to(player, with_bulk);
+  };
+  return link;
+}
+
+}  // namespace
+
+Link replay_link(Session session, SessionMatch match) {
+  return link_to(std::make_shared<Player>(std::move(session), match), true);
+}
+
+void register_replay(TransportRegistry& registry) {
+  registry.add("replay", "replay:session.zip", [](std::string_view rest, Env& env) -> Result<Link> {
+    constexpr std::string_view kMatch = ",match=";
+    SessionMatch match = SessionMatch::strict;
+    if (const std::size_t at = rest.rfind(kMatch); at != std::string_view::npos) {
+      const std::string_view word = rest.substr(at + kMatch.size());
+      if (word != "key" && word != "strict") {
+        return fail(ErrorCode::usage,
+                    fmt::format("match={} is neither strict nor key", printable(word, 40)), {},
+                    "docs/sessions.md describes both");
+      }
+      match = word == "key" ? SessionMatch::by_key : SessionMatch::strict;
+      rest = rest.substr(0, at);
+    }
+    SIXPOINT_ASSIGN(Session session, read_session(env.files, std::string(rest)));
+    return replay_link(std::move(session), match);
+  });
+}
+
+}  // namespace sixpoint::device

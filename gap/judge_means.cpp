@@ -1,0 +1,200 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "gap/diagnoser.h"
+
+namespace sixpoint::gap {
+
+void Diagnoser::judge_means() {
+  EvidenceOptions options;
+  options.lsb_mg = 1000 / bundle_.accel_scale_lsb_per_g;
+  options.allowed = [this](const std::string& name) { return allowed(name); };
+  options.record_nats = [this](Scatter scatter, double size) {
+    const auto along = [&](const std::vector<double>& sizes, const auto& nats) {
+      for (std::size_t i = 1; i < sizes.size(); ++i) {
+        if (size <= sizes[i]) {
+          const double share = (size - sizes[i - 1]) / (sizes[i] - sizes[i - 1]);
+          return nats(i - 1) * (1 - share) + nats(i) * share;
+        }
+      }
+      return nats(sizes.size() - 1);
+    };
+    if (scatter == Scatter::random_walk) {
+      return along(slow_.walk_mg, [&](std::size_t i) { return slow_.nats[i][0]; });
+    }
+    if (scatter == Scatter::by_time || scatter == Scatter::by_time_fast) {
+      // Unknown in time: any spectrum that the records show.
+      return std::max({0.0, slow_.best_both().nats - 4, slow_.free_nats});
+    }
+    if (scatter == Scatter::flicker) {
+      return along(slow_.flicker_mg, [&](std::size_t i) { return slow_.nats[0][i]; });
+    }
+    return 0.0;
+  };
+  search_.emplace(blocks_, options);
+  search_->run();
+  const Fit& fit = search_->best();
+
+  // What stays is judged against the best explanation; every linear effect becomes a candidate.
+  std::set<std::string> names;
+  for (const ParameterGroup& group : parameter_groups()) {
+    if (group.effect != "gain" && group.effect != "offset" && allowed(group.effect)) {
+      names.insert(group.effect);
+    }
+  }
+  for (const std::string& name : names) {
+    const auto estimate = search_->estimate(name);
+    if (!estimate) {
+      continue;
+    }
+    EffectFinding f;
+    f.name = name;
+    const bool in = std::any_of(fit.groups.begin(), fit.groups.end(),
+                                [&](const ParameterGroup& g) { return g.effect == name; });
+    f.nats =
+        in ? std::max(0.1, search_->gain_nats(name)) : std::min(-0.1, search_->gain_nats(name));
+    f.held_out_gain_nats = search_->held_out_nats(name);
+    if (name != "truncation") {
+      // Real effects keep to a catalogue's straight lines within some percent.
+      std::vector<double> sd = estimate->sd;
+      if (name == "drift" || name == "warm_up" || name == "offset_tempco") {
+        for (std::size_t i = 0; i < sd.size(); ++i) {
+          sd[i] = std::hypot(sd[i], kFormShare * estimate->value[i]);
+        }
+      }
+      f.parameters.push_back({parameter_name(name), estimate->value, std::move(sd)});
+    }
+    if (name == "tilt") {
+      const double angle = std::hypot(estimate->value[0], estimate->value[1]);
+      f.parameters[0].value.push_back(0);
+      f.parameters[0].sd.push_back(0);
+      f.parameters.push_back({"angle_deg", {angle}, {std::max(estimate->sd[0], estimate->sd[1])}});
+    }
+    if (name == "warm_up") {
+      f.parameters.push_back({"tau_s", {estimate->tau_s}, {0.2 * estimate->tau_s}});
+    }
+    if (in) {
+      f.confounded_with = confounded(name);
+    }
+    if (in && search_->unknown_wins() && f.nats < 50) {
+      f.nats = -0.1;  // beside scatter of an unknown kind only what stands out counts
+    }
+    if (in && f.held_out_gain_nats <= 0) {
+      f.nats = -0.1;  // it does not help where it was not fitted
+    }
+    find(std::move(f));
+  }
+  const auto scatter = [&](Scatter kind) {
+    const std::string name(to_string(kind));
+    if (!allowed(name)) {
+      return;
+    }
+    const bool in = fit.scatter == kind;
+    EffectFinding f;
+    f.name = name;
+    const double gain = search_->gain_nats(name);
+    f.nats = in ? std::max(0.1, gain) : (gain == 0 ? -5 : std::min(-0.1, gain));
+    f.held_out_gain_nats = in ? gain : std::min(0.0, gain);
+    const double size = in ? fit.scatter_size : 0;
+    f.parameters.push_back({parameter_name(name), {size}, {0.12 * size}});
+    find(std::move(f));
+  };
+  scatter(Scatter::seating);
+  scatter(Scatter::random_walk);
+  scatter(Scatter::flicker);
+  if (allowed("rounding_floor")) {
+    // Nothing can tell it from an offset of half an LSB: what is known is the prior.
+    find({"rounding_floor", 0, kLogPrior, {}, 0, false, {"offset"}});
+  }
+  judge_nuisances();
+}
+
+std::vector<std::string> Diagnoser::confounded(const std::string& name) const {
+  std::vector<std::string> others;
+  const double own = search_->gain_nats(name);
+  const CatalogueEntry* entry = find_entry(name);
+  for (const CatalogueEntry& other : catalogue()) {
+    const std::string other_name(other.name);
+    if (other_name == name || accepted(other_name)) {
+      continue;
+    }
+    const double gain = search_->gain_nats(other_name);
+    // gain of the other measured against the best without it, which holds this one.
+    if (allowed(other_name) && gain > -3 && gain != 0 && own < 12 && entry != nullptr) {
+      others.push_back(other_name);
+    }
+  }
+  if (name == "local_gravity") {
+    others.emplace_back("gain");
+  }
+  return others;
+}
+
+void Diagnoser::judge_nuisances() {
+  const ForwardState& s = search_->best().state;
+  double chi = 0;
+  double nominal = 0;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    out_.unit.gain[static_cast<std::size_t>(a)] = s.gain[a];
+    out_.unit.offset_g[static_cast<std::size_t>(a)] = s.offset_mg[a] / 1000;
+    const double g = (s.gain[a] - 1) / kGainSd;
+    const double o = s.offset_mg[a] / kOffsetSd_mg;
+    chi += g * g + o * o;
+    nominal += -0.5 * (g * g + o * o) - std::log(kGainSd) - std::log(kOffsetSd_mg);
+  }
+  if (few_poses_) {
+    return;
+  }
+  // The wrong mode: a common gain anywhere in 0.78..0.97, the unit's own 2 % about it, and
+  // offsets of 0.1 to 0.2 g.
+  double wrong = -1e300;
+  double best = -1e300;
+  double common = 1;
+  constexpr int kSteps = 96;
+  constexpr double kWide_mg = 140;
+  for (int k = 0; k < kSteps; ++k) {
+    const double c = 0.78 + 0.19 * (k + 0.5) / kSteps;
+    double nats = 0;
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      nats += -0.5 * std::pow((s.gain[a] / c - 1) / kGainSd, 2) - std::log(kGainSd * c) -
+              0.5 * std::pow(s.offset_mg[a] / kWide_mg, 2) - std::log(kWide_mg);
+    }
+    if (nats > best) {
+      best = nats;
+      common = c;
+    }
+    wrong = wrong == -1e300 ? nats
+                            : std::max(wrong, nats) + std::log1p(std::exp(-std::abs(wrong - nats)));
+  }
+  wrong -= std::log(static_cast<double>(kSteps));
+  const double nats = wrong - nominal + kLogPrior;
+  const double z = chi_to_sd(chi, 6);
+  // The unit's own gain and offset can't be known beside the mode's.
+  EffectFinding f{"filter_mismatch", 0, nats, {}, nats - kLogPrior, false, {}};
+  f.parameters.push_back({"gain", {common}, {kGainSd / std::sqrt(3.0)}});
+  f.parameters.push_back({"offset_g",
+                          {s.offset_mg[0] / 1000, s.offset_mg[1] / 1000, s.offset_mg[2] / 1000},
+                          {0.03, 0.03, 0.03}});
+  if (allowed("filter_mismatch")) {
+    if (nats > kAccept) {
+      double square = 0;
+      for (Eigen::Index a = 0; a < 3; ++a) {
+        out_.unit.gain[static_cast<std::size_t>(a)] /= common;
+        out_.unit.offset_g[static_cast<std::size_t>(a)] = 0;
+        square += std::pow(1000 * (1 - common), 2) / 3 + std::pow(s.offset_mg[a], 2);
+      }
+      extra_mg2_ += square / 3;
+      mismatch_ = true;
+    }
+    find(std::move(f));
+  }
+  if (!mismatch_ && chi > 45) {  // chi-square of six: 5e-8
+    alarm(z, "nuisance: gains or offsets of the unit lie far outside their priors");
+  }
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,18 @@
+// The diagnosis as one sheet of paper (A4, SVG): to be printed, or turned into PNG or PDF.
+#pragma once
+
+#include <string>
+
+#include "base/env.h"
+#include "base/result.h"
+#include "gap/diagnosis.h"
+
+namespace sixpoint::gap {
+
+std::string report_sheet(const Diagnosis& diagnosis);
+
+// A sheet drawn by librsvg and cairo. internal where they refuse it.
+Result<Bytes> sheet_png(const std::string& svg);
+Result<Bytes> sheet_pdf(const std::string& svg);
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,372 @@
+#include "mocks/mass_storage.h"
+
+#include <algorithm>
+#include <array>
+
+namespace sixpoint::mocks {
+
+namespace {
+
+constexpr std::uint32_t kCommandSignature = 0x43425355;  // "USBC"
+constexpr std::uint32_t kStatusSignature = 0x53425355;   // "USBS"
+constexpr std::size_t kCommandBlockBytes = 31;
+constexpr std::size_t kStatusBlockBytes = 13;
+constexpr std::size_t kMaxPacket = 512;
+
+constexpr std::uint8_t kPassed = 0;
+constexpr std::uint8_t kFailed = 1;
+constexpr std::uint8_t kPhaseError = 2;
+
+constexpr std::uint8_t kGetMaxLun = 0xFE;
+constexpr std::uint8_t kBulkOnlyReset = 0xFF;
+
+// SCSI operation codes.
+enum Operation : std::uint8_t {
+  kTestUnitReady = 0x00,
+  kRequestSense = 0x03,
+  kRead6 = 0x08,
+  kWrite6 = 0x0A,
+  kInquiry = 0x12,
+  kModeSense6 = 0x1A,
+  kStartStopUnit = 0x1B,
+  kPreventAllow = 0x1E,
+  kReadFormatCapacities = 0x23,
+  kReadCapacity10 = 0x25,
+  kRead10 = 0x28,
+  kWrite10 = 0x2A,
+  kVerify10 = 0x2F,
+  kSynchronizeCache = 0x35,
+  kModeSense10 = 0x5A,
+  kServiceActionIn = 0x9E,
+  kReportLuns = 0xA0,
+  kRead12 = 0xA8,
+  kWrite12 = 0xAA,
+};
+constexpr std::uint8_t kReadCapacity16 = 0x10;  // its service action
+
+std::uint32_t little32(std::span<const std::uint8_t> b, std::size_t at) {
+  return static_cast<std::uint32_t>(b[at]) | (static_cast<std::uint32_t>(b[at + 1]) << 8U) |
+         (static_cast<std::uint32_t>(b[at + 2]) << 16U) |
+         (static_cast<std::uint32_t>(b[at + 3]) << 24U);
+}
+
+std::uint32_t big(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t width) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < width; ++i) {
+    value = (value << 8U) | bytes[at + i];
+  }
+  return value;
+}
+
+void put_little32(Bytes& out, std::uint32_t value) {
+  for (unsigned i = 0; i < 4; ++i) {
+    out.push_back(static_cast<std::uint8_t>((value >> (8 * i)) & 0xFFU));
+  }
+}
+
+void put_big32(Bytes& out, std::uint32_t value) {
+  for (unsigned i = 4; i-- > 0;) {
+    out.push_back(static_cast<std::uint8_t>((value >> (8 * i)) & 0xFFU));
+  }
+}
+
+void put_text(Bytes& out, std::string_view text, std::size_t width) {
+  for (std::size_t i = 0; i < width; ++i) {
+    out.push_back(static_cast<std::uint8_t>(i < text.size() ? text[i] : ' '));
+  }
+}
+
+}  // namespace
+
+struct MassStorage::Plan {
+  std::uint8_t status = kPassed;
+  bool towards_device = false;
+  std::uint64_t bytes = 0;
+  std::function<Bytes(std::uint64_t, std::size_t)> source;
+
+  static Plan passed() { return {}; }
+  // An answer, cut to the command's allocation length.
+  static Plan answer(Bytes bytes, std::size_t allocation) {
+    bytes.resize(std::min(bytes.size(), allocation));
+    Plan plan;
+    plan.bytes = bytes.size();
+    plan.source = [bytes = std::move(bytes)](std::uint64_t offset, std::size_t length) {
+      const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(offset);
+      return Bytes(begin, begin + static_cast<std::ptrdiff_t>(length));
+    };
+    return plan;
+  }
+};
+
+void MassStorage::insert(std::shared_ptr<const BlockMedium> medium) {
+  attention_ = attention_ || medium_ != nullptr;
+  medium_ = std::move(medium);
+}
+
+void MassStorage::reset() {
+  phase_ = Phase::command;
+  source_ = nullptr;
+}
+
+UsbAnswer MassStorage::request(const SetupPacket& setup, std::uint8_t interface) {
+  if (setup.index != interface || setup.value != 0) {
+    return UsbAnswer::stall();
+  }
+  if (setup.request_type == 0xA1 && setup.request == kGetMaxLun && setup.length == 1) {
+    return UsbAnswer::done({0});
+  }
+  if (setup.request_type == 0x21 && setup.request == kBulkOnlyReset && setup.length == 0) {
+    reset();
+    return UsbAnswer::done();
+  }
+  return UsbAnswer::stall();
+}
+
+UsbAnswer MassStorage::take(std::span<const std::uint8_t> bytes) {
+  if (phase_ == Phase::data_out) {
+    // Nothing is ever written: what comes is taken and forgotten.
+    moved_ += std::min<std::uint64_t>(bytes.size(), expected_ - moved_);
+    if (moved_ == expected_ || bytes.size() % kMaxPacket != 0 || bytes.empty()) {
+      moved_ = 0;
+      phase_ = Phase::status;
+    }
+    return UsbAnswer::done();
+  }
+  // A command block is valid and meaningful (bulk-only transport, 6.2), or everything stops.
+  if (phase_ != Phase::command || bytes.size() != kCommandBlockBytes ||
+      little32(bytes, 0) != kCommandSignature || (bytes[13] & 0x0FU) != 0 ||
+      (bytes[14] & 0x1FU) < 1 || (bytes[14] & 0x1FU) > 16) {
+    phase_ = Phase::broken;
+    return UsbAnswer::stall();
+  }
+  tag_ = little32(bytes, 4);
+  expected_ = little32(bytes, 8);
+  const bool towards_host = (bytes[12] & 0x80U) != 0;
+  // Bytes behind the command's own length count as zero.
+  std::array<std::uint8_t, 16> command{};
+  std::copy_n(bytes.begin() + 15, bytes[14] & 0x1FU, command.begin());
+  Plan plan = execute(command);
+
+  status_ = plan.status;
+  moved_ = 0;
+  to_move_ = std::min(plan.bytes, expected_);
+  source_ = std::move(plan.source);
+  // The thirteen cases (6.7): what the device wants to move against what the host expects.
+  if (plan.bytes > expected_ ||
+      (plan.bytes > 0 && expected_ > 0 && plan.towards_device == towards_host)) {
+    status_ = kPhaseError;
+    if (plan.towards_device == towards_host) {
+      to_move_ = 0;
+    }
+  }
+  ends_short_ = to_move_ < expected_;
+  if (expected_ == 0) {
+    phase_ = Phase::status;
+  } else if (!towards_host) {
+    phase_ = Phase::data_out;
+  } else {
+    phase_ = to_move_ > 0 ? Phase::data_in : Phase::stalled_in;
+  }
+  return UsbAnswer::done();
+}
+
+UsbAnswer MassStorage::give(std::size_t max_length) {
+  switch (phase_) {
+    case Phase::data_in: {
+      const std::uint64_t left = to_move_ - moved_;
+      if (left > max_length && max_length % kMaxPacket != 0) {
+        return {UsbAnswer::Kind::overflow, {}};
+      }
+      const auto now = static_cast<std::size_t>(std::min<std::uint64_t>(left, max_length));
+      Bytes bytes = source_(moved_, now);
+      moved_ += now;
+      if (moved_ == to_move_) {
+        // A short or empty packet has told the host that this was all; where its buffer ended with
+        // the last packet, only a stall can.
+        const bool told = now < max_length || now % kMaxPacket != 0;
+        phase_ = ends_short_ && !told ? Phase::stalled_in : Phase::status;
+      }
+      return UsbAnswer::done(std::move(bytes));
+    }
+    case Phase::stalled_in:
+      phase_ = Phase::status;
+      return UsbAnswer::stall();
+    case Phase::status:
+      if (max_length < kStatusBlockBytes) {
+        return {UsbAnswer::Kind::overflow, {}};
+      }
+      phase_ = Phase::command;
+      return UsbAnswer::done(status_block());
+    case Phase::broken:
+      return UsbAnswer::stall();
+    case Phase::command:
+    case Phase::data_out:
+      break;
+  }
+  return UsbAnswer::nothing_yet();
+}
+
+Bytes MassStorage::status_block() {
+  Bytes block;
+  put_little32(block, kStatusSignature);
+  put_little32(block, tag_);
+  put_little32(block, static_cast<std::uint32_t>(expected_ - moved_));
+  block.push_back(status_);
+  return block;
+}
+
+MassStorage::Plan MassStorage::refuse(Sense sense) {
+  sense_ = sense;
+  Plan plan;
+  plan.status = kFailed;
+  return plan;
+}
+
+MassStorage::Plan MassStorage::read(std::uint64_t block, std::uint64_t count) {
+  constexpr Sense kOutOfRange = {5, 0x21, 0};
+  if (block + count > medium_->blocks()) {
+    return refuse(kOutOfRange);
+  }
+  Plan plan;
+  plan.bytes = count * kBlockBytes;
+  plan.source = [medium = medium_, block](std::uint64_t offset, std::size_t length) {
+    Bytes bytes(length);
+    std::array<std::uint8_t, kBlockBytes> one{};
+    for (std::size_t done = 0; done < length;) {
+      medium->read(static_cast<std::uint32_t>(block + (offset + done) / kBlockBytes), one);
+      const auto skip = static_cast<std::size_t>((offset + done) % kBlockBytes);
+      const std::size_t part = std::min(kBlockBytes - skip, length - done);
+      std::copy_n(one.begin() + static_cast<std::ptrdiff_t>(skip), part,
+                  bytes.begin() + static_cast<std::ptrdiff_t>(done));
+      done += part;
+    }
+    return bytes;
+  };
+  return plan;
+}
+
+MassStorage::Plan MassStorage::inquiry(std::span<const std::uint8_t> command) {
+  constexpr Sense kBadField = {5, 0x24, 0};
+  const std::size_t allocation = big(command, 3, 2);
+  Bytes answer;
+  if ((command[1] & 1U) != 0) {
+    if (command[2] == 0x00) {
+      answer = {0, 0, 0, 2, 0x00, 0x80};
+    } else if (command[2] == 0x80) {
+      answer = {0, 0x80, 0, static_cast<std::uint8_t>(identity_.serial.size())};
+      put_text(answer, identity_.serial, identity_.serial.size() & 0xFFU);
+    } else {
+      return refuse(kBadField);
+    }
+    return Plan::answer(std::move(answer), allocation);
+  }
+  if (command[2] != 0) {
+    return refuse(kBadField);
+  }
+  // A disk whose medium can change; SPC-2; 31 bytes follow the fifth.
+  answer = {0x00, 0x80, 0x04, 0x02, 31, 0, 0, 0};
+  put_text(answer, identity_.vendor, 8);
+  put_text(answer, identity_.product, 16);
+  put_text(answer, identity_.revision, 4);
+  return Plan::answer(std::move(answer), allocation);
+}
+
+MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
+  constexpr Sense kNoMedium = {2, 0x3A, 0};
+  constexpr Sense kBadCommand = {5, 0x20, 0};
+  constexpr Sense kBadField = {5, 0x24, 0};
+  constexpr Sense kChanged = {6, 0x28, 0};
+  constexpr Sense kWriteProtected = {7, 0x27, 0};
+
+  // These answer whatever the state (SPC-2, 5.6.1).
+  switch (command[0]) {
+    case kInquiry:
+      return inquiry(command);
+    case kRequestSense: {
+      const Bytes answer = {0x70, 0,           sense_.key,       0, 0, 0, 0, 10, 0, 0, 0,
+                            0,    sense_.code, sense_.qualifier, 0, 0, 0, 0};
+      sense_ = {};
+      return Plan::answer(answer, command[4]);
+    }
+    case kReportLuns:
+      return Plan::answer({0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, big(command, 6, 4));
+    default:
+      break;
+  }
+  sense_ = {};
+  if (attention_) {
+    attention_ = false;
+    ejected_ = false;
+    return refuse(kChanged);
+  }
+  if (command[0] == kStartStopUnit) {
+    const bool eject = (command[4] & 2U) != 0;
+    if (eject) {
+      ejected_ = (command[4] & 1U) == 0;
+    }
+    return Plan::passed();
+  }
+  if (command[0] == kPreventAllow) {
+    return Plan::passed();
+  }
+  if (medium_ == nullptr || ejected_) {
+    return refuse(kNoMedium);
+  }
+  constexpr std::uint8_t kWriteProtectBit = 0x80;
+  const std::uint32_t blocks = medium_->blocks();
+  switch (command[0]) {
+    case kTestUnitReady:
+    case kSynchronizeCache:
+      return Plan::passed();
+    case kModeSense6:
+      return Plan::answer({3, 0, kWriteProtectBit, 0}, command[4]);
+    case kModeSense10:
+      return Plan::answer({0, 6, 0, kWriteProtectBit, 0, 0, 0, 0}, big(command, 7, 2));
+    case kReadFormatCapacities: {
+      Bytes answer = {0, 0, 0, 8};
+      put_big32(answer, blocks);
+      put_big32(answer, 0x02000000U | kBlockBytes);  // formatted
+      return Plan::answer(std::move(answer), big(command, 7, 2));
+    }
+    case kReadCapacity10: {
+      Bytes answer;
+      put_big32(answer, blocks - 1);
+      put_big32(answer, kBlockBytes);
+      return Plan::answer(std::move(answer), 8);
+    }
+    case kServiceActionIn: {
+      if ((command[1] & 0x1FU) != kReadCapacity16) {
+        return refuse(kBadField);
+      }
+      Bytes answer;
+      put_big32(answer, 0);
+      put_big32(answer, blocks - 1);
+      put_big32(answer, kBlockBytes);
+      answer.resize(32, 0);
+      return Plan::answer(std::move(answer), big(command, 10, 4));
+    }
+    case kRead6: {
+      const std::uint32_t count = command[4] == 0 ? 256 : command[4];
+      return read(big(command, 1, 3) & 0x1FFFFFU, count);
+    }
+    case kRead10:
+      return read(big(command, 2, 4), big(command, 7, 2));
+    case kRead12:
+      return read(big(command, 2, 4), big(command, 6, 4));
+    case kVerify10: {
+      if ((command[1] & 2U) != 0) {
+        return refuse(kBadField);
+      }
+      const Plan looked_at = read(big(command, 2, 4), big(command, 7, 2));
+      return looked_at.status == kPassed ? Plan::passed() : looked_at;
+    }
+    case kWrite6:
+    case kWrite10:
+    case kWrite12:
+      return refuse(kWriteProtected);
+    default:
+      return refuse(kBadCommand);
+  }
+}
+
+}  // namespace sixpoint::mocks

@@ -1,0 +1,213 @@
+// sixpoint virtual: virtual units for a desktop, over USB/IP.
+#include <csignal>
+#include <memory>
+#include <set>
+#include <thread>
+
+#include <fmt/format.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include "base/memory_env.h"
+#include "device/usb_ids.h"
+#include "mocks/usb_unit.h"
+#include "mocks/usbip_server.h"
+#include "mocks/virtual_settings.h"
+#include "sim/recording.h"
+#include "station/cli/command.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+constexpr int kMostUnits = 64;
+
+struct Options {
+  int port = 3240;
+  int count = 1;
+  std::string scenario;
+  std::uint64_t seed = 0;
+  bool has_seed = false;
+  std::string device;
+  bool jig = false;
+  std::string faults;
+  bool json = false;
+};
+
+struct Bench {
+  std::vector<std::shared_ptr<mocks::UsbDevice>> devices;
+  std::vector<sim::UnitTruth> units;
+};
+
+// The unit of a scenario, with what it recorded in its memory.
+Status apply_scenario(Context& context, const std::string& path, mocks::VirtualSettings& settings,
+                      Bytes& recording, UtcTime& start) {
+  SIXPOINT_ASSIGN(const Bytes text, read_file(context.env.files, path));
+  SIXPOINT_ASSIGN(const sim::Scenario scenario,
+                  sim::parse_scenario({reinterpret_cast<const char*>(text.data()), text.size()}));
+  if (scenario.protocol) {
+    return fail(ErrorCode::configuration, "a scenario with a protocol has no recording for a unit",
+                path, "give a scenario with motions (docs/scenario.md)");
+  }
+  settings.unit.truth = scenario.unit;
+  settings.unit.seed = scenario.seed;
+  settings.unit.temperature_c = scenario.temperature_c;
+  settings.unit.gravity_g = scenario.gravity_g;
+  double duration_s = 0;
+  for (const sim::MotionSpec& motion : scenario.motions) {
+    duration_s += motion.duration_s;
+  }
+  // A sample has 36 bits at least.
+  if (duration_s * scenario.rate_hz * 4.5 > static_cast<double>(settings.unit.flash_bytes)) {
+    return fail(ErrorCode::configuration, "the recording does not fit into the unit's flash", path,
+                "make the scenario shorter");
+  }
+  MemoryFiles disk;
+  SIXPOINT_CHECK(sim::write_recording(disk, "recording.gt3x", scenario));
+  SIXPOINT_ASSIGN(recording, read_file(disk, "recording.gt3x", settings.unit.flash_bytes));
+  start = scenario.start;
+  return {};
+}
+
+Result<Bench> make_bench(Context& context, const Options& options) {
+  constexpr std::string_view kScheme = "virtual:";
+  std::string_view text = options.device;
+  if (text.starts_with(kScheme)) {
+    text.remove_prefix(kScheme.size());
+  }
+  const std::uint64_t seed = options.has_seed ? options.seed : context.env.seed;
+  SIXPOINT_ASSIGN(mocks::VirtualSettings first, mocks::parse_virtual_settings(text, seed));
+  Bytes recording;
+  UtcTime start{};
+  if (!options.scenario.empty()) {
+    SIXPOINT_CHECK(apply_scenario(context, options.scenario, first, recording, start));
+  }
+
+  mocks::FaultPlan plan;
+  const std::string& plan_file = options.faults.empty() ? first.faults_file : options.faults;
+  if (!plan_file.empty()) {
+    SIXPOINT_ASSIGN(plan, mocks::read_fault_plan(context.env.files, plan_file));
+  }
+
+  Bench bench;
+  const auto clock = device::borrow_clock(context.env.clock);
+  std::set<std::string> serials;
+  std::uint64_t next_seed = first.unit.seed;
+  for (int i = 0; i < options.count; ++i) {
+    mocks::VirtualUnitOptions unit = first.unit;
+    if (i > 0) {
+      // The others are units of their own, by the seeds that follow; no two of one serial number.
+      sim::UnitWishes wishes;
+      wishes.firmware = first.unit.truth.firmware;
+      do {
+        unit.seed = ++next_seed;
+        unit.truth = sim::draw_unit(unit.seed, wishes);
+      } while (!serials.insert(unit.truth.serial).second);
+    } else {
+      serials.insert(unit.truth.serial);
+    }
+    bench.units.push_back(unit.truth);
+    auto plugged = std::make_shared<mocks::PluggedUnit>(std::move(unit),
+                                                        i == 0 ? plan : mocks::FaultPlan{}, clock);
+    if (i == 0 && !recording.empty()) {
+      SIXPOINT_CHECK(plugged->unit.keep_recording(std::move(recording), start));
+    }
+    bench.devices.push_back(std::make_shared<mocks::UsbUnit>(std::move(plugged)));
+  }
+  return bench;
+}
+
+void tell(Context& context, const Options& options, const Bench& bench, std::uint16_t port) {
+  if (options.json) {
+    Json json = document("virtual");
+    json["usbip"] = {{"host", "127.0.0.1"}, {"port", port}};
+    json["devices"] = Json::array();
+    for (std::size_t i = 0; i < bench.units.size(); ++i) {
+      json["devices"].push_back({{"busid", fmt::format("1-{}", i + 1)},
+                                 {"kind", "unit"},
+                                 {"serial", bench.units[i].serial},
+                                 {"firmware", bench.units[i].firmware},
+                                 {"vendor_id", fmt::format("{:04x}", device::kUsbVendorId)},
+                                 {"product_id", fmt::format("{:04x}", device::kMonitorProductId)}});
+    }
+    print_json(context, json);
+  } else {
+    for (std::size_t i = 0; i < bench.units.size(); ++i) {
+      context.out << fmt::format("1-{}  unit {}  firmware {}\n", i + 1, bench.units[i].serial,
+                                 bench.units[i].firmware);
+    }
+    context.out << fmt::format("listening on 127.0.0.1:{}\n", port);
+  }
+  context.out << std::flush;
+  const std::string tcp_port = port == 3240 ? "" : fmt::format("--tcp-port {} ", port);
+  context.people << fmt::format(
+      "Attach as root:  modprobe vhci-hcd && usbip {}attach -r 127.0.0.1 -b 1-1\n"
+      "Stop with Ctrl-C.\n",
+      tcp_port);
+  context.people << std::flush;
+}
+
+Status serve(Context& context, const Options& options) {
+  if (options.jig) {
+    return fail(ErrorCode::usage, "a virtual jig cannot be offered over USB/IP yet", "--jig",
+                "turn a unit with 'sixpoint jig --device virtual:seed=7,jig=auto'");
+  }
+  SIXPOINT_ASSIGN(const Bench bench, make_bench(context, options));
+  mocks::UsbipServerOptions how;
+  how.port = static_cast<std::uint16_t>(options.port);
+  SIXPOINT_ASSIGN(const auto server, mocks::UsbipServer::listen(bench.devices, how));
+
+  // The signals wait for sigwait() below, in every thread that is started from here.
+  sigset_t signals;
+  sigset_t before;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, &before);
+  Status status;
+  std::thread serving([&] {
+    status = server->run();
+    if (!status) {
+      ::kill(::getpid(), SIGTERM);
+    }
+  });
+  tell(context, options, bench, server->port());
+  int signal = 0;
+  sigwait(&signals, &signal);
+  server->stop();
+  serving.join();
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  return status;
+}
+
+}  // namespace
+
+void add_virtual(CLI::App& app, Context& context) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("virtual", "offer virtual units over USB/IP until Ctrl-C");
+  command
+      ->add_option("--usbip", options->port,
+                   "TCP port on 127.0.0.1; 0 = any that is free (it is printed)")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  command->add_option("--count", options->count, "how many units: bus ids 1-1, 1-2 ...")
+      ->check(CLI::Range(1, kMostUnits))
+      ->capture_default_str();
+  command->add_option("--scenario", options->scenario,
+                      "the first unit is this scenario's, with its recording (docs/scenario.md)");
+  auto* seed = command->add_option("--seed", options->seed, "what is not given is drawn from it");
+  command->add_option("--device", options->device,
+                      "settings of the first unit: virtual:... (docs/virtual.md)");
+  command->add_flag("--jig", options->jig, "offer a virtual jig that turns the first unit, too");
+  command->add_option("--faults", options->faults,
+                      "what goes wrong with the first unit, and when (docs/faults.md)");
+  command->add_flag("--json", options->json, "what is offered, as JSON");
+  command->callback([options, seed, &context] {
+    options->has_seed = seed->count() > 0;
+    if (const Status status = serve(context, *options); !status) {
+      report_error(context, "virtual", status.error(), options->json);
+    }
+  });
+}
+
+}  // namespace sixpoint::cli

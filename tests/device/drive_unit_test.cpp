@@ -1,0 +1,89 @@
+#include "device/drive/drive_unit.h"
+
+#include <gmock/gmock.h>
+
+#include "base/atomic_file.h"
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "gt3x/recording.h"
+#include "mocks/virtual_drive.h"
+
+namespace sixpoint::device {
+namespace {
+
+using testing::HasSubstr;
+
+struct Bench {
+  Bench() {
+    options.unit.truth = sim::draw_unit(7);
+    EXPECT_OK(mocks::make_virtual_drive(memory.files, "usb", options));
+    registry.emplace(TransportRegistry());
+    register_drive(*registry);
+  }
+  MemoryEnv memory;
+  mocks::VirtualDriveOptions options;
+  std::optional<UnitRegistry> registry;
+};
+
+TEST(DriveUnit, SaysWhoItIsAndHandsOutItsRecording) {
+  Bench bench;
+  const auto unit = bench.registry->open("drive:usb/", bench.memory.env);
+  ASSERT_OK(unit);
+  EXPECT_EQ((*unit)->identity().serial, bench.options.unit.truth.serial);
+  EXPECT_EQ((*unit)->identity().firmware, bench.options.unit.truth.firmware);
+  EXPECT_FALSE((*unit)->abilities().streams);
+  EXPECT_TRUE((*unit)->abilities().offers_recordings);
+  const auto recordings = (*unit)->recordings();
+  ASSERT_OK(recordings);
+  ASSERT_EQ(recordings->size(), 1U);
+  ASSERT_OK((*unit)->download(recordings->front(), bench.memory.files, "r.gt3x"));
+  auto recording = gt3x::Recording::open(bench.memory.files, "r.gt3x");
+  ASSERT_OK(recording);
+  const auto log = recording->open_entry("log.bin");
+  ASSERT_OK(log);
+  EXPECT_EQ(*gt3x::read_all(**log, 1U << 30U), *read_file(bench.memory.files, "usb/log.bin"))
+      << "byte for byte";
+  EXPECT_FAILS((*unit)->download(recordings->front(), bench.memory.files, "r.gt3x"),
+               ErrorCode::cannot_create);
+}
+
+TEST(DriveUnit, WhatItCannotDoIsUsage) {
+  Bench bench;
+  const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
+  EXPECT_FAILS(unit->start_stream(100), ErrorCode::usage);
+  EXPECT_FAILS(unit->read_calibration(), ErrorCode::usage);
+  EXPECT_FAILS(unit->write_calibration({}), ErrorCode::usage);
+  EXPECT_FAILS(unit->set_filter(FilterConfiguration::current), ErrorCode::usage);
+  EXPECT_FAILS(unit->start_recording(30, {}), ErrorCode::usage);
+}
+
+TEST(DriveUnit, RefusesWhatIsNoUnit) {
+  Bench bench;
+  const auto open = [&](const char* address) {
+    return bench.registry->open(address, bench.memory.env);
+  };
+  EXPECT_FAILS(open("drive:nowhere"), ErrorCode::no_input);
+  ASSERT_OK(bench.memory.files.make_folders("empty"));
+  EXPECT_FAILS(open("drive:empty"), ErrorCode::bad_data);
+  ASSERT_OK(write_file(bench.memory.files, "empty/info.txt", "Serial Number: \x01\x02\r\n"));
+  ASSERT_OK(write_file(bench.memory.files, "empty/log.bin", ""));
+  EXPECT_FAILS(open("drive:empty"), ErrorCode::bad_data);
+}
+
+TEST(DriveUnit, AnotherUnitInItsPlaceIsNoticed) {
+  Bench bench;
+  const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
+  const auto recordings = *unit->recordings();
+  Bench other;
+  sim::UnitWishes wishes;
+  wishes.serial = "MOS2B99990001";
+  other.options.unit.truth = sim::draw_unit(8, wishes);
+  ASSERT_OK(mocks::make_virtual_drive(bench.memory.files, "usb", other.options));
+  const auto copied = unit->download(recordings.front(), bench.memory.files, "r.gt3x");
+  EXPECT_FAILS(copied, ErrorCode::device_unavailable);
+  EXPECT_THAT(copied.error().what, HasSubstr("is now MOS2B99990001"));
+  EXPECT_FALSE(bench.memory.files.info("r.gt3x")) << "nothing wrong is kept";
+}
+
+}  // namespace
+}  // namespace sixpoint::device

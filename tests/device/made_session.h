@@ -1,0 +1,30 @@
+// A session that a virtual unit made: identified, constants read, streamed for a while.
+#pragma once
+
+#include "base/memory_env.h"
+#include "device/session_recorder.h"
+#include "device/unit.h"
+#include "expect_result.h"
+#include "mocks/in_process.h"
+
+namespace sixpoint::tests {
+
+inline device::Session made_session(int blocks = 20) {
+  mocks::VirtualUnitOptions options;
+  options.truth = sim::draw_unit(7);
+  device::Link link = mocks::link_to(
+      std::make_shared<mocks::PluggedUnit>(options, std::make_shared<ManualClock>()), false);
+  link.address = "virtual:seed=7";
+  device::SessionRecorder recorder;
+  recorder.attach(link);
+  const auto unit = *device::Unit::open(std::move(link));
+  EXPECT_OK(unit->read_calibration());
+  EXPECT_OK(unit->start_stream(100));
+  for (int i = 0; i < blocks; ++i) {
+    EXPECT_OK(unit->next_samples(std::chrono::seconds(1)));
+  }
+  EXPECT_OK(unit->stop_stream());
+  return recorder.session();
+}
+
+}  // namespace sixpoint::tests

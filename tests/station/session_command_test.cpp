@@ -1,0 +1,136 @@
+// --record, replay: and `sixpoint session` through the program.
+#include <fstream>
+
+#include <gmock/gmock.h>
+
+#include "device/session.h"
+#include "expect_result.h"
+#include "run_command.h"
+#include "station/session_minimiser.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::HasSubstr;
+
+class SessionCommand : public testing::Test {
+ protected:
+  std::string path(const std::string& name) { return folder_ / name; }
+  tests::Answer run(const std::vector<std::string>& arguments) {
+    return tests::run_command(posix_env(), arguments);
+  }
+  tests::Answer jig(const std::string& device, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"jig",     "--device",   device,
+                                          "--store", path("s.db"), "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  tests::TemporaryFolder folder_;
+};
+
+// Oracle: the run that was recorded.
+TEST_F(SessionCommand, AReplayedJigRunGivesTheSameConstants) {
+  for (const bool write : {false, true}) {
+    const std::string file = path(write ? "w.zip" : "r.zip");
+    std::vector<std::string> more;
+    if (write) {
+      more.emplace_back("--write");
+    }
+    auto recording = more;
+    recording.insert(recording.end(), {"--record", file});
+    const auto first = jig("virtual:seed=7,jig=auto", recording);
+    ASSERT_EQ(first.exit_code, 0) << first.people;
+    const auto again = jig("replay:" + file, more);
+    EXPECT_EQ(again.exit_code, 0) << again.people;
+    for (const char* key : {"serial", "constants", "poses", "verification", "as_found"}) {
+      EXPECT_EQ(again.json()[key], first.json()[key]) << key;
+    }
+    EXPECT_EQ(jig("replay:" + file + ",match=key", more).json()["constants"],
+              first.json()["constants"]);
+  }
+  EXPECT_EQ(jig("replay:" + path("r.zip"), {"--write"}).exit_code, 69)
+      << "the recording ends before the write";
+}
+
+TEST_F(SessionCommand, AReplayedCaptureGivesTheSameFile) {
+  const auto capture = [&](const std::string& device, const std::string& output,
+                           const std::string& record) {
+    std::vector<std::string> arguments = {"capture",    "--device", device,      "--store",
+                                          path("s.db"), "-o",       path(output)};
+    if (!record.empty()) {
+      arguments.insert(arguments.end(), {"--record", path(record)});
+    }
+    return run(arguments).exit_code;
+  };
+  ASSERT_EQ(capture("virtual:seed=7,jig=auto", "a.gt3x", "c.zip"), 0);
+  ASSERT_EQ(capture("replay:" + path("c.zip"), "b.gt3x", ""), 0);
+  EXPECT_EQ(*read_file(posix_env().files, path("a.gt3x")),
+            *read_file(posix_env().files, path("b.gt3x")));
+}
+
+// What goes wrong is in the session too, and goes wrong again.
+TEST_F(SessionCommand, AFailedRunIsReplayedAsItFailed) {
+  std::ofstream(path("f.json"))
+      << R"({"schema": "sixpoint/faults/1", "faults": [{"fault": "unplug", "at_s": 25}]})";
+  const auto first =
+      jig("virtual:seed=7,jig=auto,faults=" + path("f.json"), {"--record", path("f.zip")});
+  EXPECT_EQ(first.exit_code, 69);
+  const auto again = jig("replay:" + path("f.zip"));
+  EXPECT_EQ(again.exit_code, 69) << again.people;
+  EXPECT_EQ(again.json()["poses"], first.json()["poses"]);
+  EXPECT_EQ(again.json()["error"]["what"], first.json()["error"]["what"]);
+}
+
+TEST_F(SessionCommand, ATamperedSessionIsAClearError) {
+  ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--record", path("r.zip")}).exit_code, 0);
+  auto session = *device::read_session(posix_env().files, path("r.zip"));
+  // Changed with a right hash: the protocol notices, for the request is no answer's any more.
+  for (device::SessionTransfer& transfer : session.transfers) {
+    if (transfer.kind == device::SessionTransfer::Kind::to_device && transfer.bytes[4] == 2) {
+      transfer.bytes[10] ^= 1;
+      break;
+    }
+  }
+  ASSERT_OK(device::write_session(posix_env().files, path("t.zip"), session));
+  const auto answer = jig("replay:" + path("t.zip"));
+  EXPECT_EQ(answer.exit_code, 65);
+  EXPECT_THAT(answer.people, HasSubstr("the program sends 'read_page' where the session has"));
+  // Changed in the file.
+  Bytes bytes = *read_file(posix_env().files, path("r.zip"));
+  bytes[bytes.size() / 2] ^= 1;
+  std::ofstream(path("u.zip"), std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
+  EXPECT_EQ(jig("replay:" + path("u.zip")).exit_code, 65);
+  EXPECT_EQ(jig("replay:" + path("none.zip")).exit_code, 66);
+  EXPECT_EQ(jig("replay:" + path("r.zip") + ",match=loosely").exit_code, 64);
+}
+
+// Oracle: the outcome of the whole session.
+TEST_F(SessionCommand, TheMinimiserKeepsTheOutcome) {
+  ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--record", path("r.zip")}).exit_code, 0);
+  const auto answer =
+      run({"session", "minimise", path("r.zip"), "-o", path("m.zip"), "--doing", "identify"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  const auto whole = *device::read_session(posix_env().files, path("r.zip"));
+  const auto small = *device::read_session(posix_env().files, path("m.zip"));
+  EXPECT_EQ(small.transfers.size(), 2U) << "one request, one reply";
+  EXPECT_EQ(station::outcome_of(small, station::SessionWork::identify),
+            station::outcome_of(whole, station::SessionWork::identify));
+  const auto show = run({"session", "show", path("m.zip"), "--json"});
+  EXPECT_EQ(show.json()["transfers"], 2);
+  EXPECT_EQ(show.json()["requests"]["identify"], 1);
+  EXPECT_EQ(run({"session", "minimise", path("r.zip"), "-o", path("n.zip"), "--doing", "dance"})
+                .exit_code,
+            64);
+}
+
+TEST_F(SessionCommand, FromPcapRefusesWhatIsNoCapture) {
+  std::ofstream(path("x.pcap")) << "no capture at all, but longer than a header";
+  EXPECT_EQ(run({"session", "from-pcap", path("x.pcap"), "-o", path("x.zip")}).exit_code, 65);
+  EXPECT_EQ(run({"session", "from-pcap", path("none"), "-o", path("x.zip")}).exit_code, 66);
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

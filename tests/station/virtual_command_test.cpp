@@ -1,0 +1,205 @@
+// sixpoint virtual by its contract: the program as a child, a USB/IP client of the tests' own.
+#include <csignal>
+#include <fstream>
+#include <set>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "mocks/usbip_client.h"
+#include "run_command.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::HasSubstr;
+using Json = nlohmann::json;
+using tests::UsbipClient;
+using Data = UsbipClient::Data;
+
+// `sixpoint virtual ARGUMENTS --json`, up to its document.
+class Served {
+ public:
+  explicit Served(std::vector<std::string> arguments) {
+    std::array<int, 2> ends{};
+    if (::pipe(ends.data()) != 0) {
+      throw std::runtime_error("no pipe");
+    }
+    child_ = ::fork();
+    if (child_ == 0) {
+      ::dup2(ends[1], STDOUT_FILENO);
+      ::close(ends[0]);
+      ::close(ends[1]);
+      arguments.insert(arguments.begin(), {SIXPOINT_PROGRAM, "virtual", "--usbip", "0", "--json"});
+      std::vector<char*> argv;
+      for (std::string& argument : arguments) {
+        argv.push_back(argument.data());
+      }
+      argv.push_back(nullptr);
+      ::execv(SIXPOINT_PROGRAM, argv.data());
+      ::_exit(127);
+    }
+    ::close(ends[1]);
+    out_ = ends[0];
+    std::string text;
+    std::array<char, 4096> part{};
+    while (document.is_null()) {
+      const auto count = ::read(out_, part.data(), part.size());
+      if (count <= 0) {
+        break;
+      }
+      text.append(part.data(), static_cast<std::size_t>(count));
+      if (Json::accept(text)) {
+        document = Json::parse(text);
+      }
+    }
+  }
+  Served(const Served&) = delete;
+  Served& operator=(const Served&) = delete;
+  ~Served() {
+    if (child_ > 0) {
+      stop(SIGTERM);
+    }
+    ::close(out_);
+  }
+  int stop(int signal) {
+    ::kill(child_, signal);
+    int status = 0;
+    ::waitpid(child_, &status, 0);
+    child_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  UsbipClient connect() const {
+    return UsbipClient(document["usbip"]["port"].get<std::uint16_t>());
+  }
+
+  Json document;
+
+ private:
+  pid_t child_ = -1;
+  int out_ = -1;
+};
+
+TEST(VirtualCommand, SaysWhatItServesAndServesIt) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    Served served({"--count", "3", "--device", "virtual:seed=7,serial=MOS2A45130007"});
+    ASSERT_TRUE(served.document.is_object());
+    EXPECT_EQ(served.document["schema"], "sixpoint/virtual/1");
+    EXPECT_EQ(served.document["usbip"]["host"], "127.0.0.1");
+    ASSERT_EQ(served.document["devices"].size(), 3U);
+    EXPECT_EQ(served.document["devices"][0]["serial"], "MOS2A45130007");
+    const auto devices = served.connect().list();
+    ASSERT_EQ(devices.size(), 3U);
+    std::set<std::string> serials;
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(devices[i].busid, served.document["devices"][i]["busid"]);
+      serials.insert(served.document["devices"][i]["serial"]);
+      auto client = served.connect();
+      ASSERT_EQ(client.import(devices[i].busid), 0U);
+      // The serial number of the descriptors is that of the document.
+      const Data text = client.control(0x80, 6, 0x0303, 0x0409, 255).data;
+      std::string serial;
+      for (std::size_t at = 2; at < text.size(); at += 2) {
+        serial += static_cast<char>(text[at]);
+      }
+      EXPECT_EQ(serial, served.document["devices"][i]["serial"]);
+    }
+    EXPECT_EQ(serials.size(), 3U);
+    EXPECT_EQ(served.stop(signal), 0);
+  }
+}
+
+TEST(VirtualCommand, TheSameSeedIsTheSameBench) {
+  const auto serials = [](const std::string& seed) {
+    Served served({"--count", "4", "--seed", seed});
+    return served.document["devices"].dump();
+  };
+  EXPECT_EQ(serials("5"), serials("5"));
+  EXPECT_NE(serials("5"), serials("6"));
+}
+
+// The oracle is the recording that `simulate` makes of the same scenario: info.txt and log.bin are
+// in it as they are (entries are stored).
+TEST(VirtualCommand, TheScenariosRecordingIsOnTheVolume) {
+  const tests::TemporaryFolder folder;
+  const std::string scenario = folder / "S.json";
+  std::ofstream(scenario) << R"({"schema": "sixpoint/scenario/1", "seed": 1,
+    "unit": {"serial": "MOS2A45130007"},
+    "motions": [{"kind": "still", "duration_s": 20, "pose": "+z"}]})";
+  const std::string file = folder / "S.gt3x";
+  ASSERT_EQ(
+      tests::run_command(posix_env(), {"simulate", "--scenario", scenario, "-o", file}).exit_code,
+      0);
+  const auto recording = read_file(posix_env().files, file);
+
+  Served served({"--scenario", scenario});
+  EXPECT_EQ(served.document["devices"][0]["serial"], "MOS2A45130007");
+  auto client = served.connect();
+  ASSERT_EQ(client.import("1-1"), 0U);
+  const auto read = [&client](std::uint32_t block, std::uint8_t count) {
+    Data command = {'U', 'S', 'B',  'C', 1,  0,    0, 0, 0, static_cast<std::uint8_t>(count * 2),
+                    0,   0,   0x80, 0,   10, 0x28, 0};
+    UsbipClient::put(command, block, 4);
+    command.insert(command.end(), {0, 0, count});
+    command.resize(31, 0);
+    client.out(3, command);
+    const Data data = client.in(3, std::uint32_t{count} * 512).data;
+    EXPECT_EQ(client.in(3, 13).data.back(), 0);
+    return data;
+  };
+  // A reader of FAT16 of its own: boot sector, root folder, chains of neighbours.
+  const Data boot = read(0, 1);
+  const auto little = [](const Data& bytes, std::size_t at, unsigned width) {
+    std::uint32_t value = 0;
+    while (width-- > 0) {
+      value = value << 8U | bytes.at(at + width);
+    }
+    return value;
+  };
+  const std::uint32_t root_block = little(boot, 14, 2) + boot[16] * little(boot, 22, 2);
+  const std::uint32_t data_block = root_block + little(boot, 17, 2) * 32 / 512;
+  const Data root = read(root_block, 1);
+  int found = 0;
+  for (std::size_t at = 0; at < root.size() && root[at] != 0; at += 32) {
+    const std::string name(root.begin() + static_cast<std::ptrdiff_t>(at),
+                           root.begin() + static_cast<std::ptrdiff_t>(at) + 11);
+    const std::uint32_t size = little(root, at + 28, 4);
+    if (name != "INFO    TXT" && name != "LOG     BIN") {
+      continue;
+    }
+    ++found;
+    const std::uint32_t first = data_block + (little(root, at + 26, 2) - 2) * boot[13];
+    Data content = read(first, static_cast<std::uint8_t>((size + 511) / 512));
+    content.resize(size);
+    EXPECT_NE(std::search(recording->begin(), recording->end(), content.begin(), content.end()),
+              recording->end())
+        << name;
+    EXPECT_GT(size, 300U);
+  }
+  EXPECT_EQ(found, 2);
+}
+
+TEST(VirtualCommand, RefusesWhatItCannotDo) {
+  const auto code = [](const std::vector<std::string>& arguments) {
+    return tests::run_command(posix_env(), arguments).exit_code;
+  };
+  EXPECT_EQ(code({"virtual", "--device", "virtual:shoe=1"}), 64);
+  EXPECT_EQ(code({"virtual", "--usbip", "70000"}), 64);
+  EXPECT_EQ(code({"virtual", "--count", "0"}), 64);
+  EXPECT_EQ(code({"virtual", "--scenario", "/nonexistent.json"}), 66);
+  const tests::TemporaryFolder folder;
+  std::ofstream(folder / "long.json") << R"({"schema": "sixpoint/scenario/1",
+    "motions": [{"kind": "free_living", "duration_s": 8000000}]})";
+  EXPECT_EQ(code({"virtual", "--scenario", folder / "long.json"}), 78);
+  Served served({});
+  const auto port = std::to_string(served.document["usbip"]["port"].get<int>());
+  const auto taken = tests::run_command(posix_env(), {"virtual", "--usbip", port});
+  EXPECT_EQ(taken.exit_code, 74);
+  EXPECT_THAT(taken.people, HasSubstr("127.0.0.1:" + port));
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

@@ -1,0 +1,2 @@
+# Fault plans under a real kernel.
+guest_tests --gtest_filter='Faults.*'

@@ -1,0 +1,37 @@
+# The program and Debian's usbip tool, as a person would use them.
+cd /tmp
+sixpoint virtual --count 2 --device virtual:seed=7,serial=MOS2A45130007 >offered 2>hints &
+server=$!
+for i in $(seq 100); do grep -q listening offered && break; sleep 0.1; done
+cat offered hints
+usbip list -r 127.0.0.1 2>/dev/null | tee listed
+[ "$(grep -c '1209:0001' listed)" -eq 2 ]
+
+echo "== attach both"
+usbip attach -r 127.0.0.1 -b 1-1
+usbip attach -r 127.0.0.1 -b 1-2
+for i in $(seq 100); do [ -e /dev/hidraw1 ] && [ -e /dev/sdb ] && break; sleep 0.1; done
+ls /dev/hidraw0 /dev/hidraw1
+grep -l MOS2A45130007 /sys/bus/usb/devices/*/serial
+
+echo "== the volume"
+disk=/dev/$(basename "$(ls -d /sys/bus/usb/devices/1-1:1.2/host*/target*/*/block/*)")
+mount -t vfat -o ro "$disk" /mnt
+ls -l /mnt
+grep -q 'Serial Number: MOS2A45130007' /mnt/info.txt
+[ -s /mnt/log.bin ]
+umount /mnt
+
+echo "== detach and attach again"
+usbip detach -p 0
+for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1 ] || break; sleep 0.1; done
+[ ! -e /sys/bus/usb/devices/1-1 ]
+for i in $(seq 100); do usbip attach -r 127.0.0.1 -b 1-1 2>/dev/null && break; sleep 0.1; done
+for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1/serial ] && break; sleep 0.1; done
+[ "$(cat /sys/bus/usb/devices/1-1/serial)" = MOS2A45130007 ]
+
+echo "== the program ends and takes its units along"
+kill -INT $server
+wait $server
+for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
+! ls /sys/bus/usb/devices | grep '^1-[1-9]'

@@ -1,0 +1,67 @@
+// What the USB tests need of a carrier: units that can be plugged in, pulled out and looked into.
+//
+// The bodies (bodies.h) run over umockdev, where the kernel is played, and in qemu, where it is
+// real. A carrier implements UsbBench; the units are virtual in both and live in the test's
+// process.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "mocks/in_process.h"
+#include "mocks/usb_unit.h"
+#include "sim/unit_truth.h"
+
+namespace sixpoint::tests {
+
+// The machine's time, with leaps: a recording of an hour must not take one.
+class LeapingClock final : public Clock {
+ public:
+  UtcTime now() override {
+    return posix_env().clock.now() + std::chrono::duration_cast<UtcTime::duration>(leap());
+  }
+  std::chrono::nanoseconds elapsed() override { return posix_env().clock.elapsed() + leap(); }
+  void sleep(std::chrono::nanoseconds duration) override { posix_env().clock.sleep(duration); }
+  void forward(std::chrono::nanoseconds duration) { leap_ns_ += duration.count(); }
+
+ private:
+  std::chrono::nanoseconds leap() const { return std::chrono::nanoseconds(leap_ns_.load()); }
+  std::atomic<std::int64_t> leap_ns_ = 0;
+};
+
+// A unit on the bench. Lock unit->mutex to look into unit->unit.
+struct BenchUnit {
+  std::string serial;
+  std::shared_ptr<LeapingClock> clock;
+  std::shared_ptr<mocks::PluggedUnit> unit;
+  std::shared_ptr<mocks::UsbUnit> device;
+  std::string port;  // as the kernel names the socket; empty while it is not plugged in
+
+  std::string hid_address() const { return "hid:" + serial; }
+  std::string usb_address() const { return "usb:" + serial; }
+};
+
+// Different seeds are different units.
+inline BenchUnit make_unit(std::uint64_t seed) {
+  mocks::VirtualUnitOptions options;
+  options.truth = sim::draw_unit(seed);
+  options.seed = seed;
+  BenchUnit unit;
+  unit.serial = options.truth.serial;
+  unit.clock = std::make_shared<LeapingClock>();
+  unit.unit = std::make_shared<mocks::PluggedUnit>(std::move(options), unit.clock);
+  unit.device = std::make_shared<mocks::UsbUnit>(unit.unit);
+  return unit;
+}
+
+class UsbBench {
+ public:
+  virtual ~UsbBench() = default;
+  // Sets unit.port. Into `port` where one is named; the kernel takes its time to find it.
+  virtual Status plug_in(BenchUnit& unit, const std::string& port = {}) = 0;
+  // Pulls the cable; clears unit.port.
+  virtual void unplug(BenchUnit& unit) = 0;
+};
+
+}  // namespace sixpoint::tests

@@ -1,0 +1,21 @@
+// The installed program as a child process, which finds the devices of umockdev's test bed because
+// it inherits the environment.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace sixpoint::tests {
+
+struct ChildAnswer {
+  int exit_code = -1;  // 128 and the signal, where one ended it
+  std::string out;
+  std::string people;
+};
+
+// Runs SIXPOINT_PROGRAM. `on_line` gets each line of stderr as it comes.
+ChildAnswer run_child(const std::vector<std::string>& arguments,
+                      const std::function<void(const std::string&)>& on_line = {});
+
+}  // namespace sixpoint::tests

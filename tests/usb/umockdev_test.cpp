@@ -1,0 +1,316 @@
+// The USB tests over umockdev, and what only this carrier can do: devices that misbehave, and the
+// installed program as a child process.
+#include <atomic>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "device/bulk_transport.h"
+#include "device/discovery.h"
+#include "device/hid_transport.h"
+#include "device/jig.h"
+#include "device/unit.h"
+#include "expect_result.h"
+#include "temporary_folder.h"
+#include "usb/bodies.h"
+#include "usb/child.h"
+#include "usb/umockdev_bench.h"
+
+namespace sixpoint::tests {
+namespace {
+
+using mocks::UsbAnswer;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+class Umockdev : public testing::TestWithParam<UsbBody> {};
+
+TEST_P(Umockdev, Body) {
+  auto bus = mocks::UmockdevBus::make();
+  ASSERT_OK(bus);
+  UmockdevBench bench(std::move(*bus));
+  GetParam().run(bench);
+}
+
+INSTANTIATE_TEST_SUITE_P(Usb, Umockdev, testing::ValuesIn(usb_bodies()),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+// A unit whose answers on endpoints a test may replace.
+class Wilful final : public mocks::UsbDevice {
+ public:
+  explicit Wilful(std::shared_ptr<mocks::UsbDevice> inner) : inner_(std::move(inner)) {}
+
+  const mocks::UsbDescriptors& descriptors() const override { return inner_->descriptors(); }
+  Clock& clock() override { return inner_->clock(); }
+  UsbAnswer control(const mocks::SetupPacket& setup, std::span<const std::uint8_t> data) override {
+    if (setup.request_type == 0x02 && setup.request == 1) {
+      ++cleared_halts;
+    }
+    return inner_->control(setup, data);
+  }
+  UsbAnswer out(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) override {
+    const auto own = on_out ? on_out(endpoint) : std::nullopt;
+    return own ? *own : inner_->out(endpoint, bytes);
+  }
+  UsbAnswer in(std::uint8_t endpoint, std::size_t max_length) override {
+    const auto own = on_in ? on_in(endpoint) : std::nullopt;
+    return own ? *own : inner_->in(endpoint, max_length);
+  }
+  std::optional<std::chrono::nanoseconds> next_due() const override { return inner_->next_due(); }
+  void bus_reset() override { inner_->bus_reset(); }
+  void unplug() override { inner_->unplug(); }
+  void plug_in() override { inner_->plug_in(); }
+  bool is_plugged() const override { return inner_->is_plugged(); }
+
+  // Called by the carrier's threads; set before the device is plugged in.
+  std::function<std::optional<UsbAnswer>(std::uint8_t)> on_out;
+  std::function<std::optional<UsbAnswer>(std::uint8_t)> on_in;
+  std::atomic<int> cleared_halts = 0;
+
+ private:
+  std::shared_ptr<mocks::UsbDevice> inner_;
+};
+
+class Misbehaving : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto made = mocks::UmockdevBus::make();
+    ASSERT_OK(made);
+    bus = std::move(*made);
+    unit = make_unit(7);
+    wilful = std::make_shared<Wilful>(unit.device);
+  }
+  // Plugs it in as it is set now.
+  Result<device::Link> open() {
+    SIXPOINT_ASSIGN(nodes, bus->plug_in(wilful));
+    device::TransportRegistry registry;
+    device::register_usb(registry);
+    return registry.open(unit.hid_address(), posix_env());
+  }
+
+  std::unique_ptr<mocks::UmockdevBus> bus;
+  BenchUnit unit;
+  std::shared_ptr<Wilful> wilful;
+  mocks::PluggedNodes nodes;
+};
+
+TEST_F(Misbehaving, AStalledBulkEndpointIsClearedAndTheDownloadGoesOn) {
+  std::atomic<int> stalls = 3;
+  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    const bool now = endpoint == device::kBulkInEndpoint && stalls > 0;
+    stalls -= now ? 1 : 0;
+    return now ? std::optional(UsbAnswer::stall()) : std::nullopt;
+  };
+  auto link = open();
+  ASSERT_OK(link);
+  Bytes buffer(device::kBulkBlockBytes);
+  const auto stalled = link->bulk->read(buffer, seconds(2));
+  EXPECT_FAILS(stalled, ErrorCode::io);
+  EXPECT_NE(stalled.error().what.find("stalled"), std::string::npos) << stalled.error().brief();
+  EXPECT_GE(wilful->cleared_halts, 1);
+  stalls = 2;
+  device::UnitOptions options;
+  options.reply_time_out = seconds(5);
+  auto opened = device::Unit::open(std::move(*link), options);
+  ASSERT_OK(opened);
+  ASSERT_OK((*opened)->start_recording(100, from_unix_seconds(1'500'000'000)));
+  unit.clock->forward(seconds(600));
+  ASSERT_OK((*opened)->stop_recording());
+  const auto list = (*opened)->recordings();
+  ASSERT_OK(list);
+  TemporaryFolder folder;
+  ASSERT_OK((*opened)->download(list->front(), posix_env().files, folder / "x.gt3x"));
+  EXPECT_EQ(sha256(*read_file(posix_env().files, folder / "x.gt3x")), list->front().sha256);
+  EXPECT_EQ(stalls, 0);
+}
+
+TEST_F(Misbehaving, AStalledReportIsAnIoError) {
+  wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::stall()) : std::nullopt;
+  };
+  auto link = open();
+  ASSERT_OK(link);
+  EXPECT_FAILS(link->reports->write(Bytes(64), seconds(1)), ErrorCode::io);
+}
+
+// A device that takes no report holds a hidraw write for five seconds; the program does not wait.
+TEST_F(Misbehaving, ADeviceThatTakesNothingHoldsNobody) {
+  wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::nothing_yet())
+                                               : std::nullopt;
+  };
+  auto link = open();
+  ASSERT_OK(link);
+  EXPECT_FAILS(link->reports->write(Bytes(64), milliseconds(50)), ErrorCode::io);
+  EXPECT_FAILS(link->reports->write(Bytes(64), milliseconds(50)), ErrorCode::io);
+  *link = {};  // ends although the kernel still has the first
+}
+
+TEST_F(Misbehaving, ATransferLongerThanAnyBlockIsBadData) {
+  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    return endpoint == device::kBulkInEndpoint
+               ? std::optional(UsbAnswer::done(Bytes(device::kBulkBlockBytes + 200)))
+               : std::nullopt;
+  };
+  auto link = open();
+  ASSERT_OK(link);
+  Bytes buffer(device::kBulkBlockBytes);
+  EXPECT_FAILS(link->bulk->read(buffer, seconds(2)), ErrorCode::bad_data);
+}
+
+TEST_F(Misbehaving, GarbageOnReportsIsCountedAndSurvived) {
+  std::atomic<int> garbage = 5;
+  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    const bool now = endpoint == device::kHidInEndpoint && garbage > 0;
+    garbage -= now ? 1 : 0;
+    return now ? std::optional(UsbAnswer::done(Bytes(garbage % 2 == 0 ? 64 : 3, 0xA5)))
+               : std::nullopt;
+  };
+  auto link = open();
+  ASSERT_OK(link);
+  auto opened = device::Unit::open(std::move(*link));
+  ASSERT_OK(opened);
+  EXPECT_EQ((*opened)->identity().serial, unit.serial);
+  EXPECT_EQ((*opened)->stream_statistics().damaged_reports, 5U);
+}
+
+// Reports of a unit that nobody answers fill the queue, and no more than that.
+TEST_F(Misbehaving, AFloodFillsTheQueueAndNothingElse) {
+  std::atomic<int> flood = 60;
+  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    if (endpoint != device::kHidInEndpoint) {
+      return std::nullopt;
+    }
+    return flood-- > 0 ? UsbAnswer::done(Bytes(64, 1)) : UsbAnswer::nothing_yet();
+  };
+  ASSERT_OK(bus->plug_in(wilful));
+  const auto found = device::attached_devices();
+  ASSERT_OK(found);
+  ASSERT_EQ(found->size(), 1U);
+  device::HidTransportOptions options;
+  options.waiting_reports = 10;
+  auto reports = device::open_hid_transport(found->front().hidraw_node, options);
+  ASSERT_OK(reports);
+  while (flood > 0) {
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  std::this_thread::sleep_for(milliseconds(100));
+  Bytes buffer(device::kReportBytes);
+  int count = 0;
+  while ((*reports)->read(buffer, milliseconds(100)).value_or(0) == device::kReportBytes) {
+    ++count;
+  }
+  EXPECT_EQ(count, 10);
+}
+
+class Program : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto bus = mocks::UmockdevBus::make();
+    ASSERT_OK(bus);
+    bench = std::make_unique<UmockdevBench>(std::move(*bus));
+  }
+  std::unique_ptr<UmockdevBench> bench;
+};
+
+TEST_F(Program, ListsWhatIsPluggedIn) {
+  auto a = make_unit(1);
+  auto b = make_unit(2);
+  ASSERT_OK(bench->plug_in(a));
+  ASSERT_OK(bench->plug_in(b));
+  const ChildAnswer answer = run_child({"devices", "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  const auto json = nlohmann::json::parse(answer.out);
+  EXPECT_EQ(json["schema"], "sixpoint/devices/1");
+  ASSERT_EQ(json["devices"].size(), 2U);
+  EXPECT_EQ(json["devices"][0]["address"], a.hid_address());
+  EXPECT_EQ(json["devices"][0]["port"], "1-1");
+  EXPECT_EQ(json["devices"][1]["serial"], b.serial);
+  EXPECT_EQ(json["devices"][1]["model"], "wgt3x-bt-bench-unit");
+  EXPECT_EQ(json["devices"][1]["accessible"], true);
+  bench->unplug(a);
+  EXPECT_EQ(run_child({"devices"}).out.find(a.serial), std::string::npos);
+  const ChildAnswer doctor = run_child({"doctor", "--json"});
+  EXPECT_NE(doctor.out.find("1 of our devices plugged in"), std::string::npos) << doctor.out;
+}
+
+TEST_F(Program, SaysWhichSerialsThereAre) {
+  auto unit = make_unit(1);
+  ASSERT_OK(bench->plug_in(unit));
+  const ChildAnswer answer = run_child({"jig", "--device", "hid:NOBODY"});
+  EXPECT_EQ(answer.exit_code, 69);
+  EXPECT_NE(answer.people.find(unit.serial), std::string::npos) << answer.people;
+}
+
+// Turns the unit as the program's prompts say, as a technician would.
+class Technician {
+ public:
+  explicit Technician(BenchUnit& unit) : unit_(unit) {}
+  void hear(const std::string& line) {
+    constexpr std::string_view kPrompt = "turn the unit to ";
+    if (!line.starts_with(kPrompt)) {
+      return;
+    }
+    const auto pose = device::parse_pose(line.substr(kPrompt.size(), 2));
+    ASSERT_OK(pose);
+    const auto up = device::direction_of(*pose);
+    const std::lock_guard lock(unit_.unit->mutex);
+    unit_.unit->unit.turn_to({up[0], up[1], up[2]}, unit_.clock->elapsed(), 0.3);
+    ++turns;
+  }
+  int turns = 0;
+
+ private:
+  BenchUnit& unit_;
+};
+
+TEST_F(Program, MeasuresAUnitOnTheJigAndWritesItsConstants) {
+  auto unit = make_unit(5);
+  ASSERT_OK(bench->plug_in(unit));
+  TemporaryFolder folder;
+  Technician technician(unit);
+  const ChildAnswer answer =
+      run_child({"jig", "--device", unit.hid_address(), "--jig", "manual", "--filter", "current",
+                 "--dwell", "0.5", "--write", "--json", "--store", folder / "store.db"},
+                [&](const std::string& line) { technician.hear(line); });
+  ASSERT_EQ(answer.exit_code, 0) << answer.people << answer.out;
+  EXPECT_GE(technician.turns, 11) << "six faces, three to verify, two after writing";
+  const auto json = nlohmann::json::parse(answer.out);
+  EXPECT_EQ(json["serial"], unit.serial);
+  EXPECT_EQ(json["verdict"], "pass");
+  EXPECT_EQ(json["stream"]["lost_samples"], 0);
+  EXPECT_FALSE(json["stored_id"].is_null());
+  // Oracle: what the simulated sensor really is. 0.7 % and 2 LSB: half a second of noise per pose.
+  const std::lock_guard lock(unit.unit->mutex);
+  const auto& truth = unit.unit->unit.truth();
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    EXPECT_NEAR(json["constants"]["sensitivity_g_per_lsb"][axis].get<double>() *
+                    truth.current.sensitivity_lsb_per_g[axis],
+                1, 0.007);
+    EXPECT_NEAR(json["constants"]["zero_lsb"][axis].get<double>(), truth.current.zero_lsb[axis], 2);
+  }
+  const auto page = device::decode_calibration_page(*unit.unit->unit.memory().read());
+  ASSERT_OK(page);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    EXPECT_EQ(json["constants"]["zero_lsb"].size(), kAxes);
+    EXPECT_NEAR(page->constants.zero_lsb[axis], truth.current.zero_lsb[axis], 3);
+  }
+}
+
+TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
+  auto unit = make_unit(6);
+  ASSERT_OK(bench->plug_in(unit));
+  TemporaryFolder folder;
+  const ChildAnswer answer = run_child(
+      {"jig", "--device", unit.usb_address(), "--jig", "manual", "--store", folder / "store.db"},
+      [&](const std::string& line) {
+        if (line.starts_with("turn the unit") && !unit.port.empty()) {
+          bench->unplug(unit);
+        }
+      });
+  EXPECT_EQ(answer.exit_code, 69) << answer.people;
+  EXPECT_NE(answer.people.find("plug it in again"), std::string::npos) << answer.people;
+}
+
+}  // namespace
+}  // namespace sixpoint::tests
