@@ -155,13 +155,13 @@ void Session::keep_raw(const device::SampleBlock& block) {
 
 // Waits for the unit and goes on with it. Ends the run when it does not come back.
 Status Session::come_back(JigRun& run, const Error& error) {
+  report_.stream = unit_->stream_statistics();  // reopen() lets go of the unit
   lost_before_ += unit_->stream_statistics().lost_samples;
   clock_jumps_before_ += unit_->stream_statistics().clock_jumps;
   clock_jumped_before_s_ += unit_->stream_statistics().clock_jumped_s;
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error);
     if (!again) {
-      report_.stream = unit_->stream_statistics();
       unit_ = nullptr;  // whoever kept them let go of them
       jig_ = nullptr;
     }
