@@ -89,14 +89,20 @@ const scenarios = {
 
   // A slip of each kind is refused with its reason, and the run ends well all the same.
   async slips() {
-    const station = await h.station(['virtual:seed=11,pace=10']);
+    const station = await h.station(['virtual:seed=11,pace=5']);
     const page = await h.open(station.url);
     const hand = (name) => page.locator('.hand').getByRole('button', { name, exact: true }).click();
     await start(page);
     await h.place(page, 3);
-    await h.turnAsAsked(page);
-    await page.locator('.still-dwelling').waitFor();
-    await hand('Knock');
+    // Knocked while it is measured. On a busy machine the knock may come when the pose is taken: then again.
+    await until('a knock in mid-reading', async () => {
+      const before = await h.taken(page);
+      await h.turnAsAsked(page);
+      await page.locator('.still-dwelling').waitFor();
+      await hand('Knock');
+      await until('it is decided', async () => (await h.taken(page)) > before || (await page.locator('.refusal', { hasText: 'moved during' }).isVisible()));
+      return (await h.taken(page)) === before;
+    });
     await refusal(page, 'moved during the reading');
     await h.shot(page, 'slips-1-moved');
     await h.axe(page);
@@ -110,8 +116,9 @@ const scenarios = {
     await refusal(page, /Not taken: tilted \d+\.\d degrees/);
     await h.shot(page, 'slips-3-tilted');
     await h.place(page, 5);
+    const placements = await h.taken(page);
     await button(page, 'Undo the last one (Backspace)').click();
-    await until('undone', async () => (await h.taken(page)) === 4);
+    await until('undone', async () => (await h.taken(page)) === placements - 1);
     await h.place(page, 13);
     // One of two is left to be put back: another face is the wrong one.
     const wanted = (await prompt(page)).match(/[+−][XYZ]/)[0];
@@ -305,7 +312,7 @@ const scenarios = {
     const pdf = await fetched('Certificate (PDF)');
     check(pdf.subarray(0, 5).toString() === '%PDF-' && pdf.length > 5000, 'a PDF comes');
     const json = JSON.parse((await fetched('Certificate (JSON)')).toString());
-    check(json.serial === 'MOS2A45130015' && json.operator === 'Ada', `it is this unit's: ${json.serial}, ${json.operator}`);
+    check(json.unit.serial === 'MOS2A45130015' && json.operator === 'Ada', `it is this unit's and this operator's: ${json.operator}`);
     const label = (await fetched('Label (ZPL)')).toString();
     check(label.includes('^XA') && label.includes('MOS2A45130015'), 'a label comes after the read-back');
     const report = JSON.parse((await fetched('Report (JSON)')).toString());

@@ -111,13 +111,17 @@ class Station {
   std::vector<std::string> operators;
   bool store_is_away = false;
   mocks::VirtualBench bench;
+
+ private:
+  device::TransportRegistry registry_;  // the lanes' threads use it
+
+ public:
   std::unique_ptr<Lanes> lanes;
   std::unique_ptr<RepairJob> repairs;
   std::unique_ptr<Api> api;
   std::unique_ptr<Server> server;
 
  private:
-  device::TransportRegistry registry_;
   std::thread thread_;
 };
 
