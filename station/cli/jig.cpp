@@ -253,7 +253,7 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
   station::complete_run_record(record, done.report, options.study);
-  station::StoredRun stored;
+  station::RunIds stored;
   done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
     SIXPOINT_ASSIGN(stored, station::add_run_records(keeper, done.report, record));
     return {};
