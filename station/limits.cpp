@@ -30,6 +30,10 @@ const std::vector<QuantityInfo>& quantities() {
        "0.80 to 0.95 that the filter configurations differ by"},
       {"zero_offset_mg", "Zero offset", "mg", -700, 700, -8000, 8000, "zero_low", "zero_high",
        "half a g of the sensor with its housing, and 0.2 g that the filter configuration adds"},
+      {"midpoint_minus_zero_mg", "Midpoint of +1 g, -1 g minus zero", "mg", -45, 45, -1000, 1000,
+       "midpoint_off", "midpoint_off",
+       "real units show up to 7.5 counts, 29 mg, and half of that again; beyond it the sensor is "
+       "curved or the case's sides lean the same way by more than 2.6 degrees"},
       {"noise_mg", "Noise of a sample", "mg", std::nullopt, 10, 0, 1000, "", "noise_high",
        "5.5 mg on the noisiest axis of good units at 100 Hz; what is above trembles or is broken"},
       {"cross_axis_percent", "Cross-axis sensitivity", "%", -5, 5, -100, 100, "cross_axis",

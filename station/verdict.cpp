@@ -130,6 +130,11 @@ const std::vector<FailureCode>& failure_codes() {
        "Repeat once after ten minutes on the bench. If it stays, send the unit to repair."},
       {"zero_high", "zero offset is too far above zero", "a shock bent the sensor, or water got in",
        "Repeat once after ten minutes on the bench. If it stays, send the unit to repair."},
+      {"midpoint_off",
+       "the midpoint of +1 g and -1 g is not where the axis reads when it lies level",
+       "the sensor's response is curved, the case or a seat leans, or the unit was seated badly",
+       "Clean the seats of jig and unit, look whether the case is whole, repeat. If it stays, send "
+       "the unit to repair."},
       {"noise_high", "samples scatter too much while the unit lies still",
        "the bench trembles, the unit is loose on the jig, or the sensor is broken",
        "Stop what shakes the bench, seat the unit anew and repeat."},
@@ -311,6 +316,32 @@ std::vector<JudgedQuantity> quantities_from_json(const nlohmann::ordered_json& j
 
 // --- the budget (docs/verdicts.md has it in words) ---
 
+namespace {
+
+// Scatter of one level reading, standard deviation. An axis lies level in two pairs of opposite
+// poses; a sensor askew in its case cancels within a pair and curvature touches neither, so what
+// the means of the two pairs differ by is seating and draft angle. Their variance is that of one
+// reading: 2 / 4 + 2 / 4. One degree of freedom per axis.
+double level_scatter_mg(const JigReport& report) {
+  double square = 0;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    double difference_lsb = 0;
+    for (const PoseReading& face : report.faces) {
+      const calib::NearestSide nearest = calib::nearest_side(device::direction_of(face.pose));
+      const std::size_t upright = nearest.side / 2;
+      if (upright != axis) {
+        difference_lsb += (upright == (axis + 1) % kAxes ? 0.5 : -0.5) * face.mean_lsb[axis];
+      }
+    }
+    const double mg =
+        kMgPerG * difference_lsb * report.six->best().calibration.sensitivity_g_per_lsb[axis];
+    square += mg * mg / kAxes;
+  }
+  return std::sqrt(square);
+}
+
+}  // namespace
+
 std::vector<Measured> measured_quantities(const JigReport& report) {
   if (!report.six || !report.six->missing_directions.empty() || report.faces.empty()) {
     return {};
@@ -322,6 +353,8 @@ std::vector<Measured> measured_quantities(const JigReport& report) {
   constexpr double kStep_c = 0.065;     // of it (ADXL362 datasheet)
   constexpr double kRadian = M_PI / 180;
   constexpr double kSeating_rad = 0.02 * kRadian;  // a careful hand on a clean jig, twice
+  // Student's factor for 95.45 % and three degrees of freedom, where the coverage factor says 2.
+  constexpr double kStudent3 = 3.31 / 2;
   const calib::SixPoseSolution& best = report.six->best();
   const auto count = static_cast<double>(report.faces.size());
 
@@ -371,6 +404,16 @@ std::vector<Measured> measured_quantities(const JigReport& report) {
         {"zero_offset_mg", std::string(kAxisNames[axis]),
          kMgPerG * best.calibration.zero_lsb[axis] * best.calibration.sensitivity_g_per_lsb[axis],
          report.combined.zero_mg[axis]});
+  }
+  const double level_mg = level_scatter_mg(report);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    // A mean of two readings, in which tilt counts in second order, minus a mean of four.
+    measured.push_back(
+        {"midpoint_minus_zero_mg", std::string(kAxisNames[axis]),
+         kMgPerG * report.six->midpoint_minus_zero_lsb[axis] *
+             best.calibration.sensitivity_g_per_lsb[axis],
+         std::hypot(mean_noise_mg / std::sqrt(2.0),
+                    std::hypot(kStudent3 * level_mg, kMgPerG * kSeating_rad, mean_noise_mg) / 2)});
   }
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     measured.push_back({"noise_mg", std::string(kAxisNames[axis]), noise_mg[axis],
