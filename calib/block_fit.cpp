@@ -595,6 +595,24 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       out.richer = richer;
     }
   }
+  const ZeroDriftOptions drift_options;
+  // A week of blocks need not be gone through for an answer that is not given.
+  if (blocks.back().start_time_s - blocks.front().start_time_s <= drift_options.most_span_s) {
+    std::vector<DriftPoint> drift_points;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (used[i] == 0) {
+        continue;
+      }
+      const StillBlock& block = blocks[i];
+      const double temperature =
+          block.temperature_c ? *block.temperature_c - out.reference_temperature_c : 0;
+      drift_points.push_back(
+          {block.start_time_s, out.best().calibration.to_g(block.mean_lsb),
+           magnitude_g(out.best(), {block.mean_lsb, block.ramp_variance_lsb2, 1, temperature}) -
+               options.gravity_g});
+    }
+    out.drift = zero_drift(drift_points, drift_options);
+  }
   SIXPOINT_CHECK(correlate(out.fit, structural_g2));
   for (std::size_t k = 0; k < out.cells.size(); ++k) {
     out.cell_residual_mg.push_back(kMgPerG * residual_g[k]);

@@ -22,6 +22,7 @@
 #include "base/result.h"
 #include "calib/least_squares.h"
 #include "calib/still_blocks.h"
+#include "calib/zero_drift.h"
 
 namespace sixpoint::calib {
 
@@ -76,6 +77,8 @@ struct BlockFit {
   double temperature_range_c = 0;
   double rms_mg = 0;         // of the blocks used
   double mean_error_mg = 0;  // mean absolute error of the blocks used
+  // Trends of the blocks used that best() leaves within single sides.
+  std::optional<ZeroDrift> drift;
   // Directions predicted from fits that have not seen them. Counted are those that the others can
   // predict to 5 mg; without any, held_out_rms_mg is absent.
   std::optional<double> held_out_rms_mg;

@@ -49,6 +49,10 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
           report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
     }
   }
+  for (std::size_t a = 0; a < kAxes && fit.drift; ++a) {
+    report.statistical.zero_mg[a] =
+        std::hypot(report.statistical.zero_mg[a], fit.drift->bound_mg(a));
+  }
   report.uncertainty = report.statistical;
   for (double& relative : report.uncertainty.sensitivity_relative) {
     relative = std::hypot(relative, options.gravity_sd_g / options.gravity_g);

@@ -328,6 +328,104 @@ TEST(Solve, ATemperatureRampIsWithinTheStatedUncertainty) {
   }
 }
 
+// Six sides one after another, warmth given by the share of the file that has passed. Slices of one
+// second, so that the drift goes on within each side.
+std::vector<StillBlock> warming_sides(const SyntheticUnit& unit, const std::vector<Vector>& sides,
+                                      double (*warmth_c)(double), unsigned seed) {
+  constexpr int kSeconds = 100;
+  constexpr double kRate_hz = 30;
+  std::mt19937_64 random(seed);
+  const auto reversal = Reversal::make({unit.positive, unit.negative, unit.zero}, unit.accel_scale,
+                                       RecordWidth::bits12);
+  EXPECT_OK(reversal);
+  auto finder = StillBlockFinder::make(*reversal, kRate_hz);
+  EXPECT_OK(finder);
+  double time = 0;
+  Vector before = sides.front();
+  for (const Vector& side : sides) {
+    const Vector pose = tests::wobbled(side, 3, random);
+    finder->push(time, tests::turning(unit, before, pose, 5, kRate_hz, random));
+    time += 5;
+    for (int i = 0; i < kSeconds; ++i, time += 1) {
+      const double share = time / (static_cast<double>(sides.size()) * (kSeconds + 5));
+      finder->push(time, tests::at_rest(unit, pose, 1, kRate_hz, random, warmth_c(share)));
+    }
+    before = pose;
+  }
+  return finder->finish();
+}
+
+double no_warming_c(double) { return 0; }
+double steady_ramp_c(double share) { return 20 * share - 10; }
+double falling_ramp_c(double share) { return 10 - 20 * share; }
+double warm_up_c(double share) { return -20 * std::exp(-share / 0.4); }
+double quick_warm_up_c(double share) { return -20 * std::exp(-share / 0.2); }
+
+// No temperature in the file, no residual, and 7 mg beside the truth: the trend within each side is
+// all there is to tell it by.
+TEST(Solve, ADriftWithinTheSidesIsNotVerified) {
+  const std::vector<Vector> mixed_up = {{0, 0, 1},  {0, 1, 0}, {-1, 0, 0},
+                                        {0, -1, 0}, {1, 0, 0}, {0, 0, -1}};
+  for (const auto& shape : {steady_ramp_c, falling_ramp_c, warm_up_c, quick_warm_up_c}) {
+    for (const auto& sides : {kSides, mixed_up}) {
+      for (const Vector& drift :
+           {Vector{-0.5, 0.6, -0.7}, Vector{0.5, -0.6, 0.7}, Vector{0.5, 0.5, 0.5}}) {
+        for (unsigned seed = 1; seed <= 3; ++seed) {
+          SyntheticUnit unit = mismatched(seed);
+          unit.drift_mg_per_c = drift;
+          const auto blocks = warming_sides(unit, sides, shape, seed);
+          for (const auto method : {SolveMethod::least_squares, SolveMethod::genetic}) {
+            SolveOptions options;
+            options.method = method;
+            const auto report = solve_from_still_blocks(blocks, file_constants(unit), options);
+            ASSERT_OK(report);
+            EXPECT_FALSE(report->verification.verified) << seed << report->brief();
+            EXPECT_THAT(report->verification.reasons,
+                        testing::Contains(testing::HasSubstr("room's temperature")))
+                << seed << report->brief();
+            EXPECT_GT(report->verification.worst_direction_mg, 4);
+          }
+        }
+      }
+    }
+  }
+}
+
+// One axis is enough, and what it is said to drift is what it does: 10 C at 0.7 mg/C to either end.
+TEST(Solve, ADriftOfOneAxisIsMeasured) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      SyntheticUnit unit = mismatched(7);
+      unit.drift_mg_per_c[axis] = sign * 0.7;
+      const auto report = solve_from_still_blocks(warming_sides(unit, kSides, steady_ramp_c, 11),
+                                                  file_constants(unit));
+      ASSERT_OK(report);
+      ASSERT_TRUE(report->fit->drift);
+      const ZeroDrift& drift = *report->fit->drift;
+      for (std::size_t a = 0; a < 3; ++a) {
+        EXPECT_EQ(drift.significant[a], a == axis);
+        EXPECT_NEAR(drift.half_span_mg[a], a == axis ? sign * 7 : 0,
+                    4 * drift.standard_uncertainty_mg[a]);
+        EXPECT_LT(drift.standard_uncertainty_mg[a], 2);
+      }
+      EXPECT_GT(report->uncertainty.zero_mg[axis], 5);
+      EXPECT_FALSE(report->usable());
+    }
+  }
+}
+
+// The same generator without warming: every file is good, and none is said to drift.
+TEST(Solve, SidesThatDoNotDriftStayVerified) {
+  for (unsigned seed = 1; seed <= 300; ++seed) {
+    const SyntheticUnit unit = mismatched(seed);
+    const auto report = solve_from_still_blocks(
+        warming_sides(unit, kSides, no_warming_c, seed + 500), file_constants(unit));
+    ASSERT_OK(report);
+    EXPECT_TRUE(report->usable()) << seed << report->brief();
+    EXPECT_TRUE(report->fit->drift);
+  }
+}
+
 // A side on which an axis is clipped gives no block, and is named.
 TEST(Solve, AClippedSideIsMissing) {
   SyntheticUnit unit = mismatched(15);
