@@ -63,9 +63,9 @@ void complete_run_record(db::RunRecord& run, const JigReport& report, const std:
   }
 }
 
-Result<StoredRun> add_run_records(db::Keeper& keeper, const JigReport& report,
-                                  const db::RunRecord& run) {
-  StoredRun done;
+Result<RunIds> add_run_records(db::Keeper& keeper, const JigReport& report,
+                               const db::RunRecord& run) {
+  RunIds done;
   SIXPOINT_ASSIGN(
       done.run_id,
       keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));

@@ -16,12 +16,12 @@ db::RunRecord run_record_before(const JigSessionOptions& session, const std::str
 void complete_run_record(db::RunRecord& run, const JigReport& report,
                          const std::string& study = {});
 
-struct StoredRun {
+struct RunIds {
   std::string run_id;
   std::optional<std::string> constants_id;  // of a usable report that is no study
 };
 // The run with its samples, what was written into the unit, and the constants (none of a study).
-Result<StoredRun> add_run_records(db::Keeper& keeper, const JigReport& report,
-                                  const db::RunRecord& run);
+Result<RunIds> add_run_records(db::Keeper& keeper, const JigReport& report,
+                               const db::RunRecord& run);
 
 }  // namespace sixpoint::station

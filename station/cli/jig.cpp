@@ -253,12 +253,13 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   Done done;
   SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
   station::complete_run_record(record, done.report, options.study);
+  station::RunIds stored;
   done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
-    SIXPOINT_ASSIGN(const auto stored, station::add_run_records(keeper, done.report, record));
-    done.run_id = stored.run_id;
-    done.constants_id = stored.constants_id;
+    SIXPOINT_ASSIGN(stored, station::add_run_records(keeper, done.report, record));
     return {};
   });
+  done.run_id = stored.run_id;
+  done.constants_id = stored.constants_id;
   record.id = done.run_id;
   if (done.kept) {
     make_papers(context, options, record, done);

@@ -70,7 +70,7 @@ Result<station::KeptRun> keep_run(Context& context, const Options& options,
   run.retest_of = labels.retest_of;
   station::complete_run_record(run, report);
   auto store = open_store(context, options.store);
-  station::StoredRun stored;
+  station::RunIds stored;
   SIXPOINT_CHECK(keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
     SIXPOINT_ASSIGN(stored, station::add_run_records(keeper, report, run));
     return {};

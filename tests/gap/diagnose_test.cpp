@@ -9,6 +9,10 @@
 #include "gap/report_html.h"
 #include "gap/report_sheet.h"
 
+// Fontconfig, under librsvg, keeps its tables of fonts until the process ends.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libfontconfig"; }
+
 namespace sixpoint::gap {
 namespace {
 
