@@ -89,16 +89,18 @@ Status WireUnit::reconnect(nanoseconds patience) {
   streaming_ = false;
   // Perhaps it only started anew, and the cable is as it was.
   Status answer = introduce(serial);
+  std::string hint = "plug it in again and begin anew";
   while (!answer && !identity_is_another_ && link_.reopen && !cancelled_) {
     if (link_.clock->elapsed() >= deadline) {
       return fail(ErrorCode::device_unavailable,
                   fmt::format("the unit {} went away and did not come back within {:.0f} s", serial,
                               std::chrono::duration<double>(patience).count()),
-                  link_.address, "plug it in again and begin anew");
+                  link_.address, hint);
     }
     link_.clock->sleep(options_.reopen_interval);
     Result<Link> again = link_.reopen();
     if (!again) {
+      hint = again.error().hint;  // names what is plugged in instead
       continue;
     }
     {

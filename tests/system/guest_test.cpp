@@ -31,6 +31,9 @@ TEST_P(System, Body) {
 INSTANTIATE_TEST_SUITE_P(Usb, System, testing::ValuesIn(usb_bodies()),
                          [](const auto& one) { return std::string(one.param.name); });
 
+INSTANTIATE_TEST_SUITE_P(Faults, System, testing::ValuesIn(usb_fault_bodies()),
+                         [](const auto& one) { return std::string(one.param.name); });
+
 std::string read_line(const std::string& path) {
   std::ifstream in(path);
   std::string line;

@@ -125,4 +125,13 @@ void VhciBench::unplug(BenchUnit& unit) {
   unit.port.clear();
 }
 
+bool VhciBench::wait_until_left(BenchUnit& unit) {
+  const bool left = wait_for_path("/sys/bus/usb/devices/" + unit.port, false);
+  if (left) {
+    plugs_.erase(unit.port);
+    unit.port.clear();
+  }
+  return left;
+}
+
 }  // namespace sixpoint::tests

@@ -20,6 +20,7 @@ class VhciBench final : public UsbBench {
   VhciBench& operator=(const VhciBench&) = delete;
   Status plug_in(BenchUnit& unit, const std::string& port = {}) override;
   void unplug(BenchUnit& unit) override;
+  bool wait_until_left(BenchUnit& unit) override;
 
  private:
   struct Plug;

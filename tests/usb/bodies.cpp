@@ -15,6 +15,7 @@
 #include "device/unit.h"
 #include "expect_result.h"
 #include "temporary_folder.h"
+#include "usb/plugged.h"
 
 namespace sixpoint::tests {
 namespace {
@@ -26,56 +27,6 @@ using device::HotplugWatch;
 using device::Unit;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-
-// A unit that is plugged in until the test is over, however it ends.
-class Plugged {
- public:
-  Plugged(UsbBench& bench, std::uint64_t seed, const std::string& port = {})
-      : bench_(bench), unit_(make_unit(seed)) {
-    status_ = bench.plug_in(unit_, port);
-  }
-  ~Plugged() {
-    if (!unit_.port.empty()) {
-      bench_.unplug(unit_);
-    }
-  }
-  Plugged(const Plugged&) = delete;
-  Plugged& operator=(const Plugged&) = delete;
-  BenchUnit& operator*() { return unit_; }
-  BenchUnit* operator->() { return &unit_; }
-  const Status& status() const { return status_; }
-
- private:
-  UsbBench& bench_;
-  BenchUnit unit_;
-  Status status_;
-};
-
-const device::TransportRegistry& registry() {
-  static const device::TransportRegistry registry = [] {
-    device::TransportRegistry made;
-    device::register_usb(made);
-    return made;
-  }();
-  return registry;
-}
-
-// The kernel may still be at it: what the device needs for its nodes is part of opening.
-Result<std::unique_ptr<Unit>> open(const std::string& address, device::UnitOptions options = {}) {
-  const auto deadline = std::chrono::steady_clock::now() + seconds(5);
-  for (;;) {
-    auto link = registry().open(address, posix_env());
-    if (link) {
-      return Unit::open(std::move(*link), options);
-    }
-    // In a kernel that has not enumerated it yet there is no such device.
-    if (link.error().code != ErrorCode::device_unavailable ||
-        std::chrono::steady_clock::now() > deadline) {
-      return fail(link.error());
-    }
-    std::this_thread::sleep_for(milliseconds(10));
-  }
-}
 
 // The devices as soon as `count` of them are complete.
 std::vector<AttachedDevice> wait_for(std::size_t count, const DiscoveryFilter& filter = {}) {
@@ -110,8 +61,8 @@ std::optional<AttachedDevice> event_of(HotplugWatch& watch, HotplugEvent::Kind k
 
 void enumerates_by_id_and_serial(UsbBench& bench) {
   EXPECT_TRUE(wait_for(0).empty());
-  Plugged a(bench, 11);
-  Plugged b(bench, 12);
+  Plugged a(bench, make_unit(11));
+  Plugged b(bench, make_unit(12));
   ASSERT_OK(a.status());
   ASSERT_OK(b.status());
   const auto all = wait_for(2);
@@ -180,14 +131,14 @@ void enumerates_by_id_and_serial(UsbBench& bench) {
 
 void opens_by_serial(UsbBench& bench) {
   EXPECT_FAILS(registry().open("hid:", posix_env()), ErrorCode::device_unavailable);
-  Plugged a(bench, 21);
+  Plugged a(bench, make_unit(21));
   ASSERT_OK(a.status());
   {
     auto unit = open("hid:");
     ASSERT_OK(unit);
     EXPECT_EQ((*unit)->identity().serial, a->serial) << "the only one there is";
   }
-  Plugged b(bench, 22);
+  Plugged b(bench, make_unit(22));
   ASSERT_OK(b.status());
   ASSERT_EQ(wait_for(2).size(), 2U);
   const auto several = registry().open("usb:", posix_env());
@@ -206,7 +157,7 @@ void opens_by_serial(UsbBench& bench) {
 }
 
 void writes_constants_as_a_transaction(UsbBench& bench) {
-  Plugged plugged(bench, 31);
+  Plugged plugged(bench, make_unit(31));
   ASSERT_OK(plugged.status());
   device::UnitOptions options;
   options.reply_time_out = milliseconds(100);
@@ -240,7 +191,7 @@ void writes_constants_as_a_transaction(UsbBench& bench) {
 }
 
 void streams_and_sees_loss(UsbBench& bench) {
-  Plugged plugged(bench, 41);
+  Plugged plugged(bench, make_unit(41));
   ASSERT_OK(plugged.status());
   auto opened = open(plugged->hid_address());
   ASSERT_OK(opened);
@@ -290,7 +241,7 @@ void several_units_stream_at_once(UsbBench& bench) {
   constexpr std::size_t kUnits = 4;
   std::vector<std::unique_ptr<Plugged>> plugged;
   for (std::size_t i = 0; i < kUnits; ++i) {
-    plugged.push_back(std::make_unique<Plugged>(bench, 51 + i));
+    plugged.push_back(std::make_unique<Plugged>(bench, make_unit(51 + i)));
     ASSERT_OK(plugged.back()->status());
   }
   ASSERT_EQ(wait_for(kUnits).size(), kUnits);
@@ -328,18 +279,6 @@ void several_units_stream_at_once(UsbBench& bench) {
   }
 }
 
-// A recording of `recorded` of the unit's time, in a moment of ours.
-Result<device::RecordingInfo> record(BenchUnit& bench_unit, Unit& unit, seconds recorded) {
-  SIXPOINT_CHECK(unit.start_recording(100, from_unix_seconds(1'500'000'000)));
-  bench_unit.clock->forward(recorded);
-  SIXPOINT_CHECK(unit.stop_recording());
-  SIXPOINT_ASSIGN(const auto list, unit.recordings());
-  if (list.empty()) {
-    return fail(ErrorCode::internal, "nothing was recorded");
-  }
-  return list.back();
-}
-
 device::UnitOptions patient() {
   device::UnitOptions options;
   options.reply_time_out = seconds(5);  // packing an hour takes the virtual unit a moment
@@ -347,7 +286,7 @@ device::UnitOptions patient() {
 }
 
 void downloads_and_resumes(UsbBench& bench) {
-  Plugged plugged(bench, 61);
+  Plugged plugged(bench, make_unit(61));
   ASSERT_OK(plugged.status());
   TemporaryFolder folder;
   FileSystem& files = posix_env().files;
@@ -388,7 +327,7 @@ void hotplug_arrives_leaves_and_replugs(UsbBench& bench) {
   ASSERT_OK(nothing);
   EXPECT_FALSE(nothing->has_value());
 
-  Plugged plugged(bench, 71);
+  Plugged plugged(bench, make_unit(71));
   ASSERT_OK(plugged.status());
   const auto arrived = event_of(**watch, HotplugEvent::Kind::arrived, plugged->serial);
   ASSERT_TRUE(arrived);
@@ -427,7 +366,7 @@ void hotplug_arrives_leaves_and_replugs(UsbBench& bench) {
 void unplugging_in_flight_is_seen(UsbBench& bench) {
   // While it waits for samples that do not come, and for a reply.
   for (const bool streaming : {false, true}) {
-    Plugged plugged(bench, 81);
+    Plugged plugged(bench, make_unit(81));
     ASSERT_OK(plugged.status());
     auto unit = open(plugged->hid_address());
     ASSERT_OK(unit);
@@ -450,7 +389,7 @@ void unplugging_in_flight_is_seen(UsbBench& bench) {
 }
 
 void cancel_ends_what_waits(UsbBench& bench) {
-  Plugged plugged(bench, 91);
+  Plugged plugged(bench, make_unit(91));
   ASSERT_OK(plugged.status());
   ASSERT_EQ(wait_for(1).size(), 1U);
   auto link = registry().open(plugged->usb_address(), posix_env());
@@ -471,7 +410,7 @@ void cancel_ends_what_waits(UsbBench& bench) {
 }
 
 void a_second_program_is_told_who_is_in_the_way(UsbBench& bench) {
-  Plugged plugged(bench, 101);
+  Plugged plugged(bench, make_unit(101));
   ASSERT_OK(plugged.status());
   auto unit = open(plugged->hid_address());
   ASSERT_OK(unit);
@@ -489,7 +428,7 @@ void permission_errors_name_the_rule(UsbBench& bench) {
   if (::geteuid() != 0) {
     GTEST_SKIP() << "needs root, to become somebody who may not";
   }
-  Plugged plugged(bench, 111);
+  Plugged plugged(bench, make_unit(111));
   ASSERT_OK(plugged.status());
   const auto found = wait_for(1);
   ASSERT_EQ(found.size(), 1U);
@@ -508,14 +447,14 @@ void permission_errors_name_the_rule(UsbBench& bench) {
 void a_swapped_unit_is_never_taken_for_the_first(UsbBench& bench) {
   auto watch = HotplugWatch::start();
   ASSERT_OK(watch);
-  Plugged first(bench, 121);
+  Plugged first(bench, make_unit(121));
   ASSERT_OK(first.status());
   auto unit = open(first->hid_address());
   ASSERT_OK(unit);
   ASSERT_OK((*unit)->start_stream(100));
   const std::string port = first->port;
   bench.unplug(*first);
-  Plugged second(bench, 122, port);
+  Plugged second(bench, make_unit(122), port);
   ASSERT_OK(second.status());
   EXPECT_EQ(second->port, port);
   const auto arrived = event_of(**watch, HotplugEvent::Kind::arrived, second->serial);

@@ -14,6 +14,8 @@ struct UsbBody {
 };
 
 const std::vector<UsbBody>& usb_bodies();
+// Fault plans (docs/faults.md): one body per kind of fault.
+const std::vector<UsbBody>& usb_fault_bodies();
 
 // For gtest, which would print the pointers.
 inline void PrintTo(const UsbBody& body, std::ostream* out) { *out << body.name; }
