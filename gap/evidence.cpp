@@ -632,6 +632,9 @@ std::optional<Fit> EvidenceSearch::fit_step(const Whitened& nominal, const Forwa
         later_used = here_used;
       }
     }
+    if (chosen == nullptr) {
+      return std::nullopt;  // no step has a finite evidence
+    }
     w.y = nominal.y;
     w.y.segment(chosen->first, chosen->end - chosen->first) -= chosen->own * size;
     w.y.tail(rows_ - chosen->end) -= column.bottomRows(rows_ - chosen->end) * size.head<3>();

@@ -206,7 +206,8 @@ std::string report_sheet(const Diagnosis& d) {
   const double room = (kPageHeight - kMargin - y) / 3;
   const double chart_width = std::min(half, (room - 20) * Chart::kWidth / Chart::kHeight);
   for (std::size_t i = 0; i < charts.size(); ++i) {
-    sheet.chart(i % 2 == 0 ? kMargin : right, y + room * static_cast<double>(i / 2), chart_width,
+    const std::size_t row = i / 2;
+    sheet.chart(i % 2 == 0 ? kMargin : right, y + room * static_cast<double>(row), chart_width,
                 charts[i]);
   }
   return sheet.finish();

@@ -227,7 +227,7 @@ class Table {
 
 }  // namespace
 
-Result<FatImage> FatImage::make(std::vector<FatFile> files, const FatImageOptions& options) {
+Result<FatImage> FatImage::make(const std::vector<FatFile>& files, const FatImageOptions& options) {
   const auto layout = lay_out(options.volume_bytes);
   if (!layout || options.label.size() > 11) {
     return fail(ErrorCode::usage, "no FAT12 or FAT16 volume has this size or label", options.label,

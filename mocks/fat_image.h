@@ -44,7 +44,8 @@ class FatImage final : public BlockMedium {
  public:
   // usage when a name does not fit 8.3 or comes twice, or the size is none of FAT12 or FAT16;
   // configuration when the files do not fit.
-  static Result<FatImage> make(std::vector<FatFile> files, const FatImageOptions& options = {});
+  static Result<FatImage> make(const std::vector<FatFile>& files,
+                               const FatImageOptions& options = {});
 
   std::uint32_t blocks() const override { return blocks_; }
   void read(std::uint32_t block, std::span<std::uint8_t, kBlockBytes> out) const override;

@@ -127,7 +127,7 @@ Result<FatImage> unit_volume(const VirtualUnit& unit) {
          std::make_shared<const Bytes>(sim::log_preamble(unit.truth(), date, kEmptyRate_hz)),
          date});
   }
-  return FatImage::make(std::move(files));
+  return FatImage::make(files);
 }
 
 UsbUnit::UsbUnit(std::shared_ptr<PluggedUnit> plugged)

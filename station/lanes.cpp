@@ -165,7 +165,7 @@ class Lanes::Lane {
 
   LaneAnswer<void> say(const std::string& client, OperatorWord word) {
     const std::lock_guard lock(mutex_);
-    if (const auto mine = obeys(client); !mine) {
+    if (auto mine = obeys(client); !mine) {
       return mine;
     }
     if (!is_busy()) {
@@ -180,7 +180,7 @@ class Lanes::Lane {
 
   LaneAnswer<void> side_is_placed(const std::string& client) {
     const std::lock_guard lock(mutex_);
-    if (const auto mine = obeys(client); !mine) {
+    if (auto mine = obeys(client); !mine) {
       return mine;
     }
     if (state_ != LaneState::capturing || !asked_side_) {

@@ -132,7 +132,7 @@ void Server::Impl::set_up() {
     give(api.handle(request_of(from)), response);
   });
   server.set_exception_handler([](const httplib::Request& /*from*/, httplib::Response& response,
-                                  std::exception_ptr /*error*/) {
+                                  const std::exception_ptr& /*error*/) {
     give(refused(500, "internal", "a defect of this program"), response);
   });
   server.set_error_handler([](const httplib::Request& /*from*/, httplib::Response& response) {

@@ -408,7 +408,8 @@ class Search {
     for (int k = 0; k < kFolds; ++k) {
       Resonance best = found;
       double least = 1e300;
-      for (double step = 0.06; step > 2e-4; step /= 1.6) {
+      double step = 0.06;
+      for (int refinement = 0; refinement < 13; ++refinement, step /= 1.6) {
         const Resonance centre = best;
         for (int i = -2; i <= 2; ++i) {
           for (int j = -2; j <= 2; ++j) {

@@ -75,6 +75,7 @@ HostTiming host_timing(const Bundle& bundle) {
     constexpr std::size_t kLeast = 3;
     constexpr std::size_t kMost = 5;
     std::vector<double> level;
+    level.reserve(stamps.size());
     for (const Stamp& s : stamps) {
       level.push_back(s.residual_s - rate_error * s.nominal_s);
     }

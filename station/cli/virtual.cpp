@@ -116,7 +116,7 @@ Result<Bench> make_bench(Context& context, const Options& options) {
     auto plugged = std::make_shared<mocks::PluggedUnit>(std::move(unit),
                                                         i == 0 ? plan : mocks::FaultPlan{}, clock);
     if (i == 0 && !recording.empty()) {
-      SIXPOINT_CHECK(plugged->unit.keep_recording(std::move(recording), start));
+      SIXPOINT_CHECK(plugged->unit.keep_recording(std::exchange(recording, {}), start));
     }
     if (i == 0) {
       turned = plugged;

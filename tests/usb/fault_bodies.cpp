@@ -103,8 +103,7 @@ Result<std::optional<device::SampleBlock>> read_until_failure(Unit& unit) {
 }
 
 void a_lost_reply_is_asked_for_again(UsbBench& bench) {
-  Plugged plugged(bench,
-                  faulty_unit(21, R"({"fault": "lost", "of": "replies", "at_report": 2},
+  Plugged plugged(bench, faulty_unit(21, R"({"fault": "lost", "of": "replies", "at_report": 2},
                                      {"fault": "lost", "direction": "to_unit", "at_report": 5})"));
   ASSERT_OK(plugged.status());
   auto unit = open(plugged->hid_address());
@@ -115,8 +114,8 @@ void a_lost_reply_is_asked_for_again(UsbBench& bench) {
 }
 
 void damaged_and_short_blocks_are_downloaded_again(UsbBench& bench) {
-  Plugged plugged(
-      bench, faulty_unit(22, R"({"fault": "bit_flip", "channel": "bulk", "at_report": 2},
+  Plugged plugged(bench,
+                  faulty_unit(22, R"({"fault": "bit_flip", "channel": "bulk", "at_report": 2},
              {"fault": "short_packet", "channel": "bulk", "at_report": 5, "bytes": 100})"));
   ASSERT_OK(plugged.status());
   auto unit = open(plugged->usb_address(), patient());
@@ -206,8 +205,7 @@ void a_reply_that_never_comes_is_a_unit_that_does_not_answer(UsbBench& bench) {
 }
 
 void damaged_reports_are_dropped_and_counted(UsbBench& bench) {
-  Plugged plugged(
-      bench, faulty_unit(28, R"({"fault": "bad_crc", "of": "samples", "at_report": 3},
+  Plugged plugged(bench, faulty_unit(28, R"({"fault": "bad_crc", "of": "samples", "at_report": 3},
                                 {"fault": "garbage", "of": "samples", "at_report": 6},
                                 {"fault": "bit_flip", "of": "samples", "at_report": 9, "bit": 6},
                                 {"fault": "bad_crc", "of": "replies", "at_report": 2})"));
@@ -221,8 +219,7 @@ void damaged_reports_are_dropped_and_counted(UsbBench& bench) {
 
 void duplicate_reports_are_delivered_once(UsbBench& bench) {
   Plugged plugged(
-      bench,
-      faulty_unit(29, R"({"fault": "duplicate", "of": "samples", "at_report": 2, "every": 2},
+      bench, faulty_unit(29, R"({"fault": "duplicate", "of": "samples", "at_report": 2, "every": 2},
                          {"fault": "duplicate", "of": "replies", "at_report": 1, "every": 2})"));
   ASSERT_OK(plugged.status());
   const auto unit = streamed(plugged, 12 * kSamplesPerReport);
@@ -233,9 +230,8 @@ void duplicate_reports_are_delivered_once(UsbBench& bench) {
 }
 
 void another_sequence_is_never_taken_for_the_right_one(UsbBench& bench) {
-  Plugged plugged(
-      bench,
-      faulty_unit(30, R"({"fault": "wrong_sequence", "of": "samples", "at_report": 4},
+  Plugged plugged(bench,
+                  faulty_unit(30, R"({"fault": "wrong_sequence", "of": "samples", "at_report": 4},
                          {"fault": "wrong_sequence", "of": "replies", "at_report": 2})"));
   ASSERT_OK(plugged.status());
   const auto unit = streamed(plugged, 10 * kSamplesPerReport);
