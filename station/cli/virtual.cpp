@@ -173,12 +173,13 @@ Status serve(Context& context, const Options& options) {
   SIXPOINT_ASSIGN(const auto server, mocks::UsbipServer::listen(bench.devices, how));
 
   // The signals wait for sigwait() below, in every thread that is started from here.
+  // They stay blocked: a Ctrl-C that comes twice (timeout(1) sends it to the process and to its
+  // group) must not end the orderly end.
   sigset_t signals;
-  sigset_t before;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, &before);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   Status status;
   std::thread serving([&] {
     status = server->run();
@@ -191,7 +192,6 @@ Status serve(Context& context, const Options& options) {
   sigwait(&signals, &signal);
   server->stop();
   serving.join();
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
   return status;
 }
 

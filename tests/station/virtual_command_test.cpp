@@ -74,6 +74,15 @@ class Served {
     child_ = -1;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
+  // As timeout(1) and impatient people do it: again and again until it has ended.
+  int stop_repeatedly(int signal) {
+    int status = 0;
+    do {
+      ::kill(child_, signal);
+    } while (::waitpid(child_, &status, WNOHANG) == 0);
+    child_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
   UsbipClient connect() const {
     return UsbipClient(document["usbip"]["port"].get<std::uint16_t>());
   }
@@ -112,6 +121,12 @@ TEST(VirtualCommand, SaysWhatItServesAndServesIt) {
     EXPECT_EQ(serials.size(), 3U);
     EXPECT_EQ(served.stop(signal), 0);
   }
+}
+
+TEST(VirtualCommand, ASecondCtrlCDoesNotEndTheOrderlyEnd) {
+  Served served({"--count", "2"});
+  ASSERT_TRUE(served.document.is_object());
+  EXPECT_EQ(served.stop_repeatedly(SIGINT), 0);
 }
 
 TEST(VirtualCommand, TheSameSeedIsTheSameBench) {
