@@ -595,7 +595,10 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       out.richer = richer;
     }
   }
-  const ZeroDriftOptions drift_options;
+  ZeroDriftOptions drift_options;
+  drift_options.block_sd_g = std::sqrt(block_g2);
+  drift_options.misfit_sd_g = (out.richer ? out.richer->structural_mg : out.structural_mg) / kMgPerG;
+  drift_options.cross_axis_sd = options.cross_axis_sd;
   // A week of blocks need not be gone through for an answer that is not given.
   if (blocks.back().start_time_s - blocks.front().start_time_s <= drift_options.most_span_s) {
     std::vector<DriftPoint> drift_points;
@@ -609,7 +612,8 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       drift_points.push_back(
           {block.start_time_s, out.best().calibration.to_g(block.mean_lsb),
            magnitude_g(out.best(), {block.mean_lsb, block.ramp_variance_lsb2, 1, temperature}) -
-               options.gravity_g});
+               options.gravity_g,
+           out.cells[static_cast<std::size_t>(cell_of_block[i])].neighbourhood});
     }
     out.drift = zero_drift(drift_points, drift_options);
   }

@@ -49,9 +49,14 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
           report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
     }
   }
-  for (std::size_t a = 0; a < kAxes && fit.drift; ++a) {
-    report.statistical.zero_mg[a] =
-        std::hypot(report.statistical.zero_mg[a], fit.drift->bound_mg(a));
+  if (fit.drift) {
+    const PerAxis<double> zero_mg = fit.drift->zero_mg();
+    const PerAxis<double> relative = fit.drift->sensitivity_relative();
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], zero_mg[a]);
+      report.statistical.sensitivity_relative[a] =
+          std::hypot(report.statistical.sensitivity_relative[a], relative[a]);
+    }
   }
   report.uncertainty = report.statistical;
   for (double& relative : report.uncertainty.sensitivity_relative) {
