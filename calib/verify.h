@@ -54,7 +54,7 @@ struct VerificationLimits {
   // six good sides is up to 3 mg, and with 4 mg more the worst direction's 5 mg are used up.
   double drift_mg = 4.0;
   // What a drift could have done to the worst direction without being seen, one standard deviation.
-  double hidden_drift_mg = 2.0;
+  double hidden_drift_mg = 2.5;
   int blocks_per_side = 3;  // so that a half of a side still holds a block
   // Least squares and genetic algorithm, RMS over the sphere: this, twice their combined
   // uncertainty or, where a richer model explains it, 0.8 of the misfit; but never more than the

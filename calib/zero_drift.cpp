@@ -27,6 +27,7 @@ struct Visit {
   PerAxis<double> direction{};
   double square_s2 = 0;
   double product = 0;
+  PerAxis<double> axis_product{};  // of each axis by itself
   int neighbourhood = 0;
 };
 
@@ -59,10 +60,14 @@ std::optional<Visit> visit_of(std::span<const DriftPoint> points, Scatter& scatt
   for (const DriftPoint& point : points) {
     visit.square_s2 += std::pow(point.time_s - visit.time_s, 2);
     visit.product += (point.time_s - visit.time_s) * (point.error_g - visit.error_g);
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      visit.axis_product[a] += (point.time_s - visit.time_s) * point.mean_g[a];
+    }
   }
   if (points.size() < 3 || !(visit.square_s2 > 0)) {
     visit.square_s2 = 0;
     visit.product = 0;
+    visit.axis_product = {};
     return visit;
   }
   double before = 0;
@@ -86,6 +91,45 @@ double block_variance_g2(const Scatter& scatter, const ZeroDriftOptions& options
   const double least = options.block_sd_g * options.block_sd_g;
   const double variance = scatter.freedom >= options.least_freedom ? own : std::max(own, least);
   return variance * (1 + alike) / (1 - alike) + 1e-14;
+}
+
+// What the axes that lie level say of the rates, as information and its product with the rates (g and
+// s). They see a drift as well as upright ones, and there are four of them to two; but a unit that
+// leans sinks a little, and what a drift makes in a minute is a hundredth of a degree. So how their
+// slopes scatter about a common rate is the yardstick, widened as F of 3 and n - 3 degrees of freedom
+// is wider than chi-square at one in 1000 (to 3 % between 9 and 100). They are asked whether there is
+// a drift and nothing else.
+struct Level {
+  Eigen::Vector3d information = Eigen::Vector3d::Zero();
+  Eigen::Vector3d product = Eigen::Vector3d::Zero();
+};
+Level level_axes(std::span<const Visit> visits, const ZeroDriftOptions& options) {
+  constexpr double kLevel = 0.5;
+  Level out;
+  double square_g2 = 0;
+  int slopes = 0;
+  for (const Visit& visit : visits) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      if (visit.blocks < options.level_blocks || !(std::abs(visit.direction[a]) < kLevel)) {
+        continue;
+      }
+      const auto i = static_cast<Eigen::Index>(a);
+      out.information[i] += visit.square_s2;
+      out.product[i] += visit.axis_product[a];
+      square_g2 += visit.axis_product[a] * visit.axis_product[a] / visit.square_s2;
+      ++slopes;
+    }
+  }
+  const double freedom = slopes - 3;
+  if (freedom < options.least_level_freedom || !(out.information.minCoeff() > 0)) {
+    return {};
+  }
+  const double common_g2 = (out.product.array().square() / out.information.array()).sum();
+  const double scatter_g2 =
+      (std::max(0.0, square_g2 - common_g2) / freedom + 1e-14) * std::exp(8.5 / freedom);
+  out.information /= scatter_g2;
+  out.product /= scatter_g2;
+  return out;
 }
 
 // d|q| by each parameter; for a constant, by what it is too small.
@@ -203,6 +247,7 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
   }
   middle_s /= static_cast<double>(points.size());
   const double half_s = out.span_s / 2;
+  const double half_s_inverse = 1 / half_s;
   const double block_g2 = block_variance_g2(scatter, options);
   const double visit_g2 = options.visit_sd_g * options.visit_sd_g;
 
@@ -267,19 +312,17 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
       out.hidden[static_cast<std::size_t>(i * kConstants + j)] = hidden(i, j);
     }
   }
-  // Against no drift: the prior of the rates tells nothing about whether there is one.
+  // Against no drift: without the rates' prior, and with the level axes. Rates that nothing tells of
+  // keep a little of the prior's information, so that all of them can be divided by.
   const Eigen::Matrix3d rates = with.bottomRightCorner<3, 3>();
-  Eigen::Matrix3d told = rates.inverse();
-  told.diagonal().array() -= 1 / (options.rate_sd_g * options.rate_sd_g);
   const Eigen::Vector3d rate = moved.tail<3>();
-  // told * unbiased = rates^-1 * rate, and chi-square is unbiased' told unbiased.
-  const Eigen::Vector3d weighed = rates.inverse() * rate;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(told);
-  for (int i = 0; i < 3; ++i) {
-    const double value = eigen.eigenvalues()[i];
-    const double along_axis = eigen.eigenvectors().col(i).dot(weighed);
-    out.chi2 += value > 1e-6 * rates.inverse().trace() ? along_axis * along_axis / value : 0;
-  }
+  const Level level = level_axes(visits, options);
+  const double prior = 1 / (options.rate_sd_g * options.rate_sd_g);
+  Eigen::Matrix3d told = rates.inverse();
+  const Eigen::Vector3d product = told * rate + level.product * half_s_inverse;
+  told.diagonal().array() -= 0.99 * prior;
+  told.diagonal() += level.information * (half_s_inverse * half_s_inverse);
+  out.chi2 = product.dot(told.ldlt().solve(product));
   out.shown = out.chi2 > options.least_chi2;
   for (std::size_t a = 0; a < kAxes; ++a) {
     const auto i = static_cast<Eigen::Index>(a);

@@ -33,6 +33,10 @@ struct ZeroDriftOptions {
   // All three axes together, chi-square of 3 degrees of freedom: one good file in 1000. 20 C at 0.5
   // mg/C make several times as much.
   double least_chi2 = 16.3;
+  // The same of the level axes, for visits of so many blocks (20 s), and where their slopes are
+  // enough to show how they scatter.
+  double level_blocks = 5;
+  double least_level_freedom = 9;
   // Fewer blocks beyond what the lines take say too little about their own scatter; it is at least
   // `block_sd_g` then.
   double least_freedom = 20;
