@@ -354,7 +354,7 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     // What the six leave out is not only scatter: a cross-axis term bends all directions at once,
     // and where these are few it hides in the sensitivities with next to no residual. It is put to
     // the data as far as they can tell, and by the prior where they cannot.
-    const bool alias = !fit.model.cross_axis && options.cross_axis_sd > 0;
+    const bool alias = !fit.model.cross_axis && std::ranges::any_of(options.cross_axis_sd, [](double sd) { return sd > 0; });
     if (alias) {
       wide.model.cross_axis = true;
       wide.cross_axis_sd = options.cross_axis_sd;

@@ -35,6 +35,29 @@ PartialKnowledge know_partially(std::span<const StillBlock> blocks,
   return out;
 }
 
+// The blocks as a sensor would have measured them that has the six constants of the richer model and
+// nothing of its other terms.
+std::vector<StillBlock> without_richer_terms(std::span<const StillBlock> blocks,
+                                             const BlockFit& fit) {
+  const LeastSquaresFit& more = fit.richer->fit;
+  const PerAxis<double>& s = more.calibration.sensitivity_g_per_lsb;
+  std::vector<StillBlock> out(blocks.begin(), blocks.end());
+  for (StillBlock& block : out) {
+    const double above_c =
+        block.temperature_c ? *block.temperature_c - fit.reference_temperature_c : 0;
+    PerAxis<double> u{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      block.mean_lsb[a] -= more.zero_lsb_per_c[a] * above_c;
+      u[a] = more.calibration.to_g(a, block.mean_lsb[a]);
+    }
+    const auto& [xy, xz, yz] = more.cross_axis;
+    block.mean_lsb[0] += (xy * u[1] + xz * u[2]) / s[0];
+    block.mean_lsb[1] += (xy * u[0] + yz * u[2]) / s[1];
+    block.mean_lsb[2] += (xz * u[0] + yz * u[1]) / s[2];
+  }
+  return out;
+}
+
 Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOptions& options) {
   report.statistical = fit.best().standard_uncertainty();
   if (options.method == SolveMethod::genetic && report.search) {
@@ -134,7 +157,14 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   GeneticOptions genetic_options;
   genetic_options.seed = options.seed;
   genetic_options.gravity_g = options.gravity_g;
-  SIXPOINT_ASSIGN(report.search, genetic(chosen, file_constants, genetic_options));
+  // Where cross-axis or temperature terms are admitted, it is given the blocks without them: its six
+  // constants would make up for them in the directions that were met, and be off in the others.
+  std::vector<StillBlock> plain;
+  if (report.fit->richer) {
+    plain = without_richer_terms(chosen, *report.fit);
+  }
+  SIXPOINT_ASSIGN(report.search, genetic(plain.empty() ? chosen : std::span<const StillBlock>(plain),
+                                         file_constants, genetic_options));
   report.calibration = options.method == SolveMethod::genetic ? report.search->calibration
                                                               : report.fit->best().calibration;
   report.iterations = options.method == SolveMethod::genetic

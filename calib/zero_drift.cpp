@@ -291,7 +291,9 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
   constexpr double kSensorRange = 0.2;  // of sensitivity, and g of zero
   for (int i = 0; i < kParameters; ++i) {
     const double sd = i < kConstants ? kSensorRange
-                      : i < kRates   ? std::max(1e-6, options.cross_axis_sd)
+                      : i < kRates   ? std::max(
+                                         1e-6, options.cross_axis_sd[static_cast<std::size_t>(
+                                                   i - kConstants)])
                                      : options.rate_sd_g;
     information(i, i) += 1 / (sd * sd);
   }

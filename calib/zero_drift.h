@@ -45,7 +45,7 @@ struct ZeroDriftOptions {
   // next (hysteresis, seating: 0.8 mg in the list of effects).
   double misfit_sd_g = 1.5e-3;
   double visit_sd_g = 5e-4;
-  double cross_axis_sd = 0.0045;
+  PerAxis<double> cross_axis_sd = {0.024, 0.005, 0.005};  // as in BlockFitOptions
   // Before the data: 20 C at the ADXL362's 0.5 mg/C, either way, and twice that. From the middle of
   // the file to its end.
   double rate_sd_g = 0.010;
