@@ -240,11 +240,10 @@ Descent descend(const Problem& problem, const Vector& start) {
 
 // Cross-axis terms about which something is believed before the data.
 int believed(const LeastSquaresOptions& options) {
-  return options.model.cross_axis
-             ? static_cast<int>(std::count_if(options.cross_axis_sd.begin(),
-                                              options.cross_axis_sd.end(),
-                                              [](double sd) { return sd > 0; }))
-             : 0;
+  return options.model.cross_axis ? static_cast<int>(std::count_if(
+                                        options.cross_axis_sd.begin(), options.cross_axis_sd.end(),
+                                        [](double sd) { return sd > 0; }))
+                                  : 0;
 }
 
 Status check(std::span<const GravityPoint> points, const Calibration& start,
@@ -358,8 +357,8 @@ Result<LeastSquaresFit> least_squares(std::span<const GravityPoint> points,
           covariance(i, j);
     }
   }
-  fit.degrees_of_freedom = static_cast<int>(points.size()) - n + (options.prior ? 6 : 0) +
-                           believed(options);
+  fit.degrees_of_freedom =
+      static_cast<int>(points.size()) - n + (options.prior ? 6 : 0) + believed(options);
   double square = 0;
   for (const GravityPoint& point : points) {
     const double residual = magnitude_g(fit, point) - options.gravity_g;

@@ -35,8 +35,8 @@ PartialKnowledge know_partially(std::span<const StillBlock> blocks,
   return out;
 }
 
-// The blocks as a sensor would have measured them that has the six constants of the richer model and
-// nothing of its other terms.
+// The blocks as a sensor would have measured them that has the six constants of the richer model
+// and nothing of its other terms.
 std::vector<StillBlock> without_richer_terms(std::span<const StillBlock> blocks,
                                              const BlockFit& fit) {
   const LeastSquaresFit& more = fit.richer->fit;
@@ -157,14 +157,15 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   GeneticOptions genetic_options;
   genetic_options.seed = options.seed;
   genetic_options.gravity_g = options.gravity_g;
-  // Where cross-axis or temperature terms are admitted, it is given the blocks without them: its six
-  // constants would make up for them in the directions that were met, and be off in the others.
+  // Where cross-axis or temperature terms are admitted, it is given the blocks without them: its
+  // six constants would make up for them in the directions that were met, and be off in the others.
   std::vector<StillBlock> plain;
   if (report.fit->richer) {
     plain = without_richer_terms(chosen, *report.fit);
   }
-  SIXPOINT_ASSIGN(report.search, genetic(plain.empty() ? chosen : std::span<const StillBlock>(plain),
-                                         file_constants, genetic_options));
+  SIXPOINT_ASSIGN(report.search,
+                  genetic(plain.empty() ? chosen : std::span<const StillBlock>(plain),
+                          file_constants, genetic_options));
   report.calibration = options.method == SolveMethod::genetic ? report.search->calibration
                                                               : report.fit->best().calibration;
   report.iterations = options.method == SolveMethod::genetic

@@ -151,8 +151,10 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
   if (hides) {
     reasons.push_back(fmt::format(
         "the unit lay still for {:.1f} of the file's {:.0f} min, which does not rule out that its "
-        "zeros drifted meanwhile: {:.1f} mg in the worst direction could not be told from constants "
-        "(limit {:.1f} mg); lay it on its six sides one right after another for two minutes each, or "
+        "zeros drifted meanwhile: {:.1f} mg in the worst direction could not be told from "
+        "constants "
+        "(limit {:.1f} mg); lay it on its six sides one right after another for two minutes each, "
+        "or "
         "lay it on the first side again at the end and go round all six a second time",
         fit.drift->at_rest_s / 60, fit.drift->span_s / 60,
         std::max(*out.hidden_drift_mg, fit.drift->allowance_mg()), limits.hidden_drift_mg));
@@ -191,7 +193,8 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
     out.agreement_mg = difference_over_sphere(fit.best().calibration, search->calibration).rms_mg;
     // Two error measures on data that the model does not describe differ by about the misfit.
     const double misfit_mg = fit.richer ? 0.8 * fit.richer->structural_mg : 0;
-    const double uncertainty_mg = 2 * std::hypot(fit.best().worst_direction_mg(), search->wander_mg);
+    const double uncertainty_mg =
+        2 * std::hypot(fit.best().worst_direction_mg(), search->wander_mg);
     out.agreement_limit_mg = std::min(limits.most_disagreement_mg,
                                       std::max({limits.agreement_mg, uncertainty_mg, misfit_mg}));
     if (!(*out.agreement_mg <= out.agreement_limit_mg)) {

@@ -61,9 +61,9 @@ struct VerificationLimits {
   int blocks_per_side = 3;  // so that a half of a side still holds a block
   // Least squares and genetic algorithm, RMS over the sphere: this, twice their combined
   // uncertainty or 0.8 of what a richer model still leaves; but never more than the second. They
-  // weigh a misfit differently (squares over directions, absolute values over value subsets). Where a
-  // richer model is admitted, the genetic algorithm is given the blocks without its terms: before,
-  // 1 % of cross-axis on 19 directions set them 12 mg apart.
+  // weigh a misfit differently (squares over directions, absolute values over value subsets). Where
+  // a richer model is admitted, the genetic algorithm is given the blocks without its terms:
+  // before, 1 % of cross-axis on 19 directions set them 12 mg apart.
   double agreement_mg = 2.0;
   double most_disagreement_mg = 8.0;
   double left_out_share = 0.2;  // of the blocks

@@ -1,11 +1,10 @@
 #include "calib/zero_drift.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <vector>
-
-#include <Eigen/Dense>
 
 namespace sixpoint::calib {
 
@@ -93,12 +92,12 @@ double block_variance_g2(const Scatter& scatter, const ZeroDriftOptions& options
   return variance * (1 + alike) / (1 - alike) + 1e-14;
 }
 
-// What the axes that lie level say of the rates, as information and its product with the rates (g and
-// s). They see a drift as well as upright ones, and there are four of them to two; but a unit that
-// leans sinks a little, and what a drift makes in a minute is a hundredth of a degree. So how their
-// slopes scatter about a common rate is the yardstick, widened as F of 3 and n - 3 degrees of freedom
-// is wider than chi-square at one in 1000 (to 3 % between 9 and 100). They are asked whether there is
-// a drift and nothing else.
+// What the axes that lie level say of the rates, as information and its product with the rates (g
+// and s). They see a drift as well as upright ones, and there are four of them to two; but a unit
+// that leans sinks a little, and what a drift makes in a minute is a hundredth of a degree. So how
+// their slopes scatter about a common rate is the yardstick, widened as F of 3 and n - 3 degrees of
+// freedom is wider than chi-square at one in 1000 (to 3 % between 9 and 100). They are asked
+// whether there is a drift and nothing else.
 struct Level {
   Eigen::Vector3d information = Eigen::Vector3d::Zero();
   Eigen::Vector3d product = Eigen::Vector3d::Zero();
@@ -201,8 +200,7 @@ PerAxis<double> ZeroDrift::zero_mg() const {
     const auto i = static_cast<Eigen::Index>(3 + a);
     out[a] = kMgPerG * std::sqrt(std::max(0.0, covariance(i, i)));
     if (shown) {
-      out[a] = std::max(out[a],
-                        std::abs(half_span_mg[a]) + 1.645 * standard_uncertainty_mg[a]);
+      out[a] = std::max(out[a], std::abs(half_span_mg[a]) + 1.645 * standard_uncertainty_mg[a]);
     }
   }
   return out;
@@ -290,11 +288,11 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
   }
   constexpr double kSensorRange = 0.2;  // of sensitivity, and g of zero
   for (int i = 0; i < kParameters; ++i) {
-    const double sd = i < kConstants ? kSensorRange
-                      : i < kRates   ? std::max(
-                                         1e-6, options.cross_axis_sd[static_cast<std::size_t>(
-                                                   i - kConstants)])
-                                     : options.rate_sd_g;
+    const double sd =
+        i < kConstants ? kSensorRange
+        : i < kRates
+            ? std::max(1e-6, options.cross_axis_sd[static_cast<std::size_t>(i - kConstants)])
+            : options.rate_sd_g;
     information(i, i) += 1 / (sd * sd);
   }
   const Matrix with = (information + along).ldlt().solve(Matrix::Identity());
@@ -314,8 +312,8 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
       out.hidden[static_cast<std::size_t>(i * kConstants + j)] = hidden(i, j);
     }
   }
-  // Against no drift: without the rates' prior, and with the level axes. Rates that nothing tells of
-  // keep a little of the prior's information, so that all of them can be divided by.
+  // Against no drift: without the rates' prior, and with the level axes. Rates that nothing tells
+  // of keep a little of the prior's information, so that all of them can be divided by.
   const Eigen::Matrix3d rates = with.bottomRightCorner<3, 3>();
   const Eigen::Vector3d rate = moved.tail<3>();
   const Level level = level_axes(visits, options);

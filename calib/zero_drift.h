@@ -11,8 +11,8 @@
 // with n the direction, by least squares with and without the rates. What the rates add to the
 // covariance of the constants is what a drift could have done to them without being seen; how far
 // they move the constants is what it seems to have done. A file with its sides at rest for a tenth
-// of its time cannot tell a slow drift from constants whatever is computed: the uncertainty then says
-// so, and going round the sides a second time is the cure.
+// of its time cannot tell a slow drift from constants whatever is computed: the uncertainty then
+// says so, and going round the sides a second time is the cure.
 #pragma once
 
 #include <array>

@@ -567,9 +567,9 @@ TEST(Solve, CrossAxisOfRealUnitsIsNoReasonToRefuse) {
   }
 }
 
-// Six sides once each, with long pauses, at 20 C of warming: the sides are still for too small a part
-// of the file to show the drift, so the file is refused, warmed or not; and a second round is the
-// cure for the one that was not.
+// Six sides once each, with long pauses, at 20 C of warming: the sides are still for too small a
+// part of the file to show the drift, so the file is refused, warmed or not; and a second round is
+// the cure for the one that was not.
 std::vector<StillBlock> paused_sides(const SyntheticUnit& unit, double rest_s, double pause_s,
                                      int rounds, double warming_c, unsigned seed) {
   std::mt19937_64 random(seed);
@@ -583,8 +583,8 @@ std::vector<StillBlock> paused_sides(const SyntheticUnit& unit, double rest_s, d
   for (int i = 0; i < 6 * rounds; ++i) {
     const Vector pose = tests::wobbled(kSides[static_cast<std::size_t>(i % 6)], 1.5, random);
     for (double end = time + rest_s; time < end; time += 1) {
-      finder->push(time, tests::at_rest(unit, pose, 1, 30, random,
-                                        warming_c * (time / length_s - 0.5)));
+      finder->push(time,
+                   tests::at_rest(unit, pose, 1, 30, random, warming_c * (time / length_s - 0.5)));
     }
     finder->break_run();
     time += pause_s;
@@ -613,20 +613,20 @@ TEST(Solve, ADriftBetweenTheSidesIsNotVerified) {
 TEST(Solve, PausesWithoutDriftAreSaidOrMended) {
   for (unsigned seed = 1; seed <= 25; ++seed) {
     const SyntheticUnit unit = mismatched(seed);
-    const auto once = solve_from_still_blocks(paused_sides(unit, 60, 540, 1, 0, seed),
-                                              file_constants(unit));
+    const auto once =
+        solve_from_still_blocks(paused_sides(unit, 60, 540, 1, 0, seed), file_constants(unit));
     ASSERT_OK(once);
     EXPECT_FALSE(once->usable()) << seed << once->brief();
     EXPECT_THAT(once->verification.reasons,
                 testing::Contains(testing::HasSubstr("first side again at the end")));
     EXPECT_GT(*once->verification.hidden_drift_mg, 4);
-    const auto twice = solve_from_still_blocks(paused_sides(unit, 60, 540, 2, 0, seed),
-                                               file_constants(unit));
+    const auto twice =
+        solve_from_still_blocks(paused_sides(unit, 60, 540, 2, 0, seed), file_constants(unit));
     ASSERT_OK(twice);
     EXPECT_TRUE(twice->usable()) << seed << twice->brief();
     EXPECT_LT(*twice->verification.hidden_drift_mg, 1);
-    const auto quick = solve_from_still_blocks(paused_sides(unit, 60, 20, 1, 0, seed),
-                                               file_constants(unit));
+    const auto quick =
+        solve_from_still_blocks(paused_sides(unit, 60, 20, 1, 0, seed), file_constants(unit));
     ASSERT_OK(quick);
     EXPECT_TRUE(quick->usable()) << seed << quick->brief();
   }
@@ -637,8 +637,8 @@ TEST(Solve, ASecondRoundShowsTheDrift) {
   for (unsigned seed = 1; seed <= 25; ++seed) {
     SyntheticUnit unit = mismatched(seed);
     unit.drift_mg_per_c = {0.6, seed % 2 == 0 ? 0.5 : -0.5, -0.7};
-    const auto report = solve_from_still_blocks(paused_sides(unit, 60, 540, 2, 20, seed),
-                                                file_constants(unit));
+    const auto report =
+        solve_from_still_blocks(paused_sides(unit, 60, 540, 2, 20, seed), file_constants(unit));
     ASSERT_OK(report);
     EXPECT_FALSE(report->usable()) << seed << report->brief();
     ASSERT_TRUE(report->fit->drift);
