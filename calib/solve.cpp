@@ -99,6 +99,25 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
   return {};
 }
 
+// The posterior of a documented prior, where the data alone do not determine the constants.
+Status lean_on_prior(SolveReport& report, std::span<const StillBlock> chosen,
+                     const SolveOptions& options) {
+  BlockFitOptions fit_options;
+  fit_options.gravity_g = options.gravity_g;
+  fit_options.prior = options.prior;
+  fit_options.try_richer_models = false;
+  SIXPOINT_ASSIGN(report.fit, fit_blocks(chosen, options.prior->mean, fit_options));
+  report.calibration = report.fit->fit.calibration;
+  report.iterations = report.fit->fit.iterations;
+  report.search.reset();
+  report.from_prior = true;
+  report.verification.verified = false;
+  report.verification.verdict = Verdict::rests_on_prior;
+  report.verification.reasons.emplace_back(
+      "the constants rest on a population prior where the data are silent");
+  return finish_constants(report, *report.fit, options);
+}
+
 Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
                                  const Calibration& file_constants, const SolveOptions& options) {
   SolveReport report;
@@ -126,20 +145,7 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
                     fmt::join(report.verification.missing_directions, ", ")));
     report.partial = know_partially(chosen, file_constants, options);
     if (options.prior) {
-      fit_options.prior = options.prior;
-      fit_options.try_richer_models = false;
-      auto fit = fit_blocks(chosen, options.prior->mean, fit_options);
-      if (!fit) {
-        return fail(fit.error());
-      }
-      report.fit = std::move(*fit);
-      report.calibration = report.fit->fit.calibration;
-      report.iterations = report.fit->fit.iterations;
-      report.from_prior = true;
-      report.verification.verdict = Verdict::rests_on_prior;
-      report.verification.reasons.emplace_back(
-          "the constants rest on a population prior where the data are silent");
-      SIXPOINT_CHECK(finish_constants(report, *report.fit, options));
+      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
     }
     return report;
   }
@@ -150,6 +156,9 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
     report.verification.verdict = Verdict::not_verified;
     report.verification.reasons.push_back(fit.error().what + "; " + fit.error().hint);
     report.partial = know_partially(chosen, file_constants, options);
+    if (options.prior) {
+      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
+    }
     return report;
   }
   report.fit = std::move(*fit);
@@ -199,6 +208,15 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   }
   if (!(report.verification.worst_direction_mg <= options.limits.worst_direction_mg)) {
     report.partial = know_partially(chosen, file_constants, options);
+    if (options.prior && !report.verification.verified) {
+      // Enough directions by the 0.3 g rule, and still too little in them.
+      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
+      return report;
+    }
+  }
+  if (options.prior) {
+    report.notes.emplace_back(
+        "the data determine the constants without the prior, which was not used");
   }
   if (!report.fit->left_out_reason.empty()) {
     report.notes.push_back(report.fit->left_out_reason);
@@ -234,9 +252,12 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   }
   if (report.residual_rounded_mg && *report.residual_rounded_mg > options.limits.applied_mg &&
       report.verification.verified) {
-    report.notes.emplace_back(
-        "rounded to a unit's nine integers the constants are not good enough");
-    report.stored.reset();
+    report.verification.verified = false;
+    report.verification.verdict = Verdict::not_verified;
+    report.verification.reasons = {
+        fmt::format("rounded to a unit's nine integers the constants leave still blocks {:.1f} mg "
+                    "from 1 g (limit {:.1f} mg)",
+                    *report.residual_rounded_mg, options.limits.applied_mg)};
   }
   return report;
 }
@@ -333,6 +354,15 @@ Json to_json(const SolveReport& report) {
   if (report.points > 0) {
     json["coverage_g"]["min"] = report.coverage.min_g;
     json["coverage_g"]["max"] = report.coverage.max_g;
+    // Blocks at -1.3 .. -0.7, -0.7 .. 0.7 and 0.7 .. 1.3 g of each axis.
+    Json& subsets = json["coverage_g"]["value_subsets"];
+    for (const auto& [name, subset] :
+         {std::pair{"low", ValueSubset::low}, std::pair{"middle", ValueSubset::middle},
+          std::pair{"high", ValueSubset::high}}) {
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        subsets[name].push_back(report.coverage.subset_blocks[a][static_cast<std::size_t>(subset)]);
+      }
+    }
   } else {
     json["coverage_g"]["min"] = nullptr;
     json["coverage_g"]["max"] = nullptr;

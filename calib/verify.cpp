@@ -146,6 +146,7 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
   const bool wide = !(out.worst_direction_mg <= limits.worst_direction_mg);
   // Not where other things are what is wrong.
   const bool hides = fit.drift && !drifts && undrifted_mg <= limits.worst_direction_mg &&
+                     out.repeatability_mg <= limits.repeatability_mg &&
                      (!(*out.hidden_drift_mg <= limits.hidden_drift_mg) ||
                       (wide && fit.drift->allowance_mg() > undrifted_mg));
   if (hides) {

@@ -246,6 +246,32 @@ TEST(Solve, PriorIsMarkedAndNeverVerified) {
     EXPECT_LT(std::abs(zero_off_mg), 4 * report->uncertainty.zero_mg[a]);
     EXPECT_GT(report->uncertainty.zero_mg[a], 20);
   }
+  // Directions that pass the 0.3 g rule and determine nothing well: the posterior as well. Where
+  // they do, the prior has nothing to say.
+  std::vector<Vector> narrow;
+  for (const Vector& up :
+       {Vector{.8, .5, .35}, Vector{-.45, .7, -.6}, Vector{.4, -.45, .85}, Vector{-.45, .4, .84},
+        Vector{.5, .5, -.7}, Vector{.35, -.6, .73}, Vector{.6, .5, .62}}) {
+    narrow.push_back(tests::unit_vector(up[0], up[1], up[2]));
+  }
+  const auto weak =
+      solve_from_still_blocks(blocks_of(unit, narrow, {30, 60}, 5), file_constants(unit), options);
+  ASSERT_OK(weak);
+  EXPECT_THAT(weak->verification.missing_directions, testing::IsEmpty());
+  EXPECT_TRUE(weak->from_prior) << weak->brief();
+  EXPECT_EQ(weak->verification.verdict, Verdict::rests_on_prior);
+  EXPECT_FALSE(weak->usable());
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double zero_off_mg =
+        1000 * (weak->calibration->zero_lsb[a] - unit.zero_counts[a]) / unit.counts_per_g[a];
+    EXPECT_LT(std::abs(zero_off_mg), 4 * weak->uncertainty.zero_mg[a]);
+  }
+  const auto whole = solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 2}, 5),
+                                             file_constants(unit), options);
+  ASSERT_OK(whole);
+  EXPECT_FALSE(whole->from_prior);
+  EXPECT_TRUE(whole->usable()) << whole->brief();
+  EXPECT_THAT(whole->notes, testing::Contains(testing::HasSubstr("was not used")));
   EXPECT_FAILS(population_prior("NEO1B34100019", FilterConfiguration::current),
                ErrorCode::bad_data);
 }
@@ -262,6 +288,14 @@ TEST(Solve, JsonHasTheContractsKeys) {
                           "points", "coverage_g", "residual_mg", "verified", "verdict", "reasons",
                           "missing_directions", "iterations", "seconds"}) {
     EXPECT_TRUE(json.contains(key)) << key;
+  }
+  // Six sides: every axis is up once, down once and level four times.
+  const auto& subsets = json["coverage_g"]["value_subsets"];
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto level = subsets["middle"][a].get<std::size_t>();
+    EXPECT_EQ(subsets["low"][a].get<std::size_t>() + level + subsets["high"][a].get<std::size_t>(),
+              report->points);
+    EXPECT_NEAR(static_cast<double>(level) / static_cast<double>(report->points), 4.0 / 6, 0.05);
   }
   const auto record = record_of(*report, *parse_iso8601("2016-05-16"), {"00", "a.gt3x", ""});
   ASSERT_OK(record);
