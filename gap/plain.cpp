@@ -476,7 +476,8 @@ Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
   return out;
 }
 
-Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gravity) {
+Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gravity,
+                              CrossAxis cross_axis) {
   const auto n = static_cast<Eigen::Index>(raw.size());
   if (n < 12 || !(gravity > 0)) {
     return fail(ErrorCode::bad_data, "fewer than twelve positions", {},
@@ -515,12 +516,18 @@ Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gr
           scale * (u[1] * d[2] + u[2] * d[1]), scale * (u[0] * d[2] + u[2] * d[0]),
           scale * (u[0] * d[1] + u[1] * d[0]), 0, 0, 0;
       row.tail<3>() = -fit.sensitivity * u;
+      if (cross_axis == CrossAxis::none) {
+        row.segment<3>(3).setZero();
+      }
       const double miss = gravity - length;
       a += row * row.transpose();
       b += row * miss;
       square += miss * miss;
     }
     fit.residual = std::sqrt(square / static_cast<double>(n));
+    if (cross_axis == CrossAxis::none) {
+      a.diagonal().segment<3>(3).setOnes();  // no step there
+    }
     const Eigen::LDLT<Matrix9> solver(a);
     const Vector9 step = solver.solve(b);
     if (!step.allFinite()) {
