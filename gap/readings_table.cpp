@@ -476,9 +476,8 @@ Result<Diagnosis> diagnose_table(FileSystem& files, const std::string& path,
   auto fit = fit_lengths(means, 1, CrossAxis::symmetric);
   if (fit) {
     if (const std::size_t strays = leave_out_strays(placements, *fit); strays > 0) {
-      out.losses.push_back(
-          fmt::format("{} of {} placements do not fit the others and were left out", strays,
-                      means.size()));
+      out.losses.push_back(fmt::format(
+          "{} of {} placements do not fit the others and were left out", strays, means.size()));
       means = means_of(placements);
       fit = fit_lengths(means, 1, CrossAxis::symmetric);
     }

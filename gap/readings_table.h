@@ -3,8 +3,8 @@
 // what the lengths at rest say beyond them is judged, which is whether the axes stand square.
 //
 // A line holds time and three readings, or three readings (then the rate must be told), parted by
-// spaces, commas, semicolons or tabs. Time is in seconds; readings are in any unit that is linear in
-// acceleration. A first line that is no numbers names the columns. Lines that begin with # are
+// spaces, commas, semicolons or tabs. Time is in seconds; readings are in any unit that is linear
+// in acceleration. A first line that is no numbers names the columns. Lines that begin with # are
 // passed over.
 #pragma once
 
@@ -50,8 +50,8 @@ bool is_readings_table(const std::string& path);
 Result<ReadingsTable> read_readings_table(FileSystem& files, const std::string& path,
                                           const ReadingsTableOptions& options = {});
 
-// `non_orthogonality` by the evidence of the lengths, held out by direction; inconclusive with fewer
-// than sixteen directions or where they do not span. Errors as above.
+// `non_orthogonality` by the evidence of the lengths, held out by direction; inconclusive with
+// fewer than sixteen directions or where they do not span. Errors as above.
 Result<Diagnosis> diagnose_table(FileSystem& files, const std::string& path,
                                  const DiagnoseOptions& options = {},
                                  const ReadingsTableOptions& table = {});

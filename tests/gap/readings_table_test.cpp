@@ -24,7 +24,8 @@ struct Made {
   double noise_g = 0.003;
 };
 
-// The forward model in closed form: counts = gain * (M * direction) + zero, with noise and rounding.
+// The forward model in closed form: counts = gain * (M * direction) + zero, with noise and
+// rounding.
 std::string table_of(const Made& made, std::uint64_t seed) {
   Random random(seed);
   Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
@@ -46,8 +47,8 @@ std::string table_of(const Made& made, std::uint64_t seed) {
       }
       const Eigen::Vector3d counts = gain.cwiseProduct(g) + zero;
       if (made.timed) {
-        text += fmt::format("{:.4f},{:.0f},{:.0f},{:.0f}\n", time_s, counts[0], counts[1],
-                            counts[2]);
+        text +=
+            fmt::format("{:.4f},{:.0f},{:.0f},{:.0f}\n", time_s, counts[0], counts[1], counts[2]);
       } else {
         text += fmt::format("{:.0f};{:.0f};{:.0f}\r\n", counts[0], counts[1], counts[2]);
       }
