@@ -155,7 +155,7 @@ TEST_P(CaptureFaults, DoesWhatTheTableSays) {
   if (row.exit_code == 0) {
     const auto alone = tests::run_command(posix_env(), {"solve", path("c.gt3x")});
     // Who watched knows that there was no hour between two sides; the file does not.
-    const bool jumped = row.fault.find("clock_jump") != std::string::npos;
+    const bool jumped = std::string_view(row.fault).find("clock_jump") != std::string_view::npos;
     EXPECT_EQ(alone.exit_code, jumped ? 1 : 0) << alone.out;
     EXPECT_THAT(alone.out, HasSubstr(jumped ? "zeros drifted" : "verified"));
   }
