@@ -357,6 +357,7 @@ void accuracy(const char* name, int units, unsigned seed, double rate_hz, double
   constexpr int kJudged = 200;  // the genetic algorithm takes seven times as long as the rest
   int judged = 0;
   int refused = 0;
+  int incomplete = 0;
   int failed = 0;
   int cross = 0;
   for (int i = 0; i < units; ++i) {
@@ -396,6 +397,8 @@ void accuracy(const char* name, int units, unsigned seed, double rate_hz, double
       const auto report = solve_from_still_blocks(blocks, stored_of(unit));
       ++judged;
       refused += report && report->usable() ? 0 : 1;
+      // The paper's rule reads the file's own constants, and these are wrong by up to 0.2 g.
+      incomplete += report && report->verification.verdict == Verdict::incomplete ? 1 : 0;
     }
     if (i < 50) {
       baseline.add(sphere_error(unit, closest_point(unit, blocks)).mean_mg);
@@ -403,15 +406,17 @@ void accuracy(const char* name, int units, unsigned seed, double rate_hz, double
   }
   std::printf(
       "%-34s mean %.4f mg (wanted %.3f), worst direction %.4f mg on average, %.4f at most%s; "
-      "cross-axis admitted %d (six parameters alone: %.4f mg); failed %d; refused %d of %d; "
+      "cross-axis admitted %d (six parameters alone: %.4f mg); failed %d; refused %d of %d (%d by "
+      "the 0.3 g rule); "
       "closest-point baseline "
       "%.4f mg, ratio "
       "%.1f; LS %.1f ms "
       "(%zu blocks), at most %.1f ms\n",
       name, mean.mean(), wanted_mean, worst.mean(), worst.worst,
       wanted_worst > 0 ? (" (wanted " + std::to_string(wanted_worst) + ")").c_str() : "", cross,
-      plain.mean(), failed, refused, judged, baseline.mean(), baseline.mean() / mean.mean(),
-      time.mean(), blocks_seen / static_cast<std::size_t>(units), time.worst);
+      plain.mean(), failed, refused, judged, incomplete, baseline.mean(),
+      baseline.mean() / mean.mean(), time.mean(), blocks_seen / static_cast<std::size_t>(units),
+      time.worst);
   if (bound_mean.count > 0) {
     std::printf(
         "%-34s at the Cramer-Rao bound of the same data: mean %.4f mg (ratio %.2f), worst "
@@ -580,7 +585,7 @@ struct Habit {
   double rest_s = 60;
   double handling_s = 10;
   int rounds = 1;
-  double tilt_rad = 0.05;
+  double tilt_rad = 0.03;  // each way
 };
 
 // Warmth in C, by time and by the length of the file.
@@ -662,11 +667,17 @@ void habits(int units, unsigned seed) {
   const Shape kShapes[] = {{"constant", constant_c},   {"rising", rising_c},
                            {"falling", falling_c},     {"warm-up", warm_up_c},
                            {"quick", quick_warm_up_c}, {"600 s", ten_minutes_c}};
-  const Habit kHabits[] = {{60, 10},     {60, 30},     {60, 60},          {60, 90},
-                           {60, 120},    {60, 240},    {60, 540},         {40, 5},
-                           {30, 10},     {120, 30},    {120, 60},         {180, 120},
-                           {300, 15},    {300, 600},   {20, 580},         {60, 10, 2},
-                           {60, 240, 2}, {60, 540, 2}, {60, 20, 1, 0.02}, {60, 20, 1, 0.1}};
+  const Habit kHabits[] = {{60, 10},        {60, 30},     {60, 60},          {60, 90},
+                           {60, 120},       {60, 240},    {60, 540},         {40, 5},
+                           {30, 10},        {120, 30},    {120, 60},         {180, 120},
+                           {300, 15},       {300, 600},   {20, 580},         {60, 10, 2},
+                           {60, 240, 2},    {60, 540, 2}, {60, 20, 1, 0.02}, {60, 20, 1, 0.05},
+                           {60, 20, 1, 0.1}};
+  std::printf(
+      "calibration files, %d units each: refused of the good ones; then, with 20 C of change in "
+      "the "
+      "file, wrong by more than 5 mg and verified / verified at all (largest error of these)\n",
+      units);
   for (const Habit& habit : kHabits) {
     std::printf("rest %3.0f s, handling %3.0f s, rounds %d, tilt %.2f:", habit.rest_s,
                 habit.handling_s, habit.rounds, habit.tilt_rad);
