@@ -309,7 +309,8 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
   for (int i = 0; i < kConstants; ++i) {
     out.apart[static_cast<std::size_t>(i)] = moved[i] - still[i];
     for (int j = 0; j < kConstants; ++j) {
-      out.hidden[static_cast<std::size_t>(i * kConstants + j)] = hidden(i, j);
+      out.hidden[static_cast<std::size_t>(i) * kConstants + static_cast<std::size_t>(j)] =
+          hidden(i, j);
     }
   }
   // Against no drift: without the rates' prior, and with the level axes. Rates that nothing tells
