@@ -163,6 +163,7 @@ std::optional<station::OperatorWord> terminal_word() {
 }
 
 Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(begin_session(context, recorder, options.record));
   SIXPOINT_CHECK(check_outputs(options));
   station::JigSessionOptions session;
   if (!options.limits.empty()) {
@@ -355,7 +356,7 @@ void add_jig(CLI::App& app, Context& context) {
   command->callback([options, &context] {
     device::SessionRecorder recorder;
     const Result<Done> done = run(context, *options, recorder);
-    save_session(context, recorder, options->record);
+    finish_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "jig", done.error(), options->json);
       return;

@@ -7,6 +7,7 @@
 
 #include "device/pcap.h"
 #include "device/protocol.h"
+#include "device/session_journal.h"
 #include "station/cli/command.h"
 #include "station/session_minimiser.h"
 
@@ -109,6 +110,24 @@ Status from_pcap(Context& context, const Options& options) {
   return {};
 }
 
+Status recover(Context& context, const Options& options) {
+  const std::string suffix = device::journal_of("");
+  const bool is_journal = options.input.ends_with(suffix);
+  const std::string target =
+      is_journal ? options.input.substr(0, options.input.size() - suffix.size()) : options.input;
+  SIXPOINT_ASSIGN(const auto recovered,
+                  device::recover_session(context.env.files, device::journal_of(target),
+                                          options.output.empty() ? target : options.output));
+  SIXPOINT_ASSIGN(const device::Session session,
+                  device::read_session(context.env.files, recovered.target));
+  Options about = options;
+  about.output = recovered.target;
+  tell(context, about, session,
+       fmt::format("recovered; {} bytes behind the last whole transfer were dropped",
+                   recovered.dropped_bytes));
+  return {};
+}
+
 using Work = Status (*)(Context&, const Options&);
 
 CLI::App* add(CLI::App& app, Context& context, const std::shared_ptr<Options>& options,
@@ -128,10 +147,15 @@ CLI::App* add(CLI::App& app, Context& context, const std::shared_ptr<Options>& o
 
 void add_session(CLI::App& app, Context& context) {
   CLI::App* command = app.add_subcommand(
-      "session", "recorded sessions (--record): show, make small, make of a USB capture");
+      "session", "recorded sessions (--record): show, recover, make small, make of a USB capture");
   command->require_subcommand(1);
   const auto options = std::make_shared<Options>();
   add(*command, context, options, "show", "what a session holds", "SESSION", show);
+  CLI::App* broken_off =
+      add(*command, context, options, "recover",
+          "a session of the journal that a recording left which was killed", "SESSION", recover);
+  broken_off->add_option("-o,--output", options->output,
+                         "the session to make; SESSION unless given");
   CLI::App* small = add(*command, context, options, "minimise",
                         "the least that still ends in the same way", "SESSION", minimise);
   small->add_option("-o,--output", options->output, "the session to make")->required();

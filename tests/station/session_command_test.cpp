@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "device/session.h"
+#include "device/session_journal.h"
 #include "expect_result.h"
 #include "run_command.h"
 #include "station/session_minimiser.h"
@@ -124,6 +125,40 @@ TEST_F(SessionCommand, TheMinimiserKeepsTheOutcome) {
   EXPECT_EQ(run({"session", "minimise", path("r.zip"), "-o", path("n.zip"), "--doing", "dance"})
                 .exit_code,
             64);
+}
+
+// What a killed program leaves (device/session_journal.h): the next open says what to do, recover
+// does it, and the run is replayed as far as it went.
+TEST_F(SessionCommand, ABrokenOffRecordingIsRecovered) {
+  ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--record", path("r.zip")}).exit_code, 0);
+  const auto whole = *device::read_session(posix_env().files, path("r.zip"));
+  {
+    auto journal = *device::SessionJournal::create(posix_env().files, path("k.zip"));
+    ASSERT_OK(journal.begin(whole.device, whole.started));
+    for (std::size_t i = 0; i < whole.transfers.size() / 2; ++i) {
+      ASSERT_OK(journal.append(whole.transfers[i]));
+    }
+  }
+  std::ofstream(path("k.zip.journal"), std::ios::app) << "{\"t_ns\":12";
+  const auto unread = jig("replay:" + path("k.zip"));
+  EXPECT_EQ(unread.exit_code, 66);
+  EXPECT_THAT(unread.people, HasSubstr("sixpoint session recover"));
+  const auto again = jig("virtual:seed=7,jig=auto", {"--record", path("k.zip")});
+  EXPECT_EQ(again.exit_code, 73) << "what is there is not overwritten";
+  EXPECT_THAT(again.people, HasSubstr("sixpoint session recover"));
+
+  const auto recovered = run({"session", "recover", path("k.zip"), "--json"});
+  EXPECT_EQ(recovered.exit_code, 0) << recovered.people;
+  EXPECT_EQ(recovered.json()["transfers"], whole.transfers.size() / 2);
+  EXPECT_EQ(recovered.json()["truncated"], true);
+  EXPECT_THAT(recovered.json()["summary"].get<std::string>(), HasSubstr("11 bytes"));
+  EXPECT_EQ(jig("replay:" + path("k.zip")).exit_code, 69) << "the unit is gone where it was killed";
+  EXPECT_EQ(run({"session", "recover", path("k.zip")}).exit_code, 66) << "the journal is used up";
+  // By the journal's own name, to another place.
+  { ASSERT_OK(device::SessionJournal::create(posix_env().files, path("k.zip"))->begin("x", {})); }
+  EXPECT_EQ(run({"session", "recover", path("k.zip.journal")}).exit_code, 73);
+  EXPECT_EQ(run({"session", "recover", path("k.zip.journal"), "-o", path("l.zip")}).exit_code, 0);
+  EXPECT_EQ(device::read_session(posix_env().files, path("l.zip"))->transfers.size(), 0U);
 }
 
 TEST_F(SessionCommand, FromPcapRefusesWhatIsNoCapture) {
