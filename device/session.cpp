@@ -170,9 +170,9 @@ std::string to_line(const SessionTransfer& transfer) {
     text += '"';
   }
   if (transfer.error) {
-    text +=
-        fmt::format(R"(,"error":"{}","what":{})", to_string(transfer.error->code),
-                    Json(transfer.error->what).dump(-1, ' ', false, Json::error_handler_t::replace));
+    text += fmt::format(
+        R"(,"error":"{}","what":{})", to_string(transfer.error->code),
+        Json(transfer.error->what).dump(-1, ' ', false, Json::error_handler_t::replace));
   }
   text += "}\n";
   return text;
@@ -224,10 +224,8 @@ Status write_archive(FileSystem& files, const std::string& path, const SessionHe
 Status write_session(FileSystem& files, const std::string& path, const Session& session) {
   const std::string lines = to_lines(session.transfers);
   return write_archive(
-      files, path,
-      {session.device, session.started, session.truncated, session.transfers.size()},
-      digest_of(lines),
-      std::make_unique<gt3x::MemorySource>(Bytes(lines.begin(), lines.end())));
+      files, path, {session.device, session.started, session.truncated, session.transfers.size()},
+      digest_of(lines), std::make_unique<gt3x::MemorySource>(Bytes(lines.begin(), lines.end())));
 }
 
 Result<Session> read_session(FileSystem& files, const std::string& path) {

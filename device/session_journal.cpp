@@ -112,10 +112,9 @@ Result<SessionJournal> SessionJournal::create(FileSystem& files, const std::stri
     if (!files.info(name)) {
       return fail(std::move(file).error());
     }
-    return fail(ErrorCode::cannot_create,
-                "a recording of this session was broken off, or still runs", name,
-                fmt::format("keep it with 'sixpoint session recover {}', or remove it",
-                            printable(target)));
+    return fail(
+        ErrorCode::cannot_create, "a recording of this session was broken off, or still runs", name,
+        fmt::format("keep it with 'sixpoint session recover {}', or remove it", printable(target)));
   }
   return SessionJournal(files, target, *std::move(file));
 }
@@ -155,9 +154,9 @@ Status SessionJournal::finish(bool truncated) {
   const std::string name = journal_of(target_);
   if (lines_begin_ > 0) {
     head_.truncated = truncated;
-    const Status made = write_archive(
-        *files_, target_, head_, hash_.finish(),
-        std::make_unique<PartOfFile<WritableFile>>(file_, lines_begin_, end_));
+    const Status made =
+        write_archive(*files_, target_, head_, hash_.finish(),
+                      std::make_unique<PartOfFile<WritableFile>>(file_, lines_begin_, end_));
     if (!made) {
       Error error = made.error();
       error.hint = fmt::format("{}; the transfers are in {}, for 'sixpoint session recover'",

@@ -127,8 +127,8 @@ TEST(SessionJournal, APowerCutLosesNoMoreThanWasNotSynced) {
   MemoryFiles files;
   auto journal = *SessionJournal::create(files, "s.zip");
   ASSERT_OK(journal.begin("virtual:", UtcTime{}));
-  const SessionTransfer block{SessionTransfer::Kind::from_device, SessionChannel::bulk, {},
-                              Bytes(1000, 7), {}};
+  const SessionTransfer block{
+      SessionTransfer::Kind::from_device, SessionChannel::bulk, {}, Bytes(1000, 7), {}};
   constexpr std::size_t kBlocks = 100;
   for (std::size_t i = 0; i < kBlocks; ++i) {
     ASSERT_OK(journal.append(block));

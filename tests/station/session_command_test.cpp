@@ -167,16 +167,16 @@ TEST_F(SessionCommand, TheMinimiserKeepsHowAndWhereARunFailed) {
     std::ofstream(path("f.json")) << R"({"schema": "sixpoint/faults/1", "faults": [)" << one.fault
                                   << "]}";
     const auto work = [&](const std::string& device, const std::vector<std::string>& more) {
-      std::vector<std::string> arguments = {is_jig ? "jig" : "capture", "--device", device,
-                                            "--store", path("s.db"), "--json"};
+      std::vector<std::string> arguments = {
+          is_jig ? "jig" : "capture", "--device", device, "--store", path("s.db"), "--json"};
       if (!is_jig) {
         arguments.insert(arguments.end(), {"-o", path(device.substr(0, 3) + name + ".gt3x")});
       }
       arguments.insert(arguments.end(), more.begin(), more.end());
       return run(arguments);
     };
-    const auto recorded = work("virtual:seed=7,jig=auto,faults=" + path("f.json"),
-                               {"--record", path(name + ".zip")});
+    const auto recorded =
+        work("virtual:seed=7,jig=auto,faults=" + path("f.json"), {"--record", path(name + ".zip")});
     EXPECT_EQ(recorded.exit_code, one.exit_code);
     const auto whole = *device::read_session(posix_env().files, path(name + ".zip"));
 
@@ -193,8 +193,8 @@ TEST_F(SessionCommand, TheMinimiserKeepsHowAndWhereARunFailed) {
     for (std::size_t i = 0; i < small.transfers.size(); ++i) {
       device::Session without = small;
       without.transfers.erase(without.transfers.begin() + static_cast<std::ptrdiff_t>(i));
-      EXPECT_NE(station::outcome_of(without, one.work), outcome) << "transfer " << i << " of "
-                                                                 << small.transfers.size();
+      EXPECT_NE(station::outcome_of(without, one.work), outcome)
+          << "transfer " << i << " of " << small.transfers.size();
     }
     // Oracle: the program itself, on the small session.
     ASSERT_OK(device::write_session(posix_env().files, path("m" + name + ".zip"), small));
@@ -211,7 +211,9 @@ TEST_F(SessionCommand, TheMinimiserMayLeaveNothing) {
   device::Session session;
   for (int i = 0; i < 5; ++i) {
     session.transfers.push_back({device::SessionTransfer::Kind::from_device,
-                                 device::SessionChannel::bulk, std::chrono::seconds(i), Bytes(8),
+                                 device::SessionChannel::bulk,
+                                 std::chrono::seconds(i),
+                                 Bytes(8),
                                  {}});
   }
   const auto report = station::minimise(session, {});
