@@ -35,3 +35,32 @@ kill -INT $server
 wait $server
 for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
 ! ls /sys/bus/usb/devices | grep '^1-[1-9]'
+
+echo "== a unit that is files alone: found, mounted, calibrated from its mount point"
+sixpoint virtual --device virtual:seed=7,serial=MOS2A45130008,interfaces=storage >offered2 2>hints &
+server=$!
+for i in $(seq 100); do grep -q listening offered2 && break; sleep 0.1; done
+usbip attach -r 127.0.0.1 -b 1-1
+for i in $(seq 100); do ls /sys/bus/usb/devices/1-1:1.0/host*/target*/*/block/* >/dev/null 2>&1 && break; sleep 0.1; done
+udevadm settle --timeout=10
+[ "$(cat /sys/bus/usb/devices/1-1/bNumInterfaces)" -eq 1 ]
+sixpoint devices | tee found
+grep -q '^MOS2A45130008 .*file-monitor .*not mounted' found
+disk=/dev/$(basename "$(ls -d /sys/bus/usb/devices/1-1:1.0/host*/target*/*/block/*)")
+mkdir -p "/mnt/my unit"
+mount -t vfat -o ro "$disk" "/mnt/my unit"
+sixpoint devices | tee found
+grep -q '^drive:/mnt/my unit .*file-monitor .*ready' found
+sixpoint capture --device "drive:/mnt/my unit" -o copy.gt3x --constants C.json --store bench.db
+sixpoint solve copy.gt3x
+grep -q MOS2A45130008 C.json
+status=0; sixpoint jig --device "drive:/mnt/my unit" --store bench.db || status=$?
+[ $status -eq 64 ]
+echo "== pulled out while it is mounted"
+usbip detach -p 0
+for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1 ] || break; sleep 0.1; done
+status=0; sixpoint capture --device "drive:/mnt/my unit" -o gone.gt3x --store bench.db || status=$?
+[ $status -ne 0 ]
+[ ! -e gone.gt3x ]
+kill -INT $server
+wait $server

@@ -2,6 +2,8 @@
 // installed program as a child process.
 #include <array>
 #include <atomic>
+#include <csignal>
+#include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -12,9 +14,11 @@
 #include "device/jig.h"
 #include "device/unit.h"
 #include "expect_result.h"
+#include "mocks/usb_drive.h"
 #include "temporary_folder.h"
 #include "usb/bodies.h"
 #include "usb/child.h"
+#include "usb/plugged.h"
 #include "usb/umockdev_bench.h"
 
 namespace sixpoint::tests {
@@ -236,6 +240,60 @@ TEST_F(Program, ListsWhatIsPluggedIn) {
   EXPECT_EQ(run_child({"devices"}).out.find(a.serial), std::string::npos);
   const ChildAnswer doctor = run_child({"doctor", "--json"});
   EXPECT_NE(doctor.out.find("1 of our devices plugged in"), std::string::npos) << doctor.out;
+}
+
+// Oracle: the order in which it was done.
+TEST_F(Program, SaysWhatComesAndGoes) {
+  auto a = make_unit(1);
+  ASSERT_OK(bench->plug_in(a));
+  auto b = make_unit(2);
+  const ChildAnswer answer = run_child_lines(
+      {"devices", "--watch", "--for", "20", "--json"}, [&](const std::string& line, pid_t child) {
+        // Each event leads to the next.
+        const auto json = nlohmann::json::parse(line, nullptr, false);
+        const std::string event =
+            json["event"].get<std::string>() + " " + json["device"]["serial"].get<std::string>();
+        if (event == "arrived " + a.serial && b.port.empty()) {
+          ASSERT_OK(bench->plug_in(b));
+        } else if (event == "arrived " + b.serial) {
+          bench->unplug(a);
+        } else if (event == "left " + a.serial) {
+          ::kill(child, SIGINT);
+        }
+      });
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  std::vector<std::string> events;
+  std::istringstream lines(answer.out);
+  for (std::string line; std::getline(lines, line);) {
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json["schema"], "sixpoint/device-event/1");
+    events.push_back(json["event"].get<std::string>() + " " +
+                     json["device"]["serial"].get<std::string>());
+  }
+  EXPECT_EQ(events, (std::vector<std::string>{"arrived " + a.serial, "arrived " + b.serial,
+                                              "left " + a.serial}));
+}
+
+// A unit of files alone is found as another product; it has no hidraw node and needs none.
+TEST_F(Program, FindsAUnitOfFilesAlone) {
+  const auto truth = sim::draw_unit(3);
+  mocks::VirtualUnitOptions options;
+  options.truth = truth;
+  auto volume = mocks::unit_volume(mocks::VirtualUnit(options));
+  ASSERT_OK(volume);
+  const auto drive = std::make_shared<mocks::UsbDrive>(
+      truth, std::make_shared<const mocks::FatImage>(*std::move(volume)),
+      std::make_shared<LeapingClock>());
+  ASSERT_OK(bench->bus().plug_in(drive));
+  const ChildAnswer answer = run_child({"devices", "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  const auto json = nlohmann::json::parse(answer.out);
+  ASSERT_EQ(json["devices"].size(), 1U);
+  EXPECT_EQ(json["devices"][0]["model"], "file-monitor");
+  EXPECT_EQ(json["devices"][0]["serial"], truth.serial);
+  EXPECT_EQ(json["devices"][0]["address"], nullptr) << "there is no block device here to mount";
+  EXPECT_NE(json["devices"][0]["hint"].get<std::string>().find("drive:FOLDER"), std::string::npos);
+  EXPECT_FAILS(registry().open("hid:", posix_env()), ErrorCode::device_unavailable);
 }
 
 TEST_F(Program, SaysWhichSerialsThereAre) {
