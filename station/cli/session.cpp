@@ -96,9 +96,7 @@ Status from_pcap(Context& context, const Options& options) {
                   read_file(context.env.files, options.input, kMostCapture_bytes));
   device::PcapOptions how;
   how.bus = options.bus;
-  if (options.device_number) {
-    how.device = static_cast<std::uint8_t>(*options.device_number);
-  }
+  how.device = options.device_number;
   auto session = device::session_from_pcap(bytes, how);
   if (!session) {
     Error error = std::move(session).error();
@@ -166,7 +164,7 @@ void add_session(CLI::App& app, Context& context) {
       ->capture_default_str();
   CLI::App* pcap =
       add(*command, context, options, "from-pcap",
-          "a session of what tcpdump or Wireshark captured of usbmon", "CAPTURE", from_pcap);
+          "a session of a USB capture: pcap or pcapng, of usbmon or USBPcap", "CAPTURE", from_pcap);
   pcap->add_option("-o,--output", options->output, "the session to make")->required();
   pcap->add_option("--bus", options->bus, "of this bus only");
   pcap->add_option("--device-number", options->device_number, "of this device on the bus only")
