@@ -33,8 +33,7 @@ void drain(int from, pid_t child, std::string& all, const OnLine& on_line) {
   }
 }
 
-ChildAnswer run(const std::vector<std::string>& arguments, const OnLine& on_out,
-                const OnLine& on_people) {
+ChildAnswer run(std::vector<std::string> words, const OnLine& on_out, const OnLine& on_people) {
   ChildAnswer answer;
   std::array<int, 2> out{};
   std::array<int, 2> people{};
@@ -46,8 +45,6 @@ ChildAnswer run(const std::vector<std::string>& arguments, const OnLine& on_out,
   posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, out[1], 1);
   posix_spawn_file_actions_adddup2(&actions, people[1], 2);
-  std::vector<std::string> words = {SIXPOINT_PROGRAM};
-  words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) {
     argv.push_back(word.data());
@@ -71,7 +68,14 @@ ChildAnswer run(const std::vector<std::string>& arguments, const OnLine& on_out,
   return answer;
 }
 
+std::vector<std::string> sixpoint(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), SIXPOINT_PROGRAM);
+  return arguments;
+}
+
 }  // namespace
+
+ChildAnswer run_program(const std::vector<std::string>& words) { return run(words, {}, {}); }
 
 ChildAnswer run_child(const std::vector<std::string>& arguments,
                       const std::function<void(const std::string&)>& on_line) {
@@ -79,11 +83,11 @@ ChildAnswer run_child(const std::vector<std::string>& arguments,
   if (on_line) {
     people = [&on_line](const std::string& line, pid_t /*child*/) { on_line(line); };
   }
-  return run(arguments, {}, people);
+  return run(sixpoint(arguments), {}, people);
 }
 
 ChildAnswer run_child_lines(const std::vector<std::string>& arguments, const OnLine& on_line) {
-  return run(arguments, on_line, {});
+  return run(sixpoint(arguments), on_line, {});
 }
 
 }  // namespace sixpoint::tests

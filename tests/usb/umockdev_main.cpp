@@ -1,6 +1,6 @@
 // Runs the tests under umockdev's preload library. Exit code 77, and a line that names the package,
-// where it is not installed; 1 where SIXPOINT_MUST_NOT_SKIP is set, as scripts/test.sh does after it
-// installed everything.
+// where it is not installed; 1 where SIXPOINT_MUST_NOT_SKIP is set, as scripts/test.sh does after
+// it installed everything.
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
@@ -11,8 +11,7 @@
 
 int main(int argc, char** argv) {
   // ctest lists the tests before it runs them: that needs nothing.
-  const bool only_listed =
-      argc > 1 && std::string_view(argv[1]).starts_with("--gtest_list_tests");
+  const bool only_listed = argc > 1 && std::string_view(argv[1]).starts_with("--gtest_list_tests");
   if (only_listed) {
     testing::InitGoogleTest(&argc, argv);
     return RUN_ALL_TESTS();

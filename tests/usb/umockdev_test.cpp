@@ -3,11 +3,14 @@
 #include <array>
 #include <atomic>
 #include <csignal>
+#include <filesystem>
 #include <future>
 #include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "device/bulk_transport.h"
 #include "device/discovery.h"
@@ -212,6 +215,99 @@ TEST_F(Misbehaving, AFloodFillsTheQueueAndNothingElse) {
   EXPECT_EQ(count, 10);
 }
 
+// A download whose blocks stop coming, with a patience of an hour: cancel() and the end of the unit
+// do not wait for the transfers that hang (bench/usb_bench measures how long they take).
+TEST_F(Misbehaving, AHangingDownloadIsStopped) {
+  std::atomic<bool> hang = false;
+  std::atomic<int> asked = 0;
+  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    const bool now = endpoint == device::kBulkInEndpoint && hang;
+    asked += now ? 1 : 0;
+    return now ? std::optional(UsbAnswer::nothing_yet()) : std::nullopt;
+  };
+  auto link = open();
+  ASSERT_OK(link);
+  device::UnitOptions options;
+  options.reply_time_out = seconds(5);
+  options.bulk_time_out = std::chrono::hours(1);
+  auto opened = device::Unit::open(std::move(*link), options);
+  ASSERT_OK(opened);
+  const auto info = record(unit, **opened, seconds(600));
+  ASSERT_OK(info);
+  hang = true;
+  TemporaryFolder folder;
+  auto downloading = std::async(std::launch::async, [&] {
+    return (*opened)->download(*info, posix_env().files, folder / "x.gt3x");
+  });
+  while (asked == 0) {
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  (*opened)->cancel();
+  EXPECT_FAILS(downloading.get(), ErrorCode::device_unavailable);
+  opened->reset();
+  EXPECT_FALSE(posix_env().files.info(folder / "x.gt3x"));
+  // Without cancel(): the unit ends while its transfers hang, and the reports with them.
+  auto reports_too = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::nothing_yet())
+                                               : std::nullopt;
+  };
+  bus->unplug(nodes.port);
+  wilful->on_out = reports_too;
+  wilful->plug_in();
+  auto again = open();
+  ASSERT_OK(again);
+  Bytes buffer(device::kBulkBlockBytes);
+  EXPECT_EQ(*again->bulk->read(buffer, milliseconds(20)), 0U) << "transfers are under way";
+  EXPECT_FAILS(again->reports->write(Bytes(64), milliseconds(20)), ErrorCode::io);
+  *again = {};
+}
+
+// What a device says of itself reaches no terminal as it is, and opens nothing that it should not.
+TEST_F(Misbehaving, HostileSerialNumbersNameNothing) {
+  for (const std::string& serial :
+       {std::string("A\x1b[2JB"), std::string("two words"), std::string("\xc5\xbelut\xc3\xbd"),
+        std::string(120, 'A'), std::string("../../etc"), std::string("%n%s"), std::string("a,b=c"),
+        std::string()}) {
+    SCOPED_TRACE(testing::PrintToString(serial));
+    mocks::VirtualUnitOptions options;
+    options.truth = sim::draw_unit(7);
+    options.truth.serial = serial;
+    const auto plugged =
+        std::make_shared<mocks::PluggedUnit>(std::move(options), std::make_shared<LeapingClock>());
+    auto hostile = bus->plug_in(std::make_shared<mocks::UsbUnit>(plugged));
+    ASSERT_OK(hostile);
+    const auto found = device::attached_devices();
+    ASSERT_OK(found);
+    ASSERT_EQ(found->size(), 1U);
+    const std::string& shown = found->front().serial;
+    EXPECT_TRUE(shown.empty() || shown == serial);
+    EXPECT_TRUE(
+        std::all_of(shown.begin(), shown.end(), [](char c) { return c > ' ' && c <= '~'; }));
+    for (const std::string& more : {std::string("--json"), std::string()}) {
+      const ChildAnswer listed =
+          more.empty() ? run_child({"devices"}) : run_child({"devices", more});
+      EXPECT_EQ(listed.exit_code, 0) << listed.people;
+      EXPECT_EQ((listed.out + listed.people).find('\x1b'), std::string::npos);
+      EXPECT_EQ(std::count(listed.out.begin(), listed.out.end(), '\n') == 1, more.empty());
+    }
+    // By its own name, and as the only one there is: that unit, or a refusal in words.
+    for (const std::string& address : {"hid:" + serial, std::string("hid:")}) {
+      auto link = registry().open(address, posix_env());
+      if (!link) {
+        EXPECT_EQ(link.error().brief().find('\x1b'), std::string::npos);
+        continue;
+      }
+      const auto unit_or_not = device::Unit::open(std::move(*link));
+      if (unit_or_not) {
+        EXPECT_EQ((*unit_or_not)->identity().serial, serial);
+      } else {
+        EXPECT_EQ(unit_or_not.error().code, ErrorCode::bad_data);
+      }
+    }
+    bus->unplug(hostile->port);
+  }
+}
+
 class Program : public testing::Test {
  protected:
   void SetUp() override {
@@ -305,6 +401,44 @@ TEST_F(Program, SaysWhichSerialsThereAre) {
   EXPECT_NE(answer.people.find(unit.serial), std::string::npos) << answer.people;
 }
 
+// As a person without the udev rules: the message names them, `devices` says it of each device, and
+// with permission the same person gets on.
+TEST_F(Program, WithoutPermissionNamesTheUdevRules) {
+  if (::geteuid() != 0) {
+    GTEST_SKIP() << "needs root, to start the program as somebody else";
+  }
+  auto unit = make_unit(1);
+  ASSERT_OK(bench->plug_in(unit));
+  bench->bus().allow(unit.port, false);
+  const std::string bed = ::getenv("UMOCKDEV_DIR");
+  ASSERT_EQ(::chmod(bed.c_str(), 0777), 0);  // udev's events are sockets in it
+  TemporaryFolder folder;
+  ASSERT_EQ(::chmod(folder.path().c_str(), 0777), 0);
+  std::filesystem::copy_file(SIXPOINT_PROGRAM, folder / "sixpoint");
+  const auto as_nobody = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534",
+                                         "--clear-groups", folder / "sixpoint"});
+    return run_program(arguments);
+  };
+  const ChildAnswer refused =
+      as_nobody({"jig", "--device", unit.hid_address(), "--store", folder / "s.db"});
+  EXPECT_EQ(refused.exit_code, 77) << refused.people;
+  for (const char* rules :
+       {"packaging/udev/60-sixpoint-detect.rules", "70-sixpoint-access.rules"}) {
+    EXPECT_NE(refused.people.find(rules), std::string::npos) << refused.people;
+  }
+  const ChildAnswer listed = as_nobody({"devices", "--json"});
+  EXPECT_EQ(listed.exit_code, 0) << listed.people;
+  const auto json = nlohmann::json::parse(listed.out);
+  ASSERT_EQ(json["devices"].size(), 1U);
+  EXPECT_EQ(json["devices"][0]["accessible"], false);
+  EXPECT_NE(json["devices"][0]["hint"].get<std::string>().find("60-sixpoint-detect.rules"),
+            std::string::npos);
+  bench->bus().allow(unit.port, true);
+  EXPECT_EQ(nlohmann::json::parse(as_nobody({"devices", "--json"}).out)["devices"][0]["accessible"],
+            true);
+}
+
 // Turns the unit as the program's prompts say, as a technician would.
 class Technician {
  public:
@@ -395,8 +529,8 @@ TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
       << answer.people;
 }
 
-// The table of docs/faults.md once more, with the program as people run it: what it prints, and what
-// it ends with.
+// The table of docs/faults.md once more, with the program as people run it: what it prints, and
+// what it ends with.
 struct ProgramFault {
   const char* name;
   const char* faults;  // of the plan
@@ -434,9 +568,9 @@ TEST_P(ProgramFaults, EndWithWhatTheTableSays) {
   }
   TemporaryFolder folder;
   Technician technician(unit);
-  std::vector<std::string> arguments = {"jig",     "--device", "hid:", "--jig", "manual",
-                                        "--dwell", "0.5",      "--filter", "current",
-                                        "--json",  "--store",  folder / "store.db"};
+  std::vector<std::string> arguments = {"jig",     "--device", "hid:",    "--jig",
+                                        "manual",  "--dwell",  "0.5",     "--filter",
+                                        "current", "--json",   "--store", folder / "store.db"};
   arguments.insert(arguments.end(), fault.more.begin(), fault.more.end());
   const ChildAnswer answer =
       run_child(arguments, [&](const std::string& line) { technician.hear(line); });
@@ -497,8 +631,11 @@ INSTANTIATE_TEST_SUITE_P(
                      0,
                      "it is back",
                      true},
-        ProgramFault{
-            "reset", R"({"fault": "reset", "of": "samples", "at_report": 60})", {}, 0, "it is back"},
+        ProgramFault{"reset",
+                     R"({"fault": "reset", "of": "samples", "at_report": 60})",
+                     {},
+                     0,
+                     "it is back"},
         ProgramFault{"swap",
                      R"({"fault": "swap", "of": "samples", "at_report": 60,
                          "serial": "MOS2B99990009"})",
