@@ -498,8 +498,8 @@ Result<Session> session_from_pcap(std::span<const std::uint8_t> bytes, const Pca
   if (PcapngFile::is_one(bytes)) {
     return collect(PcapngFile(bytes), options);
   }
-  SIXPOINT_ASSIGN(PcapFile file, PcapFile::open(bytes));
-  return collect(std::move(file), options);
+  SIXPOINT_ASSIGN(const PcapFile file, PcapFile::open(bytes));
+  return collect(file, options);
 }
 
 }  // namespace sixpoint::device

@@ -59,12 +59,8 @@ std::string word_for(const SessionTransfer& transfer) {
                      static_cast<int>(message->code), hex(message->payload));
 }
 
-struct Understood {
-  nlohmann::json json;
-  int exit_code = -1;
-};
-
-Understood ask_oracle(const std::string& session) {
+// What it understood, and its exit code.
+std::pair<nlohmann::json, int> ask_oracle(const std::string& session) {
   const std::string command = "python3 " + kFolder + "protocol_oracle.py " + session;
   FILE* pipe = ::popen(command.c_str(), "r");
   std::string text;
@@ -72,10 +68,8 @@ Understood ask_oracle(const std::string& session) {
   for (std::size_t count = 0; (count = std::fread(part.data(), 1, part.size(), pipe)) > 0;) {
     text.append(part.data(), count);
   }
-  Understood understood;
-  understood.exit_code = WEXITSTATUS(::pclose(pipe));
-  understood.json = nlohmann::json::parse(text, nullptr, false);
-  return understood;
+  const int exit_code = WEXITSTATUS(::pclose(pipe));
+  return {nlohmann::json::parse(text, nullptr, false), exit_code};
 }
 
 class ProtocolOracle : public testing::Test {

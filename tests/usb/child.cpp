@@ -46,6 +46,7 @@ ChildAnswer run(std::vector<std::string> words, const OnLine& on_out, const OnLi
   posix_spawn_file_actions_adddup2(&actions, out[1], 1);
   posix_spawn_file_actions_adddup2(&actions, people[1], 2);
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) {
     argv.push_back(word.data());
   }
