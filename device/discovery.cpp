@@ -1,14 +1,17 @@
 #include "device/discovery.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <map>
 #include <memory>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <libudev.h>
+#include <mntent.h>
 #include <unistd.h>
 
 #include "device/bulk_transport.h"
@@ -190,6 +193,9 @@ Result<AttachedDevice> find_device(const DiscoveryFilter& filter, Clock& clock) 
 }
 
 Status check_access(const AttachedDevice& device) {
+  if (device.product_id == kFileMonitorProductId) {
+    return {};
+  }
   for (const std::string& node : {device.usb_node, device.hidraw_node}) {
     const bool wanted = !node.empty() || !device.complete();
     if (wanted && ::access(node.c_str(), R_OK | W_OK) != 0) {
@@ -197,6 +203,38 @@ Status check_access(const AttachedDevice& device) {
     }
   }
   return {};
+}
+
+Result<std::string> mount_point(const AttachedDevice& device) {
+  const Udev context(udev_new());
+  if (!context) {
+    return fail(ErrorCode::io, "udev does not answer", "/sys", "is /sys mounted?");
+  }
+  // The disk, and its partitions where somebody made some.
+  std::vector<std::string> nodes;
+  SIXPOINT_ASSIGN(const Enumerate list, scan(context.get(), "block"));
+  for (auto* entry = udev_enumerate_get_list_entry(list.get()); entry != nullptr;
+       entry = udev_list_entry_get_next(entry)) {
+    const Device block(
+        udev_device_new_from_syspath(context.get(), udev_list_entry_get_name(entry)));
+    udev_device* usb =
+        block ? udev_device_get_parent_with_subsystem_devtype(block.get(), "usb", "usb_device")
+              : nullptr;
+    const char* node = block ? udev_device_get_devnode(block.get()) : nullptr;
+    if (usb != nullptr && node != nullptr && device.port == udev_device_get_sysname(usb)) {
+      nodes.emplace_back(node);
+    }
+  }
+  const std::unique_ptr<FILE, int (*)(FILE*)> mounts(::setmntent("/proc/self/mounts", "r"),
+                                                     &::endmntent);
+  std::array<char, 4096> text{};
+  mntent mount{};
+  while (mounts && ::getmntent_r(mounts.get(), &mount, text.data(), text.size()) != nullptr) {
+    if (std::find(nodes.begin(), nodes.end(), mount.mnt_fsname) != nodes.end()) {
+      return std::string(mount.mnt_dir);
+    }
+  }
+  return std::string();
 }
 
 Result<Link> open_monitor(const AttachedDevice& monitor, Env& env) {

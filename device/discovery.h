@@ -48,8 +48,13 @@ Result<std::vector<AttachedDevice>> attached_devices(const DiscoveryFilter& filt
 Result<AttachedDevice> find_device(const DiscoveryFilter& filter, Clock& clock);
 
 // Whether this process may use the device's nodes, without opening them. permission names the udev
-// rules; device_unavailable when a node is not there.
+// rules; device_unavailable when a node is not there. A file monitor's nodes are the operating
+// system's business.
 Status check_access(const AttachedDevice& device);
+
+// Where the volume of a device with mass storage is mounted; empty where it is not. io when udev
+// cannot be asked.
+Result<std::string> mount_point(const AttachedDevice& device);
 
 // Opens both channels of a monitor. The claimed bulk interface is what keeps a second program out.
 Result<Link> open_monitor(const AttachedDevice& monitor, Env& env);

@@ -7,8 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <zip.h>
 
-#include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "device/session_archive.h"
+#include "device/session_journal.h"
+#include "gt3x/recording_writer.h"
 
 namespace sixpoint::device {
 
@@ -19,10 +21,6 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kSchema = "sixpoint/session/1";
 constexpr const char* kHeadName = "session.json";
 constexpr const char* kTransfersName = "transfers.jsonl";
-// A jig run is half a megabyte; a download of a month at 100 Hz, in hexadecimal, two gigabytes,
-// which is more than a session is for.
-constexpr std::uint64_t kMostFile_bytes = 128ULL << 20U;
-constexpr std::uint64_t kMostText_bytes = 512ULL << 20U;
 constexpr std::size_t kMostTransferBytes = 1U << 20U;
 
 tl::unexpected<Error> broken(std::string what, const std::string& where) {
@@ -67,6 +65,45 @@ void append_hex(std::string& text, const Bytes& bytes) {
 constexpr std::array<ErrorCode, 5> kTransferErrors = {ErrorCode::device_unavailable, ErrorCode::io,
                                                       ErrorCode::bad_data, ErrorCode::permission,
                                                       ErrorCode::internal};
+
+struct CloseZip {
+  void operator()(zip_t* zip) const { zip_discard(zip); }
+};
+
+Result<std::string> entry_of(zip_t& zip, const char* name, const std::string& path) {
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  if (zip_stat(&zip, name, 0, &stat) != 0 || (stat.valid & ZIP_STAT_SIZE) == 0) {
+    return broken(fmt::format("this is no session: it holds no {}", name), path);
+  }
+  if (stat.size > kMostText_bytes) {
+    return broken("the session is larger than any that is made", path);
+  }
+  zip_file_t* file = zip_fopen(&zip, name, 0);
+  if (file == nullptr) {
+    return broken(fmt::format("{} cannot be read", name), path);
+  }
+  // Grown as it comes: what the archive says about its size is only said.
+  std::string text;
+  std::array<char, 65'536> piece{};
+  zip_int64_t count = 0;
+  while ((count = zip_fread(file, piece.data(), piece.size())) > 0 &&
+         text.size() <= kMostText_bytes) {
+    text.append(piece.data(), static_cast<std::size_t>(count));
+  }
+  const bool failed = count != 0;
+  zip_fclose(file);
+  if (failed) {
+    return broken(fmt::format("{} is damaged", name), path);
+  }
+  return text;
+}
+
+Sha256Digest digest_of(std::string_view text) {
+  return sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+}  // namespace
 
 Result<SessionTransfer> parse_line(std::string_view line, const std::string& where) {
   const Json json = Json::parse(line, nullptr, false);
@@ -117,67 +154,34 @@ Result<SessionTransfer> parse_line(std::string_view line, const std::string& whe
   return transfer;
 }
 
-struct CloseZip {
-  void operator()(zip_t* zip) const { zip_discard(zip); }
-};
-
-Result<std::string> entry_of(zip_t& zip, const char* name, const std::string& path) {
-  zip_stat_t stat;
-  zip_stat_init(&stat);
-  if (zip_stat(&zip, name, 0, &stat) != 0 || (stat.valid & ZIP_STAT_SIZE) == 0) {
-    return broken(fmt::format("this is no session: it holds no {}", name), path);
+std::string to_line(const SessionTransfer& transfer) {
+  std::string text =
+      fmt::format(R"({{"t_ns":{},"kind":"{}")", transfer.time.count(),
+                  transfer.kind == SessionTransfer::Kind::to_device     ? "out"
+                  : transfer.kind == SessionTransfer::Kind::from_device ? "in"
+                                                                        : "reopened");
+  if (transfer.kind != SessionTransfer::Kind::reopened) {
+    text += transfer.channel == SessionChannel::bulk ? R"(,"channel":"bulk")"
+                                                     : R"(,"channel":"reports")";
   }
-  if (stat.size > kMostText_bytes) {
-    return broken("the session is larger than any that is made", path);
+  if (!transfer.bytes.empty()) {
+    text += R"(,"hex":")";
+    append_hex(text, transfer.bytes);
+    text += '"';
   }
-  zip_file_t* file = zip_fopen(&zip, name, 0);
-  if (file == nullptr) {
-    return broken(fmt::format("{} cannot be read", name), path);
+  if (transfer.error) {
+    text += fmt::format(
+        R"(,"error":"{}","what":{})", to_string(transfer.error->code),
+        Json(transfer.error->what).dump(-1, ' ', false, Json::error_handler_t::replace));
   }
-  // Grown as it comes: what the archive says about its size is only said.
-  std::string text;
-  std::array<char, 65'536> piece{};
-  zip_int64_t count = 0;
-  while ((count = zip_fread(file, piece.data(), piece.size())) > 0 &&
-         text.size() <= kMostText_bytes) {
-    text.append(piece.data(), static_cast<std::size_t>(count));
-  }
-  const bool failed = count != 0;
-  zip_fclose(file);
-  if (failed) {
-    return broken(fmt::format("{} is damaged", name), path);
-  }
+  text += "}\n";
   return text;
 }
-
-std::string hash_of(std::string_view text) {
-  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
-}
-
-}  // namespace
 
 std::string to_lines(const std::vector<SessionTransfer>& transfers) {
   std::string text;
   for (const SessionTransfer& transfer : transfers) {
-    fmt::format_to(std::back_inserter(text), R"({{"t_ns":{},"kind":"{}")", transfer.time.count(),
-                   transfer.kind == SessionTransfer::Kind::to_device     ? "out"
-                   : transfer.kind == SessionTransfer::Kind::from_device ? "in"
-                                                                         : "reopened");
-    if (transfer.kind != SessionTransfer::Kind::reopened) {
-      text += transfer.channel == SessionChannel::bulk ? R"(,"channel":"bulk")"
-                                                       : R"(,"channel":"reports")";
-    }
-    if (!transfer.bytes.empty()) {
-      text += R"(,"hex":")";
-      append_hex(text, transfer.bytes);
-      text += '"';
-    }
-    if (transfer.error) {
-      text += fmt::format(
-          R"(,"error":"{}","what":{})", to_string(transfer.error->code),
-          Json(transfer.error->what).dump(-1, ' ', false, Json::error_handler_t::replace));
-    }
-    text += "}\n";
+    text += to_line(transfer);
   }
   return text;
 }
@@ -201,63 +205,34 @@ Result<std::vector<SessionTransfer>> parse_lines(std::string_view text) {
   return transfers;
 }
 
+Status write_archive(FileSystem& files, const std::string& path, const SessionHead& head,
+                     const Sha256Digest& hash, std::unique_ptr<gt3x::ByteSource> lines) {
+  Json json;
+  json["schema"] = kSchema;
+  json["device"] = printable(head.device);
+  json["started"] = to_iso8601(head.started);
+  json["transfers"] = head.transfers;
+  json["truncated"] = head.truncated;
+  json["sha256"] = to_hex(hash);
+  // The writer of recordings: one fixed time, so that the same session gives the same bytes.
+  SIXPOINT_ASSIGN(auto zip, gt3x::RecordingWriter::create(files, path));
+  SIXPOINT_CHECK(zip.add(kHeadName, json.dump(2) + "\n", gt3x::Compression::deflate));
+  SIXPOINT_CHECK(zip.add(kTransfersName, std::move(lines), gt3x::Compression::deflate));
+  return zip.commit();
+}
+
 Status write_session(FileSystem& files, const std::string& path, const Session& session) {
   const std::string lines = to_lines(session.transfers);
-  Json head;
-  head["schema"] = kSchema;
-  head["device"] = printable(session.device);
-  head["started"] = to_iso8601(session.started);
-  head["transfers"] = session.transfers.size();
-  head["truncated"] = session.truncated;
-  head["sha256"] = hash_of(lines);
-  const std::string head_text = head.dump(2) + "\n";
-
-  zip_error_t error;
-  zip_error_init(&error);
-  zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, &error);
-  if (target == nullptr) {
-    return fail(ErrorCode::internal, "no memory for the session", path, "close other programs");
-  }
-  zip_source_keep(target);  // outlives the archive, to be read afterwards
-  const std::unique_ptr<zip_source_t, void (*)(zip_source_t*)> kept(target, &zip_source_free);
-  zip_t* zip = zip_open_from_source(target, ZIP_TRUNCATE, &error);
-  if (zip == nullptr) {
-    zip_source_free(target);
-    return fail(ErrorCode::internal, "the session's archive cannot be begun", path,
-                "report this as a defect of the program");
-  }
-  const auto add = [&](const char* name, const std::string& text) {
-    zip_source_t* source = zip_source_buffer(zip, text.data(), text.size(), 0);
-    const zip_int64_t index =
-        source == nullptr ? -1 : zip_file_add(zip, name, source, ZIP_FL_ENC_UTF_8);
-    if (index < 0) {
-      zip_source_free(source);
-      return false;
-    }
-    // One fixed time: the same session gives the same bytes.
-    return zip_file_set_mtime(zip, static_cast<zip_uint64_t>(index), 1'395'619'200, 0) == 0;
-  };
-  if (!add(kHeadName, head_text) || !add(kTransfersName, lines) || zip_close(zip) != 0) {
-    zip_discard(zip);
-    return fail(ErrorCode::internal, "the session's archive cannot be made", path,
-                "report this as a defect of the program");
-  }
-  SIXPOINT_ASSIGN(auto out, AtomicFile::create(files, path));
-  if (zip_source_open(target) != 0) {
-    return fail(ErrorCode::internal, "the session's archive cannot be read back", path,
-                "report this as a defect of the program");
-  }
-  Bytes piece(1U << 20U);
-  zip_int64_t count = 0;
-  while ((count = zip_source_read(target, piece.data(), piece.size())) > 0) {
-    SIXPOINT_CHECK(
-        out.append(std::span<const std::uint8_t>(piece).first(static_cast<std::size_t>(count))));
-  }
-  zip_source_close(target);
-  return out.commit();
+  return write_archive(
+      files, path, {session.device, session.started, session.truncated, session.transfers.size()},
+      digest_of(lines), std::make_unique<gt3x::MemorySource>(Bytes(lines.begin(), lines.end())));
 }
 
 Result<Session> read_session(FileSystem& files, const std::string& path) {
+  if (!files.info(path) && files.info(journal_of(path))) {
+    return fail(ErrorCode::no_input, "the recording of this session was broken off", path,
+                fmt::format("make it whole with 'sixpoint session recover {}'", printable(path)));
+  }
   SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, kMostFile_bytes));
   zip_error_t error;
   zip_error_init(&error);
@@ -285,7 +260,7 @@ Result<Session> read_session(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(session.started, parse_iso8601(member("started").get<std::string>()));
   session.truncated = member("truncated") == true;
   SIXPOINT_ASSIGN(const std::string lines, entry_of(*zip, kTransfersName, path));
-  if (member("sha256") != hash_of(lines)) {
+  if (member("sha256") != to_hex(digest_of(lines))) {
     return broken(
         "the session was changed after it was recorded: its transfers do not have the "
         "hash that session.json names",

@@ -2,8 +2,8 @@
 // (docs/sessions.md).
 //
 // A session file is a zip of session.json (what it is, and the SHA-256 of the rest) and
-// transfers.jsonl, one line per transfer. session_recorder.h makes one, session_replay.h plays one
-// back, pcap.h makes one of a USB capture.
+// transfers.jsonl, one line per transfer. session_recorder.h makes one, by way of a journal
+// (session_journal.h), session_replay.h plays one back, pcap.h makes one of a USB capture.
 #pragma once
 
 #include <chrono>
@@ -38,17 +38,26 @@ struct SessionTransfer {
   }
 };
 
-struct Session {
+// What session.json says, but the hash.
+struct SessionHead {
   std::string device;  // as it was addressed; of a capture: its place on the bus
   UtcTime started{};
   bool truncated = false;  // it went on, but was not kept
+  std::uint64_t transfers = 0;
+};
+
+struct Session {
+  std::string device;  // as SessionHead
+  UtcTime started{};
+  bool truncated = false;
   std::vector<SessionTransfer> transfers;
 };
 
 // Whole or not at all (base/atomic_file.h).
 Status write_session(FileSystem& files, const std::string& path, const Session& session);
 
-// no_input; bad_data when it is no session, is damaged, or was changed after it was made (hash).
+// no_input, and where a journal lies beside it (session_journal.h) what to do with that; bad_data
+// when it is no session, is damaged, or was changed after it was made (hash).
 Result<Session> read_session(FileSystem& files, const std::string& path);
 
 // The text of transfers.jsonl, and back: bad_data with the line's number.

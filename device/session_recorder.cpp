@@ -1,12 +1,19 @@
 #include "device/session_recorder.h"
 
+#include <optional>
+
+#include "device/session_journal.h"
+
 namespace sixpoint::device {
 
 using std::chrono::nanoseconds;
 
 struct SessionRecorder::Log {
   std::mutex mutex;
-  Session session;
+  std::optional<SessionJournal> journal;
+  std::string target;
+  Status written;  // the first thing that went wrong with it
+  bool truncated = false;
   std::uint64_t bytes = 0;
   std::uint64_t most_bytes = 0;
   std::shared_ptr<Clock> clock;
@@ -14,14 +21,17 @@ struct SessionRecorder::Log {
 
   void add(SessionTransfer transfer) {
     const std::lock_guard lock(mutex);
+    if (!journal || !written || truncated) {
+      return;
+    }
     constexpr std::uint64_t kPerTransfer = 64;
     bytes += transfer.bytes.size() + kPerTransfer;
     if (bytes > most_bytes) {
-      session.truncated = true;
+      truncated = true;
       return;
     }
     transfer.time = clock->elapsed() - start;
-    session.transfers.push_back(std::move(transfer));
+    written = journal->append(transfer);
   }
 };
 
@@ -77,11 +87,24 @@ SessionRecorder::SessionRecorder(std::uint64_t most_bytes) : log_(std::make_shar
   log_->most_bytes = most_bytes;
 }
 
+Status SessionRecorder::begin(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto journal, SessionJournal::create(files, path));
+  const std::lock_guard lock(log_->mutex);
+  log_->journal.emplace(std::move(journal));
+  log_->target = path;
+  return {};
+}
+
 void SessionRecorder::attach(Link& link) {
-  log_->clock = link.clock;
-  log_->start = link.clock->elapsed();
-  log_->session.device = link.address;
-  log_->session.started = link.clock->now();
+  {
+    const std::lock_guard lock(log_->mutex);
+    if (!log_->journal) {
+      return;
+    }
+    log_->clock = link.clock;
+    log_->start = link.clock->elapsed();
+    log_->written = log_->journal->begin(link.address, link.clock->now());
+  }
   wrap(link, log_);
   if (link.reopen) {
     link.reopen = [reopen = std::move(link.reopen), log = log_]() -> Result<Link> {
@@ -99,13 +122,26 @@ void SessionRecorder::attach(Link& link) {
   }
 }
 
-Session SessionRecorder::session() const {
+Status SessionRecorder::finish() {
   const std::lock_guard lock(log_->mutex);
-  return log_->session;
+  if (!log_->journal) {
+    return {};
+  }
+  SessionJournal journal = *std::move(log_->journal);
+  log_->journal.reset();
+  if (!log_->written) {
+    Error error = log_->written.error();
+    error.what = "the session could not be recorded to its end: " + error.what;
+    error.hint = "what was recorded before: 'sixpoint session recover " + printable(log_->target) +
+                 "'; " + error.hint;
+    return fail(std::move(error));
+  }
+  return journal.finish(log_->truncated);
 }
 
-Status SessionRecorder::save(FileSystem& files, const std::string& path) const {
-  return write_session(files, path, session());
+bool SessionRecorder::truncated() const {
+  const std::lock_guard lock(log_->mutex);
+  return log_->truncated;
 }
 
 }  // namespace sixpoint::device

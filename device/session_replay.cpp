@@ -98,9 +98,11 @@ class Player {
   // Whether the device came back, when it was looked for then.
   Status reopen() {
     const std::lock_guard lock(mutex_);
+    if (match_ == SessionMatch::by_key) {
+      return reopen_by_key();
+    }
     const std::size_t next = next_step();
-    if (match_ == SessionMatch::by_key || next == session_.transfers.size() ||
-        session_.transfers[next].kind != Kind::reopened) {
+    if (next == session_.transfers.size() || session_.transfers[next].kind != Kind::reopened) {
       return ended();
     }
     const SessionTransfer& transfer = session_.transfers[next];
@@ -117,6 +119,7 @@ class Player {
  private:
   struct Held {
     nanoseconds due;
+    std::size_t index;  // of the transfer in the session
     SessionTransfer transfer;
   };
 
@@ -192,7 +195,28 @@ class Player {
     return 0;
   }
 
+  // The next time that it was looked for after it went.
+  Status reopen_by_key() {
+    if (!gone_at_) {
+      return ended();
+    }
+    while (++*gone_at_ < session_.transfers.size()) {
+      const SessionTransfer& transfer = session_.transfers[*gone_at_];
+      if (transfer.kind == Kind::reopened) {
+        if (transfer.error) {
+          return fail(*transfer.error);
+        }
+        gone_at_.reset();
+        return {};
+      }
+    }
+    return ended();
+  }
+
   Status write_by_key(std::span<const std::uint8_t> bytes) {
+    if (gone_at_) {
+      return fail(gone_with_);
+    }
     const auto found = answers_.find(key_of(bytes));
     if (found == answers_.end()) {
       return fail(ErrorCode::bad_data,
@@ -213,7 +237,7 @@ class Player {
       if (transfer.kind != Kind::from_device) {
         break;
       }
-      Held held{now + (transfer.time - request.time), transfer};
+      Held held{now + (transfer.time - request.time), i, transfer};
       const Result<Message> reply = decode(transfer.bytes);
       if (reply && asked && recorded && reply->kind == ReportKind::reply &&
           reply->sequence == recorded->sequence) {
@@ -229,6 +253,9 @@ class Player {
 
   Result<std::size_t> read_by_key(SessionChannel channel, std::span<std::uint8_t> out,
                                   nanoseconds time_out) {
+    if (gone_at_) {
+      return fail(gone_with_);
+    }
     const nanoseconds until = clock_->elapsed() + time_out;
     std::deque<Held>& held = held_[static_cast<std::size_t>(channel)];
     if (held.empty() || held.front().due > until) {
@@ -238,6 +265,11 @@ class Player {
     const Held next = std::move(held.front());
     held.pop_front();
     advance_to(next.due);
+    if (next.transfer.error && next.transfer.error->code == ErrorCode::device_unavailable) {
+      gone_at_ = next.index;
+      gone_with_ = *next.transfer.error;
+      held_ = {};
+    }
     return give(next.transfer, out);
   }
 
@@ -265,6 +297,8 @@ class Player {
   // by_key
   std::map<std::string, std::deque<std::size_t>> answers_;
   std::array<std::deque<Held>, 2> held_;
+  std::optional<std::size_t> gone_at_;  // the transfer at which the device went away
+  Error gone_with_;
 };
 
 class ReplayedTransport final : public Transport {

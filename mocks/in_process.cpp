@@ -133,7 +133,7 @@ device::Link link_to(std::shared_ptr<PluggedUnit> plugged, bool with_jig) {
 void register_virtual(device::TransportRegistry& registry) {
   registry.add("virtual", "virtual:seed=7,jig=auto",
                [](std::string_view rest, Env& env) -> Result<device::Link> {
-                 SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(rest, env.seed));
+                 SIXPOINT_ASSIGN(VirtualSettings settings, parse_openable_settings(rest, env.seed));
                  std::shared_ptr<Clock> clock = clock_of(settings, env.clock);
                  FaultPlan plan;
                  if (!settings.faults_file.empty()) {

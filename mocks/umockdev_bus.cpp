@@ -931,7 +931,7 @@ void UmockdevBus::Impl::allow(const std::string& port, bool allowed) {
   }
   for (const auto* node : {found->second->usb.get(), found->second->hid.get()}) {
     if (node != nullptr) {
-      ::chmod(node->path().c_str(), allowed ? 0600 : 0);
+      ::chmod(node->path().c_str(), allowed ? 0666 : 0);
     }
   }
 }

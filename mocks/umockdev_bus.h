@@ -55,7 +55,7 @@ class UmockdevBus {
   // empty. The device itself is told, too (UsbDevice::unplug).
   void unplug(const std::string& port);
 
-  // Without permission (mode 000) or with it.
+  // Without permission (mode 000), or with it for everybody (666).
   void allow(const std::string& port, bool allowed);
 
  private:

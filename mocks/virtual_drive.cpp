@@ -24,8 +24,7 @@ void tell(VirtualUnit& unit, device::Command command, Bytes payload, nanoseconds
 
 }  // namespace
 
-Status make_virtual_drive(FileSystem& files, const std::string& folder,
-                          const VirtualDriveOptions& options) {
+Result<Bytes> virtual_drive_recording(const VirtualDriveOptions& options) {
   VirtualUnit unit(options.unit);
   nanoseconds now{0};
   constexpr std::uint32_t kStart_unix_s = 1'400'000'000;
@@ -43,10 +42,15 @@ Status make_virtual_drive(FileSystem& files, const std::string& folder,
   }
   tell(unit, device::Command::stop_recording, {}, now);
   if (unit.recordings().empty()) {
-    return fail(ErrorCode::usage, "a unit with these settings records nothing", folder,
-                "give it charge and room");
+    return fail(ErrorCode::usage, "a unit with these settings records nothing",
+                options.unit.truth.serial, "give it charge and room");
   }
-  const Bytes& image = unit.recordings().front();
+  return unit.recordings().front();
+}
+
+Status make_virtual_drive(FileSystem& files, const std::string& folder,
+                          const VirtualDriveOptions& options) {
+  SIXPOINT_ASSIGN(const Bytes image, virtual_drive_recording(options));
   MemoryFiles inside;
   SIXPOINT_CHECK(
       write_file(inside, "r.gt3x", {reinterpret_cast<const char*>(image.data()), image.size()}));

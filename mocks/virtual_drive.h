@@ -14,8 +14,12 @@ struct VirtualDriveOptions {
   int sides = 6;       // fewer: the person left some out
 };
 
-// Makes `folder` with info.txt and log.bin of a unit that recorded while it lay on its sides, one
-// after the other. cannot_create where they cannot be made.
+// A .gt3x file of a unit that recorded while it lay on its sides, one after the other. usage where
+// a unit of these settings records nothing.
+Result<Bytes> virtual_drive_recording(const VirtualDriveOptions& options);
+
+// Makes `folder` with info.txt and log.bin of that recording. cannot_create where they cannot be
+// made.
 Status make_virtual_drive(FileSystem& files, const std::string& folder,
                           const VirtualDriveOptions& options);
 

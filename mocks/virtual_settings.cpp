@@ -135,6 +135,11 @@ Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint6
       }
       settings.real_time = value != "fast";
       settings.pace = factor.value_or(1);
+    } else if (key == "interfaces") {
+      if (value != "all" && value != "storage") {
+        return wrong(key, value, "all or storage");
+      }
+      settings.storage_only = value == "storage";
     } else if (key == "battery_mv") {
       const auto number = number_of<std::uint16_t>(value);
       if (!number) {
@@ -160,6 +165,16 @@ Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint6
   settings.unit.truth = sim::draw_unit(seed, wishes);
   if (const Status valid = calib::validate(settings.unit.truth.constants); !valid) {
     return wrong("positive_lsb and negative_lsb", "...", "a pair with positive above negative");
+  }
+  return settings;
+}
+
+Result<VirtualSettings> parse_openable_settings(std::string_view text, std::uint64_t default_seed) {
+  SIXPOINT_ASSIGN(VirtualSettings settings, parse_virtual_settings(text, default_seed));
+  if (settings.storage_only) {
+    return fail(ErrorCode::usage, "a unit with mass storage alone cannot be talked to",
+                fmt::format("virtual:{}", printable(text, 80)),
+                "offer it with 'sixpoint virtual --device', mount it, and use drive:FOLDER");
   }
   return settings;
 }

@@ -4,7 +4,8 @@
 //   memory holds, a/b/c), true_sensitivity_lsb_per_g, true_zero_lsb (what the sensor is under
 //   `current`, a/b/c), jig (auto: a virtual jig turns the unit; none), pace (fast: time passes as
 //   it is waited for; real: the machine's clock; 2 to 100: so many times the machine's clock),
-//   battery_mv, temperature_c, faults (a fault plan's file, whose name holds no comma).
+//   interfaces (all; storage: mass storage alone, over USB/IP), battery_mv, temperature_c, faults
+//   (a fault plan's file, whose name holds no comma).
 // What is left out comes from the seed, or is the default of VirtualUnitOptions.
 #pragma once
 
@@ -18,11 +19,14 @@ struct VirtualSettings {
   VirtualUnitOptions unit;
   bool with_jig = false;
   bool real_time = false;
-  std::string faults_file;  // empty: nothing goes wrong
-  int pace = 1;             // times the machine's clock, where it is real_time
+  bool storage_only = false;  // nothing to talk to: refused where a unit is opened by its settings
+  std::string faults_file;    // empty: nothing goes wrong
+  int pace = 1;               // times the machine's clock, where it is real_time
 };
 
 // usage on an unknown key, a key given twice, or a value that no unit can have.
 Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint64_t default_seed);
+// The same for a unit that is to be opened: usage where it offers files alone.
+Result<VirtualSettings> parse_openable_settings(std::string_view text, std::uint64_t default_seed);
 
 }  // namespace sixpoint::mocks

@@ -41,18 +41,18 @@ Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& 
 }
 
 std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
-    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell) {
-  static constexpr std::chrono::seconds kPatience{30};
+    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell,
+    std::chrono::seconds patience) {
   static constexpr int kMostReturns = 5;
-  return [&unit, &jig, tell = std::move(tell),
+  return [&unit, &jig, tell = std::move(tell), patience,
           returns = 0](const Error& gone) mutable -> Result<UnitOnJig> {
     if (++returns > kMostReturns) {
       return fail(ErrorCode::device_unavailable,
                   fmt::format("the unit went away {} times", returns), gone.where,
                   "look at its cable and battery, then begin anew");
     }
-    tell(fmt::format("{}: waiting {} s for it to come back", gone.what, kPatience.count()));
-    SIXPOINT_CHECK(unit.reconnect(kPatience));
+    tell(fmt::format("{}: waiting {} s for it to come back", gone.what, patience.count()));
+    SIXPOINT_CHECK(unit.reconnect(patience));
     tell("it is back; the run goes on");
     return UnitOnJig{&unit, &jig};
   };

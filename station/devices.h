@@ -25,10 +25,12 @@ Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& 
                                 std::unique_ptr<device::Jig>& own);
 
 // JigHooks::reopen for one unit that stays the same object: waits for it to come back, tells
-// people, and gives up after half a minute, when another unit comes, or when it goes away for the
+// people, and gives up after `patience`, when another unit comes, or when it goes away for the
 // sixth time. `unit` and `jig` outlive what is returned.
+inline constexpr std::chrono::seconds kReturnPatience{30};  // for a hand to find the cable
 std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
-    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell);
+    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell,
+    std::chrono::seconds patience = kReturnPatience);
 
 // A device string with the jig asked for: `--jig virtual` on "virtual:seed=7" is
 // "virtual:seed=7,jig=auto", and `--jig manual` takes a jig away. Other devices stay as they are.

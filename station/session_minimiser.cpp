@@ -36,9 +36,12 @@ Result<std::string> work_on(Session session, SessionWork work) {
       return unit->identity().serial;
     case SessionWork::jig: {
       JigSessionOptions options;
+      options.keep_interrupted = true;  // how far it came is a part of how it ended
       SIXPOINT_ASSIGN(const JigReport report, run_jig(*unit, jig, memory.env, options, {}));
-      return fmt::format("{} {} {}", report.serial, to_string(report.verdict),
-                         fmt::join(report.reasons, "; "));
+      return fmt::format("{} {} after {} faces: {}", report.serial, to_string(report.verdict),
+                         report.faces.size(),
+                         report.ended_by ? words_for(*report.ended_by)
+                                         : fmt::format("{}", fmt::join(report.reasons, "; ")));
     }
     case SessionWork::capture: {
       CaptureOptions options;
@@ -104,31 +107,26 @@ class Minimiser {
     return outcome_of(with(session_, parts), options_.work) == outcome_;
   }
 
+  // Sweeps with pieces that get smaller; with single parts as long as a sweep still takes one away.
   std::vector<Part> reduce(std::vector<Part> parts) {
-    std::size_t pieces = 2;
-    while (parts.size() >= 2 && replays_ < options_.most_replays) {
-      const std::size_t size = (parts.size() + pieces - 1) / pieces;
+    std::size_t size = (parts.size() + 1) / 2;
+    while (!parts.empty() && replays_ < options_.most_replays) {
       bool smaller = false;
-      for (std::size_t begin = 0; begin < parts.size() && replays_ < options_.most_replays;
-           begin += size) {
+      for (std::size_t begin = 0; begin < parts.size() && replays_ < options_.most_replays;) {
+        const std::size_t end = std::min(begin + size, parts.size());
         std::vector<Part> rest(parts.begin(), parts.begin() + static_cast<std::ptrdiff_t>(begin));
-        rest.insert(
-            rest.end(),
-            parts.begin() + static_cast<std::ptrdiff_t>(std::min(begin + size, parts.size())),
-            parts.end());
+        rest.insert(rest.end(), parts.begin() + static_cast<std::ptrdiff_t>(end), parts.end());
         if (same(rest)) {
           parts = std::move(rest);
-          pieces = std::max<std::size_t>(pieces - 1, 2);
           smaller = true;
-          break;
+        } else {
+          begin = end;
         }
       }
-      if (!smaller) {
-        if (size <= 1) {
-          break;
-        }
-        pieces = std::min(pieces * 2, parts.size());
+      if (size == 1 && !smaller) {
+        break;
       }
+      size = (size + 1) / 2;
     }
     return parts;
   }

@@ -32,9 +32,12 @@ struct MinimiseReport {
   std::string brief() const;
 };
 
-// How the work ends on this session: the error, or the verdict and what was found.
+// How the work ends on this session: the error, or the verdict and what was found; of a jig run
+// also after how many faces.
 std::string outcome_of(const device::Session& session, SessionWork work);
 
+// Where it finished, the session is 1-minimal: without any one of its transfers the work ends
+// otherwise.
 MinimiseReport minimise(const device::Session& session, const MinimiseOptions& options);
 
 }  // namespace sixpoint::station

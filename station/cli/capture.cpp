@@ -64,6 +64,7 @@ Status keep(Context& context, const Options& options, Done& done) {
 }
 
 Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(begin_session(context, recorder, options.record));
   SIXPOINT_ASSIGN(const auto unit, station::known_units().open(
                                        station::with_jig(options.device, options.jig), context.env,
                                        [&recorder](device::Link& link) { recorder.attach(link); }));
@@ -201,7 +202,7 @@ void add_capture(CLI::App& app, Context& context) {
   command->callback([options, &context] {
     device::SessionRecorder recorder;
     const Result<Done> done = run(context, *options, recorder);
-    save_session(context, recorder, options->record);
+    finish_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "capture", done.error(), options->json);
       return;

@@ -42,6 +42,7 @@ struct Options {
   std::optional<double> latitude_deg;
   double altitude_m = 0;
   double dwell_s = station::JigRunOptions{}.dwell_s;
+  int patience_s = static_cast<int>(station::kReturnPatience.count());
   bool write = false;
   bool json = false;
 };
@@ -163,6 +164,7 @@ std::optional<station::OperatorWord> terminal_word() {
 }
 
 Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(begin_session(context, recorder, options.record));
   SIXPOINT_CHECK(check_outputs(options));
   station::JigSessionOptions session;
   if (!options.limits.empty()) {
@@ -243,9 +245,11 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   }
   station::JigHooks hooks;
   hooks.tell = tell;
-  hooks.reopen = station::wait_for_unit(*unit, jig, [&context](const std::string& text) {
-    context.people << text << '\n' << std::flush;
-  });
+  hooks.reopen = station::wait_for_unit(
+      *unit, jig,
+      [&context](const std::string& text) { context.people << text << '\n'
+                                                           << std::flush; },
+      std::chrono::seconds(options.patience_s));
   if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
     context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
     hooks.words = terminal_word;
@@ -339,6 +343,11 @@ void add_jig(CLI::App& app, Context& context) {
   command->add_option("--dwell", options->dwell_s, "seconds that each pose is measured for")
       ->check(CLI::Range(0.5, 600.0))
       ->capture_default_str();
+  command
+      ->add_option("--patience", options->patience_s,
+                   "seconds to wait for a unit that went away in mid-run")
+      ->check(CLI::Range(0, 3600))
+      ->capture_default_str();
   command->add_option("--limits", options->limits,
                       "a TOML file of limits (docs/limits.md); else the built-in ones");
   command->add_option("--certificate", options->certificate,
@@ -355,7 +364,7 @@ void add_jig(CLI::App& app, Context& context) {
   command->callback([options, &context] {
     device::SessionRecorder recorder;
     const Result<Done> done = run(context, *options, recorder);
-    save_session(context, recorder, options->record);
+    finish_session(context, recorder, options->record);
     if (!done) {
       report_error(context, "jig", done.error(), options->json);
       return;

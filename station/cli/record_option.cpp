@@ -7,17 +7,17 @@ void add_record_option(CLI::App& command, std::string& path) {
                      "write every transfer with the device into this session (docs/sessions.md)");
 }
 
-void save_session(Context& context, const device::SessionRecorder& recorder,
-                  const std::string& path) {
-  if (path.empty()) {
+Status begin_session(Context& context, device::SessionRecorder& recorder, const std::string& path) {
+  return path.empty() ? Status{} : recorder.begin(context.env.files, path);
+}
+
+void finish_session(Context& context, device::SessionRecorder& recorder, const std::string& path) {
+  if (const Status made = recorder.finish(); !made) {
+    context.log().error("{}", made.error().brief());
+    context.worsen(static_cast<int>(made.error().code));
     return;
   }
-  if (const Status saved = recorder.save(context.env.files, path); !saved) {
-    context.log().error("{}", saved.error().brief());
-    context.worsen(static_cast<int>(saved.error().code));
-    return;
-  }
-  if (recorder.session().truncated) {
+  if (recorder.truncated()) {
     context.log().warn("{}: the session is longer than what is kept; its end is missing",
                        printable(path));
   }

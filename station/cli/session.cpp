@@ -7,6 +7,7 @@
 
 #include "device/pcap.h"
 #include "device/protocol.h"
+#include "device/session_journal.h"
 #include "station/cli/command.h"
 #include "station/session_minimiser.h"
 
@@ -95,9 +96,7 @@ Status from_pcap(Context& context, const Options& options) {
                   read_file(context.env.files, options.input, kMostCapture_bytes));
   device::PcapOptions how;
   how.bus = options.bus;
-  if (options.device_number) {
-    how.device = static_cast<std::uint8_t>(*options.device_number);
-  }
+  how.device = options.device_number;
   auto session = device::session_from_pcap(bytes, how);
   if (!session) {
     Error error = std::move(session).error();
@@ -106,6 +105,24 @@ Status from_pcap(Context& context, const Options& options) {
   }
   SIXPOINT_CHECK(device::write_session(context.env.files, options.output, *session));
   tell(context, options, *session, {});
+  return {};
+}
+
+Status recover(Context& context, const Options& options) {
+  const std::string suffix = device::journal_of("");
+  const bool is_journal = options.input.ends_with(suffix);
+  const std::string target =
+      is_journal ? options.input.substr(0, options.input.size() - suffix.size()) : options.input;
+  SIXPOINT_ASSIGN(const auto recovered,
+                  device::recover_session(context.env.files, device::journal_of(target),
+                                          options.output.empty() ? target : options.output));
+  SIXPOINT_ASSIGN(const device::Session session,
+                  device::read_session(context.env.files, recovered.target));
+  Options about = options;
+  about.output = recovered.target;
+  tell(context, about, session,
+       fmt::format("recovered; {} bytes behind the last whole transfer were dropped",
+                   recovered.dropped_bytes));
   return {};
 }
 
@@ -128,10 +145,15 @@ CLI::App* add(CLI::App& app, Context& context, const std::shared_ptr<Options>& o
 
 void add_session(CLI::App& app, Context& context) {
   CLI::App* command = app.add_subcommand(
-      "session", "recorded sessions (--record): show, make small, make of a USB capture");
+      "session", "recorded sessions (--record): show, recover, make small, make of a USB capture");
   command->require_subcommand(1);
   const auto options = std::make_shared<Options>();
   add(*command, context, options, "show", "what a session holds", "SESSION", show);
+  CLI::App* broken_off =
+      add(*command, context, options, "recover",
+          "a session of the journal that a recording left which was killed", "SESSION", recover);
+  broken_off->add_option("-o,--output", options->output,
+                         "the session to make; SESSION unless given");
   CLI::App* small = add(*command, context, options, "minimise",
                         "the least that still ends in the same way", "SESSION", minimise);
   small->add_option("-o,--output", options->output, "the session to make")->required();
@@ -142,7 +164,7 @@ void add_session(CLI::App& app, Context& context) {
       ->capture_default_str();
   CLI::App* pcap =
       add(*command, context, options, "from-pcap",
-          "a session of what tcpdump or Wireshark captured of usbmon", "CAPTURE", from_pcap);
+          "a session of a USB capture: pcap or pcapng, of usbmon or USBPcap", "CAPTURE", from_pcap);
   pcap->add_option("-o,--output", options->output, "the session to make")->required();
   pcap->add_option("--bus", options->bus, "of this bus only");
   pcap->add_option("--device-number", options->device_number, "of this device on the bus only")

@@ -9,9 +9,11 @@
 #include <unistd.h>
 
 #include "base/memory_env.h"
+#include "mocks/usb_drive.h"
 #include "mocks/usb_jig.h"
 #include "mocks/usb_unit.h"
 #include "mocks/usbip_server.h"
+#include "mocks/virtual_drive.h"
 #include "mocks/virtual_settings.h"
 #include "sim/recording.h"
 #include "station/cli/command.h"
@@ -74,6 +76,23 @@ Status apply_scenario(Context& context, const std::string& path, mocks::VirtualS
   return {};
 }
 
+// A unit with mass storage alone: the scenario's recording on its volume, or one in which it lay on
+// its six sides.
+Result<std::shared_ptr<mocks::UsbDevice>> make_drive(const mocks::VirtualUnitOptions& unit,
+                                                     Bytes recording, UtcTime start,
+                                                     std::shared_ptr<Clock> clock) {
+  if (recording.empty()) {
+    mocks::VirtualDriveOptions drive;
+    drive.unit = unit;
+    SIXPOINT_ASSIGN(recording, mocks::virtual_drive_recording(drive));
+  }
+  mocks::VirtualUnit holder(unit);
+  SIXPOINT_CHECK(holder.keep_recording(std::move(recording), start));
+  SIXPOINT_ASSIGN(auto volume, mocks::unit_volume(holder));
+  return std::shared_ptr<mocks::UsbDevice>(std::make_shared<mocks::UsbDrive>(
+      unit.truth, std::make_shared<const mocks::FatImage>(std::move(volume)), std::move(clock)));
+}
+
 Result<Bench> make_bench(Context& context, const Options& options) {
   constexpr std::string_view kScheme = "virtual:";
   std::string_view text = options.device;
@@ -94,6 +113,11 @@ Result<Bench> make_bench(Context& context, const Options& options) {
     SIXPOINT_ASSIGN(plan, mocks::read_fault_plan(context.env.files, plan_file));
   }
 
+  if (first.storage_only && (options.jig || !plan_file.empty())) {
+    return fail(ErrorCode::usage, "a unit with mass storage alone has no jig and no fault plan",
+                "interfaces=storage", "leave out --jig and --faults");
+  }
+
   Bench bench;
   const auto clock = device::borrow_clock(context.env.clock);
   std::shared_ptr<mocks::PluggedUnit> turned;
@@ -111,6 +135,12 @@ Result<Bench> make_bench(Context& context, const Options& options) {
       } while (!serials.insert(unit.truth.serial).second);
     } else {
       serials.insert(unit.truth.serial);
+    }
+    if (i == 0 && first.storage_only) {
+      bench.entries.push_back({"drive", unit.truth.serial, unit.truth.firmware});
+      SIXPOINT_ASSIGN(auto drive, make_drive(unit, std::exchange(recording, {}), start, clock));
+      bench.devices.push_back(std::move(drive));
+      continue;
     }
     bench.entries.push_back({"unit", unit.truth.serial, unit.truth.firmware});
     auto plugged = std::make_shared<mocks::PluggedUnit>(std::move(unit),

@@ -15,7 +15,9 @@ inline device::Session made_session(int blocks = 20) {
   device::Link link = mocks::link_to(
       std::make_shared<mocks::PluggedUnit>(options, std::make_shared<ManualClock>()), false);
   link.address = "virtual:seed=7";
+  MemoryFiles files;
   device::SessionRecorder recorder;
+  EXPECT_OK(recorder.begin(files, "made.zip"));
   recorder.attach(link);
   const auto unit = *device::Unit::open(std::move(link));
   EXPECT_OK(unit->read_calibration());
@@ -24,7 +26,8 @@ inline device::Session made_session(int blocks = 20) {
     EXPECT_OK(unit->next_samples(std::chrono::seconds(1)));
   }
   EXPECT_OK(unit->stop_stream());
-  return recorder.session();
+  EXPECT_OK(recorder.finish());
+  return *device::read_session(files, "made.zip");
 }
 
 }  // namespace sixpoint::tests

@@ -1,6 +1,9 @@
 #include "device/pcap.h"
 
-#include <gtest/gtest.h>
+#include <array>
+#include <utility>
+
+#include <gmock/gmock.h>
 
 #include "device/session_replay.h"
 #include "device/usb_ids.h"
@@ -9,115 +12,325 @@
 namespace sixpoint::device {
 namespace {
 
-// A capture as the kernel's usbmon gives it (Documentation/usb/usbmon.rst, struct usbmon_packet),
-// written by its own lines: what the reader takes apart is not what put it together.
+using testing::HasSubstr;
+
+// The containers and headers that an outsider may bring, each written by its own lines from its
+// public description: what the reader takes apart is not what put it together.
+enum class Form { pcap, pcap_nanoseconds, pcapng, pcapng_nanoseconds, pcapng_binary };
+
 class Capture {
  public:
-  Capture(std::uint32_t link_type, bool big) : big_(big), mmapped_(link_type == 220) {
-    put(0xA1B2C3D4, 4);
-    put(2, 2);
-    put(4, 2);
-    put(0, 8);
-    put(262'144, 4);
-    put(link_type, 4);
-  }
-  void add(char event, int type, int endpoint, int device, std::int64_t time_us,
-           const Bytes& data) {
-    const std::size_t length = (mmapped_ ? 64 : 48) + data.size();
-    put(static_cast<std::uint64_t>(time_us / 1'000'000), 4);
-    put(static_cast<std::uint64_t>(time_us % 1'000'000), 4);
-    put(length, 4);
-    put(length, 4);
-    put(0xFFFF888012345678, 8);
-    put(static_cast<std::uint64_t>(event), 1);
-    put(static_cast<std::uint64_t>(type), 1);
-    put(static_cast<std::uint64_t>(endpoint), 1);
-    put(static_cast<std::uint64_t>(device), 1);
-    put(3, 2);  // bus
-    put('-', 1);
-    put(0, 1);
-    put(static_cast<std::uint64_t>(time_us / 1'000'000), 8);
-    put(static_cast<std::uint64_t>(time_us % 1'000'000), 4);
-    put(0, 4);
-    put(data.size(), 4);
-    put(data.size(), 4);
-    put(0, 8);
-    if (mmapped_) {
+  Capture(Form form, std::uint32_t link_type, bool big)
+      : form_(form), link_type_(link_type), big_(big) {
+    if (form_ == Form::pcap || form_ == Form::pcap_nanoseconds) {
+      // https://www.ietf.org/archive/id/draft-ietf-opsawg-pcap-04.html, section 4
+      put(form_ == Form::pcap ? 0xA1B2C3D4 : 0xA1B23C4D, 4);
+      put(2, 2);
+      put(4, 2);
       put(0, 8);
-      put(0, 8);
+      put(262'144, 4);
+      put(link_type, 4);
+      return;
     }
-    bytes.insert(bytes.end(), data.begin(), data.end());
+    // https://www.ietf.org/archive/id/draft-ietf-opsawg-pcapng-02.html, sections 4.1 and 4.2
+    begin_block(0x0A0D0D0A);
+    put(0x1A2B3C4D, 4);
+    put(1, 2);
+    put(0, 2);
+    put(~std::uint64_t{0}, 8);
+    end_block();
+    add_interface(1);  // Ethernet, beside it
+    add_interface(link_type);
   }
+
+  void add(char event, int type, int endpoint, int device, std::int64_t time_ns, const Bytes& data,
+           int bus = 3) {
+    const Bytes packet = link_type_ == 249
+                             ? usbpcap(event, type, endpoint, device, data, bus)
+                             : usbmon(event, type, endpoint, device, time_ns, data, bus);
+    add_packet(1, time_ns, packet);
+  }
+  void add_ethernet(std::int64_t time_ns) { add_packet(0, time_ns, Bytes(60, 0xEE)); }
   Bytes bytes;
 
+  // Simple packet block: no interface, no time.
+  void add_simple() {
+    begin_block(3);
+    put(64, 4);
+    put(0, 8);
+    end_block();
+  }
+
  private:
-  void put(std::uint64_t value, int width) {
+  void put(std::uint64_t value, int width) { put(bytes, value, width, big_); }
+  static void put(Bytes& out, std::uint64_t value, int width, bool big) {
     for (int i = 0; i < width; ++i) {
-      const int shift = 8 * (big_ ? width - 1 - i : i);
-      bytes.push_back(static_cast<std::uint8_t>(shift < 64 ? (value >> shift) & 0xFFU : 0));
+      const int shift = 8 * (big ? width - 1 - i : i);
+      out.push_back(static_cast<std::uint8_t>(shift < 64 ? (value >> shift) & 0xFFU : 0));
     }
   }
+
+  // Documentation/usb/usbmon.rst, struct usbmon_packet; the last 16 bytes in link type 220 alone.
+  Bytes usbmon(char event, int type, int endpoint, int device, std::int64_t time_ns,
+               const Bytes& data, int bus) const {
+    Bytes out;
+    const auto field = [&](std::uint64_t value, int width) { put(out, value, width, big_); };
+    field(0xFFFF888012345678, 8);
+    field(static_cast<std::uint64_t>(event), 1);
+    field(static_cast<std::uint64_t>(type), 1);
+    field(static_cast<std::uint64_t>(endpoint), 1);
+    field(static_cast<std::uint64_t>(device), 1);
+    field(static_cast<std::uint64_t>(bus), 2);
+    field('-', 1);
+    field(0, 1);
+    field(static_cast<std::uint64_t>(time_ns / 1'000'000'000), 8);
+    field(static_cast<std::uint64_t>(time_ns / 1000 % 1'000'000), 4);
+    field(0, 4);
+    field(data.size(), 4);
+    field(data.size(), 4);
+    field(0, 8);
+    if (link_type_ == 220) {
+      field(0, 8);
+      field(0, 8);
+    }
+    out.insert(out.end(), data.begin(), data.end());
+    return out;
+  }
+
+  // https://desowin.org/usbpcap/captureformat.html, USBPCAP_BUFFER_PACKET_HEADER; a control
+  // transfer has one byte more. Always little-endian.
+  static Bytes usbpcap(char event, int type, int endpoint, int device, const Bytes& data, int bus) {
+    Bytes out;
+    const auto field = [&](std::uint64_t value, int width) { put(out, value, width, false); };
+    const bool control = type == 2;
+    field(control ? 28 : 27, 2);
+    field(0xFFFFFA8012345678, 8);
+    field(0, 4);
+    field(9, 2);
+    field(event == 'C' ? 1 : 0, 1);
+    field(static_cast<std::uint64_t>(bus), 2);
+    field(static_cast<std::uint64_t>(device), 2);
+    field(static_cast<std::uint64_t>(endpoint), 1);
+    field(static_cast<std::uint64_t>(type), 1);
+    field(data.size(), 4);
+    if (control) {
+      field(0, 1);
+    }
+    out.insert(out.end(), data.begin(), data.end());
+    return out;
+  }
+
+  void add_packet(std::uint32_t interface, std::int64_t time_ns, const Bytes& packet) {
+    if (form_ == Form::pcap || form_ == Form::pcap_nanoseconds) {
+      const std::int64_t rest = time_ns % 1'000'000'000;
+      put(static_cast<std::uint64_t>(time_ns / 1'000'000'000), 4);
+      put(static_cast<std::uint64_t>(form_ == Form::pcap ? rest / 1000 : rest), 4);
+      put(packet.size(), 4);
+      put(packet.size(), 4);
+      bytes.insert(bytes.end(), packet.begin(), packet.end());
+      return;
+    }
+    std::uint64_t ticks = static_cast<std::uint64_t>(time_ns / 1000);
+    if (form_ == Form::pcapng_nanoseconds) {
+      ticks = static_cast<std::uint64_t>(time_ns);
+    } else if (form_ == Form::pcapng_binary) {
+      const auto whole = static_cast<std::uint64_t>(time_ns / 1'000'000'000);
+      const auto rest = static_cast<std::uint64_t>(time_ns % 1'000'000'000);
+      ticks = (whole << 20U) + (rest << 20U) / 1'000'000'000;
+    }
+    begin_block(6);
+    put(interface, 4);
+    put(ticks >> 32U, 4);
+    put(ticks & 0xFFFFFFFFU, 4);
+    put(packet.size(), 4);
+    put(packet.size(), 4);
+    bytes.insert(bytes.end(), packet.begin(), packet.end());
+    bytes.resize((bytes.size() + 3) / 4 * 4);
+    put(1, 2);  // opt_comment, to be passed over
+    put(3, 2);
+    bytes.insert(bytes.end(), {'o', 'k', '!', 0});
+    put(0, 4);
+    end_block();
+  }
+  void add_interface(std::uint32_t link_type) {
+    begin_block(1);
+    put(link_type, 2);
+    put(0, 2);
+    put(262'144, 4);
+    put(2, 2);  // if_name
+    put(7, 2);
+    bytes.insert(bytes.end(), {'u', 's', 'b', 'm', 'o', 'n', '3', 0});
+    if (form_ != Form::pcapng) {
+      put(9, 2);  // if_tsresol
+      put(1, 2);
+      const int resolution = form_ == Form::pcapng_nanoseconds ? 9 : 0x80 | 20;
+      bytes.insert(bytes.end(), {static_cast<std::uint8_t>(resolution), 0, 0, 0});
+    }
+    put(0, 4);
+    end_block();
+  }
+  void begin_block(std::uint32_t type) {
+    block_ = bytes.size();
+    put(type, 4);
+    put(0, 4);
+  }
+  void end_block() {
+    bytes.resize(block_ + (bytes.size() - block_ + 3) / 4 * 4);
+    const std::size_t length = bytes.size() - block_ + 4;
+    put(length, 4);
+    std::copy(bytes.end() - 4, bytes.end(),
+              bytes.begin() + static_cast<std::ptrdiff_t>(block_) + 4);
+  }
+
+  Form form_;
+  std::uint32_t link_type_;
   bool big_;
-  bool mmapped_;
+  std::size_t block_ = 0;
 };
 
-Capture captured(const Session& session, std::uint32_t link_type, bool big) {
-  Capture capture(link_type, big);
-  std::int64_t time_us = 1'600'000'000'000'000;
-  capture.add('S', 2, 0x80, 1, time_us, {1, 2, 3});    // control, of a hub
-  capture.add('C', 1, 0x81, 4, time_us, Bytes(8, 7));  // a mouse
+constexpr std::int64_t kStart_ns = 1'600'000'000'000'000'000;
+
+// The session on bus 3, device 9, among the traffic of others: a hub, a mouse, another unit on
+// another bus with the same number, the unit's own mass storage.
+Capture captured(const Session& session, Form form, std::uint32_t link_type, bool big) {
+  Capture capture(form, link_type, big);
+  capture.add('S', 2, 0x80, 1, kStart_ns, {1, 2, 3});
+  capture.add('C', 1, 0x81, 4, kStart_ns, Bytes(8, 7));
+  if (form != Form::pcap && form != Form::pcap_nanoseconds) {
+    capture.add_ethernet(kStart_ns);
+  }
+  bool first = true;
   for (const SessionTransfer& transfer : session.transfers) {
-    time_us = 1'600'000'000'000'000 + transfer.time.count() / 1000;
+    const std::int64_t time_ns = kStart_ns + transfer.time.count();
     const bool in = transfer.kind == SessionTransfer::Kind::from_device;
     const bool bulk = transfer.channel == SessionChannel::bulk;
     const int endpoint = in ? (bulk ? kBulkInEndpoint : kHidInEndpoint)
                             : (bulk ? kBulkOutEndpoint : kHidOutEndpoint);
-    capture.add('S', bulk ? 3 : 1, endpoint, 9, time_us, in ? Bytes{} : transfer.bytes);
-    capture.add('C', bulk ? 3 : 1, endpoint, 9, time_us, in ? transfer.bytes : Bytes{});
-    capture.add('C', 3, 0x83, 9, time_us, Bytes(512, 0));  // mass storage beside it
+    capture.add('S', bulk ? 3 : 1, endpoint, 9, time_ns, in ? Bytes{} : transfer.bytes);
+    capture.add('C', bulk ? 3 : 1, endpoint, 9, time_ns, in ? transfer.bytes : Bytes{});
+    capture.add('C', 3, 0x83, 9, time_ns, Bytes(512, 0));
+    if (!std::exchange(first, false)) {
+      capture.add('C', 1, kHidInEndpoint, 9, time_ns, Bytes(64, 0x55), 4);
+      capture.add('C', 1, kHidInEndpoint, 10, time_ns, Bytes(64, 0x55));
+    }
   }
   return capture;
 }
 
+constexpr std::array<Form, 5> kForms = {Form::pcap, Form::pcap_nanoseconds, Form::pcapng,
+                                        Form::pcapng_nanoseconds, Form::pcapng_binary};
+constexpr std::array<std::uint32_t, 3> kLinkTypes = {189, 220, 249};
+
 // Oracle: the session that was captured.
-TEST(Pcap, BecomesTheSessionThatWasCaptured) {
+TEST(Pcap, EveryFormBecomesTheSessionThatWasCaptured) {
   const Session session = tests::made_session();
-  for (const std::uint32_t link_type : {189U, 220U}) {
-    for (const bool big : {false, true}) {
-      const auto made = session_from_pcap(captured(session, link_type, big).bytes, {});
-      ASSERT_OK(made);
-      EXPECT_EQ(made->device, "usb bus 3 device 9");
-      ASSERT_EQ(made->transfers.size(), session.transfers.size());
-      for (std::size_t i = 0; i < made->transfers.size(); ++i) {
-        EXPECT_EQ(made->transfers[i].bytes, session.transfers[i].bytes) << i;
-        EXPECT_EQ(made->transfers[i].kind, session.transfers[i].kind) << i;
+  for (const Form form : kForms) {
+    for (const std::uint32_t link_type : kLinkTypes) {
+      for (const bool big : {false, true}) {
+        SCOPED_TRACE(testing::Message() << static_cast<int>(form) << ", link type " << link_type
+                                        << (big ? ", big" : ", little") << "-endian");
+        const auto made = session_from_pcap(captured(session, form, link_type, big).bytes, {});
+        ASSERT_OK(made);
+        EXPECT_EQ(made->device, "usb bus 3 device 9");
+        EXPECT_NEAR(std::chrono::duration<double>(made->started.time_since_epoch()).count(), 1.6e9,
+                    1);
+        ASSERT_EQ(made->transfers.size(), session.transfers.size());
+        for (std::size_t i = 0; i < made->transfers.size(); ++i) {
+          EXPECT_EQ(made->transfers[i].bytes, session.transfers[i].bytes) << i;
+          EXPECT_EQ(made->transfers[i].kind, session.transfers[i].kind) << i;
+          // Clocks of a microsecond, two times.
+          const auto off = made->transfers[i].time - session.transfers[i].time;
+          EXPECT_LE(std::abs(off.count()), 2000) << i;
+        }
+        const auto unit = Unit::open(replay_link(*made, SessionMatch::strict));
+        ASSERT_OK(unit);
+        EXPECT_EQ((*unit)->read_calibration()->constants, sim::draw_unit(7).constants);
       }
-      const auto unit = Unit::open(replay_link(*made, SessionMatch::strict));
-      ASSERT_OK(unit);
-      EXPECT_EQ((*unit)->read_calibration()->constants, sim::draw_unit(7).constants);
     }
   }
 }
 
-TEST(Pcap, RefusesWhatIsNoCaptureOfAUnit) {
-  const Bytes whole = captured(tests::made_session(2), 220, false).bytes;
-  EXPECT_FAILS(session_from_pcap({}, {}), ErrorCode::bad_data);
-  EXPECT_FAILS(session_from_pcap(Bytes(100, 0), {}), ErrorCode::bad_data);
-  EXPECT_FAILS(session_from_pcap(Capture(1, false).bytes, {}), ErrorCode::bad_data);    // Ethernet
-  EXPECT_FAILS(session_from_pcap(Capture(220, false).bytes, {}), ErrorCode::bad_data);  // empty
-  PcapOptions other;
-  other.device = 5;
-  EXPECT_FAILS(session_from_pcap(whole, other), ErrorCode::bad_data);
-  // Cut anywhere: an answer, and where it is a session, a beginning of the whole one.
-  const auto all = *session_from_pcap(whole, {});
-  for (std::size_t size = 0; size < whole.size(); size += 3) {
-    const auto made = session_from_pcap(std::span(whole).first(size), {});
-    if (made) {
-      ASSERT_LE(made->transfers.size(), all.transfers.size());
-      EXPECT_TRUE(
-          std::equal(made->transfers.begin(), made->transfers.end(), all.transfers.begin()));
+// Cut anywhere: an answer, and where it is a session, a beginning of the whole one.
+TEST(Pcap, ACaptureThatWasCutIsABeginning) {
+  for (const Form form : {Form::pcap, Form::pcapng}) {
+    for (const std::uint32_t link_type : {220U, 249U}) {
+      const Bytes whole = captured(tests::made_session(2), form, link_type, false).bytes;
+      const auto all = *session_from_pcap(whole, {});
+      int beginnings = 0;
+      for (std::size_t size = 0; size < whole.size(); size += 3) {
+        const auto made = session_from_pcap(std::span(whole).first(size), {});
+        if (made) {
+          ASSERT_LE(made->transfers.size(), all.transfers.size());
+          EXPECT_TRUE(
+              std::equal(made->transfers.begin(), made->transfers.end(), all.transfers.begin()));
+          ++beginnings;
+        }
+      }
+      EXPECT_GT(beginnings, 100);
     }
   }
+}
+
+// Lengths and counts of a file that lies: an answer, whatever it is.
+TEST(Pcap, AChangedByteIsAnAnswer) {
+  for (const Form form : {Form::pcap, Form::pcapng}) {
+    const Bytes whole = captured(tests::made_session(2), form, 249, true).bytes;
+    for (std::size_t at = 0; at < std::min<std::size_t>(whole.size(), 4000); ++at) {
+      for (const std::uint8_t value : Bytes{0x00, 0xFF, 0x7F}) {
+        Bytes bytes = whole;
+        bytes[at] = value;
+        const auto made = session_from_pcap(bytes, {});
+        EXPECT_TRUE(made || made.error().code == ErrorCode::bad_data);
+      }
+    }
+  }
+}
+
+TEST(Pcap, TheDeviceMayBeNamed) {
+  const Bytes whole = captured(tests::made_session(2), Form::pcap, 220, false).bytes;
+  PcapOptions named;
+  named.bus = 3;
+  named.device = 9;
+  EXPECT_EQ(session_from_pcap(whole, named)->transfers.size(),
+            session_from_pcap(whole, {})->transfers.size());
+  named.device = 5;
+  EXPECT_FAILS(session_from_pcap(whole, named), ErrorCode::bad_data);
+  named.device = 9;
+  named.bus = 4;  // the other unit's
+  const auto other = session_from_pcap(whole, named);
+  ASSERT_OK(other);
+  EXPECT_EQ(other->transfers.front().bytes, Bytes(64, 0x55));
+}
+
+TEST(Pcap, RefusesWhatItDoesNotReadAndSaysWhatItIs) {
+  const auto why = [](const Bytes& bytes) {
+    const auto made = session_from_pcap(bytes, {});
+    EXPECT_FAILS(made, ErrorCode::bad_data);
+    return made ? std::string() : made.error().what;
+  };
+  const Session session = tests::made_session(2);
+  EXPECT_THAT(why({}), HasSubstr("too short"));
+  EXPECT_THAT(why(Bytes(100, 0)), HasSubstr("neither pcap nor pcapng"));
+  Bytes zipped(100, 0);
+  zipped[0] = 0x1F;
+  zipped[1] = 0x8B;
+  EXPECT_THAT(why(zipped), HasSubstr("gunzip"));
+  for (const Form form : {Form::pcap, Form::pcapng}) {
+    EXPECT_THAT(why(Capture(form, 220, false).bytes), HasSubstr("no transfer of a unit"));
+    EXPECT_THAT(why(captured(session, form, 266, false).bytes), HasSubstr("link type 266 (USB on"));
+    EXPECT_THAT(why(captured(session, form, 288, false).bytes), HasSubstr("hardware analyser"));
+  }
+  EXPECT_THAT(why(Capture(Form::pcap, 1, false).bytes), HasSubstr("Ethernet"));
+  Bytes modified = captured(session, Form::pcap, 220, false).bytes;
+  modified[0] = 0x34;
+  modified[1] = 0xCD;
+  EXPECT_THAT(why(modified), HasSubstr("editcap"));
+  Capture simple(Form::pcapng, 220, false);
+  simple.add_simple();
+  EXPECT_THAT(why(simple.bytes), HasSubstr("simple"));
+  Bytes later = Capture(Form::pcapng, 220, false).bytes;
+  later[12] = 2;
+  EXPECT_THAT(why(later), HasSubstr("version 2 of pcapng"));
 }
 
 }  // namespace

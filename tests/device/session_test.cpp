@@ -114,12 +114,16 @@ TEST(Recorder, KeepsErrorsAndItsLimit) {
   Link link;
   link.clock = std::make_shared<ManualClock>();
   link.reports = std::move(transport);
+  MemoryFiles files;
   SessionRecorder recorder(150);
+  ASSERT_OK(recorder.begin(files, "s.zip"));
   recorder.attach(link);
   Bytes out(65);
   EXPECT_FAILS(link.reports->read(out, {}), ErrorCode::io);
   EXPECT_EQ(*link.reports->read(out, {}), 64U);
-  const Session session = recorder.session();
+  EXPECT_TRUE(recorder.truncated());
+  ASSERT_OK(recorder.finish());
+  const Session session = *read_session(files, "s.zip");
   EXPECT_TRUE(session.truncated);
   ASSERT_EQ(session.transfers.size(), 1U);
   EXPECT_EQ(session.transfers[0].error->code, ErrorCode::io);

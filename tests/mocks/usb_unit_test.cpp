@@ -10,6 +10,8 @@
 #include "device/usb_ids.h"
 #include "expect_result.h"
 #include "gt3x/info.h"
+#include "mocks/usb_drive.h"
+#include "mocks/virtual_drive.h"
 #include "mocks/virtual_jig.h"
 
 namespace sixpoint::mocks {
@@ -263,7 +265,7 @@ struct Answer {
 
 // A host's bulk-only transport, written from the specification.
 struct Disk {
-  explicit Disk(Host& host) : usb(host.usb) {}
+  explicit Disk(UsbDevice& device) : usb(device) {}
   Bytes command_block(const Bytes& command, std::uint32_t length, bool in) {
     Bytes block = {'U', 'S', 'B', 'C'};
     ++tag;
@@ -318,14 +320,14 @@ struct Disk {
                std::uint32_t{count} * 512)
         .data;
   }
-  UsbUnit& usb;
+  UsbDevice& usb;
   std::uint32_t tag = 0;
 };
 
 TEST(UsbUnit, MassStorageAnswersAHost) {
   Host host;
   host.configure();
-  Disk disk(host);
+  Disk disk(host.usb);
   EXPECT_EQ(host.ask(0xA1, 0xFE, 0, 2, 1).bytes, Bytes{0});
   EXPECT_EQ(host.ask(0xA1, 0xFE, 0, 1, 1).kind, Kind::stall);
 
@@ -378,7 +380,7 @@ TEST(UsbUnit, MassStorageAnswersAHost) {
 TEST(UsbUnit, MassStorageHoldsToTheTransport) {
   Host host;
   host.configure();
-  Disk disk(host);
+  Disk disk(host.usb);
   EXPECT_EQ(disk.run({0x28, 0, 0, 0, 0, 0, 0, 0, 1, 0}, 0).status, 2) << "case 2: Hn < Di";
   const Answer long_host = disk.run({0x28, 0, 0, 0, 0, 0, 0, 0, 1, 0}, 1024);
   EXPECT_EQ(long_host.data.size(), 512U) << "case 5: Hi > Di";
@@ -421,7 +423,7 @@ TEST(UsbUnit, MassStorageHoldsToTheTransport) {
 TEST(UsbUnit, EjectedAndChangedMediaAreSaid) {
   Host host;
   host.configure();
-  Disk disk(host);
+  Disk disk(host.usb);
   EXPECT_EQ(disk.run({0x1B, 0, 0, 0, 2, 0}, 0).status, 0);
   EXPECT_EQ(disk.run({0, 0, 0, 0, 0, 0}, 0).status, 1);
   EXPECT_EQ(disk.sense(), (Bytes{2, 0x3A, 0}));
@@ -435,6 +437,51 @@ TEST(UsbUnit, EjectedAndChangedMediaAreSaid) {
   EXPECT_EQ(disk.run({0, 0, 0, 0, 0, 0}, 0).status, 1);
   EXPECT_EQ(disk.sense(), (Bytes{6, 0x28, 0})) << "the volume has another content";
   EXPECT_EQ(disk.run({0, 0, 0, 0, 0, 0}, 0).status, 0);
+}
+
+// The unit that offers nothing else: one interface, and the volume behind it.
+TEST(UsbDrive, IsOneInterfaceWithItsVolume) {
+  VirtualDriveOptions options;
+  options.unit.truth = sim::draw_unit(7);
+  const auto recording = virtual_drive_recording(options);
+  ASSERT_OK(recording);
+  VirtualUnit holder(options.unit);
+  ASSERT_OK(holder.keep_recording(*recording, UtcTime{}));
+  auto made = unit_volume(holder);
+  ASSERT_OK(made);
+  const auto volume = std::make_shared<const FatImage>(*std::move(made));
+  UsbDrive drive(options.unit.truth, volume, std::make_shared<ManualClock>());
+  EXPECT_EQ(drive.descriptors().product_id(), device::kFileMonitorProductId);
+  EXPECT_EQ(drive.descriptors().serial(), options.unit.truth.serial);
+  const auto configuration = parse_configuration(drive.descriptors().configuration);
+  ASSERT_OK(configuration);
+  ASSERT_EQ(configuration->interfaces.size(), 1U);
+  EXPECT_EQ(configuration->interfaces[0].device_class, 8);
+  EXPECT_EQ(configuration->endpoints.size(), 2U);
+
+  drive.bus_reset();
+  ASSERT_EQ(drive.control({0x00, 9, 1, 0, 0}, {}).kind, Kind::done);
+  EXPECT_EQ(drive.control({0xA1, 0xFE, 0, 0, 1}, {}).bytes, Bytes{0});
+  EXPECT_EQ(drive.out(0x01, Bytes(64)).kind, Kind::stall) << "no reports";
+  Disk disk(drive);
+  const Answer inquiry = disk.run({0x12, 0, 0, 0, 36, 0}, 36);
+  EXPECT_EQ(std::string(inquiry.data.begin() + 8, inquiry.data.end()),
+            "SixpointFile monitor    1.0 ");
+  for (std::uint32_t block = 0; block < 2000; block += 97) {
+    std::array<std::uint8_t, kBlockBytes> wanted{};
+    volume->read(block, wanted);
+    EXPECT_EQ(disk.read(block, 1), Bytes(wanted.begin(), wanted.end())) << block;
+  }
+  // Nonsense halts it until the reset recovery, as the monitor's storage.
+  EXPECT_EQ(drive.out(0x03, Bytes(30, 'U')).kind, Kind::stall);
+  drive.control({0x02, 1, 0, 0x83, 0}, {});
+  EXPECT_EQ(drive.in(0x83, 13).kind, Kind::stall);
+  EXPECT_EQ(drive.control({0x21, 0xFF, 0, 0, 0}, {}).kind, Kind::done);
+  drive.control({0x02, 1, 0, 0x83, 0}, {});
+  drive.control({0x02, 1, 0, 0x03, 0}, {});
+  EXPECT_EQ(disk.run({0, 0, 0, 0, 0, 0}, 0).status, 0);
+  drive.unplug();
+  EXPECT_EQ(drive.in(0x83, 13).kind, Kind::gone);
 }
 
 }  // namespace

@@ -64,6 +64,8 @@ TEST(VirtualSettings, RefusesWhatItDoesNotKnow) {
                            "battery_mv=-3",
                            "temperature_c=hot",
                            "positive_lsb=1/1/1,negative_lsb=1/1/1",
+                           "interfaces=hid",
+                           "interfaces=",
                            "seed=7,,jig=auto"}) {
     SCOPED_TRACE(text);
     EXPECT_FAILS(parse_virtual_settings(text, 1), ErrorCode::usage);
@@ -81,6 +83,17 @@ TEST(VirtualSettings, TheSchemeOpens) {
   EXPECT_FAILS(registry.open("virtual:x=1", env.env), ErrorCode::usage);
   EXPECT_FAILS(registry.open("usb:1", env.env), ErrorCode::usage);
   EXPECT_FAILS(registry.open("virtual", env.env), ErrorCode::usage);
+}
+
+TEST(VirtualSettings, AUnitOfFilesAloneIsNotOpened) {
+  const auto settings = parse_virtual_settings("seed=7,interfaces=storage", 1);
+  ASSERT_OK(settings);
+  EXPECT_TRUE(settings->storage_only);
+  EXPECT_FALSE(parse_virtual_settings("interfaces=all", 1)->storage_only);
+  EXPECT_OK(parse_openable_settings("seed=7,interfaces=all", 1));
+  const auto refused = parse_openable_settings("seed=7,interfaces=storage", 1);
+  EXPECT_FAILS(refused, ErrorCode::usage);
+  EXPECT_NE(refused.error().hint.find("drive:FOLDER"), std::string::npos);
 }
 
 }  // namespace

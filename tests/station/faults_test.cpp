@@ -7,6 +7,7 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "mocks/fault_plan.h"
 #include "mocks/in_process.h"
 #include "mocks/virtual_jig.h"
 #include "run_command.h"
@@ -245,6 +246,30 @@ TEST_F(Faults, PlansThatAreWrongAreRefused) {
                                              "--store", path("s.db")})
                 .exit_code,
             66);
+}
+
+// docs/faults.md speaks of every fault that there is, and every one has its rows in the tests that
+// it names.
+TEST(FaultsPage, KnowsEveryFaultAndSoDoTheTests) {
+  const auto text_of = [](const char* name) {
+    const Bytes bytes = read_file(posix_env().files, std::string(SIXPOINT_SOURCE_DIR) + "/" + name)
+                            .value_or(Bytes{});
+    EXPECT_FALSE(bytes.empty()) << name;
+    return std::string(bytes.begin(), bytes.end());
+  };
+  const std::string page = text_of("docs/faults.md");
+  const std::size_t carriers = page.find("## With the installed program");
+  ASSERT_NE(carriers, std::string::npos);
+  const std::string in_process = text_of("tests/station/faults_test.cpp");
+  const std::string bodies = text_of("tests/usb/fault_bodies.cpp");
+  for (int kind = 0; kind <= static_cast<int>(mocks::FaultKind::power_loss); ++kind) {
+    const std::string name(mocks::to_string(static_cast<mocks::FaultKind>(kind)));
+    ASSERT_FALSE(name.empty());
+    EXPECT_LT(page.find("`" + name + "`"), carriers) << name;
+    EXPECT_NE(page.find("`" + name + "`", carriers), std::string::npos) << name;
+    EXPECT_THAT(in_process, HasSubstr("\"fault\": \"" + name + "\""));
+    EXPECT_THAT(bodies, HasSubstr("\"fault\": \"" + name + "\""));
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "device/session.h"
+#include "device/session_journal.h"
 #include "expect_result.h"
 #include "run_command.h"
 #include "station/session_minimiser.h"
@@ -80,6 +81,23 @@ TEST_F(SessionCommand, AFailedRunIsReplayedAsItFailed) {
   EXPECT_EQ(again.exit_code, 69) << again.people;
   EXPECT_EQ(again.json()["poses"], first.json()["poses"]);
   EXPECT_EQ(again.json()["error"]["what"], first.json()["error"]["what"]);
+  const auto by_key = jig("replay:" + path("f.zip") + ",match=key");
+  EXPECT_EQ(by_key.exit_code, 69) << "away is away: " << by_key.people;
+  EXPECT_EQ(by_key.json()["poses"], first.json()["poses"]);
+}
+
+// Away and back: by key the unit comes back as it did, too.
+TEST_F(SessionCommand, AUnitThatCameBackComesBackInBothReplays) {
+  std::ofstream(path("f.json")) << R"({"schema": "sixpoint/faults/1",
+      "faults": [{"fault": "unplug", "at_s": 25, "seconds": 3}]})";
+  const auto first =
+      jig("virtual:seed=7,jig=auto,faults=" + path("f.json"), {"--record", path("f.zip")});
+  ASSERT_EQ(first.exit_code, 0) << first.people;
+  for (const char* match : {"", ",match=key"}) {
+    const auto again = jig("replay:" + path("f.zip") + match);
+    EXPECT_EQ(again.exit_code, 0) << again.people;
+    EXPECT_EQ(again.json()["constants"], first.json()["constants"]) << match;
+  }
 }
 
 TEST_F(SessionCommand, ATamperedSessionIsAClearError) {
@@ -124,6 +142,117 @@ TEST_F(SessionCommand, TheMinimiserKeepsTheOutcome) {
   EXPECT_EQ(run({"session", "minimise", path("r.zip"), "-o", path("n.zip"), "--doing", "dance"})
                 .exit_code,
             64);
+}
+
+// Jig runs and a download that fail: the small session ends as the whole one did, in the program
+// too, and each of its transfers is needed.
+TEST_F(SessionCommand, TheMinimiserKeepsHowAndWhereARunFailed) {
+  using station::SessionWork;
+  const struct {
+    const char* fault;
+    SessionWork work;
+    int exit_code;
+    std::size_t most;  // transfers that may be left, of about 700 and 70
+  } kCases[] = {
+      {R"({"fault": "unplug", "at_s": 25})", SessionWork::jig, 69, 400},
+      {R"({"fault": "axis_stuck", "at_s": 5, "axis": "y"})", SessionWork::jig, 1, 360},
+      {R"({"fault": "lost", "channel": "bulk", "at_report": 3, "count": 0})", SessionWork::capture,
+       69, 20},
+  };
+  int number = 0;
+  for (const auto& one : kCases) {
+    SCOPED_TRACE(one.fault);
+    const bool is_jig = one.work == SessionWork::jig;
+    const std::string name = std::to_string(++number);
+    std::ofstream(path("f.json")) << R"({"schema": "sixpoint/faults/1", "faults": [)" << one.fault
+                                  << "]}";
+    const auto work = [&](const std::string& device, const std::vector<std::string>& more) {
+      std::vector<std::string> arguments = {
+          is_jig ? "jig" : "capture", "--device", device, "--store", path("s.db"), "--json"};
+      if (!is_jig) {
+        arguments.insert(arguments.end(), {"-o", path(device.substr(0, 3) + name + ".gt3x")});
+      }
+      arguments.insert(arguments.end(), more.begin(), more.end());
+      return run(arguments);
+    };
+    const auto recorded =
+        work("virtual:seed=7,jig=auto,faults=" + path("f.json"), {"--record", path(name + ".zip")});
+    EXPECT_EQ(recorded.exit_code, one.exit_code);
+    const auto whole = *device::read_session(posix_env().files, path(name + ".zip"));
+
+    station::MinimiseOptions options;
+    options.work = one.work;
+    options.most_replays = 20'000;
+    const auto report = station::minimise(whole, options);
+    ASSERT_TRUE(report.finished) << report.brief();
+    const device::Session& small = report.session;
+    EXPECT_LE(small.transfers.size(), one.most);
+    EXPECT_LT(small.transfers.size(), whole.transfers.size());
+    const std::string outcome = station::outcome_of(whole, one.work);
+    EXPECT_EQ(station::outcome_of(small, one.work), outcome);
+    for (std::size_t i = 0; i < small.transfers.size(); ++i) {
+      device::Session without = small;
+      without.transfers.erase(without.transfers.begin() + static_cast<std::ptrdiff_t>(i));
+      EXPECT_NE(station::outcome_of(without, one.work), outcome)
+          << "transfer " << i << " of " << small.transfers.size();
+    }
+    // Oracle: the program itself, on the small session.
+    ASSERT_OK(device::write_session(posix_env().files, path("m" + name + ".zip"), small));
+    const auto again = work("replay:" + path("m" + name + ".zip") + ",match=key", {});
+    EXPECT_EQ(again.exit_code, one.exit_code) << again.people;
+    if (is_jig) {
+      EXPECT_EQ(again.json()["poses"].size(), recorded.json()["poses"].size());
+    }
+  }
+}
+
+// Nothing is needed where nothing is done with a session that has nothing in it.
+TEST_F(SessionCommand, TheMinimiserMayLeaveNothing) {
+  device::Session session;
+  for (int i = 0; i < 5; ++i) {
+    session.transfers.push_back({device::SessionTransfer::Kind::from_device,
+                                 device::SessionChannel::bulk,
+                                 std::chrono::seconds(i),
+                                 Bytes(8),
+                                 {}});
+  }
+  const auto report = station::minimise(session, {});
+  EXPECT_TRUE(report.finished);
+  EXPECT_TRUE(report.session.transfers.empty()) << report.brief();
+}
+
+// What a killed program leaves (device/session_journal.h): the next open says what to do, recover
+// does it, and the run is replayed as far as it went.
+TEST_F(SessionCommand, ABrokenOffRecordingIsRecovered) {
+  ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--record", path("r.zip")}).exit_code, 0);
+  const auto whole = *device::read_session(posix_env().files, path("r.zip"));
+  {
+    auto journal = *device::SessionJournal::create(posix_env().files, path("k.zip"));
+    ASSERT_OK(journal.begin(whole.device, whole.started));
+    for (std::size_t i = 0; i < whole.transfers.size() / 2; ++i) {
+      ASSERT_OK(journal.append(whole.transfers[i]));
+    }
+  }
+  std::ofstream(path("k.zip.journal"), std::ios::app) << "{\"t_ns\":12";
+  const auto unread = jig("replay:" + path("k.zip"));
+  EXPECT_EQ(unread.exit_code, 66);
+  EXPECT_THAT(unread.people, HasSubstr("sixpoint session recover"));
+  const auto again = jig("virtual:seed=7,jig=auto", {"--record", path("k.zip")});
+  EXPECT_EQ(again.exit_code, 73) << "what is there is not overwritten";
+  EXPECT_THAT(again.people, HasSubstr("sixpoint session recover"));
+
+  const auto recovered = run({"session", "recover", path("k.zip"), "--json"});
+  EXPECT_EQ(recovered.exit_code, 0) << recovered.people;
+  EXPECT_EQ(recovered.json()["transfers"], whole.transfers.size() / 2);
+  EXPECT_EQ(recovered.json()["truncated"], true);
+  EXPECT_THAT(recovered.json()["summary"].get<std::string>(), HasSubstr("10 bytes"));
+  EXPECT_EQ(jig("replay:" + path("k.zip")).exit_code, 69) << "the unit is gone where it was killed";
+  EXPECT_EQ(run({"session", "recover", path("k.zip")}).exit_code, 66) << "the journal is used up";
+  // By the journal's own name, to another place.
+  { ASSERT_OK(device::SessionJournal::create(posix_env().files, path("k.zip"))->begin("x", {})); }
+  EXPECT_EQ(run({"session", "recover", path("k.zip.journal")}).exit_code, 73);
+  EXPECT_EQ(run({"session", "recover", path("k.zip.journal"), "-o", path("l.zip")}).exit_code, 0);
+  EXPECT_EQ(device::read_session(posix_env().files, path("l.zip"))->transfers.size(), 0U);
 }
 
 TEST_F(SessionCommand, FromPcapRefusesWhatIsNoCapture) {

@@ -235,11 +235,25 @@ TEST(VirtualCommand, TheScenariosRecordingIsOnTheVolume) {
   EXPECT_EQ(found, 2);
 }
 
+// Mass storage alone: another product, one interface, and a volume from which capture works is
+// tests/system/program.sh's.
+TEST(VirtualCommand, AUnitOfFilesAloneIsOffered) {
+  Served served({"--device", "virtual:seed=7,interfaces=storage", "--count", "2"});
+  ASSERT_EQ(served.document["devices"].size(), 2U) << served.document;
+  EXPECT_EQ(served.document["devices"][0]["kind"], "drive");
+  EXPECT_EQ(served.document["devices"][0]["product_id"], "0003");
+  EXPECT_EQ(served.document["devices"][0]["serial"], "MOS2A45139074");
+  EXPECT_EQ(served.document["devices"][1]["product_id"], "0001");
+  EXPECT_EQ(served.stop(SIGINT), 0);
+}
+
 TEST(VirtualCommand, RefusesWhatItCannotDo) {
   const auto code = [](const std::vector<std::string>& arguments) {
     return tests::run_command(posix_env(), arguments).exit_code;
   };
   EXPECT_EQ(code({"virtual", "--device", "virtual:shoe=1"}), 64);
+  EXPECT_EQ(code({"virtual", "--device", "virtual:interfaces=storage", "--jig"}), 64);
+  EXPECT_EQ(code({"jig", "--device", "virtual:interfaces=storage"}), 64);
   EXPECT_EQ(code({"virtual", "--usbip", "70000"}), 64);
   EXPECT_EQ(code({"virtual", "--count", "0"}), 64);
   EXPECT_EQ(code({"virtual", "--scenario", "/nonexistent.json"}), 66);

@@ -2,7 +2,7 @@
 # Makes what run_in_qemu.sh boots: Debian's kernel, unpacked and never installed, and a root file
 # system in memory with busybox, udev, usbip, the program and the guest's tests.
 #   make_image.sh FOLDER SOURCE_FOLDER SIXPOINT GUEST_TESTS
-# Exit code 77, and a line that says what is missing, where it cannot be made.
+# Exit code 77, and a line that says what is missing, where it cannot be made (tests/skip.sh).
 set -euo pipefail
 folder=$1
 source_folder=$2
@@ -10,9 +10,9 @@ sixpoint=$3
 guest_tests=$4
 PATH=$PATH:/usr/sbin:/sbin
 
+# skip.sh's exit code is this one's.
 skip() {
-  echo "SKIPPED: $*" >&2
-  exit 77
+  exec "$source_folder/tests/skip.sh" "$@"
 }
 need() {
   command -v "$1" >/dev/null || skip "$1 is missing; install the Debian package $2"

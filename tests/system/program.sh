@@ -35,3 +35,66 @@ kill -INT $server
 wait $server
 for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
 ! ls /sys/bus/usb/devices | grep '^1-[1-9]'
+
+echo "== a unit that is files alone: found, mounted, calibrated from its mount point"
+sixpoint virtual --device virtual:seed=7,serial=MOS2A45130008,interfaces=storage >offered2 2>hints &
+server=$!
+for i in $(seq 100); do grep -q listening offered2 && break; sleep 0.1; done
+usbip attach -r 127.0.0.1 -b 1-1
+for i in $(seq 100); do ls /sys/bus/usb/devices/1-1:1.0/host*/target*/*/block/* >/dev/null 2>&1 && break; sleep 0.1; done
+udevadm settle --timeout=10
+[ "$(cat /sys/bus/usb/devices/1-1/bNumInterfaces)" -eq 1 ]
+sixpoint devices | tee found
+grep -q '^MOS2A45130008 .*file-monitor .*not mounted' found
+disk=/dev/$(basename "$(ls -d /sys/bus/usb/devices/1-1:1.0/host*/target*/*/block/*)")
+mkdir -p "/mnt/my unit"
+mount -t vfat -o ro "$disk" "/mnt/my unit"
+sixpoint devices | tee found
+grep -q '^drive:/mnt/my unit .*file-monitor .*ready' found
+sixpoint capture --device "drive:/mnt/my unit" -o copy.gt3x --constants C.json --store bench.db
+sixpoint solve copy.gt3x
+grep -q MOS2A45130008 C.json
+status=0; sixpoint jig --device "drive:/mnt/my unit" --store bench.db || status=$?
+[ $status -eq 64 ]
+echo "== pulled out while it is mounted"
+usbip detach -p 0
+for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1 ] || break; sleep 0.1; done
+status=0; sixpoint capture --device "drive:/mnt/my unit" -o gone.gt3x --store bench.db || status=$?
+[ $status -ne 0 ]
+[ ! -e gone.gt3x ]
+kill -INT $server
+wait $server
+
+echo "== the installed program, a unit and a motorised jig, through fault plans (docs/faults.md)"
+# with_faults EXIT WORDS PLAN ARGUMENTS...: offers both with the plan, attaches them, runs the
+# program, expects its exit code and what it says.
+with_faults() {
+  expected=$1 words=$2 status=0
+  echo "{\"schema\": \"sixpoint/faults/1\", \"faults\": [$3]}" >F.json
+  shift 3
+  sixpoint virtual --device virtual:seed=7,serial=MOS2A45130007 --jig --faults F.json >offered3 2>hints &
+  server=$!
+  for i in $(seq 100); do grep -q listening offered3 && break; sleep 0.1; done
+  usbip attach -r 127.0.0.1 -b 1-1
+  usbip attach -r 127.0.0.1 -b 1-2
+  for i in $(seq 100); do [ -e /dev/hidraw1 ] && break; sleep 0.1; done
+  udevadm settle --timeout=10
+  sixpoint "$@" --json >answer 2>said || status=$?
+  cat said
+  [ $status -eq "$expected" ] || { echo "FAILED: ended with $status, not with $expected"; cat answer; return 1; }
+  cat said answer | grep -q "$words" || { echo "FAILED: no word of: $words"; cat answer; return 1; }
+  kill -INT $server
+  wait $server
+  for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
+}
+run="jig --device hid:MOS2A45130007 --jig hid:J600001 --store bench.db --dwell 0.5 --filter current"
+with_faults 74 'charge the unit' '{"fault": "battery_low", "at_s": 0}' $run --write
+with_faults 1 'y axis is stuck' '{"fault": "axis_stuck", "of": "samples", "at_report": 20, "axis": "y"}' $run
+with_faults 69 'does not answer' '{"fault": "lost", "of": "replies", "at_report": 4, "count": 0}' $run
+[ "$(sixpoint history MOS2A45130007 --store bench.db --json | grep -c '"method"')" -eq 0 ]
+with_faults 0 '"verdict": "pass"' '{"fault": "bad_page", "at_s": 0},
+  {"fault": "stall", "of": "replies", "at_report": 3}, {"fault": "bad_crc", "of": "replies", "at_report": 6},
+  {"fault": "duplicate", "at_report": 2, "every": 3}, {"fault": "garbage", "of": "samples", "at_report": 70},
+  {"fault": "bit_flip", "of": "samples", "at_report": 150, "bit": 6},
+  {"fault": "wrong_sequence", "of": "samples", "at_report": 310}' $run --write
+grep -q 'were unreadable' answer said

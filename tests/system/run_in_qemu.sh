@@ -7,8 +7,7 @@ folder=$1
 script=$2
 
 if [ ! -e "$folder/root.cpio" ]; then
-  echo "SKIPPED: there is no image in $folder; system.Image says why" >&2
-  exit 77
+  exec "$(dirname "$0")/../skip.sh" "there is no image in $folder; system.Image says why"
 fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

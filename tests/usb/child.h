@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <sys/types.h>
+
 namespace sixpoint::tests {
 
 struct ChildAnswer {
@@ -17,5 +19,10 @@ struct ChildAnswer {
 // Runs SIXPOINT_PROGRAM. `on_line` gets each line of stderr as it comes.
 ChildAnswer run_child(const std::vector<std::string>& arguments,
                       const std::function<void(const std::string&)>& on_line = {});
+// Runs any program: its path, and its arguments.
+ChildAnswer run_program(const std::vector<std::string>& words);
+// `on_line` gets each line of stdout, and the child to signal.
+ChildAnswer run_child_lines(const std::vector<std::string>& arguments,
+                            const std::function<void(const std::string&, pid_t)>& on_line);
 
 }  // namespace sixpoint::tests

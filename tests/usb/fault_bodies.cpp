@@ -1,6 +1,8 @@
 // Fault plans on a unit behind the real hidapi and libusb: of the table in docs/faults.md what a
 // unit of the station does, seen at its interface (device/unit.h).
+#include <array>
 #include <future>
+#include <set>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -347,6 +349,28 @@ void a_frozen_sensor_repeats_its_counts(UsbBench& bench) {
   }
 }
 
+void a_stuck_axis_repeats_alone(UsbBench& bench) {
+  Plugged plugged(bench, faulty_unit(39, R"({"fault": "axis_stuck", "at_s": 0, "axis": "y"})"));
+  ASSERT_OK(plugged.status());
+  auto unit = open(plugged->hid_address());
+  ASSERT_OK(unit);
+  ASSERT_OK((*unit)->start_stream(100));
+  std::array<std::set<std::int16_t>, kAxes> seen;
+  for (int i = 0; i < 15; ++i) {
+    const auto block = (*unit)->next_samples(seconds(5));
+    ASSERT_OK(block);
+    ASSERT_TRUE(block->has_value());
+    for (const auto& counts : (*block)->counts) {
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        seen[axis].insert(counts[axis]);
+      }
+    }
+  }
+  EXPECT_EQ(seen[1].size(), 1U);
+  EXPECT_GT(seen[0].size(), 1U) << "5.5 mg of noise";
+  EXPECT_GT(seen[2].size(), 1U);
+}
+
 void power_lost_in_a_write_leaves_a_whole_page(UsbBench& bench) {
   Plugged plugged(bench, faulty_unit(38, R"({"fault": "power_loss", "at_s": 0, "bytes": 300,
                                              "seconds": 0.5})"));
@@ -388,6 +412,7 @@ const std::vector<UsbBody>& usb_fault_bodies() {
       {"AFullFlashRefusesToRecord", a_full_flash_refuses_to_record},
       {"AJumpingClockIsNotedAndNothingIsLost", a_jumping_clock_is_noted_and_nothing_is_lost},
       {"AFrozenSensorRepeatsItsCounts", a_frozen_sensor_repeats_its_counts},
+      {"AStuckAxisRepeatsAlone", a_stuck_axis_repeats_alone},
       {"PowerLostInAWriteLeavesAWholePage", power_lost_in_a_write_leaves_a_whole_page},
   };
   return kBodies;

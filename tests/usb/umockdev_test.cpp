@@ -2,9 +2,15 @@
 // installed program as a child process.
 #include <array>
 #include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <future>
+#include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "device/bulk_transport.h"
 #include "device/discovery.h"
@@ -12,9 +18,11 @@
 #include "device/jig.h"
 #include "device/unit.h"
 #include "expect_result.h"
+#include "mocks/usb_drive.h"
 #include "temporary_folder.h"
 #include "usb/bodies.h"
 #include "usb/child.h"
+#include "usb/plugged.h"
 #include "usb/umockdev_bench.h"
 
 namespace sixpoint::tests {
@@ -207,6 +215,99 @@ TEST_F(Misbehaving, AFloodFillsTheQueueAndNothingElse) {
   EXPECT_EQ(count, 10);
 }
 
+// A download whose blocks stop coming, with a patience of an hour: cancel() and the end of the unit
+// do not wait for the transfers that hang (bench/usb_bench measures how long they take).
+TEST_F(Misbehaving, AHangingDownloadIsStopped) {
+  std::atomic<bool> hang = false;
+  std::atomic<int> asked = 0;
+  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    const bool now = endpoint == device::kBulkInEndpoint && hang;
+    asked += now ? 1 : 0;
+    return now ? std::optional(UsbAnswer::nothing_yet()) : std::nullopt;
+  };
+  auto link = open();
+  ASSERT_OK(link);
+  device::UnitOptions options;
+  options.reply_time_out = seconds(5);
+  options.bulk_time_out = std::chrono::hours(1);
+  auto opened = device::Unit::open(std::move(*link), options);
+  ASSERT_OK(opened);
+  const auto info = record(unit, **opened, seconds(600));
+  ASSERT_OK(info);
+  hang = true;
+  TemporaryFolder folder;
+  auto downloading = std::async(std::launch::async, [&] {
+    return (*opened)->download(*info, posix_env().files, folder / "x.gt3x");
+  });
+  while (asked == 0) {
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  (*opened)->cancel();
+  EXPECT_FAILS(downloading.get(), ErrorCode::device_unavailable);
+  opened->reset();
+  EXPECT_FALSE(posix_env().files.info(folder / "x.gt3x"));
+  // Without cancel(): the unit ends while its transfers hang, and the reports with them.
+  auto reports_too = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::nothing_yet())
+                                               : std::nullopt;
+  };
+  bus->unplug(nodes.port);
+  wilful->on_out = reports_too;
+  wilful->plug_in();
+  auto again = open();
+  ASSERT_OK(again);
+  Bytes buffer(device::kBulkBlockBytes);
+  EXPECT_EQ(*again->bulk->read(buffer, milliseconds(20)), 0U) << "transfers are under way";
+  EXPECT_FAILS(again->reports->write(Bytes(64), milliseconds(20)), ErrorCode::io);
+  *again = {};
+}
+
+// What a device says of itself reaches no terminal as it is, and opens nothing that it should not.
+TEST_F(Misbehaving, HostileSerialNumbersNameNothing) {
+  for (const std::string& serial :
+       {std::string("A\x1b[2JB"), std::string("two words"), std::string("\xc5\xbelut\xc3\xbd"),
+        std::string(120, 'A'), std::string("../../etc"), std::string("%n%s"), std::string("a,b=c"),
+        std::string()}) {
+    SCOPED_TRACE(testing::PrintToString(serial));
+    mocks::VirtualUnitOptions options;
+    options.truth = sim::draw_unit(7);
+    options.truth.serial = serial;
+    const auto plugged =
+        std::make_shared<mocks::PluggedUnit>(std::move(options), std::make_shared<LeapingClock>());
+    auto hostile = bus->plug_in(std::make_shared<mocks::UsbUnit>(plugged));
+    ASSERT_OK(hostile);
+    const auto found = device::attached_devices();
+    ASSERT_OK(found);
+    ASSERT_EQ(found->size(), 1U);
+    const std::string& shown = found->front().serial;
+    EXPECT_TRUE(shown.empty() || shown == serial);
+    EXPECT_TRUE(
+        std::all_of(shown.begin(), shown.end(), [](char c) { return c > ' ' && c <= '~'; }));
+    for (const std::string& more : {std::string("--json"), std::string()}) {
+      const ChildAnswer listed =
+          more.empty() ? run_child({"devices"}) : run_child({"devices", more});
+      EXPECT_EQ(listed.exit_code, 0) << listed.people;
+      EXPECT_EQ((listed.out + listed.people).find('\x1b'), std::string::npos);
+      EXPECT_EQ(std::count(listed.out.begin(), listed.out.end(), '\n') == 1, more.empty());
+    }
+    // By its own name, and as the only one there is: that unit, or a refusal in words.
+    for (const std::string& address : {"hid:" + serial, std::string("hid:")}) {
+      auto link = registry().open(address, posix_env());
+      if (!link) {
+        EXPECT_EQ(link.error().brief().find('\x1b'), std::string::npos);
+        continue;
+      }
+      const auto unit_or_not = device::Unit::open(std::move(*link));
+      if (unit_or_not) {
+        EXPECT_EQ((*unit_or_not)->identity().serial, serial);
+      } else {
+        EXPECT_EQ(unit_or_not.error().code, ErrorCode::bad_data);
+      }
+    }
+    bus->unplug(hostile->port);
+  }
+}
+
 class Program : public testing::Test {
  protected:
   void SetUp() override {
@@ -238,12 +339,104 @@ TEST_F(Program, ListsWhatIsPluggedIn) {
   EXPECT_NE(doctor.out.find("1 of our devices plugged in"), std::string::npos) << doctor.out;
 }
 
+// Oracle: the order in which it was done.
+TEST_F(Program, SaysWhatComesAndGoes) {
+  auto a = make_unit(1);
+  ASSERT_OK(bench->plug_in(a));
+  auto b = make_unit(2);
+  const ChildAnswer answer = run_child_lines(
+      {"devices", "--watch", "--for", "20", "--json"}, [&](const std::string& line, pid_t child) {
+        // Each event leads to the next.
+        const auto json = nlohmann::json::parse(line, nullptr, false);
+        const std::string event =
+            json["event"].get<std::string>() + " " + json["device"]["serial"].get<std::string>();
+        if (event == "arrived " + a.serial && b.port.empty()) {
+          ASSERT_OK(bench->plug_in(b));
+        } else if (event == "arrived " + b.serial) {
+          bench->unplug(a);
+        } else if (event == "left " + a.serial) {
+          ::kill(child, SIGINT);
+        }
+      });
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  std::vector<std::string> events;
+  std::istringstream lines(answer.out);
+  for (std::string line; std::getline(lines, line);) {
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json["schema"], "sixpoint/device-event/1");
+    events.push_back(json["event"].get<std::string>() + " " +
+                     json["device"]["serial"].get<std::string>());
+  }
+  EXPECT_EQ(events, (std::vector<std::string>{"arrived " + a.serial, "arrived " + b.serial,
+                                              "left " + a.serial}));
+}
+
+// A unit of files alone is found as another product; it has no hidraw node and needs none.
+TEST_F(Program, FindsAUnitOfFilesAlone) {
+  const auto truth = sim::draw_unit(3);
+  mocks::VirtualUnitOptions options;
+  options.truth = truth;
+  auto volume = mocks::unit_volume(mocks::VirtualUnit(options));
+  ASSERT_OK(volume);
+  const auto drive = std::make_shared<mocks::UsbDrive>(
+      truth, std::make_shared<const mocks::FatImage>(*std::move(volume)),
+      std::make_shared<LeapingClock>());
+  ASSERT_OK(bench->bus().plug_in(drive));
+  const ChildAnswer answer = run_child({"devices", "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  const auto json = nlohmann::json::parse(answer.out);
+  ASSERT_EQ(json["devices"].size(), 1U);
+  EXPECT_EQ(json["devices"][0]["model"], "file-monitor");
+  EXPECT_EQ(json["devices"][0]["serial"], truth.serial);
+  EXPECT_EQ(json["devices"][0]["address"], nullptr) << "there is no block device here to mount";
+  EXPECT_NE(json["devices"][0]["hint"].get<std::string>().find("drive:FOLDER"), std::string::npos);
+  EXPECT_FAILS(registry().open("hid:", posix_env()), ErrorCode::device_unavailable);
+}
+
 TEST_F(Program, SaysWhichSerialsThereAre) {
   auto unit = make_unit(1);
   ASSERT_OK(bench->plug_in(unit));
   const ChildAnswer answer = run_child({"jig", "--device", "hid:NOBODY"});
   EXPECT_EQ(answer.exit_code, 69);
   EXPECT_NE(answer.people.find(unit.serial), std::string::npos) << answer.people;
+}
+
+// As a person without the udev rules: the message names them, `devices` says it of each device, and
+// with permission the same person gets on.
+TEST_F(Program, WithoutPermissionNamesTheUdevRules) {
+  if (::geteuid() != 0) {
+    GTEST_SKIP() << "needs root, to start the program as somebody else";
+  }
+  auto unit = make_unit(1);
+  ASSERT_OK(bench->plug_in(unit));
+  bench->bus().allow(unit.port, false);
+  const std::string bed = ::getenv("UMOCKDEV_DIR");
+  ASSERT_EQ(::chmod(bed.c_str(), 0777), 0);  // udev's events are sockets in it
+  TemporaryFolder folder;
+  ASSERT_EQ(::chmod(folder.path().c_str(), 0777), 0);
+  std::filesystem::copy_file(SIXPOINT_PROGRAM, folder / "sixpoint");
+  const auto as_nobody = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534",
+                                         "--clear-groups", folder / "sixpoint"});
+    return run_program(arguments);
+  };
+  const ChildAnswer refused =
+      as_nobody({"jig", "--device", unit.hid_address(), "--store", folder / "s.db"});
+  EXPECT_EQ(refused.exit_code, 77) << refused.people;
+  for (const char* rules :
+       {"packaging/udev/60-sixpoint-detect.rules", "70-sixpoint-access.rules"}) {
+    EXPECT_NE(refused.people.find(rules), std::string::npos) << refused.people;
+  }
+  const ChildAnswer listed = as_nobody({"devices", "--json"});
+  EXPECT_EQ(listed.exit_code, 0) << listed.people;
+  const auto json = nlohmann::json::parse(listed.out);
+  ASSERT_EQ(json["devices"].size(), 1U);
+  EXPECT_EQ(json["devices"][0]["accessible"], false);
+  EXPECT_NE(json["devices"][0]["hint"].get<std::string>().find("60-sixpoint-detect.rules"),
+            std::string::npos);
+  bench->bus().allow(unit.port, true);
+  EXPECT_EQ(nlohmann::json::parse(as_nobody({"devices", "--json"}).out)["devices"][0]["accessible"],
+            true);
 }
 
 // Turns the unit as the program's prompts say, as a technician would.
@@ -324,17 +517,149 @@ TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
   auto unit = make_unit(6);
   ASSERT_OK(bench->plug_in(unit));
   TemporaryFolder folder;
-  const ChildAnswer answer = run_child(
-      {"jig", "--device", unit.usb_address(), "--jig", "manual", "--store", folder / "store.db"},
-      [&](const std::string& line) {
-        if (line.starts_with("turn the unit") && !unit.port.empty()) {
-          bench->unplug(unit);
-        }
-      });
+  const ChildAnswer answer =
+      run_child({"jig", "--device", unit.usb_address(), "--jig", "manual", "--patience", "2",
+                 "--store", folder / "store.db"},
+                [&](const std::string& line) {
+                  if (line.starts_with("turn the unit") && !unit.port.empty()) {
+                    bench->unplug(unit);
+                  }
+                });
   EXPECT_EQ(answer.exit_code, 69) << answer.people;
-  EXPECT_NE(answer.people.find("did not come back within 30 s; plug it in"), std::string::npos)
+  EXPECT_NE(answer.people.find("did not come back within 2 s; plug it in"), std::string::npos)
       << answer.people;
 }
+
+// The table of docs/faults.md once more, with the program as people run it: what it prints, and
+// what it ends with.
+struct ProgramFault {
+  const char* name;
+  const char* faults;  // of the plan
+  std::vector<const char*> more;
+  int exit_code;
+  const char* says;  // on stderr
+  int leaves = 0;    // how often it leaves the bus
+};
+
+void PrintTo(const ProgramFault& fault, std::ostream* out) { *out << fault.name; }
+
+class ProgramFaults : public testing::TestWithParam<ProgramFault> {};
+
+TEST_P(ProgramFaults, EndWithWhatTheTableSays) {
+  const ProgramFault& fault = GetParam();
+  auto made = mocks::UmockdevBus::make();
+  ASSERT_OK(made);
+  UmockdevBench bench(std::move(*made));
+  constexpr int kPace = 8;
+  auto plan = mocks::parse_fault_plan(
+      std::string(R"({"schema": "sixpoint/faults/1", "faults": [)") + fault.faults + "]}");
+  ASSERT_OK(plan);
+  auto unit = make_unit(5, *std::move(plan), kPace);
+  const sim::UnitTruth truth = unit.unit->unit.truth();
+  ASSERT_OK(bench.plug_in(unit));
+  std::future<Status> back;
+  if (fault.leaves > 0) {
+    back = std::async(std::launch::async, [&]() -> Status {
+      for (int i = 0; i < fault.leaves; ++i) {
+        const std::string port = unit.port;
+        if (!bench.wait_until_left(unit)) {
+          return fail(ErrorCode::internal, "the unit did not leave the bus");
+        }
+        SIXPOINT_CHECK(bench.plug_in(unit, port));
+      }
+      return {};
+    });
+  }
+  TemporaryFolder folder;
+  Technician technician(unit);
+  std::vector<std::string> arguments = {"jig",     "--device", "hid:",    "--jig",
+                                        "manual",  "--dwell",  "0.5",     "--filter",
+                                        "current", "--json",   "--store", folder / "store.db"};
+  arguments.insert(arguments.end(), fault.more.begin(), fault.more.end());
+  const ChildAnswer answer =
+      run_child(arguments, [&](const std::string& line) { technician.hear(line); });
+  if (back.valid()) {
+    EXPECT_OK(back.get());
+  }
+  EXPECT_EQ(answer.exit_code, fault.exit_code) << answer.people << answer.out;
+  EXPECT_NE((answer.people + answer.out).find(fault.says), std::string::npos) << answer.people;
+  const auto json = nlohmann::json::parse(answer.out, nullptr, false);
+  const ChildAnswer history =
+      run_child({"history", truth.serial, "--store", folder / "store.db", "--json"});
+  const auto stored = nlohmann::json::parse(history.out, nullptr, false);
+  if (fault.exit_code != 0) {
+    const bool any = stored.is_object() && stored.contains("constants");
+    EXPECT_TRUE(!any || stored["constants"].empty()) << "nothing wrong is stored";
+    return;
+  }
+  ASSERT_TRUE(json.is_object());
+  EXPECT_EQ(json["verdict"], "pass");
+  EXPECT_EQ(stored["constants"].size(), 1U);
+  // Oracle: what the simulated sensor really is; as in MeasuresAUnitOnTheJigAndWritesItsConstants.
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    EXPECT_NEAR(json["constants"]["sensitivity_g_per_lsb"][axis].get<double>() *
+                    truth.current.sensitivity_lsb_per_g[axis],
+                1, 0.007);
+    EXPECT_NEAR(json["constants"]["zero_lsb"][axis].get<double>(), truth.current.zero_lsb[axis], 2);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, ProgramFaults,
+    testing::Values(
+        // A poor cable and a poor unit, all at once: none of it reaches the constants.
+        ProgramFault{"poor_cable",
+                     R"({"fault": "bad_page", "at_s": 0},
+                        {"fault": "stall", "of": "replies", "at_report": 3},
+                        {"fault": "lost", "of": "replies", "at_report": 6},
+                        {"fault": "bad_crc", "of": "replies", "at_report": 9},
+                        {"fault": "duplicate", "at_report": 2, "every": 3},
+                        {"fault": "delay", "of": "samples", "at_report": 40, "seconds": 0.5},
+                        {"fault": "garbage", "of": "samples", "at_report": 70},
+                        {"fault": "bit_flip", "of": "samples", "at_report": 150, "bit": 6},
+                        {"fault": "short_packet", "of": "samples", "at_report": 230},
+                        {"fault": "wrong_sequence", "of": "samples", "at_report": 310},
+                        {"fault": "clock_jump", "of": "samples", "at_report": 350, "seconds": 4})",
+                     {"--write"},
+                     0,
+                     "unreadable"},
+        // Thrice away, in three ways; each time it is found again, also under another node.
+        ProgramFault{"away_and_back",
+                     R"({"fault": "reset", "of": "samples", "at_report": 60},
+                        {"fault": "unplug", "of": "samples", "at_report": 160, "seconds": 4},
+                        {"fault": "reenumerate", "of": "samples", "at_report": 260})",
+                     {},
+                     0,
+                     "it is back",
+                     2},
+        ProgramFault{"swap",
+                     R"({"fault": "swap", "of": "samples", "at_report": 60,
+                         "serial": "MOS2B99990009"})",
+                     {},
+                     69,
+                     "MOS2B99990009",
+                     1},
+        ProgramFault{"frozen_sensor",
+                     R"({"fault": "frozen_sensor", "of": "samples", "at_report": 20})",
+                     {},
+                     1,
+                     "the sensor is frozen"},
+        ProgramFault{"axis_stuck",
+                     R"({"fault": "axis_stuck", "of": "samples", "at_report": 20, "axis": "y"})",
+                     {},
+                     1,
+                     "y axis is stuck"},
+        ProgramFault{"battery_low",
+                     R"({"fault": "battery_low", "at_s": 0})",
+                     {"--write"},
+                     74,
+                     "charge the unit"},
+        ProgramFault{"no_reply",
+                     R"({"fault": "lost", "of": "replies", "at_report": 4, "count": 0})",
+                     {},
+                     69,
+                     "does not answer"}),
+    [](const auto& one) { return std::string(one.param.name); });
 
 }  // namespace
 }  // namespace sixpoint::tests

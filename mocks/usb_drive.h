@@ -1,0 +1,34 @@
+// A unit that offers mass storage and nothing else, as the USB device that it is: one interface
+// with a read-only volume (docs/devices/file-monitor.md). What a host mounts is what device/drive/
+// calibrates by files.
+#pragma once
+
+#include <memory>
+
+#include "mocks/mass_storage.h"
+#include "mocks/usb_device.h"
+#include "sim/unit_truth.h"
+
+namespace sixpoint::mocks {
+
+class UsbDrive final : public StandardUsbDevice {
+ public:
+  // Interface 0; the endpoints are those of a monitor's storage (device/usb_ids.h).
+  static constexpr std::uint8_t kInterface = 0;
+
+  // `volume` is never null: unit_volume() (usb_unit.h) makes one of a unit's recordings.
+  UsbDrive(const sim::UnitTruth& truth, std::shared_ptr<const BlockMedium> volume,
+           std::shared_ptr<Clock> clock);
+
+ private:
+  UsbAnswer own_request(const SetupPacket& setup, std::span<const std::uint8_t> data) override;
+  UsbAnswer take(const UsbEndpoint& endpoint, std::span<const std::uint8_t> bytes) override;
+  UsbAnswer give(const UsbEndpoint& endpoint, std::size_t max_length) override;
+  void on_reset() override { storage_.reset(); }
+  bool may_clear_halt(std::uint8_t /*endpoint*/) override { return !storage_.needs_reset(); }
+  UsbAnswer halted_by(UsbAnswer answer, std::uint8_t endpoint);
+
+  MassStorage storage_;
+};
+
+}  // namespace sixpoint::mocks
