@@ -235,6 +235,10 @@ class MemoryLock final : public FileLock {
 
 Result<std::unique_ptr<FileLock>> MemoryFiles::lock(const std::string& path) {
   SIXPOINT_CHECK(may_change(path));
+  {
+    const std::lock_guard lock(mutex_);
+    seen_.try_emplace(path, std::make_shared<Node>());
+  }
   const std::lock_guard lock(locked_->mutex);
   if (!locked_->paths.insert(path).second) {
     return nullptr;
