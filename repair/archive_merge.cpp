@@ -55,8 +55,7 @@ Result<MergedArchive> merge_archive(FileSystem& files, const std::string& folder
     if (!result) {
       const ShardStanding standing = standing_of(files, folder, plan, k);
       // It may have come to its end since the line before.
-      shard.state =
-          standing.state == ShardState::done ? ShardState::running : standing.state;
+      shard.state = standing.state == ShardState::done ? ShardState::running : standing.state;
       shard.files_done = standing.files_done;
       merged.shards.push_back(shard);
       continue;

@@ -28,8 +28,7 @@ constexpr std::uint64_t kLargestPlan = 256ULL << 20;
 constexpr std::uint64_t kLargestManifest = 1ULL << 30;
 
 std::string hash_of(std::string_view text) {
-  return to_hex(
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
 }
 
 std::string_view text_of(const Bytes& bytes) {
@@ -98,11 +97,10 @@ Json to_json(const ArchivePlan& plan) {
                      {"undo_rotation", repair.options.undo_rotation},
                      {"allow_prior", repair.options.allow_prior}};
   json["constants"] = repair.given ? calib::to_json(*repair.given) : Json(nullptr);
-  json["calibration_file"] =
-      repair.calibration_file
-          ? Json{{"path", encode_path(repair.calibration_file->path)},
-                 {"sha256", repair.calibration_file->sha256}}
-          : Json(nullptr);
+  json["calibration_file"] = repair.calibration_file
+                                 ? Json{{"path", encode_path(repair.calibration_file->path)},
+                                        {"sha256", repair.calibration_file->sha256}}
+                                 : Json(nullptr);
   json["store"] = {{"location", encode_path(plan.store)}, {"sha256", plan.constants_sha256}};
   Json& shards = json["shards"] = Json::array();
   for (const ArchiveShard& shard : plan.shards) {
@@ -289,10 +287,10 @@ class Planner {
     }
     shards = std::min(shards, made_.files.size());
     if (shards > kMostShards) {
-      return fail(ErrorCode::usage,
-                  fmt::format("{} shards are more than the {} that a plan may have", shards,
-                              kMostShards),
-                  {}, "choose fewer or larger ones");
+      return fail(
+          ErrorCode::usage,
+          fmt::format("{} shards are more than the {} that a plan may have", shards, kMostShards),
+          {}, "choose fewer or larger ones");
     }
     std::size_t from = 0;
     for (const std::size_t to : cut_into_shards(bytes, shards)) {
@@ -339,17 +337,15 @@ Result<ArchiveFile> file_of(std::string_view line, const ArchivePlan& plan) {
 }  // namespace
 
 std::size_t ArchivePlan::files() const {
-  return std::accumulate(shards.begin(), shards.end(), std::size_t{0},
-                         [](std::size_t sum, const ArchiveShard& shard) {
-                           return sum + shard.files;
-                         });
+  return std::accumulate(
+      shards.begin(), shards.end(), std::size_t{0},
+      [](std::size_t sum, const ArchiveShard& shard) { return sum + shard.files; });
 }
 
 std::uint64_t ArchivePlan::bytes() const {
-  return std::accumulate(shards.begin(), shards.end(), std::uint64_t{0},
-                         [](std::uint64_t sum, const ArchiveShard& shard) {
-                           return sum + shard.bytes;
-                         });
+  return std::accumulate(
+      shards.begin(), shards.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const ArchiveShard& shard) { return sum + shard.bytes; });
 }
 
 std::string encode_path(std::string_view path) {
@@ -480,9 +476,8 @@ Result<ArchivePlan> read_plan(FileSystem& files, const std::string& folder) {
                 fmt::format("the plan has version {}, this program reads {}", *version, kVersion),
                 path, "run it with the version of sixpoint that made it");
   }
-  const std::string id = json.contains("id") && json["id"].is_string()
-                             ? json["id"].get<std::string>()
-                             : "";
+  const std::string id =
+      json.contains("id") && json["id"].is_string() ? json["id"].get<std::string>() : "";
   json.erase("id");
   if (hash_of(text_of(json)) != id) {
     return fail(ErrorCode::configuration, "the plan was changed after it was made", path,

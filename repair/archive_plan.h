@@ -72,7 +72,9 @@ struct ArchivePlan {
 
   std::size_t files() const;
   std::uint64_t bytes() const;
-  std::string input_of(const ArchiveFile& file) const { return roots[file.root].path + "/" + file.relative; }
+  std::string input_of(const ArchiveFile& file) const {
+    return roots[file.root].path + "/" + file.relative;
+  }
 };
 
 struct ArchiveDraft {

@@ -26,14 +26,17 @@ std::string results_of(const std::string& folder) { return folder + "/results"; 
 std::string result_path(const std::string& folder, std::size_t shard) {
   return fmt::format("{}/results/{:05}.jsonl", folder, shard);
 }
-std::string part_prefix(std::size_t shard) { return fmt::format("{:05}.part-", shard); }
+// A folder of their own: to list the one folder of all shards would cost every shard more the more
+// there are.
+std::string parts_folder(const std::string& folder, std::size_t shard) {
+  return fmt::format("{}/results/{:05}.parts", folder, shard);
+}
 std::string lock_path(const std::string& folder, std::size_t shard) {
   return fmt::format("{}/results/{:05}.lock", folder, shard);
 }
 
 std::string hash_of(std::string_view text) {
-  return to_hex(
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
 }
 
 Json to_json(const Error& error) {
@@ -44,11 +47,11 @@ Json to_json(const Error& error) {
 }
 
 std::string line_of(std::size_t index, const RepairReport& report) {
-  Json json = {{"file", index},
-               {"report", report.to_json()},
-               {"error", report.error ? to_json(*report.error) : Json(nullptr)},
-               {"repaired_at",
-                report.repaired_at ? Json(to_iso8601(*report.repaired_at)) : Json(nullptr)}};
+  Json json = {
+      {"file", index},
+      {"report", report.to_json()},
+      {"error", report.error ? to_json(*report.error) : Json(nullptr)},
+      {"repaired_at", report.repaired_at ? Json(to_iso8601(*report.repaired_at)) : Json(nullptr)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -129,16 +132,13 @@ class Shard {
     for (const auto& [index, report] : lines.reports) {
       body += line_of(index, report);
     }
-    const Json header = {{"schema", kResultSchema},
-                         {"plan", plan_->id},
-                         {"shard", number_},
-                         {"output_folder", encode_path(lines.output_folder)},
-                         {"software", lines.software},
-                         {"files", lines.reports.size()},
-                         {"sha256", hash_of(body)}};
-    return write_file(
-        *files_, path,
-        header.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n" + body);
+    const Json header = {
+        {"schema", kResultSchema},    {"plan", plan_->id},
+        {"shard", number_},           {"output_folder", encode_path(lines.output_folder)},
+        {"software", lines.software}, {"files", lines.reports.size()},
+        {"sha256", hash_of(body)}};
+    return write_file(*files_, path,
+                      header.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n" + body);
   }
 
   Result<Lines> read(const std::string& path) const {
@@ -170,15 +170,14 @@ class Shard {
     return lines;
   }
 
-  // The parts of runs that did not come to their end, in the order in which they were written.
+  // The parts of runs that did not come to their end, in the order in which they were written, and
+  // temporary files of them (whose bytes no reader takes for a part).
   std::vector<std::string> parts() const {
     std::vector<std::string> paths;
-    const auto names = files_->list(results_of(folder_));
+    const auto names = files_->list(parts_folder(folder_, number_));
     if (names) {
       for (const std::string& name : *names) {
-        if (name.starts_with(part_prefix(number_)) && name.ends_with(".jsonl")) {
-          paths.push_back(results_of(folder_) + "/" + name);
-        }
+        paths.push_back(parts_folder(folder_, number_) + "/" + name);
       }
     }
     return paths;
@@ -337,11 +336,11 @@ class ShardRun {
       }
     }
     if (*known != options_.output_folder) {
-      return fail(ErrorCode::usage,
-                  fmt::format("the other shards of this plan are mended into {}",
-                              printable(*known)),
-                  options_.output_folder,
-                  fmt::format("use -o {}, or make another plan", shell_word(*known)));
+      return fail(
+          ErrorCode::usage,
+          fmt::format("the other shards of this plan are mended into {}", printable(*known)),
+          options_.output_folder,
+          fmt::format("use -o {}, or make another plan", shell_word(*known)));
     }
     return {};
   }
@@ -401,9 +400,7 @@ class ShardRun {
       if (!options_.dry_run && done < reports.size() &&
           (fresh.reports.size() >= options_.checkpoint_files ||
            env_.clock.elapsed() - since >= options_.checkpoint_after)) {
-        SIXPOINT_CHECK(shard.write(fmt::format("{}/{}{:06}.jsonl", results_of(folder_),
-                                               part_prefix(options_.shard), next_part++),
-                                   fresh));
+        SIXPOINT_CHECK(write_part(shard, next_part++, fresh));
         fresh.reports.clear();
         since = env_.clock.elapsed();
       }
@@ -417,6 +414,12 @@ class ShardRun {
     return options_.dry_run ? Status() : conclude(shard, all, nothing_to_do);
   }
 
+  Status write_part(const Shard& shard, std::size_t number, const Lines& lines) {
+    const std::string parts = parts_folder(folder_, options_.shard);
+    SIXPOINT_CHECK(make_folder(parts));
+    return shard.write(fmt::format("{}/{:06}.jsonl", parts, number), lines);
+  }
+
   // The result, and then the parts away that it has made useless.
   Status conclude(const Shard& shard, const Lines& all, bool nothing_was_done) {
     const std::string path = result_path(folder_, options_.shard);
@@ -428,14 +431,14 @@ class ShardRun {
     for (const std::string& part : parts) {
       SIXPOINT_CHECK(files_.remove(part));
     }
-    return parts.empty() ? Status() : files_.sync_folder(results_of(folder_));
+    return parts.empty() ? Status() : files_.sync_folder(parts_folder(folder_, options_.shard));
   }
 
-  std::size_t number_after(const std::vector<std::string>& parts) const {
+  static std::size_t number_after(const std::vector<std::string>& parts) {
     std::size_t number = 1;
     for (const std::string& path : parts) {
       std::size_t its = 0;
-      for (const char c : file_name_of(path).substr(part_prefix(options_.shard).size())) {
+      for (const char c : file_name_of(path)) {
         if (c < '0' || c > '9' || its > 100'000'000) {
           break;
         }

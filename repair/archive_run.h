@@ -7,7 +7,7 @@
 // a time are refused by a lock. Files that failed are tried again by the next run.
 //
 //   results/output.json            the output folder, the same for all shards
-//   results/00000.part-000128.jsonl  what a run that has not ended did so far
+//   results/00000.parts/000001.jsonl  what a run that has not ended did so far
 //   results/00000.jsonl            the result of the whole shard
 #pragma once
 
@@ -36,9 +36,9 @@ struct ShardRunOptions {
 struct ShardResult {
   std::size_t shard = 0;
   std::string output_folder;
-  std::string software;                // of the run that ended it
-  std::vector<RepairReport> files;     // in the order of the manifest
-  std::size_t done_before = 0;         // of them, by earlier runs
+  std::string software;             // of the run that ended it
+  std::vector<RepairReport> files;  // in the order of the manifest
+  std::size_t done_before = 0;      // of them, by earlier runs
 };
 
 // cannot_create where another run holds the shard; usage where the output folder is another one

@@ -29,7 +29,7 @@ db::RepairRecord record_of(const RepairReport& report, const std::string& softwa
 }  // namespace
 
 RepairRecords records_of(db::Store& store, const std::vector<RepairReport>& reports,
-                                 const std::string& software) {
+                         const std::string& software) {
   RepairRecords made;
   std::map<std::string, std::set<std::string>> ids;  // of the constants of each serial
   for (const RepairReport& report : reports) {

@@ -20,6 +20,6 @@ struct RepairRecords {
 // whenever this is called: they carry the time of the repair, and so their ids are the same. A
 // store that does not answer knows nothing. `software`: what mended the files, with its build.
 RepairRecords records_of(db::Store& store, const std::vector<RepairReport>& reports,
-                                 const std::string& software);
+                         const std::string& software);
 
 }  // namespace sixpoint::repair

@@ -1,4 +1,5 @@
-// sixpoint archive plan|run|merge|status: an archive on a cluster, shard by shard (docs/archive.md).
+// sixpoint archive plan|run|merge|status: an archive on a cluster, shard by shard
+// (docs/archive.md).
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -188,8 +189,8 @@ void run_plan(PlanOptions& options, Context& context) {
     return report_error(context, "archive", planned.error(), options.json);
   }
   if (!options.dry_run) {
-    const Status written = repair::write_plan(context.env, absolute(options.folder), draft,
-                                              *planned);
+    const Status written =
+        repair::write_plan(context.env, absolute(options.folder), draft, *planned);
     if (!written) {
       return report_error(context, "archive", written.error(), options.json);
     }
@@ -204,9 +205,8 @@ void run_plan(PlanOptions& options, Context& context) {
                        printable(planned->not_followed[i]));
   }
   if (plan.shards.size() > repair::kUsualMostShards) {
-    context.log().warn(
-        "{} shards: Slurm's MaxArraySize is 1001 unless your cluster says otherwise",
-        plan.shards.size());
+    context.log().warn("{} shards: Slurm's MaxArraySize is 1001 unless your cluster says otherwise",
+                       plan.shards.size());
   }
   FileStream files(context, options.json);
   for (const repair::RefusedPath& refused : plan.refused) {
@@ -340,9 +340,9 @@ void say_what_is_missing(const MergedArchive& merged, const Rerun& rerun, Contex
     }
     again.push_back(shard.shard);
     context.people << (shard.complete()
-                           ? fmt::format("shard {}: {} of its {} files failed; try them again: {}\n",
-                                         shard.shard, shard.failed, shard.files,
-                                         rerun.shard(shard.shard))
+                           ? fmt::format(
+                                 "shard {}: {} of its {} files failed; try them again: {}\n",
+                                 shard.shard, shard.failed, shard.files, rerun.shard(shard.shard))
                            : fmt::format("shard {} is {} ({} of {} files): {}\n", shard.shard,
                                          repair::to_string(shard.state), shard.files_done,
                                          shard.files, rerun.shard(shard.shard)));
@@ -493,8 +493,8 @@ void run_status(const StatusOptions& options, Context& context) {
                   << (shard.failed > 0 ? fmt::format(", {} failed", shard.failed) : "") << '\n';
     }
     context.people << fmt::format("{} of {} shards, {} of {} files done\n",
-                                  counts[repair::ShardState::done], plan->shards.size(),
-                                  files_done, plan->files());
+                                  counts[repair::ShardState::done], plan->shards.size(), files_done,
+                                  plan->files());
   }
 }
 
@@ -547,8 +547,9 @@ void add_merge(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("merge", "The answers of all shards as one; tells the store");
   auto options = std::make_shared<MergeOptions>();
   command->add_option("plan", options->plan, "The folder of the plan")->required();
-  command->add_option("--store", options->store,
-                      "The store that is told (default: the one that the plan took constants from)");
+  command->add_option(
+      "--store", options->store,
+      "The store that is told (default: the one that the plan took constants from)");
   command->add_flag("--verify", options->verify, "Also read every mended file again");
   command->add_flag("--dry-run", options->dry_run, "Tell the store nothing");
   command->add_flag("--json", options->json, "One JSON document on stdout");

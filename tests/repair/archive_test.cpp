@@ -1,4 +1,5 @@
-// An archive in shards against one `repair` of the same files, and with the power cut at every step.
+// An archive in shards against one `repair` of the same files, and with the power cut at every
+// step.
 #include <algorithm>
 #include <map>
 #include <numeric>
@@ -65,8 +66,7 @@ class Archive : public testing::Test {
       ASSERT_OK(files.make_folders(folder));
       // Names are bytes: a line end, no UTF-8, the plan's own escape.
       const std::string odd[] = {"plain", "line\nend", "\xff\xfe", "100%41", "quote'\""};
-      const std::string path =
-          folder + "/" + odd[random.below(5)] + std::to_string(i) + ".gt3x";
+      const std::string path = folder + "/" + odd[random.below(5)] + std::to_string(i) + ".gt3x";
       if (random.below(8) == 0) {
         auto broken = files.create(path);
         ASSERT_OK(broken);
@@ -195,8 +195,8 @@ TEST_F(Archive, EqualsOneRepairForRandomTreesAndShardCounts) {
       statuses.insert(nlohmann::json::parse(text)["status"]);
     }
   }
-  EXPECT_EQ(statuses, (std::set<std::string>{"repaired", "not_affected", "not_repairable",
-                                             "failed"}))
+  EXPECT_EQ(statuses,
+            (std::set<std::string>{"repaired", "not_affected", "not_repairable", "failed"}))
       << "the trees must hold every kind of file";
 }
 
@@ -250,11 +250,11 @@ TEST_F(Archive, APowerCutAtEveryStepOfAShardLosesAndDoublesNothing) {
       }
     }
     // Nothing half-written is left over, neither beside the outputs nor beside the results.
+    EXPECT_TRUE(memory.files.list("/plan/results/00000.parts").value().empty()) << stop;
     for (const std::string folder : {"/mended", "/plan/results"}) {
       const auto names = memory.files.list(folder).value();
       for (const std::string& name : names) {
         EXPECT_FALSE(name.ends_with(".tmp")) << folder << "/" << name << " at " << stop;
-        EXPECT_EQ(name.find(".part-"), std::string::npos) << name << " at " << stop;
       }
     }
     ++cuts;
@@ -504,21 +504,24 @@ TEST_F(HostilePlan, EditedByHandIsRefused) {
 TEST_F(HostilePlan, NamesThatLeaveTheArchiveAreRefused) {
   for (const char* name : {"../secret.gt3x", "a/../../x.gt3x", "/etc/x.gt3x", "", ".", "a//b",
                            "a/./b", "x%00y", "a/..", "%2E%2E/x.gt3x"}) {
-    forge_manifest(std::string(R"({"root":0,"path":")") + name +
-                   R"(","size":1,"modified_ns":1})" + "\n");
+    forge_manifest(std::string(R"({"root":0,"path":")") + name + R"(","size":1,"modified_ns":1})" +
+                   "\n");
     SCOPED_TRACE(name);
     EXPECT_FAILS(run_first(), ErrorCode::bad_data);
   }
-  forge_manifest(R"({"root":7,"path":"a","size":1,"modified_ns":1})" "\n");
+  forge_manifest(R"({"root":7,"path":"a","size":1,"modified_ns":1})"
+                 "\n");
   EXPECT_FAILS(run_first(), ErrorCode::bad_data);
-  const std::string twice = R"({"root":0,"path":"a","size":1,"modified_ns":1})" "\n";
+  const std::string twice = R"({"root":0,"path":"a","size":1,"modified_ns":1})"
+                            "\n";
   forge_manifest(twice + twice);
   EXPECT_FAILS(run_first(), ErrorCode::bad_data);
   forge_manifest("{}\n");
   EXPECT_FAILS(run_first(), ErrorCode::bad_data);
   forge_manifest("[1,2\n");
   EXPECT_FAILS(run_first(), ErrorCode::bad_data);
-  forge_manifest(R"({"root":0,"path":"a","size":-1,"modified_ns":1e300})" "\n");
+  forge_manifest(R"({"root":0,"path":"a","size":-1,"modified_ns":1e300})"
+                 "\n");
   const auto odd = run_first();  // numbers that fit nothing: no crash, and no such file
   EXPECT_TRUE(!odd || odd->files.front().status == RepairStatus::failed);
   EXPECT_TRUE(memory_.files.list("/mended").value_or(std::vector<std::string>()).empty());

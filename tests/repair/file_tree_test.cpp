@@ -1,4 +1,5 @@
-// Trees that real disks hold: links in circles, folders that cannot be read, things that are no files.
+// Trees that real disks hold: links in circles, folders that cannot be read, things that are no
+// files.
 #include "repair/file_tree.h"
 
 #include <filesystem>

@@ -131,8 +131,8 @@ class ArchiveCommand : public testing::Test {
 
 TEST_F(ArchiveCommand, AnswersAsOneRepairWould) {
   fill();
-  const Answer expected = run({"repair", archive_, "-o", folder_ / "whole", "--constants",
-                               constants_, "--json"});
+  const Answer expected =
+      run({"repair", archive_, "-o", folder_ / "whole", "--constants", constants_, "--json"});
   const Answer planned = plan({"--shards", "3"});
   EXPECT_EQ(planned.exit_code, 0) << planned.people;
   EXPECT_EQ(planned.json()["schema"], "sixpoint/archive/1");
@@ -154,8 +154,8 @@ TEST_F(ArchiveCommand, AnswersAsOneRepairWould) {
   expect_same_outputs(folder_ / "whole", out_);
   // For people the two say the same, line by line.
   const Answer words = run({"archive", "merge", plan_});
-  const Answer as_repair = run({"repair", archive_, "-o", folder_ / "whole", "--constants",
-                                constants_, "--resume"});
+  const Answer as_repair =
+      run({"repair", archive_, "-o", folder_ / "whole", "--constants", constants_, "--resume"});
   EXPECT_EQ(words.out, as_repair.out);
 }
 
@@ -246,8 +246,8 @@ TEST_F(ArchiveCommand, SurvivesKillNine) {
     ASSERT_OK(some_minutes(static_cast<std::uint64_t>(i), 20'000)
                   .write(files_, archive_ + "/" + std::to_string(i) + ".gt3x"));
   }
-  const Answer expected = run({"repair", archive_, "-o", folder_ / "whole", "--constants",
-                               constants_, "--json"});
+  const Answer expected =
+      run({"repair", archive_, "-o", folder_ / "whole", "--constants", constants_, "--json"});
   ASSERT_EQ(expected.exit_code, 0);
   ASSERT_EQ(plan({"--shards", "1"}).exit_code, 0);
   Random random(1);
@@ -296,10 +296,12 @@ TEST_F(ArchiveCommand, TheStoreIsToldOnceAtTheMerge) {
     record.document = kConstants;
     ASSERT_OK(made->add_constants(record, "wGT3X-BT"));
   }
-  ASSERT_EQ(run({"archive", "plan", archive_, "-o", plan_, "--store", store, "--shards", "2"})
-                .exit_code,
-            0);
-  const auto rows = [&] { return run({"audit", "verify", "--store", store, "--json"}).json()["rows"]; };
+  ASSERT_EQ(
+      run({"archive", "plan", archive_, "-o", plan_, "--store", store, "--shards", "2"}).exit_code,
+      0);
+  const auto rows = [&] {
+    return run({"audit", "verify", "--store", store, "--json"}).json()["rows"];
+  };
   const Json before = rows();
   run_shard(0);
   run_shard(1);
@@ -385,9 +387,9 @@ TEST_F(ArchiveCommand, RealRecordings) {
   const std::string real = tests::shared_file("data/wgt3x-bt-affected");
   const Answer expected = run({"repair", real, "-o", folder_ / "whole", "--scan", "--json"});
   ASSERT_GE(expected.json()["files"].size(), 2U);
-  ASSERT_EQ(run({"archive", "plan", real, "-o", plan_, "--scan", "--shards", "2", "--hash"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      run({"archive", "plan", real, "-o", plan_, "--scan", "--shards", "2", "--hash"}).exit_code,
+      0);
   run_shard(0);
   run_shard(1);
   const Answer merged = merge({"--verify"});
@@ -410,8 +412,8 @@ TEST_F(ArchiveCommand, RealRecordingsMended) {
     constants.replace(constants.find("MOS2A45130450"), 13, serial);
     std::ofstream(constants_, std::ios::trunc) << constants;
     const std::string path = file["path"];
-    const Answer expected = run({"repair", path, "-o", folder_ / ("whole" + serial),
-                                 "--constants", constants_, "--json"});
+    const Answer expected = run(
+        {"repair", path, "-o", folder_ / ("whole" + serial), "--constants", constants_, "--json"});
     ASSERT_EQ(expected.json()["summary"]["repaired"], 1) << expected.people;
     const std::string its_plan = folder_ / ("plan" + serial);
     const std::string its_out = folder_ / ("out" + serial);
@@ -423,7 +425,8 @@ TEST_F(ArchiveCommand, RealRecordingsMended) {
     const std::string mended = merged.json()["files"][0]["output"];
     const std::string whole = expected.json()["files"][0]["output"];
     EXPECT_FALSE(tests::entry_of(files_, mended, "log.bin").empty());
-    EXPECT_EQ(tests::entry_of(files_, mended, "log.bin"), tests::entry_of(files_, whole, "log.bin"));
+    EXPECT_EQ(tests::entry_of(files_, mended, "log.bin"),
+              tests::entry_of(files_, whole, "log.bin"));
   }
 }
 
