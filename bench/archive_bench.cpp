@@ -3,8 +3,8 @@
 //   archive_bench [FILES [SAMPLES]]        default: 60 files of 100000 samples
 //
 // The whole program in process, on the real disk, one shard after the other. Printed: seconds, and
-// the ratio to the baseline, which is `repair --jobs 1`; then the same for runs that find everything
-// done. Files of both sides are in the page cache.
+// the ratio to the baseline, which is `repair --jobs 1`; then the same for runs that find
+// everything done. Files of both sides are in the page cache.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -55,9 +55,8 @@ void run(std::size_t count, std::size_t samples) {
   const std::string constants = folder / "c.json";
   // The first pass of either kind warms the cache.
   seconds({{"repair", archive, "-o", folder / "warm", "--constants", constants, "--jobs", "1"}});
-  const double whole =
-      seconds({{"repair", archive, "-o", folder / "whole", "--constants", constants, "--jobs",
-                "1"}});
+  const double whole = seconds(
+      {{"repair", archive, "-o", folder / "whole", "--constants", constants, "--jobs", "1"}});
   std::printf("%zu files of %zu samples\nrepair --jobs 1            %7.3f s  ratio 1 (baseline)\n",
               count, samples, whole);
   for (const std::size_t shards : {std::size_t{1}, std::size_t{8}, count}) {
