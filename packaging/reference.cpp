@@ -1,8 +1,8 @@
 // Makes the manual page and the shell completion of the program from its own commands, so that they
 // name what the program has. Run by the build:
 //
-//   sixpoint_reference man TEMPLATE          the page, with the commands in the template's %COMMANDS%
-//   sixpoint_reference completion TEMPLATE   likewise
+//   sixpoint_reference man TEMPLATE          the page, with the commands in the template's
+//   %COMMANDS% sixpoint_reference completion TEMPLATE   likewise
 #include <algorithm>
 #include <fstream>
 #include <iostream>
@@ -20,8 +20,7 @@ using Visit = std::function<void(const CLI::App& command, const std::string& pat
 // Every command and subcommand, in the order of --help. "archive plan" is a path.
 void for_each_command(const CLI::App& app, const std::string& path, const Visit& visit) {
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
-    const std::string name =
-        path.empty() ? command->get_name() : path + " " + command->get_name();
+    const std::string name = path.empty() ? command->get_name() : path + " " + command->get_name();
     visit(*command, name);
     for_each_command(*command, name, visit);
   }
@@ -51,7 +50,8 @@ std::string usage_of(const CLI::Option& option) {
   const bool positional = option.nonpositional() == false;
   std::string text = fmt::format("\\fB{}\\fR", roff(option.get_name(positional, true), false));
   if (!positional && option.get_items_expected_max() != 0) {
-    text += fmt::format(" \\fI{}\\fR", roff(option.get_type_name().empty() ? "VALUE" : "VALUE", false));
+    text +=
+        fmt::format(" \\fI{}\\fR", roff(option.get_type_name().empty() ? "VALUE" : "VALUE", false));
   }
   return option.get_expected_max() > 1 ? text + " ..." : text;
 }
@@ -59,14 +59,15 @@ std::string usage_of(const CLI::Option& option) {
 std::string man_page(const CLI::App& app) {
   std::string text;
   for_each_command(app, "", [&](const CLI::App& command, const std::string& path) {
-    text += fmt::format(".SS sixpoint {}\n{}\n", roff(path, false), roff(command.get_description()));
+    text +=
+        fmt::format(".SS sixpoint {}\n{}\n", roff(path, false), roff(command.get_description()));
     for (const CLI::Option* option : command.get_options()) {
       if (option == command.get_help_ptr()) {
         continue;
       }
-      text += fmt::format(".TP\n{}\n{}\n", usage_of(*option),
-                          option->get_description().empty() ? "\\&"
-                                                            : roff(option->get_description()));
+      text +=
+          fmt::format(".TP\n{}\n{}\n", usage_of(*option),
+                      option->get_description().empty() ? "\\&" : roff(option->get_description()));
     }
   });
   return text;
