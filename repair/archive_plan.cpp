@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
-#include "base/sha256.h"
+#include "repair/archive_json.h"
 #include "repair/archive_scripts.h"
 
 namespace sixpoint::repair {
@@ -26,10 +26,6 @@ constexpr std::uint64_t kBytesPerFile = 64ULL << 10;
 constexpr std::uint64_t kLargestFile = 1ULL << 40;
 constexpr std::uint64_t kLargestPlan = 256ULL << 20;
 constexpr std::uint64_t kLargestManifest = 1ULL << 30;
-
-std::string hash_of(std::string_view text) {
-  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
-}
 
 std::string_view text_of(const Bytes& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -53,13 +49,6 @@ bool stays_below(std::string_view path) {
     }
     path.remove_prefix(slash + 1);
   }
-}
-
-Json to_json(const Error& error) {
-  return {{"code", static_cast<int>(error.code)},
-          {"what", error.what},
-          {"where", encode_path(error.where)},
-          {"hint", error.hint}};
 }
 
 std::string line_of(const ArchiveFile& file) {
@@ -109,7 +98,7 @@ Json to_json(const ArchivePlan& plan) {
   }
   Json& refused = json["refused"] = Json::array();
   for (const RefusedPath& path : plan.refused) {
-    refused.push_back({{"path", encode_path(path.path)}, {"error", to_json(path.error)}});
+    refused.push_back({{"path", encode_path(path.path)}, {"error", error_to_json(path.error)}});
   }
   return json;
 }
@@ -141,21 +130,14 @@ Result<ArchivePlan> plan_of(const Json& json) {
   SIXPOINT_ASSIGN(plan.store, decode_path(json.at("store").at("location").get<std::string>()));
   plan.constants_sha256 = json.at("store").at("sha256");
   for (const Json& shard : json.at("shards")) {
-    plan.shards.push_back({shard.at("files").get<std::size_t>(),
-                           shard.at("bytes").get<std::uint64_t>(),
+    plan.shards.push_back({integer_of<std::size_t>(shard.at("files")),
+                           integer_of<std::uint64_t>(shard.at("bytes")),
                            shard.at("sha256").get<std::string>()});
   }
   for (const Json& refused : json.at("refused")) {
     RefusedPath path;
     SIXPOINT_ASSIGN(path.path, decode_path(refused.at("path").get<std::string>()));
-    const Json& error = refused.at("error");
-    path.error.code = static_cast<ErrorCode>(error.at("code").get<int>());
-    if (!is_error_code(error.at("code").get<int>())) {
-      return fail(ErrorCode::bad_data, "the plan holds an error of no known kind");
-    }
-    path.error.what = error.at("what");
-    SIXPOINT_ASSIGN(path.error.where, decode_path(error.at("where").get<std::string>()));
-    path.error.hint = error.at("hint");
+    SIXPOINT_ASSIGN(path.error, error_from_json(refused.at("error")));
     plan.refused.push_back(std::move(path));
   }
   return plan;
@@ -317,10 +299,10 @@ Result<ArchiveFile> file_of(std::string_view line, const ArchivePlan& plan) {
   const Json json = Json::parse(line, nullptr, false);
   ArchiveFile file;
   try {
-    file.root = json.at("root").get<std::size_t>();
+    file.root = integer_of<std::size_t>(json.at("root"));
     SIXPOINT_ASSIGN(file.relative, decode_path(json.at("path").get<std::string>()));
-    file.size = json.at("size").get<std::uint64_t>();
-    file.modified_ns = json.at("modified_ns").get<std::int64_t>();
+    file.size = integer_of<std::uint64_t>(json.at("size"));
+    file.modified_ns = integer_of<std::int64_t>(json.at("modified_ns"));
     file.sha256 = json.value("sha256", "");
   } catch (const Json::exception&) {
     return fail(ErrorCode::bad_data, "a line of the manifest is damaged", {}, "make the plan anew");

@@ -8,6 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "repair/archive_json.h"
 #include "repair/archive_scripts.h"
 #include "repair/constants_finder.h"
 
@@ -35,22 +36,11 @@ std::string lock_path(const std::string& folder, std::size_t shard) {
   return fmt::format("{}/results/{:05}.lock", folder, shard);
 }
 
-std::string hash_of(std::string_view text) {
-  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
-}
-
-Json to_json(const Error& error) {
-  return {{"code", static_cast<int>(error.code)},
-          {"what", error.what},
-          {"where", encode_path(error.where)},
-          {"hint", error.hint}};
-}
-
 std::string line_of(std::size_t index, const RepairReport& report) {
   Json json = {
       {"file", index},
       {"report", report.to_json()},
-      {"error", report.error ? to_json(*report.error) : Json(nullptr)},
+      {"error", report.error ? error_to_json(*report.error) : Json(nullptr)},
       {"repaired_at", report.repaired_at ? Json(to_iso8601(*report.repaired_at)) : Json(nullptr)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -85,10 +75,10 @@ Result<RepairReport> report_of(const Json& json) {
   report.method = optional_of<std::string>(from.at("method")).value_or("");
   report.reasons = from.at("reasons").get<std::vector<std::string>>();
   report.serial = from.at("serial");
-  report.samples = from.at("samples");
-  report.clipped_before = from.at("clipped_before");
-  report.clipped_after = from.at("clipped_after");
-  report.still_blocks = from.at("still_blocks");
+  report.samples = integer_of<std::uint64_t>(from.at("samples"));
+  report.clipped_before = integer_of<std::uint64_t>(from.at("clipped_before"));
+  report.clipped_after = integer_of<std::uint64_t>(from.at("clipped_after"));
+  report.still_blocks = integer_of<std::size_t>(from.at("still_blocks"));
   report.still_error_before_mg = optional_of<double>(from.at("still_error_mg").at("before"));
   report.still_error_after_mg = optional_of<double>(from.at("still_error_mg").at("after"));
   report.rotation_undone = from.at("rotation_undone");
@@ -96,13 +86,7 @@ Result<RepairReport> report_of(const Json& json) {
   report.input_sha256 = optional_of<std::string>(from.at("input_sha256")).value_or("");
   report.output_sha256 = optional_of<std::string>(from.at("output_sha256")).value_or("");
   if (const Json& error = json.at("error"); !error.is_null()) {
-    if (!is_error_code(error.at("code").get<int>())) {
-      return fail(ErrorCode::bad_data, "an error of no known kind");
-    }
-    report.error = Error{static_cast<ErrorCode>(error.at("code").get<int>()),
-                         error.at("what").get<std::string>(),
-                         decode_path(error.at("where").get<std::string>()).value_or(""),
-                         error.at("hint").get<std::string>()};
+    SIXPOINT_ASSIGN(report.error, error_from_json(error));
   }
   if (const Json& time = json.at("repaired_at"); !time.is_null()) {
     SIXPOINT_ASSIGN(report.repaired_at, parse_iso8601(time.get<std::string>()));
@@ -226,7 +210,7 @@ class Shard {
       const std::string_view line = text.substr(0, text.find('\n'));
       text.remove_prefix(std::min(text.size(), line.size() + 1));
       const Json json = Json::parse(line, nullptr, false);
-      const auto index = json.at("file").get<std::size_t>();
+      const auto index = integer_of<std::size_t>(json.at("file"));
       if (index >= manifest_.size() || !seen.insert(index).second) {
         return fail(ErrorCode::bad_data, "a file that is not in the shard");
       }
