@@ -47,11 +47,10 @@ std::string roff(std::string_view text, bool line_start = true) {
 
 // "--device VALUE", "PATH ..."
 std::string usage_of(const CLI::Option& option) {
-  const bool positional = option.nonpositional() == false;
+  const bool positional = !option.nonpositional();
   std::string text = fmt::format("\\fB{}\\fR", roff(option.get_name(positional, true), false));
   if (!positional && option.get_items_expected_max() != 0) {
-    text +=
-        fmt::format(" \\fI{}\\fR", roff(option.get_type_name().empty() ? "VALUE" : "VALUE", false));
+    text += " \\fIVALUE\\fR";
   }
   return option.get_expected_max() > 1 ? text + " ..." : text;
 }
@@ -119,5 +118,10 @@ int run(const std::vector<std::string>& arguments) {
 }  // namespace sixpoint
 
 int main(int argc, char** argv) {
-  return sixpoint::run(std::vector<std::string>(argv + 1, argv + argc));
+  try {
+    return sixpoint::run(std::vector<std::string>(argv + 1, argv + argc));
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << '\n';
+    return 70;
+  }
 }

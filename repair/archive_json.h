@@ -15,8 +15,7 @@
 namespace sixpoint::repair {
 
 inline std::string hash_of(std::string_view text) {
-  return to_hex(
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
 }
 
 // get<T>() would convert a number with a fraction, or beyond T, at any price. Throws as at() does.
