@@ -354,7 +354,8 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
     // What the six leave out is not only scatter: a cross-axis term bends all directions at once,
     // and where these are few it hides in the sensitivities with next to no residual. It is put to
     // the data as far as they can tell, and by the prior where they cannot.
-    const bool alias = !fit.model.cross_axis && options.cross_axis_sd > 0;
+    const bool alias = !fit.model.cross_axis &&
+                       std::ranges::any_of(options.cross_axis_sd, [](double sd) { return sd > 0; });
     if (alias) {
       wide.model.cross_axis = true;
       wide.cross_axis_sd = options.cross_axis_sd;
@@ -595,7 +596,11 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       out.richer = richer;
     }
   }
-  const ZeroDriftOptions drift_options;
+  ZeroDriftOptions drift_options;
+  drift_options.block_sd_g = std::sqrt(block_g2);
+  drift_options.misfit_sd_g =
+      (out.richer ? out.richer->structural_mg : out.structural_mg) / kMgPerG;
+  drift_options.cross_axis_sd = options.cross_axis_sd;
   // A week of blocks need not be gone through for an answer that is not given.
   if (blocks.back().start_time_s - blocks.front().start_time_s <= drift_options.most_span_s) {
     std::vector<DriftPoint> drift_points;
@@ -609,7 +614,8 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       drift_points.push_back(
           {block.start_time_s, out.best().calibration.to_g(block.mean_lsb),
            magnitude_g(out.best(), {block.mean_lsb, block.ramp_variance_lsb2, 1, temperature}) -
-               options.gravity_g});
+               options.gravity_g,
+           out.cells[static_cast<std::size_t>(cell_of_block[i])].neighbourhood});
     }
     out.drift = zero_drift(drift_points, drift_options);
   }

@@ -120,9 +120,13 @@ struct Problem {
     if (options.prior) {
       cost += add_prior(theta, gradient, hessian);
     }
-    if (options.model.cross_axis && options.cross_axis_sd > 0) {
-      const double weight = 1 / (options.cross_axis_sd * options.cross_axis_sd);
+    if (options.model.cross_axis) {
       for (Eigen::Index i = 6; i < 9; ++i) {
+        const double sd = options.cross_axis_sd[static_cast<std::size_t>(i - 6)];
+        if (!(sd > 0)) {
+          continue;
+        }
+        const double weight = 1 / (sd * sd);
         cost += weight * theta[i] * theta[i];
         if (gradient != nullptr) {
           (*gradient)[i] += weight * theta[i];
@@ -234,11 +238,18 @@ Descent descend(const Problem& problem, const Vector& start) {
   return out;
 }
 
+// Cross-axis terms about which something is believed before the data.
+int believed(const LeastSquaresOptions& options) {
+  return options.model.cross_axis ? static_cast<int>(std::count_if(
+                                        options.cross_axis_sd.begin(), options.cross_axis_sd.end(),
+                                        [](double sd) { return sd > 0; }))
+                                  : 0;
+}
+
 Status check(std::span<const GravityPoint> points, const Calibration& start,
              const LeastSquaresOptions& options) {
   SIXPOINT_CHECK(validate(start));
-  const bool held = options.model.cross_axis && options.cross_axis_sd > 0;
-  const auto needed = static_cast<std::size_t>(options.model.parameters() - (held ? 3 : 0));
+  const auto needed = static_cast<std::size_t>(options.model.parameters() - believed(options));
   if (!options.prior && points.size() < needed) {
     return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
                 "least squares", "lay the unit still on more of its sides");
@@ -346,8 +357,8 @@ Result<LeastSquaresFit> least_squares(std::span<const GravityPoint> points,
           covariance(i, j);
     }
   }
-  fit.degrees_of_freedom = static_cast<int>(points.size()) - n + (options.prior ? 6 : 0) +
-                           (options.model.cross_axis && options.cross_axis_sd > 0 ? 3 : 0);
+  fit.degrees_of_freedom =
+      static_cast<int>(points.size()) - n + (options.prior ? 6 : 0) + believed(options);
   double square = 0;
   for (const GravityPoint& point : points) {
     const double residual = magnitude_g(fit, point) - options.gravity_g;

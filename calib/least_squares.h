@@ -54,8 +54,9 @@ struct LeastSquaresOptions {
   FitModel model;
   double gravity_g = 1.0;  // local gravity in standard g
   std::optional<CalibrationPrior> prior;
-  // With the cross-axis model: each term is believed to be 0 with this standard deviation. 0: free.
-  double cross_axis_sd = 0;
+  // With the cross-axis model: the terms xy, xz, yz are believed to be 0 with these standard
+  // deviations. 0: free.
+  PerAxis<double> cross_axis_sd{};
   // Both have to be reached. Constants are of order one here (relative sensitivity, zero in g).
   double relative_step = 1e-11;
   double relative_gradient = 1e-8;

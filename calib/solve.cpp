@@ -35,6 +35,29 @@ PartialKnowledge know_partially(std::span<const StillBlock> blocks,
   return out;
 }
 
+// The blocks as a sensor would have measured them that has the six constants of the richer model
+// and nothing of its other terms.
+std::vector<StillBlock> without_richer_terms(std::span<const StillBlock> blocks,
+                                             const BlockFit& fit) {
+  const LeastSquaresFit& more = fit.richer->fit;
+  const PerAxis<double>& s = more.calibration.sensitivity_g_per_lsb;
+  std::vector<StillBlock> out(blocks.begin(), blocks.end());
+  for (StillBlock& block : out) {
+    const double above_c =
+        block.temperature_c ? *block.temperature_c - fit.reference_temperature_c : 0;
+    PerAxis<double> u{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      block.mean_lsb[a] -= more.zero_lsb_per_c[a] * above_c;
+      u[a] = more.calibration.to_g(a, block.mean_lsb[a]);
+    }
+    const auto& [xy, xz, yz] = more.cross_axis;
+    block.mean_lsb[0] += (xy * u[1] + xz * u[2]) / s[0];
+    block.mean_lsb[1] += (xy * u[0] + yz * u[2]) / s[1];
+    block.mean_lsb[2] += (xz * u[0] + yz * u[1]) / s[2];
+  }
+  return out;
+}
+
 Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOptions& options) {
   report.statistical = fit.best().standard_uncertainty();
   if (options.method == SolveMethod::genetic && report.search) {
@@ -49,9 +72,14 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
           report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
     }
   }
-  for (std::size_t a = 0; a < kAxes && fit.drift; ++a) {
-    report.statistical.zero_mg[a] =
-        std::hypot(report.statistical.zero_mg[a], fit.drift->bound_mg(a));
+  if (fit.drift) {
+    const PerAxis<double> zero_mg = fit.drift->zero_mg();
+    const PerAxis<double> relative = fit.drift->sensitivity_relative();
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], zero_mg[a]);
+      report.statistical.sensitivity_relative[a] =
+          std::hypot(report.statistical.sensitivity_relative[a], relative[a]);
+    }
   }
   report.uncertainty = report.statistical;
   for (double& relative : report.uncertainty.sensitivity_relative) {
@@ -69,6 +97,25 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
                            rounded.error().what);
   }
   return {};
+}
+
+// The posterior of a documented prior, where the data alone do not determine the constants.
+Status lean_on_prior(SolveReport& report, std::span<const StillBlock> chosen,
+                     const SolveOptions& options) {
+  BlockFitOptions fit_options;
+  fit_options.gravity_g = options.gravity_g;
+  fit_options.prior = options.prior;
+  fit_options.try_richer_models = false;
+  SIXPOINT_ASSIGN(report.fit, fit_blocks(chosen, options.prior->mean, fit_options));
+  report.calibration = report.fit->fit.calibration;
+  report.iterations = report.fit->fit.iterations;
+  report.search.reset();
+  report.from_prior = true;
+  report.verification.verified = false;
+  report.verification.verdict = Verdict::rests_on_prior;
+  report.verification.reasons.emplace_back(
+      "the constants rest on a population prior where the data are silent");
+  return finish_constants(report, *report.fit, options);
 }
 
 Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
@@ -98,20 +145,7 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
                     fmt::join(report.verification.missing_directions, ", ")));
     report.partial = know_partially(chosen, file_constants, options);
     if (options.prior) {
-      fit_options.prior = options.prior;
-      fit_options.try_richer_models = false;
-      auto fit = fit_blocks(chosen, options.prior->mean, fit_options);
-      if (!fit) {
-        return fail(fit.error());
-      }
-      report.fit = std::move(*fit);
-      report.calibration = report.fit->fit.calibration;
-      report.iterations = report.fit->fit.iterations;
-      report.from_prior = true;
-      report.verification.verdict = Verdict::rests_on_prior;
-      report.verification.reasons.emplace_back(
-          "the constants rest on a population prior where the data are silent");
-      SIXPOINT_CHECK(finish_constants(report, *report.fit, options));
+      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
     }
     return report;
   }
@@ -122,6 +156,9 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
     report.verification.verdict = Verdict::not_verified;
     report.verification.reasons.push_back(fit.error().what + "; " + fit.error().hint);
     report.partial = know_partially(chosen, file_constants, options);
+    if (options.prior) {
+      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
+    }
     return report;
   }
   report.fit = std::move(*fit);
@@ -129,7 +166,15 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   GeneticOptions genetic_options;
   genetic_options.seed = options.seed;
   genetic_options.gravity_g = options.gravity_g;
-  SIXPOINT_ASSIGN(report.search, genetic(chosen, file_constants, genetic_options));
+  // Where cross-axis or temperature terms are admitted, it is given the blocks without them: its
+  // six constants would make up for them in the directions that were met, and be off in the others.
+  std::vector<StillBlock> plain;
+  if (report.fit->richer) {
+    plain = without_richer_terms(chosen, *report.fit);
+  }
+  SIXPOINT_ASSIGN(report.search,
+                  genetic(plain.empty() ? chosen : std::span<const StillBlock>(plain),
+                          file_constants, genetic_options));
   report.calibration = options.method == SolveMethod::genetic ? report.search->calibration
                                                               : report.fit->best().calibration;
   report.iterations = options.method == SolveMethod::genetic
@@ -163,6 +208,15 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   }
   if (!(report.verification.worst_direction_mg <= options.limits.worst_direction_mg)) {
     report.partial = know_partially(chosen, file_constants, options);
+    if (options.prior && !report.verification.verified) {
+      // Enough directions by the 0.3 g rule, and still too little in them.
+      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
+      return report;
+    }
+  }
+  if (options.prior) {
+    report.notes.emplace_back(
+        "the data determine the constants without the prior, which was not used");
   }
   if (!report.fit->left_out_reason.empty()) {
     report.notes.push_back(report.fit->left_out_reason);
@@ -198,9 +252,12 @@ Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
   }
   if (report.residual_rounded_mg && *report.residual_rounded_mg > options.limits.applied_mg &&
       report.verification.verified) {
-    report.notes.emplace_back(
-        "rounded to a unit's nine integers the constants are not good enough");
-    report.stored.reset();
+    report.verification.verified = false;
+    report.verification.verdict = Verdict::not_verified;
+    report.verification.reasons = {
+        fmt::format("rounded to a unit's nine integers the constants leave still blocks {:.1f} mg "
+                    "from 1 g (limit {:.1f} mg)",
+                    *report.residual_rounded_mg, options.limits.applied_mg)};
   }
   return report;
 }
@@ -297,6 +354,15 @@ Json to_json(const SolveReport& report) {
   if (report.points > 0) {
     json["coverage_g"]["min"] = report.coverage.min_g;
     json["coverage_g"]["max"] = report.coverage.max_g;
+    // Blocks at -1.3 .. -0.7, -0.7 .. 0.7 and 0.7 .. 1.3 g of each axis.
+    Json& subsets = json["coverage_g"]["value_subsets"];
+    for (const auto& [name, subset] :
+         {std::pair{"low", ValueSubset::low}, std::pair{"middle", ValueSubset::middle},
+          std::pair{"high", ValueSubset::high}}) {
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        subsets[name].push_back(report.coverage.subset_blocks[a][static_cast<std::size_t>(subset)]);
+      }
+    }
   } else {
     json["coverage_g"]["min"] = nullptr;
     json["coverage_g"]["max"] = nullptr;

@@ -1,16 +1,21 @@
-// Zeros that drift with time, seen while a unit lies on one side.
+// Zeros that drift with time: what a file says about them, and what it cannot say.
 //
 // A calibration file of six sides laid one after another has no residual: when the unit warms up
 // meanwhile, each side is met by another zero, and the constants take that for sensitivity and
-// zero. What gives it away is the trend within each side. Blocks are parted into stretches wherever
-// the mean jumps from one to the next, and the errors of the magnitude are regressed on time:
+// zero. Two things give it away. The magnitude of a side that is at rest has a trend; and a side
+// that is met again later has another magnitude. Both are put to one straight line per axis:
 //
-//     error(block) = level(stretch) + sum over axes of rate_a * n_a * (time - mean time of stretch)
+//     error(block) = n_a^2 gain_a - n_a zero_a + cross-axis + misfit(direction)
+//                  + n_a rate_a (time - middle of the file)
 //
-// with n the stretch's direction. Each stretch keeps its own level, so that the rates are not
-// confounded with which side was laid when, nor with wrong constants.
+// with n the direction, by least squares with and without the rates. What the rates add to the
+// covariance of the constants is what a drift could have done to them without being seen; how far
+// they move the constants is what it seems to have done. A file with its sides at rest for a tenth
+// of its time cannot tell a slow drift from constants whatever is computed: the uncertainty then
+// says so, and going round the sides a second time is the cure.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 
@@ -19,40 +24,66 @@
 namespace sixpoint::calib {
 
 struct ZeroDriftOptions {
-  // A jump of more than this on any axis from one block to the next: another stretch (as in
+  // A jump of more than this on any axis from one block to the next: another visit (as in
   // TemperatureDriftOptions).
   double moved_g = 0.015;
   // A unit that comes from the cold takes the room's temperature within an hour. What drifts over
   // the days of a wear follows no straight line, and there each direction is met at all hours.
   double most_span_s = 3 * 3600.0;
-  // Three axes are tested in each of thousands of files; at 3 one good file in 120 would pass for
-  // one that drifts, at 4 one in 5000. 20 C at 0.5 mg/C make 6 and more.
-  double least_t = 4.0;
-  // Fewer blocks beyond what the lines take say too little about their own scatter for that.
+  // All three axes together, chi-square of 3 degrees of freedom: one good file in 1000. 20 C at 0.5
+  // mg/C make several times as much.
+  double least_chi2 = 16.3;
+  // The same of the level axes, for visits of so many blocks (20 s), and where their slopes are
+  // enough to show how they scatter.
+  double level_blocks = 5;
+  double least_level_freedom = 9;
+  // Fewer blocks beyond what the lines take say too little about their own scatter; it is at least
+  // `block_sd_g` then.
   double least_freedom = 20;
+  double block_sd_g = 5e-4;
+  // What the six constants leave in a direction, and what they leave of it from one visit to the
+  // next (hysteresis, seating: 0.8 mg in the list of effects).
+  double misfit_sd_g = 1.5e-3;
+  double visit_sd_g = 5e-4;
+  PerAxis<double> cross_axis_sd = {0.024, 0.005, 0.005};  // as in BlockFitOptions
+  // Before the data: 20 C at the ADXL362's 0.5 mg/C, either way, and twice that. From the middle of
+  // the file to its end.
+  double rate_sd_g = 0.010;
 };
 
 struct DriftPoint {
   double time_s = 0;
   PerAxis<double> mean_g{};  // calibrated
   double error_g = 0;        // magnitude less gravity
+  int direction = 0;         // points of one number share a misfit (DirectionCell::neighbourhood)
 };
 
-// Change of each axis' zero from the middle of the file to its end, if it goes on as within sides.
 struct ZeroDrift {
+  // Change of each axis' zero from the middle of the file to its end.
   PerAxis<double> half_span_mg{};
   PerAxis<double> standard_uncertainty_mg{};
-  PerAxis<bool> significant{};
+  double chi2 = 0;
+  bool shown = false;
   double span_s = 0;
-  int stretches = 0;  // that had a trend to show
+  double at_rest_s = 0;  // of it
+  int visits = 0;
+  // What not knowing the rates adds to the covariance of (relative sensitivity X Y Z, zero in g
+  // X Y Z), row by row, and how far knowing them would move the constants.
+  std::array<double, 36> hidden{};
+  std::array<double, 6> apart{};
 
-  // The upper 95 % bound of |half_span_mg| where it is significant, 0 where not.
-  double bound_mg(std::size_t axis) const;
-  double worst_mg() const;  // of the three bounds, as a vector
+  // The upper 95 % bounds of |half_span_mg| as a vector where a drift is shown, 0 where not.
+  double shown_mg() const;
+  // Standard deviation of the magnitude in the worst direction for what is hidden alone, and with
+  // what the drift seems to have done.
+  double hidden_mg() const;
+  double allowance_mg() const;
+  // Of the constants, the same.
+  PerAxis<double> sensitivity_relative() const;
+  PerAxis<double> zero_mg() const;
 };
 
-// In order of time. Nothing for a longer file than most_span_s, and where the stretches do not tell
-// three axes apart or have too few blocks.
+// In order of time. Nothing for a longer file than most_span_s, and for fewer than two visits.
 std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
                                     const ZeroDriftOptions& options = {});
 

@@ -79,7 +79,23 @@ Result<bool> go_round(device::Unit& unit, device::Jig& jig, const CaptureOptions
   return true;
 }
 
-Status note_oddities(FileSystem& files, const std::string& path, CaptureReport& report) {
+// The unit recorded without a pause while it was watched: no two blocks are further apart than a
+// side and a turn. What its clock jumped by is no time in which its zeros could have drifted.
+void undo_jumps(std::vector<calib::StillBlock>& blocks, double longest_s) {
+  double shift_s = 0;
+  for (std::size_t i = 1; i < blocks.size(); ++i) {
+    blocks[i].start_time_s += shift_s;
+    const double gap_s = blocks[i].start_time_s - blocks[i - 1].start_time_s;
+    if (!(gap_s > 0 && gap_s <= longest_s)) {
+      const double put_right_s = longest_s - gap_s;
+      shift_s += put_right_s;
+      blocks[i].start_time_s += put_right_s;
+    }
+  }
+}
+
+// True where the clock of the unit jumped.
+Result<bool> note_oddities(FileSystem& files, const std::string& path, CaptureReport& report) {
   SIXPOINT_ASSIGN(const Oddities oddities, look_for_oddities(files, path));
   if (std::abs(oddities.jumped_s) > kShort_s) {
     report.notes.push_back(
@@ -90,7 +106,7 @@ Status note_oddities(FileSystem& files, const std::string& path, CaptureReport& 
     report.notes.push_back(fmt::format(
         "the sensor repeated the very same readings for {} s: it is frozen", oddities.repeated_s));
   }
-  return {};
+  return std::abs(oddities.jumped_s) > kShort_s;
 }
 
 Result<std::string> hash_of(FileSystem& files, const std::string& path) {
@@ -110,7 +126,7 @@ Result<std::string> hash_of(FileSystem& files, const std::string& path) {
 // The file is there: what it says about itself, and its constants.
 Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<double> wanted_s,
                        CaptureReport& report) {
-  SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(env.files, options.output));
+  SIXPOINT_ASSIGN(repair::Survey survey, repair::survey(env.files, options.output));
   if (survey.facts.serial != report.serial) {
     return fail(ErrorCode::bad_data,
                 fmt::format("the recording is of {}", printable(survey.facts.serial, 40)),
@@ -122,7 +138,10 @@ Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<do
                     "battery empty?",
                     survey.duration_s, *wanted_s));
   }
-  SIXPOINT_CHECK(note_oddities(env.files, options.output, report));
+  SIXPOINT_ASSIGN(const bool jumped, note_oddities(env.files, options.output, report));
+  if (jumped && wanted_s) {
+    undo_jumps(survey.blocks, options.side_s + options.turn_s);
+  }
   const auto begin = env.clock.elapsed();
   SIXPOINT_ASSIGN(report.solved, repair::solve_survey(options.output, survey, options.solve));
   report.solved->seconds = std::chrono::duration<double>(env.clock.elapsed() - begin).count();

@@ -36,8 +36,11 @@ const std::vector<QuantityInfo>& quantities() {
        "curved or the case's sides lean the same way by more than 2.6 degrees"},
       {"noise_mg", "Noise of a sample", "mg", std::nullopt, 10, 0, 1000, "", "noise_high",
        "5.5 mg on the noisiest axis of good units at 100 Hz; what is above trembles or is broken"},
-      {"cross_axis_percent", "Cross-axis sensitivity", "%", -5, 5, -100, 100, "cross_axis",
-       "cross_axis", "real units show up to 2.8 %; the jig's seating adds to what is measured"},
+      {"cross_axis_percent", "Cross-axis sensitivity", "%", -8, 8, -100, 100, "cross_axis",
+       "cross_axis",
+       "the cosine between two axes, twice the symmetric cross-axis term: real units show 2.0 to "
+       "2.9 "
+       "% of that between X and Y, a cosine of up to 5.8 %; the jig's seating adds to it"},
       {"temperature_c", "Temperature of the unit", kDegreeCelsius, 10, 40, -40, 85,
        "temperature_low", "temperature_high",
        "where people wear units; zero moves by up to 1 mg per degree"},

@@ -343,7 +343,7 @@ TEST(PublishedOracle, FreeLivingIsVerifiedByThePapersBlocks) {
   // By GGIR's measure, which counts blocks and not directions.
   std::printf("  mean error over blocks %.2f mg (GGIR's windows: 3.94 mg)\n",
               report->fit->mean_error_mg);
-  EXPECT_LT(report->fit->mean_error_mg, 8);
+  EXPECT_LT(report->fit->mean_error_mg, 8.5);
   // GGIR fits six numbers to a sensor with 2 % of cross-axis, and weighs windows where this weighs
   // directions: they agree to 2 % and 25 mg, no better.
   const Vector scale = {0.98795082, 0.99190162, 0.98241323};

@@ -91,7 +91,7 @@ TEST(Solve, SixSidesOfAMismatchedUnit) {
     SyntheticUnit unit = mismatched(seed);
     unit.noise_mg = 4 + 0.1 * (seed % 16);
     const double rate = std::array{30.0, 50.0, 90.0, 100.0}[seed % 4];
-    const double wobble = std::array{0.0, 1.0, 4.0, 8.0, 15.0}[seed % 5];
+    const double wobble = std::array{0.0, 1.0, 2.0, 3.0, 2.5}[seed % 5];
     const auto blocks = blocks_of(unit, kSides, {rate, 60, wobble}, seed + 1000);
     const auto report = solve_from_still_blocks(blocks, file_constants(unit));
     ASSERT_OK(report);
@@ -246,14 +246,40 @@ TEST(Solve, PriorIsMarkedAndNeverVerified) {
     EXPECT_LT(std::abs(zero_off_mg), 4 * report->uncertainty.zero_mg[a]);
     EXPECT_GT(report->uncertainty.zero_mg[a], 20);
   }
+  // Directions that pass the 0.3 g rule and determine nothing well: the posterior as well. Where
+  // they do, the prior has nothing to say.
+  std::vector<Vector> narrow;
+  for (const Vector& up :
+       {Vector{.8, .5, .35}, Vector{-.45, .7, -.6}, Vector{.4, -.45, .85}, Vector{-.45, .4, .84},
+        Vector{.5, .5, -.7}, Vector{.35, -.6, .73}, Vector{.6, .5, .62}}) {
+    narrow.push_back(tests::unit_vector(up[0], up[1], up[2]));
+  }
+  const auto weak =
+      solve_from_still_blocks(blocks_of(unit, narrow, {30, 60}, 5), file_constants(unit), options);
+  ASSERT_OK(weak);
+  EXPECT_THAT(weak->verification.missing_directions, testing::IsEmpty());
+  EXPECT_TRUE(weak->from_prior) << weak->brief();
+  EXPECT_EQ(weak->verification.verdict, Verdict::rests_on_prior);
+  EXPECT_FALSE(weak->usable());
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double zero_off_mg =
+        1000 * (weak->calibration->zero_lsb[a] - unit.zero_counts[a]) / unit.counts_per_g[a];
+    EXPECT_LT(std::abs(zero_off_mg), 4 * weak->uncertainty.zero_mg[a]);
+  }
+  const auto whole = solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 2}, 5),
+                                             file_constants(unit), options);
+  ASSERT_OK(whole);
+  EXPECT_FALSE(whole->from_prior);
+  EXPECT_TRUE(whole->usable()) << whole->brief();
+  EXPECT_THAT(whole->notes, testing::Contains(testing::HasSubstr("was not used")));
   EXPECT_FAILS(population_prior("NEO1B34100019", FilterConfiguration::current),
                ErrorCode::bad_data);
 }
 
 TEST(Solve, JsonHasTheContractsKeys) {
   const SyntheticUnit unit = mismatched(3);
-  auto report =
-      solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 4}, 5), file_constants(unit));
+  const auto blocks = blocks_of(unit, kSides, {30, 60, 4}, 5);
+  auto report = solve_from_still_blocks(blocks, file_constants(unit));
   ASSERT_OK(report);
   report->serial = "MOS2A45130450";
   report->filter = FilterConfiguration::current;
@@ -262,6 +288,18 @@ TEST(Solve, JsonHasTheContractsKeys) {
                           "points", "coverage_g", "residual_mg", "verified", "verdict", "reasons",
                           "missing_directions", "iterations", "seconds"}) {
     EXPECT_TRUE(json.contains(key)) << key;
+  }
+  // As the file's own, wrong constants have it.
+  const auto& subsets = json["coverage_g"]["value_subsets"];
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto between = [&](double low_g, double high_g) {
+      return std::count_if(blocks.begin(), blocks.end(), [&](const StillBlock& block) {
+        return !block.noisy && block.mean_g[a] > low_g && block.mean_g[a] < high_g;
+      });
+    };
+    EXPECT_EQ(subsets["low"][a], between(-1.3, -0.7));
+    EXPECT_EQ(subsets["middle"][a], between(-0.7, 0.7));
+    EXPECT_EQ(subsets["high"][a], between(0.7, 1.3));
   }
   const auto record = record_of(*report, *parse_iso8601("2016-05-16"), {"00", "a.gt3x", ""});
   ASSERT_OK(record);
@@ -381,7 +419,7 @@ TEST(Solve, ADriftWithinTheSidesIsNotVerified) {
             ASSERT_OK(report);
             EXPECT_FALSE(report->verification.verified) << seed << report->brief();
             EXPECT_THAT(report->verification.reasons,
-                        testing::Contains(testing::HasSubstr("room's temperature")))
+                        testing::Contains(testing::HasSubstr("drift")))
                 << seed << report->brief();
             EXPECT_GT(report->verification.worst_direction_mg, 4);
           }
@@ -403,7 +441,7 @@ TEST(Solve, ADriftOfOneAxisIsMeasured) {
       ASSERT_TRUE(report->fit->drift);
       const ZeroDrift& drift = *report->fit->drift;
       for (std::size_t a = 0; a < 3; ++a) {
-        EXPECT_EQ(drift.significant[a], a == axis);
+        EXPECT_TRUE(drift.shown);
         EXPECT_NEAR(drift.half_span_mg[a], a == axis ? sign * 7 : 0,
                     4 * drift.standard_uncertainty_mg[a]);
         EXPECT_LT(drift.standard_uncertainty_mg[a], 2);
@@ -498,7 +536,7 @@ TEST(Solve, NoGoodFileOfSixSidesIsRefused) {
   for (unsigned seed = 1; seed <= 150; ++seed) {
     SyntheticUnit unit = mismatched(seed);
     unit.cross_axis = {0.003, -0.002, 0.003};
-    const auto report = solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 5}, seed + 77),
+    const auto report = solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 2}, seed + 77),
                                                 file_constants(unit));
     ASSERT_OK(report);
     EXPECT_TRUE(report->fit->fit.converged) << seed;
@@ -506,6 +544,147 @@ TEST(Solve, NoGoodFileOfSixSidesIsRefused) {
     EXPECT_LT(difference_over_sphere(truth(unit), *report->calibration).worst_mg,
               4 * report->verification.worst_direction_mg)
         << seed;
+  }
+}
+
+// What four units of public recordings have between X and Y. Sides that lie flat do not feel it,
+// tilted ones take it for sensitivity and zero, and nothing in the file says so. Oracle: the
+// generator's constants.
+TEST(Solve, CrossAxisOfRealUnitsOnTiltedSidesIsStated) {
+  for (const double tilt_deg : {1.0, 2.0, 4.0, 8.0, 15.0}) {
+    int verified = 0;
+    int within_two = 0;
+    constexpr int kUnits = 60;
+    for (unsigned seed = 1; seed <= kUnits; ++seed) {
+      SyntheticUnit unit = mismatched(seed);
+      unit.cross_axis = {seed % 2 == 0 ? 0.024 : -0.024, 0.005, -0.005};
+      SolveOptions options;
+      options.method = seed % 4 == 0 ? SolveMethod::genetic : SolveMethod::least_squares;
+      const auto report = solve_from_still_blocks(
+          blocks_of(unit, kSides, {30, 60, tilt_deg}, seed + 300), file_constants(unit), options);
+      ASSERT_OK(report);
+      const double off_mg = difference_over_sphere(truth(unit), *report->calibration).worst_mg;
+      within_two += off_mg <= 2 * report->verification.worst_direction_mg ? 1 : 0;
+      if (report->usable()) {
+        ++verified;
+        EXPECT_LT(off_mg, 10) << tilt_deg << " " << seed << report->brief();
+      } else {
+        EXPECT_THAT(report->verification.reasons, testing::Contains(testing::HasSubstr("flat")))
+            << tilt_deg << " " << seed << report->brief();
+      }
+    }
+    EXPECT_GE(within_two, 54) << tilt_deg;  // of 60, at one standard deviation of cross-axis
+    if (tilt_deg <= 2) {
+      EXPECT_EQ(verified, kUnits) << tilt_deg;
+    } else if (tilt_deg >= 8) {
+      EXPECT_LT(verified, kUnits / 2) << tilt_deg;
+    }
+  }
+}
+
+// A week of directions shows the same cross-axis, and then nothing of it is left.
+TEST(Solve, CrossAxisOfRealUnitsIsNoReasonToRefuse) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    SyntheticUnit unit = mismatched(seed);
+    unit.cross_axis = {seed % 2 == 0 ? 0.024 : -0.024, 0.005, -0.005};
+    std::mt19937_64 random(seed);
+    std::vector<Vector> poses;
+    for (int i = 0; i < 45; ++i) {
+      poses.push_back(tests::random_direction(random));
+    }
+    SolveOptions options;
+    options.method = seed % 2 == 0 ? SolveMethod::genetic : SolveMethod::least_squares;
+    const auto report = solve_from_still_blocks(blocks_of(unit, poses, {30, 25}, seed),
+                                                file_constants(unit), options);
+    ASSERT_OK(report);
+    EXPECT_TRUE(report->usable()) << seed << report->brief();
+    Calibration six = truth(unit);
+    EXPECT_LT(difference_over_sphere(six, *report->calibration).worst_mg, 3) << seed;
+    ASSERT_TRUE(report->verification.agreement_mg);
+    EXPECT_LT(*report->verification.agreement_mg, 1) << seed;
+  }
+}
+
+// Six sides once each, with long pauses, at 20 C of warming: the sides are still for too small a
+// part of the file to show the drift, so the file is refused, warmed or not; and a second round is
+// the cure for the one that was not.
+std::vector<StillBlock> paused_sides(const SyntheticUnit& unit, double rest_s, double pause_s,
+                                     int rounds, double warming_c, unsigned seed) {
+  std::mt19937_64 random(seed);
+  const auto reversal = Reversal::make({unit.positive, unit.negative, unit.zero}, unit.accel_scale,
+                                       RecordWidth::bits12);
+  EXPECT_OK(reversal);
+  auto finder = StillBlockFinder::make(*reversal, 30);
+  EXPECT_OK(finder);
+  const double length_s = 6 * rounds * (rest_s + pause_s);
+  double time = 0;
+  for (int i = 0; i < 6 * rounds; ++i) {
+    const Vector pose = tests::wobbled(kSides[static_cast<std::size_t>(i % 6)], 1.5, random);
+    for (double end = time + rest_s; time < end; time += 1) {
+      finder->push(time,
+                   tests::at_rest(unit, pose, 1, 30, random, warming_c * (time / length_s - 0.5)));
+    }
+    finder->break_run();
+    time += pause_s;
+  }
+  return finder->finish();
+}
+
+TEST(Solve, ADriftBetweenTheSidesIsNotVerified) {
+  struct Habit {
+    double rest_s;
+    double pause_s;
+  };
+  for (const Habit& habit : {Habit{60, 540}, Habit{20, 580}, Habit{60, 240}, Habit{60, 60}}) {
+    for (unsigned seed = 1; seed <= 25; ++seed) {
+      SyntheticUnit unit = mismatched(seed);
+      unit.drift_mg_per_c = {seed % 2 == 0 ? 0.6 : -0.6, 0.5, seed % 3 == 0 ? 0.7 : -0.7};
+      const auto report = solve_from_still_blocks(
+          paused_sides(unit, habit.rest_s, habit.pause_s, 1, 20, seed), file_constants(unit));
+      ASSERT_OK(report);
+      EXPECT_FALSE(report->usable()) << habit.pause_s << " " << seed << report->brief();
+      EXPECT_THAT(report->verification.reasons, testing::Contains(testing::HasSubstr("drift")));
+    }
+  }
+}
+
+TEST(Solve, PausesWithoutDriftAreSaidOrMended) {
+  for (unsigned seed = 1; seed <= 25; ++seed) {
+    const SyntheticUnit unit = mismatched(seed);
+    const auto once =
+        solve_from_still_blocks(paused_sides(unit, 60, 540, 1, 0, seed), file_constants(unit));
+    ASSERT_OK(once);
+    EXPECT_FALSE(once->usable()) << seed << once->brief();
+    EXPECT_THAT(once->verification.reasons,
+                testing::Contains(testing::HasSubstr("first side again at the end")));
+    EXPECT_GT(*once->verification.hidden_drift_mg, 4);
+    const auto twice =
+        solve_from_still_blocks(paused_sides(unit, 60, 540, 2, 0, seed), file_constants(unit));
+    ASSERT_OK(twice);
+    EXPECT_TRUE(twice->usable()) << seed << twice->brief();
+    EXPECT_LT(*twice->verification.hidden_drift_mg, 1);
+    const auto quick =
+        solve_from_still_blocks(paused_sides(unit, 60, 20, 1, 0, seed), file_constants(unit));
+    ASSERT_OK(quick);
+    EXPECT_TRUE(quick->usable()) << seed << quick->brief();
+  }
+}
+
+// 20 C, each side met at both ends of it: now it is seen.
+TEST(Solve, ASecondRoundShowsTheDrift) {
+  for (unsigned seed = 1; seed <= 25; ++seed) {
+    SyntheticUnit unit = mismatched(seed);
+    unit.drift_mg_per_c = {0.6, seed % 2 == 0 ? 0.5 : -0.5, -0.7};
+    const auto report =
+        solve_from_still_blocks(paused_sides(unit, 60, 540, 2, 20, seed), file_constants(unit));
+    ASSERT_OK(report);
+    EXPECT_FALSE(report->usable()) << seed << report->brief();
+    ASSERT_TRUE(report->fit->drift);
+    EXPECT_TRUE(report->fit->drift->shown);
+    for (std::size_t a = 0; a < 3; ++a) {
+      // Its line runs from the first block to the last: 11.1 of 12 parts of the warming.
+      EXPECT_NEAR(report->fit->drift->half_span_mg[a], unit.drift_mg_per_c[a] * 10 * 11.1 / 12, 1);
+    }
   }
 }
 
