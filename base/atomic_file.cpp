@@ -26,12 +26,30 @@ AtomicFile::~AtomicFile() {
   }
 }
 
+namespace {
+
+constexpr int kMostAttempts = 100;
+
+std::string temporary_name(const std::string& path, int attempt) {
+  return fmt::format("{}/.{}.{}.tmp", folder_of(path), file_name_of(path), attempt);
+}
+
+}  // namespace
+
+void AtomicFile::remove_left_over(FileSystem& files, const std::string& path) {
+  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+    if (!files.info(temporary_name(path, attempt)) ||
+        !files.remove(temporary_name(path, attempt))) {
+      return;
+    }
+  }
+}
+
 Result<AtomicFile> AtomicFile::create(FileSystem& files, const std::string& path) {
   // The first free name: one that a killed process left behind must not stop the next run, and two
   // processes that write the same target must not share a temporary file.
-  for (int attempt = 0; attempt < 100; ++attempt) {
-    const std::string temporary =
-        fmt::format("{}/.{}.{}.tmp", folder_of(path), file_name_of(path), attempt);
+  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+    const std::string temporary = temporary_name(path, attempt);
     auto file = files.create(temporary);
     if (file) {
       return AtomicFile(files, path, temporary, *std::move(file));
@@ -60,6 +78,18 @@ Status AtomicFile::commit() {
   SIXPOINT_CHECK(files_->rename(temporary_, path_));
   file_.reset();
   return files_->sync_folder(folder_of(path_));
+}
+
+Status make_synced_folders(FileSystem& files, const std::string& path) {
+  if (files.info(path)) {
+    return files.make_folders(path);  // says so where it is no folder
+  }
+  const std::string parent = folder_of(path);
+  if (parent != path && parent != ".") {
+    SIXPOINT_CHECK(make_synced_folders(files, parent));
+  }
+  SIXPOINT_CHECK(files.make_folders(path));
+  return files.sync_folder(parent);
 }
 
 Status write_file(FileSystem& files, const std::string& path, std::string_view text) {

@@ -21,6 +21,10 @@ class AtomicFile {
  public:
   static Result<AtomicFile> create(FileSystem& files, const std::string& path);
 
+  // Removes the temporary files that killed processes left for this target. Only for who knows that
+  // no other process is writing it.
+  static void remove_left_over(FileSystem& files, const std::string& path);
+
   AtomicFile(AtomicFile&&) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;
   ~AtomicFile();
@@ -41,6 +45,9 @@ class AtomicFile {
   std::unique_ptr<WritableFile> file_;
   std::uint64_t size_ = 0;
 };
+
+// As FileSystem::make_folders(), and every folder that was made is on the medium.
+Status make_synced_folders(FileSystem& files, const std::string& path);
 
 Status write_file(FileSystem& files, const std::string& path, std::string_view text);
 

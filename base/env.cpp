@@ -4,6 +4,10 @@
 
 namespace sixpoint {
 
+Result<std::unique_ptr<FileLock>> FileSystem::lock(const std::string& path) {
+  return fail(ErrorCode::io, "this file system has no locks", path, "choose another folder");
+}
+
 Result<Bytes> read_file(FileSystem& files, const std::string& path, std::uint64_t limit) {
   SIXPOINT_ASSIGN(const auto file, files.open(path));
   if (file->size() > limit) {

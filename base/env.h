@@ -51,6 +51,17 @@ class WritableFile {
 struct FileInfo {
   bool is_folder = false;
   std::uint64_t size = 0;
+  bool is_link = false;          // only from link_info()
+  std::int64_t modified_ns = 0;  // nanoseconds since 1970 UTC
+  // Which file it is, whatever its name: device and inode. Zeros where a file system has no such.
+  std::uint64_t device = 0;
+  std::uint64_t inode = 0;
+};
+
+// Held until it is destroyed or the process ends, however it ends.
+class FileLock {
+ public:
+  virtual ~FileLock() = default;
 };
 
 class FileSystem {
@@ -65,6 +76,14 @@ class FileSystem {
   virtual Status rename(const std::string& from, const std::string& to) = 0;     // replaces `to`
   virtual Status remove(const std::string& path) = 0;
   virtual Status sync_folder(const std::string& path) = 0;  // makes renames in it durable
+  // As info(), of a symbolic link itself where `path` is one.
+  virtual Result<FileInfo> link_info(const std::string& path) { return info(path); }
+  // The path without symbolic links, "." and "..", from the root; no_input where there is none.
+  virtual Result<std::string> real_path(const std::string& path) { return path; }
+  // Locks the file `path`, which is made where it is not there, against every other lock() in any
+  // process, on a network file system also on other machines. Null where another holds it; an error
+  // where the file cannot be made or its file system has no locks.
+  virtual Result<std::unique_ptr<FileLock>> lock(const std::string& path);
 };
 
 struct Env {

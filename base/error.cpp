@@ -4,6 +4,11 @@
 
 namespace sixpoint {
 
+bool is_error_code(int number) {
+  const auto code = static_cast<ErrorCode>(number);
+  return code == ErrorCode::internal || to_string(code) != to_string(ErrorCode::internal);
+}
+
 std::string_view to_string(ErrorCode code) {
   switch (code) {
     case ErrorCode::usage:

@@ -26,6 +26,9 @@ enum class ErrorCode {
 // A short stable name such as "bad_data", for JSON.
 std::string_view to_string(ErrorCode code);
 
+// Is a number that was read from a file one of the kinds above?
+bool is_error_code(int number);
+
 struct Error {
   ErrorCode code = ErrorCode::internal;
   std::string what;   // what happened, one sentence without a full stop

@@ -29,6 +29,7 @@ struct MemoryFiles::Node {
   std::mutex mutex;
   Bytes seen;
   Bytes synced;
+  std::int64_t modified = 0;
 };
 
 namespace {
@@ -66,7 +67,9 @@ class MemoryWritableFile final : public WritableFile {
       : disk_(disk), path_(std::move(path)), node_(std::move(node)) {}
   Status write_at(std::uint64_t offset, std::span<const std::uint8_t> bytes) override {
     SIXPOINT_CHECK(disk_.may_change(path_));
+    const std::int64_t modified = disk_.next_change();
     const std::lock_guard lock(node_->mutex);
+    node_->modified = modified;
     node_->seen.resize(std::max<std::size_t>(node_->seen.size(), offset + bytes.size()));
     std::copy(bytes.begin(), bytes.end(),
               node_->seen.begin() + static_cast<std::ptrdiff_t>(offset));
@@ -89,6 +92,11 @@ class MemoryWritableFile final : public WritableFile {
   std::string path_;
   std::shared_ptr<MemoryFiles::Node> node_;
 };
+
+std::int64_t MemoryFiles::next_change() {
+  const std::lock_guard lock(mutex_);
+  return ++changes_;
+}
 
 Status MemoryFiles::may_change(const std::string& path) {
   const std::lock_guard lock(mutex_);
@@ -121,14 +129,19 @@ Result<std::unique_ptr<WritableFile>> MemoryFiles::create(const std::string& pat
 Result<FileInfo> MemoryFiles::info(const std::string& path) {
   const std::lock_guard lock(mutex_);
   if (folders_.contains(path)) {
-    return FileInfo{true, 0};
+    FileInfo info;
+    info.is_folder = true;
+    return info;
   }
   const auto found = seen_.find(path);
   if (found == seen_.end()) {
     return fail(ErrorCode::no_input, "no such file", path, "check the path");
   }
   const std::lock_guard node_lock(found->second->mutex);
-  return FileInfo{false, found->second->seen.size()};
+  FileInfo info;
+  info.size = found->second->seen.size();
+  info.modified_ns = found->second->modified;
+  return info;
 }
 
 Result<std::vector<std::string>> MemoryFiles::list(const std::string& folder) {
@@ -193,6 +206,46 @@ Status MemoryFiles::sync_folder(const std::string& path) {
   return {};
 }
 
+struct MemoryFiles::LockedPaths {
+  std::mutex mutex;
+  std::set<std::string> paths;
+};
+
+MemoryFiles::MemoryFiles() : locked_(std::make_shared<LockedPaths>()) {}
+
+namespace {
+
+class MemoryLock final : public FileLock {
+ public:
+  MemoryLock(std::shared_ptr<MemoryFiles::LockedPaths> locked, std::string path)
+      : locked_(std::move(locked)), path_(std::move(path)) {}
+  MemoryLock(const MemoryLock&) = delete;
+  MemoryLock& operator=(const MemoryLock&) = delete;
+  ~MemoryLock() override {
+    const std::lock_guard lock(locked_->mutex);
+    locked_->paths.erase(path_);
+  }
+
+ private:
+  std::shared_ptr<MemoryFiles::LockedPaths> locked_;
+  std::string path_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<FileLock>> MemoryFiles::lock(const std::string& path) {
+  SIXPOINT_CHECK(may_change(path));
+  {
+    const std::lock_guard lock(mutex_);
+    seen_.try_emplace(path, std::make_shared<Node>());
+  }
+  const std::lock_guard lock(locked_->mutex);
+  if (!locked_->paths.insert(path).second) {
+    return nullptr;
+  }
+  return std::make_unique<MemoryLock>(locked_, path);
+}
+
 void MemoryFiles::lose_power() {
   const std::lock_guard lock(mutex_);
   std::map<std::string, std::shared_ptr<Node>> survivors;
@@ -201,6 +254,7 @@ void MemoryFiles::lose_power() {
     auto survivor = std::make_shared<Node>();
     survivor->seen = node->synced;
     survivor->synced = node->synced;
+    survivor->modified = node->modified;
     survivors[path] = std::move(survivor);
   }
   seen_ = survivors;

@@ -42,6 +42,7 @@ class MemoryFiles final : public FileSystem {
   Status rename(const std::string& from, const std::string& to) override;
   Status remove(const std::string& path) override;
   Status sync_folder(const std::string& path) override;
+  Result<std::unique_ptr<FileLock>> lock(const std::string& path) override;
 
   // Forgets whatever is not on the medium. Files that are open stay usable but lead nowhere.
   void lose_power();
@@ -52,15 +53,20 @@ class MemoryFiles final : public FileSystem {
 
   // What one open file shares with the disk; defined in the source file.
   struct Node;
+  struct LockedPaths;
+  MemoryFiles();
 
  private:
   friend class MemoryWritableFile;
   Status may_change(const std::string& path);
+  std::int64_t next_change();
 
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Node>> seen_;
   std::map<std::string, std::shared_ptr<Node>> medium_;
   std::set<std::string> folders_;
+  std::shared_ptr<LockedPaths> locked_;
+  std::int64_t changes_ = 0;  // the clock of FileInfo::modified_ns
   std::size_t operations_ = 0;
   std::optional<std::size_t> fail_from_;
 };

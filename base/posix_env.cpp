@@ -7,6 +7,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -131,6 +132,26 @@ class PosixWritableFile final : public WritableFile {
   std::string path_;
 };
 
+FileInfo info_of(const struct stat& status) {
+  FileInfo info;
+  info.is_folder = S_ISDIR(status.st_mode);
+  info.is_link = S_ISLNK(status.st_mode);
+  info.size = static_cast<std::uint64_t>(status.st_size);
+  info.modified_ns =
+      std::int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + std::int64_t{status.st_mtim.tv_nsec};
+  info.device = status.st_dev;
+  info.inode = status.st_ino;
+  return info;
+}
+
+class PosixLock final : public FileLock {
+ public:
+  explicit PosixLock(int fd) : fd_(fd) {}
+
+ private:
+  Descriptor fd_;  // closing it gives the lock back
+};
+
 class PosixFileSystem final : public FileSystem {
  public:
   Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
@@ -161,7 +182,45 @@ class PosixFileSystem final : public FileSystem {
     if (::stat(path.c_str(), &status) != 0) {
       return system_failure(errno, ErrorCode::no_input, "cannot look at", path);
     }
-    return FileInfo{S_ISDIR(status.st_mode), static_cast<std::uint64_t>(status.st_size)};
+    return info_of(status);
+  }
+
+  Result<FileInfo> link_info(const std::string& path) override {
+    struct stat status {};
+    if (::lstat(path.c_str(), &status) != 0) {
+      return system_failure(errno, ErrorCode::no_input, "cannot look at", path);
+    }
+    return info_of(status);
+  }
+
+  Result<std::string> real_path(const std::string& path) override {
+    std::error_code error;
+    const auto real = std::filesystem::canonical(path, error);
+    if (error) {
+      return system_failure(error.value(), ErrorCode::no_input, "cannot look at", path);
+    }
+    return real.string();
+  }
+
+  // flock() belongs to the open file: it also keeps two threads of one process apart, and Linux
+  // takes it as a byte-range lock to the server of an NFS folder.
+  Result<std::unique_ptr<FileLock>> lock(const std::string& path) override {
+    const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (fd < 0) {
+      return system_failure(errno, ErrorCode::cannot_create, "cannot make the lock", path);
+    }
+    std::unique_ptr<FileLock> held = std::make_unique<PosixLock>(fd);
+    int result = 0;
+    do {
+      result = ::flock(fd, LOCK_EX | LOCK_NB);
+    } while (result != 0 && errno == EINTR);
+    if (result == 0) {
+      return held;
+    }
+    if (errno == EWOULDBLOCK) {
+      return nullptr;
+    }
+    return system_failure(errno, ErrorCode::io, "cannot lock", path);
   }
 
   Result<std::vector<std::string>> list(const std::string& folder) override {

@@ -1,9 +1,12 @@
 #include "base/sha256.h"
 
 #include <new>
+#include <vector>
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
+
+#include "base/env.h"
 
 namespace sixpoint {
 
@@ -46,6 +49,21 @@ Sha256Digest sha256(std::span<const std::uint8_t> bytes) {
   Sha256 hash;
   hash.update(bytes);
   return hash.finish();
+}
+
+Result<std::string> file_sha256(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const auto file, files.open(path));
+  Sha256 hash;
+  std::vector<std::uint8_t> piece(1U << 20);
+  std::uint64_t at = 0;
+  while (true) {
+    SIXPOINT_ASSIGN(const auto count, file->read_at(at, piece));
+    if (count == 0) {
+      return to_hex(hash.finish());
+    }
+    hash.update(std::span(piece).first(count));
+    at += count;
+  }
 }
 
 std::string to_hex(std::span<const std::uint8_t> bytes) {

@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "base/result.h"
+
 namespace sixpoint {
 
 using Sha256Digest = std::array<std::uint8_t, 32>;
@@ -28,6 +30,9 @@ class Sha256 {
 };
 
 Sha256Digest sha256(std::span<const std::uint8_t> bytes);
+class FileSystem;
+// Of a whole file, read piece by piece; in lower-case hex digits.
+Result<std::string> file_sha256(FileSystem& files, const std::string& path);
 std::string to_hex(std::span<const std::uint8_t> bytes);  // lower case
 
 }  // namespace sixpoint

@@ -62,10 +62,20 @@ ConstantsFinder::ConstantsFinder(Env& env, ConstantsFinderOptions options)
 
 Status ConstantsFinder::ask_store(const Survey& survey, ConstantsChoice& choice) {
   const std::lock_guard lock(mutex_);
-  SIXPOINT_ASSIGN(
-      const auto found,
-      options_.store->constants_for(survey.facts.serial,
-                                    std::string(calib::to_string(FilterConfiguration::current))));
+  std::optional<ConstantsSnapshot::Entry> found;
+  if (options_.snapshot != nullptr) {
+    if (const auto* entry = options_.snapshot->find(survey.facts.serial); entry != nullptr) {
+      found = *entry;
+    }
+  } else {
+    SIXPOINT_ASSIGN(
+        const auto record,
+        options_.store->constants_for(survey.facts.serial,
+                                      std::string(calib::to_string(FilterConfiguration::current))));
+    if (record) {
+      found = {record->id, record->document};
+    }
+  }
   if (!found.has_value()) {
     choice.reasons.push_back(fmt::format(
         "the store holds no constants of {} under the current configuration", survey.facts.serial));
@@ -155,7 +165,7 @@ Result<ConstantsChoice> ConstantsFinder::choose(const std::string& path, const S
     choice.chosen = ChosenConstants{*options_.given, "constants", ""};
     return choice;
   }
-  if (options_.store != nullptr) {
+  if (options_.store != nullptr || options_.snapshot != nullptr) {
     SIXPOINT_CHECK(ask_store(survey, choice));
   }
   if (!choice.chosen && options_.calibration_file.has_value()) {

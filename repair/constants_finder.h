@@ -13,6 +13,7 @@
 
 #include "calib/solve.h"
 #include "db/store.h"
+#include "repair/constants_snapshot.h"
 #include "repair/repair_file.h"
 
 namespace sixpoint::repair {
@@ -22,6 +23,8 @@ struct ConstantsFinderOptions {
   std::optional<calib::ConstantsRecord> given;
   // Not owned; may be null.
   db::Store* store = nullptr;
+  // The store's word instead of the store (an archive's shards). Not owned; may be null.
+  const ConstantsSnapshot* snapshot = nullptr;
   std::optional<std::string> calibration_file;
   // The file's own still periods, where nothing better was found.
   bool scan = true;

@@ -17,21 +17,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uint64_t kLargestMark = 1U << 20;
 
-Result<std::string> file_sha256(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(const auto file, files.open(path));
-  Sha256 hash;
-  Bytes piece(1U << 20);
-  std::uint64_t at = 0;
-  while (true) {
-    SIXPOINT_ASSIGN(const auto count, file->read_at(at, piece));
-    if (count == 0) {
-      return to_hex(hash.finish());
-    }
-    hash.update(std::span(piece).first(count));
-    at += count;
-  }
-}
-
 Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& chosen,
              const Survey& survey, UtcTime now) {
   Json mark;
@@ -252,6 +237,9 @@ class Repair {
         // What was used then, whatever would be chosen today.
         report_.method = text_in(*mark, "method");
         report_.constants_id = text_in(*mark, "constants_id");
+        if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
+          report_.repaired_at = *then;
+        }
         report_.output = output_;
         SIXPOINT_ASSIGN(const auto mended, survey(env_.files, output_, options_.still));
         if (mended.magnitude.blocks > 0) {
@@ -274,8 +262,9 @@ class Repair {
         SIXPOINT_CHECK(writer.copy(recording, entry.name));
       }
     }
+    report_.repaired_at = env_.clock.now();
     SIXPOINT_CHECK(
-        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, env_.clock.now())
+        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, *report_.repaired_at)
                                         .dump(2, ' ', false, Json::error_handler_t::replace) +
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());

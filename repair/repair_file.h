@@ -74,6 +74,7 @@ struct RepairReport {
   bool rotation_undone = false;
   bool resumed = false;  // mended by an earlier run; method and constants are those of its mark
   std::string constants_id;
+  std::optional<UtcTime> repaired_at;  // as its mark says
   std::string input_sha256;
   std::string output_sha256;
   bool dry_run = false;

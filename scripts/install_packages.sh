@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that are missing; nothing when none is. Sourced or run by the other
 # scripts:  install_packages.sh build|test...
-# Groups: build (to make the program), test (to test it as CI does).
+# Groups: build (to make the program), test (to test it as CI does), package (to make the .deb).
 set -euo pipefail
 
 build_packages=(
@@ -19,7 +19,9 @@ test_packages=(
   libumockdev-dev umockdev
   busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils
   poppler-utils zbar-tools
+  dpkg-dev file groff-base lintian systemd
 )
+package_packages=(dpkg-dev file)
 
 # The page's tests need Node; a machine that has it from elsewhere keeps it (its package has npm inside
 # and does not go together with Debian's).
@@ -32,7 +34,8 @@ for group in "${@:-build}"; do
   case "$group" in
     build) wanted+=("${build_packages[@]}") ;;
     test) wanted+=("${test_packages[@]}") ;;
-    *) echo "install_packages.sh: no group '$group'; there are: build test" >&2; exit 64 ;;
+    package) wanted+=("${package_packages[@]}") ;;
+    *) echo "install_packages.sh: no group '$group'; there are: build test package" >&2; exit 64 ;;
   esac
 done
 

@@ -9,8 +9,8 @@
 
 #include "base/atomic_file.h"
 #include "calib/solve.h"
+#include "repair/file_tree.h"
 #include "station/calibration_file.h"
-#include "station/cli/file_tree.h"
 
 namespace sixpoint::station {
 
@@ -492,7 +492,7 @@ ApiAnswer Api::list_files(const std::string& relative) const {
     }
     if (info->is_folder) {
       json["folders"].push_back(name);
-    } else if (cli::has_ending(name, ".gt3x")) {
+    } else if (repair::has_ending(name, ".gt3x")) {
       json["files"].push_back({{"name", name}, {"bytes", info->size}});
     }
   }

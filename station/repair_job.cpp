@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "repair/constants_finder.h"
-#include "station/cli/file_tree.h"
+#include "repair/file_tree.h"
 
 namespace sixpoint::station {
 
@@ -34,8 +34,7 @@ db::RepairRecord repair_record_of(const repair::RepairReport& report, UtcTime ma
 struct RepairJob::Impl {
   Impl(Env& its_env, StoreOpener opener) : env(its_env), open_store(std::move(opener)) {}
 
-  void work(const std::stop_token& stop, const RepairOrder& order,
-            const std::vector<cli::FoundFile>& files);
+  void work(const std::stop_token& stop, const RepairOrder& order, const repair::FileTree& tree);
   void end(std::string how, std::string problem) {
     const std::lock_guard lock(mutex);
     state = std::move(how);
@@ -59,7 +58,7 @@ struct RepairJob::Impl {
 };
 
 void RepairJob::Impl::work(const std::stop_token& stop, const RepairOrder& order,
-                           const std::vector<cli::FoundFile>& found) {
+                           const repair::FileTree& tree) {
   Result<db::Store> store = open_store();
   if (!store) {
     end("failed", store.error().brief());
@@ -71,7 +70,19 @@ void RepairJob::Impl::work(const std::stop_token& stop, const RepairOrder& order
     options.calibration_file = order.calibration_file;
   }
   repair::ConstantsFinder finder(env, options);
-  for (const cli::FoundFile& file : found) {
+  for (const repair::RefusedPath& refused : tree.refused) {
+    const std::lock_guard lock(mutex);
+    summary["failed"] = summary.value("failed", 0) + 1;
+    if (files.size() < kShownFiles) {
+      files.push_back({{"input", printable(refused.path)},
+                       {"status", "failed"},
+                       {"method", ""},
+                       {"reasons", {refused.error.brief()}},
+                       {"still_error_mg", {{"before", nullptr}, {"after", nullptr}}}});
+    }
+    ++changes;
+  }
+  for (const repair::FoundFile& file : tree.files) {
     if (stop.stop_requested()) {
       end("cancelled", "");
       return;
@@ -124,15 +135,16 @@ RepairJob::RepairJob(Env& env, StoreOpener open_store)
 RepairJob::~RepairJob() = default;
 
 Status RepairJob::start(const RepairOrder& order) {
-  SIXPOINT_ASSIGN(auto found, cli::find_files(impl_->env.files, order.folder, {".gt3x"}));
+  SIXPOINT_ASSIGN(auto tree, repair::find_files(impl_->env.files, order.folder, {{".gt3x"}}));
   // What an earlier job made lies below the folder when the output does: not mended again.
-  std::erase_if(
-      found, [&](const cli::FoundFile& file) { return file.path.starts_with(order.output + "/"); });
+  std::erase_if(tree.files, [&](const repair::FoundFile& file) {
+    return file.path.starts_with(order.output + "/");
+  });
   const std::lock_guard lock(impl_->mutex);
   if (impl_->state == "running") {
     return fail(ErrorCode::usage, "files are being mended already", {}, "wait, or cancel that job");
   }
-  if (found.empty()) {
+  if (tree.files.empty()) {
     return fail(ErrorCode::no_input, "there is no .gt3x file in this folder", order.folder,
                 "choose the folder with your recordings");
   }
@@ -142,14 +154,13 @@ Status RepairJob::start(const RepairOrder& order) {
   impl_->state = "running";
   impl_->error.clear();
   impl_->done = 0;
-  impl_->total = found.size();
+  impl_->total = tree.files.size();
   impl_->summary = Json::object();
   impl_->files = Json::array();
   ++impl_->changes;
-  impl_->thread =
-      std::jthread([this, order, found = std::move(found)](const std::stop_token& stop) {
-        impl_->work(stop, order, found);
-      });
+  impl_->thread = std::jthread([this, order, tree = std::move(tree)](const std::stop_token& stop) {
+    impl_->work(stop, order, tree);
+  });
   return {};
 }
 

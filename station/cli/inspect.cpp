@@ -9,11 +9,11 @@
 #include "gt3x/model.h"
 #include "gt3x/sample_reader.h"
 #include "repair/agd.h"
+#include "repair/file_tree.h"
 #include "repair/still_scan.h"
 #include "repair/survey.h"
 #include "repair/triage.h"
 #include "station/cli/command.h"
-#include "station/cli/file_tree.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -451,7 +451,7 @@ void add_inspect(CLI::App& app, Context& context) {
   command->add_option("FILE", options->path, "the recording")->required();
   command->add_flag("--json", options->json, "one JSON document on standard output");
   command->callback([options, &context] {
-    const auto findings = has_ending(options->path, ".agd")
+    const auto findings = repair::has_ending(options->path, ".agd")
                               ? inspect_agd(options->path)
                               : inspect_recording(context.env.files, options->path);
     if (!findings) {

@@ -1,22 +1,20 @@
 // sixpoint repair PATH... -o OUTDIR: mends affected files; the originals stay as they are.
-#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
 
 #include "repair/constants_finder.h"
+#include "repair/file_tree.h"
 #include "repair/repair_file.h"
 #include "station/cli/command.h"
-#include "station/cli/file_tree.h"
+#include "station/cli/repair_answer.h"
 #include "station/cli/store_option.h"
 #include "station/cli/workers.h"
-#include "station/software.h"
 
 namespace sixpoint::cli {
 namespace {
 
 using repair::RepairReport;
-using repair::RepairStatus;
 
 struct Options {
   std::vector<std::string> paths;
@@ -30,107 +28,12 @@ struct Options {
   bool json = false;
 };
 
-int exit_code_of(const RepairReport& report) {
-  switch (report.status) {
-    case RepairStatus::failed:
-      return static_cast<int>(report.error ? report.error->code : ErrorCode::internal);
-    case RepairStatus::not_repairable:
-      return kExitFailed;
-    default:
-      return kExitPassed;
-  }
-}
-
-RepairReport failed(const std::string& input, const Error& error) {
-  RepairReport report;
-  report.input = input;
-  report.error = error;
-  report.reasons.push_back(error.brief());
-  return report;
-}
-
-// What the store is told about a file that was mended.
-db::RepairRecord record_of(Context& context, const RepairReport& report) {
-  db::RepairRecord record;
-  record.serial = report.serial;
-  record.made_at = context.env.clock.now();
-  record.input = report.input;
-  record.input_sha256 = report.input_sha256;
-  record.output_sha256 = report.output_sha256;
-  record.method = report.method;
-  record.constants_id = report.constants_id;
-  record.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
-  record.software = station::software_name();
-  if (const std::string build = station::software_build(); !build.empty()) {
-    record.software += fmt::format(" ({})", build);
-  }
-  return record;
-}
-
-// Tells the store about all files that were mended. A file of an earlier run (--resume) is told
-// only when that run ended before it could say so. Nothing where there was nothing to say.
-Result<std::optional<db::Kept>> remember(Context& context, const std::string& location,
-                                         db::Store store,
-                                         const std::vector<RepairReport>& reports) {
-  std::vector<db::RepairRecord> records;
-  for (const RepairReport& report : reports) {
-    if (report.status != RepairStatus::repaired || report.dry_run) {
-      continue;
-    }
-    if (report.resumed) {
-      const auto known = store.repair_of_output(report.output_sha256);
-      if (known && *known && (*known)->input_sha256 == report.input_sha256) {
-        continue;
-      }
-    }
-    db::RepairRecord record = record_of(context, report);
-    if (report.resumed && !record.constants_id.empty()) {
-      // The mark may name constants of another store.
-      const auto known = store.history(report.serial);
-      const bool here =
-          known && std::any_of(known->begin(), known->end(), [&](const auto& constants) {
-            return constants.id == record.constants_id;
-          });
-      record.constants_id = here ? record.constants_id : "";
-    }
-    // One file with a serial number that no store keeps must not stand in the way of the others.
-    if (const auto id = db::id_of(record); !id) {
-      context.log().error("{}: mended, but the store cannot keep it: {}", printable(report.input),
-                          id.error().brief());
-      context.worsen(static_cast<int>(id.error().code));
-      continue;
-    }
-    records.push_back(std::move(record));
-  }
-  if (records.empty()) {
-    return std::nullopt;
-  }
-  Result<db::Store> taken = std::move(store);
-  std::size_t acknowledged = 0;
-  SIXPOINT_ASSIGN(auto kept,
-                  keep_records(context, location, taken, [&](db::Keeper& keeper) -> Status {
-                    for (; acknowledged < records.size(); ++acknowledged) {
-                      SIXPOINT_CHECK(keeper.add_repair(records[acknowledged]));
-                    }
-                    return {};
-                  }));
-  return kept;
-}
-
 Result<repair::ConstantsFinderOptions> sources(const Options& options, Context& context,
                                                std::optional<db::Store>& store) {
   repair::ConstantsFinderOptions finder;
   finder.still = options.repair.still;
   if (!options.constants.empty()) {
-    SIXPOINT_ASSIGN(const auto bytes, read_file(context.env.files, options.constants, 1U << 20));
-    auto record = calib::parse_constants_record(
-        std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-    if (!record) {
-      Error error = record.error();
-      error.where = options.constants;
-      return fail(std::move(error));
-    }
-    finder.given = *std::move(record);
+    SIXPOINT_ASSIGN(finder.given, read_constants(context.env.files, options.constants));
   }
   const bool only_scan = options.scan && options.store.empty() && options.calibration_file.empty();
   if (!options.store.empty()) {
@@ -165,19 +68,22 @@ void run(const Options& options, Context& context) {
   std::vector<std::size_t> places;
   std::map<std::string, std::string> taken;  // output -> input
   for (const std::string& path : options.paths) {
-    const auto found = find_files(files, path, {".gt3x"});
+    const auto found = repair::find_files(files, path, {{".gt3x"}});
     if (!found) {
-      reports.push_back(failed(path, found.error()));
+      reports.push_back(failed_report(path, found.error()));
       continue;
     }
-    if (found->empty()) {
+    for (const repair::RefusedPath& refused : found->refused) {
+      reports.push_back(failed_report(refused.path, refused.error));
+    }
+    if (found->files.empty()) {
       context.log().warn("{}: no .gt3x file below this folder", printable(path));
     }
-    for (const FoundFile& file : *found) {
+    for (const repair::FoundFile& file : found->files) {
       const std::string output = options.folder + "/" + file.relative;
       const auto [other, fresh] = taken.emplace(output, file.path);
       if (!fresh) {
-        reports.push_back(failed(
+        reports.push_back(failed_report(
             file.path,
             Error{ErrorCode::cannot_create,
                   fmt::format("{} would have the same name in {}", other->second, options.folder),
@@ -197,7 +103,7 @@ void run(const Options& options, Context& context) {
           RepairReport& report = reports[places[i]];
           if (!options.repair.dry_run) {
             if (const auto made = files.make_folders(folder_of(jobs[i].output)); !made) {
-              report = failed(jobs[i].input, made.error());
+              report = failed_report(jobs[i].input, made.error());
               return;
             }
           }
@@ -207,21 +113,15 @@ void run(const Options& options, Context& context) {
         [&](std::size_t done) { progress.at(done); });
   }
 
-  Json summary = {{"files", reports.size()},
-                  {"repaired", 0},
-                  {"not_affected", 0},
-                  {"not_repairable", 0},
-                  {"already_repaired", 0},
-                  {"failed", 0},
-                  {"dry_run", options.repair.dry_run}};
+  RepairTally tally;
   for (const RepairReport& report : reports) {
     context.worsen(exit_code_of(report));
-    const std::string status(to_string(report.status));
-    summary[status] = summary[status].get<int>() + 1;
+    tally.add(report);
   }
   Json kept_json(nullptr);
   if (store) {
-    const auto kept = remember(context, options.store, *std::move(store), reports);
+    Result<db::Store> opened = *std::move(store);
+    const auto kept = keep_repairs(context, options.store, opened, reports);
     if (!kept) {
       context.log().error(
           "the files are mended, but the store does not know: {}; run it again "
@@ -239,25 +139,14 @@ void run(const Options& options, Context& context) {
     for (const RepairReport& report : reports) {
       json["files"].push_back(report.to_json());
     }
-    json["summary"] = summary;
+    json["summary"] = tally.to_json(options.repair.dry_run);
     json["kept"] = kept_json;
     return print_json(context, json);
   }
   for (const RepairReport& report : reports) {
-    context.out << report.brief() << '\n';
-    if (report.status != RepairStatus::repaired) {
-      for (const std::string& reason : report.reasons) {
-        context.out << "                 " << printable(reason) << '\n';
-      }
-    }
+    print_report(context, report);
   }
-  context.people << fmt::format(
-      "{} files: {} repaired{}, {} not affected, {} already repaired, {} not repairable, {} "
-      "failed\n",
-      reports.size(), summary["repaired"].get<int>(),
-      options.repair.dry_run ? " (dry run: nothing was written)" : "",
-      summary["not_affected"].get<int>(), summary["already_repaired"].get<int>(),
-      summary["not_repairable"].get<int>(), summary["failed"].get<int>());
+  context.people << tally.brief(options.repair.dry_run);
 }
 
 }  // namespace

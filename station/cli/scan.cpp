@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include "repair/agd.h"
+#include "repair/file_tree.h"
 #include "repair/survey.h"
 #include "repair/triage.h"
 #include "station/cli/command.h"
-#include "station/cli/file_tree.h"
 #include "station/cli/workers.h"
 
 namespace sixpoint::cli {
@@ -120,15 +120,18 @@ void run(const Options& options, Context& context) {
   std::vector<std::string> paths;
   std::vector<std::size_t> places;
   for (const std::string& path : options.paths) {
-    const auto found = find_files(context.env.files, path, {".gt3x", ".agd", ".agdc"});
+    const auto found = repair::find_files(context.env.files, path, {{".gt3x", ".agd", ".agdc"}});
     if (!found) {
       answers.push_back(unreadable(path, found.error()));
       continue;
     }
-    if (found->empty()) {
+    for (const repair::RefusedPath& refused : found->refused) {
+      answers.push_back(unreadable(refused.path, refused.error));
+    }
+    if (found->files.empty()) {
       context.log().warn("{}: no .gt3x, .agdc or .agd file below this folder", printable(path));
     }
-    for (const FoundFile& file : *found) {
+    for (const repair::FoundFile& file : found->files) {
       places.push_back(answers.size());
       paths.push_back(file.path);
       answers.emplace_back();
@@ -139,7 +142,7 @@ void run(const Options& options, Context& context) {
     for_each_job(
         paths.size(), options.jobs,
         [&](std::size_t i) {
-          answers[places[i]] = has_ending(paths[i], ".agd")
+          answers[places[i]] = repair::has_ending(paths[i], ".agd")
                                    ? scan_agd(paths[i])
                                    : scan_recording(context.env.files, paths[i]);
         },

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "base/random.h"
 #include "db/store.h"
@@ -160,6 +161,25 @@ TEST_F(RepairCommand, CalibrationFileOfTheSameUnitUnderCurrentOnly) {
   const Json stranger = repair(folder_ / "other.gt3x", "stranger");
   EXPECT_EQ(stranger["status"], "not_repairable");
   EXPECT_THAT(stranger["reasons"].dump(), HasSubstr("MOS2A45130451"));
+}
+
+// A tree as disks hold them: links in circles and into nothing, a FIFO, a device.
+TEST_F(RepairCommand, OddThingsInATreeGetTheirLinesAndTheRestIsMended) {
+  std::filesystem::create_symlink("..", archive_ + "/sub/up");
+  std::filesystem::create_symlink(".", archive_ + "/sub/here");
+  std::filesystem::create_symlink("nowhere", archive_ + "/dangling.gt3x");
+  std::filesystem::create_symlink("/dev/zero", archive_ + "/endless.gt3x");
+  ASSERT_EQ(::mkfifo((archive_ + "/fifo.gt3x").c_str(), 0600), 0);
+  const auto scanned = run({"scan", archive_, "--json"});
+  EXPECT_EQ(scanned.exit_code, 66);
+  EXPECT_EQ(scanned.json()["files"].size(), 5U) << "no file by two names: " << scanned.out;
+  EXPECT_EQ(scanned.json()["summary"]["unreadable"], 3);
+  const auto mended =
+      run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", "--json"});
+  EXPECT_EQ(mended.exit_code, 66);
+  EXPECT_EQ(mended.json()["summary"]["repaired"], 1);
+  EXPECT_EQ(mended.json()["summary"]["not_affected"], 1);
+  EXPECT_EQ(mended.json()["summary"]["failed"], 3);
 }
 
 TEST_F(RepairCommand, DryRunWritesNothing) {

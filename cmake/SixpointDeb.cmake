@@ -1,0 +1,65 @@
+# The Debian package (packaging/README.md): cpack -G DEB, or scripts/package.sh.
+# Two components: `program`, which `cmake --install` also installs anywhere, and `deb`, what has its
+# place on a Debian system and nowhere else.
+set(reference ${PROJECT_BINARY_DIR}/packaging)
+file(MAKE_DIRECTORY ${reference})
+
+add_executable(sixpoint_reference ${PROJECT_SOURCE_DIR}/packaging/reference.cpp)
+target_link_libraries(sixpoint_reference PRIVATE sixpoint::station fmt::fmt sixpoint_warnings)
+configure_file(packaging/man/sixpoint.1.in ${reference}/sixpoint.1.in @ONLY)
+configure_file(packaging/deb/changelog.in ${reference}/changelog @ONLY)
+# Packed without a time stamp: the same sources give the same package.
+add_custom_command(OUTPUT ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash ${reference}/changelog.gz
+  COMMAND sixpoint_reference man ${reference}/sixpoint.1.in > ${reference}/sixpoint.1
+  COMMAND gzip -9nkf ${reference}/sixpoint.1
+  COMMAND sixpoint_reference completion ${PROJECT_SOURCE_DIR}/packaging/bash/sixpoint.in
+          > ${reference}/sixpoint.bash
+  COMMAND gzip -9nkf ${reference}/changelog
+  DEPENDS sixpoint_reference ${reference}/sixpoint.1.in ${reference}/changelog
+          ${PROJECT_SOURCE_DIR}/packaging/bash/sixpoint.in VERBATIM)
+add_custom_target(sixpoint_package_files ALL
+  DEPENDS ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash ${reference}/changelog.gz)
+
+install(FILES ${reference}/sixpoint.1.gz DESTINATION share/man/man1 COMPONENT program)
+install(FILES ${reference}/sixpoint.bash DESTINATION share/bash-completion/completions RENAME sixpoint
+        COMPONENT program)
+set(deb COMPONENT deb EXCLUDE_FROM_ALL)
+install(FILES packaging/deb/copyright ${reference}/changelog.gz README.md
+        DESTINATION share/doc/sixpoint ${deb})
+install(DIRECTORY docs/ DESTINATION share/doc/sixpoint/docs ${deb} FILES_MATCHING PATTERN "*.md")
+install(FILES packaging/udev/60-sixpoint-detect.rules packaging/udev/70-sixpoint-access.rules
+        packaging/udev/71-sixpoint-service.rules DESTINATION /lib/udev/rules.d ${deb})
+install(FILES packaging/systemd/sixpoint-station.service DESTINATION /lib/systemd/system ${deb})
+install(FILES packaging/systemd/sixpoint-station.default DESTINATION /etc/default
+        RENAME sixpoint-station ${deb})
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME sixpoint)
+set(CPACK_PACKAGE_VENDOR "The Sixpoint authors")
+set(CPACK_PACKAGE_CONTACT "The Sixpoint authors <sixpoint@packages.invalid>")
+set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/package)
+set(CPACK_INSTALL_CMAKE_PROJECTS
+    "${PROJECT_BINARY_DIR};sixpoint;program;/" "${PROJECT_BINARY_DIR};sixpoint;deb;/")
+# Absolute destinations (/lib, /etc) go into the package, not onto this machine.
+set(CPACK_SET_DESTDIR ON)
+set(CPACK_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
+    OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+# What is built is packed; packing builds nothing.
+set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "udev")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "calibrate activity monitors and mend their recordings")
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
+"Activity monitors of the kind wGT3X-BT that were calibrated before 2014-03-24
+and later run by firmware 1.4.0 to 1.7.0 wrote recordings that are wrong by
+100 mg and more. Sixpoint measures the right constants on a six-orientation
+jig, in a calibration file or in the recordings themselves, finds the affected
+files, and mends them without touching the originals.")
+set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/deb/conffiles)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+include(CPack)

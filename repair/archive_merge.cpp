@@ -1,0 +1,77 @@
+#include "repair/archive_merge.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "base/sha256.h"
+
+namespace sixpoint::repair {
+namespace {
+
+// A mended file that is not what its shard wrote counts as failed: running the shard again finds
+// out what to do.
+void verify(FileSystem& files, RepairReport& report) {
+  if (report.status != RepairStatus::repaired) {
+    return;
+  }
+  Error error;
+  const auto digest = file_sha256(files, report.output);
+  if (!digest) {
+    error = digest.error();
+  } else if (*digest != report.output_sha256) {
+    error = {ErrorCode::bad_data, "the mended file is not what the shard wrote", report.output,
+             "remove it and run the shard again"};
+  } else {
+    return;
+  }
+  report.status = RepairStatus::failed;
+  report.reasons = {error.brief()};
+  report.error = std::move(error);
+  report.output.clear();
+}
+
+}  // namespace
+
+bool MergedArchive::complete() const {
+  return std::all_of(shards.begin(), shards.end(),
+                     [](const MergedShard& shard) { return shard.complete(); });
+}
+
+std::size_t MergedArchive::files_missing() const {
+  return std::accumulate(shards.begin(), shards.end(), std::size_t{0},
+                         [](std::size_t sum, const MergedShard& shard) {
+                           return sum + (shard.complete() ? 0 : shard.files);
+                         });
+}
+
+Result<MergedArchive> merge_archive(FileSystem& files, const std::string& folder,
+                                    const ArchivePlan& plan, const MergeOptions& options) {
+  MergedArchive merged;
+  for (std::size_t k = 0; k < plan.shards.size(); ++k) {
+    MergedShard shard;
+    shard.shard = k;
+    shard.files = plan.shards[k].files;
+    auto result = read_result(files, folder, plan, k);
+    if (!result) {
+      const ShardStanding standing = standing_of(files, folder, plan, k);
+      // It may have come to its end since the line before.
+      shard.state = standing.state == ShardState::done ? ShardState::running : standing.state;
+      shard.files_done = standing.files_done;
+      merged.shards.push_back(shard);
+      continue;
+    }
+    shard.state = ShardState::done;
+    shard.files_done = shard.files;
+    for (RepairReport& report : result->files) {
+      if (options.verify) {
+        verify(files, report);
+      }
+      shard.failed += report.status == RepairStatus::failed ? 1 : 0;
+    }
+    merged.shards.push_back(shard);
+    SIXPOINT_CHECK(options.visit(*result));
+  }
+  return merged;
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,40 @@
+// The results of all shards together: one answer, as one `repair` of the same files would give it.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "repair/archive_run.h"
+
+namespace sixpoint::repair {
+
+struct MergeOptions {
+  // Also reads every mended file and compares it with the hash that the shard wrote.
+  bool verify = false;
+  // Given every result that there is, in the order of the shards, one in memory at a time. An error
+  // of it ends the merge.
+  std::function<Status(const ShardResult&)> visit = [](const ShardResult&) { return Status(); };
+};
+
+struct MergedShard {
+  std::size_t shard = 0;
+  ShardState state = ShardState::missing;
+  std::size_t files = 0;
+  std::size_t files_done = 0;
+  std::size_t failed = 0;  // of a shard that is done: files that the next run tries again
+
+  bool complete() const { return state == ShardState::done; }
+};
+
+struct MergedArchive {
+  std::vector<MergedShard> shards;  // all of the plan
+
+  bool complete() const;
+  std::size_t files_missing() const;  // of shards without a result
+};
+
+// Errors of single shards stand in their states.
+Result<MergedArchive> merge_archive(FileSystem& files, const std::string& folder,
+                                    const ArchivePlan& plan, const MergeOptions& options);
+
+}  // namespace sixpoint::repair

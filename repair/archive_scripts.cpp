@@ -1,0 +1,74 @@
+#include "repair/archive_scripts.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include <fmt/format.h>
+
+namespace sixpoint::repair {
+
+std::string shell_word(const std::string& text) {
+  const bool plain = !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+           std::string_view("/._-+:,=@").find(c) != std::string_view::npos;
+  });
+  if (plain) {
+    return text;
+  }
+  std::string quoted = "'";
+  for (const char c : text) {
+    if (c == '\'') {
+      quoted += "'\\''";
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + "'";
+}
+
+// No path may stand in a comment: one with a line end would go on as commands.
+std::string slurm_script(const ArchiveScripts& scripts) {
+  return fmt::format(R"(#!/bin/bash
+# Mends this plan's files as a Slurm job array, one shard per task:  sbatch run.sbatch OUTDIR
+# What is done is not done again, and a task that was killed goes on where it was: submit it again
+# as often as you like. Then: sixpoint archive merge PLANDIR
+#SBATCH --job-name=sixpoint
+#SBATCH --array=0-{2}{3}
+#SBATCH --ntasks=1
+#SBATCH --cpus-per-task=1
+#SBATCH --mem=1G
+#SBATCH --requeue
+#SBATCH --open-mode=append
+set -euo pipefail
+plan={0}
+program=${{SIXPOINT:-{1}}}
+output=${{1:?'usage: sbatch run.sbatch OUTDIR'}}
+shard=${{SLURM_ARRAY_TASK_ID:?'run this with sbatch; on one machine use run_all.sh'}}
+status=0
+"$program" archive run "$plan" --shard "$shard" -o "$output" || status=$?
+# 1: the shard is done, and something in it cannot be mended. The task did its work; merge says what.
+if [ "$status" -eq 1 ]; then status=0; fi
+exit "$status"
+)",
+                     shell_word(scripts.folder), shell_word(scripts.program), scripts.shards - 1,
+                     scripts.at_once > 0 ? fmt::format("%{}", scripts.at_once) : "");
+}
+
+std::string shell_script(const ArchiveScripts& scripts) {
+  return fmt::format(R"(#!/bin/bash
+# Mends this plan's files on this machine, without Slurm:  bash run_all.sh OUTDIR
+# and merges the results. JOBS says how many shards at a time (default: one per core). Ends with merge's exit code.
+set -euo pipefail
+plan={0}
+program=${{SIXPOINT:-{1}}}
+output=${{1:?'usage: bash run_all.sh OUTDIR'}}
+# A shard that fails stops no other one: merge names it.
+seq 0 {2} | xargs -P "${{JOBS:-$(nproc)}}" -n 1 \
+  sh -c '"$1" archive run "$2" --shard "$4" -o "$3" >/dev/null || true' _ \
+  "$program" "$plan" "$output"
+exec "$program" archive merge "$plan"
+)",
+                     shell_word(scripts.folder), shell_word(scripts.program), scripts.shards - 1);
+}
+
+}  // namespace sixpoint::repair

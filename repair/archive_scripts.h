@@ -1,0 +1,21 @@
+// The two scripts of a plan: its shards as a Slurm job array, and on one machine.
+#pragma once
+
+#include <string>
+
+namespace sixpoint::repair {
+
+struct ArchiveScripts {
+  std::string folder;   // of the plan, as the tasks reach it
+  std::string program;  // sixpoint, as the tasks reach it
+  std::size_t shards = 0;
+  std::size_t at_once = 0;  // tasks at a time; 0: as many as the queue lets run
+};
+
+std::string slurm_script(const ArchiveScripts& scripts);
+std::string shell_script(const ArchiveScripts& scripts);
+
+// A word of a shell command line, in quotes where it needs them.
+std::string shell_word(const std::string& text);
+
+}  // namespace sixpoint::repair

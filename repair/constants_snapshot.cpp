@@ -1,0 +1,60 @@
+#include "repair/constants_snapshot.h"
+
+#include <nlohmann/json.hpp>
+
+#include "calib/constants.h"
+
+namespace sixpoint::repair {
+
+using Json = nlohmann::ordered_json;
+
+Result<ConstantsSnapshot> ConstantsSnapshot::of_store(db::Store& store) {
+  ConstantsSnapshot snapshot;
+  SIXPOINT_ASSIGN(const auto units, store.units());
+  for (const db::UnitRecord& unit : units) {
+    SIXPOINT_ASSIGN(
+        const auto found,
+        store.constants_for(unit.serial,
+                            std::string(calib::to_string(calib::FilterConfiguration::current))));
+    if (found) {
+      snapshot.entries_[unit.serial] = {found->id, found->document};
+    }
+  }
+  return snapshot;
+}
+
+std::string ConstantsSnapshot::to_json_lines() const {
+  std::string text;
+  for (const auto& [serial, entry] : entries_) {
+    text += Json{{"serial", serial}, {"id", entry.id}, {"document", entry.document}}.dump(
+        -1, ' ', false, Json::error_handler_t::replace);
+    text += '\n';
+  }
+  return text;
+}
+
+Result<ConstantsSnapshot> ConstantsSnapshot::parse(std::string_view text) {
+  ConstantsSnapshot snapshot;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    const Json json = Json::parse(line, nullptr, false);
+    const auto is_text = [&](const char* key) {
+      return json.is_object() && json.contains(key) && json[key].is_string();
+    };
+    if (!is_text("serial") || !is_text("id") || !is_text("document")) {
+      return fail(ErrorCode::bad_data, "a line of the constants is damaged", {},
+                  "make the plan anew");
+    }
+    snapshot.entries_[json["serial"].get<std::string>()] = {json["id"].get<std::string>(),
+                                                            json["document"].get<std::string>()};
+  }
+  return snapshot;
+}
+
+const ConstantsSnapshot::Entry* ConstantsSnapshot::find(const std::string& serial) const {
+  const auto found = entries_.find(serial);
+  return found == entries_.end() ? nullptr : &found->second;
+}
+
+}  // namespace sixpoint::repair

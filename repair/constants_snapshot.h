@@ -1,0 +1,34 @@
+// The constants of all units as a store held them at one moment: what the shards of an archive use
+// instead of the store, for a hundred tasks on one database file on a network disk is asking for
+// trouble, and for all of them to see the same constants.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "db/store.h"
+
+namespace sixpoint::repair {
+
+class ConstantsSnapshot {
+ public:
+  struct Entry {
+    std::string id;        // in the store
+    std::string document;  // JSON in the form of constants.json
+  };
+
+  // The newest constants under `current` that nobody has withdrawn, of every unit of the store.
+  static Result<ConstantsSnapshot> of_store(db::Store& store);
+  // What to_json_lines() wrote; bad_data otherwise.
+  static Result<ConstantsSnapshot> parse(std::string_view text);
+  std::string to_json_lines() const;
+
+  const Entry* find(const std::string& serial) const;  // null where there is none
+  std::size_t size() const { return entries_.size(); }
+
+ private:
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace sixpoint::repair

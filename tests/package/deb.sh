@@ -1,0 +1,140 @@
+#!/usr/bin/env bash
+# The Debian package as its user gets it: made by cpack, unpacked into a scratch root, and looked at.
+#   deb.sh CPACK BUILD_FOLDER SOURCE_FOLDER
+set -euo pipefail
+cpack=$1 build_folder=$2 source_folder=$3
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+failures=0
+failed() { echo "FAILED: $*"; failures=1; }
+# A tool that CI has; elsewhere its part of the test says that it says nothing.
+have() {
+  command -v "$1" >/dev/null && return
+  [ -z "${SIXPOINT_MUST_NOT_SKIP:-}" ] || { failed "$1 is missing"; return 1; }
+  echo "SKIPPED, NOT PASSED: $2 needs $1"
+  return 1
+}
+have dpkg-shlibdeps "the package" || exit 77
+
+"$cpack" --config "$build_folder/CPackConfig.cmake" -B "$scratch/made" >"$scratch/log" 2>&1 ||
+  { cat "$scratch/log"; exit 1; }
+package=$(echo "$scratch"/made/*.deb)
+[ -f "$package" ] || { echo "FAILED: cpack made no .deb"; exit 1; }
+root=$scratch/root
+dpkg-deb -x "$package" "$root"
+dpkg-deb -e "$package" "$root/DEBIAN"
+
+# What it needs: every library that the program loads belongs to a package that it names.
+depends=$(dpkg-deb -f "$package" Depends)
+known=$(ldconfig -p)
+for library in $(objdump -p "$root/usr/bin/sixpoint" | awk '/NEEDED/ { print $2 }'); do
+  case $library in ld-linux* | libm.so* | libc.so*) continue ;; esac
+  path=$(awk -v name="$library" '$1 == name && !seen { print $NF; seen = 1 }' <<<"$known")
+  owner=$(dpkg -S "$(readlink -f "$path")" "$path" 2>/dev/null | sed -n '1s/:.*//p' || true)
+  grep -qw -- "$owner" <<<"$depends" || failed "$library is in $owner, which Depends does not name: $depends"
+done
+if (cd "$root" && md5sum --quiet -c DEBIAN/md5sums); then :; else failed "md5sums do not fit"; fi
+
+for file in usr/bin/sixpoint lib/udev/rules.d/60-sixpoint-detect.rules \
+  lib/udev/rules.d/70-sixpoint-access.rules lib/systemd/system/sixpoint-station.service \
+  etc/default/sixpoint-station usr/share/man/man1/sixpoint.1.gz \
+  usr/share/bash-completion/completions/sixpoint usr/share/doc/sixpoint/copyright; do
+  [ -f "$root/$file" ] || failed "no $file in the package"
+done
+grep -qx /etc/default/sixpoint-station "$root/DEBIAN/conffiles" || failed "no conffile"
+if grep -rIlF -e "$build_folder" -e "$source_folder" "$root" || grep -qF "$source_folder" "$root/usr/bin/sixpoint"; then
+  failed "the package names the folders it was built in"
+fi
+
+# The program from there.
+program=$root/usr/bin/sixpoint
+version=$(dpkg-deb -f "$package" Version)
+[ "$("$program" --version)" = "sixpoint $version" ] || failed "another version than the package's"
+export HOME=$scratch/home
+mkdir -p "$HOME" "$scratch/archive"
+"$program" simulate --scenario "$source_folder/tests/docs/scenario.json" \
+  -o "$scratch/archive/day.gt3x" >/dev/null 2>&1 || failed "simulate ended with $?"
+status=0
+"$program" scan "$scratch/archive" >/dev/null 2>&1 || status=$?
+[ "$status" -eq 1 ] || failed "scan ended with $status, not with 1"
+"$program" repair "$scratch/archive" -o "$scratch/mended" --scan >/dev/null 2>&1 ||
+  failed "repair ended with $?"
+
+# Every command has its section of the manual page, and its options; and the shell offers it.
+page=$(gunzip -c "$root/usr/share/man/man1/sixpoint.1.gz" | sed 's/\\-/-/g; s/\\f[BIR]//g')
+# shellcheck source=/dev/null
+source "$root/usr/share/bash-completion/completions/sixpoint"
+offered() { # offered WORD...: what Tab gives after these words, the last one half-typed
+  COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMPREPLY=()
+  _sixpoint
+  printf '%s\n' "${COMPREPLY[@]}"
+}
+commands_of() { "$program" "$@" --help | awk '/^Subcommands:/ { inside = 1; next } /^$/ { inside = 0 } inside && /^  [a-z]/ { print $1 }'; }
+options_of() { "$program" "$@" --help | grep -oE '^  (-[a-z],)?--[a-z0-9-]+' | grep -oE -- '--[a-z0-9-]+$'; }
+checked=0
+check_command() {
+  local section sub option
+  section=$(awk -v head=".SS sixpoint $*" '$0 == head { inside = 1; next } /^\.S[SH]/ { inside = 0 } inside' <<<"$page")
+  [ -n "$section" ] || failed "the manual page has no section 'sixpoint $*'"
+  for option in $(options_of "$@"); do
+    offered sixpoint "$@" "$option" | grep -qxF -- "$option" || failed "the shell does not offer $* $option"
+    [ "$option" = --help ] || grep -qF -- "$option" <<<"$section" || failed "the manual page's section $* lacks $option"
+  done
+  checked=$((checked + 1))
+  for sub in $(commands_of "$@"); do
+    offered sixpoint "$@" "${sub:0:2}" | grep -qxF -- "$sub" || failed "the shell does not offer $* $sub"
+    check_command "$@" "$sub"
+  done
+}
+for command in $(commands_of); do
+  offered sixpoint "${command:0:1}" | grep -qxF -- "$command" || failed "the shell does not offer $command"
+  check_command "$command"
+done
+[ "$checked" -gt 40 ] || failed "only $checked commands were looked at"
+[ -z "$(offered sixpoint repair archive)" ] || failed "a folder's name was taken for a command"
+if have groff "the manual page's form"; then
+  words=$(gunzip -c "$root/usr/share/man/man1/sixpoint.1.gz" | groff -man -Tascii -ww -z 2>&1) || failed "groff: $words"
+  [ -z "$words" ] || failed "groff: $words"
+fi
+
+# The service: its unit is well formed and shut in, and its command line serves the page.
+unit=$root/lib/systemd/system/sixpoint-station.service
+if have systemd-analyze "the unit's form"; then
+  sed "s#/usr/bin/sixpoint#$program#" "$unit" >"$scratch/sixpoint-station.service"
+  words=$(systemd-analyze verify --man=no "$scratch/sixpoint-station.service" 2>&1) || failed "systemd-analyze: $words"
+  [ -z "$words" ] || failed "systemd-analyze: $words"
+  # 2.0 of 10; OK begins below 5.
+  words=$(systemd-analyze security --offline=true --threshold=20 "$scratch/sixpoint-station.service" 2>&1) ||
+    failed "the unit is exposed more than 2.0: $(tail -n 1 <<<"$words")"
+fi
+mkdir -p "$scratch/state/sixpoint"
+# shellcheck source=/dev/null
+source "$root/etc/default/sixpoint-station"
+command=$(sed -n 's/^ExecStart=//p' "$unit" | sed "s#/usr/bin/sixpoint#$program#; s#%S#$scratch/state#g")
+command=${command/\$SIXPOINT_STATION_OPTIONS/${SIXPOINT_STATION_OPTIONS/--port 6020/--port 0}}
+# Word splitting as systemd does it.
+XDG_DATA_HOME=$scratch/state $command >"$scratch/station" 2>&1 &
+station=$!
+for _ in $(seq 100); do
+  grep -q 'http://127.0.0.1:' "$scratch/station" && break
+  sleep 0.1
+done
+port=$(grep -oE 'http://127.0.0.1:[0-9]+' "$scratch/station" | head -n 1 | grep -oE '[0-9]+$' || true)
+if [ -n "$port" ] && exec 3<>"/dev/tcp/127.0.0.1/$port"; then
+  printf 'GET / HTTP/1.1\r\nHost: 127.0.0.1:%s\r\nConnection: close\r\n\r\n' "$port" >&3
+  head -n 1 <&3 | grep -q '200 OK' || failed "the page is not served"
+  exec 3>&-
+else
+  failed "the service's command line does not start the station: $(cat "$scratch/station")"
+fi
+kill -TERM "$station"
+status=0
+wait "$station" || status=$?
+[ "$status" -eq 0 ] || failed "the station ended with $status after SIGTERM"
+[ -f "$scratch/state/sixpoint/store.db" ] || [ -d "$scratch/state/sixpoint" ] || failed "no state folder"
+
+if have lintian "the package's form"; then
+  errors=$(lintian --allow-root --fail-on error "$package" 2>&1) || failed "lintian: $errors"
+fi
+[ "$failures" -eq 0 ] && echo "the package $(basename "$package") is sound; $checked commands"
+exit "$failures"
