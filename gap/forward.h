@@ -49,6 +49,9 @@ struct ParameterGroup {
   double high = 0;      // an estimate beyond four times this is another thing
   double tau_s = 0;     // warm_up's shape
   int shape = 1;        // hysteresis'
+
+  // Prior standard deviation of the group's i-th number.
+  double sd_of(int i) const { return i >= 3 && curve_sd > 0 ? curve_sd : prior_sd; }
 };
 inline constexpr int kForwardParameters = 40;
 // Every group, with each shape of warm_up and hysteresis as a group of its own.

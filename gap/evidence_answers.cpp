@@ -1,0 +1,107 @@
+#include <algorithm>
+#include <cmath>
+
+#include "gap/evidence.h"
+
+namespace sixpoint::gap {
+namespace {
+
+double log_sum(double a, double b) {
+  const double high = std::max(a, b);
+  return high == -1e300 ? high : high + std::log(std::exp(a - high) + std::exp(b - high));
+}
+
+}  // namespace
+
+double EvidenceSearch::probability(const std::string& effect) const {
+  double with = -1e300;
+  double without = -1e300;
+  for (const State& state : states_) {
+    const bool has =
+        to_string(state.scatter) == effect ||
+        std::any_of(state.subset.groups.begin(), state.subset.groups.end(),
+                    [&](int g) { return groups_[static_cast<std::size_t>(g)].effect == effect; });
+    double& sum = has ? with : without;
+    sum = log_sum(sum, state.subset.nats);
+  }
+  return with == -1e300 ? 0 : 1 / (1 + std::exp(std::min(700.0, without - with)));
+}
+
+double EvidenceSearch::gain_nats(const std::string& effect) const {
+  double with = -1e300;
+  double without = -1e300;
+  for (const State& state : states_) {
+    const bool has =
+        to_string(state.scatter) == effect ||
+        std::any_of(state.subset.groups.begin(), state.subset.groups.end(),
+                    [&](int g) { return groups_[static_cast<std::size_t>(g)].effect == effect; });
+    double& best = has ? with : without;
+    best = std::max(best, state.subset.nats);
+  }
+  return with == -1e300 || without == -1e300 ? 0 : with - without;
+}
+
+std::optional<EvidenceSearch::Estimate> EvidenceSearch::estimate(const std::string& effect) const {
+  std::vector<int> base = best().subset.groups;
+  int chosen = -1;
+  for (const int g : base) {
+    if (groups_[static_cast<std::size_t>(g)].effect == effect) {
+      chosen = g;
+    }
+  }
+  if (chosen < 0) {
+    double best = -1e300;
+    for (int g = kNuisances; g < static_cast<int>(groups_.size()); ++g) {
+      if (groups_[static_cast<std::size_t>(g)].effect == effect) {
+        std::vector<int> grown = base;
+        grown.insert(std::upper_bound(grown.begin(), grown.end(), g), g);
+        const double nats = evidence(final_, grown, nullptr);
+        if (nats > best) {
+          best = nats;
+          chosen = g;
+        }
+      }
+    }
+    if (chosen < 0) {
+      return std::nullopt;
+    }
+    base.insert(std::upper_bound(base.begin(), base.end(), chosen), chosen);
+  }
+  Posterior posterior;
+  evidence(final_, base, &posterior);
+  Estimate estimate;
+  const ParameterGroup& group = groups_[static_cast<std::size_t>(chosen)];
+  for (std::size_t k = 0; k < posterior.columns.size(); ++k) {
+    const int c = posterior.columns[k] - group_column_[static_cast<std::size_t>(chosen)];
+    if (c >= 0 && c < std::min(3, group.count)) {
+      const auto i = static_cast<Eigen::Index>(k);
+      estimate.value.push_back(posterior.mean[i]);
+      estimate.sd.push_back(std::sqrt(posterior.covariance(i, i)));
+    }
+  }
+  estimate.tau_s = group.tau_s;
+  return estimate;
+}
+
+double EvidenceSearch::undetermined(const std::string& effect) const {
+  double worst = 0;
+  bool any = false;
+  for (int g = kNuisances; g < static_cast<int>(groups_.size()); ++g) {
+    const ParameterGroup& group = groups_[static_cast<std::size_t>(g)];
+    if (group.effect != effect) {
+      continue;
+    }
+    Posterior posterior;
+    evidence(final_, {g}, &posterior);
+    double here = 0;
+    for (std::size_t k = 6; k < std::min<std::size_t>(9, posterior.columns.size()); ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      here = std::max(here, std::sqrt(posterior.covariance(i, i)) / group.prior_sd);
+    }
+    worst = any ? std::min(worst, here) : here;  // the best determined shape counts
+    any = true;
+  }
+  return any ? worst : 1;
+}
+
+}  // namespace sixpoint::gap
