@@ -23,6 +23,7 @@
 #include "base/atomic_file.h"
 #include "sim/bundle_writer.h"
 #include "station/cli/workers.h"
+#include "station/gap_outside.h"
 #include "station/gap_trials.h"
 
 extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
@@ -83,6 +84,8 @@ struct Outcome {
              return not_observable.contains(effect.name);
            });
   }
+  // For an effect that the diagnosis can't know: what the protocol can't show needs no "unknown".
+  bool honest() const { return unknown || family_right() || honestly_blind(); }
   bool confidently_wrong() const {
     constexpr double kConfident = 0.9;
     return !unknown && !named.empty() && named.front().second > kConfident && !family_right();
@@ -304,9 +307,7 @@ Scores score(const std::vector<Outcome>& outcomes, bool strip) {
     const bool withheld =
         outcome.kind == TrialKind::outside || (strip && outcome.kind != TrialKind::none);
     if (withheld) {
-      // What the protocol can't show at all needs no "unknown".
-      scores.withheld_honest.count(outcome.unknown || outcome.family_right() ||
-                                   outcome.honestly_blind());
+      scores.withheld_honest.count(outcome.honest());
       scores.withheld_wrong.count(outcome.confidently_wrong());
       continue;
     }
@@ -396,6 +397,8 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
       entry["named"].push_back({{"name", name}, {"probability", number(probability)}});
     }
     entry["unknown"] = outcome.unknown;
+    entry["honest"] = outcome.honest();
+    entry["confidently_wrong"] = outcome.confidently_wrong();
     entry["seconds"] = outcome.seconds;
     if (!outcome.failure.empty()) {
       entry["failure"] = outcome.failure;
@@ -492,7 +495,11 @@ Status challenge(Context& context, Options options) {
                 "production or engineering");
   }
   for (const std::string& name : options.only) {
-    if (const auto found = sim::find_effect(name); !found) {
+    const auto& outside = station::outside_kinds();
+    const bool is_outside =
+        std::any_of(outside.begin(), outside.end(),
+                    [&](const station::OutsideKind& kind) { return kind.effect.name == name; });
+    if (const auto found = sim::find_effect(name); !found && !is_outside) {
       return tl::unexpected(found.error());
     }
   }
