@@ -92,8 +92,13 @@ class EvidenceSearch {
 
   // Probability over everything that was looked at (with scatter of the catalogue).
   double probability(const std::string& effect) const;
-  // Log evidence of the best explanation with this effect over the best without it.
-  double gain_nats(const std::string& effect) const;
+  // Log evidence of the best explanation with this effect over the best without it; with
+  // `known_only` kinds of scatter that the catalogue lacks do not compete.
+  double gain_nats(const std::string& effect, bool known_only = false) const;
+  // Log odds of the best explanation with scatter of an unknown kind over the best known one.
+  double unknown_nats() const {
+    return best_unknown_ ? best_unknown_->nats - best_known_.nats : -1e3;
+  }
   // Estimate of an effect on top of the best explanation, for candidates that were not accepted.
   struct Estimate {
     std::vector<double> value;

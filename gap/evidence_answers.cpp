@@ -27,10 +27,13 @@ double EvidenceSearch::probability(const std::string& effect) const {
   return with == -1e300 ? 0 : 1 / (1 + std::exp(std::min(700.0, without - with)));
 }
 
-double EvidenceSearch::gain_nats(const std::string& effect) const {
+double EvidenceSearch::gain_nats(const std::string& effect, bool known_only) const {
   double with = -1e300;
   double without = -1e300;
   for (const State& state : states_) {
+    if (known_only && !in_catalogue(state.scatter)) {
+      continue;
+    }
     const bool has =
         to_string(state.scatter) == effect ||
         std::any_of(state.subset.groups.begin(), state.subset.groups.end(),

@@ -45,7 +45,8 @@ std::string parameter_name(const std::string& effect) {
 }
 
 void Diagnoser::find(EffectFinding finding) {
-  finding.probability = logistic(finding.nats);
+  finding.probability =
+      1 / (1 / logistic(finding.nats) + std::exp(std::min(9.0, finding.other_nats)));
   if (!allowed(finding.name)) {
     return;
   }
