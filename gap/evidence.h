@@ -109,6 +109,9 @@ class EvidenceSearch {
   // How well this effect's parameters would be known: sd over prior sd of the worst, 1 = not at
   // all.
   double undetermined(const std::string& effect) const;
+  // Log evidence to be expected of this effect at its smallest realistic size, prior included:
+  // below the threshold of acceptance this recording can't show it so small.
+  double expected_nats(const std::string& effect) const;
   // Log predictive likelihood of held-out conditions with the effect less without it.
   double held_out_nats(const std::string& effect) const;
 

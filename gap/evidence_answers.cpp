@@ -107,4 +107,32 @@ double EvidenceSearch::undetermined(const std::string& effect) const {
   return any ? worst : 1;
 }
 
+double EvidenceSearch::expected_nats(const std::string& effect) const {
+  // One axis has the size, the others a uniform share of it: the squares add up to 5/3 on average.
+  constexpr double kOthers = 1.0 / 3;
+  double best = -1e300;
+  for (int g = kNuisances; g < static_cast<int>(groups_.size()); ++g) {
+    const ParameterGroup& group = groups_[static_cast<std::size_t>(g)];
+    if (group.effect != effect || group.small == 0) {
+      continue;
+    }
+    Posterior posterior;
+    evidence(final_, {g}, &posterior);
+    const Eigen::Index count = std::min(3, group.count);
+    // What the data alone say of the numbers: posterior less prior precision.
+    const Eigen::MatrixXd covariance = posterior.covariance.block(6, 6, count, count);
+    double square = 0;
+    double occam = 0;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double prior2 = group.prior_sd * group.prior_sd;
+      const double left = std::min(covariance(i, i), prior2 * (1 - 1e-9));
+      const double information = 1 / left - 1 / prior2;
+      square += group.small * group.small * information * (i == 0 ? 1 : kOthers);
+      occam += 0.5 * std::log(prior2 / left);
+    }
+    best = std::max(best, 0.5 * square - occam + log_prior({g}));
+  }
+  return best == -1e300 ? 1e300 : best;
+}
+
 }  // namespace sixpoint::gap

@@ -47,6 +47,7 @@ struct ParameterGroup {
   double prior_mean = 0;
   double curve_sd = 0;  // of the fourth number on: what bends the effect's main law
   double high = 0;      // an estimate beyond four times this is another thing
+  double small = 0;     // smallest realistic size; 0: not asked
   double tau_s = 0;     // warm_up's shape
   int shape = 1;        // hysteresis'
 
