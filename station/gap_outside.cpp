@@ -381,6 +381,259 @@ Made narrow_band(Draw d) {
   return made;
 }
 
+// Stiction: the reading stays until the force has moved on by this much.
+Made dead_zone(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->analog = [width = 3 * d.severity / kMgPerG,
+                  held = Eigen::Vector3d(9, 9, 9)](SimulatedBlock& block) mutable {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      for (Eigen::Index a = 0; a < 3; ++a) {
+        held[a] = std::clamp(held[a], sensed[a] - width, sensed[a] + width);
+        sensed[a] = held[a];
+      }
+    }
+  };
+  return made;
+}
+
+// The front end follows no faster than so many g per second.
+Made slew_limit(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [most = 0.8 / d.severity, last = Eigen::Vector3d(9, 9, 9),
+                  end_s = -1.0](SimulatedBlock& block) mutable {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      Eigen::Vector3d& sensed = block.sensed_g[i];
+      if (block.time_s[i] < end_s + 0.1) {
+        for (Eigen::Index a = 0; a < 3; ++a) {
+          sensed[a] = std::clamp(sensed[a], last[a] - most, last[a] + most);
+        }
+      }
+      last = sensed;
+      end_s = block.time_s[i];
+    }
+  };
+  return made;
+}
+
+// The low bits are not there: steps of two to eight.
+Made coarse_steps(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [step = d.severity < 0.7   ? 2
+                           : d.severity < 1.5 ? 4
+                                              : 8](SimulatedBlock& block) {
+    for (gt3x::Counts& counts : block.stored) {
+      for (std::int16_t& x : counts) {
+        x = static_cast<std::int16_t>(std::lround(static_cast<double>(x) / step) * step);
+      }
+    }
+  };
+  return made;
+}
+
+// A higher bit of one axis always reads one.
+Made stuck_high_bit(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [axis = d.axis(),
+                    bit = 1 << (1 + static_cast<int>(d.random.below(4)))](SimulatedBlock& block) {
+    for (gt3x::Counts& counts : block.stored) {
+      counts[axis] = static_cast<std::int16_t>(counts[axis] | bit);
+    }
+  };
+  return made;
+}
+
+// The zero follows the square of the temperature, or a kink in it.
+Made bent_tempco(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [g = d.vector(3 * d.severity) / kMgPerG, kink = d.random.uniform() < 0.5,
+                  at_c = d.between(20, 30)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double x = (block.temperature_c[i] - at_c) / 12;
+      block.sensed_g[i] += g * (kink ? std::max(0.0, x) : x * x);
+    }
+  };
+  return made;
+}
+
+// The hand warms the unit at every placement.
+Made hand_warmth(Draw d) {
+  auto made = std::make_unique<Parts>();
+  auto since_s = std::make_shared<double>(-1e9);
+  made->placement = [since_s](const Placement& at) {
+    if (at.anew) {
+      *since_s = at.start_s;
+    }
+  };
+  made->sensor = [since_s, g = d.vector(2 * d.severity) / kMgPerG,
+                  tau_s = d.between_log(4, 40)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      block.sensed_g[i] += g * std::exp(-std::max(0.0, block.time_s[i] - *since_s) / tau_s);
+    }
+  };
+  return made;
+}
+
+// The battery runs down, and the gain with it.
+Made battery_droop(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [per_h = -0.002 * d.severity](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      block.sensed_g[i] *= 1 + per_h * block.time_s[i] / 3600;
+    }
+  };
+  return made;
+}
+
+// A machine that runs for a while and rests for a while.
+Made blower(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const double period_s = d.between_log(20, 200);
+  made->stimulus = [g = d.vector(2 * d.severity) / kMgPerG, f = d.between(6, 40), period_s,
+                    on_s = period_s * d.between(0.2, 0.6)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (std::fmod(block.time_s[i], period_s) < on_s) {
+        block.motion[i].force_lab_g += g * std::sin(kTwoPi * f * block.time_s[i]);
+      }
+    }
+  };
+  return made;
+}
+
+// The board bends under its own weight: how the sensor sits depends on the pose.
+Made sagging_board(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [deg = 0.1 * d.severity, a = d.axis(), b = d.axis()](SimulatedBlock& block) {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      Eigen::Vector3d bend = Eigen::Vector3d::Zero();
+      bend[row(b)] = deg * sensed[row(a)];
+      sensed = turn_by(bend) * sensed;
+    }
+  };
+  return made;
+}
+
+// The sample clock drifts with the temperature.
+Made clock_tempco(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sampling = [ppm_per_c = d.sign() * 8 * d.severity, shift_s = 0.0,
+                    start_s = -1.0](SimulatedBlock& block) mutable {
+    if (block.clock_start_s != start_s) {
+      start_s = block.clock_start_s;
+      shift_s = 0;
+    }
+    // The chamber's programme as the clock feels it: it swings by 12 C in half an hour.
+    for (double& t : block.time_s) {
+      shift_s += 0.01 * 1e-6 * ppm_per_c * 12 * std::sin(kTwoPi * t / 3600);
+      t += shift_s;
+    }
+  };
+  return made;
+}
+
+// A buffer overflows now and then: tens of samples are lost in one go.
+Made lost_bursts(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sampling = [d, shift_s = 0.0, start_s = -1.0](SimulatedBlock& block) mutable {
+    if (block.clock_start_s != start_s) {
+      start_s = block.clock_start_s;
+      shift_s = 0;
+    }
+    for (double& t : block.time_s) {
+      if (d.random.uniform() < 2e-4 * d.severity) {
+        shift_s += 0.01 * static_cast<double>(5 + d.random.below(45));
+      }
+      t += shift_s;
+    }
+  };
+  return made;
+}
+
+// For some samples two axes change places.
+Made crossed_axes(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [d, a = d.axis(), left = std::uint64_t{0}](SimulatedBlock& block) mutable {
+    for (gt3x::Counts& counts : block.stored) {
+      if (left == 0 && d.random.uniform() < 2e-4 * d.severity) {
+        left = 1 + d.random.below(100);
+      }
+      if (left > 0) {
+        --left;
+        std::swap(counts[a], counts[(a + 1) % kAxes]);
+      }
+    }
+  };
+  return made;
+}
+
+// The sensor runs at half the rate that is stored: every value comes twice.
+Made half_rate(Draw /*d*/) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [last = gt3x::Counts{}](SimulatedBlock& block) mutable {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if ((block.first_sample + i) % 2 == 1 && i > 0) {
+        block.stored[i] = last;
+      }
+      last = block.stored[i];
+    }
+  };
+  return made;
+}
+
+// Somebody knocks against the table.
+Made knocks(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->stimulus = [d, g = Eigen::Vector3d(Eigen::Vector3d::Zero()), age_s = 1e9,
+                    f = d.between(8, 30)](SimulatedBlock& block) mutable {
+    for (sim::MotionState& motion : block.motion) {
+      if (d.random.uniform() < 3e-4) {
+        g = d.vector(40 * d.severity) / kMgPerG;
+        age_s = 0;
+      }
+      age_s += 0.01;
+      motion.force_lab_g += g * (std::exp(-age_s / 0.15) * std::cos(kTwoPi * f * age_s));
+    }
+  };
+  return made;
+}
+
+// The table settles: its level creeps while the units are measured.
+Made creeping_table(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->stimulus = [deg = 0.15 * d.severity, direction = d.between(0, kTwoPi),
+                    tau_s = d.between_log(60, 3000)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double now = deg * (1 - std::exp(-block.time_s[i] / tau_s));
+      block.motion[i].rotation =
+          block.motion[i].rotation *
+          turn_by(now * Eigen::Vector3d(std::cos(direction), std::sin(direction), 0));
+    }
+  };
+  return made;
+}
+
+// One axis is noisier than its kind.
+Made noisy_axis(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [d, axis = d.axis(), g = 4 * d.severity / kMgPerG](SimulatedBlock& block) mutable {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      sensed[row(axis)] += g * d.random.normal();
+    }
+  };
+  return made;
+}
+
+// An auto-zero that hunts: the zero ramps off and is set back, again and again.
+Made saw_tooth(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [g = d.vector(2 * d.severity) / kMgPerG,
+                  period_s = d.between_log(30, 300)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      block.sensed_g[i] += g * (std::fmod(block.time_s[i], period_s) / period_s);
+    }
+  };
+  return made;
+}
+
 template <Made (*kMake)(Draw)>
 OutsideKind outside(const char* name, Stage stage, std::string_view family, bool in_faces = true) {
   EffectKind kind = {name,
@@ -416,6 +669,24 @@ const std::vector<OutsideKind>& outside_kinds() {
       outside<delayed_axis>("delayed_axis", Stage::firmware, "", false),
       outside<noise_spells>("noise_spells", Stage::sensor, ""),
       outside<narrow_band>("narrow_band", Stage::stimulus, "line"),
+      // The kinds from here on were written after the diagnosis was frozen (docs/gap.md).
+      outside<dead_zone>("dead_zone", Stage::sensor, ""),
+      outside<slew_limit>("slew_limit", Stage::sensor, "", false),
+      outside<coarse_steps>("coarse_steps", Stage::firmware, "rounding"),
+      outside<stuck_high_bit>("stuck_high_bit", Stage::firmware, ""),
+      outside<bent_tempco>("bent_tempco", Stage::sensor, "", false),
+      outside<hand_warmth>("hand_warmth", Stage::sensor, ""),
+      outside<battery_droop>("battery_droop", Stage::sensor, "", false),
+      outside<blower>("blower", Stage::stimulus, "line"),
+      outside<sagging_board>("sagging_board", Stage::sensor, ""),
+      outside<clock_tempco>("clock_tempco", Stage::sampling, "timing", false),
+      outside<lost_bursts>("lost_bursts", Stage::sampling, "timing"),
+      outside<crossed_axes>("crossed_axes", Stage::firmware, ""),
+      outside<half_rate>("half_rate", Stage::firmware, "timing"),
+      outside<knocks>("knocks", Stage::stimulus, ""),
+      outside<creeping_table>("creeping_table", Stage::stimulus, ""),
+      outside<noisy_axis>("noisy_axis", Stage::sensor, ""),
+      outside<saw_tooth>("saw_tooth", Stage::sensor, ""),
   };
   return kKinds;
 }
