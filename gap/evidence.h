@@ -112,6 +112,9 @@ class EvidenceSearch {
   // Log evidence to be expected of this effect at its smallest realistic size, prior included:
   // below the threshold of acceptance this recording can't show it so small.
   double expected_nats(const std::string& effect) const;
+  // Log evidence that an effect of the best explanation (or "gain") is not constant but changes in
+  // proportion to time, over the best explanation, in which it is constant.
+  double changing_nats(const std::string& effect) const;
   // Log predictive likelihood of held-out conditions with the effect less without it.
   double held_out_nats(const std::string& effect) const;
 

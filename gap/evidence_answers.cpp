@@ -1,3 +1,4 @@
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -133,6 +134,56 @@ double EvidenceSearch::expected_nats(const std::string& effect) const {
     best = std::max(best, 0.5 * square - occam + log_prior({g}));
   }
   return best == -1e300 ? 1e300 : best;
+}
+
+double EvidenceSearch::changing_nats(const std::string& effect) const {
+  const Fit& fit = best();
+  if (blocks_.empty() || !in_catalogue(fit.scatter)) {
+    return 0;
+  }
+  std::vector<int> all = {0, 1};
+  all.insert(all.end(), fit.subset.groups.begin(), fit.subset.groups.end());
+  const auto at = std::find_if(all.begin(), all.end(), [&](int g) {
+    return groups_[static_cast<std::size_t>(g)].effect == effect;
+  });
+  if (at == all.end()) {
+    return 0;
+  }
+  const ParameterGroup& group = groups_[static_cast<std::size_t>(*at)];
+  // Scatter could stand for the change: then the comparison is with none beside it.
+  const Whitened w = whiten(fit.state, Scatter::nominal, 0);
+  Posterior posterior;
+  const double without = evidence(w, fit.subset.groups, &posterior) + log_prior(fit.subset.groups);
+  const double first_s = blocks_.front().middle_s;
+  const double half_s = std::max(1.0, (blocks_.back().middle_s - first_s) / 2);
+  const Eigen::Index count = std::min(3, group.count);
+  // Placements are whitened apart, and short against the recording: a column of the change is the
+  // effect's own, row by row times the time.
+  Eigen::MatrixXd change(w.x.rows(), count);
+  for (Eigen::Index row = 0; row < change.rows(); ++row) {
+    const Block& block =
+        blocks_[static_cast<std::size_t>(w.row_block[static_cast<std::size_t>(row)])];
+    const double time = (block.middle_s - first_s) / half_s - 1;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      change(row, i) = w.x(row, group_column_[static_cast<std::size_t>(*at)] + i) * time;
+    }
+  }
+  Eigen::MatrixXd used(w.x.rows(), posterior.mean.size());
+  for (std::size_t c = 0; c < posterior.columns.size(); ++c) {
+    used.col(static_cast<Eigen::Index>(c)) = w.x.col(posterior.columns[c]);
+  }
+  const Eigen::VectorXd residual = w.y - used * posterior.mean;
+  const Eigen::MatrixXd cross = used.transpose() * change;
+  Eigen::MatrixXd a =
+      change.transpose() * change - cross.transpose() * posterior.covariance * cross;
+  const Eigen::VectorXd b = change.transpose() * residual;
+  // As much change as a small effect has size; gains by a thousandth.
+  const double sd = group.effect == "gain" ? 1e-3 : 0.5 * group.prior_sd;
+  a.diagonal().array() += 1 / (sd * sd);
+  const Eigen::LLT<Eigen::MatrixXd> llt(a);
+  return without - (fit.scatter == Scatter::nominal ? without : fit.nats) +
+         0.5 * b.dot(llt.solve(b)) - llt.matrixLLT().diagonal().array().log().sum() -
+         static_cast<double>(count) * std::log(sd);
 }
 
 }  // namespace sixpoint::gap

@@ -10,6 +10,29 @@
 
 namespace sixpoint::gap {
 
+namespace {
+
+constexpr double kOtherWins = 3;            // twenty to one, as for scatter of unknown kinds
+constexpr double kLogPriorChanging = -4.5;  // as of each unknown kind
+
+// Whether the zero's curve over temperature lies outside what goes with its slope: beyond four
+// prior standard deviations, and surely so.
+bool bends(const Fit& fit) {
+  Eigen::Index at = 6;
+  for (const ParameterGroup& group : fit.groups) {
+    for (int i = 0; i < group.count; ++i, ++at) {
+      if (group.effect == "offset_tempco" && i >= 3 &&
+          std::abs(fit.posterior.mean[at]) - 3 * std::sqrt(fit.posterior.covariance(at, at)) >
+              4 * group.curve_sd) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
 void Diagnoser::judge_means() {
   EvidenceOptions options;
   options.lsb_mg = 1000 / bundle_.accel_scale_lsb_per_g;
@@ -87,7 +110,21 @@ void Diagnoser::judge_means() {
     if (in && f.held_out_gain_nats <= 0) {
       f.nats = -0.1;  // it does not help where it was not fitted
     }
+    if (in && name != "drift" && name != "warm_up") {
+      f.other_nats = search_->changing_nats(name) + kLogPriorChanging;
+      if (f.other_nats > kOtherWins) {
+        alarm(std::sqrt(2 * f.other_nats) + kAlarm_sd,
+              fmt::format("mean: {} that changes while the recording runs", name));
+      }
+    }
+    if (in && name == "offset_tempco" && bends(fit)) {
+      alarm(2 * kAlarm_sd, "mean: the zero bends over temperature more than a zero's drift does");
+      f.other_nats = kOtherWins;
+    }
     find(std::move(f));
+  }
+  if (const double nats = search_->changing_nats("gain") + kLogPriorChanging; nats > kOtherWins) {
+    alarm(std::sqrt(2 * nats) + kAlarm_sd, "mean: gains that change while the recording runs");
   }
   const auto scatter = [&](Scatter kind) {
     const std::string name(to_string(kind));
