@@ -125,9 +125,10 @@ TEST_P(Resimulation, GapAfterIsWhatTheSimulatorLeaves) {
   RecordProperty("after_ug", static_cast<int>(1000 * after_mg));
   RecordProperty("closed_form_after_ug", static_cast<int>(1000 * found->gap.after_mg));
   RecordProperty("floor_ug", static_cast<int>(1000 * floor_mg));
-  // The closed form's gap.after is the simulator's within a fifth.
-  EXPECT_NEAR(after_mg / found->gap.after_mg, 1, 0.2)
-      << after_mg << " against " << found->gap.after_mg;
+  // The closed form's gap.after, held out, is the simulator's within a quarter, and never smaller:
+  // it counts the tones of the high shaker, too, which are known worse.
+  EXPECT_LT(after_mg, 1.05 * found->gap.after_mg);
+  EXPECT_GT(after_mg, 0.75 * found->gap.after_mg);
   // gap.md: nine tenths of what the true form would close.
   const double closable = before_mg * before_mg - floor_mg * floor_mg;
   const double closed = before_mg * before_mg - after_mg * after_mg;
