@@ -145,8 +145,9 @@ TEST_F(GapChallenge, AddsEffectsToARecording) {
   EXPECT_EQ(json["scores"]["none_alarms"]["right"], 0);
   EXPECT_GE(json["scores"]["single_first_right"]["share"].get<double>(), 0.8);
   const auto refused = [&](const char* effect, const std::string& recording) {
-    return tests::run_command(posix_env(), {"gap", "challenge", "--recording", recording,
-                                            "--effects", effect, "--trials", "1"})
+    return tests::run_command(posix_env(),
+                              {"gap", "challenge", "--program", SIXPOINT_BINARY_DIR "/sixpoint",
+                               "--recording", recording, "--effects", effect, "--trials", "1"})
         .exit_code;
   };
   EXPECT_EQ(refused("clock_error", folder_ / "recorded"), 64);
