@@ -1,10 +1,12 @@
 // A bundle's three text files beside a good recording: the first byte says which of them is
-// hostile. Whatever is read is within the recording, and says so the same way twice.
+// hostile, and whether what was read is diagnosed, too (slow). Whatever is read is within the
+// recording, and a diagnosis of it answers.
 #include <cstdlib>
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "gap/bundle.h"
+#include "gap/diagnose.h"
 #include "sim/bundle_writer.h"
 #include "sim/scenario.h"
 
@@ -36,6 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                 *read_file(prepared().files, kNames[1]),
                                 *read_file(prepared().files, kNames[2])};
   const std::size_t which = data[0] % 3;
+  const bool diagnosed = data[0] >= 0xC0;
   MemoryFiles& files = prepared().files;
   const auto put = [&](std::string_view text) {
     (void)files.remove(kNames[which]);
@@ -48,6 +51,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (bundle) {
     for (const gap::Segment& segment : bundle->segments) {
       if (segment.first_sample + segment.samples > bundle->samples.size()) {
+        std::abort();
+      }
+    }
+    if (diagnosed) {
+      const auto diagnosis = gap::diagnose(*bundle);
+      if (!diagnosis || diagnosis->brief().empty()) {
         std::abort();
       }
     }

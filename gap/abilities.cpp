@@ -102,6 +102,7 @@ void Diagnoser::list_not_observable() {
       continue;
     }
     bool missing = (entry.needs & ~abilities_) != 0;
+    bool too_small = false;
     if (name == "clock_error" || name == "dropped_samples" || name == "duplicated_samples") {
       missing = !timing_.usable && (abilities_ & kShaker) == 0;
       if (name == "clock_error" && !missing) {
@@ -111,6 +112,7 @@ void Diagnoser::list_not_observable() {
     } else if (!missing && !parameter_name(name).empty() && search_ && name != "seating" &&
                name != "random_walk" && name != "flicker") {
       missing = search_->undetermined(name) > 0.35;
+      too_small = !missing && search_->expected_nats(name) < kAccept;
     }
     if (name == "filter_mismatch") {
       missing = missing || options_.uncalibrated;
@@ -118,9 +120,10 @@ void Diagnoser::list_not_observable() {
     if (name == "axis_rotation") {
       missing = !clean_.axes_decidable;
     }
-    if (missing) {
-      out_.not_observable.emplace_back(name,
-                                       entry.segment.empty() ? "none" : std::string(entry.segment));
+    if (missing || too_small) {
+      const std::string_view segment =
+          too_small && !entry.finer.empty() ? entry.finer : entry.segment;
+      out_.not_observable.emplace_back(name, segment.empty() ? "none" : std::string(segment));
     }
   }
   struct Offer {

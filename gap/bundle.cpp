@@ -66,10 +66,13 @@ class Fields {
     for (Eigen::Index row = 0; row < 3; ++row) {
       matrix.row(row) = vector_of((*found)[static_cast<std::size_t>(row)], key).transpose();
     }
+    if (!problem_ && matrix.determinant() < -0.5) {
+      complain(fmt::format("'{}' mirrors: it is no rotation", key));
+    }
     if (!problem_ &&
         (!((matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <
            kOrthonormal) ||
-         matrix.determinant() < 0)) {
+         !(matrix.determinant() > 0))) {
       complain(fmt::format("'{}' is no rotation (its rows are not orthonormal)", key));
     }
     return matrix;
@@ -179,7 +182,7 @@ Result<Segment> read_segment(const Json& json, const std::string& where) {
     Vibration v;
     v.direction_lab = inner.vector("direction_lab");
     v.frequency_hz = inner.number("frequency_hz", 1e-3, 1e4);
-    v.amplitude_g = inner.number("amplitude_g", 0, 1e3);
+    v.amplitude_g = inner.number("amplitude_g", 0, 100);
     const double length = v.direction_lab.norm();
     if (!(std::abs(length - 1) < 0.01)) {
       inner.complain("'direction_lab' is not of unit length");
@@ -320,6 +323,34 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
   return {};
 }
 
+// Stamps that are not of this recording's segments would make samples lost or repeated.
+void drop_foreign_clock(Bundle& bundle) {
+  std::size_t off = 0;
+  std::size_t of_segments = 0;
+  for (std::size_t i = 0; i < bundle.host_clock.sample_index.size(); ++i) {
+    const std::size_t at = bundle.host_clock.sample_index[i];
+    for (const Segment& segment : bundle.segments) {
+      if (at >= segment.first_sample && at < segment.first_sample + segment.samples) {
+        const double into_s = static_cast<double>(at - segment.first_sample) / bundle.rate_hz;
+        // A clock error of 0.5 %, and a hundredth of all samples lost or repeated.
+        off += std::abs(bundle.host_clock.host_time_s[i] - segment.host_start_s - into_s) >
+                       0.5 + 0.02 * into_s
+                   ? 1
+                   : 0;
+        ++of_segments;
+        break;
+      }
+    }
+  }
+  if (2 * off > of_segments) {
+    bundle.losses.push_back(fmt::format(
+        "host_clock.csv contradicts the protocol's times ({} of {} stamps) and was left "
+        "out: lost or repeated samples and the clock's error show in shaker tones only",
+        off, of_segments));
+    bundle.host_clock = {};
+  }
+}
+
 void find_placements(Bundle& bundle) {
   constexpr double kNoPause_s = 0.05;
   constexpr double kClockReach = 0.012;
@@ -443,6 +474,10 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
     if (!bundle.segments.empty() && segment.host_start_s < bundle.segments.back().host_start_s) {
       return bad(where, "it starts earlier than the segment before");
     }
+    if (segment.vibration && segment.vibration->frequency_hz >= bundle.rate_hz / 2) {
+      return bad(where, fmt::format("a tone of {} Hz can't be seen at {} Hz",
+                                    segment.vibration->frequency_hz, bundle.rate_hz));
+    }
     end = segment.first_sample + segment.samples;
     bundle.segments.push_back(std::move(segment));
   }
@@ -455,6 +490,7 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   }
   read_temperature(files, folder, bundle);
   read_host_clock(files, folder, bundle);
+  drop_foreign_clock(bundle);
   find_placements(bundle);
   return bundle;
 }

@@ -20,6 +20,8 @@ struct CatalogueEntry {
   // of the first parameter; 0: nothing said.
   double datasheet = 0;
   std::string_view advice;  // one sentence for a technician
+  // The segment that shows it smaller, where `segment` is there already; empty: the same.
+  std::string_view finer = {};
 };
 
 // What a protocol offers.

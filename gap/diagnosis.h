@@ -26,6 +26,8 @@ struct EffectFinding {
   double held_out_gain_nats = 0;
   bool outside_datasheet = false;
   std::vector<std::string> confounded_with;
+  // Log odds of something that the catalogue lacks in its place; takes from the probability.
+  double other_nats = -1e3;
 };
 
 struct UnknownFinding {

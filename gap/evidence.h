@@ -1,5 +1,5 @@
 // Which subset of effects explains the blocks: exact Gaussian evidence, over subsets and over the
-// kinds of scatter between dwells.
+// kinds of scatter (scatter.h) between dwells.
 //
 // Model: value = forward(parameters) + seating + scatter + noise. Parameters have Gaussian priors
 // from the catalogue's realistic sizes, so that the evidence of a subset is known in closed form
@@ -20,26 +20,11 @@
 #include <vector>
 
 #include "gap/forward.h"
+#include "gap/scatter.h"
 
 namespace sixpoint::gap {
 
-enum class Scatter {
-  nominal,
-  seating,
-  random_walk,
-  flicker,
-  by_pose,       // from here on what the catalogue has not
-  by_placement,  // and with the amplitude of tones
-  by_session,    // runs of segments of one name
-  by_temperature,
-  by_time,
-  by_time_fast,
-  step  // the zero moved once, between two placements
-};
-std::string_view to_string(Scatter scatter);
-bool in_catalogue(Scatter scatter);
-
-inline constexpr double kNominalSeating_deg = 0.01;
+inline constexpr int kNuisances = 2;  // groups: gain, offset
 
 // Sums that the evidence of every subset needs, for one covariance.
 struct Whitened {
@@ -107,8 +92,13 @@ class EvidenceSearch {
 
   // Probability over everything that was looked at (with scatter of the catalogue).
   double probability(const std::string& effect) const;
-  // Log evidence of the best explanation with this effect over the best without it.
-  double gain_nats(const std::string& effect) const;
+  // Log evidence of the best explanation with this effect over the best without it; with
+  // `known_only` kinds of scatter that the catalogue lacks do not compete.
+  double gain_nats(const std::string& effect, bool known_only = false) const;
+  // Log odds of the best explanation with scatter of an unknown kind over the best known one.
+  double unknown_nats() const {
+    return best_unknown_ ? best_unknown_->nats - best_known_.nats : -1e3;
+  }
   // Estimate of an effect on top of the best explanation, for candidates that were not accepted.
   struct Estimate {
     std::vector<double> value;
@@ -119,6 +109,12 @@ class EvidenceSearch {
   // How well this effect's parameters would be known: sd over prior sd of the worst, 1 = not at
   // all.
   double undetermined(const std::string& effect) const;
+  // Log evidence to be expected of this effect at its smallest realistic size, prior included:
+  // below the threshold of acceptance this recording can't show it so small.
+  double expected_nats(const std::string& effect) const;
+  // Log evidence that an effect of the best explanation (or "gain") is not constant but changes in
+  // proportion to time, over the best explanation, in which it is constant.
+  double changing_nats(const std::string& effect) const;
   // Log predictive likelihood of held-out conditions with the effect less without it.
   double held_out_nats(const std::string& effect) const;
 
@@ -137,17 +133,21 @@ class EvidenceSearch {
   HeldOut held_out() const;
 
  private:
+  // evidence_whiten.cpp
   Whitened whiten(const ForwardState& at, Scatter scatter, double size) const;
+  // evidence_subsets.cpp
   Subset search(const Whitened& w, std::vector<Subset>& looked_at) const;
   double evidence(const Whitened& w, const std::vector<int>& groups, Posterior* posterior) const;
   double evidence_of(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, double yy,
                      const std::vector<int>& groups, Posterior* posterior) const;
   double log_prior(const std::vector<int>& groups) const;
   Fit make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const;
+  // evidence.cpp
   double chi_sd(const Fit& fit) const;
-  std::optional<Fit> fit_step(const Whitened& nominal, const ForwardState& at) const;
   ForwardState first_guess() const;
   void polish_shapes(Fit& fit);
+  // evidence_zero_step.cpp
+  std::optional<Fit> fit_step(const Whitened& nominal, const ForwardState& at) const;
 
   const std::vector<Block>& blocks_;
   EvidenceOptions options_;

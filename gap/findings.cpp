@@ -45,7 +45,8 @@ std::string parameter_name(const std::string& effect) {
 }
 
 void Diagnoser::find(EffectFinding finding) {
-  finding.probability = logistic(finding.nats);
+  finding.probability =
+      1 / (1 / logistic(finding.nats) + std::exp(std::min(9.0, finding.other_nats)));
   if (!allowed(finding.name)) {
     return;
   }
@@ -58,7 +59,13 @@ void Diagnoser::find(EffectFinding finding) {
 Diagnosis Diagnoser::give_up(const std::string& why) {
   out_.inconclusive = true;
   out_.losses.push_back(why);
-  out_.verdict = out_.effects.empty() ? Verdict::unexplained : Verdict::partly_explained;
+  // A recording that is held or zero throughout has several causes: none is named.
+  out_.effects.clear();
+  for (EffectFinding& candidate : out_.candidates) {
+    candidate.nats = std::min(candidate.nats, 0.0);
+    candidate.probability = std::min(candidate.probability, 0.5);
+  }
+  out_.verdict = Verdict::unexplained;
   out_.unknown.present = true;
   out_.unknown.probability = 0.5;
   out_.unknown.where.push_back(why);

@@ -59,27 +59,28 @@ double parameter(const ForwardState& state, int position) {
 
 std::vector<ParameterGroup> parameter_groups() {
   // Nuisances are free here (sd of 0.3): their own priors, 2 % and 35 mg, are judged afterwards.
-  // Effects: prior sd about the middle of the catalogue's realistic sizes, `high` their upper end.
+  // Effects: prior sd about the middle of the catalogue's realistic sizes, `high` their upper end,
+  // `small` their lower (where the catalogue names none: a third of the typical).
   // A zero bends over temperature by some hundredths of its slope per degree.
   std::vector<ParameterGroup> groups = {
-      {"gain", 0, 3, 0.3, 1, 0, 10, 0, 1},
-      {"offset", 3, 3, 300, 0, 0, 1e4, 0, 1},
-      {"tilt", 6, 2, 0.2, 0, 0, 0.5, 0, 1},
-      {"misalignment", 8, 3, 0.4, 0, 0, 1, 0, 1},
-      {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0, 1},
-      {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0, 1},
-      {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0, 1},
-      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0, 1},
-      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0, 1},
-      {"drift", 35, 3, 2.5, 0, 0, 5, 0, 1},
-      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0, 1},
-      {"truncation", 39, 1, 0.05, 1, 0, 0.35, 0, 1},
+      {"gain", 0, 3, 0.3, 1, 0, 10, 0, 0, 1},
+      {"offset", 3, 3, 300, 0, 0, 1e4, 0, 0, 1},
+      {"tilt", 6, 2, 0.2, 0, 0, 0.5, 0.05, 0, 1},
+      {"misalignment", 8, 3, 0.4, 0, 0, 1, 0.1, 0, 1},
+      {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0.0015, 0, 1},
+      {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0.12, 0, 1},
+      {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0.012, 0, 1},
+      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0.2, 0, 1},
+      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0.01, 0, 1},
+      {"drift", 35, 3, 2.5, 0, 0, 5, 1, 0, 1},
+      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0.0005, 0, 1},
+      {"truncation", 39, 1, 0.05, 1, 0, 0.35, 0, 0, 1},
   };
   for (const int shape : {1, 0, 2}) {
-    groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0, shape});
+    groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0.2, 0, shape});
   }
   for (const double tau_s : {75.0, 120.0, 180.0, 270.0, 400.0, 600.0}) {
-    groups.push_back({"warm_up", 32, 3, 4, 0, 0, 10, tau_s, 1});
+    groups.push_back({"warm_up", 32, 3, 4, 0, 0, 10, 1, tau_s, 1});
   }
   return groups;
 }

@@ -47,8 +47,12 @@ struct ParameterGroup {
   double prior_mean = 0;
   double curve_sd = 0;  // of the fourth number on: what bends the effect's main law
   double high = 0;      // an estimate beyond four times this is another thing
+  double small = 0;     // smallest realistic size; 0: not asked
   double tau_s = 0;     // warm_up's shape
   int shape = 1;        // hysteresis'
+
+  // Prior standard deviation of the group's i-th number.
+  double sd_of(int i) const { return i >= 3 && curve_sd > 0 ? curve_sd : prior_sd; }
 };
 inline constexpr int kForwardParameters = 40;
 // Every group, with each shape of warm_up and hysteresis as a group of its own.

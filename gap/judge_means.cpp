@@ -6,8 +6,32 @@
 #include <fmt/format.h>
 
 #include "gap/diagnoser.h"
+#include "gap/slow_structure.h"
 
 namespace sixpoint::gap {
+
+namespace {
+
+constexpr double kOtherWins = 3;            // twenty to one, as for scatter of unknown kinds
+constexpr double kLogPriorChanging = -4.5;  // as of each unknown kind
+
+// Whether the zero's curve over temperature lies outside what goes with its slope: beyond four
+// prior standard deviations, and surely so.
+bool bends(const Fit& fit) {
+  Eigen::Index at = 6;
+  for (const ParameterGroup& group : fit.groups) {
+    for (int i = 0; i < group.count; ++i, ++at) {
+      if (group.effect == "offset_tempco" && i >= 3 &&
+          std::abs(fit.posterior.mean[at]) - 3 * std::sqrt(fit.posterior.covariance(at, at)) >
+              4 * group.curve_sd) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace
 
 void Diagnoser::judge_means() {
   EvidenceOptions options;
@@ -86,7 +110,21 @@ void Diagnoser::judge_means() {
     if (in && f.held_out_gain_nats <= 0) {
       f.nats = -0.1;  // it does not help where it was not fitted
     }
+    if (in && name != "drift" && name != "warm_up") {
+      f.other_nats = search_->changing_nats(name) + kLogPriorChanging;
+      if (f.other_nats > kOtherWins) {
+        alarm(std::sqrt(2 * f.other_nats) + kAlarm_sd,
+              fmt::format("mean: {} that changes while the recording runs", name));
+      }
+    }
+    if (in && name == "offset_tempco" && bends(fit)) {
+      alarm(2 * kAlarm_sd, "mean: the zero bends over temperature more than a zero's drift does");
+      f.other_nats = kOtherWins;
+    }
     find(std::move(f));
+  }
+  if (const double nats = search_->changing_nats("gain") + kLogPriorChanging; nats > kOtherWins) {
+    alarm(std::sqrt(2 * nats) + kAlarm_sd, "mean: gains that change while the recording runs");
   }
   const auto scatter = [&](Scatter kind) {
     const std::string name(to_string(kind));
@@ -96,8 +134,24 @@ void Diagnoser::judge_means() {
     const bool in = fit.scatter == kind;
     EffectFinding f;
     f.name = name;
-    const double gain = search_->gain_nats(name);
+    const double gain = search_->gain_nats(name, in);
     f.nats = in ? std::max(0.1, gain) : (gain == 0 ? -5 : std::min(-0.1, gain));
+    if (in) {
+      f.other_nats = search_->unknown_nats();
+      const SlowStructure structure = kind == Scatter::seating
+                                          ? SlowStructure{}
+                                          : slow_structure(blocks_, fit, slow_, options.lsb_mg);
+      f.other_nats = std::max(f.other_nats, structure.other_nats);
+      if (f.other_nats > 0) {
+        // Likelier than the noise that would be named; where the odds are even, neither is.
+        const bool by_structure = structure.other_nats >= f.other_nats;
+        f.nats = -0.1;
+        alarm(std::sqrt(2 * f.other_nats) + kAlarm_sd,
+              by_structure ? "mean: slow, but " + structure.other
+                           : fmt::format("mean: scatter by {}, or {}",
+                                         to_string(search_->best_unknown()->scatter), name));
+      }
+    }
     f.held_out_gain_nats = in ? gain : std::min(0.0, gain);
     const double size = in ? fit.scatter_size : 0;
     f.parameters.push_back({parameter_name(name), {size}, {0.12 * size}});
@@ -109,6 +163,16 @@ void Diagnoser::judge_means() {
   if (allowed("rounding_floor")) {
     // Nothing can tell it from an offset of half an LSB: what is known is the prior.
     find({"rounding_floor", 0, kLogPrior, {}, 0, false, {"offset"}});
+  }
+  // What explains much, but so do others, is a gap all the same.
+  const bool named = std::any_of(out_.effects.begin(), out_.effects.end(), [&](const auto& e) {
+    return e.name == to_string(fit.scatter) ||
+           std::any_of(fit.groups.begin(), fit.groups.end(),
+                       [&](const ParameterGroup& g) { return g.effect == e.name; });
+  });
+  const double much = fit.nats - search_->nominal().nats;
+  if (!named && alarms_.empty() && much > 6) {
+    alarm(std::sqrt(2 * much) + 2, "mean: several explanations do alike");
   }
   judge_nuisances();
 }

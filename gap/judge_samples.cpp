@@ -115,6 +115,9 @@ void Diagnoser::judge_codes() {
     test(spread - 0.5, fmt::format("codes: the noise changes from dwell to dwell (worst: {})",
                                    bundle_.segments[codes_.worst_segment].name));
     test(codes_.kurtosis_sd / (1 + wider) - 1, "codes: the noise is not Gaussian");
+    test(std::abs(codes_.code_sd) / (1 + wider) - 0.5,
+         fmt::format("codes: axis {} has the value {} {} often than its neighbours let expect",
+                     "XYZ"[codes_.code_axis], codes_.code, codes_.code_sd < 0 ? "less" : "more"));
   }
   if (!line) {
     test(std::abs(codes_.cross_correlation_sd) / std::sqrt(1 + wider) - 0.5,

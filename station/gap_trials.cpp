@@ -9,136 +9,17 @@
 #include <fmt/format.h>
 
 #include "base/random.h"
+#include "station/gap_outside.h"
 
 namespace sixpoint::station {
 
 namespace {
 
-using sim::Effect;
 using sim::EffectKind;
 using sim::EffectSpec;
 using sim::ParameterSet;
-using sim::SimulatedBlock;
-using sim::Stage;
 
 constexpr std::uint64_t kTrialStream = 0x74726961;
-
-// Effects outside the catalogue. Real ones, all of them; only the diagnosis has no name for them.
-
-// Random telegraph ("popcorn") noise of a bad contact or a trap in the front end.
-class Popcorn final : public Effect {
- public:
-  Popcorn(const ParameterSet& values, Random random)
-      : g_(values.at("mg")[0] / kMgPerG), random_(random) {}
-  void on_sensor(SimulatedBlock& block) override {
-    constexpr double kMeanStay_s = 20;
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      while (block.time_s[i] >= next_s_) {
-        next_s_ += -kMeanStay_s * std::log(1 - random_.uniform());
-        up_ = !up_;
-      }
-      block.sensed_g[i][0] += up_ ? g_ : 0;
-    }
-  }
-
- private:
-  double g_;
-  Random random_;
-  double next_s_ = 0;
-  bool up_ = false;
-};
-
-// A knock moves the zero once and for all.
-class ZeroStep final : public Effect {
- public:
-  ZeroStep(const ParameterSet& values, Random random)
-      : g_(values.at("mg")[0] / kMgPerG), share_(random.uniform(0.25, 0.75)) {}
-  void on_recording(const sim::RecordingPlan& plan) override {
-    at_ = static_cast<std::uint64_t>(share_ * static_cast<double>(plan.length()));
-  }
-  void on_sensor(SimulatedBlock& block) override {
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      if (block.first_sample + i >= at_) {
-        block.sensed_g[i] += Eigen::Vector3d(g_, -g_, g_);
-      }
-    }
-  }
-
- private:
-  double g_;
-  double share_;
-  std::uint64_t at_ = 0;
-};
-
-// The lowest bit of one axis never changes.
-class StuckBit final : public Effect {
- public:
-  StuckBit(const ParameterSet& /*values*/, Random random)
-      : axis_(static_cast<std::size_t>(random.below(kAxes))) {}
-  void on_firmware(SimulatedBlock& block) override {
-    for (gt3x::Counts& counts : block.stored) {
-      counts[axis_] = static_cast<std::int16_t>(counts[axis_] & ~1);
-    }
-  }
-
- private:
-  std::size_t axis_;
-};
-
-// Sensitivity that differs between the two directions of an axis.
-class Asymmetry final : public Effect {
- public:
-  Asymmetry(const ParameterSet& values, Random /*random*/) : ratio_(values.at("mg")[0] / kMgPerG) {}
-  void on_sensor(SimulatedBlock& block) override {
-    for (Eigen::Vector3d& sensed : block.sensed_g) {
-      sensed.array() += ratio_ * sensed.array() * (sensed.array() * 20).tanh() * 0.5;
-      sensed[1] += ratio_ * sensed[0] * sensed[2];  // and a cross-axis product
-    }
-  }
-
- private:
-  double ratio_;
-};
-
-// A machine that runs up and down: a line whose frequency wanders.
-class SweptLine final : public Effect {
- public:
-  SweptLine(const ParameterSet& values, Random random)
-      : g_(values.at("mg")[0] / kMgPerG), phase_(random.uniform(0, 6)) {}
-  void on_stimulus(SimulatedBlock& block) override {
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      const double t = block.time_s[i];
-      const double angle = 2 * std::numbers::pi * (14 * t - 4 * 60 / 6.3 * std::cos(6.3 * t / 60));
-      block.motion[i].force_lab_g.z() += g_ * std::sin(angle + phase_);
-    }
-  }
-
- private:
-  double g_;
-  double phase_;
-};
-
-template <class T>
-EffectKind outside_kind(const char* name, Stage stage) {
-  return {name,
-          stage,
-          "outside the catalogue",
-          {{"mg", "mg", {2}, 0, 100, "drawn"}},
-          [](const ParameterSet& values, Random random) -> std::unique_ptr<Effect> {
-            return std::make_unique<T>(values, random);
-          }};
-}
-
-const std::vector<EffectKind>& outside_catalogue() {
-  static const std::vector<EffectKind> kKinds = {
-      outside_kind<Popcorn>("popcorn", Stage::sensor),
-      outside_kind<ZeroStep>("zero_step", Stage::sensor),
-      outside_kind<StuckBit>("stuck_bit", Stage::firmware),
-      outside_kind<Asymmetry>("asymmetry", Stage::sensor),
-      outside_kind<SweptLine>("swept_line", Stage::stimulus),
-  };
-  return kKinds;
-}
 
 class Drawing {
  public:
@@ -347,12 +228,17 @@ std::string_view family_of(std::string_view effect) {
       {"sensitivity_tempco", "gain"},
       {"idle_sleep", "made up"},
       {"charging_zeros", "made up"},
-      // Outside the catalogue, but near enough to one of its families to be acted on alike.
-      {"swept_line", "line"},
-      {"asymmetry", "curvature"},
   };
-  const auto found = kFamilies.find(effect);
-  return found == kFamilies.end() ? effect : found->second;
+  if (const auto found = kFamilies.find(effect); found != kFamilies.end()) {
+    return found->second;
+  }
+  // Outside the catalogue, but maybe near enough to one of its families to be acted on alike.
+  for (const OutsideKind& kind : outside_kinds()) {
+    if (kind.effect.name == effect && !kind.family.empty()) {
+      return kind.family;
+    }
+  }
+  return effect;
 }
 
 Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::StandardProtocol protocol,
@@ -371,10 +257,19 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
                                       R"({{"seed": {}, "protocol": "{}", "unit": {}}})",
                                       random.bits() >> 12U, to_string(protocol), unit)));
 
-  std::vector<std::string> names = only;
-  if (names.empty()) {
-    for (const EffectKind& kind : sim::effect_catalogue()) {
+  std::vector<std::string> names;
+  for (const EffectKind& kind : sim::effect_catalogue()) {
+    if (only.empty() || std::find(only.begin(), only.end(), kind.name) != only.end()) {
       names.push_back(kind.name);
+    }
+  }
+  std::vector<const OutsideKind*> outside;
+  for (const OutsideKind& kind : outside_kinds()) {
+    const bool wanted =
+        std::find(only.begin(), only.end(), kind.effect.name) != only.end() ||
+        (only.empty() && (kind.in_faces || protocol == sim::StandardProtocol::engineering));
+    if (wanted) {
+      outside.push_back(&kind);
     }
   }
   const double dice = random.uniform();
@@ -383,13 +278,12 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
     trial.kind = TrialKind::none;
     return trial;
   }
-  if (dice < shares.none + shares.outside) {
+  if (!outside.empty() && (names.empty() || dice < shares.none + shares.outside)) {
     trial.kind = TrialKind::outside;
-    const auto& kinds = outside_catalogue();
-    const EffectKind& kind = kinds[static_cast<std::size_t>(random.below(kinds.size()))];
+    const OutsideKind& kind = *outside[static_cast<std::size_t>(random.below(outside.size()))];
     const double severity = drawing.severity();
-    effects.push_back({&kind, {{"mg", {3 * severity}}}});
-    trial.effects.push_back({kind.name, severity});
+    effects.push_back({&kind.effect, {{"severity", {severity}}}});
+    trial.effects.push_back({kind.effect.name, severity});
     return trial;
   }
   trial.kind = dice < shares.none + shares.outside + shares.pair && names.size() > 1

@@ -3,7 +3,8 @@
 //
 // Severity is log-uniform from 0.3 to 3 times a typical size. Forms vary on purpose: mounts ring in
 // two modes, lines have harmonics, drifts bend, low-passes have several orders, warm-ups two time
-// constants. Trials outside the catalogue hold effects that no diagnosis knows by name.
+// constants. Trials outside the catalogue hold effects that no diagnosis knows by name
+// (gap_outside.h).
 #pragma once
 
 #include <cstdint>
@@ -37,7 +38,8 @@ struct TrialShares {
   double outside = 0.15;  // the rest is single
 };
 
-// The same seed and index give the same trial. `only` restricts the effects drawn; empty: all.
+// The same seed and index give the same trial. `only` restricts the effects drawn, of the catalogue
+// or outside it; empty: all that the protocol can show.
 Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::StandardProtocol protocol,
                             const TrialShares& shares, const std::vector<std::string>& only = {});
 

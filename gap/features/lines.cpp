@@ -204,6 +204,12 @@ std::vector<Sight> sights_at(const Bundle& bundle, const std::vector<Stretch>& a
   return sights;
 }
 
+double stretch_start_s(const Bundle& bundle, const Stretch& stretch) {
+  const Segment& segment = bundle.segments[stretch.segment];
+  return segment.host_start_s +
+         static_cast<double>(segment.samples - stretch.samples) / bundle.rate_hz;
+}
+
 struct Peak {
   double frequency_hz = 0;
   double nats = 0;  // above the threshold
@@ -307,6 +313,120 @@ LineScan scan(const Bundle& bundle, const std::vector<const Stretch*>& set,
   return out;
 }
 
+// Where no long record is, dwells within some minutes are summed with the phases that one line
+// would have by the host's clock: a sum of eighteen dwells sees a line of a third of the size that
+// their powers show.
+LineScan coherent_scan(const Bundle& bundle, const std::vector<Stretch>& set,
+                       const NoiseSpectrum& noise) {
+  constexpr double kLongest_s = 900;
+  constexpr std::size_t kCoarse = 64;
+  LineScan out;
+  std::vector<const Stretch*> near;
+  double first_s = 0;
+  for (const Stretch& s : set) {
+    const double t = stretch_start_s(bundle, s);
+    first_s = near.empty() ? t : first_s;
+    if (t - first_s < kLongest_s) {
+      near.push_back(&s);
+    }
+  }
+  if (near.size() < 4) {
+    return out;
+  }
+  const double span_s = stretch_start_s(bundle, *near.back()) - first_s + 10;
+  std::size_t length = 1024;
+  while (static_cast<double>(length) < 1.5 * span_s * bundle.rate_hz) {
+    length *= 2;
+  }
+  const std::size_t half = length / 2;
+  out.step_hz = bundle.rate_hz / static_cast<double>(length);
+  out.nats.assign(half, 0);
+  // Maximum likelihood per frequency: b' A^-1 b with b the sum of the dwells' weighted spectra,
+  // each turned into the frame, and A its covariance. Noise gives it a gamma law of shape 3.
+  std::array<std::vector<double>, 3> weight;  // 1 / variance, on a coarse grid: noise is smooth
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t k = 0; k < half; k += kCoarse) {
+      weight[axis].push_back(
+          1 / noise.variance_at(axis, static_cast<double>(k + kCoarse / 2) * out.step_hz));
+    }
+  }
+  std::vector<Vector3c> lab(half, Vector3c::Zero());
+  std::vector<Vector3c> sensor(half, Vector3c::Zero());
+  Eigen::FFT<double> fft;
+  std::array<std::vector<Complex>, 3> spectrum;
+  std::vector<double> x;
+  for (const Stretch* s : near) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      x = s->x[axis];
+      x.resize(length, 0);
+      fft.fwd(spectrum[axis], x);
+    }
+    const Eigen::Matrix3cd back = bundle.segments[s->segment].rotation.transpose().cast<Complex>();
+    const Complex turn =
+        std::polar(1.0, -2 * M_PI * out.step_hz * (stretch_start_s(bundle, *s) - first_s));
+    Complex phase = 1;
+    for (std::size_t k = 0; k < half; ++k) {
+      const std::size_t c = k / kCoarse;
+      const Vector3c z =
+          phase * Vector3c(spectrum[0][k] * weight[0][c], spectrum[1][k] * weight[1][c],
+                           spectrum[2][k] * weight[2][c]);
+      sensor[k] += z;
+      lab[k] += back * z;
+      phase *= turn;
+    }
+  }
+  Eigen::Matrix3d lab_covariance;
+  Eigen::Matrix3d sensor_covariance;
+  for (std::size_t k = 0; k < half; ++k) {
+    if (k % kCoarse == 0) {
+      lab_covariance.setZero();
+      sensor_covariance.setZero();
+      const std::size_t c = k / kCoarse;
+      const Eigen::Matrix3d white =
+          Eigen::Vector3d(weight[0][c], weight[1][c], weight[2][c]).asDiagonal();
+      for (const Stretch* s : near) {
+        const Eigen::Matrix3d& r = bundle.segments[s->segment].rotation;
+        sensor_covariance += static_cast<double>(s->samples) * white;
+        lab_covariance += static_cast<double>(s->samples) * (r.transpose() * white * r);
+      }
+      lab_covariance = lab_covariance.inverse().eval();
+      sensor_covariance = sensor_covariance.inverse().eval();
+    }
+    const auto power = [](const Vector3c& b, const Eigen::Matrix3d& inverse) {
+      return b.real().dot(inverse * b.real()) + b.imag().dot(inverse * b.imag());
+    };
+    out.nats[k] =
+        -log_tail(std::max(power(sensor[k], sensor_covariance), power(lab[k], lab_covariance)), 3) -
+        std::log(2.0);
+  }
+  return out;
+}
+
+// The likeliest vector of a line that keeps its phase by the host's clock; chi is not set.
+VectorFit coherent_sum(const Bundle& bundle, const std::vector<Stretch>& all,
+                       const NoiseSpectrum& noise, double frequency_hz, bool in_lab) {
+  const double w = 2 * M_PI * frequency_hz;
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Vector3c b = Vector3c::Zero();
+  for (const Stretch& s : all) {
+    const double t = stretch_start_s(bundle, s) - stretch_start_s(bundle, all.front());
+    const Eigen::Matrix3d to_sensor =
+        in_lab ? bundle.segments[s.segment].rotation : Eigen::Matrix3d::Identity();
+    Eigen::Vector3d weight;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      weight[static_cast<Eigen::Index>(axis)] =
+          static_cast<double>(s.samples) / (2 * noise.variance_at(axis, frequency_hz));
+    }
+    const Eigen::Matrix3d back = to_sensor.transpose() * weight.asDiagonal();
+    a += back * to_sensor;
+    b += back.cast<Complex>() * (amplitude_at(s, w / bundle.rate_hz) * std::polar(1.0, -w * t));
+  }
+  VectorFit fit;
+  fit.vector = a.inverse().cast<Complex>() * b;
+  fit.nats = 0.5 * (fit.vector.dot(b)).real();
+  return fit;
+}
+
 std::optional<Peak> best_peak(const LineScan& power, const std::vector<double>& taken_hz,
                               double guard_hz) {
   std::optional<Peak> best;
@@ -346,22 +466,27 @@ LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const Noi
       dwells.push_back(&s);
     }
   }
-  std::vector<LineScan> powers;
+  enum class Scan { of_longest, of_dwells, in_step };
+  std::vector<std::pair<Scan, LineScan>> powers;
   if (static_cast<double>(longest->samples) > 60 * bundle.rate_hz) {
-    powers.push_back(scan(bundle, {&*longest}, noise));
+    powers.emplace_back(Scan::of_longest, scan(bundle, {&*longest}, noise));
+  } else {
+    powers.emplace_back(Scan::in_step, coherent_scan(bundle, all, noise));
   }
   if (!dwells.empty()) {
-    powers.push_back(scan(bundle, dwells, noise));
+    powers.emplace_back(Scan::of_dwells, scan(bundle, dwells, noise));
   }
   std::vector<double> taken;
   while (search.lines.size() < 4) {
     std::optional<Peak> peak;
     const LineScan* from = nullptr;
-    for (const LineScan& power : powers) {
+    Scan kind = Scan::of_dwells;
+    for (const auto& [scanned, power] : powers) {
       const auto found = best_peak(power, taken, 0.6);
       if (found && (!peak || found->nats > peak->nats)) {
         peak = found;
         from = &power;
+        kind = scanned;
       }
     }
     if (!peak) {
@@ -369,7 +494,6 @@ LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const Noi
     }
     // Refine where the found peak was seen.
     double f = peak->frequency_hz;
-    const std::vector<Stretch>* set = &all;
     double best = -1;
     for (int round = 0; round < 2; ++round) {
       const double step = from->step_hz / (round == 0 ? 4 : 20);
@@ -378,11 +502,14 @@ LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const Noi
         const double candidate = centre + k * step;
         double sum = 0;
         const double w = 2 * M_PI * candidate / bundle.rate_hz;
-        for (const Stretch& s : *set) {
-          if (from == powers.data() && powers.size() > 1 && &s != &*longest) {
-            continue;
+        if (kind == Scan::in_step) {
+          sum = std::max(coherent_sum(bundle, all, noise, candidate, true).nats,
+                         coherent_sum(bundle, all, noise, candidate, false).nats);
+        }
+        for (const Stretch& s : all) {
+          if (kind == Scan::of_dwells || (kind == Scan::of_longest && &s == &*longest)) {
+            sum += amplitude_at(s, w).squaredNorm() * static_cast<double>(s.samples);
           }
-          sum += amplitude_at(s, w).squaredNorm() * static_cast<double>(s.samples);
         }
         if (sum > best) {
           best = sum;
@@ -393,8 +520,22 @@ LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const Noi
     SpectralLine line;
     line.frequency_hz = f;
     const auto sights = sights_at(bundle, all, noise, f);
-    const VectorFit lab = fit_vector(sights, true);
-    const VectorFit sensor = fit_vector(sights, false);
+    VectorFit lab = fit_vector(sights, true);
+    VectorFit sensor = fit_vector(sights, false);
+    if (kind == Scan::in_step) {
+      const VectorFit lab_in_step = coherent_sum(bundle, all, noise, f, true);
+      const VectorFit sensor_in_step = coherent_sum(bundle, all, noise, f, false);
+      // A line that keeps its phase: the frame is told by the sum, too.
+      if (std::max(lab_in_step.nats, sensor_in_step.nats) >
+          std::max(lab.nats, sensor.nats) - static_cast<double>(sights.size())) {
+        const double chi_lab = lab.chi;
+        const double chi_sensor = sensor.chi;
+        lab = lab_in_step;
+        sensor = sensor_in_step;
+        lab.chi = chi_lab;
+        sensor.chi = chi_sensor;
+      }
+    }
     line.lab_over_sensor_nats = lab.nats - sensor.nats;
     line.in_lab = line.lab_over_sensor_nats > 0;
     const VectorFit& chosen = line.in_lab ? lab : sensor;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <map>
 #include <unsupported/Eigen/FFT>
 
 namespace sixpoint::gap {
@@ -117,6 +118,31 @@ NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean) {
   return spectrum;
 }
 
+namespace {
+
+// How often a code was stored, and how often Gaussian noise about the dwells' means would have it.
+struct CodeCount {
+  double seen = 0;
+  double expected = 0;
+  double variance = 0;
+};
+
+// Codes of `samples` values of this mean and variance (as stored, in LSB).
+void expect_codes(double mean, double variance, double samples, std::map<int, CodeCount>& codes) {
+  const double sd = std::sqrt(std::max(0.01, variance - 1.0 / 12));  // of what was rounded
+  const auto below = [&](double x) { return 0.5 * std::erfc((mean - x) / (sd * M_SQRT2)); };
+  const int reach = static_cast<int>(std::min(50.0, std::ceil(4 * sd)));
+  const int middle = static_cast<int>(std::lround(mean));
+  for (int code = middle - reach; code <= middle + reach; ++code) {
+    const double share = below(code + 0.5) - below(code - 0.5);
+    CodeCount& count = codes[code];
+    count.expected += samples * share;
+    count.variance += samples * share * (1 - share);
+  }
+}
+
+}  // namespace
+
 CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) {
   CodeStatistics codes;
   std::array<double, 3> odd{};
@@ -136,6 +162,7 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
     double n;
   };
   std::vector<Dwell> dwells;
+  std::array<std::map<int, CodeCount>, 3> by_code;
   std::size_t n_all = 0;
   for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
     const Segment& segment = bundle.segments[s];
@@ -187,6 +214,7 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
         const double grid = std::exp(-M_PI * M_PI * variance / 2) * n * 2 / M_PI;
         parity_variance[axis] += n / 4;
         parity_grid[axis] += grid;  // of one sign in the worst case
+        expect_codes(mean[axis], variance, n, by_code[axis]);
       }
       for (std::size_t i = first; i < first + piece; ++i) {
         const std::size_t at = segment.first_sample + i;
@@ -195,6 +223,7 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
         }
         std::array<double, 3> z{};
         for (std::size_t axis = 0; axis < 3; ++axis) {
+          by_code[axis][clean.samples[at][axis]].seen += 1;
           z[axis] = (clean.samples[at][axis] - mean[axis]) / sd[axis];
           // Six sd, and at least three quarters of an LSB beyond, so that the grid itself is none.
           if (std::abs(z[axis]) > 6 + 0.75 / sd[axis]) {
@@ -213,6 +242,19 @@ CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) 
   codes.samples = n_all;
   if (n_all == 0) {
     return codes;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const auto& [code, count] : by_code[axis]) {
+      // Noise is Gaussian within some per cent of a code's share.
+      constexpr double kForm = 0.04;
+      const double z = (count.seen - count.expected) /
+                       std::sqrt(count.variance + std::pow(kForm * count.expected, 2));
+      if (count.expected > 20 && std::abs(z) > std::abs(codes.code_sd)) {
+        codes.code_sd = z;
+        codes.code_axis = axis;
+        codes.code = code;
+      }
+    }
   }
   codes.outliers_expected = 3 * static_cast<double>(n_all) * 2e-9;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -40,7 +40,11 @@ struct CodeStatistics {
   double spread_freedom = 0;
   std::size_t worst_segment = 0;
   double worst_ratio = 1;
-  double kurtosis_sd = 0;           // excess kurtosis over its standard deviation
+  double kurtosis_sd = 0;  // excess kurtosis over its standard deviation
+  // The code whose count is furthest from what Gaussian noise puts there, all dwells together.
+  double code_sd = 0;
+  std::size_t code_axis = 0;
+  int code = 0;
   double cross_correlation_sd = 0;  // largest correlation between two axes' noise, in sd
 };
 CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean);

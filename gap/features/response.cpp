@@ -40,6 +40,11 @@ double axis_free_chi(const std::vector<Ratio>& ratios, const std::vector<double>
   return chi;
 }
 
+struct Pink {
+  double mg = 0;
+  double slope = 1;
+};
+
 class Search {
  public:
   Search(const Bundle& bundle, const NoiseSpectrum& noise, const std::vector<ToneFit>& tones,
@@ -84,27 +89,35 @@ class Search {
     Response response;
     response.has_tones = !ratios_.empty();
     std::array<double, 3> white{};
-    const auto flat_fit = noise_nats({}, white);
+    auto flat_fit = noise_nats({}, white);
     response.noise_flat_sd = flat_fit.left_sd;
     response.noise_left_sd = flat_fit.left_sd;
     response.white_mg = white;
+    const Pink pink = find_pink({}, flat_fit.nats);
+    if (pink.mg > 0) {
+      pink_ = pink;
+      flat_fit.nats = noise_nats({}, white).nats - kPinkCost;
+      response.white_mg = white;
+      response.pink_mg = pink.mg;
+      pink_ = {};
+    }
     const std::vector<double> none(ratios_.size(), 0);
     const double flat_chi = axis_free_chi(ratios_, none);
     const double freedom = tone_freedom();
     response.tone_flat_sd = freedom > 0 ? (flat_chi - freedom) / std::sqrt(2 * freedom) : 0;
     double best = 0;
     std::vector<double> low_pass_log(ratios_.size(), 0);
-    for (const LowPassForm form :
-         {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue}) {
-      for (const int order : {4, 2, 1, 3, 6, 8}) {
-        const auto corners = static_cast<int>(std::log(0.492 * rate_hz_ / 4) / std::log(1.05));
-        for (int k = 0; k <= corners; ++k) {
-          const double corner = 4 * std::pow(1.05, k);
-          try_low_pass({corner, 0, order, 0, 0, form}, flat_fit.nats, flat_chi, best, response,
-                       white);
-        }
+    Pink low_pass_pink;
+    for (const Pink& with_pink :
+         pink.mg > 0 ? std::vector<Pink>{{}, pink} : std::vector<Pink>{{}}) {
+      pink_ = with_pink;
+      const double before = best;
+      search_low_pass(flat_fit.nats, flat_chi, best, response, white);
+      if (best > before) {
+        low_pass_pink = with_pink;
       }
     }
+    pink_ = low_pass_pink;
     double step = 0.048;
     for (int halving = 0; halving < 15 && response.low_pass.corner_hz > 0; ++halving) {
       step /= 2;
@@ -129,8 +142,12 @@ class Search {
       }
       base_chi = axis_free_chi(ratios_, low_pass_log);
       std::array<double, 3> own{};
+      pink_ = {};
+      const auto alone = noise_nats(response.low_pass, own);
+      response.noise_left_sd = alone.left_sd;
+      pink_ = pink.mg > 0 ? find_pink(response.low_pass, alone.nats) : Pink{};
+      response.pink_mg = pink_.mg;
       const auto fit = noise_nats(response.low_pass, own);
-      response.noise_left_sd = fit.left_sd;
       response.white_mg = own;
       LowPass near = response.low_pass;
       near.corner_hz *= 1.01;
@@ -202,6 +219,41 @@ class Search {
   }
 
  private:
+  void search_low_pass(double flat_nats, double flat_chi, double& best, Response& response,
+                       std::array<double, 3>& white) const {
+    for (const LowPassForm form :
+         {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue}) {
+      for (const int order : {4, 2, 1, 3, 6, 8}) {
+        const auto corners = static_cast<int>(std::log(0.492 * rate_hz_ / 4) / std::log(1.05));
+        for (int k = 0; k <= corners; ++k) {
+          const double corner = 4 * std::pow(1.05, k);
+          try_low_pass({corner, 0, order, 0, 0, form}, flat_nats, flat_chi, best, response, white);
+        }
+      }
+    }
+  }
+
+  static constexpr double kPinkCost = 2;  // a size found on a grid
+
+  // The likeliest 1/f noise beside this low-pass, 0 where it does not pay.
+  Pink find_pink(const LowPass& low_pass, double without_nats) {
+    const Pink kept = pink_;
+    double best = without_nats + kPinkCost;
+    Pink found;
+    std::array<double, 3> white{};
+    for (const double slope : {1.0, 0.8, 1.2, 1.4, 1.7, 2.0}) {
+      for (double mg = 0.08; mg < 4; mg *= 1.2) {
+        pink_ = {mg, slope};
+        if (const double nats = noise_nats(low_pass, white).nats; nats > best) {
+          best = nats;
+          found = pink_;
+        }
+      }
+    }
+    pink_ = kept;
+    return found;
+  }
+
   struct NoiseFit {
     double nats = 0;
     double left_sd = 0;
@@ -230,8 +282,9 @@ class Search {
           const Bin& bin = bins_[i];
           if (bin.axis == axis) {
             const double h = h2[i];
-            const double p = s2 * h + rounding_;
-            up += h * (bin.variance - rounding_) / (p * p);
+            const double other = rounding_ + pink_at(bin.frequency_hz) * h;
+            const double p = s2 * h + other;
+            up += h * (bin.variance - other) / (p * p);
             down += h * h / (p * p);
           }
         }
@@ -241,7 +294,7 @@ class Search {
       for (std::size_t i = 0; i < bins_.size(); ++i) {
         const Bin& bin = bins_[i];
         if (bin.axis == axis) {
-          const double p = s2 * h2[i] + rounding_;
+          const double p = (s2 + pink_at(bin.frequency_hz)) * h2[i] + rounding_;
           fit.nats -= effective_ * (std::log(p) + bin.variance / p);
           // Rounding of noise narrower than an LSB is not quite white: a filter's shape is seen to
           // some per cent.
@@ -253,6 +306,14 @@ class Search {
     const auto n = static_cast<double>(bins_.size());
     fit.left_sd = n > 3 ? (chi - n + 3) / std::sqrt(2 * n) : 0;
     return fit;
+  }
+
+  // 1/f noise as equivalent white variance. Real 1/f noise keeps to its law within some tenths of
+  // the exponent.
+  double pink_at(double frequency_hz) const {
+    return pink_.mg == 0
+               ? 0
+               : pink_.mg * pink_.mg * std::pow(frequency_hz, -pink_.slope) * rate_hz_ / 2;
   }
 
   double axis_noise_nats(const LowPass& low_pass, int axis) const {
@@ -439,6 +500,7 @@ class Search {
 
   double rate_hz_;
   ResponseOptions options_;
+  Pink pink_;  // beside the white in noise_nats
   double rounding_ = 0;
   double effective_ = 0;
   std::vector<Bin> bins_;

@@ -52,7 +52,7 @@ struct Response {
   bool has_tones = false;
   // Per order: ratio of noise at the highest quarter of the band to the lowest, all axes.
   double noise_flat_sd = 0;  // chi-square of flat noise, in sd
-  double noise_left_sd = 0;  // ... of the low-pass
+  double noise_left_sd = 0;  // ... of the low-pass, without 1/f noise
   double tone_flat_sd = 0;   // chi-square of flat tones
   double tone_left_sd = 0;   // ... less what is significant of low-pass and resonance
   double tone_flat_chi = 0;
@@ -62,6 +62,9 @@ struct Response {
   // What is left of the tones' amplitudes beyond noise, as a share: how well the form is known.
   double tone_form_share = 0;
   std::array<double, 3> white_mg{};  // of one sample before rounding and filter
+  // 1/f noise beside the white, root of its one-sided density at 1 Hz; 0 where none is needed. It
+  // and a low-pass bend the spectrum alike, so that both are tried together.
+  double pink_mg = 0;
 
   // |H| of a tone and of noise by what is significant; 1 where nothing is.
   double tone_gain(double frequency_hz, double rate_hz) const;

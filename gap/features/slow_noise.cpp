@@ -19,6 +19,79 @@ struct Coefficient {
   std::size_t axis;
 };
 
+double log_mean(const std::vector<double>& nats) {
+  double high = -1e300;
+  for (const double x : nats) {
+    high = std::max(high, x);
+  }
+  double sum = 0;
+  for (const double x : nats) {
+    sum += std::exp(x - high);
+  }
+  return high + std::log(sum / static_cast<double>(std::max<std::size_t>(1, nats.size())));
+}
+
+constexpr std::array<double, 5> kWalks_mg = {0.05, 0.1, 0.2, 0.4, 0.8};
+constexpr std::array<double, 5> kFlickers_mg = {0.1, 0.2, 0.4, 0.8, 1.6};
+constexpr std::array<double, 3> kJumps_mg = {0.6, 2, 6};
+constexpr std::array<double, 3> kJumpRates = {0.05, 0.2, 0.6};  // per piece
+
+// What makes a short piece of a record, its level free: sums over pieces, over white noise alone.
+class PieceEvidence {
+ public:
+  void add(const Eigen::VectorXd& piece, double white) {
+    const Eigen::Index n = piece.size();
+    const Eigen::VectorXd y = piece.array() - piece.mean();
+    for (Eigen::Index k = 1; k < n; ++k) {
+      double c = 0;
+      const double w = M_PI * static_cast<double>(k) / static_cast<double>(n);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        c += y[i] * std::cos(w * (static_cast<double>(i) + 0.5));
+      }
+      const double square = c * c * 2.0 / static_cast<double>(n);
+      const double s2 = std::pow(std::sin(w / 2), 2);
+      const auto gain = [&](double variance) {
+        const double v = white + variance;
+        return -0.5 * (std::log(v / white) + square / v - square / white);
+      };
+      for (std::size_t i = 0; i < kWalks_mg.size(); ++i) {
+        walk_[i] += gain(kWalks_mg[i] * kWalks_mg[i] * (1 - 2.0 / 3.0 * s2) / (4 * s2));
+        flicker_[i] += gain(flicker_density_mg2(kFlickers_mg[i]) * static_cast<double>(n) /
+                            static_cast<double>(k));
+      }
+    }
+    for (std::size_t s = 0; s < kJumps_mg.size(); ++s) {
+      // One jump at an unknown second, its size Gaussian.
+      std::vector<double> at;
+      double before = 0;
+      for (Eigen::Index i = 1; i < n; ++i) {
+        before += y[i - 1];
+        const auto left = static_cast<double>(i);
+        const auto right = static_cast<double>(n - i);
+        const double a = left * right / static_cast<double>(n) / white;
+        const double step = -before / right - before / left;
+        const double b = a * step;
+        const double prior = kJumps_mg[s] * kJumps_mg[s];
+        at.push_back(0.5 * b * b / (a + 1 / prior) - 0.5 * std::log1p(a * prior));
+      }
+      const double jump = log_mean(at);
+      for (std::size_t r = 0; r < kJumpRates.size(); ++r) {
+        const double high = std::max(0.0, jump);
+        jump_[kJumpRates.size() * s + r] += high + std::log((1 - kJumpRates[r]) * std::exp(-high) +
+                                                            kJumpRates[r] * std::exp(jump - high));
+      }
+    }
+  }
+  double jump_over_noise() const {
+    return log_mean(jump_) - std::max({0.0, log_mean(walk_), log_mean(flicker_)});
+  }
+
+ private:
+  std::vector<double> walk_ = std::vector<double>(kWalks_mg.size(), 0);
+  std::vector<double> flicker_ = std::vector<double>(kFlickers_mg.size(), 0);
+  std::vector<double> jump_ = std::vector<double>(kJumps_mg.size() * kJumpRates.size(), 0);
+};
+
 }  // namespace
 
 double flicker_density_mg2(double flicker_mg) { return flicker_mg * flicker_mg; }
@@ -29,8 +102,10 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
   // Per axis and width: count, squares, fourth powers of differences between neighbouring means.
   constexpr std::array<Eigen::Index, 2> kWidths_s = {3, 8};
   std::array<std::array<std::array<double, 3>, 2>, 3> moments{};
+  PieceEvidence pieces;
   const auto second = static_cast<std::size_t>(bundle.rate_hz);
   for (const Segment& segment : bundle.segments) {
+    const std::size_t first_mode = slow.modes.size();
     if (segment.kind == Segment::Kind::vibration || segment.kind == Segment::Kind::ramp ||
         second < 10) {
       continue;
@@ -69,6 +144,13 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
           moments[axis][k][2] += d * d * d * d;
         }
       }
+      constexpr Eigen::Index kPiece_s = 10;
+      const double white = std::pow(noise.white_mg[axis], 2) / static_cast<double>(second);
+      for (Eigen::Index i = 0; i < n; i += kPiece_s) {
+        if (const Eigen::Index size = std::min(kPiece_s, n - i); size >= 6) {
+          pieces.add(y.segment(i, size), white);
+        }
+      }
       y.array() -= y.mean();
       Eigen::Index first = 1;
       if (n >= 60) {
@@ -82,7 +164,6 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
       }
       // 300 coefficients reach from the record's length to a few seconds: the rest is white.
       const Eigen::Index last = std::min<Eigen::Index>(n, 300);
-      const double white = std::pow(noise.white_mg[axis], 2) / static_cast<double>(second);
       for (Eigen::Index k = first; k < last; ++k) {
         double c = 0;
         const double w = M_PI * static_cast<double>(k) / static_cast<double>(n);
@@ -96,6 +177,15 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
                                 static_cast<int>(std::floor(std::log2(2.0 * static_cast<double>(n) /
                                                                       static_cast<double>(k)))),
                                 axis});
+        const std::size_t mode = first_mode + static_cast<std::size_t>(k - first);
+        if (mode >= slow.modes.size()) {
+          slow.modes.emplace_back();
+        }
+        SlowNoise::Mode& here = slow.modes[mode];
+        here.value_mg[axis] = c;
+        here.white_mg2[axis] = white;
+        here.walk = coefficients.back().walk;
+        here.flicker = coefficients.back().flicker;
       }
     }
   }
@@ -108,6 +198,7 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
       }
     }
   }
+  slow.jump_nats = pieces.jump_over_noise();
   slow.coefficients = coefficients.size();
   slow.walk_mg = {0, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16, 0.2, 0.25, 0.3, 0.38, 0.5, 0.8};
   slow.flicker_mg = {0, 0.02, 0.035, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5, 0.7, 1, 1.4, 2.2};

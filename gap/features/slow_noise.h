@@ -7,6 +7,7 @@
 // noise.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "gap/bundle.h"
@@ -32,6 +33,18 @@ struct SlowNoise {
   // Excess kurtosis of the differences between means of neighbouring 3 s and 8 s, the worst axis,
   // in sd. Walks and 1/f noise are Gaussian; a zero that jumps is not.
   double jump_sd = 0;
+  // Log evidence, from records cut into pieces of ten seconds, of "now and then the zero jumps"
+  // over the better of "it walks" and "1/f noise"; sizes and rates unknown.
+  double jump_nats = 0;
+
+  // The coefficients, axis by axis, for who asks whether the axes go together.
+  struct Mode {
+    std::array<double, 3> value_mg{};
+    std::array<double, 3> white_mg2{};
+    double walk = 0;     // variance per (mg per sqrt(s))^2
+    double flicker = 0;  // variance per mg^2/Hz at 1 Hz
+  };
+  std::vector<Mode> modes;
 
   struct Best {
     double walk_mg = 0;

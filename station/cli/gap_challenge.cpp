@@ -23,6 +23,8 @@
 #include "base/atomic_file.h"
 #include "sim/bundle_writer.h"
 #include "station/cli/workers.h"
+#include "station/gap_outside.h"
+#include "station/gap_recorded.h"
 #include "station/gap_trials.h"
 
 extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
@@ -45,6 +47,10 @@ struct Options {
   std::string program;
   std::string keep;
   std::string html;
+  std::string recording;  // a bundle to which effects are added
+  // What the diagnosis says of that bundle as it is.
+  std::set<std::string> own_effects;
+  bool own_unknown = false;
   bool json = false;
 };
 
@@ -83,6 +89,8 @@ struct Outcome {
              return not_observable.contains(effect.name);
            });
   }
+  // For an effect that the diagnosis can't know: what the protocol can't show needs no "unknown".
+  bool honest() const { return unknown || family_right() || honestly_blind(); }
   bool confidently_wrong() const {
     constexpr double kConfident = 0.9;
     return !unknown && !named.empty() && named.front().second > kConfident && !family_right();
@@ -186,7 +194,13 @@ Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtoco
   outcome.kind = trial.kind;
   outcome.truth = trial.effects;
   const std::string bundle = fmt::format("{}/{:06}", folder, index);
-  SIXPOINT_CHECK(sim::write_bundle(env.files, bundle, trial.scenario));
+  if (options.recording.empty()) {
+    SIXPOINT_CHECK(sim::write_bundle(env.files, bundle, trial.scenario));
+  } else {
+    SIXPOINT_CHECK(station::write_recorded_trial(env.files, options.recording, bundle,
+                                                 trial.scenario.protocol->effects,
+                                                 trial.scenario.seed));
+  }
   std::vector<std::string> arguments = {options.program, "gap", "diagnose", bundle, "--json"};
   if (options.strip) {
     for (const station::TrialEffect& effect : trial.effects) {
@@ -211,6 +225,10 @@ Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtoco
   SIXPOINT_ASSIGN(const Bytes text, read_file(env.files, answer));
   if (outcome.failure.empty()) {
     read_answer(Json::parse(text.begin(), text.end(), nullptr, false), outcome);
+    // What the recording has of its own is not what was added.
+    std::erase_if(outcome.named,
+                  [&](const auto& named) { return options.own_effects.contains(named.first); });
+    outcome.unknown = outcome.unknown && !options.own_unknown;
   }
   if (options.keep.empty()) {
     std::error_code ignored;
@@ -218,6 +236,30 @@ Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtoco
     std::filesystem::remove(answer, ignored);
   }
   return outcome;
+}
+
+// Diagnoses the recording to which effects will be added, as it is.
+Status learn_own(Env& env, Options& options, const std::string& folder) {
+  const std::string answer = folder + "/own.answer.json";
+  constexpr double kLimit_s = 120;
+  SIXPOINT_ASSIGN(const int exit_code,
+                  run_process({options.program, "gap", "diagnose", options.recording, "--json"},
+                              answer, kLimit_s, env.clock));
+  constexpr int kFirstError = 64;
+  Outcome own;
+  if (exit_code < kFirstError) {
+    SIXPOINT_ASSIGN(const Bytes text, read_file(env.files, answer));
+    read_answer(Json::parse(text.begin(), text.end(), nullptr, false), own);
+  }
+  if (exit_code >= kFirstError || !own.failure.empty()) {
+    return fail(ErrorCode::bad_data, "the recording can't be diagnosed", options.recording,
+                "sixpoint gap diagnose says why");
+  }
+  for (const auto& [name, probability] : own.named) {
+    options.own_effects.insert(name);
+  }
+  options.own_unknown = own.unknown;
+  return {};
 }
 
 // Wilson's interval for a share, 95 %.
@@ -304,9 +346,7 @@ Scores score(const std::vector<Outcome>& outcomes, bool strip) {
     const bool withheld =
         outcome.kind == TrialKind::outside || (strip && outcome.kind != TrialKind::none);
     if (withheld) {
-      // What the protocol can't show at all needs no "unknown".
-      scores.withheld_honest.count(outcome.unknown || outcome.family_right() ||
-                                   outcome.honestly_blind());
+      scores.withheld_honest.count(outcome.honest());
       scores.withheld_wrong.count(outcome.confidently_wrong());
       continue;
     }
@@ -354,6 +394,11 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
   json["seed"] = options.seed;
   json["protocol"] = options.protocol;
   json["strip"] = options.strip;
+  if (!options.recording.empty()) {
+    json["recording"] = options.recording;
+    json["own_effects"] = options.own_effects;
+    json["own_unknown"] = options.own_unknown;
+  }
   Json& result = json["scores"];
   result["single_first_right"] = scores.first.to_json();
   result["single_alone_and_right"] = scores.exact.to_json();
@@ -396,6 +441,8 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
       entry["named"].push_back({{"name", name}, {"probability", number(probability)}});
     }
     entry["unknown"] = outcome.unknown;
+    entry["honest"] = outcome.honest();
+    entry["confidently_wrong"] = outcome.confidently_wrong();
     entry["seconds"] = outcome.seconds;
     if (!outcome.failure.empty()) {
       entry["failure"] = outcome.failure;
@@ -491,8 +538,26 @@ Status challenge(Context& context, Options options) {
     return fail(ErrorCode::usage, "there is no such protocol", options.protocol,
                 "production or engineering");
   }
+  if (!options.recording.empty()) {
+    options.shares.outside = 0;
+    options.shares.pair = 0;
+    if (options.only.empty()) {
+      options.only = station::effects_for_recordings();
+    }
+    for (const std::string& name : options.only) {
+      const auto& can = station::effects_for_recordings();
+      if (std::find(can.begin(), can.end(), name) == can.end()) {
+        return fail(ErrorCode::usage, "this effect can't be added to a recording", name,
+                    fmt::format("one of {}", fmt::join(can, ", ")));
+      }
+    }
+  }
   for (const std::string& name : options.only) {
-    if (const auto found = sim::find_effect(name); !found) {
+    const auto& outside = station::outside_kinds();
+    const bool is_outside =
+        std::any_of(outside.begin(), outside.end(),
+                    [&](const station::OutsideKind& kind) { return kind.effect.name == name; });
+    if (const auto found = sim::find_effect(name); !found && !is_outside) {
       return tl::unexpected(found.error());
     }
   }
@@ -510,6 +575,9 @@ Status challenge(Context& context, Options options) {
                   "name one with --keep");
     }
     folder = pattern;
+  }
+  if (!options.recording.empty()) {
+    SIXPOINT_CHECK(learn_own(context.env, options, folder));
   }
   std::vector<Result<Outcome>> results(options.trials, Result<Outcome>(Outcome{}));
   {
@@ -558,6 +626,9 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
   command->add_option("--protocol", options->protocol, "production or engineering (default)");
   command->add_option("--effects", options->only, "draw only these")->delimiter(',');
   command->add_flag("--strip", options->strip, "take the true effects out of the catalogue");
+  command->add_option(
+      "--recording", options->recording,
+      "add effects to this bundle of a real unit at rest instead of simulating one");
   command->add_option("--none", options->shares.none, "share of trials without any effect")
       ->check(CLI::Range(0.0, 1.0));
   command->add_option("--pairs", options->shares.pair, "share of trials with two effects")

@@ -15,6 +15,7 @@
 #include "mocks/usbip_server.h"
 #include "mocks/virtual_drive.h"
 #include "mocks/virtual_settings.h"
+#include "sim/bundle_writer.h"
 #include "sim/recording.h"
 #include "station/cli/command.h"
 
@@ -52,26 +53,35 @@ Status apply_scenario(Context& context, const std::string& path, mocks::VirtualS
   SIXPOINT_ASSIGN(const Bytes text, read_file(context.env.files, path));
   SIXPOINT_ASSIGN(const sim::Scenario scenario,
                   sim::parse_scenario({reinterpret_cast<const char*>(text.data()), text.size()}));
-  if (scenario.protocol) {
-    return fail(ErrorCode::configuration, "a scenario with a protocol has no recording for a unit",
-                path, "give a scenario with motions (docs/scenario.md)");
-  }
   settings.unit.truth = scenario.unit;
   settings.unit.seed = scenario.seed;
   settings.unit.temperature_c = scenario.temperature_c;
   settings.unit.gravity_g = scenario.gravity_g;
-  double duration_s = 0;
-  for (const sim::MotionSpec& motion : scenario.motions) {
-    duration_s += motion.duration_s;
+  double bytes = 0;
+  if (scenario.protocol) {
+    constexpr double kBytesPerSample = 6;
+    for (const sim::ProtocolSegment& segment : scenario.protocol->segments) {
+      bytes += kBytesPerSample * static_cast<double>(segment.samples);
+    }
   }
-  // A sample has 36 bits at least.
-  if (duration_s * scenario.rate_hz * 4.5 > static_cast<double>(settings.unit.flash_bytes)) {
+  for (const sim::MotionSpec& motion : scenario.motions) {
+    constexpr double kBytesPerSample = 4.5;  // a sample has 36 bits at least
+    bytes += kBytesPerSample * motion.duration_s * scenario.rate_hz;
+  }
+  if (bytes > static_cast<double>(settings.unit.flash_bytes)) {
     return fail(ErrorCode::configuration, "the recording does not fit into the unit's flash", path,
                 "make the scenario shorter");
   }
   MemoryFiles disk;
-  SIXPOINT_CHECK(sim::write_recording(disk, "recording.gt3x", scenario));
-  SIXPOINT_ASSIGN(recording, read_file(disk, "recording.gt3x", settings.unit.flash_bytes));
+  std::string made = "recording.gt3x";
+  if (scenario.protocol) {
+    // What the unit stored on its way through the protocol, effects and all.
+    SIXPOINT_CHECK(sim::write_bundle(disk, "unit", scenario));
+    made = "unit/" + made;
+  } else {
+    SIXPOINT_CHECK(sim::write_recording(disk, made, scenario));
+  }
+  SIXPOINT_ASSIGN(recording, read_file(disk, made, settings.unit.flash_bytes));
   start = scenario.start;
   return {};
 }

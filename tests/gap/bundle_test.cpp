@@ -90,6 +90,18 @@ TEST_F(BundleTest, ContradictionsAreBadData) {
   fails("/segments/1/host_start_s", 10);  // before the one before
   fails("/segments/1/kind", "dance");
   fails("/segments/1/kind", "vibration");  // without saying which
+  fails("/segments/1/host_start_s", nullptr);
+  fails("/segments/1/rotation/0/0", 1e308);
+  for (const char* tone :
+       {R"({"direction_lab": [0, 0, 1], "frequency_hz": 9999, "amplitude_g": 1})",
+        R"({"direction_lab": [0, 0, 1], "frequency_hz": 9, "amplitude_g": 900})",
+        R"({"direction_lab": [0, 1, 1], "frequency_hz": 9, "amplitude_g": 1})"}) {
+    protocol_ = good;
+    protocol_["segments"][1]["kind"] = "vibration";
+    protocol_["segments"][1]["vibration"] = Json::parse(tone);
+    SCOPED_TRACE(tone);
+    EXPECT_FAILS(read(), ErrorCode::bad_data);
+  }
   fails("/segments/1/temperature_c", "warm");
   protocol_ = Json::array();
   EXPECT_FAILS(read(), ErrorCode::bad_data);
@@ -112,6 +124,58 @@ TEST_F(BundleTest, LogsOfNonsenseAreLossesNotCrashes) {
   ASSERT_OK(bundle);
   EXPECT_GE(bundle->losses.size(), 2U);
   EXPECT_TRUE(bundle->host_clock.empty());
+}
+
+TEST_F(BundleTest, LiteralsThatAreNoJsonAreBadData) {
+  for (const char* literal : {"NaN", "Infinity", "-Infinity", "1e999"}) {
+    std::string text = protocol_.dump();
+    text.replace(text.find("1.0"), 3, literal);
+    (void)memory_.files.remove("b/protocol.json");
+    ASSERT_OK(write_file(memory_.files, "b/protocol.json", text));
+    SCOPED_TRACE(literal);
+    EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
+  }
+}
+
+TEST_F(BundleTest, TooManySegmentsAreRefused) {
+  Json many = Json::array();
+  Json one = protocol_["segments"][0];
+  one["samples"] = 1;
+  for (int i = 0; i < 5001; ++i) {
+    one["first_sample"] = i;
+    many.push_back(one);
+  }
+  protocol_["segments"] = many;
+  EXPECT_FAILS(read(), ErrorCode::bad_data);
+}
+
+TEST_F(BundleTest, AForeignHostClockIsALoss) {
+  std::string stamps = "sample_index,host_time_s\n";
+  for (int i = 0; i < 30; ++i) {
+    stamps += std::to_string(100 * i) + ",5\n";
+  }
+  ASSERT_OK(write_file(memory_.files, "b/host_clock.csv", stamps));
+  const auto bundle = read();
+  ASSERT_OK(bundle);
+  EXPECT_TRUE(bundle->host_clock.empty());
+  EXPECT_NE(bundle->losses.back().find("contradicts"), std::string::npos);
+}
+
+// Constant, all zero, all at one end of the range: nothing is named.
+TEST_F(BundleTest, DeadDataNamesNothing) {
+  const auto bundle = read();
+  ASSERT_OK(bundle);
+  for (const gt3x::Counts value : {gt3x::Counts{17, 256, -3}, gt3x::Counts{0, 0, 0},
+                                   gt3x::Counts{2047, 2047, 2047}, gt3x::Counts{-2048, 2047, 0}}) {
+    Bundle dead = *bundle;
+    std::fill(dead.samples.begin(), dead.samples.end(), value);
+    const auto diagnosis = diagnose(dead);
+    ASSERT_OK(diagnosis);
+    EXPECT_TRUE(diagnosis->inconclusive) << value[0];
+    EXPECT_TRUE(diagnosis->effects.empty()) << diagnosis->effects.front().name;
+    EXPECT_TRUE(diagnosis->unknown.present);
+    EXPECT_FALSE(diagnosis->losses.empty());
+  }
 }
 
 TEST_F(BundleTest, FewPosesGiveNoConfidentGuess) {

@@ -125,6 +125,35 @@ TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRun) {
   EXPECT_GE(engineering["scores"]["single_first_right_observable"]["share"].get<double>(), 0.8);
 }
 
+// Semi-synthetic: the effect is added to what was recorded, whose own effects count for nothing.
+TEST_F(GapChallenge, AddsEffectsToARecording) {
+  std::ofstream(folder_ / "unit.json")
+      << R"({"schema": "sixpoint/scenario/1", "seed": 31, "protocol": "production",
+             "effects": [{"name": "tilt", "parameters": {"rotation_vector_deg": [0.3, 0, 0]}}]})";
+  ASSERT_EQ(tests::run_command(posix_env(), {"simulate", "--scenario", folder_ / "unit.json", "-o",
+                                             folder_ / "recorded"})
+                .exit_code,
+            0);
+  const auto answer = tests::run_command(
+      posix_env(), {"gap", "challenge", "--program", SIXPOINT_BINARY_DIR "/sixpoint", "--recording",
+                    folder_ / "recorded", "--effects", "misalignment,seating,idle_sleep",
+                    "--trials", "12", "--none", "0.2", "--seed", "3", "--json"});
+  ASSERT_EQ(answer.exit_code, 0) << answer.people;
+  const auto json = answer.json();
+  EXPECT_EQ(json["own_effects"], nlohmann::json::array({"tilt"}));
+  EXPECT_EQ(json["scores"]["failures"]["right"], 0);
+  EXPECT_EQ(json["scores"]["none_alarms"]["right"], 0);
+  EXPECT_GE(json["scores"]["single_first_right"]["share"].get<double>(), 0.8);
+  const auto refused = [&](const char* effect, const std::string& recording) {
+    return tests::run_command(posix_env(),
+                              {"gap", "challenge", "--program", SIXPOINT_BINARY_DIR "/sixpoint",
+                               "--recording", recording, "--effects", effect, "--trials", "1"})
+        .exit_code;
+  };
+  EXPECT_EQ(refused("clock_error", folder_ / "recorded"), 64);
+  EXPECT_GE(refused("tilt", folder_ / "nowhere"), 64);
+}
+
 TEST_F(GapChallenge, AProgramThatFailsIsCounted) {
   const auto crashed = challenge({"--program", program("exit 70"), "--trials", "2"});
   EXPECT_EQ(crashed.exit_code, 1);

@@ -10,8 +10,10 @@
 
 #include "device/hid_jig.h"
 #include "device/protocol.h"
+#include "gap/diagnosis.h"
 #include "mocks/usbip_client.h"
 #include "run_command.h"
+#include "sim/effect.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::cli {
@@ -93,6 +95,43 @@ class Served {
   pid_t child_ = -1;
   int out_ = -1;
 };
+
+// What a diagnosis would leave behind that found these effects, at the simulator's default sizes.
+std::string augmented(const std::vector<const sim::EffectKind*>& kinds) {
+  gap::Diagnosis diagnosis;
+  diagnosis.protocol = "production";
+  diagnosis.serial = "MOS2A45130007";
+  diagnosis.seed = 5;
+  diagnosis.unit.noise_mg = {3.9, 3.9, 5.5};
+  for (const sim::EffectKind* kind : kinds) {
+    gap::EffectFinding finding;
+    finding.name = kind->name;
+    for (const sim::Parameter& parameter : kind->parameters) {
+      finding.parameters.push_back({parameter.name, parameter.default_value, {}});
+    }
+    diagnosis.effects.push_back(finding);
+  }
+  return gap::augmented_scenario(diagnosis).dump();
+}
+
+// gap.md: the augmented scenario is one command away from the virtual unit.
+TEST(VirtualCommand, TakesTheAugmentedScenarioOfEveryEffect) {
+  const tests::TemporaryFolder folder;
+  const auto& kinds = sim::effect_catalogue();
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const std::vector<std::vector<const sim::EffectKind*>> sets = {
+        {&kinds[i]}, {&kinds[i], &kinds[(i + 7) % kinds.size()]}};
+    for (const auto& set : sets) {
+      SCOPED_TRACE(set.front()->name + " and " + set.back()->name);
+      std::ofstream(folder / "augmented.json") << augmented(set);
+      Served served({"--scenario", folder / "augmented.json"});
+      ASSERT_TRUE(served.document.is_object());
+      ASSERT_TRUE(served.document.contains("devices")) << served.document.dump();
+      EXPECT_EQ(served.document["devices"][0]["serial"], "MOS2A45130007");
+      EXPECT_EQ(served.connect().list().size(), 1U);
+    }
+  }
+}
 
 TEST(VirtualCommand, SaysWhatItServesAndServesIt) {
   for (const int signal : {SIGINT, SIGTERM}) {

@@ -1,0 +1,129 @@
+#include "gap/slow_structure.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace sixpoint::gap {
+namespace {
+
+// Sums over modes: z is each axis' coefficient in units of what noise of the found size would give
+// it, `weight` the share of that which is slow.
+struct Sums {
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();  // sum of w z z'
+  double weight = 0;
+  double weight2 = 0;
+
+  void add(const Eigen::Vector3d& z, double w) {
+    products += w * z * z.transpose();
+    weight += w;
+    weight2 += w * w;
+  }
+  // So many modes of slow noise alone would know as much.
+  double modes() const { return weight2 > 0 ? weight * weight / weight2 : 0; }
+};
+
+void add_records(const SlowNoise& records, Scatter scatter, double size, Sums& sums) {
+  for (const SlowNoise::Mode& mode : records.modes) {
+    const double slow_mg2 = scatter == Scatter::random_walk
+                                ? size * size * mode.walk
+                                : flicker_density_mg2(size) * mode.flicker;
+    Eigen::Vector3d z;
+    double weight = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double variance = slow_mg2 + mode.white_mg2[a];
+      z[static_cast<Eigen::Index>(a)] = mode.value_mg[a] / std::sqrt(variance);
+      weight += slow_mg2 / variance / 3;
+    }
+    sums.add(z, weight);
+  }
+}
+
+// The dwells' means: modes are the eigenvectors of the slow covariance over the white one.
+void add_means(const std::vector<Block>& blocks, const Fit& fit, double lsb_mg, Sums& sums) {
+  const auto n = static_cast<Eigen::Index>(blocks.size());
+  if (n < 4) {
+    return;
+  }
+  const double start_s = blocks.front().middle_s - blocks.front().seconds / 2;
+  Eigen::MatrixXd slow(n, n);
+  Eigen::MatrixXd left(n, 3);
+  Eigen::MatrixXd white(n, 3);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Block& block = blocks[static_cast<std::size_t>(i)];
+    const Eigen::VectorXd off = block.value_mg - predict(fit.state, block, lsb_mg);
+    const Eigen::MatrixXd lever = seating_lever(block);
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      left(i, a) = off[a];
+      white(i, a) =
+          block.white_mg2(a, a) + std::pow(kNominalSeating_deg, 2) * lever.row(a).squaredNorm();
+    }
+    for (Eigen::Index j = 0; j < n; ++j) {
+      slow(i, j) = fit.scatter_size * fit.scatter_size *
+                   scatter_kernel(fit.scatter, block, blocks[static_cast<std::size_t>(j)], start_s);
+    }
+  }
+  const Eigen::VectorXd common = white.rowwise().mean();
+  const Eigen::VectorXd scale = common.cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(scale.asDiagonal() * slow *
+                                                             scale.asDiagonal());
+  const Eigen::MatrixXd along = modes.eigenvectors().transpose() * scale.asDiagonal() * left;
+  const Eigen::Vector3d share = (white.array().colwise() / common.array()).colwise().mean();
+  // The first modes hold little but the offset, which was fitted.
+  for (Eigen::Index k = 0; k + 1 < n; ++k) {
+    const double variance = std::max(0.0, modes.eigenvalues()[k]);
+    Eigen::Vector3d z;
+    double weight = 0;
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      z[a] = along(k, a) / std::sqrt(variance + share[a]);
+      weight += variance / (variance + share[a]) / 3;
+    }
+    sums.add(z, weight);
+  }
+}
+
+}  // namespace
+
+SlowStructure slow_structure(const std::vector<Block>& blocks, const Fit& fit,
+                             const SlowNoise& records, double lsb_mg) {
+  constexpr double kLogPriorOther = -2;  // of each of the three, less that of the noise
+  SlowStructure found;
+  Sums sums;
+  add_records(records, fit.scatter, fit.scatter_size, sums);
+  add_means(blocks, fit, lsb_mg, sums);
+  const double modes = sums.modes();
+  found.jump_nats = records.jump_nats;
+  if (modes > 8) {
+    const Eigen::Vector3d sd = sums.products.diagonal().cwiseSqrt().cwiseMax(1e-12);
+    const Eigen::Matrix3d correlation =
+        sd.cwiseInverse().asDiagonal() * sums.products * sd.cwiseInverse().asDiagonal();
+    // Three correlations, uniform before, against none: the determinant's likelihood ratio less
+    // what three free numbers cost (Schwarz).
+    const double free_modes = modes - 5;  // gains, offsets and more were fitted
+    found.in_step_nats = -0.5 * free_modes * std::log(std::max(1e-9, correlation.determinant())) -
+                         1.5 * std::log(std::max(1.0, free_modes / (2 * M_PI)));
+    // Sizes per axis: noise has them within half a unit of the logarithm of its variance, another
+    // thing within two.
+    const Eigen::Vector3d size =
+        (sums.products.diagonal() / sums.weight).cwiseMax(1e-9).array().log();
+    const double square = (size.array() - size.mean()).square().sum();
+    const double like = 2 / modes + 2 / (modes * modes) + 0.25;
+    const double unlike = like + 4;
+    found.unlike_nats = 0.5 * square * (1 / like - 1 / unlike) - std::log(unlike / like);
+  }
+  const std::array<std::pair<double, const char*>, 3> others = {
+      {{found.in_step_nats, "several axes move in step, as no noise of a sensor does"},
+       {found.unlike_nats, "one axis wanders and others do not"},
+       {found.jump_nats, "the zero jumps, and rests between"}}};
+  for (const auto& [nats, words] : others) {
+    if (nats + kLogPriorOther > found.other_nats) {
+      found.other_nats = nats + kLogPriorOther;
+      found.other = words;
+    }
+  }
+  return found;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,694 @@
+#include "station/gap_outside.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <memory>
+#include <numbers>
+
+namespace sixpoint::station {
+
+namespace {
+
+using sim::Effect;
+using sim::EffectKind;
+using sim::ParameterSet;
+using sim::Placement;
+using sim::RecordingPlan;
+using sim::SimulatedBlock;
+using sim::Stage;
+
+constexpr double kTwoPi = 2 * std::numbers::pi;
+
+// An effect out of functions: each kind sets those it needs.
+struct Parts final : Effect {
+  std::function<void(const RecordingPlan&)> recording;
+  std::function<void(const Placement&)> placement;
+  std::function<void(sim::Tone&)> tone;
+  std::function<void(SimulatedBlock&)> sampling, stimulus, sensor, analog, firmware;
+
+  void on_recording(const RecordingPlan& plan) override {
+    if (recording) {
+      recording(plan);
+    }
+  }
+  void on_placement(const Placement& at) override {
+    if (placement) {
+      placement(at);
+    }
+  }
+  void on_tone(sim::Tone& of) const override {
+    if (tone) {
+      tone(of);
+    }
+  }
+  void on_sampling(SimulatedBlock& block) override { run(sampling, block); }
+  void on_stimulus(SimulatedBlock& block) override { run(stimulus, block); }
+  void on_sensor(SimulatedBlock& block) override { run(sensor, block); }
+  void on_analog(SimulatedBlock& block) override { run(analog, block); }
+  void on_firmware(SimulatedBlock& block) override { run(firmware, block); }
+
+ private:
+  static void run(const std::function<void(SimulatedBlock&)>& part, SimulatedBlock& block) {
+    if (part) {
+      part(block);
+    }
+  }
+};
+
+using Made = std::unique_ptr<Effect>;
+
+// What a kind draws from.
+struct Draw {
+  double severity;
+  Random random;
+
+  double between(double low, double high) { return random.uniform(low, high); }
+  double between_log(double low, double high) {
+    return std::exp(random.uniform(std::log(low), std::log(high)));
+  }
+  double sign() { return random.uniform() < 0.5 ? -1 : 1; }
+  std::size_t axis() { return static_cast<std::size_t>(random.below(kAxes)); }
+  // Three numbers whose largest is `size`, either sign.
+  Eigen::Vector3d vector(double size) {
+    Eigen::Vector3d v(between(-1, 1), between(-1, 1), between(-1, 1));
+    return v * (size / std::max(v.cwiseAbs().maxCoeff(), 1e-6));
+  }
+};
+
+Eigen::Matrix3d turn_by(const Eigen::Vector3d& deg) {
+  const double angle = deg.norm() * std::numbers::pi / 180;
+  return angle < 1e-15 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
+                       : Eigen::AngleAxisd(angle, deg.normalized()).toRotationMatrix();
+}
+
+// A sample number somewhere in the middle half of the recording.
+struct Moment {
+  double share;
+  std::uint64_t sample = 0;
+  void in(const RecordingPlan& plan) {
+    sample = static_cast<std::uint64_t>(share * static_cast<double>(plan.length()));
+  }
+};
+
+Eigen::Index row(std::size_t axis) { return static_cast<Eigen::Index>(axis); }
+
+// Random telegraph ("popcorn") noise of a bad contact or a trap in the front end.
+Made popcorn(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const double g = 3 * d.severity / kMgPerG;
+  made->sensor = [g, d, next_s = 0.0, up = false](SimulatedBlock& block) mutable {
+    constexpr double kMeanStay_s = 20;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      while (block.time_s[i] >= next_s) {
+        next_s += -kMeanStay_s * std::log(1 - d.random.uniform());
+        up = !up;
+      }
+      block.sensed_g[i][0] += up ? g : 0;
+    }
+  };
+  return made;
+}
+
+// A knock moves the zero once and for all.
+Made zero_step(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const double g = 3 * d.severity / kMgPerG;
+  auto moment = std::make_shared<Moment>(Moment{d.between(0.25, 0.75)});
+  made->recording = [moment](const RecordingPlan& plan) { moment->in(plan); };
+  made->sensor = [g, moment](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (block.first_sample + i >= moment->sample) {
+        block.sensed_g[i] += Eigen::Vector3d(g, -g, g);
+      }
+    }
+  };
+  return made;
+}
+
+// The lowest bit of one axis never changes.
+Made stuck_bit(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [axis = d.axis()](SimulatedBlock& block) {
+    for (gt3x::Counts& counts : block.stored) {
+      counts[axis] = static_cast<std::int16_t>(counts[axis] & ~1);
+    }
+  };
+  return made;
+}
+
+// Sensitivity that differs between the two directions of an axis.
+Made asymmetry(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [ratio = 3 * d.severity / kMgPerG](SimulatedBlock& block) {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      sensed.array() += ratio * sensed.array() * (sensed.array() * 20).tanh() * 0.5;
+      sensed[1] += ratio * sensed[0] * sensed[2];  // and a cross-axis product
+    }
+  };
+  return made;
+}
+
+// A machine that runs up and down: a line whose frequency wanders.
+Made swept_line(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->stimulus = [g = 3 * d.severity / kMgPerG, phase = d.between(0, 6)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double t = block.time_s[i];
+      const double angle = kTwoPi * (14 * t - 4 * 60 / 6.3 * std::cos(6.3 * t / 60));
+      block.motion[i].force_lab_g.z() += g * std::sin(angle + phase);
+    }
+  };
+  return made;
+}
+
+// A converter that never gives some of its codes: their neighbours get them.
+Made missing_codes(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const std::array<int, 4> every = {4, 8, 16, 32};
+  const int period = every[static_cast<std::size_t>(d.random.below(every.size()))];
+  const int code = static_cast<int>(d.random.below(static_cast<std::uint64_t>(period)));
+  made->firmware = [axis = d.axis(), period, code,
+                    side = d.random.uniform() < 0.5 ? 1 : -1](SimulatedBlock& block) {
+    for (gt3x::Counts& counts : block.stored) {
+      if (((counts[axis] % period) + period) % period == code) {
+        counts[axis] = static_cast<std::int16_t>(counts[axis] + side);
+      }
+    }
+  };
+  return made;
+}
+
+// Play in the jig's hinge: the pose falls short of where it was turned to.
+Made hinge_backlash(Draw d) {
+  auto made = std::make_unique<Parts>();
+  auto error = std::make_shared<Eigen::Matrix3d>(Eigen::Matrix3d::Identity());
+  made->placement = [error, deg = 0.15 * d.severity](const Placement& at) {
+    const Eigen::AngleAxisd moved(at.rotation * at.previous.transpose());
+    if (moved.angle() > 0.05) {
+      *error = turn_by(-deg * moved.axis());
+    }
+  };
+  made->stimulus = [error](SimulatedBlock& block) {
+    for (sim::MotionState& motion : block.motion) {
+      motion.rotation = *error * motion.rotation;
+    }
+  };
+  return made;
+}
+
+// The gain rises or falls with the rate of change, as behind a leaky coupling.
+Made rate_gain(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->tone = [per_decade = d.sign() * 0.02 * d.severity](sim::Tone& tone) {
+    tone.amplitude_g *= 1 + per_decade * std::log10(std::max(0.1, tone.frequency_hz) / 2);
+  };
+  return made;
+}
+
+// Something that switches on and off on the same supply moves the zero with it.
+Made supply_crosstalk(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const double period_s = d.between_log(4, 60);
+  made->sensor = [period_s, on_s = period_s * d.between(0.1, 0.5),
+                  g = d.vector(2 * d.severity) / kMgPerG,
+                  phase_s = d.between(0, period_s)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (std::fmod(block.time_s[i] + phase_s, period_s) < on_s) {
+        block.sensed_g[i] += g;
+      }
+    }
+  };
+  return made;
+}
+
+// A controller that hunts: the zero swings slowly.
+Made slow_oscillation(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [g = d.vector(2 * d.severity) / kMgPerG, period_s = d.between_log(25, 700),
+                  phase = d.between(0, kTwoPi)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      block.sensed_g[i] += g * std::sin(kTwoPi * block.time_s[i] / period_s + phase);
+    }
+  };
+  return made;
+}
+
+// One axis clips on one side only.
+Made one_sided_clip(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [axis = d.axis(), side = d.sign(),
+                  level_g = d.between(3.5, 7)](SimulatedBlock& block) {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      double& x = sensed[row(axis)];
+      x = side > 0 ? std::min(x, level_g) : std::max(x, -level_g);
+    }
+  };
+  return made;
+}
+
+// The zero goes up one way with the temperature and comes down another.
+Made thermal_hysteresis(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [g = d.vector(1.5 * d.severity) / kMgPerG, width_c = d.between(0.5, 4),
+                  play_c = 0.0, started = false](SimulatedBlock& block) mutable {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double t = block.temperature_c[i];
+      play_c = started ? std::clamp(play_c, t - width_c, t + width_c) : t;
+      started = true;
+      block.sensed_g[i] += g * ((t - play_c) / width_c);
+    }
+  };
+  return made;
+}
+
+// The nest wears: each time the unit sits a little further off than the time before.
+Made seating_walk(Draw d) {
+  auto made = std::make_unique<Parts>();
+  auto where = std::make_shared<Eigen::Vector3d>(Eigen::Vector3d::Zero());
+  made->placement = [where, d](const Placement& at) mutable {
+    if (at.anew) {
+      const double step_deg = 0.04 * d.severity;
+      *where += step_deg * Eigen::Vector3d(d.random.normal(), d.random.normal(), d.random.normal());
+    }
+  };
+  made->stimulus = [where](SimulatedBlock& block) {
+    const Eigen::Matrix3d turn = turn_by(*where);
+    for (sim::MotionState& motion : block.motion) {
+      motion.rotation = turn * motion.rotation;
+    }
+  };
+  return made;
+}
+
+// Two packets in the wrong order, now and then: the samples of half a second change places.
+Made swapped_packets(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sampling = [d](SimulatedBlock& block) mutable {
+    for (std::size_t i = 0; i + 50 <= block.size(); i += 50) {
+      if (d.random.uniform() < 0.03 * d.severity) {
+        for (std::size_t k = 0; k < 25; ++k) {
+          std::swap(block.time_s[i + k], block.time_s[i + k + 25]);
+        }
+      }
+    }
+  };
+  return made;
+}
+
+// The firmware averages neighbours.
+Made averaged_neighbours(Draw d) {
+  auto made = std::make_unique<Parts>();
+  auto last = std::make_shared<Eigen::Vector3d>(Eigen::Vector3d::Zero());
+  made->analog = [last, weight = std::min(0.5, 0.3 * d.severity),
+                  fresh = true](SimulatedBlock& block) mutable {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      const Eigen::Vector3d now = sensed;
+      // The first of a pose follows itself: what went before was left out.
+      const bool near = !fresh && (now - *last).cwiseAbs().maxCoeff() < 0.3;
+      sensed = near ? Eigen::Vector3d((1 - weight) * now + weight * *last) : now;
+      *last = now;
+      fresh = false;
+    }
+  };
+  return made;
+}
+
+// The gain of one axis or all jumps once.
+Made gain_step(Draw d) {
+  auto made = std::make_unique<Parts>();
+  auto moment = std::make_shared<Moment>(Moment{d.between(0.2, 0.8)});
+  Eigen::Vector3d ratio = d.vector(0.003 * d.severity);
+  made->recording = [moment](const RecordingPlan& plan) { moment->in(plan); };
+  made->sensor = [moment, ratio](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (block.first_sample + i >= moment->sample) {
+        block.sensed_g[i] += ratio.cwiseProduct(block.sensed_g[i]);
+      }
+    }
+  };
+  return made;
+}
+
+// One axis is read a sample later than the others.
+Made delayed_axis(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [axis = d.axis(), last = std::int16_t{0}](SimulatedBlock& block) mutable {
+    for (gt3x::Counts& counts : block.stored) {
+      std::swap(counts[axis], last);
+    }
+  };
+  return made;
+}
+
+// Now and then the noise is louder for a while.
+Made noise_spells(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const double period_s = d.between_log(20, 400);
+  made->sensor = [d, period_s, on_s = period_s * d.between(0.1, 0.4),
+                  g = 2.5 * d.severity / kMgPerG](SimulatedBlock& block) mutable {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (std::fmod(block.time_s[i], period_s) < on_s) {
+        for (double& x : block.sensed_g[i]) {
+          x += g * d.random.normal();
+        }
+      }
+    }
+  };
+  return made;
+}
+
+// Vibration of the table has a narrow band, but no line: the building sways at its own pace.
+Made narrow_band(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const double f = d.between(5, 35);
+  const double damping = d.between_log(0.01, 0.08);
+  const Eigen::Vector3d direction = d.vector(2 * d.severity) / kMgPerG;
+  made->stimulus = [d, f, damping, direction, x = 0.0, y = 0.0](SimulatedBlock& block) mutable {
+    const double keep = std::exp(-kTwoPi * f * damping * 0.01);
+    const double push = std::sqrt(1 - keep * keep);
+    const double c = std::cos(kTwoPi * f * 0.01);
+    const double s = std::sin(kTwoPi * f * 0.01);
+    for (sim::MotionState& motion : block.motion) {
+      const double turned = c * x - s * y;
+      y = keep * (s * x + c * y) + push * d.random.normal();
+      x = keep * turned + push * d.random.normal();
+      motion.force_lab_g += x * direction;
+    }
+  };
+  return made;
+}
+
+// Stiction: the reading stays until the force has moved on by this much.
+Made dead_zone(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->analog = [width = 3 * d.severity / kMgPerG,
+                  held = Eigen::Vector3d(9, 9, 9)](SimulatedBlock& block) mutable {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      for (Eigen::Index a = 0; a < 3; ++a) {
+        held[a] = std::clamp(held[a], sensed[a] - width, sensed[a] + width);
+        sensed[a] = held[a];
+      }
+    }
+  };
+  return made;
+}
+
+// The front end follows no faster than so many g per second.
+Made slew_limit(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [most = 0.8 / d.severity, last = Eigen::Vector3d(9, 9, 9),
+                  end_s = -1.0](SimulatedBlock& block) mutable {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      Eigen::Vector3d& sensed = block.sensed_g[i];
+      if (block.time_s[i] < end_s + 0.1) {
+        for (Eigen::Index a = 0; a < 3; ++a) {
+          sensed[a] = std::clamp(sensed[a], last[a] - most, last[a] + most);
+        }
+      }
+      last = sensed;
+      end_s = block.time_s[i];
+    }
+  };
+  return made;
+}
+
+// The low bits are not there: steps of two to eight.
+Made coarse_steps(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [step = d.severity < 0.7   ? 2
+                           : d.severity < 1.5 ? 4
+                                              : 8](SimulatedBlock& block) {
+    for (gt3x::Counts& counts : block.stored) {
+      for (std::int16_t& x : counts) {
+        x = static_cast<std::int16_t>(std::lround(static_cast<double>(x) / step) * step);
+      }
+    }
+  };
+  return made;
+}
+
+// A higher bit of one axis always reads one.
+Made stuck_high_bit(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [axis = d.axis(),
+                    bit = 1 << (1 + static_cast<int>(d.random.below(4)))](SimulatedBlock& block) {
+    for (gt3x::Counts& counts : block.stored) {
+      counts[axis] = static_cast<std::int16_t>(counts[axis] | bit);
+    }
+  };
+  return made;
+}
+
+// The zero follows the square of the temperature, or a kink in it.
+Made bent_tempco(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [g = d.vector(3 * d.severity) / kMgPerG, kink = d.random.uniform() < 0.5,
+                  at_c = d.between(20, 30)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double x = (block.temperature_c[i] - at_c) / 12;
+      block.sensed_g[i] += g * (kink ? std::max(0.0, x) : x * x);
+    }
+  };
+  return made;
+}
+
+// The hand warms the unit at every placement.
+Made hand_warmth(Draw d) {
+  auto made = std::make_unique<Parts>();
+  auto since_s = std::make_shared<double>(-1e9);
+  made->placement = [since_s](const Placement& at) {
+    if (at.anew) {
+      *since_s = at.start_s;
+    }
+  };
+  made->sensor = [since_s, g = d.vector(2 * d.severity) / kMgPerG,
+                  tau_s = d.between_log(4, 40)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      block.sensed_g[i] += g * std::exp(-std::max(0.0, block.time_s[i] - *since_s) / tau_s);
+    }
+  };
+  return made;
+}
+
+// The battery runs down, and the gain with it.
+Made battery_droop(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [per_h = -0.002 * d.severity](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      block.sensed_g[i] *= 1 + per_h * block.time_s[i] / 3600;
+    }
+  };
+  return made;
+}
+
+// A machine that runs for a while and rests for a while.
+Made blower(Draw d) {
+  auto made = std::make_unique<Parts>();
+  const double period_s = d.between_log(20, 200);
+  made->stimulus = [g = d.vector(2 * d.severity) / kMgPerG, f = d.between(6, 40), period_s,
+                    on_s = period_s * d.between(0.2, 0.6)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (std::fmod(block.time_s[i], period_s) < on_s) {
+        block.motion[i].force_lab_g += g * std::sin(kTwoPi * f * block.time_s[i]);
+      }
+    }
+  };
+  return made;
+}
+
+// The board bends under its own weight: how the sensor sits depends on the pose.
+Made sagging_board(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [deg = 0.1 * d.severity, a = d.axis(), b = d.axis()](SimulatedBlock& block) {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      Eigen::Vector3d bend = Eigen::Vector3d::Zero();
+      bend[row(b)] = deg * sensed[row(a)];
+      sensed = turn_by(bend) * sensed;
+    }
+  };
+  return made;
+}
+
+// The sample clock drifts with the temperature.
+Made clock_tempco(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sampling = [ppm_per_c = d.sign() * 8 * d.severity, shift_s = 0.0,
+                    start_s = -1.0](SimulatedBlock& block) mutable {
+    if (block.clock_start_s != start_s) {
+      start_s = block.clock_start_s;
+      shift_s = 0;
+    }
+    // The chamber's programme as the clock feels it: it swings by 12 C in half an hour.
+    for (double& t : block.time_s) {
+      shift_s += 0.01 * 1e-6 * ppm_per_c * 12 * std::sin(kTwoPi * t / 3600);
+      t += shift_s;
+    }
+  };
+  return made;
+}
+
+// A buffer overflows now and then: tens of samples are lost in one go.
+Made lost_bursts(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sampling = [d, shift_s = 0.0, start_s = -1.0](SimulatedBlock& block) mutable {
+    if (block.clock_start_s != start_s) {
+      start_s = block.clock_start_s;
+      shift_s = 0;
+    }
+    for (double& t : block.time_s) {
+      if (d.random.uniform() < 2e-4 * d.severity) {
+        shift_s += 0.01 * static_cast<double>(5 + d.random.below(45));
+      }
+      t += shift_s;
+    }
+  };
+  return made;
+}
+
+// For some samples two axes change places.
+Made crossed_axes(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [d, a = d.axis(), left = std::uint64_t{0}](SimulatedBlock& block) mutable {
+    for (gt3x::Counts& counts : block.stored) {
+      if (left == 0 && d.random.uniform() < 2e-4 * d.severity) {
+        left = 1 + d.random.below(100);
+      }
+      if (left > 0) {
+        --left;
+        std::swap(counts[a], counts[(a + 1) % kAxes]);
+      }
+    }
+  };
+  return made;
+}
+
+// The sensor runs at half the rate that is stored: every value comes twice.
+Made half_rate(Draw /*d*/) {
+  auto made = std::make_unique<Parts>();
+  made->firmware = [last = gt3x::Counts{}](SimulatedBlock& block) mutable {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if ((block.first_sample + i) % 2 == 1 && i > 0) {
+        block.stored[i] = last;
+      }
+      last = block.stored[i];
+    }
+  };
+  return made;
+}
+
+// Somebody knocks against the table.
+Made knocks(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->stimulus = [d, g = Eigen::Vector3d(Eigen::Vector3d::Zero()), age_s = 1e9,
+                    f = d.between(8, 30)](SimulatedBlock& block) mutable {
+    for (sim::MotionState& motion : block.motion) {
+      if (d.random.uniform() < 3e-4) {
+        g = d.vector(40 * d.severity) / kMgPerG;
+        age_s = 0;
+      }
+      age_s += 0.01;
+      motion.force_lab_g += g * (std::exp(-age_s / 0.15) * std::cos(kTwoPi * f * age_s));
+    }
+  };
+  return made;
+}
+
+// The table settles: its level creeps while the units are measured.
+Made creeping_table(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->stimulus = [deg = 0.15 * d.severity, direction = d.between(0, kTwoPi),
+                    tau_s = d.between_log(60, 3000)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double now = deg * (1 - std::exp(-block.time_s[i] / tau_s));
+      block.motion[i].rotation =
+          block.motion[i].rotation *
+          turn_by(now * Eigen::Vector3d(std::cos(direction), std::sin(direction), 0));
+    }
+  };
+  return made;
+}
+
+// One axis is noisier than its kind.
+Made noisy_axis(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [d, axis = d.axis(), g = 4 * d.severity / kMgPerG](SimulatedBlock& block) mutable {
+    for (Eigen::Vector3d& sensed : block.sensed_g) {
+      sensed[row(axis)] += g * d.random.normal();
+    }
+  };
+  return made;
+}
+
+// An auto-zero that hunts: the zero ramps off and is set back, again and again.
+Made saw_tooth(Draw d) {
+  auto made = std::make_unique<Parts>();
+  made->sensor = [g = d.vector(2 * d.severity) / kMgPerG,
+                  period_s = d.between_log(30, 300)](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      block.sensed_g[i] += g * (std::fmod(block.time_s[i], period_s) / period_s);
+    }
+  };
+  return made;
+}
+
+template <Made (*kMake)(Draw)>
+OutsideKind outside(const char* name, Stage stage, std::string_view family, bool in_faces = true) {
+  EffectKind kind = {name,
+                     stage,
+                     "outside the catalogue",
+                     {{"severity", "1", {1}, 0, 10, "drawn"}},
+                     [](const ParameterSet& values, Random random) -> std::unique_ptr<Effect> {
+                       return kMake(Draw{values.at("severity")[0], random});
+                     }};
+  return {std::move(kind), family, in_faces};
+}
+
+}  // namespace
+
+const std::vector<OutsideKind>& outside_kinds() {
+  static const std::vector<OutsideKind> kKinds = {
+      outside<popcorn>("popcorn", Stage::sensor, ""),
+      outside<zero_step>("zero_step", Stage::sensor, ""),
+      outside<stuck_bit>("stuck_bit", Stage::firmware, ""),
+      outside<asymmetry>("asymmetry", Stage::sensor, "curvature"),
+      outside<swept_line>("swept_line", Stage::stimulus, "line"),
+      outside<missing_codes>("missing_codes", Stage::firmware, ""),
+      outside<hinge_backlash>("hinge_backlash", Stage::stimulus, "repeat"),
+      outside<rate_gain>("rate_gain", Stage::stimulus, "response", false),
+      outside<supply_crosstalk>("supply_crosstalk", Stage::sensor, ""),
+      outside<slow_oscillation>("slow_oscillation", Stage::sensor, ""),
+      outside<one_sided_clip>("one_sided_clip", Stage::sensor, "range", false),
+      outside<thermal_hysteresis>("thermal_hysteresis", Stage::sensor, "", false),
+      outside<seating_walk>("seating_walk", Stage::stimulus, "repeat"),
+      outside<swapped_packets>("swapped_packets", Stage::sampling, "timing", false),
+      outside<averaged_neighbours>("averaged_neighbours", Stage::sensor, "response"),
+      outside<gain_step>("gain_step", Stage::sensor, ""),
+      outside<delayed_axis>("delayed_axis", Stage::firmware, "", false),
+      outside<noise_spells>("noise_spells", Stage::sensor, ""),
+      outside<narrow_band>("narrow_band", Stage::stimulus, "line"),
+      // The kinds from here on were written after the diagnosis was frozen (docs/gap.md).
+      outside<dead_zone>("dead_zone", Stage::sensor, ""),
+      outside<slew_limit>("slew_limit", Stage::sensor, "", false),
+      outside<coarse_steps>("coarse_steps", Stage::firmware, "rounding"),
+      outside<stuck_high_bit>("stuck_high_bit", Stage::firmware, ""),
+      outside<bent_tempco>("bent_tempco", Stage::sensor, "", false),
+      outside<hand_warmth>("hand_warmth", Stage::sensor, ""),
+      outside<battery_droop>("battery_droop", Stage::sensor, "", false),
+      outside<blower>("blower", Stage::stimulus, "line"),
+      outside<sagging_board>("sagging_board", Stage::sensor, ""),
+      outside<clock_tempco>("clock_tempco", Stage::sampling, "timing", false),
+      outside<lost_bursts>("lost_bursts", Stage::sampling, "timing"),
+      outside<crossed_axes>("crossed_axes", Stage::firmware, ""),
+      outside<half_rate>("half_rate", Stage::firmware, "timing"),
+      outside<knocks>("knocks", Stage::stimulus, ""),
+      outside<creeping_table>("creeping_table", Stage::stimulus, ""),
+      outside<noisy_axis>("noisy_axis", Stage::sensor, ""),
+      outside<saw_tooth>("saw_tooth", Stage::sensor, ""),
+  };
+  return kKinds;
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,174 @@
+#include "station/gap_recorded.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "base/atomic_file.h"
+#include "base/random.h"
+#include "gap/bundle.h"
+#include "gt3x/recording_writer.h"
+#include "sim/recording.h"
+#include "sim/unit_truth.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+constexpr std::uint64_t kFractionStream = 0x66726163;
+constexpr std::size_t kBlock = 512;
+constexpr double kLow12 = -2048;
+constexpr double kHigh12 = 2047;
+
+class Adding {
+ public:
+  Adding(const gap::Bundle& bundle, const std::vector<sim::EffectSpec>& specs, std::uint64_t seed)
+      : bundle_(bundle),
+        effects_(sim::make_effects(specs, seed)),
+        fraction_(seed, kFractionStream),
+        counts_(bundle.samples) {
+    // What firmware makes of counts needs no fraction of them.
+    analog_ = std::any_of(specs.begin(), specs.end(), [](const sim::EffectSpec& spec) {
+      return spec.kind->stage != sim::Stage::firmware;
+    });
+    sim::RecordingPlan plan{bundle.rate_hz, bundle.samples.size(), {}};
+    for (const gap::Segment& segment : bundle.segments) {
+      plan.rests.push_back({segment.first_sample, segment.samples});
+    }
+    for (const auto& effect : effects_) {
+      effect->on_digital(format_);
+      effect->on_recording(plan);
+    }
+  }
+
+  std::vector<gt3x::Counts> run() {
+    Eigen::Matrix3d before = bundle_.segments.front().rotation;
+    for (const gap::Segment& segment : bundle_.segments) {
+      const sim::Placement placement{segment.host_start_s, segment.rotation, before,
+                                     segment.starts_placement, !segment.starts_placement};
+      for (const auto& effect : effects_) {
+        effect->on_placement(placement);
+      }
+      before = segment.rotation;
+      for (std::size_t done = 0; done < segment.samples; done += kBlock) {
+        add(segment, done, std::min(kBlock, segment.samples - done));
+      }
+    }
+    return std::move(counts_);
+  }
+
+ private:
+  void add(const gap::Segment& segment, std::size_t first, std::size_t count) {
+    const std::size_t at = segment.first_sample + first;
+    block_.first_sample = at;
+    block_.clock_start_s = segment.host_start_s;
+    block_.time_s.resize(count);
+    block_.temperature_c.resize(count);
+    block_.true_g.resize(count);
+    block_.sensed_g.resize(count);
+    block_.stored.resize(count);
+    const Eigen::Vector3d gravity(0, 0, bundle_.gravity_g);
+    block_.motion.assign(count, {segment.rotation, gravity});
+    for (std::size_t i = 0; i < count; ++i) {
+      block_.time_s[i] = segment.host_start_s + static_cast<double>(first + i) / bundle_.rate_hz;
+      block_.temperature_c[i] = bundle_.temperature_at(block_.time_s[i]);
+    }
+    for (const auto& effect : effects_) {
+      effect->on_stimulus(block_);
+    }
+    const Eigen::Vector3d rest = segment.rotation * gravity;
+    for (std::size_t i = 0; i < count; ++i) {
+      const sim::MotionState& motion = block_.motion[i];
+      block_.true_g[i] = motion.rotation * motion.force_lab_g;
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        const double fraction = analog_ ? fraction_.uniform(-0.5, 0.5) : 0;
+        block_.sensed_g[i][static_cast<Eigen::Index>(axis)] =
+            (counts_[at + i][axis] + fraction) / bundle_.accel_scale_lsb_per_g;
+      }
+      block_.sensed_g[i] += block_.true_g[i] - rest;
+    }
+    for (const auto& effect : effects_) {
+      effect->on_sensor(block_);
+    }
+    for (const auto& effect : effects_) {
+      effect->on_analog(block_);
+    }
+    bool clipped = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        const double lsb =
+            block_.sensed_g[i][static_cast<Eigen::Index>(axis)] * bundle_.accel_scale_lsb_per_g;
+        block_.stored[i][axis] =
+            static_cast<std::int16_t>(format_.to_integer(lsb, kLow12, kHigh12, clipped));
+      }
+    }
+    for (const auto& effect : effects_) {
+      effect->on_firmware(block_);
+    }
+    std::copy(block_.stored.begin(), block_.stored.end(),
+              counts_.begin() + static_cast<std::ptrdiff_t>(at));
+  }
+
+  const gap::Bundle& bundle_;
+  std::vector<std::unique_ptr<sim::Effect>> effects_;
+  Random fraction_;
+  std::vector<gt3x::Counts> counts_;
+  sim::NumberFormat format_;
+  bool analog_ = false;
+  sim::SimulatedBlock block_;
+};
+
+}  // namespace
+
+const std::vector<std::string>& effects_for_recordings() {
+  static const std::vector<std::string> kNames = {
+      "tilt",         "seating",         "settling",      "floor_vibration", "misalignment",
+      "second_order", "hysteresis",      "warm_up",       "bandwidth",       "non_orthogonality",
+      "random_walk",  "electrical_line", "axis_rotation", "idle_sleep",      "charging_zeros"};
+  return kNames;
+}
+
+Status write_recorded_trial(FileSystem& files, const std::string& from, const std::string& to,
+                            const std::vector<sim::EffectSpec>& effects, std::uint64_t seed) {
+  SIXPOINT_ASSIGN(const gap::Bundle bundle, gap::read_bundle(files, from));
+  for (const gap::Segment& segment : bundle.segments) {
+    if (segment.vibration) {
+      return fail(ErrorCode::usage, "effects can be added to recordings at rest only",
+                  from + ": segment " + segment.name,
+                  "give a bundle of faces, as a run of the jig is");
+    }
+  }
+  const std::vector<gt3x::Counts> counts = Adding(bundle, effects, seed).run();
+  sim::UnitWishes wishes;
+  if (!bundle.header.serial.empty()) {
+    wishes.serial = bundle.header.serial;
+  }
+  const sim::UnitTruth unit = sim::draw_unit(seed, wishes);
+  const UtcTime start = from_unix_seconds(1'640'439'383);
+  const auto rate = static_cast<std::size_t>(std::lround(bundle.rate_hz));
+  Bytes log = sim::log_preamble(unit, start, static_cast<int>(rate));
+  std::int64_t second = 0;
+  for (std::size_t first = 0; first < counts.size(); first += rate, ++second) {
+    sim::append_second(log, start + std::chrono::seconds(second),
+                       std::span(counts).subspan(first, std::min(rate, counts.size() - first)),
+                       true);
+  }
+  SIXPOINT_CHECK(files.make_folders(to));
+  SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, to + "/recording.gt3x"));
+  SIXPOINT_CHECK(writer.add("log.bin", std::move(log)));
+  SIXPOINT_CHECK(writer.add(
+      "info.txt",
+      sim::recording_info(unit, start, start + std::chrono::seconds(second), static_cast<int>(rate))
+          .serialise()));
+  SIXPOINT_CHECK(writer.commit());
+  for (const char* name : {"/temperature.csv", "/host_clock.csv", "/protocol.json"}) {
+    if (const auto text = read_file(files, from + name)) {
+      SIXPOINT_CHECK(write_file(files, to + name,
+                                {reinterpret_cast<const char*>(text->data()), text->size()}));
+    }
+  }
+  return {};
+}
+
+}  // namespace sixpoint::station
