@@ -282,7 +282,7 @@ Json Lanes::Lane::to_json() const {
     run["waiting_since_ms"] = waiting_since_ms_;
   }
   json["capture"] = nullptr;
-  if (state_ == LaneState::capturing) {
+  if (has_capture_) {
     json["capture"]["side"] = asked_side_ ? Json(device::to_string(*asked_side_)) : Json(nullptr);
     json["capture"]["number"] = side_number_;
     json["capture"]["of"] = device::kPoses.size();
@@ -440,6 +440,14 @@ void Lanes::Lane::work(const std::stop_token& stop) {
     } else if (*left) {
       resume(stop);
     }
+    auto capture_left = folder_.load_capture();
+    if (!capture_left) {
+      const std::lock_guard lock(mutex_);
+      tell("problem", capture_left.error().brief());
+      static_cast<void>(folder_.set_aside());
+    } else if (*capture_left && !stop.stop_requested()) {
+      resume_capture(stop, **capture_left);
+    }
     break;
   }
   while (!stop.stop_requested()) {
@@ -471,7 +479,7 @@ void Lanes::Lane::work(const std::stop_token& stop) {
         streaming_ = false;
       }
       if (order->capture) {
-        capture(stop, *order);
+        capture(stop, *order, {});
       } else {
         run(stop, *order, {});
       }
@@ -485,7 +493,7 @@ void Lanes::Lane::work(const std::stop_token& stop) {
 // Answers with the unit of this serial number, opened anew. Gives up with device_unavailable when
 // time or the operator says so, with `internal` when the program ends.
 Result<UnitOnJig> Lanes::Lane::wait_for_unit(const std::stop_token& stop, const std::string& serial,
-                                             const std::string& why) {
+                                             const std::string& why, LaneState working) {
   close_unit();
   const auto deadline = env_.clock.elapsed() + from_seconds(shared_.options.unit_wait_s);
   {
@@ -506,8 +514,8 @@ Result<UnitOnJig> Lanes::Lane::wait_for_unit(const std::stop_token& stop, const 
     if (open_unit()) {
       if (unit_->identity().serial == serial) {
         const std::lock_guard lock(mutex_);
-        set_state(LaneState::running, "");
-        tell("back", "the unit is back; the run goes on");
+        set_state(working, "");
+        tell("back", "the unit is back; it goes on");
         return on_jig();
       }
       const std::string other = unit_->identity().serial;

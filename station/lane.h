@@ -117,9 +117,14 @@ class Lanes::Lane {
   void close_interrupted(const UnfinishedRun& left, const std::string& reason);
   void conclude(const JigReport& report, const RunLabels& labels);
   void keep(const std::stop_token& stop);
-  void capture(const std::stop_token& stop, const Order& order);
+  void capture(const std::stop_token& stop, const Order& order,
+               const std::optional<UnfinishedCapture>& left);
+  void resume_capture(const std::stop_token& stop, const UnfinishedCapture& left);
+  void end_capture(nlohmann::ordered_json result);
+  SideAnswer ask_side(const std::stop_token& stop, device::Pose side, std::size_t number);
+  // Answers with the unit of this serial number, opened anew, and `working` as the lane's state.
   Result<UnitOnJig> wait_for_unit(const std::stop_token& stop, const std::string& serial,
-                                  const std::string& why);
+                                  const std::string& why, LaneState working);
   UnitOnJig on_jig();
 
   // With mutex_ held.
@@ -180,6 +185,7 @@ class Lanes::Lane {
   std::vector<Pose> open_;
   bool has_run_ = false;
   nlohmann::ordered_json result_;  // null until a run has ended
+  bool has_capture_ = false;       // one is under way, whether or not the unit is there
   std::optional<Pose> asked_side_;
   std::size_t side_number_ = 0;
   bool side_placed_ = false;

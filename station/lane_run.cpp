@@ -125,7 +125,9 @@ void Lanes::Lane::run(const std::stop_token& stop, const Order& order,
     changed();
   };
   hooks.words = [&] { return take_word(); };
-  hooks.reopen = [&](const Error& error) { return wait_for_unit(stop, state.serial, error.what); };
+  hooks.reopen = [&](const Error& error) {
+    return wait_for_unit(stop, state.serial, error.what, LaneState::running);
+  };
 
   const auto report =
       run_jig(on_jig(), env_, session, hooks, left ? std::optional(left->resume) : std::nullopt);
@@ -246,8 +248,8 @@ void Lanes::Lane::resume(const std::stop_token& stop) {
     set_state(LaneState::resuming,
               fmt::format("waits for unit {} to go on with its run", printable(left.serial, 40)));
   }
-  const auto unit =
-      wait_for_unit(stop, left.serial, "the program was started again; the run goes on");
+  const auto unit = wait_for_unit(
+      stop, left.serial, "the program was started again; the run goes on", LaneState::running);
   if (stop.stop_requested()) {
     return;
   }
