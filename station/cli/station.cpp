@@ -22,6 +22,7 @@
 #include "station/run_records.h"
 #include "station/server.h"
 #include "station/software.h"
+#include "station/station_desk.h"
 #include "station/station_records.h"
 
 namespace sixpoint::cli {
@@ -185,6 +186,11 @@ Status serve(Context& context, const Options& options) {
   // The command's own streams and exit code belong to one thread at a time.
   std::mutex context_mutex;
   const station::JigSessionOptions session = lanes_asked.session;
+  const station::StoreOpener store_opener = [&] {
+    const std::lock_guard lock(context_mutex);
+    return open_store(context, options.store);
+  };
+  station::StationDesk desk(context.env, store_opener, options.station, session.limits);
   lanes_asked.may_start = [&](const std::string& serial) -> Result<station::RetestState> {
     const std::lock_guard lock(context_mutex);
     auto store = open_store(context, options.store);
@@ -200,14 +206,15 @@ Status serve(Context& context, const Options& options) {
                   station::Lanes::open(
                       context.env, devices, std::move(lanes_asked),
                       [&](const station::JigReport& report, const station::RunLabels& labels) {
-                        const std::lock_guard lock(context_mutex);
-                        return keep_run(context, options, session, report, labels);
+                        auto kept = [&] {
+                          const std::lock_guard lock(context_mutex);
+                          return keep_run(context, options, session, report, labels);
+                        }();
+                        desk.look_soon();  // it may have been a check unit
+                        return kept;
                       },
                       capture_keeper));
-  station::RepairJob repairs(context.env, [&] {
-    const std::lock_guard lock(context_mutex);
-    return open_store(context, options.store);
-  });
+  station::RepairJob repairs(context.env, store_opener);
   station::ApiOptions api_options;
   api_options.station = options.station;
   api_options.version = station::software_name();
@@ -218,7 +225,8 @@ Status serve(Context& context, const Options& options) {
                                  [&](const std::string& run, const std::string& kind) {
                                    const std::lock_guard lock(context_mutex);
                                    return document_of(context, options, run, kind);
-                                 }});
+                                 },
+                                 &desk});
   station::ServerOptions server_options;
   server_options.bind = options.bind;
   server_options.port = options.port;

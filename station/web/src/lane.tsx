@@ -4,7 +4,7 @@ import { LiveBox, PosePicture } from './box';
 import { S } from './strings';
 import { ask, client, type Refusal } from './station';
 import { Spark, TraceChart } from './traces';
-import { POSES, type Lane, type Live, type Pose, type Result, type State } from './types';
+import { POSES, type Lane, type Live, type Lock, type Pose, type Result, type State } from './types';
 
 const BUSY = ['running', 'unit_away', 'wrong_unit', 'resuming', 'capturing'];
 
@@ -96,9 +96,11 @@ export function CaptureSteps({ lane, say }: { lane: Lane; say: (word: string, bo
   );
 }
 
-export function LaneView({ lane, live, operator, virtual, setProblem }: {
-  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; setProblem: (problem: Refusal | null) => void;
+export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
+  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; lock: Lock | null; setProblem: (problem: Refusal | null) => void;
 }) {
+  const watches = !!lock && !!lane.unit && lock.check_units.includes(lane.unit.serial);
+  const locked = !!lock?.locked && !watches;
   const [write, setWrite] = useState(false);
   const [sure, setSure] = useState(false);
   const busy = BUSY.includes(lane.state);
@@ -128,8 +130,8 @@ export function LaneView({ lane, live, operator, virtual, setProblem }: {
   const refusal = lane.state === 'running' ? lane.run?.last_refusal : '';
   return (
     <section class={`lane state-${lane.state}`} aria-labelledby="lane-title">
-      <h2 id="lane-title">{S.lane(lane.lane)} <small>{lane.unit ? S.unit(lane.unit.serial, lane.unit.firmware) : lane.device}</small></h2>
-      <p class="prompt" role="status" aria-live="polite">{S.prompt(lane)}</p>
+      <h2 id="lane-title">{S.lane(lane.lane)} <small>{lane.unit ? S.unit(lane.unit.serial, lane.unit.firmware) : lane.device}</small>{watches && <b class="tag">{S.lock.checkUnit}</b>}</h2>
+      <p class="prompt" role="status" aria-live="polite">{locked && (lane.state === 'idle' || lane.state === 'done') ? S.lock.prompt : S.prompt(lane)}</p>
       {(lane.state === 'wrong_unit' || lane.state === 'unit_away') && <p class="notice bad"><b aria-hidden="true">⚠ </b>{lane.message}</p>}
       {lane.scan && <p class={lane.scan.matches ? 'notice good' : 'notice bad'}><b aria-hidden="true">{lane.scan.matches ? '✔ ' : '✖ '}</b>{S.scanned(lane.scan.serial, lane.scan.matches)}</p>}
       <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal)}</p>
@@ -157,7 +159,7 @@ export function LaneView({ lane, live, operator, virtual, setProblem }: {
       <div class="buttons">
         {(lane.state === 'idle' || lane.state === 'done') && (
           <>
-            <button type="button" class="primary" onClick={start}>{lane.result?.kind === 'jig' ? S.again : S.start}</button>
+            <button type="button" class="primary" disabled={locked} onClick={start}>{lane.result?.kind === 'jig' ? S.again : S.start}</button>
             <label class="check"><input type="checkbox" checked={write} onChange={(event) => setWrite(event.currentTarget.checked)} /> {S.write}</label>
           </>
         )}
