@@ -319,6 +319,168 @@ const scenarios = {
     check(report.as_left.written === true && report.recheck.poses.length === 2, 'written, read back and measured again');
   },
 
+  // A check unit goes out of control: every screen says so, only check units are measured, and an engineer's
+  // signature (by keyboard) opens the station again.
+  async lock() {
+    const home = h.folder();
+    const store = join(home, 'store.db');
+    const run = (...words) => execFileSync(h.program, [...words, '--store', store], { stdio: ['ignore', 'pipe', 'pipe'] });
+    const watcher = 'serial=MOS2A45130007,true_sensitivity_lsb_per_g=237.7/251.8/242.3,jig=auto';
+    for (let seed = 1; seed <= 11; ++seed) {
+      run('jig', '--device', `virtual:seed=${seed},${watcher},true_zero_lsb=49.9/95.8/60.8`, '--station', 'Bench 1', '--operator', 'Ada');
+    }
+    run('check-unit', 'add', 'MOS2A45130007', '--operator', 'Eve', '--reason', 'watches bench 1');
+    const station = await h.station([
+      'virtual:seed=8,serial=MOS2A45130008,pace=10',
+      `virtual:seed=12,${watcher},true_zero_lsb=54.9/95.8/60.8`,  // five counts, 20 mg, off on X
+    ], { home });
+    const page = await h.open(station.url);
+    await button(page, 'Check units').click();
+    await page.locator('.control').nth(5).waitFor();
+    await page.getByText('In control: the station is open').waitFor();
+    check((await page.locator('.control .word-good').count()) === 6, 'six charts in control');
+    const label = await page.locator('.control svg').nth(3).getAttribute('aria-label');
+    check(/Zero offset x, mg of check unit MOS2A45130007: 11 points, the last .* limits/.test(label), `the chart says what it shows: ${label}`);
+    await h.shot(page, 'lock-1-charts');
+    await h.axe(page);
+    // The check unit is measured, and has moved.
+    check((await station.api('/api/run', { lane: 2, operator: 'Ada' })).status === 202, 'the check unit is measured');
+    await page.getByRole('heading', { name: 'Station locked' }).waitFor();
+    await page.getByText('a point beyond 3 sigma').first().waitFor();
+    await page.locator('.control .word-bad').first().waitFor();
+    check((await page.locator('.chart .rule').count()) > 0, 'the point carries the number of its rule');
+    await page.getByText('locks the station').first().waitFor();
+    await h.shot(page, 'lock-2-out-of-control');
+    await h.axe(page);
+    await button(page, 'Jig').click();
+    await page.getByRole('heading', { name: 'Station locked' }).waitFor();
+    check((await prompt(page)) === 'Station locked: check units only', 'the lane says so in its biggest words');
+    check(await button(page, 'Start the measurement').isDisabled(), 'no other unit is started');
+    await station.api('/api/run', { lane: 1, operator: 'Ada' });
+    const refused = await until('the station refuses', async () => (await station.api('/api/lanes/1')).json.result);
+    check(refused.verdict === 'refused' && /is locked/.test(refused.reasons.join()), `and the server refuses too: ${refused.reasons}`);
+    await h.shot(page, 'lock-3-jig');
+    await h.axe(page);
+    // A signature without a name is none.
+    check((await fetch(new URL('/api/station-lock', station.url), { method: 'POST', headers: { 'X-Sixpoint-Client': 'x' }, body: '{"operator": " ", "reason": "x"}' })).status === 400, 'a name is needed');
+    check((await station.api('/api/station-lock', { operator: 'Mallory', reason: 'x' })).status === 403, 'and the page\'s own header');
+    // By keyboard alone.
+    const reach = async (test) => {
+      for (let i = 0; i < 60; ++i) {
+        await page.keyboard.press('Tab');
+        if (await page.evaluate(test)) return;
+      }
+      throw new Error(`Tab does not reach ${test}`);
+    };
+    await reach(() => document.activeElement?.textContent === 'Sign as engineer');
+    await page.keyboard.press('Enter');
+    await reach(() => document.activeElement?.closest('label')?.textContent?.startsWith('Engineer') ?? false);
+    await page.keyboard.type('Eve', { delay: 100 });
+    await page.keyboard.press('Tab');
+    await page.keyboard.type('seat cleaned', { delay: 100 });
+    await h.shot(page, 'lock-4-signing');
+    await h.axe(page);
+    await page.keyboard.press('Enter');
+    await page.getByRole('heading', { name: 'Station locked' }).waitFor({ state: 'detached' });
+    check(await button(page, 'Start the measurement').isEnabled(), 'the station is open again');
+    await button(page, 'Check units').click();
+    await page.getByText('Last signature: Eve').waitFor();
+    await page.getByText('seat cleaned').waitFor();
+    await h.shot(page, 'lock-5-signed');
+    // Check units are named and released here as well.
+    await page.getByLabel('Serial number').last().fill('mos2a45130008');
+    await page.getByLabel('Who decides').fill('Eve');
+    await page.getByLabel('Why').fill('a second one');
+    await button(page, 'This is a check unit').click();
+    await page.getByText('MOS2A45130008: Recorded.').waitFor();
+    check((await station.api('/api/check-units')).json.check_units.includes('MOS2A45130008'), 'it is in the store');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // Yields, failure codes, capability and a gage study, from a store with runs of two operators.
+  async statistics() {
+    const home = h.folder();
+    const store = join(home, 'store.db');
+    const jig = (...words) => {
+      try {
+        execFileSync(h.program, ['jig', ...words, '--store', store, '--station', 'Bench 1'], { stdio: ['ignore', 'pipe', 'pipe'] });
+      } catch (error) {
+        if (error.status !== 1) throw error;  // 1: measured, and failed
+      }
+    };
+    for (let seed = 1; seed <= 6; ++seed) jig('--device', `virtual:seed=${seed},jig=auto`, '--operator', seed % 2 ? 'Ada' : 'Bo');
+    jig('--device', 'virtual:seed=9,serial=MOS2A45130009,jig=auto,zero_lsb=50/200/61,true_sensitivity_lsb_per_g=237.7/251.8/242.3,true_zero_lsb=49.9/199.8/60.8', '--operator', 'Bo');
+    for (const part of [21, 22, 23]) for (const who of ['Ada', 'Bo']) for (const trial of [1, 2]) jig('--device', `virtual:seed=${part},jig=auto`, '--operator', who, '--study', 'spring');
+    const station = await h.station(['virtual:seed=8,pace=10'], { home });
+    const page = await h.open(station.url);
+    await button(page, 'Statistics').click();
+    await page.locator('.tile', { hasText: 'Yield' }).first().waitFor();
+    check((await page.locator('.tile').first().textContent()).includes('85.7 %6 of 7'), `six of seven: ${await page.locator('.tile').first().textContent()}`);
+    await page.getByRole('rowheader', { name: 'zero_high' }).waitFor();
+    await page.getByLabel('Compare by').selectOption('operator');
+    const bo = page.locator('tr', { has: page.getByRole('rowheader', { name: 'Bo', exact: true }) });
+    await bo.waitFor();
+    check(/75\.0 %/.test(await bo.textContent()), `Bo's yield: ${await bo.textContent()}`);
+    check(/\d\.\d\d – /.test(await page.getByRole('row', { name: /^Zero offset x, mg/ }).textContent()), 'Cpk with its interval');
+    // The page says what the command says.
+    const command = JSON.parse(execFileSync(h.program, ['statistics', '--store', store, '--by', 'operator', '--json']).toString());
+    const shown = (await station.api('/api/statistics?by=operator')).json;
+    check(JSON.stringify(shown.groups) === JSON.stringify(command.groups) && JSON.stringify(shown.capability) === JSON.stringify(command.capability), 'as the command line has it');
+    await button(page, 'Compute').click();
+    await page.getByText('3 parts, 2 operators, 2 trials').waitFor();
+    await page.locator('tr', { hasText: 'Part to part' }).waitFor();
+    await h.shot(page, 'statistics-1');
+    await h.axe(page);
+    await page.getByLabel('Before').fill('2001-01-01');
+    await page.getByText('No runs were stored yet.').waitFor();
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // A calibration file whose unit is pulled out, and whose page is loaded anew, in the middle.
+  async capture() {
+    const station = await h.station(['virtual:seed=7,serial=MOS2A45130007,pace=20']);
+    const page = await h.open(station.url);
+    await button(page, 'My files').click();
+    await button(page, 'Start recording').click();
+    const capture = page.locator('section', { hasText: '1. Record' }).first();
+    const side = async (number) => {
+      await page.getByText(`Side ${number} of 6`).waitFor();
+      const face = (await capture.locator('.prompt').textContent()).match(/[+−][XYZ]/)[0];
+      await capture.locator('.hand').getByRole('button', { name: face, exact: true }).click();
+      await button(page, 'It lies there').click();
+      await page.getByText(/Leave it alone/).waitFor();
+      return face;
+    };
+    const next = (number) => page.getByText(`Side ${number} of 6`).waitFor();
+    await side(1);
+    await next(2);
+    // Pulled out while it rests on its second side.
+    const second = await side(2);
+    await capture.locator('.hand').getByRole('button', { name: 'Unplug', exact: true }).click();
+    await page.getByText('The unit is unplugged: plug it in again').waitFor();
+    await page.getByText('What was recorded is kept').waitFor();
+    await h.shot(page, 'capture-1-unplugged');
+    await h.axe(page);
+    await capture.locator('.hand').getByRole('button', { name: 'Plug in', exact: true }).click();
+    await button(page, 'It lies there').waitFor();
+    check((await capture.locator('.prompt').textContent()).includes(second), 'the side under way is asked again');
+    await page.getByText('Side 2 of 6').waitFor();
+    await side(2);
+    await next(3);
+    // The page is loaded anew: it is still the same person's.
+    await page.reload();
+    await page.getByText('Side 3 of 6').waitFor();
+    check(await button(page, 'Stop recording').isVisible(), 'and may be stopped');
+    for (const number of [3, 4, 5, 6]) {
+      await side(number);
+      if (number < 6) await next(number + 1);
+    }
+    await capture.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Constants saved in/).first().waitFor();
+    await h.shot(page, 'capture-2-done');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
   // Another person's page sees the run and may not touch it, until it takes it over.
   async operators() {
     const station = await h.station(['virtual:seed=14,pace=10']);

@@ -126,7 +126,7 @@ export function CheckUnits({ state, setProblem }: { state: State; setProblem: Se
         <Designate units={units} setProblem={setProblem} done={load} />
         {!view.locked && view.charts.length > 0 && <details><summary>{S.lock.signTitle}</summary><SignForm setProblem={setProblem} done={load} /></details>}
       </section>
-      <section class="charts" aria-label={C.title}>
+      <section class="charts" aria-label={C.charts}>
         {view.charts.length ? view.charts.map((chart) => <ChartFigure chart={chart} view={view} />) : <p>{C.noRuns}</p>}
         {view.charts.length > 0 && <p>{C.legend}</p>}
       </section>

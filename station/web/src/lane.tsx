@@ -159,7 +159,7 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
       <div class="buttons">
         {(lane.state === 'idle' || lane.state === 'done') && (
           <>
-            <button type="button" class="primary" disabled={locked} onClick={start}>{lane.result?.kind === 'jig' ? S.again : S.start}</button>
+            <button type="button" class="primary" disabled={locked} onClick={start}>{lane.result?.kind === 'jig' && lane.result.verdict !== 'refused' ? S.again : S.start}</button>
             <label class="check"><input type="checkbox" checked={write} onChange={(event) => setWrite(event.currentTarget.checked)} /> {S.write}</label>
           </>
         )}

@@ -142,6 +142,7 @@ export const S = {
     locks: 'locks the station',
     signal: (point: number, time: string, rule: number, meaning: string) =>
       `Point ${point} (${time.slice(0, 16).replace('T', ' ')}), rule ${rule}: ${meaning}`,
+    charts: 'Control charts',
     upper: '+3σ', lower: '−3σ', mean: 'mean', range: 'moving range', rangeLimit: 'limit', baseline: 'baseline',
     legend: 'Squares with a number: points that break that one of Nelson\'s rules.',
   },
