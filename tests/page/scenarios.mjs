@@ -410,7 +410,13 @@ const scenarios = {
     };
     for (let seed = 1; seed <= 6; ++seed) jig('--device', `virtual:seed=${seed},jig=auto`, '--operator', seed % 2 ? 'Ada' : 'Bo');
     jig('--device', 'virtual:seed=9,serial=MOS2A45130009,jig=auto,zero_lsb=50/200/61,true_sensitivity_lsb_per_g=237.7/251.8/242.3,true_zero_lsb=49.9/199.8/60.8', '--operator', 'Bo');
-    for (const part of [21, 22, 23]) for (const who of ['Ada', 'Bo']) for (const trial of [1, 2]) jig('--device', `virtual:seed=${part},jig=auto`, '--operator', who, '--study', 'spring');
+    let seed = 100;  // of the noise; the parts' sensors are what they are
+    for (const part of [1, 2, 3]) {
+      for (const who of ['Ada', 'Bo', 'Ada', 'Bo']) {
+        const device = `virtual:seed=${++seed},serial=MOS2A4514000${part},true_sensitivity_lsb_per_g=237.7/251.8/242.3,true_zero_lsb=${44 + 4 * part}/95.8/60.8,jig=auto`;
+        jig('--device', device, '--operator', who, '--study', 'spring');
+      }
+    }
     const station = await h.station(['virtual:seed=8,pace=10'], { home });
     const page = await h.open(station.url);
     await button(page, 'Statistics').click();
@@ -428,12 +434,71 @@ const scenarios = {
     check(JSON.stringify(shown.groups) === JSON.stringify(command.groups) && JSON.stringify(shown.capability) === JSON.stringify(command.capability), 'as the command line has it');
     await button(page, 'Compute').click();
     await page.getByText('3 parts, 2 operators, 2 trials').waitFor();
-    await page.locator('tr', { hasText: 'Part to part' }).waitFor();
+    const gage = (await station.api('/api/gage-rr?study=spring&quantity=zero_offset_mg&axis=x')).json;
+    check(gage.grr_percent > 0 && gage.grr_percent < 30 && gage.usable, `a gage with some scatter: ${gage.grr_percent} %`);
+    check((await page.locator('tr', { hasText: 'Part to part' }).textContent()).includes((gage.components.part.contribution_percent).toFixed(1)), 'the table has the parts');
     await h.shot(page, 'statistics-1');
     await h.axe(page);
     await page.getByLabel('Before').fill('2001-01-01');
     await page.getByText('No runs were stored yet.').waitFor();
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // What a technician with gloves reads at one metre, on a phone, a laptop and a screen: a letter of 5 mm needs
+  // about 28 px at 96 dpi; a target for a gloved finger 44 px.
+  async sizes() {
+    const devices = Array.from({ length: 4 }, (_, i) => `virtual:seed=${30 + i},pace=5`);
+    for (const [name, width, height, lanes] of [['phone', 390, 844, 1], ['laptop', 1366, 768, 1], ['laptop-4', 1366, 768, 4], ['screen', 1920, 1080, 4]]) {
+      const station = await h.station(devices.slice(0, lanes));
+      const page = await h.open(station.url, { width, height });
+      const view = (what) => page.screenshot({ path: join(h.shots, `sizes-${name}-${what}.png`) });
+      const bare = async (what) => {
+        const over = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+        check(over <= 0, `${name} ${what}: nothing to scroll sideways (${over} px)`);
+        await h.axe(page);
+        await view(what);
+      };
+      const readable = async (selector, px) => {
+        const found = await page.evaluate((css) => {
+          const each = document.querySelector(css);
+          const box = each.getBoundingClientRect();
+          return { px: parseFloat(getComputedStyle(each).fontSize), top: box.top, bottom: box.bottom, height: innerHeight };
+        }, selector);
+        check(found.px >= px, `${name}: ${selector} is ${found.px} px high`);
+        check(found.top >= 0 && found.bottom <= found.height, `${name}: ${selector} is on the screen without scrolling (${found.top} to ${found.bottom})`);
+      };
+      await button(page, 'Start the measurement').waitFor();
+      await readable('.prompt', 36);
+      const targets = await page.evaluate(() => [...document.querySelectorAll('main button, main select')].map((each) => [each.textContent, each.getBoundingClientRect().height]));
+      for (const [text, high] of targets) check(high >= 44, `${name}: '${text}' is ${high} px high`);
+      await bare('ready');
+      await start(page);
+      await h.place(page, 2);
+      await h.turnAsAsked(page);
+      await page.locator('.still-dwelling').waitFor();
+      await page.evaluate(() => scrollTo(0, 0));
+      await readable('.prompt', 36);
+      await readable('.still span', 26);
+      await readable('.scene', 0);
+      await bare('measuring');
+      await page.locator('.hand').getByRole('button', { name: 'Lean on an edge', exact: true }).click();
+      await refusal(page, 'none of its six faces');
+      await page.evaluate(() => scrollTo(0, 0));
+      await readable('.refusal', 26);
+      await bare('refused');
+      await h.place(page, 14);
+      await page.locator('.result').waitFor();
+      await page.evaluate(() => scrollTo(0, 0));
+      await readable('.result .verdict', 40);
+      await bare('verdict');
+      for (const tab of ['My files', 'Check units', 'Statistics']) {
+        await button(page, tab).click();
+        await page.locator('.files h2').first().waitFor();
+        await bare(tab.toLowerCase().replace(' ', '-'));
+      }
+      await page.close();
+      await station.end();
+    }
   },
 
   // A calibration file whose unit is pulled out, and whose page is loaded anew, in the middle.

@@ -23,12 +23,13 @@ function ChartPicture({ chart, title }: { chart: Chart; title: string }) {
   const y = (value: number) => BOTTOM - ((BOTTOM - TOP) * (value - low)) / (high - low);
   const rangeY = (value: number) => RANGE_BOTTOM - ((RANGE_BOTTOM - RANGE_TOP) * value) / most;
   const points = (list: number[], at: (value: number) => number, first: number) => list.map((value, i) => `${x(i + first).toFixed(1)},${at(value).toFixed(1)}`).join(' ');
-  const level = (at: number, name: string, value: number, dashed: boolean) => (
+  const level = (at: number, name: string, value: number, dashed: boolean, label = at) => (
     <>
       <line x1={LEFT} x2={RIGHT} y1={at} y2={at} stroke="#56636e" stroke-dasharray={dashed ? '8 5' : undefined} />
-      <text x={RIGHT + 6} y={at + 5}>{name} {text(value)}</text>
+      <text x={RIGHT + 6} y={label + 5}>{name} {text(value)}</text>
     </>
   );
+  const middle = Math.min(BOTTOM - 18, Math.max(TOP + 18, y(chart.centre)));  // labels keep apart
   const edge = chart.in_force ? (x(chart.baseline - 1) + x(Math.min(chart.baseline, values.length - 1))) / 2 : 0;
   const rules = (i: number) => chart.signals.filter((signal) => signal.point === i).map((signal) => signal.rule).join(',');
   const last = values[values.length - 1];
@@ -38,10 +39,10 @@ function ChartPicture({ chart, title }: { chart: Chart; title: string }) {
       {chart.in_force && (
         <>
           <rect x={LEFT} y={TOP} width={edge - LEFT} height={BOTTOM - TOP} fill="#e8edf1" />
-          <text x={LEFT + 4} y={BOTTOM + 16}>{C.baseline}</text>
-          {level(y(chart.upper), C.upper, chart.upper, true)}
-          {level(y(chart.centre), C.mean, chart.centre, false)}
-          {level(y(chart.lower), C.lower, chart.lower, true)}
+          <text x={LEFT + 4} y={TOP + 15}>{C.baseline}</text>
+          {level(y(chart.upper), C.upper, chart.upper, true, Math.min(y(chart.upper), middle - 18))}
+          {level(y(chart.centre), C.mean, chart.centre, false, middle)}
+          {level(y(chart.lower), C.lower, chart.lower, true, Math.max(y(chart.lower), middle + 18))}
           {level(rangeY(chart.upper_range), C.rangeLimit, chart.upper_range, true)}
         </>
       )}

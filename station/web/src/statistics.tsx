@@ -7,6 +7,7 @@ import type { GageView, Group, StatisticsView, Studies } from './types';
 
 const T = S.statistics;
 const figure = (value: number) => (Math.abs(value) >= 100 ? value.toFixed(0) : value.toPrecision(3));
+const index = (value: number) => value.toFixed(Math.abs(value) >= 100 ? 0 : 2);
 
 function Tile({ name, value, small }: { name: string; value: string; small?: string }) {
   return <div class="tile"><span>{name}</span><b>{value}</b><small>{small}</small></div>;
@@ -49,8 +50,8 @@ function Capabilities({ view }: { view: StatisticsView }) {
       <tbody>{rows.map(([name, one]) => (
         <tr>
           <th scope="row">{view.titles[name] ? T.quantityTitle(view.titles[name]) : name}</th>
-          <td>{one.n}</td><td>{figure(one.mean)}</td><td>{figure(one.sd)}</td><td>{one.cp === null ? '–' : one.cp.toFixed(2)}</td>
-          <td><b>{one.cpk.toFixed(2)}</b> <small>{one.cpk_interval[0].toFixed(2)} – {one.cpk_interval[1].toFixed(2)}</small></td>
+          <td>{one.n}</td><td>{figure(one.mean)}</td><td>{figure(one.sd)}</td><td>{one.cp === null ? '–' : index(one.cp)}</td>
+          <td><b>{index(one.cpk)}</b> <small>{index(one.cpk_interval[0])} – {index(one.cpk_interval[1])}</small></td>
         </tr>
       ))}</tbody>
     </table></div>

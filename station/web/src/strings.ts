@@ -13,7 +13,7 @@ export const S = {
     lost: 'The station does not answer. Is the program still running? Trying again …',
   },
   operator: 'Your name',
-  scan: 'Scan or type a serial number',
+  scan: 'Scan a label',
   scanGo: 'Find',
   lanes: 'Lanes',
   follow: 'Show the lane that needs a hand',
@@ -91,6 +91,7 @@ export const S = {
     pass: 'Pass', conditional_pass: 'Conditional pass', conditional_fail: 'Conditional fail', fail: 'Fail',
     inconclusive: 'No verdict', stopped: 'Stopped', refused: 'Cannot help',
   } as Record<string, string>,
+  verdict: (r: Result): string => (r.kind === 'jig' && r.verdict === 'refused' ? 'Not measured' : S.verdicts[r.verdict] ?? r.verdict),
   verdictSigns: {
     pass: '✔', conditional_pass: '✔?', conditional_fail: '✖?', fail: '✖', inconclusive: '?', stopped: '■', refused: '✖',
   } as Record<string, string>,
