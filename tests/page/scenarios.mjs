@@ -469,7 +469,7 @@ const scenarios = {
       };
       await button(page, 'Start the measurement').waitFor();
       await readable('.prompt', 36);
-      const targets = await page.evaluate(() => [...document.querySelectorAll('main button, main select')].map((each) => [each.textContent, each.getBoundingClientRect().height]));
+      const targets = await page.evaluate(() => [...document.querySelectorAll('main button, main select, nav button')].map((each) => [each.textContent, each.getBoundingClientRect().height]));
       for (const [text, high] of targets) check(high >= 44, `${name}: '${text}' is ${high} px high`);
       await bare('ready');
       await start(page);
@@ -485,6 +485,7 @@ const scenarios = {
       await refusal(page, 'none of its six faces');
       await page.evaluate(() => scrollTo(0, 0));
       await readable('.refusal', 26);
+      check(!(await page.locator('.still').textContent()).includes('Taken'), 'what was refused is not called taken');
       await bare('refused');
       await h.place(page, 14);
       await page.locator('.result').waitFor();

@@ -140,7 +140,7 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
       {(lane.state === 'done' || lane.state === 'idle') && lane.result && <ResultBox result={lane.result} />}
       {lane.state === 'running' && lane.run && (
         <div class={`still still-${shown}`}>
-          <span>{shown ? S.stillness[shown] : ''}</span>
+          <span>{shown ? S.stillness[shown === 'leaving' && refusal ? 'refused' : shown] : ''}</span>
           <progress max={1} value={shown === 'dwelling' ? live?.dwell ?? 0 : 0} aria-label={S.stillness.dwelling} />
         </div>
       )}

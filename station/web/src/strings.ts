@@ -37,6 +37,7 @@ export const S = {
     settling: 'Settling …',
     dwelling: 'Measuring: do not touch',
     leaving: 'Taken. Turn it.',
+    refused: 'Turn it.',
   } as Record<string, string>,
 
   // What to do next, the biggest words on the page.
