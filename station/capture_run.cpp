@@ -235,7 +235,13 @@ class CaptureRun {
 
   Status begin_recording() {
     piece_began_ = unit().clock().now();
-    SIXPOINT_ASSIGN(recording_, unit().start_recording(options_.rate_hz, piece_began_));
+    auto begun = unit().start_recording(options_.rate_hz, piece_began_);
+    if (!begun && begun.error().code == ErrorCode::io) {
+      // Perhaps a program that was killed left it streaming.
+      SIXPOINT_CHECK(unit().stop_stream());
+      begun = unit().start_recording(options_.rate_hz, piece_began_);
+    }
+    SIXPOINT_ASSIGN(recording_, begun);
     save();
     return {};
   }

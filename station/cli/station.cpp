@@ -42,6 +42,7 @@ struct Options {
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
+  double side_s = station::CaptureOptions{}.side_s;
 };
 
 bool is_loopback(const std::string& bind) {
@@ -134,6 +135,7 @@ Result<station::LanesOptions> lanes_options(Context& context, const Options& opt
   lanes.state_folder = state_folder(options);
   lanes.station = options.station;
   lanes.capture_folder = options.files;
+  lanes.capture.side_s = options.side_s;
   if (options.gravity_m_per_s2) {
     SIXPOINT_ASSIGN(lanes.session.gravity, calib::gravity_entered(*options.gravity_m_per_s2));
   } else if (options.latitude_deg) {
@@ -272,6 +274,11 @@ void add_station(CLI::App& app, Context& context) {
                    "folder below which the page may check and mend files")
       ->capture_default_str();
   command->add_option("--limits", options->limits, "limits of the verdict (TOML)");
+  command
+      ->add_option("--side-seconds", options->side_s,
+                   "how long a unit rests on each side of a calibration file")
+      ->check(CLI::Range(10.0, 3600.0))
+      ->capture_default_str();
   command->add_option("--gravity", options->gravity_m_per_s2, "local gravity in m/s2");
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");

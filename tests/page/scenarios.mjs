@@ -547,6 +547,97 @@ const scenarios = {
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 
+  // A unit on emulated USB (hid:SERIAL behind the real hidapi), not a virtual one: pulled out and put back, the
+  // program killed and started again, written and read back.
+  async usb() {
+    const station = await h.stationOnUsb();
+    const page = await h.open(station.url);
+    await page.getByText(station.serial).first().waitFor();
+    check((await page.locator('.hand').count()) === 0, 'nobody turns it by buttons');
+    await page.getByLabel('Your name').fill('Ada');
+    await page.getByLabel('Write the constants into the unit').check();
+    await start(page);
+    const place = async (count) => {
+      for (let asked = ''; (await h.taken(page)) < count && !(await page.locator('.result').count());) {
+        const text = await until('a wanted side', async () => {
+          const now = (await prompt(page)) ?? '';
+          const question = `${now} ${await h.taken(page)}`;
+          return (/[+−][XYZ] side up/.test(now) && question !== asked && (asked = question) && now) || (await page.locator('.result').count()) > 0;
+        });
+        if (text === true) return;
+        const [sign, axis] = text.match(/[+−][XYZ]/)[0];
+        await station.tell(`turn ${sign === '+' ? '+' : '-'}${axis.toLowerCase()}`);
+        const before = await h.taken(page);
+        await until('it is taken, or asked otherwise', async () => (await h.taken(page)) > before || (await page.locator('.result').count()) > 0
+          || (await prompt(page)) !== text || !(await page.locator('.refusal').isHidden()), 30);
+        if ((await h.taken(page)) === before) asked = '';
+      }
+    };
+    await place(4);
+    await station.tell('unplug');
+    const pulled = Date.now();
+    await page.getByText('The unit is unplugged: plug it in again').waitFor();
+    console.log(`unplugging was on the page after ${Date.now() - pulled} ms`);
+    await h.shot(page, 'usb-1-unplugged');
+    await station.tell('plug');
+    await until('it goes on', async () => /[+−][XYZ] side up/.test(await prompt(page)));
+    check((await h.taken(page)) >= 4, `what was taken is still there: ${await h.taken(page)}`);
+    await place(8);
+    await station.tell('kill');
+    await page.getByText('The station does not answer').waitFor();
+    await station.tell('start');
+    await station.again();
+    await page.getByText('The station does not answer').waitFor({ state: 'detached' });
+    await until('the run goes on', async () => (await h.taken(page)) >= 8, 20).catch(async (error) => { console.error(JSON.stringify(await station.api('/api/lanes/1'), null, 1)); throw error; });
+    await place(99);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Stored as run/).waitFor();
+    await h.shot(page, 'usb-2-verdict');
+    const lane = await station.api('/api/lanes/1');
+    check(lane.device === `hid:${station.serial}`, `the lane is the USB device: ${lane.device}`);
+    check(lane.result.written === true && lane.result.serial === station.serial && lane.operator === 'Ada', JSON.stringify(lane.result));
+    const report = await station.api(`/api/runs/${lane.result.run}/report.json`);
+    check(report.recheck.poses.length === 2 && report.verification.poses.length === 8, 'measured again with what was written');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // A calibration file of the same: the unit records on while the program is killed, and nothing is lost.
+  async usb_capture() {
+    const station = await h.stationOnUsb(['--side-seconds', '10']);
+    const page = await h.open(station.url);
+    await button(page, 'My files').click();
+    await page.getByText(station.serial).first().waitFor();
+    await button(page, 'Start recording').click();
+    const side = async (number) => {
+      await page.getByText(`Side ${number} of 6`).waitFor();
+      const [sign, axis] = await until('the side', async () => (await page.locator('.prompt').textContent()).match(/[+−][XYZ]/)?.[0]);
+      await station.tell(`turn ${sign === '+' ? '+' : '-'}${axis.toLowerCase()}`);
+      await button(page, 'It lies there').click();
+      await page.getByText(/Leave it alone/).waitFor();
+    };
+    await side(1);
+    await side(2);
+    await page.getByText('Side 3 of 6').waitFor();
+    await station.tell('unplug');
+    await page.getByText('The unit is unplugged: plug it in again').waitFor();
+    await station.tell('plug');
+    await side(3);
+    await page.getByText('Side 4 of 6').waitFor();
+    await station.tell('kill');
+    await page.getByText('The station does not answer').waitFor();
+    await station.tell('start');
+    await station.again();
+    await page.getByText('The station does not answer').waitFor({ state: 'detached' });
+    for (const number of [4, 5, 6]) await side(number);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Constants saved in/).first().waitFor();
+    await h.shot(page, 'usb-capture');
+    const lane = await station.api('/api/lanes/1');
+    check(!/lost its recording/.test((lane.result.notes ?? []).join()), `nothing was asked twice: ${lane.result.notes}`);
+    check(lane.result.serial === station.serial && lane.result.stored, JSON.stringify(lane.result));
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
   // Another person's page sees the run and may not touch it, until it takes it over.
   async operators() {
     const station = await h.station(['virtual:seed=14,pace=10']);
