@@ -71,7 +71,7 @@ export async function stationOnUsb(words = []) {
   child.stderr.on('data', (data) => { said += data; });
   createInterface({ input: child.stdout }).on('line', (line) => lines.push(line));
   let ended;
-  child.once('exit', (code) => { ended = code; });
+  child.once('exit', (code, signal) => { ended = code ?? signal; });
   cleanups.push(async () => { child.stdin.end(); await until('the unit is put away', () => ended !== undefined); });
   const line = (test) => until(`a line of the station on USB (${said})`, () => {
     if (ended !== undefined) throw new Error(`the station on USB ended with ${ended}: ${said}`);
