@@ -843,6 +843,16 @@ Result<AuditReport> Store::audit(const std::string& earlier_head) {
         }
         return {};
       }));
+  // The chain holds their names; the databases' own keys may have been switched off.
+  SIXPOINT_ASSIGN(
+      const auto lost,
+      database.query(fmt::format("SELECT captures.sha256 FROM captures LEFT JOIN attachments "
+                                 "ON attachments.sha256 = captures.sha256 "
+                                 "WHERE attachments.sha256 IS NULL ORDER BY captures.seq LIMIT {}",
+                                 kMostFindings)));
+  for (const Row& capture : lost) {
+    find(fmt::format("attachment {} was removed", printable(text_of(capture[0]), 70)));
+  }
 
   SIXPOINT_ASSIGN(auto history, HistoryReader::open(database));
   ChainHasher hasher;

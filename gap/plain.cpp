@@ -276,6 +276,69 @@ double length_nats(const std::vector<Eigen::Vector3d>& means, double common, dou
   return -0.5 * y.dot(z) - llt.matrixLLT().diagonal().array().log().sum();
 }
 
+// How far the means of a pose move with temperature, and how far after the slopes of the other
+// poses are taken off: a pose is judged by what it did not teach. Nothing with a single pose.
+void measure_tempco_gap(const std::vector<std::vector<const Rest*>>& poses, GapSize& gap) {
+  struct Sums {
+    double xx = 0, n = 0;
+    Eigen::Vector3d xy = Eigen::Vector3d::Zero();
+    Eigen::Vector3d yy = Eigen::Vector3d::Zero();
+  };
+  std::vector<Sums> of_pose;
+  Sums all;
+  for (const auto& list : poses) {
+    if (list.size() < 30) {
+      continue;
+    }
+    const auto n = static_cast<double>(list.size());
+    double mean_c = 0;
+    Eigen::Vector3d mean_g = Eigen::Vector3d::Zero();
+    for (const Rest* rest : list) {
+      mean_c += *rest->temperature_c / n;
+      mean_g += rest->mean_g / n;
+    }
+    Sums sums;
+    sums.n = n;
+    for (const Rest* rest : list) {
+      const double x = *rest->temperature_c - mean_c;
+      const Eigen::Vector3d y_mg = 1000 * (rest->mean_g - mean_g);
+      sums.xx += x * x;
+      sums.xy += x * y_mg;
+      sums.yy += y_mg.cwiseAbs2();
+    }
+    all.xx += sums.xx;
+    all.xy += sums.xy;
+    all.n += sums.n;
+    of_pose.push_back(sums);
+  }
+  double before = 0;
+  double after = 0;
+  double n = 0;
+  for (const Sums& own : of_pose) {
+    const double others_xx = all.xx - own.xx;
+    if (!(others_xx > 0)) {
+      continue;
+    }
+    const Eigen::Vector3d slope = (all.xy - own.xy) / others_xx;
+    before += own.yy.sum();
+    after += (own.yy - 2 * slope.cwiseProduct(own.xy) + own.xx * slope.cwiseAbs2()).sum();
+    n += 3 * own.n;
+  }
+  if (n == 0 || of_pose.size() < 2 || !(before > 0)) {
+    return;
+  }
+  // The mean of a block: 5 mg of noise over four seconds at 30 Hz and more.
+  constexpr double kFloor_mg = 0.5;
+  gap.before_mg = std::sqrt(before / n);
+  gap.after_mg = std::sqrt(std::max(after, 0.0) / n);
+  gap.floor_mg = kFloor_mg;
+  gap.before_sigma = gap.before_mg / kFloor_mg;
+  gap.after_sigma = gap.after_mg / kFloor_mg;
+  gap.after_interval_mg = {0.8 * gap.after_mg, 1.25 * gap.after_mg};
+  gap.closed_fraction = std::clamp(1 - std::pow(gap.after_mg / gap.before_mg, 2), 0.0, 1.0);
+  gap.by_feature[0] = {gap.before_sigma, gap.after_sigma};
+}
+
 }  // namespace
 
 Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
@@ -448,7 +511,11 @@ Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
           "offset_tempco",       0, nats, {}, nats - kLogPrior - 3, slope.cwiseAbs().maxCoeff() > 1,
           {"sensitivity_tempco"}};
       f.parameters.push_back({"mg_per_c", {slope[0], slope[1], slope[2]}, {sd[0], sd[1], sd[2]}});
+      const bool accepted = f.nats > kAccept;
       find(std::move(f));
+      if (accepted && out.effects.size() == 1) {
+        measure_tempco_gap(poses, out.gap);
+      }
     }
   }
   for (const CatalogueEntry& entry : catalogue()) {
@@ -476,7 +543,8 @@ Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
   return out;
 }
 
-Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gravity) {
+Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gravity,
+                              CrossAxis cross_axis) {
   const auto n = static_cast<Eigen::Index>(raw.size());
   if (n < 12 || !(gravity > 0)) {
     return fail(ErrorCode::bad_data, "fewer than twelve positions", {},
@@ -515,12 +583,18 @@ Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gr
           scale * (u[1] * d[2] + u[2] * d[1]), scale * (u[0] * d[2] + u[2] * d[0]),
           scale * (u[0] * d[1] + u[1] * d[0]), 0, 0, 0;
       row.tail<3>() = -fit.sensitivity * u;
+      if (cross_axis == CrossAxis::none) {
+        row.segment<3>(3).setZero();
+      }
       const double miss = gravity - length;
       a += row * row.transpose();
       b += row * miss;
       square += miss * miss;
     }
     fit.residual = std::sqrt(square / static_cast<double>(n));
+    if (cross_axis == CrossAxis::none) {
+      a.diagonal().segment<3>(3).setOnes();  // no step there
+    }
     const Eigen::LDLT<Matrix9> solver(a);
     const Vector9 step = solver.solve(b);
     if (!step.allFinite()) {

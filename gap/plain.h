@@ -20,9 +20,11 @@ Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
                                  const DiagnoseOptions& options = {});
 
 // Gain, zero and cross-axis terms from the length of vectors at rest in many directions: `raw` in
-// counts or any unit, one row per position, `gravity` in the unit wanted. Nine parameters, by
-// Gauss-Newton on the squared length; the symmetric part only, since a rotation does not change
-// lengths. bad_data for fewer than twelve positions or directions that do not span.
+// counts or any unit, one row per position, `gravity` in the unit wanted. Nine parameters, or six
+// without the cross-axis terms, by Gauss-Newton on the length; the symmetric part only, since a
+// rotation does not change lengths. bad_data for fewer than twelve positions or directions that do
+// not span.
+enum class CrossAxis { none, symmetric };
 struct LengthFit {
   Eigen::Matrix3d sensitivity;  // symmetric: g = sensitivity * (raw - zero)
   Eigen::Vector3d zero;
@@ -30,6 +32,7 @@ struct LengthFit {
   Eigen::Vector3d cross_sd;
   double residual = 0;  // rms of length less gravity
 };
-Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gravity);
+Result<LengthFit> fit_lengths(const std::vector<Eigen::Vector3d>& raw, double gravity,
+                              CrossAxis cross_axis = CrossAxis::symmetric);
 
 }  // namespace sixpoint::gap

@@ -33,6 +33,28 @@ NearestFace nearest_face(const PerAxis<double>& force_g) {
           std::acos(std::clamp(cosine, -1.0, 1.0)) * kDegPerRad};
 }
 
+FirstApproximation first_approximation(const std::optional<StoredConstants>& stored) {
+  if (stored) {
+    if (const auto own = calib::calibration_from(*stored)) {
+      bool is_possible = true;
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        const double lsb_per_g = 1 / own->sensitivity_g_per_lsb[axis];
+        is_possible = is_possible && lsb_per_g >= 150 && lsb_per_g <= 350 &&
+                      std::abs(own->zero_lsb[axis]) <= 0.75 * lsb_per_g;
+      }
+      if (is_possible) {
+        return {*own, false};
+      }
+    }
+  }
+  constexpr double kNominal_lsb_per_g = 256;
+  constexpr double kNominalZero_lsb = 40;  // of the units whose constants are known
+  FirstApproximation nominal;
+  nominal.calibration.sensitivity_g_per_lsb.fill(1 / kNominal_lsb_per_g);
+  nominal.calibration.zero_lsb.fill(kNominalZero_lsb);
+  return nominal;
+}
+
 std::string_view to_string(JigPhase phase) {
   switch (phase) {
     case JigPhase::measuring:
@@ -105,6 +127,7 @@ double dwell_budget_s(const JigRunOptions& options) {
 JigRun::JigRun(JigRunOptions options, const calib::Calibration& approximation)
     : options_(std::move(options)),
       approximation_(approximation),
+      nominal_(first_approximation(std::nullopt).calibration),
       open_(device::kPoses.begin(), device::kPoses.end()) {}
 
 void JigRun::resume(const JigProgress& progress) {
@@ -134,7 +157,7 @@ JigLive JigRun::live() const {
   JigLive live;
   live.stillness = state_;
   if (!recent_.empty()) {
-    live.face = nearest_face(approximation_.to_g(window().mean_lsb));
+    live.face = recognise(window().mean_lsb);
   }
   live.dwell_fraction = std::min(
       1.0, static_cast<double>(dwell_.size()) / std::max(1.0, options_.dwell_s * options_.rate_hz));
@@ -324,8 +347,7 @@ std::vector<JigAction> JigRun::on_sample(const Sample& sample) {
   const bool still = is_still(now, state_ != State::moving);
   if (!still) {
     if (state_ == State::dwelling) {
-      const Pose pose = nearest_face(approximation_.to_g(dwell_start_lsb_)).pose;
-      refuse(pose, "moved during the reading");
+      refuse(recognise(dwell_start_lsb_).pose, "moved during the reading");
     }
     state_ = State::moving;
     still_samples_ = 0;
@@ -353,8 +375,7 @@ std::vector<JigAction> JigRun::on_sample(const Sample& sample) {
         const double moved_mg =
             std::abs(now.mean_lsb[axis] - dwell_start_lsb_[axis]) * g_per_lsb(axis) * kMgPerG;
         if (moved_mg > options_.moved_mg) {
-          refuse(nearest_face(approximation_.to_g(dwell_start_lsb_)).pose,
-                 "moved during the reading");
+          refuse(recognise(dwell_start_lsb_).pose, "moved during the reading");
           return std::exchange(actions_, {});
         }
       }
@@ -379,6 +400,52 @@ std::vector<JigAction> JigRun::on_sample(const Sample& sample) {
   return std::exchange(actions_, {});
 }
 
+std::optional<calib::Calibration> JigRun::seen_by_faces() const {
+  if (faces_.empty()) {
+    return std::nullopt;
+  }
+  calib::Calibration seen = approximation_;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    // An axis reads its zero where it lies level. One that never did reads it off its face, but for
+    // its sensitivity.
+    double sum_lsb = 0;
+    int count = 0;
+    for (const PoseReading& face : faces_) {
+      if (device::axis_of(face.pose) == axis) {
+        sum_lsb += face.mean_lsb[axis] -
+                   device::sign_of(face.pose) / approximation_.sensitivity_g_per_lsb[axis];
+        ++count;
+      }
+    }
+    const std::optional<double> level = level_lsb(axis, std::nullopt);
+    seen.zero_lsb[axis] = level ? *level : sum_lsb / count;
+  }
+  return seen;
+}
+
+NearestFace JigRun::recognise(const PerAxis<double>& mean_lsb) const {
+  std::optional<NearestFace> seen;
+  if (const auto constants = seen_by_faces()) {
+    seen = nearest_face(constants->to_g(mean_lsb));
+    if (seen->angle_deg <= options_.between_faces_deg) {
+      return *seen;
+    }
+  }
+  const NearestFace own = nearest_face(approximation_.to_g(mean_lsb));
+  const NearestFace nominal = nearest_face(nominal_.to_g(mean_lsb));
+  const bool own_near = own.angle_deg <= options_.between_faces_deg;
+  const bool nominal_near = nominal.angle_deg <= options_.between_faces_deg;
+  if (own_near && nominal_near && own.pose != nominal.pose) {
+    // One of them is wrong: more likely the one that sees what nobody asked for.
+    return !open_.empty() && nominal.pose == detour_.value_or(open_.front()) ? nominal : own;
+  }
+  if (own_near || nominal_near) {
+    return own_near ? own : nominal;
+  }
+  const NearestFace& nearer = own.angle_deg <= nominal.angle_deg ? own : nominal;
+  return seen && seen->angle_deg < nearer.angle_deg ? *seen : nearer;
+}
+
 void JigRun::leave() {
   dwell_.clear();
   state_ = State::leaving;
@@ -389,8 +456,11 @@ void JigRun::leave() {
 
 void JigRun::begin_dwell() {
   const Window now = window();
-  const NearestFace face = nearest_face(approximation_.to_g(now.mean_lsb));
-  if (face.angle_deg > options_.between_faces_deg) {
+  const NearestFace face = recognise(now.mean_lsb);
+  const bool between = face.angle_deg > options_.between_faces_deg;
+  if (between && !(phase_ == JigPhase::measuring && between_faces_lsb_ &&
+                   same_placement(now.mean_lsb, *between_faces_lsb_))) {
+    between_faces_lsb_ = now.mean_lsb;
     refuse(face.pose, fmt::format("lies on none of its six faces: tilted {:.1f} degrees from {}",
                                   face.angle_deg, device::to_string(face.pose)));
     return;
@@ -430,7 +500,7 @@ std::string JigRun::why_not_open(Pose pose) const {
   return {};
 }
 
-std::optional<double> JigRun::level_lsb(std::size_t axis, Pose except) const {
+std::optional<double> JigRun::level_lsb(std::size_t axis, std::optional<Pose> except) const {
   double sum = 0;
   int count = 0;
   for (const PoseReading& face : faces_) {
@@ -458,13 +528,14 @@ double JigRun::tilt_of(const PoseReading& reading) const {
 }
 
 bool JigRun::repeats_refused(const PoseReading& reading) const {
-  if (!last_refused_ || last_refused_->pose != reading.pose) {
-    return false;
-  }
+  return last_refused_ && last_refused_->pose == reading.pose &&
+         same_placement(reading.mean_lsb, last_refused_->mean_lsb);
+}
+
+bool JigRun::same_placement(const PerAxis<double>& a_lsb, const PerAxis<double>& b_lsb) const {
   constexpr double kSamePlacement_g = 0.01;  // 0.6 degree
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    if (std::abs(reading.mean_lsb[axis] - last_refused_->mean_lsb[axis]) * g_per_lsb(axis) >
-        kSamePlacement_g) {
+    if (std::abs(a_lsb[axis] - b_lsb[axis]) * g_per_lsb(axis) > kSamePlacement_g) {
       return false;
     }
   }
@@ -497,7 +568,7 @@ void JigRun::drop_disagreeing(const PoseReading& reading) {
 
 void JigRun::finish_dwell() {
   PoseReading reading;
-  reading.pose = nearest_face(approximation_.to_g(dwell_start_lsb_)).pose;
+  reading.pose = recognise(dwell_start_lsb_).pose;
   reading.samples = static_cast<int>(dwell_.size());
   reading.start_s = dwell_.front().time_s;
   reading.from = came_from_;
@@ -561,6 +632,7 @@ void JigRun::finish_dwell() {
   }
 
   last_refused_.reset();
+  between_faces_lsb_.reset();
   refusals_in_row_ = 0;
   last_progress_s_ = now_s_;
   std::erase(open_, reading.pose);

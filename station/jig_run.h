@@ -13,12 +13,15 @@
 //
 // resume() starts a machine with what an earlier one had accepted: the program was restarted.
 //
-// A pose is recognised from the readings by the unit's own constants, which may be off by 20 % and
-// 0.2 g. Stillness is judged by the unit's own noise, with hysteresis. Tilt is judged by the two
-// level axes: an axis reads its zero in all four poses in which it lies level, so a placement that
-// is off by an angle disagrees with the others. Where one placement disagrees with one other,
-// either may be the tilted one: the newer is asked for again, and when it repeats itself the older
-// goes.
+// A pose is recognised from the readings by what the accepted ones say of the unit, by the unit's
+// own constants, which may be off by 20 % and 0.2 g, or by nominal ones. Where all of them see a
+// unit between its faces, and the same placement comes again, a hand would not have repeated it to
+// half a degree but a jig would: then the constants are what is wrong (an ADXL362's zero may lie
+// 0.45 g off), and the placement is taken; the tilt is judged as for every other. Stillness is
+// judged by the unit's own noise, with hysteresis. Tilt is judged by the two level axes: an axis
+// reads its zero in all four poses in which it lies level, so a placement that is off by an angle
+// disagrees with the others. Where one placement disagrees with one other, either may be the tilted
+// one: the newer is asked for again, and when it repeats itself the older goes.
 #pragma once
 
 #include <cstdint>
@@ -146,9 +149,18 @@ struct JigLive {
   double dwell_fraction = 0;        // of the reading under way
 };
 
+// What a run recognises a unit's faces by at first: its stored constants where a working ADXL362
+// could have them (150 to 350 LSB/g, zero within 0.75 g: the datasheet's limits and what the two
+// filter configurations do), nominal ones otherwise. `is_nominal` says which.
+struct FirstApproximation {
+  calib::Calibration calibration;
+  bool is_nominal = true;
+};
+FirstApproximation first_approximation(const std::optional<StoredConstants>& stored);
+
 class JigRun {
  public:
-  // `approximation`: the unit's stored constants, or nominal ones where it has none.
+  // `approximation`: first_approximation() of the unit's stored constants.
   JigRun(JigRunOptions options, const calib::Calibration& approximation);
 
   // Before start(): goes on where another machine was. A write that was under way is done anew.
@@ -192,6 +204,9 @@ class JigRun {
   std::string why_not_open(Pose pose) const;
   bool from_other_side(Pose pose, Pose from) const;
   double g_per_lsb(std::size_t axis) const { return approximation_.sensitivity_g_per_lsb[axis]; }
+  NearestFace recognise(const PerAxis<double>& mean_lsb) const;
+  // What the accepted faces say of the unit; none before the first.
+  std::optional<calib::Calibration> seen_by_faces() const;
   Window window() const;
   bool is_still(const Window& window, bool already) const;
   void leave();
@@ -203,16 +218,19 @@ class JigRun {
   void finish(JigOutcome outcome, std::string text);
   bool is_stuck(const device::RawCounts& counts);
   // Reading of a level axis in the accepted poses; nothing where there is none yet.
-  std::optional<double> level_lsb(std::size_t axis, Pose except) const;
+  std::optional<double> level_lsb(std::size_t axis, std::optional<Pose> except) const;
   double tilt_of(const PoseReading& reading) const;
   bool repeats_refused(const PoseReading& reading) const;
+  bool same_placement(const PerAxis<double>& a_lsb, const PerAxis<double>& b_lsb) const;
   void drop_disagreeing(const PoseReading& reading);
 
   JigRunOptions options_;
   calib::Calibration approximation_;
+  calib::Calibration nominal_;
   JigPhase phase_ = JigPhase::measuring;
   JigOutcome outcome_ = JigOutcome::running;
   State state_ = State::moving;
+  std::optional<PerAxis<double>> between_faces_lsb_;  // where it was refused for that last
   std::vector<Pose> open_;
   std::vector<PoseReading> faces_;
   std::vector<PoseReading> reversed_;

@@ -19,18 +19,9 @@ constexpr std::chrono::milliseconds kReadFor{250};
 constexpr std::string_view kRawHeadline = "device_time_us,x_lsb,y_lsb,z_lsb,temperature_c\n";
 constexpr int kWritable_mv = 3300;  // docs/protocol.md, code 7
 // A unit without a readable page: the middle of what ADXL362 units hold. Enough to tell faces.
-constexpr double kNominal_lsb_per_g = 256;
-constexpr double kNominalZero_lsb = 40;
 
 double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
-}
-
-Calibration nominal() {
-  Calibration calibration;
-  calibration.sensitivity_g_per_lsb.fill(1 / kNominal_lsb_per_g);
-  calibration.zero_lsb.fill(kNominalZero_lsb);
-  return calibration;
 }
 
 // A returned unit of 2013-14: the firmware knows two configurations for it.
@@ -88,7 +79,7 @@ class Session {
   const JigHooks& hooks_;
   double gravity_g_;
   JigReport report_;
-  Calibration approximation_ = nominal();
+  Calibration approximation_ = first_approximation(std::nullopt).calibration;
   bool ended_ = false;
   bool write_unknown_ = false;  // a write was begun, and the page not read since
   std::optional<Error> gone_;   // why the unit was given up
@@ -111,7 +102,12 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
   const auto page = unit_->read_calibration();
   if (page) {
     report_.as_found = *page;
-    SIXPOINT_ASSIGN(approximation_, calib::calibration_from(page->constants));
+    const FirstApproximation first = first_approximation(page->constants);
+    approximation_ = first.calibration;
+    if (first.is_nominal) {
+      report_.reasons.emplace_back(
+          "as found, the unit held constants that no working sensor can have");
+    }
   } else if (page.error().code == ErrorCode::bad_data) {
     report_.reasons.push_back("as found, the unit's constants were unreadable: " +
                               page.error().what);

@@ -16,9 +16,6 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t kTraceSeconds = 6;
 constexpr std::size_t kLogLines = 30;
-// A unit without a readable page is shown by the middle of what units hold.
-constexpr double kNominal_lsb_per_g = 256;
-constexpr double kNominalZero_lsb = 40;
 
 // The folder of a lane: the same device in the same lane finds what it left.
 std::string folder_of_lane(const std::string& state_folder, std::size_t number,
@@ -323,16 +320,13 @@ bool Lanes::Lane::open_unit() {
   } else {
     problem = opened.error();
   }
-  calib::Calibration approximation;
-  approximation.sensitivity_g_per_lsb.fill(1 / kNominal_lsb_per_g);
-  approximation.zero_lsb.fill(kNominalZero_lsb);
+  std::optional<StoredConstants> stored;
   if (unit) {
     if (const auto page = unit->read_calibration()) {
-      if (const auto calibration = calib::calibration_from(page->constants)) {
-        approximation = *calibration;
-      }
+      stored = page->constants;
     }
   }
+  const calib::Calibration approximation = first_approximation(stored).calibration;
   streaming_ = false;
   const std::lock_guard lock(mutex_);
   if (!unit) {

@@ -118,7 +118,9 @@ void Server::Impl::set_up() {
       give(refused(411, "length_required", "send the body plain and with its length"), response);
       return httplib::Server::HandlerResponse::Handled;
     }
-    if (from.method != "GET" && from.method != "HEAD" && from.method != "POST") {
+    // A request that announces no body has none (RFC 9112, 6.3); the library would wait for one.
+    const bool without_body = from.method == "POST" && !from.has_header("Content-Length");
+    if (without_body || (from.method != "GET" && from.method != "HEAD" && from.method != "POST")) {
       give(api.handle(request_of(from)), response);
       return httplib::Server::HandlerResponse::Handled;
     }

@@ -11,6 +11,7 @@
 #include "gap/bundle.h"
 #include "gap/diagnose.h"
 #include "gap/plain.h"
+#include "gap/readings_table.h"
 #include "gap/report_html.h"
 #include "gap/report_sheet.h"
 #include "station/cli/command.h"
@@ -32,6 +33,7 @@ struct Options {
   std::string pdf;
   std::string scenario;
   std::uint64_t seed = 0;
+  double rate_hz = 0;  // 0: not told
   bool json = false;
 };
 
@@ -61,8 +63,12 @@ Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
   }
   SIXPOINT_ASSIGN(const FileInfo info, context.env.files.info(options.bundle));
   if (!info.is_folder) {
+    gap::ReadingsTableOptions table;
+    table.rate_hz = options.rate_hz;
     SIXPOINT_ASSIGN(gap::Diagnosis plain,
-                    gap::diagnose_plain(context.env.files, options.bundle, how));
+                    gap::is_readings_table(options.bundle)
+                        ? gap::diagnose_table(context.env.files, options.bundle, how, table)
+                        : gap::diagnose_plain(context.env.files, options.bundle, how));
     plain.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
     return plain;
   }
@@ -147,7 +153,11 @@ void add_gap(CLI::App& app, Context& context) {
       command->add_subcommand("diagnose", "which effect explains a recording of a known protocol");
   CLI::Option* bundle = diagnose_command->add_option(
       "BUNDLE", options->bundle,
-      "folder with recording.gt3x and protocol.json, or a plain recording");
+      "folder with recording.gt3x and protocol.json, a plain recording, or a table of readings "
+      "(.txt, .csv, also .gz: time in seconds and three axes)");
+  diagnose_command
+      ->add_option("--rate", options->rate_hz, "readings a second of a table without a time column")
+      ->check(CLI::Range(5.0, 10'000.0));
   diagnose_command->add_option("--run", options->run, "a stored jig run instead of a bundle")
       ->excludes(bundle);
   add_store_option(*diagnose_command, options->store);

@@ -211,8 +211,8 @@ TEST_F(StoreTest, AuditFindsWhatWasTouched) {
            "4; "
            "UPDATE constants SET seq = 4 WHERE seq = 100",
            "UPDATE units SET serial = 'X' WHERE seq = 1",
-           "UPDATE attachments SET bytes = " + place_->empty_bytes(), "UPDATE head SET rows = 3",
-           "UPDATE constants SET filter = 'legacy' WHERE seq = 3",
+           "UPDATE attachments SET bytes = " + place_->empty_bytes(), "DELETE FROM attachments",
+           "UPDATE head SET rows = 3", "UPDATE constants SET filter = 'legacy' WHERE seq = 3",
            "UPDATE runs SET temperature_c = '21' WHERE serial = 'MOS2A1'",
            "UPDATE constants SET origin = '{}' WHERE seq = 4"}) {
     place_->erase("main");

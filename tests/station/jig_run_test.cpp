@@ -18,7 +18,10 @@ using testing::HasSubstr;
 class Hand {
  public:
   explicit Hand(JigRunOptions options = {}, std::uint64_t seed = 1)
-      : options_(options), run(options, approximation()), random(seed) {
+      : Hand(options, seed, approximation(), truth_of_16cpan03()) {}
+  Hand(const JigRunOptions& options, std::uint64_t seed, const calib::Calibration& first,
+       const calib::Calibration& truth)
+      : options_(options), truth_(truth), run(options, first), random(seed) {
     keep(run.start(0));
   }
   static calib::Calibration approximation() {
@@ -27,12 +30,14 @@ class Hand {
     calibration.zero_lsb = {50, 40, 30};
     return calibration;
   }
-  calib::Calibration truth() const {
+  static calib::Calibration truth_of_16cpan03() {
     calib::Calibration calibration;
     calibration.sensitivity_g_per_lsb.fill(1 / 234.0);
     calibration.zero_lsb = {50 + 39.0, 40 - 39.0, 30 + 35.0};
     return calibration;
   }
+
+  const calib::Calibration& truth() const { return truth_; }
 
   void sample(const PerAxis<double>& force_g) {
     time_s += 1.0 / options_.rate_hz;
@@ -41,7 +46,7 @@ class Hand {
     sample.temperature_c = 25;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       const double g = force_g[axis] + noise_mg / 1000 * random.normal();
-      const double lsb = g * 234 + truth().zero_lsb[axis];
+      const double lsb = g / truth().sensitivity_g_per_lsb[axis] + truth().zero_lsb[axis];
       sample.counts[axis] =
           static_cast<std::int16_t>(std::clamp<double>(std::round(lsb), -2048, 2047));
     }
@@ -115,6 +120,7 @@ class Hand {
 
  private:
   JigRunOptions options_;
+  calib::Calibration truth_;
 
  public:
   JigRun run;
@@ -250,6 +256,72 @@ TEST(JigRun, WrongFacesAreNamed) {
   hand.stuck = true;
   hand.place(Pose::plus_x);
   EXPECT_THAT(hand.last_refusal(), HasSubstr("z axis does not change at all"));
+}
+
+// A sensor may be anywhere within its datasheet's limits, and its constants lost: nothing but the
+// order of its readings tells the faces then.
+TEST(JigRun, AUnitWithoutUsefulConstantsIsMeasured) {
+  const calib::Calibration nominal = first_approximation(std::nullopt).calibration;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    Random random(seed);
+    calib::Calibration truth;
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const double lsb_per_g = random.uniform(210, 285);
+      truth.sensitivity_g_per_lsb[axis] = 1 / lsb_per_g;
+      truth.zero_lsb[axis] = random.uniform(-0.4, 0.4) * lsb_per_g;
+    }
+    Hand hand({}, seed, nominal, truth);
+    for (int i = 0; i < 12 && hand.run.phase() == JigPhase::measuring; ++i) {
+      hand.place(hand.wanted);
+    }
+    ASSERT_EQ(hand.run.phase(), JigPhase::verifying) << seed << ": " << hand.last_refusal();
+    for (const PoseReading& face : hand.run.faces()) {
+      const auto direction = device::direction_of(face.pose);
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        EXPECT_NEAR(face.mean_lsb[axis],
+                    direction[axis] / truth.sensitivity_g_per_lsb[axis] + truth.zero_lsb[axis], 0.4)
+            << seed;
+      }
+    }
+  }
+}
+
+// Once the faces are known a placement between them is refused however often it comes.
+TEST(JigRun, LeaningIsTakenAtFirstOnlyWhereItRepeatsItself) {
+  Hand hand;
+  hand.place(Pose::plus_z, 40);
+  EXPECT_THAT(hand.last_refusal(), HasSubstr("none of its six faces"));
+  hand.place(Pose::plus_z, 36);  // a hand leans it otherwise the second time
+  EXPECT_THAT(hand.last_refusal(), HasSubstr("none of its six faces"));
+  EXPECT_TRUE(hand.run.faces().empty());
+  // And where it does repeat itself, the others show what it was.
+  hand.place(Pose::plus_z, 36);
+  ASSERT_EQ(hand.run.faces().size(), 1U);
+  for (int i = 0; i < 20 && hand.run.phase() == JigPhase::measuring; ++i) {
+    hand.place(hand.wanted);
+  }
+  ASSERT_EQ(hand.run.phase(), JigPhase::verifying);
+  for (const PoseReading& face : hand.run.faces()) {
+    const auto direction = device::direction_of(face.pose);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      EXPECT_NEAR(face.mean_lsb[axis], direction[axis] * 234 + hand.truth().zero_lsb[axis], 0.4);
+    }
+  }
+}
+
+TEST(JigRun, ConstantsThatNoSensorHasAreNotUsed) {
+  const StoredConstants good = {{311, 310, 287}, {-204, -216, -234}, {54, 47, 26}};
+  EXPECT_FALSE(first_approximation(good).is_nominal);
+  StoredConstants turned = good;
+  turned.positive_lsb[1] = -300;
+  EXPECT_TRUE(first_approximation(turned).is_nominal);
+  StoredConstants narrow = good;
+  narrow.positive_lsb[0] = -190;  // 7 LSB per g
+  EXPECT_TRUE(first_approximation(narrow).is_nominal);
+  StoredConstants far = good;
+  far.zero_lsb[2] = 700;
+  EXPECT_TRUE(first_approximation(far).is_nominal);
+  EXPECT_TRUE(first_approximation(std::nullopt).is_nominal);
 }
 
 TEST(JigRun, AnAcceptedPoseIsNotReadTwiceWithoutBeingTouched) {

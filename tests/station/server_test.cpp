@@ -1,6 +1,7 @@
 // The station's server by an HTTP client: what it serves, what it refuses, and that runs survive.
 #include "station/server.h"
 
+#include <array>
 #include <future>
 #include <thread>
 
@@ -127,6 +128,26 @@ class Station {
  private:
   std::thread thread_;
 };
+
+// The status line of the answer to these bytes.
+std::string answer_to(const Station& station, const std::string& bytes) {
+  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(station.server->port()));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::string answer;
+  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0 &&
+      ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(bytes.size())) {
+    std::array<char, 1024> some{};
+    for (ssize_t n = 1; n > 0 && answer.find("\r\n") == std::string::npos;) {
+      n = ::recv(fd, some.data(), some.size(), 0);
+      answer.append(some.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
+    }
+  }
+  ::close(fd);
+  return answer.substr(0, answer.find("\r\n"));
+}
 
 // What a person does: looks where the unit is wanted, and turns it there.
 void serve(const Station& station, int lane, int placements) {
@@ -365,6 +386,16 @@ TEST(Server, NonsenseIsRefused) {
   EXPECT_THAT(answer->get_header_value("Content-Security-Policy"), HasSubstr("default-src 'none'"));
   EXPECT_EQ(answer->get_header_value("Access-Control-Allow-Origin"), "");
   EXPECT_EQ(answer->get_header_value("Cache-Control"), "no-store");
+}
+
+// `curl -X POST` sends neither a body nor its length; all that a run takes is optional.
+TEST(Server, ARequestWithoutABodyIsAnswered) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(station.server->port()) + "\r\n\r\n";
+  EXPECT_THAT(answer_to(station, "POST /api/lanes/1/stop HTTP/1.1\r\n" + host), HasSubstr(" 409 "));
+  EXPECT_THAT(answer_to(station, "POST /api/run HTTP/1.1\r\n" + host), HasSubstr(" 202 "));
+  station.wait_state(1, "running");
 }
 
 TEST(Server, OtherPagesInTheBrowserMayNotCommandIt) {
