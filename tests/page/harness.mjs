@@ -2,6 +2,7 @@
 import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync, readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
+import { createServer as createHttpServer } from 'node:http';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
@@ -90,15 +91,34 @@ export async function stationOnUsb(words = []) {
 }
 
 let browser;
-export async function open(url, { width = 1500, height = 1000 } = {}) {
+async function launch() {
   if (!browser) {
     browser = await chromium.launch({
       executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
       args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
-        '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+        '--disable-background-networking', '--disable-component-update', '--disable-sync',
+        '--host-resolver-rules=MAP rebound.example 127.0.0.1'],
     });
     cleanups.push(() => browser.close());
   }
+}
+
+// A page of somebody else, on another port of this machine.
+export async function serve(page) {
+  const server = createHttpServer((request, response) => response.setHeader('Content-Type', 'text/html').end(page(request)));
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  cleanups.push(() => { server.closeAllConnections(); server.close(); });
+  return `http://localhost:${server.address().port}/`;
+}
+export async function bare(url) {
+  await launch();
+  const page = await (await browser.newContext()).newPage();
+  await page.goto(url);
+  return page;
+}
+
+export async function open(url, { width = 1500, height = 1000 } = {}) {
+  await launch();
   const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);

@@ -547,6 +547,67 @@ const scenarios = {
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 
+  // A page of somebody else in the same browser: nothing that it sends does anything, nothing that it asks is
+  // answered to it; and a name that was made to point here (DNS rebinding) is refused.
+  async hostile() {
+    const station = await h.station(['virtual:seed=7,serial=MOS2A45130007,pace=10']);
+    await until('ready', async () => (await station.api('/api/lanes/1')).json.state === 'idle');
+    const port = new URL(station.url).port;
+    const evil = await h.serve((request) => (request.url === '/frame' ? `<iframe src="${station.url}"></iframe>` : '<form method=post enctype=text/plain><input name=x></form>'));
+    const page = await h.bare(evil);
+    const before = (await station.api('/api/state')).json;
+    const commands = [['/api/run', { lane: 1 }], ['/api/capture', { lane: 1 }], ['/api/lanes/1/scan', { serial: 'MOS2A00000000' }],
+      ['/api/check-units', { serial: 'MOS2A45130007', action: 'add', operator: 'E', reason: 'x' }],
+      ['/api/station-lock', { operator: 'E', reason: 'x' }], ['/api/repair', { folder: '', output: 'out' }]];
+    for (const [path, body] of commands) {
+      for (const how of ['no-cors', 'cors', 'header', 'form', 'beacon']) {
+        const seen = await page.evaluate(async ([url, text, kind]) => {
+          const options = { method: 'POST', body: text, credentials: 'include' };
+          try {
+            if (kind === 'form') {
+              const form = document.createElement('form');
+              const field = Object.assign(document.createElement('input'), { name: text.slice(0, -1), value: '}' });
+              Object.assign(form, { method: 'post', enctype: 'text/plain', action: url, target: 'elsewhere' });
+              form.append(field);
+              document.body.append(form, Object.assign(document.createElement('iframe'), { name: 'elsewhere' }));
+              form.submit();
+              return 'sent';
+            }
+            if (kind === 'beacon') return navigator.sendBeacon(url, text);
+            if (kind === 'header') options.headers = { 'X-Sixpoint-Client': 'x', 'Content-Type': 'application/json' };
+            const answer = await fetch(url, { ...options, mode: kind === 'no-cors' ? 'no-cors' : 'cors' });
+            return answer.type === 'opaque' ? 'opaque' : `read ${answer.status}`;
+          } catch (error) {
+            return `blocked ${error.message}`;
+          }
+        }, [new URL(path, station.url).href, JSON.stringify(body), how]);
+        check(!String(seen).startsWith('read'), `${path} by ${how}: ${seen}`);
+      }
+    }
+    const got = await page.evaluate(async (url) => {
+      const events = await new Promise((resolve) => {
+        const source = new EventSource(`${url}api/events`);
+        source.onopen = () => resolve('open');
+        source.onerror = () => { source.close(); resolve('refused'); };
+      });
+      const read = await fetch(`${url}api/state`).then((answer) => answer.text(), () => 'blocked');
+      return [events, read];
+    }, station.url);
+    check(got[0] === 'refused' && got[1] === 'blocked', `neither events nor state: ${got}`);
+    await page.goto(`${evil}frame`);
+    const inside = await page.frames()[1]?.evaluate(() => document.querySelectorAll('button').length).catch(() => 0);
+    check(!inside, 'the station is in no frame');
+    // The browser is told that this name is this machine; what it asks still carries the name.
+    const rebound = await page.goto(`http://rebound.example:${port}/`);
+    check(rebound.status() === 421, `another name: ${rebound.status()}`);
+    const asked = await page.evaluate(async () => (await fetch('/api/run', { method: 'POST', body: '{"lane": 1}', headers: { 'X-Sixpoint-Client': 'x' } })).status);
+    check(asked === 421, `nor a command under it: ${asked}`);
+    const after = (await station.api('/api/state')).json;
+    check(after.lanes[0].state === 'idle' && after.lanes[0].result === null && after.lanes[0].scan === null, JSON.stringify(after.lanes[0]));
+    check(after.lock.check_units.length === 0 && after.lock.signature === null && after.job.state === 'none', 'nothing was decided, nothing begun');
+    check(before.lanes[0].unit.serial === after.lanes[0].unit.serial, 'the same unit');
+  },
+
   // A unit on emulated USB (hid:SERIAL behind the real hidapi), not a virtual one: pulled out and put back, the
   // program killed and started again, written and read back.
   async usb() {
