@@ -1,16 +1,13 @@
 #include "station/api.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/atomic_file.h"
-#include "calib/solve.h"
-#include "repair/file_tree.h"
-#include "station/calibration_file.h"
+#include "station/api_answers.h"
+#include "station/station_desk.h"
 
 namespace sixpoint::station {
 
@@ -18,55 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostText = 200;     // of names and serial numbers that come in
-constexpr std::size_t kMostListed = 2000;  // files of one folder
-constexpr std::chrono::seconds kHeartbeat{5};
-
-std::string dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-ApiAnswer answer(int status, const Json& json) {
-  return {status, "application/json", dump(json), {}};
-}
-
-ApiAnswer refusal(int status, std::string_view code, std::string_view what,
-                  std::string_view hint = "") {
-  Json json;
-  json["error"]["code"] = code;
-  json["error"]["what"] = what;
-  json["error"]["hint"] = hint;
-  return answer(status, json);
-}
-
-ApiAnswer refusal(const Error& error) {
-  int status = 500;
-  switch (error.code) {
-    case ErrorCode::usage:
-    case ErrorCode::bad_data:
-    case ErrorCode::configuration:
-      status = 400;
-      break;
-    case ErrorCode::no_input:
-      status = 404;
-      break;
-    case ErrorCode::permission:
-      status = 403;
-      break;
-    case ErrorCode::cannot_create:
-      status = 409;
-      break;
-    case ErrorCode::device_unavailable:
-      status = 503;
-      break;
-    case ErrorCode::internal:
-    case ErrorCode::io:
-      break;
-  }
-  return refusal(status, to_string(error.code), error.brief(), error.hint);
-}
-
-ApiAnswer refusal(const LaneRefusal& why) {
+ApiAnswer lane_refusal(const LaneRefusal& why) {
   switch (why.kind) {
     case LaneRefusal::Kind::no_such_lane:
       return refusal(404, "no_such_lane", why.what, why.hint);
@@ -115,17 +64,6 @@ bool is_address(std::string_view name) {
   return !name.empty() && name.find_first_not_of("0123456789.") == std::string_view::npos;
 }
 
-// A text of a JSON body; empty where it is not there. Nothing where it is no text or too long.
-std::optional<std::string> text_of(const Json& body, const char* key) {
-  if (!body.contains(key) || body[key].is_null()) {
-    return std::string();
-  }
-  if (!body[key].is_string() || body[key].get_ref<const std::string&>().size() > kMostText) {
-    return std::nullopt;
-  }
-  return body[key].get<std::string>();
-}
-
 std::optional<std::size_t> number_of(std::string_view text) {
   std::size_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -146,14 +84,6 @@ std::vector<std::string> parts_of(const std::string& path) {
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
   return parts;
-}
-
-ApiAnswer unknown_route() {
-  return refusal(404, "not_found", "there is nothing at this address", "docs/station.md lists all");
-}
-
-ApiAnswer bad_field(std::string_view key, std::string_view wanted) {
-  return refusal(400, "bad_request", fmt::format("'{}' must be {}", key, wanted));
 }
 
 const std::vector<std::pair<std::string, std::string>>& common_headers() {
@@ -247,6 +177,7 @@ Json Api::state() const {
   }
   json["queue"] = parts_.lanes.queue();
   json["job"] = parts_.repairs.to_json();
+  json["lock"] = parts_.desk != nullptr ? parts_.desk->lock() : Json(nullptr);
   return json;
 }
 
@@ -281,6 +212,9 @@ ApiAnswer Api::get(const ApiRequest& request) {
   }
   if (parts.size() == 1 && parts[0] == "job") {
     return answer(200, parts_.repairs.to_json());
+  }
+  if (parts.size() == 1) {
+    return desk_view(request, parts[0]).value_or(unknown_route());
   }
   if (parts.size() == 2 && parts[0] == "lanes") {
     const auto lane = number_of(parts[1]);
@@ -329,13 +263,16 @@ ApiAnswer Api::post(const ApiRequest& request) {
       return bad_field("serial", "a serial number");
     }
     const auto lane = parts_.lanes.scan(0, *serial);
-    return lane ? answer(200, {{"lane", *lane}}) : refusal(lane.error());
+    return lane ? answer(200, {{"lane", *lane}}) : lane_refusal(lane.error());
   }
   if (parts.size() == 1 && parts[0] == "check") {
     return check_file(body);
   }
   if (parts.size() == 1 && parts[0] == "repair") {
     return start_repair(body);
+  }
+  if (parts.size() == 1) {
+    return desk_decision(request, parts[0], body).value_or(unknown_route());
   }
   if (parts.size() == 2 && parts[0] == "repair" && parts[1] == "cancel") {
     parts_.repairs.cancel();
@@ -374,7 +311,7 @@ ApiAnswer Api::run(const ApiRequest& request, const Json& body) {
   order.write = body.value("write", false);
   const auto started = request.path == "/api/capture" ? parts_.lanes.start_capture(lane, order)
                                                       : parts_.lanes.start(lane, order);
-  return started ? answer(202, {{"lane", lane}, {"started", true}}) : refusal(started.error());
+  return started ? answer(202, {{"lane", lane}, {"started", true}}) : lane_refusal(started.error());
 }
 
 ApiAnswer Api::lane_word(std::size_t lane, const std::string& word, const ApiRequest& request,
@@ -400,7 +337,7 @@ ApiAnswer Api::lane_word(std::size_t lane, const std::string& word, const ApiReq
   } else {
     return unknown_route();
   }
-  return done ? answer(200, {{"lane", lane}}) : refusal(done.error());
+  return done ? answer(200, {{"lane", lane}}) : lane_refusal(done.error());
 }
 
 // A virtual unit is turned by buttons of the page: for practice, and for tests.
@@ -448,210 +385,6 @@ ApiAnswer Api::hand(std::size_t lane, const Json& body) {
     return bad_field("do", "turn, lean, knock, unplug, plug or swap");
   }
   return done ? answer(200, {{"lane", lane}}) : refusal(done.error());
-}
-
-// A path that the page named, below the folder that this station may touch.
-Result<std::string> Api::inside(const std::string& relative) const {
-  const bool plain = relative.size() < 1000 && !relative.starts_with('/') &&
-                     std::none_of(relative.begin(), relative.end(), [](char c) {
-                       return static_cast<unsigned char>(c) < 0x20 || c == '\\';
-                     });
-  std::string_view rest = relative;
-  bool up = false;
-  while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find('/'), rest.size());
-    up = up || rest.substr(0, end) == "..";
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
-  if (!plain || up) {
-    return fail(ErrorCode::permission, "this path leads out of the station's folder",
-                printable(relative, 100), "choose a folder below it (--files)");
-  }
-  return relative.empty() ? options_.files_folder : options_.files_folder + "/" + relative;
-}
-
-ApiAnswer Api::list_files(const std::string& relative) const {
-  const auto folder = inside(relative);
-  if (!folder) {
-    return refusal(folder.error());
-  }
-  const auto names = parts_.env.files.list(*folder);
-  if (!names) {
-    return refusal(404, "no_input", "there is no such folder");
-  }
-  Json json;
-  json["path"] = printable(relative);
-  json["folders"] = Json::array();
-  json["files"] = Json::array();
-  json["cut"] = names->size() > kMostListed;
-  for (std::size_t i = 0; i < std::min(names->size(), kMostListed); ++i) {
-    const std::string& name = (*names)[i];
-    const auto info = parts_.env.files.info(*folder + "/" + name);
-    if (!info || name.starts_with('.')) {
-      continue;
-    }
-    if (info->is_folder) {
-      json["folders"].push_back(name);
-    } else if (repair::has_ending(name, ".gt3x")) {
-      json["files"].push_back({{"name", name}, {"bytes", info->size}});
-    }
-  }
-  return answer(200, json);
-}
-
-ApiAnswer Api::check_file(const Json& body) {
-  const auto name = text_of(body, "file");
-  if (!name || name->empty()) {
-    return bad_field("file", "a file below the station's folder");
-  }
-  const auto path = inside(*name);
-  if (!path) {
-    return refusal(path.error());
-  }
-  const auto check = check_calibration_file(parts_.env, *path);
-  if (!check) {
-    return refusal(check.error());
-  }
-  Json json;
-  json["file"] = *name;
-  json["serial"] = printable(check->serial, 40);
-  json["firmware"] = printable(check->firmware, 40);
-  json["usable"] = check->usable();
-  json["refusal"] = check->refusal;
-  json["reasons"] =
-      check->solved ? check->solved->verification.reasons : std::vector<std::string>{};
-  json["repeat_sides"] =
-      check->solved ? Json(check->solved->verification.missing_directions) : Json::array();
-  json["solved"] = check->solved ? calib::to_json(*check->solved) : Json(nullptr);
-  json["constants_file"] = nullptr;
-  json["stored_id"] = nullptr;
-  if (check->usable() && body.value("save", Json(false)) == Json(true)) {
-    CaptureReport report;
-    report.serial = check->serial;
-    report.firmware = check->firmware;
-    report.file = *path;
-    report.file_sha256 = check->sha256;
-    report.solved = check->solved;
-    const auto id = parts_.keep_capture(report);
-    if (!id) {
-      return refusal(id.error());
-    }
-    json["stored_id"] = *id;
-    json["constants_file"] = *name + ".constants.json";
-  }
-  return answer(200, json);
-}
-
-ApiAnswer Api::start_repair(const Json& body) {
-  const auto folder = text_of(body, "folder");
-  const auto output = text_of(body, "output");
-  const auto calibration = text_of(body, "calibration_file");
-  if (!folder || !output || !calibration || output->empty()) {
-    return bad_field("folder, output", "folders below the station's folder");
-  }
-  RepairOrder order;
-  const auto from = inside(*folder);
-  const auto into = inside(*output);
-  const auto file = inside(*calibration);
-  for (const auto* path : {&from, &into, &file}) {
-    if (!*path) {
-      return refusal(path->error());
-    }
-  }
-  order.folder = *from;
-  order.output = *into;
-  order.calibration_file = calibration->empty() ? "" : *file;
-  if (const Status started = parts_.repairs.start(order); !started) {
-    return started.error().code == ErrorCode::usage
-               ? refusal(409, "conflict", started.error().what, started.error().hint)
-               : refusal(started.error());
-  }
-  return answer(202, parts_.repairs.to_json());
-}
-
-std::unique_ptr<EventStream> Api::open_events() {
-  if (++streams_ > options_.most_streams) {
-    --streams_;
-    return nullptr;
-  }
-  return std::unique_ptr<EventStream>(new EventStream(*this));
-}
-
-// --- EventStream ---
-
-namespace {
-
-void add_event(std::string& text, std::string_view name, const Json& data) {
-  text += "event: ";
-  text += name;
-  text += "\ndata: ";
-  text += dump(data);  // one line: JSON escapes line ends
-  text += "\n\n";
-}
-
-}  // namespace
-
-EventStream::EventStream(Api& api)
-    : api_(api), seen_changes_(api.parts_.lanes.size()), next_reading_(api.parts_.lanes.size()) {}
-EventStream::~EventStream() { --api_.streams_; }
-
-std::string EventStream::next() {
-  std::string text;
-  Lanes& lanes = api_.parts_.lanes;
-  const auto now = api_.parts_.env.clock.elapsed();
-  if (!greeted_) {
-    greeted_ = true;
-    for (std::size_t i = 0; i < lanes.size(); ++i) {
-      seen_changes_[i] = lanes.changes(i + 1);
-    }
-    seen_job_ = api_.parts_.repairs.changes();
-    add_event(text, "state", api_.state());
-  }
-  for (std::size_t i = 0; i < lanes.size(); ++i) {
-    const std::uint64_t changes = lanes.changes(i + 1);
-    if (changes != seen_changes_[i]) {
-      seen_changes_[i] = changes;
-      add_event(text, "lane", lanes.to_json(i + 1));
-    }
-  }
-  Json live;
-  live["lanes"] = Json::array();
-  for (std::size_t i = 0; i < lanes.size(); ++i) {
-    const LaneTrace trace = lanes.trace(i + 1, next_reading_[i]);
-    if (trace.force_mg.empty()) {
-      continue;
-    }
-    next_reading_[i] = trace.first + trace.force_mg.size();
-    Json lane;
-    lane["lane"] = i + 1;
-    lane["first"] = trace.first;
-    lane["host_ms"] = trace.host_ms;
-    Json& flat = lane["mg"] = Json::array();
-    for (const auto& force_mg : trace.force_mg) {
-      for (const std::int16_t mg : force_mg) {
-        flat.push_back(mg);
-      }
-    }
-    lane["live"] = lanes.live(i + 1);
-    live["lanes"].push_back(std::move(lane));
-  }
-  auto queue = lanes.queue();
-  if (!live["lanes"].empty() || queue != seen_queue_) {
-    live["queue"] = queue;
-    seen_queue_ = std::move(queue);
-    add_event(text, "live", live);
-  }
-  if (const std::uint64_t job = api_.parts_.repairs.changes(); job != seen_job_) {
-    seen_job_ = job;
-    add_event(text, "job", api_.parts_.repairs.to_json());
-  }
-  if (text.empty() && now - last_word_ > kHeartbeat) {
-    text = ": still here\n\n";
-  }
-  if (!text.empty()) {
-    last_word_ = now;
-  }
-  return text;
 }
 
 }  // namespace sixpoint::station

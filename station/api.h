@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,7 +32,8 @@ struct ApiRequest {
   std::string cookie;
   std::string client;  // X-Sixpoint-Client: who may command a run
   std::string path_parameter;
-  std::string token_parameter;  // ?token=, on the first call of the page
+  std::map<std::string, std::string> parameters;  // of the query, the first of each name
+  std::string token_parameter;                    // ?token=, on the first call of the page
 };
 
 struct ApiAnswer {
@@ -59,6 +61,8 @@ struct RunDocument {
 using RunDocuments =
     std::function<Result<RunDocument>(const std::string& run, const std::string& kind)>;
 
+class StationDesk;  // station_desk.h
+
 struct ApiParts {
   Env& env;
   Lanes& lanes;
@@ -66,6 +70,7 @@ struct ApiParts {
   mocks::VirtualBench* bench = nullptr;  // null: no virtual units
   CaptureKeeper keep_capture;            // constants of a file that was checked
   RunDocuments run_document;
+  StationDesk* desk = nullptr;  // null: no check units, no statistics
 };
 
 class EventStream;
@@ -98,6 +103,10 @@ class Api {
   ApiAnswer lane_word(std::size_t lane, const std::string& word, const ApiRequest& request,
                       const nlohmann::ordered_json& body);
   ApiAnswer hand(std::size_t lane, const nlohmann::ordered_json& body);
+  // Nothing where `what` is no route of theirs.
+  std::optional<ApiAnswer> desk_view(const ApiRequest& request, const std::string& what);
+  std::optional<ApiAnswer> desk_decision(const ApiRequest& request, const std::string& what,
+                                         const nlohmann::ordered_json& body);
   ApiAnswer list_files(const std::string& relative) const;
   ApiAnswer check_file(const nlohmann::ordered_json& body);
   ApiAnswer start_repair(const nlohmann::ordered_json& body);
@@ -128,6 +137,7 @@ class EventStream {
   std::vector<std::uint64_t> seen_changes_;
   std::vector<std::uint64_t> next_reading_;
   std::uint64_t seen_job_ = 0;
+  std::uint64_t seen_lock_ = 0;
   std::vector<std::size_t> seen_queue_;
   std::chrono::nanoseconds last_word_{0};
 };

@@ -9,6 +9,7 @@
 #include "gt3x/recording.h"
 #include "repair/constants_finder.h"
 #include "repair/survey.h"
+#include "station/recording_pieces.h"
 
 namespace sixpoint::station {
 
@@ -58,27 +59,6 @@ Result<Oddities> look_for_oddities(FileSystem& files, const std::string& path) {
   }
 }
 
-// True when the unit went through all sides.
-Result<bool> go_round(device::Unit& unit, device::Jig& jig, const CaptureOptions& options,
-                      const SidePrompt& prompt) {
-  std::size_t number = 0;
-  for (const device::Pose side : device::kPoses) {
-    if (!prompt(side, ++number, device::kPoses.size())) {
-      return false;
-    }
-    SIXPOINT_CHECK(jig.go_to(side));
-    const auto until = unit.clock().elapsed() + from_seconds(options.turn_s + options.side_s);
-    for (auto now = unit.clock().elapsed(); now < until; now = unit.clock().elapsed()) {
-      if (options.cancelled && options.cancelled()) {
-        return false;
-      }
-      unit.clock().sleep(
-          std::min<std::chrono::nanoseconds>(until - now, std::chrono::milliseconds(200)));
-    }
-  }
-  return true;
-}
-
 // The unit recorded without a pause while it was watched: no two blocks are further apart than a
 // side and a turn. What its clock jumped by is no time in which its zeros could have drifted.
 void undo_jumps(std::vector<calib::StillBlock>& blocks, double longest_s) {
@@ -109,20 +89,6 @@ Result<bool> note_oddities(FileSystem& files, const std::string& path, CaptureRe
   return std::abs(oddities.jumped_s) > kShort_s;
 }
 
-Result<std::string> hash_of(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(const auto file, files.open(path));
-  Sha256 hash;
-  Bytes piece(1U << 20U);
-  for (std::uint64_t offset = 0;;) {
-    SIXPOINT_ASSIGN(const std::size_t count, file->read_at(offset, piece));
-    if (count == 0) {
-      return to_hex(hash.finish());
-    }
-    hash.update(std::span<const std::uint8_t>(piece).first(count));
-    offset += count;
-  }
-}
-
 // The file is there: what it says about itself, and its constants.
 Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<double> wanted_s,
                        CaptureReport& report) {
@@ -138,9 +104,11 @@ Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<do
                     "battery empty?",
                     survey.duration_s, *wanted_s));
   }
-  SIXPOINT_ASSIGN(const bool jumped, note_oddities(env.files, options.output, report));
-  if (jumped && wanted_s) {
-    undo_jumps(survey.blocks, options.side_s + options.turn_s);
+  if (report.pieces.empty()) {
+    SIXPOINT_ASSIGN(const bool jumped, note_oddities(env.files, options.output, report));
+    if (jumped && wanted_s) {
+      undo_jumps(survey.blocks, options.side_s + options.turn_s);
+    }
   }
   const auto begin = env.clock.elapsed();
   SIXPOINT_ASSIGN(report.solved, repair::solve_survey(options.output, survey, options.solve));
@@ -148,21 +116,12 @@ Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<do
   return {};
 }
 
-// Does `step` until it succeeds, and waits for the unit in between where that is what failed.
-template <class Step>
-auto with_the_same_unit(device::Unit& unit, const CaptureOptions& options, CaptureReport& report,
-                        Step step) -> decltype(step()) {
-  for (int attempt = 1;; ++attempt) {
-    auto result = step();
-    if (result || attempt >= options.downloads ||
-        result.error().code != ErrorCode::device_unavailable) {
-      return result;
-    }
-    if (const Status back = unit.reconnect(from_seconds(options.replug_patience_s)); !back) {
-      return fail(back.error());
-    }
-    report.notes.push_back(fmt::format("the unit came back ({})", result.error().what));
-  }
+// "c.gt3x" and 2: "c-2.gt3x".
+std::string piece_name(const std::string& output, std::size_t number) {
+  const std::size_t dot = output.rfind('.');
+  const std::size_t end =
+      dot == std::string::npos || output.find('/', dot) != std::string::npos ? output.size() : dot;
+  return fmt::format("{}-{}{}", output.substr(0, end), number, output.substr(end));
 }
 
 }  // namespace
@@ -192,7 +151,7 @@ Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
   }
   SIXPOINT_CHECK(unit.download(recordings.back(), env.files, options.output));
   report.file = options.output;
-  SIXPOINT_ASSIGN(report.file_sha256, hash_of(env.files, options.output));
+  SIXPOINT_ASSIGN(report.file_sha256, file_sha256(env.files, options.output));
   SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(env.files, options.output));
   if (const auto filter = repair::filter_in_force(survey.facts)) {
     report.recording_filter = *filter;
@@ -205,62 +164,316 @@ Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
   return report;
 }
 
-Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,
-                                  const CaptureOptions& options, const SidePrompt& prompt) {
-  CaptureReport report;
-  report.serial = unit.identity().serial;
-  report.firmware = unit.identity().firmware;
-  SIXPOINT_ASSIGN(const device::FilterState filter, unit.filter());
-  report.recording_filter = filter.recording;
-  report.refusal = why_recording_cannot_help(filter, report.serial, report.firmware);
-  if (!report.refusal.empty()) {
-    return report;
-  }
-  if (env.files.info(options.output)) {
-    return fail(ErrorCode::cannot_create, "the file exists already", options.output,
-                "choose another name with -o, or remove it");
+namespace {
+
+class CaptureRun {
+ public:
+  CaptureRun(UnitOnJig on_jig, Env& env, const CaptureOptions& options, const CaptureHooks& hooks)
+      : on_jig_(on_jig), env_(env), options_(options), hooks_(hooks) {}
+
+  Result<CaptureReport> run(const std::optional<CaptureResume>& resume) {
+    report_.serial = unit().identity().serial;
+    report_.firmware = unit().identity().firmware;
+    SIXPOINT_ASSIGN(const device::FilterState filter, unit().filter());
+    report_.recording_filter = filter.recording;
+    report_.refusal = why_recording_cannot_help(filter, report_.serial, report_.firmware);
+    if (!report_.refusal.empty()) {
+      return report_;
+    }
+    if (resume) {
+      progress_ = *resume;
+      SIXPOINT_CHECK(again([&] { return begin_anew(); }));
+    } else {
+      if (env_.files.info(options_.output)) {
+        return fail(ErrorCode::cannot_create, "the file exists already", options_.output,
+                    "choose another name with -o, or remove it");
+      }
+      progress_.started = unit().clock().now();
+      SIXPOINT_CHECK(begin_recording());
+    }
+    const Result<bool> round = go_round();
+    if (!round && (gone_ || round.error().code == ErrorCode::internal)) {
+      return fail(round.error());  // the unit, wherever it is, goes on recording
+    }
+    SIXPOINT_CHECK(end_recording());
+    SIXPOINT_CHECK(round);
+    if (!*round) {
+      report_.stopped = true;
+      return report_;
+    }
+    SIXPOINT_CHECK(fetch());
+    return report_;
   }
 
-  const UtcTime started = unit.clock().now();
-  SIXPOINT_ASSIGN(const std::uint16_t id, unit.start_recording(options.rate_hz, started));
-  const Result<bool> round = go_round(unit, jig, options, prompt);
-  // First of all: a unit left recording runs empty. Perhaps it is another by now: ask.
-  SIXPOINT_CHECK(with_the_same_unit(unit, options, report, [&] { return unit.identify(); }));
-  const auto stopped = with_the_same_unit(
-      unit, options, report, [&]() -> Result<std::uint16_t> { return unit.stop_recording(); });
-  const double wanted_s = std::chrono::duration<double>(unit.clock().now() - started).count();
-  if (!stopped) {
-    if (stopped.error().code != ErrorCode::io) {
+ private:
+  enum class Step { done, stopped, away };
+
+  device::Unit& unit() { return *on_jig_.unit; }
+  bool looks() const { return hooks_.reopen != nullptr; }
+
+  // Does `step` until it succeeds, and waits for the unit in between where that is what failed.
+  template <class Action>
+  auto again(Action step) -> decltype(step()) {
+    for (int attempt = 1;; ++attempt) {
+      auto result = step();
+      if (result || attempt >= options_.downloads ||
+          result.error().code != ErrorCode::device_unavailable) {
+        return result;
+      }
+      if (const Status back = come_back(result.error()); !back) {
+        return fail(back.error());
+      }
+    }
+  }
+
+  Status come_back(const Error& why) {
+    if (looks()) {
+      gone_ = true;
+      SIXPOINT_ASSIGN(on_jig_, hooks_.reopen(why));
+      gone_ = false;
+    } else {
+      SIXPOINT_CHECK(unit().reconnect(from_seconds(options_.replug_patience_s)));
+    }
+    report_.notes.push_back(fmt::format("the unit came back ({})", why.what));
+    return {};
+  }
+
+  Status begin_recording() {
+    piece_began_ = unit().clock().now();
+    auto begun = unit().start_recording(options_.rate_hz, piece_began_);
+    if (!begun && begun.error().code == ErrorCode::io) {
+      // Perhaps a program that was killed left it streaming.
+      SIXPOINT_CHECK(unit().stop_stream());
+      begun = unit().start_recording(options_.rate_hz, piece_began_);
+    }
+    SIXPOINT_ASSIGN(recording_, begun);
+    save();
+    return {};
+  }
+
+  // The unit was away, or another program began this: the recording so far is ended and kept, and
+  // the rest gets one of its own. Sides of a recording that the unit lost are asked again.
+  Status begin_anew() {
+    pieces_ = true;
+    if (const auto stopped = unit().stop_recording();
+        !stopped && stopped.error().code != ErrorCode::io) {
       return fail(stopped.error());
     }
-    // It is not recording any more: what there is, is in its list.
-    report.notes.push_back(
-        "the unit had stopped recording by itself: it started anew, or its "
-        "battery or memory gave out");
-  }
-  SIXPOINT_CHECK(round);
-  if (!*round) {
-    report.stopped = true;
-    return report;
+    SIXPOINT_ASSIGN(const auto recordings, unit().recordings());
+    const auto lost = [&](const CaptureResume::Side& side) {
+      return std::none_of(recordings.begin(), recordings.end(),
+                          [&](const auto& one) { return one.id == side.recording; });
+    };
+    const auto before = progress_.done.size();
+    std::erase_if(progress_.done, lost);
+    if (const auto gone = before - progress_.done.size(); gone > 0) {
+      report_.notes.push_back(fmt::format("the unit lost its recording; {} side{} asked again",
+                                          gone, gone == 1 ? " is" : "s are"));
+    }
+    return begin_recording();
   }
 
-  SIXPOINT_ASSIGN(const auto recordings,
-                  with_the_same_unit(unit, options, report, [&] { return unit.recordings(); }));
-  const device::RecordingInfo* made = nullptr;
-  for (const device::RecordingInfo& recording : recordings) {
-    made = recording.id == id ? &recording : made;
+  void save() {
+    if (hooks_.progress) {
+      hooks_.progress(progress_);
+    }
   }
-  if (made == nullptr) {
-    return fail(ErrorCode::io, "the unit does not list the recording it made", report.serial,
-                "plug the unit in again and repeat");
-  }
-  SIXPOINT_CHECK(with_the_same_unit(
-      unit, options, report, [&] { return unit.download(*made, env.files, options.output); }));
-  report.file = options.output;
-  report.file_sha256 = to_hex(made->sha256);
 
-  SIXPOINT_CHECK(check_and_solve(env, options, wanted_s, report));
-  return report;
+  // Whether the unit still answers. Its other errors are no sign that it went.
+  Status look() {
+    if (!looks()) {
+      return {};
+    }
+    const auto identity = unit().identify();
+    return identity || identity.error().code != ErrorCode::device_unavailable
+               ? Status{}
+               : fail(identity.error());
+  }
+
+  Result<Step> place(device::Pose side, std::size_t number) {
+    for (;;) {
+      switch (hooks_.ask(side, number, device::kPoses.size())) {
+        case SideAnswer::placed:
+          return Step::done;
+        case SideAnswer::stop:
+          return Step::stopped;
+        case SideAnswer::leave:
+          return fail(ErrorCode::internal, "the program ends");
+        case SideAnswer::waiting:
+          if (Status there = look(); !there) {
+            away_ = there.error();
+            return Step::away;
+          }
+          break;
+      }
+    }
+  }
+
+  Result<Step> rest() {
+    Clock* clock = &unit().clock();
+    const auto until = clock->elapsed() + from_seconds(options_.turn_s + options_.side_s);
+    auto looked = clock->elapsed();
+    for (auto now = looked; now < until; now = clock->elapsed()) {
+      const SideAnswer word = hooks_.word ? hooks_.word() : SideAnswer::waiting;
+      if (word == SideAnswer::leave) {
+        return fail(ErrorCode::internal, "the program ends");
+      }
+      if (word == SideAnswer::stop || (options_.cancelled && options_.cancelled())) {
+        return Step::stopped;
+      }
+      if (now - looked >= kLookEvery) {
+        looked = now;
+        if (Status there = look(); !there) {
+          away_ = there.error();
+          return Step::away;
+        }
+      }
+      clock->sleep(std::min<std::chrono::nanoseconds>(until - now, std::chrono::milliseconds(200)));
+    }
+    if (Status there = look(); !there) {
+      away_ = there.error();
+      return Step::away;
+    }
+    return Step::done;
+  }
+
+  Result<Step> take(device::Pose side, std::size_t number) {
+    SIXPOINT_ASSIGN(const Step placed, place(side, number));
+    if (placed != Step::done) {
+      return placed;
+    }
+    if (const Status turned = on_jig_.jig->go_to(side); !turned) {
+      if (!looks() || turned.error().code != ErrorCode::device_unavailable) {
+        return fail(turned.error());
+      }
+      away_ = turned.error();
+      return Step::away;
+    }
+    return rest();
+  }
+
+  bool is_done(device::Pose side) const {
+    return std::any_of(progress_.done.begin(), progress_.done.end(),
+                       [side](const CaptureResume::Side& one) { return one.pose == side; });
+  }
+
+  // True when the unit went through all sides; a side that the unit lost is asked again.
+  Result<bool> go_round() {
+    for (std::size_t number = 1; number <= device::kPoses.size();) {
+      const device::Pose side = device::kPoses[number - 1];
+      if (is_done(side)) {
+        ++number;
+        continue;
+      }
+      SIXPOINT_ASSIGN(const Step step, take(side, number));
+      if (step == Step::stopped) {
+        return false;
+      }
+      if (step == Step::away) {
+        SIXPOINT_CHECK(come_back(away_));
+        SIXPOINT_CHECK(again([&] { return begin_anew(); }));
+        number = 1;
+        continue;
+      }
+      progress_.done.push_back({side, recording_});
+      save();
+    }
+    return true;
+  }
+
+  // First of all: a unit left recording runs empty. Perhaps it is another by now: ask.
+  Status end_recording() {
+    SIXPOINT_CHECK(again([&] { return unit().identify(); }));
+    const auto stopped = again([&] { return unit().stop_recording(); });
+    wanted_s_ = std::chrono::duration<double>(unit().clock().now() - piece_began_).count();
+    if (!stopped) {
+      if (stopped.error().code != ErrorCode::io) {
+        return fail(stopped.error());
+      }
+      // It is not recording any more: what there is, is in its list.
+      report_.notes.push_back(
+          "the unit had stopped recording by itself: it started anew, or its "
+          "battery or memory gave out");
+    }
+    return {};
+  }
+
+  Status fetch() {
+    SIXPOINT_ASSIGN(const auto recordings, again([&] { return unit().recordings(); }));
+    std::vector<device::RecordingInfo> made;
+    for (const device::RecordingInfo& recording : recordings) {
+      if (std::any_of(progress_.done.begin(), progress_.done.end(),
+                      [&](const auto& side) { return side.recording == recording.id; })) {
+        made.push_back(recording);
+      }
+    }
+    const auto is_missing = [&](const CaptureResume::Side& side) {
+      return std::none_of(made.begin(), made.end(),
+                          [&](const auto& one) { return one.id == side.recording; });
+    };
+    if (std::any_of(progress_.done.begin(), progress_.done.end(), is_missing)) {
+      return fail(ErrorCode::io, "the unit does not list the recording it made", report_.serial,
+                  "plug the unit in again and repeat");
+    }
+    report_.file = options_.output;
+    if (made.size() == 1) {
+      SIXPOINT_CHECK(download(made.front(), options_.output));
+      report_.file_sha256 = to_hex(made.front().sha256);
+      return check_and_solve(env_, options_, pieces_ ? std::nullopt : std::optional(wanted_s_),
+                             report_);
+    }
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      report_.pieces.push_back(piece_name(options_.output, i + 1));
+      SIXPOINT_CHECK(download(made[i], report_.pieces.back()));
+      SIXPOINT_CHECK(note_oddities(env_.files, report_.pieces.back(), report_));
+    }
+    SIXPOINT_CHECK(join_recordings(env_.files, report_.pieces, options_.output));
+    SIXPOINT_ASSIGN(report_.file_sha256, file_sha256(env_.files, options_.output));
+    return check_and_solve(env_, options_, std::nullopt, report_);
+  }
+
+  // What an earlier program downloaded already is not downloaded again.
+  Status download(const device::RecordingInfo& recording, const std::string& path) {
+    if (pieces_ && env_.files.info(path)) {
+      SIXPOINT_ASSIGN(const std::string there, file_sha256(env_.files, path));
+      if (there == to_hex(recording.sha256)) {
+        return {};
+      }
+    }
+    return again([&] { return unit().download(recording, env_.files, path, {}); });
+  }
+
+  static constexpr std::chrono::seconds kLookEvery{1};
+
+  UnitOnJig on_jig_;
+  Env& env_;
+  const CaptureOptions& options_;
+  const CaptureHooks& hooks_;
+  CaptureReport report_;
+  CaptureResume progress_;
+  std::uint16_t recording_ = 0;  // under way
+  UtcTime piece_began_{};
+  double wanted_s_ = 0;
+  bool pieces_ = false;  // the unit was away, or an earlier program began this
+  Error away_;
+  bool gone_ = false;  // and given up: on_jig_ is not to be used any more
+};
+
+}  // namespace
+
+Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,
+                                  const CaptureOptions& options, const SidePrompt& prompt) {
+  CaptureHooks hooks;
+  hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
+    return prompt(side, number, of) ? SideAnswer::placed : SideAnswer::stop;
+  };
+  return CaptureRun({&unit, &jig}, env, options, hooks).run({});
+}
+
+Result<CaptureReport> run_capture(UnitOnJig on_jig, Env& env, const CaptureOptions& options,
+                                  const CaptureHooks& hooks,
+                                  const std::optional<CaptureResume>& resume) {
+  return CaptureRun(on_jig, env, options, hooks).run(resume);
 }
 
 }  // namespace sixpoint::station

@@ -3,8 +3,13 @@
 //
 // Sequential, because a unit that records sends no live samples: what can be judged is judged on
 // the file afterwards, and says which sides to repeat.
+//
+// A capture outlives a unit that is pulled out and a program that ends: what was recorded until
+// then stays in the unit as a recording of its own, the side under way is asked again, and at the
+// end the pieces are put together (recording_pieces.h).
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,6 +17,7 @@
 
 #include "calib/solve.h"
 #include "device/unit.h"
+#include "station/jig_session.h"
 
 namespace sixpoint::station {
 
@@ -35,6 +41,37 @@ struct CaptureOptions {
 // that turns by itself is sent there afterwards.
 using SidePrompt = std::function<bool(device::Pose side, std::size_t number, std::size_t of)>;
 
+// What an earlier program had of this capture.
+struct CaptureResume {
+  struct Side {
+    device::Pose pose = device::Pose::plus_z;
+    std::uint16_t recording = 0;  // that holds it
+  };
+  UtcTime started{};
+  std::vector<Side> done;
+};
+
+enum class SideAnswer {
+  placed,   // it lies there
+  waiting,  // asked again at once, after a look whether the unit is still there
+  stop,     // the person gives up: the recording is ended
+  leave     // the program ends: the unit goes on, and so does the capture, with a later program
+};
+
+// Whoever drives the capture hangs in here; all called on its own thread.
+struct CaptureHooks {
+  // `number` counts from 1.
+  std::function<SideAnswer(device::Pose side, std::size_t number, std::size_t of)> ask;
+  // Asked several times a second while the unit rests; anything but `stop` and `leave` goes on.
+  std::function<SideAnswer()> word = nullptr;
+  // After every side, for a disk. May be empty.
+  std::function<void(const CaptureResume&)> progress = nullptr;
+  // The unit went away. Waits until it is back and answers with it, opened anew, or gives up. Where
+  // this is empty nobody looks: a unit that was unplugged to be turned goes on recording, and is
+  // waited for at the end.
+  std::function<Result<UnitOnJig>(const Error&)> reopen = nullptr;
+};
+
 struct CaptureReport {
   std::string serial;
   std::string firmware;
@@ -44,6 +81,7 @@ struct CaptureReport {
   bool stopped = false;  // by the person; the recording was stopped and left in the unit
   std::string file;
   std::string file_sha256;
+  std::vector<std::string> pieces;  // the recordings that `file` was put together from, if it was
   std::optional<calib::SolveReport> solved;
   // What went wrong on the way and was got over, or explains what is missing.
   std::vector<std::string> notes;
@@ -61,7 +99,11 @@ std::vector<std::string> why_recording_cannot_help(const device::FilterState& fi
 // its sides, is copied, checked and solved. bad_data where it holds none.
 Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env, const CaptureOptions& options);
 
-// device_unavailable when the unit goes away; cannot_create when the file exists or cannot be made.
+// device_unavailable when the unit goes away; cannot_create when the file exists or cannot be made;
+// `internal` when `leave` was said.
+Result<CaptureReport> run_capture(UnitOnJig on_jig, Env& env, const CaptureOptions& options,
+                                  const CaptureHooks& hooks,
+                                  const std::optional<CaptureResume>& resume = {});
 Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,
                                   const CaptureOptions& options, const SidePrompt& prompt);
 

@@ -427,7 +427,8 @@ NearestFace JigRun::recognise(const PerAxis<double>& mean_lsb) const {
   std::optional<NearestFace> seen;
   if (const auto constants = seen_by_faces()) {
     seen = nearest_face(constants->to_g(mean_lsb));
-    if (seen->angle_deg <= options_.between_faces_deg) {
+    // Two readings that agree leave no doubt about the zeros; one may itself be the tilted one.
+    if (seen->angle_deg <= options_.between_faces_deg || faces_.size() > 1) {
       return *seen;
     }
   }

@@ -32,6 +32,16 @@ bool has_two_filters(const std::string& serial,
          (!page || page->calibrated < from_unix_seconds(kFilterChange_unix_s));
 }
 
+// A program that was killed leaves its unit streaming, and such a unit takes no other filter.
+Status choose_filter(device::Unit& unit, calib::FilterConfiguration filter) {
+  const Status chosen = unit.set_filter(filter);
+  if (chosen || chosen.error().code != ErrorCode::io) {
+    return chosen;
+  }
+  SIXPOINT_CHECK(unit.stop_stream());
+  return unit.set_filter(filter);
+}
+
 class Session {
  public:
   Session(UnitOnJig on_jig, Env& env, const JigSessionOptions& options, const JigHooks& hooks)
@@ -127,7 +137,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
                             unit_->identity().battery_mv, kWritable_mv),
                 report_.serial, "charge the unit, or leave out --write");
   }
-  return unit_->set_filter(options_.filter);
+  return choose_filter(*unit_, options_.filter);
 }
 
 void Session::keep_rows(std::string_view rows) {
@@ -176,7 +186,7 @@ Status Session::come_back(JigRun& run, const Error& error) {
     if (unit_->identity().serial != report_.serial) {
       continue;
     }
-    Status ready = unit_->set_filter(options_.filter);
+    Status ready = choose_filter(*unit_, options_.filter);
     if (ready) {
       ready = unit_->start_stream(options_.run.rate_hz);
     }
@@ -462,7 +472,7 @@ Status Session::write_constants(JigRun& run) {
   report_.written = true;
   SIXPOINT_ASSIGN(const Calibration written, calib::calibration_from(report_.as_left->constants));
   run.set_approximation(written);
-  SIXPOINT_CHECK(unit_->set_filter(options_.filter));
+  SIXPOINT_CHECK(choose_filter(*unit_, options_.filter));
   SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
   return handle(run, run.on_written(seconds(unit_->clock().elapsed())));
 }

@@ -15,6 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kSamples = "samples-";
+constexpr const char* kCapture = "/capture.json";
 constexpr std::uint64_t kMostState_bytes = 4U << 20U;
 // Eight hours of a sixteenth lane: more is no run.
 constexpr std::uint64_t kMostSamples_bytes = 256ULL << 20U;
@@ -57,6 +58,23 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
   SIXPOINT_ASSIGN(run.resume.progress, parse_jig_progress(json.at("progress")));
   return run;
+}
+
+Result<UnfinishedCapture> parse_capture(const Json& json) {
+  UnfinishedCapture capture;
+  capture.serial = json.at("serial").get<std::string>();
+  capture.operator_name = json.at("operator").get<std::string>();
+  capture.client = json.at("client").get<std::string>();
+  capture.output = json.at("output").get<std::string>();
+  SIXPOINT_ASSIGN(capture.resume.started, parse_iso8601(json.at("started").get<std::string>()));
+  for (const Json& side : json.at("done")) {
+    const auto pose = device::parse_pose(side.at("pose").get<std::string>());
+    if (!pose) {
+      return fail(ErrorCode::bad_data, "no pose");
+    }
+    capture.resume.done.push_back({*pose, side.at("recording").get<std::uint16_t>()});
+  }
+  return capture;
 }
 
 // samples-12.csv -> 12; 0 for other names.
@@ -182,11 +200,52 @@ Status RunFolder::clear() {
   return env_.files.info(folder_) ? env_.files.sync_folder(folder_) : Status{};
 }
 
+Result<std::optional<UnfinishedCapture>> RunFolder::load_capture() {
+  const std::string path = folder_ + kCapture;
+  if (!env_.files.info(path)) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(const Bytes bytes, read_file(env_.files, path, kMostState_bytes));
+  try {
+    SIXPOINT_ASSIGN(const UnfinishedCapture capture,
+                    parse_capture(Json::parse(bytes, nullptr, false)));
+    return capture;
+  } catch (const std::exception&) {
+    return fail(ErrorCode::bad_data, "this is no state of a capture", path,
+                "look at it, then remove the folder");
+  }
+}
+
+Status RunFolder::save_capture(const UnfinishedCapture& capture) {
+  Json json;
+  json["schema"] = "sixpoint/unfinished-capture/1";
+  json["serial"] = capture.serial;
+  json["operator"] = capture.operator_name;
+  json["client"] = capture.client;
+  json["output"] = capture.output;
+  json["started"] = to_iso8601(capture.resume.started);
+  json["done"] = Json::array();
+  for (const CaptureResume::Side& side : capture.resume.done) {
+    json["done"].push_back({{"pose", device::to_string(side.pose)}, {"recording", side.recording}});
+  }
+  SIXPOINT_CHECK(env_.files.make_folders(folder_));
+  return write_file(env_.files, folder_ + kCapture,
+                    json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Status RunFolder::clear_capture() {
+  if (!env_.files.info(folder_ + kCapture)) {
+    return {};
+  }
+  SIXPOINT_CHECK(env_.files.remove(folder_ + kCapture));
+  return env_.files.sync_folder(folder_);
+}
+
 Status RunFolder::set_aside() {
   SIXPOINT_ASSIGN(const auto list, names());
   const std::string mark = fmt::format("{}.bad", to_unix_seconds(env_.clock.now()));
   for (const std::string& name : list) {
-    if (name == "run.json" || number_of(name) > 0) {
+    if (name == "run.json" || name == "capture.json" || number_of(name) > 0) {
       SIXPOINT_CHECK(
           env_.files.rename(folder_ + "/" + name, fmt::format("{}/{}.{}", folder_, name, mark)));
     }

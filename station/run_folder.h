@@ -2,6 +2,7 @@
 //
 //   FOLDER/run.json       who, which unit, which poses are taken; written anew, whole, at each step
 //   FOLDER/samples-1.csv  rows since the first sample; -2 and so on after each restart
+//   FOLDER/capture.json   a calibration file under way: which sides are done, in which recordings
 //
 // A power cut loses at most the samples of the last second. One thread at a time.
 #pragma once
@@ -11,6 +12,7 @@
 #include <string>
 
 #include "base/env.h"
+#include "station/capture_run.h"
 #include "station/jig_session.h"
 
 namespace sixpoint::station {
@@ -28,6 +30,15 @@ struct UnfinishedRun {
   JigResume resume;
 };
 
+// A calibration file, likewise. Its samples are in the unit.
+struct UnfinishedCapture {
+  std::string serial;
+  std::string operator_name;
+  std::string client;
+  std::string output;  // the .gt3x to make
+  CaptureResume resume;
+};
+
 class RunFolder {
  public:
   RunFolder(Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
@@ -40,6 +51,9 @@ class RunFolder {
   Status close();                         // syncs what is open
   // The run is in the store: nothing of it is needed here any more.
   Status clear();
+  Result<std::optional<UnfinishedCapture>> load_capture();  // as load()
+  Status save_capture(const UnfinishedCapture& capture);
+  Status clear_capture();
   // Puts what load() could not read out of the way, under a name with `.bad`.
   Status set_aside();
 

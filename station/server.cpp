@@ -25,6 +25,9 @@ ApiRequest request_of(const httplib::Request& from) {
   request.client = from.get_header_value("X-Sixpoint-Client");
   request.path_parameter = from.get_param_value("path");
   request.token_parameter = from.get_param_value("token");
+  for (const auto& [name, value] : from.params) {
+    request.parameters.emplace(name, value);
+  }
   return request;
 }
 

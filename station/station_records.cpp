@@ -145,9 +145,10 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
       }
       if (last != nullptr) {
         state.locked = true;
+        const std::string time = to_iso8601(chart.times[last->point]);
         state.reasons.push_back(fmt::format(
-            "check unit {}, {}: {} on {}", serial, chart.chart.name, nelson_rule(last->rule),
-            to_iso8601(std::chrono::floor<std::chrono::seconds>(chart.times[last->point]))));
+            "check unit {}, {} {}: {} on {} at {} UTC", serial, find_quantity(name)->title, axis,
+            nelson_rule(last->rule), time.substr(0, 10), time.substr(11, 5)));
       }
       state.charts.push_back(std::move(chart));
     }
@@ -227,10 +228,12 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
   if (!check_units.empty()) {
     SIXPOINT_ASSIGN(const StationState state, station_state(store, station, limits.check_unit));
     if (state.locked) {
-      return fail(ErrorCode::configuration, state.brief(), {},
-                  fmt::format("measure a check unit again; then an engineer signs: sixpoint "
-                              "station-lock sign --station '{}' --operator NAME --reason WHY",
-                              station));
+      return fail(
+          ErrorCode::configuration, state.brief(), {},
+          fmt::format(
+              "measure a check unit again; then an engineer signs, on the page or by: sixpoint "
+              "station-lock sign --station '{}' --operator NAME --reason WHY",
+              station));
     }
   }
   SIXPOINT_ASSIGN(RetestState state, unit_retest_state(store, serial, limits.retest));

@@ -48,6 +48,18 @@ std::string shown(double value, std::string_view unit) {
              : fmt::format("{:.4g} {}", value, unit);
 }
 
+bool is_uncertainty(std::string_view name) { return name.find("_uncertainty_") != name.npos; }
+
+// No value at all would be inside by the expanded uncertainty.
+bool is_too_coarse(const JudgedQuantity& judged) {
+  const QuantityInfo& info = *find_quantity(judged.name);
+  const double low =
+      judged.low ? *judged.low + judged.expanded_uncertainty : std::min(info.least, judged.value);
+  const double high =
+      judged.high ? *judged.high - judged.expanded_uncertainty : std::max(info.most, judged.value);
+  return low > high;
+}
+
 std::string sentence(const JudgedQuantity& judged) {
   const QuantityInfo& info = *find_quantity(judged.name);
   const bool below =
@@ -58,7 +70,16 @@ std::string sentence(const JudgedQuantity& judged) {
     case JigVerdict::pass:
       return {};
     case JigVerdict::inconclusive:
-      return std::isfinite(judged.value)
+      if (!is_uncertainty(judged.name) && std::isfinite(judged.expanded_uncertainty)) {
+        return fmt::format(
+            "{}{}: the expanded uncertainty of {} leaves nothing inside {}; measured too coarsely "
+            "to judge the unit",
+            info.title, axis, shown(judged.expanded_uncertainty, info.unit),
+            judged.low && judged.high ? fmt::format("{} to {}", shown(*judged.low, info.unit),
+                                                    shown(*judged.high, info.unit))
+                                      : shown(limit, info.unit));
+      }
+      return is_uncertainty(judged.name) && std::isfinite(judged.value)
                  ? fmt::format("{}{}: {} is more than {}; measured too coarsely to judge the unit",
                                info.title, axis, shown(judged.value, info.unit),
                                shown(limit, info.unit))
@@ -78,8 +99,6 @@ std::string sentence(const JudgedQuantity& judged) {
   return fmt::format("{}{}: {} is {} {}", info.title, axis, shown(judged.value, info.unit),
                      below ? "below" : "above", shown(limit, info.unit));
 }
-
-bool is_uncertainty(std::string_view name) { return name.find("_uncertainty_") != name.npos; }
 
 }  // namespace
 
@@ -218,6 +237,12 @@ JudgedQuantity judge_quantity(const Measured& measured, const Limits& limits) {
   const double above_low = limit.low ? measured.value - *limit.low : HUGE_VAL;
   const double below_high = limit.high ? *limit.high - measured.value : HUGE_VAL;
   const double inside = std::min(above_low, below_high);
+  // What is beyond a limit by more than U fails, however large U is; nothing else is certain then.
+  if (is_too_coarse(judged) && -inside < judged.expanded_uncertainty) {
+    judged.verdict = JigVerdict::inconclusive;
+    judged.code = "uncertainty_high";
+    return judged;
+  }
   if (inside >= judged.guard_band) {
     return judged;
   }

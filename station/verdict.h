@@ -5,6 +5,9 @@
 // inside the limit a value passes; inside it, but nearer, it passes conditionally; beyond it by
 // less than w it fails conditionally; beyond that it fails. w is the expanded uncertainty times the
 // decision rule's factor, and at least the limit's own guard band.
+//
+// Where the expanded uncertainty is so large that no value could pass, the quantity is
+// inconclusive, unless it is beyond its limit by more than that: nothing is said against the unit.
 #pragma once
 
 #include <optional>
@@ -75,7 +78,7 @@ nlohmann::ordered_json to_json(const JudgedQuantity& quantity);
 std::vector<JudgedQuantity> quantities_from_json(const nlohmann::ordered_json& json);
 
 // One quantity against its limits. A value that is not finite is inconclusive. An uncertainty that
-// is judged and too large makes the run inconclusive, not the unit bad.
+// is too large, of a quantity or judged by itself, makes the run inconclusive, not the unit bad.
 JudgedQuantity judge_quantity(const Measured& measured, const Limits& limits);
 // All of them; the worst one is the verdict (inconclusive before conditional passes, after fails).
 Verdict judge_quantities(const std::vector<Measured>& measured, const Limits& limits);

@@ -22,6 +22,7 @@
 #include "station/run_records.h"
 #include "station/server.h"
 #include "station/software.h"
+#include "station/station_desk.h"
 #include "station/station_records.h"
 
 namespace sixpoint::cli {
@@ -41,6 +42,7 @@ struct Options {
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
+  double side_s = station::CaptureOptions{}.side_s;
 };
 
 bool is_loopback(const std::string& bind) {
@@ -133,6 +135,7 @@ Result<station::LanesOptions> lanes_options(Context& context, const Options& opt
   lanes.state_folder = state_folder(options);
   lanes.station = options.station;
   lanes.capture_folder = options.files;
+  lanes.capture.side_s = options.side_s;
   if (options.gravity_m_per_s2) {
     SIXPOINT_ASSIGN(lanes.session.gravity, calib::gravity_entered(*options.gravity_m_per_s2));
   } else if (options.latitude_deg) {
@@ -185,6 +188,11 @@ Status serve(Context& context, const Options& options) {
   // The command's own streams and exit code belong to one thread at a time.
   std::mutex context_mutex;
   const station::JigSessionOptions session = lanes_asked.session;
+  const station::StoreOpener store_opener = [&] {
+    const std::lock_guard lock(context_mutex);
+    return open_store(context, options.store);
+  };
+  station::StationDesk desk(context.env, store_opener, options.station, session.limits);
   lanes_asked.may_start = [&](const std::string& serial) -> Result<station::RetestState> {
     const std::lock_guard lock(context_mutex);
     auto store = open_store(context, options.store);
@@ -200,14 +208,15 @@ Status serve(Context& context, const Options& options) {
                   station::Lanes::open(
                       context.env, devices, std::move(lanes_asked),
                       [&](const station::JigReport& report, const station::RunLabels& labels) {
-                        const std::lock_guard lock(context_mutex);
-                        return keep_run(context, options, session, report, labels);
+                        auto kept = [&] {
+                          const std::lock_guard lock(context_mutex);
+                          return keep_run(context, options, session, report, labels);
+                        }();
+                        desk.look_soon();  // it may have been a check unit
+                        return kept;
                       },
                       capture_keeper));
-  station::RepairJob repairs(context.env, [&] {
-    const std::lock_guard lock(context_mutex);
-    return open_store(context, options.store);
-  });
+  station::RepairJob repairs(context.env, store_opener);
   station::ApiOptions api_options;
   api_options.station = options.station;
   api_options.version = station::software_name();
@@ -218,7 +227,8 @@ Status serve(Context& context, const Options& options) {
                                  [&](const std::string& run, const std::string& kind) {
                                    const std::lock_guard lock(context_mutex);
                                    return document_of(context, options, run, kind);
-                                 }});
+                                 },
+                                 &desk});
   station::ServerOptions server_options;
   server_options.bind = options.bind;
   server_options.port = options.port;
@@ -264,6 +274,11 @@ void add_station(CLI::App& app, Context& context) {
                    "folder below which the page may check and mend files")
       ->capture_default_str();
   command->add_option("--limits", options->limits, "limits of the verdict (TOML)");
+  command
+      ->add_option("--side-seconds", options->side_s,
+                   "how long a unit rests on each side of a calibration file")
+      ->check(CLI::Range(10.0, 3600.0))
+      ->capture_default_str();
   command->add_option("--gravity", options->gravity_m_per_s2, "local gravity in m/s2");
   command->add_option("--latitude", options->latitude_deg,
                       "... or computed from the latitude in degrees");

@@ -2,8 +2,11 @@
 import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync, readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
+import { createServer as createHttpServer } from 'node:http';
+import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
+import { createInterface } from 'node:readline';
 import { fileURLToPath } from 'node:url';
 
 export const source = join(dirname(fileURLToPath(import.meta.url)), '..', '..');
@@ -11,7 +14,7 @@ const require = createRequire(join(source, 'station', 'web', 'package.json'));
 const { chromium } = require('playwright-core');
 export const axeSource = readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
 
-export const [scenario, program, shots] = process.argv.slice(2);
+export const [scenario, program, shots, usbStation] = process.argv.slice(2);
 mkdirSync(shots, { recursive: true });
 
 const cleanups = [];
@@ -54,16 +57,68 @@ export async function station(devices, { home = folder(), port = 0 } = {}) {
   return { url, home, end, api, pid: child.pid };
 }
 
+// The same with a unit on emulated USB, which outlives the station (usb_station.cpp): `tell` does what a hand does.
+export async function stationOnUsb(words = []) {
+  const home = folder();
+  const port = await new Promise((resolve) => {
+    const probe = createServer().listen(0, '127.0.0.1', () => { const { port } = probe.address(); probe.close(() => resolve(port)); });
+  });
+  const child = spawn(usbStation, [
+    program, 'station', '--port', String(port), '--store', join(home, 'store.db'), '--state', join(home, 'state'), '--files', home,
+    '--station', 'Bench 1', '--device', '{device}', ...words,
+  ], { stdio: ['pipe', 'pipe', 'pipe'], env: { ...process.env, HOME: home, XDG_DATA_HOME: home } });
+  const lines = [];
+  let said = '';
+  child.stderr.on('data', (data) => { said += data; });
+  createInterface({ input: child.stdout }).on('line', (line) => lines.push(line));
+  let ended;
+  child.once('exit', (code, signal) => { ended = code ?? signal; });
+  cleanups.push(async () => { child.stdin.end(); await until('the unit is put away', () => ended !== undefined); });
+  const line = (test) => until(`a line of the station on USB (${said})`, () => {
+    if (ended !== undefined) throw new Error(`the station on USB ended with ${ended}: ${said}`);
+    const at = lines.findIndex(test);
+    return at >= 0 && lines.splice(at, 1)[0];
+  });
+  const serial = (await line((text) => text.startsWith('serial '))).slice(7);
+  const url = await line((text) => text.startsWith('http'));
+  const tell = async (word) => {
+    child.stdin.write(`${word}\n`);
+    check((await line((text) => text === 'ok' || text === 'failed')) === 'ok', `${word} is done`);
+  };
+  const api = async (path) => (await fetch(new URL(path, url))).json();
+  const again = () => line((text) => text.startsWith('http'));
+  return { serial, url, tell, api, again, home };
+}
+
 let browser;
-export async function open(url, { width = 1500, height = 1000 } = {}) {
+async function launch() {
   if (!browser) {
     browser = await chromium.launch({
       executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
       args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
-        '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+        '--disable-background-networking', '--disable-component-update', '--disable-sync',
+        '--host-resolver-rules=MAP rebound.example 127.0.0.1'],
     });
     cleanups.push(() => browser.close());
   }
+}
+
+// A page of somebody else, on another port of this machine.
+export async function serve(page) {
+  const server = createHttpServer((request, response) => response.setHeader('Content-Type', 'text/html').end(page(request)));
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  cleanups.push(() => { server.closeAllConnections(); server.close(); });
+  return `http://localhost:${server.address().port}/`;
+}
+export async function bare(url) {
+  await launch();
+  const page = await (await browser.newContext()).newPage();
+  await page.goto(url);
+  return page;
+}
+
+export async function open(url, { width = 1500, height = 1000 } = {}) {
+  await launch();
   const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);

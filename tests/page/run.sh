@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs one scenario of the page in Debian's Chromium, or a check of its bundle.
-#   run.sh SCENARIO SIXPOINT_PROGRAM SCREENSHOTS        bundle: dist/ is what the sources build to
+#   run.sh SCENARIO SIXPOINT_PROGRAM SCREENSHOTS [USB_STATION]    bundle: dist/ is what the sources build to
 # Ends with 77 where there is no Node, npm or Chromium, or npm cannot fetch what the lock file names.
 set -euo pipefail
 scenario=$1 program=$2 shots=$3
@@ -37,4 +37,4 @@ if [ "$scenario" = bundle ]; then
   [ "$bytes" -lt 60000 ] || { echo "FAILED: more than 60 kB"; exit 1; }
   exit 0
 fi
-exec timeout 280 node "$source_folder/tests/page/scenarios.mjs" "$scenario" "$program" "$shots"
+exec timeout 280 node "$source_folder/tests/page/scenarios.mjs" "$scenario" "$program" "$shots" ${4:+"$4"}

@@ -319,6 +319,387 @@ const scenarios = {
     check(report.as_left.written === true && report.recheck.poses.length === 2, 'written, read back and measured again');
   },
 
+  // A check unit goes out of control: every screen says so, only check units are measured, and an engineer's
+  // signature (by keyboard) opens the station again.
+  async lock() {
+    const home = h.folder();
+    const store = join(home, 'store.db');
+    const run = (...words) => execFileSync(h.program, [...words, '--store', store], { stdio: ['ignore', 'pipe', 'pipe'] });
+    const watcher = 'serial=MOS2A45130007,true_sensitivity_lsb_per_g=237.7/251.8/242.3,jig=auto';
+    for (let seed = 1; seed <= 11; ++seed) {
+      run('jig', '--device', `virtual:seed=${seed},${watcher},true_zero_lsb=49.9/95.8/60.8`, '--station', 'Bench 1', '--operator', 'Ada');
+    }
+    run('check-unit', 'add', 'MOS2A45130007', '--operator', 'Eve', '--reason', 'watches bench 1');
+    const station = await h.station([
+      'virtual:seed=8,serial=MOS2A45130008,pace=10',
+      `virtual:seed=12,${watcher},true_zero_lsb=54.9/95.8/60.8`,  // five counts, 20 mg, off on X
+    ], { home });
+    const page = await h.open(station.url);
+    await button(page, 'Check units').click();
+    await page.locator('.control').nth(5).waitFor();
+    await page.getByText('In control: the station is open').waitFor();
+    check((await page.locator('.control .word-good').count()) === 6, 'six charts in control');
+    const label = await page.locator('.control svg').nth(3).getAttribute('aria-label');
+    check(/Zero offset x, mg of check unit MOS2A45130007: 11 points, the last .* limits/.test(label), `the chart says what it shows: ${label}`);
+    await h.shot(page, 'lock-1-charts');
+    await h.axe(page);
+    // The check unit is measured, and has moved.
+    check((await station.api('/api/run', { lane: 2, operator: 'Ada' })).status === 202, 'the check unit is measured');
+    await page.getByRole('heading', { name: 'Station locked' }).waitFor();
+    await page.getByText('a point beyond 3 sigma').first().waitFor();
+    await page.locator('.control .word-bad').first().waitFor();
+    check((await page.locator('.chart .rule').count()) > 0, 'the point carries the number of its rule');
+    await page.getByText('locks the station').first().waitFor();
+    await h.shot(page, 'lock-2-out-of-control');
+    await h.axe(page);
+    await button(page, 'Jig').click();
+    await page.getByRole('heading', { name: 'Station locked' }).waitFor();
+    check((await prompt(page)) === 'Station locked: check units only', 'the lane says so in its biggest words');
+    check(await button(page, 'Start the measurement').isDisabled(), 'no other unit is started');
+    await station.api('/api/run', { lane: 1, operator: 'Ada' });
+    const refused = await until('the station refuses', async () => (await station.api('/api/lanes/1')).json.result);
+    check(refused.verdict === 'refused' && /is locked/.test(refused.reasons.join()), `and the server refuses too: ${refused.reasons}`);
+    await h.shot(page, 'lock-3-jig');
+    await h.axe(page);
+    // A signature without a name is none.
+    check((await fetch(new URL('/api/station-lock', station.url), { method: 'POST', headers: { 'X-Sixpoint-Client': 'x' }, body: '{"operator": " ", "reason": "x"}' })).status === 400, 'a name is needed');
+    check((await station.api('/api/station-lock', { operator: 'Mallory', reason: 'x' })).status === 403, 'and the page\'s own header');
+    // By keyboard alone.
+    const reach = async (test) => {
+      for (let i = 0; i < 60; ++i) {
+        await page.keyboard.press('Tab');
+        if (await page.evaluate(test)) return;
+      }
+      throw new Error(`Tab does not reach ${test}`);
+    };
+    await reach(() => document.activeElement?.textContent === 'Sign as engineer');
+    await page.keyboard.press('Enter');
+    await reach(() => document.activeElement?.closest('label')?.textContent?.startsWith('Engineer') ?? false);
+    await page.keyboard.type('Eve', { delay: 100 });
+    await page.keyboard.press('Tab');
+    await page.keyboard.type('seat cleaned', { delay: 100 });
+    await h.shot(page, 'lock-4-signing');
+    await h.axe(page);
+    await page.keyboard.press('Enter');
+    await page.getByRole('heading', { name: 'Station locked' }).waitFor({ state: 'detached' });
+    check(await button(page, 'Start the measurement').isEnabled(), 'the station is open again');
+    await button(page, 'Check units').click();
+    await page.getByText('Last signature: Eve').waitFor();
+    await page.getByText('seat cleaned').waitFor();
+    await h.shot(page, 'lock-5-signed');
+    // Check units are named and released here as well.
+    await page.getByLabel('Serial number').last().fill('mos2a45130008');
+    await page.getByLabel('Who decides').fill('Eve');
+    await page.getByLabel('Why').fill('a second one');
+    await button(page, 'This is a check unit').click();
+    await page.getByText('MOS2A45130008: Recorded.').waitFor();
+    check((await station.api('/api/check-units')).json.check_units.includes('MOS2A45130008'), 'it is in the store');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // Yields, failure codes, capability and a gage study, from a store with runs of two operators.
+  async statistics() {
+    const home = h.folder();
+    const store = join(home, 'store.db');
+    const jig = (...words) => {
+      try {
+        execFileSync(h.program, ['jig', ...words, '--store', store, '--station', 'Bench 1'], { stdio: ['ignore', 'pipe', 'pipe'] });
+      } catch (error) {
+        if (error.status !== 1) throw error;  // 1: measured, and failed
+      }
+    };
+    for (let seed = 1; seed <= 6; ++seed) jig('--device', `virtual:seed=${seed},jig=auto`, '--operator', seed % 2 ? 'Ada' : 'Bo');
+    jig('--device', 'virtual:seed=9,serial=MOS2A45130009,jig=auto,zero_lsb=50/200/61,true_sensitivity_lsb_per_g=237.7/251.8/242.3,true_zero_lsb=49.9/199.8/60.8', '--operator', 'Bo');
+    let seed = 100;  // of the noise; the parts' sensors are what they are
+    for (const part of [1, 2, 3]) {
+      for (const who of ['Ada', 'Bo', 'Ada', 'Bo']) {
+        const device = `virtual:seed=${++seed},serial=MOS2A4514000${part},true_sensitivity_lsb_per_g=237.7/251.8/242.3,true_zero_lsb=${44 + 4 * part}/95.8/60.8,jig=auto`;
+        jig('--device', device, '--operator', who, '--study', 'spring');
+      }
+    }
+    const station = await h.station(['virtual:seed=8,pace=10'], { home });
+    const page = await h.open(station.url);
+    await button(page, 'Statistics').click();
+    await page.locator('.tile', { hasText: 'Yield' }).first().waitFor();
+    check((await page.locator('.tile').first().textContent()).includes('85.7 %6 of 7'), `six of seven: ${await page.locator('.tile').first().textContent()}`);
+    await page.getByRole('rowheader', { name: 'zero_high' }).waitFor();
+    await page.getByLabel('Compare by').selectOption('operator');
+    const bo = page.locator('tr', { has: page.getByRole('rowheader', { name: 'Bo', exact: true }) });
+    await bo.waitFor();
+    check(/75\.0 %/.test(await bo.textContent()), `Bo's yield: ${await bo.textContent()}`);
+    check(/\d\.\d\d – /.test(await page.getByRole('row', { name: /^Zero offset x, mg/ }).textContent()), 'Cpk with its interval');
+    // The page says what the command says.
+    const command = JSON.parse(execFileSync(h.program, ['statistics', '--store', store, '--by', 'operator', '--json']).toString());
+    const shown = (await station.api('/api/statistics?by=operator')).json;
+    check(JSON.stringify(shown.groups) === JSON.stringify(command.groups) && JSON.stringify(shown.capability) === JSON.stringify(command.capability), 'as the command line has it');
+    await button(page, 'Compute').click();
+    await page.getByText('3 parts, 2 operators, 2 trials').waitFor();
+    const gage = (await station.api('/api/gage-rr?study=spring&quantity=zero_offset_mg&axis=x')).json;
+    check(gage.grr_percent > 0 && gage.grr_percent < 30 && gage.usable, `a gage with some scatter: ${gage.grr_percent} %`);
+    check((await page.locator('tr', { hasText: 'Part to part' }).textContent()).includes((gage.components.part.contribution_percent).toFixed(1)), 'the table has the parts');
+    await h.shot(page, 'statistics-1');
+    await h.axe(page);
+    await page.getByLabel('Before').fill('2001-01-01');
+    await page.getByText('No runs were stored yet.').waitFor();
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // What a technician with gloves reads at one metre, on a phone, a laptop and a screen: a letter of 5 mm needs
+  // about 28 px at 96 dpi; a target for a gloved finger 44 px.
+  async sizes() {
+    const devices = Array.from({ length: 4 }, (_, i) => `virtual:seed=${30 + i},pace=5`);
+    for (const [name, width, height, lanes] of [['phone', 390, 844, 1], ['laptop', 1366, 768, 1], ['laptop-4', 1366, 768, 4], ['screen', 1920, 1080, 4]]) {
+      const station = await h.station(devices.slice(0, lanes));
+      const page = await h.open(station.url, { width, height });
+      const view = (what) => page.screenshot({ path: join(h.shots, `sizes-${name}-${what}.png`) });
+      const bare = async (what) => {
+        const over = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+        check(over <= 0, `${name} ${what}: nothing to scroll sideways (${over} px)`);
+        await h.axe(page);
+        await view(what);
+      };
+      const readable = async (selector, px) => {
+        const found = await page.evaluate((css) => {
+          const each = document.querySelector(css);
+          const box = each.getBoundingClientRect();
+          return { px: parseFloat(getComputedStyle(each).fontSize), top: box.top, bottom: box.bottom, height: innerHeight };
+        }, selector);
+        check(found.px >= px, `${name}: ${selector} is ${found.px} px high`);
+        check(found.top >= 0 && found.bottom <= found.height, `${name}: ${selector} is on the screen without scrolling (${found.top} to ${found.bottom})`);
+      };
+      await button(page, 'Start the measurement').waitFor();
+      await readable('.prompt', 36);
+      const targets = await page.evaluate(() => [...document.querySelectorAll('main button, main select, nav button')].map((each) => [each.textContent, each.getBoundingClientRect().height]));
+      for (const [text, high] of targets) check(high >= 44, `${name}: '${text}' is ${high} px high`);
+      await bare('ready');
+      await start(page);
+      await h.place(page, 2);
+      await h.turnAsAsked(page);
+      await page.locator('.still-dwelling').waitFor();
+      await page.evaluate(() => scrollTo(0, 0));
+      await readable('.prompt', 36);
+      await readable('.still span', 26);
+      await readable('.scene', 0);
+      await bare('measuring');
+      await page.locator('.hand').getByRole('button', { name: 'Lean on an edge', exact: true }).click();
+      await refusal(page, 'none of its six faces');
+      await page.evaluate(() => scrollTo(0, 0));
+      await readable('.refusal', 26);
+      check(!(await page.locator('.still').textContent()).includes('Taken'), 'what was refused is not called taken');
+      await bare('refused');
+      await h.place(page, 14);
+      await page.locator('.result').waitFor();
+      await page.evaluate(() => scrollTo(0, 0));
+      await readable('.result .verdict', 40);
+      await bare('verdict');
+      for (const tab of ['My files', 'Check units', 'Statistics']) {
+        await button(page, tab).click();
+        await page.locator('.files h2').first().waitFor();
+        await bare(tab.toLowerCase().replace(' ', '-'));
+      }
+      await page.close();
+      await station.end();
+    }
+  },
+
+  // A calibration file whose unit is pulled out, and whose page is loaded anew, in the middle.
+  async capture() {
+    const station = await h.station(['virtual:seed=7,serial=MOS2A45130007,pace=20']);
+    const page = await h.open(station.url);
+    await button(page, 'My files').click();
+    await button(page, 'Start recording').click();
+    const capture = page.locator('section', { hasText: '1. Record' }).first();
+    const side = async (number) => {
+      await page.getByText(`Side ${number} of 6`).waitFor();
+      const face = (await capture.locator('.prompt').textContent()).match(/[+−][XYZ]/)[0];
+      await capture.locator('.hand').getByRole('button', { name: face, exact: true }).click();
+      await button(page, 'It lies there').click();
+      await page.getByText(/Leave it alone/).waitFor();
+      return face;
+    };
+    const next = (number) => page.getByText(`Side ${number} of 6`).waitFor();
+    await side(1);
+    await next(2);
+    // Pulled out while it rests on its second side.
+    const second = await side(2);
+    await capture.locator('.hand').getByRole('button', { name: 'Unplug', exact: true }).click();
+    await page.getByText('The unit is unplugged: plug it in again').waitFor();
+    await page.getByText('What was recorded is kept').waitFor();
+    await h.shot(page, 'capture-1-unplugged');
+    await h.axe(page);
+    await capture.locator('.hand').getByRole('button', { name: 'Plug in', exact: true }).click();
+    await button(page, 'It lies there').waitFor();
+    check((await capture.locator('.prompt').textContent()).includes(second), 'the side under way is asked again');
+    await page.getByText('Side 2 of 6').waitFor();
+    await side(2);
+    await next(3);
+    // The page is loaded anew: it is still the same person's.
+    await page.reload();
+    await page.getByText('Side 3 of 6').waitFor();
+    check(await button(page, 'Stop recording').isVisible(), 'and may be stopped');
+    for (const number of [3, 4, 5, 6]) {
+      await side(number);
+      if (number < 6) await next(number + 1);
+    }
+    await capture.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Constants saved in/).first().waitFor();
+    await h.shot(page, 'capture-2-done');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // A page of somebody else in the same browser: nothing that it sends does anything, nothing that it asks is
+  // answered to it; and a name that was made to point here (DNS rebinding) is refused.
+  async hostile() {
+    const station = await h.station(['virtual:seed=7,serial=MOS2A45130007,pace=10']);
+    await until('ready', async () => (await station.api('/api/lanes/1')).json.state === 'idle');
+    const port = new URL(station.url).port;
+    const evil = await h.serve((request) => (request.url === '/frame' ? `<iframe src="${station.url}"></iframe>` : '<form method=post enctype=text/plain><input name=x></form>'));
+    const page = await h.bare(evil);
+    const before = (await station.api('/api/state')).json;
+    const commands = [['/api/run', { lane: 1 }], ['/api/capture', { lane: 1 }], ['/api/lanes/1/scan', { serial: 'MOS2A00000000' }],
+      ['/api/check-units', { serial: 'MOS2A45130007', action: 'add', operator: 'E', reason: 'x' }],
+      ['/api/station-lock', { operator: 'E', reason: 'x' }], ['/api/repair', { folder: '', output: 'out' }]];
+    for (const [path, body] of commands) {
+      for (const how of ['no-cors', 'cors', 'header', 'form', 'beacon']) {
+        const seen = await page.evaluate(async ([url, text, kind]) => {
+          const options = { method: 'POST', body: text, credentials: 'include' };
+          try {
+            if (kind === 'form') {
+              const form = document.createElement('form');
+              const field = Object.assign(document.createElement('input'), { name: text.slice(0, -1), value: '}' });
+              Object.assign(form, { method: 'post', enctype: 'text/plain', action: url, target: 'elsewhere' });
+              form.append(field);
+              document.body.append(form, Object.assign(document.createElement('iframe'), { name: 'elsewhere' }));
+              form.submit();
+              return 'sent';
+            }
+            if (kind === 'beacon') return navigator.sendBeacon(url, text);
+            if (kind === 'header') options.headers = { 'X-Sixpoint-Client': 'x', 'Content-Type': 'application/json' };
+            const answer = await fetch(url, { ...options, mode: kind === 'no-cors' ? 'no-cors' : 'cors' });
+            return answer.type === 'opaque' ? 'opaque' : `read ${answer.status}`;
+          } catch (error) {
+            return `blocked ${error.message}`;
+          }
+        }, [new URL(path, station.url).href, JSON.stringify(body), how]);
+        check(!String(seen).startsWith('read'), `${path} by ${how}: ${seen}`);
+      }
+    }
+    const got = await page.evaluate(async (url) => {
+      const events = await new Promise((resolve) => {
+        const source = new EventSource(`${url}api/events`);
+        source.onopen = () => resolve('open');
+        source.onerror = () => { source.close(); resolve('refused'); };
+      });
+      const read = await fetch(`${url}api/state`).then((answer) => answer.text(), () => 'blocked');
+      return [events, read];
+    }, station.url);
+    check(got[0] === 'refused' && got[1] === 'blocked', `neither events nor state: ${got}`);
+    await page.goto(`${evil}frame`);
+    const inside = await page.frames()[1]?.evaluate(() => document.querySelectorAll('button').length).catch(() => 0);
+    check(!inside, 'the station is in no frame');
+    // The browser is told that this name is this machine; what it asks still carries the name.
+    const rebound = await page.goto(`http://rebound.example:${port}/`);
+    check(rebound.status() === 421, `another name: ${rebound.status()}`);
+    const asked = await page.evaluate(async () => (await fetch('/api/run', { method: 'POST', body: '{"lane": 1}', headers: { 'X-Sixpoint-Client': 'x' } })).status);
+    check(asked === 421, `nor a command under it: ${asked}`);
+    const after = (await station.api('/api/state')).json;
+    check(after.lanes[0].state === 'idle' && after.lanes[0].result === null && after.lanes[0].scan === null, JSON.stringify(after.lanes[0]));
+    check(after.lock.check_units.length === 0 && after.lock.signature === null && after.job.state === 'none', 'nothing was decided, nothing begun');
+    check(before.lanes[0].unit.serial === after.lanes[0].unit.serial, 'the same unit');
+  },
+
+  // A unit on emulated USB (hid:SERIAL behind the real hidapi), not a virtual one: pulled out and put back, the
+  // program killed and started again, written and read back.
+  async usb() {
+    const station = await h.stationOnUsb();
+    const page = await h.open(station.url);
+    await page.getByText(station.serial).first().waitFor();
+    check((await page.locator('.hand').count()) === 0, 'nobody turns it by buttons');
+    await page.getByLabel('Your name').fill('Ada');
+    await page.getByLabel('Write the constants into the unit').check();
+    await start(page);
+    const place = async (count) => {
+      for (let asked = ''; (await h.taken(page)) < count && !(await page.locator('.result').count());) {
+        const text = await until('a wanted side', async () => {
+          const now = (await prompt(page)) ?? '';
+          const question = `${now} ${await h.taken(page)}`;
+          return (/[+−][XYZ] side up/.test(now) && question !== asked && (asked = question) && now) || (await page.locator('.result').count()) > 0;
+        });
+        if (text === true) return;
+        const [sign, axis] = text.match(/[+−][XYZ]/)[0];
+        await station.tell(`turn ${sign === '+' ? '+' : '-'}${axis.toLowerCase()}`);
+        const before = await h.taken(page);
+        // What is refused is put there again, after a while: a unit that is never let rest is never measured.
+        await until('it is taken, or asked otherwise', async () => (await h.taken(page)) > before || (await page.locator('.result').count()) > 0
+          || (await prompt(page)) !== text, 8).catch(async () => console.log(`again: ${text}; ${await page.locator('.refusal').textContent()}`));
+        if ((await h.taken(page)) === before) asked = '';
+      }
+    };
+    await place(4);
+    await station.tell('unplug');
+    const pulled = Date.now();
+    await page.getByText('The unit is unplugged: plug it in again').waitFor();
+    console.log(`unplugging was on the page after ${Date.now() - pulled} ms`);
+    await h.shot(page, 'usb-1-unplugged');
+    await station.tell('plug');
+    await until('it goes on', async () => /[+−][XYZ] side up/.test(await prompt(page)));
+    check((await h.taken(page)) >= 4, `what was taken is still there: ${await h.taken(page)}`);
+    await place(8);
+    await station.tell('kill');
+    await page.getByText('The station does not answer').waitFor();
+    await station.tell('start');
+    await station.again();
+    await page.getByText('The station does not answer').waitFor({ state: 'detached' });
+    await until('the run goes on', async () => (await h.taken(page)) >= 8, 20);
+    await place(99);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Stored as run/).waitFor();
+    await h.shot(page, 'usb-2-verdict');
+    const lane = await station.api('/api/lanes/1');
+    check(lane.device === `hid:${station.serial}`, `the lane is the USB device: ${lane.device}`);
+    check(lane.result.written === true && lane.result.serial === station.serial && lane.operator === 'Ada', JSON.stringify(lane.result));
+    const report = await station.api(`/api/runs/${lane.result.run}/report.json`);
+    check(report.recheck.poses.length === 2 && report.verification.poses.length === 8, 'measured again with what was written');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // A calibration file of the same: the unit records on while the program is killed, and nothing is lost.
+  async usb_capture() {
+    const station = await h.stationOnUsb(['--side-seconds', '10']);
+    const page = await h.open(station.url);
+    await button(page, 'My files').click();
+    await page.getByText(station.serial).first().waitFor();
+    await button(page, 'Start recording').click();
+    const side = async (number) => {
+      await page.getByText(`Side ${number} of 6`).waitFor();
+      const [sign, axis] = await until('the side', async () => (await page.locator('.prompt').textContent()).match(/[+−][XYZ]/)?.[0]);
+      await station.tell(`turn ${sign === '+' ? '+' : '-'}${axis.toLowerCase()}`);
+      await button(page, 'It lies there').click();
+      await page.getByText(/Leave it alone/).waitFor();
+    };
+    await side(1);
+    await side(2);
+    await page.getByText('Side 3 of 6').waitFor();
+    await station.tell('unplug');
+    await page.getByText('The unit is unplugged: plug it in again').waitFor();
+    await station.tell('plug');
+    await side(3);
+    await page.getByText('Side 4 of 6').waitFor();
+    await station.tell('kill');
+    await page.getByText('The station does not answer').waitFor();
+    await station.tell('start');
+    await station.again();
+    await page.getByText('The station does not answer').waitFor({ state: 'detached' });
+    for (const number of [4, 5, 6]) await side(number);
+    await page.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
+    await page.getByText(/Constants saved in/).first().waitFor();
+    await h.shot(page, 'usb-capture');
+    const lane = await station.api('/api/lanes/1');
+    check(!/lost its recording/.test((lane.result.notes ?? []).join()), `nothing was asked twice: ${lane.result.notes}`);
+    check(lane.result.serial === station.serial && lane.result.stored, JSON.stringify(lane.result));
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
   // Another person's page sees the run and may not touch it, until it takes it over.
   async operators() {
     const station = await h.station(['virtual:seed=14,pace=10']);

@@ -229,6 +229,16 @@ TEST(JigReportJson, HasTheContractsKeys) {
   EXPECT_EQ(json["verification"]["poses"].size(), 8U);
 }
 
+// As a program that was killed leaves it.
+TEST(JigSession, AUnitThatWasLeftStreamingIsMeasuredAllTheSame) {
+  Bench bench;
+  ASSERT_OK(bench.unit->start_stream(50));
+  ASSERT_FALSE(bench.unit->set_filter(FilterConfiguration::legacy)) << "it is busy";
+  const auto report = run_jig(*bench.unit, *bench.jig, bench.env.env, {}, {});
+  ASSERT_OK(report);
+  EXPECT_EQ(report->verdict, JigVerdict::pass) << report->brief();
+}
+
 // --- capture ---
 
 const SidePrompt kYes = [](device::Pose, std::size_t, std::size_t) { return true; };
@@ -301,6 +311,16 @@ TEST(Capture, ThePersonMayStopAndTheUnitIsNotLeftRecording) {
   ASSERT_OK(report);
   EXPECT_TRUE(report->stopped);
   ASSERT_OK(bench.unit->start_stream(100));  // not busy
+}
+
+TEST(Capture, AUnitThatWasLeftStreamingRecords) {
+  Bench bench;
+  ASSERT_OK(bench.unit->start_stream(50));
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  const auto report = run_capture(*bench.unit, *bench.jig, bench.env.env, options, kYes);
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->usable());
 }
 
 TEST(Capture, DoesNotWriteOverAFile) {

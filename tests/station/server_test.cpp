@@ -27,10 +27,13 @@ using testing::HasSubstr;
 // A whole station in this process; what it would store is kept here.
 class Station {
  public:
+  // `its_bench`: one that outlives this program, where the units shall.
   explicit Station(std::vector<std::string> devices, const std::string& folder,
-                   std::string token = {}, int most_streams = 24)
-      : registry_(known_devices()) {
-    bench.register_in(registry_);
+                   std::string token = {}, int most_streams = 24,
+                   std::shared_ptr<mocks::VirtualBench> its_bench = {})
+      : bench_(its_bench ? std::move(its_bench) : std::make_shared<mocks::VirtualBench>()),
+        registry_(known_devices()) {
+    bench_->register_in(registry_);
     LanesOptions options;
     options.devices = std::move(devices);
     options.state_folder = folder + "/state";
@@ -62,7 +65,7 @@ class Station {
         ApiParts{posix_env(),
                  *lanes,
                  *repairs,
-                 &bench,
+                 bench_.get(),
                  [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); },
                  {}});
     auto listening = Server::open(posix_env(), *api, {});
@@ -111,9 +114,9 @@ class Station {
   std::vector<JigReport> reports;
   std::vector<std::string> operators;
   bool store_is_away = false;
-  mocks::VirtualBench bench;
 
  private:
+  std::shared_ptr<mocks::VirtualBench> bench_;
   device::TransportRegistry registry_;  // the lanes' threads use it
 
  public:
@@ -530,6 +533,128 @@ TEST(Server, CapturesACalibrationFileSideBySide) {
   const Json check = Json::parse(answer->body);
   EXPECT_EQ(check["usable"], true);
   EXPECT_TRUE(check["repeat_sides"].empty());
+}
+
+// A hand that does a capture's bidding, up to and with side `last`. Answers with the sides in the
+// order in which they were asked.
+std::vector<std::string> serve_capture(const Station& station, std::size_t last) {
+  std::vector<std::string> asked;
+  for (;;) {
+    const Json lane = station.wait(1, [&](const Json& now) {
+      return now["state"] == "done" ||
+             (now["capture"].is_object() && now["capture"]["side"].is_string() &&
+              now["capture"]["placed"] == false);
+    });
+    if (lane["state"] == "done" || lane["capture"]["number"] > last) {
+      return asked;
+    }
+    asked.push_back(lane["capture"]["side"]);
+    EXPECT_EQ(station.post("/api/lanes/1/hand", {{"do", "turn"}, {"pose", asked.back()}}), 200);
+    EXPECT_EQ(station.post("/api/lanes/1/placed", Json::object()), 200);
+    station.wait(1, [&](const Json& now) {
+      return now["state"] != "capturing" || now["capture"]["placed"] == true ||
+             now["capture"]["side"] != asked.back();
+    });
+  }
+}
+
+constexpr const char* kCaptured = "virtual:seed=7,serial=MOS2A45130007,pace=100";
+
+TEST(Server, ACaptureSurvivesAReplugAndAsksTheSideUnderWayAgain) {
+  const tests::TemporaryFolder folder;
+  Station station({kCaptured}, folder.path());
+  station.wait_state(1, "idle");
+  ASSERT_EQ(station.post("/api/capture", Json::object()), 202);
+  EXPECT_THAT(serve_capture(station, 2), testing::ElementsAre("+z", "-z"));
+  const auto hand = [&](const Json& body) { return station.post("/api/lanes/1/hand", body); };
+  // Pulled out while it rests on the third side.
+  const Json third = station.wait(1, [](const Json& json) {
+    return json["capture"].is_object() && json["capture"]["number"] == 3;
+  });
+  ASSERT_EQ(station.post("/api/lanes/1/placed", Json::object()), 200);
+  hand({{"do", "unplug"}});
+  const Json away = station.wait_state(1, "unit_away");
+  EXPECT_TRUE(away["capture"].is_object()) << "the capture is still there";
+  hand({{"do", "plug"}});
+  const Json back = station.wait(1, [](const Json& json) {
+    return json["state"] == "capturing" && json["capture"]["side"].is_string();
+  });
+  EXPECT_EQ(back["capture"]["side"], third["capture"]["side"]) << "asked again";
+  EXPECT_EQ(back["capture"]["placed"], false);
+  // And once more while it waits for a hand: nobody has to press anything to have it noticed.
+  hand({{"do", "unplug"}});
+  station.wait_state(1, "unit_away");
+  hand({{"do", "plug"}});
+  station.wait_state(1, "capturing");
+  const auto rest = serve_capture(station, 6);
+  ASSERT_EQ(rest.size(), 4U) << "the two that were done are not asked again";
+  EXPECT_EQ(rest.front(), third["capture"]["side"].get<std::string>());
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
+  EXPECT_TRUE(lane["capture"].is_null());
+  // The file that was put together from the pieces is a calibration file like any other.
+  std::string file = lane["result"]["file"];
+  file = file.substr(folder.path().size() + 1);
+  const auto answer =
+      station.client().Post("/api/check", Json{{"file", file}}.dump(), "application/json");
+  ASSERT_EQ(answer->status, 200) << answer->body;
+  EXPECT_EQ(Json::parse(answer->body)["usable"], true);
+}
+
+TEST(Server, AnotherUnitInACaptureIsNoticedAndNothingIsMixed) {
+  const tests::TemporaryFolder folder;
+  Station station({kCaptured}, folder.path());
+  station.wait_state(1, "idle");
+  ASSERT_EQ(station.post("/api/capture", Json::object()), 202);
+  serve_capture(station, 1);
+  EXPECT_EQ(station.post("/api/lanes/1/hand", {{"do", "swap"}, {"serial", "MOS2A45139999"}}), 200);
+  const Json wrong = station.wait_state(1, "wrong_unit");
+  EXPECT_THAT(wrong["message"].get<std::string>(), HasSubstr("MOS2A45139999"));
+  EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "stopped");
+  EXPECT_EQ(lane["result"]["serial"], "MOS2A45130007");
+}
+
+TEST(Server, ACaptureSurvivesTheProgram) {
+  const tests::TemporaryFolder folder;
+  const auto bench = std::make_shared<mocks::VirtualBench>();  // the units go on without it
+  {
+    Station station({kCaptured}, folder.path(), "", 24, bench);
+    station.wait_state(1, "idle");
+    ASSERT_EQ(station.post("/api/capture", {{"operator", "Ada"}}), 202);
+    EXPECT_EQ(serve_capture(station, 3).size(), 3U);
+  }
+  {
+    Station station({kCaptured}, folder.path(), "", 24, bench);
+    station.wait(1, [](const Json& json) {
+      return json["state"] == "capturing" && json["capture"]["number"] == 4;
+    });
+    EXPECT_EQ(station.lane(1)["operator"], "Ada");
+    EXPECT_EQ(serve_capture(station, 6).size(), 3U) << "the first three are kept";
+    const Json lane = station.wait_state(1, "done");
+    EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
+    EXPECT_EQ(lane["result"]["stored"], true);
+  }
+  Station station({kCaptured}, folder.path(), "", 24, bench);
+  station.wait_state(1, "idle");  // nothing is left to go on with
+}
+
+// A unit whose memory was lost meanwhile: it is said, and all sides are asked again.
+TEST(Server, ACaptureWhoseRecordingTheUnitLostBeginsAnew) {
+  const tests::TemporaryFolder folder;
+  {
+    Station station({kCaptured}, folder.path());
+    station.wait_state(1, "idle");
+    ASSERT_EQ(station.post("/api/capture", Json::object()), 202);
+    EXPECT_EQ(serve_capture(station, 2).size(), 2U);
+  }
+  Station station({kCaptured}, folder.path());  // a unit that knows nothing of it
+  station.wait_state(1, "capturing");
+  EXPECT_EQ(serve_capture(station, 6).size(), 6U);
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
+  EXPECT_THAT(lane["result"]["notes"].dump(), HasSubstr("lost its recording; 2 sides are"));
 }
 
 TEST(Server, ACaptureOfAUnitThatCannotHelpIsRefused) {

@@ -101,7 +101,7 @@ TEST_F(StationRecords, ACheckUnitOutOfControlLocksItsStationUntilAnEngineerSigns
   const auto locked = start("MOS2A1");
   EXPECT_FAILS(locked, ErrorCode::configuration);
   EXPECT_THAT(locked.error().what,
-              HasSubstr("station A is locked; check unit CHECK1, zero_offset_mg"));
+              HasSubstr("station A is locked; check unit CHECK1, Zero offset"));
   EXPECT_THAT(locked.error().hint, HasSubstr("station-lock sign"));
   EXPECT_OK(start("CHECK1")) << "a check unit may always be measured";
   EXPECT_OK(start("MOS2A1", "B")) << "another station is not concerned";

@@ -48,6 +48,16 @@ TEST(ControlChart, LimitsOfNistsExample) {
   EXPECT_TRUE(chart.signals.empty());
 }
 
+// Oracle: the range of two normal values has the mean 2/sqrt(pi) and the variance 2 - 4/pi sigma
+// squared; the tables give both constants with four digits. (statistics_oracle.py integrates them.)
+TEST(ControlChart, ItsConstantsAreThoseOfTheNormalDistribution) {
+  const auto chart = control_chart("c", {1, 2, 4, 3, 5}, 5);
+  const double d2 = 2 / std::sqrt(M_PI);
+  const double d3 = std::sqrt(2 - 4 / M_PI);
+  EXPECT_NEAR(chart.mean_range / chart.sigma, d2, 5e-4);
+  EXPECT_NEAR(chart.upper_range / chart.mean_range, 1 + 3 * d3 / d2, 1e-3);
+}
+
 // A baseline of mean 0 and sigma 1: moving ranges of 1.128.
 std::vector<double> after_baseline(const std::vector<double>& more) {
   std::vector<double> values = {0.564, -0.564, 0.564, -0.564, 0.564, -0.564, 0.564, -0.564};
@@ -126,7 +136,8 @@ TEST(ControlChart, ALeastSigmaAndASignatureTakeSignalsAway) {
 // --- gage R&R ---
 
 // AIAG, Measurement Systems Analysis, 4th edition, table III-B 6: ten parts, three appraisers,
-// three trials.
+// three trials. The figures below were computed a second time, in exact fractions and by other
+// formulas, and agree: statistics_oracle.py, which compares the program with them at every run.
 constexpr double kAiag[3][3][10] = {
     {{0.29, -0.56, 1.34, 0.47, -0.80, 0.02, 0.59, -0.31, 2.26, -1.36},
      {0.41, -0.68, 1.17, 0.50, -0.92, -0.11, 0.75, -0.20, 1.99, -1.25},

@@ -54,6 +54,44 @@ TEST(Verdict, TheLimitsOwnGuardBandHoldsWhereItIsWider) {
       << "U = 40 is wider";
 }
 
+// docs/verdicts.md: an uncertainty that leaves nothing to pass makes a quantity inconclusive, every
+// quantity of the table and whatever the decision rule; only what is beyond its limit by U fails.
+// Oracle: the definition, value by value over the whole range of each quantity.
+TEST(Verdict, AnUncertaintyLargerThanItsLimitIsInconclusiveForEveryQuantity) {
+  for (const char* rule : {"", "[decision]\nguard_factor = 0\n"}) {
+    const Limits limits = with(rule);
+    for (const QuantityInfo& info : quantities()) {
+      if (info.name.find("_uncertainty_") != std::string_view::npos) {
+        continue;  // judged without an uncertainty of their own
+      }
+      const Limit& limit = limits.of(info.name);
+      ASSERT_TRUE(limit.high) << info.name;
+      const double low = limit.low.value_or(info.least);
+      const double room = limit.low ? (*limit.high - low) / 2 : *limit.high - low;
+      const auto judged = [&](double value, double expanded) {
+        return judge_quantity({std::string(info.name), "", value, expanded / 2}, limits);
+      };
+      for (int step = 0; step <= 100; ++step) {
+        const double value = low + 0.01 * step * (*limit.high - low);
+        const auto coarse = judged(value, 1.01 * room);
+        EXPECT_EQ(coarse.verdict, JigVerdict::inconclusive) << info.name << ' ' << value;
+        EXPECT_EQ(coarse.code, "uncertainty_high");
+        EXPECT_NE(judged(value, 0.99 * room).verdict, JigVerdict::inconclusive) << info.name;
+      }
+      EXPECT_EQ(judged(limit.low ? low + room : low, 0.99 * room).verdict, JigVerdict::pass)
+          << info.name << ": one value may still pass";
+      EXPECT_EQ(judged(*limit.high + 0.9 * room, 1.01 * room).verdict, JigVerdict::inconclusive);
+      EXPECT_EQ(judged(*limit.high + 1.1 * room, 1.01 * room).verdict, JigVerdict::fail)
+          << info.name << ": that is beyond it, however coarse";
+    }
+  }
+  const Verdict verdict = judge_quantities({{"noise_mg", "x", 5, 6}}, default_limits());
+  EXPECT_EQ(verdict.verdict, JigVerdict::inconclusive);
+  EXPECT_THAT(verdict.codes, testing::ElementsAre("uncertainty_high"));
+  EXPECT_THAT(verdict.reasons[0],
+              HasSubstr("the expanded uncertainty of 12 mg leaves nothing inside 10 mg"));
+}
+
 TEST(Verdict, WithoutAGuardBandThereIsNothingConditional) {
   const Limits limits = with("[decision]\nguard_factor = 0\n[zero_offset_mg]\nhigh = 200\n");
   EXPECT_EQ(judge_quantity({"zero_offset_mg", "x", 200, 5}, limits).verdict, JigVerdict::pass);

@@ -3,14 +3,14 @@ import { useEffect, useState } from 'preact/hooks';
 import { LiveBox, PosePicture } from './box';
 import { CaptureSteps, ResultBox, VirtualHand } from './lane';
 import { S } from './strings';
-import { ask, type Refusal } from './station';
+import { ask, client, type Refusal } from './station';
 import { POSES, type State } from './types';
 
 const F = S.files;
 type SetProblem = (problem: Refusal | null) => void;
 
 function Capture({ state, setProblem }: { state: State; setProblem: SetProblem }) {
-  const [chosen, setChosen] = useState(state.lanes[0]?.lane ?? 1);
+  const [chosen, setChosen] = useState(() => (state.lanes.find((each) => each.capture) ?? state.lanes[0])?.lane ?? 1);
   const lane = state.lanes[chosen - 1];
   const say = async (word: string, body: object = {}) => {
     const answer = await ask(`/api/lanes/${chosen}/${word}`, body);
@@ -29,12 +29,15 @@ function Capture({ state, setProblem }: { state: State; setProblem: SetProblem }
           {state.lanes.map((each) => <option value={each.lane}>{S.lane(each.lane)} {each.unit?.serial ?? S.states.absent}</option>)}
         </select></label>
       )}
-      {lane?.state === 'capturing' ? (
+      {lane?.capture ? (
         <>
           <p class="prompt" role="status">{S.prompt(lane)}</p>
           <div class="pictures">{lane.capture?.side && <figure><figcaption>{S.wantedTitle}: <b>{S.poseText(lane.capture.side)}</b></figcaption><PosePicture pose={lane.capture.side} /></figure>}</div>
+          {lane.state !== 'capturing' && <p class="notice bad"><b aria-hidden="true">⚠ </b>{lane.message}. {F.kept}</p>}
           <CaptureSteps lane={lane} say={say} />
-          <div class="buttons"><button type="button" onClick={() => say('stop')}>{S.stop}</button></div>
+          <div class="buttons">{lane.client === client || lane.client === ''
+            ? <button type="button" onClick={() => say('stop')}>{F.captureStop}</button>
+            : <span>{S.held(lane.operator)} <button type="button" onClick={() => say('take')}>{S.takeOver}</button></span>}</div>
         </>
       ) : lane?.unit ? (
         <>
@@ -43,7 +46,7 @@ function Capture({ state, setProblem }: { state: State; setProblem: SetProblem }
           <div class="buttons"><button type="button" class="primary" disabled={lane.state !== 'idle' && lane.state !== 'done'} onClick={start}>{F.captureStart}</button></div>
         </>
       ) : <p>{F.captureNone}</p>}
-      {lane?.result?.kind === 'capture' && lane.state !== 'capturing' && <ResultBox result={lane.result} />}
+      {lane?.result?.kind === 'capture' && !lane.capture && <ResultBox result={lane.result} />}
       {state.virtual_hands.includes(chosen) && <VirtualHand lane={chosen} setProblem={setProblem} />}
     </section>
   );

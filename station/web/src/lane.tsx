@@ -4,20 +4,21 @@ import { LiveBox, PosePicture } from './box';
 import { S } from './strings';
 import { ask, client, type Refusal } from './station';
 import { Spark, TraceChart } from './traces';
-import { POSES, type Lane, type Live, type Pose, type Result, type State } from './types';
+import { POSES, type Lane, type Live, type Lock, type Pose, type Result, type State } from './types';
 
 const BUSY = ['running', 'unit_away', 'wrong_unit', 'resuming', 'capturing'];
 
 export function ResultBox({ result }: { result: Result }) {
+  const name = S.verdict(result);
   const good = result.verdict === 'pass' || result.verdict === 'conditional_pass';
   return (
-    <section class={good ? 'result good' : 'result bad'} aria-label={S.verdicts[result.verdict]}>
-      <p class="verdict"><b aria-hidden="true">{S.verdictSigns[result.verdict] ?? '?'}</b> {S.verdicts[result.verdict] ?? result.verdict}</p>
+    <section class={good ? 'result good' : 'result bad'} aria-label={name}>
+      <p class="verdict"><b aria-hidden="true">{S.verdictSigns[result.verdict] ?? '?'}</b> {name}</p>
       <p>{result.serial}</p>
       {typeof result.residual_mg === 'number' && <p>{S.residual(result.residual_mg, result.as_found_residual_mg ?? null)}</p>}
       {result.reasons.map((reason) => <p>{reason}</p>)}
       {result.repeat_sides && result.repeat_sides.length > 0 && <p>{S.files.repeat(result.repeat_sides)}</p>}
-      {result.kind === 'jig' && <p>{S.stored(result)}</p>}
+      {result.kind === 'jig' && result.verdict !== 'refused' && <p>{S.stored(result)}</p>}
       {result.kind === 'capture' && result.stored && <p>{S.files.saved(`${result.file}.constants.json`)}</p>}
       {result.run && result.stored && (
         <p class="links">
@@ -96,9 +97,11 @@ export function CaptureSteps({ lane, say }: { lane: Lane; say: (word: string, bo
   );
 }
 
-export function LaneView({ lane, live, operator, virtual, setProblem }: {
-  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; setProblem: (problem: Refusal | null) => void;
+export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
+  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; lock: Lock | null; setProblem: (problem: Refusal | null) => void;
 }) {
+  const watches = !!lock && !!lane.unit && lock.check_units.includes(lane.unit.serial);
+  const locked = !!lock?.locked && !watches;
   const [write, setWrite] = useState(false);
   const [sure, setSure] = useState(false);
   const busy = BUSY.includes(lane.state);
@@ -128,13 +131,19 @@ export function LaneView({ lane, live, operator, virtual, setProblem }: {
   const refusal = lane.state === 'running' ? lane.run?.last_refusal : '';
   return (
     <section class={`lane state-${lane.state}`} aria-labelledby="lane-title">
-      <h2 id="lane-title">{S.lane(lane.lane)} <small>{lane.unit ? S.unit(lane.unit.serial, lane.unit.firmware) : lane.device}</small></h2>
-      <p class="prompt" role="status" aria-live="polite">{S.prompt(lane)}</p>
+      <h2 id="lane-title">{S.lane(lane.lane)} <small>{lane.unit ? S.unit(lane.unit.serial, lane.unit.firmware) : lane.device}</small>{watches && <b class="tag">{S.lock.checkUnit}</b>}</h2>
+      <p class="prompt" role="status" aria-live="polite">{locked && (lane.state === 'idle' || lane.state === 'done') ? S.lock.prompt : S.prompt(lane)}</p>
       {(lane.state === 'wrong_unit' || lane.state === 'unit_away') && <p class="notice bad"><b aria-hidden="true">⚠ </b>{lane.message}</p>}
       {lane.scan && <p class={lane.scan.matches ? 'notice good' : 'notice bad'}><b aria-hidden="true">{lane.scan.matches ? '✔ ' : '✖ '}</b>{S.scanned(lane.scan.serial, lane.scan.matches)}</p>}
       <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal)}</p>
 
       {(lane.state === 'done' || lane.state === 'idle') && lane.result && <ResultBox result={lane.result} />}
+      {lane.state === 'running' && lane.run && (
+        <div class={`still still-${shown}`}>
+          <span>{shown ? S.stillness[shown === 'leaving' && refusal ? 'refused' : shown] : ''}</span>
+          <progress max={1} value={shown === 'dwelling' ? live?.dwell ?? 0 : 0} aria-label={S.stillness.dwelling} />
+        </div>
+      )}
       <div class="pictures">
         {wanted && (
           <figure><figcaption>{S.wantedTitle}: <b>{S.poseText(wanted)}</b></figcaption><PosePicture pose={wanted} /></figure>
@@ -143,21 +152,13 @@ export function LaneView({ lane, live, operator, virtual, setProblem }: {
           <figure><figcaption>{S.nowTitle} <b>{nowText(live)}</b></figcaption><LiveBox lane={lane.lane} text={nowText(live)} /></figure>
         )}
       </div>
-      {lane.state === 'running' && lane.run && (
-        <>
-          <div class={`still still-${shown}`}>
-            <span>{shown ? S.stillness[shown] : ''}</span>
-            <progress max={1} value={shown === 'dwelling' ? live?.dwell ?? 0 : 0} aria-label={S.stillness.dwelling} />
-          </div>
-          <Placements lane={lane} />
-        </>
-      )}
+      {lane.state === 'running' && lane.run && <Placements lane={lane} />}
       {lane.state === 'capturing' && <CaptureSteps lane={lane} say={say} />}
 
       <div class="buttons">
         {(lane.state === 'idle' || lane.state === 'done') && (
           <>
-            <button type="button" class="primary" onClick={start}>{lane.result?.kind === 'jig' ? S.again : S.start}</button>
+            <button type="button" class="primary" disabled={locked} onClick={start}>{lane.result?.kind === 'jig' && lane.result.verdict !== 'refused' ? S.again : S.start}</button>
             <label class="check"><input type="checkbox" checked={write} onChange={(event) => setWrite(event.currentTarget.checked)} /> {S.write}</label>
           </>
         )}
@@ -196,7 +197,7 @@ export function LaneCards({ state, chosen, follow, setFollow, choose }: {
               <button type="button" class={`card state-${lane.state} verdict-${verdict}`} aria-current={chosen === lane.lane ? 'true' : undefined} onClick={() => choose(lane.lane)}>
                 <span class="number">{lane.lane}</span>
                 <span class="what">
-                  <b>{verdict ? `${S.verdictSigns[verdict]} ${S.verdicts[verdict]}` : lane.state === 'running' && lane.run ? S.placements(lane.run.taken.length, lane.run.of).split(' pl')[0] : S.states[lane.state]}</b>
+                  <b>{verdict ? `${S.verdictSigns[verdict]} ${S.verdict(lane.result!)}` : lane.state === 'running' && lane.run ? S.placements(lane.run.taken.length, lane.run.of).split(' pl')[0] : S.states[lane.state]}</b>
                   <span>{lane.unit?.serial ?? '–'}</span>
                   <span class="next">{place === 0 ? '☞ ' : ''}{place >= 0 && lane.run?.wanted ? S.prompt(lane) : place >= 0 ? S.states[lane.state] : ' '}</span>
                 </span>

@@ -1,8 +1,11 @@
 import { render } from 'preact';
 import { useEffect, useReducer, useRef, useState } from 'preact/hooks';
 import './page.css';
+import { CheckUnits } from './check';
 import { Files } from './files';
 import { LaneCards, LaneView } from './lane';
+import { LockBanner } from './lock';
+import { Statistics } from './statistics';
 import { S } from './strings';
 import { ask, current, subscribe, type Refusal } from './station';
 
@@ -33,7 +36,7 @@ function Page() {
   const [, again] = useReducer((n: number) => n + 1, 0);
   useEffect(() => subscribe(() => again(0)), []);
   const { state, connected, live } = current();
-  const [tab, setTab] = useState(location.hash === '#files' ? 'files' : 'jig');
+  const [tab, setTab] = useState(() => (location.hash.slice(1) in S.tabs ? location.hash.slice(1) : 'jig'));
   const [chosen, setChosen] = useState(1);
   const [follow, setFollow] = useState(true);
   const [operator, setOperator] = useState(localStorage.getItem('sixpoint-operator') ?? '');
@@ -90,10 +93,13 @@ function Page() {
           {problem && <p class="notice bad"><b aria-hidden="true">✖ </b>{problem.what}. {problem.hint}{' '}
             <button type="button" onClick={() => setProblem(null)}>OK</button></p>}
         </div>
-        {!state ? <p>…</p> : tab === 'files' ? <Files state={state} setProblem={setProblem} /> : (
+        {state?.lock?.locked && <LockBanner lock={state.lock} setProblem={setProblem} />}
+        {!state ? <p>…</p> : tab === 'files' ? <Files state={state} setProblem={setProblem} />
+          : tab === 'check' ? <CheckUnits state={state} setProblem={setProblem} />
+          : tab === 'statistics' ? <Statistics setProblem={setProblem} /> : (
           <div class={state.lanes.length > 1 ? 'bench' : 'bench single'}>
             {lane && <LaneView key={chosen} lane={lane} live={live[chosen]} operator={operator}
-              virtual={state.virtual_hands.includes(chosen)} setProblem={setProblem} />}
+              virtual={state.virtual_hands.includes(chosen)} lock={state.lock} setProblem={setProblem} />}
             {state.lanes.length > 1 && (
               <LaneCards state={state} chosen={chosen} follow={follow} setFollow={setFollow}
                 choose={(n) => { setChosen(n); setFollow(false); }} />

@@ -1,5 +1,5 @@
 // The connection to the station: state by server-sent events, commands by POST.
-import type { Job, Lane, Live, State } from './types';
+import type { Job, Lane, Live, Lock, State } from './types';
 
 // Readings of one lane, the newest at `end`. Kept outside the page's state: they are drawn, not rendered.
 export const KEPT = 600;
@@ -55,6 +55,7 @@ function connect() {
     change({ state: { ...snapshot.state, lanes } });
   });
   on<Job>('job', (job) => { if (snapshot.state) change({ state: { ...snapshot.state, job } }); });
+  on<Lock>('lock', (lock) => { if (snapshot.state) change({ state: { ...snapshot.state, lock } }); });
   interface LiveEvent { queue: number[]; lanes: { lane: number; first: number; host_ms: number; mg: number[]; live: Live }[] }
   on<LiveEvent>('live', (data) => {
     let differs = false;

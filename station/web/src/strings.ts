@@ -1,5 +1,5 @@
 // Every English text of the page.
-import type { Lane, Pose, Result } from './types';
+import type { Lane, Pose, Proportion, Result, Signature, Title } from './types';
 
 const axisOf = (pose: Pose) => pose[1].toUpperCase();
 export const faceName = (pose: Pose) =>
@@ -7,13 +7,13 @@ export const faceName = (pose: Pose) =>
 
 export const S = {
   title: 'Sixpoint station',
-  tabs: { jig: 'Jig', files: 'My files' },
+  tabs: { jig: 'Jig', files: 'My files', check: 'Check units', statistics: 'Statistics' } as Record<string, string>,
   connection: {
     live: 'Connected',
     lost: 'The station does not answer. Is the program still running? Trying again …',
   },
   operator: 'Your name',
-  scan: 'Scan or type a serial number',
+  scan: 'Scan a label',
   scanGo: 'Find',
   lanes: 'Lanes',
   follow: 'Show the lane that needs a hand',
@@ -37,6 +37,7 @@ export const S = {
     settling: 'Settling …',
     dwelling: 'Measuring: do not touch',
     leaving: 'Taken. Turn it.',
+    refused: 'Turn it.',
   } as Record<string, string>,
 
   // What to do next, the biggest words on the page.
@@ -44,7 +45,7 @@ export const S = {
     switch (lane.state) {
       case 'absent': return 'Plug a unit in';
       case 'idle': return lane.scan && !lane.scan.matches ? 'This is not the unit that was scanned' : 'Ready to measure';
-      case 'resuming': return 'Plug the unit in: its run goes on';
+      case 'resuming': return lane.capture ? 'Plug the unit in: its recording goes on' : 'Plug the unit in: its run goes on';
       case 'unit_away': return 'The unit is unplugged: plug it in again';
       case 'wrong_unit': return 'Another unit is plugged in';
       case 'capturing': return lane.capture?.side
@@ -91,6 +92,7 @@ export const S = {
     pass: 'Pass', conditional_pass: 'Conditional pass', conditional_fail: 'Conditional fail', fail: 'Fail',
     inconclusive: 'No verdict', stopped: 'Stopped', refused: 'Cannot help',
   } as Record<string, string>,
+  verdict: (r: Result): string => (r.kind === 'jig' && r.verdict === 'refused' ? 'Not measured' : S.verdicts[r.verdict] ?? r.verdict),
   verdictSigns: {
     pass: '✔', conditional_pass: '✔?', conditional_fail: '✖?', fail: '✖', inconclusive: '?', stopped: '■', refused: '✖',
   } as Record<string, string>,
@@ -101,6 +103,83 @@ export const S = {
   documents: { certificate: 'Certificate (PDF)', json: 'Certificate (JSON)', label: 'Label (ZPL)', report: 'Report (JSON)' },
   unit: (serial: string, firmware: string) => `${serial}, firmware ${firmware}`,
   low: (mv: number) => `Battery ${(mv / 1000).toFixed(2)} V`,
+
+  lock: {
+    title: 'Station locked',
+    text: 'A check unit is out of control. Until an engineer signs, only check units are measured here.',
+    next: (units: string[]) => `Measure a check unit again (${units.join(', ')}) and look at its charts.`,
+    sign: 'Sign as engineer',
+    signTitle: 'Engineer\'s signature',
+    name: 'Engineer\'s name',
+    reason: 'What was found and done',
+    newBaseline: 'The jig was changed: begin the charts anew',
+    submit: 'Sign: the station may go on',
+    cancel: 'Not now',
+    prompt: 'Station locked: check units only',
+    checkUnit: 'Check unit',
+    problem: (text: string) => `The check units cannot be asked now: ${text}`,
+  },
+  check: {
+    title: 'Check units of this station',
+    text: (runs: number) => `A check unit stays at the station and is measured as any unit. After ${runs} runs its charts are in force; a point out of control locks the station.`,
+    open: 'In control: the station is open',
+    none: 'This station has no check unit yet.',
+    noRuns: 'No check unit was measured at this station yet.',
+    signed: (s: Signature) => `Last signature: ${s.operator}, ${s.made_at.slice(0, 16).replace('T', ' ')}: ${s.reason}${s.new_baseline ? ' (charts begun anew)' : ''}`,
+    change: 'Name a check unit, or release one',
+    serial: 'Serial number',
+    name: 'Who decides',
+    reason: 'Why',
+    add: 'This is a check unit',
+    remove: 'It is one no more',
+    done: 'Recorded.',
+    chart: (title: string, serial: string) => `${title}: check unit ${serial}`,
+    label: (title: string, serial: string, points: number, last: string, limits: string, signals: number) =>
+      `${title} of check unit ${serial}: ${points} points, the last ${last}${limits}${signals ? `, ${signals} signals` : ''}`,
+    within: (low: string, high: string) => `, limits ${low} and ${high}`,
+    tooFew: (points: number, runs: number) => `${points} of ${runs} runs until limits can be computed`,
+    inControl: 'in control',
+    outOfControl: 'out of control',
+    shown: 'shown, does not lock',
+    locks: 'locks the station',
+    signal: (point: number, time: string, rule: number, meaning: string) =>
+      `Point ${point} (${time.slice(0, 16).replace('T', ' ')}), rule ${rule}: ${meaning}`,
+    charts: 'Control charts',
+    upper: '+3σ', lower: '−3σ', mean: 'mean', range: 'moving range', rangeLimit: 'limit', baseline: 'baseline',
+    legend: 'Squares with a number: points that break that one of Nelson\'s rules.',
+  },
+  statistics: {
+    title: 'Statistics',
+    by: 'Compare by',
+    groups: { '': 'nothing', station: 'station', jig: 'jig', operator: 'operator', firmware: 'firmware' } as Record<string, string>,
+    from: 'From', to: 'Before',
+    refresh: 'Compute again',
+    none: 'No runs were stored yet.',
+    all: 'all', notStated: 'not stated',
+    yield: 'Yield', first: 'First-pass yield', perUnit: 'Time per unit', runs: 'Runs', units: 'Units',
+    percent: (p: Proportion) => p.value === null ? '–' : `${(100 * p.value).toFixed(1)} %`,
+    interval: (p: Proportion) => p.value === null ? '' : `${p.count} of ${p.of}; ${(100 * p.interval[0]).toFixed(0)} to ${(100 * p.interval[1]).toFixed(0)} %`,
+    intervals: 'Small figures: counts and the 95 % interval. Time: median of all runs of a unit together.',
+    seconds: (s: number | null) => s === null ? '–' : s < 120 ? `${s.toFixed(0)} s` : `${(s / 60).toFixed(1)} min`,
+    codes: 'Why units did not pass',
+    noCodes: 'No run failed.',
+    code: 'Failure code', times: 'Runs', next: 'What to do',
+    capability: 'Capability',
+    quantity: 'Quantity', n: 'Units', meanOf: 'Mean', sd: 'SD', cp: 'Cp', cpk: 'Cpk (95 % interval)',
+    noCapability: 'Too few units for capability.',
+    quantityTitle: (t: Title) => `${t.title}${t.axis ? ` ${t.axis}` : ''}${t.unit ? `, ${t.unit}` : ''}`,
+    gage: 'Gage study (R&R)',
+    gageNone: 'The store has no gage study. Measure one with: sixpoint jig --study NAME --operator WHO',
+    study: 'Study', axis: 'Axis', compute: 'Compute',
+    gageUsable: 'The gage can be used', gageBad: 'The gage cannot be used',
+    gageText: (grr: number, ndc: number, judgement: string) => `${grr.toFixed(1)} % of the total variation, ${ndc} distinct categories: ${judgement}`,
+    gageOf: (parts: number, operators: number, trials: number) => `${parts} parts, ${operators} operators, ${trials} trials`,
+    source: 'Source', share: 'Share of variance, %', studyShare: '% of study variation',
+    sources: {
+      grr: 'Gage R&R', repeatability: 'Repeatability', reproducibility: 'Reproducibility', operator: 'Operator',
+      'part x operator': 'Part × operator', part: 'Part to part', total: 'Total',
+    } as Record<string, string>,
+  },
 
   hand: {
     title: 'Practice: this unit is virtual. Turn it here.',
@@ -113,6 +192,8 @@ export const S = {
     captureLane: 'Unit',
     captureStart: 'Start recording',
     captureNone: 'No unit is plugged in.',
+    captureStop: 'Stop recording',
+    kept: 'What was recorded is kept; the side that was under way is asked again.',
     placed: 'It lies there',
     sideOf: (n: number, of: number) => `Side ${n} of ${of}`,
     rest: (s: number) => `Leave it alone for ${s} s`,

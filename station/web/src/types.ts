@@ -26,6 +26,36 @@ export interface Job {
   state: string; done: number; total: number; current: string; error: string; summary: Record<string, number>;
   files: { input: string; status: string; reasons: string[]; still_error_mg: { before: number | null; after: number | null } }[];
 }
+export interface Signature { made_at: string; operator: string; reason: string; new_baseline: boolean }
+export interface Lock { locked: boolean; reasons: string[]; check_units: string[]; signature: Signature | null; problem: string }
 export interface State {
-  station: string; version: string; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job;
+  station: string; version: string; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job; lock: Lock | null;
+}
+
+export interface Title { name: string; title: string; unit: string; axis?: string }
+export interface Chart {
+  serial: string; name: string; in_force: boolean; baseline: number; centre: number; sigma: number; lower: number; upper: number;
+  mean_range: number; upper_range: number; values: number[]; times: string[];
+  signals: { point: number; rule: number; meaning: string }[];
+}
+export interface CheckUnitsView extends Lock {
+  charts: Chart[]; titles: Record<string, Title>; baseline_runs: number; locking_rules: number[];
+}
+export interface Proportion { count: number; of: number; value: number | null; interval: [number, number] }
+export interface Group {
+  name: string; runs: number; units: number; yield: Proportion; first_pass_yield: Proportion;
+  failure_codes: { code: string; runs: number }[]; seconds_per_unit: { median: number | null };
+}
+export interface Capability {
+  n: number; mean: number; sd: number; cp: number | null; cpk: number; cpk_interval: [number, number];
+}
+export interface StatisticsView {
+  by: string; all: Group; groups: Group[]; capability: Record<string, Capability>; titles: Record<string, Title>;
+  codes: Record<string, { meaning: string; cause: string; next_action: string }>;
+}
+export interface Studies { studies: string[]; quantities: (Title & { axes: string[] })[] }
+export interface GageView {
+  study: string; quantity: string; axis: string; parts: number; operators: number; trials: number; grr_percent: number; ndc: number;
+  judgement: string; usable: boolean; pooled: boolean;
+  components: Record<string, { variance: number; sd: number; contribution_percent: number; study_percent: number }>;
 }

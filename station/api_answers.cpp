@@ -1,0 +1,72 @@
+#include "station/api_answers.h"
+
+#include <fmt/format.h>
+
+namespace sixpoint::station {
+
+using Json = nlohmann::ordered_json;
+
+std::string dump(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+ApiAnswer answer(int status, const Json& json) {
+  return {status, "application/json", dump(json), {}};
+}
+
+ApiAnswer refusal(int status, std::string_view code, std::string_view what, std::string_view hint) {
+  Json json;
+  json["error"]["code"] = code;
+  json["error"]["what"] = what;
+  json["error"]["hint"] = hint;
+  return answer(status, json);
+}
+
+ApiAnswer refusal(const Error& error) {
+  int status = 500;
+  switch (error.code) {
+    case ErrorCode::usage:
+    case ErrorCode::bad_data:
+    case ErrorCode::configuration:
+      status = 400;
+      break;
+    case ErrorCode::no_input:
+      status = 404;
+      break;
+    case ErrorCode::permission:
+      status = 403;
+      break;
+    case ErrorCode::cannot_create:
+      status = 409;
+      break;
+    case ErrorCode::device_unavailable:
+      status = 503;
+      break;
+    case ErrorCode::internal:
+    case ErrorCode::io:
+      break;
+  }
+  const std::string what =
+      error.where.empty() ? error.what : fmt::format("{}: {}", error.where, error.what);
+  return refusal(status, to_string(error.code), what, error.hint);
+}
+
+ApiAnswer unknown_route() {
+  return refusal(404, "not_found", "there is nothing at this address", "docs/station.md lists all");
+}
+
+ApiAnswer bad_field(std::string_view key, std::string_view wanted) {
+  return refusal(400, "bad_request", fmt::format("'{}' must be {}", key, wanted));
+}
+
+std::optional<std::string> text_of(const Json& body, const char* key) {
+  if (!body.contains(key) || body[key].is_null()) {
+    return std::string();
+  }
+  if (!body[key].is_string() || body[key].get_ref<const std::string&>().size() > kMostText) {
+    return std::nullopt;
+  }
+  return body[key].get<std::string>();
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,106 @@
+// Check units, the lock, statistics, gage studies: the routes of station_desk.h.
+#include <charconv>
+
+#include "station/api_answers.h"
+#include "station/station_desk.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string parameter(const ApiRequest& request, const char* name) {
+  const auto found = request.parameters.find(name);
+  return found == request.parameters.end() ? std::string() : found->second.substr(0, kMostText);
+}
+
+ApiAnswer answer_of(const Result<Json>& json) {
+  return json ? answer(200, *json) : refusal(json.error());
+}
+
+bool is_serial(const std::string& text) {
+  return !text.empty() && text.size() <= 16 &&
+         text.find_first_not_of(
+             "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-") ==
+             std::string::npos;
+}
+
+}  // namespace
+
+std::optional<ApiAnswer> Api::desk_view(const ApiRequest& request, const std::string& what) {
+  if (parts_.desk == nullptr) {
+    return std::nullopt;
+  }
+  if (what == "check-units") {
+    return answer_of(parts_.desk->check_units());
+  }
+  if (what == "statistics") {
+    return answer_of(parts_.desk->statistics(
+        {parameter(request, "by"), parameter(request, "from"), parameter(request, "to")}));
+  }
+  if (what == "gage-rr") {
+    GageQuestion question;
+    question.study = parameter(request, "study");
+    if (question.study.empty()) {
+      return answer_of(parts_.desk->studies());
+    }
+    if (const auto quantity = parameter(request, "quantity"); !quantity.empty()) {
+      question.quantity = quantity;
+      question.axis = parameter(request, "axis");
+    }
+    if (const std::string text = parameter(request, "tolerance"); !text.empty()) {
+      const char* const end = text.data() + text.size();
+      const auto [stop, error] = std::from_chars(text.data(), end, question.tolerance);
+      if (error != std::errc() || stop != end || !(question.tolerance > 0)) {
+        return bad_field("tolerance", "a width above 0");
+      }
+    }
+    return answer_of(parts_.desk->gage_study(question));
+  }
+  return std::nullopt;
+}
+
+std::optional<ApiAnswer> Api::desk_decision(const ApiRequest& request, const std::string& what,
+                                            const Json& body) {
+  if (parts_.desk == nullptr || (what != "station-lock" && what != "check-units")) {
+    return std::nullopt;
+  }
+  // Beyond what the guard asks of every request: no form of another page can send this header.
+  if (request.client.empty()) {
+    return refusal(403, "client_needed", "a decision comes from the station's own page",
+                   "send the header X-Sixpoint-Client");
+  }
+  const auto operator_name = text_of(body, "operator");
+  const auto reason = text_of(body, "reason");
+  if (!operator_name || !reason) {
+    return bad_field(operator_name ? "reason" : "operator", "a text of at most 200 bytes");
+  }
+  Decision decision;
+  decision.operator_name = *operator_name;
+  decision.reason = *reason;
+  if (what == "station-lock") {
+    if (body.contains("new_baseline") && !body["new_baseline"].is_boolean()) {
+      return bad_field("new_baseline", "true or false");
+    }
+    decision.action = body.value("new_baseline", false) ? "sign_new_baseline" : "sign";
+  } else {
+    const auto serial = text_of(body, "serial");
+    const auto action = text_of(body, "action");
+    if (!serial || !is_serial(*serial)) {
+      return bad_field("serial", "a serial number");
+    }
+    if (!action || (*action != "add" && *action != "remove")) {
+      return bad_field("action", "add or remove");
+    }
+    decision.serial = *serial;
+    decision.action = *action == "add" ? "check_unit" : "check_unit_end";
+  }
+  const auto id = parts_.desk->decide(decision);
+  if (!id) {
+    return refusal(id.error());
+  }
+  return answer(200, {{"stored_id", *id}, {"lock", parts_.desk->lock()}});
+}
+
+}  // namespace sixpoint::station
