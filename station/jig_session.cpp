@@ -34,7 +34,7 @@ bool has_two_filters(const std::string& serial,
 
 // A program that was killed leaves its unit streaming, and such a unit takes no other filter.
 Status choose_filter(device::Unit& unit, calib::FilterConfiguration filter) {
-  const Status chosen = unit.set_filter(filter);
+  Status chosen = unit.set_filter(filter);
   if (chosen || chosen.error().code != ErrorCode::io) {
     return chosen;
   }

@@ -343,11 +343,12 @@ LineScan coherent_scan(const Bundle& bundle, const std::vector<Stretch>& set,
   out.nats.assign(half, 0);
   // Maximum likelihood per frequency: b' A^-1 b with b the sum of the dwells' weighted spectra,
   // each turned into the frame, and A its covariance. Noise gives it a gamma law of shape 3.
+  constexpr std::size_t kHalfCoarse = kCoarse / 2;
   std::array<std::vector<double>, 3> weight;  // 1 / variance, on a coarse grid: noise is smooth
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t k = 0; k < half; k += kCoarse) {
       weight[axis].push_back(
-          1 / noise.variance_at(axis, static_cast<double>(k + kCoarse / 2) * out.step_hz));
+          1 / noise.variance_at(axis, static_cast<double>(k + kHalfCoarse) * out.step_hz));
     }
   }
   std::vector<Vector3c> lab(half, Vector3c::Zero());

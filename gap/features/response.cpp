@@ -242,7 +242,8 @@ class Search {
     Pink found;
     std::array<double, 3> white{};
     for (const double slope : {1.0, 0.8, 1.2, 1.4, 1.7, 2.0}) {
-      for (double mg = 0.08; mg < 4; mg *= 1.2) {
+      double mg = 0.08;
+      for (int step = 0; step < 22; ++step, mg *= 1.2) {  // to 3.7 mg
         pink_ = {mg, slope};
         if (const double nats = noise_nats(low_pass, white).nats; nats > best) {
           best = nats;
