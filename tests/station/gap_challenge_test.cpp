@@ -140,7 +140,7 @@ TEST_F(GapChallenge, AddsEffectsToARecording) {
                     "--trials", "12", "--none", "0.2", "--seed", "3", "--json"});
   ASSERT_EQ(answer.exit_code, 0) << answer.people;
   const auto json = answer.json();
-  EXPECT_EQ(json["own_effects"], nlohmann::json::array({"tilt"}));
+  EXPECT_EQ(json["own_effects"], nlohmann::ordered_json::array({"tilt"}));
   EXPECT_EQ(json["scores"]["failures"]["right"], 0);
   EXPECT_EQ(json["scores"]["none_alarms"]["right"], 0);
   EXPECT_GE(json["scores"]["single_first_right"]["share"].get<double>(), 0.8);
