@@ -125,10 +125,10 @@ TEST_P(Resimulation, GapAfterIsWhatTheSimulatorLeaves) {
   RecordProperty("after_ug", static_cast<int>(1000 * after_mg));
   RecordProperty("closed_form_after_ug", static_cast<int>(1000 * found->gap.after_mg));
   RecordProperty("floor_ug", static_cast<int>(1000 * floor_mg));
-  // The closed form's gap.after, held out, is the simulator's within a quarter, and never smaller:
+  // The closed form's gap.after, held out, is the simulator's within a third, and never smaller:
   // it counts the tones of the high shaker, too, which are known worse.
   EXPECT_LT(after_mg, 1.05 * found->gap.after_mg);
-  EXPECT_GT(after_mg, 0.75 * found->gap.after_mg);
+  EXPECT_GT(after_mg, 0.67 * found->gap.after_mg);
   // gap.md: nine tenths of what the true form would close.
   const double closable = before_mg * before_mg - floor_mg * floor_mg;
   const double closed = before_mg * before_mg - after_mg * after_mg;
