@@ -61,6 +61,6 @@ run_ctest build/sanitize -L '^unit$'
 # All of it takes two cores half an hour where nothing is known from an earlier run; what changed
 # last comes first.
 step "clang-tidy"
-scripts/tidy.sh --within 420
+scripts/tidy.sh --within 240
 
 step "Everything passed"
