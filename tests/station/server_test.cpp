@@ -392,6 +392,7 @@ TEST(Server, NonsenseIsRefused) {
 TEST(Server, ARequestWithoutABodyIsAnswered) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7"}, folder.path());
+  station.wait_state(1, "idle");
   const std::string host = "Host: 127.0.0.1:" + std::to_string(station.server->port()) + "\r\n\r\n";
   EXPECT_THAT(answer_to(station, "POST /api/lanes/1/stop HTTP/1.1\r\n" + host), HasSubstr(" 409 "));
   EXPECT_THAT(answer_to(station, "POST /api/run HTTP/1.1\r\n" + host), HasSubstr(" 202 "));
