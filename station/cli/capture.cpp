@@ -28,6 +28,8 @@ struct Options {
   std::optional<double> gravity_m_per_s2;
   int rate_hz = 30;
   double side_s = 40;
+  double turn_s = 5;
+  int patience_s = 60;
   bool json = false;
 };
 
@@ -76,6 +78,8 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   station::CaptureOptions capture;
   capture.rate_hz = options.rate_hz;
   capture.side_s = options.side_s;
+  capture.turn_s = options.turn_s;
+  capture.replug_patience_s = options.patience_s;
   capture.output = options.output;
   if (capture.output.empty()) {
     const std::string day = to_iso8601(context.env.clock.now()).substr(0, 10);
@@ -194,7 +198,18 @@ void add_capture(CLI::App& app, Context& context) {
       ->check(CLI::Range(30, 100))
       ->capture_default_str();
   command->add_option("--side-seconds", options->side_s, "how long the unit rests on a side")
-      ->check(CLI::Range(10.0, 3600.0))
+      ->check(CLI::Range(1.0, 3600.0))
+      ->capture_default_str();
+  command
+      ->add_option("--turn-seconds", options->turn_s,
+                   "and before that, for the hand to let go of it")
+      ->check(CLI::Range(0.0, 60.0))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--patience", options->patience_s,
+          "seconds to wait for a unit that is not plugged in when its recording is fetched")
+      ->check(CLI::Range(0, 3600))
       ->capture_default_str();
   add_store_option(*command, options->store);
   add_record_option(*command, options->record);

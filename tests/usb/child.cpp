@@ -33,7 +33,8 @@ void drain(int from, pid_t child, std::string& all, const OnLine& on_line) {
   }
 }
 
-ChildAnswer run(std::vector<std::string> words, const OnLine& on_out, const OnLine& on_people) {
+ChildAnswer run(std::vector<std::string> words, const OnLine& on_out, const OnLine& on_people,
+                const std::string& input = "/dev/null") {
   ChildAnswer answer;
   std::array<int, 2> out{};
   std::array<int, 2> people{};
@@ -42,7 +43,7 @@ ChildAnswer run(std::vector<std::string> words, const OnLine& on_out, const OnLi
   }
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 0, input.c_str(), O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, out[1], 1);
   posix_spawn_file_actions_adddup2(&actions, people[1], 2);
   std::vector<char*> argv;
@@ -79,12 +80,13 @@ std::vector<std::string> sixpoint(std::vector<std::string> arguments) {
 ChildAnswer run_program(const std::vector<std::string>& words) { return run(words, {}, {}); }
 
 ChildAnswer run_child(const std::vector<std::string>& arguments,
-                      const std::function<void(const std::string&)>& on_line) {
+                      const std::function<void(const std::string&)>& on_line,
+                      const std::string& input) {
   OnLine people;
   if (on_line) {
     people = [&on_line](const std::string& line, pid_t /*child*/) { on_line(line); };
   }
-  return run(sixpoint(arguments), {}, people);
+  return run(sixpoint(arguments), {}, people, input);
 }
 
 ChildAnswer run_child_lines(const std::vector<std::string>& arguments, const OnLine& on_line) {

@@ -16,9 +16,11 @@ struct ChildAnswer {
   std::string people;
 };
 
-// Runs SIXPOINT_PROGRAM. `on_line` gets each line of stderr as it comes.
+// Runs SIXPOINT_PROGRAM. `on_line` gets each line of stderr as it comes; stdin is the file `input`.
+// May be called by several threads at once.
 ChildAnswer run_child(const std::vector<std::string>& arguments,
-                      const std::function<void(const std::string&)>& on_line = {});
+                      const std::function<void(const std::string&)>& on_line = {},
+                      const std::string& input = "/dev/null");
 // Runs any program: its path, and its arguments.
 ChildAnswer run_program(const std::vector<std::string>& words);
 // `on_line` gets each line of stdout, and the child to signal.

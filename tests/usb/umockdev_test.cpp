@@ -23,6 +23,7 @@
 #include "usb/bodies.h"
 #include "usb/child.h"
 #include "usb/plugged.h"
+#include "usb/technician.h"
 #include "usb/umockdev_bench.h"
 
 namespace sixpoint::tests {
@@ -439,46 +440,6 @@ TEST_F(Program, WithoutPermissionNamesTheUdevRules) {
             true);
 }
 
-// Turns the unit as the program's prompts say, as a technician would.
-class Technician {
- public:
-  explicit Technician(BenchUnit& unit) : unit_(unit) {}
-  void hear(const std::string& line) {
-    // "turn the unit to +x: ...", "lay the unit on -z ...", "take the unit off, ... turn it to +y
-    // ..."
-    constexpr std::array<std::string_view, 3> kPrompts = {"turn the unit to ", "lay the unit on ",
-                                                          "turn it to "};
-    const bool off_first = line.starts_with("take the unit off");
-    for (const std::string_view prompt : kPrompts) {
-      const std::size_t at = line.find(prompt);
-      if (at == std::string::npos) {
-        continue;
-      }
-      const auto pose = device::parse_pose(line.substr(at + prompt.size(), 2));
-      if (!pose) {
-        continue;
-      }
-      turn(*pose, off_first);
-      return;
-    }
-  }
-  void turn(device::Pose pose, bool off_first) {
-    const auto up = device::direction_of(pose);
-    const std::lock_guard lock(unit_.unit->mutex);
-    auto now = unit_.clock->elapsed();
-    if (off_first) {
-      unit_.unit->unit.turn_to({up[1], up[2], up[0]}, now, 0.3);
-      now += milliseconds(500);
-    }
-    unit_.unit->unit.turn_to({up[0], up[1], up[2]}, now, 0.3);
-    ++turns;
-  }
-  int turns = 0;
-
- private:
-  BenchUnit& unit_;
-};
-
 TEST_F(Program, MeasuresAUnitOnTheJigAndWritesItsConstants) {
   constexpr int kPace = 8;  // the unit's time passes so much faster than the program's
   auto unit = make_unit(5, {}, kPace);
@@ -529,137 +490,6 @@ TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
   EXPECT_NE(answer.people.find("did not come back within 2 s; plug it in"), std::string::npos)
       << answer.people;
 }
-
-// The table of docs/faults.md once more, with the program as people run it: what it prints, and
-// what it ends with.
-struct ProgramFault {
-  const char* name;
-  const char* faults;  // of the plan
-  std::vector<const char*> more;
-  int exit_code;
-  const char* says;  // on stderr
-  int leaves = 0;    // how often it leaves the bus
-};
-
-void PrintTo(const ProgramFault& fault, std::ostream* out) { *out << fault.name; }
-
-class ProgramFaults : public testing::TestWithParam<ProgramFault> {};
-
-TEST_P(ProgramFaults, EndWithWhatTheTableSays) {
-  const ProgramFault& fault = GetParam();
-  auto made = mocks::UmockdevBus::make();
-  ASSERT_OK(made);
-  UmockdevBench bench(std::move(*made));
-  constexpr int kPace = 8;
-  auto plan = mocks::parse_fault_plan(
-      std::string(R"({"schema": "sixpoint/faults/1", "faults": [)") + fault.faults + "]}");
-  ASSERT_OK(plan);
-  auto unit = make_unit(5, *std::move(plan), kPace);
-  const sim::UnitTruth truth = unit.unit->unit.truth();
-  ASSERT_OK(bench.plug_in(unit));
-  std::future<Status> back;
-  if (fault.leaves > 0) {
-    back = std::async(std::launch::async, [&]() -> Status {
-      for (int i = 0; i < fault.leaves; ++i) {
-        const std::string port = unit.port;
-        if (!bench.wait_until_left(unit)) {
-          return fail(ErrorCode::internal, "the unit did not leave the bus");
-        }
-        SIXPOINT_CHECK(bench.plug_in(unit, port));
-      }
-      return {};
-    });
-  }
-  TemporaryFolder folder;
-  Technician technician(unit);
-  std::vector<std::string> arguments = {"jig",     "--device", "hid:",    "--jig",
-                                        "manual",  "--dwell",  "0.5",     "--filter",
-                                        "current", "--json",   "--store", folder / "store.db"};
-  arguments.insert(arguments.end(), fault.more.begin(), fault.more.end());
-  const ChildAnswer answer =
-      run_child(arguments, [&](const std::string& line) { technician.hear(line); });
-  if (back.valid()) {
-    EXPECT_OK(back.get());
-  }
-  EXPECT_EQ(answer.exit_code, fault.exit_code) << answer.people << answer.out;
-  EXPECT_NE((answer.people + answer.out).find(fault.says), std::string::npos) << answer.people;
-  const auto json = nlohmann::json::parse(answer.out, nullptr, false);
-  const ChildAnswer history =
-      run_child({"history", truth.serial, "--store", folder / "store.db", "--json"});
-  const auto stored = nlohmann::json::parse(history.out, nullptr, false);
-  if (fault.exit_code != 0) {
-    const bool any = stored.is_object() && stored.contains("constants");
-    EXPECT_TRUE(!any || stored["constants"].empty()) << "nothing wrong is stored";
-    return;
-  }
-  ASSERT_TRUE(json.is_object());
-  EXPECT_EQ(json["verdict"], "pass");
-  EXPECT_EQ(stored["constants"].size(), 1U);
-  // Oracle: what the simulated sensor really is; as in MeasuresAUnitOnTheJigAndWritesItsConstants.
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    EXPECT_NEAR(json["constants"]["sensitivity_g_per_lsb"][axis].get<double>() *
-                    truth.current.sensitivity_lsb_per_g[axis],
-                1, 0.007);
-    EXPECT_NEAR(json["constants"]["zero_lsb"][axis].get<double>(), truth.current.zero_lsb[axis], 2);
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Table, ProgramFaults,
-    testing::Values(
-        // A poor cable and a poor unit, all at once: none of it reaches the constants.
-        ProgramFault{"poor_cable",
-                     R"({"fault": "bad_page", "at_s": 0},
-                        {"fault": "stall", "of": "replies", "at_report": 3},
-                        {"fault": "lost", "of": "replies", "at_report": 6},
-                        {"fault": "bad_crc", "of": "replies", "at_report": 9},
-                        {"fault": "duplicate", "at_report": 2, "every": 3},
-                        {"fault": "delay", "of": "samples", "at_report": 40, "seconds": 0.5},
-                        {"fault": "garbage", "of": "samples", "at_report": 70},
-                        {"fault": "bit_flip", "of": "samples", "at_report": 150, "bit": 6},
-                        {"fault": "short_packet", "of": "samples", "at_report": 230},
-                        {"fault": "wrong_sequence", "of": "samples", "at_report": 310},
-                        {"fault": "clock_jump", "of": "samples", "at_report": 350, "seconds": 4})",
-                     {"--write"},
-                     0,
-                     "unreadable"},
-        // Thrice away, in three ways; each time it is found again, also under another node.
-        ProgramFault{"away_and_back",
-                     R"({"fault": "reset", "of": "samples", "at_report": 60},
-                        {"fault": "unplug", "of": "samples", "at_report": 160, "seconds": 4},
-                        {"fault": "reenumerate", "of": "samples", "at_report": 260})",
-                     {},
-                     0,
-                     "it is back",
-                     2},
-        ProgramFault{"swap",
-                     R"({"fault": "swap", "of": "samples", "at_report": 60,
-                         "serial": "MOS2B99990009"})",
-                     {},
-                     69,
-                     "MOS2B99990009",
-                     1},
-        ProgramFault{"frozen_sensor",
-                     R"({"fault": "frozen_sensor", "of": "samples", "at_report": 20})",
-                     {},
-                     1,
-                     "the sensor is frozen"},
-        ProgramFault{"axis_stuck",
-                     R"({"fault": "axis_stuck", "of": "samples", "at_report": 20, "axis": "y"})",
-                     {},
-                     1,
-                     "y axis is stuck"},
-        ProgramFault{"battery_low",
-                     R"({"fault": "battery_low", "at_s": 0})",
-                     {"--write"},
-                     74,
-                     "charge the unit"},
-        ProgramFault{"no_reply",
-                     R"({"fault": "lost", "of": "replies", "at_report": 4, "count": 0})",
-                     {},
-                     69,
-                     "does not answer"}),
-    [](const auto& one) { return std::string(one.param.name); });
 
 }  // namespace
 }  // namespace sixpoint::tests
