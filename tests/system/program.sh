@@ -67,19 +67,28 @@ wait $server
 
 echo "== the installed program, a unit and a motorised jig, through fault plans (docs/faults.md)"
 # with_faults EXIT WORDS PLAN ARGUMENTS...: offers both with the plan, attaches them, runs the
-# program, expects its exit code and what it says.
+# program, expects its exit code and what it says. A unit that its plan takes off the bus is
+# attached again. The unit's time passes at $pace.
+pace=real
+plug_in_again() {
+  for i in $(seq 1000); do [ -e /sys/bus/usb/devices/1-1 ] || break; sleep 0.1; done
+  for i in $(seq 100); do usbip attach -r 127.0.0.1 -b 1-1 2>/dev/null && break; sleep 0.1; done
+}
 with_faults() {
   expected=$1 words=$2 status=0
   echo "{\"schema\": \"sixpoint/faults/1\", \"faults\": [$3]}" >F.json
   shift 3
-  sixpoint virtual --device virtual:seed=7,serial=MOS2A45130007 --jig --faults F.json >offered3 2>hints &
+  sixpoint virtual --device "virtual:seed=7,serial=MOS2A45130007,pace=$pace" --jig --faults F.json >offered3 2>hints &
   server=$!
   for i in $(seq 100); do grep -q listening offered3 && break; sleep 0.1; done
   usbip attach -r 127.0.0.1 -b 1-1
   usbip attach -r 127.0.0.1 -b 1-2
   for i in $(seq 100); do [ -e /dev/hidraw1 ] && break; sleep 0.1; done
   udevadm settle --timeout=10
+  plug_in_again &
+  cable=$!
   sixpoint "$@" --json >answer 2>said || status=$?
+  kill $cable 2>/dev/null || true
   cat said
   [ $status -eq "$expected" ] || { echo "FAILED: ended with $status, not with $expected"; cat answer; return 1; }
   cat said answer | grep -q "$words" || { echo "FAILED: no word of: $words"; cat answer; return 1; }
@@ -98,3 +107,17 @@ with_faults 0 '"verdict": "pass"' '{"fault": "bad_page", "at_s": 0},
   {"fault": "bit_flip", "of": "samples", "at_report": 150, "bit": 6},
   {"fault": "wrong_sequence", "of": "samples", "at_report": 310}' $run --write
 grep -q 'were unreadable' answer said
+with_faults 0 'it is back' '{"fault": "power_loss", "at_s": 1, "bytes": 300, "seconds": 1},
+  {"fault": "lost", "of": "replies", "at_report": 5}' $run --write
+echo "== captures"
+pace=40
+run="capture --device hid:MOS2A45130007 --jig hid:J600001 --store bench.db --side-seconds 1 --turn-seconds 0.4"
+with_faults 74 'storage full' '{"fault": "full_flash", "at_s": 0}' $run -o full.gt3x
+[ ! -e full.gt3x ]
+with_faults 0 '"verified": true' '{"fault": "stall", "channel": "bulk", "at_report": 1},
+  {"fault": "bit_flip", "channel": "bulk", "at_report": 2}, {"fault": "short_packet", "channel": "bulk", "at_report": 4, "bytes": 100},
+  {"fault": "lost", "channel": "bulk", "at_report": 5}, {"fault": "garbage", "channel": "bulk", "at_report": 7},
+  {"fault": "bad_crc", "of": "replies", "at_report": 3}, {"fault": "duplicate", "channel": "bulk", "at_report": 9},
+  {"fault": "wrong_sequence", "of": "replies", "at_report": 5}' $run -o poor.gt3x
+sixpoint solve poor.gt3x
+with_faults 0 'the unit came back' '{"fault": "unplug", "channel": "bulk", "at_report": 2, "seconds": 30}' $run -o away.gt3x
