@@ -20,6 +20,7 @@
 #include "expect_result.h"
 #include "mocks/fault_plan.h"
 #include "mocks/in_process.h"
+#include "skip_unless.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::device {
@@ -75,10 +76,7 @@ std::pair<nlohmann::json, int> ask_oracle(const std::string& session) {
 class ProtocolOracle : public testing::Test {
  protected:
   void SetUp() override {
-    if (!has_python()) {
-      ASSERT_EQ(std::getenv("SIXPOINT_MUST_NOT_SKIP"), nullptr) << "python3 is missing";
-      GTEST_SKIP() << "python3 is missing; install the Debian package python3";
-    }
+    SIXPOINT_SKIP_UNLESS(has_python(), "python3 is missing; install the Debian package python3");
   }
   // A session of everything that a station asks a unit for, with these faults on the way.
   Session record(const std::string& faults) {

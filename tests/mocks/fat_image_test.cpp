@@ -12,6 +12,7 @@
 
 #include "base/random.h"
 #include "expect_result.h"
+#include "skip_unless.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::mocks {
@@ -61,10 +62,7 @@ bool has_tools() {
 class AgainstTools : public testing::TestWithParam<std::tuple<std::uint64_t, int>> {};
 
 TEST_P(AgainstTools, FilesComeBackAsTheyWere) {
-  if (!has_tools()) {
-    ASSERT_EQ(std::getenv("SIXPOINT_MUST_NOT_SKIP"), nullptr) << "mtools or dosfstools is missing";
-    GTEST_SKIP() << "SKIPPED: mtools and dosfstools are not installed";
-  }
+  SIXPOINT_SKIP_UNLESS(has_tools(), "install the Debian packages mtools and dosfstools");
   const auto [volume_bytes, bits] = GetParam();
   tests::TemporaryFolder folder;
   const UtcTime time = *parse_iso8601("2015-04-09T14:04:32");

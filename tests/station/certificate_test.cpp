@@ -14,6 +14,7 @@
 #include "mocks/in_process.h"
 #include "mocks/virtual_jig.h"
 #include "run_command.h"
+#include "skip_unless.h"
 #include "station/jig_session.h"
 #include "temporary_folder.h"
 
@@ -41,12 +42,10 @@ bool has_tools() {
   return output_of("for tool in pdftotext pdftoppm zbarimg; do command -v $tool; done | wc -l")
       .starts_with("3");
 }
-#define NEEDS_TOOLS()                                                                 \
-  if (!has_tools()) {                                                                 \
-    ASSERT_EQ(std::getenv("SIXPOINT_MUST_NOT_SKIP"), nullptr) << "tools are missing"; \
-    GTEST_SKIP() << "pdftotext, pdftoppm and zbarimg are needed: "                    \
-                    "scripts/install_packages.sh test (poppler-utils zbar-tools)";    \
-  }
+#define NEEDS_TOOLS()                                                        \
+  SIXPOINT_SKIP_UNLESS(has_tools(),                                          \
+                       "pdftotext, pdftoppm or zbarimg is missing; install " \
+                       "the Debian packages poppler-utils and zbar-tools")
 
 // A run as the store would give it back, of a virtual unit.
 db::RunRecord record_of(std::uint64_t seed, const JigSessionOptions& options,

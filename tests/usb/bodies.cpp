@@ -14,6 +14,7 @@
 #include "device/payload.h"
 #include "device/unit.h"
 #include "expect_result.h"
+#include "skip_unless.h"
 #include "temporary_folder.h"
 #include "usb/plugged.h"
 
@@ -425,9 +426,7 @@ void a_second_program_is_told_who_is_in_the_way(UsbBench& bench) {
 }
 
 void permission_errors_name_the_rule(UsbBench& bench) {
-  if (::geteuid() != 0) {
-    GTEST_SKIP() << "needs root, to become somebody who may not";
-  }
+  SIXPOINT_SKIP_UNLESS(::geteuid() == 0, "needs root, to become somebody who may not");
   Plugged plugged(bench, make_unit(111));
   ASSERT_OK(plugged.status());
   const auto found = wait_for(1);
