@@ -504,6 +504,31 @@ TEST_F(Program, MeasuresAUnitOnTheJigAndWritesItsConstants) {
   }
 }
 
+// What passed through hidapi, played back without it: the same run.
+TEST_F(Program, RecordsASessionThatReplaysWithoutTheUnit) {
+  auto unit = make_unit(5, {}, 8);
+  ASSERT_OK(bench->plug_in(unit));
+  const TemporaryFolder folder;
+  const std::string session = folder / "session.zip";
+  Technician technician(unit);
+  const auto jig = [&](const std::string& device, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"jig",     "--device",         device, "--jig",
+                                          "manual",  "--dwell",          "0.5",  "--json",
+                                          "--store", folder / "store.db"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_child(arguments, [&](const std::string& line) { technician.hear(line); });
+  };
+  const ChildAnswer recorded = jig(unit.hid_address(), {"--record", session});
+  ASSERT_EQ(recorded.exit_code, 0) << recorded.people;
+  bench->unplug(unit);
+  for (const std::string& match : {std::string(), std::string(",match=key")}) {
+    const ChildAnswer replayed = jig("replay:" + session + match, {});
+    ASSERT_EQ(replayed.exit_code, 0) << replayed.people;
+    EXPECT_EQ(nlohmann::json::parse(replayed.out)["constants"],
+              nlohmann::json::parse(recorded.out)["constants"]);
+  }
+}
+
 TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
   auto unit = make_unit(6);
   ASSERT_OK(bench->plug_in(unit));
