@@ -88,34 +88,36 @@ class Unit {
   // come within `patience`, or another unit came.
   virtual Status reconnect(std::chrono::nanoseconds patience) = 0;
 
-  virtual Result<CalibrationPage> read_calibration() = 0;
+  // What follows answers `usage` unless the unit overrides it (abilities()).
+  virtual Result<CalibrationPage> read_calibration();
   // The whole transaction: stage, read back, compare, commit, read, compare. After an error the
   // unit holds the old page or the new one; read_calibration() tells which.
-  virtual Status write_calibration(const CalibrationPage& page) = 0;
+  virtual Status write_calibration(const CalibrationPage& page);
 
-  virtual Result<FilterState> filter() = 0;
-  virtual Status set_filter(FilterConfiguration filter) = 0;  // reads it back
+  virtual Result<FilterState> filter();
+  virtual Status set_filter(FilterConfiguration filter);  // reads it back
 
-  virtual Status start_stream(int rate_hz) = 0;
+  virtual Status start_stream(int rate_hz);
   // The next block in order. Empty when none came in time.
-  virtual Result<std::optional<SampleBlock>> next_samples(std::chrono::nanoseconds time_out) = 0;
-  virtual Status stop_stream() = 0;  // what still waits is dropped
-  virtual const StreamStatistics& stream_statistics() const = 0;
+  virtual Result<std::optional<SampleBlock>> next_samples(std::chrono::nanoseconds time_out);
+  virtual Status stop_stream();  // what still waits is dropped
+  virtual const StreamStatistics& stream_statistics() const;
 
-  virtual Result<std::uint16_t> start_recording(int rate_hz, UtcTime now) = 0;
-  virtual Result<std::uint16_t> stop_recording() = 0;
-  virtual Result<std::vector<RecordingInfo>> recordings() = 0;
+  virtual Result<std::uint16_t> start_recording(int rate_hz, UtcTime now);
+  virtual Result<std::uint16_t> stop_recording();
+  virtual Result<std::vector<RecordingInfo>> recordings();
   // Saves a recording under `path`. What arrives is kept in `path`.HASH.part, and goes on from
   // there in a later call; `path` appears when the whole has the announced SHA-256. cannot_create
   // where `path` exists. `progress` gets the bytes so far.
   virtual Status download(const RecordingInfo& recording, FileSystem& files,
                           const std::string& path,
-                          const std::function<void(std::uint64_t)>& progress = {}) = 0;
+                          const std::function<void(std::uint64_t)>& progress = {});
 
   virtual void cancel() = 0;
 
  protected:
   Unit() = default;
+  tl::unexpected<Error> cannot(const char* what) const;
 };
 
 }  // namespace sixpoint::device

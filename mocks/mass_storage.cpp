@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "device/usb_ids.h"
+
 namespace sixpoint::mocks {
 
 namespace {
@@ -367,6 +369,31 @@ MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
     default:
       return refuse(kBadCommand);
   }
+}
+
+UsbAnswer StorageUsbDevice::halting(UsbAnswer answer, std::uint8_t endpoint) {
+  if (answer.kind == UsbAnswer::Kind::stall) {
+    halt(endpoint);
+  }
+  if (storage_.needs_reset()) {
+    halt(device::kStorageInEndpoint);
+    halt(device::kStorageOutEndpoint);
+  }
+  return answer;
+}
+
+UsbAnswer StorageUsbDevice::take_storage(std::span<const std::uint8_t> bytes) {
+  return halting(storage_.take(bytes), device::kStorageOutEndpoint);
+}
+
+UsbAnswer StorageUsbDevice::give_storage(std::size_t max_length) {
+  return halting(storage_.give(max_length), device::kStorageInEndpoint);
+}
+
+bool StorageUsbDevice::may_clear_halt(std::uint8_t endpoint) {
+  const bool of_storage =
+      endpoint == device::kStorageInEndpoint || endpoint == device::kStorageOutEndpoint;
+  return !of_storage || !storage_.needs_reset();
 }
 
 }  // namespace sixpoint::mocks

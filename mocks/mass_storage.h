@@ -71,4 +71,22 @@ class MassStorage {
   std::function<Bytes(std::uint64_t offset, std::size_t length)> source_;
 };
 
+// A device with mass storage behind the endpoints kStorageInEndpoint and kStorageOutEndpoint
+// (device/usb_ids.h): a command block that made no sense halts both until the reset recovery.
+class StorageUsbDevice : public StandardUsbDevice {
+ protected:
+  StorageUsbDevice(UsbDescriptors descriptors, std::shared_ptr<Clock> clock, ScsiIdentity identity)
+      : StandardUsbDevice(std::move(descriptors), std::move(clock)),
+        storage_(std::move(identity)) {}
+
+  UsbAnswer take_storage(std::span<const std::uint8_t> bytes);
+  UsbAnswer give_storage(std::size_t max_length);
+  bool may_clear_halt(std::uint8_t endpoint) override;
+
+  MassStorage storage_;
+
+ private:
+  UsbAnswer halting(UsbAnswer answer, std::uint8_t endpoint);
+};
+
 }  // namespace sixpoint::mocks

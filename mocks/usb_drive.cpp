@@ -33,8 +33,8 @@ UsbDescriptors drive_descriptors(const std::string& serial) {
 
 UsbDrive::UsbDrive(const sim::UnitTruth& truth, std::shared_ptr<const BlockMedium> volume,
                    std::shared_ptr<Clock> clock)
-    : StandardUsbDevice(drive_descriptors(truth.serial), std::move(clock)),
-      storage_({.product = kProductName, .serial = truth.serial}) {
+    : StorageUsbDevice(drive_descriptors(truth.serial), std::move(clock),
+                       {.product = kProductName, .serial = truth.serial}) {
   storage_.insert(std::move(volume));
 }
 
@@ -42,23 +42,12 @@ UsbAnswer UsbDrive::own_request(const SetupPacket& setup, std::span<const std::u
   return storage_.request(setup, kInterface);
 }
 
-UsbAnswer UsbDrive::halted_by(UsbAnswer answer, std::uint8_t endpoint) {
-  if (answer.kind == UsbAnswer::Kind::stall) {
-    halt(endpoint);
-  }
-  if (storage_.needs_reset()) {
-    halt(device::kStorageInEndpoint);
-    halt(device::kStorageOutEndpoint);
-  }
-  return answer;
+UsbAnswer UsbDrive::take(const UsbEndpoint& /*endpoint*/, std::span<const std::uint8_t> bytes) {
+  return take_storage(bytes);
 }
 
-UsbAnswer UsbDrive::take(const UsbEndpoint& endpoint, std::span<const std::uint8_t> bytes) {
-  return halted_by(storage_.take(bytes), endpoint.address);
-}
-
-UsbAnswer UsbDrive::give(const UsbEndpoint& endpoint, std::size_t max_length) {
-  return halted_by(storage_.give(max_length), endpoint.address);
+UsbAnswer UsbDrive::give(const UsbEndpoint& /*endpoint*/, std::size_t max_length) {
+  return give_storage(max_length);
 }
 
 }  // namespace sixpoint::mocks

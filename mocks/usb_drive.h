@@ -11,7 +11,7 @@
 
 namespace sixpoint::mocks {
 
-class UsbDrive final : public StandardUsbDevice {
+class UsbDrive final : public StorageUsbDevice {
  public:
   // Interface 0; the endpoints are those of a monitor's storage (device/usb_ids.h).
   static constexpr std::uint8_t kInterface = 0;
@@ -25,10 +25,6 @@ class UsbDrive final : public StandardUsbDevice {
   UsbAnswer take(const UsbEndpoint& endpoint, std::span<const std::uint8_t> bytes) override;
   UsbAnswer give(const UsbEndpoint& endpoint, std::size_t max_length) override;
   void on_reset() override { storage_.reset(); }
-  bool may_clear_halt(std::uint8_t /*endpoint*/) override { return !storage_.needs_reset(); }
-  UsbAnswer halted_by(UsbAnswer answer, std::uint8_t endpoint);
-
-  MassStorage storage_;
 };
 
 }  // namespace sixpoint::mocks

@@ -130,11 +130,19 @@ Result<FatImage> unit_volume(const VirtualUnit& unit) {
   return FatImage::make(files);
 }
 
+namespace {
+
+ScsiIdentity scsi_identity(const sim::UnitTruth& truth) {
+  return {.product = "Activity monitor", .serial = truth.serial};
+}
+
+}  // namespace
+
 UsbUnit::UsbUnit(std::shared_ptr<PluggedUnit> plugged)
-    : StandardUsbDevice(unit_descriptors(plugged->unit.truth()), plugged->clock),
+    : StorageUsbDevice(unit_descriptors(plugged->unit.truth()), plugged->clock,
+                       scsi_identity(plugged->unit.truth())),
       plugged_(std::move(plugged)),
-      bulk_(kBulkPacketBytes),
-      storage_({.product = "Activity monitor", .serial = plugged_->unit.truth().serial}) {
+      bulk_(kBulkPacketBytes) {
   enumeration_seen_ = plugged_->faults.enumeration();
   show_recordings();
 }
@@ -163,8 +171,7 @@ void UsbUnit::on_reset() {
   if (enumeration_seen_ != plugged_->faults.enumeration()) {
     enumeration_seen_ = plugged_->faults.enumeration();
     describe(unit_descriptors(plugged_->unit.truth()));
-    storage_ =
-        MassStorage({.product = "Activity monitor", .serial = plugged_->unit.truth().serial});
+    storage_ = MassStorage(scsi_identity(plugged_->unit.truth()));
     recordings_shown_.reset();
     show_recordings();
   }
@@ -182,12 +189,6 @@ bool UsbUnit::is_on_bus() const {
   FaultInjector& faults = plugged_->faults;
   faults.advance(plugged_->unit, plugged_->clock->elapsed());
   return faults.plugged() && faults.enumeration() == enumeration_seen_;
-}
-
-bool UsbUnit::may_clear_halt(std::uint8_t endpoint) {
-  const bool of_storage =
-      endpoint == device::kStorageInEndpoint || endpoint == device::kStorageOutEndpoint;
-  return !of_storage || !storage_.needs_reset();
 }
 
 UsbAnswer UsbUnit::own_request(const SetupPacket& setup, std::span<const std::uint8_t> data) {
@@ -252,17 +253,6 @@ UsbAnswer UsbUnit::give_report(std::size_t max_length) {
   return answer;
 }
 
-UsbAnswer UsbUnit::of_storage(UsbAnswer answer, std::uint8_t endpoint) {
-  if (answer.kind == UsbAnswer::Kind::stall) {
-    halt(endpoint);
-  }
-  if (storage_.needs_reset()) {
-    halt(device::kStorageInEndpoint);
-    halt(device::kStorageOutEndpoint);
-  }
-  return answer;
-}
-
 UsbAnswer UsbUnit::take(const UsbEndpoint& endpoint, std::span<const std::uint8_t> bytes) {
   switch (endpoint.address) {
     case device::kHidOutEndpoint:
@@ -272,7 +262,7 @@ UsbAnswer UsbUnit::take(const UsbEndpoint& endpoint, std::span<const std::uint8_
         const std::lock_guard lock(plugged_->mutex);
         show_recordings();
       }
-      return of_storage(storage_.take(bytes), endpoint.address);
+      return take_storage(bytes);
     }
     default:
       return UsbAnswer::done();  // the bulk OUT endpoint is not used (docs/protocol.md)
@@ -284,7 +274,7 @@ UsbAnswer UsbUnit::give(const UsbEndpoint& endpoint, std::size_t max_length) {
     case device::kHidInEndpoint:
       return give_report(max_length);
     case device::kStorageInEndpoint:
-      return of_storage(storage_.give(max_length), endpoint.address);
+      return give_storage(max_length);
     default:
       break;
   }

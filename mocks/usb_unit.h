@@ -25,7 +25,7 @@ UsbDescriptors unit_descriptors(const sim::UnitTruth& truth);
 // What a file manager sees of the unit; configuration when the recordings do not fit.
 Result<FatImage> unit_volume(const VirtualUnit& unit);
 
-class UsbUnit final : public StandardUsbDevice {
+class UsbUnit final : public StorageUsbDevice {
  public:
   // The unit is shared with whoever turns it (virtual_jig.h) or looks into it; its mutex is held
   // while the device answers.
@@ -41,17 +41,14 @@ class UsbUnit final : public StandardUsbDevice {
   void on_reset() override;
   void on_plug(bool plugged) override;
   bool is_on_bus() const override;
-  bool may_clear_halt(std::uint8_t endpoint) override;
 
   UsbAnswer take_reports(std::span<const std::uint8_t> bytes);
   UsbAnswer give_report(std::size_t max_length);
-  UsbAnswer of_storage(UsbAnswer answer, std::uint8_t endpoint);
   void show_recordings();
 
   std::shared_ptr<PluggedUnit> plugged_;
   TransferQueue bulk_;
   std::uint64_t download_of_bulk_ = 0;  // to which request what is in bulk_ belongs
-  MassStorage storage_;
   std::optional<std::size_t> recordings_shown_;
   Bytes last_report_ = Bytes(device::kReportBytes, std::uint8_t{0});
   std::uint32_t enumeration_seen_ = 0;  // of the fault plan

@@ -105,11 +105,6 @@ Result<Identity> DriveUnit::read_identity() const {
   return identity;
 }
 
-tl::unexpected<Error> DriveUnit::cannot(const char* what) const {
-  return fail(ErrorCode::usage, fmt::format("this unit offers files and {}", what), address_,
-              "calibrate it by a file: 'sixpoint capture --device drive:FOLDER'");
-}
-
 Result<Identity> DriveUnit::identify() {
   SIXPOINT_ASSIGN(Identity identity, read_identity());
   if (identity.serial != identity_.serial) {
@@ -135,22 +130,6 @@ Status DriveUnit::reconnect(std::chrono::nanoseconds patience) {
     env_.clock.sleep(std::chrono::milliseconds(200));
   }
 }
-
-Result<CalibrationPage> DriveUnit::read_calibration() { return cannot("shows no constants"); }
-Status DriveUnit::write_calibration(const CalibrationPage& /*page*/) {
-  return cannot("takes no constants");
-}
-Result<FilterState> DriveUnit::filter() { return cannot("says nothing of its filter"); }
-Status DriveUnit::set_filter(FilterConfiguration /*filter*/) { return cannot("takes no commands"); }
-Status DriveUnit::start_stream(int /*rate_hz*/) { return cannot("no live samples"); }
-Result<std::optional<SampleBlock>> DriveUnit::next_samples(std::chrono::nanoseconds /*time_out*/) {
-  return cannot("no live samples");
-}
-Status DriveUnit::stop_stream() { return cannot("no live samples"); }
-Result<std::uint16_t> DriveUnit::start_recording(int /*rate_hz*/, UtcTime /*now*/) {
-  return cannot("takes no commands");
-}
-Result<std::uint16_t> DriveUnit::stop_recording() { return cannot("takes no commands"); }
 
 Result<std::vector<RecordingInfo>> DriveUnit::recordings() {
   SIXPOINT_ASSIGN(const FileInfo log, env_.files.info(path_of(kLogName)));

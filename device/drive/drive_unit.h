@@ -22,17 +22,6 @@ class DriveUnit final : public Unit {
   Result<Identity> identify() override;
   Status reconnect(std::chrono::nanoseconds patience) override;
 
-  Result<CalibrationPage> read_calibration() override;
-  Status write_calibration(const CalibrationPage& page) override;
-  Result<FilterState> filter() override;
-  Status set_filter(FilterConfiguration filter) override;
-  Status start_stream(int rate_hz) override;
-  Result<std::optional<SampleBlock>> next_samples(std::chrono::nanoseconds time_out) override;
-  Status stop_stream() override;
-  const StreamStatistics& stream_statistics() const override { return statistics_; }
-  Result<std::uint16_t> start_recording(int rate_hz, UtcTime now) override;
-  Result<std::uint16_t> stop_recording() override;
-
   // The one recording; bytes and hash are those of its log.bin.
   Result<std::vector<RecordingInfo>> recordings() override;
   // Makes a .gt3x of log.bin and info.txt, byte for byte as they are in the unit. bad_data when
@@ -47,13 +36,11 @@ class DriveUnit final : public Unit {
 
   std::string path_of(const char* name) const { return folder_ + "/" + name; }
   Result<Identity> read_identity() const;
-  tl::unexpected<Error> cannot(const char* what) const;
 
   std::string folder_;
   std::string address_;
   Env& env_;
   Identity identity_;
-  StreamStatistics statistics_;
 };
 
 // Registers "drive:FOLDER".
