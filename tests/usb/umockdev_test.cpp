@@ -534,7 +534,7 @@ TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
   ASSERT_OK(bench->plug_in(unit));
   TemporaryFolder folder;
   const ChildAnswer answer =
-      run_child({"jig", "--device", unit.usb_address(), "--jig", "manual", "--patience", "2",
+      run_child({"jig", "--device", unit.usb_address(), "--jig", "manual", "--patience", "1",
                  "--store", folder / "store.db"},
                 [&](const std::string& line) {
                   if (line.starts_with("turn the unit") && !unit.port.empty()) {
@@ -542,7 +542,7 @@ TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
                   }
                 });
   EXPECT_EQ(answer.exit_code, 69) << answer.people;
-  EXPECT_NE(answer.people.find("did not come back within 2 s; plug it in"), std::string::npos)
+  EXPECT_NE(answer.people.find("did not come back within 1 s; plug it in"), std::string::npos)
       << answer.people;
 }
 
