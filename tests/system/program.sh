@@ -1,10 +1,8 @@
-#The program and Debian's usbip tool, as a person would use them.
+# The program and Debian's usbip tool, as a person would use them.
 cd /tmp
 sixpoint virtual --count 2 --device virtual:seed=7,serial=MOS2A45130007 >offered 2>hints &
 server=$!
-for i in $(seq 100);
-do grep - q listening offered&& break;
-sleep 0.1; done
+for i in $(seq 100); do grep -q listening offered && break; sleep 0.1; done
 cat offered hints
 usbip list -r 127.0.0.1 2>/dev/null | tee listed
 [ "$(grep -c '1209:0001' listed)" -eq 2 ]
@@ -12,22 +10,18 @@ usbip list -r 127.0.0.1 2>/dev/null | tee listed
 echo "== attach both"
 usbip attach -r 127.0.0.1 -b 1-1
 usbip attach -r 127.0.0.1 -b 1-2
-for i in $(seq 100);
-do [-e / dev / hidraw1] && [-e / dev / sdb] && break;
-sleep 0.1;
-done ls / dev / hidraw0 / dev / hidraw1 grep -
-    l MOS2A45130007 / sys / bus / usb /
-        devices         /*/serial
-        
+for i in $(seq 100); do [ -e /dev/hidraw1 ] && [ -e /dev/sdb ] && break; sleep 0.1; done
+ls /dev/hidraw0 /dev/hidraw1
+grep -l MOS2A45130007 /sys/bus/usb/devices/*/serial
+
 echo "== the volume"
-disk=/dev/$(basename "$(ls -d /sys/bus/usb/devices/1-1:1.2/host*/
-            target*     /*/block/*)")
+disk=/dev/$(basename "$(ls -d /sys/bus/usb/devices/1-1:1.2/host*/target*/*/block/*)")
 mount -t vfat -o ro "$disk" /mnt
 ls -l /mnt
 grep -q 'Serial Number: MOS2A45130007' /mnt/info.txt
 [ -s /mnt/log.bin ]
 umount /mnt
-    
+
 echo "== detach and attach again"
 usbip detach -p 0
 for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1 ] || break; sleep 0.1; done
@@ -35,26 +29,24 @@ for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1 ] || break; sleep 0.1; don
 for i in $(seq 100); do usbip attach -r 127.0.0.1 -b 1-1 2>/dev/null && break; sleep 0.1; done
 for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1/serial ] && break; sleep 0.1; done
 [ "$(cat /sys/bus/usb/devices/1-1/serial)" = MOS2A45130007 ]
-    
+
 echo "== the program ends and takes its units along"
 kill -INT $server
 wait $server
 for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
 ! ls /sys/bus/usb/devices | grep '^1-[1-9]'
-    
+
 echo "== a unit that is files alone: found, mounted, calibrated from its mount point"
 sixpoint virtual --device virtual:seed=7,serial=MOS2A45130008,interfaces=storage >offered2 2>hints &
 server=$!
 for i in $(seq 100); do grep -q listening offered2 && break; sleep 0.1; done
 usbip attach -r 127.0.0.1 -b 1-1
-for i in $(seq 100); do ls /sys/bus/usb/devices/1-1:1.0/host*/
-                target* /*/block/* >/dev/null 2>&1 && break; sleep 0.1; done
+for i in $(seq 100); do ls /sys/bus/usb/devices/1-1:1.0/host*/target*/*/block/* >/dev/null 2>&1 && break; sleep 0.1; done
 udevadm settle --timeout=10
 [ "$(cat /sys/bus/usb/devices/1-1/bNumInterfaces)" -eq 1 ]
 sixpoint devices | tee found
 grep -q '^MOS2A45130008 .*file-monitor .*not mounted' found
-disk=/dev/$(basename "$(ls -d /sys/bus/usb/devices/1-1:1.0/host*/
-                    target*/*/block/*)")
+disk=/dev/$(basename "$(ls -d /sys/bus/usb/devices/1-1:1.0/host*/target*/*/block/*)")
 mkdir -p "/mnt/my unit"
 mount -t vfat -o ro "$disk" "/mnt/my unit"
 sixpoint devices | tee found
