@@ -5,11 +5,13 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "gap/header_evidence.h"
 #include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
 
@@ -285,13 +287,22 @@ void read_host_clock(FileSystem& files, const std::string& folder, Bundle& bundl
 }
 
 Status read_recording(FileSystem& files, const std::string& path, const BundleLimits& limits,
-                      Bundle& bundle) {
+                      Bundle& bundle, HeaderClaims& claims) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
   bundle.header.serial = recording.info().serial();
   bundle.header.model = recording.info().device_type();
   bundle.header.firmware = recording.info().firmware();
   gt3x::SampleReader reader(recording);
   std::uint64_t damaged_s = 0;
+  std::map<std::size_t, std::size_t> records_of;  // so many samples
+  const auto claim_scale = [&claims](const char* source, std::optional<double> lsb_per_g) {
+    const bool known = std::any_of(claims.scales.begin(), claims.scales.end(),
+                                   [&](const auto& claim) { return claim.source == source; });
+    if (lsb_per_g && std::isfinite(*lsb_per_g) && *lsb_per_g > 0 && !known) {
+      claims.scales.push_back({source, *lsb_per_g});
+    }
+  };
+  claim_scale("info.txt", recording.info().accel_scale_lsb_per_g());
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
     if (!item) {
@@ -302,8 +313,10 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
         return bad(path, fmt::format("more than {} samples", limits.max_samples));
       }
       bundle.samples.insert(bundle.samples.end(), item->counts.begin(), item->counts.end());
+      ++records_of[item->counts.size()];
       if (item->parameters != nullptr) {
         bundle.header.calibration_time = item->parameters->calibration_time;
+        claim_scale("PARAMETERS record", item->parameters->accel_scale_lsb_per_g);
       }
     } else if (item->gap == gt3x::GapKind::damaged) {
       damaged_s += item->seconds;
@@ -315,10 +328,14 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
                            "numbers no longer hold",
                            damaged_s));
   }
-  if (const auto rate = recording.info().sample_rate_hz();
-      rate && *rate > 0 && std::abs(*rate - bundle.rate_hz) > 0.5) {
-    return bad(path, fmt::format("the recording was made at {} Hz, the protocol says {} Hz", *rate,
-                                 bundle.rate_hz));
+  if (const auto rate = recording.info().sample_rate_hz(); rate && *rate > 0) {
+    claims.rate_hz = *rate;
+  }
+  const auto most =
+      std::max_element(records_of.begin(), records_of.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most != records_of.end() && most->first > 0) {
+    claims.samples_per_record = static_cast<double>(most->first);
   }
   return {};
 }
@@ -458,7 +475,8 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   if (segments->size() > limits.max_segments) {
     return bad(protocol_path, fmt::format("more than {} segments", limits.max_segments));
   }
-  SIXPOINT_CHECK(read_recording(files, folder + "/recording.gt3x", limits, bundle));
+  HeaderClaims claims;
+  SIXPOINT_CHECK(read_recording(files, folder + "/recording.gt3x", limits, bundle, claims));
   std::size_t end = 0;
   for (std::size_t i = 0; i < segments->size(); ++i) {
     const std::string where = fmt::format("{}: segments[{}]", protocol_path, i);
@@ -490,6 +508,7 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   }
   read_temperature(files, folder, bundle);
   read_host_clock(files, folder, bundle);
+  SIXPOINT_CHECK(weigh_header(claims, bundle));
   drop_foreign_clock(bundle);
   find_placements(bundle);
   return bundle;

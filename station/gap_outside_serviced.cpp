@@ -45,8 +45,7 @@ Made stress_creep(Draw d) {
   made->sensor = [=, ratio = d.vector_of_mg(2 * d.severity), watch = Stopwatch{}, fresh = true,
                   load = Eigen::Vector3d(Eigen::Vector3d::Zero()),
                   quick = Eigen::Vector3d(Eigen::Vector3d::Zero()),
-                  slow =
-                      Eigen::Vector3d(Eigen::Vector3d::Zero())](SimulatedBlock& block) mutable {
+                  slow = Eigen::Vector3d(Eigen::Vector3d::Zero())](SimulatedBlock& block) mutable {
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (fresh) {
         load = quick = slow = block.sensed_g[i];
@@ -56,8 +55,8 @@ Made stress_creep(Draw d) {
       quick += (1 - std::exp(-passed_s / quick_s)) * (load - quick);
       slow += (1 - std::exp(-passed_s / slow_s)) * (load - slow);
       load = block.sensed_g[i];
-      block.sensed_g[i] += ratio.cwiseProduct((1 - slow_share) * (load - quick) +
-                                              slow_share * (load - slow));
+      block.sensed_g[i] +=
+          ratio.cwiseProduct((1 - slow_share) * (load - quick) + slow_share * (load - slow));
     }
   };
   return made;
@@ -100,21 +99,21 @@ Made channel_crosstalk(Draw d) {
   made->placement = [fresh](const Placement& at) { *fresh = *fresh || !at.contiguous; };
   const std::size_t first = d.axis();
   const std::size_t step = d.random.uniform() < 0.5 ? 1 : 2;
-  made->analog = [fresh, order = std::array{first, (first + step) % kAxes,
-                                            (first + 2 * step) % kAxes},
-                  share = d.sign() * 0.004 * d.severity, kept = 0.0](SimulatedBlock& block) mutable {
-    for (Eigen::Vector3d& sensed : block.sensed_g) {
-      if (*fresh) {  // the samples before were left out: alike
-        kept = sensed[row(order[kAxes - 1])];
-        *fresh = false;
-      }
-      for (const std::size_t axis : order) {
-        const double now = sensed[row(axis)];
-        sensed[row(axis)] += share * (kept - now);
-        kept = now;
-      }
-    }
-  };
+  made->analog =
+      [fresh, order = std::array{first, (first + step) % kAxes, (first + 2 * step) % kAxes},
+       share = d.sign() * 0.004 * d.severity, kept = 0.0](SimulatedBlock& block) mutable {
+        for (Eigen::Vector3d& sensed : block.sensed_g) {
+          if (*fresh) {  // the samples before were left out: alike
+            kept = sensed[row(order[kAxes - 1])];
+            *fresh = false;
+          }
+          for (const std::size_t axis : order) {
+            const double now = sensed[row(axis)];
+            sensed[row(axis)] += share * (kept - now);
+            kept = now;
+          }
+        }
+      };
   return made;
 }
 
@@ -158,15 +157,15 @@ Made magnet_pull(Draw d) {
 // turned from where the cable is held, at once or only when the cable is taut.
 Made cable_pull(Draw d) {
   auto made = std::make_unique<Parts>();
-  made->stimulus = [outlet = direction(d), held = direction(d), deg = 0.15 * d.severity,
-                    slack = d.random.uniform() < 0.5 ? -1.0
-                                                     : d.between(-0.5, 0.5)](SimulatedBlock& block) {
-    for (sim::MotionState& motion : block.motion) {
-      const Eigen::Vector3d out = motion.rotation.transpose() * outlet;
-      const double pull = std::max(0.0, -out.dot(held) - slack) / (1 - slack);
-      motion.rotation = motion.rotation * turn_by(deg * pull * out.cross(held));
-    }
-  };
+  made->stimulus =
+      [outlet = direction(d), held = direction(d), deg = 0.15 * d.severity,
+       slack = d.random.uniform() < 0.5 ? -1.0 : d.between(-0.5, 0.5)](SimulatedBlock& block) {
+        for (sim::MotionState& motion : block.motion) {
+          const Eigen::Vector3d out = motion.rotation.transpose() * outlet;
+          const double pull = std::max(0.0, -out.dot(held) - slack) / (1 - slack);
+          motion.rotation = motion.rotation * turn_by(deg * pull * out.cross(held));
+        }
+      };
   return made;
 }
 
@@ -176,8 +175,7 @@ Made loose_battery(Draw d) {
   auto made = std::make_unique<Parts>();
   const Eigen::Vector3d slot = direction(d);
   made->sensor = [slot, sticks_g = d.between(0.2, 0.9) * slot.cwiseAbs().maxCoeff(), end = d.sign(),
-                  g = d.vector_of_mg(1.5 * d.severity)](
-                     SimulatedBlock& block) mutable {
+                  g = d.vector_of_mg(1.5 * d.severity)](SimulatedBlock& block) mutable {
     for (Eigen::Vector3d& sensed : block.sensed_g) {
       const double along = slot.dot(sensed);
       if (std::abs(along) > sticks_g) {
@@ -243,9 +241,9 @@ Made torn_reads(Draw d) {
 // zero follows the difference, not the temperature.
 Made thermal_gradient(Draw d) {
   auto made = std::make_unique<Parts>();
-  made->sensor = [g_per_c = d.vector_of_mg(0.5 * d.severity),
-                  lag_s = d.between_log(40, 400), watch = Stopwatch{}, before_c = 0.0,
-                  inside_c = 0.0, fresh = true](SimulatedBlock& block) mutable {
+  made->sensor = [g_per_c = d.vector_of_mg(0.5 * d.severity), lag_s = d.between_log(40, 400),
+                  watch = Stopwatch{}, before_c = 0.0, inside_c = 0.0,
+                  fresh = true](SimulatedBlock& block) mutable {
     for (std::size_t i = 0; i < block.size(); ++i) {
       const double outside_c = block.temperature_c[i];
       const double passed_s = watch.lap(block.time_s[i]);
@@ -254,8 +252,8 @@ Made thermal_gradient(Draw d) {
         fresh = false;
       } else if (passed_s > 0) {  // a first-order lag behind a straight line, exactly
         const double behind_c = (outside_c - before_c) / passed_s * lag_s;
-        inside_c = outside_c - behind_c +
-                   (inside_c - before_c + behind_c) * std::exp(-passed_s / lag_s);
+        inside_c =
+            outside_c - behind_c + (inside_c - before_c + behind_c) * std::exp(-passed_s / lag_s);
         before_c = outside_c;
       }
       block.sensed_g[i] += g_per_c * (outside_c - inside_c);
@@ -281,8 +279,8 @@ Made wrong_pose(Draw d) {
   made->recording = [state, shares](const RecordingPlan& plan) {
     for (const double share : shares) {
       if (!plan.rests.empty()) {
-        state->rests.push_back(plan.rests[static_cast<std::size_t>(
-            share * static_cast<double>(plan.rests.size()))]);
+        state->rests.push_back(
+            plan.rests[static_cast<std::size_t>(share * static_cast<double>(plan.rests.size()))]);
       }
     }
   };
@@ -311,8 +309,8 @@ Made wrong_pose(Draw d) {
 // places, or a few samples on end are nonsense.
 Made bit_errors(Draw d) {
   auto made = std::make_unique<Parts>();
-  made->firmware = [d, law = d.random.below(3), left = std::uint64_t{0}](
-                       SimulatedBlock& block) mutable {
+  made->firmware = [d, law = d.random.below(3),
+                    left = std::uint64_t{0}](SimulatedBlock& block) mutable {
     for (gt3x::Counts& counts : block.stored) {
       const bool hit = d.random.uniform() < 1e-3 * d.severity;
       std::int16_t& one = counts[d.axis()];
@@ -341,8 +339,8 @@ Made vibration_rectification(Draw d) {
   auto made = std::make_unique<Parts>();
   auto fresh = std::make_shared<bool>(true);
   made->placement = [fresh](const Placement& at) { *fresh = *fresh || at.anew; };
-  made->sensor = [fresh, per_g = d.vector_of_mg(2 * d.severity),
-                  of_all = d.random.uniform() < 0.5, tau_s = d.between(0.5, 2), watch = Stopwatch{},
+  made->sensor = [fresh, per_g = d.vector_of_mg(2 * d.severity), of_all = d.random.uniform() < 0.5,
+                  tau_s = d.between(0.5, 2), watch = Stopwatch{},
                   mean = Eigen::Vector3d(Eigen::Vector3d::Zero()),
                   power = Eigen::Vector3d(Eigen::Vector3d::Zero())](SimulatedBlock& block) mutable {
     for (std::size_t i = 0; i < block.size(); ++i) {
@@ -355,8 +353,8 @@ Made vibration_rectification(Draw d) {
       mean += follow * (block.sensed_g[i] - mean);
       const Eigen::Vector3d moving = block.sensed_g[i] - mean;
       power += follow * (moving.cwiseAbs2() - power);
-      block.sensed_g[i] +=
-          of_all ? Eigen::Vector3d(per_g * power.sum()) : Eigen::Vector3d(per_g.cwiseProduct(power));
+      block.sensed_g[i] += of_all ? Eigen::Vector3d(per_g * power.sum())
+                                  : Eigen::Vector3d(per_g.cwiseProduct(power));
     }
   };
   return made;
@@ -368,8 +366,8 @@ Made self_calibration(Draw d) {
   auto made = std::make_unique<Parts>();
   made->firmware = [share = std::min(1.0, 0.5 * d.severity), tau_s = d.between_log(1, 20),
                     watch = Stopwatch{}, still = 0, scale = 1.0,
-                    smooth = Eigen::Vector3d(Eigen::Vector3d::Zero())](
-                       SimulatedBlock& block) mutable {
+                    smooth =
+                        Eigen::Vector3d(Eigen::Vector3d::Zero())](SimulatedBlock& block) mutable {
     constexpr double kMoves_lsb = 12;
     constexpr int kStill = 200;
     constexpr double kSmooth = 0.03;  // per sample

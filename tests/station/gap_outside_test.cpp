@@ -24,10 +24,12 @@ constexpr double kRate_hz = 100;
 constexpr double kLsbPerG = 256;
 constexpr int kForms = 40;
 constexpr std::array kServiced = {
-    "stress_creep",    "bit_weight",       "channel_crosstalk",       "beating_ripple",
-    "magnet_pull",     "cable_pull",       "loose_battery",           "regulator_dropout",
-    "torn_reads",      "thermal_gradient", "wrong_pose",              "bit_errors",
-    "self_calibration", "reference_noise", "vibration_rectification", "transverse_shaker"};
+    "stress_creep",     "bit_weight",        "channel_crosstalk",
+    "beating_ripple",   "magnet_pull",       "cable_pull",
+    "loose_battery",    "regulator_dropout", "torn_reads",
+    "thermal_gradient", "wrong_pose",        "bit_errors",
+    "self_calibration", "reference_noise",   "vibration_rectification",
+    "transverse_shaker"};
 
 const OutsideKind& kind_of(std::string_view name) {
   const auto& kinds = outside_kinds();
@@ -329,7 +331,7 @@ TEST(OutsideKinds, MagnetPullsByHowTheUnitStandsInTheRoom) {
     const Vector3d b = zero(pose({0, 0, 1}, 90));
     const Vector3d turned = zero(pose({0, 0, 1}, 180));
     EXPECT_GT((a - b).norm() + (a - turned).norm(), 1e-7);  // not by gravity alone
-    EXPECT_LT(a.cross(b).norm(), 1e-12);                     // always along one direction
+    EXPECT_LT(a.cross(b).norm(), 1e-12);                    // always along one direction
     // Seen through a point, a magnet turns its sign and steel does not.
     const Matrix3d point = -pose({0, 0, 1});
     magnetised += (zero(point) + a).norm() < 1e-12 ? 1 : 0;
@@ -540,7 +542,8 @@ TEST(OutsideKinds, BitErrorsAreFewAndStayWithinTwelveBits) {
         bits += static_cast<int>(std::bitset<12>(differ).count());
       }
       one_bit += bits == 1 ? 1 : 0;
-      nibbles += counts == gt3x::Counts{0x50, -20, 0x0B3} || counts == gt3x::Counts{5, -50, 0x0B3} ||
+      nibbles += counts == gt3x::Counts{0x50, -20, 0x0B3} ||
+                         counts == gt3x::Counts{5, -50, 0x0B3} ||
                          counts == gt3x::Counts{5, -20, 0x03B}
                      ? 1
                      : 0;
