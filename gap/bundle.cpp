@@ -238,7 +238,7 @@ void read_temperature(FileSystem& files, const std::string& folder, Bundle& bund
   std::stable_sort(table.rows.begin(), table.rows.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::erase_if(table.rows, [](const auto& row) { return std::abs(row.second) > 200; });
-  if (table.rows.size() < 2) {
+  if (table.rows.size() < 2 || !(table.rows.back().first > table.rows.front().first)) {
     bundle.losses.emplace_back(
         "temperature.csv is missing or empty: the commanded temperatures stand in for the unit's, "
         "effects of "
@@ -338,6 +338,52 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
     claims.samples_per_record = static_cast<double>(most->first);
   }
   return {};
+}
+
+// A log that ends early or is of another day is read on as its last value: say so.
+void weigh_logs(Bundle& bundle) {
+  constexpr double kReach_s = 60;
+  constexpr double kFar_c = 20;  // the unit lags behind the chamber by less
+  std::size_t unlogged = 0;
+  std::size_t far = 0;
+  std::size_t unstamped = 0;
+  for (const Segment& segment : bundle.segments) {
+    const double end_s =
+        segment.host_start_s + static_cast<double>(segment.samples) / bundle.rate_hz;
+    if (!bundle.temperature.empty()) {
+      unlogged += segment.host_start_s < bundle.temperature.host_time_s.front() - kReach_s ||
+                          end_s > bundle.temperature.host_time_s.back() + kReach_s
+                      ? 1
+                      : 0;
+      const double commanded = 0.5 * (segment.temperature_start_c + segment.temperature_end_c);
+      far +=
+          std::abs(bundle.temperature_at(0.5 * (segment.host_start_s + end_s)) - commanded) > kFar_c
+              ? 1
+              : 0;
+    }
+    const auto& stamps = bundle.host_clock.sample_index;
+    const auto stamp = std::lower_bound(stamps.begin(), stamps.end(), segment.first_sample);
+    unstamped += stamp == stamps.end() || *stamp >= segment.first_sample + segment.samples ? 1 : 0;
+  }
+  const std::size_t all = bundle.segments.size();
+  if (unlogged > 0) {
+    bundle.losses.push_back(
+        fmt::format("temperature.csv does not cover {} of {} segments: its nearest reading stands "
+                    "in, effects of temperature are told from effects of time less well",
+                    unlogged, all));
+  }
+  if (far > 0) {
+    bundle.losses.push_back(
+        fmt::format("temperature.csv is more than {:g} C from what was commanded in {} of {} "
+                    "segments: one of the two is wrong, the log is taken",
+                    kFar_c, far, all));
+  }
+  if (!bundle.host_clock.empty() && unstamped > 0) {
+    bundle.losses.push_back(fmt::format(
+        "host_clock.csv has no stamp in {} of {} segments: an error of the sample clock "
+        "and lost or repeated samples are looked for in the others",
+        unstamped, all));
+  }
 }
 
 // Stamps that are not of this recording's segments would make samples lost or repeated.
@@ -461,7 +507,7 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   }
   bundle.rate_hz = fields.number("sample_rate_hz", 1, 10'000);
   bundle.accel_scale_lsb_per_g = fields.number("accel_scale_lsb_per_g", 1, 100'000);
-  bundle.gravity_g = fields.number("gravity_g", 0.9, 1.1);
+  bundle.gravity_g = fields.number("gravity_g", 0.99, 1.01);  // 0.9956 to 1.0028
   SIXPOINT_CHECK(fields.status());
   if (const Json* unit = fields.object("unit")) {
     if (const auto serial = unit->find("serial"); serial != unit->end() && serial->is_string()) {
@@ -510,6 +556,7 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   read_host_clock(files, folder, bundle);
   SIXPOINT_CHECK(weigh_header(claims, bundle));
   drop_foreign_clock(bundle);
+  weigh_logs(bundle);
   find_placements(bundle);
   return bundle;
 }

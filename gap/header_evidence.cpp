@@ -35,8 +35,7 @@ std::optional<double> measured_lsb_per_g(const Bundle& bundle) {
     double n = 0;
     for (std::size_t i = from; i < segment.first_sample + segment.samples; ++i) {
       const gt3x::Counts& counts = bundle.samples[i];
-      if (counts == gt3x::Counts{} ||
-          std::any_of(counts.begin(), counts.end(), [](std::int16_t x) {
+      if (counts == gt3x::Counts{} || std::any_of(counts.begin(), counts.end(), [](std::int16_t x) {
             return x > kNearLimit || x < -kNearLimit;
           })) {
         continue;
@@ -68,8 +67,8 @@ double tolerance(double apart) { return std::min(0.12, 0.4 * std::abs(apart)); }
 
 Status weigh_scale(const HeaderClaims::Scale& claim, std::optional<double> measured,
                    Bundle& bundle) {
-  constexpr double kAlike = 0.002;    // digits that were cut
-  constexpr double kHidden = 0.05;    // a unit's own gains hide less than that
+  constexpr double kAlike = 0.002;  // digits that were cut
+  constexpr double kHidden = 0.05;  // a unit's own gains hide less than that
   const double said = bundle.accel_scale_lsb_per_g;
   const double apart = std::log(claim.lsb_per_g / said);
   if (std::abs(apart) < kAlike) {
@@ -89,19 +88,20 @@ Status weigh_scale(const HeaderClaims::Scale& claim, std::optional<double> measu
   const double by_header = *measured / claim.lsb_per_g;
   const auto fits = [&](double g) { return std::abs(std::log(g)) < tolerance(apart); };
   const auto mismatched = [](double g) { return g > kMismatchLow && g < kMismatchHigh; };
-  const std::string lengths = fmt::format("gravity at rest is {:.3f} g by the protocol's and {:.3f} "
-                                          "g by the header's",
-                                          by_protocol, by_header);
-  if (fits(by_protocol) || (!fits(by_header) && mismatched(by_protocol) && !mismatched(by_header))) {
-    bundle.losses.push_back(fmt::format("{}; {}: the header's is set aside, headers are copied",
-                                        both, lengths));
+  const std::string lengths = fmt::format(
+      "gravity at rest is {:.3f} g by the protocol's and {:.3f} "
+      "g by the header's",
+      by_protocol, by_header);
+  if (fits(by_protocol) ||
+      (!fits(by_header) && mismatched(by_protocol) && !mismatched(by_header))) {
+    bundle.losses.push_back(
+        fmt::format("{}; {}: the header's is set aside, headers are copied", both, lengths));
     return {};
   }
   return fail(ErrorCode::bad_data, fmt::format("{}; {}", both, lengths),
               bundle.path + "/protocol.json: accel_scale_lsb_per_g",
-              fits(by_header)
-                  ? "correct the protocol's scale: the samples bear out the header"
-                  : "find out the unit's scale: the samples bear out neither of them");
+              fits(by_header) ? "correct the protocol's scale: the samples bear out the header"
+                              : "find out the unit's scale: the samples bear out neither of them");
 }
 
 // Samples per second of the host's time, by the stamps within each segment; the median.
@@ -111,8 +111,8 @@ std::optional<double> stamped_rate_hz(const Bundle& bundle) {
   for (const Segment& segment : bundle.segments) {
     const auto begin = std::lower_bound(clock.sample_index.begin(), clock.sample_index.end(),
                                         segment.first_sample);
-    const auto end = std::lower_bound(begin, clock.sample_index.end(),
-                                      segment.first_sample + segment.samples);
+    const auto end =
+        std::lower_bound(begin, clock.sample_index.end(), segment.first_sample + segment.samples);
     if (end - begin < 2) {
       continue;
     }
@@ -120,8 +120,8 @@ std::optional<double> stamped_rate_hz(const Bundle& bundle) {
     const auto last = static_cast<std::size_t>(end - clock.sample_index.begin()) - 1;
     const double passed_s = clock.host_time_s[last] - clock.host_time_s[first];
     if (passed_s > 0.5) {
-      rates.push_back(
-          static_cast<double>(clock.sample_index[last] - clock.sample_index[first]) / passed_s);
+      rates.push_back(static_cast<double>(clock.sample_index[last] - clock.sample_index[first]) /
+                      passed_s);
     }
   }
   if (rates.empty()) {
@@ -141,16 +141,22 @@ Status weigh_rate(const HeaderClaims& claims, Bundle& bundle) {
   };
   const std::optional<double> stamped = stamped_rate_hz(bundle);
   const bool contradicted = claims.rate_hz && std::abs(*claims.rate_hz - said) > kAlike_hz;
-  const bool borne_out = agrees(stamped) || (!stamped && agrees(claims.samples_per_record));
+  // Of two claims the nearer one: 100 and 101 Hz are no clock error, but two numbers.
+  const auto nearer = [&](const std::optional<double>& rate_hz) {
+    return agrees(rate_hz) &&
+           (!claims.rate_hz || std::abs(*rate_hz - said) < std::abs(*rate_hz - *claims.rate_hz));
+  };
+  const bool borne_out = nearer(stamped) || (!stamped && nearer(claims.samples_per_record));
   const bool disproved = (stamped || claims.samples_per_record) && !agrees(stamped) &&
                          !agrees(claims.samples_per_record);
   if (!disproved && (!contradicted || borne_out)) {
     if (contradicted) {
-      bundle.losses.push_back(fmt::format(
-          "protocol.json says {:g} Hz, the recording's header {:g} Hz: {} the protocol, the header's "
-          "is set aside",
-          said, *claims.rate_hz,
-          stamped ? "the host's stamps bear out" : "the records' lengths bear out"));
+      bundle.losses.push_back(
+          fmt::format("protocol.json says {:g} Hz, the recording's header {:g} Hz: {} the "
+                      "protocol, the header's "
+                      "is set aside",
+                      said, *claims.rate_hz,
+                      stamped ? "the host's stamps bear out" : "the records' lengths bear out"));
     }
     return {};
   }
@@ -159,10 +165,9 @@ Status weigh_rate(const HeaderClaims& claims, Bundle& bundle) {
     what += fmt::format(", the recording's header {:g} Hz", *claims.rate_hz);
   }
   what += stamped ? fmt::format(", the host's stamps {:.1f} Hz", *stamped) : "";
-  what += claims.samples_per_record
-              ? fmt::format(", a record of one second holds {:g} samples",
-                            *claims.samples_per_record)
-              : "";
+  what += claims.samples_per_record ? fmt::format(", a record of one second holds {:g} samples",
+                                                  *claims.samples_per_record)
+                                    : "";
   return fail(ErrorCode::bad_data, what, bundle.path + "/protocol.json: sample_rate_hz",
               "correct the protocol's rate, or take the recording that belongs to it");
 }

@@ -210,7 +210,8 @@ void Diagnoser::judge_nuisances() {
     chi += g * g + o * o;
     nominal += -0.5 * (g * g + o * o) - std::log(kGainSd) - std::log(kOffsetSd_mg);
   }
-  if (few_poses_ || options_.uncalibrated) {
+  // Gains that were fitted to poses which are none of the unit's mean nothing.
+  if (few_poses_ || poses_wrong_ || options_.uncalibrated) {
     return;
   }
   // The wrong mode: a common gain anywhere in 0.78..0.97, the unit's own 2 % about it, and

@@ -10,6 +10,7 @@
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
+#include "base/random.h"
 #include "expect_result.h"
 #include "gap/diagnose.h"
 #include "gt3x/recording.h"
@@ -85,6 +86,7 @@ TEST_F(BundleTest, ContradictionsAreBadData) {
   fails("/sample_rate_hz", "100");
   fails("/sample_rate_hz", 30);  // the recording says 100
   fails("/gravity_g", nullptr);  // what NaN becomes in JSON
+  fails("/gravity_g", 1.05);     // nowhere on Earth
   fails("/segments", Json::array());
   fails("/segments/0/rotation", Json::parse("[[0,0,1],[1,0,0],[0,1,1]]"));   // not orthonormal
   fails("/segments/0/rotation", Json::parse("[[0,0,1],[1,0,0],[0,-1,0]]"));  // a reflection
@@ -238,8 +240,8 @@ TEST_F(Clerks, ASmallDifferenceIsALossAndCutDigitsAreNone) {
   EXPECT_TRUE(cut->losses.empty());
 }
 
-// Three public recordings have 2 to 2.9 % between X and Y (docs/constants.md): named, and said to be
-// more than the datasheet has.
+// Three public recordings have 2 to 2.9 % between X and Y (docs/constants.md): named, and said to
+// be more than the datasheet has.
 TEST_F(Clerks, TheCrossAxisOfARealUnitIsNamed) {
   const auto real = bundle(
       256, 256, 256,
@@ -275,6 +277,8 @@ TEST_F(Clerks, AWrongScaleThatBothSayIsAnUnknown) {
 TEST_F(Clerks, TheSampleRateIsWeighedByStampsAndRecords) {
   ASSERT_OK(bundle(256, 256, 256));
   set("sample_rate_hz", 30);
+  EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
+  set("sample_rate_hz", 101);  // no clock error: header, stamps and records all say 100
   EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
   set("sample_rate_hz", 97);
   EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
@@ -312,6 +316,92 @@ TEST_F(Clerks, TheSampleRateIsWeighedByStampsAndRecords) {
       [](const std::string& loss) { return loss.find("records' lengths") != std::string::npos; }));
   set("sample_rate_hz", 30);  // header and protocol lie alike, the records do not
   EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
+}
+
+// Poses, sample numbers and samples that do not belong together: said, and no effect is named.
+TEST_F(Clerks, AProtocolOfAnotherRecordingNamesNothing) {
+  const auto read = bundle(256, 256, 256);
+  ASSERT_OK(read);
+  const auto named_nothing = [](const Bundle& wrong, bool inconclusive, const char* why) {
+    SCOPED_TRACE(why);
+    const auto diagnosis = diagnose(wrong);
+    ASSERT_OK(diagnosis);
+    EXPECT_TRUE(diagnosis->effects.empty()) << diagnosis->effects.front().name;
+    EXPECT_EQ(diagnosis->inconclusive, inconclusive);
+    ASSERT_TRUE(diagnosis->unknown.present);
+    const auto& where = diagnosis->unknown.where;
+    EXPECT_TRUE(std::any_of(where.begin(), where.end(), [&](const std::string& at) {
+      return at.find(why) != std::string::npos;
+    })) << where.front();
+  };
+  Bundle wrong = *read;
+  std::swap(wrong.segments[0].rotation, wrong.segments[1].rotation);
+  named_nothing(wrong, false, "does not lie as the protocol says");
+  wrong = *read;
+  for (Segment& segment : wrong.segments) {
+    segment.rotation.transposeInPlace();
+  }
+  named_nothing(wrong, false, "does not lie as the protocol says");
+  wrong = *read;
+  wrong.segments.pop_back();
+  for (Segment& segment : wrong.segments) {
+    segment.first_sample += 500;
+  }
+  named_nothing(wrong, true, "moves inside the segments");
+  Random random(4);
+  for (const bool corners : {false, true}) {
+    wrong = *read;
+    for (gt3x::Counts& counts : wrong.samples) {
+      for (std::int16_t& x : counts) {
+        x = static_cast<std::int16_t>(corners ? 256 * (static_cast<int>(random.below(3)) - 1)
+                                              : static_cast<int>(random.below(4096)) - 2048);
+      }
+    }
+    named_nothing(wrong, true, "moves inside the segments");
+  }
+  wrong = *read;
+  for (gt3x::Counts& counts : wrong.samples) {
+    counts = {static_cast<std::int16_t>(3 + random.below(2)), -4,
+              static_cast<std::int16_t>(257 + random.below(2))};
+  }
+  const auto lying = diagnose(wrong);  // it never left one pose
+  ASSERT_OK(lying);
+  EXPECT_TRUE(lying->effects.empty());
+  EXPECT_TRUE(lying->unknown.present);
+}
+
+TEST_F(Clerks, LogsThatCoverHalfOrContradictAreLosses) {
+  ASSERT_OK(bundle(256, 256, 256));
+  const auto said = [&](const char* words) {
+    const auto read = read_bundle(memory_.files, "b");
+    EXPECT_OK(read);
+    return read && std::any_of(read->losses.begin(), read->losses.end(), [&](const auto& loss) {
+             return loss.find(words) != std::string::npos;
+           });
+  };
+  for (const char* words : {"does not cover", "from what was commanded", "has no stamp"}) {
+    EXPECT_FALSE(said(words)) << words;
+  }
+  for (const char* name : {"b/temperature.csv", "b/host_clock.csv"}) {
+    const Bytes whole = read_file(memory_.files, name).value();
+    ASSERT_OK(memory_.files.remove(name));
+    ASSERT_OK(write_file(
+        memory_.files, name,
+        std::string(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2))));
+  }
+  EXPECT_TRUE(said("temperature.csv does not cover"));
+  EXPECT_TRUE(said("host_clock.csv has no stamp"));
+  std::string hot = "host_time_s,temperature_c\n";
+  for (int i = 0; i < 600; ++i) {
+    hot += std::to_string(i) + ",90\n";
+  }
+  ASSERT_OK(memory_.files.remove("b/temperature.csv"));
+  ASSERT_OK(write_file(memory_.files, "b/temperature.csv", hot));
+  EXPECT_TRUE(said("from what was commanded"));
+  ASSERT_OK(memory_.files.remove("b/temperature.csv"));
+  ASSERT_OK(write_file(memory_.files, "b/temperature.csv",
+                       "host_time_s,temperature_c\n5,20\n5,30\n5,20\n"));
+  EXPECT_TRUE(said("temperature.csv is missing or empty"));
 }
 
 // Constant, all zero, all at one end of the range: nothing is named.
