@@ -32,8 +32,8 @@ std::vector<Dwell> dwells_of(const Bundle& bundle, const CleanSamples& clean) {
     if (segment.kind != Segment::Kind::still && segment.kind != Segment::Kind::soak) {
       continue;
     }
-    const std::size_t ring = std::min(static_cast<std::size_t>(kRing_s * bundle.rate_hz),
-                                      segment.samples / 2);
+    const std::size_t ring =
+        std::min(static_cast<std::size_t>(kRing_s * bundle.rate_hz), segment.samples / 2);
     const std::size_t middle = segment.first_sample + (ring + segment.samples) / 2;
     std::array<Eigen::Vector3d, 2> sum = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
     std::array<double, 2> n{};
@@ -92,9 +92,10 @@ bool Diagnoser::judge_poses() {
   }
   if (worst_g > kElsewhere_g) {
     poses_wrong_ = true;
-    alarm(worst_g / 0.005, fmt::format("pose: segment {} ({}) does not lie as the protocol says, by "
-                                       "{:.2f} g",
-                                       worst, bundle_.segments[worst].name, worst_g));
+    alarm(worst_g / 0.005,
+          fmt::format("pose: segment {} ({}) does not lie as the protocol says, by "
+                      "{:.2f} g",
+                      worst, bundle_.segments[worst].name, worst_g));
   }
   return true;
 }

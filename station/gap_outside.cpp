@@ -8,7 +8,7 @@ namespace sixpoint::station {
 
 namespace {
 
-using namespace outside_parts;  // NOLINT(google-build-using-namespace): made for this file
+using namespace outside_parts;
 
 // Random telegraph ("popcorn") noise of a bad contact or a trap in the front end.
 Made popcorn(Draw d) {

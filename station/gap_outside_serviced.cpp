@@ -266,10 +266,9 @@ Made thermal_gradient(Draw d) {
 // where it is known when the unit rests.
 Made wrong_pose(Draw d) {
   auto made = std::make_unique<Parts>();
-  std::vector<double> shares;
-  const int times = d.severity <= 0 ? 0 : d.severity < 1 ? 1 : d.severity < 2 ? 2 : 3;
-  for (int i = 0; i < times; ++i) {
-    shares.push_back(d.random.uniform());
+  std::vector<double> shares(d.severity <= 0 ? 0 : d.severity < 1 ? 1 : d.severity < 2 ? 2 : 3);
+  for (double& share : shares) {
+    share = d.random.uniform();
   }
   struct State {
     std::vector<RecordingPlan::Stretch> rests;
