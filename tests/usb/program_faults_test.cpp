@@ -32,7 +32,7 @@ struct ProgramFault {
   int comes_back = 0;
 };
 
-struct Ended {
+struct Ended {  // NOLINT(bugprone-exception-escape): json's destructor asserts
   ChildAnswer answer;
   nlohmann::json document;   // the answer's
   nlohmann::json constants;  // that the store holds
@@ -252,6 +252,7 @@ class ProgramFaults : public testing::Test {
            const std::function<std::vector<std::string>(const std::string& file)>& command,
            const std::function<void(const Ended&, const sim::UnitTruth&)>& judge) {
     std::vector<std::thread> programs;
+    programs.reserve(rows.size());
     std::uint64_t seed = 300;
     for (const ProgramFault& fault : rows) {
       programs.emplace_back([&, seed = ++seed] {
