@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "station/jig_session.h"
+#include "station/jig_report.h"
 
 namespace sixpoint::station {
 

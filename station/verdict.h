@@ -21,7 +21,7 @@
 
 namespace sixpoint::station {
 
-struct JigReport;  // jig_session.h
+struct JigReport;  // jig_report.h
 
 enum class JigVerdict { pass, conditional_pass, conditional_fail, fail, inconclusive, stopped };
 std::string_view to_string(JigVerdict verdict);  // "pass", "conditional_pass" ...
