@@ -215,6 +215,74 @@ void JigRun::drop_disagreeing(const PoseReading& reading) {
   });
 }
 
+// An axis' readings at +1 g and -1 g have its zero in their midpoint, whatever the tilt of those
+// two placements (it acts in second order). Does that speak for this reading, against the level
+// ones?
+bool JigRun::midpoints_agree_with(const PoseReading& reading) const {
+  const double limit_g = std::sin(options_.tilt_limit_deg / kDegPerRad);
+  bool supported = false;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    double sum_lsb = 0;
+    int count = 0;
+    for (const PoseReading& face : faces_) {
+      if (device::axis_of(face.pose) == axis) {
+        sum_lsb += face.mean_lsb[axis];
+        ++count;
+      }
+    }
+    if (axis != device::axis_of(reading.pose) && count == 2 &&
+        std::abs(reading.mean_lsb[axis] - sum_lsb / 2) * g_per_lsb(axis) > limit_g) {
+      return false;
+    }
+    supported = supported || (axis != device::axis_of(reading.pose) && count == 2);
+  }
+  return supported;
+}
+
+// Two readings of one pose differ by how the unit was seated, and by nothing of the sensor's own:
+// where one of them was tilted they say so even when the mean of all level readings does not, into
+// which a tilted one went itself. The newer is asked for again; when it repeats itself, the older
+// one of the first round goes, and the newer stands for it.
+bool JigRun::agrees_with_first_round(const PoseReading& reading) {
+  const auto first = std::find_if(faces_.begin(), faces_.end(), [&](const PoseReading& face) {
+    return face.pose == reading.pose;
+  });
+  if (first == faces_.end()) {
+    return true;
+  }
+  double square_g2 = 0;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    if (axis != device::axis_of(reading.pose)) {
+      const double apart_g = (reading.mean_lsb[axis] - first->mean_lsb[axis]) * g_per_lsb(axis);
+      square_g2 += apart_g * apart_g;
+    }
+  }
+  const double apart_deg = std::asin(std::min(1.0, std::sqrt(square_g2))) * kDegPerRad;
+  if (apart_deg <= options_.tilt_limit_deg) {
+    return true;
+  }
+  if (!repeats_refused(reading)) {
+    last_refused_ = reading;
+    refuse(reading.pose,
+           fmt::format("tilted {:.1f} degrees from how it lay in the first round", apart_deg));
+    return false;
+  }
+  last_refused_.reset();
+  refusals_in_row_ = 0;
+  last_progress_s_ = now_s_;
+  *first = reading;
+  actions_.push_back(
+      {JigAction::Kind::dropped, reading.pose,
+       fmt::format(
+           "{} was tilted about {:.1f} degrees in the first round, as two placements agree; "
+           "this one stands for it, and is needed once more from another side",
+           device::to_string(reading.pose), apart_deg)});
+  actions_.push_back({JigAction::Kind::fit, reading.pose, "the six faces are computed anew"});
+  leave();
+  ask_next();
+  return false;
+}
+
 void JigRun::finish_dwell() {
   PoseReading reading;
   reading.pose = recognise(dwell_start_lsb_).pose;
@@ -260,7 +328,8 @@ void JigRun::finish_dwell() {
     if (phase_ == JigPhase::measuring && repeats) {
       std::vector<PoseReading> before = faces_;
       drop_disagreeing(reading);
-      const bool overruled = before.size() - faces_.size() > 1 && !faces_.empty();
+      const bool overruled =
+          before.size() - faces_.size() > 1 && !faces_.empty() && !midpoints_agree_with(reading);
       if (overruled) {  // several agree with each other: it is this one after all
         for (const PoseReading& face : before) {
           std::erase(open_, face.pose);
@@ -280,7 +349,13 @@ void JigRun::finish_dwell() {
     }
   }
 
-  last_refused_.reset();
+  if (phase_ == JigPhase::verifying && !agrees_with_first_round(reading)) {
+    return;
+  }
+
+  if (last_refused_ && last_refused_->pose == reading.pose) {
+    last_refused_.reset();  // another pose's may come again, and is then a repeat
+  }
   between_faces_lsb_.reset();
   refusals_in_row_ = 0;
   last_progress_s_ = now_s_;
