@@ -8,6 +8,8 @@ const { check, until } = h;
 const button = (page, name) => page.getByRole('button', { name, exact: true });
 const start = (page) => button(page, 'Start the measurement').click();
 const prompt = (page) => page.locator('.prompt').first().textContent();
+// The side that is asked for now, or as soon as one is.
+const wantedFace = (place) => until('a wanted side', async () => (await place.locator('.prompt').first().textContent())?.match(/[+−][XYZ]/)?.[0]);
 const refusal = (page, text) => page.locator('.refusal', { hasText: text }).waitFor();
 
 const scenarios = {
@@ -69,7 +71,7 @@ const scenarios = {
     await page.keyboard.press('Enter');
     await until('it runs', async () => /side up/.test(await prompt(page)));
     for (let done = 0; done < 2; ++done) {
-      const face = (await prompt(page)).match(/[+−][XYZ]/)[0];
+      const face = await wantedFace(page);
       await reach(face);
       await page.keyboard.press('Enter');
       await until('taken', async () => (await h.taken(page)) > done);
@@ -121,7 +123,7 @@ const scenarios = {
     await until('undone', async () => (await h.taken(page)) === placements - 1);
     await h.place(page, 13);
     // One of two is left to be put back: another face is the wrong one.
-    const wanted = (await prompt(page)).match(/[+−][XYZ]/)[0];
+    const wanted = await wantedFace(page);
     await hand(wanted === '+Y' ? '−Y' : '+Y');
     await refusal(page, 'wrong face');
     await h.shot(page, 'slips-4-wrong-face');
@@ -188,7 +190,7 @@ const scenarios = {
 
   // One person, sixteen units, one session.
   async sixteen() {
-    const devices = Array.from({ length: 16 }, (_, i) => `virtual:seed=${100 + i},pace=8`);
+    const devices = Array.from({ length: 16 }, (_, i) => `virtual:seed=${100 + i},pace=16`);
     const station = await h.station(devices);
     const page = await h.open(station.url, { width: 1900, height: 1050 });
     await page.locator('.card').nth(15).waitFor();
@@ -220,7 +222,7 @@ const scenarios = {
       }
       return view.finished === 16;
     }, 240);
-    console.log(`sixteen units in ${((Date.now() - began) / 1000).toFixed(0)} s at eight times the real pace`);
+    console.log(`sixteen units in ${((Date.now() - began) / 1000).toFixed(0)} s at sixteen times the real pace`);
     await h.shot(page, 'sixteen-2-done');
     for (let lane = 1; lane <= 16; ++lane) {
       const json = (await station.api(`/api/lanes/${lane}`)).json;
@@ -250,7 +252,7 @@ const scenarios = {
     const capture = page.locator('section', { hasText: '1. Record' }).first();
     for (let side = 1; side <= 6; ++side) {
       await page.getByText(`Side ${side} of 6`).waitFor();
-      const face = (await capture.locator('.prompt').textContent()).match(/[+−][XYZ]/)[0];
+      const face = await wantedFace(capture);
       await capture.locator('.hand').getByRole('button', { name: face, exact: true }).click();
       if (side === 2) await h.shot(page, 'files-1-side');
       await button(page, 'It lies there').click();
@@ -534,7 +536,7 @@ const scenarios = {
     const capture = page.locator('section', { hasText: '1. Record' }).first();
     const side = async (number) => {
       await page.getByText(`Side ${number} of 6`).waitFor();
-      const face = (await capture.locator('.prompt').textContent()).match(/[+−][XYZ]/)[0];
+      const face = await wantedFace(capture);
       await capture.locator('.hand').getByRole('button', { name: face, exact: true }).click();
       await button(page, 'It lies there').click();
       await page.getByText(/Leave it alone/).waitFor();
@@ -695,7 +697,7 @@ const scenarios = {
     await button(page, 'Start recording').click();
     const side = async (number) => {
       await page.getByText(`Side ${number} of 6`).waitFor();
-      const [sign, axis] = await until('the side', async () => (await page.locator('.prompt').textContent()).match(/[+−][XYZ]/)?.[0]);
+      const [sign, axis] = await wantedFace(page);
       await station.tell(`turn ${sign === '+' ? '+' : '-'}${axis.toLowerCase()}`);
       await button(page, 'It lies there').click();
       await page.getByText(/Leave it alone/).waitFor();
