@@ -499,11 +499,13 @@ TEST(Server, TheLiveBoxGoesByWhatTheRunHasSeenOfAnAffectedUnit) {
   station.wait(1, [](const Json& json) {
     return json["run"].is_object() && json["run"]["taken"].size() == 1;
   });
-  EXPECT_EQ(station.post("/api/lanes/1/hand", {{"do", "turn"}, {"pose", "+z"}}), 200);
-  for (int i = 0; i < 500 && shown_tilt_deg(station) > 2; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));  // until it is turned
+  // It lies where it lay. The reading that was taken may have been the last one shown by the old
+  // ones.
+  double shown_deg = shown_tilt_deg(station);
+  for (int i = 0; i < 500 && shown_deg > 2; ++i) {
+    shown_deg = shown_tilt_deg(station);
   }
-  EXPECT_LT(shown_tilt_deg(station), 2) << "seating and noise of a single reading";
+  EXPECT_LT(shown_deg, 2) << "seating and noise of a single reading";
 }
 
 // Two thousand pages at once: those beyond the limit are refused, and the station goes on.
