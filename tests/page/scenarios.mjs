@@ -214,9 +214,7 @@ const scenarios = {
       const question = `${face} ${view.taken} ${view.refusal}`;
       if (face && !/dwelling|settling/.test(view.still) && done.get(view.lane) !== question) {
         done.set(view.lane, question);
-        // Without waiting until nothing on the page moves: sixteen traces always do. A click that missed would
-        // never bring the lane on.
-        await page.locator('.hand').getByRole('button', { name: face, exact: true }).click({ force: true });
+        await page.locator('.hand').getByRole('button', { name: face, exact: true }).click();
         if (++pictures === 100) {
           await h.shot(page, 'sixteen-1-at-work');
           await h.axe(page);
