@@ -5,10 +5,11 @@
 // ASKEW_DEG: every unit's sensor is turned in its case by up to so many degrees about each axis,
 // and the four sides of its case lean by up to so many towards one end. Default: 1000, 1, 0.
 //
-// In process, on simulated clocks. Printed: wrong passes (a bad unit that passed) against none,
-// wrong fails (a sound unit that did not pass; one without a verdict is measured once more, as
-// docs/verdicts.md says) against 1 %, and the time from the last accepted
-// placement to the verdict against 200 ms.
+// In process, on simulated clocks; every unit, slip and fault follows from its seed. Printed: wrong
+// passes (a bad unit that passed) against none; wrong fails (a sound unit that did not pass)
+// against 1 %, both by each unit's first run alone and with a unit without a verdict measured once
+// more, as docs/verdicts.md says; and the time from the last accepted placement to the verdict
+// against 200 ms.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <chrono>
@@ -147,7 +148,7 @@ void spoil(Fault fault, std::size_t axis, const sim::SensorTruth& truth, std::ui
     case Fault::noisy:
       change_lsb = 0.06 * random.normal() * lsb_per_g;
       break;
-    case Fault::gain_jump:  // a bad solder joint: from the middle of the run on
+    case Fault::gain_jump:  // a bad solder joint: from the middle of each run on
       change_lsb = sample > 7000 ? 0.05 * force_g[axis] * lsb_per_g : 0;
       break;
     case Fault::drift:  // 0.5 mg a second
@@ -193,6 +194,7 @@ int run(int units, std::uint64_t first_seed, double askew_deg) {
   int bad = 0;
   int wrong_pass = 0;
   int wrong_fail = 0;
+  int wrong_fail_first = 0;
   int repeated = 0;
   int repeated_sound = 0;
   int refusals = 0;
@@ -207,7 +209,7 @@ int run(int units, std::uint64_t first_seed, double askew_deg) {
         random.uniform(0, 1) < 0.3 ? static_cast<Fault>(1 + random.below(7)) : Fault::none;
     const auto axis = static_cast<std::size_t>(random.below(kAxes));
     MemoryEnv env;
-    std::uint64_t samples = 0;  // over all replugs
+    std::uint64_t samples = 0;  // of a run, over all replugs
     mocks::VirtualUnitOptions options;
     options.seed = seed;
     options.truth = sim::draw_unit(seed);
@@ -235,10 +237,18 @@ int run(int units, std::uint64_t first_seed, double askew_deg) {
       return UnitOnJig{unit.get(), &hand};
     };
     auto report = run_jig({unit.get(), &hand}, env.env, {}, hooks);
+    if (fault == Fault::none && (!report || !report->usable())) {
+      ++wrong_fail_first;
+    }
     if (report && report->verdict == JigVerdict::inconclusive) {
       // As the catalogue's next action says: it is measured once more.
       ++repeated;
       repeated_sound += fault == Fault::none ? 1 : 0;
+      if (fault == Fault::none) {
+        std::printf("  sound unit %d, first run: %s\n", static_cast<int>(seed),
+                    report->brief().c_str());
+      }
+      samples = 0;
       report = run_jig({unit.get(), &hand}, env.env, {}, hooks);
     }
     const std::string verdict = report ? std::string(to_string(report->verdict)) : "error";
@@ -291,18 +301,25 @@ int run(int units, std::uint64_t first_seed, double askew_deg) {
   std::printf("  reports lost %d; placements refused %d\n", lost, refusals);
   std::sort(verdict_ms.begin(), verdict_ms.end());
   const double p95_ms = verdict_ms.empty() ? 0 : verdict_ms[verdict_ms.size() * 95 / 100];
+  std::printf(
+      "seeds %llu to %llu\n", static_cast<unsigned long long>(first_seed),
+      static_cast<unsigned long long>(first_seed) + static_cast<unsigned long long>(units) - 1);
   std::printf("%d units (%d sound, %d bad), %.0f h of simulated work in %.1f s\n", units, sound,
               bad, simulated_s / 3600, seconds);
   std::printf("wrong passes          %d of %d (none allowed)\n", wrong_pass, bad);
   std::printf("measured once more    %d without a verdict, %d of them sound\n", repeated,
               repeated_sound);
-  std::printf("wrong fails           %d of %d, %.2f of the 1 %% allowed\n", wrong_fail, sound,
-              sound > 0 ? 100.0 * wrong_fail / sound : 0.0);
+  const auto print_wrong_fails = [&](const char* when, int count) {
+    std::printf("wrong fails, %-9s%d of %d, %.2f of the 1 %% allowed\n", when, count, sound,
+                sound > 0 ? 100.0 * count / sound : 0.0);
+  };
+  print_wrong_fails("1st run", wrong_fail_first);
+  print_wrong_fails("repeated", wrong_fail);
   std::printf("midpoint minus zero   %.1f mg at most in sound units (limit 45 mg)\n",
               most_midpoint_mg);
   std::printf("last pose to verdict  %.1f ms at p95, %.3f of the 200 ms allowed\n", p95_ms,
               p95_ms / 200);
-  return wrong_pass == 0 && wrong_fail * 100 <= sound ? 0 : 1;
+  return wrong_pass == 0 && wrong_fail_first * 100 < sound && wrong_fail * 100 < sound ? 0 : 1;
 }
 
 }  // namespace

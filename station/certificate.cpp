@@ -7,7 +7,7 @@
 
 #include "base/atomic_file.h"
 #include "gt3x/model.h"
-#include "station/jig_session.h"
+#include "station/jig_report.h"
 
 namespace sixpoint::station {
 

@@ -179,6 +179,10 @@ class JigRun {
   // Better knowledge of the unit, from the six faces: tilt is judged against it from here on.
   void set_approximation(const calib::Calibration& calibration) { approximation_ = calibration; }
 
+  // What is known of the unit so far, for a picture of how it lies: by the faces that were taken,
+  // where there are any, and what the machine was given otherwise.
+  calib::Calibration approximation() const { return seen_by_faces().value_or(approximation_); }
+
   JigPhase phase() const { return phase_; }
   JigOutcome outcome() const { return outcome_; }
   const std::vector<Pose>& open_poses() const { return open_; }
@@ -223,6 +227,9 @@ class JigRun {
   bool repeats_refused(const PoseReading& reading) const;
   bool same_placement(const PerAxis<double>& a_lsb, const PerAxis<double>& b_lsb) const;
   void drop_disagreeing(const PoseReading& reading);
+  bool midpoints_agree_with(const PoseReading& reading) const;
+  // False when it asked for the pose again instead.
+  bool agrees_with_first_round(const PoseReading& reading);
 
   JigRunOptions options_;
   calib::Calibration approximation_;

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/sha256.h"
+#include "station/jig_judgement.h"
 
 namespace sixpoint::station {
 
@@ -18,7 +18,6 @@ using calib::FilterConfiguration;
 constexpr std::chrono::milliseconds kReadFor{250};
 constexpr std::string_view kRawHeadline = "device_time_us,x_lsb,y_lsb,z_lsb,temperature_c\n";
 constexpr int kWritable_mv = 3300;  // docs/protocol.md, code 7
-// A unit without a readable page: the middle of what ADXL362 units hold. Enough to tell faces.
 
 double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
@@ -66,9 +65,6 @@ class Session {
   Status stream(JigRun& run);
   Status handle(JigRun& run, const std::vector<JigAction>& actions);
   void keep_raw(const device::SampleBlock& block);
-  Result<calib::SixPoseReport> solve(const std::vector<PoseReading>& faces,
-                                     const std::vector<PoseReading>& held_out) const;
-  Result<bool> judge_verification(const JigRun& run);
   Status write_constants(JigRun& run);
   Status conclude(const JigRun& run);
 
@@ -359,12 +355,13 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
         place = action.pose;
         break;
       case JigAction::Kind::fit: {
-        SIXPOINT_ASSIGN(const calib::SixPoseReport first, solve(run.faces(), {}));
+        SIXPOINT_ASSIGN(const calib::SixPoseReport first,
+                        solve_faces(run.faces(), {}, options_.gravity, options_.limits));
         run.set_approximation(first.pair.calibration);
         break;
       }
       case JigAction::Kind::write: {
-        SIXPOINT_ASSIGN(const bool verified, judge_verification(run));
+        SIXPOINT_ASSIGN(const bool verified, judge_readings(report_, run));
         if (!verified) {
           ended_ = true;  // constants that failed are not written
           return {};
@@ -386,59 +383,6 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
     hooks_.progress(report_, run);
   }
   return place ? jig_->go_to(*place) : Status{};
-}
-
-Result<calib::SixPoseReport> Session::solve(const std::vector<PoseReading>& faces,
-                                            const std::vector<PoseReading>& held_out) const {
-  const auto readings = [](const std::vector<PoseReading>& from) {
-    std::vector<calib::PoseReading> to;
-    to.reserve(from.size());
-    for (const PoseReading& reading : from) {
-      to.push_back({device::direction_of(reading.pose), reading.mean_lsb, reading.sd_lsb,
-                    reading.samples, reading.temperature_c});
-    }
-    return to;
-  };
-  calib::SixPoseOptions options;
-  options.gravity = options_.gravity;
-  // Ranges and residuals are judged by the limits, with their guard bands; the solver only says
-  // whether the readings contradict each other.
-  options.gain_range = HUGE_VAL;
-  options.zero_range_g = HUGE_VAL;
-  options.held_out_mg = HUGE_VAL;
-  options.most_sd_mg = std::max(options.most_sd_mg, 2 * *options_.limits.of("noise_mg").high);
-  options.most_tilt_deg = std::max(options.most_tilt_deg, 2 * *options_.limits.of("tilt_deg").high);
-  return calib::solve_six_poses(readings(faces), readings(held_out), options);
-}
-
-// Solves, chooses by the readings that no solution has seen, and says whether they may be used.
-Result<bool> Session::judge_verification(const JigRun& run) {
-  report_.faces = run.faces();
-  if (report_.faces.size() < device::kPoses.size()) {
-    return false;
-  }
-  SIXPOINT_ASSIGN(report_.six, solve(run.faces(), run.verification()));
-  const calib::SixPoseSolution& best = report_.six->best();
-  report_.method = fmt::format("six_pose_{}", calib::to_string(report_.six->chosen));
-  report_.verification = judge(run.verification(), best.calibration, gravity_g_);
-  if (const auto rounded = calib::calibration_from(best.stored)) {
-    report_.rounded_residual_mg = judge(run.verification(), *rounded, gravity_g_).worst_mg;
-  }
-  for (PoseReading& face : report_.faces) {
-    for (const calib::PoseResidual& residual : report_.six->poses) {
-      if (!residual.held_out && residual.side == device::to_string(face.pose)) {
-        face.tilt_deg = residual.tilt_deg;
-      }
-    }
-  }
-  const double left_mg = report_.verification.rms_mg;
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    report_.combined.sensitivity_relative[axis] =
-        std::hypot(best.uncertainty.sensitivity_relative[axis], left_mg / kMgPerG);
-    report_.combined.zero_mg[axis] = std::hypot(best.uncertainty.zero_mg[axis], left_mg);
-  }
-  return report_.six->verified &&
-         judge_quantities(measured_quantities(report_), options_.limits).usable();
 }
 
 Status Session::write_constants(JigRun& run) {
@@ -480,7 +424,7 @@ Status Session::write_constants(JigRun& run) {
 Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
-  SIXPOINT_CHECK(judge_verification(run));
+  SIXPOINT_CHECK(judge_readings(report_, run));
   say_what_is_left();
   if (report_.as_found) {
     if (const auto found = calib::calibration_from(report_.as_found->constants)) {
@@ -493,73 +437,7 @@ Status Session::conclude(const JigRun& run) {
                     "depend on it, recordings of this unit may",
                     report_.stream.clock_jumped_s, report_.stream.clock_jumps));
   }
-  switch (run.outcome()) {
-    case JigOutcome::sensor_stuck:
-      report_.verdict = JigVerdict::fail;
-      report_.codes = {"sensor_stuck"};
-      report_.reasons.push_back(last_words_);
-      return {};
-    case JigOutcome::stopped:
-      report_.verdict = JigVerdict::stopped;
-      report_.codes = {"stopped"};
-      report_.reasons.push_back("stopped by the operator");
-      return {};
-    case JigOutcome::timed_out:
-    case JigOutcome::too_many_refusals:
-    case JigOutcome::unit_gone:
-      report_.verdict = JigVerdict::inconclusive;
-      if (run.outcome() == JigOutcome::unit_gone) {
-        report_.ended_by = gone_;
-      }
-      report_.codes = {run.outcome() == JigOutcome::timed_out           ? "time_out"
-                       : run.outcome() == JigOutcome::too_many_refusals ? "too_many_refusals"
-                                                                        : "unit_gone"};
-      report_.reasons.push_back(
-          run.outcome() == JigOutcome::timed_out
-              ? "no pose was accepted in time; is the unit on the jig, and does the jig turn it?"
-          : run.outcome() == JigOutcome::unit_gone
-              ? fmt::format("the unit went away in mid-run and did not come back ({})",
-                            gone_ ? gone_->what : std::string())
-              : "too many placements were refused; look at jig, seat and cable");
-      if (run.outcome() == JigOutcome::timed_out && report_.stream.lost_samples > 0) {
-        report_.reasons.push_back(
-            fmt::format("{} samples were lost or damaged on the way, and every reading begins anew "
-                        "then: look at the cable",
-                        report_.stream.lost_samples));
-      }
-      return {};
-    case JigOutcome::running:
-    case JigOutcome::complete:
-      break;
-  }
-  if (report_.written) {
-    const auto left = calib::calibration_from(report_.as_left->constants);
-    report_.recheck = judge(run.recheck(), *left, gravity_g_);
-  }
-  Verdict judged = judge_quantities(measured_quantities(report_), options_.limits);
-  const auto worse = [&](JigVerdict verdict, const char* code) {
-    judged.verdict = verdict;
-    judged.codes.emplace_back(code);
-  };
-  if (!report_.six || !report_.six->missing_directions.empty()) {
-    worse(JigVerdict::inconclusive, "missing_pose");
-  } else if (!report_.six->verified) {
-    worse(JigVerdict::fail, "not_verified");
-    judged.reasons.insert(judged.reasons.end(), report_.six->reasons.begin(),
-                          report_.six->reasons.end());
-  }
-  if (report_.written && report_.as_left->constants != report_.six->best().stored) {
-    worse(JigVerdict::fail, "read_back_differs");
-    judged.reasons.emplace_back("the unit does not hold what was written");
-  } else if (!report_.written && options_.run.write && judged.usable()) {
-    worse(JigVerdict::fail, "write_refused");
-    judged.reasons.emplace_back("the constants were not written into the unit");
-  }
-  apply_retest(judged, options_.retest);
-  report_.verdict = judged.verdict;
-  report_.codes = std::move(judged.codes);
-  report_.quantities = std::move(judged.quantities);
-  report_.reasons.insert(report_.reasons.end(), judged.reasons.begin(), judged.reasons.end());
+  conclude_report(report_, run, {options_.run.write, options_.retest, last_words_, gone_});
   return {};
 }
 
@@ -593,221 +471,7 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
   return std::move(report_);
 }
 
-nlohmann::ordered_json json_of(const PoseReading& reading) {
-  nlohmann::ordered_json json;
-  json["pose"] = device::to_string(reading.pose);
-  json["mean_lsb"] = reading.mean_lsb;
-  json["sd_lsb"] = reading.sd_lsb;
-  json["samples"] = reading.samples;
-  json["temperature_c"] = reading.temperature_c;
-  json["tilt_deg"] = reading.tilt_deg;
-  json["from"] = reading.from ? nlohmann::ordered_json(device::to_string(*reading.from))
-                              : nlohmann::ordered_json(nullptr);
-  return json;
-}
-
-PoseReading parse_reading(const nlohmann::ordered_json& json) {
-  PoseReading reading;
-  reading.pose = device::parse_pose(json.at("pose").get<std::string>()).value();
-  reading.mean_lsb = json.at("mean_lsb").get<PerAxis<double>>();
-  reading.sd_lsb = json.at("sd_lsb").get<PerAxis<double>>();
-  reading.samples = json.at("samples").get<int>();
-  reading.temperature_c = json.at("temperature_c").get<double>();
-  reading.tilt_deg = json.at("tilt_deg").get<double>();
-  if (!json.at("from").is_null()) {
-    reading.from = device::parse_pose(json.at("from").get<std::string>()).value();
-  }
-  return reading;
-}
-
-nlohmann::ordered_json json_of(const JudgedPoses& judged) {
-  nlohmann::ordered_json json;
-  json["residual_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
-                                             : nlohmann::ordered_json(judged.worst_mg);
-  json["rms_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
-                                        : nlohmann::ordered_json(judged.rms_mg);
-  json["poses"] = nlohmann::ordered_json::array();
-  for (const JudgedPose& pose : judged.poses) {
-    nlohmann::ordered_json item = json_of(pose.reading);
-    item["magnitude_g"] = pose.magnitude_g;
-    item["error_mg"] = pose.error_mg;
-    json["poses"].push_back(std::move(item));
-  }
-  return json;
-}
-
-// Standard uncertainties under the contract's names, then what they are made of and expanded to.
-nlohmann::ordered_json uncertainty_to_json(const JigReport& report) {
-  const double coverage = report.limits.decision.coverage_factor;
-  nlohmann::ordered_json json = calib::to_json(report.combined);
-  PerAxis<double> sensitivity_percent{};
-  PerAxis<double> zero_mg{};
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    sensitivity_percent[axis] = 100 * coverage * report.combined.sensitivity_relative[axis];
-    zero_mg[axis] = coverage * report.combined.zero_mg[axis];
-  }
-  json["coverage_factor"] = coverage;
-  json["expanded"] = {{"sensitivity_percent", sensitivity_percent}, {"zero_mg", zero_mg}};
-  json["budget"] = {{"noise_tilt_gravity", calib::to_json(report.six->best().uncertainty)},
-                    {"gravity_relative", report.gravity.sd_g() / report.gravity.g()},
-                    {"unused_poses_rms_mg", report.verification.rms_mg}};
-  return json;
-}
-
-nlohmann::ordered_json json_of(const std::optional<device::CalibrationPage>& page) {
-  if (!page) {
-    return nullptr;
-  }
-  nlohmann::ordered_json json = calib::to_json(page->constants);
-  json["calibrated"] = to_iso8601(page->calibrated);
-  return json;
-}
-
 }  // namespace
-
-JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& calibration,
-                  double gravity_g) {
-  JudgedPoses judged;
-  for (const PoseReading& reading : readings) {
-    const PerAxis<double> force_g = calibration.to_g(reading.mean_lsb);
-    JudgedPose pose;
-    pose.reading = reading;
-    pose.magnitude_g = std::hypot(force_g[0], force_g[1], force_g[2]);
-    pose.error_mg = (pose.magnitude_g - gravity_g) * kMgPerG;
-    judged.worst_mg = std::max(judged.worst_mg, std::abs(pose.error_mg));
-    judged.rms_mg += pose.error_mg * pose.error_mg / static_cast<double>(readings.size());
-    judged.poses.push_back(pose);
-  }
-  judged.rms_mg = std::sqrt(judged.rms_mg);
-  return judged;
-}
-
-std::string JigReport::brief() const {
-  std::string text = fmt::format("{} under '{}': {}", printable(serial), calib::to_string(filter),
-                                 to_string(verdict));
-  if (!verification.poses.empty()) {
-    text += fmt::format("; {:.1f} mg off on {} poses that were not fitted", verification.worst_mg,
-                        verification.poses.size());
-  }
-  for (const std::string& reason : reasons) {
-    text += "; " + reason;
-  }
-  return text;
-}
-
-nlohmann::ordered_json JigReport::to_json() const {
-  nlohmann::ordered_json json;
-  json["serial"] = serial;
-  json["firmware"] = firmware;
-  json["jig"] = jig;
-  json["filter"] = calib::to_string(filter);
-  json["verdict"] = to_string(verdict);
-  json["codes"] = codes;
-  json["reasons"] = reasons;
-  json["started"] = to_iso8601(started);
-  json["ended"] = to_iso8601(ended);
-  json["gravity_m_per_s2"] = gravity.m_per_s2;
-  json["gravity_standard_uncertainty_m_per_s2"] = gravity.standard_uncertainty_m_per_s2;
-  json["raw_sha256"] = raw_sha256();
-  json["poses"] = nlohmann::ordered_json::array();
-  for (const PoseReading& face : faces) {
-    json["poses"].push_back(json_of(face));
-  }
-  if (six) {
-    json["constants"] = calib::to_json(six->best().calibration, six->best().stored);
-  } else {
-    json["constants"] = nullptr;
-  }
-  json["method"] = method;
-  json["as_found"] = json_of(as_found);
-  if (as_found) {
-    json["as_found"]["residual_mg"] = as_found_residual_mg;
-  }
-  json["as_left"] = json_of(as_left);
-  if (as_left) {
-    json["as_left"]["written"] = written;
-    json["as_left"]["residual_mg"] = written ? nlohmann::ordered_json(recheck.worst_mg)
-                                             : nlohmann::ordered_json(as_found_residual_mg);
-  }
-  json["verification"] = json_of(verification);
-  json["verification"]["residual_rounded_mg"] = rounded_residual_mg;
-  json["recheck"] = written ? json_of(recheck) : nlohmann::ordered_json(nullptr);
-  json["uncertainty"] = six ? uncertainty_to_json(*this) : nlohmann::ordered_json(nullptr);
-  json["limits"] = station::to_json(limits);
-  json["quantities"] = nlohmann::ordered_json::array();
-  for (const JudgedQuantity& quantity : quantities) {
-    json["quantities"].push_back(station::to_json(quantity));
-  }
-  json["solutions"] = six ? calib::to_json(*six) : nlohmann::ordered_json(nullptr);
-  json["refusals"] = refusals;
-  json["stream"]["samples"] = stream.samples;
-  json["stream"]["lost_samples"] = stream.lost_samples;
-  json["stream"]["duplicate_reports"] = stream.duplicate_reports;
-  json["stream"]["damaged_reports"] = stream.damaged_reports;
-  json["stream"]["failed_transfers"] = stream.failed_transfers;
-  json["stream"]["clock_jumps"] = stream.clock_jumps;
-  return json;
-}
-
-std::string JigReport::raw_sha256() const {
-  return to_hex(
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
-}
-
-calib::ConstantsRecord JigReport::record() const {
-  calib::ConstantsRecord record;
-  record.serial = serial;
-  record.filter = filter;
-  if (six) {
-    record.calibration = six->best().calibration;
-    record.stored = six->best().stored;
-    record.uncertainty = combined;
-  }
-  record.method = method;
-  record.made_at = ended;
-  record.made_from.sha256 = raw_sha256();
-  record.gravity_m_per_s2 = gravity.m_per_s2;
-  return record;
-}
-
-nlohmann::ordered_json to_json(const JigProgress& progress) {
-  nlohmann::ordered_json json;
-  json["phase"] = to_string(progress.phase);
-  json["refusals"] = progress.refusals;
-  const auto list = [&json](const char* name, const std::vector<PoseReading>& readings) {
-    json[name] = nlohmann::ordered_json::array();
-    for (const PoseReading& reading : readings) {
-      json[name].push_back(json_of(reading));
-    }
-  };
-  list("faces", progress.faces);
-  list("reversed", progress.reversed);
-  list("reseat", progress.reseat);
-  list("recheck", progress.recheck);
-  return json;
-}
-
-Result<JigProgress> parse_jig_progress(const nlohmann::ordered_json& json) {
-  // nlohmann and value() throw on what does not fit; it stops here.
-  try {
-    JigProgress progress;
-    SIXPOINT_ASSIGN(progress.phase, parse_jig_phase(json.at("phase").get<std::string>()));
-    progress.refusals = json.at("refusals").get<int>();
-    const auto list = [&json](const char* name, std::vector<PoseReading>& readings) {
-      for (const auto& item : json.at(name)) {
-        readings.push_back(parse_reading(item));
-      }
-    };
-    list("faces", progress.faces);
-    list("reversed", progress.reversed);
-    list("reseat", progress.reseat);
-    list("recheck", progress.recheck);
-    return progress;
-  } catch (const std::exception& error) {
-    return fail(ErrorCode::bad_data, fmt::format("the state of a run does not hold together: {}",
-                                                 printable(error.what(), 120)));
-  }
-}
 
 JigReport interrupted_report(const JigResume& resume, const std::string& serial,
                              const std::string& firmware, const JigSessionOptions& options,

@@ -100,6 +100,12 @@ void Lanes::Lane::run(const std::stop_token& stop, const Order& order,
   };
   hooks.samples = [&](const device::SampleBlock& block, const JigRun& machine) {
     const JigLive live = machine.live();
+    {
+      // The unit's own constants may be wrong by 25 degrees; what the run has seen is not.
+      const calib::Calibration known = machine.approximation();
+      const std::lock_guard lock(mutex_);
+      approximation_ = known;
+    }
     see(block, &live);
   };
   bool disk_failed = false;
@@ -174,6 +180,7 @@ void Lanes::Lane::conclude(const JigReport& report, const RunLabels& labels) {
   result["serial"] = report.serial;
   result["verdict"] = station::to_string(report.verdict);
   result["reasons"] = report.reasons;
+  result["next_actions"] = report.usable() ? Json::array() : Json(next_actions(report.codes));
   result["residual_mg"] =
       report.verification.poses.empty() ? Json(nullptr) : Json(report.verification.worst_mg);
   result["as_found_residual_mg"] =

@@ -45,7 +45,11 @@ class Reader {
 
   Result<double> number(const toml::node& node, std::string_view key, double least,
                         double most) const {
-    const auto value = node.is_number() ? node.value<double>() : std::nullopt;
+    // A whole number that no double holds exactly is one all the same.
+    const auto whole = node.value_exact<std::int64_t>();
+    const auto value = whole              ? std::optional(static_cast<double>(*whole))
+                       : node.is_number() ? node.value<double>()
+                                          : std::nullopt;
     if (!value) {
       return wrong(node.source(), fmt::format("{} is no number", key));
     }

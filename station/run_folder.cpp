@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "station/jig_progress.h"
 
 namespace sixpoint::station {
 

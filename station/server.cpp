@@ -1,10 +1,17 @@
 #include "station/server.h"
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <utility>
 
 #include <fmt/format.h>
 #include <httplib.h>
+#include <poll.h>
 #include <sys/socket.h>
+#include <unistd.h>
+
+#include "station/waiting_room.h"
 
 namespace sixpoint::station {
 
@@ -46,10 +53,112 @@ ApiAnswer refused(int status, std::string_view code, std::string_view what) {
           {{"X-Content-Type-Options", "nosniff"}, {"Cache-Control", "no-store"}}};
 }
 
-// The library lets five connections wait to be accepted; a burst of pages would wait for seconds.
+// A request of which the head was read already. Everything else of it must come before the
+// deadline: the library would wait for every byte anew.
+class Connection final : public httplib::Stream {
+ public:
+  Connection(int socket, std::string request, std::chrono::seconds time_out)
+      : socket_(socket), request_(std::move(request)), time_out_(time_out) {}
+  bool is_readable() const override { return at_ < request_.size() || ready(POLLIN, left()); }
+  bool is_writable() const override {
+    return ready(POLLOUT, time_out_) && !ready(POLLRDHUP, std::chrono::milliseconds(0));
+  }
+  ssize_t read(char* to, std::size_t size) override {
+    if (at_ < request_.size()) {
+      const std::size_t count = request_.copy(to, size, at_);
+      at_ += count;
+      return static_cast<ssize_t>(count);
+    }
+    return ready(POLLIN, left()) ? ::recv(socket_, to, size, 0) : -1;
+  }
+  ssize_t write(const char* from, std::size_t size) override {
+    return ready(POLLOUT, time_out_) ? ::send(socket_, from, size, MSG_NOSIGNAL | MSG_DONTWAIT)
+                                     : -1;
+  }
+  void get_remote_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
+  void get_local_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
+  int socket() const override { return socket_; }
+
+ private:
+  std::chrono::milliseconds left() const {
+    const auto left = deadline_ - std::chrono::steady_clock::now();
+    return std::max(std::chrono::milliseconds(0),
+                    std::chrono::ceil<std::chrono::milliseconds>(left));
+  }
+  bool ready(short what, std::chrono::milliseconds within) const {
+    pollfd one{socket_, what, 0};
+    return ::poll(&one, 1, static_cast<int>(within.count())) > 0 && (one.revents & what) != 0;
+  }
+
+  int socket_;
+  std::string request_;
+  std::size_t at_ = 0;
+  std::chrono::milliseconds time_out_;
+  std::chrono::steady_clock::time_point deadline_ = std::chrono::steady_clock::now() + time_out_;
+};
+
+// The library gives every connection a thread as soon as it is made, before it has said anything.
+// Here it waits in a room with all others until its request is there.
 class PatientServer : public httplib::Server {
  public:
+  // The library lets five connections wait to be accepted; a burst of pages would wait for seconds.
   void widen_backlog() { ::listen(svr_sock_, 256); }
+
+  void receive(const ServerOptions& options) {
+    new_task_queue = [this, &options] {
+      auto* reception = new Reception(options, [this](int socket, std::string request) {
+        bool closed = false;
+        Connection connection(socket, std::move(request), std::chrono::seconds(read_timeout_sec_));
+        process_request(connection, true, closed, nullptr);
+        ::shutdown(socket, SHUT_RDWR);
+        ::close(socket);
+      });
+      reception_ = reception;
+      return reception;
+    };
+  }
+
+ private:
+  // What the library takes for its queue of threads: accepted connections go into the room at once,
+  // requests to the threads.
+  class Reception final : public httplib::TaskQueue {
+   public:
+    Reception(const ServerOptions& options,
+              const std::function<void(int socket, std::string request)>& answer)
+        : threads_(options.threads),
+          room_(waiting(options), [this, answer](int socket, std::string request) {
+            threads_.enqueue([answer, socket, its_request = std::move(request)]() mutable {
+              answer(socket, std::move(its_request));
+            });
+          }) {}
+    void enqueue(std::function<void()> accept) override { accept(); }
+    void shutdown() override {
+      room_.stop();
+      threads_.shutdown();
+    }
+    void enter(int socket) { room_.enter(socket); }
+
+   private:
+    static WaitingRoomOptions waiting(const ServerOptions& options) {
+      WaitingRoomOptions waiting;
+      waiting.most_connections = options.most_waiting;
+      waiting.most_body_bytes = options.most_body_bytes;
+      waiting.time_out = std::chrono::seconds(options.request_time_out_s);
+      return waiting;
+    }
+    httplib::ThreadPool threads_;
+    WaitingRoom room_;
+  };
+
+  bool process_and_close_socket(socket_t socket) override {
+    // A page that does not read what it is sent is let go of, and holds little until then.
+    const int most_unread_bytes = 128 << 10;
+    ::setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &most_unread_bytes, sizeof(most_unread_bytes));
+    reception_->enter(socket);
+    return true;
+  }
+
+  Reception* reception_ = nullptr;  // the library's, while it listens
 };
 
 }  // namespace
@@ -106,7 +215,7 @@ void Server::Impl::set_up() {
   server.set_keep_alive_timeout(2);
   // One request per connection: a page that was refused must not hold a thread any longer.
   server.set_keep_alive_max_count(1);
-  server.new_task_queue = [this] { return new httplib::ThreadPool(options.threads); };
+  server.receive(options);
   // Before the body is read: who may not ask, does not send either.
   server.set_pre_routing_handler([this](const httplib::Request& from, httplib::Response& response) {
     if (auto no = api.guard(request_of(from))) {

@@ -17,7 +17,11 @@ struct ServerOptions {
   std::size_t most_body_bytes = 64U << 10U;
   // Threads that answer; every event stream holds one of them.
   std::size_t threads = 48;
+  // For a request, from connecting to its end, and for every write that the client does not take.
   int request_time_out_s = 5;
+  // Connections whose request is not there yet. Below the 1,024 descriptors that a process usually
+  // has; sixteen lanes and their pages need two hundred.
+  std::size_t most_waiting = 512;
 };
 
 class Server {

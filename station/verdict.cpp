@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "station/jig_session.h"
+#include "station/jig_report.h"
 
 namespace sixpoint::station {
 
@@ -197,7 +197,7 @@ const std::vector<FailureCode>& failure_codes() {
       {"too_many_refusals", "too many placements were refused",
        "dirt in the seat, a loose cable that pulls, a bench that trembles",
        "Look at jig, seat and cable, repeat."},
-      {"stopped", "the operator stopped the run", "", "Repeat."},
+      {"stopped", "the operator stopped the run", "somebody wished so", "Repeat."},
       {"unit_gone", "the unit went away", "the cable was pulled, or the battery is empty",
        "Plug it in and repeat."},
       {"sensor_stuck", "the sensor repeats itself: an axis is stuck, or all are frozen",
@@ -214,6 +214,18 @@ const FailureCode* find_failure_code(std::string_view code) {
   const auto found = std::find_if(failure_codes().begin(), failure_codes().end(),
                                   [&](const FailureCode& other) { return other.code == code; });
   return found == failure_codes().end() ? nullptr : &*found;
+}
+
+std::vector<std::string> next_actions(const std::vector<std::string>& codes) {
+  std::vector<std::string> actions;
+  for (const std::string& code : codes) {
+    const FailureCode* known = find_failure_code(code);
+    if (known != nullptr &&
+        std::find(actions.begin(), actions.end(), known->next_action) == actions.end()) {
+      actions.emplace_back(known->next_action);
+    }
+  }
+  return actions;
 }
 
 JudgedQuantity judge_quantity(const Measured& measured, const Limits& limits) {

@@ -21,7 +21,7 @@
 
 namespace sixpoint::station {
 
-struct JigReport;  // jig_session.h
+struct JigReport;  // jig_report.h
 
 enum class JigVerdict { pass, conditional_pass, conditional_fail, fail, inconclusive, stopped };
 std::string_view to_string(JigVerdict verdict);  // "pass", "conditional_pass" ...
@@ -42,6 +42,8 @@ struct FailureCode {
 };
 const std::vector<FailureCode>& failure_codes();
 const FailureCode* find_failure_code(std::string_view code);
+// What the person at the station does about a run's codes: each once, in their order.
+std::vector<std::string> next_actions(const std::vector<std::string>& codes);
 
 // A value to be judged.
 struct Measured {

@@ -2,12 +2,15 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <span>
+#include <utility>
 
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "base/sha256.h"
 #include "calib/gravity.h"
 #include "device/unit.h"
 #include "station/certificate.h"
@@ -16,6 +19,7 @@
 #include "station/cli/store_option.h"
 #include "station/devices.h"
 #include "station/jig_session.h"
+#include "station/run_folder.h"
 #include "station/run_records.h"
 #include "station/station_records.h"
 
@@ -38,6 +42,8 @@ struct Options {
   std::string label;
   std::string store;
   std::string record;
+  std::string state;
+  bool anew = false;
   std::optional<double> gravity_m_per_s2;
   std::optional<double> latitude_deg;
   double altitude_m = 0;
@@ -163,6 +169,85 @@ std::optional<station::OperatorWord> terminal_word() {
   }
 }
 
+// A run on the disk while it is under way: the next program goes on with it. Where the disk does
+// not take it, the run goes on without.
+class RunOnDisk {
+ public:
+  RunOnDisk(Context& context, std::string folder, station::UnfinishedRun state)
+      : context_(context), folder_(context.env, std::move(folder)), state_(std::move(state)) {}
+
+  // What an earlier program left of this unit's run under this filter.
+  std::optional<station::JigResume> begin(bool anew) {
+    auto left = folder_.load();
+    if (!left) {
+      context_.log().warn("{}; it is put aside", left.error().brief());
+      watch(folder_.set_aside());
+      return std::nullopt;
+    }
+    if (*left && ((*left)->serial != state_.serial || (*left)->filter != state_.filter || anew)) {
+      watch(folder_.clear());
+      left->reset();
+    }
+    if (!*left) {
+      return std::nullopt;
+    }
+    return std::move((*left)->resume);
+  }
+  void hang_into(station::JigHooks& hooks) {
+    hooks.raw = [this](std::string_view rows) { watch(folder_.append(rows)); };
+    hooks.progress = [this](const station::JigReport& report, const station::JigRun& machine) {
+      state_.resume.started = report.started;
+      state_.resume.as_found = report.as_found;
+      state_.resume.written = report.written ? report.as_left : std::nullopt;
+      state_.resume.progress = machine.progress();
+      if (machine.phase() != station::JigPhase::finished) {
+        watch(folder_.save(state_));
+      }
+    };
+  }
+  void end() { watch(folder_.clear()); }
+
+ private:
+  void watch(const Status& status) {
+    if (!status && !std::exchange(failed_, true)) {
+      context_.log().warn("this run would not survive the end of the program: {}",
+                          status.error().brief());
+    }
+  }
+
+  Context& context_;
+  station::RunFolder folder_;
+  station::UnfinishedRun state_;
+  bool failed_ = false;
+};
+
+// Nothing where the run is not to be kept: a jig that turns by itself begins anew in two minutes,
+// and a gage study measures each run whole.
+std::optional<RunOnDisk> run_on_disk(Context& context, const Options& options,
+                                     const device::Unit& unit, const device::Jig& jig,
+                                     calib::FilterConfiguration filter) {
+  const bool by_hand = context.people_at_terminal && !jig.turns_by_itself();
+  if (!options.study.empty() || (options.state.empty() && !by_hand)) {
+    return std::nullopt;
+  }
+  const std::string& serial = unit.identity().serial;
+  const std::string who = (options.store.empty() ? default_store() : options.store) + "\n" + serial;
+  const std::string folder =
+      options.state.empty() ? folder_of(journal_folder("")) + "/../jig" : options.state;
+  station::UnfinishedRun state;
+  state.device = options.device;
+  state.serial = serial;
+  state.firmware = unit.identity().firmware;
+  state.operator_name = options.operator_name;
+  state.station = options.station;
+  state.write = options.write;
+  state.filter = filter;
+  const auto digest =
+      sha256(std::span(reinterpret_cast<const std::uint8_t*>(who.data()), who.size()));
+  return std::optional<RunOnDisk>(
+      std::in_place, context, folder + "/" + to_hex(std::span(digest).first(6)), std::move(state));
+}
+
 Result<Done> run(Context& context, const Options& options, device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(begin_session(context, recorder, options.record));
   SIXPOINT_CHECK(check_outputs(options));
@@ -254,8 +339,24 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
     context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
     hooks.words = terminal_word;
   }
+  auto on_disk = run_on_disk(context, options, *unit, jig, session.filter);
+  std::optional<station::JigResume> left;
+  if (on_disk) {
+    left = on_disk->begin(options.anew);
+    on_disk->hang_into(hooks);
+  }
+  if (left) {
+    const station::JigProgress& had = left->progress;
+    context.people << fmt::format(
+                          "the run of {} goes on; it has {} placements (--anew begins anew)\n",
+                          to_iso8601(left->started),
+                          had.faces.size() + had.reversed.size() + had.reseat.size() +
+                              had.recheck.size())
+                   << std::flush;
+  }
   Done done;
-  SIXPOINT_ASSIGN(done.report, station::run_jig({unit.get(), &jig}, context.env, session, hooks));
+  SIXPOINT_ASSIGN(done.report,
+                  station::run_jig({unit.get(), &jig}, context.env, session, hooks, left));
   station::complete_run_record(record, done.report, options.study);
   station::RunIds stored;
   done.kept = keep_records(context, options.store, store, [&](db::Keeper& keeper) -> Status {
@@ -265,6 +366,9 @@ Result<Done> run(Context& context, const Options& options, device::SessionRecord
   done.run_id = stored.run_id;
   done.constants_id = stored.constants_id;
   record.id = done.run_id;
+  if (on_disk && done.kept) {
+    on_disk->end();
+  }
   if (done.kept) {
     make_papers(context, options, record, done);
   }
@@ -294,6 +398,11 @@ Json to_json(const Options& options, const Done& done) {
 void print(Context& context, const Done& done) {
   const station::JigReport& report = done.report;
   context.out << report.brief() << '\n';
+  if (!report.usable()) {
+    for (const std::string& action : station::next_actions(report.codes)) {
+      context.out << "  what to do: " << action << '\n';
+    }
+  }
   if (report.six) {
     const calib::SixPoseSolution& best = report.six->best();
     context.out << "     sensitivity         zero        +1 g   -1 g    0 g\n";
@@ -354,6 +463,11 @@ void add_jig(CLI::App& app, Context& context) {
                       "the calibration certificate: a .pdf or .json to make");
   command->add_option("--label", options->label,
                       "a label for the unit, as ZPL; after a read-back only (--write)");
+  command->add_option(
+      "--state", options->state,
+      "the folder that keeps the run while it is under way, so that the next program "
+      "goes on with it; a person at a terminal has one by default");
+  command->add_flag("--anew", options->anew, "begin anew where an earlier program left a run");
   command->add_option("--study", options->study,
                       "this run belongs to a gage study of that name (sixpoint gage-rr)");
   command->add_flag("--write", options->write,

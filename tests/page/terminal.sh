@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# The jig run in a real terminal (tmux): the prompts come, u and Enter undoes, s and Enter stops.
-#   terminal.sh SIXPOINT_PROGRAM
+# The jig run in a real terminal (tmux): the prompts come, u and Enter undoes, s and Enter stops. With the
+# unit on emulated USB and a hand that turns it: a slip, an undo, Ctrl-C, and the run goes on.
+#   terminal.sh SIXPOINT_PROGRAM [USB_STATION]
 set -euo pipefail
-program=$1
+program=$1 usb_station=${2:-}
 command -v tmux >/dev/null || { echo "SKIPPED: tmux is not installed (scripts/install_packages.sh test)"; exit 77; }
 folder=$(mktemp -d)
 tmux=(tmux -S "$folder/socket" -f /dev/null)
@@ -19,7 +20,7 @@ wait_for() { # TEXT
   exit 1
 }
 
-"${tmux[@]}" new-session -d -s t -x 110 -y 60 "sh"
+"${tmux[@]}" new-session -d -s t -x 160 -y 60 "env HOME=$folder XDG_DATA_HOME=$folder sh"
 run() { "${tmux[@]}" send-keys -t t "clear; $program jig --store $folder/store.db --device virtual:seed=7,jig=auto,pace=8 --operator Ada; echo ended with \$?" Enter; }
 
 run
@@ -40,3 +41,50 @@ wait_for "-z is taken"
 wait_for "stopped by the operator"
 wait_for "ended with 3"
 echo "the terminal run: undo, stop, and a whole run"
+
+[ -n "$usb_station" ] || { echo "SKIPPED: the run by hand needs umockdev (Debian packages libumockdev-dev and umockdev)"; exit 77; }
+hand=$folder/hand
+mkfifo "$hand"
+"${tmux[@]}" send-keys -t t "clear" Enter
+"${tmux[@]}" clear-history -t t
+"${tmux[@]}" send-keys -t t "SIXPOINT_HAND=$hand $usb_station $program jig --jig manual --device {device} --store $folder/usb.db --operator Ada --write; echo all over" Enter
+wait_for "u and Enter: undo the last pose"
+# Turns the unit where the terminal asks for it, every question once, until TEXT is there.
+turn_until() { # TEXT
+  local text now asked=""
+  for _ in $(seq 1500); do
+    text=$(screen)
+    if grep -qF -- "$1" <<<"$text"; then return 0; fi
+    now=$(grep -nE '(turn the unit to|turn it to|lay the unit on) [+-][xyz]' <<<"$text" | tail -1)
+    if [ -n "$now" ] && [ "$now" != "$asked" ]; then
+      asked=$now
+      sed -E 's/.*(to|on) ([+-][xyz]): its.*/turn \2/' <<<"$now" >"$hand"
+    fi
+    sleep 0.1
+  done
+  echo "FAILED: '$1' never came; the terminal shows:"
+  screen
+  exit 1
+}
+turn_until "+x is taken"
+echo "turn -z" >"$hand"
+wait_for "refused: -z is done already"
+"${tmux[@]}" send-keys -t t u Enter
+wait_for "+x is taken back"
+turn_until "-x is taken"
+"${tmux[@]}" send-keys -t t C-c
+echo wait >"$hand"
+wait_for "the program has ended"
+# The emulated kernel does not always notice that a killed program's files are closed; a new plug it does.
+printf 'unplug\nplug\nstart\n' >"$hand"
+wait_for "goes on; it has "
+taken=$(screen | sed -nE 's/.*goes on; it has ([0-9]+) placements.*/\1/p')
+[ "$taken" -ge 3 ] || { echo "FAILED: only $taken placements were kept"; screen; exit 1; }
+turn_until "the run is complete"
+wait_for ": pass"
+wait_for "constants stored as"
+echo wait >"$hand"
+echo end >"$hand"
+wait_for "all over"
+[ -z "$(find "$folder" -name run.json)" ] || { echo "FAILED: the run is still on the disk"; exit 1; }
+echo "the run by hand: a slip, an undo, Ctrl-C, and it went on with $taken placements"

@@ -5,9 +5,13 @@
 //
 // Says `serial S` and, at every start, what the station prints; then does what the lines of its
 // standard input say, each answered with `ok`: turn POSE, unplug, plug, kill (the station, by
-// SIGKILL), start. Ends with its input.
+// SIGKILL), start, wait (until it has ended by itself). Ends with its input. With SIXPOINT_HAND
+// these lines come from that file or pipe instead, up to the line `end`, nothing is answered, and
+// the program has this one's terminal for itself, Ctrl-C included.
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -31,12 +35,29 @@ class Child {
   Child& operator=(const Child&) = delete;
 
   bool start() {
+    kill();
     std::vector<char*> argv;
     for (std::string& word : words_) {
       argv.push_back(word.data());
     }
     argv.push_back(nullptr);
-    return ::posix_spawn(&pid_, argv[0], nullptr, nullptr, argv.data(), environ) == 0;
+    posix_spawnattr_t attributes;
+    sigset_t interrupt;
+    sigemptyset(&interrupt);
+    sigaddset(&interrupt, SIGINT);
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setsigdefault(&attributes, &interrupt);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+    const bool begun =
+        ::posix_spawn(&pid_, argv[0], nullptr, &attributes, argv.data(), environ) == 0;
+    posix_spawnattr_destroy(&attributes);
+    return begun;
+  }
+  void wait() {
+    if (pid_ > 0) {
+      ::waitpid(pid_, nullptr, 0);
+      pid_ = 0;
+    }
   }
   void kill() {
     if (pid_ > 0) {
@@ -84,7 +105,14 @@ int run(std::vector<std::string> words) {
   std::cout << "serial " << unit.serial << std::endl;
   Child station(words);
   bool fine = station.start();
-  for (std::string line; fine && std::getline(std::cin, line);) {
+  const char* hand = std::getenv("SIXPOINT_HAND");
+  std::fstream pipe;
+  if (hand != nullptr) {
+    std::signal(SIGINT, SIG_IGN);
+    pipe.open(hand, std::ios::in | std::ios::out);  // both: it has no end when a writer goes
+  }
+  std::istream& words_of_hand = hand != nullptr ? pipe : std::cin;
+  for (std::string line; fine && std::getline(words_of_hand, line) && line != "end";) {
     if (line.starts_with("turn ")) {
       fine = turn(unit, line.substr(5));
     } else if (line == "unplug") {
@@ -95,10 +123,15 @@ int run(std::vector<std::string> words) {
       station.kill();
     } else if (line == "start") {
       fine = station.start();
+    } else if (line == "wait") {
+      station.wait();
+      std::cout << "the program has ended" << std::endl;
     } else {
       fine = false;
     }
-    std::cout << (fine ? "ok" : "failed") << std::endl;
+    if (hand == nullptr || !fine) {
+      std::cout << (fine ? "ok" : "failed") << std::endl;
+    }
   }
   station.kill();
   if (!unit.port.empty()) {

@@ -32,12 +32,16 @@ struct Bench {
     unit = *device::Unit::open(mocks::link_to(plugged, false));
   }
   Result<JigReport> run(JigSessionOptions options = {}) {
-    return run_jig(*unit, *jig, env.env, options, [this](const JigAction& action) {
+    auto report = run_jig(*unit, *jig, env.env, options, [this](const JigAction& action) {
       log.push_back(action);
       if (on_action) {
         on_action(action);
       }
     });
+    for (const std::string& code : report ? report->codes : std::vector<std::string>{}) {
+      EXPECT_NE(find_failure_code(code), nullptr) << code << " is not in the catalogue";
+    }
+    return report;
   }
   MemoryEnv env;
   std::shared_ptr<ManualClock> clock;

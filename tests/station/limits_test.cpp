@@ -1,10 +1,13 @@
 #include "station/limits.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "run_command.h"
 
 namespace sixpoint::station {
 namespace {
@@ -70,6 +73,32 @@ TEST_P(BadLimits, AreRefusedWithTheLine) {
   EXPECT_FALSE(limits.error().hint.empty());
 }
 
+// What a person sees: one line, which names file and line, and exit code 78, from every command
+// that reads such a file. A jig run ends before the unit is touched.
+TEST_P(BadLimits, EndEveryCommandWithOneLine) {
+  MemoryEnv env;
+  const std::string text = GetParam().text;
+  auto file = env.files.create("l.toml");
+  ASSERT_OK(file);
+  ASSERT_OK((*file)->write_at(
+      0, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  ASSERT_OK((*file)->close());
+  const std::vector<std::vector<std::string>> commands = {
+      {"limits", "check", "l.toml"},
+      {"limits", "print", "l.toml"},
+      {"jig", "--device", "virtual:seed=7,jig=auto", "--store", "s.db", "--limits", "l.toml"},
+      {"station", "--device", "virtual:seed=7", "--store", "s.db", "--limits", "l.toml"}};
+  for (const auto& command : commands) {
+    const auto answer = tests::run_command(env.env, command);
+    EXPECT_EQ(answer.exit_code, 78) << command[0] << ' ' << answer.people;
+    EXPECT_TRUE(answer.out.empty()) << answer.out;
+    EXPECT_THAT(answer.people, HasSubstr(GetParam().where));
+    EXPECT_EQ(std::count(answer.people.begin(), answer.people.end(), '\n'), 1) << answer.people;
+    EXPECT_LT(answer.people.size(), 300U) << answer.people;
+    EXPECT_FALSE(env.files.open("s.db").has_value()) << "nothing was begun";
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, BadLimits,
     testing::Values(
@@ -100,6 +129,19 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"RulesNoList", "[check_unit]\nlocking_rules = 1\n", "l.toml:2", "no list"},
         BadFile{"UnknownDecision", "[decision]\nfactor = 1\n", "l.toml:2", "unknown key"},
         BadFile{"Twice", "[noise_mg]\nhigh = 3\n[noise_mg]\nhigh = 3\n", "l.toml:3", "no TOML"},
+        BadFile{"TwiceAKey", "[noise_mg]\nhigh = 3\nhigh = 4\n", "l.toml:3", "no TOML"},
+        BadFile{"MinusInfinity", "[zero_offset_mg]\nlow = -inf\n", "l.toml:2", "outside"},
+        BadFile{"Huge", "[noise_mg]\nhigh = 1e308\n", "l.toml:2", "outside"},
+        BadFile{"HugerThanANumber", "[noise_mg]\nhigh = 1e999\n", "l.toml:2", ""},
+        BadFile{"HugeWholeNumber", "[retest]\nmost_failures = 9223372036854775807\n", "l.toml:2",
+                "outside"},
+        BadFile{"AWordWithItsUnit", "[noise_mg]\nhigh = \"10 mg\"\n", "l.toml:2", "no number"},
+        BadFile{"ANumberWithItsUnit", "[noise_mg]\nhigh = 10 mg\n", "l.toml:2", "no TOML"},
+        BadFile{"ANameWithoutItsUnit", "[noise]\nhigh = 10\n", "l.toml:1", "'noise' is nothing"},
+        BadFile{"ADate", "[noise_mg]\nhigh = 2020-01-01\n", "l.toml:2", "no number"},
+        BadFile{"AListOfLimits", "[[noise_mg]]\nhigh = 3\n", "l.toml:1", "no table"},
+        BadFile{"NoCoverage", "[decision]\ncoverage_factor = 0\n", "l.toml:2", "outside"},
+        BadFile{"ShortBaseline", "[check_unit]\nbaseline_runs = 1\n", "l.toml:2", "outside"},
         BadFile{"NoToml", "\n\n[noise_mg\n", "l.toml:3", "no TOML"},
         BadFile{"Binary", "\x01\x02\x03", "l.toml:1", "no TOML"}),
     [](const auto& one) { return one.param.name; });

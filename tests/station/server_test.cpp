@@ -2,6 +2,8 @@
 #include "station/server.h"
 
 #include <array>
+#include <cmath>
+#include <fstream>
 #include <future>
 #include <thread>
 
@@ -30,7 +32,8 @@ class Station {
   // `its_bench`: one that outlives this program, where the units shall.
   explicit Station(std::vector<std::string> devices, const std::string& folder,
                    std::string token = {}, int most_streams = 24,
-                   std::shared_ptr<mocks::VirtualBench> its_bench = {})
+                   std::shared_ptr<mocks::VirtualBench> its_bench = {},
+                   const ServerOptions& server_options = {})
       : bench_(its_bench ? std::move(its_bench) : std::make_shared<mocks::VirtualBench>()),
         registry_(known_devices()) {
     bench_->register_in(registry_);
@@ -68,7 +71,7 @@ class Station {
                  bench_.get(),
                  [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); },
                  {}});
-    auto listening = Server::open(posix_env(), *api, {});
+    auto listening = Server::open(posix_env(), *api, server_options);
     EXPECT_OK(listening);
     server = *std::move(listening);
     thread_ = std::thread([this] { server->serve(); });
@@ -459,6 +462,52 @@ TEST(Server, EventsCarryStateLanesAndReadings) {
   EXPECT_EQ(json["lanes"][0]["live"]["face"], "+z");
 }
 
+// How far from +z the box on the page stands: the newest reading of lane 1, as the page has it.
+double shown_tilt_deg(const Station& station) {
+  std::string text;
+  Json json;
+  station.client().Get("/api/events", [&](const char* data, std::size_t size) {
+    text.append(data, size);
+    const std::string head = "event: live\ndata: ";
+    const std::size_t live = text.find(head);
+    const std::size_t end = live == std::string::npos ? live : text.find('\n', live + head.size());
+    if (end != std::string::npos) {
+      const std::size_t begin = live + head.size();
+      json = Json::parse(text.substr(begin, end - begin), nullptr, false);
+      text.erase(0, end);
+      return json["lanes"].empty() || json["lanes"][0]["mg"].size() < 3;
+    }
+    return true;
+  });
+  const auto mg = json["lanes"][0]["mg"].get<std::vector<double>>();
+  const double z = mg[mg.size() - 1];
+  return std::atan2(std::hypot(mg[mg.size() - 2], mg[mg.size() - 3]), z) * 180 / M_PI;
+}
+
+// A unit with constants of the other filter configuration lies right, and its box stood 25 degrees
+// askew. Oracle: the virtual unit's true constants, which have it at +z.
+TEST(Server, TheLiveBoxGoesByWhatTheRunHasSeenOfAnAffectedUnit) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,positive_lsb=305/302/280,negative_lsb=-205/-208/-228,"
+                   "zero_lsb=50/47/26,true_sensitivity_lsb_per_g=237.7/251.8/242.3,"
+                   "true_zero_lsb=-30/127/26,pace=20"},
+                  folder.path());
+  station.wait_state(1, "idle");
+  EXPECT_GT(shown_tilt_deg(station), 20) << "by the unit's own constants";
+  ASSERT_EQ(station.post("/api/run", Json::object()), 202);
+  serve(station, 1, 1);
+  station.wait(1, [](const Json& json) {
+    return json["run"].is_object() && json["run"]["taken"].size() == 1;
+  });
+  // It lies where it lay. The reading that was taken may have been the last one shown by the old
+  // ones.
+  double shown_deg = shown_tilt_deg(station);
+  for (int i = 0; i < 500 && shown_deg > 2; ++i) {
+    shown_deg = shown_tilt_deg(station);
+  }
+  EXPECT_LT(shown_deg, 2) << "seating and noise of a single reading";
+}
+
 // Two thousand pages at once: those beyond the limit are refused, and the station goes on.
 TEST(Server, ThousandsOfEventStreamsDoNotTakeItDown) {
   const tests::TemporaryFolder folder;
@@ -514,6 +563,148 @@ TEST(Server, ThousandsOfEventStreamsDoNotTakeItDown) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   ADD_FAILURE() << "no stream after the others had gone";
+}
+
+// A connection to the station, made by hand; -1 when this process may open no more.
+int connect_to(const Station& station, int receive_bytes = 0) {
+  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
+  if (descriptor < 0) {
+    return -1;
+  }
+  if (receive_bytes > 0) {
+    setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &receive_bytes, sizeof(receive_bytes));
+  }
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(station.server->port()));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  if (connect(descriptor, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0) {
+    close(descriptor);
+    return -1;
+  }
+  return descriptor;
+}
+
+double resident_mb() {
+  std::ifstream file("/proc/self/statm");
+  double pages = 0;
+  file >> pages >> pages;
+  return pages * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+// Clients that say nothing, half a line, or half a body, far more of them than there are threads:
+// the page's own requests are answered at once, within the client's time-out, and memory stays
+// bounded.
+TEST(Server, IdleAndHalfSaidRequestsHoldNoThread) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,pace=20"}, folder.path());
+  station.wait_state(1, "idle");
+  const double before_mb = resident_mb();
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(station.server->port()) + "\r\n";
+  const std::array<std::string, 4> said = {
+      "", "GET /api/st", "GET /api/state HTTP/1.1\r\n" + host,
+      "POST /api/run HTTP/1.1\r\n" + host + "Content-Length: 60000\r\n\r\n{\"operator\":"};
+  std::vector<int> sockets;
+  for (std::size_t i = 0; i < 400; ++i) {
+    const int descriptor = connect_to(station);
+    if (descriptor < 0) {
+      break;
+    }
+    const std::string& text = said[i % said.size()];
+    EXPECT_EQ(send(descriptor, text.data(), text.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(text.size()));
+    sockets.push_back(descriptor);
+  }
+  EXPECT_EQ(sockets.size(), 400U);
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(station.get("/api/state")["schema"], "sixpoint/station/1");
+  }
+  EXPECT_LT(resident_mb() - before_mb, 64);
+  // They are closed when their time is over; what was half said was not done.
+  for (const int descriptor : sockets) {
+    const timeval patience{60, 0};
+    setsockopt(descriptor, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    char byte = 0;
+    EXPECT_LE(recv(descriptor, &byte, 1, 0), 0) << "closed without an answer";
+    close(descriptor);
+  }
+  EXPECT_EQ(station.lane(1)["state"], "idle");
+}
+
+// More than may wait: the oldest goes, and the newest is heard.
+TEST(Server, WhenTooManyWaitTheOldestGoes) {
+  const tests::TemporaryFolder folder;
+  ServerOptions options;
+  options.most_waiting = 20;
+  options.request_time_out_s = 60;  // nobody goes for another reason
+  Station station({"virtual:seed=7,pace=20"}, folder.path(), "", 24, {}, options);
+  const int oldest = connect_to(station);
+  ASSERT_GE(oldest, 0);
+  std::vector<int> others;
+  for (int i = 0; i < 30; ++i) {
+    others.push_back(connect_to(station));
+  }
+  EXPECT_EQ(station.get("/api/state")["schema"], "sixpoint/station/1");
+  const timeval patience{30, 0};
+  setsockopt(oldest, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+  char byte = 0;
+  EXPECT_EQ(recv(oldest, &byte, 1, 0), 0) << "closed";
+  const std::string request =
+      "GET /icon.svg HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(station.server->port()) +
+      "\r\n\r\n";
+  EXPECT_GT(send(others.back(), request.data(), request.size(), MSG_NOSIGNAL), 0);
+  std::array<char, 16> head{};
+  EXPECT_GT(recv(others.back(), head.data(), head.size(), 0), 0);
+  EXPECT_THAT(std::string(head.data(), head.size()), testing::StartsWith("HTTP/1.1 200"));
+  for (const int descriptor : others) {
+    close(descriptor);
+  }
+  close(oldest);
+}
+
+// Pages that are open and read nothing take every stream; they are let go of, and others get in.
+TEST(Server, PagesThatDoNotReadAreLetGo) {
+  const tests::TemporaryFolder folder;
+  ServerOptions options;
+  options.request_time_out_s = 1;
+  Station station({"virtual:seed=7,pace=100"}, folder.path(), "", 4, {}, options);
+  station.wait_state(1, "idle");
+  const std::string request =
+      "GET /api/events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(station.server->port()) +
+      "\r\n\r\n";
+  const auto streams = [&] {
+    int status = 0;
+    station.client().Get(
+        "/api/events",
+        [&](const httplib::Response& response) {
+          status = response.status;
+          return false;
+        },
+        [](const char* /*data*/, std::size_t /*size*/) { return false; });
+    return status;
+  };
+  const double before_mb = resident_mb();
+  std::vector<int> sockets;
+  for (int i = 0; i < 4; ++i) {
+    sockets.push_back(connect_to(station, 4096));
+    ASSERT_GE(sockets.back(), 0);
+    EXPECT_GT(send(sockets.back(), request.data(), request.size(), MSG_NOSIGNAL), 0);
+  }
+  for (const int descriptor : sockets) {
+    std::array<char, 12> head{};
+    EXPECT_EQ(recv(descriptor, head.data(), head.size(), MSG_WAITALL), 12);
+    EXPECT_EQ(std::string_view(head.data(), head.size()), "HTTP/1.1 200") << "a stream is taken";
+  }
+  int status = 0;
+  for (int i = 0; i < 3000 && status != 200; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    status = streams();
+  }
+  EXPECT_EQ(status, 200) << "and one is free again";
+  EXPECT_LT(resident_mb() - before_mb, 64);
+  for (const int descriptor : sockets) {
+    close(descriptor);
+  }
 }
 
 TEST(Server, CapturesACalibrationFileSideBySide) {

@@ -1,9 +1,11 @@
 #include "station/verdict.h"
 
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <set>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
@@ -135,6 +137,7 @@ TEST(FailureCodes, EveryCodeThatCanComeIsInTheCatalogueOnce) {
   for (const FailureCode& code : failure_codes()) {
     EXPECT_TRUE(seen.insert(code.code).second) << code.code;
     EXPECT_FALSE(code.meaning.empty()) << code.code;
+    EXPECT_FALSE(code.cause.empty()) << code.code;
     EXPECT_FALSE(code.next_action.empty()) << code.code;
   }
   for (const QuantityInfo& info : quantities()) {
@@ -142,6 +145,35 @@ TEST(FailureCodes, EveryCodeThatCanComeIsInTheCatalogueOnce) {
       EXPECT_TRUE(code.empty() || find_failure_code(code) != nullptr) << code;
     }
   }
+}
+
+// docs/verdicts.md is the catalogue for people: the same codes in the same words, none more, none
+// fewer.
+TEST(FailureCodes, TheDocumentHasEveryCodeAndNoOther) {
+  std::ifstream file(SIXPOINT_SOURCE "/docs/verdicts.md");
+  ASSERT_TRUE(file);
+  const std::string head = "| code | what | probable cause | what to do |";
+  std::vector<std::string> rows;
+  bool inside = false;
+  for (std::string line; std::getline(file, line);) {
+    inside = line == head || (inside && line.starts_with("|"));
+    if (inside && line.starts_with("| `")) {
+      rows.push_back(line);
+    }
+  }
+  std::vector<std::string> wanted;
+  for (const FailureCode& code : failure_codes()) {
+    wanted.push_back(fmt::format("| `{}` | {} | {} | {} |", code.code, code.meaning, code.cause,
+                                 code.next_action));
+  }
+  EXPECT_THAT(rows, testing::ElementsAreArray(wanted));
+}
+
+TEST(FailureCodes, WhatToDoIsSaidOnceEach) {
+  EXPECT_THAT(next_actions({"temperature_low", "noise_high", "temperature_high", "no_such_code"}),
+              testing::ElementsAre("Leave it on the bench for an hour and repeat.",
+                                   "Stop what shakes the bench, seat the unit anew and repeat."));
+  EXPECT_TRUE(next_actions({}).empty());
 }
 
 TEST(Verdict, NamesAreReadBack) {

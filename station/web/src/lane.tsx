@@ -17,6 +17,7 @@ export function ResultBox({ result }: { result: Result }) {
       <p>{result.serial}</p>
       {typeof result.residual_mg === 'number' && <p>{S.residual(result.residual_mg, result.as_found_residual_mg ?? null)}</p>}
       {result.reasons.map((reason) => <p>{reason}</p>)}
+      {result.next_actions && result.next_actions.length > 0 && <p class="todo"><b>{S.todo}:</b> {result.next_actions.join(' ')}</p>}
       {result.repeat_sides && result.repeat_sides.length > 0 && <p>{S.files.repeat(result.repeat_sides)}</p>}
       {result.kind === 'jig' && result.verdict !== 'refused' && <p>{S.stored(result)}</p>}
       {result.kind === 'capture' && result.stored && <p>{S.files.saved(`${result.file}.constants.json`)}</p>}

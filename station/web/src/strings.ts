@@ -100,6 +100,7 @@ export const S = {
     before === null ? `${after.toFixed(1)} mg off on sides that were not fitted`
       : `${after.toFixed(1)} mg off on sides that were not fitted (as found: ${before.toFixed(0)} mg)`,
   stored: (r: Result) => r.stored ? `Stored as run ${(r.run ?? '').slice(0, 12)}` : r.problem ?? 'Storing …',
+  todo: 'What to do',
   documents: { certificate: 'Certificate (PDF)', json: 'Certificate (JSON)', label: 'Label (ZPL)', report: 'Report (JSON)' },
   unit: (serial: string, firmware: string) => `${serial}, firmware ${firmware}`,
   low: (mv: number) => `Battery ${(mv / 1000).toFixed(2)} V`,

@@ -10,7 +10,7 @@ export interface Run {
 export interface Result {
   kind: 'jig' | 'capture'; serial: string; verdict: string; reasons: string[]; stored: boolean;
   residual_mg?: number | null; as_found_residual_mg?: number | null; run?: string; constants_id?: string | null;
-  problem?: string; file?: string; repeat_sides?: string[]; written?: boolean;
+  problem?: string; file?: string; repeat_sides?: string[]; written?: boolean; next_actions?: string[];
 }
 export interface Lane {
   lane: number; device: string; message: string; turns_by_itself: boolean;

@@ -1,0 +1,168 @@
+#include "station/jig_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/sha256.h"
+#include "station/jig_progress.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using calib::Calibration;
+
+nlohmann::ordered_json json_of(const JudgedPoses& judged) {
+  nlohmann::ordered_json json;
+  json["residual_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
+                                             : nlohmann::ordered_json(judged.worst_mg);
+  json["rms_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
+                                        : nlohmann::ordered_json(judged.rms_mg);
+  json["poses"] = nlohmann::ordered_json::array();
+  for (const JudgedPose& pose : judged.poses) {
+    nlohmann::ordered_json item = station::to_json(pose.reading);
+    item["magnitude_g"] = pose.magnitude_g;
+    item["error_mg"] = pose.error_mg;
+    json["poses"].push_back(std::move(item));
+  }
+  return json;
+}
+
+// Standard uncertainties under the contract's names, then what they are made of and expanded to.
+nlohmann::ordered_json uncertainty_to_json(const JigReport& report) {
+  const double coverage = report.limits.decision.coverage_factor;
+  nlohmann::ordered_json json = calib::to_json(report.combined);
+  PerAxis<double> sensitivity_percent{};
+  PerAxis<double> zero_mg{};
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    sensitivity_percent[axis] = 100 * coverage * report.combined.sensitivity_relative[axis];
+    zero_mg[axis] = coverage * report.combined.zero_mg[axis];
+  }
+  json["coverage_factor"] = coverage;
+  json["expanded"] = {{"sensitivity_percent", sensitivity_percent}, {"zero_mg", zero_mg}};
+  json["budget"] = {{"noise_tilt_gravity", calib::to_json(report.six->best().uncertainty)},
+                    {"gravity_relative", report.gravity.sd_g() / report.gravity.g()},
+                    {"unused_poses_rms_mg", report.verification.rms_mg}};
+  return json;
+}
+
+nlohmann::ordered_json json_of(const std::optional<device::CalibrationPage>& page) {
+  if (!page) {
+    return nullptr;
+  }
+  nlohmann::ordered_json json = calib::to_json(page->constants);
+  json["calibrated"] = to_iso8601(page->calibrated);
+  return json;
+}
+
+}  // namespace
+
+JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& calibration,
+                  double gravity_g) {
+  JudgedPoses judged;
+  for (const PoseReading& reading : readings) {
+    const PerAxis<double> force_g = calibration.to_g(reading.mean_lsb);
+    JudgedPose pose;
+    pose.reading = reading;
+    pose.magnitude_g = std::hypot(force_g[0], force_g[1], force_g[2]);
+    pose.error_mg = (pose.magnitude_g - gravity_g) * kMgPerG;
+    judged.worst_mg = std::max(judged.worst_mg, std::abs(pose.error_mg));
+    judged.rms_mg += pose.error_mg * pose.error_mg / static_cast<double>(readings.size());
+    judged.poses.push_back(pose);
+  }
+  judged.rms_mg = std::sqrt(judged.rms_mg);
+  return judged;
+}
+
+std::string JigReport::brief() const {
+  std::string text = fmt::format("{} under '{}': {}", printable(serial), calib::to_string(filter),
+                                 to_string(verdict));
+  if (!verification.poses.empty()) {
+    text += fmt::format("; {:.1f} mg off on {} poses that were not fitted", verification.worst_mg,
+                        verification.poses.size());
+  }
+  for (const std::string& reason : reasons) {
+    text += "; " + reason;
+  }
+  return text;
+}
+
+nlohmann::ordered_json JigReport::to_json() const {
+  nlohmann::ordered_json json;
+  json["serial"] = serial;
+  json["firmware"] = firmware;
+  json["jig"] = jig;
+  json["filter"] = calib::to_string(filter);
+  json["verdict"] = to_string(verdict);
+  json["codes"] = codes;
+  json["reasons"] = reasons;
+  json["started"] = to_iso8601(started);
+  json["ended"] = to_iso8601(ended);
+  json["gravity_m_per_s2"] = gravity.m_per_s2;
+  json["gravity_standard_uncertainty_m_per_s2"] = gravity.standard_uncertainty_m_per_s2;
+  json["raw_sha256"] = raw_sha256();
+  json["poses"] = nlohmann::ordered_json::array();
+  for (const PoseReading& face : faces) {
+    json["poses"].push_back(station::to_json(face));
+  }
+  if (six) {
+    json["constants"] = calib::to_json(six->best().calibration, six->best().stored);
+  } else {
+    json["constants"] = nullptr;
+  }
+  json["method"] = method;
+  json["as_found"] = json_of(as_found);
+  if (as_found) {
+    json["as_found"]["residual_mg"] = as_found_residual_mg;
+  }
+  json["as_left"] = json_of(as_left);
+  if (as_left) {
+    json["as_left"]["written"] = written;
+    json["as_left"]["residual_mg"] = written ? nlohmann::ordered_json(recheck.worst_mg)
+                                             : nlohmann::ordered_json(as_found_residual_mg);
+  }
+  json["verification"] = json_of(verification);
+  json["verification"]["residual_rounded_mg"] = rounded_residual_mg;
+  json["recheck"] = written ? json_of(recheck) : nlohmann::ordered_json(nullptr);
+  json["uncertainty"] = six ? uncertainty_to_json(*this) : nlohmann::ordered_json(nullptr);
+  json["limits"] = station::to_json(limits);
+  json["quantities"] = nlohmann::ordered_json::array();
+  for (const JudgedQuantity& quantity : quantities) {
+    json["quantities"].push_back(station::to_json(quantity));
+  }
+  json["solutions"] = six ? calib::to_json(*six) : nlohmann::ordered_json(nullptr);
+  json["refusals"] = refusals;
+  json["stream"]["samples"] = stream.samples;
+  json["stream"]["lost_samples"] = stream.lost_samples;
+  json["stream"]["duplicate_reports"] = stream.duplicate_reports;
+  json["stream"]["damaged_reports"] = stream.damaged_reports;
+  json["stream"]["failed_transfers"] = stream.failed_transfers;
+  json["stream"]["clock_jumps"] = stream.clock_jumps;
+  return json;
+}
+
+std::string JigReport::raw_sha256() const {
+  return to_hex(
+      sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
+}
+
+calib::ConstantsRecord JigReport::record() const {
+  calib::ConstantsRecord record;
+  record.serial = serial;
+  record.filter = filter;
+  if (six) {
+    record.calibration = six->best().calibration;
+    record.stored = six->best().stored;
+    record.uncertainty = combined;
+  }
+  record.method = method;
+  record.made_at = ended;
+  record.made_from.sha256 = raw_sha256();
+  record.gravity_m_per_s2 = gravity.m_per_s2;
+  return record;
+}
+
+}  // namespace sixpoint::station
