@@ -17,6 +17,21 @@ Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
                     : Eigen::AngleAxisd(angle, vector_deg.normalized()).toRotationMatrix();
 }
 
+// cos p, cos 2p and cos 3p over half a period.
+template <int kCount>
+const std::array<std::array<double, 3>, kCount / 2 + 1>& cosines() {
+  static const auto kTable = [] {
+    std::array<std::array<double, 3>, kCount / 2 + 1> table{};
+    for (std::size_t k = 0; k < table.size(); ++k) {
+      for (std::size_t h = 0; h < 3; ++h) {
+        table[k][h] = std::cos(2 * M_PI * static_cast<double>((h + 1) * k) / kCount);
+      }
+    }
+    return table;
+  }();
+  return kTable;
+}
+
 double sign_of_step(double step_g) {
   return std::abs(step_g) < 0.05 ? 0 : std::copysign(1.0, step_g);
 }
@@ -111,9 +126,13 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
 
   Eigen::VectorXd out = Eigen::VectorXd::Zero(block.size());
   const int phases = !block.tone ? 1 : s.truncation != 0 ? kPhasesTruncated : kPhases;
-  for (int k = 0; k < phases; ++k) {
-    const double p = 2 * M_PI * k / phases;
-    const double c1 = block.tone ? std::cos(p) : 0;
+  // The second half of a period is the first, mirrored.
+  for (int k = 0; k <= phases / 2; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const std::array<double, 3>& cosine =
+        phases == kPhasesTruncated ? cosines<kPhasesTruncated>()[at] : cosines<kPhases>()[at];
+    const double share = (k == 0 || 2 * k == phases ? 1.0 : 2.0) / phases;
+    const double c1 = block.tone ? cosine[0] : 0;
     const Eigen::Vector3d u = rest + c1 * swing;
     for (Eigen::Index a = 0; a < 3; ++a) {
       const double v = u[a];
@@ -123,14 +142,16 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
       y = y * s.gain[a] + s.offset_mg[a];
       if (s.truncation != 0) {
         const double sigma = std::max(0.3 * lsb_mg, block.noise_mg[a]);
-        y -= s.truncation * 0.5 * lsb_mg * std::erf(y / (sigma * M_SQRT2));
+        const double x = y / (sigma * M_SQRT2);
+        const double sign = std::abs(x) > 4.5 ? std::copysign(1.0, x) : std::erf(x);  // to 2e-10
+        y -= s.truncation * 0.5 * lsb_mg * sign;
       }
-      out[a] += y / phases;
+      out[a] += y * share;
       if (block.tone) {
-        out[3 + a] += 2 * y * c1 / phases;
+        out[3 + a] += 2 * y * c1 * share;
         if (block.harmonics && a == block.axis) {
-          out[6] += 2 * y * std::cos(2 * p) / phases;
-          out[7] += 2 * y * std::cos(3 * p) / phases;
+          out[6] += 2 * y * cosine[1] * share;
+          out[7] += 2 * y * cosine[2] * share;
         }
       }
     }
