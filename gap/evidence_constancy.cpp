@@ -134,7 +134,7 @@ std::vector<Inconstancy> EvidenceSearch::inconstancies() const {
   }
   std::map<std::string, Inconstancy> by_factor;
   std::map<std::string, std::vector<double>> all;
-  const auto judge = [&](const Fit& fit, double null_nats) {
+  const auto judge = [&](const Fit& fit, std::optional<double> over_nats) {
     const Eigen::MatrixXd raw = linearise(fit.state);
     std::vector<int> used_groups = {0, 1};
     used_groups.insert(used_groups.end(), fit.subset.groups.begin(), fit.subset.groups.end());
@@ -166,7 +166,7 @@ std::vector<Inconstancy> EvidenceSearch::inconstancies() const {
       }
       terms.push_back(std::move(term));
     }
-    terms[1].form_in_time = 0.05 * slow_mg;
+    terms[1].form_in_time = 0.1 * slow_mg;
     Term lab{"the jig's level", Eigen::MatrixXd(rows_, 3), {0.02, 0.1, 0.4}};
     Term seat{"the seat", Eigen::MatrixXd(rows_, 3), {0.02, 0.1, 0.4}};
     Eigen::Index row = 0;
@@ -203,23 +203,32 @@ std::vector<Inconstancy> EvidenceSearch::inconstancies() const {
         }
       }
     }
-    whiten_rows(fit.scatter, fit.scatter_size, m);
-    const Eigen::VectorXd left = m.col(used) - m.leftCols(used) * fit.posterior.mean;
-    // What the parameters in use would take over from the changes.
+    const double half_log_det = whiten_rows(fit.scatter, fit.scatter_size, m);
     Eigen::VectorXd prior_sd(used);
+    Eigen::VectorXd prior_mean(used);
     Eigen::Index i_used = 0;
     for (const int g : used_groups) {
       const ParameterGroup& group = groups_[static_cast<std::size_t>(g)];
       for (int i = 0; i < group.count; ++i) {
+        prior_mean[i_used] = group.prior_mean;
         prior_sd[i_used++] = group.sd_of(i);
       }
     }
+    // The fit once more, about its own estimate: in units of the prior, from the prior's mean.
     const Eigen::MatrixXd scaled_used = m.leftCols(used) * prior_sd.asDiagonal();
     const Eigen::LLT<Eigen::MatrixXd> normal(scaled_used.transpose() * scaled_used +
                                              Eigen::MatrixXd::Identity(used, used));
+    const Eigen::VectorXd value = m.col(used) - m.leftCols(used) * prior_mean;
+    const Eigen::VectorXd pull = scaled_used.transpose() * value;
+    const Eigen::VectorXd estimate = normal.solve(pull);
+    const Eigen::VectorXd left = value - scaled_used * estimate;
+    const double fit_nats = 0.5 * pull.dot(estimate) - 0.5 * value.squaredNorm() - half_log_det -
+                            normal.matrixLLT().diagonal().array().log().sum() +
+                            log_prior(fit.subset.groups);
+    const double less = over_nats ? *over_nats - fit_nats : 0;
+    // What the parameters in use would take over from the changes.
     Eigen::MatrixXd taken = scaled_used.transpose() * m.rightCols(columns);
     normal.matrixL().solveInPlace(taken);
-    const double less = null_nats - fit.nats;
     Eigen::Index first = 0;
     for (const Term& term : terms) {
       for (const Factor& factor : factors) {
@@ -249,9 +258,15 @@ std::vector<Inconstancy> EvidenceSearch::inconstancies() const {
           const Eigen::VectorXd v = sd.cwiseProduct(b);
           return 0.5 * v.dot(llt.solve(v)) - llt.matrixLLT().diagonal().array().log().sum();
         };
+        // The form's own changes may have any size up to this; others begin beyond.
+        const double tolerated =
+            factor.in_time ? std::max(term.form, term.form_in_time) : term.form;
         const double form =
-            nats(factor.in_time ? std::max(term.form, term.form_in_time) : term.form);
+            std::max({0.0, nats(tolerated / 10), nats(tolerated / 3), nats(tolerated)});
         for (const double size : term.sizes) {
+          if (size < 2 * tolerated) {
+            continue;
+          }
           const double gain = nats(size) - form - less;
           all[factor.words].push_back(gain);
           Inconstancy& most = by_factor[factor.words];
@@ -262,7 +277,7 @@ std::vector<Inconstancy> EvidenceSearch::inconstancies() const {
       }
     }
   };
-  judge(best_known_, best_known_.nats);
+  judge(best_known_, std::nullopt);
   if (best_known_.scatter != Scatter::nominal) {
     judge(best_nominal_, certain_nats);
   }

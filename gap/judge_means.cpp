@@ -56,7 +56,16 @@ double Diagnoser::size_apart_nats(Scatter kind) const {
   double here = 0;
   const double size = search_->best().scatter_size;
   const auto along = [&](const std::vector<double>& sizes, const auto& nats) {
-    here = interpolated(sizes, nats, size);
+    // The two are computed by approximations that differ, and what else there is adds to one of
+    // them: sizes within a factor of two are the same.
+    constexpr double kAlike = 2;
+    here = std::max(interpolated(sizes, nats, size / kAlike),
+                    interpolated(sizes, nats, size * kAlike));
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      if (sizes[i] > size / kAlike && sizes[i] < size * kAlike) {
+        here = std::max(here, nats(i));
+      }
+    }
     for (std::size_t i = 0; i < sizes.size(); ++i) {
       best = std::max(best, nats(i));
     }
