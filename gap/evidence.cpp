@@ -92,6 +92,11 @@ void EvidenceSearch::polish_shapes(Fit& fit) {
 }
 
 void EvidenceSearch::run() {
+  find_best();
+  linear_best_ = linearise(best().state);
+}
+
+void EvidenceSearch::find_best() {
   ForwardState at = first_guess();
   // Nominal scatter first, relinearised about its own best explanation.
   Whitened w;

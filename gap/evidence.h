@@ -148,6 +148,7 @@ class EvidenceSearch {
   HeldOut held_out() const;
 
  private:
+  void find_best();
   // evidence_whiten.cpp
   // `linear`: as linearise() gives it.
   Whitened whiten(Eigen::MatrixXd linear, Scatter scatter, double size) const;
@@ -189,7 +190,8 @@ class EvidenceSearch {
   Fit best_known_;
   Fit best_nominal_;  // of the catalogue, without scatter
   std::optional<Fit> best_unknown_;
-  Whitened final_;  // at best()'s covariance and state
+  Whitened final_;               // at best()'s covariance and state
+  Eigen::MatrixXd linear_best_;  // linearise() at best()'s state
 };
 
 }  // namespace sixpoint::gap

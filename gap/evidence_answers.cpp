@@ -166,7 +166,7 @@ double EvidenceSearch::changing_nats(const std::string& effect) const {
   }
   const ParameterGroup& group = groups_[static_cast<std::size_t>(*at)];
   // Scatter could stand for the change: then the comparison is with none beside it.
-  const Whitened w = whiten(fit.state, Scatter::nominal, 0);
+  const Whitened w = whiten(linear_best_, Scatter::nominal, 0);
   Posterior posterior;
   const double without = evidence(w, fit.subset.groups, &posterior) + log_prior(fit.subset.groups);
   const double first_s = blocks_.front().middle_s;

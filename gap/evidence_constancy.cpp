@@ -135,7 +135,7 @@ std::vector<Inconstancy> EvidenceSearch::inconstancies() const {
   std::map<std::string, Inconstancy> by_factor;
   std::map<std::string, std::vector<double>> all;
   const auto judge = [&](const Fit& fit, std::optional<double> over_nats) {
-    const Eigen::MatrixXd raw = linearise(fit.state);
+    const Eigen::MatrixXd raw = &fit == &best() ? linear_best_ : linearise(fit.state);
     std::vector<int> used_groups = {0, 1};
     used_groups.insert(used_groups.end(), fit.subset.groups.begin(), fit.subset.groups.end());
     std::vector<Term> terms;
