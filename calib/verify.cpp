@@ -58,6 +58,17 @@ int fewest_blocks_per_side(std::span<const StillBlock> blocks) {
   return *std::min_element(count.begin(), count.end());
 }
 
+// The sides that neither the file's constants nor the new ones see reached: the first may be the
+// wrong ones, and the second have to stand up to all else that is asked here.
+std::vector<std::string> missing_in_both(const Coverage& by_file, const Coverage& by_chosen) {
+  std::vector<std::string> missing = by_file.missing_directions();
+  const std::vector<std::string> still_missing = by_chosen.missing_directions();
+  std::erase_if(missing, [&](const std::string& side) {
+    return std::find(still_missing.begin(), still_missing.end(), side) == still_missing.end();
+  });
+  return missing;
+}
+
 void check_range(const Calibration& file_constants, const Calibration& chosen,
                  const VerificationLimits& limits, std::vector<std::string>& reasons) {
   for (std::size_t a = 0; a < kAxes; ++a) {
@@ -102,7 +113,7 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
                     const VerificationLimits& limits) {
   Verification out;
   std::vector<std::string>& reasons = out.reasons;
-  out.missing_directions = coverage_of(used).missing_directions();
+  out.missing_directions = missing_in_both(coverage_of(used), coverage_of(used, chosen));
   // Whether the blocks are gravity is asked of the best model; what the six constants leave of it
   // is asked by applied_rms_mg.
   out.held_out_rms_mg =

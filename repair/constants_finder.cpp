@@ -14,7 +14,7 @@ std::string joined(const std::vector<std::string>& parts) {
 // Why a report has no verified constants, in one sentence.
 std::string refusal_of(const calib::SolveReport& report) {
   std::string text = joined(report.verification.reasons);
-  const auto missing = report.coverage.missing_directions();
+  const auto& missing = report.verification.missing_directions;
   if (!missing.empty()) {
     text += fmt::format("{}no still period on the sides {}", text.empty() ? "" : "; ",
                         fmt::join(missing, " "));

@@ -142,6 +142,44 @@ TEST(Solve, ExactDirectionsAreNamed) {
   }
 }
 
+// Reached to 0.34 g, which wrong stored constants show as 0.2: the 0.3 g rule is about the unit.
+TEST(Solve, ASideThatOnlyWrongConstantsHideIsNotMissing) {
+  int hidden = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const SyntheticUnit unit = mismatched(seed);
+    std::mt19937_64 random(seed);
+    std::vector<Vector> poses = {{0.34, 0.94 / std::sqrt(2.0), 0.94 / std::sqrt(2.0)}};
+    while (poses.size() < 60) {
+      const Vector up = tests::random_direction(random);
+      if (up[0] < 0.34) {
+        poses.push_back(up);
+      }
+    }
+    for (const double reach : {0.36, 0.25}) {
+      poses[0] = {reach, std::sqrt((1 - reach * reach) / 2), std::sqrt((1 - reach * reach) / 2)};
+      if (reach < 0.3) {
+        std::erase_if(poses, [](const Vector& up) { return up[0] > 0.25; });
+      }
+      const auto blocks = blocks_of(unit, poses, {30, 60}, seed + 40);
+      const bool seen = coverage_of(blocks).complete();
+      hidden += reach > 0.3 && !seen ? 1 : 0;
+      const auto report = solve_from_still_blocks(blocks, file_constants(unit));
+      ASSERT_OK(report);
+      if (reach > 0.3) {
+        EXPECT_TRUE(report->usable()) << seed << report->brief();
+        EXPECT_THAT(report->verification.missing_directions, testing::IsEmpty());
+        ASSERT_TRUE(report->calibration);
+        EXPECT_LT(difference_over_sphere(truth(unit), *report->calibration).worst_mg, 1) << seed;
+      } else if (!seen) {
+        EXPECT_FALSE(report->usable()) << seed;
+        EXPECT_THAT(report->verification.missing_directions, testing::Contains("+x")) << seed;
+        EXPECT_FALSE(report->calibration) << seed;
+      }
+    }
+  }
+  EXPECT_GT(hidden, 3) << "the case that is tested";
+}
+
 TEST(Solve, OnePoseAndNothing) {
   const SyntheticUnit unit = mismatched(8);
   const auto one =

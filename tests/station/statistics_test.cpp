@@ -1,6 +1,7 @@
 #include "station/statistics.h"
 
 #include <cmath>
+#include <ostream>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -70,6 +71,7 @@ struct RuleCase {
   std::vector<double> fires;   // at the last point, not before
   std::vector<double> silent;  // nearly
 };
+void PrintTo(const RuleCase& value, std::ostream* out) { *out << "rule " << value.rule; }
 class NelsonRule : public testing::TestWithParam<RuleCase> {};
 
 TEST_P(NelsonRule, FiresAtTheLastPointOfItsPatternOnly) {
