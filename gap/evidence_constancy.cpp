@@ -61,7 +61,8 @@ std::vector<Factor> factors_of(const std::vector<Block>& blocks) {
   for (const Block& block : blocks) {
     sessions.emplace(block.session, static_cast<int>(sessions.size()));
   }
-  if (sessions.size() > 1) {
+  constexpr std::size_t kMostSessions = 24;  // a protocol of more has no sessions
+  if (sessions.size() > 1 && sessions.size() <= kMostSessions) {
     Factor factor{"session", Eigen::MatrixXd::Zero(n, std::ssize(sessions)), {}, false};
     for (Eigen::Index i = 0; i < n; ++i) {
       factor.value(i, sessions[blocks[static_cast<std::size_t>(i)].session]) = 1;
