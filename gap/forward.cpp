@@ -18,18 +18,28 @@ Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
 }
 
 // cos p, cos 2p and cos 3p over half a period.
-template <int kCount>
-const std::array<std::array<double, 3>, kCount / 2 + 1>& cosines() {
+const std::array<std::array<double, 3>, kPhasesTruncated / 2 + 1>& cosines() {
   static const auto kTable = [] {
-    std::array<std::array<double, 3>, kCount / 2 + 1> table{};
+    std::array<std::array<double, 3>, kPhasesTruncated / 2 + 1> table{};
     for (std::size_t k = 0; k < table.size(); ++k) {
       for (std::size_t h = 0; h < 3; ++h) {
-        table[k][h] = std::cos(2 * M_PI * static_cast<double>((h + 1) * k) / kCount);
+        table[k][h] = std::cos(2 * M_PI * static_cast<double>((h + 1) * k) / kPhasesTruncated);
       }
     }
     return table;
   }();
   return kTable;
+}
+
+// Phases that a truncated swing of so many standard deviations of the noise needs: its harmonics
+// fall as exp(-(k / swing)^2 / 2).
+int phases_of(double swing) {
+  for (const int phases : {kPhases, 48, 72, 144, 240}) {
+    if (phases > 8 * std::abs(swing)) {
+      return phases;
+    }
+  }
+  return kPhasesTruncated;
 }
 
 // erf to 1e-11, by cubic interpolation with its own derivative: what truncation costs is this.
@@ -156,23 +166,23 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
       Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c;
 
   Eigen::VectorXd out = Eigen::VectorXd::Zero(block.size());
-  const int phases = !block.tone ? 1 : s.truncation != 0 ? kPhasesTruncated : kPhases;
-  // The second half of a period is the first, mirrored.
-  for (int k = 0; k <= phases / 2; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    const std::array<double, 3>& cosine =
-        phases == kPhasesTruncated ? cosines<kPhasesTruncated>()[at] : cosines<kPhases>()[at];
-    const double share = (k == 0 || 2 * k == phases ? 1.0 : 2.0) / phases;
-    const double c1 = block.tone ? cosine[0] : 0;
-    const Eigen::Vector3d u = rest + c1 * swing;
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      const double v = u[a];
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const double sigma = std::max(0.3 * lsb_mg, block.noise_mg[a]);
+    const int phases = !block.tone         ? 1
+                       : s.truncation == 0 ? kPhases
+                                           : phases_of(1000 * s.gain[a] * swing[a] / sigma);
+    const int stride = kPhasesTruncated / phases;
+    // The second half of a period is the first, mirrored.
+    for (int k = 0; k <= phases / 2; ++k) {
+      const std::array<double, 3>& cosine = cosines()[static_cast<std::size_t>(k * stride)];
+      const double share = (k == 0 || 2 * k == phases ? 1.0 : 2.0) / phases;
+      const double c1 = block.tone ? cosine[0] : 0;
+      const double v = rest[a] + c1 * swing[a];
       double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
                      sensitivity[a] +
                  slow_mg[a];
       y = y * s.gain[a] + s.offset_mg[a];
       if (s.truncation != 0) {
-        const double sigma = std::max(0.3 * lsb_mg, block.noise_mg[a]);
         y -= s.truncation * 0.5 * lsb_mg * quick_erf(y / (sigma * M_SQRT2));
       }
       out[a] += y * share;
