@@ -8,6 +8,7 @@
 #include "gap/made_bundle.h"
 #include "gap/report_html.h"
 #include "gap/report_sheet.h"
+#include "sanitized.h"
 
 // Fontconfig, under librsvg, keeps its tables of fonts until the process ends.
 extern "C" const char* __lsan_default_suppressions();
@@ -29,7 +30,7 @@ const NamedValue* parameter_of(const Diagnosis& d, const std::string& effect,
 }
 
 TEST(Diagnose, NothingMissingNoAlarm) {
-  for (unsigned seed = 1; seed <= 12; ++seed) {
+  for (unsigned seed = 1; seed <= (tests::kSanitized ? 3U : 12U); ++seed) {
     tests::MadeUnit unit;
     unit.seed = seed;
     const auto d = diagnose(tests::made_production(unit));
