@@ -171,10 +171,10 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
     const int phases = !block.tone         ? 1
                        : s.truncation == 0 ? kPhases
                                            : phases_of(1000 * s.gain[a] * swing[a] / sigma);
-    const int stride = kPhasesTruncated / phases;
+    const auto stride = static_cast<std::size_t>(kPhasesTruncated / phases);
     // The second half of a period is the first, mirrored.
     for (int k = 0; k <= phases / 2; ++k) {
-      const std::array<double, 3>& cosine = cosines()[static_cast<std::size_t>(k * stride)];
+      const std::array<double, 3>& cosine = cosines()[static_cast<std::size_t>(k) * stride];
       const double share = (k == 0 || 2 * k == phases ? 1.0 : 2.0) / phases;
       const double c1 = block.tone ? cosine[0] : 0;
       const double v = rest[a] + c1 * swing[a];

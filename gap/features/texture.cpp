@@ -235,6 +235,7 @@ Texture noise_texture(const Bundle& bundle, const CleanSamples& clean) {
     all.push_back(sums_at(bundle, clean, stretch));
   }
   std::vector<const Sums*> fine;
+  texture.scales.reserve(all.size() + 1);
   for (std::size_t i = 0; i < all.size(); ++i) {
     Texture::Scale scale;
     scale.samples = kStretches[i];
