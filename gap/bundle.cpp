@@ -5,11 +5,13 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "gap/header_evidence.h"
 #include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
 
@@ -236,7 +238,7 @@ void read_temperature(FileSystem& files, const std::string& folder, Bundle& bund
   std::stable_sort(table.rows.begin(), table.rows.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::erase_if(table.rows, [](const auto& row) { return std::abs(row.second) > 200; });
-  if (table.rows.size() < 2) {
+  if (table.rows.size() < 2 || !(table.rows.back().first > table.rows.front().first)) {
     bundle.losses.emplace_back(
         "temperature.csv is missing or empty: the commanded temperatures stand in for the unit's, "
         "effects of "
@@ -285,13 +287,22 @@ void read_host_clock(FileSystem& files, const std::string& folder, Bundle& bundl
 }
 
 Status read_recording(FileSystem& files, const std::string& path, const BundleLimits& limits,
-                      Bundle& bundle) {
+                      Bundle& bundle, HeaderClaims& claims) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
   bundle.header.serial = recording.info().serial();
   bundle.header.model = recording.info().device_type();
   bundle.header.firmware = recording.info().firmware();
   gt3x::SampleReader reader(recording);
   std::uint64_t damaged_s = 0;
+  std::map<std::size_t, std::size_t> records_of;  // so many samples
+  const auto claim_scale = [&claims](const char* source, std::optional<double> lsb_per_g) {
+    const bool known = std::any_of(claims.scales.begin(), claims.scales.end(),
+                                   [&](const auto& claim) { return claim.source == source; });
+    if (lsb_per_g && std::isfinite(*lsb_per_g) && *lsb_per_g > 0 && !known) {
+      claims.scales.push_back({source, *lsb_per_g});
+    }
+  };
+  claim_scale("info.txt", recording.info().accel_scale_lsb_per_g());
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
     if (!item) {
@@ -302,8 +313,10 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
         return bad(path, fmt::format("more than {} samples", limits.max_samples));
       }
       bundle.samples.insert(bundle.samples.end(), item->counts.begin(), item->counts.end());
+      ++records_of[item->counts.size()];
       if (item->parameters != nullptr) {
         bundle.header.calibration_time = item->parameters->calibration_time;
+        claim_scale("PARAMETERS record", item->parameters->accel_scale_lsb_per_g);
       }
     } else if (item->gap == gt3x::GapKind::damaged) {
       damaged_s += item->seconds;
@@ -315,12 +328,62 @@ Status read_recording(FileSystem& files, const std::string& path, const BundleLi
                            "numbers no longer hold",
                            damaged_s));
   }
-  if (const auto rate = recording.info().sample_rate_hz();
-      rate && *rate > 0 && std::abs(*rate - bundle.rate_hz) > 0.5) {
-    return bad(path, fmt::format("the recording was made at {} Hz, the protocol says {} Hz", *rate,
-                                 bundle.rate_hz));
+  if (const auto rate = recording.info().sample_rate_hz(); rate && *rate > 0) {
+    claims.rate_hz = *rate;
+  }
+  const auto most =
+      std::max_element(records_of.begin(), records_of.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most != records_of.end() && most->first > 0) {
+    claims.samples_per_record = static_cast<double>(most->first);
   }
   return {};
+}
+
+// A log that ends early or is of another day is read on as its last value: say so.
+void weigh_logs(Bundle& bundle) {
+  constexpr double kReach_s = 60;
+  constexpr double kFar_c = 20;  // the unit lags behind the chamber by less
+  std::size_t unlogged = 0;
+  std::size_t far = 0;
+  std::size_t unstamped = 0;
+  for (const Segment& segment : bundle.segments) {
+    const double end_s =
+        segment.host_start_s + static_cast<double>(segment.samples) / bundle.rate_hz;
+    if (!bundle.temperature.empty()) {
+      unlogged += segment.host_start_s < bundle.temperature.host_time_s.front() - kReach_s ||
+                          end_s > bundle.temperature.host_time_s.back() + kReach_s
+                      ? 1
+                      : 0;
+      const double commanded = 0.5 * (segment.temperature_start_c + segment.temperature_end_c);
+      far +=
+          std::abs(bundle.temperature_at(0.5 * (segment.host_start_s + end_s)) - commanded) > kFar_c
+              ? 1
+              : 0;
+    }
+    const auto& stamps = bundle.host_clock.sample_index;
+    const auto stamp = std::lower_bound(stamps.begin(), stamps.end(), segment.first_sample);
+    unstamped += stamp == stamps.end() || *stamp >= segment.first_sample + segment.samples ? 1 : 0;
+  }
+  const std::size_t all = bundle.segments.size();
+  if (unlogged > 0) {
+    bundle.losses.push_back(
+        fmt::format("temperature.csv does not cover {} of {} segments: its nearest reading stands "
+                    "in, effects of temperature are told from effects of time less well",
+                    unlogged, all));
+  }
+  if (far > 0) {
+    bundle.losses.push_back(
+        fmt::format("temperature.csv is more than {:g} C from what was commanded in {} of {} "
+                    "segments: one of the two is wrong, the log is taken",
+                    kFar_c, far, all));
+  }
+  if (!bundle.host_clock.empty() && unstamped > 0) {
+    bundle.losses.push_back(fmt::format(
+        "host_clock.csv has no stamp in {} of {} segments: an error of the sample clock "
+        "and lost or repeated samples are looked for in the others",
+        unstamped, all));
+  }
 }
 
 // Stamps that are not of this recording's segments would make samples lost or repeated.
@@ -444,7 +507,7 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   }
   bundle.rate_hz = fields.number("sample_rate_hz", 1, 10'000);
   bundle.accel_scale_lsb_per_g = fields.number("accel_scale_lsb_per_g", 1, 100'000);
-  bundle.gravity_g = fields.number("gravity_g", 0.9, 1.1);
+  bundle.gravity_g = fields.number("gravity_g", 0.99, 1.01);  // 0.9956 to 1.0028
   SIXPOINT_CHECK(fields.status());
   if (const Json* unit = fields.object("unit")) {
     if (const auto serial = unit->find("serial"); serial != unit->end() && serial->is_string()) {
@@ -458,7 +521,8 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   if (segments->size() > limits.max_segments) {
     return bad(protocol_path, fmt::format("more than {} segments", limits.max_segments));
   }
-  SIXPOINT_CHECK(read_recording(files, folder + "/recording.gt3x", limits, bundle));
+  HeaderClaims claims;
+  SIXPOINT_CHECK(read_recording(files, folder + "/recording.gt3x", limits, bundle, claims));
   std::size_t end = 0;
   for (std::size_t i = 0; i < segments->size(); ++i) {
     const std::string where = fmt::format("{}: segments[{}]", protocol_path, i);
@@ -490,7 +554,9 @@ Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
   }
   read_temperature(files, folder, bundle);
   read_host_clock(files, folder, bundle);
+  SIXPOINT_CHECK(weigh_header(claims, bundle));
   drop_foreign_clock(bundle);
+  weigh_logs(bundle);
   find_placements(bundle);
   return bundle;
 }

@@ -102,7 +102,8 @@ struct BundleLimits {
 
 // no_input where the folder, protocol.json or recording.gt3x is missing; bad_data where the
 // protocol is no JSON of schema sixpoint/bundle/1, lacks a key, holds a number that can't be, a
-// rotation that is none, or segments that overlap or reach beyond the recording.
+// rotation that is none, segments that overlap or reach beyond the recording, or a scale or sample
+// rate that the header contradicts and the samples do not bear out (header_evidence.h).
 Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
                            const BundleLimits& limits = {});
 

@@ -20,6 +20,11 @@ Diagnosis Diagnoser::run() {
   find_abilities();
   clean_ = clean_samples(bundle_);
   judge_discrete();
+  if (!judge_poses()) {
+    return give_up(
+        "the unit moves inside the segments: the protocol's sample numbers are not of this "
+        "recording");
+  }
   noise_ = noise_spectrum(bundle_, clean_);
   if (!noise_.usable()) {
     return give_up("too little of the recording lies still and unmasked to know even its noise");
@@ -50,6 +55,7 @@ Diagnosis Diagnoser::run() {
                                   std::lround(2 * up[2])));
   }
   if (blocks_.empty() || clean_.pose_error_g > 0.45) {
+    poses_wrong_ = true;
     if (!blocks_.empty()) {
       alarm(50, "pose: the recording's axes do not follow the protocol's poses");
     }

@@ -81,6 +81,10 @@ class Diagnoser {
   void judge_codes();
   void judge_texture();
 
+  // judge_poses.cpp: false where the unit moves inside the dwells: then nothing that follows means
+  // anything.
+  bool judge_poses();
+
   // judge_timing.cpp
   void judge_timing();
   void judge_jitter();
@@ -137,6 +141,7 @@ class Diagnoser {
   bool step_there_ = false;  // something follows the moves that is not accepted as settling
   bool mismatch_ = false;
   bool few_poses_ = false;
+  bool poses_wrong_ = false;  // some dwells do not lie as the protocol says
 };
 
 }  // namespace sixpoint::gap

@@ -270,7 +270,8 @@ void Diagnoser::judge_nuisances() {
     chi += g * g + o * o;
     nominal += -0.5 * (g * g + o * o) - std::log(kGainSd) - std::log(kOffsetSd_mg);
   }
-  if (few_poses_ || options_.uncalibrated) {
+  // Gains that were fitted to poses which are none of the unit's mean nothing.
+  if (few_poses_ || poses_wrong_ || options_.uncalibrated) {
     return;
   }
   // The wrong mode: a common gain anywhere in 0.78..0.97, the unit's own 2 % about it, and
@@ -330,6 +331,26 @@ void Diagnoser::judge_nuisances() {
   f.parameters.push_back({"offset_g",
                           {s.offset_mg[0] / 1000, s.offset_mg[1] / 1000, s.offset_mg[2] / 1000},
                           {0.03, 0.03, 0.03}});
+  // A protocol that takes a unit of 256 LSB/g for one of 341 (both exist) reads alike: then the
+  // gains stand about that ratio as closely as they should about 1, and the zeros where they
+  // should.
+  constexpr double kCoarse_lsb_per_g = 256;
+  const double ratio = kCoarse_lsb_per_g / bundle_.accel_scale_lsb_per_g;
+  if (ratio < 0.98) {
+    double other = 0;
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      other += -0.5 * (std::pow((s.gain[a] / ratio - 1) / kGainSd, 2) +
+                       std::pow(s.offset_mg[a] / kOffsetSd_mg, 2)) -
+               std::log(kGainSd * ratio) - std::log(kOffsetSd_mg);
+    }
+    f.other_nats = other - wrong;
+  }
+  if (nats > kAccept && f.other_nats > 0) {
+    alarm(z,
+          fmt::format("scale: the gains are those of a unit of {:g} LSB/g, the protocol says {:g}",
+                      kCoarse_lsb_per_g, bundle_.accel_scale_lsb_per_g));
+    return;
+  }
   if (allowed("filter_mismatch")) {
     if (f.nats > kAccept) {
       double square = 0;

@@ -1,99 +1,14 @@
 #include "station/gap_outside.h"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <map>
-#include <memory>
-#include <numbers>
+#include <array>
+
+#include "station/gap_outside_parts.h"
 
 namespace sixpoint::station {
 
 namespace {
 
-using sim::Effect;
-using sim::EffectKind;
-using sim::ParameterSet;
-using sim::Placement;
-using sim::RecordingPlan;
-using sim::SimulatedBlock;
-using sim::Stage;
-
-constexpr double kTwoPi = 2 * std::numbers::pi;
-
-// An effect out of functions: each kind sets those it needs.
-struct Parts final : Effect {
-  std::function<void(const RecordingPlan&)> recording;
-  std::function<void(const Placement&)> placement;
-  std::function<void(sim::Tone&)> tone;
-  std::function<void(SimulatedBlock&)> sampling, stimulus, sensor, analog, firmware;
-
-  void on_recording(const RecordingPlan& plan) override {
-    if (recording) {
-      recording(plan);
-    }
-  }
-  void on_placement(const Placement& at) override {
-    if (placement) {
-      placement(at);
-    }
-  }
-  void on_tone(sim::Tone& of) const override {
-    if (tone) {
-      tone(of);
-    }
-  }
-  void on_sampling(SimulatedBlock& block) override { run(sampling, block); }
-  void on_stimulus(SimulatedBlock& block) override { run(stimulus, block); }
-  void on_sensor(SimulatedBlock& block) override { run(sensor, block); }
-  void on_analog(SimulatedBlock& block) override { run(analog, block); }
-  void on_firmware(SimulatedBlock& block) override { run(firmware, block); }
-
- private:
-  static void run(const std::function<void(SimulatedBlock&)>& part, SimulatedBlock& block) {
-    if (part) {
-      part(block);
-    }
-  }
-};
-
-using Made = std::unique_ptr<Effect>;
-
-// What a kind draws from.
-struct Draw {
-  double severity;
-  Random random;
-
-  double between(double low, double high) { return random.uniform(low, high); }
-  double between_log(double low, double high) {
-    return std::exp(random.uniform(std::log(low), std::log(high)));
-  }
-  double sign() { return random.uniform() < 0.5 ? -1 : 1; }
-  std::size_t axis() { return static_cast<std::size_t>(random.below(kAxes)); }
-  // Three numbers whose largest is `size`, either sign.
-  Eigen::Vector3d vector(double size) {
-    Eigen::Vector3d v(between(-1, 1), between(-1, 1), between(-1, 1));
-    return v * (size / std::max(v.cwiseAbs().maxCoeff(), 1e-6));
-  }
-};
-
-Eigen::Matrix3d turn_by(const Eigen::Vector3d& deg) {
-  const double angle = deg.norm() * std::numbers::pi / 180;
-  return angle < 1e-15 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
-                       : Eigen::AngleAxisd(angle, deg.normalized()).toRotationMatrix();
-}
-
-// A sample number somewhere in the middle half of the recording.
-struct Moment {
-  double share;
-  std::uint64_t sample = 0;
-  void in(const RecordingPlan& plan) {
-    sample = static_cast<std::uint64_t>(share * static_cast<double>(plan.length()));
-  }
-};
-
-Eigen::Index row(std::size_t axis) { return static_cast<Eigen::Index>(axis); }
+using namespace outside_parts;
 
 // Random telegraph ("popcorn") noise of a bad contact or a trap in the front end.
 Made popcorn(Draw d) {
@@ -213,7 +128,7 @@ Made supply_crosstalk(Draw d) {
   auto made = std::make_unique<Parts>();
   const double period_s = d.between_log(4, 60);
   made->sensor = [period_s, on_s = period_s * d.between(0.1, 0.5),
-                  g = d.vector(2 * d.severity) / kMgPerG,
+                  g = d.vector_of_mg(2 * d.severity),
                   phase_s = d.between(0, period_s)](SimulatedBlock& block) {
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (std::fmod(block.time_s[i] + phase_s, period_s) < on_s) {
@@ -227,7 +142,7 @@ Made supply_crosstalk(Draw d) {
 // A controller that hunts: the zero swings slowly.
 Made slow_oscillation(Draw d) {
   auto made = std::make_unique<Parts>();
-  made->sensor = [g = d.vector(2 * d.severity) / kMgPerG, period_s = d.between_log(25, 700),
+  made->sensor = [g = d.vector_of_mg(2 * d.severity), period_s = d.between_log(25, 700),
                   phase = d.between(0, kTwoPi)](SimulatedBlock& block) {
     for (std::size_t i = 0; i < block.size(); ++i) {
       block.sensed_g[i] += g * std::sin(kTwoPi * block.time_s[i] / period_s + phase);
@@ -252,8 +167,8 @@ Made one_sided_clip(Draw d) {
 // The zero goes up one way with the temperature and comes down another.
 Made thermal_hysteresis(Draw d) {
   auto made = std::make_unique<Parts>();
-  made->sensor = [g = d.vector(1.5 * d.severity) / kMgPerG, width_c = d.between(0.5, 4),
-                  play_c = 0.0, started = false](SimulatedBlock& block) mutable {
+  made->sensor = [g = d.vector_of_mg(1.5 * d.severity), width_c = d.between(0.5, 4), play_c = 0.0,
+                  started = false](SimulatedBlock& block) mutable {
     for (std::size_t i = 0; i < block.size(); ++i) {
       const double t = block.temperature_c[i];
       play_c = started ? std::clamp(play_c, t - width_c, t + width_c) : t;
@@ -365,7 +280,7 @@ Made narrow_band(Draw d) {
   auto made = std::make_unique<Parts>();
   const double f = d.between(5, 35);
   const double damping = d.between_log(0.01, 0.08);
-  const Eigen::Vector3d direction = d.vector(2 * d.severity) / kMgPerG;
+  const Eigen::Vector3d direction = d.vector_of_mg(2 * d.severity);
   made->stimulus = [d, f, damping, direction, x = 0.0, y = 0.0](SimulatedBlock& block) mutable {
     const double keep = std::exp(-kTwoPi * f * damping * 0.01);
     const double push = std::sqrt(1 - keep * keep);
@@ -445,7 +360,7 @@ Made stuck_high_bit(Draw d) {
 // The zero follows the square of the temperature, or a kink in it.
 Made bent_tempco(Draw d) {
   auto made = std::make_unique<Parts>();
-  made->sensor = [g = d.vector(3 * d.severity) / kMgPerG, kink = d.random.uniform() < 0.5,
+  made->sensor = [g = d.vector_of_mg(3 * d.severity), kink = d.random.uniform() < 0.5,
                   at_c = d.between(20, 30)](SimulatedBlock& block) {
     for (std::size_t i = 0; i < block.size(); ++i) {
       const double x = (block.temperature_c[i] - at_c) / 12;
@@ -464,7 +379,7 @@ Made hand_warmth(Draw d) {
       *since_s = at.start_s;
     }
   };
-  made->sensor = [since_s, g = d.vector(2 * d.severity) / kMgPerG,
+  made->sensor = [since_s, g = d.vector_of_mg(2 * d.severity),
                   tau_s = d.between_log(4, 40)](SimulatedBlock& block) {
     for (std::size_t i = 0; i < block.size(); ++i) {
       block.sensed_g[i] += g * std::exp(-std::max(0.0, block.time_s[i] - *since_s) / tau_s);
@@ -488,7 +403,7 @@ Made battery_droop(Draw d) {
 Made blower(Draw d) {
   auto made = std::make_unique<Parts>();
   const double period_s = d.between_log(20, 200);
-  made->stimulus = [g = d.vector(2 * d.severity) / kMgPerG, f = d.between(6, 40), period_s,
+  made->stimulus = [g = d.vector_of_mg(2 * d.severity), f = d.between(6, 40), period_s,
                     on_s = period_s * d.between(0.2, 0.6)](SimulatedBlock& block) {
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (std::fmod(block.time_s[i], period_s) < on_s) {
@@ -586,7 +501,7 @@ Made knocks(Draw d) {
                     f = d.between(8, 30)](SimulatedBlock& block) mutable {
     for (sim::MotionState& motion : block.motion) {
       if (d.random.uniform() < 3e-4) {
-        g = d.vector(40 * d.severity) / kMgPerG;
+        g = d.vector_of_mg(40 * d.severity);
         age_s = 0;
       }
       age_s += 0.01;
@@ -625,7 +540,7 @@ Made noisy_axis(Draw d) {
 // An auto-zero that hunts: the zero ramps off and is set back, again and again.
 Made saw_tooth(Draw d) {
   auto made = std::make_unique<Parts>();
-  made->sensor = [g = d.vector(2 * d.severity) / kMgPerG,
+  made->sensor = [g = d.vector_of_mg(2 * d.severity),
                   period_s = d.between_log(30, 300)](SimulatedBlock& block) {
     for (std::size_t i = 0; i < block.size(); ++i) {
       block.sensed_g[i] += g * (std::fmod(block.time_s[i], period_s) / period_s);
@@ -634,60 +549,53 @@ Made saw_tooth(Draw d) {
   return made;
 }
 
-template <Made (*kMake)(Draw)>
-OutsideKind outside(const char* name, Stage stage, std::string_view family, bool in_faces = true) {
-  EffectKind kind = {name,
-                     stage,
-                     "outside the catalogue",
-                     {{"severity", "1", {1}, 0, 10, "drawn"}},
-                     [](const ParameterSet& values, Random random) -> std::unique_ptr<Effect> {
-                       return kMake(Draw{values.at("severity")[0], random});
-                     }};
-  return {std::move(kind), family, in_faces};
-}
-
 }  // namespace
 
 const std::vector<OutsideKind>& outside_kinds() {
-  static const std::vector<OutsideKind> kKinds = {
-      outside<popcorn>("popcorn", Stage::sensor, ""),
-      outside<zero_step>("zero_step", Stage::sensor, ""),
-      outside<stuck_bit>("stuck_bit", Stage::firmware, ""),
-      outside<asymmetry>("asymmetry", Stage::sensor, "curvature"),
-      outside<swept_line>("swept_line", Stage::stimulus, "line"),
-      outside<missing_codes>("missing_codes", Stage::firmware, ""),
-      outside<hinge_backlash>("hinge_backlash", Stage::stimulus, "repeat"),
-      outside<rate_gain>("rate_gain", Stage::stimulus, "response", false),
-      outside<supply_crosstalk>("supply_crosstalk", Stage::sensor, ""),
-      outside<slow_oscillation>("slow_oscillation", Stage::sensor, ""),
-      outside<one_sided_clip>("one_sided_clip", Stage::sensor, "range", false),
-      outside<thermal_hysteresis>("thermal_hysteresis", Stage::sensor, "", false),
-      outside<seating_walk>("seating_walk", Stage::stimulus, "repeat"),
-      outside<swapped_packets>("swapped_packets", Stage::sampling, "timing", false),
-      outside<averaged_neighbours>("averaged_neighbours", Stage::sensor, "response"),
-      outside<gain_step>("gain_step", Stage::sensor, ""),
-      outside<delayed_axis>("delayed_axis", Stage::firmware, "", false),
-      outside<noise_spells>("noise_spells", Stage::sensor, ""),
-      outside<narrow_band>("narrow_band", Stage::stimulus, "line"),
-      // The kinds from here on were written after the diagnosis was frozen (docs/gap.md).
-      outside<dead_zone>("dead_zone", Stage::sensor, ""),
-      outside<slew_limit>("slew_limit", Stage::sensor, "", false),
-      outside<coarse_steps>("coarse_steps", Stage::firmware, "rounding"),
-      outside<stuck_high_bit>("stuck_high_bit", Stage::firmware, ""),
-      outside<bent_tempco>("bent_tempco", Stage::sensor, "", false),
-      outside<hand_warmth>("hand_warmth", Stage::sensor, ""),
-      outside<battery_droop>("battery_droop", Stage::sensor, "", false),
-      outside<blower>("blower", Stage::stimulus, "line"),
-      outside<sagging_board>("sagging_board", Stage::sensor, ""),
-      outside<clock_tempco>("clock_tempco", Stage::sampling, "timing", false),
-      outside<lost_bursts>("lost_bursts", Stage::sampling, "timing"),
-      outside<crossed_axes>("crossed_axes", Stage::firmware, ""),
-      outside<half_rate>("half_rate", Stage::firmware, "timing"),
-      outside<knocks>("knocks", Stage::stimulus, ""),
-      outside<creeping_table>("creeping_table", Stage::stimulus, ""),
-      outside<noisy_axis>("noisy_axis", Stage::sensor, ""),
-      outside<saw_tooth>("saw_tooth", Stage::sensor, ""),
-  };
+  static const std::vector<OutsideKind> kKinds = [] {
+    std::vector<OutsideKind> kinds = {
+        outside<popcorn>("popcorn", Stage::sensor, ""),
+        outside<zero_step>("zero_step", Stage::sensor, ""),
+        outside<stuck_bit>("stuck_bit", Stage::firmware, ""),
+        outside<asymmetry>("asymmetry", Stage::sensor, "curvature"),
+        outside<swept_line>("swept_line", Stage::stimulus, "line"),
+        outside<missing_codes>("missing_codes", Stage::firmware, ""),
+        outside<hinge_backlash>("hinge_backlash", Stage::stimulus, "repeat"),
+        outside<rate_gain>("rate_gain", Stage::stimulus, "response", false),
+        outside<supply_crosstalk>("supply_crosstalk", Stage::sensor, ""),
+        outside<slow_oscillation>("slow_oscillation", Stage::sensor, ""),
+        outside<one_sided_clip>("one_sided_clip", Stage::sensor, "range", false),
+        outside<thermal_hysteresis>("thermal_hysteresis", Stage::sensor, "", false),
+        outside<seating_walk>("seating_walk", Stage::stimulus, "repeat"),
+        outside<swapped_packets>("swapped_packets", Stage::sampling, "timing", false),
+        outside<averaged_neighbours>("averaged_neighbours", Stage::sensor, "response"),
+        outside<gain_step>("gain_step", Stage::sensor, ""),
+        outside<delayed_axis>("delayed_axis", Stage::firmware, "", false),
+        outside<noise_spells>("noise_spells", Stage::sensor, ""),
+        outside<narrow_band>("narrow_band", Stage::stimulus, "line"),
+        // The kinds from here on were written after the diagnosis was frozen (docs/gap.md).
+        outside<dead_zone>("dead_zone", Stage::sensor, ""),
+        outside<slew_limit>("slew_limit", Stage::sensor, "", false),
+        outside<coarse_steps>("coarse_steps", Stage::firmware, "rounding"),
+        outside<stuck_high_bit>("stuck_high_bit", Stage::firmware, ""),
+        outside<bent_tempco>("bent_tempco", Stage::sensor, "", false),
+        outside<hand_warmth>("hand_warmth", Stage::sensor, ""),
+        outside<battery_droop>("battery_droop", Stage::sensor, "", false),
+        outside<blower>("blower", Stage::stimulus, "line"),
+        outside<sagging_board>("sagging_board", Stage::sensor, ""),
+        outside<clock_tempco>("clock_tempco", Stage::sampling, "timing", false),
+        outside<lost_bursts>("lost_bursts", Stage::sampling, "timing"),
+        outside<crossed_axes>("crossed_axes", Stage::firmware, ""),
+        outside<half_rate>("half_rate", Stage::firmware, "timing"),
+        outside<knocks>("knocks", Stage::stimulus, ""),
+        outside<creeping_table>("creeping_table", Stage::stimulus, ""),
+        outside<noisy_axis>("noisy_axis", Stage::sensor, ""),
+        outside<saw_tooth>("saw_tooth", Stage::sensor, ""),
+    };
+    std::vector<OutsideKind> more = serviced_kinds();
+    std::move(more.begin(), more.end(), std::back_inserter(kinds));
+    return kinds;
+  }();
   return kKinds;
 }
 

@@ -18,6 +18,9 @@ struct OutsideKind {
   // The family of the catalogue whose advice would be right for it; empty: only "unknown" is right.
   std::string_view family;
   bool in_faces = true;  // six faces can show it; else it needs tones or temperatures
+  // Drawn only where a trial asks for it by name: a kind that came later changes no earlier trial,
+  // and nobody meets it by chance while he works on the diagnosis.
+  bool only_by_name = false;
 };
 
 const std::vector<OutsideKind>& outside_kinds();

@@ -265,9 +265,9 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
   }
   std::vector<const OutsideKind*> outside;
   for (const OutsideKind& kind : outside_kinds()) {
-    const bool wanted =
-        std::find(only.begin(), only.end(), kind.effect.name) != only.end() ||
-        (only.empty() && (kind.in_faces || protocol == sim::StandardProtocol::engineering));
+    const bool wanted = std::find(only.begin(), only.end(), kind.effect.name) != only.end() ||
+                        (only.empty() && !kind.only_by_name &&
+                         (kind.in_faces || protocol == sim::StandardProtocol::engineering));
     if (wanted) {
       outside.push_back(&kind);
     }

@@ -1,13 +1,21 @@
 // Hostile bundles: a clear error or a stated loss, never a confident guess.
 #include "gap/bundle.h"
 
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
+#include "base/random.h"
 #include "expect_result.h"
 #include "gap/diagnose.h"
+#include "gt3x/recording.h"
+#include "gt3x/recording_writer.h"
+#include "sim/bundle_writer.h"
 #include "sim/recording.h"
 #include "sim/scenario.h"
 
@@ -78,6 +86,7 @@ TEST_F(BundleTest, ContradictionsAreBadData) {
   fails("/sample_rate_hz", "100");
   fails("/sample_rate_hz", 30);  // the recording says 100
   fails("/gravity_g", nullptr);  // what NaN becomes in JSON
+  fails("/gravity_g", 1.05);     // nowhere on Earth
   fails("/segments", Json::array());
   fails("/segments/0/rotation", Json::parse("[[0,0,1],[1,0,0],[0,1,1]]"));   // not orthonormal
   fails("/segments/0/rotation", Json::parse("[[0,0,1],[1,0,0],[0,-1,0]]"));  // a reflection
@@ -159,6 +168,240 @@ TEST_F(BundleTest, AForeignHostClockIsALoss) {
   ASSERT_OK(bundle);
   EXPECT_TRUE(bundle->host_clock.empty());
   EXPECT_NE(bundle->losses.back().find("contradicts"), std::string::npos);
+}
+
+// A unit in six faces whose samples are of 256 LSB/g or not, with what header and protocol say.
+class Clerks : public ::testing::Test {
+ protected:
+  // `true_scale` is what the samples are of; a unit of `header` whose gain is off by the ratio.
+  Result<Bundle> bundle(double true_scale, double header, double protocol,
+                        const std::string& effects = "") {
+    const double gain = true_scale / header;
+    const auto scenario = sim::parse_scenario(fmt::format(
+        R"({{"schema": "sixpoint/scenario/1", "seed": 5, "protocol": "production", "effects": [{}],
+             "unit": {{"accel_scale_lsb_per_g": {}, "gain": [{}, {}, {}], "offset_g": [0.02, -0.03, 0.01]}}}})",
+        effects, header, gain, gain * 1.01, gain * 0.99));
+    EXPECT_OK(scenario);
+    EXPECT_OK(sim::write_bundle(memory_.files, "b", *scenario));
+    set("accel_scale_lsb_per_g", protocol);
+    return read_bundle(memory_.files, "b");
+  }
+  void set(const char* key, double value) {
+    const Bytes text = read_file(memory_.files, "b/protocol.json").value();
+    Json json = Json::parse(text);
+    json[key] = value;
+    ASSERT_OK(memory_.files.remove("b/protocol.json"));
+    ASSERT_OK(write_file(memory_.files, "b/protocol.json", json.dump()));
+  }
+  static std::string first_loss(const Bundle& bundle) {
+    return bundle.losses.empty() ? "" : bundle.losses.front();
+  }
+  static constexpr const char* kMismatch =
+      R"({"name": "filter_mismatch", "parameters": {"gain": [0.88], "offset_g": [0.1, -0.12, 0.15]}})";
+  MemoryEnv memory_;
+};
+
+TEST_F(Clerks, AProtocolWhoseScaleIsWrongIsRefused) {
+  EXPECT_FAILS(bundle(256, 256, 341), ErrorCode::bad_data);
+  EXPECT_FAILS(bundle(341, 341, 256), ErrorCode::bad_data);
+  EXPECT_FAILS(bundle(256, 256, 341, kMismatch), ErrorCode::bad_data);
+  EXPECT_FAILS(bundle(256, 300, 200), ErrorCode::bad_data);  // neither of them
+  const auto refused = bundle(256, 256, 341);
+  EXPECT_NE(refused.error().where.find("accel_scale_lsb_per_g"), std::string::npos);
+  EXPECT_NE(refused.error().what.find("256"), std::string::npos);
+  EXPECT_NE(refused.error().what.find("341"), std::string::npos);
+}
+
+TEST_F(Clerks, AHeaderWhoseScaleIsWrongIsSetAside) {
+  for (const double header : {341.0, 200.0, 290.0}) {
+    const auto plain = bundle(256, header, 256);
+    ASSERT_OK(plain);
+    EXPECT_NE(first_loss(*plain).find("set aside"), std::string::npos);
+    const auto diagnosis = diagnose(*plain);
+    ASSERT_OK(diagnosis);
+    EXPECT_TRUE(diagnosis->effects.empty()) << diagnosis->effects.front().name;
+    EXPECT_FALSE(diagnosis->unknown.present);
+  }
+  // A unit in the wrong mode under a header that lies: it is found as ever.
+  const auto mismatched = bundle(256, 341, 256, kMismatch);
+  ASSERT_OK(mismatched);
+  const auto diagnosis = diagnose(*mismatched);
+  ASSERT_OK(diagnosis);
+  ASSERT_FALSE(diagnosis->effects.empty());
+  EXPECT_EQ(diagnosis->effects.front().name, "filter_mismatch");
+}
+
+TEST_F(Clerks, ASmallDifferenceIsALossAndCutDigitsAreNone) {
+  const auto near = bundle(256, 256, 250);
+  ASSERT_OK(near);
+  EXPECT_NE(first_loss(*near).find("in doubt by 2.4 %"), std::string::npos) << first_loss(*near);
+  const auto cut = bundle(256, 256, 256.3);
+  ASSERT_OK(cut);
+  EXPECT_TRUE(cut->losses.empty());
+}
+
+// Three public recordings have 2 to 2.9 % between X and Y (docs/constants.md): named, and said to
+// be more than the datasheet has.
+TEST_F(Clerks, TheCrossAxisOfARealUnitIsNamed) {
+  const auto real = bundle(
+      256, 256, 256,
+      R"({"name": "non_orthogonality", "parameters": {"yz_xz_xy": [0.0035, -0.0015, 0.0288]}})");
+  ASSERT_OK(real);
+  const auto diagnosis = diagnose(*real);
+  ASSERT_OK(diagnosis);
+  ASSERT_EQ(diagnosis->effects.size(), 1U);
+  EXPECT_EQ(diagnosis->effects[0].name, "non_orthogonality");
+  EXPECT_TRUE(diagnosis->effects[0].outside_datasheet);
+  EXPECT_NEAR(diagnosis->effects[0].parameters[0].value[2], 0.0288, 3e-4);
+  EXPECT_FALSE(diagnosis->unknown.present);
+}
+
+// Nothing contradicts: but a clerk's 341 for 256 is no filter mismatch either.
+TEST_F(Clerks, AWrongScaleThatBothSayIsAnUnknown) {
+  const auto both = bundle(256, 341, 341);
+  ASSERT_OK(both);
+  const auto diagnosis = diagnose(*both);
+  ASSERT_OK(diagnosis);
+  EXPECT_TRUE(diagnosis->effects.empty());
+  ASSERT_TRUE(diagnosis->unknown.present);
+  EXPECT_EQ(diagnosis->unknown.where.front().find("scale"), 0U);
+  // A true mismatch of a unit of 341 stays what it is: its zeros give it away.
+  const auto mismatched = bundle(341, 341, 341, kMismatch);
+  ASSERT_OK(mismatched);
+  const auto named = diagnose(*mismatched);
+  ASSERT_OK(named);
+  ASSERT_FALSE(named->effects.empty());
+  EXPECT_EQ(named->effects.front().name, "filter_mismatch");
+}
+
+TEST_F(Clerks, TheSampleRateIsWeighedByStampsAndRecords) {
+  ASSERT_OK(bundle(256, 256, 256));
+  set("sample_rate_hz", 30);
+  EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
+  set("sample_rate_hz", 101);  // no clock error: header, stamps and records all say 100
+  EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
+  set("sample_rate_hz", 97);
+  EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
+  // A header that lies: the entry is changed in place, the archive's sum with it.
+  set("sample_rate_hz", 100);
+  auto opened = gt3x::Recording::open(memory_.files, "b/recording.gt3x");
+  ASSERT_OK(opened);
+  gt3x::Info info = opened->info();
+  const auto entry = [&](const std::string& name) {
+    auto source = opened->open_entry(name).value();
+    Bytes bytes;
+    std::array<std::uint8_t, 4096> piece{};
+    for (std::size_t n = source->read(piece).value(); n > 0; n = source->read(piece).value()) {
+      bytes.insert(bytes.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(n));
+    }
+    return bytes;
+  };
+  const Bytes log = entry("log.bin");
+  info.set("Sample Rate", "30");
+  const std::string text = info.serialise();
+  ASSERT_OK(memory_.files.remove("b/recording.gt3x"));
+  auto writer = gt3x::RecordingWriter::create(memory_.files, "b/recording.gt3x");
+  ASSERT_OK(writer);
+  ASSERT_OK(writer->add("log.bin", log));
+  ASSERT_OK(writer->add("info.txt", Bytes(text.begin(), text.end())));
+  ASSERT_OK(writer->commit());
+  const auto stamped = read_bundle(memory_.files, "b");
+  ASSERT_OK(stamped);
+  EXPECT_NE(first_loss(*stamped).find("stamps bear out"), std::string::npos);
+  ASSERT_OK(memory_.files.remove("b/host_clock.csv"));
+  const auto counted = read_bundle(memory_.files, "b");
+  ASSERT_OK(counted);
+  EXPECT_TRUE(std::any_of(
+      counted->losses.begin(), counted->losses.end(),
+      [](const std::string& loss) { return loss.find("records' lengths") != std::string::npos; }));
+  set("sample_rate_hz", 30);  // header and protocol lie alike, the records do not
+  EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
+}
+
+// Poses, sample numbers and samples that do not belong together: said, and no effect is named.
+TEST_F(Clerks, AProtocolOfAnotherRecordingNamesNothing) {
+  const auto read = bundle(256, 256, 256);
+  ASSERT_OK(read);
+  const auto named_nothing = [](const Bundle& wrong, bool inconclusive, const char* why) {
+    SCOPED_TRACE(why);
+    const auto diagnosis = diagnose(wrong);
+    ASSERT_OK(diagnosis);
+    EXPECT_TRUE(diagnosis->effects.empty()) << diagnosis->effects.front().name;
+    EXPECT_EQ(diagnosis->inconclusive, inconclusive);
+    ASSERT_TRUE(diagnosis->unknown.present);
+    const auto& where = diagnosis->unknown.where;
+    EXPECT_TRUE(std::any_of(where.begin(), where.end(), [&](const std::string& at) {
+      return at.find(why) != std::string::npos;
+    })) << where.front();
+  };
+  Bundle wrong = *read;
+  std::swap(wrong.segments[0].rotation, wrong.segments[1].rotation);
+  named_nothing(wrong, false, "does not lie as the protocol says");
+  wrong = *read;
+  for (Segment& segment : wrong.segments) {
+    segment.rotation.transposeInPlace();
+  }
+  named_nothing(wrong, false, "does not lie as the protocol says");
+  wrong = *read;
+  wrong.segments.pop_back();
+  for (Segment& segment : wrong.segments) {
+    segment.first_sample += 500;
+  }
+  named_nothing(wrong, true, "moves inside the segments");
+  Random random(4);
+  for (const bool corners : {false, true}) {
+    wrong = *read;
+    for (gt3x::Counts& counts : wrong.samples) {
+      for (std::int16_t& x : counts) {
+        x = static_cast<std::int16_t>(corners ? 256 * (static_cast<int>(random.below(3)) - 1)
+                                              : static_cast<int>(random.below(4096)) - 2048);
+      }
+    }
+    named_nothing(wrong, true, "moves inside the segments");
+  }
+  wrong = *read;
+  for (gt3x::Counts& counts : wrong.samples) {
+    counts = {static_cast<std::int16_t>(3 + random.below(2)), -4,
+              static_cast<std::int16_t>(257 + random.below(2))};
+  }
+  const auto lying = diagnose(wrong);  // it never left one pose
+  ASSERT_OK(lying);
+  EXPECT_TRUE(lying->effects.empty());
+  EXPECT_TRUE(lying->unknown.present);
+}
+
+TEST_F(Clerks, LogsThatCoverHalfOrContradictAreLosses) {
+  ASSERT_OK(bundle(256, 256, 256));
+  const auto said = [&](const char* words) {
+    const auto read = read_bundle(memory_.files, "b");
+    EXPECT_OK(read);
+    return read && std::any_of(read->losses.begin(), read->losses.end(), [&](const auto& loss) {
+             return loss.find(words) != std::string::npos;
+           });
+  };
+  for (const char* words : {"does not cover", "from what was commanded", "has no stamp"}) {
+    EXPECT_FALSE(said(words)) << words;
+  }
+  for (const char* name : {"b/temperature.csv", "b/host_clock.csv"}) {
+    const Bytes whole = read_file(memory_.files, name).value();
+    ASSERT_OK(memory_.files.remove(name));
+    ASSERT_OK(write_file(
+        memory_.files, name,
+        std::string(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2))));
+  }
+  EXPECT_TRUE(said("temperature.csv does not cover"));
+  EXPECT_TRUE(said("host_clock.csv has no stamp"));
+  std::string hot = "host_time_s,temperature_c\n";
+  for (int i = 0; i < 600; ++i) {
+    hot += std::to_string(i) + ",90\n";
+  }
+  ASSERT_OK(memory_.files.remove("b/temperature.csv"));
+  ASSERT_OK(write_file(memory_.files, "b/temperature.csv", hot));
+  EXPECT_TRUE(said("from what was commanded"));
+  ASSERT_OK(memory_.files.remove("b/temperature.csv"));
+  ASSERT_OK(write_file(memory_.files, "b/temperature.csv",
+                       "host_time_s,temperature_c\n5,20\n5,30\n5,20\n"));
+  EXPECT_TRUE(said("temperature.csv is missing or empty"));
 }
 
 // Constant, all zero, all at one end of the range: nothing is named.

@@ -56,6 +56,19 @@ TEST(Effects, EveryEntryIsWhole) {
                ErrorCode::configuration);
 }
 
+// Oracle: the wGT3X-BT with the largest cross-axis of those that were measured (docs/constants.md).
+TEST(Effects, TheCrossAxisOfRealUnitsIsPlausible) {
+  const EffectKind& kind = **find_effect("non_orthogonality");
+  for (const double term : {0.0288, -0.0239, -0.0015, 0.0035}) {
+    EXPECT_GT(term, kind.parameters[0].low);
+    EXPECT_LT(term, kind.parameters[0].high);
+  }
+  const SimulatedBlock block =
+      run("non_orthogonality", {{"yz_xz_xy", {0.0035, -0.0015, 0.0288}}}, {1, 0, 0});
+  EXPECT_NEAR(block.sensed_g[0].y(), 0.0288, 1e-12);
+  EXPECT_NEAR(block.sensed_g[0].z(), -0.0015, 1e-12);
+}
+
 TEST(Effects, TheManualListsEveryEffectAndParameter) {
   std::ifstream file(std::string(SIXPOINT_SOURCE_DIR) + "/docs/scenario.md");
   std::stringstream manual;
