@@ -39,9 +39,12 @@ double peak_mib() {
 int main() {
   using namespace sixpoint;
   const char* const effects[] = {
-      "", R"({"name": "seating", "parameters": {"sd_deg": 0.1}})",
+      "",
+      R"({"name": "seating", "parameters": {"sd_deg": 0.1}})",
       R"({"name": "tilt"}, {"name": "offset_tempco"}, {"name": "settling"})",
-      R"({"name": "truncation"})", R"({"name": "random_walk"})"};
+      R"({"name": "truncation"})",
+      R"({"name": "random_walk"})",
+      R"({"name": "flicker"}, {"name": "truncation"})"};
   std::printf("%-14s %-52s %8s %8s %7s %9s\n", "protocol", "effects", "read s", "total s", "ratio",
               "peak MiB");
   for (const char* protocol : {"production", "engineering"}) {

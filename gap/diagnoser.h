@@ -79,6 +79,7 @@ class Diagnoser {
   // judge_samples.cpp
   void judge_discrete();
   void judge_codes();
+  void judge_texture();
 
   // judge_poses.cpp: false where the unit moves inside the dwells: then nothing that follows means
   // anything.
@@ -104,6 +105,7 @@ class Diagnoser {
 
   // judge_means.cpp: means and tones together
   void judge_means();
+  double size_apart_nats(Scatter kind) const;
   // Other effects that would do nearly as well in its place.
   std::vector<std::string> confounded(const std::string& name) const;
   void judge_nuisances();

@@ -92,6 +92,11 @@ void EvidenceSearch::polish_shapes(Fit& fit) {
 }
 
 void EvidenceSearch::run() {
+  find_best();
+  linear_best_ = linearise(best().state);
+}
+
+void EvidenceSearch::find_best() {
   ForwardState at = first_guess();
   // Nominal scatter first, relinearised about its own best explanation.
   Whitened w;
@@ -115,6 +120,7 @@ void EvidenceSearch::run() {
   nothing.nats = evidence(w, nothing.groups, nullptr);
   nominal_ = make_fit(w, nothing, at);
   best_known_ = fit;
+  best_nominal_ = fit;
   final_ = w;
   for (const Subset& s : looked_at) {
     states_.push_back({Scatter::nominal, 0, s});
@@ -134,6 +140,7 @@ void EvidenceSearch::run() {
     return;
   }
   const ForwardState nominal_at = at;
+  const Eigen::MatrixXd linear = linearise(first_guess());
   Whitened final_unknown;
   for (const Scatter scatter : {Scatter::seating, Scatter::random_walk, Scatter::flicker,
                                 Scatter::by_pose, Scatter::by_placement, Scatter::by_session,
@@ -144,12 +151,12 @@ void EvidenceSearch::run() {
     }
     std::optional<Fit> best;
     std::optional<Whitened> best_w;
-    ForwardState here = scatter == Scatter::nominal ? nominal_at : first_guess();
+    const ForwardState here = first_guess();
     int falling = 0;
     double last = -1e300;
     std::vector<std::array<double, 2>> tried;  // size, nats
     const auto try_size = [&](double size) {
-      Whitened trial = whiten(here, scatter, size);
+      Whitened trial = whiten(linear, scatter, size);
       looked_at.clear();
       const Subset subset = search(trial, looked_at);
       for (const Subset& s : looked_at) {

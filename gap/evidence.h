@@ -74,6 +74,14 @@ struct Fit {
   std::vector<int> row_block;
 };
 
+// A parameter that does not hold throughout the recording.
+struct Inconstancy {
+  std::string term;    // "the zero", "the gain", "the seat", "the jig's level", or an effect
+  std::string factor;  // what it changes with
+  double nats = 0;     // mean of the Bayes factors of all changes with this factor
+  double best_nats = 0;
+};
+
 class EvidenceSearch {
  public:
   // Keeps a reference to `blocks`.
@@ -115,6 +123,13 @@ class EvidenceSearch {
   // Log evidence that an effect of the best explanation (or "gain") is not constant but changes in
   // proportion to time, over the best explanation, in which it is constant.
   double changing_nats(const std::string& effect) const;
+  // Whether every parameter holds in all parts of the recording: whether a change of it with time,
+  // temperature, session, pose, approach or vibration is likelier than that it is constant. One
+  // entry per factor, likeliest first. Means of Bayes factors: under constancy one exceeds e^x with
+  // a chance below e^-x.
+  std::vector<Inconstancy> inconstancies() const;
+  // Per row of best(): mean square of the whitened residual to be expected, 1 less the leverage.
+  std::vector<double> row_freedom() const;
   // Log predictive likelihood of held-out conditions with the effect less without it.
   double held_out_nats(const std::string& effect) const;
 
@@ -133,8 +148,15 @@ class EvidenceSearch {
   HeldOut held_out() const;
 
  private:
+  void find_best();
   // evidence_whiten.cpp
-  Whitened whiten(const ForwardState& at, Scatter scatter, double size) const;
+  // `linear`: as linearise() gives it.
+  Whitened whiten(Eigen::MatrixXd linear, Scatter scatter, double size) const;
+  Whitened whiten(const ForwardState& at, Scatter scatter, double size) const {
+    return whiten(linearise(at), scatter, size);
+  }
+  Eigen::MatrixXd linearise(const ForwardState& at) const;
+  double whiten_rows(Scatter scatter, double size, Eigen::MatrixXd& m) const;
   // evidence_subsets.cpp
   Subset search(const Whitened& w, std::vector<Subset>& looked_at) const;
   double evidence(const Whitened& w, const std::vector<int>& groups, Posterior* posterior) const;
@@ -166,8 +188,10 @@ class EvidenceSearch {
   std::vector<State> states_;
   Fit nominal_;
   Fit best_known_;
+  Fit best_nominal_;  // of the catalogue, without scatter
   std::optional<Fit> best_unknown_;
-  Whitened final_;  // at best()'s covariance and state
+  Whitened final_;               // at best()'s covariance and state
+  Eigen::MatrixXd linear_best_;  // linearise() at best()'s state
 };
 
 }  // namespace sixpoint::gap

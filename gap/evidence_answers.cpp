@@ -136,6 +136,21 @@ double EvidenceSearch::expected_nats(const std::string& effect) const {
   return best == -1e300 ? 1e300 : best;
 }
 
+std::vector<double> EvidenceSearch::row_freedom() const {
+  const Posterior& posterior = best().posterior;
+  const auto used = static_cast<Eigen::Index>(posterior.columns.size());
+  Eigen::MatrixXd x(final_.x.rows(), used);
+  for (Eigen::Index c = 0; c < used; ++c) {
+    x.col(c) = final_.x.col(posterior.columns[static_cast<std::size_t>(c)]);
+  }
+  const Eigen::VectorXd leverage = (x * posterior.covariance).cwiseProduct(x).rowwise().sum();
+  std::vector<double> freedom;
+  for (const double h : leverage) {
+    freedom.push_back(std::clamp(1 - h, 0.0, 1.0));
+  }
+  return freedom;
+}
+
 double EvidenceSearch::changing_nats(const std::string& effect) const {
   const Fit& fit = best();
   if (blocks_.empty() || !in_catalogue(fit.scatter)) {
@@ -151,7 +166,7 @@ double EvidenceSearch::changing_nats(const std::string& effect) const {
   }
   const ParameterGroup& group = groups_[static_cast<std::size_t>(*at)];
   // Scatter could stand for the change: then the comparison is with none beside it.
-  const Whitened w = whiten(fit.state, Scatter::nominal, 0);
+  const Whitened w = whiten(linear_best_, Scatter::nominal, 0);
   Posterior posterior;
   const double without = evidence(w, fit.subset.groups, &posterior) + log_prior(fit.subset.groups);
   const double first_s = blocks_.front().middle_s;

@@ -57,7 +57,7 @@ EvidenceSearch::HeldOut EvidenceSearch::held_out() const {
   if (rows_ == 0) {
     return out;
   }
-  const Whitened w = whiten(best().state, Scatter::nominal, 0);
+  const Whitened w = whiten(linear_best_, Scatter::nominal, 0);
   int folds = 0;
   for (const Block& block : blocks_) {
     folds = std::max(folds, block.condition + 1);

@@ -6,13 +6,9 @@
 
 namespace sixpoint::gap {
 
-// What the data look like from one linearisation, under one covariance.
-Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double size) const {
-  Whitened w;
-  w.scatter = scatter;
-  w.size = size;
-  w.row_block = row_block_;
-  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(rows_, columns_);
+// Columns of all groups, and on the right the values that they add up to.
+Eigen::MatrixXd EvidenceSearch::linearise(const ForwardState& at) const {
+  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(rows_, columns_ + 1);
   Eigen::VectorXd y = Eigen::VectorXd::Zero(rows_);
   Eigen::VectorXd theta = Eigen::VectorXd::Zero(columns_);
   int row = 0;
@@ -50,8 +46,13 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
     }
     row += static_cast<int>(block.size());
   }
-  y += x * theta;
+  x.col(columns_) = y + x.leftCols(columns_) * theta;
+  return x;
+}
 
+// Divides rows by the square root of their covariance; half the logarithm of its determinant.
+double EvidenceSearch::whiten_rows(Scatter scatter, double size, Eigen::MatrixXd& m) const {
+  double half_log_det = 0;
   const auto seat = [&](const Block& a, const Block& b, double sd_deg) -> Eigen::MatrixXd {
     return sd_deg * sd_deg * seating_lever(a) * seating_lever(b).transpose();
   };
@@ -62,7 +63,7 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
   const double start_s =
       blocks_.empty() ? 0 : blocks_.front().middle_s - blocks_.front().seconds / 2;
 
-  const auto whiten_rows = [&](std::size_t first, std::size_t last, int first_row) {
+  const auto whiten_some = [&](std::size_t first, std::size_t last, int first_row) {
     int size_rows = 0;
     for (std::size_t b = first; b < last; ++b) {
       size_rows += static_cast<int>(blocks_[b].size());
@@ -105,15 +106,12 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
     }
     v.diagonal().array() *= 1 + 1e-9;
     const Eigen::LLT<Eigen::MatrixXd> llt(v);
-    llt.matrixL().solveInPlace(x.middleRows(first_row, size_rows));
-    Eigen::VectorXd piece = y.segment(first_row, size_rows);
-    llt.matrixL().solveInPlace(piece);
-    y.segment(first_row, size_rows) = piece;
-    w.half_log_det += llt.matrixLLT().diagonal().array().log().sum();
+    llt.matrixL().solveInPlace(m.middleRows(first_row, size_rows));
+    half_log_det += llt.matrixLLT().diagonal().array().log().sum();
     return size_rows;
   };
   if (dense) {
-    whiten_rows(0, blocks_.size(), 0);
+    whiten_some(0, blocks_.size(), 0);
   } else {
     int first_row = 0;
     for (std::size_t first = 0; first < blocks_.size();) {
@@ -121,12 +119,22 @@ Whitened EvidenceSearch::whiten(const ForwardState& at, Scatter scatter, double 
       while (last < blocks_.size() && blocks_[last].placement == blocks_[first].placement) {
         ++last;
       }
-      first_row += whiten_rows(first, last, first_row);
+      first_row += whiten_some(first, last, first_row);
       first = last;
     }
   }
-  w.x = std::move(x);
-  w.y = std::move(y);
+  return half_log_det;
+}
+
+// What the data look like from one linearisation, under one covariance.
+Whitened EvidenceSearch::whiten(Eigen::MatrixXd x, Scatter scatter, double size) const {
+  Whitened w;
+  w.scatter = scatter;
+  w.size = size;
+  w.row_block = row_block_;
+  w.half_log_det = whiten_rows(scatter, size, x);
+  w.y = x.col(columns_);
+  w.x = x.leftCols(columns_);
   w.a = w.x.transpose() * w.x;
   w.b = w.x.transpose() * w.y;
   w.yy = w.y.squaredNorm();

@@ -17,6 +17,62 @@ Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
                     : Eigen::AngleAxisd(angle, vector_deg.normalized()).toRotationMatrix();
 }
 
+// cos p, cos 2p and cos 3p over half a period.
+const std::array<std::array<double, 3>, kPhasesTruncated / 2 + 1>& cosines() {
+  static const auto kTable = [] {
+    std::array<std::array<double, 3>, kPhasesTruncated / 2 + 1> table{};
+    for (std::size_t k = 0; k < table.size(); ++k) {
+      for (std::size_t h = 0; h < 3; ++h) {
+        table[k][h] = std::cos(2 * M_PI * static_cast<double>((h + 1) * k) / kPhasesTruncated);
+      }
+    }
+    return table;
+  }();
+  return kTable;
+}
+
+// Phases that a truncated swing of so many standard deviations of the noise needs: its harmonics
+// fall as exp(-(k / swing)^2 / 2).
+int phases_of(double swing) {
+  for (const int phases : {kPhases, 48, 72, 144, 240}) {
+    if (phases > 8 * std::abs(swing)) {
+      return phases;
+    }
+  }
+  return kPhasesTruncated;
+}
+
+// erf to 1e-11, by cubic interpolation with its own derivative: what truncation costs is this.
+double quick_erf(double x) {
+  constexpr int kPerUnit = 256;
+  constexpr double kEnd = 5;
+  struct Knot {
+    double value, slope;  // per knot's distance
+  };
+  static const std::vector<Knot> kKnots = [] {
+    std::vector<Knot> knots;
+    for (int i = 0; i <= static_cast<int>(kEnd) * kPerUnit + 1; ++i) {
+      const double at = static_cast<double>(i) / kPerUnit;
+      knots.push_back({std::erf(at), M_2_SQRTPI * std::exp(-at * at) / kPerUnit});
+    }
+    return knots;
+  }();
+  const double size = std::abs(x);
+  if (!(size < kEnd)) {
+    return std::copysign(1.0, x);  // to 2e-12
+  }
+  const double scaled = size * kPerUnit;
+  const auto i = static_cast<std::size_t>(scaled);
+  const double t = scaled - static_cast<double>(i);
+  const Knot& a = kKnots[i];
+  const Knot& b = kKnots[i + 1];
+  const double rise = b.value - a.value;
+  const double value =
+      a.value +
+      t * (a.slope + t * (3 * rise - 2 * a.slope - b.slope + t * (a.slope + b.slope - 2 * rise)));
+  return std::copysign(value, x);
+}
+
 double sign_of_step(double step_g) {
   return std::abs(step_g) < 0.05 ? 0 : std::copysign(1.0, step_g);
 }
@@ -110,27 +166,31 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
       Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c;
 
   Eigen::VectorXd out = Eigen::VectorXd::Zero(block.size());
-  const int phases = !block.tone ? 1 : s.truncation != 0 ? kPhasesTruncated : kPhases;
-  for (int k = 0; k < phases; ++k) {
-    const double p = 2 * M_PI * k / phases;
-    const double c1 = block.tone ? std::cos(p) : 0;
-    const Eigen::Vector3d u = rest + c1 * swing;
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      const double v = u[a];
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const double sigma = std::max(0.3 * lsb_mg, block.noise_mg[a]);
+    const int phases = !block.tone         ? 1
+                       : s.truncation == 0 ? kPhases
+                                           : phases_of(1000 * s.gain[a] * swing[a] / sigma);
+    const auto stride = static_cast<std::size_t>(kPhasesTruncated / phases);
+    // The second half of a period is the first, mirrored.
+    for (int k = 0; k <= phases / 2; ++k) {
+      const std::array<double, 3>& cosine = cosines()[static_cast<std::size_t>(k) * stride];
+      const double share = (k == 0 || 2 * k == phases ? 1.0 : 2.0) / phases;
+      const double c1 = block.tone ? cosine[0] : 0;
+      const double v = rest[a] + c1 * swing[a];
       double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
                      sensitivity[a] +
                  slow_mg[a];
       y = y * s.gain[a] + s.offset_mg[a];
       if (s.truncation != 0) {
-        const double sigma = std::max(0.3 * lsb_mg, block.noise_mg[a]);
-        y -= s.truncation * 0.5 * lsb_mg * std::erf(y / (sigma * M_SQRT2));
+        y -= s.truncation * 0.5 * lsb_mg * quick_erf(y / (sigma * M_SQRT2));
       }
-      out[a] += y / phases;
+      out[a] += y * share;
       if (block.tone) {
-        out[3 + a] += 2 * y * c1 / phases;
+        out[3 + a] += 2 * y * c1 * share;
         if (block.harmonics && a == block.axis) {
-          out[6] += 2 * y * std::cos(2 * p) / phases;
-          out[7] += 2 * y * std::cos(3 * p) / phases;
+          out[6] += 2 * y * cosine[1] * share;
+          out[7] += 2 * y * cosine[2] * share;
         }
       }
     }

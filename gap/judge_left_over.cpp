@@ -26,14 +26,18 @@ void Diagnoser::judge_left_over() {
   const double n = static_cast<double>(fit.residual.size());
   const double p = static_cast<double>(fit.posterior.columns.size());
   test(chi_to_sd(fit.residual.squaredNorm(), n - p), "mean: dwells and tones together");
-  std::map<std::string, std::array<double, 2>> groups;
-  std::vector<double> block_chi(blocks_.size(), 0);
+  // Random scatter has its size in every part of the recording: too little of it is as telling as
+  // too much. A row's chi-square is one less what the parameters took of it.
+  const bool scattered = fit.scatter != Scatter::nominal && in_catalogue(fit.scatter);
+  const std::vector<double> freedom_of_row = search_->row_freedom();
+  std::map<std::string, std::array<double, 3>> groups;
   for (Eigen::Index row = 0; row < fit.residual.size(); ++row) {
     const int b = fit.row_block[static_cast<std::size_t>(row)];
     const Block& block = blocks_[static_cast<std::size_t>(b)];
     auto& group = groups[bundle_.segments[block.segment].name];
     group[0] += fit.residual[row] * fit.residual[row];
     group[1] += 1;
+    group[2] += freedom_of_row[static_cast<std::size_t>(row)];
   }
   for (const auto& [name, group] : groups) {
     // Tones of five samples a period meet a truncated zero at five phases only.
@@ -41,6 +45,10 @@ void Diagnoser::judge_left_over() {
       continue;
     }
     test(chi_to_sd(group[0], group[1]), fmt::format("mean: segment {}", name));
+    if (scattered) {
+      test(-chi_to_sd(group[0], group[2]),
+           fmt::format("mean: less {} in segment {} than elsewhere", to_string(fit.scatter), name));
+    }
   }
   if (search_->unknown_wins()) {
     const double gain = search_->best_unknown()->nats - search_->best_known().nats;
@@ -141,6 +149,7 @@ void Diagnoser::judge_left_over() {
     }
   }
   judge_codes();
+  judge_texture();
 }
 
 }  // namespace sixpoint::gap

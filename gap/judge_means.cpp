@@ -16,14 +16,17 @@ constexpr double kOtherWins = 3;            // twenty to one, as for scatter of 
 constexpr double kLogPriorChanging = -4.5;  // as of each unknown kind
 
 // Whether the zero's curve over temperature lies outside what goes with its slope: beyond four
-// prior standard deviations, and surely so.
+// standard deviations, and surely so. Zeros bend by a per cent of their slope per degree.
 bool bends(const Fit& fit) {
+  constexpr double kShare = 0.01;
+  constexpr double kLeast_mg_per_c2 = 0.001;
+  const double slope = fit.state.tempco_mg_per_c.cwiseAbs().maxCoeff();
   Eigen::Index at = 6;
   for (const ParameterGroup& group : fit.groups) {
     for (int i = 0; i < group.count; ++i, ++at) {
       if (group.effect == "offset_tempco" && i >= 3 &&
           std::abs(fit.posterior.mean[at]) - 3 * std::sqrt(fit.posterior.covariance(at, at)) >
-              4 * group.curve_sd) {
+              4 * std::min(group.curve_sd, std::max(kLeast_mg_per_c2, kShare * slope))) {
         return true;
       }
     }
@@ -31,31 +34,66 @@ bool bends(const Fit& fit) {
   return false;
 }
 
+// nats(i) belongs to sizes[i]; in between a straight line.
+template <typename Nats>
+double interpolated(const std::vector<double>& sizes, const Nats& nats, double size) {
+  for (std::size_t i = 1; i < sizes.size(); ++i) {
+    if (size <= sizes[i]) {
+      const double share = (size - sizes[i - 1]) / (sizes[i] - sizes[i - 1]);
+      return nats(i - 1) * (1 - share) + nats(i) * share;
+    }
+  }
+  return nats(sizes.size() - 1);
+}
+
 }  // namespace
+
+// Slow noise has one size, within dwells as between them: log odds of one of its own for each,
+// less what the free number costs.
+double Diagnoser::size_apart_nats(Scatter kind) const {
+  constexpr double kCost = 1.5;
+  double best = 0;
+  double here = 0;
+  const double size = search_->best().scatter_size;
+  const auto along = [&](const std::vector<double>& sizes, const auto& nats) {
+    // The two are computed by approximations that differ, and what else there is adds to one of
+    // them: sizes within a factor of two are the same.
+    constexpr double kAlike = 2;
+    here = std::max(interpolated(sizes, nats, size / kAlike),
+                    interpolated(sizes, nats, size * kAlike));
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      if (sizes[i] > size / kAlike && sizes[i] < size * kAlike) {
+        here = std::max(here, nats(i));
+      }
+    }
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      best = std::max(best, nats(i));
+    }
+  };
+  if (kind == Scatter::random_walk) {
+    along(slow_.walk_mg, [&](std::size_t i) { return slow_.nats[i][0]; });
+  } else if (kind == Scatter::flicker) {
+    along(slow_.flicker_mg, [&](std::size_t i) { return slow_.nats[0][i]; });
+  }
+  return best - here - kCost;
+}
 
 void Diagnoser::judge_means() {
   EvidenceOptions options;
   options.lsb_mg = 1000 / bundle_.accel_scale_lsb_per_g;
   options.allowed = [this](const std::string& name) { return allowed(name); };
   options.record_nats = [this](Scatter scatter, double size) {
-    const auto along = [&](const std::vector<double>& sizes, const auto& nats) {
-      for (std::size_t i = 1; i < sizes.size(); ++i) {
-        if (size <= sizes[i]) {
-          const double share = (size - sizes[i - 1]) / (sizes[i] - sizes[i - 1]);
-          return nats(i - 1) * (1 - share) + nats(i) * share;
-        }
-      }
-      return nats(sizes.size() - 1);
-    };
     if (scatter == Scatter::random_walk) {
-      return along(slow_.walk_mg, [&](std::size_t i) { return slow_.nats[i][0]; });
+      return interpolated(
+          slow_.walk_mg, [&](std::size_t i) { return slow_.nats[i][0]; }, size);
     }
     if (scatter == Scatter::by_time || scatter == Scatter::by_time_fast) {
       // Unknown in time: any spectrum that the records show.
       return std::max({0.0, slow_.best_both().nats - 4, slow_.free_nats});
     }
     if (scatter == Scatter::flicker) {
-      return along(slow_.flicker_mg, [&](std::size_t i) { return slow_.nats[0][i]; });
+      return interpolated(
+          slow_.flicker_mg, [&](std::size_t i) { return slow_.nats[0][i]; }, size);
     }
     return 0.0;
   };
@@ -68,6 +106,15 @@ void Diagnoser::judge_means() {
   for (const ParameterGroup& group : parameter_groups()) {
     if (group.effect != "gain" && group.effect != "offset" && allowed(group.effect)) {
       names.insert(group.effect);
+    }
+  }
+  // Whatever changes takes from the probability of all that is named as constant.
+  double changing = -1e3;
+  for (const Inconstancy& inconstancy : search_->inconstancies()) {
+    changing = std::max(changing, inconstancy.nats + kLogPriorChanging);
+    if (inconstancy.nats + kLogPriorChanging > kOtherWins) {
+      alarm(std::sqrt(2 * inconstancy.nats) + kAlarm_sd,
+            fmt::format("mean: {} changes with {}", inconstancy.term, inconstancy.factor));
     }
   }
   for (const std::string& name : names) {
@@ -110,12 +157,17 @@ void Diagnoser::judge_means() {
     if (in && f.held_out_gain_nats <= 0) {
       f.nats = -0.1;  // it does not help where it was not fitted
     }
+    if (in) {
+      // What is certain beside a change stays so: its evidence pays for both.
+      f.other_nats = std::min(changing, kOtherWins - 0.1 * std::max(0.0, f.nats - 20));
+    }
     if (in && name != "drift" && name != "warm_up") {
-      f.other_nats = search_->changing_nats(name) + kLogPriorChanging;
-      if (f.other_nats > kOtherWins) {
-        alarm(std::sqrt(2 * f.other_nats) + kAlarm_sd,
+      const double other = search_->changing_nats(name) + kLogPriorChanging;
+      if (other > kOtherWins) {
+        alarm(std::sqrt(2 * other) + kAlarm_sd,
               fmt::format("mean: {} that changes while the recording runs", name));
       }
+      f.other_nats = std::max(f.other_nats, other);
     }
     if (in && name == "offset_tempco" && bends(fit)) {
       alarm(2 * kAlarm_sd, "mean: the zero bends over temperature more than a zero's drift does");
@@ -142,7 +194,15 @@ void Diagnoser::judge_means() {
                                           ? SlowStructure{}
                                           : slow_structure(blocks_, fit, slow_, options.lsb_mg);
       f.other_nats = std::max(f.other_nats, structure.other_nats);
-      if (f.other_nats > 0) {
+      const double apart = size_apart_nats(kind) + kLogPriorChanging;
+      if (apart > std::max(0.0, f.other_nats)) {
+        alarm(std::sqrt(2 * apart) + kAlarm_sd,
+              fmt::format("mean: {} between dwells, but not of that size within them", name));
+      }
+      if (apart > std::max(0.0, f.other_nats)) {
+        f.other_nats = apart;
+        f.nats = -0.1;
+      } else if (f.other_nats > 0) {
         // Likelier than the noise that would be named; where the odds are even, neither is.
         const bool by_structure = structure.other_nats >= f.other_nats;
         f.nats = -0.1;
@@ -236,10 +296,37 @@ void Diagnoser::judge_nuisances() {
                             : std::max(wrong, nats) + std::log1p(std::exp(-std::abs(wrong - nats)));
   }
   wrong -= std::log(static_cast<double>(kSteps));
+  // Gains and offsets that went astray otherwise: of one axis or of all, each by itself.
+  constexpr double kWideGain = 0.15;
+  std::vector<double> astray;
+  for (unsigned axes = 1; axes < 8; ++axes) {
+    if (axes != 7 && (axes & (axes - 1)) != 0) {
+      continue;  // one, or all
+    }
+    for (unsigned which = 1; which < 4; ++which) {
+      double sum = 0;
+      for (Eigen::Index a = 0; a < 3; ++a) {
+        const bool of_it = (axes & (1U << static_cast<unsigned>(a))) != 0;
+        const double gain_sd = of_it && (which & 1U) != 0 ? kWideGain : kGainSd;
+        const double offset_sd = of_it && (which & 2U) != 0 ? kWide_mg : kOffsetSd_mg;
+        sum += -0.5 * std::pow((s.gain[a] - 1) / gain_sd, 2) - std::log(gain_sd) -
+               0.5 * std::pow(s.offset_mg[a] / offset_sd, 2) - std::log(offset_sd);
+      }
+      astray.push_back(sum);
+    }
+  }
+  const double most_astray = *std::max_element(astray.begin(), astray.end());
   const double nats = wrong - nominal + kLogPrior;
   const double z = chi_to_sd(chi, 6);
   // The unit's own gain and offset can't be known beside the mode's.
   EffectFinding f{"filter_mismatch", 0, nats, {}, nats - kLogPrior, false, {}};
+  f.other_nats = most_astray - std::log(static_cast<double>(astray.size())) + kLogPriorChanging -
+                 wrong - kLogPrior;
+  if (nats > kAccept && f.other_nats > kOtherWins) {
+    f.nats = -0.1;
+    alarm(std::sqrt(2 * f.other_nats) + kAlarm_sd,
+          "nuisance: gains or offsets are far out, but not as a wrong mode has them");
+  }
   f.parameters.push_back({"gain", {common}, {kGainSd / std::sqrt(3.0)}});
   f.parameters.push_back({"offset_g",
                           {s.offset_mg[0] / 1000, s.offset_mg[1] / 1000, s.offset_mg[2] / 1000},
@@ -265,7 +352,7 @@ void Diagnoser::judge_nuisances() {
     return;
   }
   if (allowed("filter_mismatch")) {
-    if (nats > kAccept) {
+    if (f.nats > kAccept) {
       double square = 0;
       for (Eigen::Index a = 0; a < 3; ++a) {
         out_.unit.gain[static_cast<std::size_t>(a)] /= common;

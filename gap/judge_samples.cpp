@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "gap/diagnoser.h"
+#include "gap/features/texture.h"
 
 namespace sixpoint::gap {
 
@@ -83,6 +84,28 @@ void Diagnoser::judge_discrete() {
     } else {
       alarm(100, "codes: values pile up below full scale in the high shaker");
     }
+  }
+}
+
+void Diagnoser::judge_texture() {
+  // A line is no noise, and truncation swallows noise about zero.
+  if (!lines_.lines.empty() || accepted("truncation")) {
+    return;
+  }
+  // These have their distribution by theory, not to a percent only: thirty tests at 4.5 sd alarm by
+  // chance once in ten thousand bundles.
+  constexpr double kExact = kAlarm_sd - 4.5;
+  for (const Texture::Scale& scale : noise_texture(bundle_, clean_).scales) {
+    const std::string noise =
+        scale.samples == 0 ? "the fast noise"
+                           : fmt::format("the noise within {:.2g} s",
+                                         2 * static_cast<double>(scale.samples) / bundle_.rate_hz);
+    test(std::abs(scale.tails_sd) + kExact, fmt::format("codes: {} is not Gaussian", noise));
+    test(scale.dwells_sd + kExact, fmt::format("codes: {} changes from dwell to dwell", noise));
+    test(scale.moments_sd + kExact, fmt::format("codes: {} comes and goes", noise));
+    test(scale.loudest_sd + kExact,
+         fmt::format("codes: {} is loud for a moment (segment {})", noise,
+                     bundle_.segments[scale.loudest_segment].name));
   }
 }
 

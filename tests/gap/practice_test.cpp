@@ -8,6 +8,7 @@
 
 #include "expect_result.h"
 #include "gap/diagnose.h"
+#include "sanitized.h"
 #include "shared_data.h"
 
 namespace sixpoint::gap {
@@ -28,12 +29,14 @@ struct Case {
   }
 };
 
-std::vector<Case> run_all(const char* folder) {
+// Every `step`-th of them.
+std::vector<Case> run_all(const char* folder, std::size_t step) {
   std::vector<Case> cases;
+  std::size_t number = 0;
   std::ifstream file(tests::shared_file("gap/practice/labels.json"));
   const auto labels = nlohmann::json::parse(file, nullptr, false);
   for (const auto& [name, label] : labels.items()) {
-    if (!name.starts_with(folder)) {
+    if (!name.starts_with(folder) || number++ % step != 0) {
       continue;
     }
     Case one;
@@ -77,12 +80,16 @@ void judge(const std::vector<Case>& cases, std::size_t& seen, std::size_t& right
 
 TEST(Practice, Engineering) {
   SIXPOINT_NEED_SHARED("gap/practice/labels.json");
-  const auto cases = run_all("engineering");
-  ASSERT_EQ(cases.size(), 24U);
+  const auto cases = run_all("engineering", tests::kSanitized ? 12 : 1);
+  ASSERT_EQ(cases.size(), tests::kSanitized ? 2U : 24U);
+  const auto singles =
+      std::count_if(cases.begin(), cases.end(), [](const Case& c) { return c.truth.size() == 1; });
+  EXPECT_GE(singles, tests::kSanitized ? 1 : 18);
   std::size_t seen = 0;
   std::size_t right = 0;
   judge(cases, seen, right);
-  EXPECT_EQ(seen, 18U) << "every single effect shows with the whole protocol";
+  EXPECT_EQ(static_cast<std::ptrdiff_t>(seen), singles)
+      << "every single effect shows with the whole protocol";
   EXPECT_GE(static_cast<double>(right), 0.95 * static_cast<double>(seen));
   for (const Case& c : cases) {
     for (const std::string& effect : c.truth) {
@@ -97,12 +104,12 @@ TEST(Practice, Engineering) {
 
 TEST(Practice, Production) {
   SIXPOINT_NEED_SHARED("gap/practice/labels.json");
-  const auto cases = run_all("production");
-  ASSERT_EQ(cases.size(), 30U);
+  const auto cases = run_all("production", tests::kSanitized ? 5 : 1);
+  ASSERT_EQ(cases.size(), tests::kSanitized ? 6U : 30U);
   std::size_t seen = 0;
   std::size_t right = 0;
   judge(cases, seen, right);
-  EXPECT_GE(seen, 13U);
+  EXPECT_GE(seen, tests::kSanitized ? 1U : 13U);
   EXPECT_GE(static_cast<double>(right), 0.95 * static_cast<double>(seen));
   for (const Case& c : cases) {
     // What needs heat, hours or a shaker can't be seen in three minutes at one temperature.

@@ -7,6 +7,7 @@
 
 #include "expect_result.h"
 #include "run_command.h"
+#include "sanitized.h"
 #include "station/gap_trials.h"
 #include "temporary_folder.h"
 
@@ -108,17 +109,22 @@ TEST_F(GapChallenge, StripTakesTheTruthAwayAndTheBundleKeepsIt) {
 // The real diagnosis on trials that it never saw. The bounds are far below what it reaches
 // (docs/gap.md): chance must not break the test.
 TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRun) {
+  const std::string trials = tests::kSanitized ? "12" : "60";
   const auto production =
-      challenge({"--program", SIXPOINT_BINARY_DIR "/sixpoint", "--trials", "60"}).json();
+      challenge({"--program", SIXPOINT_BINARY_DIR "/sixpoint", "--trials", trials}).json();
   const auto& scores = production["scores"];
   EXPECT_EQ(scores["failures"]["right"], 0);
   EXPECT_LE(scores["none_alarms"]["right"].get<int>(), 1);
   EXPECT_GE(scores["single_first_right_observable"]["share"].get<double>(), 0.8);
   EXPECT_LE(scores["expected_calibration_error"].get<double>(), 0.05);
+}
+
+TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRunOfTheWholeProtocol) {
+  const std::string trials = tests::kSanitized ? "3" : "12";
   const auto engineering =
       tests::run_command(posix_env(),
                          {"gap", "challenge", "--program", SIXPOINT_BINARY_DIR "/sixpoint",
-                          "--trials", "12", "--protocol", "engineering", "--seed", "5", "--json"})
+                          "--trials", trials, "--protocol", "engineering", "--seed", "5", "--json"})
           .json();
   EXPECT_EQ(engineering["scores"]["failures"]["right"], 0);
   EXPECT_LE(engineering["scores"]["withheld_confidently_wrong"]["right"].get<int>(), 1);

@@ -1,0 +1,257 @@
+#include "gap/features/texture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+namespace sixpoint::gap {
+namespace {
+
+constexpr std::uint8_t kUnusable = kSampleZero | kSampleHeld | kSampleClipped;
+constexpr std::array<std::size_t, 7> kStretches = {1, 2, 4, 8, 16, 32, 64};
+constexpr std::size_t kMoment = 128;  // samples
+constexpr std::size_t kLags = 4;
+// Variance of a difference, rounding's own twelfth taken off, below which its distribution shows
+// the grid of counts, LSB^2: the grid's share is then exp(-2 pi^2 2 x 0.25), a few in 10^5.
+constexpr double kFree_lsb2 = 0.25;
+
+// One axis of one dwell (or ten seconds of a long record) at one scale.
+struct Piece {
+  std::size_t axis = 0;
+  double n = 0;
+  double square = 0;
+};
+
+struct Moment {
+  std::size_t segment = 0;
+  std::size_t start = 0;  // its first sample
+  std::array<double, 3> n{};
+  std::array<double, 3> square{};
+};
+
+struct Sums {
+  std::array<double, 3> n{}, square{}, fourth{};
+  std::array<std::array<double, kLags>, 3> lagged{};
+  std::vector<Piece> pieces;
+  std::vector<Moment> moments;
+
+  double variance(std::size_t axis) const { return n[axis] > 0 ? square[axis] / n[axis] : 0; }
+  bool free_of_grid(std::size_t axis) const {
+    return n[axis] > 200 && variance(axis) - 1.0 / 12 > kFree_lsb2;
+  }
+  double correlation(std::size_t axis, std::size_t lag) const {
+    return square[axis] > 0 ? lagged[axis][lag] / square[axis] : 0;
+  }
+  // So many values count for one in a sum of squares.
+  double bunch(std::size_t axis, int power = 2) const {
+    double sum = 1;
+    for (std::size_t lag = 0; lag < kLags; ++lag) {
+      sum += 2 * std::pow(correlation(axis, lag), power);
+    }
+    return sum;
+  }
+};
+
+// Normal deviate of a chi-square (Wilson and Hilferty).
+double normal_of(double chi, double freedom) {
+  const double s = 2 / (9 * freedom);
+  return (std::cbrt(chi / freedom) - (1 - s)) / std::sqrt(s);
+}
+
+Sums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretch) {
+  Sums sums;
+  const auto rate = static_cast<std::size_t>(bundle.rate_hz);
+  const std::size_t piece_length = 10 * rate;
+  const double scale = std::sqrt(static_cast<double>(stretch) / 2);
+  for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
+    const Segment& segment = bundle.segments[s];
+    if (segment.kind == Segment::Kind::vibration) {
+      continue;
+    }
+    const std::size_t quiet = segment.may_ring() ? 3 * rate : 0;
+    for (std::size_t first = quiet; first < segment.samples; first += piece_length) {
+      const std::size_t length = std::min(piece_length, segment.samples - first);
+      std::array<Piece, 3> pieces;
+      std::array<std::array<double, kLags>, 3> before{};
+      std::size_t known = 0;  // of `before`
+      std::size_t moment = static_cast<std::size_t>(-1);
+      for (std::size_t i = 0; i + 2 * stretch <= length; i += 2 * stretch) {
+        const std::size_t at = segment.first_sample + first + i;
+        std::array<int, 3> difference{};
+        bool whole = true;
+        for (std::size_t k = 0; k < 2 * stretch; ++k) {
+          whole = whole && (clean.flags[at + k] & kUnusable) == 0;
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            difference[axis] +=
+                k < stretch ? -clean.samples[at + k][axis] : clean.samples[at + k][axis];
+          }
+        }
+        if (!whole) {
+          known = 0;
+          continue;
+        }
+        if (i / kMoment != moment) {
+          moment = i / kMoment;
+          sums.moments.emplace_back();
+          sums.moments.back().segment = s;
+          sums.moments.back().start = segment.first_sample + first + moment * kMoment;
+        }
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const double d = difference[axis] * scale / static_cast<double>(stretch);
+          const double square = d * d;
+          sums.n[axis] += 1;
+          sums.square[axis] += square;
+          sums.fourth[axis] += square * square;
+          pieces[axis].n += 1;
+          pieces[axis].square += square;
+          sums.moments.back().n[axis] += 1;
+          sums.moments.back().square[axis] += square;
+          for (std::size_t lag = 0; lag < std::min(known, kLags); ++lag) {
+            sums.lagged[axis][lag] += d * before[axis][lag];
+          }
+          for (std::size_t lag = kLags - 1; lag > 0; --lag) {
+            before[axis][lag] = before[axis][lag - 1];
+          }
+          before[axis][0] = d;
+        }
+        ++known;
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        pieces[axis].axis = axis;
+        if (pieces[axis].n >= 4) {
+          sums.pieces.push_back(pieces[axis]);
+        }
+      }
+    }
+  }
+  return sums;
+}
+
+double tails(const Sums& sums) {
+  double up = 0;
+  double down = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (sums.free_of_grid(axis)) {
+      const double n = sums.n[axis];
+      const double variance = sums.variance(axis);
+      const double excess = sums.fourth[axis] / n / (variance * variance) - 3 + 6 / n;
+      const double weight = n / (24 * sums.bunch(axis, 4));
+      up += excess * weight;
+      down += weight;
+    }
+  }
+  return down > 0 ? up / std::sqrt(down) : 0;
+}
+
+// Bartlett's test of equal variances.
+double dwells(const std::vector<const Sums*>& scales) {
+  double statistic = 0;
+  double freedom = 0;
+  for (const Sums* sums : scales) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!sums->free_of_grid(axis)) {
+        continue;
+      }
+      const double bunch = sums->bunch(axis);
+      double all = 0, square = 0, logs = 0, inverse = 0, count = 0;
+      for (const Piece& piece : sums->pieces) {
+        if (piece.axis == axis && piece.square > 0) {
+          const double n = piece.n / bunch;
+          all += n;
+          square += piece.square / bunch;
+          logs += n * std::log(piece.square / piece.n);
+          inverse += 1 / n;
+          count += 1;
+        }
+      }
+      if (count > 2) {
+        const double m = all * std::log(square / all) - logs;
+        statistic += m / (1 + (inverse - 1 / all) / (3 * (count - 1)));
+        freedom += count - 1;
+      }
+    }
+  }
+  return freedom > 0 ? normal_of(std::max(0.0, statistic), freedom) : 0;
+}
+
+void moments(const std::vector<const Sums*>& scales, Texture::Scale& found) {
+  struct Energy {
+    std::size_t segment = 0;
+    double chi = 0;
+    double freedom = 0;
+  };
+  std::map<std::size_t, Energy> energies;
+  for (const Sums* sums : scales) {
+    std::array<double, 3> per{};
+    std::array<double, 3> bunch{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      bunch[axis] = sums->bunch(axis);
+      per[axis] = sums->free_of_grid(axis) ? 1 / (sums->variance(axis) * bunch[axis]) : 0;
+    }
+    for (const Moment& moment : sums->moments) {
+      Energy& energy = energies[moment.start];
+      energy.segment = moment.segment;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (per[axis] > 0) {
+          energy.chi += moment.square[axis] * per[axis];
+          energy.freedom += moment.n[axis] / bunch[axis];
+        }
+      }
+    }
+  }
+  double square = 0;
+  double count = 0;
+  double loudest = -1e9;
+  for (const auto& [start, energy] : energies) {
+    if (energy.freedom < 6) {
+      continue;
+    }
+    const double z = normal_of(energy.chi, energy.freedom);
+    square += z * z;
+    count += 1;
+    if (z > loudest) {
+      loudest = z;
+      found.loudest_segment = energy.segment;
+    }
+  }
+  if (count > 10) {
+    found.moments_sd = normal_of(square, count);
+    // The largest of n is beyond z as often as one is beyond the root of z^2 - 2 ln n.
+    found.loudest_sd =
+        loudest > 0 ? std::sqrt(std::max(0.0, loudest * loudest - 2 * std::log(count))) : 0;
+  }
+}
+
+}  // namespace
+
+Texture noise_texture(const Bundle& bundle, const CleanSamples& clean) {
+  Texture texture;
+  if (bundle.rate_hz < 10) {
+    return texture;
+  }
+  std::vector<Sums> all;
+  for (const std::size_t stretch : kStretches) {
+    all.push_back(sums_at(bundle, clean, stretch));
+  }
+  std::vector<const Sums*> fine;
+  texture.scales.reserve(all.size() + 1);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    Texture::Scale scale;
+    scale.samples = kStretches[i];
+    scale.tails_sd = tails(all[i]);
+    scale.dwells_sd = dwells({&all[i]});
+    moments({&all[i]}, scale);
+    texture.scales.push_back(scale);
+    if (kStretches[i] <= 8) {
+      fine.push_back(&all[i]);
+    }
+  }
+  Texture::Scale together;
+  together.dwells_sd = dwells(fine);
+  moments(fine, together);
+  texture.scales.push_back(together);
+  return texture;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,35 @@
+// Whether the noise of what lies still is one stationary Gaussian process: at seven time scales,
+// in every dwell, at every moment.
+//
+// Differences between the means of neighbouring stretches (Haar's wavelets) of 1 to 64 samples.
+// Whatever filter stands behind Gaussian noise, each scale's are Gaussian, of one variance in all
+// dwells and at all times; only their correlation is the filter's, and it is measured. Knocks,
+// spells of louder noise, machines that come and go, and anything that is not linear are not like
+// that. No form of theirs is assumed.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "gap/bundle.h"
+#include "gap/clean.h"
+
+namespace sixpoint::gap {
+
+struct Texture {
+  // All in standard deviations of a normal variable.
+  struct Scale {
+    std::size_t samples = 0;  // of one stretch; 0: 1 to 8 together
+    double tails_sd = 0;      // excess kurtosis, signed
+    double dwells_sd = 0;     // variances from dwell to dwell (pieces of ten seconds)
+    double moments_sd = 0;    // energies of all axes from moment to moment (1.28 s)
+    double loudest_sd = 0;    // the loudest moment, their number allowed for
+    std::size_t loudest_segment = 0;
+  };
+  std::vector<Scale> scales;
+};
+
+// Scales at which rounding to whole counts would show are left out.
+Texture noise_texture(const Bundle& bundle, const CleanSamples& clean);
+
+}  // namespace sixpoint::gap
