@@ -264,9 +264,9 @@ TEST_F(Misbehaving, AHangingDownloadIsStopped) {
   *again = {};
 }
 
-// docs/devices/wgt3x-bt-bench-unit.md: a thread per unit, stopped whatever it waits for. The reading
-// and the bulk thread wait for an hour here, which no test lasts; bench/usb_bench says how long
-// stopping takes.
+// docs/devices/wgt3x-bt-bench-unit.md: a thread per unit, stopped whatever it waits for. The
+// reading and the bulk thread wait for an hour here, which no test lasts; bench/usb_bench says how
+// long stopping takes.
 TEST_F(Misbehaving, TheThreadsOfAUnitStopWhateverTheyWaitFor) {
   for (int i = 0; i < 10; ++i) {
     auto link = i == 0 ? open() : registry().open(unit.hid_address(), posix_env());
