@@ -27,6 +27,7 @@ constexpr double kLogPrior = -3.5;
 constexpr double kAccept = 2.2;
 constexpr double kGainSd = 0.02;
 constexpr double kOffsetSd_g = 0.035;
+constexpr double kLength_sd = 0.006;  // temperature, curvature, gravity at an unknown place
 
 struct Rest {
   double time_s = 0;
@@ -254,7 +255,6 @@ std::vector<Eigen::Vector3d> directions_of(const std::vector<Rest>& rests) {
 double length_nats(const std::vector<Eigen::Vector3d>& means, double common, double gain_sd,
                    double offset_sd, Eigen::Matrix<double, 6, 1>* estimate) {
   const auto n = static_cast<Eigen::Index>(means.size());
-  constexpr double kLength_sd = 0.006;  // temperature, curvature, gravity at an unknown place
   Eigen::MatrixXd x(n, 6);
   Eigen::VectorXd y(n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -274,6 +274,26 @@ double length_nats(const std::vector<Eigen::Vector3d>& means, double common, dou
     *estimate = prior.asDiagonal() * (xs.transpose() * z);
   }
   return -0.5 * y.dot(z) - llt.matrixLLT().diagonal().array().log().sum();
+}
+
+// The direction whose length is farthest from 1 g by what units' gains and offsets are like: how
+// many standard deviations, and its length.
+struct Farthest {
+  double sigma = 0;
+  double length_g = 1;
+};
+Farthest farthest_length(const std::vector<Eigen::Vector3d>& means) {
+  Farthest out;
+  for (const Eigen::Vector3d& m : means) {
+    const Eigen::Vector3d u = m.normalized();
+    const double sd = std::sqrt(kGainSd * kGainSd * u.cwiseAbs2().squaredNorm() +
+                                kOffsetSd_g * kOffsetSd_g + kLength_sd * kLength_sd);
+    const double sigma = std::abs(m.norm() - 1) / sd;
+    if (sigma > out.sigma) {
+      out = {sigma, m.norm()};
+    }
+  }
+  return out;
 }
 
 // How far the means of a pose move with temperature, and how far after the slopes of the other
@@ -445,6 +465,17 @@ Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
       // Gain and offset within their priors are the unit's own, no gap.
       out.gap.before_mg = std::max(out.gap.after_mg, 0.0);
       out.gap.before_sigma = out.gap.after_sigma;
+    }
+    // A gain or offset far outside of what units have is a finding and no explanation, also where
+    // too few directions were met to say what it is: one unit in a thousand.
+    constexpr double kFar_sigma = 3.3;
+    const Farthest farthest = farthest_length(means);
+    if (!mismatch && allowed("filter_mismatch") && farthest.sigma > kFar_sigma) {
+      out.unknown.present = true;
+      out.unknown.where.push_back(
+          fmt::format("mean: a length at rest of {:.3f} g is {:.1f} standard deviations from what "
+                      "units read; more sides would say why",
+                      farthest.length_g, farthest.sigma));
     }
     if (out.gap.after_mg > 40) {
       out.unknown.present = true;

@@ -8,7 +8,10 @@
 #include "base/atomic_file.h"
 #include "base/random.h"
 #include "gap/bundle.h"
+#include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
+#include "repair/rescaled_log.h"
+#include "repair/survey.h"
 #include "sim/recording.h"
 #include "sim/unit_truth.h"
 
@@ -127,6 +130,57 @@ const std::vector<std::string>& effects_for_recordings() {
       "second_order", "hysteresis",      "warm_up",       "bandwidth",       "non_orthogonality",
       "random_walk",  "electrical_line", "axis_rotation", "idle_sleep",      "charging_zeros"};
   return kNames;
+}
+
+const std::vector<std::string>& effects_for_plain_recordings() {
+  static const std::vector<std::string> kNames = {"filter_mismatch"};
+  return kNames;
+}
+
+Status write_plain_trial(FileSystem& files, const std::string& from, const std::string& to,
+                         const std::vector<sim::EffectSpec>& effects) {
+  if (effects.size() > 1 || (effects.size() == 1 && effects[0].kind->name != "filter_mismatch")) {
+    return fail(ErrorCode::usage, "a plain recording can be given a filter mismatch only", from,
+                "give a bundle for other effects");
+  }
+  SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(files, from));
+  if (survey.constants_problem) {
+    return fail(*survey.constants_problem);
+  }
+  if (survey.already_repaired || survey.raw_counts || survey.constants.size() != 1) {
+    return fail(ErrorCode::bad_data,
+                "the counts of this recording do not come from one set of constants", from,
+                "give a .gt3x file as the unit wrote it");
+  }
+  repair::RescaledLogOptions options;
+  options.accel_scale_lsb_per_g = survey.accel_scale_lsb_per_g;
+  options.rate_hz = survey.rate_hz;
+  options.first_constants = survey.constants.front();
+  options.beyond_12_bits = survey.beyond_12_bits;
+  options.affine = !survey.plausibility.plausible();
+  options.size = survey.log_bytes;
+  if (!effects.empty()) {
+    // gain s (m - z) + offset = s' (m - z')
+    const sim::ParameterSet& values = effects[0].values;
+    SIXPOINT_ASSIGN(calib::Calibration fresh, calib::calibration_from(survey.constants.front()));
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      fresh.sensitivity_g_per_lsb[axis] *= values.find("gain")->second[0];
+      fresh.zero_lsb[axis] -=
+          values.find("offset_g")->second[axis] / fresh.sensitivity_g_per_lsb[axis];
+    }
+    options.fresh = fresh;
+  }
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, from));
+  SIXPOINT_ASSIGN(auto reader, recording.open_log());
+  SIXPOINT_ASSIGN(auto log, repair::RescaledLog::make(std::move(reader), options));
+  SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, to));
+  for (const gt3x::EntryInfo& entry : recording.entries()) {
+    if (entry.name != "log.bin") {
+      SIXPOINT_CHECK(writer.copy(recording, entry.name));
+    }
+  }
+  SIXPOINT_CHECK(writer.add("log.bin", std::move(log)));
+  return writer.commit();
 }
 
 Status write_recorded_trial(FileSystem& files, const std::string& from, const std::string& to,

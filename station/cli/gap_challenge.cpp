@@ -47,7 +47,7 @@ struct Options {
   std::string program;
   std::string keep;
   std::string html;
-  std::string recording;  // a bundle to which effects are added
+  std::string recording;  // a bundle or a .gt3x file to which effects are added
   // What the diagnosis says of that bundle as it is.
   std::set<std::string> own_effects;
   bool own_unknown = false;
@@ -186,6 +186,11 @@ void read_answer(const Json& json, Outcome& outcome) {
   }
 }
 
+bool is_plain(const std::string& recording) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(recording, error);
+}
+
 Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtocol protocol,
                           const std::string& folder, std::size_t index) {
   SIXPOINT_ASSIGN(const GapTrial trial,
@@ -193,9 +198,13 @@ Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtoco
   Outcome outcome;
   outcome.kind = trial.kind;
   outcome.truth = trial.effects;
-  const std::string bundle = fmt::format("{}/{:06}", folder, index);
+  const bool plain = is_plain(options.recording);
+  const std::string bundle = fmt::format("{}/{:06}{}", folder, index, plain ? ".gt3x" : "");
   if (options.recording.empty()) {
     SIXPOINT_CHECK(sim::write_bundle(env.files, bundle, trial.scenario));
+  } else if (plain) {
+    SIXPOINT_CHECK(station::write_plain_trial(env.files, options.recording, bundle,
+                                              trial.scenario.protocol->effects));
   } else {
     SIXPOINT_CHECK(station::write_recorded_trial(env.files, options.recording, bundle,
                                                  trial.scenario.protocol->effects,
@@ -541,11 +550,12 @@ Status challenge(Context& context, Options options) {
   if (!options.recording.empty()) {
     options.shares.outside = 0;
     options.shares.pair = 0;
+    const auto& can = is_plain(options.recording) ? station::effects_for_plain_recordings()
+                                                  : station::effects_for_recordings();
     if (options.only.empty()) {
-      options.only = station::effects_for_recordings();
+      options.only = can;
     }
     for (const std::string& name : options.only) {
-      const auto& can = station::effects_for_recordings();
       if (std::find(can.begin(), can.end(), name) == can.end()) {
         return fail(ErrorCode::usage, "this effect can't be added to a recording", name,
                     fmt::format("one of {}", fmt::join(can, ", ")));
@@ -575,9 +585,16 @@ Status challenge(Context& context, Options options) {
                   "name one with --keep");
     }
     folder = pattern;
+  } else {
+    SIXPOINT_CHECK(context.env.files.make_folders(folder));
   }
   if (!options.recording.empty()) {
     SIXPOINT_CHECK(learn_own(context.env, options, folder));
+    if (std::all_of(options.only.begin(), options.only.end(),
+                    [&](const std::string& name) { return options.own_effects.contains(name); })) {
+      return fail(ErrorCode::bad_data, "the recording has of its own all that could be added to it",
+                  options.recording, "give the recording of a unit that reads right");
+    }
   }
   std::vector<Result<Outcome>> results(options.trials, Result<Outcome>(Outcome{}));
   {
@@ -628,7 +645,8 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
   command->add_flag("--strip", options->strip, "take the true effects out of the catalogue");
   command->add_option(
       "--recording", options->recording,
-      "add effects to this bundle of a real unit at rest instead of simulating one");
+      "add effects to this bundle of a real unit at rest, or a filter mismatch to this .gt3x "
+      "file, instead of simulating one");
   command->add_option("--none", options->shares.none, "share of trials without any effect")
       ->check(CLI::Range(0.0, 1.0));
   command->add_option("--pairs", options->shares.pair, "share of trials with two effects")

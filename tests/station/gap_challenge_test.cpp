@@ -3,11 +3,13 @@
 #include <fstream>
 #include <set>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "expect_result.h"
 #include "run_command.h"
 #include "sanitized.h"
+#include "shared_data.h"
 #include "station/gap_trials.h"
 #include "temporary_folder.h"
 
@@ -158,6 +160,51 @@ TEST_F(GapChallenge, AddsEffectsToARecording) {
   };
   EXPECT_EQ(refused("clock_error", folder_ / "recorded"), 64);
   EXPECT_GE(refused("tilt", folder_ / "nowhere"), 64);
+}
+
+// A filter mismatch added to a real unit's free living (a GT9X that reads right) is found, and the
+// recording as it is raises no alarm; one that has a mismatch of its own is no ground to stand on.
+TEST_F(GapChallenge, AddsAFilterMismatchToARealRecording) {
+  SIXPOINT_NEED_SHARED("data/gt9x/TAS1E31150129.gt3x");
+  SIXPOINT_NEED_SHARED("data/wgt3x-bt-affected/MOS2A45130450.gt3x");
+  const auto challenged = [&](const std::string& recording) {
+    return tests::run_command(
+        posix_env(),
+        {"gap", "challenge", "--program", SIXPOINT_BINARY_DIR "/sixpoint", "--recording", recording,
+         "--trials", "6", "--none", "0.4", "--seed", "3", "--keep", folder_ / "kept", "--json"});
+  };
+  const std::string real = tests::shared_file("data/gt9x/TAS1E31150129.gt3x");
+  const auto answer = challenged(real);
+  ASSERT_EQ(answer.exit_code, 0) << answer.people;
+  const auto json = answer.json();
+  EXPECT_TRUE(json["own_effects"].empty());
+  EXPECT_EQ(json["scores"]["failures"]["right"], 0);
+  EXPECT_GE(json["scores"]["none_alarms"]["of"].get<int>(), 1);
+  EXPECT_EQ(json["scores"]["none_alarms"]["right"], 0);
+  // Twenty-two blocks in few directions: what lies within the gains and offsets that units have
+  // anyway is not told from these, and nothing else is named for it.
+  EXPECT_GE(json["scores"]["single_first_right"]["of"].get<int>(), 4);
+  EXPECT_GE(json["scores"]["single_first_right"]["share"].get<double>(), 0.5);
+  // What is no sample record came through as it was, and nothing was changed where nothing was
+  // added.
+  for (const auto& outcome : json["outcomes"]) {
+    const std::string written =
+        folder_ / fmt::format("kept/{:06}.gt3x", outcome["trial"].get<int>());
+    const auto same = tests::run_command(posix_env(), {"inspect", written, "--json"}).json();
+    const auto was = tests::run_command(posix_env(), {"inspect", real, "--json"}).json();
+    EXPECT_EQ(same["records"], was["records"]);
+    EXPECT_EQ(same["constants"], was["constants"]);
+    EXPECT_EQ(same["still"]["magnitude_mg"] == was["still"]["magnitude_mg"],
+              outcome["kind"] == "none");
+    for (const auto& named : outcome["named"]) {
+      EXPECT_EQ(named["name"], "filter_mismatch");
+    }
+    // 0.15 g and more is never passed over in silence.
+    if (same["still"]["magnitude_mg"]["worst_error"].get<double>() > 150) {
+      EXPECT_NE(outcome["verdict"], "no_gap") << outcome.dump();
+    }
+  }
+  EXPECT_EQ(challenged(tests::shared_file("data/wgt3x-bt-affected/MOS2A45130450.gt3x")).exit_code, 65);
 }
 
 TEST_F(GapChallenge, AProgramThatFailsIsCounted) {
