@@ -231,6 +231,7 @@ Texture noise_texture(const Bundle& bundle, const CleanSamples& clean) {
     return texture;
   }
   std::vector<Sums> all;
+  all.reserve(kStretches.size());
   for (const std::size_t stretch : kStretches) {
     all.push_back(sums_at(bundle, clean, stretch));
   }
