@@ -204,7 +204,8 @@ TEST_F(GapChallenge, AddsAFilterMismatchToARealRecording) {
       EXPECT_NE(outcome["verdict"], "no_gap") << outcome.dump();
     }
   }
-  EXPECT_EQ(challenged(tests::shared_file("data/wgt3x-bt-affected/MOS2A45130450.gt3x")).exit_code, 65);
+  EXPECT_EQ(challenged(tests::shared_file("data/wgt3x-bt-affected/MOS2A45130450.gt3x")).exit_code,
+            65);
 }
 
 TEST_F(GapChallenge, AProgramThatFailsIsCounted) {

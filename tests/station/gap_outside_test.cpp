@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "expect_result.h"
+#include "sanitized.h"
 #include "station/gap_trials.h"
 
 namespace sixpoint::station {
@@ -22,7 +23,7 @@ using Eigen::Vector3d;
 
 constexpr double kRate_hz = 100;
 constexpr double kLsbPerG = 256;
-constexpr int kForms = 40;
+constexpr int kForms = tests::kSanitized ? 20 : 40;
 constexpr std::array kServiced = {
     "stress_creep",     "bit_weight",        "channel_crosstalk",
     "beating_ripple",   "magnet_pull",       "cable_pull",
