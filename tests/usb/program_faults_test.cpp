@@ -1,6 +1,7 @@
 // The tables of docs/faults.md with the program as people run it, over umockdev: what it prints,
 // what it ends with, and what it keeps.
 #include <atomic>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <future>
@@ -31,6 +32,8 @@ struct ProgramFault {
   int leaves = 0;    // how often it leaves the bus
   int comes_back = 0;
 };
+
+void PrintTo(const ProgramFault& fault, std::ostream* out) { *out << fault.name; }
 
 struct Ended {  // NOLINT(bugprone-exception-escape): json's destructor asserts
   ChildAnswer answer;
@@ -237,9 +240,8 @@ const std::vector<ProgramFault>& capture_rows() {
   return kRows;
 }
 
-// A bench of units, each with its plan, its technician and its own program, all at once: the
-// programs mostly wait.
-class ProgramFaults : public testing::Test {
+// Turns the unit of one row while the program works on it; a bus of its own for every row.
+class ProgramFaultRow : public testing::TestWithParam<ProgramFault> {
  protected:
   void SetUp() override {
     auto made = mocks::UmockdevBus::make();
@@ -247,43 +249,29 @@ class ProgramFaults : public testing::Test {
     bench_ = std::make_unique<UmockdevBench>(std::move(*made));
     std::ofstream(enter_) << "\n\n\n\n\n\n";
   }
-  // `command` makes the program's arguments of a row's file; `judge` gets what passed.
-  void run(const std::vector<ProgramFault>& rows, int pace,
-           const std::function<std::vector<std::string>(const std::string& file)>& command,
+  // `judge` gets what passed.
+  void run(int pace, const std::vector<std::string>& arguments,
            const std::function<void(const Ended&, const sim::UnitTruth&)>& judge) {
-    std::vector<std::thread> programs;
-    programs.reserve(rows.size());
-    std::uint64_t seed = 300;
-    for (const ProgramFault& fault : rows) {
-      programs.emplace_back([&, seed = ++seed] {
-        SCOPED_TRACE(fault.name);
-        sim::UnitTruth truth;
-        const Ended ended = run_under_plan(*bench_, fault, seed, pace,
-                                           command(folder_ / std::string(fault.name) + ".gt3x"),
-                                           folder_, truth, enter_);
-        if (fault.exit_code == 0 && ended.document.is_object() && !ended.constants.empty()) {
-          judge(ended, truth);
-        }
-      });
-    }
-    for (std::thread& program : programs) {
-      program.join();
+    constexpr std::uint64_t kSeed = 301;
+    sim::UnitTruth truth;
+    const Ended ended =
+        run_under_plan(*bench_, GetParam(), kSeed, pace, arguments, folder_, truth, enter_);
+    if (GetParam().exit_code == 0 && ended.document.is_object() && !ended.constants.empty()) {
+      judge(ended, truth);
     }
   }
+  const TemporaryFolder folder_;
 
  private:
-  const TemporaryFolder folder_;
   const std::string enter_ = folder_ / "enter";  // six times, for the prompts
   std::unique_ptr<UmockdevBench> bench_;
 };
+class JigFault : public ProgramFaultRow {};
+class CaptureFault : public ProgramFaultRow {};
 
-TEST_F(ProgramFaults, EndJigRunsAsTheTableSays) {
+TEST_P(JigFault, EndsAsTheTableSays) {
   constexpr int kPace = 8;  // the unit's time passes so much faster than the program's
-  run(
-      jig_rows(), kPace,
-      [](const std::string&) {
-        return std::vector<std::string>{"jig", "--dwell", "0.5", "--filter", "current"};
-      },
+  run(kPace, {"jig", "--dwell", "0.5", "--filter", "current"},
       [](const Ended& ended, const sim::UnitTruth& truth) {
         EXPECT_EQ(ended.document["verdict"], "pass");
         // 0.7 % and 2 LSB: half a second of noise per pose.
@@ -291,20 +279,47 @@ TEST_F(ProgramFaults, EndJigRunsAsTheTableSays) {
       });
 }
 
-TEST_F(ProgramFaults, EndCapturesAsTheTableSays) {
+TEST_P(CaptureFault, EndsAsTheTableSays) {
   constexpr int kPace = 40;
-  run(
-      capture_rows(), kPace,
-      [](const std::string& file) {
-        return std::vector<std::string>{
-            "capture", "--side-seconds", "1", "--turn-seconds", "0.4", "-o", file};
-      },
+  run(kPace, {"capture", "--side-seconds", "1", "--turn-seconds", "0.4", "-o", folder_ / "c.gt3x"},
       [](const Ended& ended, const sim::UnitTruth& truth) {
         EXPECT_EQ(ended.document["verified"], true) << ended.answer.out;
         // 1 % and 3 LSB: six sides of 40 s, at the paper's noise.
         expect_constants(ended.constants[0]["constants"], truth, 0.01, 3);
       });
 }
+
+const auto kNameOfRow = [](const testing::TestParamInfo<ProgramFault>& row) {
+  return std::string(row.param.name);
+};
+INSTANTIATE_TEST_SUITE_P(Rows, JigFault, testing::ValuesIn(jig_rows()), kNameOfRow);
+INSTANTIATE_TEST_SUITE_P(Rows, CaptureFault, testing::ValuesIn(capture_rows()), kNameOfRow);
+
+// All rows at once, for they mostly wait. Each in a process of its own: programs that share a test
+// bed take each other's event sockets, which umockdev names by descriptor, and a program that ends
+// while another's unit is plugged in takes the test bed with it.
+void run_rows(const std::string& suite, const std::vector<ProgramFault>& rows) {
+  const std::string self = std::filesystem::read_symlink("/proc/self/exe");
+  std::vector<ChildAnswer> answers(rows.size());
+  std::vector<std::thread> programs;
+  programs.reserve(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    programs.emplace_back([&, i] {
+      answers[i] = run_program(
+          {self, "--gtest_filter=Rows/" + suite + ".EndsAsTheTableSays/" + rows[i].name});
+    });
+  }
+  for (std::thread& program : programs) {
+    program.join();
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(answers[i].exit_code, 0) << rows[i].name << answers[i].people << answers[i].out;
+    EXPECT_NE(answers[i].out.find("[  PASSED  ] 1 test."), std::string::npos) << answers[i].out;
+  }
+}
+
+TEST(ProgramFaults, EndJigRunsAsTheTableSays) { run_rows("JigFault", jig_rows()); }
+TEST(ProgramFaults, EndCapturesAsTheTableSays) { run_rows("CaptureFault", capture_rows()); }
 
 // docs/faults.md says where each fault is tested: its columns of this file are those of the rows
 // above.
