@@ -68,9 +68,7 @@ Status AtomicFile::append(std::span<const std::uint8_t> bytes) {
   return {};
 }
 
-Status AtomicFile::append(std::string_view text) {
-  return append(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
-}
+Status AtomicFile::append(std::string_view text) { return append(as_bytes(text)); }
 
 Status AtomicFile::commit() {
   SIXPOINT_CHECK(file_->sync());

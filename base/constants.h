@@ -1,4 +1,9 @@
 // The nine integers that a unit keeps in its non-volatile memory and writes into every recording.
+//
+//   StoredConstants stored;
+//   stored.positive_lsb = {264, 262, 259};  // X, Y, Z
+//   stored.negative_lsb = {-254, -257, -251};
+//   stored.zero_lsb = {5, 3, 4};
 #pragma once
 
 #include "base/measure.h"

@@ -1,8 +1,12 @@
 // Env: the only way in which a library reaches the clock and the disk.
 //
+//   SIXPOINT_ASSIGN(const Bytes bytes, read_file(env.files, "unit.gt3x"));
+//   SIXPOINT_ASSIGN(const FileInfo info, env.files.info("unit.gt3x"));
+//   env.clock.sleep(std::chrono::milliseconds(100));
+//
 // A library that needs time or files takes an Env (or just its Clock or FileSystem). The program
-// passes posix_env(); tests pass a MemoryEnv (memory_env.h), whose clock moves when told to and
-// whose disk forgets on command whatever was not synced.
+// passes posix_env(); tests pass a MemoryEnv (memory_env.h), whose clock moves on command and
+// whose disk forgets on command what was not synced.
 //
 // Paths are strings as the operating system takes them. All functions are safe to call from several
 // threads; one file object belongs to one thread at a time.
@@ -16,12 +20,11 @@
 #include <string>
 #include <vector>
 
+#include "base/bytes.h"
 #include "base/result.h"
 #include "base/time.h"
 
 namespace sixpoint {
-
-using Bytes = std::vector<std::uint8_t>;
 
 class Clock {
  public:
@@ -89,7 +92,7 @@ class FileSystem {
 struct Env {
   Clock& clock;
   FileSystem& files;
-  // Seed for everything random that nobody gave a seed to. Fixed unless the program changes it, so
+  // Seed for everything random that was given no seed. Fixed unless the program changes it, so
   // that two runs are alike.
   std::uint64_t seed = 20140324;
 };

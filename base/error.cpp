@@ -1,36 +1,38 @@
 #include "base/error.h"
 
+#include <algorithm>
+#include <array>
+#include <utility>
+
 #include <fmt/format.h>
 
 namespace sixpoint {
 
-bool is_error_code(int number) {
-  const auto code = static_cast<ErrorCode>(number);
-  return code == ErrorCode::internal || to_string(code) != to_string(ErrorCode::internal);
+namespace {
+
+constexpr std::array<std::pair<ErrorCode, std::string_view>, 9> kNames = {{
+    {ErrorCode::usage, "usage"},
+    {ErrorCode::bad_data, "bad_data"},
+    {ErrorCode::no_input, "no_input"},
+    {ErrorCode::device_unavailable, "device_unavailable"},
+    {ErrorCode::internal, "internal"},
+    {ErrorCode::cannot_create, "cannot_create"},
+    {ErrorCode::io, "io"},
+    {ErrorCode::permission, "permission"},
+    {ErrorCode::configuration, "configuration"},
+}};
+
+const auto* entry_of(ErrorCode code) {
+  return std::ranges::find(kNames, code, &std::pair<ErrorCode, std::string_view>::first);
 }
 
+}  // namespace
+
+bool is_error_code(int number) { return entry_of(static_cast<ErrorCode>(number)) != kNames.end(); }
+
 std::string_view to_string(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::usage:
-      return "usage";
-    case ErrorCode::bad_data:
-      return "bad_data";
-    case ErrorCode::no_input:
-      return "no_input";
-    case ErrorCode::device_unavailable:
-      return "device_unavailable";
-    case ErrorCode::internal:
-      return "internal";
-    case ErrorCode::cannot_create:
-      return "cannot_create";
-    case ErrorCode::io:
-      return "io";
-    case ErrorCode::permission:
-      return "permission";
-    case ErrorCode::configuration:
-      return "configuration";
-  }
-  return "internal";
+  const auto* entry = entry_of(code);
+  return entry == kNames.end() ? "internal" : entry->second;
 }
 
 std::string printable(std::string_view text, std::size_t limit) {

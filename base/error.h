@@ -1,5 +1,8 @@
 // The one error type of the project.
 //
+//   const Error error{ErrorCode::bad_data, "not a zip archive", "unit.gt3x", "download it again"};
+//   error.brief();  // "unit.gt3x: not a zip archive; download it again"
+//
 // An error says what happened, where (a file, an offset, a device), and what a person can do next.
 // Libraries never print and never exit; they return Result<T> (result.h) with one of these inside.
 #pragma once

@@ -1,4 +1,10 @@
-// A clock that moves when told to, and a disk in memory that behaves like a real one on a bad day.
+// A clock that moves on command, and a disk in memory that can lose power or fail on command.
+//
+//   MemoryEnv memory;
+//   memory.clock.sleep(std::chrono::hours(1));  // returns at once
+//   memory.files.fail_after(3);                 // the fourth change of the disk fails with `io`
+//   const Status status = memory.env.files.make_folders("a/b");
+//   memory.files.lose_power();
 //
 // MemoryFiles keeps two states: what a running process sees, and what the medium holds. Bytes reach
 // the medium by WritableFile::sync(), names by sync_folder(). lose_power() throws away everything

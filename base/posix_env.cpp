@@ -37,6 +37,12 @@ tl::unexpected<Error> system_failure(int error, ErrorCode otherwise, const std::
   }
 }
 
+// Of a system call that answers 0 where it succeeded.
+Status done_unless(int result, ErrorCode otherwise, const std::string& doing,
+                   const std::string& path) {
+  return result == 0 ? Status() : Status(system_failure(errno, otherwise, doing, path));
+}
+
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -115,34 +121,16 @@ class PosixWritableFile final : public WritableFile {
     return pread_all(fd_.get(), offset, out, path_);
   }
   Status sync() override {
-    if (::fsync(fd_.get()) != 0) {
-      return system_failure(errno, ErrorCode::io, "syncing failed", path_);
-    }
-    return {};
+    return done_unless(::fsync(fd_.get()), ErrorCode::io, "syncing failed", path_);
   }
   Status close() override {
-    if (fd_.close() != 0) {
-      return system_failure(errno, ErrorCode::io, "closing failed", path_);
-    }
-    return {};
+    return done_unless(fd_.close(), ErrorCode::io, "closing failed", path_);
   }
 
  private:
   Descriptor fd_;
   std::string path_;
 };
-
-FileInfo info_of(const struct stat& status) {
-  FileInfo info;
-  info.is_folder = S_ISDIR(status.st_mode);
-  info.is_link = S_ISLNK(status.st_mode);
-  info.size = static_cast<std::uint64_t>(status.st_size);
-  info.modified_ns =
-      std::int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + std::int64_t{status.st_mtim.tv_nsec};
-  info.device = status.st_dev;
-  info.inode = status.st_ino;
-  return info;
-}
 
 class PosixLock final : public FileLock {
  public:
@@ -177,21 +165,8 @@ class PosixFileSystem final : public FileSystem {
     return std::make_unique<PosixWritableFile>(fd, path);
   }
 
-  Result<FileInfo> info(const std::string& path) override {
-    struct stat status {};
-    if (::stat(path.c_str(), &status) != 0) {
-      return system_failure(errno, ErrorCode::no_input, "cannot look at", path);
-    }
-    return info_of(status);
-  }
-
-  Result<FileInfo> link_info(const std::string& path) override {
-    struct stat status {};
-    if (::lstat(path.c_str(), &status) != 0) {
-      return system_failure(errno, ErrorCode::no_input, "cannot look at", path);
-    }
-    return info_of(status);
-  }
+  Result<FileInfo> info(const std::string& path) override { return info_by(::stat, path); }
+  Result<FileInfo> link_info(const std::string& path) override { return info_by(::lstat, path); }
 
   Result<std::string> real_path(const std::string& path) override {
     std::error_code error;
@@ -248,25 +223,35 @@ class PosixFileSystem final : public FileSystem {
   }
 
   Status rename(const std::string& from, const std::string& to) override {
-    if (::rename(from.c_str(), to.c_str()) != 0) {
-      return system_failure(errno, ErrorCode::cannot_create, "cannot put in place", to);
-    }
-    return {};
+    return done_unless(::rename(from.c_str(), to.c_str()), ErrorCode::cannot_create,
+                       "cannot put in place", to);
   }
 
   Status remove(const std::string& path) override {
-    if (::unlink(path.c_str()) != 0) {
-      return system_failure(errno, ErrorCode::io, "cannot remove", path);
-    }
-    return {};
+    return done_unless(::unlink(path.c_str()), ErrorCode::io, "cannot remove", path);
   }
 
   Status sync_folder(const std::string& path) override {
     const Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (folder.get() < 0 || ::fsync(folder.get()) != 0) {
-      return system_failure(errno, ErrorCode::io, "cannot sync the folder", path);
+    return done_unless(folder.get() < 0 ? -1 : ::fsync(folder.get()), ErrorCode::io,
+                       "cannot sync the folder", path);
+  }
+
+ private:
+  static Result<FileInfo> info_by(int (*call)(const char*, struct stat*), const std::string& path) {
+    struct stat status {};
+    if (call(path.c_str(), &status) != 0) {
+      return system_failure(errno, ErrorCode::no_input, "cannot look at", path);
     }
-    return {};
+    FileInfo info;
+    info.is_folder = S_ISDIR(status.st_mode);
+    info.is_link = S_ISLNK(status.st_mode);
+    info.size = static_cast<std::uint64_t>(status.st_size);
+    info.modified_ns =
+        std::int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + std::int64_t{status.st_mtim.tv_nsec};
+    info.device = status.st_dev;
+    info.inode = status.st_ino;
+    return info;
   }
 };
 

@@ -1,5 +1,9 @@
 // Random numbers that are the same on every machine for the same seed.
 //
+//   Random random(7);  // the seed
+//   const double noise_mg = 3.9 * random.normal();
+//   const std::uint64_t pose = random.below(6);  // 0 .. 5
+//
 // The standard library's distributions may differ between implementations; a recording made by
 // `simulate` and a solution of the genetic algorithm must not. The generator is xoshiro256++
 // (Blackman and Vigna 2019, "Scrambled linear pseudorandom number generators"), seeded by

@@ -1,4 +1,14 @@
 // Result<T>: a value, or the Error that explains why there is none.
+//
+//   Result<double> to_g(int count, double scale_lsb_per_g) {
+//     if (scale_lsb_per_g <= 0) return fail(ErrorCode::bad_data, "the scale is not positive");
+//     return count / scale_lsb_per_g;
+//   }
+//   Status add_g(double& sum_g, int count) {
+//     SIXPOINT_ASSIGN(const double value_g, to_g(count, 256));  // an error goes to the caller
+//     sum_g += value_g;
+//     return {};
+//   }
 #pragma once
 
 #include <string>

@@ -1,9 +1,7 @@
 #include "base/sha256.h"
 
 #include <new>
-#include <vector>
 
-#include <fmt/format.h>
 #include <openssl/evp.h>
 
 #include "base/env.h"
@@ -51,23 +49,25 @@ Sha256Digest sha256(std::span<const std::uint8_t> bytes) {
   return hash.finish();
 }
 
-Result<std::string> file_sha256(FileSystem& files, const std::string& path) {
+std::string text_sha256(std::string_view text) { return to_hex(sha256(as_bytes(text))); }
+
+Result<Sha256Digest> file_digest(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(const auto file, files.open(path));
   Sha256 hash;
-  std::vector<std::uint8_t> piece(1U << 20);
+  Bytes piece(1U << 20);
   std::uint64_t at = 0;
   while (true) {
     SIXPOINT_ASSIGN(const auto count, file->read_at(at, piece));
     if (count == 0) {
-      return to_hex(hash.finish());
+      return hash.finish();
     }
     hash.update(std::span(piece).first(count));
     at += count;
   }
 }
 
-std::string to_hex(std::span<const std::uint8_t> bytes) {
-  return fmt::format("{:02x}", fmt::join(bytes, ""));
+Result<std::string> file_sha256(FileSystem& files, const std::string& path) {
+  return file_digest(files, path).map([](const Sha256Digest& digest) { return to_hex(digest); });
 }
 
 }  // namespace sixpoint

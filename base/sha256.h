@@ -1,4 +1,11 @@
-// SHA-256 (FIPS 180-4), by OpenSSL's libcrypto: names a file, a capture or a row for good.
+// SHA-256 (FIPS 180-4), by OpenSSL's libcrypto (sha256.cpp alone uses it).
+//
+//   text_sha256("abc");  // "ba7816bf..."
+//   SIXPOINT_ASSIGN(const std::string file_hash, file_sha256(env.files, path));
+//   Sha256 hash;
+//   hash.update("a");
+//   hash.update("bc");
+//   to_hex(hash.finish());  // the same as the first
 #pragma once
 
 #include <array>
@@ -8,6 +15,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/bytes.h"
 #include "base/result.h"
 
 namespace sixpoint {
@@ -30,9 +38,11 @@ class Sha256 {
 };
 
 Sha256Digest sha256(std::span<const std::uint8_t> bytes);
+// Of a text, in lower-case hex digits.
+std::string text_sha256(std::string_view text);
 class FileSystem;
 // Of a whole file, read piece by piece; in lower-case hex digits.
+Result<Sha256Digest> file_digest(FileSystem& files, const std::string& path);
 Result<std::string> file_sha256(FileSystem& files, const std::string& path);
-std::string to_hex(std::span<const std::uint8_t> bytes);  // lower case
 
 }  // namespace sixpoint

@@ -346,20 +346,10 @@ std::vector<Vector> directions_of(const Unit& unit, std::span<const StillBlock> 
 template <class Wear>
 void accuracy(const char* name, int units, unsigned seed, double rate_hz, double drift_mg,
               double wanted_mean, double wanted_worst, const Wear& wear) {
-  Statistics mean;
-  Statistics worst;
-  Statistics baseline;
-  Statistics plain;
-  Statistics time;
-  Statistics bound_mean;
-  Statistics bound_worst;
+  Statistics mean, worst, baseline, plain, time, bound_mean, bound_worst;
   std::size_t blocks_seen = 0;
   constexpr int kJudged = 200;  // the genetic algorithm takes seven times as long as the rest
-  int judged = 0;
-  int refused = 0;
-  int incomplete = 0;
-  int failed = 0;
-  int cross = 0;
+  int judged = 0, refused = 0, incomplete = 0, failed = 0, cross = 0;
   for (int i = 0; i < units; ++i) {
     std::mt19937_64 random(seed + static_cast<unsigned>(i));
     Unit unit = make_unit(random);
@@ -527,11 +517,7 @@ Mixed mixed_unit(unsigned seed) {
 
 // How often is a wrong answer called verified?
 void confidence(int units, unsigned seed, SolveMethod method) {
-  int verified = 0;
-  int wrong = 0;
-  int silent = 0;
-  int refused_bad = 0;
-  int refused_good = 0;
+  int verified = 0, wrong = 0, silent = 0, refused_bad = 0, refused_good = 0;
   double square = 0;
   int compared = 0;
   double largest = 0;

@@ -8,10 +8,10 @@
 #include <sys/resource.h>
 
 #include "base/memory_env.h"
-#include "gap/bundle.h"
-#include "gap/diagnose.h"
-#include "gap/report_html.h"
-#include "gap/report_sheet.h"
+#include "gap/judge/diagnose.h"
+#include "gap/recording/bundle.h"
+#include "gap/report/report_html.h"
+#include "gap/report/report_sheet.h"
 #include "sim/bundle_writer.h"
 #include "sim/scenario.h"
 

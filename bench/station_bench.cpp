@@ -23,9 +23,10 @@
 
 #include "base/memory_env.h"
 #include "base/random.h"
-#include "mocks/in_process.h"
-#include "mocks/inert.h"
-#include "station/jig_session.h"
+#include "device/wire/wire_unit.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/inert/inert.h"
+#include "station/run/jig_session.h"
 
 namespace sixpoint::station {
 namespace {
@@ -36,10 +37,6 @@ using std::chrono::nanoseconds;
 enum class Fault { none, stuck_axis, cross_axis, second_order, clipping, noisy, gain_jump, drift };
 constexpr std::array<const char*, 8> kFaultNames = {
     "none", "stuck_axis", "cross_axis", "second_order", "clipping", "noisy", "gain_jump", "drift"};
-
-nanoseconds from_seconds(double time_s) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
-}
 
 // How a sensor sits in its case and the case on the jig, apart from the hand's slips.
 struct Askew {
@@ -108,7 +105,7 @@ class Hand final : public device::Jig {
     }
     return {};
   }
-  Result<device::JigReport> report() override { return device::JigReport{}; }
+  Result<device::JigPosition> position() override { return device::JigPosition{}; }
   Status stop() override { return {}; }
 
   std::map<std::string, int> slips;
@@ -217,10 +214,11 @@ int run(int units, std::uint64_t first_seed, double askew_deg) {
     const auto clock = std::make_shared<ManualClock>();
     const auto plugged = std::make_shared<mocks::PluggedUnit>(options, clock);
     Hand hand(plugged, random, draw_askew(seed, askew_deg));
-    auto unit = device::Unit::open(link_with(plugged, fault, axis, random, lost, samples)).value();
+    auto unit =
+        device::WireUnit::open(link_with(plugged, fault, axis, random, lost, samples)).value();
     JigHooks hooks;
     std::chrono::steady_clock::time_point last_accepted{};
-    hooks.tell = [&](const JigAction& action) {
+    hooks.on_action = [&](const JigAction& action) {
       if (action.kind == JigAction::Kind::accepted) {
         last_accepted = std::chrono::steady_clock::now();
       }
@@ -233,7 +231,7 @@ int run(int units, std::uint64_t first_seed, double askew_deg) {
         plugged->unit.restore_power(clock->elapsed());
         plugged->unplugged = false;
       }
-      unit = device::Unit::open(link_with(plugged, fault, axis, random, lost, samples)).value();
+      unit = device::WireUnit::open(link_with(plugged, fault, axis, random, lost, samples)).value();
       return UnitOnJig{unit.get(), &hand};
     };
     auto report = run_jig({unit.get(), &hand}, env.env, {}, hooks);

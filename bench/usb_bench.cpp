@@ -19,12 +19,13 @@
 #include <sys/resource.h>
 
 #include "base/memory_env.h"
-#include "device/discovery.h"
-#include "device/hotplug.h"
-#include "device/payload.h"
 #include "device/unit.h"
-#include "mocks/umockdev_bus.h"
-#include "mocks/usb_unit.h"
+#include "device/usb/discovery.h"
+#include "device/usb/hotplug.h"
+#include "device/wire/payload.h"
+#include "device/wire/wire_unit.h"
+#include "mocks/usb/umockdev_bus.h"
+#include "mocks/usb/usb_unit.h"
 
 namespace {
 
@@ -96,7 +97,7 @@ Streamed stream_all(std::uint64_t samples, const Open& open) {
   std::vector<std::thread> threads;
   for (int i = 0; i < kUnits; ++i) {
     threads.emplace_back([&, i] {
-      const auto unit = need(device::Unit::open(open(i)));
+      const auto unit = need(device::WireUnit::open(open(i)));
       results[static_cast<std::size_t>(i)] = stream(*unit, samples);
     });
   }
@@ -200,7 +201,7 @@ double plain_mb_per_s(const device::AttachedDevice& attached, const device::Reco
 }
 
 double unit_mb_per_s(const device::AttachedDevice& attached, const device::RecordingInfo& info) {
-  const auto unit = need(device::Unit::open(need(device::open_monitor(attached, posix_env()))));
+  const auto unit = need(device::WireUnit::open(need(device::open_monitor(attached, posix_env()))));
   MemoryEnv env;
   const auto start = steady_clock::now();
   need(unit->download(info, env.files, "x.gt3x"));
@@ -213,10 +214,10 @@ void download(mocks::UmockdevBus& bus) {
   const auto attached = need(device::attached_devices()).front();
   device::RecordingInfo info;
   {
-    device::UnitOptions options;
+    device::WireOptions options;
     options.reply_time_out = seconds(60);  // packing takes the virtual unit a while
     const auto unit =
-        need(device::Unit::open(need(device::open_monitor(attached, posix_env())), options));
+        need(device::WireUnit::open(need(device::open_monitor(attached, posix_env())), options));
     need(unit->start_recording(kRate_hz, from_unix_seconds(1'500'000'000)));
     clock->leap += std::chrono::hours(8);
     need(unit->stop_recording());
@@ -248,7 +249,7 @@ void plug_to_identified(mocks::UmockdevBus& bus) {
     for (bool identified = false; !identified;) {
       const auto event = need(watch->next(seconds(10)));
       if (event && event->kind == device::HotplugEvent::Kind::arrived) {
-        need(device::Unit::open(need(device::open_monitor(event->device, posix_env()))));
+        need(device::WireUnit::open(need(device::open_monitor(event->device, posix_env()))));
         identified = true;
       }
     }
@@ -269,7 +270,7 @@ void closing(mocks::UmockdevBus& bus) {
     device::Link link = need(device::open_monitor(attached, posix_env()));
     Bytes buffer(device::kBulkBlockBytes);
     need(link.bulk->read(buffer, milliseconds(1)));  // its thread runs, its transfers wait
-    auto unit = need(device::Unit::open(std::move(link)));
+    auto unit = need(device::WireUnit::open(std::move(link)));
     need(unit->start_stream(kRate_hz));
     need(unit->next_samples(seconds(2)));
     const auto start = steady_clock::now();

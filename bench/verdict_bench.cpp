@@ -15,9 +15,10 @@
 
 #include "base/memory_env.h"
 #include "base/random.h"
-#include "mocks/in_process.h"
-#include "mocks/virtual_jig.h"
-#include "station/jig_session.h"
+#include "device/wire/wire_unit.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/in_process/virtual_jig.h"
+#include "station/run/jig_session.h"
 
 namespace {
 
@@ -49,17 +50,17 @@ bool is_inside(const sim::SensorTruth& truth, const station::Limits& limits) {
   return true;
 }
 
-void measure(std::uint64_t seed, const sim::UnitWishes& wishes,
+void measure(std::uint64_t seed, const sim::GivenProperties& given,
              const station::JigSessionOptions& options, Counts& counts) {
   mocks::VirtualUnitOptions unit_options;
   unit_options.seed = seed;
-  unit_options.truth = sim::draw_unit(seed, wishes);
+  unit_options.truth = sim::draw_unit(seed, given);
   auto plugged =
       std::make_shared<mocks::PluggedUnit>(unit_options, std::make_shared<ManualClock>());
   mocks::VirtualJig jig(plugged);
-  auto unit = device::Unit::open(mocks::link_to(plugged, false));
+  auto unit = device::WireUnit::open(mocks::link_to(plugged, false));
   MemoryEnv env;
-  const auto report = station::run_jig(**unit, jig, env.env, options, {});
+  const auto report = station::run_jig({unit->get(), &jig}, env.env, options, {});
   if (!report) {
     std::fprintf(stderr, "%s\n", report.error().brief().c_str());
     std::exit(70);
@@ -77,8 +78,8 @@ void measure(std::uint64_t seed, const sim::UnitWishes& wishes,
 }
 
 // One quantity of one axis lies within `spread` of one of its limits.
-sim::UnitWishes at_the_limit(Random& random, const station::Limits& limits, bool zero) {
-  sim::UnitWishes wishes;
+sim::GivenProperties at_the_limit(Random& random, const station::Limits& limits, bool zero) {
+  sim::GivenProperties given;
   PerAxis<double> sensitivity{};
   PerAxis<double> zeros{};
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -96,12 +97,12 @@ sim::UnitWishes at_the_limit(Random& random, const station::Limits& limits, bool
     const double percent = (high ? *limit.high : *limit.low) + random.uniform(-0.25, 0.25);
     sensitivity[axis] = 1 / (0.004 * (1 + percent / 100));
   }
-  wishes.current_sensitivity_lsb_per_g = sensitivity;
-  wishes.current_zero_lsb = zeros;
+  given.current_sensitivity_lsb_per_g = sensitivity;
+  given.current_zero_lsb = zeros;
   // The page knows about it, or the faces would not be recognised.
-  wishes.legacy_sensitivity_lsb_per_g = sensitivity;
-  wishes.legacy_zero_lsb = zeros;
-  return wishes;
+  given.legacy_sensitivity_lsb_per_g = sensitivity;
+  given.legacy_zero_lsb = zeros;
+  return given;
 }
 
 void print(const char* name, const Counts& counts) {
@@ -127,9 +128,9 @@ int main(int argc, char** argv) {
       Counts counts;
       for (int i = 0; i < units; ++i) {
         const bool zero = where[0] == 'z';
-        const sim::UnitWishes wishes =
-            where[0] == 'a' ? sim::UnitWishes() : at_the_limit(random, options.limits, zero);
-        measure(static_cast<std::uint64_t>(i) + 1, wishes, options, counts);
+        const sim::GivenProperties given =
+            where[0] == 'a' ? sim::GivenProperties() : at_the_limit(random, options.limits, zero);
+        measure(static_cast<std::uint64_t>(i) + 1, given, options, counts);
       }
       print((std::string(where) + (guarded ? "" : ", no guard band")).c_str(), counts);
     }

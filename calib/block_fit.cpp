@@ -3,96 +3,33 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
-#include <unordered_map>
 
 #include <fmt/format.h>
+
+#include "calib/held_out.h"
 
 namespace sixpoint::calib {
 
 namespace {
 
-constexpr int kGrid = 16;                   // cells along a cube face: 90 / 16 = 5.6 degrees
-constexpr double kNeighbourCosine = 0.978;  // 12 degrees
-constexpr double kTemperatureBin_c = 1.0;
-
-// Which of the 6 * kGrid * kGrid cells of a cube around the sphere; -1 for a zero vector.
-int cell_key(const PerAxis<double>& mean_g) {
-  std::size_t face_axis = 0;
-  for (std::size_t a = 1; a < kAxes; ++a) {
-    if (std::abs(mean_g[a]) > std::abs(mean_g[face_axis])) {
-      face_axis = a;
-    }
-  }
-  const double length = mean_g[face_axis];
-  if (length == 0) {
-    return -1;
-  }
-  const double inverse = 1 / std::abs(length);
-  // Angles, not tangents, so that cells are alike in size; atan t on -1 .. 1 to 0.3 degrees is
-  // t (pi/4 + 0.273 (1 - |t|)) (Rajan and others 2006), which is monotonic and enough here.
-  const auto slot = [&](std::size_t axis) {
-    const double t = mean_g[axis] * inverse;
-    const double angle = t * (M_PI_4 + 0.273 * (1 - std::abs(t))) / M_PI_2 + 0.5;
-    return std::clamp(static_cast<int>(angle * kGrid), 0, kGrid - 1);
-  };
-  const int face = static_cast<int>(face_axis) * 2 + (length < 0 ? 1 : 0);
-  return (face * kGrid + slot((face_axis + 1) % 3)) * kGrid + slot((face_axis + 2) % 3);
-}
-
-PerAxis<double> direction_of(const DirectionCell& cell, const Calibration& calibration) {
-  PerAxis<double> g = calibration.to_g(cell.mean_lsb);
-  const double length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-  for (double& value : g) {
-    value /= length > 0 ? length : 1;
-  }
-  return g;
-}
-
-// Numbers the neighbourhoods, the fullest cell of each first. Returns how many there are.
-int number_neighbourhoods(std::vector<DirectionCell>& cells, const Calibration& calibration) {
-  std::vector<std::size_t> order(cells.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t left, std::size_t right) {
-    return cells[left].blocks > cells[right].blocks;
-  });
-  std::vector<PerAxis<double>> leaders;
-  for (const std::size_t i : order) {
-    const PerAxis<double> n = direction_of(cells[i], calibration);
-    int found = -1;
-    double best = kNeighbourCosine;
-    for (std::size_t k = 0; k < leaders.size(); ++k) {
-      const double cosine = n[0] * leaders[k][0] + n[1] * leaders[k][1] + n[2] * leaders[k][2];
-      if (cosine >= best) {
-        best = cosine;
-        found = static_cast<int>(k);
-      }
-    }
-    if (found < 0) {
-      found = static_cast<int>(leaders.size());
-      leaders.push_back(n);
-    }
-    cells[i].neighbourhood = found;
-  }
-  return static_cast<int>(leaders.size());
-}
-
-std::vector<double> neighbours_of(const std::vector<DirectionCell>& cells, int neighbourhoods) {
-  std::vector<double> size(static_cast<std::size_t>(neighbourhoods), 0);
-  for (const DirectionCell& cell : cells) {
-    size[static_cast<std::size_t>(cell.neighbourhood)] += 1;
-  }
-  std::vector<double> out;
-  out.reserve(cells.size());
-  for (const DirectionCell& cell : cells) {
-    out.push_back(size[static_cast<std::size_t>(cell.neighbourhood)]);
-  }
-  return out;
-}
-
-GravityPoint point_of(const DirectionCell& cell, double sigma_g) {
-  return {cell.mean_lsb, cell.variance_lsb2, sigma_g, cell.temperature_c};
-}
+// Before the data say otherwise: 3 mg of misfit, so that every direction counts nearly equally, and
+// 1 mg of scatter between blocks.
+constexpr double kFirstStructure_g2 = 9e-6;
+constexpr double kFirstBlock_g2 = 1e-6;
+constexpr double kLeastVariance_g2 = 1e-14;  // rounding of the arithmetic; no sigma is zero
+// Blocks beyond what the cells take: fewer say too little about their own scatter.
+constexpr double kLeastBlockFreedom = 20;
+// The assumed misfit counts as much as this many directions, until there are enough.
+constexpr double kAssumedFreedom = 2;
+constexpr int kEnoughRedundancy = 30;
+constexpr int kOutlierRounds = 6;
+constexpr double kOutlierSigmas = 6;
+constexpr double kSdPerMedian = 1.4826;  // of the size of a normal variable
+constexpr double kSettled_mg = 1e-3;
+constexpr std::size_t kCellsForBasin = 256;
+// A richer model needs this much of the evidence to be tried.
+constexpr double kLeastTemperatureRange_c = 5;
+constexpr int kSpareDirections = 3;
 
 double median(std::vector<double> values) {
   if (values.empty()) {
@@ -133,246 +70,367 @@ double paule_mandel(const std::vector<double>& residual_g, const std::vector<dou
   return 0.5 * (low + high);
 }
 
-// Of the blocks that have one: what constants without temperature terms hold for.
-double mean_temperature_c(std::span<const StillBlock> blocks) {
-  double sum = 0;
-  double count = 0;
-  for (const StillBlock& block : blocks) {
-    if (block.temperature_c && std::isfinite(*block.temperature_c)) {
-      sum += *block.temperature_c;
-      count += 1;
-    }
-  }
-  return count > 0 ? sum / count : 0;
-}
-
-struct HeldOut {
-  double rms_mg = 0;
-  int directions = 0;  // that could be predicted at all
-  bool valid() const { return directions > 0; }
-};
-
-// Standard deviation of the magnitude that a fit predicts at a point.
-double predicted_sd_g(const LeastSquaresFit& fit, const DirectionCell& cell) {
-  const PerAxis<double> g = fit.calibration.to_g(cell.mean_lsb);
-  const double length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-  const std::array<double, 6> pull = {g[0] * g[0] / length, g[1] * g[1] / length,
-                                      g[2] * g[2] / length, -g[0] / length,
-                                      -g[1] / length,       -g[2] / length};
-  double variance = 0;
-  for (std::size_t i = 0; i < 6; ++i) {
-    for (std::size_t j = 0; j < 6; ++j) {
-      variance += pull[i] * pull[j] * fit.covariance_at(i, j);
-    }
-  }
-  return std::sqrt(std::max(0.0, variance));
-}
-
-// Folds of whole neighbourhoods: five, or one each where there are few.
-HeldOut hold_out(const std::vector<DirectionCell>& cells, const std::vector<double>& sigma_g,
-                 const std::vector<double>& weight_sigma_g, const LeastSquaresFit& fit,
-                 const BlockFitOptions& options, int directions) {
-  constexpr int kFew = 15;
-  constexpr double kPredictable_g = 0.005;
-  const int folds = directions <= kFew ? directions : 5;
-  double square = 0;
-  double weights = 0;
-  std::vector<char> tested(static_cast<std::size_t>(directions), 0);
-  for (int fold = 0; fold < folds; ++fold) {
-    std::vector<GravityPoint> kept;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (cells[i].neighbourhood % folds != fold) {
-        kept.push_back(point_of(cells[i], sigma_g[i]));
-      }
-    }
-    LeastSquaresOptions least;
-    least.model = fit.model;
-    least.gravity_g = options.gravity_g;
-    least.prior = options.prior;
-    least.starts = 1;
-    least.max_iterations = 50;
-    const auto fold_fit = least_squares(kept, fit.calibration, least);
-    if (!fold_fit || !fold_fit->converged) {
-      continue;
-    }
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (cells[i].neighbourhood % folds != fold ||
-          !(predicted_sd_g(*fold_fit, cells[i]) < kPredictable_g)) {
-        continue;
-      }
-      const double residual =
-          magnitude_g(*fold_fit, point_of(cells[i], sigma_g[i])) - options.gravity_g;
-      const double weight = 1 / (weight_sigma_g[i] * weight_sigma_g[i]);
-      square += weight * residual * residual;
-      weights += weight;
-      tested[static_cast<std::size_t>(cells[i].neighbourhood)] = 1;
-    }
-  }
-  HeldOut out;
-  out.directions = static_cast<int>(std::count(tested.begin(), tested.end(), 1));
-  out.rms_mg = weights > 0 ? kMgPerG * std::sqrt(square / weights) : 0;
-  return out;
-}
-
-}  // namespace
-
-std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::span<const char> used,
-                                    std::vector<int>* cell_of_block) {
-  std::vector<DirectionCell> cells;
-  if (cell_of_block != nullptr) {
-    cell_of_block->assign(blocks.size(), -1);
-  }
-  const double reference_c = mean_temperature_c(blocks);
-  const auto temperature_of = [&](const StillBlock& block) {
-    return block.temperature_c ? *block.temperature_c - reference_c : 0.0;
-  };
-  const auto bin_of = [&](const StillBlock& block) {
-    return static_cast<int>(
-        std::clamp(std::floor(temperature_of(block) / kTemperatureBin_c + 0.5), -200.0, 200.0));
-  };
-  int lowest_bin = 0;
-  int highest_bin = 0;
-  for (const StillBlock& block : blocks) {
-    lowest_bin = std::min(lowest_bin, bin_of(block));
-    highest_bin = std::max(highest_bin, bin_of(block));
-  }
-  constexpr std::size_t kKeys = 6 * kGrid * kGrid + 1;
-  std::vector<int> number(static_cast<std::size_t>(highest_bin - lowest_bin + 1) * kKeys, -1);
-  std::vector<PerAxis<double>> square;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (!used.empty() && used[i] == 0) {
-      continue;
-    }
-    const StillBlock& block = blocks[i];
-    int& found = number[static_cast<std::size_t>(bin_of(block) - lowest_bin) * kKeys +
-                        static_cast<std::size_t>(cell_key(block.mean_g) + 1)];
-    if (found < 0) {
-      found = static_cast<int>(cells.size());
-      cells.emplace_back();
-      cells.back().first_s = block.start_time_s;
-      square.emplace_back();
-    }
-    const auto k = static_cast<std::size_t>(found);
-    DirectionCell& cell = cells[k];
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      cell.mean_lsb[a] += block.mean_lsb[a];
-      cell.variance_lsb2[a] += block.ramp_variance_lsb2[a];
-      square[k][a] += block.mean_lsb[a] * block.mean_lsb[a];
-    }
-    cell.temperature_c += temperature_of(block);
-    cell.blocks += 1;
-    cell.first_s = std::min(cell.first_s, block.start_time_s);
-    cell.last_s = std::max(cell.last_s, block.start_time_s);
-    if (cell_of_block != nullptr) {
-      (*cell_of_block)[i] = found;
-    }
-  }
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    DirectionCell& cell = cells[k];
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      cell.mean_lsb[a] /= cell.blocks;
-      cell.variance_lsb2[a] /= cell.blocks;
-      cell.variance_lsb2[a] +=
-          std::max(0.0, square[k][a] / cell.blocks - cell.mean_lsb[a] * cell.mean_lsb[a]);
-    }
-    cell.temperature_c /= cell.blocks;
-  }
-  return cells;
-}
-
-Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibration& start,
-                            const BlockFitOptions& options) {
+// Finite, and at least one.
+Status check(std::span<const StillBlock> blocks) {
   if (blocks.empty()) {
     return fail(ErrorCode::bad_data, "no still block", "least squares",
                 "lay the unit still on each of its six sides for a minute");
   }
   for (const StillBlock& block : blocks) {
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      if (!std::isfinite(block.mean_g[a]) || !std::isfinite(block.mean_lsb[a]) ||
-          !std::isfinite(block.ramp_variance_lsb2[a])) {
-        return fail(ErrorCode::bad_data, "a still block is not a finite number", "least squares",
-                    "the recording is damaged");
-      }
+    if (!all_finite(block.mean_g, block.mean_lsb, block.ramp_variance_lsb2)) {
+      return fail(ErrorCode::bad_data, "a still block is not a finite number", "least squares",
+                  "the recording is damaged");
     }
   }
-  BlockFit out;
-  bool all_have_temperature = true;
+  return {};
+}
+
+// 0 where not every block has a temperature.
+double temperature_range_c(std::span<const StillBlock> blocks) {
   double coldest = 1e9;
   double warmest = -1e9;
   for (const StillBlock& block : blocks) {
-    all_have_temperature = all_have_temperature && block.temperature_c.has_value() &&
-                           std::isfinite(*block.temperature_c);
-    if (all_have_temperature) {
-      coldest = std::min(coldest, *block.temperature_c);
-      warmest = std::max(warmest, *block.temperature_c);
+    if (!block.temperature_c || !std::isfinite(*block.temperature_c)) {
+      return 0;
     }
+    coldest = std::min(coldest, *block.temperature_c);
+    warmest = std::max(warmest, *block.temperature_c);
   }
-  out.temperature_range_c = all_have_temperature ? warmest - coldest : 0;
-  out.reference_temperature_c = mean_temperature_c(blocks);
+  return warmest - coldest;
+}
 
-  std::vector<char> used(blocks.size(), 1);
-  std::vector<int> cell_of_block;
-  LeastSquaresOptions least;
-  least.gravity_g = options.gravity_g;
-  least.prior = options.prior;
-  Calibration from = start;
-  std::vector<double> sigma_g;
-  double structural_g2 = 9e-6;  // to begin with: every direction nearly equal
-  double block_g2 = 1e-6;
+// The steps of one fit, over the state that they share: which blocks are used, their cells, and
+// what is known of the scatter so far.
+class BlockFitter {
+ public:
+  BlockFitter(std::span<const StillBlock> blocks, const Calibration& start,
+              const BlockFitOptions& options)
+      : blocks_(blocks),
+        options_(options),
+        start_(start),
+        used_(blocks.size(), 1),
+        error_g_(blocks.size()) {
+    least_.gravity_g = options.gravity_g;
+    least_.prior = options.prior;
+    out_.temperature_range_c = temperature_range_c(blocks);
+    out_.reference_temperature_c = mean_temperature_c(blocks);
+  }
 
-  const auto fit_once = [&]() -> Status {
-    std::vector<GravityPoint> points;
-    points.reserve(out.cells.size());
-    for (std::size_t k = 0; k < out.cells.size(); ++k) {
-      points.push_back(point_of(out.cells[k], sigma_g[k]));
+  Result<BlockFit> run() {
+    SIXPOINT_CHECK(merge());
+    SIXPOINT_CHECK(find_basin());
+    const LeastSquaresFit basin = out_.fit;
+    least_.starts = 1;
+    SIXPOINT_CHECK(fit_cells());
+    measure_noise();
+    SIXPOINT_CHECK(leave_out_outliers());
+    measure_blocks();
+    measure_cells();
+    out_.fit.starts = basin.starts;
+    out_.fit.starts_in_basin = basin.starts_in_basin;
+    SIXPOINT_CHECK(try_richer_models());
+    find_drift();
+    SIXPOINT_CHECK(widen_covariance(out_.fit, structural_g2_));
+    for (const double sigma_g : sigma_g_) {
+      out_.cell_sigma_mg.push_back(kMgPerG * sigma_g);
     }
-    SIXPOINT_ASSIGN(out.fit, least_squares(points, from, least));
-    from = out.fit.calibration;
-    return {};
-  };
-  const auto sigmas = [&](double structure_g2) {
+    return std::move(out_);
+  }
+
+ private:
+  GravityPoint point_of_block(const StillBlock& block) const {
+    const double above_c =
+        block.temperature_c ? *block.temperature_c - out_.reference_temperature_c : 0;
+    return {block.mean_lsb, block.ramp_variance_lsb2, 1, above_c};
+  }
+
+  std::size_t cell_of(std::size_t block) const {
+    return static_cast<std::size_t>(cell_of_block_[block]);
+  }
+
+  // Standard deviations of the cells' magnitudes. `correlated`: the misfit of cells next to each
+  // other is the same and does not average out over them.
+  std::vector<double> sigmas_g(double structure_g2, bool correlated = false) const {
+    const auto sizes = neighbourhood_sizes(out_.cells, out_.directions);
     std::vector<double> values;
-    values.reserve(out.cells.size());
-    for (const DirectionCell& cell : out.cells) {
-      values.push_back(std::sqrt(block_g2 / cell.blocks + structure_g2 + 1e-14));
+    values.reserve(out_.cells.size());
+    for (std::size_t k = 0; k < out_.cells.size(); ++k) {
+      values.push_back(std::sqrt(block_g2_ / out_.cells[k].blocks +
+                                 structure_g2 * (correlated ? sizes[k] : 1) + kLeastVariance_g2));
     }
     return values;
+  }
+
+  // Cells of the blocks in use. Fails where they are fewer than the constants.
+  Status merge() {
+    out_.cells = cells_of(blocks_, used_, &cell_of_block_);
+    out_.directions = number_neighbourhoods(out_.cells, start_);
+    sigma_g_ = sigmas_g(structural_g2_);
+    if (out_.cells.size() < static_cast<std::size_t>(least_.model.parameters()) &&
+        !options_.prior) {
+      return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
+                  "least squares", "lay the unit still on each of its six sides for a minute");
+    }
+    return {};
+  }
+
+  // The right minimum from a part of the cells; its bottom is found from all of them later.
+  Status find_basin() {
+    std::vector<GravityPoint> part;
+    for (std::size_t k = 0; k < out_.cells.size(); k += 1 + out_.cells.size() / kCellsForBasin) {
+      part.push_back(point_of(out_.cells[k], sigma_g_[k]));
+    }
+    LeastSquaresOptions rough = least_;
+    rough.relative_step = 1e-6;
+    rough.relative_gradient = 1e-4;
+    SIXPOINT_ASSIGN(out_.fit, least_squares(part, start_, rough));
+    if (out_.fit.converged) {
+      start_ = out_.fit.calibration;
+    }
+    return {};
+  }
+
+  Status fit_cells() {
+    SIXPOINT_ASSIGN(out_.fit, least_squares(points_of(out_.cells, sigma_g_), start_, least_));
+    start_ = out_.fit.calibration;
+    return {};
+  }
+
+  // What the samples' own noise makes of the blocks' magnitudes.
+  void measure_noise() {
+    for (const StillBlock& block : blocks_) {
+      double variance = 0;
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const double s = out_.fit.calibration.sensitivity_g_per_lsb[a];
+        const double along = out_.fit.calibration.to_g(a, block.mean_lsb[a]) * s * block.sd_lsb[a];
+        variance += along * along;
+      }
+      noise_g2_ += variance / std::max(1, block.samples);
+    }
+    noise_g2_ /= static_cast<double>(blocks_.size());
+    out_.noise_sd_mg = kMgPerG * std::sqrt(noise_g2_);
+  }
+
+  // Magnitude errors of all blocks, and the scatter of those in use.
+  void measure_blocks() {
+    std::vector<double> cell_sum(out_.cells.size(), 0);
+    out_.blocks_used = 0;
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      error_g_[i] = magnitude_g(out_.fit, point_of_block(blocks_[i])) - options_.gravity_g;
+      if (used_[i] != 0) {
+        ++out_.blocks_used;
+        cell_sum[cell_of(i)] += error_g_[i];
+      }
+    }
+    double within = 0;
+    double square = 0;
+    double absolute = 0;
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      if (used_[i] != 0) {
+        const double off = error_g_[i] - cell_sum[cell_of(i)] / out_.cells[cell_of(i)].blocks;
+        within += off * off;
+        square += error_g_[i] * error_g_[i];
+        absolute += std::abs(error_g_[i]);
+      }
+    }
+    const double freedom =
+        static_cast<double>(out_.blocks_used) - static_cast<double>(out_.cells.size());
+    const double pooled = freedom > 0 ? within / freedom : 0;
+    block_g2_ = std::max(freedom >= kLeastBlockFreedom ? pooled : std::max(pooled, noise_g2_),
+                         kLeastVariance_g2);
+    const auto count = static_cast<double>(std::max<std::size_t>(1, out_.blocks_used));
+    out_.block_sd_mg = kMgPerG * std::sqrt(block_g2_);
+    out_.rms_mg = kMgPerG * std::sqrt(square / count);
+    out_.mean_error_mg = kMgPerG * absolute / count;
+  }
+
+  std::vector<double> cell_residuals_g(const LeastSquaresFit& fit) const {
+    std::vector<double> residual_g;
+    for (const DirectionCell& cell : out_.cells) {
+      residual_g.push_back(magnitude_g(fit, point_of(cell, 1)) - options_.gravity_g);
+    }
+    return residual_g;
+  }
+
+  // What the cells' scatter says about the misfit of a model, as a variance.
+  double structure_g2(const LeastSquaresFit& fit, const std::vector<double>& residual_g) const {
+    std::vector<double> white_g2;
+    for (const DirectionCell& cell : out_.cells) {
+      white_g2.push_back(block_g2_ / cell.blocks + kLeastVariance_g2);
+    }
+    const int redundancy = out_.directions - fit.model.parameters();
+    const double estimate = paule_mandel(residual_g, white_g2, fit.model.parameters());
+    if (redundancy >= kEnoughRedundancy) {
+      return estimate;
+    }
+    const double assumed = std::pow(options_.assumed_structural_mg / kMgPerG, 2);
+    const double freedom = std::max(0, redundancy);
+    return (freedom * estimate + kAssumedFreedom * assumed) / (freedom + kAssumedFreedom);
+  }
+
+  void measure_cells() {
+    out_.redundancy = out_.directions - out_.fit.model.parameters();
+    residual_g_ = cell_residuals_g(out_.fit);
+    structural_g2_ = structure_g2(out_.fit, residual_g_);
+    out_.structural_mg = kMgPerG * std::sqrt(structural_g2_);
+  }
+
+  // Which blocks are in use under this limit. True where that has changed.
+  bool choose_blocks(double limit_g) {
+    bool changed = false;
+    std::size_t left_out = 0;
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      const char keep = std::abs(error_g_[i]) <= limit_g ? 1 : 0;
+      changed = changed || keep != used_[i];
+      used_[i] = keep;
+      left_out += keep == 0 ? 1 : 0;
+    }
+    if (left_out * 2 > blocks_.size()) {
+      // The fit describes less than half of the data: there is no majority to follow.
+      std::fill(used_.begin(), used_.end(), 1);
+      return true;
+    }
+    return changed;
+  }
+
+  // Leaves out and fits in turn, until neither changes.
+  Status leave_out_outliers() {
+    double limit_g = 0;
+    for (int round = 0; round < kOutlierRounds; ++round) {
+      measure_blocks();
+      measure_cells();
+      std::vector<double> sizes = residual_g_;
+      std::ranges::for_each(sizes, [](double& size) { size = std::abs(size); });
+      limit_g = std::max(options_.outlier_g, kOutlierSigmas * kSdPerMedian * median(sizes));
+      const bool changed = choose_blocks(limit_g);
+      if (changed) {
+        SIXPOINT_CHECK(merge());
+      } else {
+        sigma_g_ = sigmas_g(structural_g2_);
+      }
+      const Calibration before = start_;
+      SIXPOINT_CHECK(fit_cells());
+      if (!changed && round > 0 && difference_over_sphere(before, start_).worst_mg < kSettled_mg) {
+        break;
+      }
+    }
+    out_.blocks_left_out = static_cast<std::size_t>(std::count(used_.begin(), used_.end(), 0));
+    if (out_.blocks_left_out > 0) {
+      out_.left_out_reason = fmt::format(
+          "{} of {} still blocks were left out: more than {:.0f} mg from the magnitude "
+          "that all others agree on",
+          out_.blocks_left_out, blocks_.size(), kMgPerG * limit_g);
+    }
+    return {};
+  }
+
+  // Every model is judged with the plain fit's weights.
+  HeldOut predict_held_out(const std::vector<double>& fit_sigma_g,
+                           const LeastSquaresFit& fit) const {
+    return hold_out({out_.cells, out_.directions, fit_sigma_g, sigma_g_}, fit, options_.gravity_g,
+                    options_.prior);
+  }
+
+  // A fit with more terms, and its misfit as a variance; nothing where it does not converge.
+  struct Candidate {
+    LeastSquaresFit fit;
+    double misfit_g2 = 0;
   };
-  const auto weigh = [&]() { sigma_g = sigmas(structural_g2); };
-  // The misfit of cells next to each other is the same: it does not average out over them, and the
-  // covariance must not believe so.
-  const auto correlate = [&](LeastSquaresFit& fit, double structure_g2) -> Status {
-    const auto neighbours = neighbours_of(out.cells, out.directions);
-    std::vector<GravityPoint> points;
-    for (std::size_t k = 0; k < out.cells.size(); ++k) {
-      points.push_back(point_of(out.cells[k], std::sqrt(block_g2 / out.cells[k].blocks +
-                                                        structure_g2 * neighbours[k] + 1e-14)));
+  std::optional<Candidate> fit_model(FitModel model) const {
+    LeastSquaresOptions options = least_;
+    options.model = model;
+    Candidate out{{}, structural_g2_};
+    for (int round = 0; round < 3; ++round) {
+      auto fit = least_squares(points_of(out_.cells, sigmas_g(out.misfit_g2)), start_, options);
+      if (!fit || !fit->converged) {
+        return std::nullopt;
+      }
+      out = {*fit, structure_g2(*fit, cell_residuals_g(*fit))};
     }
-    LeastSquaresOptions wide = least;
-    wide.model = fit.model;
-    wide.starts = 1;
-    // What the six leave out is not only scatter: a cross-axis term bends all directions at once,
-    // and where these are few it hides in the sensitivities with next to no residual. It is put to
-    // the data as far as they can tell, and by the prior where they cannot.
-    const bool alias = !fit.model.cross_axis &&
-                       std::ranges::any_of(options.cross_axis_sd, [](double sd) { return sd > 0; });
-    if (alias) {
-      wide.model.cross_axis = true;
-      wide.cross_axis_sd = options.cross_axis_sd;
+    return out;
+  }
+
+  Status try_richer_models() {
+    const HeldOut plain = predict_held_out(sigma_g_, out_.fit);
+    if (plain.directions == 0) {
+      return {};
     }
-    SIXPOINT_ASSIGN(const LeastSquaresFit other, least_squares(points, fit.calibration, wide));
-    if (!alias) {
+    out_.held_out_rms_mg = plain.rms_mg;
+    out_.held_out_directions = plain.directions;
+    double best_mg = plain.rms_mg;
+    for (const FitModel model :
+         {FitModel{true, false}, FitModel{false, true}, FitModel{true, true}}) {
+      if (!options_.try_richer_models ||
+          (model.temperature && !(out_.temperature_range_c >= kLeastTemperatureRange_c)) ||
+          out_.directions < model.parameters() + kSpareDirections) {
+        continue;
+      }
+      auto richer = fit_model(model);
+      if (!richer) {
+        continue;
+      }
+      const HeldOut held = predict_held_out(sigmas_g(richer->misfit_g2), richer->fit);
+      if (held.directions >= plain.directions * 3 / 4 && held.directions > 0 &&
+          held.rms_mg < options_.model_gain * best_mg) {
+        best_mg = held.rms_mg;
+        SIXPOINT_CHECK(widen_covariance(richer->fit, richer->misfit_g2));
+        out_.richer = {richer->fit, kMgPerG * std::sqrt(richer->misfit_g2), held.rms_mg,
+                       held.directions};
+      }
+    }
+    return {};
+  }
+
+  void find_drift() {
+    ZeroDriftOptions options;
+    options.block_sd_g = std::sqrt(block_g2_);
+    options.misfit_sd_g = (out_.richer ? out_.richer->structural_mg : out_.structural_mg) / kMgPerG;
+    options.cross_axis_sd = options_.cross_axis_sd;
+    if (blocks_.back().start_time_s - blocks_.front().start_time_s > options.most_span_s) {
+      return;  // zero_drift() gives no answer for it either
+    }
+    std::vector<DriftPoint> points;
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      if (used_[i] != 0) {
+        points.push_back({blocks_[i].start_time_s,
+                          out_.best().calibration.to_g(blocks_[i].mean_lsb),
+                          magnitude_g(out_.best(), point_of_block(blocks_[i])) - options_.gravity_g,
+                          out_.cells[cell_of(i)].neighbourhood});
+      }
+    }
+    out_.drift = zero_drift(points, options);
+  }
+
+  // The covariance for what is not only scatter: neighbouring cells have the same misfit, and a
+  // cross-axis term changes all directions at once. The term is estimated as far as the data show
+  // it and bounded by its prior where they do not.
+  Status widen_covariance(LeastSquaresFit& fit, double misfit_g2) const {
+    LeastSquaresOptions options = least_;
+    options.model = fit.model;
+    options.starts = 1;
+    const bool allow_cross_axis =
+        !fit.model.cross_axis &&
+        std::ranges::any_of(options_.cross_axis_sd, [](double sd) { return sd > 0; });
+    if (allow_cross_axis) {
+      options.model.cross_axis = true;
+      options.cross_axis_sd = options_.cross_axis_sd;
+    }
+    SIXPOINT_ASSIGN(
+        const LeastSquaresFit other,
+        least_squares(points_of(out_.cells, sigmas_g(misfit_g2, true)), fit.calibration, options));
+    if (!allow_cross_axis) {
       fit.covariance = other.covariance;
       return {};
     }
-    const auto kept = [&](std::size_t i) { return i < 6 ? i : i + 3; };
+    // The same parameters, without the three cross-axis terms.
+    const auto in_other = [](std::size_t i) { return i < 6 ? i : i + kAxes; };
     const auto parameters = static_cast<std::size_t>(fit.model.parameters());
     for (std::size_t i = 0; i < parameters; ++i) {
       for (std::size_t j = 0; j < parameters; ++j) {
-        fit.covariance[i * kMaxParameters + j] = other.covariance_at(kept(i), kept(j));
+        fit.covariance[i * kMaxParameters + j] = other.covariance_at(in_other(i), in_other(j));
       }
     }
-    // The estimate stays the plain one; how far it lies from the centre of that is error as well.
+    // The estimate stays the plain one; how far it lies from the other one is error as well.
     std::array<double, 6> apart{};
     for (std::size_t a = 0; a < kAxes; ++a) {
       apart[a] =
@@ -386,329 +444,29 @@ Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibratio
       }
     }
     return {};
-  };
-  const auto merge = [&]() {
-    out.cells = cells_of(blocks, used, &cell_of_block);
-    out.directions = number_neighbourhoods(out.cells, from);
-    weigh();
-  };
-
-  // Magnitude errors of all blocks, and what they say about scatter.
-  std::vector<double> error_g(blocks.size());
-  double noise = 0;
-  const auto look_at_noise = [&]() {
-    std::size_t count = 0;
-    noise = 0;
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      const StillBlock& block = blocks[i];
-      if (used[i] == 0) {
-        continue;
-      }
-      ++count;
-      double variance = 0;
-      for (std::size_t a = 0; a < kAxes; ++a) {
-        const double s = out.fit.calibration.sensitivity_g_per_lsb[a];
-        const double along = out.fit.calibration.to_g(a, block.mean_lsb[a]) * s * block.sd_lsb[a];
-        variance += along * along;
-      }
-      noise += variance / std::max(1, block.samples);
-    }
-    noise /= static_cast<double>(std::max<std::size_t>(1, count));
-    out.noise_sd_mg = kMgPerG * std::sqrt(noise);
-  };
-  const auto look = [&]() {
-    std::vector<double> cell_sum(out.cells.size(), 0);
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      const StillBlock& block = blocks[i];
-      const double temperature =
-          block.temperature_c ? *block.temperature_c - out.reference_temperature_c : 0;
-      error_g[i] =
-          magnitude_g(out.fit, {block.mean_lsb, block.ramp_variance_lsb2, 1, temperature}) -
-          options.gravity_g;
-      if (used[i] == 0) {
-        continue;
-      }
-      ++count;
-      cell_sum[static_cast<std::size_t>(cell_of_block[i])] += error_g[i];
-    }
-    out.blocks_used = count;
-    double within = 0;
-    double square = 0;
-    double absolute = 0;
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      if (used[i] == 0) {
-        continue;
-      }
-      const auto k = static_cast<std::size_t>(cell_of_block[i]);
-      const double off = error_g[i] - cell_sum[k] / out.cells[k].blocks;
-      within += off * off;
-      square += error_g[i] * error_g[i];
-      absolute += std::abs(error_g[i]);
-    }
-    const double freedom = static_cast<double>(count) - static_cast<double>(out.cells.size());
-    const double pooled = freedom > 0 ? within / freedom : 0;
-    // Few repeats say little about scatter; then it is at least what the samples' noise makes.
-    block_g2 = std::max(freedom >= 20 ? pooled : std::max(pooled, noise), 1e-14);
-    out.block_sd_mg = kMgPerG * std::sqrt(block_g2);
-    out.rms_mg = kMgPerG * std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count)));
-    out.mean_error_mg = kMgPerG * absolute / static_cast<double>(std::max<std::size_t>(1, count));
-  };
-  // What the cells' scatter says about the misfit of a model, as a variance.
-  const auto structure_of = [&](const LeastSquaresFit& fit, std::vector<double>& residual_g) {
-    residual_g.clear();
-    std::vector<double> white_g2;
-    for (const DirectionCell& cell : out.cells) {
-      residual_g.push_back(magnitude_g(fit, point_of(cell, 1)) - options.gravity_g);
-      white_g2.push_back(block_g2 / cell.blocks + 1e-14);
-    }
-    const int redundancy = out.directions - fit.model.parameters();
-    const double found = paule_mandel(residual_g, white_g2, fit.model.parameters());
-    const double assumed = std::pow(options.assumed_structural_mg / kMgPerG, 2);
-    const double freedom = std::max(0, redundancy);
-    constexpr double kAssumedFreedom = 2;
-    return redundancy >= 30
-               ? found
-               : (freedom * found + kAssumedFreedom * assumed) / (freedom + kAssumedFreedom);
-  };
-  std::vector<double> residual_g;
-  const auto look_at_cells = [&]() {
-    out.redundancy = out.directions - out.fit.model.parameters();
-    structural_g2 = structure_of(out.fit, residual_g);
-    out.structural_mg = kMgPerG * std::sqrt(structural_g2);
-  };
-
-  merge();
-  if (out.cells.size() < static_cast<std::size_t>(least.model.parameters()) && !options.prior) {
-    return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
-                "least squares", "lay the unit still on each of its six sides for a minute");
-  }
-  // The basin from a part of the cells, the minimum from all of them.
-  {
-    constexpr std::size_t kForTheBasin = 256;
-    const std::size_t stride = 1 + out.cells.size() / kForTheBasin;
-    std::vector<GravityPoint> part;
-    for (std::size_t k = 0; k < out.cells.size(); k += stride) {
-      part.push_back(point_of(out.cells[k], sigma_g[k]));
-    }
-    LeastSquaresOptions basin = least;
-    basin.relative_step = 1e-6;
-    basin.relative_gradient = 1e-4;
-    SIXPOINT_ASSIGN(const LeastSquaresFit rough, least_squares(part, from, basin));
-    if (rough.converged) {
-      from = rough.calibration;
-    }
-    out.fit.starts = rough.starts;
-    out.fit.starts_in_basin = rough.starts_in_basin;
-  }
-  const int starts = out.fit.starts;
-  const int starts_in_basin = out.fit.starts_in_basin;
-  least.starts = 1;
-  SIXPOINT_CHECK(fit_once());
-  look_at_noise();
-  double outlier_limit_g = 0;
-  for (int round = 0; round < 6; ++round) {
-    look();
-    look_at_cells();
-    std::vector<double> sizes;
-    sizes.reserve(residual_g.size());
-    for (const double residual : residual_g) {
-      sizes.push_back(std::abs(residual));
-    }
-    outlier_limit_g = std::max(options.outlier_g, 6 * 1.4826 * median(sizes));
-    bool changed = false;
-    std::size_t left_out = 0;
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      const char keep = std::abs(error_g[i]) <= outlier_limit_g ? 1 : 0;
-      changed = changed || keep != used[i];
-      used[i] = keep;
-      left_out += keep == 0 ? 1 : 0;
-    }
-    if (left_out * 2 > blocks.size()) {
-      // The fit describes less than half of the data: there is no majority to keep to.
-      std::fill(used.begin(), used.end(), 1);
-      changed = true;
-    }
-    const Calibration before = from;
-    if (changed) {
-      merge();
-    } else {
-      weigh();
-    }
-    if (out.cells.size() < static_cast<std::size_t>(least.model.parameters()) && !options.prior) {
-      return fail(ErrorCode::bad_data, "fewer directions than constants to determine",
-                  "least squares", "lay the unit still on each of its six sides for a minute");
-    }
-    SIXPOINT_CHECK(fit_once());
-    if (!changed && round > 0 && difference_over_sphere(before, from).worst_mg < 1e-3) {
-      break;
-    }
   }
 
-  look();
-  look_at_cells();
-  out.fit.starts = starts;
-  out.fit.starts_in_basin = starts_in_basin;
-  const HeldOut plain = hold_out(out.cells, sigma_g, sigma_g, out.fit, options, out.directions);
-  if (plain.valid()) {
-    out.held_out_rms_mg = plain.rms_mg;
-    out.held_out_directions = plain.directions;
-  }
-  double best_mg = plain.rms_mg;
-  for (const FitModel candidate :
-       {FitModel{true, false}, FitModel{false, true}, FitModel{true, true}}) {
-    if (!options.try_richer_models || !plain.valid() ||
-        (candidate.temperature && !(out.temperature_range_c >= 5)) ||
-        out.directions < candidate.parameters() + 3) {
-      continue;
-    }
-    BlockFit::Richer richer;
-    LeastSquaresOptions with_more = least;
-    with_more.model = candidate;
-    double structure_g2 = structural_g2;
-    std::vector<double> unused;
-    bool converged = true;
-    for (int round = 0; round < 3 && converged; ++round) {
-      const auto own_sigma_g = sigmas(structure_g2);
-      std::vector<GravityPoint> points;
-      for (std::size_t k = 0; k < out.cells.size(); ++k) {
-        points.push_back(point_of(out.cells[k], own_sigma_g[k]));
-      }
-      auto fit = least_squares(points, from, with_more);
-      converged = fit && fit->converged;
-      if (converged) {
-        richer.fit = *fit;
-        structure_g2 = structure_of(richer.fit, unused);
-      }
-    }
-    if (!converged) {
-      continue;
-    }
-    const HeldOut held =
-        hold_out(out.cells, sigmas(structure_g2), sigma_g, richer.fit, options, out.directions);
-    if (held.directions >= plain.directions * 3 / 4 && held.directions > 0 &&
-        held.rms_mg < options.model_gain * best_mg) {
-      best_mg = held.rms_mg;
-      richer.structural_mg = kMgPerG * std::sqrt(structure_g2);
-      richer.held_out_rms_mg = held.rms_mg;
-      richer.held_out_directions = held.directions;
-      SIXPOINT_CHECK(correlate(richer.fit, structure_g2));
-      out.richer = richer;
-    }
-  }
-  ZeroDriftOptions drift_options;
-  drift_options.block_sd_g = std::sqrt(block_g2);
-  drift_options.misfit_sd_g =
-      (out.richer ? out.richer->structural_mg : out.structural_mg) / kMgPerG;
-  drift_options.cross_axis_sd = options.cross_axis_sd;
-  // A week of blocks need not be gone through for an answer that is not given.
-  if (blocks.back().start_time_s - blocks.front().start_time_s <= drift_options.most_span_s) {
-    std::vector<DriftPoint> drift_points;
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      if (used[i] == 0) {
-        continue;
-      }
-      const StillBlock& block = blocks[i];
-      const double temperature =
-          block.temperature_c ? *block.temperature_c - out.reference_temperature_c : 0;
-      drift_points.push_back(
-          {block.start_time_s, out.best().calibration.to_g(block.mean_lsb),
-           magnitude_g(out.best(), {block.mean_lsb, block.ramp_variance_lsb2, 1, temperature}) -
-               options.gravity_g,
-           out.cells[static_cast<std::size_t>(cell_of_block[i])].neighbourhood});
-    }
-    out.drift = zero_drift(drift_points, drift_options);
-  }
-  SIXPOINT_CHECK(correlate(out.fit, structural_g2));
-  for (std::size_t k = 0; k < out.cells.size(); ++k) {
-    out.cell_residual_mg.push_back(kMgPerG * residual_g[k]);
-    out.cell_sigma_mg.push_back(kMgPerG * sigma_g[k]);
-  }
-  out.blocks_left_out = blocks.size() - out.blocks_used;
-  if (out.blocks_left_out > 0) {
-    out.left_out_reason = fmt::format(
-        "{} of {} still blocks were left out: more than {:.0f} mg from the magnitude "
-        "that all others agree on",
-        out.blocks_left_out, blocks.size(), kMgPerG * outlier_limit_g);
-  }
-  return out;
-}
+  std::span<const StillBlock> blocks_;
+  const BlockFitOptions& options_;
+  LeastSquaresOptions least_;
+  Calibration start_;       // of the next fit: the last one's answer
+  std::vector<char> used_;  // of each block
+  std::vector<int> cell_of_block_;
+  std::vector<double> error_g_;  // of each block's magnitude
+  std::vector<double> sigma_g_;  // of each cell
+  std::vector<double> residual_g_;
+  double structural_g2_ = kFirstStructure_g2;
+  double block_g2_ = kFirstBlock_g2;
+  double noise_g2_ = 0;
+  BlockFit out_;
+};
 
-Result<StoredConstants> round_constants(const Calibration& calibration,
-                                        std::span<const DirectionCell> cells,
-                                        std::span<const double> sigma_mg, double gravity_g) {
-  SIXPOINT_ASSIGN(const StoredConstants nearest, nearest_stored(calibration));
-  PerAxis<int> span_low{};
-  PerAxis<int> zero_low{};
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    span_low[a] = static_cast<int>(std::floor(2 / calibration.sensitivity_g_per_lsb[a]));
-    zero_low[a] = static_cast<int>(std::floor(calibration.zero_lsb[a]));
-  }
-  // Squares of every cell, axis and choice once; the 16^3 combinations are then sums. Per axis:
-  // floor and floor + 1 of both numbers, and one further on either side.
-  constexpr std::size_t kChoices = 16;
-  PerAxis<std::vector<double>> squares;
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    squares[a].resize(cells.size() * kChoices);
-    for (std::size_t c = 0; c < kChoices; ++c) {
-      const double s = 2.0 / std::max(1, span_low[a] - 1 + static_cast<int>(c / 4));
-      const double zero = zero_low[a] - 1 + static_cast<int>(c % 4);
-      for (std::size_t k = 0; k < cells.size(); ++k) {
-        const double level = s * (cells[k].mean_lsb[a] - zero);
-        squares[a][k * kChoices + c] = level * level + s * s * cells[k].variance_lsb2[a];
-      }
-    }
-  }
-  std::vector<double> weight;
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    const double sigma = k < sigma_mg.size() && sigma_mg[k] > 0 ? sigma_mg[k] : 1;
-    weight.push_back(1 / (sigma * sigma));
-  }
-  double best = HUGE_VAL;
-  PerAxis<std::size_t> chosen = {5, 5, 5};
-  const auto try_choice = [&](std::size_t x, std::size_t y, std::size_t z) {
-    double cost = 0;
-    for (std::size_t k = 0; k < cells.size() && cost < best; ++k) {
-      const double residual =
-          std::sqrt(squares[0][k * kChoices + x] + squares[1][k * kChoices + y] +
-                    squares[2][k * kChoices + z]) -
-          gravity_g;
-      cost += weight[k] * residual * residual;
-    }
-    if (cost < best) {
-      best = cost;
-      chosen = {x, y, z};
-    }
-  };
-  for (std::size_t x = 0; x < kChoices; ++x) {
-    for (std::size_t y = 0; y < kChoices; ++y) {
-      for (std::size_t z = 0; z < kChoices; ++z) {
-        try_choice(x, y, z);
-      }
-    }
-  }
-  StoredConstants out = nearest;
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    const int span = span_low[a] - 1 + static_cast<int>(chosen[a] / 4);
-    out.zero_lsb[a] = zero_low[a] - 1 + static_cast<int>(chosen[a] % 4);
-    out.positive_lsb[a] = out.negative_lsb[a] + span;
-  }
-  SIXPOINT_CHECK(validate(out));
-  return out;
-}
+}  // namespace
 
-double cells_rms_mg(std::span<const DirectionCell> cells, const Calibration& calibration,
-                    double gravity_g) {
-  std::unordered_map<int, double> members;
-  for (const DirectionCell& cell : cells) {
-    members[cell.neighbourhood] += 1;
-  }
-  double square = 0;
-  for (const DirectionCell& cell : cells) {
-    const double residual = magnitude_g(calibration, cell.mean_lsb, cell.variance_lsb2) - gravity_g;
-    square += residual * residual / members[cell.neighbourhood];
-  }
-  return members.empty() ? 0 : kMgPerG * std::sqrt(square / static_cast<double>(members.size()));
+Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibration& start,
+                            const BlockFitOptions& options) {
+  SIXPOINT_CHECK(check(blocks));
+  return BlockFitter(blocks, start, options).run();
 }
 
 }  // namespace sixpoint::calib

@@ -59,6 +59,42 @@ std::string read_text(const Json& json, const char* key) {
   return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
+tl::unexpected<Error> bad_record(std::string what, std::string where = "constants.json") {
+  return fail(ErrorCode::bad_data, std::move(what), std::move(where),
+              "write the file with 'sixpoint solve -o' or 'sixpoint jig'");
+}
+
+// The doubles, the nine integers, or both; then the doubles hold.
+Status read_constants(const Json& json, ConstantsRecord& record) {
+  StoredConstants& stored = record.stored;
+  const bool has_doubles = json.contains("sensitivity_g_per_lsb");
+  if (has_doubles) {
+    SIXPOINT_ASSIGN(record.calibration.sensitivity_g_per_lsb,
+                    read_axes<double>(json, "sensitivity_g_per_lsb"));
+    SIXPOINT_ASSIGN(record.calibration.zero_lsb, read_axes<double>(json, "zero_lsb"));
+    SIXPOINT_CHECK(validate(record.calibration));
+    if (!json.contains("positive_lsb")) {
+      SIXPOINT_ASSIGN(stored, nearest_stored(record.calibration));
+      return {};
+    }
+  }
+  SIXPOINT_ASSIGN(stored.positive_lsb, read_axes<int>(json, "positive_lsb"));
+  SIXPOINT_ASSIGN(stored.negative_lsb, read_axes<int>(json, "negative_lsb"));
+  const char* zero_key = has_doubles ? "stored_zero_lsb" : "zero_lsb";
+  if (!has_doubles || json.contains(zero_key)) {
+    SIXPOINT_ASSIGN(stored.zero_lsb, read_axes<int>(json, zero_key));
+  } else {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      stored.zero_lsb[a] = static_cast<int>(std::lround(record.calibration.zero_lsb[a]));
+    }
+  }
+  if (has_doubles) {
+    return validate(stored);
+  }
+  SIXPOINT_ASSIGN(record.calibration, calibration_from(stored));
+  return {};
+}
+
 }  // namespace
 
 std::string_view to_string(FilterConfiguration filter) {
@@ -147,18 +183,23 @@ std::string ConstantsRecord::brief() const {
   return line;
 }
 
+Json number_or_null(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
+}
+
 Json to_json(const StoredConstants& stored) {
-  Json json;
-  json["positive_lsb"] = stored.positive_lsb;
-  json["negative_lsb"] = stored.negative_lsb;
-  json["zero_lsb"] = stored.zero_lsb;
-  return json;
+  return {{"positive_lsb", stored.positive_lsb},
+          {"negative_lsb", stored.negative_lsb},
+          {"zero_lsb", stored.zero_lsb}};
+}
+
+Json to_json(const Calibration& calibration) {
+  return {{"sensitivity_g_per_lsb", calibration.sensitivity_g_per_lsb},
+          {"zero_lsb", calibration.zero_lsb}};
 }
 
 Json to_json(const Calibration& calibration, const StoredConstants& stored) {
-  Json json;
-  json["sensitivity_g_per_lsb"] = calibration.sensitivity_g_per_lsb;
-  json["zero_lsb"] = calibration.zero_lsb;
+  Json json = to_json(calibration);
   json["positive_lsb"] = stored.positive_lsb;
   json["negative_lsb"] = stored.negative_lsb;
   // The unrounded zero above holds; the unit's memory takes this one.
@@ -168,16 +209,11 @@ Json to_json(const Calibration& calibration, const StoredConstants& stored) {
 
 Json to_json(const ConstantsUncertainty& uncertainty) {
   const auto axes = [](const PerAxis<double>& values) {
-    Json json = Json::array();
-    for (const double value : values) {
-      json.push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
-    }
-    return json;
+    return Json::array(
+        {number_or_null(values[0]), number_or_null(values[1]), number_or_null(values[2])});
   };
-  Json json;
-  json["sensitivity_relative"] = axes(uncertainty.sensitivity_relative);
-  json["zero_mg"] = axes(uncertainty.zero_mg);
-  return json;
+  return {{"sensitivity_relative", axes(uncertainty.sensitivity_relative)},
+          {"zero_mg", axes(uncertainty.zero_mg)}};
 }
 
 Json to_json(const ConstantsRecord& record) {
@@ -203,50 +239,24 @@ Json to_json(const ConstantsRecord& record) {
 }
 
 Result<ConstantsRecord> constants_record_from_json(const Json& json) {
-  const std::string hint = "write the file with 'sixpoint solve -o' or 'sixpoint jig'";
   if (!json.is_object()) {
-    return fail(ErrorCode::bad_data, "is not a JSON object", "constants.json", hint);
+    return bad_record("is not a JSON object");
   }
   ConstantsRecord record;
   record.serial = read_text(json, "serial");
   if (record.serial.empty()) {
-    return fail(ErrorCode::bad_data, "names no serial number", "constants.json", hint);
+    return bad_record("names no serial number");
   }
   auto filter = parse_filter_configuration(read_text(json, "filter"));
   if (!filter) {
-    return fail(ErrorCode::bad_data, filter.error().what, "constants.json, filter", hint);
+    return bad_record(filter.error().what, "constants.json, filter");
   }
   record.filter = *filter;
   const auto constants = json.find("constants");
   if (constants == json.end() || !constants->is_object()) {
-    return fail(ErrorCode::bad_data, "holds no constants", "constants.json", hint);
+    return bad_record("holds no constants");
   }
-  const bool has_integers = constants->contains("positive_lsb");
-  if (constants->contains("sensitivity_g_per_lsb")) {
-    SIXPOINT_ASSIGN(record.calibration.sensitivity_g_per_lsb,
-                    read_axes<double>(*constants, "sensitivity_g_per_lsb"));
-    SIXPOINT_ASSIGN(record.calibration.zero_lsb, read_axes<double>(*constants, "zero_lsb"));
-    SIXPOINT_CHECK(validate(record.calibration));
-    if (has_integers) {
-      SIXPOINT_ASSIGN(record.stored.positive_lsb, read_axes<int>(*constants, "positive_lsb"));
-      SIXPOINT_ASSIGN(record.stored.negative_lsb, read_axes<int>(*constants, "negative_lsb"));
-      if (constants->contains("stored_zero_lsb")) {
-        SIXPOINT_ASSIGN(record.stored.zero_lsb, read_axes<int>(*constants, "stored_zero_lsb"));
-      } else {
-        for (std::size_t a = 0; a < kAxes; ++a) {
-          record.stored.zero_lsb[a] = static_cast<int>(std::lround(record.calibration.zero_lsb[a]));
-        }
-      }
-      SIXPOINT_CHECK(validate(record.stored));
-    } else {
-      SIXPOINT_ASSIGN(record.stored, nearest_stored(record.calibration));
-    }
-  } else {
-    SIXPOINT_ASSIGN(record.stored.positive_lsb, read_axes<int>(*constants, "positive_lsb"));
-    SIXPOINT_ASSIGN(record.stored.negative_lsb, read_axes<int>(*constants, "negative_lsb"));
-    SIXPOINT_ASSIGN(record.stored.zero_lsb, read_axes<int>(*constants, "zero_lsb"));
-    SIXPOINT_ASSIGN(record.calibration, calibration_from(record.stored));
-  }
+  SIXPOINT_CHECK(read_constants(*constants, record));
   if (const auto found = json.find("standard_uncertainty");
       found != json.end() && found->is_object()) {
     SIXPOINT_ASSIGN(record.uncertainty.sensitivity_relative,
@@ -258,16 +268,14 @@ Result<ConstantsRecord> constants_record_from_json(const Json& json) {
     SIXPOINT_ASSIGN(record.made_at, parse_iso8601(made_at));
   }
   if (const auto found = json.find("made_from"); found != json.end() && found->is_object()) {
-    record.made_from.sha256 = read_text(*found, "sha256");
-    record.made_from.file = read_text(*found, "file");
-    record.made_from.station = read_text(*found, "station");
+    record.made_from = {read_text(*found, "sha256"), read_text(*found, "file"),
+                        read_text(*found, "station")};
   }
   if (const auto found = json.find("gravity_m_per_s2"); found != json.end()) {
-    SIXPOINT_ASSIGN(record.gravity_m_per_s2,
-                    read_number(*found, "constants.json, gravity_m_per_s2"));
+    const std::string where = "constants.json, gravity_m_per_s2";
+    SIXPOINT_ASSIGN(record.gravity_m_per_s2, read_number(*found, where));
     if (record.gravity_m_per_s2 < 9.7 || record.gravity_m_per_s2 > 9.9) {
-      return fail(ErrorCode::bad_data, "is no gravity of this planet's surface",
-                  "constants.json, gravity_m_per_s2", hint);
+      return bad_record("is no gravity of this planet's surface", where);
     }
   }
   if (const auto found = json.find("from_prior"); found != json.end() && found->is_boolean()) {

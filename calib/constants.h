@@ -1,8 +1,12 @@
 // Constants: what turns a unit's raw counts into g, under which filter they hold, and their file.
 //
+//   const StoredConstants stored{{264, 262, 259}, {-254, -257, -251}, {5, 3, 4}};
+//   SIXPOINT_ASSIGN(const Calibration constants, calibration_from(stored));
+//   const double value_g = constants.to_g(0, 132);  // axis X, a raw count of the sensor
+//
 // Constants belong to (serial number, filter configuration): the same sensor reads differently
 // under the two antialiasing configurations, and constants measured under one and applied under the
-// other are the defect that this program mends.
+// other are the defect that this program repairs.
 #pragma once
 
 #include <optional>
@@ -89,7 +93,16 @@ struct ConstantsRecord {
   std::string brief() const;  // one line for people
 };
 
+// A real sensor against its stored constants: its zero lies within 0.5 g, its sensitivity within
+// 10 % of nominal (paper; ADXL362 datasheet), and the filter mismatch adds to that.
+inline constexpr double kLeastGain = 0.72;
+inline constexpr double kMostGain = 1.38;
+inline constexpr double kMostZeroChange_g = 0.5;
+
+// null for a number that is absent or not finite.
+nlohmann::ordered_json number_or_null(const std::optional<double>& value);
 nlohmann::ordered_json to_json(const StoredConstants& stored);  // {positive_lsb, ...}
+nlohmann::ordered_json to_json(const Calibration& calibration);
 nlohmann::ordered_json to_json(const Calibration& calibration, const StoredConstants& stored);
 nlohmann::ordered_json to_json(const ConstantsUncertainty& uncertainty);
 nlohmann::ordered_json to_json(const ConstantsRecord& record);

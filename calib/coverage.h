@@ -1,4 +1,9 @@
-// Whether still blocks see enough of the sphere: the paper's value subsets and its 0.3 g rule.
+// Whether still blocks cover enough directions: the paper's value subsets and its 0.3 g rule.
+//
+//   const Coverage coverage = coverage_of(blocks);
+//   if (!coverage.complete()) {
+//     const std::vector<std::string> missing = coverage.missing_directions();  // "+x", "-z" ...
+//   }
 #pragma once
 
 #include <array>
@@ -27,7 +32,7 @@ struct Coverage {
   std::size_t blocks = 0;
 
   bool complete() const;
-  // The sides that a person must still lay the unit on, out of "+x", "-x", "+y", "-y", "+z", "-z":
+  // The sides on which the unit must still be laid, out of "+x", "-x", "+y", "-y", "+z", "-z":
   // "+x" when no block has x above 0.3 g. Empty when complete.
   std::vector<std::string> missing_directions() const;
 };

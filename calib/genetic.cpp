@@ -93,14 +93,13 @@ class Search {
 
   GeneticResult run() {
     GeneticResult result;
-    result.points_per_recursion = points_;
     std::vector<Genes> bests;
     for (int recursion = 0; recursion < options_.recursions; ++recursion) {
       draw();
-      evaluate(0, result);
+      evaluate(0);
       for (int generation = 0; generation < options_.generations; ++generation) {
         breed();
-        evaluate(1, result);
+        evaluate(1);
       }
       bests.push_back(population_.front().genes);
       result.fitness_mg.push_back(kMgPerG * population_.front().error_g);
@@ -113,8 +112,8 @@ class Search {
   Genes random_genes() {
     Genes genes{};
     for (std::size_t a = 0; a < kAxes; ++a) {
-      genes[a] = random_.uniform(options_.gain_low, options_.gain_high) - 1;
-      genes[3 + a] = random_.uniform(-options_.zero_range_g, options_.zero_range_g);
+      genes[a] = random_.uniform(kLeastGain, kMostGain) - 1;
+      genes[3 + a] = random_.uniform(-kMostZeroChange_g, kMostZeroChange_g);
     }
     return genes;
   }
@@ -153,11 +152,10 @@ class Search {
     }
   }
 
-  void evaluate(std::size_t first, GeneticResult& result) {
+  void evaluate(std::size_t first) {
     const auto gravity = static_cast<float>(options_.gravity_g);
     for (std::size_t i = first; i < population_.size(); ++i) {
       population_[i].error_g = subset_.error_g(population_[i].genes, gravity);
-      ++result.evaluations;
     }
     std::stable_sort(
         population_.begin(), population_.end(),
@@ -208,9 +206,8 @@ class Search {
         }
       }
       for (std::size_t a = 0; a < kAxes; ++a) {
-        child.genes[a] = std::clamp(child.genes[a], options_.gain_low - 1, options_.gain_high - 1);
-        child.genes[3 + a] =
-            std::clamp(child.genes[3 + a], -options_.zero_range_g, options_.zero_range_g);
+        child.genes[a] = std::clamp(child.genes[a], kLeastGain - 1, kMostGain - 1);
+        child.genes[3 + a] = std::clamp(child.genes[3 + a], -kMostZeroChange_g, kMostZeroChange_g);
       }
       next.push_back(child);
     }
@@ -247,7 +244,7 @@ class Search {
     }
     result.spread_mg = count > 1 ? std::sqrt(square / (count - 1)) : HUGE_VAL;
     result.trend_mg = index_square > 0 ? moment / index_square * (count - 1) : HUGE_VAL;
-    result.wander_mg = std::sqrt(wander / count);
+    result.scatter_mg = std::sqrt(wander / count);
     if (!(result.level_mg <= options_.most_level_mg)) {
       result.reasons.push_back(
           fmt::format("the best fitness dithers about {:.1f} mg and not about 0 (limit {:.1f} mg)",
@@ -262,10 +259,10 @@ class Search {
       result.reasons.push_back(
           fmt::format("the best fitness still tends by {:.1f} mg", result.trend_mg));
     }
-    if (!(result.wander_mg <= options_.most_wander_mg)) {
+    if (!(result.scatter_mg <= options_.most_scatter_mg)) {
       result.reasons.push_back(
           fmt::format("the best members of different subsets lie {:.1f} mg apart (limit {:.1f} mg)",
-                      result.wander_mg, options_.most_wander_mg));
+                      result.scatter_mg, options_.most_scatter_mg));
     }
     result.settled = result.reasons.empty();
   }
@@ -285,14 +282,6 @@ class Search {
 Result<GeneticResult> genetic(std::span<const StillBlock> blocks, const Calibration& file_constants,
                               const GeneticOptions& options) {
   SIXPOINT_CHECK(validate(file_constants));
-  if (options.population < options.random_members + 4 || options.population > 10'000 ||
-      options.random_members < 0 || options.generations < 1 || options.generations > 10'000 ||
-      options.recursions < 2 || options.recursions > 1000 || !(options.subset > 0) ||
-      !(options.random_share >= 0 && options.random_share <= 1) || !(options.zero_range_g > 0) ||
-      !(options.gain_low > 0 && options.gain_low < options.gain_high)) {
-    return fail(ErrorCode::usage, "the options of the genetic algorithm make no sense",
-                "genetic algorithm", "use the defaults");
-  }
   if (blocks.empty()) {
     return fail(ErrorCode::bad_data, "no still block", "genetic algorithm",
                 "lay the unit still on each of its six sides for a minute");

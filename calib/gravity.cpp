@@ -8,18 +8,6 @@
 
 namespace sixpoint::calib {
 
-namespace {
-
-// WGS84.
-constexpr double kEquator_m_per_s2 = 9.7803253359;
-constexpr double kSomigliana = 0.00193185265241;
-constexpr double kFirstEccentricitySquared = 0.00669437999014;
-constexpr double kSemiMajorAxis_m = 6378137.0;
-constexpr double kFlattening = 1 / 298.257223563;
-constexpr double kCentrifugal = 0.00344978650684;  // omega^2 a^2 b / GM
-
-}  // namespace
-
 double LocalGravity::g() const { return m_per_s2 / kStandardGravity_m_per_s2; }
 double LocalGravity::sd_g() const {
   return standard_uncertainty_m_per_s2 / kStandardGravity_m_per_s2;
@@ -35,6 +23,13 @@ Result<LocalGravity> gravity_at(double latitude_deg, double altitude_m) {
     return fail(ErrorCode::usage, fmt::format("an altitude of {} m is no station's", altitude_m),
                 "gravity", "give it in metres above sea level");
   }
+  // WGS84.
+  constexpr double kEquator_m_per_s2 = 9.7803253359;
+  constexpr double kSomigliana = 0.00193185265241;
+  constexpr double kFirstEccentricitySquared = 0.00669437999014;
+  constexpr double kSemiMajorAxis_m = 6378137.0;
+  constexpr double kFlattening = 1 / 298.257223563;
+  constexpr double kCentrifugal = 0.00344978650684;  // omega^2 a^2 b / GM
   const double sine = std::sin(latitude_deg * M_PI / 180);
   const double square = sine * sine;
   const double at_sea = kEquator_m_per_s2 * (1 + kSomigliana * square) /

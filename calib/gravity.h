@@ -1,5 +1,8 @@
 // Gravity at a place: the reference of every still pose.
 //
+//   SIXPOINT_ASSIGN(const LocalGravity local, gravity_at(48.1, 520));  // degrees, m above the sea
+//   const double reference_g = local.g();
+//
 // Normal gravity on the WGS84 ellipsoid (Somigliana's closed formula) with the free-air change with
 // height to second order (NIMA TR8350.2, third edition, Eq. 4-1 and 4-3). Real gravity differs from
 // it by the masses around: some 0.3 mm/s2 as a rule, below 1 mm/s2 nearly everywhere, which is
@@ -19,10 +22,10 @@ struct LocalGravity {
 
 // usage outside -90 .. 90 degrees or -500 .. 9000 m.
 Result<LocalGravity> gravity_at(double latitude_deg, double altitude_m);
-// Entered by hand (a surveyed value); usage outside 9.76 .. 9.84 m/s2.
+// A surveyed value that was entered; usage outside 9.76 .. 9.84 m/s2.
 Result<LocalGravity> gravity_entered(double m_per_s2);
-// Somewhere on land between equator and pole: standard gravity, known to 0.0150 m/s2 (a uniform
-// distribution over 9.780 .. 9.832).
+// For an unknown place, somewhere on land between equator and pole: standard gravity, known to
+// 0.0150 m/s2 (a uniform distribution over 9.780 .. 9.832).
 LocalGravity gravity_unknown();
 
 }  // namespace sixpoint::calib

@@ -1,11 +1,17 @@
 // Least squares on gravity's magnitude: the constants for which every still point reads 1 g.
 //
-//   minimise  sum_i ((|q_i| - g) / sigma_i)^2,   q_i,a = s_a (m_i,a - zero_a)      (paper, Eq. 4-7)
+//   SIXPOINT_ASSIGN(const LeastSquaresFit fit, least_squares(points, file_constants));
+//   if (fit.converged) {
+//     const Calibration& constants = fit.calibration;
+//     const ConstantsUncertainty uncertainty = fit.standard_uncertainty();
+//   }
+//
+//     minimise sum_i ((|q_i| - g) / sigma_i)^2,  q_i,a = s_a (m_i,a - zero_a)   (paper, Eq. 4-7)
 //
 // over the six degrees of freedom (three sensitivities, three zeros), by damped Gauss-Newton with
 // an analytic Jacobian. It ends only when both the relative step and the relative gradient are
-// small: the closest-point iteration common in this field stops when its residual no longer falls
-// by a fixed amount, which on long files is long before the minimum. Three symmetric cross-axis
+// small. (The closest-point iteration common in this field stops when its residual no longer falls
+// by a fixed amount, which on long files is long before the minimum.) Three symmetric cross-axis
 // terms and three temperature coefficients of zero can be freed as well.
 //
 // A mean vector over a slowly turning block is shorter than gravity; a point therefore carries the
@@ -43,7 +49,7 @@ struct FitModel {
   bool operator==(const FitModel&) const = default;
 };
 
-// What is believed before the data: normal and independent per constant.
+// What is known before the data: normal and independent per constant.
 struct CalibrationPrior {
   Calibration mean;
   PerAxis<double> sensitivity_relative_sd{};
@@ -54,8 +60,8 @@ struct LeastSquaresOptions {
   FitModel model;
   double gravity_g = 1.0;  // local gravity in standard g
   std::optional<CalibrationPrior> prior;
-  // With the cross-axis model: the terms xy, xz, yz are believed to be 0 with these standard
-  // deviations. 0: free.
+  // With the cross-axis model: a prior of mean 0 and these standard deviations for the terms xy,
+  // xz, yz. 0: free.
   PerAxis<double> cross_axis_sd{};
   // Both have to be reached. Constants are of order one here (relative sensitivity, zero in g).
   double relative_step = 1e-11;
@@ -90,6 +96,8 @@ struct LeastSquaresFit {
   double covariance_at(std::size_t row, std::size_t column) const {
     return covariance[row * kMaxParameters + column];
   }
+  // Variance of a function of the six constants with this slope, in the covariance's order.
+  double variance_along(const std::array<double, 6>& slope) const;
   ConstantsUncertainty standard_uncertainty() const;
   // Standard uncertainty, in mg, of the magnitude that these constants give in the direction where
   // it is largest.
@@ -106,6 +114,9 @@ Result<LeastSquaresFit> least_squares(std::span<const GravityPoint> points,
 double magnitude_g(const Calibration& calibration, const PerAxis<double>& mean_lsb,
                    const PerAxis<double>& variance_lsb2);
 double magnitude_g(const LeastSquaresFit& fit, const GravityPoint& point);
+
+// 98 directions spread evenly enough over the sphere: the surface of a 5 x 5 x 5 grid of a cube.
+std::span<const PerAxis<double>> sphere_grid();
 
 // The largest difference, in mg, between what two calibrations make of a still unit's magnitude,
 // over the sphere of directions (as `a` has them), and its root mean square.

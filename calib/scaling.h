@@ -1,6 +1,11 @@
 // What the firmware did to every sample, undone exactly, and done again with other constants.
 //
-//   stored = round_half_away(2 (m - zero) / (positive - negative) * accel_scale), clipped
+//   SIXPOINT_ASSIGN(const Reversal reversal, Reversal::make(stored, 256, RecordWidth::bits12));
+//   SIXPOINT_ASSIGN(const Rescale rescale, Rescale::make(reversal, fresh, {}));
+//   RescaleTally tally;
+//   rescale.apply(counts, counts, tally);
+//
+//     stored = round_half_away(2 (m - zero) / (positive - negative) * accel_scale), clipped
 //
 // (paper, Eq. 1-6; the rounding and the clipping are the recordings'). m was an integer count of
 // the sensor. Reversal finds it by running that rule forward over all integers; Rescale then
@@ -34,7 +39,7 @@ constexpr int highest_count(RecordWidth width) {
 int round_half_away(double value);
 
 // The firmware's rule, forward, clipped to `width`. Exact: numerator and quotient are such that a
-// double tells every half-way case from its neighbours. `stored` must be valid.
+// double separates every half-way case from its neighbours. `stored` must be valid.
 std::int16_t firmware_count(const StoredConstants& stored, double accel_scale_lsb_per_g,
                             std::size_t axis, int raw_lsb, RecordWidth width);
 
@@ -95,7 +100,7 @@ class Reversal {
 
 // Whether a file's counts can have come from its constants. Where positive - negative is below
 // 2 accel_scale, some stored counts have no integer behind them; a file that holds such counts was
-// mended, resampled, or written by other firmware.
+// repaired, resampled, or written by other firmware.
 struct PlausibilityTally {
   std::uint64_t counts = 0;      // stored counts looked at (three per sample), clipped ones not
   std::uint64_t impossible = 0;  // those without a candidate

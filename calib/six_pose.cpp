@@ -6,16 +6,13 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
-#include "calib/block_fit.h"
+#include "calib/direction_cells.h"
 #include "calib/least_squares.h"
 
 namespace sixpoint::calib {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr double kRadian = M_PI / 180;
 
@@ -23,14 +20,12 @@ double length_of(const PerAxis<double>& v) {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-Status check(std::span<const PoseReading> readings) {
-  for (const PoseReading& reading : readings) {
-    bool finite = std::abs(length_of(reading.up) - 1) < 1e-3;
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      finite = finite && std::isfinite(reading.mean_lsb[a]) && std::isfinite(reading.sd_lsb[a]) &&
-               reading.sd_lsb[a] >= 0;
-    }
-    if (!finite || reading.samples < 1) {
+Status check(std::span<const PoseMean> readings) {
+  for (const PoseMean& reading : readings) {
+    const bool usable = std::abs(length_of(reading.up) - 1) < 1e-3 &&
+                        all_finite(reading.mean_lsb, reading.sd_lsb) &&
+                        std::ranges::min(reading.sd_lsb) >= 0 && reading.samples >= 1;
+    if (!usable) {
       return fail(ErrorCode::bad_data,
                   "a pose's reading is not a finite number or has no direction", "six poses",
                   "measure the pose again");
@@ -41,8 +36,8 @@ Status check(std::span<const PoseReading> readings) {
 
 // Variance of one axis' mean, in g: noise, and tilt of the case about its two horizontal axes. On
 // an upright axis tilt acts in second order: (1 - cos t) with t^2 of mean 2 sd^2.
-double reading_variance_g2(const PoseReading& reading, std::size_t axis,
-                           const SixPoseOptions& options, double g_per_lsb) {
+double reading_variance_g2(const PoseMean& reading, std::size_t axis, const SixPoseOptions& options,
+                           double g_per_lsb) {
   const double noise = reading.sd_lsb[axis] * g_per_lsb;
   const double tilt = options.tilt_sd_deg * kRadian;
   const double level = std::max(0.0, 1 - reading.up[axis] * reading.up[axis]);
@@ -57,8 +52,16 @@ struct Regression {
   double residual_square = 0;  // unweighted
 };
 
-Regression regress(const Eigen::MatrixXd& design, const Eigen::VectorXd& value,
-                   const Eigen::VectorXd& variance) {
+// One axis' mean readings, in LSB, on the columns of `design`, a row per reading.
+Regression regress(const Eigen::MatrixXd& design, std::span<const PoseMean> readings,
+                   std::size_t axis, const SixPoseOptions& options, double g_per_lsb) {
+  Eigen::VectorXd value(design.rows());
+  Eigen::VectorXd variance(design.rows());
+  for (Eigen::Index i = 0; i < design.rows(); ++i) {
+    const PoseMean& reading = readings[static_cast<std::size_t>(i)];
+    value[i] = reading.mean_lsb[axis];
+    variance[i] = reading_variance_g2(reading, axis, options, g_per_lsb) / (g_per_lsb * g_per_lsb);
+  }
   const Eigen::VectorXd weight = variance.cwiseInverse();
   const Eigen::MatrixXd normal = design.transpose() * weight.asDiagonal() * design;
   const Eigen::LDLT<Eigen::MatrixXd> factors(normal);
@@ -69,9 +72,9 @@ Regression regress(const Eigen::MatrixXd& design, const Eigen::VectorXd& value,
   return out;
 }
 
-std::vector<DirectionCell> cells_from(std::span<const PoseReading> readings) {
+std::vector<DirectionCell> cells_from(std::span<const PoseMean> readings) {
   std::vector<DirectionCell> cells;
-  for (const PoseReading& reading : readings) {
+  for (const PoseMean& reading : readings) {
     DirectionCell cell;
     cell.mean_lsb = reading.mean_lsb;
     cell.blocks = 1;
@@ -83,7 +86,7 @@ std::vector<DirectionCell> cells_from(std::span<const PoseReading> readings) {
 
 class Jig {
  public:
-  Jig(std::span<const PoseReading> used, std::span<const PoseReading> held_out,
+  Jig(std::span<const PoseMean> used, std::span<const PoseMean> held_out,
       const SixPoseOptions& options)
       : used_(used), held_out_(held_out), options_(options), gravity_g_(options.gravity.g()) {}
 
@@ -98,7 +101,8 @@ class Jig {
     SIXPOINT_CHECK(solve_letter());
     SIXPOINT_CHECK(solve_pair());
     SIXPOINT_CHECK(solve_vector());
-    for (SixPoseSolution* solution : {&report_.letter, &report_.pair, &report_.vector.six}) {
+    for (SixPoseSolution* solution :
+         {&report_.as_published, &report_.per_axis, &report_.all_axes.six}) {
       SIXPOINT_CHECK(judge(*solution));
     }
     choose();
@@ -110,19 +114,12 @@ class Jig {
  private:
   void find_sides() {
     std::array<int, kSides> count{};
-    double warmth = 0;
-    int warm = 0;
-    for (const PoseReading& reading : used_) {
+    for (const PoseMean& reading : used_) {
       const NearestSide nearest = nearest_side(reading.up);
       if (nearest.tilt_deg < 10) {
         ++count[nearest.side];
       }
-      if (reading.temperature_c) {
-        warmth += *reading.temperature_c;
-        ++warm;
-      }
     }
-    report_.temperature_mean_c = warm > 0 ? warmth / warm : 0;
     for (std::size_t side = 0; side < kSides; ++side) {
       if (count[side] == 0) {
         report_.missing_directions.emplace_back(kSideNames[side]);
@@ -134,7 +131,7 @@ class Jig {
   double side_mean(std::size_t side, std::size_t axis) const {
     double sum = 0;
     int count = 0;
-    for (const PoseReading& reading : used_) {
+    for (const PoseMean& reading : used_) {
       const NearestSide nearest = nearest_side(reading.up);
       if (nearest.side == side && nearest.tilt_deg < 10) {
         sum += reading.mean_lsb[axis];
@@ -145,7 +142,7 @@ class Jig {
   }
 
   Status solve_letter() {
-    SixPoseSolution& out = report_.letter;
+    SixPoseSolution& out = report_.as_published;
     const double tilt = options_.tilt_sd_deg * kRadian;
     for (std::size_t a = 0; a < kAxes; ++a) {
       const double positive = side_mean(2 * a, a);
@@ -173,22 +170,15 @@ class Jig {
   }
 
   Status solve_pair() {
-    SixPoseSolution& out = report_.pair;
+    SixPoseSolution& out = report_.per_axis;
     const auto n = static_cast<Eigen::Index>(used_.size());
     for (std::size_t a = 0; a < kAxes; ++a) {
-      const double g_per_lsb = report_.letter.calibration.sensitivity_g_per_lsb[a];
+      const double g_per_lsb = report_.as_published.calibration.sensitivity_g_per_lsb[a];
       Eigen::MatrixXd design(n, 2);
-      Eigen::VectorXd value(n);
-      Eigen::VectorXd variance(n);
       for (Eigen::Index i = 0; i < n; ++i) {
-        const PoseReading& reading = used_[static_cast<std::size_t>(i)];
-        design(i, 0) = 1;
-        design(i, 1) = reading.up[a] * gravity_g_;
-        value[i] = reading.mean_lsb[a];
-        variance[i] =
-            reading_variance_g2(reading, a, options_, g_per_lsb) / (g_per_lsb * g_per_lsb);
+        design.row(i) << 1, used_[static_cast<std::size_t>(i)].up[a] * gravity_g_;
       }
-      const Regression fit = regress(design, value, variance);
+      const Regression fit = regress(design, used_, a, options_, g_per_lsb);
       const double slope = fit.solution[1];
       if (!(slope > 0)) {
         return fail(ErrorCode::bad_data, "no positive sensitivity fits the readings", "six poses",
@@ -203,27 +193,16 @@ class Jig {
   }
 
   Status solve_vector() {
-    VectorSolution& out = report_.vector;
+    AllAxesSolution& out = report_.all_axes;
     const auto n = static_cast<Eigen::Index>(used_.size());
     Eigen::MatrixXd design(n, 4);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const PoseReading& reading = used_[static_cast<std::size_t>(i)];
-      design(i, 0) = 1;
-      for (std::size_t b = 0; b < kAxes; ++b) {
-        design(i, 1 + static_cast<Eigen::Index>(b)) = reading.up[b] * gravity_g_;
-      }
+      const PerAxis<double>& up = used_[static_cast<std::size_t>(i)].up;
+      design.row(i) << 1, up[0] * gravity_g_, up[1] * gravity_g_, up[2] * gravity_g_;
     }
     for (std::size_t a = 0; a < kAxes; ++a) {
-      const double g_per_lsb = report_.pair.calibration.sensitivity_g_per_lsb[a];
-      Eigen::VectorXd value(n);
-      Eigen::VectorXd variance(n);
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const PoseReading& reading = used_[static_cast<std::size_t>(i)];
-        value[i] = reading.mean_lsb[a];
-        variance[i] =
-            reading_variance_g2(reading, a, options_, g_per_lsb) / (g_per_lsb * g_per_lsb);
-      }
-      const Regression fit = regress(design, value, variance);
+      const double g_per_lsb = report_.per_axis.calibration.sensitivity_g_per_lsb[a];
+      const Regression fit = regress(design, used_, a, options_, g_per_lsb);
       PerAxis<double> row{};
       for (std::size_t b = 0; b < kAxes; ++b) {
         row[b] = fit.solution[1 + static_cast<Eigen::Index>(b)];
@@ -255,10 +234,10 @@ class Jig {
     return validate(out.six.calibration);
   }
 
-  double rms_mg(std::span<const PoseReading> readings, const Calibration& calibration,
+  double rms_mg(std::span<const PoseMean> readings, const Calibration& calibration,
                 double* worst = nullptr) const {
     double square = 0;
-    for (const PoseReading& reading : readings) {
+    for (const PoseMean& reading : readings) {
       const double off =
           kMgPerG * (magnitude_g(calibration, reading.mean_lsb, {0, 0, 0}) - gravity_g_);
       square += off * off;
@@ -273,13 +252,9 @@ class Jig {
     SIXPOINT_CHECK(validate(solution.calibration));
     solution.own_rms_mg = rms_mg(used_, solution.calibration);
     const auto cells = cells_from(used_);
-    auto rounded = round_constants(solution.calibration, cells, {}, gravity_g_);
-    if (!rounded) {
-      return fail(std::move(rounded).error());
-    }
-    solution.stored = *rounded;
-    if (&solution == &report_.letter) {
-      // The letter's integers are the letter's: every reading rounded by itself.
+    SIXPOINT_ASSIGN(solution.stored, round_constants(solution.calibration, cells, {}, gravity_g_));
+    if (&solution == &report_.as_published) {
+      // As published: every reading rounded by itself.
       SIXPOINT_ASSIGN(solution.stored, nearest_stored(solution.calibration));
       for (std::size_t a = 0; a < kAxes; ++a) {
         const double midpoint =
@@ -310,19 +285,19 @@ class Jig {
     // The pair is left only for a gain that chance does not give: the RMS over three unused poses,
     // each the mean of six seconds, scatters by a tenth of a milligravity.
     constexpr double kMatters_mg = 0.3;
-    report_.chosen = JigSolution::pair;
-    if (error(report_.letter) < error(report_.best()) - kMatters_mg) {
-      report_.chosen = JigSolution::letter;
+    report_.chosen = SixPoseMethod::per_axis;
+    if (error(report_.as_published) < error(report_.best()) - kMatters_mg) {
+      report_.chosen = SixPoseMethod::as_published;
     }
-    if (error(report_.vector.six) < error(report_.best()) - kMatters_mg) {
-      report_.chosen = JigSolution::vector;
+    if (error(report_.all_axes.six) < error(report_.best()) - kMatters_mg) {
+      report_.chosen = SixPoseMethod::all_axes;
     }
-    report_.better_by_mg = error(report_.letter) - error(report_.best());
+    report_.better_by_mg = error(report_.as_published) - error(report_.best());
   }
 
   void describe_poses() {
     const Calibration& calibration = report_.best().calibration;
-    const auto add = [&](const PoseReading& reading, bool held_out) {
+    const auto add = [&](const PoseMean& reading, bool held_out) {
       const PerAxis<double> g = calibration.to_g(reading.mean_lsb);
       const double length = length_of(g);
       const double along =
@@ -331,90 +306,100 @@ class Jig {
                                kMgPerG * (length - gravity_g_),
                                std::acos(std::clamp(along, -1.0, 1.0)) / kRadian, held_out});
     };
-    for (const PoseReading& reading : used_) {
+    for (const PoseMean& reading : used_) {
       add(reading, false);
     }
-    for (const PoseReading& reading : held_out_) {
+    for (const PoseMean& reading : held_out_) {
       add(reading, true);
     }
   }
 
   void verify() {
-    std::vector<std::string>& reasons = report_.reasons;
-    const Calibration& calibration = report_.best().calibration;
+    check_readings();
+    check_poses();
+    check_sensor();
+    const auto held_out_mg = report_.best().held_out_rms_mg;
+    if (!held_out_mg) {
+      report_.reasons.emplace_back("no readings were left out to verify with");
+    } else if (!(*held_out_mg <= options_.held_out_mg)) {
+      report_.reasons.push_back(
+          fmt::format("unused readings are {:.1f} mg from local gravity (limit {:.1f} mg)",
+                      *held_out_mg, options_.held_out_mg));
+    }
+    report_.verified = report_.reasons.empty();
+  }
+
+  void check_readings() {
+    const PerAxis<double>& sensitivity = report_.best().calibration.sensitivity_g_per_lsb;
     for (const auto readings : {used_, held_out_}) {
-      for (const PoseReading& reading : readings) {
+      for (const PoseMean& reading : readings) {
         const auto side = kSideNames[nearest_side(reading.up).side];
         if (reading.samples < options_.fewest_samples) {
-          reasons.push_back(fmt::format("{}: only {} samples", side, reading.samples));
+          report_.reasons.push_back(fmt::format("{}: only {} samples", side, reading.samples));
         }
         for (std::size_t a = 0; a < kAxes; ++a) {
-          const double sd_mg = kMgPerG * reading.sd_lsb[a] * calibration.sensitivity_g_per_lsb[a];
+          const double sd_mg = kMgPerG * reading.sd_lsb[a] * sensitivity[a];
           if (sd_mg > options_.most_sd_mg) {
-            reasons.push_back(fmt::format("{}: moved, {} scatters by {:.0f} mg (limit {:.0f} mg)",
-                                          side, kAxisNames[a], sd_mg, options_.most_sd_mg));
+            report_.reasons.push_back(
+                fmt::format("{}: moved, {} scatters by {:.0f} mg (limit {:.0f} mg)", side,
+                            kAxisNames[a], sd_mg, options_.most_sd_mg));
           }
         }
       }
     }
+  }
+
+  // Of every reading its tilt, of every side its repeatability.
+  void check_poses() {
     for (const PoseResidual& pose : report_.poses) {
       if (pose.tilt_deg > options_.most_tilt_deg) {
-        reasons.push_back(fmt::format("{}: {:.1f} degrees off the jig's direction (limit {:.0f})",
-                                      pose.side, pose.tilt_deg, options_.most_tilt_deg));
+        report_.reasons.push_back(
+            fmt::format("{}: {:.1f} degrees off the jig's direction (limit {:.0f})", pose.side,
+                        pose.tilt_deg, options_.most_tilt_deg));
       }
     }
-    for (std::size_t side = 0; side < kSides; ++side) {
+    for (const std::string_view side : kSideNames) {
       double low = HUGE_VAL;
       double high = -HUGE_VAL;
       for (const PoseResidual& pose : report_.poses) {
-        if (pose.side == kSideNames[side]) {
+        if (pose.side == side) {
           low = std::min(low, pose.magnitude_mg);
           high = std::max(high, pose.magnitude_mg);
         }
       }
       if (high - low > options_.repeatability_mg) {
-        reasons.push_back(fmt::format("{}: readings differ by {:.1f} mg (limit {:.1f} mg)",
-                                      kSideNames[side], high - low, options_.repeatability_mg));
+        report_.reasons.push_back(fmt::format("{}: readings differ by {:.1f} mg (limit {:.1f} mg)",
+                                              side, high - low, options_.repeatability_mg));
       }
     }
+  }
+
+  // The constants are those of a working sensor.
+  void check_sensor() {
+    const Calibration& calibration = report_.best().calibration;
     for (std::size_t a = 0; a < kAxes; ++a) {
       const double gain = calibration.sensitivity_g_per_lsb[a] / options_.nominal_g_per_lsb;
       const double zero_g = calibration.zero_lsb[a] * calibration.sensitivity_g_per_lsb[a];
       if (!(std::abs(gain - 1) <= options_.gain_range)) {
-        reasons.push_back(fmt::format("{}: a sensitivity {:.0f} % from nominal (limit {:.0f} %)",
-                                      kAxisNames[a], 100 * std::abs(gain - 1),
-                                      100 * options_.gain_range));
+        report_.reasons.push_back(
+            fmt::format("{}: a sensitivity {:.0f} % from nominal (limit {:.0f} %)", kAxisNames[a],
+                        100 * std::abs(gain - 1), 100 * options_.gain_range));
       }
       if (!(std::abs(zero_g) <= options_.zero_range_g)) {
-        reasons.push_back(fmt::format("{}: a zero of {:.2f} g (limit {:.2f} g)", kAxisNames[a],
-                                      zero_g, options_.zero_range_g));
+        report_.reasons.push_back(fmt::format("{}: a zero of {:.2f} g (limit {:.2f} g)",
+                                              kAxisNames[a], zero_g, options_.zero_range_g));
       }
     }
-    if (held_out_.empty()) {
-      reasons.emplace_back("no readings were kept back to verify with");
-    } else if (!(*report_.best().held_out_rms_mg <= options_.held_out_mg)) {
-      reasons.push_back(
-          fmt::format("unused readings are {:.1f} mg from local gravity (limit {:.1f} "
-                      "mg)",
-                      *report_.best().held_out_rms_mg, options_.held_out_mg));
-    }
-    report_.verified = reasons.empty();
   }
 
-  std::span<const PoseReading> used_;
-  std::span<const PoseReading> held_out_;
+  std::span<const PoseMean> used_;
+  std::span<const PoseMean> held_out_;
   const SixPoseOptions& options_;
   double gravity_g_;
   SixPoseReport report_;
 };
 
 }  // namespace
-
-PerAxis<double> side_direction(std::size_t side) {
-  PerAxis<double> up{};
-  up[side / 2 % kAxes] = side % 2 == 0 ? 1 : -1;
-  return up;
-}
 
 NearestSide nearest_side(const PerAxis<double>& up) {
   NearestSide out;
@@ -431,27 +416,19 @@ NearestSide nearest_side(const PerAxis<double>& up) {
   return out;
 }
 
-std::string_view to_string(JigSolution solution) {
-  switch (solution) {
-    case JigSolution::letter:
-      return "letter";
-    case JigSolution::pair:
-      return "pair";
-    case JigSolution::vector:
-      return "vector";
-  }
-  return "pair";
+std::string_view to_string(SixPoseMethod method) {
+  constexpr std::array<std::string_view, 3> kNames = {"letter", "pair", "vector"};
+  return kNames[static_cast<std::size_t>(method)];
 }
 
-Result<SixPoseReport> solve_six_poses(std::span<const PoseReading> used,
-                                      std::span<const PoseReading> held_out,
+Result<SixPoseReport> solve_six_poses(std::span<const PoseMean> used,
+                                      std::span<const PoseMean> held_out,
                                       const SixPoseOptions& options) {
   SIXPOINT_CHECK(check(used));
   SIXPOINT_CHECK(check(held_out));
-  if (!(options.tilt_sd_deg > 0 && options.tilt_sd_deg < 45) ||
-      !(options.gravity.m_per_s2 > 9.7 && options.gravity.m_per_s2 < 9.9)) {
-    return fail(ErrorCode::usage, "the jig's tilt or the station's gravity makes no sense",
-                "six poses", "enter the station's gravity and the jig's tilt uncertainty");
+  if (!(options.gravity.m_per_s2 > 9.7 && options.gravity.m_per_s2 < 9.9)) {
+    return fail(ErrorCode::usage, "the station's gravity makes no sense", "six poses",
+                "enter the station's gravity");
   }
   return Jig(used, held_out, options).run();
 }
@@ -471,49 +448,6 @@ std::string SixPoseReport::brief() const {
     line += fmt::format(": {}", fmt::join(reasons, "; "));
   }
   return line;
-}
-
-Json to_json(const SixPoseSolution& solution) {
-  const auto maybe = [](const std::optional<double>& value) {
-    return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
-  };
-  Json json;
-  json["constants"] = to_json(solution.calibration, solution.stored);
-  json["standard_uncertainty"] = to_json(solution.uncertainty);
-  json["own_rms_mg"] = solution.own_rms_mg;
-  json["held_out_rms_mg"] = maybe(solution.held_out_rms_mg);
-  json["held_out_worst_mg"] = maybe(solution.held_out_worst_mg);
-  json["rounded_rms_mg"] = maybe(solution.rounded_rms_mg);
-  return json;
-}
-
-Json to_json(const SixPoseReport& report) {
-  Json json;
-  json["verified"] = report.verified;
-  json["reasons"] = report.reasons;
-  json["missing_directions"] = report.missing_directions;
-  json["gravity_m_per_s2"] = report.gravity.m_per_s2;
-  if (!report.missing_directions.empty()) {
-    return json;
-  }
-  json["chosen"] = to_string(report.chosen);
-  json["better_by_mg"] = report.better_by_mg;
-  json["letter"] = to_json(report.letter);
-  json["pair"] = to_json(report.pair);
-  json["vector"] = to_json(report.vector.six);
-  json["vector"]["lsb_per_g"] = report.vector.lsb_per_g;
-  json["vector"]["cross_axis"] = report.vector.cross_axis;
-  json["vector"]["rotation_deg"] = report.vector.rotation_deg;
-  json["vector"]["degrees_of_freedom"] = report.vector.degrees_of_freedom;
-  json["midpoint_minus_zero_lsb"] = report.midpoint_minus_zero_lsb;
-  json["poses"] = Json::array();
-  for (const PoseResidual& pose : report.poses) {
-    json["poses"].push_back({{"pose", pose.side},
-                             {"magnitude_mg", pose.magnitude_mg},
-                             {"tilt_deg", pose.tilt_deg},
-                             {"held_out", pose.held_out}});
-  }
-  return json;
 }
 
 }  // namespace sixpoint::calib

@@ -5,25 +5,41 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
 namespace sixpoint::calib {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+// What one solution is made from.
+struct Input {
+  std::span<const StillBlock> blocks;
+  const Calibration& file_constants;
+  const SolveOptions& options;
 
-PartialKnowledge know_partially(std::span<const StillBlock> blocks,
-                                const Calibration& file_constants, const SolveOptions& options) {
-  PartialKnowledge out;
-  BlockFitOptions fit_options;
-  fit_options.gravity_g = options.gravity_g;
-  fit_options.try_richer_models = false;
+  BlockFitOptions fit_options() const {
+    BlockFitOptions out;
+    out.gravity_g = options.gravity_g;
+    return out;
+  }
+  Result<BlockFit> fit_with_prior(const CalibrationPrior& prior, const Calibration& start) const {
+    BlockFitOptions with_prior = fit_options();
+    with_prior.prior = prior;
+    with_prior.try_richer_models = false;
+    return fit_blocks(blocks, start, with_prior);
+  }
+};
+
+PartialKnowledge partial_knowledge(const Input& in) {
   // As wide as the verification's range of a real sensor.
-  fit_options.prior = CalibrationPrior{file_constants, {0.15, 0.15, 0.15}, {0.2, 0.2, 0.2}};
-  out.zero_mg.fill(kMgPerG * 0.2);
-  out.sensitivity_relative.fill(0.15);
-  if (const auto fit = fit_blocks(blocks, file_constants, fit_options)) {
+  constexpr double kSensitivityRange = 0.15;
+  constexpr double kZeroRange_g = 0.2;
+  PartialKnowledge out;
+  out.zero_mg.fill(kMgPerG * kZeroRange_g);
+  out.sensitivity_relative.fill(kSensitivityRange);
+  CalibrationPrior range{in.file_constants, {}, {}};
+  range.sensitivity_relative_sd.fill(kSensitivityRange);
+  range.zero_g_sd.fill(kZeroRange_g);
+  if (const auto fit = in.fit_with_prior(range, in.file_constants)) {
     const ConstantsUncertainty uncertainty = fit->fit.standard_uncertainty();
     out.zero_mg = uncertainty.zero_mg;
     out.sensitivity_relative = uncertainty.sensitivity_relative;
@@ -58,33 +74,35 @@ std::vector<StillBlock> without_richer_terms(std::span<const StillBlock> blocks,
   return out;
 }
 
-Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOptions& options) {
+void add_uncertainty(ConstantsUncertainty& to, const PerAxis<double>& sensitivity_relative,
+                     const PerAxis<double>& zero_mg) {
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    to.zero_mg[a] = std::hypot(to.zero_mg[a], zero_mg[a]);
+    to.sensitivity_relative[a] = std::hypot(to.sensitivity_relative[a], sensitivity_relative[a]);
+  }
+}
+
+// Uncertainty, residuals and the nine integers of report.calibration.
+Status finish_constants(SolveReport& report, const SolveOptions& options) {
+  const BlockFit& fit = *report.fit;
   report.statistical = fit.best().standard_uncertainty();
   if (options.method == SolveMethod::genetic && report.search) {
-    // Its members wander about the answer, and it may lie beside the minimum; least squares'
-    // covariance knows nothing of that.
+    // Its best members scatter about the answer, and the answer may lie beside the minimum. Neither
+    // is in least squares' covariance.
+    const double scatter_mg = report.search->scatter_mg;
     const double apart_mg =
         difference_over_sphere(fit.best().calibration, *report.calibration).rms_mg;
-    const double wander_mg = std::hypot(report.search->wander_mg, apart_mg);
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], wander_mg);
-      report.statistical.sensitivity_relative[a] = std::hypot(
-          report.statistical.sensitivity_relative[a], report.search->wander_mg / kMgPerG);
-    }
+    const double zero_mg = std::hypot(scatter_mg, apart_mg);
+    const double relative = scatter_mg / kMgPerG;
+    add_uncertainty(report.statistical, {relative, relative, relative},
+                    {zero_mg, zero_mg, zero_mg});
   }
   if (fit.drift) {
-    const PerAxis<double> zero_mg = fit.drift->zero_mg();
-    const PerAxis<double> relative = fit.drift->sensitivity_relative();
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      report.statistical.zero_mg[a] = std::hypot(report.statistical.zero_mg[a], zero_mg[a]);
-      report.statistical.sensitivity_relative[a] =
-          std::hypot(report.statistical.sensitivity_relative[a], relative[a]);
-    }
+    add_uncertainty(report.statistical, fit.drift->sensitivity_relative(), fit.drift->zero_mg());
   }
   report.uncertainty = report.statistical;
-  for (double& relative : report.uncertainty.sensitivity_relative) {
-    relative = std::hypot(relative, options.gravity_sd_g / options.gravity_g);
-  }
+  const double gravity = options.gravity_sd_g / options.gravity_g;
+  add_uncertainty(report.uncertainty, {gravity, gravity, gravity}, {});
   report.residual_after_mg = cells_rms_mg(fit.cells, *report.calibration, options.gravity_g);
   auto rounded =
       round_constants(*report.calibration, fit.cells, fit.cell_sigma_mg, options.gravity_g);
@@ -100,13 +118,9 @@ Status finish_constants(SolveReport& report, const BlockFit& fit, const SolveOpt
 }
 
 // The posterior of a documented prior, where the data alone do not determine the constants.
-Status lean_on_prior(SolveReport& report, std::span<const StillBlock> chosen,
-                     const SolveOptions& options) {
-  BlockFitOptions fit_options;
-  fit_options.gravity_g = options.gravity_g;
-  fit_options.prior = options.prior;
-  fit_options.try_richer_models = false;
-  SIXPOINT_ASSIGN(report.fit, fit_blocks(chosen, options.prior->mean, fit_options));
+Status solve_with_prior(SolveReport& report, const Input& in) {
+  const CalibrationPrior& prior = *in.options.prior;
+  SIXPOINT_ASSIGN(report.fit, in.fit_with_prior(prior, prior.mean));
   report.calibration = report.fit->fit.calibration;
   report.iterations = report.fit->fit.iterations;
   report.search.reset();
@@ -115,65 +129,114 @@ Status lean_on_prior(SolveReport& report, std::span<const StillBlock> chosen,
   report.verification.verdict = Verdict::rests_on_prior;
   report.verification.reasons.emplace_back(
       "the constants rest on a population prior where the data are silent");
-  return finish_constants(report, *report.fit, options);
+  return finish_constants(report, in.options);
+}
+
+// A report without verified constants: what the data determine nevertheless.
+Result<SolveReport> undetermined(SolveReport report, Verdict verdict, std::string reason,
+                                 const Input& in) {
+  report.verification.verdict = verdict;
+  report.verification.reasons.push_back(std::move(reason));
+  report.partial = partial_knowledge(in);
+  if (in.options.prior) {
+    SIXPOINT_CHECK(solve_with_prior(report, in));
+  }
+  return report;
+}
+
+// The same minimum by another way. Where cross-axis or temperature terms are admitted, the genetic
+// algorithm is given the blocks without them: its six constants would make up for them in the
+// directions that were met, and be off in the others.
+Result<GeneticResult> search_beside(const BlockFit& fit, const Input& in) {
+  GeneticOptions options;
+  options.seed = in.options.seed;
+  options.gravity_g = in.options.gravity_g;
+  if (fit.richer) {
+    return genetic(without_richer_terms(in.blocks, fit), in.file_constants, options);
+  }
+  return genetic(in.blocks, in.file_constants, options);
+}
+
+void refuse(Verification& verification, std::vector<std::string> reasons) {
+  if (verification.verified) {
+    verification.reasons.clear();
+  }
+  verification.verified = false;
+  verification.verdict = Verdict::not_verified;
+  verification.reasons.insert(verification.reasons.end(), reasons.begin(), reasons.end());
+}
+
+// Why the genetic algorithm's answer is not to be used.
+std::vector<std::string> genetic_doubts(const SolveReport& report) {
+  std::vector<std::string> doubts = report.search->reasons;
+  // Where it is not the same as least squares it must at least be within what is promised.
+  const double apart_mg =
+      difference_over_sphere(report.fit->best().calibration, *report.calibration).worst_mg;
+  if (!(apart_mg <= VerificationLimits::worst_direction_mg)) {
+    doubts.push_back(fmt::format(
+        "the genetic algorithm's answer is {:.1f} mg from least squares' in the worst direction "
+        "(limit {:.1f} mg)",
+        apart_mg, VerificationLimits::worst_direction_mg));
+  }
+  return doubts;
+}
+
+// What a person should know of the fit besides the verdict.
+void add_notes(std::vector<std::string>& notes, const BlockFit& fit) {
+  if (!fit.left_out_reason.empty()) {
+    notes.push_back(fit.left_out_reason);
+  }
+  const FitModel model = fit.richer ? fit.richer->fit.model : FitModel();
+  if (model.cross_axis) {
+    const auto& c = fit.richer->fit.cross_axis;
+    notes.push_back(fmt::format(
+        "the data show cross-axis terms of {:+.2f} % (xy) {:+.2f} % (xz) {:+.2f} % (yz), which six "
+        "constants cannot correct: unseen directions are predicted to {:.1f} mg with them, {:.1f} "
+        "mg without",
+        100 * c[0], 100 * c[1], 100 * c[2], fit.richer->held_out_rms_mg,
+        fit.held_out_rms_mg.value_or(0)));
+  }
+  if (model.temperature) {
+    const LeastSquaresFit& more = fit.richer->fit;
+    const auto mg_per_c = [&](std::size_t a) {
+      return kMgPerG * more.calibration.sensitivity_g_per_lsb[a] * more.zero_lsb_per_c[a];
+    };
+    notes.push_back(fmt::format(
+        "the data show zeros that drift by {:+.2f} {:+.2f} {:+.2f} mg/C (X Y Z), which six "
+        "constants cannot follow: they hold at {:.1f} C; unseen directions are predicted to "
+        "{:.1f} mg with the drift, {:.1f} mg without",
+        mg_per_c(0), mg_per_c(1), mg_per_c(2), fit.reference_temperature_c,
+        fit.richer->held_out_rms_mg, fit.held_out_rms_mg.value_or(0)));
+  } else if (fit.temperature_range_c >= 10) {
+    notes.push_back(
+        fmt::format("the temperature changed by {:.0f} C; the constants hold for its mean",
+                    fit.temperature_range_c));
+  }
 }
 
 // From a fit to the verdict: the genetic algorithm beside it, rounding, verification, notes.
-Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit,
-                                 std::span<const StillBlock> chosen,
-                                 const Calibration& file_constants, const SolveOptions& options) {
-  BlockFitOptions fit_options;
-  fit_options.gravity_g = options.gravity_g;
+Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit, const Input& in) {
+  const SolveOptions& options = in.options;
+  const bool by_search = options.method == SolveMethod::genetic;
   report.fit = std::move(fit);
-  // Its rounded means are a check on each other: the same minimum by another way.
-  GeneticOptions genetic_options;
-  genetic_options.seed = options.seed;
-  genetic_options.gravity_g = options.gravity_g;
-  // Where cross-axis or temperature terms are admitted, it is given the blocks without them: its
-  // six constants would make up for them in the directions that were met, and be off in the others.
-  std::vector<StillBlock> plain;
-  if (report.fit->richer) {
-    plain = without_richer_terms(chosen, *report.fit);
-  }
-  SIXPOINT_ASSIGN(report.search,
-                  genetic(plain.empty() ? chosen : std::span<const StillBlock>(plain),
-                          file_constants, genetic_options));
-  report.calibration = options.method == SolveMethod::genetic ? report.search->calibration
-                                                              : report.fit->best().calibration;
-  report.iterations = options.method == SolveMethod::genetic
-                          ? static_cast<int>(report.search->fitness_mg.size())
-                          : report.fit->fit.iterations;
-  SIXPOINT_CHECK(finish_constants(report, *report.fit, options));
-  report.residual_before_mg = cells_rms_mg(report.fit->cells, file_constants, options.gravity_g);
-  report.verification = verify(chosen, file_constants, *report.calibration, *report.fit,
-                               report.search, fit_options, options.limits);
-  std::vector<std::string> doubts;
-  if (options.method == SolveMethod::genetic) {
-    doubts = report.search->reasons;
-    // Where it is not the same as least squares it must at least be within what is promised.
-    const double apart_mg =
-        difference_over_sphere(report.fit->best().calibration, *report.calibration).worst_mg;
-    if (!(apart_mg <= options.limits.worst_direction_mg)) {
-      doubts.push_back(fmt::format(
-          "the genetic algorithm's answer is {:.1f} mg from least squares' in the worst direction "
-          "(limit {:.1f} mg)",
-          apart_mg, options.limits.worst_direction_mg));
+  SIXPOINT_ASSIGN(report.search, search_beside(*report.fit, in));
+  report.calibration = by_search ? report.search->calibration : report.fit->best().calibration;
+  report.iterations =
+      by_search ? static_cast<int>(report.search->fitness_mg.size()) : report.fit->fit.iterations;
+  SIXPOINT_CHECK(finish_constants(report, options));
+  report.residual_before_mg = cells_rms_mg(report.fit->cells, in.file_constants, options.gravity_g);
+  report.verification = verify(in.blocks, in.file_constants, *report.calibration, *report.fit,
+                               report.search, in.fit_options());
+  if (by_search) {
+    if (auto doubts = genetic_doubts(report); !doubts.empty()) {
+      refuse(report.verification, std::move(doubts));
     }
   }
-  if (!doubts.empty()) {
-    if (report.verification.verified) {
-      report.verification.reasons.clear();
-    }
-    report.verification.verified = false;
-    report.verification.verdict = Verdict::not_verified;
-    report.verification.reasons.insert(report.verification.reasons.end(), doubts.begin(),
-                                       doubts.end());
-  }
-  if (!(report.verification.worst_direction_mg <= options.limits.worst_direction_mg)) {
-    report.partial = know_partially(chosen, file_constants, options);
+  if (!(report.verification.worst_direction_mg <= VerificationLimits::worst_direction_mg)) {
+    report.partial = partial_knowledge(in);
     if (options.prior && !report.verification.verified) {
       // Enough directions by the 0.3 g rule, and still too little in them.
-      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
+      SIXPOINT_CHECK(solve_with_prior(report, in));
       return report;
     }
   }
@@ -181,126 +244,68 @@ Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit,
     report.notes.emplace_back(
         "the data determine the constants without the prior, which was not used");
   }
-  if (!report.fit->left_out_reason.empty()) {
-    report.notes.push_back(report.fit->left_out_reason);
-  }
-  if (report.fit->richer && report.fit->richer->fit.model.cross_axis) {
-    const auto& c = report.fit->richer->fit.cross_axis;
-    report.notes.push_back(fmt::format(
-        "the data show cross-axis terms of {:+.2f} % (xy) {:+.2f} % (xz) {:+.2f} % (yz), which six "
-        "constants cannot correct: unseen directions are predicted to {:.1f} mg with them, {:.1f} "
-        "mg without",
-        100 * c[0], 100 * c[1], 100 * c[2], report.fit->richer->held_out_rms_mg,
-        report.fit->held_out_rms_mg.value_or(0)));
-  }
-  if (report.fit->richer && report.fit->richer->fit.model.temperature) {
-    const LeastSquaresFit& more = report.fit->richer->fit;
-    report.notes.push_back(
-        fmt::format("the data show zeros that drift by {:+.2f} {:+.2f} {:+.2f} mg/C (X Y Z), which "
-                    "six constants "
-                    "cannot follow: they hold at {:.1f} C; unseen directions are predicted to "
-                    "{:.1f} mg with the "
-                    "drift, {:.1f} mg without",
-                    kMgPerG * more.calibration.sensitivity_g_per_lsb[0] * more.zero_lsb_per_c[0],
-                    kMgPerG * more.calibration.sensitivity_g_per_lsb[1] * more.zero_lsb_per_c[1],
-                    kMgPerG * more.calibration.sensitivity_g_per_lsb[2] * more.zero_lsb_per_c[2],
-                    report.fit->reference_temperature_c, report.fit->richer->held_out_rms_mg,
-                    report.fit->held_out_rms_mg.value_or(0)));
-  }
-  if (report.fit->temperature_range_c >= 10 &&
-      !(report.fit->richer && report.fit->richer->fit.model.temperature)) {
-    report.notes.push_back(
-        fmt::format("the temperature changed by {:.0f} C; the constants hold for its mean",
-                    report.fit->temperature_range_c));
-  }
-  if (report.residual_rounded_mg && *report.residual_rounded_mg > options.limits.applied_mg &&
+  add_notes(report.notes, *report.fit);
+  if (report.residual_rounded_mg && *report.residual_rounded_mg > VerificationLimits::applied_mg &&
       report.verification.verified) {
-    report.verification.verified = false;
-    report.verification.verdict = Verdict::not_verified;
-    report.verification.reasons = {
-        fmt::format("rounded to a unit's nine integers the constants leave still blocks {:.1f} mg "
-                    "from 1 g (limit {:.1f} mg)",
-                    *report.residual_rounded_mg, options.limits.applied_mg)};
+    refuse(report.verification,
+           {fmt::format("rounded to a unit's nine integers the constants leave still blocks "
+                        "{:.1f} mg from 1 g (limit {:.1f} mg)",
+                        *report.residual_rounded_mg, VerificationLimits::applied_mg)});
   }
   return report;
 }
 
-// The paper's rule is about what the sensor was exposed to, and reads it off the file's own
-// constants. Where these are the wrong ones, by 0.2 g and more, a side that was reached may not
-// look like it. So the rule is asked of the new constants as well, and they are believed where
-// directions that the fit has not seen bear them out.
-Result<std::optional<SolveReport>> solve_exposed(const SolveReport& begun,
-                                                 std::span<const StillBlock> chosen,
-                                                 const Calibration& file_constants,
-                                                 const SolveOptions& options) {
-  BlockFitOptions fit_options;
-  fit_options.gravity_g = options.gravity_g;
-  auto fit = fit_blocks(chosen, file_constants, fit_options);
-  if (!fit || fit->redundancy < options.limits.held_out_directions ||
-      !coverage_of(chosen, fit->best().calibration).complete()) {
+// The paper's 0.3 g rule uses the file's own constants. Where these are wrong by 0.2 g and more, a
+// side that was reached may seem not to be. So the rule is applied to the new constants as well,
+// which count where directions that the fit has not seen confirm them.
+Result<std::optional<SolveReport>> solve_exposed(const SolveReport& begun, const Input& in) {
+  auto fit = fit_blocks(in.blocks, in.file_constants, in.fit_options());
+  if (!fit || fit->redundancy < VerificationLimits::held_out_directions ||
+      !coverage_of(in.blocks, fit->best().calibration).complete()) {
     return std::optional<SolveReport>();
   }
-  SIXPOINT_ASSIGN(SolveReport report,
-                  solve_fitted(begun, std::move(*fit), chosen, file_constants, options));
+  SIXPOINT_ASSIGN(SolveReport report, solve_fitted(begun, std::move(*fit), in));
   if (report.verification.verdict != Verdict::verified) {
     return std::optional<SolveReport>();
   }
   report.notes.push_back(
       fmt::format("towards {} no still block reaches beyond 0.3 g by the file's own constants; by "
-                  "the new ones, "
-                  "which unseen directions confirm, all six sides do",
+                  "the new ones, which unseen directions confirm, all six sides do",
                   fmt::join(begun.coverage.missing_directions(), ", ")));
   return std::optional(std::move(report));
 }
 
-Result<SolveReport> solve_chosen(std::span<const StillBlock> chosen,
-                                 const Calibration& file_constants, const SolveOptions& options) {
+Result<SolveReport> solve_input(const Input& in) {
   SolveReport report;
-  report.method = options.method;
-  report.gravity_g = options.gravity_g;
-  report.points = chosen.size();
-  report.coverage = coverage_of(chosen);
+  report.method = in.options.method;
+  report.gravity_g = in.options.gravity_g;
+  report.points = in.blocks.size();
+  report.coverage = coverage_of(in.blocks);
   report.verification.missing_directions = report.coverage.missing_directions();
-
-  if (chosen.empty()) {
+  if (in.blocks.empty()) {
     report.verification.verdict = Verdict::incomplete;
     report.verification.reasons.emplace_back(
         "no still block of 4 s was found; lay the unit on each of its six sides for a minute");
     return report;
   }
-  BlockFitOptions fit_options;
-  fit_options.gravity_g = options.gravity_g;
-  const auto cells = cells_of(chosen);
-  report.residual_before_mg = cells_rms_mg(cells, file_constants, options.gravity_g);
-
+  report.residual_before_mg =
+      cells_rms_mg(cells_of(in.blocks), in.file_constants, in.options.gravity_g);
   if (!report.coverage.complete()) {
-    SIXPOINT_ASSIGN(auto exposed, solve_exposed(report, chosen, file_constants, options));
+    SIXPOINT_ASSIGN(auto exposed, solve_exposed(report, in));
     if (exposed) {
       return std::move(*exposed);
     }
-    report.verification.verdict = Verdict::incomplete;
-    report.verification.reasons.push_back(
-        fmt::format("no still block reaches beyond 0.3 g towards {}",
-                    fmt::join(report.verification.missing_directions, ", ")));
-    report.partial = know_partially(chosen, file_constants, options);
-    if (options.prior) {
-      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
-    }
-    return report;
+    const auto reason = fmt::format("no still block reaches beyond 0.3 g towards {}",
+                                    fmt::join(report.verification.missing_directions, ", "));
+    return undetermined(std::move(report), Verdict::incomplete, reason, in);
   }
-
-  auto fit = fit_blocks(chosen, file_constants, fit_options);
+  auto fit = fit_blocks(in.blocks, in.file_constants, in.fit_options());
   if (!fit) {
     // Directions that pass the 0.3 g rule and are still fewer than six: not a damaged file.
-    report.verification.verdict = Verdict::not_verified;
-    report.verification.reasons.push_back(fit.error().what + "; " + fit.error().hint);
-    report.partial = know_partially(chosen, file_constants, options);
-    if (options.prior) {
-      SIXPOINT_CHECK(lean_on_prior(report, chosen, options));
-    }
-    return report;
+    return undetermined(std::move(report), Verdict::not_verified,
+                        fit.error().what + "; " + fit.error().hint, in);
   }
-  return solve_fitted(std::move(report), std::move(*fit), chosen, file_constants, options);
+  return solve_fitted(std::move(report), std::move(*fit), in);
 }
 
 }  // namespace
@@ -310,11 +315,8 @@ std::string_view to_string(SolveMethod method) {
 }
 
 Result<SolveMethod> parse_solve_method(std::string_view text) {
-  if (text == "ls") {
-    return SolveMethod::least_squares;
-  }
-  if (text == "ga") {
-    return SolveMethod::genetic;
+  if (text == "ls" || text == "ga") {
+    return text == "ga" ? SolveMethod::genetic : SolveMethod::least_squares;
   }
   return fail(ErrorCode::usage, fmt::format("unknown method '{}'", text), "", "use 'ls' or 'ga'");
 }
@@ -329,25 +331,22 @@ Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
                 "solve", "give local gravity in m/s2, or latitude and altitude");
   }
   for (const StillBlock& block : blocks) {
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      if (!std::isfinite(block.mean_g[a]) || !std::isfinite(block.mean_lsb[a]) ||
-          !std::isfinite(block.sd_lsb[a]) || !std::isfinite(block.ramp_variance_lsb2[a])) {
-        return fail(ErrorCode::bad_data, "a still block is not a finite number", "solve",
-                    "the recording is damaged");
-      }
+    if (!all_finite(block.mean_g, block.mean_lsb, block.sd_lsb, block.ramp_variance_lsb2)) {
+      return fail(ErrorCode::bad_data, "a still block is not a finite number", "solve",
+                  "the recording is damaged");
     }
   }
-  // By the paper's letter first; with the blocks that only sensor noise keeps from it where those
-  // do not suffice.
+  // The paper's criteria first. Where they leave too few blocks, also those that fail only by
+  // sensor noise.
   std::vector<StillBlock> paper;
   for (const StillBlock& block : blocks) {
     if (!block.noisy) {
       paper.push_back(block);
     }
   }
-  SIXPOINT_ASSIGN(SolveReport report, solve_chosen(paper, file_constants, options));
+  SIXPOINT_ASSIGN(SolveReport report, solve_input({paper, file_constants, options}));
   if (!report.usable() && paper.size() < blocks.size()) {
-    SIXPOINT_ASSIGN(report, solve_chosen(blocks, file_constants, options));
+    SIXPOINT_ASSIGN(report, solve_input({blocks, file_constants, options}));
     report.noisy_points = blocks.size() - paper.size();
     report.notes.push_back(fmt::format(
         "{} of {} still blocks exceed the paper's residual limit of 0.015 g by sensor noise alone "
@@ -367,111 +366,6 @@ std::string SolveReport::brief() const {
   return line;
 }
 
-Json to_json(const SolveReport& report) {
-  const auto maybe = [](const std::optional<double>& value) {
-    return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
-  };
-  Json json;
-  json["serial"] = report.serial;
-  json["filter"] = report.filter ? Json(to_string(*report.filter)) : Json(nullptr);
-  json["method"] = to_string(report.method);
-  if (report.calibration && report.stored) {
-    json["constants"] = to_json(*report.calibration, *report.stored);
-  } else if (report.calibration) {
-    json["constants"]["sensitivity_g_per_lsb"] = report.calibration->sensitivity_g_per_lsb;
-    json["constants"]["zero_lsb"] = report.calibration->zero_lsb;
-  } else {
-    json["constants"] = nullptr;
-  }
-  if (report.calibration) {
-    json["standard_uncertainty"] = to_json(report.uncertainty);
-    json["standard_uncertainty"]["of_the_data_alone"] = to_json(report.statistical);
-  } else {
-    json["standard_uncertainty"] = nullptr;
-  }
-  json["points"] = report.points;
-  json["points_found"] = report.points_found;
-  json["noisy_points"] = report.noisy_points;
-  if (report.points > 0) {
-    json["coverage_g"]["min"] = report.coverage.min_g;
-    json["coverage_g"]["max"] = report.coverage.max_g;
-    // Blocks at -1.3 .. -0.7, -0.7 .. 0.7 and 0.7 .. 1.3 g of each axis.
-    Json& subsets = json["coverage_g"]["value_subsets"];
-    for (const auto& [name, subset] :
-         {std::pair{"low", ValueSubset::low}, std::pair{"middle", ValueSubset::middle},
-          std::pair{"high", ValueSubset::high}}) {
-      for (std::size_t a = 0; a < kAxes; ++a) {
-        subsets[name].push_back(report.coverage.subset_blocks[a][static_cast<std::size_t>(subset)]);
-      }
-    }
-  } else {
-    json["coverage_g"]["min"] = nullptr;
-    json["coverage_g"]["max"] = nullptr;
-  }
-  json["residual_mg"]["before"] =
-      report.points > 0 ? Json(report.residual_before_mg) : Json(nullptr);
-  json["residual_mg"]["after"] = maybe(report.residual_after_mg);
-  json["residual_mg"]["rounded"] = maybe(report.residual_rounded_mg);
-  json["verified"] = report.verification.verified;
-  json["verdict"] = to_string(report.verification.verdict);
-  json["reasons"] = report.verification.reasons;
-  json["missing_directions"] = report.verification.missing_directions;
-  json["notes"] = report.notes;
-  json["iterations"] = report.iterations;
-  json["seconds"] = report.seconds;
-  json["gravity_m_per_s2"] = report.gravity_g * kStandardGravity_m_per_s2;
-  json["from_prior"] = report.from_prior;
-  json["verification"] = to_json(report.verification);
-  if (report.fit) {
-    const BlockFit& fit = *report.fit;
-    Json& least = json["least_squares"];
-    least["converged"] = fit.fit.converged;
-    least["condition"] = fit.fit.condition;
-    least["degrees_of_freedom"] = fit.fit.degrees_of_freedom;
-    least["blocks_left_out"] = fit.blocks_left_out;
-    least["block_sd_mg"] = fit.block_sd_mg;
-    least["structural_mg"] = fit.structural_mg;
-    if (fit.richer) {
-      Json& richer = json["richer_model"];
-      const LeastSquaresFit& more = fit.richer->fit;
-      richer["sensitivity_g_per_lsb"] = more.calibration.sensitivity_g_per_lsb;
-      richer["zero_lsb"] = more.calibration.zero_lsb;
-      richer["cross_axis"] = more.model.cross_axis ? Json(more.cross_axis) : Json(nullptr);
-      richer["zero_lsb_per_c"] = more.model.temperature ? Json(more.zero_lsb_per_c) : Json(nullptr);
-      richer["reference_temperature_c"] =
-          more.model.temperature ? Json(fit.reference_temperature_c) : Json(nullptr);
-      richer["held_out_rms_mg"] = fit.richer->held_out_rms_mg;
-    }
-  }
-  if (report.search) {
-    Json& search = json["genetic"];
-    search["settled"] = report.search->settled;
-    search["fitness_mg"] = report.search->fitness_mg;
-    search["level_mg"] = report.search->level_mg;
-    search["spread_mg"] = report.search->spread_mg;
-    search["trend_mg"] = report.search->trend_mg;
-    search["constants"]["sensitivity_g_per_lsb"] = report.search->calibration.sensitivity_g_per_lsb;
-    search["constants"]["zero_lsb"] = report.search->calibration.zero_lsb;
-  }
-  if (report.temperature) {
-    const TemperatureDrift& drift = *report.temperature;
-    Json& temperature = json["temperature"];
-    temperature["low_c"] = drift.low_c;
-    temperature["high_c"] = drift.high_c;
-    temperature["zero_mg_per_c"] = drift.zero_mg_per_c;
-    temperature["standard_uncertainty_mg_per_c"] = drift.standard_uncertainty_mg_per_c;
-    temperature["blocks"] = drift.blocks;
-  }
-  if (report.partial) {
-    Json& partial = json["partial"];
-    partial["zero_mg"] = report.partial->zero_mg;
-    partial["sensitivity_relative"] = report.partial->sensitivity_relative;
-    partial["zero_determined"] = report.partial->zero_determined;
-    partial["sensitivity_determined"] = report.partial->sensitivity_determined;
-  }
-  return json;
-}
-
 Result<ConstantsRecord> record_of(const SolveReport& report, UtcTime made_at,
                                   ConstantsOrigin made_from) {
   if (!report.calibration || !report.stored) {
@@ -480,7 +374,7 @@ Result<ConstantsRecord> record_of(const SolveReport& report, UtcTime made_at,
   }
   if (report.serial.empty() || !report.filter) {
     return fail(ErrorCode::bad_data, "the recording names no serial number or filter configuration",
-                report.serial, "constants belong to both and cannot be kept without");
+                report.serial, "constants belong to both and cannot be stored without");
   }
   ConstantsRecord record;
   record.serial = report.serial;

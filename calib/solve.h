@@ -1,7 +1,11 @@
 // From still blocks to constants with a verdict: the paper's methods 1 and 2.
 //
-//   auto report = solve_from_still_blocks(finder.finish(), reversal.calibration());
-//   if (report && report->usable()) { apply report->calibration; }
+//   SIXPOINT_ASSIGN(const SolveReport report, solve_from_still_blocks(blocks, file_constants));
+//   if (report.usable()) {
+//     const Calibration& constants = *report.calibration;
+//   } else {
+//     report.verification.missing_directions;  // what the recording lacks
+//   }
 //
 // A report is never invented: where the data do not suffice there are no constants in it, but what
 // is missing (missing_directions) and what is determined nevertheless (partial).
@@ -39,9 +43,8 @@ struct SolveOptions {
   // distribution about standard gravity.
   double gravity_g = 1.0;
   double gravity_sd_g = 0.0015;
-  VerificationLimits limits;
   // A documented prior over a model's constants (population_prior): partial data then give a
-  // posterior with an honest, wide uncertainty, which is never verified.
+  // posterior with a wide uncertainty, which is never verified.
   std::optional<CalibrationPrior> prior;
 };
 
@@ -75,7 +78,7 @@ struct SolveReport {
   std::optional<double> residual_after_mg;
   std::optional<double> residual_rounded_mg;  // with the nine integers
   Verification verification;
-  std::vector<std::string> notes;  // what a person should know besides the verdict
+  std::vector<std::string> notes;  // what matters for people besides the verdict
   std::optional<BlockFit> fit;
   std::optional<GeneticResult> search;
   std::optional<PartialKnowledge> partial;

@@ -9,10 +9,9 @@ namespace sixpoint::calib {
 
 namespace {
 
-struct Line {
-  double mean = 0;
-  double slope = 0;
-};
+constexpr double kNoiseSigmas = 5;  // see StillBlockOptions::noisy_sd_g
+
+using Line = StillBlockFinder::Line;
 
 // Sums of values and of values times the centred sample number. Both are exact: doubled centred
 // numbers and counts are integers below 2^53. Chunks keep the inner loops in 32 bits, where the
@@ -69,11 +68,9 @@ StillBlockFinder::StillBlockFinder(const Reversal& reversal, double rate_hz,
       options_(options),
       rate_hz_(rate_hz),
       block_samples_(static_cast<int>(std::lround(options.block_s * rate_hz))),
-      step_samples_(std::max(1, static_cast<int>(std::lround(options.step_s * rate_hz)))) {
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    // Stored counts are calibrated: g is the count over accel_scale, whatever the constants.
-    g_per_count_[a] = 1.0 / reversal.accel_scale_lsb_per_g();
-  }
+      step_samples_(std::max(1, static_cast<int>(std::lround(options.step_s * rate_hz)))),
+      // Stored counts are calibrated: g is the count over accel_scale, whatever the constants.
+      g_per_count_(1.0 / reversal.accel_scale_lsb_per_g()) {
   for (int i = 0; i < block_samples_; ++i) {
     const double centred = i - 0.5 * (block_samples_ - 1);
     centred_.push_back(static_cast<float>(centred));
@@ -153,83 +150,28 @@ void StillBlockFinder::search() {
 }
 
 bool StillBlockFinder::take_block(std::size_t begin) {
-  PerAxis<const std::int16_t*> values{};
+  Window window;
   for (std::size_t a = 0; a < kAxes; ++a) {
-    values[a] = run_[a].data() + begin;
+    window.values[a] = run_[a].data() + begin;
   }
-  PerAxis<Line> lines;
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    lines[a] = fit_line(values[a], block_samples_, sum_square_index_);
-    if (std::abs(lines[a].slope) * g_per_count_[a] >= options_.max_slope_g_per_sample) {
+  if (!fit_lines(window)) {
+    return false;
+  }
+  StillBlock block = measure(window);
+  if (!window.within_paper) {
+    if (!is_noise(window)) {
       return false;
-    }
-  }
-  bool within_paper = true;
-  const double widest = std::max(options_.max_residual_g, 5 * options_.noisy_sd_g);
-  PerAxis<double> largest{};
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    largest[a] = g_per_count_[a] *
-                 static_cast<double>(largest_residual(values[a], centred_.data(), block_samples_,
-                                                      static_cast<float>(lines[a].mean),
-                                                      static_cast<float>(lines[a].slope)));
-    within_paper = within_paper && largest[a] < options_.max_residual_g;
-    if (!within_paper && (options_.noisy_sd_g <= 0 || largest[a] >= widest)) {
-      return false;
-    }
-  }
-
-  const auto size = static_cast<std::size_t>(block_samples_);
-  bool zeros = false;
-  bool clipped = false;
-  for (std::size_t i = 0; i < size; ++i) {
-    const bool x = values[0][i] == 0;
-    const bool y = values[1][i] == 0;
-    const bool z = values[2][i] == 0;
-    zeros = zeros || (options_.strict_nonzero ? (x || y || z) : (x && y && z));
-    clipped = clipped || reversal_->clipped(values[0][i]) || reversal_->clipped(values[1][i]) ||
-              reversal_->clipped(values[2][i]);
-  }
-
-  StillBlock block;
-  PerAxis<double> sd_g{};
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    double sum_raw = 0;
-    double square = 0;
-    for (std::size_t i = 0; i < size; ++i) {
-      sum_raw += reversal_->raw_lsb(a, values[a][i]);
-      const double residual =
-          values[a][i] - (lines[a].mean + lines[a].slope * static_cast<double>(centred_[i]));
-      square += residual * residual;
-    }
-    const double sd = std::sqrt(square / (block_samples_ - 2));
-    sd_g[a] = sd * g_per_count_[a];
-    const double raw_per_count =
-        g_per_count_[a] / reversal_->calibration().sensitivity_g_per_lsb[a];
-    block.mean_g[a] = lines[a].mean * g_per_count_[a];
-    block.mean_lsb[a] = sum_raw / block_samples_;
-    block.sd_lsb[a] = sd * raw_per_count;
-    const double slope_lsb = lines[a].slope * raw_per_count;
-    block.ramp_variance_lsb2[a] = slope_lsb * slope_lsb * sum_square_index_ / block_samples_;
-  }
-  if (!within_paper) {
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      // Noise and nothing else: as small as a sensor's, and no sample far out of it.
-      if (sd_g[a] >= options_.noisy_sd_g ||
-          (largest[a] >= options_.max_residual_g && largest[a] >= 5 * sd_g[a])) {
-        return false;
-      }
     }
     block.noisy = true;
   }
-  if (zeros) {
+  if (has_zeros(window)) {
     ++tally_.rejected_zero;
     return false;
   }
-  if (clipped) {
+  if (has_clipped(window)) {
     ++tally_.rejected_clipped;
     return false;
   }
-
   const auto after =
       std::upper_bound(marks_.begin(), marks_.end(), begin,
                        [](std::size_t index, const Mark& mark) { return index < mark.index; });
@@ -240,6 +182,84 @@ bool StillBlockFinder::take_block(std::size_t begin) {
   block.temperature_c = temperature_c_;
   keep(block);
   return true;
+}
+
+// Criteria 1 and 2. False where the window cannot be a block, noisy or not.
+bool StillBlockFinder::fit_lines(Window& window) const {
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    window.lines[a] = fit_line(window.values[a], block_samples_, sum_square_index_);
+    if (std::abs(window.lines[a].slope) * g_per_count_ >= options_.max_slope_g_per_sample) {
+      return false;
+    }
+  }
+  const double widest = std::max(options_.max_residual_g, kNoiseSigmas * options_.noisy_sd_g);
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const double largest_g = g_per_count_ * static_cast<double>(largest_residual(
+                                                window.values[a], centred_.data(), block_samples_,
+                                                static_cast<float>(window.lines[a].mean),
+                                                static_cast<float>(window.lines[a].slope)));
+    window.largest_g[a] = largest_g;
+    window.within_paper = window.within_paper && largest_g < options_.max_residual_g;
+    if (!window.within_paper && (options_.noisy_sd_g <= 0 || largest_g >= widest)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+StillBlock StillBlockFinder::measure(Window& window) const {
+  StillBlock block;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const Line& line = window.lines[a];
+    double sum_raw = 0;
+    double square = 0;
+    for (std::size_t i = 0; i < centred_.size(); ++i) {
+      sum_raw += reversal_->raw_lsb(a, window.values[a][i]);
+      const double residual =
+          window.values[a][i] - (line.mean + line.slope * static_cast<double>(centred_[i]));
+      square += residual * residual;
+    }
+    const double sd = std::sqrt(square / (block_samples_ - 2));
+    window.sd_g[a] = sd * g_per_count_;
+    const double raw_per_count = g_per_count_ / reversal_->calibration().sensitivity_g_per_lsb[a];
+    block.mean_g[a] = line.mean * g_per_count_;
+    block.mean_lsb[a] = sum_raw / block_samples_;
+    block.sd_lsb[a] = sd * raw_per_count;
+    const double slope_lsb = line.slope * raw_per_count;
+    block.ramp_variance_lsb2[a] = slope_lsb * slope_lsb * sum_square_index_ / block_samples_;
+  }
+  return block;
+}
+
+// Noise and nothing else: as small as a sensor's, and no sample far out of it.
+bool StillBlockFinder::is_noise(const Window& window) const {
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    if (window.sd_g[a] >= options_.noisy_sd_g ||
+        (window.largest_g[a] >= options_.max_residual_g &&
+         window.largest_g[a] >= kNoiseSigmas * window.sd_g[a])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Criterion 3.
+bool StillBlockFinder::has_zeros(const Window& window) const {
+  const auto& [x, y, z] = window.values;
+  for (std::size_t i = 0; i < centred_.size(); ++i) {
+    if (options_.strict_nonzero ? x[i] == 0 || y[i] == 0 || z[i] == 0
+                                : x[i] == 0 && y[i] == 0 && z[i] == 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool StillBlockFinder::has_clipped(const Window& window) const {
+  return std::ranges::any_of(window.values, [&](const std::int16_t* values) {
+    return std::any_of(values, values + block_samples_,
+                       [&](std::int16_t value) { return reversal_->clipped(value); });
+  });
 }
 
 void StillBlockFinder::keep(StillBlock block) {

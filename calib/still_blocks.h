@@ -1,12 +1,15 @@
-// Still blocks: the stretches in which a sensor feels gravity and nothing else.
+// Still blocks: the stretches in which a sensor measures gravity and nothing else.
 //
-// A legitimate block is "any 4-second long block of data" (paper, Step 2) in which, on calibrated
-// g, the linear regression of every axis has a slope below 0.0005 g per sample, no sample lies
-// 0.015 g or more from its line, and the unit was not charging. The finder reads a run of gapless
-// samples once, in order. A block starts at the first sample where one fits and not on a fixed
-// grid of 4 s: a stretch of 7.9 s then always gives a block, a grid only sometimes. After a block
-// the search goes on behind it, so blocks never overlap and stay independent of each other; after a
-// failure it goes on half a second later (StillBlockOptions::step_s).
+//   SIXPOINT_ASSIGN(auto finder, StillBlockFinder::make(reversal, 30.0));
+//   finder.push(start_time_s, counts);  // again and again; break_run() at every gap
+//   const std::vector<StillBlock> blocks = finder.finish();
+//
+// A block is "any 4-second long block of data" (paper, Step 2) in which, on calibrated g, the
+// linear regression of every axis has a slope below 0.0005 g per sample, no sample lies 0.015 g or
+// more from its line, and the unit was not charging. A block starts at the first sample where one
+// fits and not on a fixed grid of 4 s: a stretch of 7.9 s then always gives a block, a grid only
+// sometimes. After a block the search goes on behind it, so blocks never overlap and stay
+// independent; after a failure it goes on half a second later (StillBlockOptions::step_s).
 #pragma once
 
 #include <cstddef>
@@ -36,15 +39,19 @@ struct StillBlockOptions {
   // The residual limit is three standard deviations of a sensor with 5 mg of noise, and a block of
   // 400 samples on three axes nearly always has one sample beyond that: at 100 Hz the letter of
   // criterion 2 refuses a noisy sensor lying on a rock. With this set, a block that fails only
-  // criterion 2 is kept and marked `noisy` when its residuals look like noise: standard deviation
-  // below this, largest below 5 of them. Solvers take noisy blocks only where the others do not
-  // suffice, and say so. 0 switches it off. 7 mg is the ADXL362's datasheet noise of its worst axis
-  // (920 ug/sqrt(Hz)) in 50 Hz.
+  // criterion 2 is taken and marked `noisy` when its residuals are those of noise: standard
+  // deviation below this, largest below 5 of them. Solvers take noisy blocks only where the others
+  // do not suffice, and say so. 0 switches it off. 7 mg is the ADXL362's datasheet noise of its
+  // worst axis (920 ug/sqrt(Hz)) in 50 Hz.
   double noisy_sd_g = 0.007;
-  // Upper bound of memory: beyond it every second block is forgotten and from then on only every
-  // second one kept (and so on). 250,000 blocks are eleven days of uninterrupted stillness.
+  // Upper bound of memory: beyond it every second block is dropped and from then on only every
+  // second one is taken (and so on). 250,000 blocks are eleven days of uninterrupted stillness.
   std::size_t max_blocks = 250'000;
 };
+
+// A jump of more than this on any axis from one block to the next: the unit was moved. Under a
+// chamber's fan (40 mg) means of 4 s scatter by 3.5 mg; 4 s of warming make 0.02 mg.
+inline constexpr double kMoved_g = 0.015;
 
 struct StillBlock {
   double start_time_s = 0;
@@ -57,18 +64,18 @@ struct StillBlock {
   // variance of the regression line over the block, raw counts squared.
   PerAxis<double> ramp_variance_lsb2{};
   std::optional<double> temperature_c;
-  bool noisy = false;  // fails criterion 2 of the paper, kept by StillBlockOptions::noisy_sd_g
+  bool noisy = false;  // fails criterion 2 of the paper, taken by StillBlockOptions::noisy_sd_g
 };
 
 // What the finder met, for reports.
 struct StillBlockTally {
   std::uint64_t samples = 0;
   std::uint64_t runs = 0;
-  std::uint64_t blocks = 0;            // found, whether or not still kept
+  std::uint64_t blocks = 0;            // found, dropped ones included
   std::uint64_t noisy_blocks = 0;      // of these
   std::uint64_t rejected_zero = 0;     // windows that failed for all-zero (or strict) samples only
   std::uint64_t rejected_clipped = 0;  // still windows with a sample at the record's limit
-  std::uint64_t thinned = 1;           // only every so many-th block is kept
+  std::uint64_t thinned = 1;           // one block in so many is stored
   PlausibilityTally plausibility;      // of all samples pushed
 };
 
@@ -97,10 +104,29 @@ class StillBlockFinder {
   const StillBlockTally& tally() const { return tally_; }
   int samples_per_block() const { return block_samples_; }
 
+  // The regression line of one axis over a window, in counts.
+  struct Line {
+    double mean = 0;
+    double slope = 0;  // per sample
+  };
+
  private:
+  // A candidate for a block, and what is found out about it.
+  struct Window {
+    PerAxis<const std::int16_t*> values{};
+    PerAxis<Line> lines;
+    PerAxis<double> largest_g{};  // residual
+    PerAxis<double> sd_g{};
+    bool within_paper = true;
+  };
   StillBlockFinder(const Reversal& reversal, double rate_hz, const StillBlockOptions& options);
   void search();
   bool take_block(std::size_t begin);
+  bool fit_lines(Window& window) const;
+  StillBlock measure(Window& window) const;
+  bool is_noise(const Window& window) const;
+  bool has_zeros(const Window& window) const;
+  bool has_clipped(const Window& window) const;
   void keep(StillBlock block);
 
   const Reversal* reversal_;
@@ -108,7 +134,7 @@ class StillBlockFinder {
   double rate_hz_;
   int block_samples_;
   int step_samples_;
-  PerAxis<double> g_per_count_{};
+  double g_per_count_;
   PerAxis<std::vector<std::int16_t>> run_;  // the samples of the run that are not yet behind us
   std::size_t next_ = 0;                    // where the next window starts in run_
   struct Mark {

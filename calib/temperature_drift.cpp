@@ -9,6 +9,9 @@ namespace sixpoint::calib {
 
 namespace {
 
+// The least range of a stretch that counts: over less, settling and creep look like drift.
+constexpr double kLeastRange_c = 3;
+
 // Means over one degree of one stretch.
 struct Degree {
   double temperature_c = 0;
@@ -50,8 +53,7 @@ struct Sums {
 }  // namespace
 
 std::optional<TemperatureDrift> temperature_drift(std::span<const StillBlock> blocks,
-                                                  const Calibration& calibration,
-                                                  const TemperatureDriftOptions& options) {
+                                                  const Calibration& calibration) {
   TemperatureDrift out;
   Sums sums;
   const auto add = [&](std::span<const StillBlock> stretch) {
@@ -60,7 +62,7 @@ std::optional<TemperatureDrift> temperature_drift(std::span<const StillBlock> bl
     }
     const auto degrees = degrees_of(stretch, calibration);
     if (degrees.size() < 3 ||
-        degrees.back().temperature_c - degrees.front().temperature_c < options.least_range_c) {
+        degrees.back().temperature_c - degrees.front().temperature_c < kLeastRange_c) {
       return;
     }
     Degree mean;
@@ -102,7 +104,7 @@ std::optional<TemperatureDrift> temperature_drift(std::span<const StillBlock> bl
     for (std::size_t a = 0; a < kAxes && i > begin; ++a) {
       const double jump_g = calibration.sensitivity_g_per_lsb[a] *
                             (blocks[i].mean_lsb[a] - blocks[i - 1].mean_lsb[a]);
-      moved = moved || !(std::abs(jump_g) <= options.moved_g);
+      moved = moved || !(std::abs(jump_g) <= kMoved_g);
     }
     if (moved) {
       add(blocks.subspan(begin, i - begin));

@@ -6,6 +6,9 @@
 #include <map>
 #include <vector>
 
+#include "calib/least_squares.h"
+#include "calib/still_blocks.h"
+
 namespace sixpoint::calib {
 
 namespace {
@@ -81,8 +84,8 @@ std::optional<Visit> visit_of(std::span<const DriftPoint> points, Scatter& scatt
   return visit;
 }
 
-// Variance of one block's magnitude, widened as usual for first order autocorrelation: a slow sway
-// makes neighbours alike and a trend out of nothing.
+// Variance of one block's magnitude, increased as usual for first order autocorrelation: a slow
+// movement makes neighbouring blocks similar, and looks like a trend.
 double block_variance_g2(const Scatter& scatter, const ZeroDriftOptions& options) {
   const double alike =
       scatter.left_g2 > 0 ? std::clamp(scatter.neighbours_g2 / scatter.left_g2, 0.0, 0.9) : 0;
@@ -92,12 +95,12 @@ double block_variance_g2(const Scatter& scatter, const ZeroDriftOptions& options
   return variance * (1 + alike) / (1 - alike) + 1e-14;
 }
 
-// What the axes that lie level say of the rates, as information and its product with the rates (g
-// and s). They see a drift as well as upright ones, and there are four of them to two; but a unit
-// that leans sinks a little, and what a drift makes in a minute is a hundredth of a degree. So how
-// their slopes scatter about a common rate is the yardstick, widened as F of 3 and n - 3 degrees of
-// freedom is wider than chi-square at one in 1000 (to 3 % between 9 and 100). They are asked
-// whether there is a drift and nothing else.
+// What the level axes say of the rates, as information and its product with the rates (g and s).
+// They measure a drift as well as upright axes, and there are four of them to two. But a unit that
+// leans sinks a little, and what a drift makes in a minute is a hundredth of a degree. So their
+// slopes are compared with how they scatter about a common rate, increased as F of 3 and n - 3
+// degrees of freedom is wider than chi-square at one in 1000 (to 3 % between 9 and 100). They
+// decide whether there is a drift and nothing else.
 struct Level {
   Eigen::Vector3d information = Eigen::Vector3d::Zero();
   Eigen::Vector3d product = Eigen::Vector3d::Zero();
@@ -131,7 +134,8 @@ Level level_axes(std::span<const Visit> visits, const ZeroDriftOptions& options)
   return out;
 }
 
-// d|q| by each parameter; for a constant, by what it is too small.
+// Slope of a visit's error in each parameter. For a constant, the parameter is how much it is too
+// small.
 Row row_of(const Visit& visit, double middle_s, double half_s) {
   const PerAxis<double>& n = visit.direction;
   Row row;
@@ -143,22 +147,114 @@ Row row_of(const Visit& visit, double middle_s, double half_s) {
   return row;
 }
 
-// The largest variance over a grid of directions, as LeastSquaresFit::worst_direction_mg() has it.
-double worst_sd_mg(const Head& covariance) {
-  double worst = 0;
-  for (int x = -2; x <= 2; ++x) {
-    for (int y = -2; y <= 2; ++y) {
-      for (int z = -2; z <= 2; ++z) {
-        if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != 2) {
-          continue;
-        }
-        Eigen::Matrix<double, 3, 1> n(x, y, z);
-        n.normalize();
-        Eigen::Matrix<double, kConstants, 1> pull;
-        pull << n[0] * n[0], n[1] * n[1], n[2] * n[2], -n[0], -n[1], -n[2];
-        worst = std::max(worst, pull.dot(covariance * pull));
+// The stays on the sides, in order of time.
+struct Visits {
+  std::vector<Visit> list;
+  double middle_s = 0;  // mean time of the blocks
+  double at_rest_s = 0;
+  double block_g2 = 0;  // variance of one block's magnitude
+};
+
+Visits visits_of(std::span<const DriftPoint> points, const ZeroDriftOptions& options) {
+  Visits out;
+  Scatter scatter;
+  const auto end_visit = [&](std::span<const DriftPoint> visit) {
+    if (const auto made = visit_of(visit, scatter)) {
+      out.list.push_back(*made);
+      out.middle_s += made->time_s * made->blocks;
+      out.at_rest_s += visit.back().time_s - visit.front().time_s;
+    }
+  };
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    bool moved = false;
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      moved = moved || !(std::abs(points[i].mean_g[a] - points[i - 1].mean_g[a]) <= kMoved_g);
+    }
+    if (moved) {
+      end_visit(points.subspan(begin, i - begin));
+      begin = i;
+    }
+  }
+  end_visit(points.subspan(begin));
+  out.middle_s /= static_cast<double>(points.size());
+  out.block_g2 = block_variance_g2(scatter, options);
+  return out;
+}
+
+// Between visits, those of one direction sharing its misfit (Woodbury), and along each visit, which
+// holds information on the rates alone.
+struct Information {
+  Matrix between = Matrix::Zero();
+  Row pull = Row::Zero();
+  Matrix along = Matrix::Zero();
+  Row along_pull = Row::Zero();
+};
+
+Information information_of(const Visits& visits, double half_s, const ZeroDriftOptions& options) {
+  struct Shared {
+    Row row = Row::Zero();
+    double error = 0;
+    double weight = 0;
+  };
+  Information out;
+  std::map<int, Shared> directions;
+  const double visit_g2 = options.visit_sd_g * options.visit_sd_g;
+  for (const Visit& visit : visits.list) {
+    const Row row = row_of(visit, visits.middle_s, half_s);
+    const double weight = 1 / (visits.block_g2 / visit.blocks + visit_g2);
+    out.between += weight * row * row.transpose();
+    out.pull += weight * visit.error_g * row;
+    Shared& shared = directions[visit.neighbourhood];
+    shared.row += weight * row;
+    shared.error += weight * visit.error_g;
+    shared.weight += weight;
+    for (int a = 0; a < 3; ++a) {
+      const double n_a = visit.direction[static_cast<std::size_t>(a)];
+      out.along_pull[kRates + a] += n_a * visit.product / half_s / visits.block_g2;
+      for (int b = 0; b < 3; ++b) {
+        out.along(kRates + a, kRates + b) += n_a * visit.direction[static_cast<std::size_t>(b)] *
+                                             visit.square_s2 / (half_s * half_s) / visits.block_g2;
       }
     }
+  }
+  const double misfit_g2 = options.misfit_sd_g * options.misfit_sd_g;
+  for (const auto& [number, shared] : directions) {
+    const double share = misfit_g2 / (1 + misfit_g2 * shared.weight);
+    out.between -= share * shared.row * shared.row.transpose();
+    out.pull -= share * shared.error * shared.row;
+  }
+  constexpr double kSensorRange = 0.2;  // of sensitivity, and g of zero
+  for (int i = 0; i < kParameters; ++i) {
+    const double sd =
+        i < kConstants ? kSensorRange
+        : i < kRates
+            ? std::max(1e-6, options.cross_axis_sd[static_cast<std::size_t>(i - kConstants)])
+            : options.rate_sd_g;
+    out.between(i, i) += 1 / (sd * sd);
+  }
+  return out;
+}
+
+// Against no drift: without the rates' prior, and with the level axes. A rate without any data
+// keeps a little of the prior's information, so that all of them can be divided by.
+double chi2_of(const Eigen::Matrix3d& rates, const Eigen::Vector3d& rate, const Level& level,
+               double half_s_inverse, const ZeroDriftOptions& options) {
+  const double prior = 1 / (options.rate_sd_g * options.rate_sd_g);
+  Eigen::Matrix3d information = rates.inverse();
+  const Eigen::Vector3d product = information * rate + level.product * half_s_inverse;
+  information.diagonal().array() -= 0.99 * prior;
+  information.diagonal() += level.information * (half_s_inverse * half_s_inverse);
+  return product.dot(information.ldlt().solve(product));
+}
+
+// Standard deviation of the magnitude in the direction where it is largest.
+double worst_sd_mg(const Head& covariance) {
+  double worst = 0;
+  for (const PerAxis<double>& n : sphere_grid()) {
+    Eigen::Matrix<double, kConstants, 1> slope;
+    slope << n[0] * n[0], n[1] * n[1], n[2] * n[2], -n[0], -n[1], -n[2];
+    worst = std::max(worst, slope.dot(covariance * slope));
   }
   return kMgPerG * std::sqrt(worst);
 }
@@ -216,91 +312,20 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
   if (!(out.span_s > 0 && out.span_s <= options.most_span_s)) {
     return std::nullopt;
   }
-  Scatter scatter;
-  std::vector<Visit> visits;
-  double middle_s = 0;
-  const auto end_visit = [&](std::span<const DriftPoint> visit) {
-    if (const auto made = visit_of(visit, scatter)) {
-      visits.push_back(*made);
-      middle_s += made->time_s * made->blocks;
-      out.at_rest_s += visit.back().time_s - visit.front().time_s;
-    }
-  };
-  std::size_t begin = 0;
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    bool moved = false;
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      moved =
-          moved || !(std::abs(points[i].mean_g[a] - points[i - 1].mean_g[a]) <= options.moved_g);
-    }
-    if (moved) {
-      end_visit(points.subspan(begin, i - begin));
-      begin = i;
-    }
-  }
-  end_visit(points.subspan(begin));
-  out.visits = static_cast<int>(visits.size());
-  if (visits.size() < 2) {
+  const Visits visits = visits_of(points, options);
+  out.at_rest_s = visits.at_rest_s;
+  out.visits = static_cast<int>(visits.list.size());
+  if (out.visits < 2) {
     return std::nullopt;
   }
-  middle_s /= static_cast<double>(points.size());
   const double half_s = out.span_s / 2;
-  const double half_s_inverse = 1 / half_s;
-  const double block_g2 = block_variance_g2(scatter, options);
-  const double visit_g2 = options.visit_sd_g * options.visit_sd_g;
-
-  // Information: between visits, those of one direction sharing its misfit (Woodbury), and along
-  // each visit, which tells of the rates alone. Zero is to be small in all of it but for what a
-  // real sensor has.
-  Matrix information = Matrix::Zero();
-  Row pull = Row::Zero();
-  struct Shared {
-    Row row = Row::Zero();
-    double error = 0;
-    double weight = 0;
-  };
-  std::map<int, Shared> directions;
-  Matrix along = Matrix::Zero();
-  Row along_pull = Row::Zero();
-  for (const Visit& visit : visits) {
-    const Row row = row_of(visit, middle_s, half_s);
-    const double weight = 1 / (block_g2 / visit.blocks + visit_g2);
-    information += weight * row * row.transpose();
-    pull += weight * visit.error_g * row;
-    Shared& shared = directions[visit.neighbourhood];
-    shared.row += weight * row;
-    shared.error += weight * visit.error_g;
-    shared.weight += weight;
-    for (int a = 0; a < 3; ++a) {
-      const double n_a = visit.direction[static_cast<std::size_t>(a)];
-      along_pull[kRates + a] += n_a * visit.product / half_s / block_g2;
-      for (int b = 0; b < 3; ++b) {
-        along(kRates + a, kRates + b) += n_a * visit.direction[static_cast<std::size_t>(b)] *
-                                         visit.square_s2 / (half_s * half_s) / block_g2;
-      }
-    }
-  }
-  const double misfit_g2 = options.misfit_sd_g * options.misfit_sd_g;
-  for (const auto& [number, shared] : directions) {
-    const double share = misfit_g2 / (1 + misfit_g2 * shared.weight);
-    information -= share * shared.row * shared.row.transpose();
-    pull -= share * shared.error * shared.row;
-  }
-  constexpr double kSensorRange = 0.2;  // of sensitivity, and g of zero
-  for (int i = 0; i < kParameters; ++i) {
-    const double sd =
-        i < kConstants ? kSensorRange
-        : i < kRates
-            ? std::max(1e-6, options.cross_axis_sd[static_cast<std::size_t>(i - kConstants)])
-            : options.rate_sd_g;
-    information(i, i) += 1 / (sd * sd);
-  }
-  const Matrix with = (information + along).ldlt().solve(Matrix::Identity());
+  const Information information = information_of(visits, half_s, options);
+  const Matrix with = (information.between + information.along).ldlt().solve(Matrix::Identity());
   const Eigen::Matrix<double, kRates, kRates> without =
-      information.topLeftCorner<kRates, kRates>().ldlt().solve(
+      information.between.topLeftCorner<kRates, kRates>().ldlt().solve(
           Eigen::Matrix<double, kRates, kRates>::Identity());
-  const Row moved = with * (pull + along_pull);
-  const Eigen::Matrix<double, kRates, 1> still = without * pull.head<kRates>();
+  const Row moved = with * (information.pull + information.along_pull);
+  const Eigen::Matrix<double, kRates, 1> still = without * information.pull.head<kRates>();
   if (!with.allFinite() || !without.allFinite() || !moved.allFinite() || !still.allFinite()) {
     return std::nullopt;
   }
@@ -313,17 +338,9 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
           hidden(i, j);
     }
   }
-  // Against no drift: without the rates' prior, and with the level axes. Rates that nothing tells
-  // of keep a little of the prior's information, so that all of them can be divided by.
   const Eigen::Matrix3d rates = with.bottomRightCorner<3, 3>();
   const Eigen::Vector3d rate = moved.tail<3>();
-  const Level level = level_axes(visits, options);
-  const double prior = 1 / (options.rate_sd_g * options.rate_sd_g);
-  Eigen::Matrix3d told = rates.inverse();
-  const Eigen::Vector3d product = told * rate + level.product * half_s_inverse;
-  told.diagonal().array() -= 0.99 * prior;
-  told.diagonal() += level.information * (half_s_inverse * half_s_inverse);
-  out.chi2 = product.dot(told.ldlt().solve(product));
+  out.chi2 = chi2_of(rates, rate, level_axes(visits.list, options), 1 / half_s, options);
   out.shown = out.chi2 > options.least_chi2;
   for (std::size_t a = 0; a < kAxes; ++a) {
     const auto i = static_cast<Eigen::Index>(a);

@@ -1,18 +1,22 @@
-// Zeros that drift with time: what a file says about them, and what it cannot say.
+// Zeros that drift with time: what a file shows of them, and what it cannot show.
 //
-// A calibration file of six sides laid one after another has no residual: when the unit warms up
-// meanwhile, each side is met by another zero, and the constants take that for sensitivity and
-// zero. Two things give it away. The magnitude of a side that is at rest has a trend; and a side
-// that is met again later has another magnitude. Both are put to one straight line per axis:
+//   if (const auto drift = zero_drift(points)) {
+//     const double hidden_mg = drift->allowance_mg();
+//   }
+//
+// A calibration file of six sides laid one after another has no residual. When the unit warms up
+// meanwhile, each side is measured with another zero, and the fit takes that for sensitivity and
+// zero. Two things show a drift: the magnitude of a side at rest has a trend, and a side that is
+// measured again later has another magnitude. Both are fitted with one straight line per axis:
 //
 //     error(block) = n_a^2 gain_a - n_a zero_a + cross-axis + misfit(direction)
 //                  + n_a rate_a (time - middle of the file)
 //
 // with n the direction, by least squares with and without the rates. What the rates add to the
-// covariance of the constants is what a drift could have done to them without being seen; how far
-// they move the constants is what it seems to have done. A file with its sides at rest for a tenth
-// of its time cannot tell a slow drift from constants whatever is computed: the uncertainty then
-// says so, and going round the sides a second time is the cure.
+// covariance of the constants is what a drift could have done to them without being shown; how far
+// they move the constants is the best estimate of what it did. A file whose sides were at rest for
+// a tenth of its time cannot separate a slow drift from constants. Its uncertainty is large then,
+// and the remedy is to go round the sides a second time.
 #pragma once
 
 #include <array>
@@ -24,31 +28,28 @@
 namespace sixpoint::calib {
 
 struct ZeroDriftOptions {
-  // A jump of more than this on any axis from one block to the next: another visit (as in
-  // TemperatureDriftOptions).
-  double moved_g = 0.015;
   // A unit that comes from the cold takes the room's temperature within an hour. What drifts over
   // the days of a wear follows no straight line, and there each direction is met at all hours.
-  double most_span_s = 3 * 3600.0;
+  static constexpr double most_span_s = 3 * 3600.0;
   // All three axes together, chi-square of 3 degrees of freedom: one good file in 1000. 20 C at 0.5
   // mg/C make several times as much.
-  double least_chi2 = 16.3;
+  static constexpr double least_chi2 = 16.3;
   // The same of the level axes, for visits of so many blocks (20 s), and where their slopes are
   // enough to show how they scatter.
-  double level_blocks = 5;
-  double least_level_freedom = 9;
+  static constexpr double level_blocks = 5;
+  static constexpr double least_level_freedom = 9;
   // Fewer blocks beyond what the lines take say too little about their own scatter; it is at least
   // `block_sd_g` then.
-  double least_freedom = 20;
+  static constexpr double least_freedom = 20;
   double block_sd_g = 5e-4;
   // What the six constants leave in a direction, and what they leave of it from one visit to the
   // next (hysteresis, seating: 0.8 mg in the list of effects).
   double misfit_sd_g = 1.5e-3;
-  double visit_sd_g = 5e-4;
+  static constexpr double visit_sd_g = 5e-4;
   PerAxis<double> cross_axis_sd = {0.024, 0.005, 0.005};  // as in BlockFitOptions
   // Before the data: 20 C at the ADXL362's 0.5 mg/C, either way, and twice that. From the middle of
   // the file to its end.
-  double rate_sd_g = 0.010;
+  static constexpr double rate_sd_g = 0.010;
 };
 
 struct DriftPoint {

@@ -5,13 +5,15 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
-#include "repair/archive_merge.h"
-#include "repair/archive_plan.h"
-#include "repair/archive_run.h"
-#include "repair/archive_scripts.h"
-#include "station/cli/command.h"
-#include "station/cli/repair_answer.h"
-#include "station/cli/store_option.h"
+#include "cli/command.h"
+#include "cli/repair_answer.h"
+#include "cli/store_option.h"
+#include "repair/archive/archive_merge.h"
+#include "repair/archive/archive_plan.h"
+#include "repair/archive/archive_run.h"
+#include "repair/archive/archive_scripts.h"
+#include "repair/archive/plan_folder.h"
+#include "station/records/software.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -26,40 +28,20 @@ using repair::ShardResult;
 
 constexpr std::size_t kLinksShown = 10;
 
-struct PlanOptions {
+// Of all subcommands, because only one of them runs.
+struct Options {
   std::vector<std::string> paths;
-  std::string folder;
-  std::string constants;
-  std::string store;
-  std::string calibration_file;
-  bool scan = false;
-  bool dry_run = false;
-  bool json = false;
-  ArchiveDraft draft;
-};
-
-struct RunOptions {
-  std::string plan;
-  std::string output;
+  std::string plan;    // the folder of the plan
+  std::string output;  // plan: its folder; run: the folder for repaired files
+  RepairSources sources;
+  ArchiveDraft draft;  // as far as the options describe it
   std::size_t shard = 0;
-  bool dry_run = false;
-  bool json = false;
-};
-
-struct MergeOptions {
-  std::string plan;
-  std::string store;
   bool verify = false;
   bool dry_run = false;
   bool json = false;
 };
 
-struct StatusOptions {
-  std::string plan;
-  bool json = false;
-};
-
-// Tasks run in other folders. ".." stays: behind a link it is not what it looks like.
+// Tasks run in other folders. ".." stays: after a link it leads elsewhere than the path says.
 std::string absolute(const std::string& path) {
   std::error_code error;
   const std::filesystem::path whole = std::filesystem::absolute(path, error);
@@ -74,13 +56,19 @@ std::string absolute(const std::string& path) {
   return text;
 }
 
-std::string this_program() {
-  std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  return error ? "sixpoint" : program.string();
+// A progress bar that appears with the library's first call.
+std::function<void(std::size_t, std::size_t)> show_in(std::optional<Progress>& progress,
+                                                      Context& context, std::string doing) {
+  return [&progress, &context, doing = std::move(doing)](std::size_t done, std::size_t files) {
+    if (!progress) {
+      progress.emplace(context, doing, files);
+    }
+    progress->at(done);
+  };
 }
 
-// A JSON document whose list of files may be longer than memory.
+// The answer with its list of files, which may be longer than memory: each file is written as it
+// comes, as JSON or as lines for people.
 class FileStream {
  public:
   FileStream(Context& context, bool json) : context_(context), json_(json) {
@@ -90,8 +78,7 @@ class FileStream {
   }
   void add(const Json& file) {
     if (json_) {
-      context_.out << (first_ ? "\n" : ",\n")
-                   << file.dump(-1, ' ', false, Json::error_handler_t::replace);
+      context_.out << (first_ ? "\n" : ",\n") << text_of(file);
       first_ = false;
     }
   }
@@ -109,13 +96,15 @@ class FileStream {
     }
     context_.out << "\n]";
     for (const auto& [key, value] : rest.items()) {
-      context_.out << ",\n\"" << key
-                   << "\": " << value.dump(-1, ' ', false, Json::error_handler_t::replace);
+      context_.out << ",\n\"" << key << "\": " << text_of(value);
     }
     context_.out << "\n}\n";
   }
 
  private:
+  static std::string text_of(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  }
   Context& context_;
   bool json_;
   bool first_ = true;
@@ -123,30 +112,27 @@ class FileStream {
 
 // --- plan
 
-Status gather_constants(PlanOptions& options, Context& context,
+Status gather_constants(const RepairSources& sources, Context& context, ArchiveDraft& draft,
                         std::optional<repair::ConstantsSnapshot>& snapshot) {
-  ArchiveDraft& draft = options.draft;
-  if (!options.constants.empty()) {
-    SIXPOINT_ASSIGN(draft.repair.given, read_constants(context.env.files, options.constants));
+  if (!sources.constants.empty()) {
+    SIXPOINT_ASSIGN(draft.repair.given, read_constants(context.env.files, sources.constants));
   }
-  // The same choice as repair's.
-  const bool only_scan = options.scan && options.store.empty() && options.calibration_file.empty();
-  if (!options.store.empty() || (!only_scan && store_exists(context, ""))) {
-    SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-    SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(store));
-    const std::string place = store.database().location();
+  SIXPOINT_ASSIGN(auto store, store_of(context, sources));
+  if (store) {
+    SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(*store));
+    const std::string place = store->database().location();
     draft.store = place.find("://") == std::string::npos ? absolute(place) : place;
     draft.snapshot = &*snapshot;
   }
-  if (!options.calibration_file.empty()) {
-    const std::string path = absolute(options.calibration_file);
+  if (!sources.calibration_file.empty()) {
+    const std::string path = absolute(sources.calibration_file);
     SIXPOINT_ASSIGN(std::string digest, file_sha256(context.env.files, path));
     draft.repair.calibration_file = {path, std::move(digest)};
   }
   return {};
 }
 
-void say_plan(const PlanOptions& options, const PlannedArchive& planned, Context& context) {
+void print_plan(const Options& options, const PlannedArchive& planned, Context& context) {
   const ArchivePlan& plan = planned.plan;
   for (std::size_t k = 0; k < plan.shards.size(); ++k) {
     context.out << fmt::format("shard {:05}  {} files  {:.1f} MB\n", k, plan.shards[k].files,
@@ -158,69 +144,36 @@ void say_plan(const PlanOptions& options, const PlannedArchive& planned, Context
     context.people << "dry run: nothing was written\n";
     return;
   }
-  const std::string folder = repair::shell_word(options.folder);
+  const std::string folder = repair::shell_word(options.output);
   context.people << fmt::format(
       "with Slurm:     sbatch {0}/run.sbatch OUTDIR, then sixpoint archive merge {0}\n"
       "on one machine: bash {0}/run_all.sh OUTDIR\n",
       folder);
 }
 
-void run_plan(PlanOptions& options, Context& context) {
-  std::optional<repair::ConstantsSnapshot> snapshot;
-  if (const Status gathered = gather_constants(options, context, snapshot); !gathered) {
-    return report_error(context, "archive", gathered.error(), options.json);
-  }
-  ArchiveDraft& draft = options.draft;
-  for (const std::string& path : options.paths) {
-    draft.paths.push_back(absolute(path));
-  }
-  draft.software = software_and_build();
-  draft.program = this_program();
-  std::optional<Progress> progress;
-  draft.progress = [&](std::size_t done, std::size_t files) {
-    if (!progress) {
-      progress.emplace(context, "hashing", files);
-    }
-    progress->at(done);
-  };
-  auto planned = repair::plan_archive(context.env, draft);
-  progress.reset();
-  if (!planned) {
-    return report_error(context, "archive", planned.error(), options.json);
-  }
-  if (!options.dry_run) {
-    const Status written =
-        repair::write_plan(context.env, absolute(options.folder), draft, *planned);
-    if (!written) {
-      return report_error(context, "archive", written.error(), options.json);
-    }
-  }
-  const ArchivePlan& plan = planned->plan;
-  for (std::size_t i = 0; i < planned->not_followed.size(); ++i) {
+void warn_about_plan(const PlannedArchive& planned, Context& context) {
+  for (std::size_t i = 0; i < planned.not_followed.size(); ++i) {
     if (i == kLinksShown) {
-      context.log().warn("... and {} links more", planned->not_followed.size() - i);
+      context.log().warn("... and {} links more", planned.not_followed.size() - i);
       break;
     }
     context.log().warn("{}: this link leads out of the tree and is not followed",
-                       printable(planned->not_followed[i]));
+                       printable(planned.not_followed[i]));
   }
-  if (plan.shards.size() > repair::kUsualMostShards) {
+  const std::size_t shards = planned.plan.shards.size();
+  if (shards > repair::kUsualMostShards) {
     context.log().warn("{} shards: Slurm's MaxArraySize is 1001 unless your cluster says otherwise",
-                       plan.shards.size());
+                       shards);
   }
-  FileStream files(context, options.json);
-  for (const repair::RefusedPath& refused : plan.refused) {
-    files.add(failed_report(refused.path, refused.error));
-    context.worsen(static_cast<int>(refused.error.code));
-  }
-  if (!options.json) {
-    return say_plan(options, *planned, context);
-  }
+}
+
+void end_json_of_plan(const PlannedArchive& planned, bool dry_run, FileStream& files) {
+  const ArchivePlan& plan = planned.plan;
   Json shards = Json::array();
   std::size_t at = 0;
   for (std::size_t k = 0; k < plan.shards.size(); ++k) {
     for (std::size_t i = 0; i < plan.shards[k].files; ++i, ++at) {
-      const repair::ArchiveFile& file = planned->files[at];
+      const repair::ArchiveFile& file = planned.files[at];
       files.add(Json{{"input", plan.input_of(file)},
                      {"status", "planned"},
                      {"shard", k},
@@ -237,41 +190,65 @@ void run_plan(PlanOptions& options, Context& context) {
                {"bytes", plan.bytes()},
                {"shards", plan.shards.size()},
                {"refused", plan.refused.size()},
-               {"links_not_followed", planned->not_followed.size()},
-               {"dry_run", options.dry_run}}},
-             {"plan", plan.id.empty() ? Json(nullptr) : Json(plan.id)}});
+               {"links_not_followed", planned.not_followed.size()},
+               {"dry_run", dry_run}}},
+             {"plan", text_or_null(plan.id)}});
+}
+
+Status run_plan(const Options& options, Context& context) {
+  ArchiveDraft draft = options.draft;
+  std::optional<repair::ConstantsSnapshot> snapshot;
+  SIXPOINT_CHECK(gather_constants(options.sources, context, draft, snapshot));
+  for (const std::string& path : options.paths) {
+    draft.paths.push_back(absolute(path));
+  }
+  draft.software = station::software_and_build();
+  draft.program = this_program();
+  std::optional<Progress> progress;
+  draft.progress = show_in(progress, context, "hashing");
+  auto planned = repair::plan_archive(context.env, draft);
+  progress.reset();
+  if (!planned) {
+    return fail(planned.error());
+  }
+  if (!options.dry_run) {
+    SIXPOINT_CHECK(repair::write_plan(context.env, absolute(options.output), draft, *planned));
+  }
+  warn_about_plan(*planned, context);
+  FileStream files(context, options.json);
+  for (const repair::RefusedPath& refused : planned->plan.refused) {
+    files.add(failed_report(refused.path, refused.error));
+    context.worsen(refused.error.code);
+  }
+  if (options.json) {
+    end_json_of_plan(*planned, options.dry_run, files);
+  } else {
+    print_plan(options, *planned, context);
+  }
+  return {};
 }
 
 // --- run
 
-void run_shard(const RunOptions& options, Context& context) {
+Status run_shard(const Options& options, Context& context) {
   const std::string folder = absolute(options.plan);
-  const auto plan = repair::read_plan(context.env.files, folder);
-  if (!plan) {
-    return report_error(context, "archive", plan.error(), options.json);
-  }
+  SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
+  std::optional<Progress> progress;
   repair::ShardRunOptions how;
   how.shard = options.shard;
   how.output_folder = absolute(options.output);
   how.dry_run = options.dry_run;
-  how.software = software_and_build();
-  std::optional<Progress> progress;
-  how.progress = [&](std::size_t done, std::size_t files) {
-    if (!progress) {
-      progress.emplace(context, fmt::format("shard {}", options.shard), files);
-    }
-    progress->at(done);
-  };
-  const auto result = repair::run_shard(context.env, folder, *plan, how);
+  how.software = station::software_and_build();
+  how.progress = show_in(progress, context, fmt::format("shard {}", options.shard));
+  const auto result = repair::run_shard(context.env, folder, plan, how);
   progress.reset();
   if (!result) {
-    return report_error(context, "archive", result.error(), options.json);
+    return fail(result.error());
   }
   RepairTally tally;
   FileStream files(context, options.json);
   for (const RepairReport& report : result->files) {
-    context.worsen(exit_code_of(report));
-    tally.add(report);
+    tally.add(context, report);
     files.add(report);
   }
   files.end({{"shards",
@@ -288,11 +265,12 @@ void run_shard(const RunOptions& options, Context& context) {
     }
     context.people << fmt::format("shard {}: ", options.shard) << tally.brief(options.dry_run);
   }
+  return {};
 }
 
 // --- merge
 
-// How a shard that is not done, or in which files failed, is run again.
+// The commands that run shards again: those that are not done, and those in which files failed.
 class Rerun {
  public:
   Rerun(FileSystem& files, std::string plan) : plan_(std::move(plan)) {
@@ -315,24 +293,21 @@ class Rerun {
 
 bool wants_rerun(const MergedShard& shard) { return !shard.complete() || shard.failed > 0; }
 
-Json to_json(const MergedShard& shard, const Rerun& rerun) {
-  return {{"shard", shard.shard},
-          {"state", repair::to_string(shard.state)},
-          {"files", shard.files},
-          {"files_done", shard.files_done},
-          {"failed", shard.failed},
-          {"rerun", wants_rerun(shard) ? Json(rerun.shard(shard.shard)) : Json(nullptr)}};
-}
-
 Json shards_to_json(const MergedArchive& merged, const Rerun& rerun) {
   Json shards = Json::array();
   for (const MergedShard& shard : merged.shards) {
-    shards.push_back(to_json(shard, rerun));
+    shards.push_back(
+        {{"shard", shard.shard},
+         {"state", repair::to_string(shard.state)},
+         {"files", shard.files},
+         {"files_done", shard.files_done},
+         {"failed", shard.failed},
+         {"rerun", wants_rerun(shard) ? Json(rerun.shard(shard.shard)) : Json(nullptr)}});
   }
   return shards;
 }
 
-void say_what_is_missing(const MergedArchive& merged, const Rerun& rerun, Context& context) {
+void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& context) {
   std::vector<std::size_t> again;
   for (const MergedShard& shard : merged.shards) {
     if (!wants_rerun(shard)) {
@@ -352,227 +327,171 @@ void say_what_is_missing(const MergedArchive& merged, const Rerun& rerun, Contex
   }
 }
 
-void run_merge(const MergeOptions& options, Context& context) {
+Status run_merge(const Options& options, Context& context) {
   const std::string folder = absolute(options.plan);
-  const auto plan = repair::read_plan(context.env.files, folder);
-  if (!plan) {
-    return report_error(context, "archive", plan.error(), options.json);
-  }
-  // The store that the constants came from, unless another one is named.
-  const std::string location = options.store.empty() ? plan->store : options.store;
+  SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
+  // The store that is named, else the one that the constants came from.
+  const std::string location = options.sources.store.empty() ? plan.store : options.sources.store;
   std::optional<Result<db::Store>> store;
   if (!location.empty() && !options.dry_run) {
-    store = open_existing_store(context, location);
-    if (!*store) {
-      return report_error(context, "archive", store->error(), options.json);
-    }
+    SIXPOINT_ASSIGN(auto opened, open_existing_store(context, location));
+    store.emplace(std::move(opened));
   }
   RepairTally tally;
   FileStream files(context, options.json);
-  for (const repair::RefusedPath& refused : plan->refused) {
-    const RepairReport report = failed_report(refused.path, refused.error);
-    context.worsen(exit_code_of(report));
-    tally.add(report);
+  const auto add = [&](const RepairReport& report) {
+    tally.add(context, report);
     files.add(report);
-  }
-  Json kept_json(nullptr);
-  const auto keep = [&](const ShardResult& result) {
-    if (!store) {
-      return;
-    }
-    const auto kept = keep_repairs(context, location, *store, result.files, result.software);
-    if (!kept) {
-      context.log().error("shard {}: the store does not know of its files: {}; merge again",
-                          result.shard, kept.error().brief());
-      context.worsen(static_cast<int>(kept.error().code));
-      kept_json = {{"in", nullptr}, {"error", error_to_json(kept.error())}};
-    } else if (*kept && (kept_json.is_null() || !(*kept)->in_store())) {
-      kept_json = kept_to_json(**kept);
-    }
   };
-  std::optional<Progress> progress;
-  progress.emplace(context, "merging", plan->shards.size());
+  for (const repair::RefusedPath& refused : plan.refused) {
+    add(failed_report(refused.path, refused.error));
+  }
+  Json kept(nullptr);
+  std::optional<Progress> progress(std::in_place, context, "merging", plan.shards.size());
   repair::MergeOptions how;
   how.verify = options.verify;
   how.visit = [&](const ShardResult& result) -> Status {
-    for (const RepairReport& report : result.files) {
-      context.worsen(exit_code_of(report));
-      tally.add(report);
-      files.add(report);
+    std::for_each(result.files.begin(), result.files.end(), add);
+    if (store) {
+      Json kept_now =
+          keep_repairs(context, location, *store, result.files,
+                       fmt::format("merge again (shard {})", result.shard), result.software);
+      // A shard that is not in the store is the more important one to report.
+      if (kept.is_null() || (!kept_now.is_null() && kept_now["in"] != "store")) {
+        kept = std::move(kept_now);
+      }
     }
-    keep(result);
     progress->at(result.shard);
     return {};
   };
-  const auto merged = repair::merge_archive(context.env.files, folder, *plan, how);
+  const auto merged = repair::merge_archive(context.env.files, folder, plan, how);
   progress.reset();
-  if (!merged) {  // nothing that a visit answers; said all the same
-    context.log().error(merged.error().brief());
-    context.worsen(static_cast<int>(merged.error().code));
-    return;
+  if (!merged) {  // the JSON document was begun: no second one
+    report_error(context, merged.error());
+    return {};
   }
-  if (!merged->complete()) {
-    context.worsen(kExitInconclusive);
-  }
+  context.worsen(merged->complete() ? kExitPassed : kExitInconclusive);
   const Rerun rerun(context.env.files, options.plan);
   files.end({{"shards", shards_to_json(*merged, rerun)},
              {"summary", tally.to_json(false)},
              {"complete", merged->complete()},
              {"files_missing", merged->files_missing()},
-             {"kept", kept_json}});
+             {"kept", kept}});
   if (!options.json) {
     context.people << tally.brief(false);
     if (!merged->complete()) {
       context.people << fmt::format("not complete: nothing is known of {} files yet\n",
                                     merged->files_missing());
     }
-    say_what_is_missing(*merged, rerun, context);
+    print_missing(*merged, rerun, context);
   }
+  return {};
 }
 
 // --- status
 
-void run_status(const StatusOptions& options, Context& context) {
-  const std::string folder = absolute(options.plan);
-  const auto plan = repair::read_plan(context.env.files, folder);
-  if (!plan) {
-    return report_error(context, "archive", plan.error(), options.json);
-  }
-  std::vector<RepairReport> failed;
+// How far the archive is, and the reports that say `failed`.
+Result<MergedArchive> standing(FileSystem& files, const std::string& folder,
+                               const ArchivePlan& plan, std::vector<RepairReport>& failed) {
   repair::MergeOptions how;
   how.visit = [&](const ShardResult& result) -> Status {
-    for (const RepairReport& report : result.files) {
-      if (report.status == repair::RepairStatus::failed) {
-        failed.push_back(report);
-      }
-    }
+    std::copy_if(
+        result.files.begin(), result.files.end(), std::back_inserter(failed),
+        [](const RepairReport& report) { return report.status == repair::RepairStatus::failed; });
     return {};
   };
-  auto merged = repair::merge_archive(context.env.files, folder, *plan, how);
-  if (!merged) {
-    return report_error(context, "archive", merged.error(), options.json);
-  }
-  // A finished shard may be under way once more, for its files that failed.
-  for (MergedShard& shard : merged->shards) {
+  SIXPOINT_ASSIGN(auto merged, repair::merge_archive(files, folder, plan, how));
+  // A finished shard may be running once more, for its files that failed.
+  for (MergedShard& shard : merged.shards) {
     if (shard.complete() && shard.failed > 0) {
-      const auto standing = repair::standing_of(context.env.files, folder, *plan, shard.shard);
-      shard.state = standing.state;
+      shard.state = repair::standing_of(files, folder, plan, shard.shard).state;
     }
   }
+  return merged;
+}
+
+Status run_status(const Options& options, Context& context) {
+  const std::string folder = absolute(options.plan);
+  SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
+  std::vector<RepairReport> failed;
+  SIXPOINT_ASSIGN(const auto merged, standing(context.env.files, folder, plan, failed));
+  context.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
   std::map<repair::ShardState, std::size_t> counts;
   std::size_t files_done = 0;
-  for (const MergedShard& shard : merged->shards) {
+  std::string text;
+  for (const MergedShard& shard : merged.shards) {
     ++counts[shard.state];
     files_done += shard.files_done;
+    text += fmt::format("shard {:05}  {:<8} {} of {} files{}\n", shard.shard,
+                        repair::to_string(shard.state), shard.files_done, shard.files,
+                        shard.failed > 0 ? fmt::format(", {} failed", shard.failed) : "");
   }
-  if (!merged->complete()) {
-    context.worsen(kExitInconclusive);
+  if (!options.json) {
+    context.out << text;
+    context.people << fmt::format("{} of {} shards, {} of {} files done\n",
+                                  counts[repair::ShardState::done], plan.shards.size(), files_done,
+                                  plan.files());
+    return {};
   }
-  const Rerun rerun(context.env.files, options.plan);
-  Json summary = {{"files", plan->files()},
+  Json summary = {{"files", plan.files()},
                   {"files_done", files_done},
                   {"failed", failed.size()},
-                  {"refused", plan->refused.size()},
-                  {"shards", plan->shards.size()}};
+                  {"refused", plan.refused.size()},
+                  {"shards", plan.shards.size()}};
   for (const auto state :
        {repair::ShardState::done, repair::ShardState::running, repair::ShardState::partly,
         repair::ShardState::missing, repair::ShardState::damaged}) {
     summary[std::string(repair::to_string(state))] = counts[state];
   }
-  FileStream files(context, options.json);
-  if (options.json) {
-    for (const RepairReport& report : failed) {
-      files.add(report);
-    }
+  FileStream files(context, /*json=*/true);
+  for (const RepairReport& report : failed) {
+    files.add(report);
   }
-  files.end({{"shards", shards_to_json(*merged, rerun)}, {"summary", summary}});
-  if (!options.json) {
-    for (const MergedShard& shard : merged->shards) {
-      context.out << fmt::format("shard {:05}  {:<8} {} of {} files", shard.shard,
-                                 repair::to_string(shard.state), shard.files_done, shard.files)
-                  << (shard.failed > 0 ? fmt::format(", {} failed", shard.failed) : "") << '\n';
-    }
-    context.people << fmt::format("{} of {} shards, {} of {} files done\n",
-                                  counts[repair::ShardState::done], plan->shards.size(), files_done,
-                                  plan->files());
-  }
-}
-
-void add_plan(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("plan", "Write down what is mended, in how many shards");
-  auto options = std::make_shared<PlanOptions>();
-  command->add_option("path", options->paths, "Recordings (.gt3x) or folders of them")->required();
-  command->add_option("-o,--output", options->folder, "The folder for the plan")->required();
-  auto* shards = command->add_option("--shards", options->draft.shards, "How many shards")
-                     ->check(CLI::Range(std::size_t{1}, repair::kMostShards));
-  command
-      ->add_option("--shard-bytes", options->draft.shard_bytes,
-                   "What a shard holds at most, such as 500MB (default: 4GB, 1000 shards at most)")
-      ->transform(CLI::AsSizeValue(false))
-      ->excludes(shards);
-  command->add_option("--at-once", options->draft.at_once,
-                      "Tasks of the Slurm array at a time (default: 64; 0: no limit)");
-  command->add_flag("--hash", options->draft.hash,
-                    "Know files by SHA-256, not by size and time of change: reads all of them");
-  command->add_option("--constants", options->constants, "Use these constants (constants.json)");
-  add_store_option(*command, options->store);
-  command->add_option("--calibration-file", options->calibration_file,
-                      "A recording of the unit lying still on each of its six sides");
-  command->add_flag("--scan", options->scan,
-                    "Use the still periods of the file itself (also the last resort without it)");
-  repair::RepairOptions& how = options->draft.repair.options;
-  command->add_flag("--wide", how.wide,
-                    "Write 16-bit records (ACTIVITY2), in which nothing needs clipping");
-  command->add_flag("--undo-rotation", how.undo_rotation,
-                    "Also turn back the axes of firmware 1.6.0 where the constants are right");
-  command->add_flag("--allow-prior", how.allow_prior,
-                    "Also use constants that rest on a population prior");
-  command->add_flag("--dry-run", options->dry_run, "Say what would be planned, write nothing");
-  command->add_flag("--json", options->json, "One JSON document on stdout");
-  command->callback([options, &context] { run_plan(*options, context); });
-}
-
-void add_run(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("run", "Mend one shard; again as often as you like");
-  auto options = std::make_shared<RunOptions>();
-  command->add_option("plan", options->plan, "The folder of the plan")->required();
-  command->add_option("--shard", options->shard, "Which one, counted from 0")->required();
-  command->add_option("-o,--output", options->output, "The folder for mended files")->required();
-  command->add_flag("--dry-run", options->dry_run, "Compute everything, write nothing");
-  command->add_flag("--json", options->json, "One JSON document on stdout");
-  command->callback([options, &context] { run_shard(*options, context); });
-}
-
-void add_merge(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("merge", "The answers of all shards as one; tells the store");
-  auto options = std::make_shared<MergeOptions>();
-  command->add_option("plan", options->plan, "The folder of the plan")->required();
-  command->add_option(
-      "--store", options->store,
-      "The store that is told (default: the one that the plan took constants from)");
-  command->add_flag("--verify", options->verify, "Also read every mended file again");
-  command->add_flag("--dry-run", options->dry_run, "Tell the store nothing");
-  command->add_flag("--json", options->json, "One JSON document on stdout");
-  command->callback([options, &context] { run_merge(*options, context); });
-}
-
-void add_status(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("status", "How far the shards are");
-  auto options = std::make_shared<StatusOptions>();
-  command->add_option("plan", options->plan, "The folder of the plan")->required();
-  command->add_flag("--json", options->json, "One JSON document on stdout");
-  command->callback([options, &context] { run_status(*options, context); });
+  files.end({{"shards", shards_to_json(merged, Rerun(context.env.files, options.plan))},
+             {"summary", summary}});
+  return {};
 }
 
 }  // namespace
 
 void add_archive(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("archive", "Mend an archive on a cluster, shard by shard");
-  command->require_subcommand(1);
-  add_plan(*command, context);
-  add_run(*command, context);
-  add_merge(*command, context);
-  add_status(*command, context);
+  CLI::App& group = add_group(app, "archive", "repair an archive on a cluster, shard by shard");
+  auto [plan, options] =
+      add_command<Options>(group, context, "archive", "plan",
+                           "write down what is repaired, in how many shards", run_plan);
+  plan.add_option("path", options.paths, "recordings (.gt3x) or folders of them")->required();
+  plan.add_option("-o,--output", options.output, "the folder for the plan")->required();
+  auto* shards = plan.add_option("--shards", options.draft.shards, "how many shards")
+                     ->check(CLI::Range(std::size_t{1}, repair::kMostShards));
+  plan.add_option("--shard-bytes", options.draft.shard_bytes,
+                  "what a shard holds at most, such as 500MB (default: 4GB, 1000 shards at most)")
+      ->transform(CLI::AsSizeValue(false))
+      ->excludes(shards);
+  plan.add_option("--at-once", options.draft.at_once,
+                  "tasks of the Slurm array at a time (default: 64; 0: no limit)");
+  plan.add_flag("--hash", options.draft.hash,
+                "know files by SHA-256, not by size and time of change: reads all of them");
+  add_source_options(plan, options.sources);
+  add_repair_options(plan, options.draft.repair.options);
+  plan.add_flag("--dry-run", options.dry_run, "print what would be planned, write nothing");
+  const auto add = [&](const char* name, const char* about,
+                       Status (*work)(const Options&, Context&)) {
+    auto declared = add_command<Options>(group, context, "archive", name, about, work);
+    declared.command.add_option("plan", declared.options.plan, "the folder of the plan")
+        ->required();
+    return declared;
+  };
+  auto [run, of_run] = add("run", "repair one shard; may be repeated", run_shard);
+  run.add_option("--shard", of_run.shard, "which one, counted from 0")->required();
+  run.add_option("-o,--output", of_run.output, "the folder for repaired files")->required();
+  run.add_flag("--dry-run", of_run.dry_run, "compute everything, write nothing");
+  auto [merge, of_merge] =
+      add("merge", "the answers of all shards as one; adds them to the store", run_merge);
+  merge.add_option("--store", of_merge.sources.store,
+                   "the store to add to (default: the one that the plan took constants from)");
+  merge.add_flag("--verify", of_merge.verify, "also read every repaired file again");
+  merge.add_flag("--dry-run", of_merge.dry_run, "add nothing to the store");
+  add("status", "how far the shards are", run_status);
 }
 
 }  // namespace sixpoint::cli

@@ -1,27 +1,26 @@
-#include "station/cli/command.h"
+#include "cli/command.h"
 
 #include <cmath>
+#include <filesystem>
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <fmt/format.h>
 #include <spdlog/sinks/ostream_sink.h>
 
+#include "station/records/software.h"
+
 namespace sixpoint::cli {
 
 namespace {
 
-// The contract's order of badness.
-int badness(int code) {
+// The rank of an exit code in the table of Context::worsen().
+int rank(int code) {
   switch (code) {
-    case kExitPassed:
-      return 0;
     case kExitInconclusive:
       return 1;
     case kExitFailed:
       return 2;
-    case kExitStopped:
-      return 3;
     default:
       return code;
   }
@@ -39,7 +38,7 @@ spdlog::logger& Context::log() {
 }
 
 void Context::worsen(int code) {
-  if (badness(code) > badness(exit_code)) {
+  if (rank(code) > rank(exit_code)) {
     exit_code = code;
   }
 }
@@ -50,30 +49,53 @@ Json document(std::string_view command) {
   return json;
 }
 
-void print_json(Context& context, const Json& json) {
-  // Bytes from outside that are no UTF-8 are replaced, never thrown on.
+Status print_json(Context& context, const Json& json) {
+  // A file may hold bytes that are not UTF-8: they are replaced.
   context.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+  return {};
+}
+
+Status print_answer(Context& context, bool as_json, const Json& json, std::string_view text) {
+  if (as_json) {
+    return print_json(context, json);
+  }
+  context.out << text;
+  return {};
 }
 
 Json error_to_json(const Error& error) {
-  Json json;
-  json["code"] = to_string(error.code);
-  json["what"] = error.what;
-  json["where"] = error.where;
-  json["hint"] = error.hint;
-  return json;
+  return {{"code", to_string(error.code)},
+          {"what", error.what},
+          {"where", error.where},
+          {"hint", error.hint}};
 }
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-void report_error(Context& context, std::string_view command, const Error& error, bool json) {
+Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+void report_error(Context& context, const Error& error) {
   context.log().error(error.brief());
-  context.worsen(static_cast<int>(error.code));
+  context.worsen(error.code);
+}
+
+void report_error(Context& context, std::string_view command, const Error& error, bool json) {
+  report_error(context, error);
   if (json) {
-    Json answer = document(command);
-    answer["error"] = error_to_json(error);
-    print_json(context, answer);
+    Json document_of_error = document(command);
+    document_of_error["error"] = error_to_json(error);
+    print_json(context, document_of_error);
   }
+}
+
+CLI::App& add_group(CLI::App& parent, const char* name, const char* about) {
+  return *parent.add_subcommand(name, about)->require_subcommand(1);
+}
+
+std::string this_program() {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  return error ? "sixpoint" : program.string();
 }
 
 Progress::Progress(Context& context, std::string doing, std::uint64_t total)
@@ -107,8 +129,9 @@ void Progress::at(std::uint64_t done) {
 }
 
 int run_program(const std::vector<std::string>& arguments, Context& context) {
-  CLI::App app("Sixpoint makes an activity monitor tell the truth about gravity.", "sixpoint");
-  app.set_version_flag("--version", "sixpoint " SIXPOINT_VERSION);
+  CLI::App app("Sixpoint measures the constants of activity monitors and repairs their recordings.",
+               "sixpoint");
+  app.set_version_flag("--version", station::software_name());
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
   for (const CommandEntry& entry : commands()) {
@@ -127,7 +150,7 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
                         printable(error.what()));
     return static_cast<int>(ErrorCode::usage);
   } catch (const std::exception& error) {
-    // A defect: libraries answer with Result. Said as such, never hidden.
+    // The libraries return errors as values: an exception is a defect of this program.
     context.log().critical("internal error: {}; please report it with the command line",
                            printable(error.what()));
     return static_cast<int>(ErrorCode::internal);

@@ -1,10 +1,10 @@
 // The list of commands. A new command is one file, one line in the list and one in CMakeLists.txt.
-#include "station/cli/command.h"
+#include "cli/command.h"
 
 namespace sixpoint::cli {
 
-// In the order in which --help lists them: looking at files, mending them, measuring units, the
-// store, the simulator. add_NAME is defined in NAME.cpp.
+// In the order in which --help lists them: reading and repairing files, measuring units, the store,
+// the simulator. add_NAME is defined in NAME.cpp.
 // clang-format off
 #define SIXPOINT_COMMANDS(COMMAND) \
   COMMAND(inspect)                 \

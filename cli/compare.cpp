@@ -1,8 +1,8 @@
 // sixpoint compare A B [C]: recordings of units that were moved together.
-#include "repair/compare.h"
+#include "repair/compare/compare.h"
 
 #include "base/atomic_file.h"
-#include "station/cli/command.h"
+#include "cli/command.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -36,43 +36,30 @@ Status run(const Options& options, Context& context) {
     SIXPOINT_CHECK(
         write_file(context.env.files, options.html, repair::compare_html(traces, pairs)));
   }
-  if (options.json) {
-    Json json = document("compare");
-    json["pairs"] = Json::array();
-    for (const repair::PairComparison& pair : pairs) {
-      json["pairs"].push_back(pair.to_json());
-    }
-    print_json(context, json);
-  } else {
-    for (const repair::PairComparison& pair : pairs) {
-      context.out << pair.brief() << '\n';
-    }
-  }
+  Json json = document("compare");
+  Json& list = json["pairs"] = Json::array();
+  std::string text;
   for (const repair::PairComparison& pair : pairs) {
+    list.push_back(pair.to_json());
+    text += pair.brief() + "\n";
     for (const std::string& remark : pair.remarks) {
       context.log().warn("{}, {}: {}", printable(pair.a), printable(pair.b), remark);
     }
   }
-  return {};
+  return print_answer(context, options.json, json, text);
 }
 
 }  // namespace
 
 void add_compare(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("compare", "recordings of units that were moved together");
-  auto options = std::make_shared<Options>();
-  command->add_option("RECORDING", options->paths, "two or three recordings")
+  auto [command, options] = add_command<Options>(
+      app, context, "compare", "recordings of units that were moved together", run);
+  command.add_option("RECORDING", options.paths, "two or three recordings")
       ->required()
       ->expected(2, 3);
-  command->add_option("--html", options->html, "a page with the traces and the histograms");
-  command->add_option("--max-lag", options->max_lag_s, "how far the clocks may differ, seconds")
+  command.add_option("--html", options.html, "a page with the traces and the histograms");
+  command.add_option("--max-lag", options.max_lag_s, "how far the clocks may differ, seconds")
       ->check(CLI::Range(0.0, 3'600.0));
-  command->add_flag("--json", options->json, "one JSON document on standard output");
-  command->callback([options, &context] {
-    if (auto status = run(*options, context); !status) {
-      report_error(context, "compare", status.error(), options->json);
-    }
-  });
 }
 
 }  // namespace sixpoint::cli

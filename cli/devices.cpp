@@ -1,15 +1,14 @@
-// sixpoint devices: what is plugged in, and whether this user may use it; with --watch what comes
-// and goes.
-#include <csignal>
+// sixpoint devices: which devices are plugged in, and whether this user may open them; with --watch
+// the devices that arrive and leave.
 #include <set>
 #include <thread>
 
 #include <fmt/format.h>
-#include <pthread.h>
 
-#include "device/discovery.h"
-#include "device/hotplug.h"
-#include "station/cli/command.h"
+#include "cli/command.h"
+#include "cli/stop_signals.h"
+#include "device/usb/discovery.h"
+#include "device/usb/hotplug.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -20,8 +19,8 @@ struct Options {
   std::optional<double> for_s;
 };
 
-// What a command would open it by; empty where there is nothing (a file monitor that is not
-// mounted, a jig, a device without a serial number).
+// The address for --device; empty where there is none (a file monitor that is not mounted, a jig, a
+// device without a serial number).
 std::string address_of(const device::AttachedDevice& attached) {
   if (attached.product_id == device::kMonitorProductId && !attached.serial.empty()) {
     return "hid:" + attached.serial;
@@ -35,28 +34,38 @@ std::string address_of(const device::AttachedDevice& attached) {
 
 constexpr const char* kMountIt = "mount it, then 'sixpoint capture --device drive:FOLDER'";
 
-Json to_json(const device::AttachedDevice& attached) {
-  const Status access = device::check_access(attached);
-  const std::string address = address_of(attached);
-  const bool unmounted = attached.product_id == device::kFileMonitorProductId && address.empty();
-  Json json;
-  json["address"] = address.empty() ? Json(nullptr) : Json(address);
-  json["serial"] = attached.serial;
-  json["model"] = attached.model;
-  json["vendor_id"] = fmt::format("{:04x}", attached.vendor_id);
-  json["product_id"] = fmt::format("{:04x}", attached.product_id);
-  json["port"] = attached.port;
-  json["usb_node"] = attached.usb_node;
-  json["hidraw_node"] = attached.hidraw_node.empty() ? Json(nullptr) : Json(attached.hidraw_node);
-  json["accessible"] = access.has_value();
-  json["hint"] = !access ? Json(access.error().hint) : unmounted ? Json(kMountIt) : Json(nullptr);
-  return json;
+// One device as a user of this machine has it.
+struct Standing {
+  std::string address;  // of address_of()
+  Status access;        // may this user open it?
+  bool unmounted = false;
+};
+
+Standing standing_of(const device::AttachedDevice& attached) {
+  Standing standing{address_of(attached), device::check_access(attached)};
+  standing.unmounted =
+      attached.product_id == device::kFileMonitorProductId && standing.address.empty();
+  return standing;
 }
 
-void tell(Context& context, const device::AttachedDevice& attached) {
-  const Status access = device::check_access(attached);
-  const std::string address = address_of(attached);
-  const bool unmounted = attached.product_id == device::kFileMonitorProductId && address.empty();
+Json to_json(const device::AttachedDevice& attached) {
+  const Standing standing = standing_of(attached);
+  return {{"address", text_or_null(standing.address)},
+          {"serial", attached.serial},
+          {"model", attached.model},
+          {"vendor_id", fmt::format("{:04x}", attached.vendor_id)},
+          {"product_id", fmt::format("{:04x}", attached.product_id)},
+          {"port", attached.port},
+          {"usb_node", attached.usb_node},
+          {"hidraw_node", text_or_null(attached.hidraw_node)},
+          {"accessible", standing.access.has_value()},
+          {"hint", !standing.access     ? Json(standing.access.error().hint)
+                   : standing.unmounted ? Json(kMountIt)
+                                        : Json(nullptr)}};
+}
+
+void print(Context& context, const device::AttachedDevice& attached) {
+  const auto [address, access, unmounted] = standing_of(attached);
   context.out << fmt::format("{:<24} {:<20} port {:<8} {}\n",
                              printable(address.empty() ? attached.serial : address),
                              attached.model.empty() ? "?" : attached.model, attached.port,
@@ -76,35 +85,29 @@ device::DiscoveryFilter every_product() {
   return every;
 }
 
-void list(const Options& options, Context& context) {
-  const auto attached = device::attached_devices(every_product());
-  if (!attached) {
-    return report_error(context, "devices", attached.error(), options.json);
-  }
+Status list(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(const auto attached, device::attached_devices(every_product()));
   Json json = document("devices");
-  json["devices"] = Json::array();
-  for (const device::AttachedDevice& one : *attached) {
+  Json& devices = json["devices"] = Json::array();
+  for (const device::AttachedDevice& one : attached) {
     if (options.json) {
-      json["devices"].push_back(to_json(one));
+      devices.push_back(to_json(one));
     } else {
-      tell(context, one);
+      print(context, one);
     }
   }
   if (options.json) {
     print_json(context, json);
-  } else if (attached->empty()) {
-    context.people << "No device is plugged in. A unit in software: --device virtual:seed=7\n";
+  } else if (attached.empty()) {
+    context.people << "No device is plugged in. A virtual unit: --device virtual:seed=7\n";
   }
+  return {};
 }
 
-// Lines as things happen, until Ctrl-C or --for: of JSON one document per event.
+// One line per event until Ctrl-C or --for; with --json one document per line.
 Status watch(const Options& options, Context& context) {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
   sigset_t before;
-  pthread_sigmask(SIG_BLOCK, &signals, &before);
+  const sigset_t signals = block_stop_signals(&before);
   SIXPOINT_ASSIGN(const auto hotplug, device::HotplugWatch::start(every_product()));
   const auto start = context.env.clock.elapsed();
   constexpr std::chrono::milliseconds kSlice{200};  // how long Ctrl-C takes at most
@@ -134,7 +137,7 @@ Status watch(const Options& options, Context& context) {
       context.out << json.dump() << '\n';
     } else if (arrived) {
       context.out << "arrived  ";
-      tell(context, one);
+      print(context, one);
     } else {
       context.out << fmt::format("left     {:<24} {:<20} port {}\n", one.serial,
                                  one.model.empty() ? "?" : one.model, one.port);
@@ -145,28 +148,21 @@ Status watch(const Options& options, Context& context) {
   return status;
 }
 
-void run(const Options& options, Context& context) {
-  if (!options.watch) {
-    return list(options, context);
-  }
-  if (const Status status = watch(options, context); !status) {
-    report_error(context, "devices", status.error(), options.json);
-  }
+Status run(const Options& options, Context& context) {
+  return options.watch ? watch(options, context) : list(options, context);
 }
 
 }  // namespace
 
 void add_devices(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("devices", "List the devices that are plugged in");
-  auto options = std::make_shared<Options>();
-  command->add_flag("--json", options->json, "One JSON document on stdout");
-  auto* watching = command->add_flag("--watch", options->watch,
-                                     "Say what comes and goes until Ctrl-C; with --json one "
-                                     "document per line");
-  command->add_option("--for", options->for_s, "Watch so many seconds")
+  auto [command, options] =
+      add_command<Options>(app, context, "devices", "list the devices that are plugged in", run);
+  auto* watching = command.add_flag("--watch", options.watch,
+                                    "print what arrives and leaves until Ctrl-C; with --json one "
+                                    "document per line");
+  command.add_option("--for", options.for_s, "watch so many seconds")
       ->check(CLI::Range(0.0, 1e9))
       ->needs(watching);
-  command->callback([options, &context] { run(*options, context); });
 }
 
 }  // namespace sixpoint::cli

@@ -4,11 +4,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "cli/command.h"
+#include "cli/store_option.h"
 #include "db/journal.h"
-#include "device/discovery.h"
-#include "device/usb_errors.h"
-#include "station/cli/command.h"
-#include "station/cli/store_option.h"
+#include "device/usb/discovery.h"
+#include "device/usb/usb_errors.h"
+#include "station/records/software.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -28,9 +29,10 @@ struct Check {
 };
 
 Check check_store(const Options& options, Context& context) {
-  const std::string path = options.store.empty() ? default_store() : options.store;
-  if (path.find("://") == std::string::npos && !context.env.files.info(path)) {
-    return {"store", true, fmt::format("{} is made at the first run", path)};
+  if (!store_exists(context, options.store)) {
+    return {"store", true,
+            fmt::format("{} is made at the first run",
+                        options.store.empty() ? default_store() : options.store)};
   }
   auto store = open_existing_store(context, options.store);
   if (!store) {
@@ -43,7 +45,7 @@ Check check_store(const Options& options, Context& context) {
   return {"store", audit->ok, audit->brief()};
 }
 
-// What was measured and is not in the store yet.
+// Are there measurements that the store did not take yet?
 Check check_journal(const Options& options, Context& context) {
   const std::string folder = journal_folder(options.store);
   if (!context.env.files.info(folder)) {
@@ -67,11 +69,11 @@ Check check_disk(const std::string& folder) {
     return {"disk", false, fmt::format("{}: {}", folder, error.message())};
   }
   return {"disk", space.available >= kEnoughSpace_bytes,
-          fmt::format("{} MiB free here; mended files need as much as the originals",
+          fmt::format("{} MiB free here; repaired files need as much as the originals",
                       space.available >> 20)};
 }
 
-// A machine without USB is no defect: it mends files and drives virtual units.
+// A machine without USB passes: it can repair files and use virtual units.
 Check check_usb() {
   std::error_code error;
   if (!std::filesystem::is_directory("/dev/bus/usb", error)) {
@@ -103,7 +105,7 @@ Check check_udev_rules() {
     }
     if (!found) {
       return {"udev", !needed,
-              fmt::format("{} is not installed: without it only root can use units; it lies in "
+              fmt::format("{} is not installed: without it only root can use units; it is in "
                           "packaging/udev",
                           rules)};
     }
@@ -111,9 +113,9 @@ Check check_udev_rules() {
   return {"udev", true, "detection and access rules are installed"};
 }
 
-void run(const Options& options, Context& context) {
+Status run(const Options& options, Context& context) {
   const std::vector<Check> checks = {
-      {"version", true, "sixpoint " SIXPOINT_VERSION},
+      {"version", true, station::software_name()},
       check_store(options, context),
       check_journal(options, context),
       check_disk("."),
@@ -121,28 +123,23 @@ void run(const Options& options, Context& context) {
       check_udev_rules(),
   };
   Json json = document("doctor");
-  json["checks"] = Json::array();
+  Json& list = json["checks"] = Json::array();
+  std::string text;
   for (const Check& check : checks) {
     context.worsen(check.ok ? kExitPassed : kExitFailed);
-    json["checks"].push_back({{"name", check.name}, {"ok", check.ok}, {"hint", check.hint}});
-    if (!options.json) {
-      context.out << fmt::format("{:<4} {:<8} {}\n", check.ok ? "ok" : "NO", check.name,
-                                 printable(check.hint));
-    }
+    list.push_back({{"name", check.name}, {"ok", check.ok}, {"hint", check.hint}});
+    text +=
+        fmt::format("{:<4} {:<8} {}\n", check.ok ? "ok" : "NO", check.name, printable(check.hint));
   }
-  if (options.json) {
-    print_json(context, json);
-  }
+  return print_answer(context, options.json, json, text);
 }
 
 }  // namespace
 
 void add_doctor(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand("doctor", "Check that this machine is ready");
-  auto options = std::make_shared<Options>();
-  add_store_option(*command, options->store);
-  command->add_flag("--json", options->json, "One JSON document on stdout");
-  command->callback([options, &context] { run(*options, context); });
+  auto [command, options] =
+      add_command<Options>(app, context, "doctor", "check that this machine is ready", run);
+  add_store_option(command, options.store);
 }
 
 }  // namespace sixpoint::cli

@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "cli/command.h"
 #include "gt3x/raw_csv.h"
-#include "station/cli/command.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -17,7 +17,7 @@ struct Options {
   bool no_fill = false;
 };
 
-// A slip of the hand must not cost a recording: an output that exists and is a zip is no CSV.
+// A wrong name must not destroy a recording: a file that begins like a zip is not written over.
 Status refuse_recordings(FileSystem& files, const Options& options) {
   bool recording = std::filesystem::path(options.csv).lexically_normal() ==
                    std::filesystem::path(options.path).lexically_normal();
@@ -27,7 +27,7 @@ Status refuse_recordings(FileSystem& files, const Options& options) {
     recording = recording || (count && *count == 2 && start[0] == 'P' && start[1] == 'K');
   }
   if (recording) {
-    return fail(ErrorCode::cannot_create, "this is a recording and will not be written over",
+    return fail(ErrorCode::cannot_create, "this is a recording and is not written over",
                 options.csv, "choose another name for the CSV");
   }
   return {};
@@ -68,7 +68,7 @@ Status run(const Options& options, Context& context) {
   if (tally.out_of_step_seconds > 0 && !options.no_fill) {
     warn(
         fmt::format("at {} seconds the time does not go forward or there are too many samples: "
-                    "behind them the line number does not tell the time",
+                    "after them the line number does not give the time",
                     tally.out_of_step_seconds));
   }
   return {};
@@ -77,19 +77,13 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_export(CLI::App& app, Context& context) {
-  auto* command =
-      app.add_subcommand("export", "a recording's samples as the vendor's raw CSV writes them");
-  auto options = std::make_shared<Options>();
-  command->add_option("FILE", options->path, "the recording")->required();
-  command->add_option("--csv", options->csv, "the CSV to write, - for standard output")->required();
-  command->add_flag("--raw", options->raw, "stored counts in LSB instead of g");
-  command->add_flag("--no-fill", options->no_fill,
-                    "what was recorded, without the seconds that are missing");
-  command->callback([options, &context] {
-    if (auto status = run(*options, context); !status) {
-      report_error(context, "export", status.error(), false);
-    }
-  });
+  auto [command, options] = add_command<Options>(
+      app, context, "export", "a recording's samples as the vendor's raw CSV writes them", run);
+  command.add_option("FILE", options.path, "the recording")->required();
+  command.add_option("--csv", options.csv, "the CSV to write, - for standard output")->required();
+  command.add_flag("--raw", options.raw, "stored counts in LSB instead of g");
+  command.add_flag("--no-fill", options.no_fill,
+                   "what was recorded, without the seconds that are missing");
 }
 
 }  // namespace sixpoint::cli

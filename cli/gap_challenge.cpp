@@ -2,14 +2,11 @@
 //
 // Each trial is a bundle in a temporary folder; `gap diagnose` runs as a process of its own that
 // gets nothing but that folder, and with --strip a catalogue without the true effects.
-#include "station/cli/gap_challenge.h"
+#include "cli/gap_challenge.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <csignal>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <set>
 
@@ -21,11 +18,13 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "base/html.h"
+#include "cli/workers.h"
+#include "gap/challenge/outside.h"
+#include "gap/challenge/recorded.h"
+#include "gap/challenge/score.h"
+#include "gap/challenge/trials.h"
 #include "sim/bundle_writer.h"
-#include "station/cli/workers.h"
-#include "station/gap_outside.h"
-#include "station/gap_recorded.h"
-#include "station/gap_trials.h"
 
 extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
 
@@ -33,8 +32,10 @@ namespace sixpoint::cli {
 
 namespace {
 
-using station::GapTrial;
-using station::TrialKind;
+using gap::GapTrial;
+using gap::Outcome;
+using gap::Scores;
+using gap::Share;
 
 struct Options {
   std::size_t trials = 100;
@@ -42,7 +43,7 @@ struct Options {
   std::string protocol = "engineering";
   std::vector<std::string> only;
   bool strip = false;
-  station::TrialShares shares;
+  gap::TrialShares shares;
   unsigned jobs = 1;
   std::string program;
   std::string keep;
@@ -52,49 +53,6 @@ struct Options {
   std::set<std::string> own_effects;
   bool own_unknown = false;
   bool json = false;
-};
-
-// What came of one trial.
-struct Outcome {
-  TrialKind kind = TrialKind::none;
-  std::vector<station::TrialEffect> truth;
-  std::string failure;  // of the program; empty where it answered
-  std::string verdict;
-  std::vector<std::pair<std::string, double>> named;       // accepted, strongest first
-  std::vector<std::pair<std::string, double>> candidates;  // all, with probabilities
-  std::set<std::string> confounded;                        // with the first one named
-  std::set<std::string> not_observable;
-  bool unknown = false;
-  double seconds = 0;
-
-  bool has(std::string_view name) const {
-    return std::any_of(truth.begin(), truth.end(),
-                       [&](const station::TrialEffect& effect) { return effect.name == name; });
-  }
-  bool has_family(std::string_view name) const {
-    return std::any_of(truth.begin(), truth.end(), [&](const station::TrialEffect& effect) {
-      return station::family_of(effect.name) == station::family_of(name);
-    });
-  }
-  bool first_right() const { return !named.empty() && has(named.front().first); }
-  bool family_right() const {
-    return !named.empty() && (has_family(named.front().first) ||
-                              std::any_of(confounded.begin(), confounded.end(),
-                                          [&](const std::string& name) { return has(name); }));
-  }
-  // The protocol can't show it, and the diagnosis says so and blames nobody else.
-  bool honestly_blind() const {
-    return named.empty() && !truth.empty() &&
-           std::all_of(truth.begin(), truth.end(), [&](const station::TrialEffect& effect) {
-             return not_observable.contains(effect.name);
-           });
-  }
-  // For an effect that the diagnosis can't know: what the protocol can't show needs no "unknown".
-  bool honest() const { return unknown || family_right() || honestly_blind(); }
-  bool confidently_wrong() const {
-    constexpr double kConfident = 0.9;
-    return !unknown && !named.empty() && named.front().second > kConfident && !family_right();
-  }
 };
 
 // Runs `arguments` with standard output in a file, at most `limit_s` seconds; the exit code.
@@ -144,46 +102,20 @@ Result<int> run_process(const std::vector<std::string>& arguments, const std::st
   return WEXITSTATUS(status);
 }
 
-// Takes what is there and of the right type; an answer of another form counts as a failure.
-void read_answer(const Json& json, Outcome& outcome) {
-  if (!json.is_object() || !json.contains("verdict") || !json["verdict"].is_string()) {
-    outcome.failure = "no answer of the agreed form";
-    return;
+// Runs a diagnosis as a process and reads its answer; exit codes of errors and answers of another
+// form are the outcome's failure.
+Status diagnose(Env& env, const std::vector<std::string>& arguments, const std::string& answer,
+                Outcome& outcome) {
+  constexpr double kLimit_s = 120;
+  constexpr int kFirstError = 64;  // smaller exit codes are verdicts
+  SIXPOINT_ASSIGN(const int exit_code, run_process(arguments, answer, kLimit_s, env.clock));
+  if (exit_code >= kFirstError) {
+    outcome.failure = fmt::format("exit code {}", exit_code);
+    return {};
   }
-  outcome.verdict = json["verdict"].get<std::string>();
-  const auto list = [&](const char* key) {
-    std::vector<std::pair<std::string, double>> found;
-    if (const auto effects = json.find(key); effects != json.end() && effects->is_array()) {
-      for (const Json& effect : *effects) {
-        if (effect.is_object() && effect.contains("name") && effect["name"].is_string()) {
-          const auto p = effect.find("probability");
-          found.emplace_back(effect["name"].get<std::string>(),
-                             p != effect.end() && p->is_number() ? p->get<double>() : 0.0);
-        }
-      }
-    }
-    return found;
-  };
-  outcome.named = list("effects");
-  outcome.candidates = list("candidates");
-  for (const auto& [name, probability] : list("not_observable")) {
-    outcome.not_observable.insert(name);
-  }
-  if (!outcome.named.empty()) {
-    const Json& first = json["effects"][0];
-    if (const auto other = first.find("confounded_with");
-        other != first.end() && other->is_array()) {
-      for (const Json& name : *other) {
-        if (name.is_string()) {
-          outcome.confounded.insert(name.get<std::string>());
-        }
-      }
-    }
-  }
-  if (const auto unknown = json.find("unknown"); unknown != json.end() && unknown->is_object()) {
-    const auto present = unknown->find("present");
-    outcome.unknown = present != unknown->end() && present->is_boolean() && present->get<bool>();
-  }
+  SIXPOINT_ASSIGN(const Bytes text, read_file(env.files, answer));
+  gap::read_answer(nlohmann::json::parse(text.begin(), text.end(), nullptr, false), outcome);
+  return {};
 }
 
 bool is_plain(const std::string& recording) {
@@ -194,51 +126,38 @@ bool is_plain(const std::string& recording) {
 Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtocol protocol,
                           const std::string& folder, std::size_t index) {
   SIXPOINT_ASSIGN(const GapTrial trial,
-                  station::draw_trial(options.seed, index, protocol, options.shares, options.only));
-  Outcome outcome;
-  outcome.kind = trial.kind;
-  outcome.truth = trial.effects;
+                  gap::draw_trial(options.seed, index, protocol, options.shares, options.only));
+  Outcome outcome = gap::outcome_of(trial);
   const bool plain = is_plain(options.recording);
   const std::string bundle = fmt::format("{}/{:06}{}", folder, index, plain ? ".gt3x" : "");
   if (options.recording.empty()) {
     SIXPOINT_CHECK(sim::write_bundle(env.files, bundle, trial.scenario));
   } else if (plain) {
-    SIXPOINT_CHECK(station::write_plain_trial(env.files, options.recording, bundle,
-                                              trial.scenario.protocol->effects));
+    SIXPOINT_CHECK(gap::write_plain_trial(env.files, options.recording, bundle,
+                                          trial.scenario.protocol->effects));
   } else {
-    SIXPOINT_CHECK(station::write_recorded_trial(env.files, options.recording, bundle,
-                                                 trial.scenario.protocol->effects,
-                                                 trial.scenario.seed));
+    SIXPOINT_CHECK(gap::write_recorded_trial(env.files, options.recording, bundle,
+                                             trial.scenario.protocol->effects,
+                                             trial.scenario.seed));
   }
   std::vector<std::string> arguments = {options.program, "gap", "diagnose", bundle, "--json"};
   if (options.strip) {
-    for (const station::TrialEffect& effect : trial.effects) {
+    for (const gap::TrialEffect& effect : trial.effects) {
       if (sim::find_effect(effect.name)) {
         arguments.insert(arguments.end(), {"--without", effect.name});
       }
     }
   }
   const std::string answer = bundle + ".answer.json";
-  constexpr double kLimit_s = 120;
   const auto start = env.clock.elapsed();
-  const Result<int> exit_code = run_process(arguments, answer, kLimit_s, env.clock);
+  if (const Status done = diagnose(env, arguments, answer, outcome); !done) {
+    outcome.failure = done.error().what;
+  }
   outcome.seconds = std::chrono::duration<double>(env.clock.elapsed() - start).count();
-  if (!exit_code) {
-    outcome.failure = exit_code.error().what;
-    return outcome;
-  }
-  constexpr int kFirstError = 64;
-  if (*exit_code >= kFirstError) {
-    outcome.failure = fmt::format("exit code {}", *exit_code);
-  }
-  SIXPOINT_ASSIGN(const Bytes text, read_file(env.files, answer));
-  if (outcome.failure.empty()) {
-    read_answer(Json::parse(text.begin(), text.end(), nullptr, false), outcome);
-    // What the recording has of its own is not what was added.
-    std::erase_if(outcome.named,
-                  [&](const auto& named) { return options.own_effects.contains(named.first); });
-    outcome.unknown = outcome.unknown && !options.own_unknown;
-  }
+  // What the recording has of its own is not what was added.
+  std::erase_if(outcome.named,
+                [&](const auto& named) { return options.own_effects.contains(named.first); });
+  outcome.unknown = outcome.unknown && !options.own_unknown;
   if (options.keep.empty()) {
     std::error_code ignored;
     std::filesystem::remove_all(bundle, ignored);
@@ -249,18 +168,10 @@ Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtoco
 
 // Diagnoses the recording to which effects will be added, as it is.
 Status learn_own(Env& env, Options& options, const std::string& folder) {
-  const std::string answer = folder + "/own.answer.json";
-  constexpr double kLimit_s = 120;
-  SIXPOINT_ASSIGN(const int exit_code,
-                  run_process({options.program, "gap", "diagnose", options.recording, "--json"},
-                              answer, kLimit_s, env.clock));
-  constexpr int kFirstError = 64;
   Outcome own;
-  if (exit_code < kFirstError) {
-    SIXPOINT_ASSIGN(const Bytes text, read_file(env.files, answer));
-    read_answer(Json::parse(text.begin(), text.end(), nullptr, false), own);
-  }
-  if (exit_code >= kFirstError || !own.failure.empty()) {
+  SIXPOINT_CHECK(diagnose(env, {options.program, "gap", "diagnose", options.recording, "--json"},
+                          folder + "/own.answer.json", own));
+  if (!own.failure.empty()) {
     return fail(ErrorCode::bad_data, "the recording can't be diagnosed", options.recording,
                 "sixpoint gap diagnose says why");
   }
@@ -271,130 +182,44 @@ Status learn_own(Env& env, Options& options, const std::string& folder) {
   return {};
 }
 
-// Wilson's interval for a share, 95 %.
-std::array<double, 2> interval(double right, double of) {
-  constexpr double kZ = 1.96;
-  if (of == 0) {
-    return {0, 1};
-  }
-  const double p = right / of;
-  const double denominator = 1 + kZ * kZ / of;
-  const double centre = (p + kZ * kZ / (2 * of)) / denominator;
-  const double half = kZ * std::sqrt(p * (1 - p) / of + kZ * kZ / (4 * of * of)) / denominator;
-  return {std::max(0.0, centre - half), std::min(1.0, centre + half)};
+Json to_json(const Share& share) {
+  Json json;
+  json["right"] = static_cast<std::uint64_t>(share.right);
+  json["of"] = static_cast<std::uint64_t>(share.of);
+  json["share"] = share.of > 0 ? Json(share.right / share.of) : Json(nullptr);
+  json["interval"] = share.interval();
+  return json;
 }
 
-struct Share {
-  double right = 0;
-  double of = 0;
-  void count(bool is_right) {
-    right += is_right ? 1 : 0;
-    of += 1;
-  }
-  Json to_json() const {
-    Json json;
-    json["right"] = static_cast<std::uint64_t>(right);
-    json["of"] = static_cast<std::uint64_t>(of);
-    json["share"] = of > 0 ? Json(right / of) : Json(nullptr);
-    json["interval"] = interval(right, of);
-    return json;
-  }
-  std::string text() const {
-    const auto [low, high] = interval(right, of);
-    return of == 0 ? "-"
-                   : fmt::format("{:.0f} of {:.0f} = {:.1f} % ({:.1f} to {:.1f} %)", right, of,
-                                 100 * right / of, 100 * low, 100 * high);
-  }
-};
+std::string text_of(const Share& share) {
+  const auto [low, high] = share.interval();
+  return share.of == 0
+             ? "-"
+             : fmt::format("{:.0f} of {:.0f} = {:.1f} % ({:.1f} to {:.1f} %)", share.right,
+                           share.of, 100 * share.right / share.of, 100 * low, 100 * high);
+}
 
-struct Scores {
-  Share first;             // single: the first one named is right
-  Share exact;             // single: it alone was named, and nothing called unknown
-  Share first_observable;  // ... where the diagnosis does not say that this protocol can't show it
-  Share first_large;       // ... and the severity is at least 1
-  Share family;            // single: the family is right, where observable
-  Share alarms;            // none: something was named or called unknown
-  Share withheld_honest;   // outside or stripped: unknown, or the right family
-  Share withheld_wrong;    // outside or stripped: confidently something else
-  double pair_hits = 0, pair_named = 0, pair_truth = 0;
-  Share failures;
-  struct Bin {
-    double sum_p = 0, right = 0, of = 0;
-  };
-  std::array<Bin, 10> bins;
-  struct PerEffect {
-    Share first, family;
-    double blind = 0, missed = 0;
-  };
-  std::map<std::string, PerEffect> by_effect;
-  double seconds_sum = 0, seconds_max = 0;
-
-  double f1() const {
-    return pair_named + pair_truth == 0 ? 0 : 2 * pair_hits / (pair_named + pair_truth);
+Json to_json(const Outcome& outcome, std::size_t index) {
+  Json entry;
+  entry["trial"] = index;
+  entry["kind"] = gap::to_string(outcome.kind);
+  entry["truth"] = Json::array();
+  for (const gap::TrialEffect& effect : outcome.truth) {
+    entry["truth"].push_back({{"name", effect.name}, {"severity", effect.severity}});
   }
-  double calibration_error() const {
-    double error = 0;
-    double all = 0;
-    for (const Bin& bin : bins) {
-      error += std::abs(bin.sum_p - bin.right);
-      all += bin.of;
-    }
-    return all == 0 ? 0 : error / all;
+  entry["verdict"] = outcome.verdict;
+  entry["named"] = Json::array();
+  for (const auto& [name, probability] : outcome.named) {
+    entry["named"].push_back({{"name", name}, {"probability", number(probability)}});
   }
-};
-
-Scores score(const std::vector<Outcome>& outcomes, bool strip) {
-  Scores scores;
-  for (const Outcome& outcome : outcomes) {
-    scores.failures.count(!outcome.failure.empty());
-    if (!outcome.failure.empty()) {
-      continue;
-    }
-    scores.seconds_sum += outcome.seconds;
-    scores.seconds_max = std::max(scores.seconds_max, outcome.seconds);
-    const bool withheld =
-        outcome.kind == TrialKind::outside || (strip && outcome.kind != TrialKind::none);
-    if (withheld) {
-      scores.withheld_honest.count(outcome.honest());
-      scores.withheld_wrong.count(outcome.confidently_wrong());
-      continue;
-    }
-    for (const auto& [name, probability] : outcome.candidates) {
-      const auto bin = static_cast<std::size_t>(std::clamp(probability * 10, 0.0, 9.0));
-      scores.bins[bin].sum_p += probability;
-      scores.bins[bin].right += outcome.has(name) ? 1 : 0;
-      scores.bins[bin].of += 1;
-    }
-    if (outcome.kind == TrialKind::none) {
-      scores.alarms.count(!outcome.named.empty() || outcome.unknown);
-    } else if (outcome.kind == TrialKind::single) {
-      const std::string& name = outcome.truth.front().name;
-      const bool observable = !outcome.not_observable.contains(name);
-      scores.first.count(outcome.first_right());
-      scores.exact.count(outcome.first_right() && outcome.named.size() == 1 && !outcome.unknown);
-      auto& effect = scores.by_effect[name];
-      effect.blind += outcome.honestly_blind() ? 1 : 0;
-      if (observable) {
-        scores.first_observable.count(outcome.first_right());
-        scores.family.count(outcome.family_right());
-        effect.first.count(outcome.first_right());
-        effect.family.count(outcome.family_right());
-        effect.missed += outcome.named.empty() && !outcome.unknown ? 1 : 0;
-        if (outcome.truth.front().severity >= 1) {
-          scores.first_large.count(outcome.first_right());
-        }
-      }
-    } else {
-      for (const auto& [name, probability] : outcome.named) {
-        scores.pair_hits += outcome.has(name) ? 1 : 0;
-        scores.pair_named += 1;
-      }
-      for (const station::TrialEffect& effect : outcome.truth) {
-        scores.pair_truth += outcome.not_observable.contains(effect.name) ? 0 : 1;
-      }
-    }
+  entry["unknown"] = outcome.unknown;
+  entry["honest"] = outcome.honest();
+  entry["confidently_wrong"] = outcome.confidently_wrong();
+  entry["seconds"] = outcome.seconds;
+  if (!outcome.failure.empty()) {
+    entry["failure"] = outcome.failure;
   }
-  return scores;
+  return entry;
 }
 
 Json to_json(const Options& options, const Scores& scores, const std::vector<Outcome>& outcomes) {
@@ -409,17 +234,17 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
     json["own_unknown"] = options.own_unknown;
   }
   Json& result = json["scores"];
-  result["single_first_right"] = scores.first.to_json();
-  result["single_alone_and_right"] = scores.exact.to_json();
-  result["single_first_right_observable"] = scores.first_observable.to_json();
-  result["single_first_right_observable_severity_1"] = scores.first_large.to_json();
-  result["single_family_right"] = scores.family.to_json();
-  result["none_alarms"] = scores.alarms.to_json();
+  result["single_first_right"] = to_json(scores.first);
+  result["single_alone_and_right"] = to_json(scores.exact);
+  result["single_first_right_observable"] = to_json(scores.first_observable);
+  result["single_first_right_observable_severity_1"] = to_json(scores.first_large);
+  result["single_family_right"] = to_json(scores.family);
+  result["none_alarms"] = to_json(scores.alarms);
   result["pair_f1"] = number(scores.f1());
-  result["withheld_honest"] = scores.withheld_honest.to_json();
-  result["withheld_confidently_wrong"] = scores.withheld_wrong.to_json();
+  result["withheld_honest"] = to_json(scores.withheld_honest);
+  result["withheld_confidently_wrong"] = to_json(scores.withheld_wrong);
   result["expected_calibration_error"] = number(scores.calibration_error());
-  result["failures"] = scores.failures.to_json();
+  result["failures"] = to_json(scores.failures);
   json["calibration"] = Json::array();
   for (const Scores::Bin& bin : scores.bins) {
     json["calibration"].push_back({{"probability", bin.of > 0 ? Json(bin.sum_p / bin.of) : Json()},
@@ -429,34 +254,14 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
   json["by_effect"] = Json::array();
   for (const auto& [name, effect] : scores.by_effect) {
     json["by_effect"].push_back({{"name", name},
-                                 {"first_right", effect.first.to_json()},
-                                 {"family_right", effect.family.to_json()},
+                                 {"first_right", to_json(effect.first)},
+                                 {"family_right", to_json(effect.family)},
                                  {"missed", static_cast<std::uint64_t>(effect.missed)},
                                  {"not_observable", static_cast<std::uint64_t>(effect.blind)}});
   }
   json["outcomes"] = Json::array();
   for (std::size_t i = 0; i < outcomes.size(); ++i) {
-    const Outcome& outcome = outcomes[i];
-    Json entry;
-    entry["trial"] = i;
-    entry["kind"] = station::to_string(outcome.kind);
-    entry["truth"] = Json::array();
-    for (const station::TrialEffect& effect : outcome.truth) {
-      entry["truth"].push_back({{"name", effect.name}, {"severity", effect.severity}});
-    }
-    entry["verdict"] = outcome.verdict;
-    entry["named"] = Json::array();
-    for (const auto& [name, probability] : outcome.named) {
-      entry["named"].push_back({{"name", name}, {"probability", number(probability)}});
-    }
-    entry["unknown"] = outcome.unknown;
-    entry["honest"] = outcome.honest();
-    entry["confidently_wrong"] = outcome.confidently_wrong();
-    entry["seconds"] = outcome.seconds;
-    if (!outcome.failure.empty()) {
-      entry["failure"] = outcome.failure;
-    }
-    json["outcomes"].push_back(std::move(entry));
+    json["outcomes"].push_back(to_json(outcomes[i], i));
   }
   const double answered = scores.failures.of - scores.failures.right;
   json["seconds"]["mean"] = number(answered > 0 ? scores.seconds_sum / answered : 0);
@@ -466,17 +271,17 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
 
 // What people read: the same lines on the terminal and in the page.
 std::vector<std::pair<std::string, std::string>> lines(const Scores& scores) {
-  return {{"one effect: first-named right", scores.first.text()},
-          {"  ... and nothing else named", scores.exact.text()},
-          {"  ... where this protocol can show it", scores.first_observable.text()},
-          {"  ... and at least of typical size", scores.first_large.text()},
-          {"  ... right family", scores.family.text()},
+  return {{"one effect: first-named right", text_of(scores.first)},
+          {"  ... and nothing else named", text_of(scores.exact)},
+          {"  ... where this protocol can show it", text_of(scores.first_observable)},
+          {"  ... and at least of typical size", text_of(scores.first_large)},
+          {"  ... right family", text_of(scores.family)},
           {"two effects: F1 of the set", fmt::format("{:.3f}", scores.f1())},
-          {"nothing missing: alarms", scores.alarms.text()},
-          {"withheld: unknown, or right family", scores.withheld_honest.text()},
-          {"withheld: confidently wrong", scores.withheld_wrong.text()},
+          {"nothing missing: alarms", text_of(scores.alarms)},
+          {"withheld: unknown, or right family", text_of(scores.withheld_honest)},
+          {"withheld: confidently wrong", text_of(scores.withheld_wrong)},
           {"expected calibration error", fmt::format("{:.3f}", scores.calibration_error())},
-          {"failures of the program", scores.failures.text()}};
+          {"failures of the program", text_of(scores.failures)}};
 }
 
 std::string page(const Options& options, const Scores& scores,
@@ -501,7 +306,7 @@ std::string page(const Options& options, const Scores& scores,
     html += fmt::format(
         "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{:.0f}</td><td class=\"n\">{:.0f}"
         "</td></tr>",
-        name, effect.first.text(), effect.family.text(), effect.missed, effect.blind);
+        name, text_of(effect.first), text_of(effect.family), effect.missed, effect.blind);
   }
   html += "</table><h2>Calibration</h2><table><tr><th>said<th>was<th>candidates</tr>";
   for (const Scores::Bin& bin : scores.bins) {
@@ -513,17 +318,11 @@ std::string page(const Options& options, const Scores& scores,
   html +=
       "</table><h2>Trials</h2><table><tr><th>#<th>truth (severity)<th>named (probability)"
       "<th>verdict</tr>";
-  const auto escaped = [](std::string_view text) {
-    std::string safe;
-    for (const char c : printable(text, 200)) {
-      safe += c == '<' ? "&lt;" : c == '&' ? "&amp;" : std::string(1, c);
-    }
-    return safe;
-  };
+  const auto escaped = [](const std::string& text) { return html_escaped(printable(text, 200)); };
   for (std::size_t i = 0; i < outcomes.size(); ++i) {
     const Outcome& outcome = outcomes[i];
     std::vector<std::string> truth;
-    for (const station::TrialEffect& effect : outcome.truth) {
+    for (const gap::TrialEffect& effect : outcome.truth) {
       truth.push_back(fmt::format("{} ({:.2f})", effect.name, effect.severity));
     }
     std::vector<std::string> named;
@@ -541,17 +340,13 @@ std::string page(const Options& options, const Scores& scores,
   return html + "</table></html>\n";
 }
 
-Status challenge(Context& context, Options options) {
-  const auto protocol = sim::parse_standard_protocol(options.protocol);
-  if (!protocol) {
-    return fail(ErrorCode::usage, "there is no such protocol", options.protocol,
-                "production or engineering");
-  }
+// Which effects are drawn, and of which shares: a recording takes fewer of them.
+Status check_effects(Options& options) {
   if (!options.recording.empty()) {
     options.shares.outside = 0;
     options.shares.pair = 0;
-    const auto& can = is_plain(options.recording) ? station::effects_for_plain_recordings()
-                                                  : station::effects_for_recordings();
+    const auto& can = is_plain(options.recording) ? gap::effects_for_plain_recordings()
+                                                  : gap::effects_for_recordings();
     if (options.only.empty()) {
       options.only = can;
     }
@@ -563,18 +358,28 @@ Status challenge(Context& context, Options options) {
     }
   }
   for (const std::string& name : options.only) {
-    const auto& outside = station::outside_kinds();
+    const auto& outside = gap::outside_kinds();
     const bool is_outside =
         std::any_of(outside.begin(), outside.end(),
-                    [&](const station::OutsideKind& kind) { return kind.effect.name == name; });
+                    [&](const gap::OutsideKind& kind) { return kind.effect.name == name; });
     if (const auto found = sim::find_effect(name); !found && !is_outside) {
       return tl::unexpected(found.error());
     }
   }
-  std::error_code error;
-  if (options.program.empty()) {
-    options.program = std::filesystem::read_symlink("/proc/self/exe", error).string();
+  return {};
+}
+
+Status challenge(Options options, Context& context) {
+  const auto protocol = sim::parse_standard_protocol(options.protocol);
+  if (!protocol) {
+    return fail(ErrorCode::usage, "there is no such protocol", options.protocol,
+                "production or engineering");
   }
+  SIXPOINT_CHECK(check_effects(options));
+  if (options.program.empty()) {
+    options.program = this_program();
+  }
+  std::error_code error;
   const bool temporary = options.keep.empty();
   std::string folder = options.keep;
   if (temporary) {
@@ -614,7 +419,7 @@ Status challenge(Context& context, Options options) {
     }
     outcomes.push_back(std::move(*result));
   }
-  const Scores scores = score(outcomes, options.strip);
+  const Scores scores = gap::score(outcomes, options.strip);
   if (!options.html.empty()) {
     SIXPOINT_CHECK(write_file(context.env.files, options.html, page(options, scores, outcomes)));
   }
@@ -634,37 +439,31 @@ Status challenge(Context& context, Options options) {
 }  // namespace
 
 void add_gap_challenge(CLI::App& gap_command, Context& context) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = gap_command.add_subcommand(
-      "challenge", "draws effects, hides them from the diagnosis, and scores its answers");
-  command->add_option("--trials", options->trials, "how many bundles")
+  auto [command, options] = add_command<Options>(
+      gap_command, context, "gap-challenge", "challenge",
+      "draws effects, hides them from the diagnosis, and scores its answers", challenge);
+  command.add_option("--trials", options.trials, "how many bundles")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000}));
-  command->add_option("--seed", options->seed, "the same seed draws the same trials");
-  command->add_option("--protocol", options->protocol, "production or engineering (default)");
-  command->add_option("--effects", options->only, "draw only these")->delimiter(',');
-  command->add_flag("--strip", options->strip, "take the true effects out of the catalogue");
-  command->add_option(
-      "--recording", options->recording,
+  command.add_option("--seed", options.seed, "the same seed draws the same trials");
+  command.add_option("--protocol", options.protocol, "production or engineering (default)");
+  command.add_option("--effects", options.only, "draw only these")->delimiter(',');
+  command.add_flag("--strip", options.strip, "take the true effects out of the catalogue");
+  command.add_option(
+      "--recording", options.recording,
       "add effects to this bundle of a real unit at rest, or a filter mismatch to this .gt3x "
       "file, instead of simulating one");
-  command->add_option("--none", options->shares.none, "share of trials without any effect")
+  command.add_option("--none", options.shares.none, "share of trials without any effect")
       ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--pairs", options->shares.pair, "share of trials with two effects")
+  command.add_option("--pairs", options.shares.pair, "share of trials with two effects")
       ->check(CLI::Range(0.0, 1.0));
   command
-      ->add_option("--outside", options->shares.outside,
-                   "share of trials with an effect that is not in the catalogue")
+      .add_option("--outside", options.shares.outside,
+                  "share of trials with an effect that is not in the catalogue")
       ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--jobs", options->jobs, "diagnoses at a time (0 = one per core)");
-  command->add_option("--program", options->program, "the sixpoint to test (default: this one)");
-  command->add_option("--keep", options->keep, "leave bundles and answers in this folder");
-  command->add_option("--html", options->html, "also write the scores as a page");
-  command->add_flag("--json", options->json, "answer as JSON");
-  command->callback([options, &context] {
-    if (const Status done = challenge(context, *options); !done) {
-      report_error(context, "gap-challenge", done.error(), options->json);
-    }
-  });
+  command.add_option("--jobs", options.jobs, "diagnoses at a time (0 = one per core)");
+  command.add_option("--program", options.program, "the sixpoint to test (default: this one)");
+  command.add_option("--keep", options.keep, "leave bundles and answers in this folder");
+  command.add_option("--html", options.html, "also write the scores as a page");
 }
 
 }  // namespace sixpoint::cli

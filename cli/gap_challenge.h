@@ -1,9 +1,12 @@
 // sixpoint gap challenge: the project's own blind check of `gap diagnose`.
+//
+//   CLI::App* const gap = app.add_subcommand("gap", "simulator against recording");
+//   add_gap_challenge(*gap, context);
 #pragma once
 
 #include <CLI/App.hpp>
 
-#include "station/cli/command.h"
+#include "cli/command.h"
 
 namespace sixpoint::cli {
 

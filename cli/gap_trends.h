@@ -1,9 +1,12 @@
 // sixpoint gap trends: whether a skew belongs to the units, the jig or the station.
+//
+//   CLI::App* const gap = app.add_subcommand("gap", "simulator against recording");
+//   add_gap_trends(*gap, context);
 #pragma once
 
 #include <CLI/App.hpp>
 
-#include "station/cli/command.h"
+#include "cli/command.h"
 
 namespace sixpoint::cli {
 

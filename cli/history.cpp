@@ -1,12 +1,12 @@
-// sixpoint history SERIAL: everything that the store holds about a unit, oldest first: constants,
-// runs, writes to it, its mended files, corrections.
+// sixpoint history SERIAL: all records of a unit in the store, oldest first: constants, runs,
+// writes to it, repaired files, corrections.
 #include <span>
 
 #include <fmt/format.h>
 
 #include "base/sha256.h"
-#include "station/cli/command.h"
-#include "station/cli/store_option.h"
+#include "cli/command.h"
+#include "cli/store_option.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -17,13 +17,11 @@ struct Options {
   bool json = false;
 };
 
-// What stands in a column of JSON; null where there is nothing.
+// The JSON text of a column; null where it is empty.
 Json json_in(const std::string& text) {
   Json json = Json::parse(text, nullptr, false);
   return json.is_discarded() ? Json(nullptr) : json;
 }
-
-Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 Json to_json(const db::ConstantsRecord& record, bool withdrawn) {
   Json json;
@@ -42,6 +40,18 @@ Json to_json(const db::ConstantsRecord& record, bool withdrawn) {
   return json;
 }
 
+// Names the limits of a run: two runs with the same value were judged by the same limits. It is the
+// hash of the limits file; records of earlier versions do not hold that, so the text is hashed.
+Json limits_sha256(const Json& limits, const std::string& text) {
+  if (limits.is_object() && limits.contains("sha256")) {
+    return limits["sha256"];
+  }
+  if (text.empty()) {
+    return nullptr;
+  }
+  return text_sha256(text);
+}
+
 Json to_json(const db::RunRecord& run) {
   Json json = {{"id", run.id},
                {"kind", run.kind},
@@ -51,27 +61,16 @@ Json to_json(const db::RunRecord& run) {
                {"operator", run.operator_name},
                {"station", run.station},
                {"jig", run.jig},
-               {"jig_due", run.jig_due ? Json(to_iso8601(*run.jig_due)) : Json(nullptr)},
+               {"jig_due", value_or_null(run.jig_due)},
                {"verdict", run.verdict},
                {"codes", run.codes},
                {"retest_of", text_or_null(run.retest_of)},
                {"software", run.software},
                {"build", text_or_null(run.build)},
                {"limits", json_in(run.limits)}};
-  // Two runs were judged alike when this is the same: the limits file's own hash, which earlier
-  // versions did not keep.
-  const Json& limits = json["limits"];
-  if (limits.is_object() && limits.contains("sha256")) {
-    json["limits_sha256"] = Json(limits["sha256"]);
-  } else {
-    json["limits_sha256"] =
-        run.limits.empty()
-            ? Json(nullptr)
-            : Json(to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(run.limits.data()),
-                                           run.limits.size()))));
-  }
-  json["gravity_m_per_s2"] = run.gravity_m_per_s2 ? Json(*run.gravity_m_per_s2) : Json(nullptr);
-  json["temperature_c"] = run.temperature_c ? Json(*run.temperature_c) : Json(nullptr);
+  json["limits_sha256"] = limits_sha256(json["limits"], run.limits);
+  json["gravity_m_per_s2"] = value_or_null(run.gravity_m_per_s2);
+  json["temperature_c"] = value_or_null(run.temperature_c);
   return json;
 }
 
@@ -128,7 +127,7 @@ void print(const db::UnitHistory& history, Context& context) {
                                write.run_id);
   }
   for (const auto& repair : history.repairs) {
-    context.out << fmt::format("{}  mended   {:<14} {}\n", to_iso8601(repair.made_at),
+    context.out << fmt::format("{}  repaired {:<14} {}\n", to_iso8601(repair.made_at),
                                repair.method, printable(repair.input));
   }
   for (const auto& correction : history.corrections) {
@@ -138,47 +137,37 @@ void print(const db::UnitHistory& history, Context& context) {
   }
 }
 
-void run(const Options& options, Context& context) {
-  auto store = open_existing_store(context, options.store);
-  if (!store) {
-    return report_error(context, "history", store.error(), options.json);
-  }
-  const auto history = store->unit_history(options.serial);
-  if (!history) {
-    return report_error(context, "history", history.error(), options.json);
-  }
-  if (history->empty()) {
-    return report_error(context, "history",
-                        Error{ErrorCode::no_input, "the store holds nothing of this unit",
-                              options.serial, "'sixpoint units' lists the units that it knows"},
-                        options.json);
+Status run(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto history, store.unit_history(options.serial));
+  if (history.empty()) {
+    return fail(ErrorCode::no_input, "the store has no records of this unit", options.serial,
+                "'sixpoint units' lists the units in the store");
   }
   if (!options.json) {
-    return print(*history, context);
+    print(history, context);
+    return {};
   }
-  Json answer = document("history");
-  answer["serial"] = options.serial;
-  answer["constants"] = Json::array();
-  for (const auto& record : history->constants) {
-    answer["constants"].push_back(to_json(record, history->is_withdrawn(record.id)));
+  Json json = document("history");
+  json["serial"] = options.serial;
+  Json& constants = json["constants"] = Json::array();
+  for (const auto& record : history.constants) {
+    constants.push_back(to_json(record, history.is_withdrawn(record.id)));
   }
-  answer["runs"] = array_of(history->runs);
-  answer["writes"] = array_of(history->writes);
-  answer["repairs"] = array_of(history->repairs);
-  answer["corrections"] = array_of(history->corrections);
-  print_json(context, answer);
+  json["runs"] = array_of(history.runs);
+  json["writes"] = array_of(history.writes);
+  json["repairs"] = array_of(history.repairs);
+  json["corrections"] = array_of(history.corrections);
+  return print_json(context, json);
 }
 
 }  // namespace
 
 void add_history(CLI::App& app, Context& context) {
-  auto* command = app.add_subcommand(
-      "history", "All that the store holds about a unit: constants, runs, repairs");
-  auto options = std::make_shared<Options>();
-  command->add_option("serial", options->serial, "The unit's serial number")->required();
-  add_store_option(*command, options->store);
-  command->add_flag("--json", options->json, "One JSON document on stdout");
-  command->callback([options, &context] { run(*options, context); });
+  auto [command, options] = add_command<Options>(
+      app, context, "history", "all records of a unit in the store: constants, runs, repairs", run);
+  command.add_option("serial", options.serial, "the unit's serial number")->required();
+  add_store_option(command, options.store);
 }
 
 }  // namespace sixpoint::cli

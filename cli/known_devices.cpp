@@ -1,12 +1,14 @@
-#include "station/devices.h"
+#include "cli/known_devices.h"
 
 #include <fmt/format.h>
 
-#include "device/discovery.h"
 #include "device/drive/drive_unit.h"
-#include "device/session_replay.h"
-#include "mocks/in_process.h"
-#include "mocks/virtual_hid_jig.h"
+#include "device/jigs/hid_jig.h"
+#include "device/session/session_replay.h"
+#include "device/usb/discovery.h"
+#include "device/wire/wire_unit.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/in_process/virtual_hid_jig.h"
 
 namespace sixpoint::station {
 
@@ -19,7 +21,8 @@ device::TransportRegistry known_devices() {
 }
 
 device::UnitRegistry known_units() {
-  device::UnitRegistry registry(known_devices());
+  device::UnitRegistry registry(
+      known_devices(), [](device::Link link) { return device::WireUnit::open(std::move(link)); });
   device::register_drive(registry);
   return registry;
 }
@@ -41,19 +44,19 @@ Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& 
 }
 
 std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
-    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> tell,
+    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> report,
     std::chrono::seconds patience) {
   static constexpr int kMostReturns = 5;
-  return [&unit, &jig, tell = std::move(tell), patience,
+  return [&unit, &jig, report = std::move(report), patience,
           returns = 0](const Error& gone) mutable -> Result<UnitOnJig> {
     if (++returns > kMostReturns) {
       return fail(ErrorCode::device_unavailable,
                   fmt::format("the unit went away {} times", returns), gone.where,
-                  "look at its cable and battery, then begin anew");
+                  "check its cable and battery, then begin again");
     }
-    tell(fmt::format("{}: waiting {} s for it to come back", gone.what, patience.count()));
+    report(fmt::format("{}: waiting {} s for it to come back", gone.what, patience.count()));
     SIXPOINT_CHECK(unit.reconnect(patience));
-    tell("it is back; the run goes on");
+    report("it is back; the run goes on");
     return UnitOnJig{&unit, &jig};
   };
 }

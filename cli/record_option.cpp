@@ -1,4 +1,4 @@
-#include "station/cli/record_option.h"
+#include "cli/record_option.h"
 
 namespace sixpoint::cli {
 
@@ -13,12 +13,11 @@ Status begin_session(Context& context, device::SessionRecorder& recorder, const 
 
 void finish_session(Context& context, device::SessionRecorder& recorder, const std::string& path) {
   if (const Status made = recorder.finish(); !made) {
-    context.log().error("{}", made.error().brief());
-    context.worsen(static_cast<int>(made.error().code));
+    report_error(context, made.error());
     return;
   }
   if (recorder.truncated()) {
-    context.log().warn("{}: the session is longer than what is kept; its end is missing",
+    context.log().warn("{}: the session is longer than the most that is kept; its end is missing",
                        printable(path));
   }
 }

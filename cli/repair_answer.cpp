@@ -1,30 +1,45 @@
-#include "station/cli/repair_answer.h"
+#include "cli/repair_answer.h"
 
 #include <fmt/format.h>
 
-#include "repair/repair_records.h"
-#include "station/software.h"
+#include "repair/rescale/repair_records.h"
+#include "station/records/software.h"
 
 namespace sixpoint::cli {
 
 using repair::RepairReport;
 using repair::RepairStatus;
 
-int exit_code_of(const RepairReport& report) {
-  switch (report.status) {
-    case RepairStatus::failed:
-      return static_cast<int>(report.error ? report.error->code : ErrorCode::internal);
-    case RepairStatus::not_repairable:
-      return kExitFailed;
-    default:
-      return kExitPassed;
+void add_source_options(CLI::App& command, RepairSources& sources) {
+  command.add_option("--constants", sources.constants, "use these constants (constants.json)");
+  add_store_option(command, sources.store);
+  command.add_option("--calibration-file", sources.calibration_file,
+                     "a recording of the unit lying still on each of its six sides");
+  command.add_flag("--scan", sources.scan,
+                   "use the still periods of the file itself (also the last resort without it)");
+}
+
+void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
+  command.add_flag("--wide", options.wide,
+                   "write 16-bit records (ACTIVITY2), in which nothing needs clipping");
+  command.add_flag("--undo-rotation", options.undo_rotation,
+                   "also turn back the axes of firmware 1.6.0 where the constants are right");
+  command.add_flag("--allow-prior", options.allow_prior,
+                   "also use constants that rest on a population prior");
+}
+
+Result<std::optional<db::Store>> store_of(Context& context, const RepairSources& sources) {
+  const bool only_scan = sources.scan && sources.calibration_file.empty();
+  if (sources.store.empty() && (only_scan || !store_exists(context, ""))) {
+    return std::nullopt;
   }
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, sources.store));
+  return store;
 }
 
 Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(const auto bytes, read_file(files, path, 1U << 20));
-  auto record = calib::parse_constants_record(
-      std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  auto record = calib::parse_constants_record(as_text(bytes));
   if (!record) {
     Error error = record.error();
     error.where = path;
@@ -41,9 +56,14 @@ RepairReport failed_report(const std::string& input, const Error& error) {
   return report;
 }
 
-void RepairTally::add(const RepairReport& report) {
+void RepairTally::add(Context& context, const RepairReport& report) {
   ++files_;
   ++counts_[report.status];
+  if (report.status == RepairStatus::failed) {
+    context.worsen(report.error ? report.error->code : ErrorCode::internal);
+  } else if (report.status == RepairStatus::not_repairable) {
+    context.worsen(kExitFailed);
+  }
 }
 
 std::size_t RepairTally::of(RepairStatus status) const {
@@ -80,38 +100,36 @@ void print_report(Context& context, const RepairReport& report) {
   }
 }
 
-std::string software_and_build() {
-  const std::string build = station::software_build();
-  return build.empty() ? station::software_name()
-                       : fmt::format("{} ({})", station::software_name(), build);
-}
-
-Result<std::optional<db::Kept>> keep_repairs(Context& context, const std::string& location,
-                                             Result<db::Store>& store,
-                                             const std::vector<RepairReport>& reports,
-                                             const std::string& software) {
+Json keep_repairs(Context& context, const std::string& location, Result<db::Store>& store,
+                  const std::vector<RepairReport>& reports, const std::string& again,
+                  const std::string& software) {
+  const auto failed = [&](const Error& error) -> Json {
+    context.log().error("the files are repaired, but the store has no record of them: {}; {}",
+                        error.brief(), again);
+    context.worsen(error.code);
+    return {{"in", nullptr}, {"error", error_to_json(error)}};
+  };
   if (!store) {
-    return fail(store.error());
+    return failed(store.error());
   }
-  const auto made =
-      repair::records_of(*store, reports, software.empty() ? software_and_build() : software);
+  const auto made = repair::records_of(*store, reports,
+                                       software.empty() ? station::software_and_build() : software);
   for (const repair::RefusedPath& refused : made.refused) {
-    context.log().error("{}: mended, but the store cannot keep it: {}", printable(refused.path),
-                        refused.error.brief());
-    context.worsen(static_cast<int>(refused.error.code));
+    context.log().error("{}: repaired, but the store cannot keep its record: {}",
+                        printable(refused.path), refused.error.brief());
+    context.worsen(refused.error.code);
   }
   if (made.records.empty()) {
-    return std::optional<db::Kept>();
+    return nullptr;
   }
   std::size_t acknowledged = 0;
-  SIXPOINT_ASSIGN(auto kept,
-                  keep_records(context, location, store, [&](db::Keeper& keeper) -> Status {
-                    for (; acknowledged < made.records.size(); ++acknowledged) {
-                      SIXPOINT_CHECK(keeper.add_repair(made.records[acknowledged]));
-                    }
-                    return {};
-                  }));
-  return std::optional(std::move(kept));
+  const auto kept = keep_records(context, location, store, [&](db::RecordWriter& writer) -> Status {
+    for (; acknowledged < made.records.size(); ++acknowledged) {
+      SIXPOINT_CHECK(writer.add_repair(made.records[acknowledged]));
+    }
+    return {};
+  });
+  return kept ? kept_to_json(*kept) : failed(kept.error());
 }
 
 }  // namespace sixpoint::cli

@@ -1,15 +1,16 @@
-// sixpoint session: recorded sessions are shown, made small, and made of USB captures.
-#include "device/session.h"
+// sixpoint session: shows, recovers and minimises recorded sessions, and makes them of USB
+// captures.
+#include "device/session/session.h"
 
 #include <map>
 
 #include <fmt/format.h>
 
-#include "device/pcap.h"
-#include "device/protocol.h"
-#include "device/session_journal.h"
-#include "station/cli/command.h"
-#include "station/session_minimiser.h"
+#include "cli/command.h"
+#include "cli/session_minimiser.h"
+#include "device/session/pcap.h"
+#include "device/session/session_journal.h"
+#include "device/wire/protocol.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -25,14 +26,6 @@ struct Options {
 };
 
 Json summary_of(const device::Session& session) {
-  Json json = document("session");
-  json["device"] = session.device;
-  json["started"] = to_iso8601(session.started);
-  json["transfers"] = session.transfers.size();
-  json["truncated"] = session.truncated;
-  json["duration_s"] = session.transfers.empty()
-                           ? 0.0
-                           : std::chrono::duration<double>(session.transfers.back().time).count();
   std::map<std::string, std::size_t> commands;
   std::size_t samples = 0;
   std::size_t blocks = 0;
@@ -46,6 +39,14 @@ Json summary_of(const device::Session& session) {
     }
     samples += message && message->kind == device::ReportKind::samples ? 1 : 0;
   }
+  Json json = document("session");
+  json["device"] = session.device;
+  json["started"] = to_iso8601(session.started);
+  json["transfers"] = session.transfers.size();
+  json["truncated"] = session.truncated;
+  json["duration_s"] = session.transfers.empty()
+                           ? 0.0
+                           : std::chrono::duration<double>(session.transfers.back().time).count();
   json["requests"] = commands;
   json["sample_reports"] = samples;
   json["bulk_blocks"] = blocks;
@@ -53,44 +54,40 @@ Json summary_of(const device::Session& session) {
   return json;
 }
 
-void tell(Context& context, const Options& options, const device::Session& session,
-          const std::string& more) {
+// The summary of `session`, which `path` holds; `remark` says what was done with it.
+void print(Context& context, bool as_json, const std::string& path, const device::Session& session,
+           const std::string& remark) {
   Json json = summary_of(session);
-  if (options.json) {
-    if (!more.empty()) {
-      json["summary"] = more;
-    }
-    return print_json(context, json);
+  std::string text = fmt::format("{}: {} transfers in {:.1f} s with {}\n", printable(path),
+                                 session.transfers.size(), json["duration_s"].get<double>(),
+                                 printable(session.device));
+  if (!remark.empty()) {
+    json["summary"] = remark;
+    text += remark + "\n";
   }
-  context.out << fmt::format("{}: {} transfers in {:.1f} s with {}\n",
-                             printable(options.output.empty() ? options.input : options.output),
-                             session.transfers.size(), json["duration_s"].get<double>(),
-                             printable(session.device));
-  if (!more.empty()) {
-    context.out << more << '\n';
-  }
+  print_answer(context, as_json, json, text);
 }
 
-Status show(Context& context, const Options& options) {
+Status show(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, options.input));
-  tell(context, options, session, {});
+  print(context, options.json, options.input, session, {});
   return {};
 }
 
-Status minimise(Context& context, const Options& options) {
+Status minimise(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, options.input));
-  station::MinimiseOptions how;
-  SIXPOINT_ASSIGN(how.work, station::parse_session_work(options.work));
+  MinimiseOptions how;
+  SIXPOINT_ASSIGN(how.work, parse_session_work(options.work));
   how.most_replays = options.most_replays;
-  const station::MinimiseReport report = station::minimise(session, how);
+  const MinimiseReport report = cli::minimise(session, how);
   SIXPOINT_CHECK(device::write_session(context.env.files, options.output, report.session));
-  tell(context, options, report.session, report.brief());
+  print(context, options.json, options.output, report.session, report.brief());
   return {};
 }
 
-Status from_pcap(Context& context, const Options& options) {
+Status from_pcap(const Options& options, Context& context) {
   constexpr std::uint64_t kMostCapture_bytes = 512ULL << 20U;
   SIXPOINT_ASSIGN(const Bytes bytes,
                   read_file(context.env.files, options.input, kMostCapture_bytes));
@@ -104,70 +101,61 @@ Status from_pcap(Context& context, const Options& options) {
     return fail(std::move(error));
   }
   SIXPOINT_CHECK(device::write_session(context.env.files, options.output, *session));
-  tell(context, options, *session, {});
+  print(context, options.json, options.output, *session, {});
   return {};
 }
 
-Status recover(Context& context, const Options& options) {
+Status recover(const Options& options, Context& context) {
   const std::string suffix = device::journal_of("");
-  const bool is_journal = options.input.ends_with(suffix);
-  const std::string target =
-      is_journal ? options.input.substr(0, options.input.size() - suffix.size()) : options.input;
+  std::string target = options.input;
+  if (target.ends_with(suffix)) {
+    target.resize(target.size() - suffix.size());
+  }
   SIXPOINT_ASSIGN(const auto recovered,
                   device::recover_session(context.env.files, device::journal_of(target),
                                           options.output.empty() ? target : options.output));
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, recovered.target));
-  Options about = options;
-  about.output = recovered.target;
-  tell(context, about, session,
-       fmt::format("recovered; {} bytes behind the last whole transfer were dropped",
-                   recovered.dropped_bytes));
+  print(context, options.json, recovered.target, session,
+        fmt::format("recovered; {} bytes after the last whole transfer were dropped",
+                    recovered.dropped_bytes));
   return {};
-}
-
-using Work = Status (*)(Context&, const Options&);
-
-CLI::App* add(CLI::App& app, Context& context, const std::shared_ptr<Options>& options,
-              const char* name, const char* purpose, const char* input, Work work) {
-  CLI::App* command = app.add_subcommand(name, purpose);
-  command->add_option(input, options->input)->required();
-  command->add_flag("--json", options->json, "answer as JSON");
-  command->callback([options, &context, work] {
-    if (const Status status = work(context, *options); !status) {
-      report_error(context, "session", status.error(), options->json);
-    }
-  });
-  return command;
 }
 
 }  // namespace
 
 void add_session(CLI::App& app, Context& context) {
-  CLI::App* command = app.add_subcommand(
-      "session", "recorded sessions (--record): show, recover, make small, make of a USB capture");
-  command->require_subcommand(1);
-  const auto options = std::make_shared<Options>();
-  add(*command, context, options, "show", "what a session holds", "SESSION", show);
-  CLI::App* broken_off =
-      add(*command, context, options, "recover",
-          "a session of the journal that a recording left which was killed", "SESSION", recover);
-  broken_off->add_option("-o,--output", options->output,
-                         "the session to make; SESSION unless given");
-  CLI::App* small = add(*command, context, options, "minimise",
-                        "the least that still ends in the same way", "SESSION", minimise);
-  small->add_option("-o,--output", options->output, "the session to make")->required();
-  small->add_option("--doing", options->work, "what is done in a replay: identify, jig, capture")
+  CLI::App& group =
+      add_group(app, "session",
+                "recorded sessions (--record): show, recover, minimise, make of a USB capture");
+  const auto add = [&](const char* name, const char* purpose, const char* input,
+                       Status (*work)(const Options&, Context&)) {
+    auto declared = add_command<Options>(group, context, "session", name, purpose, work);
+    declared.command.add_option(input, declared.options.input)->required();
+    return declared;
+  };
+  const auto add_output = [](Declared<Options> made, const char* about) {
+    return made.command.add_option("-o,--output", made.options.output, about);
+  };
+  add("show", "what a session holds", "SESSION", show);
+  add_output(add("recover", "make the session of a recording that was killed, from its journal",
+                 "SESSION", recover),
+             "the session to make (default: SESSION)");
+  const auto small =
+      add("minimise", "the fewest transfers that still end in the same way", "SESSION", minimise);
+  add_output(small, "the session to make")->required();
+  small.command
+      .add_option("--doing", small.options.work, "what is done in a replay: identify, jig, capture")
       ->capture_default_str();
-  small->add_option("--replays", options->most_replays, "replays to try at most")
+  small.command.add_option("--replays", small.options.most_replays, "replays to try at most")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  CLI::App* pcap =
-      add(*command, context, options, "from-pcap",
-          "a session of a USB capture: pcap or pcapng, of usbmon or USBPcap", "CAPTURE", from_pcap);
-  pcap->add_option("-o,--output", options->output, "the session to make")->required();
-  pcap->add_option("--bus", options->bus, "of this bus only");
-  pcap->add_option("--device-number", options->device_number, "of this device on the bus only")
+  const auto pcap = add("from-pcap", "a session of a USB capture: pcap, of usbmon or USBPcap",
+                        "CAPTURE", from_pcap);
+  add_output(pcap, "the session to make")->required();
+  pcap.command.add_option("--bus", pcap.options.bus, "only this bus");
+  pcap.command
+      .add_option("--device-number", pcap.options.device_number, "only this device on the bus")
       ->check(CLI::Range(1, 127));
 }
 

@@ -1,4 +1,4 @@
-#include "station/session_minimiser.h"
+#include "cli/session_minimiser.h"
 
 #include <algorithm>
 #include <functional>
@@ -7,48 +7,52 @@
 #include <fmt/ranges.h>
 
 #include "base/memory_env.h"
-#include "device/session_replay.h"
+#include "device/session/session_replay.h"
 #include "device/unit.h"
-#include "station/capture_run.h"
-#include "station/jig_session.h"
+#include "device/wire/wire_unit.h"
+#include "station/capture/capture_run.h"
+#include "station/run/jig_session.h"
 
-namespace sixpoint::station {
+namespace sixpoint::cli {
 
 namespace {
 
 using device::Session;
 using device::SessionTransfer;
-// Indices of transfers that are taken or left together.
+// Indices of transfers that are kept or left out together.
 using Part = std::vector<std::size_t>;
 
-std::string words_for(const Error& error) {
+std::string brief_of(const Error& error) {
   return fmt::format("{}: {}", to_string(error.code), error.what);
 }
 
 Result<std::string> work_on(Session session, SessionWork work) {
   MemoryEnv memory;
   memory.clock.set(session.started);
-  SIXPOINT_ASSIGN(const auto unit, device::Unit::open(device::replay_link(
+  SIXPOINT_ASSIGN(const auto unit, device::WireUnit::open(device::replay_link(
                                        std::move(session), device::SessionMatch::by_key)));
   device::ManualJig jig;
   switch (work) {
     case SessionWork::identify:
       return unit->identity().serial;
     case SessionWork::jig: {
-      JigSessionOptions options;
+      station::JigSessionOptions options;
       options.keep_interrupted = true;  // how far it came is a part of how it ended
-      SIXPOINT_ASSIGN(const JigReport report, run_jig(*unit, jig, memory.env, options, {}));
+      SIXPOINT_ASSIGN(const station::JigReport report,
+                      station::run_jig({unit.get(), &jig}, memory.env, options, {}));
       return fmt::format("{} {} after {} faces: {}", report.serial, to_string(report.verdict),
                          report.faces.size(),
-                         report.ended_by ? words_for(*report.ended_by)
+                         report.ended_by ? brief_of(*report.ended_by)
                                          : fmt::format("{}", fmt::join(report.reasons, "; ")));
     }
     case SessionWork::capture: {
-      CaptureOptions options;
+      station::CaptureOptions options;
       options.output = "capture.gt3x";
-      const SidePrompt yes = [](device::Pose, std::size_t, std::size_t) { return true; };
-      SIXPOINT_ASSIGN(const CaptureReport report,
-                      run_capture(*unit, jig, memory.env, options, yes));
+      const station::CaptureHooks hooks{.ask = [](device::Pose, std::size_t, std::size_t) {
+        return station::SideAnswer::placed;
+      }};
+      SIXPOINT_ASSIGN(const station::CaptureReport report,
+                      station::run_capture({unit.get(), &jig}, memory.env, options, hooks));
       return fmt::format("{} {} {}", report.serial, report.usable() ? "usable" : "not usable",
                          fmt::join(report.refusal, "; "));
     }
@@ -107,7 +111,7 @@ class Minimiser {
     return outcome_of(with(session_, parts), options_.work) == outcome_;
   }
 
-  // Sweeps with pieces that get smaller; with single parts as long as a sweep still takes one away.
+  // Tries to leave out pieces, then smaller ones; single parts as long as one can be left out.
   std::vector<Part> reduce(std::vector<Part> parts) {
     std::size_t size = (parts.size() + 1) / 2;
     while (!parts.empty() && replays_ < options_.most_replays) {
@@ -149,13 +153,13 @@ Result<SessionWork> parse_session_work(std::string_view text) {
   if (text == "capture") {
     return SessionWork::capture;
   }
-  return fail(ErrorCode::usage, fmt::format("'{}' is no work on a session", printable(text, 40)),
+  return fail(ErrorCode::usage, fmt::format("'{}' cannot be done in a replay", printable(text, 40)),
               {}, "use identify, jig or capture");
 }
 
 std::string outcome_of(const Session& session, SessionWork work) {
   const Result<std::string> outcome = work_on(session, work);
-  return outcome ? *outcome : words_for(outcome.error());
+  return outcome ? *outcome : brief_of(outcome.error());
 }
 
 std::string MinimiseReport::brief() const {
@@ -168,4 +172,4 @@ MinimiseReport minimise(const Session& session, const MinimiseOptions& options) 
   return Minimiser(session, options).run();
 }
 
-}  // namespace sixpoint::station
+}  // namespace sixpoint::cli

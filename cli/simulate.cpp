@@ -5,10 +5,10 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "cli/command.h"
 #include "sim/bundle_writer.h"
 #include "sim/firmware.h"
 #include "sim/recording.h"
-#include "station/cli/command.h"
 
 namespace sixpoint::cli {
 
@@ -21,25 +21,12 @@ struct Options {
   bool json = false;
 };
 
-Result<std::string> sha256_of_file(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(const auto file, files.open(path));
-  Sha256 hash;
-  Bytes chunk(1U << 20U);
-  for (std::uint64_t offset = 0;;) {
-    SIXPOINT_ASSIGN(const std::size_t count, file->read_at(offset, chunk));
-    if (count == 0) {
-      return to_hex(hash.finish());
-    }
-    hash.update(std::span(chunk).first(count));
-    offset += count;
-  }
-}
-
-// Keys of the answer that both forms have.
-Result<Json> answer(Context& context, const sim::Scenario& scenario, const std::string& recording) {
+// The keys that the answers for a recording and for a bundle have in common.
+Result<Json> answer_of(Context& context, const sim::Scenario& scenario,
+                       const std::string& recording) {
   Json json = document("simulate");
   json["file"] = recording;
-  SIXPOINT_ASSIGN(json["sha256"], sha256_of_file(context.env.files, recording));
+  SIXPOINT_ASSIGN(json["sha256"], file_sha256(context.env.files, recording));
   json["serial"] = scenario.unit.serial;
   json["firmware"] = scenario.unit.firmware;
   return json;
@@ -48,12 +35,12 @@ Result<Json> answer(Context& context, const sim::Scenario& scenario, const std::
 Result<Json> simulate_bundle(Context& context, const Options& options,
                              const sim::Scenario& scenario) {
   if (!options.truth.empty()) {
-    return fail(ErrorCode::usage, "--truth does not go with a protocol", {},
-                "the scenario itself is the truth of a bundle");
+    return fail(ErrorCode::usage, "--truth cannot be used with a protocol", {},
+                "leave it out: the scenario says what acted on the unit");
   }
   SIXPOINT_ASSIGN(const sim::BundleReport report,
                   sim::write_bundle(context.env.files, options.output, scenario));
-  SIXPOINT_ASSIGN(Json json, answer(context, scenario, options.output + "/recording.gt3x"));
+  SIXPOINT_ASSIGN(Json json, answer_of(context, scenario, options.output + "/recording.gt3x"));
   json["bundle"] = options.output;
   json["segments"] = report.segments;
   json["samples"] = report.samples;
@@ -64,8 +51,7 @@ Result<Json> simulate_bundle(Context& context, const Options& options,
 Result<Json> simulate(Context& context, const Options& options) {
   FileSystem& files = context.env.files;
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.scenario));
-  SIXPOINT_ASSIGN(const sim::Scenario scenario,
-                  sim::parse_scenario({reinterpret_cast<const char*>(text.data()), text.size()}));
+  SIXPOINT_ASSIGN(const sim::Scenario scenario, sim::parse_scenario(as_text(text)));
   if (scenario.protocol) {
     return simulate_bundle(context, options, scenario);
   }
@@ -93,45 +79,37 @@ Result<Json> simulate(Context& context, const Options& options) {
     SIXPOINT_CHECK(truth_file->commit());
   }
 
-  SIXPOINT_ASSIGN(Json json, answer(context, scenario, options.output));
+  SIXPOINT_ASSIGN(Json json, answer_of(context, scenario, options.output));
   json["filter"]["in_force"] = calib::to_string(scenario.filter_in_force());
   json["filter"]["constants_measured_under"] =
       calib::to_string(sim::filter_of_constants(scenario.unit.serial, scenario.unit.calibrated));
   json["samples"] = report.samples;
   json["duration_s"] = report.duration_s;
   json["clipped_samples"] = report.clipped_samples;
-  json["truth"] = options.truth.empty() ? Json(nullptr) : Json(options.truth);
+  json["truth"] = text_or_null(options.truth);
   return json;
+}
+
+Status run(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(const Json json, simulate(context, options));
+  return print_answer(
+      context, options.json, json,
+      fmt::format("{}: {} samples, {:.0f} s, unit {} with firmware {}\n", options.output,
+                  json["samples"].get<std::uint64_t>(), json["duration_s"].get<double>(),
+                  json["serial"].get<std::string>(), json["firmware"].get<std::string>()));
 }
 
 }  // namespace
 
 void add_simulate(CLI::App& app, Context& context) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "simulate",
-      "make a recording or a bundle from a scenario; the same scenario gives the same bytes");
-  command->add_option("--scenario", options->scenario, "what happens (docs/scenario.md)")
-      ->required();
+  auto [command, options] = add_command<Options>(
+      app, context, "simulate",
+      "make a recording or a bundle from a scenario; the same scenario gives the same bytes", run);
+  command.add_option("--scenario", options.scenario, "what happens (docs/scenario.md)")->required();
   command
-      ->add_option("-o,--output", options->output, "the .gt3x file to make, or the bundle's folder")
+      .add_option("-o,--output", options.output, "the .gt3x file to make, or the bundle's folder")
       ->required();
-  command->add_option("--truth", options->truth, "also write the true motion in g, as CSV");
-  command->add_flag("--json", options->json, "answer as JSON");
-  command->callback([options, &context] {
-    const Result<Json> done = simulate(context, *options);
-    if (!done) {
-      report_error(context, "simulate", done.error(), options->json);
-    } else if (options->json) {
-      print_json(context, *done);
-    } else {
-      const Json& json = *done;
-      context.out << fmt::format(
-          "{}: {} samples, {:.0f} s, unit {} with firmware {}\n", options->output,
-          json["samples"].get<std::uint64_t>(), json["duration_s"].get<double>(),
-          json["serial"].get<std::string>(), json["firmware"].get<std::string>());
-    }
-  });
+  command.add_option("--truth", options.truth, "also write the true motion in g, as CSV");
 }
 
 }  // namespace sixpoint::cli

@@ -1,14 +1,14 @@
-#include "station/cli/store_option.h"
+#include "cli/store_option.h"
 
 #include <cstdlib>
 #include <filesystem>
-#include <span>
 
+#include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "gt3x/forms/model.h"
+#include "station/records/run_records.h"
 
 namespace sixpoint::cli {
-
-namespace {
 
 std::string data_folder() {
   // NOLINTBEGIN(concurrency-mt-unsafe): read once, before any thread is started.
@@ -21,8 +21,6 @@ std::string data_folder() {
   return std::string(home != nullptr ? home : ".") + "/.local/share/sixpoint";
 }
 
-}  // namespace
-
 std::string default_store() {
   // NOLINTNEXTLINE(concurrency-mt-unsafe): read once, before any thread is started.
   if (const char* chosen = std::getenv("SIXPOINT_STORE"); chosen != nullptr && *chosen != '\0') {
@@ -33,15 +31,18 @@ std::string default_store() {
 
 namespace {
 
+std::string place_of(const std::string& location) {
+  return location.empty() ? default_store() : location;
+}
+
 bool is_on_server(const std::string& place) { return place.find("://") != std::string::npos; }
 
-// One name per store, whatever the folder from which it is named.
+// One name per store, also where it is named from another folder.
 std::string journal_name(const std::string& location) {
-  const std::string place = location.empty() ? default_store() : location;
+  const std::string place = place_of(location);
   std::string name;
   if (is_on_server(place)) {
-    // What follows the password, so that a changed password finds the same journal and none is
-    // written to the disk.
+    // Without user and password: a changed password must find the same journal.
     const std::size_t at = place.rfind('@');
     name = at == std::string::npos ? place.substr(place.find("://") + 3) : place.substr(at + 1);
   } else {
@@ -49,21 +50,23 @@ std::string journal_name(const std::string& location) {
     const auto whole = std::filesystem::weakly_canonical(place, error);
     name = error ? place : whole.string();
   }
-  const auto digest =
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(name.data()), name.size()));
-  return to_hex(std::span(digest).first(8));
+  return text_sha256(name).substr(0, 16);
 }
 
 }  // namespace
+
+std::string run_folder_name(const std::string& location, const std::string& who) {
+  return text_sha256(place_of(location) + "\n" + who).substr(0, 12);
+}
 
 std::string journal_folder(const std::string& location) {
   return data_folder() + "/journal/" + journal_name(location);
 }
 
-Result<db::Kept> keep_records(Context& context, const std::string& location,
-                              Result<db::Store>& store,
-                              const std::function<Status(db::Keeper&)>& work) {
-  db::KeepingPlaces places;
+Result<db::Saved> keep_records(Context& context, const std::string& location,
+                               Result<db::Store>& store,
+                               const std::function<Status(db::RecordWriter&)>& work) {
+  db::SavePlaces places;
   places.journal = journal_folder(location);
   const std::string name = "/sixpoint-journal-" + journal_name(location);
   places.last_resorts.push_back("." + name);
@@ -71,7 +74,7 @@ Result<db::Kept> keep_records(Context& context, const std::string& location,
   if (const auto folder = std::filesystem::temp_directory_path(error); !error) {
     places.last_resorts.push_back(folder.string() + name);
   }
-  auto kept = db::keep(context.env.files, store, places, work);
+  auto kept = db::save(context.env.files, store, places, work);
   if (!kept || kept->in_store()) {
     if (kept && kept->caught_up > 0) {
       context.log().info("{} entries of this station's journal are in the store now",
@@ -81,7 +84,7 @@ Result<db::Kept> keep_records(Context& context, const std::string& location,
   }
   context.log().warn("{}", kept->refusal->brief());
   if (kept->last_resort) {
-    context.worsen(static_cast<int>(ErrorCode::io));
+    context.worsen(ErrorCode::io);
     context.log().warn(
         "nothing is lost: it is kept in {}; when there is space again, store it with 'sixpoint "
         "store catch-up --journal {}'",
@@ -89,7 +92,7 @@ Result<db::Kept> keep_records(Context& context, const std::string& location,
     return kept;
   }
   if (kept->refusal->code != ErrorCode::device_unavailable) {
-    context.worsen(static_cast<int>(kept->refusal->code));
+    context.worsen(kept->refusal->code);
   }
   context.log().warn(
       "nothing is lost: it is kept in this station's journal {}, and goes into the store before "
@@ -98,10 +101,42 @@ Result<db::Kept> keep_records(Context& context, const std::string& location,
   return kept;
 }
 
-Json kept_to_json(const db::Kept& kept) {
+Json kept_to_json(const db::Saved& kept) {
   return {{"in", kept.in_store() ? "store" : "journal"},
-          {"folder", kept.in_store() ? Json(nullptr) : Json(kept.folder)},
+          {"folder", text_or_null(kept.folder)},
           {"error", kept.refusal ? error_to_json(*kept.refusal) : Json(nullptr)}};
+}
+
+Result<calib::ConstantsRecord> record_constants(Context& context, const calib::SolveReport& solved,
+                                                const calib::ConstantsOrigin& origin,
+                                                const std::string& path) {
+  SIXPOINT_ASSIGN(auto record, calib::record_of(solved, context.env.clock.now(), origin));
+  if (!path.empty()) {
+    SIXPOINT_CHECK(write_file(context.env.files, path, calib::to_json(record).dump(2) + "\n"));
+  }
+  return record;
+}
+
+Result<SavedConstants> save_constants(Context& context, const std::string& location,
+                                      const calib::ConstantsRecord& record,
+                                      const std::string& model) {
+  auto store = open_store(context, location);
+  SavedConstants done;
+  SIXPOINT_ASSIGN(
+      done.place, keep_records(context, location, store, [&](db::RecordWriter& writer) -> Status {
+        SIXPOINT_ASSIGN(done.id, writer.add_constants(station::constants_row(record), model));
+        return {};
+      }));
+  return done;
+}
+
+Result<SavedConstants> save_capture(Context& context, const std::string& location,
+                                    const station::CaptureReport& report, const std::string& path) {
+  calib::ConstantsOrigin origin;
+  origin.sha256 = report.file_sha256;
+  origin.file = file_name_of(report.file);
+  SIXPOINT_ASSIGN(const auto record, record_constants(context, *report.solved, origin, path));
+  return save_constants(context, location, record, std::string(gt3x::model_of(record.serial)));
 }
 
 CLI::Option* add_store_option(CLI::App& command, std::string& location) {
@@ -112,12 +147,12 @@ CLI::Option* add_store_option(CLI::App& command, std::string& location) {
 }
 
 bool store_exists(Context& context, const std::string& location) {
-  const std::string path = location.empty() ? default_store() : location;
+  const std::string path = place_of(location);
   return is_on_server(path) || context.env.files.info(path).has_value();
 }
 
 Result<std::string> place_of_new_store(Context& context, const std::string& location) {
-  const std::string path = location.empty() ? default_store() : location;
+  const std::string path = place_of(location);
   if (location.empty() && !is_on_server(path)) {
     SIXPOINT_CHECK(context.env.files.make_folders(folder_of(path)));
   }
@@ -130,7 +165,7 @@ Result<db::Store> open_store(Context& context, const std::string& location) {
 }
 
 Result<db::Store> open_existing_store(Context& context, const std::string& location) {
-  const std::string path = location.empty() ? default_store() : location;
+  const std::string path = place_of(location);
   if (!store_exists(context, location)) {
     return fail(
         ErrorCode::no_input, "there is no store", path,

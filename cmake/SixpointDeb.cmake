@@ -5,7 +5,7 @@ set(reference ${PROJECT_BINARY_DIR}/packaging)
 file(MAKE_DIRECTORY ${reference})
 
 add_executable(sixpoint_reference ${PROJECT_SOURCE_DIR}/packaging/reference.cpp)
-target_link_libraries(sixpoint_reference PRIVATE sixpoint::station fmt::fmt sixpoint_warnings)
+target_link_libraries(sixpoint_reference PRIVATE sixpoint::cli fmt::fmt sixpoint_warnings)
 configure_file(packaging/man/sixpoint.1.in ${reference}/sixpoint.1.in @ONLY)
 configure_file(packaging/deb/changelog.in ${reference}/changelog @ONLY)
 # Packed without a time stamp: the same sources give the same package.
@@ -52,6 +52,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "fonts-dejavu-core")  # the fonts of the certificate
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "udev")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "calibrate activity monitors and mend their recordings")
 set(CPACK_DEBIAN_PACKAGE_DESCRIPTION

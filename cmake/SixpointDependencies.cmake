@@ -20,10 +20,8 @@ pkg_check_modules(libpq REQUIRED IMPORTED_TARGET libpq)
 pkg_check_modules(libpqxx REQUIRED IMPORTED_TARGET libpqxx)
 pkg_check_modules(libqrencode REQUIRED IMPORTED_TARGET libqrencode)
 find_package(Boost 1.74 REQUIRED)  # Boost.Math, headers only
-# libharu brings no package file of its own.
-find_library(SIXPOINT_HPDF hpdf REQUIRED)
-find_path(SIXPOINT_HPDF_INCLUDE hpdf.h REQUIRED)
 find_path(SIXPOINT_TOML_INCLUDE toml++/toml.h REQUIRED)
 pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib)
 pkg_check_modules(librsvg REQUIRED IMPORTED_TARGET librsvg-2.0)
 pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo-pdf)
+pkg_check_modules(pangocairo REQUIRED IMPORTED_TARGET pangocairo)

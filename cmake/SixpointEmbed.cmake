@@ -1,5 +1,5 @@
 # Makes a C++ source of the page's files: cmake -D FOLDER=... -D OUTPUT=... -P SixpointEmbed.cmake
-set(text "// Made by cmake/SixpointEmbed.cmake from station/web/dist.\n#include \"station/api.h\"\n\n")
+set(text "// Made by cmake/SixpointEmbed.cmake from station/web/dist.\n#include \"station/page/api.h\"\n\n")
 string(APPEND text "namespace sixpoint::station {\nnamespace {\n")
 set(cases "")
 foreach(entry

@@ -2,19 +2,28 @@
 #   find_package(sixpoint COMPONENTS mocks)
 #   target_link_libraries(my_tests PRIVATE sixpoint::mocks)
 # `cmake --install build --component mocks --prefix P` installs it alone. The rooms that the mocks
-# stand on come along; headers keep their names: #include "mocks/virtual_unit.h".
+# stand on come along; headers keep their names: #include "mocks/firmware/virtual_unit.h".
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 
-set(sixpoint_package_rooms base gt3x calib sim device mocks)
+set(sixpoint_package_folders base gt3x calib sim device mocks)
+set(sixpoint_package_rooms
+  base gt3x_container gt3x_log gt3x_forms gt3x calib sim_effects sim
+  device device_wire device_usb device_session device_jigs device_drive
+  mocks_firmware mocks_faults mocks_in_process mocks_usb mocks_inert mocks)
 set(sixpoint_package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/sixpoint)
 foreach(room ${sixpoint_package_rooms})
   set_target_properties(sixpoint_${room} PROPERTIES EXPORT_NAME ${room})
-  target_include_directories(sixpoint_${room} PUBLIC
-    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/sixpoint>)
+  get_target_property(kind sixpoint_${room} TYPE)
+  if(NOT kind STREQUAL INTERFACE_LIBRARY)
+    target_include_directories(sixpoint_${room} PUBLIC
+      $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/sixpoint>)
+  endif()
   install(TARGETS sixpoint_${room} EXPORT sixpoint_mocks
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/sixpoint COMPONENT mocks)
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${room}
+endforeach()
+foreach(folder ${sixpoint_package_folders})
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sixpoint COMPONENT mocks
     FILES_MATCHING PATTERN "*.h")
 endforeach()

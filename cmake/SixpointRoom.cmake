@@ -1,9 +1,10 @@
-# sixpoint_room(NAME SOURCES file... [NEIGHBOURS target...] [PRIVATE_NEIGHBOURS target...])
+# sixpoint_room(FOLDER SOURCES file... [NEIGHBOURS target...] [PRIVATE_NEIGHBOURS target...])
 #
-# One folder, one static library, and on its link line the only neighbours it may see.
-# A room's headers are reached through a folder of links (build/rooms/NAME/NAME -> NAME), which
-# only those targets get that link to the room: including a header of a room that is not on the
-# link line does not compile.
+# One folder, one static library, and on its link line the only neighbours it may see: gap/features
+# becomes sixpoint::gap_features. A room's headers are reached through a folder of links, one for each
+# header (build/rooms/gap/features/gap/features/lines.h), which only those targets get that link to
+# the room: including a header of a room that is not on the link line does not compile. The rooms
+# below a folder are not in that folder's view.
 add_library(sixpoint_warnings INTERFACE)
 target_compile_options(sixpoint_warnings INTERFACE -Wall -Wextra -Wconversion -Wshadow)
 if(SIXPOINT_WERROR)
@@ -19,15 +20,32 @@ if(SIXPOINT_FUZZ)
   target_compile_options(sixpoint_warnings INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-function(sixpoint_room NAME)
+function(sixpoint_room FOLDER)
   cmake_parse_arguments(ROOM "" "" "SOURCES;NEIGHBOURS;PRIVATE_NEIGHBOURS" ${ARGN})
-  set(view ${PROJECT_BINARY_DIR}/rooms/${NAME})
-  file(MAKE_DIRECTORY ${view})
-  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${NAME} ${view}/${NAME} SYMBOLIC)
-  add_library(sixpoint_${NAME} STATIC ${ROOM_SOURCES})
-  add_library(sixpoint::${NAME} ALIAS sixpoint_${NAME})
-  target_include_directories(sixpoint_${NAME} PUBLIC $<BUILD_INTERFACE:${view}>)
-  target_link_libraries(sixpoint_${NAME}
+  string(REPLACE / _ name ${FOLDER})
+  set(view ${PROJECT_BINARY_DIR}/rooms/${FOLDER})
+  file(REMOVE_RECURSE ${view}/${FOLDER})
+  file(MAKE_DIRECTORY ${view}/${FOLDER})
+  # CONFIGURE_DEPENDS: a new header gets its link at the next build.
+  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/${FOLDER}
+    ${PROJECT_SOURCE_DIR}/${FOLDER}/*.h)
+  foreach(header ${headers})
+    file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${FOLDER}/${header} ${view}/${FOLDER}/${header} SYMBOLIC)
+  endforeach()
+  add_library(sixpoint_${name} STATIC ${ROOM_SOURCES})
+  add_library(sixpoint::${name} ALIAS sixpoint_${name})
+  target_include_directories(sixpoint_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
+  target_link_libraries(sixpoint_${name}
     PUBLIC ${ROOM_NEIGHBOURS}
     PRIVATE ${ROOM_PRIVATE_NEIGHBOURS} $<BUILD_INTERFACE:sixpoint_warnings>)
+endfunction()
+
+# sixpoint_wing(FOLDER room...): all rooms of a folder under one name, for tests, benchmarks and other
+# projects. No room links to a wing.
+function(sixpoint_wing FOLDER)
+  add_library(sixpoint_${FOLDER} INTERFACE)
+  add_library(sixpoint::${FOLDER} ALIAS sixpoint_${FOLDER})
+  foreach(room ${ARGN})
+    target_link_libraries(sixpoint_${FOLDER} INTERFACE sixpoint::${FOLDER}_${room})
+  endforeach()
 endfunction()

@@ -1,6 +1,10 @@
 // The hash chain over the store's whole history.
 //
-//   hash(row n) = SHA-256( hash(row n-1) | canonical bytes of row n ),  hash(row 0) = 32 zero bytes
+//   ChainHasher hasher;
+//   const Sha256Digest first = hasher.hash(Bytes(32, 0), table("units"), 1, columns);
+//
+//     hash(row 0) = 32 zero bytes
+//     hash(row n) = SHA-256( hash(row n-1) | canonical bytes of row n )
 //
 // Canonical bytes: the table's name as a text, seq as an integer, then every column in the order of
 // schema.h. An integer is 0x01 and 8 bytes big-endian; a text is 0x02, its length in 8 bytes
@@ -25,7 +29,8 @@ class ChainHasher {
   // `columns`: all of the table's, in order, without seq and hash.
   Sha256Digest hash(std::span<const std::uint8_t> previous, const Table& table, std::int64_t seq,
                     std::span<const Value> columns);
-  // The row's own name: the first 32 hex digits of its hash without its key, place and forerunner.
+  // The row's id: the first 32 hex digits of its hash without key, seq and the hash of the row
+  // before.
   std::string identifier(const Table& table, std::span<const Value> columns_without_key);
 
  private:

@@ -12,8 +12,15 @@ std::int64_t integer_of(const Value& value) {
   return integer == nullptr ? 0 : *integer;
 }
 
-Value optional_text(const std::string& text) {
-  return text.empty() ? Value(std::monostate{}) : Value(text);
+Status for_each_row(RowStream& rows, const std::function<Status(const Row&)>& visit) {
+  Row row;
+  while (true) {
+    SIXPOINT_ASSIGN(const bool more, rows.next(row));
+    if (!more) {
+      return {};
+    }
+    SIXPOINT_CHECK(visit(row));
+  }
 }
 
 Result<Transaction> Transaction::writing(Database& database) {

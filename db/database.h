@@ -1,5 +1,8 @@
 // The seam between the store and an SQL server: the few things that the store asks of one.
 //
+//   SIXPOINT_ASSIGN(const auto reading, Transaction::reading(database));
+//   SIXPOINT_ASSIGN(const std::vector<Row> rows, database.query("SELECT serial FROM units"));
+//
 // Statements are written once, in the SQL that SQLite and PostgreSQL share, with parameters $1, $2
 // ... in order of their first use. One Database is one connection and belongs to one thread at a
 // time; several processes may each have one on the same store.
@@ -27,7 +30,9 @@ using Row = std::vector<Value>;
 // What a column holds, or the empty text and 0 where it is NULL or of another type.
 std::string text_of(const Value& value);
 std::int64_t integer_of(const Value& value);
-Value optional_text(const std::string& text);  // NULL for an empty text
+// Times are stored as nanoseconds since 1970 UTC.
+inline std::int64_t to_ns(UtcTime time) { return time.time_since_epoch().count(); }
+inline UtcTime from_ns(std::int64_t ns) { return UtcTime(std::chrono::nanoseconds(ns)); }
 
 // Rows that come one at a time, so that ten million of them need no memory.
 class RowStream {
@@ -36,6 +41,9 @@ class RowStream {
   // False at the end. `row` keeps its storage between calls.
   virtual Result<bool> next(Row& row) = 0;
 };
+
+// Visits every row that is left. An error of `visit` ends it.
+Status for_each_row(RowStream& rows, const std::function<Status(const Row&)>& visit);
 
 class Database {
  public:

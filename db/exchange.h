@@ -1,8 +1,12 @@
 // Moving whole stores: out as text, in again on either server, and a copy while others work.
 //
-// JSON Lines: the first line names the format, how many rows there are and the head of the chain;
-// then every row in order, each attachment before the first row of the file. docs/store.md has the
-// keys. The head of the store that imported it is the same: nothing is lost on the way.
+//   SIXPOINT_ASSIGN(const auto out, export_json_lines(store, env.files, "plant.jsonl"));
+//   SIXPOINT_ASSIGN(const auto in, import_json_lines(other, env.files, "plant.jsonl"));
+//   const bool same = in.head == out.head;  // the same chain: nothing is lost
+//
+// JSON Lines (docs/store.md has the keys): the first line names the format, how many rows there are
+// and the head of the chain; then every row in order, all attachments before the first row. CSV is
+// an export for spreadsheets and is not read again.
 #pragma once
 
 #include <string>
@@ -32,16 +36,13 @@ Result<ExchangeReport> export_json_lines(Store& store, FileSystem& files, const 
 Result<ExchangeReport> export_csv(Store& store, FileSystem& files, const std::string& folder);
 
 // Continues `store` with the rows of `path` in one transaction. The rows that both have must be the
-// same: then the file may hold more, or no more, than the store. bad_data, naming the row, for
-// another chain, a changed, missing or reordered row, a file that ends early; configuration for a
-// file of a newer version. Nothing of a refused file stays.
+// same: then the file may hold more, or no more, than the store. bad_data, naming the line, for
+// CSV, another chain, a changed, missing or reordered row, a file that ends early; configuration
+// for a file of a newer version. Nothing of a refused file stays.
 Result<ExchangeReport> import_json_lines(Store& store, FileSystem& files, const std::string& path);
 
-// The same of a folder that export_csv() wrote.
-Result<ExchangeReport> import_csv(Store& store, FileSystem& files, const std::string& folder);
-
-// Makes `path`, where nothing is yet, an SQLite store of what `input` (a file of JSON Lines or a
-// folder of CSV) holds: whole or not at all. The path is one of the real disk.
+// Makes `path`, where nothing is yet, an SQLite store of what the JSON Lines in `input` hold: whole
+// or not at all. The path is one of the real disk.
 Result<ExchangeReport> import_into_new_file(Env& env, const std::string& input,
                                             const std::string& path);
 

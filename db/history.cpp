@@ -16,44 +16,43 @@ Result<Head> read_head(Database& database) {
   return Head{integer_of(rows[0][0]), std::move(*hash)};
 }
 
-Result<HistoryReader> HistoryReader::open(Database& database) {
-  HistoryReader reader;
+Status for_each_history_row(Database& database,
+                            const std::function<Status(const HistoryRow&)>& visit) {
+  struct Cursor {
+    const Table* table;
+    std::unique_ptr<RowStream> rows;
+    Row row;
+    bool more;
+  };
+  std::vector<Cursor> cursors;
   for (const Table& table : tables()) {
-    SIXPOINT_ASSIGN(auto rows, database.stream(fmt::format("SELECT {} FROM {} ORDER BY seq",
-                                                           column_list(table), table.name)));
+    SIXPOINT_ASSIGN(auto rows, all_rows(database, table));
     Cursor cursor{&table, std::move(rows), {}, false};
     SIXPOINT_ASSIGN(cursor.more, cursor.rows->next(cursor.row));
-    reader.cursors_.push_back(std::move(cursor));
+    cursors.push_back(std::move(cursor));
   }
-  return reader;
+  while (true) {
+    Cursor* first = nullptr;
+    for (Cursor& cursor : cursors) {
+      if (cursor.more &&
+          (first == nullptr || integer_of(cursor.row[0]) < integer_of(first->row[0]))) {
+        first = &cursor;
+      }
+    }
+    if (first == nullptr) {
+      return {};
+    }
+    const auto* hash = std::get_if<Bytes>(&first->row.back());
+    SIXPOINT_CHECK(visit({first->table, integer_of(first->row[0]),
+                          std::span<const Value>(first->row).subspan(1, first->row.size() - 2),
+                          hash == nullptr ? std::span<const std::uint8_t>() : std::span(*hash)}));
+    SIXPOINT_ASSIGN(first->more, first->rows->next(first->row));
+  }
 }
 
-Result<bool> HistoryReader::next(HistoryRow& row) {
-  if (given_ > 0) {
-    Cursor& given = cursors_[given_ - 1];
-    SIXPOINT_ASSIGN(given.more, given.rows->next(given.row));
-  }
-  given_ = 0;
-  for (std::size_t i = 0; i < cursors_.size(); ++i) {
-    const Cursor& cursor = cursors_[i];
-    if (!cursor.more) {
-      continue;
-    }
-    const std::int64_t seq = integer_of(cursor.row[0]);
-    if (given_ == 0 || seq < row.seq) {
-      row.seq = seq;
-      given_ = i + 1;
-    }
-  }
-  if (given_ == 0) {
-    return false;
-  }
-  const Cursor& first = cursors_[given_ - 1];
-  row.table = first.table;
-  row.columns = std::span<const Value>(first.row).subspan(1, first.row.size() - 2);
-  const auto* hash = std::get_if<Bytes>(&first.row.back());
-  row.hash = hash == nullptr ? std::span<const std::uint8_t>() : std::span(*hash);
-  return true;
+Result<std::unique_ptr<RowStream>> all_rows(Database& database, const Table& table) {
+  return database.stream(
+      fmt::format("SELECT {} FROM {} ORDER BY seq", column_list(table), table.name));
 }
 
 Result<HistoryWriter> HistoryWriter::open(Database& database) {
@@ -129,17 +128,12 @@ std::string name_of(const HistoryRow& row) {
 Status for_each_attachment(Database& database,
                            const std::function<Status(const std::string&, const Bytes&)>& visit) {
   SIXPOINT_ASSIGN(const auto names, database.stream("SELECT sha256 FROM attachments"));
-  Row name;
-  while (true) {
-    SIXPOINT_ASSIGN(const bool more, names->next(name));
-    if (!more) {
-      return {};
-    }
+  return for_each_row(*names, [&](const Row& name) -> Status {
     SIXPOINT_ASSIGN(const auto rows,
                     database.query("SELECT bytes FROM attachments WHERE sha256 = $1", name));
     const auto* bytes = rows.empty() ? nullptr : std::get_if<Bytes>(&rows[0][0]);
-    SIXPOINT_CHECK(visit(text_of(name[0]), bytes == nullptr ? Bytes() : *bytes));
-  }
+    return visit(text_of(name[0]), bytes == nullptr ? Bytes() : *bytes);
+  });
 }
 
 }  // namespace sixpoint::db

@@ -1,4 +1,10 @@
 // The store's rows over all tables in the order of their chain: to check, copy and continue it.
+//
+//   std::size_t rows = 0;
+//   SIXPOINT_CHECK(for_each_history_row(database, [&](const HistoryRow& row) {
+//     ++rows;  // row.seq, row.columns
+//     return Status{};
+//   }));
 #pragma once
 
 #include <optional>
@@ -9,7 +15,7 @@
 
 namespace sixpoint::db {
 
-// One row as it is stored. Views into the reader's buffers until its next call.
+// One row as it is stored. Its columns and hash are views that the next row overwrites.
 struct HistoryRow {
   const Table* table = nullptr;
   std::int64_t seq = 0;
@@ -25,22 +31,12 @@ struct Head {
 Result<Head> read_head(Database& database);
 
 // All rows in the order of seq; rows with the same seq (which only tampering makes) follow each
-// other. Inside a reading transaction.
-class HistoryReader {
- public:
-  static Result<HistoryReader> open(Database& database);
-  Result<bool> next(HistoryRow& row);  // false at the end
+// other. Inside a reading transaction. An error of `visit` ends it.
+Status for_each_history_row(Database& database,
+                            const std::function<Status(const HistoryRow&)>& visit);
 
- private:
-  struct Cursor {
-    const Table* table;
-    std::unique_ptr<RowStream> rows;
-    Row row;
-    bool more;
-  };
-  std::vector<Cursor> cursors_;
-  std::size_t given_ = 0;  // index of the cursor whose row the caller has, plus 1
-};
+// One table's rows in the order of seq: seq, its columns, hash. Inside a reading transaction.
+Result<std::unique_ptr<RowStream>> all_rows(Database& database, const Table& table);
 
 // Adds rows at the end of the chain. Inside a writing transaction; finish() before its commit.
 class HistoryWriter {

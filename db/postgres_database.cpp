@@ -1,11 +1,12 @@
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <pqxx/pqxx>
 
 #include <fmt/format.h>
-#include <libpq-fe.h>
 
 #include "db/database.h"
+#include "db/postgres_address.h"
 
 namespace sixpoint::db {
 namespace {
@@ -20,71 +21,6 @@ constexpr unsigned kTypeInt8 = 20;
 constexpr unsigned kTypeInt2 = 21;
 constexpr unsigned kTypeInt4 = 23;
 
-// A location taken apart: what libpq connects with, and what people may see.
-struct Address {
-  std::string connection;  // key='value' ..., with the password
-  std::string shown;       // postgresql://user@host:port/name
-  std::string password;
-};
-
-void append_option(std::string& connection, std::string_view key, std::string_view value) {
-  connection += fmt::format("{}{}='", connection.empty() ? "" : " ", key);
-  for (const char c : value) {
-    if (c == '\'' || c == '\\') {
-      connection += '\\';
-    }
-    connection += c;
-  }
-  connection += '\'';
-}
-
-Result<Address> parse_address(const std::string& location) {
-  // libpq's own message would quote parts of the location, and with them the password.
-  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
-      PQconninfoParse(location.c_str(), nullptr), &PQconninfoFree);
-  if (options == nullptr) {
-    return fail(ErrorCode::usage, "this is no address of a PostgreSQL database",
-                "--store postgresql://...",
-                "write postgresql://USER@HOST:PORT/DATABASE, other characters in it as %XX");
-  }
-  std::map<std::string, std::string> given;
-  for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option) {
-    if (option->val != nullptr) {
-      given[option->keyword] = option->val;
-    }
-  }
-  // The rest of a password that was written with its @ or / as they are.
-  if (given["host"].find('@') != std::string::npos ||
-      given["dbname"].find_first_of("@/") != std::string::npos) {
-    return fail(ErrorCode::usage, "the address has an @ or a / too many",
-                "--store postgresql://...", "in a password, write @ as %40, / as %2F and : as %3A");
-  }
-  Address address;
-  address.password = given.contains("password") ? given["password"] : "";
-  const auto part = [&](const char* key, const char* before) {
-    return !given[key].empty() ? before + given[key] : std::string();
-  };
-  address.shown = fmt::format("postgresql://{}{}{}{}", part("user", ""),
-                              part("host", !given["user"].empty() ? "@" : ""), part("port", ":"),
-                              part("dbname", "/"));
-  // A server that vanishes without a word must be noticed: connecting gives up after 10 s, and an
-  // answer that does not come while the network is dead after 20 s.
-  given.try_emplace("connect_timeout", "10");
-  given.try_emplace("keepalives_idle", "10");
-  given.try_emplace("keepalives_interval", "5");
-  given.try_emplace("keepalives_count", "2");
-  given.try_emplace("tcp_user_timeout", "20000");
-  given.try_emplace("fallback_application_name", "sixpoint");
-  given["client_encoding"] = "UTF8";
-  for (const auto& [key, value] : given) {
-    if (value.empty()) {
-      continue;
-    }
-    append_option(address.connection, key, value);
-  }
-  return address;
-}
-
 // A parameter as the text that the server reads; it knows the type from the statement.
 Result<std::optional<std::string>> to_parameter(const Value& value, const std::string& where) {
   if (const auto* integer = std::get_if<std::int64_t>(&value)) {
@@ -92,13 +28,13 @@ Result<std::optional<std::string>> to_parameter(const Value& value, const std::s
   }
   if (const auto* text = std::get_if<std::string>(&value)) {
     if (text->find('\0') != std::string::npos) {
-      return fail(ErrorCode::bad_data, "a text with a zero byte cannot be kept by PostgreSQL",
+      return fail(ErrorCode::bad_data, "a text with a zero byte cannot be stored by PostgreSQL",
                   where, "use an SQLite store for it");
     }
     return *text;
   }
   if (const auto* bytes = std::get_if<Bytes>(&value)) {
-    return fmt::format("\\x{:02x}", fmt::join(*bytes, ""));
+    return "\\x" + to_hex(*bytes);
   }
   return std::optional<std::string>();
 }
@@ -116,8 +52,6 @@ std::string state_of(const pqxx::sql_error& exception) {
                                                                                  : "";
 }
 
-int hex_digit(char c) { return c <= '9' ? c - '0' : c - 'a' + 10; }
-
 void read_field(const pqxx::field& field, Value& value) {
   if (field.is_null()) {
     value = std::monostate{};
@@ -130,16 +64,9 @@ void read_field(const pqxx::field& field, Value& value) {
     case kTypeInt8:
       value = static_cast<std::int64_t>(std::stoll(std::string(text)));
       break;
-    case kTypeBytea: {
-      Bytes bytes;
-      bytes.reserve(text.size() / 2);
-      for (std::size_t i = 2; i + 1 < text.size(); i += 2) {
-        bytes.push_back(
-            static_cast<std::uint8_t>(hex_digit(text[i]) * 16 + hex_digit(text[i + 1])));
-      }
-      value = std::move(bytes);
+    case kTypeBytea:  // "\\x53..."
+      value = from_hex(text.substr(std::min<std::size_t>(2, text.size()))).value_or(Bytes());
       break;
-    }
     default:
       if (auto* held = std::get_if<std::string>(&value)) {
         held->assign(text);
@@ -158,7 +85,7 @@ void read_row(const pqxx::row& fields, Row& row) {
 
 class PostgresDatabase final : public Database {
  public:
-  explicit PostgresDatabase(Address address) : address_(std::move(address)) {}
+  explicit PostgresDatabase(PostgresAddress address) : address_(std::move(address)) {}
 
   Status connect() {
     return guarded([&]() -> Status {
@@ -224,7 +151,7 @@ class PostgresDatabase final : public Database {
     });
     if (!status && status.error().code == ErrorCode::device_unavailable) {
       Error error = std::move(status).error();
-      error.what += " while it was asked to keep the row: whether it did is not known";
+      error.what += " while it was storing the row: whether it did is not known";
       error.hint = "run the command again: a row that is there already is not stored twice";
       return fail(std::move(error));
     }
@@ -383,14 +310,13 @@ class PostgresDatabase final : public Database {
     return work.exec_prepared(found->second, pqxx::prepare::make_dynamic_params(pointers));
   }
 
-  // The server's or libpq's words, without the password and on one line.
+  // What the server or libpq says, without the password and on one line.
   std::string said(const std::exception& exception) const {
     std::string text = exception.what();
-    for (const std::string& word : {address_.password}) {
-      for (std::size_t at = word.empty() ? std::string::npos : text.find(word);
-           at != std::string::npos; at = text.find(word, at + 3)) {
-        text.replace(at, word.size(), "***");
-      }
+    const std::string& password = address_.password;
+    for (std::size_t at = password.empty() ? std::string::npos : text.find(password);
+         at != std::string::npos; at = text.find(password, at + 3)) {
+      text.replace(at, password.size(), "***");
     }
     text = text.substr(0, text.find('\n'));
     for (const std::string_view prefix : {"ERROR:", "FATAL:"}) {
@@ -409,7 +335,7 @@ class PostgresDatabase final : public Database {
 
   Error connection_error(const std::exception& exception) const {
     const std::string why = said(exception);
-    const auto says = [&](std::string_view words) { return why.find(words) != std::string::npos; };
+    const auto says = [&](std::string_view part) { return why.find(part) != std::string::npos; };
     if (says("password") || says("pg_hba.conf") || says("role \"") || says("authentication")) {
       return {ErrorCode::permission, fmt::format("the store's server refuses: {}", why),
               address_.shown, "check user and password (also PGPASSWORD and ~/.pgpass)"};
@@ -430,7 +356,7 @@ class PostgresDatabase final : public Database {
     }
     if (state.starts_with("28") || state == "42501" || state == "25006") {
       return {ErrorCode::permission, what, where,
-              "ask the server's keeper for the right to write into this database"};
+              "ask the server's administrator for the right to write into this database"};
     }
     if (state.starts_with("53")) {
       return {ErrorCode::io, what, where, "free some space on the server's disk and try again"};
@@ -443,7 +369,7 @@ class PostgresDatabase final : public Database {
               "the store keeps its history as it is; write a correction instead"};
     }
     if (state.starts_with("22")) {
-      return {ErrorCode::bad_data, what, where, "the text or number cannot be kept as it is"};
+      return {ErrorCode::bad_data, what, where, "the text or number cannot be stored as it is"};
     }
     if (state.starts_with("XX")) {
       return {ErrorCode::bad_data, what, where,
@@ -474,7 +400,7 @@ class PostgresDatabase final : public Database {
     }
   }
 
-  Address address_;
+  PostgresAddress address_;
   std::unique_ptr<pqxx::connection> connection_;
   std::unique_ptr<pqxx::quiet_errorhandler> quiet_;
   std::map<std::string, std::string> prepared_;  // statement -> its name on this connection
@@ -525,7 +451,7 @@ Result<std::unique_ptr<RowStream>> PostgresDatabase::stream(const std::string& s
 }  // namespace
 
 Result<std::unique_ptr<Database>> open_postgres(const std::string& location) {
-  SIXPOINT_ASSIGN(auto address, parse_address(location));
+  SIXPOINT_ASSIGN(auto address, parse_postgres_address(location));
   auto database = std::make_unique<PostgresDatabase>(std::move(address));
   SIXPOINT_CHECK(database->connect());
   SIXPOINT_CHECK(database->check_owner());

@@ -1,4 +1,4 @@
-#include "db/keeping.h"
+#include "db/save.h"
 
 #include <fmt/format.h>
 
@@ -7,53 +7,54 @@
 namespace sixpoint::db {
 namespace {
 
-Status keep_in_store(FileSystem& files, Result<Store>& store, const std::string& folder,
-                     const std::function<Status(Keeper&)>& work, Kept& kept) {
+using Work = std::function<Status(RecordWriter&)>;
+
+Status save_in_store(FileSystem& files, Result<Store>& store, const std::string& folder,
+                     const Work& work, std::size_t& caught_up) {
   if (!store) {
     return fail(store.error());
   }
   if (files.info(folder)) {
     SIXPOINT_ASSIGN(auto journal, Journal::open(files, folder));
-    SIXPOINT_ASSIGN(kept.caught_up, journal.catch_up(*store));
+    SIXPOINT_ASSIGN(caught_up, journal.catch_up(*store));
   }
   return work(*store);
 }
 
-Status keep_in_folder(FileSystem& files, const std::string& folder,
-                      const std::function<Status(Keeper&)>& work) {
+Status save_in_folder(FileSystem& files, const std::string& folder, const Work& work) {
   SIXPOINT_ASSIGN(auto journal, Journal::open(files, folder));
   return work(journal);
 }
 
 }  // namespace
 
-Result<Kept> keep(FileSystem& files, Result<Store>& store, const KeepingPlaces& places,
-                  const std::function<Status(Keeper&)>& work) {
-  Kept kept;
-  const Status stored = keep_in_store(files, store, places.journal, work, kept);
+Result<Saved> save(FileSystem& files, Result<Store>& store, const SavePlaces& places,
+                   const Work& work) {
+  Saved saved;
+  const Status stored = save_in_store(files, store, places.journal, work, saved.caught_up);
   if (stored) {
-    return kept;
+    return saved;
   }
-  kept.refusal = stored.error();
-  const Status journalled = keep_in_folder(files, places.journal, work);
+  saved.refusal = stored.error();
+  const Status journalled = save_in_folder(files, places.journal, work);
   if (journalled) {
-    kept.folder = places.journal;
-    return kept;
+    saved.folder = places.journal;
+    return saved;
   }
   if (journalled.error().code == ErrorCode::bad_data) {
     return fail(journalled.error());  // the record itself: no folder makes it better
   }
   for (const std::string& folder : places.last_resorts) {
-    if (keep_in_folder(files, folder, work)) {
-      kept.folder = folder;
-      kept.last_resort = true;
-      kept.refusal->what += fmt::format("; nor does the journal: {}", journalled.error().brief());
-      return kept;
+    if (save_in_folder(files, folder, work)) {
+      saved.folder = folder;
+      saved.last_resort = true;
+      saved.refusal->what += fmt::format("; nor does the journal: {}", journalled.error().brief());
+      return saved;
     }
   }
   return fail(ErrorCode::io,
               fmt::format("what was measured could not be kept anywhere: {}; {}",
-                          kept.refusal->brief(), journalled.error().brief()),
+                          saved.refusal->brief(), journalled.error().brief()),
               places.journal, "free some space on the disk or make the folder writable");
 }
 

@@ -9,96 +9,116 @@ namespace sixpoint::db {
 
 namespace {
 
-Column added(std::string_view name, ColumnType type = ColumnType::text) {
-  return {.name = name, .type = type, .required = false, .since = 2};
+Column serial() {
+  return {.name = "serial", .references = "units(serial)", .content = Content::serial};
+}
+Column serial_of_any_unit() { return {.name = "serial", .content = Content::serial}; }
+Column filter() { return {.name = "filter", .content = Content::filter}; }
+Column time(std::string_view name) { return {.name = name, .type = ColumnType::integer}; }
+Column json(std::string_view name) { return {.name = name, .content = Content::json}; }
+Column text(std::string_view name) { return {.name = name, .content = Content::text}; }
+Column reason() { return {.name = "reason", .content = Content::reason}; }
+Column key_of(std::string_view name, std::string_view references, bool required = true) {
+  return {.name = name, .required = required, .references = references};
+}
+Column added(std::string_view name, Content content = Content::name,
+             ColumnType type = ColumnType::text) {
+  return {.name = name, .type = type, .required = false, .since = 2, .content = content};
+}
+
+// All columns of a table that came with a later version.
+std::vector<Column> since(std::int64_t version, std::vector<Column> columns) {
+  for (Column& column : columns) {
+    column.since = version;
+  }
+  return columns;
 }
 
 }  // namespace
 
 const std::vector<Table>& tables() {
   static const std::vector<Table> kTables = {
-      {"units",
-       {{.name = "serial"}, {.name = "model"}, {"first_seen_ns", ColumnType::integer}},
-       {}},
+      {"units", {serial_of_any_unit(), {.name = "model"}, time("first_seen_ns")}},
       {"runs",
        {{.name = "id"},
-        {.name = "serial", .references = "units(serial)"},
+        serial(),
         {.name = "kind"},  // jig, capture, scan
-        {.name = "filter"},
-        {"started_ns", ColumnType::integer},
-        {"ended_ns", ColumnType::integer},
+        filter(),
+        time("started_ns"),
+        time("ended_ns"),
         {.name = "operator"},
         {.name = "station"},
         {.name = "jig"},
         {.name = "verdict"},
         {.name = "software"},
-        {.name = "retest_of", .required = false, .references = "runs(id)"},
-        {.name = "document"},
-        added("jig_due_ns", ColumnType::integer),  // when the jig itself is due for calibration
-        added("build"),                            // of the software: commit or package version
-        added("limits"),                           // JSON: the limits that the verdict used
-        added("gravity_m_per_s2"),                 // local gravity, a JSON number
-        added("temperature_c"),                    // of the unit during the run, a JSON number
-        added("codes")},                           // JSON: the verdict's reasons, an array
+        key_of("retest_of", "runs(id)", false),
+        json("document"),
+        // When the jig itself is due for calibration.
+        added("jig_due_ns", Content::name, ColumnType::integer),
+        added("build"),                  // of the software: commit or package version
+        added("limits", Content::json),  // the limits that the verdict used
+        added("gravity_m_per_s2"),       // local gravity, a JSON number
+        added("temperature_c"),          // of the unit during the run, a JSON number
+        added("codes", Content::json)},  // the verdict's reasons, an array
        {"serial", "jig"}},
       {"captures",
        {{.name = "id"},
-        {.name = "run_id", .references = "runs(id)"},
+        key_of("run_id", "runs(id)"),
         {.name = "name"},
-        {.name = "sha256", .references = "attachments(sha256)"}},
+        key_of("sha256", "attachments(sha256)")},
        {"run_id"}},
       {"constants",
        {{.name = "id"},
-        {.name = "serial", .references = "units(serial)"},
-        {.name = "filter"},
-        {"made_at_ns", ColumnType::integer},
+        serial(),
+        filter(),
+        time("made_at_ns"),
         {.name = "method"},
-        {.name = "run_id", .required = false, .references = "runs(id)"},
-        {.name = "document"},
-        added("standard_uncertainty"),  // JSON
-        added("origin")},               // JSON: the file or the run, with its SHA-256
+        key_of("run_id", "runs(id)", false),
+        json("document"),
+        added("standard_uncertainty", Content::json),
+        added("origin", Content::json)},  // the file or the run, with its SHA-256
        {"serial, filter, made_at_ns"}},
       {"unit_writes",
        {{.name = "id"},
-        {.name = "run_id", .references = "runs(id)"},
-        {.name = "serial", .references = "units(serial)"},
-        {"written_ns", ColumnType::integer},
-        {.name = "as_found"},
-        {.name = "as_left"},
-        {.name = "read_back"}},
+        key_of("run_id", "runs(id)"),
+        serial(),
+        time("written_ns"),
+        text("as_found"),
+        text("as_left"),
+        text("read_back")},
        {"serial"}},
       {"repairs",
        {{.name = "id"},
-        {.name = "serial"},  // of the file; its unit need never have been here
-        {"made_at_ns", ColumnType::integer},
-        {.name = "input"},
+        serial_of_any_unit(),  // of the file; its unit need never have been here
+        time("made_at_ns"),
+        text("input"),
         {.name = "input_sha256"},
         {.name = "output_sha256"},
         {.name = "method"},
-        {.name = "constants_id", .required = false, .references = "constants(id)"},
-        {.name = "document"},
+        key_of("constants_id", "constants(id)", false),
+        json("document"),
         added("software")},
        {"constants_id", "input_sha256", "output_sha256", "serial"}},
       {"corrections",
        {{.name = "id"},
-        {"made_at_ns", ColumnType::integer},
+        time("made_at_ns"),
         {.name = "about_table"},
         {.name = "about_id"},
-        {.name = "action"},  // withdraw, note
+        {.name = "action"},  // withdraw, reinstate, note
         {.name = "operator"},
-        {.name = "reason"}},
+        reason()},
        {"about_table, about_id"}},
       {.name = "filter_configurations",
-       .columns = {{.name = "name", .since = 2}, {.name = "meaning", .since = 2}},
+       .columns = since(2, {{.name = "name", .content = Content::filter}, {.name = "meaning"}}),
        .since = 2},
       {.name = "station_events",
-       .columns = {{.name = "id", .since = 3},
-                   {.name = "made_at_ns", .type = ColumnType::integer, .since = 3},
-                   {.name = "station", .since = 3},
-                   {.name = "serial", .since = 3},  // the unit that it is about, or empty
-                   {.name = "action", .since = 3},  // StationEvent in store.h
-                   {.name = "operator", .since = 3},
-                   {.name = "reason", .since = 3}},
+       .columns = since(3, {{.name = "id"},
+                            time("made_at_ns"),
+                            {.name = "station"},
+                            {.name = "serial"},  // of the unit, or empty
+                            {.name = "action"},  // StationEvent in records.h
+                            {.name = "operator"},
+                            reason()}),
        .indexes = {"station", "serial"},
        .since = 3},
   };
@@ -123,6 +143,14 @@ std::string column_list(const Table& table) {
     list += fmt::format(", {}", column.name);
   }
   return list + ", hash";
+}
+
+std::string record_columns(const Table& table) {
+  std::string list;
+  for (const Column& column : table.columns) {
+    list += fmt::format("{}{}.{}", list.empty() ? "" : ", ", table.name, column.name);
+  }
+  return list;
 }
 
 namespace {

@@ -165,7 +165,7 @@ class SqliteDatabase final : public Database {
     return check_owner();
   }
 
-  // Ours, empty, or somebody else's file that must not be touched.
+  // Ours, empty, or another program's file that must not be changed.
   Status check_owner() {
     const std::int64_t id = database_.execAndGet("PRAGMA application_id").getInt64();
     if (id == kApplicationId) {
@@ -197,16 +197,8 @@ class SqliteDatabase final : public Database {
   }
 
   Status execute(const std::string& sql, std::span<const Value> parameters) override {
-    try {
-      auto& statement = prepared(sql);
-      const Reset reset(statement);
-      bind(statement, parameters);
-      while (statement.executeStep()) {
-      }
-      return {};
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path_));
-    }
+    SIXPOINT_CHECK(query(sql, parameters));
+    return {};
   }
 
   Result<std::unique_ptr<RowStream>> stream(const std::string& sql,

@@ -5,21 +5,9 @@
 namespace sixpoint::device {
 
 std::string_view to_string(Pose pose) {
-  switch (pose) {
-    case Pose::plus_x:
-      return "+x";
-    case Pose::minus_x:
-      return "-x";
-    case Pose::plus_y:
-      return "+y";
-    case Pose::minus_y:
-      return "-y";
-    case Pose::plus_z:
-      return "+z";
-    case Pose::minus_z:
-      return "-z";
-  }
-  return "?";
+  constexpr std::array<std::string_view, 6> kNames = {"+x", "-x", "+y", "-y", "+z", "-z"};
+  const auto index = static_cast<std::size_t>(pose);
+  return index < kNames.size() ? kNames[index] : "?";
 }
 
 Result<Pose> parse_pose(std::string_view text) {
@@ -47,7 +35,7 @@ PerAxis<double> direction_of(Pose pose) {
 }
 
 Status ManualJig::go_to(Pose /*pose*/) { return {}; }
-Result<JigReport> ManualJig::report() { return JigReport{std::nullopt, 0, 0.5, {}}; }
+Result<JigPosition> ManualJig::position() { return JigPosition{std::nullopt, 0, 0.5, {}}; }
 Status ManualJig::stop() { return {}; }
 
 }  // namespace sixpoint::device

@@ -1,6 +1,14 @@
-// What turns a unit into its poses: a person, a motor, or a program.
+// A jig turns a unit into its six poses: a person, a motor, or a program.
 //
-// A pose is named by the axis that points up and therefore reads +1 g, or down (-1 g).
+//   Status turn_up(Jig& jig) {
+//     SIXPOINT_CHECK(jig.go_to(Pose::plus_z));
+//     SIXPOINT_ASSIGN(const JigPosition position, jig.position());
+//     if (!position.fault.empty()) return fail(ErrorCode::io, position.fault, jig.name());
+//     return {};
+//   }
+//
+// A pose is named by the axis that points up and reads +1 g, or that points down and reads -1 g.
+// Angles are in degrees. Errors: device_unavailable when the jig is gone or faulty.
 #pragma once
 
 #include <array>
@@ -25,11 +33,12 @@ int sign_of(Pose pose);
 Pose pose_of(std::size_t axis, int sign);
 PerAxis<double> direction_of(Pose pose);  // specific force at rest, in g
 
-struct JigReport {
-  std::optional<Pose> pose;  // where it stands; none while it moves or does not know
-  double angle_off_deg = 0;  // from that pose, as the jig itself measures it
-  double angle_uncertainty_deg = 0.1;
-  std::string fault;  // empty while all is well
+// Where a jig stands, by its own measurement.
+struct JigPosition {
+  std::optional<Pose> pose;            // none while it moves, or when it does not know
+  double angle_off_deg = 0;            // from that pose
+  double angle_uncertainty_deg = 0.1;  // standard uncertainty of that angle
+  std::string fault;                   // for people; empty where there is none
 };
 
 // One thread at a time, except stop(), which may come from any.
@@ -37,22 +46,21 @@ class Jig {
  public:
   virtual ~Jig() = default;
   virtual std::string name() const = 0;  // for certificates: kind and serial
-  // True when go_to() turns the unit by itself; false when a person is to be asked.
+  // True when go_to() turns the unit; false when a person must do it.
   virtual bool turns_by_itself() const = 0;
-  // Begins to turn; device_unavailable when the jig is gone or faulty. The unit is in its pose some
-  // time later: whoever asked watches the unit's own readings.
+  // Begins to turn. The unit is in its pose some time later: watch the unit's own readings.
   virtual Status go_to(Pose pose) = 0;
-  virtual Result<JigReport> report() = 0;
+  virtual Result<JigPosition> position() = 0;
   virtual Status stop() = 0;  // emergency stop: no movement until the next go_to()
 };
 
-// A person turns the unit. go_to() does nothing: the prompt is the station's business.
+// A person turns the unit. go_to() does nothing: the station shows the prompt.
 class ManualJig final : public Jig {
  public:
   std::string name() const override { return "manual"; }
   bool turns_by_itself() const override { return false; }
   Status go_to(Pose pose) override;
-  Result<JigReport> report() override;
+  Result<JigPosition> position() override;
   Status stop() override;
 };
 

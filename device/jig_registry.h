@@ -1,29 +1,32 @@
-// Every way to open a jig: "manual", or "SCHEME:REST" as devices are.
+// Every way to open a jig that is not "manual": an address "SCHEME:REST".
+//
+//   device::JigRegistry jigs;
+//   device::register_hid_jig(jigs);  // jigs/hid_jig.h
+//   Result<std::unique_ptr<device::Jig>> jig = jigs.open("hid:J600001", env, unit);
 #pragma once
 
+#include <functional>
+#include <memory>
+
 #include "device/jig.h"
+#include "device/scheme_table.h"
 #include "device/unit.h"
 
 namespace sixpoint::device {
 
 class JigRegistry {
  public:
-  // `unit` is the one that will lie in the jig; a jig in software has to know it.
+  // `unit` lies in the jig; a jig in software has to know it.
   using Opener =
       std::function<Result<std::unique_ptr<Jig>>(std::string_view rest, Env& env, Unit& unit)>;
-  void add(std::string scheme, std::string example, Opener opener);
-  // usage when the string names no known kind; device_unavailable and so on as its opener says.
+  void add(std::string scheme, std::string example, Opener opener) {
+    openers_.add(std::move(scheme), std::move(example), std::move(opener));
+  }
+  // usage when the address has no known scheme; else the errors of its opener.
   Result<std::unique_ptr<Jig>> open(std::string_view address, Env& env, Unit& unit) const;
 
  private:
-  struct Entry {
-    std::string example;
-    Opener opener;
-  };
-  std::map<std::string, Entry, std::less<>> entries_;
+  SchemeTable<Opener> openers_;
 };
-
-// "hid:SERIAL" and "hid:" (the only one that is plugged in): a HidJig.
-void register_hid_jig(JigRegistry& registry);
 
 }  // namespace sixpoint::device

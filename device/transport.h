@@ -1,14 +1,17 @@
 // Bytes to and from one endpoint pair, and the list of ways to reach a device.
 //
-// A device is named by a string "SCHEME:REST": hid:SERIAL, usb:SERIAL, virtual:seed=7,
-// replay:session.zip. Each scheme is one function that opens such a string; the program fills a
-// TransportRegistry once and hands it to whoever opens devices.
+//   device::TransportRegistry links;
+//   mocks::register_virtual(links);  // mocks/in_process/in_process.h
+//   Result<device::Link> link = links.open("virtual:seed=7", env);
+//
+// A device is named by an address "SCHEME:REST": hid:SERIAL, usb:SERIAL, virtual:seed=7,
+// replay:session.zip. Each scheme is one function that opens such an address. The program fills a
+// TransportRegistry once.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -17,6 +20,7 @@
 
 #include "base/env.h"
 #include "device/jig.h"
+#include "device/scheme_table.h"
 
 namespace sixpoint::device {
 
@@ -35,7 +39,7 @@ class Transport {
   virtual void cancel() = 0;
 };
 
-// An open device: its channels, the time that passes on them, and what else came with it.
+// An open device: its channels and its clock.
 struct Link {
   std::string address;                 // the string it was opened by
   std::unique_ptr<Transport> reports;  // never null
@@ -44,10 +48,10 @@ struct Link {
   // software brings its own, on which a minute passes at once. Never null.
   std::shared_ptr<Clock> clock;
   // The serial number that the device gave outside of the protocol (USB descriptor); empty where
-  // there is none. Unit::open() refuses a unit that calls itself otherwise.
+  // there is none. WireUnit::open() refuses a unit that answers another one.
   std::string serial = {};
-  // Opens the same place again, after the device went away; whoever is there now answers, which
-  // need not be the same unit. TransportRegistry::open() fills it in where the opener did not.
+  // Opens the same address again after the device went away; it may be another unit then.
+  // TransportRegistry::open() sets it where the opener did not.
   std::function<Result<Link>()> reopen = {};
   std::unique_ptr<Jig> jig;  // a jig that is part of the device (virtual units); mostly null
 };
@@ -60,18 +64,16 @@ class TransportRegistry {
   using Opener = std::function<Result<Link>(std::string_view rest, Env& env)>;
 
   // Replaces an opener of the same scheme. `example` is shown to people.
-  void add(std::string scheme, std::string example, Opener opener);
+  void add(std::string scheme, std::string example, Opener opener) {
+    openers_.add(std::move(scheme), std::move(example), std::move(opener));
+  }
   // usage when the string has no known scheme or its rest is malformed; device_unavailable,
   // permission or no_input when it cannot be reached. `env` outlives the link.
   Result<Link> open(std::string_view address, Env& env) const;
-  std::vector<std::string> examples() const;
+  std::vector<std::string> examples() const { return openers_.examples(); }
 
  private:
-  struct Entry {
-    std::string example;
-    Opener opener;
-  };
-  std::map<std::string, Entry, std::less<>> entries_;
+  SchemeTable<Opener> openers_;
 };
 
 }  // namespace sixpoint::device

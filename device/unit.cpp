@@ -8,7 +8,7 @@ tl::unexpected<Error> Unit::cannot(const char* what) const {
   return fail(ErrorCode::usage, fmt::format("this unit {}", what), address(),
               abilities().offers_recordings
                   ? "calibrate it by a file: 'sixpoint capture --device ADDRESS'"
-                  : "docs/devices says what it can");
+                  : "docs/devices lists what it can do");
 }
 
 Result<CalibrationPage> Unit::read_calibration() { return cannot("shows no constants"); }

@@ -19,8 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
   if (data[0] % 2 == 0) {
     // Past the checksum, which no fuzzer guesses.
-    const std::string hash =
-        to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+    const std::string hash = text_sha256(text);
     text = nlohmann::json{{"record", text}, {"sha256", hash}}.dump(
         -1, ' ', false, nlohmann::json::error_handler_t::ignore);
   }
@@ -28,8 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   auto journal = db::Journal::open(files, "journal").value();
   {
     auto file = files.create("journal/0000000001-x.json").value();
-    static_cast<void>(file->write_at(
-        0, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+    static_cast<void>(file->write_at(0, as_bytes(text)));
   }
   const auto taken = journal.catch_up(store);
   if (journal.pending().value() != (taken ? 0U : 1U)) {

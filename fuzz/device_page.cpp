@@ -1,8 +1,8 @@
 // The calibration page: what is decoded and written into the same page is decoded again the same.
 #include <cstdlib>
 
-#include "device/calibration_page.h"
-#include "device/protocol.h"
+#include "device/wire/calibration_page.h"
+#include "device/wire/protocol.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

@@ -2,7 +2,7 @@
 #include <cstdlib>
 
 #include "base/memory_env.h"
-#include "device/pcap.h"
+#include "device/session/pcap.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

@@ -1,8 +1,8 @@
 // The decoders of everything that a unit or a jig may send. What is decoded encodes to what came.
 #include <cstdlib>
 
-#include "device/hid_jig.h"
-#include "device/protocol.h"
+#include "device/jigs/hid_jig.h"
+#include "device/wire/protocol.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint::device;

@@ -3,9 +3,10 @@
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
-#include "device/session.h"
-#include "device/session_replay.h"
+#include "device/session/session.h"
+#include "device/session/session_replay.h"
 #include "device/unit.h"
+#include "device/wire/wire_unit.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;
@@ -18,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     device::Session session;
     session.transfers = std::move(*transfers);
     for (const auto match : {device::SessionMatch::strict, device::SessionMatch::by_key}) {
-      auto unit = device::Unit::open(device::replay_link(session, match));
+      auto unit = device::WireUnit::open(device::replay_link(session, match));
       if (unit) {
         static_cast<void>((*unit)->read_calibration());
         static_cast<void>((*unit)->recordings());

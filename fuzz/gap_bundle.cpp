@@ -5,8 +5,8 @@
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
-#include "gap/bundle.h"
-#include "gap/diagnose.h"
+#include "gap/judge/diagnose.h"
+#include "gap/recording/bundle.h"
 #include "sim/bundle_writer.h"
 #include "sim/scenario.h"
 

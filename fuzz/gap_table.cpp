@@ -3,7 +3,7 @@
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
-#include "gap/readings_table.h"
+#include "gap/unguided/readings_table.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

@@ -1,8 +1,8 @@
 // info.txt: whatever is parsed is written back as it was, and every getter answers.
 #include <cstdlib>
 
-#include "gt3x/info.h"
-#include "gt3x/model.h"
+#include "gt3x/forms/info.h"
+#include "gt3x/forms/model.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

@@ -2,7 +2,7 @@
 // has one that does.
 #include <cstdlib>
 
-#include "gt3x/log_reader.h"
+#include "gt3x/log/log_reader.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

@@ -1,9 +1,9 @@
 // PARAMETERS, EVENT-sized payloads, samples and the JSON of .agdc files.
 #include <cstdlib>
 
-#include "gt3x/agdc.h"
-#include "gt3x/parameters.h"
-#include "gt3x/samples.h"
+#include "gt3x/forms/agdc.h"
+#include "gt3x/forms/parameters.h"
+#include "gt3x/log/samples.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

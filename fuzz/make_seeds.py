@@ -48,22 +48,6 @@ def pcap(transfers, link, order):
     return file
 
 
-def pcapng(transfers, link, order):
-    def block(kind, body):
-        body += bytes(-len(body) % 4)
-        length = len(body) + 12
-        return struct.pack(order + "II", kind, length) + body + struct.pack(order + "I", length)
-
-    nanoseconds = struct.pack(order + "HHB3xHH", 9, 1, 9, 0, 0)
-    file = block(0x0A0D0D0A, struct.pack(order + "IHHq", 0x1A2B3C4D, 1, 0, -1))
-    file += block(1, struct.pack(order + "HHI", link, 0, 0) + nanoseconds)
-    for transfer in transfers:
-        data = packet(transfer, link, order)
-        high, low = divmod(transfer["t_ns"], 1 << 32)
-        file += block(6, struct.pack(order + "IIIII", 0, high, low, len(data), len(data)) + data)
-    return file
-
-
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
@@ -87,7 +71,6 @@ def main():
             (LINK_USBMON, LINK_USBMON_MAPPED, LINK_USBPCAP), "<>", (3, 14)):
         name = f"{link}-{'big' if order == '>' else 'little'}-{count}"
         save("device_pcap", f"{name}.pcap", pcap(seen[:count], link, order))
-        save("device_pcap", f"{name}.pcapng", pcapng(seen[:count], link, order))
 
 
 if __name__ == "__main__":

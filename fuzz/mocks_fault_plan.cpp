@@ -2,8 +2,9 @@
 // an end.
 #include "base/memory_env.h"
 #include "device/unit.h"
-#include "mocks/fault_plan.h"
-#include "mocks/in_process.h"
+#include "device/wire/wire_unit.h"
+#include "mocks/faults/fault_plan.h"
+#include "mocks/in_process/in_process.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;
@@ -15,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   options.truth = sim::draw_unit(7);
   const auto plugged = std::make_shared<mocks::PluggedUnit>(options, std::move(*plan),
                                                             std::make_shared<ManualClock>());
-  auto unit = device::Unit::open(mocks::link_to(plugged, false));
+  auto unit = device::WireUnit::open(mocks::link_to(plugged, false));
   if (unit) {
     static_cast<void>((*unit)->read_calibration());
     static_cast<void>((*unit)->start_stream(100));

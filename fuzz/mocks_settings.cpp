@@ -2,8 +2,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "mocks/virtual_hid_jig.h"
-#include "mocks/virtual_settings.h"
+#include "mocks/firmware/virtual_settings.h"
+#include "mocks/in_process/virtual_hid_jig.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

@@ -4,8 +4,8 @@
 #include <cstdlib>
 
 #include "base/memory_env.h"
-#include "mocks/usb_unit.h"
-#include "mocks/usbip_session.h"
+#include "mocks/usb/usb_unit.h"
+#include "mocks/usb/usbip_session.h"
 
 namespace {
 

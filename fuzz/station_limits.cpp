@@ -2,7 +2,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "station/limits.h"
+#include "station/limits/limits.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

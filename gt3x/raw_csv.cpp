@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "gt3x/agdc.h"
+#include "gt3x/forms/agdc.h"
 #include "gt3x/sample_reader.h"
 
 namespace sixpoint::gt3x {
@@ -178,12 +178,89 @@ Result<std::optional<AgdcCalibration>> agdc_calibration_of(Recording& recording,
   }
   SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
   SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1 << 20));
-  const auto parsed = parse_agdc_calibration(
-      std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
-      static_cast<int>(rate_hz));
+  const auto parsed = parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz));
   // Not every calibration.json is one of these; who needs it will say that it is missing.
   return parsed ? std::optional(*parsed) : std::nullopt;
 }
+
+// Lines for the seconds of a recording, one after the other.
+class Export {
+ public:
+  Export(const Recording& recording, const RawCsvOptions& options, const TextSink& sink,
+         double rate_hz, const std::optional<AgdcCalibration>& agdc)
+      : options_(options),
+        rate_hz_(rate_hz),
+        rate_(static_cast<std::uint64_t>(std::llround(rate_hz))),
+        agdc_(agdc),
+        out_(recording, options, sink) {}
+
+  Status take(const SampleItem& item) {
+    if (!started_) {
+      SIXPOINT_CHECK(out_.header(item.unix_time, rate_hz_));
+      started_ = true;
+    }
+    if (options_.fill && short_by_ > 0) {
+      SIXPOINT_CHECK(fill(std::exchange(short_by_, 0)));
+    }
+    return item.kind == SampleItem::Kind::recorded ? take_samples(item) : take_gap(item);
+  }
+
+  Result<RawCsvTally> finish(const std::string& path) {
+    if (tally_.samples == 0) {
+      return fail(ErrorCode::bad_data, "the recording holds no samples", path,
+                  "check that the unit was started; download the recording again");
+    }
+    SIXPOINT_CHECK(out_.finish());
+    return tally_;
+  }
+
+ private:
+  Status take_samples(const SampleItem& item) {
+    SIXPOINT_CHECK(out_.set_scale(item, agdc_));
+    for (const Counts& sample : item.counts) {
+      SIXPOINT_CHECK(out_.line(sample));
+    }
+    last_ = item.counts.back();
+    zeros_ = false;
+    tally_.samples += item.counts.size();
+    tally_.out_of_step_seconds += item.broke_order || item.counts.size() > rate_ ? 1 : 0;
+    short_by_ = item.counts.size() < rate_ ? rate_ - item.counts.size() : 0;
+    return {};
+  }
+
+  Status take_gap(const SampleItem& item) {
+    zeros_ = zeros_ || item.kind == SampleItem::Kind::usb;
+    if (!options_.fill) {
+      return {};
+    }
+    filled_s_ += item.seconds;
+    if (filled_s_ > kLongestFill_s) {
+      return fail(
+          ErrorCode::bad_data,
+          fmt::format("more than {} days are missing at {}; a time stamp must be wrong",
+                      kLongestFill_s / 86'400, to_iso8601(from_unix_seconds(item.unix_time))),
+          {}, "export what was recorded with --no-fill");
+    }
+    return fill(item.seconds * rate_);
+  }
+
+  Status fill(std::uint64_t lines) {
+    tally_.filled += lines;
+    return zeros_ ? out_.zeros(lines) : out_.repeat(last_, lines);
+  }
+
+  const RawCsvOptions& options_;
+  double rate_hz_;
+  std::uint64_t rate_;
+  const std::optional<AgdcCalibration>& agdc_;
+  Writer out_;
+  RawCsvTally tally_;
+  Counts last_{};
+  bool zeros_ = false;  // since a USB record
+  std::uint64_t filled_s_ = 0;
+  std::uint64_t short_by_ = 0;  // lines that the second before lacks; the last of all may be short
+  bool started_ = false;
+};
 
 }  // namespace
 
@@ -204,72 +281,25 @@ Result<RawCsvTally> write_raw_csv(Recording& recording, const RawCsvOptions& opt
     return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all",
                 recording.path(), "download the recording from the unit again");
   }
-  const auto rate = static_cast<std::uint64_t>(std::llround(rate_hz));
   SIXPOINT_ASSIGN(const auto agdc, agdc_calibration_of(recording, rate_hz));
-  Writer out(recording, options, sink);
+  Export out(recording, options, sink, rate_hz, agdc);
   SampleReader reader(recording);
-  RawCsvTally tally;
-  Counts last{};
-  bool zeros = false;  // since a USB record
-  std::uint64_t filled_s = 0;
-  std::uint64_t short_by = 0;  // lines that the second before lacks; the last of all may be short
-  bool started = false;
-  const auto fill_lines = [&](std::uint64_t lines) -> Status {
-    tally.filled += lines;
-    return zeros ? out.zeros(lines) : out.repeat(last, lines);
-  };
   for (;;) {
     auto next = reader.next();
-    if (!next) {
-      Error error = std::move(next).error();
+    Status status = next ? Status() : Status(fail(next.error()));
+    if (next && *next) {
+      status = out.take(**next);
+    }
+    if (!status) {
+      Error error = std::move(status).error();
       error.where = error.where.empty() ? recording.path() : error.where;
       return fail(std::move(error));
     }
     if (!*next) {
       break;
     }
-    const SampleItem& item = **next;
-    if (!started) {
-      SIXPOINT_CHECK(out.header(item.unix_time, rate_hz));
-      started = true;
-    }
-    if (options.fill && short_by > 0) {
-      SIXPOINT_CHECK(fill_lines(std::exchange(short_by, 0)));
-    }
-    if (item.kind == SampleItem::Kind::recorded) {
-      if (auto status = out.set_scale(item, agdc); !status) {
-        status.error().where = recording.path();
-        return fail(std::move(status).error());
-      }
-      for (const Counts& sample : item.counts) {
-        SIXPOINT_CHECK(out.line(sample));
-      }
-      last = item.counts.back();
-      zeros = false;
-      tally.samples += item.counts.size();
-      tally.out_of_step_seconds += item.broke_order || item.counts.size() > rate ? 1 : 0;
-      short_by = item.counts.size() < rate ? rate - item.counts.size() : 0;
-      continue;
-    }
-    zeros = zeros || item.kind == SampleItem::Kind::usb;
-    if (!options.fill) {
-      continue;
-    }
-    filled_s += item.seconds;
-    if (filled_s > kLongestFill_s) {
-      return fail(
-          ErrorCode::bad_data,
-          fmt::format("more than {} days are missing at {}; a time stamp must be wrong",
-                      kLongestFill_s / 86'400, to_iso8601(from_unix_seconds(item.unix_time))),
-          recording.path(), "export what was recorded with --no-fill");
-    }
-    SIXPOINT_CHECK(fill_lines(item.seconds * rate));
   }
-  if (tally.samples == 0) {
-    return fail(ErrorCode::bad_data, "the recording holds no samples", recording.path(),
-                "check that the unit was started; download the recording again");
-  }
-  SIXPOINT_CHECK(out.finish());
+  SIXPOINT_ASSIGN(RawCsvTally tally, out.finish(recording.path()));
   tally.checksum_failures = reader.statistics().checksum_failures;
   tally.damaged_stretches = reader.statistics().damaged_stretches;
   return tally;

@@ -1,5 +1,13 @@
 // A recording's samples as the raw CSV that the vendor's software exports, character for character.
 //
+//   SIXPOINT_ASSIGN(auto recording, Recording::open(env.files, "unit.gt3x"));
+//   std::string csv;
+//   const TextSink sink = [&](std::string_view text) {
+//     csv += text;
+//     return Status{};
+//   };
+//   SIXPOINT_ASSIGN(const RawCsvTally tally, write_raw_csv(recording, {}, sink));
+//
 // Ten header lines, one line of column names, then a line per sample, X Y Z, without time stamps:
 // the n-th line belongs to start + n / rate. Lines end in CR LF.
 //

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <set>
 
 #include <fmt/format.h>
 
+#include "gt3x/container/zip_bridge.h"
 #include "gt3x/recording_archive.h"
-#include "gt3x/zip_bridge.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -101,24 +100,13 @@ zip_int64_t Recording::Archive::origin(void* user, void* data, zip_uint64_t leng
       auto count =
           self->file->read_at(self->at, std::span(static_cast<std::uint8_t*>(data), length));
       if (!count) {
-        if (!self->failure) {
-          self->failure = std::move(count).error();
-        }
-        zip_error_set(&self->error, ZIP_ER_READ, EIO);
-        return -1;
+        return refuse(std::move(count).error(), self->failure, ZIP_ER_READ, self->error);
       }
       self->at += *count;
       return static_cast<zip_int64_t>(*count);
     }
-    case ZIP_SOURCE_SEEK: {
-      const auto target =
-          zip_source_seek_compute_offset(self->at, self->file->size(), data, length, &self->error);
-      if (target < 0) {
-        return -1;
-      }
-      self->at = static_cast<std::uint64_t>(target);
-      return 0;
-    }
+    case ZIP_SOURCE_SEEK:
+      return seek(self->at, self->file->size(), data, length, self->error);
     case ZIP_SOURCE_TELL:
       return static_cast<zip_int64_t>(self->at);
     case ZIP_SOURCE_STAT: {
@@ -153,9 +141,6 @@ tl::unexpected<Error> Recording::Archive::bad(std::string what, std::string hint
 }
 
 Recording::Recording(std::shared_ptr<Archive> archive) : archive_(std::move(archive)) {}
-Recording::Recording(Recording&&) noexcept = default;
-Recording& Recording::operator=(Recording&&) noexcept = default;
-Recording::~Recording() = default;
 
 const std::string& Recording::path() const { return archive_->path; }
 const Info& Recording::info() const { return archive_->info; }
@@ -165,92 +150,99 @@ bool Recording::has_entry(const std::string& name) const {
   return archive_->index_of(name).has_value();
 }
 
-Result<Recording> Recording::open(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(auto file, files.open(path));
-  auto archive = std::make_shared<Archive>(std::move(file), path);
-  zip_error_t error;
-  zip_error_init(&error);
-  zip_source_t* source = zip_source_function_create(&Archive::origin, archive.get(), &error);
+Status Recording::Archive::open_zip() {
+  zip_error_t problem;
+  zip_error_init(&problem);
+  zip_source_t* source = zip_source_function_create(&Archive::origin, this, &problem);
   if (source != nullptr) {
-    archive->zip = zip_open_from_source(source, ZIP_RDONLY, &error);
-    if (archive->zip == nullptr) {
+    zip = zip_open_from_source(source, ZIP_RDONLY, &problem);
+    if (zip == nullptr) {
       zip_source_free(source);
     }
   }
-  if (archive->zip == nullptr) {
-    const std::string reason = describe(&error);
-    if (archive->failure) {
-      return fail(*archive->failure);
-    }
-    std::array<std::uint8_t, 4> start{};
-    SIXPOINT_ASSIGN(const std::size_t count, archive->file->read_at(0, start));
-    if (count == start.size() && start == std::array<std::uint8_t, 4>{'P', 'K', 3, 4}) {
-      return archive->bad(fmt::format("the archive is cut short or damaged ({})", reason));
-    }
-    return archive->bad("not a zip archive, so no .gt3x recording",
-                        "check that this is the file that the unit's software wrote");
+  const std::string reason = describe(&problem);
+  if (zip != nullptr) {
+    return {};
   }
-  zip_error_fini(&error);
+  if (failure) {
+    return fail(*failure);
+  }
+  std::array<std::uint8_t, 4> start{};
+  SIXPOINT_ASSIGN(const std::size_t count, file->read_at(0, start));
+  if (count == start.size() && start == std::array<std::uint8_t, 4>{'P', 'K', 3, 4}) {
+    return bad(fmt::format("the archive is cut short or damaged ({})", reason));
+  }
+  return bad("not a zip archive, so no .gt3x recording",
+             "check that this is the file that the unit's software wrote");
+}
 
-  const zip_int64_t count = zip_get_num_entries(archive->zip, 0);
+Result<EntryInfo> Recording::Archive::read_entry(zip_uint64_t index) const {
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  const char* name = zip_get_name(zip, index, ZIP_FL_ENC_RAW);
+  if (name == nullptr || zip_stat_index(zip, index, 0, &stat) != 0) {
+    return bad("the archive's list of entries is damaged");
+  }
+  EntryInfo entry{name, stat.size, stat.comp_size};
+  const std::string shown = printable(entry.name, 60);
+  if (!plain_name(entry.name)) {
+    return bad(fmt::format("the archive holds an entry named with a path: '{}'", shown),
+               "pack the recording's files again without folders");
+  }
+  if (index_of(entry.name)) {
+    return bad(fmt::format("the archive holds two entries named {}", shown),
+               "there is no way to know which one is right; " + std::string(kDownloadAgain));
+  }
+  if (stat.encryption_method != ZIP_EM_NONE ||
+      (stat.comp_method != ZIP_CM_STORE && stat.comp_method != ZIP_CM_DEFLATE)) {
+    return bad(
+        fmt::format("entry {} is encrypted or packed in a way that recordings are not", shown),
+        "unpack it and pack it again as an ordinary zip");
+  }
+  if (entry.size > kMaxEntrySize ||
+      (entry.size > kRatioMattersFrom && entry.size / kMaxRatio > entry.compressed_size)) {
+    return bad(
+        fmt::format("entry {} claims {} bytes, more than a recording can have", shown, entry.size),
+        "check that this is a recording");
+  }
+  return entry;
+}
+
+Status Recording::Archive::read_entries() {
+  const zip_int64_t count = zip_get_num_entries(zip, 0);
   if (count > kMaxEntries) {
-    return archive->bad(fmt::format("the archive has {} entries, a recording has a few", count),
-                        "check that this is a recording");
+    return bad(fmt::format("the archive has {} entries, a recording has a few", count),
+               "check that this is a recording");
   }
-  std::set<std::string, std::less<>> names;
   for (zip_int64_t index = 0; index < count; ++index) {
-    zip_stat_t stat;
-    zip_stat_init(&stat);
-    const char* name = zip_get_name(archive->zip, static_cast<zip_uint64_t>(index), ZIP_FL_ENC_RAW);
-    if (name == nullptr ||
-        zip_stat_index(archive->zip, static_cast<zip_uint64_t>(index), 0, &stat) != 0) {
-      return archive->bad("the archive's list of entries is damaged");
-    }
-    EntryInfo entry{name, stat.size, stat.comp_size};
-    const std::string shown = printable(entry.name, 60);
-    if (!plain_name(entry.name)) {
-      return archive->bad(fmt::format("the archive holds an entry named with a path: '{}'", shown),
-                          "pack the recording's files again without folders");
-    }
-    if (!names.insert(entry.name).second) {
-      return archive->bad(fmt::format("the archive holds two entries named {}", shown),
-                          "nobody can say which one is right; " + std::string(kDownloadAgain));
-    }
-    if (stat.encryption_method != ZIP_EM_NONE ||
-        (stat.comp_method != ZIP_CM_STORE && stat.comp_method != ZIP_CM_DEFLATE)) {
-      return archive->bad(
-          fmt::format("entry {} is encrypted or packed in a way that recordings are not", shown),
-          "unpack it and pack it again as an ordinary zip");
-    }
-    if (entry.size > kMaxEntrySize ||
-        (entry.size > kRatioMattersFrom && entry.size / kMaxRatio > entry.compressed_size)) {
-      return archive->bad(fmt::format("entry {} claims {} bytes, more than a recording can have",
-                                      shown, entry.size),
-                          "check that this is a recording");
-    }
-    archive->entries.push_back(std::move(entry));
+    SIXPOINT_ASSIGN(EntryInfo entry, read_entry(static_cast<zip_uint64_t>(index)));
+    entries.push_back(std::move(entry));
   }
-  if (archive->index_of("log.bin")) {
-    archive->form = RecordingForm::log;
-  } else if (archive->index_of("activity.bin")) {
-    archive->form = RecordingForm::activity;
+  if (index_of("log.bin")) {
+    form = RecordingForm::log;
+  } else if (index_of("activity.bin")) {
+    form = RecordingForm::activity;
   } else {
-    return archive->bad("the archive holds no log.bin, so no samples",
-                        "check that this is a recording and not another zip file");
+    return bad("the archive holds no log.bin, so no samples",
+               "check that this is a recording and not another zip file");
   }
+  return index_of("info.txt") ? Status() : Status(bad("the archive holds no info.txt"));
+}
+
+Result<Recording> Recording::open(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto file, files.open(path));
+  auto archive = std::make_shared<Archive>(std::move(file), path);
+  SIXPOINT_CHECK(archive->open_zip());
+  SIXPOINT_CHECK(archive->read_entries());
   Recording recording(archive);
-  if (!archive->index_of("info.txt")) {
-    return archive->bad("the archive holds no info.txt");
-  }
   SIXPOINT_ASSIGN(const auto info_source, recording.open_entry("info.txt"));
-  auto text = read_all(*info_source, 1 << 20);
+  const auto text = read_all(*info_source, 1 << 20);
   if (!text) {
-    Error failure = std::move(text).error();
+    Error failure = text.error();
     failure.where = path + ":info.txt";
     return fail(std::move(failure));
   }
-  auto info =
-      Info::parse(std::string_view(reinterpret_cast<const char*>(text->data()), text->size()));
+  auto info = Info::parse(as_text(*text));
   if (!info) {
     return archive->bad(info.error().what, info.error().hint);
   }

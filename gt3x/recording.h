@@ -2,8 +2,8 @@
 //
 //   SIXPOINT_ASSIGN(auto recording, Recording::open(env.files, path));
 //   recording.info().serial();
-//   SIXPOINT_ASSIGN(auto log, recording.open_log());       // record by record, or
-//   SampleReader samples(recording);                       // second by second (sample_reader.h)
+//   SIXPOINT_ASSIGN(auto log, recording.open_log());  // record by record, or
+//   SampleReader samples(recording);                  // second by second (sample_reader.h)
 //
 // The file is read through the FileSystem that was given, piece by piece; nothing is unpacked to
 // disk and no entry is held in memory whole, but info.txt.
@@ -19,9 +19,9 @@
 #include <vector>
 
 #include "base/env.h"
-#include "gt3x/byte_source.h"
-#include "gt3x/info.h"
-#include "gt3x/log_reader.h"
+#include "gt3x/container/byte_source.h"
+#include "gt3x/forms/info.h"
+#include "gt3x/log/log_reader.h"
 
 namespace sixpoint::gt3x {
 
@@ -42,10 +42,6 @@ class Recording {
   // log.bin nor activity.bin, no info.txt, two entries of one name, entries named with a path,
   // encrypted ones, or sizes that no recording has.
   static Result<Recording> open(FileSystem& files, const std::string& path);
-
-  Recording(Recording&&) noexcept;
-  Recording& operator=(Recording&&) noexcept;
-  ~Recording();
 
   const std::string& path() const;
   const Info& info() const;

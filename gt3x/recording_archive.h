@@ -20,6 +20,9 @@ struct Recording::Archive {
 
   static zip_int64_t origin(void* user, void* data, zip_uint64_t length, zip_source_cmd_t command);
 
+  Status open_zip();
+  Status read_entries();
+  Result<EntryInfo> read_entry(zip_uint64_t index) const;
   std::optional<std::size_t> index_of(const std::string& name) const;
   tl::unexpected<Error> bad(std::string what, std::string hint = {}) const;
 

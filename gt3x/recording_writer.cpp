@@ -9,8 +9,8 @@
 #include <zip.h>
 
 #include "base/atomic_file.h"
+#include "gt3x/container/zip_bridge.h"
 #include "gt3x/recording_archive.h"
-#include "gt3x/zip_bridge.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -92,25 +92,14 @@ zip_int64_t RecordingWriter::Archive::destination(void* user, void* data, zip_ui
     case ZIP_SOURCE_WRITE: {
       const std::span bytes(static_cast<const std::uint8_t*>(data), length);
       if (auto status = self->out.file().write_at(self->at, bytes); !status) {
-        if (!self->failure) {
-          self->failure = std::move(status).error();
-        }
-        zip_error_set(&self->error, ZIP_ER_WRITE, EIO);
-        return -1;
+        return refuse(std::move(status).error(), self->failure, ZIP_ER_WRITE, self->error);
       }
       self->at += length;
       self->end = std::max(self->end, self->at);
       return static_cast<zip_int64_t>(length);
     }
-    case ZIP_SOURCE_SEEK_WRITE: {
-      const auto target =
-          zip_source_seek_compute_offset(self->at, self->end, data, length, &self->error);
-      if (target < 0) {
-        return -1;
-      }
-      self->at = static_cast<std::uint64_t>(target);
-      return 0;
-    }
+    case ZIP_SOURCE_SEEK_WRITE:
+      return seek(self->at, self->end, data, length, self->error);
     case ZIP_SOURCE_TELL_WRITE:
       return static_cast<zip_int64_t>(self->at);
     case ZIP_SOURCE_BEGIN_WRITE:

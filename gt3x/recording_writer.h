@@ -1,7 +1,7 @@
 // Writes a .gt3x file: entries in the order in which they were added, whole or not at all.
 //
 //   SIXPOINT_ASSIGN(auto out, RecordingWriter::create(env.files, path));
-//   SIXPOINT_CHECK(out.add("log.bin", std::move(source)));   // pulled piece by piece at commit()
+//   SIXPOINT_CHECK(out.add("log.bin", std::move(source)));  // pulled piece by piece at commit()
 //   SIXPOINT_CHECK(out.add("info.txt", info.serialise()));
 //   SIXPOINT_CHECK(out.commit());
 //
@@ -18,7 +18,7 @@
 #include <string_view>
 
 #include "base/env.h"
-#include "gt3x/byte_source.h"
+#include "gt3x/container/byte_source.h"
 
 namespace sixpoint::gt3x {
 

@@ -1,24 +1,17 @@
 #include "gt3x/sample_reader.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 
-#include "gt3x/model.h"
+#include "gt3x/forms/model.h"
 
 namespace sixpoint::gt3x {
 
 std::string_view to_string(GapKind kind) {
-  switch (kind) {
-    case GapKind::idle_sleep:
-      return "idle_sleep";
-    case GapKind::usb:
-      return "usb";
-    case GapKind::damaged:
-      return "damaged";
-    case GapKind::unexplained:
-      return "unexplained";
-  }
-  return "unexplained";
+  constexpr std::array<std::string_view, 4> kNames = {"idle_sleep", "usb", "damaged",
+                                                      "unexplained"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 std::optional<double> accel_scale_lsb_per_g(const Info& info, const Parameters* parameters) {
@@ -70,14 +63,8 @@ struct SampleReader::State {
   // The gap before `item`, where there is one; `item` then waits.
   SampleItem deliver(SampleItem& item) {
     if (last_time && item.unix_time > *last_time + std::uint64_t{1}) {
-      SampleItem gap;
-      gap.kind = SampleItem::Kind::gap;
-      gap.unix_time = *last_time + 1;
-      gap.seconds = item.unix_time - gap.unix_time;
-      gap.gap = reason();
-      last_time = item.unix_time - 1;
       waiting = item;
-      return gap;
+      return gap_until(item.unix_time);
     }
     item.broke_order = last_time && item.unix_time <= *last_time;
     last_time = item.unix_time;
@@ -89,6 +76,17 @@ struct SampleReader::State {
       samples_delivered += samples.size();
     }
     return item;
+  }
+
+  // The seconds after the last one, up to `end`.
+  SampleItem gap_until(std::uint32_t end) {
+    SampleItem gap;
+    gap.kind = SampleItem::Kind::gap;
+    gap.unix_time = *last_time + 1;
+    gap.seconds = end - gap.unix_time;
+    gap.gap = reason();
+    last_time = end - 1;
+    return gap;
   }
 
   GapKind reason() const {
@@ -194,12 +192,11 @@ struct SampleReader::State {
         parameters->constants != parsed->constants) {
       constants_changed = true;
     }
-    auto set = std::make_unique<ParameterSet>(
-        ParameterSet{record.unix_time, samples_delivered, *std::move(parsed)});
+    auto set = std::make_unique<ParameterSet>(ParameterSet{record.unix_time, *std::move(parsed)});
     if (sets.size() < kMaxParameterSets) {
       sets.push_back(std::move(set));
     } else {
-      // Earlier items may still point at the last but one; nobody may keep more than one item.
+      // Earlier items may still point at the last but one; no caller may hold more than one item.
       std::swap(previous_set, sets.back());
       sets.back() = std::move(set);
     }
@@ -210,13 +207,7 @@ struct SampleReader::State {
     if (!last_time || !last_sample_time || *last_sample_time <= *last_time + std::uint64_t{1}) {
       return std::nullopt;
     }
-    SampleItem gap;
-    gap.kind = SampleItem::Kind::gap;
-    gap.unix_time = *last_time + 1;
-    gap.seconds = *last_sample_time - gap.unix_time;
-    gap.gap = reason();
-    last_time = *last_sample_time - 1;
-    return gap;
+    return gap_until(*last_sample_time);
   }
 
   // activity.bin knows no seconds: they are counted from Start Date at the rate of info.txt.

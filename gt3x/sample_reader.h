@@ -4,7 +4,7 @@
 //   for (;;) {
 //     SIXPOINT_ASSIGN(const auto item, samples.next());
 //     if (!item) break;
-//     if (item->kind == SampleItem::Kind::recorded) use(item->counts, item->parameters);
+//     if (item->kind == SampleItem::Kind::recorded) seconds.push_back(item->counts.front());
 //   }
 //
 // Items come in the order of the file. A record whose checksum fails gives no samples: its second
@@ -22,9 +22,9 @@
 #include <string_view>
 #include <vector>
 
-#include "gt3x/parameters.h"
+#include "gt3x/forms/parameters.h"
+#include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
-#include "gt3x/samples.h"
 
 namespace sixpoint::gt3x {
 
@@ -71,7 +71,7 @@ struct SampleItem {
 
 class SampleReader {
  public:
-  // The recording must outlive nothing: the reader keeps what it needs open.
+  // The reader keeps open what it needs: `recording` may end before it.
   explicit SampleReader(Recording& recording);
   SampleReader(SampleReader&&) noexcept;
   SampleReader& operator=(SampleReader&&) noexcept;
@@ -86,7 +86,6 @@ class SampleReader {
 
   struct ParameterSet {
     std::uint32_t unix_time = 0;
-    std::uint64_t samples_before = 0;  // samples handed out when it came
     Parameters parameters;
   };
   // Every PARAMETERS record met so far, but one that repeats the set before it; of more than

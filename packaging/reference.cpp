@@ -1,8 +1,8 @@
-// Makes the manual page and the shell completion of the program from its own commands, so that they
-// name what the program has. Run by the build:
+// Makes the manual page and the shell completion from the commands of the program, so that both are
+// always complete. The commands replace %COMMANDS% in the template. Run by the build:
 //
-//   sixpoint_reference man TEMPLATE          the page, with the commands in the template's
-//   %COMMANDS% sixpoint_reference completion TEMPLATE   likewise
+//   sixpoint_reference man TEMPLATE
+//   sixpoint_reference completion TEMPLATE
 #include <algorithm>
 #include <fstream>
 #include <iostream>
@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "station/cli/command.h"
+#include "cli/command.h"
 
 namespace sixpoint {
 namespace {

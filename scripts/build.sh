@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/install_packages.sh build
 source scripts/build_environment.sh
-# Tests and benchmarks need packages of their own (scripts/test.sh); a folder that has them keeps them.
+# Tests and benchmarks need more packages (scripts/test.sh); a build folder that has them is left as it is.
 if [ ! -f build/CMakeCache.txt ]; then
   configure release -DSIXPOINT_TESTS=OFF -DSIXPOINT_BENCH=OFF
 fi

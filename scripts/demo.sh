@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The main job, end to end, without any hardware: a virtual unit of 2013 comes back, is measured on the
-# jig, and its archive is scanned and mended. Everything it makes lies in build/demo. A few seconds
-# after the build.
+# The main job from beginning to end, without hardware: a virtual unit of 2013 is measured on the jig, and
+# its archive is scanned and repaired. The results are in build/demo. It takes a few seconds after the
+# build.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 scripts/build.sh
@@ -14,7 +14,7 @@ mkdir -p "$out/scenarios" "$out/archive" "$out/truth"
 store=$out/store.db
 
 say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
-# Runs a command whose exit code may be the one given: 1 says "affected", which is no failure here.
+# Runs a command that must end with the given exit code. 1 means "affected", which is expected here.
 expect() {
   local wanted=$1 got=0
   shift
@@ -26,7 +26,7 @@ expect() {
 }
 
 # The unit: what its memory holds (constants of 2013, measured under the legacy filter configuration)
-# and what its sensor really is under the current one.
+# and the true constants of its sensor under the current one.
 serial=MOS2A45130007
 positive='[311, 310, 287]' negative='[-204, -216, -234]' zero='[54, 47, 26]'
 sensitivity='[237.7, 251.8, 242.3]' sensor_zero='[49.9, 95.8, 60.8]'
@@ -66,7 +66,7 @@ for name in day1 day2 day3 before after; do
   "$sixpoint" simulate --scenario "$out/scenarios/$name.json" -o "$out/archive/$name.gt3x" \
     --truth "$out/truth/$name.csv"
 done
-# A sound unit that went through day1 beside it, for the pictures (paper, Figures 4-6).
+# A good unit that was moved together with it on day1, for the pictures (paper, Figures 4-6).
 sed -e "s/$serial/MOS2C01150042/; s/2013-11-12/2015-01-12/; /\"constants\"/d; /\"sensor\"/d" \
   -e 's/"unit": {/"unit": { "seed": 42,/' \
   "$out/scenarios/day1.json" >"$out/scenarios/sound.json"
@@ -80,13 +80,13 @@ say "3. The unit on the jig, under the current filter configuration"
   "virtual:seed=7,serial=$serial,firmware=1.5.0,calibrated=2013-11-12,positive_lsb=311/310/287,negative_lsb=-204/-216/-234,zero_lsb=54/47/26,true_sensitivity_lsb_per_g=237.7/251.8/242.3,true_zero_lsb=49.9/95.8/60.8,jig=auto"
 "$sixpoint" history "$serial" --store "$store"
 
-say "4. The archive mended; the originals stay as they are"
+say "4. The archive is repaired; the originals are not changed"
 (cd "$out/archive" && sha256sum ./*.gt3x) >"$out/originals.sha256"
 "$sixpoint" repair "$out/archive" -o "$out/repaired" --store "$store" --json >"$out/repair.json"
 (cd "$out/archive" && sha256sum --quiet -c "$out/originals.sha256")
 echo "originals: unchanged"
 
-# RMS distance in mg between what a file stored and what really acted, over all samples and axes.
+# RMS difference in mg between the stored samples and the truth, over all samples and axes.
 rms_mg() {
   "$sixpoint" export "$1" --raw --no-fill --csv - |
     awk -F, -v truth="$2" '
@@ -98,7 +98,8 @@ rms_mg() {
       }
       END { printf "%.3f", 1000 * sqrt(s / n) }'
 }
-# What sensor noise, the sensor's own counts and one rounding to 1/256 g alone give (closed form).
+# The least RMS that is possible: sensor noise, the counts of the sensor and one rounding to 1/256 g
+# (closed form).
 floor_mg=$(awk -v noise="$noise" -v sensitivity="$sensitivity" 'BEGIN {
   gsub(/[][ ]/, "", noise); gsub(/[][ ]/, "", sensitivity)
   split(noise, n, ","); split(sensitivity, k, ",")
@@ -128,7 +129,7 @@ if [ "$failed" -ne 0 ]; then
   exit 70
 fi
 
-say "6. Pictures: the affected unit, a sound one beside it, and the mended data"
+say "6. Pictures: the affected unit, a good one beside it, and the repaired data"
 "$sixpoint" compare "$out/archive/day1.gt3x" "$out/sound.gt3x" "$out/repaired/day1.gt3x" \
   --html "$out/report.html"
 
@@ -138,7 +139,7 @@ if [ -d "$real" ]; then
   expect 1 "$sixpoint" scan "$real"
   for file in "$real"/*.gt3x; do
     echo
-    "$sixpoint" solve "$file" || true # the answer, whatever it is, is the point here
+    "$sixpoint" solve "$file" || true # every verdict is an answer here
   done
 else
   echo "SKIPPED: $real is not there; set SIXPOINT_SHARED to the folder with the recordings"

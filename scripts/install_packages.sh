@@ -8,9 +8,9 @@ build_packages=(
   ca-certificates ccache cmake g++ git ninja-build pkg-config
   libcli11-dev libcpp-httplib-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev
   libspdlog-dev libsqlite3-dev libhidapi-dev libudev-dev libusb-1.0-0-dev
-  libcairo2-dev librsvg2-dev
+  libcairo2-dev libpango1.0-dev librsvg2-dev fonts-dejavu-core
   libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
-  libboost-dev libhpdf-dev libqrencode-dev libtomlplusplus-dev
+  libboost-dev libqrencode-dev libtomlplusplus-dev
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev

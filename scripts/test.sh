@@ -14,7 +14,7 @@ esac
 jobs=$(nproc)
 
 step() { printf '\n== %s\n' "$*"; }
-# ctest's own lines; a skip is shown with its reason, for a skip is not a pass.
+# ctest's own lines; skips are listed with their reasons, because a skip is not a pass.
 run_ctest() {
   local folder=$1 log
   shift
@@ -31,7 +31,7 @@ run_ctest() {
 }
 
 scripts/install_packages.sh build test
-# Everything is there now: a server that is missing is a failure.
+# All packages are installed now: a server that is missing is a failure.
 export SIXPOINT_MUST_NOT_SKIP=1
 source scripts/build_environment.sh
 
@@ -58,8 +58,7 @@ cmake --build build/sanitize -- --quiet
 step "Unit tests under the sanitizers"
 run_ctest build/sanitize -L '^unit$'
 
-# All of it takes two cores half an hour where nothing is known from an earlier run; what changed
-# last comes first.
+# A first run over all files takes half an hour on two cores, so the last changes come first.
 step "clang-tidy"
 scripts/tidy.sh --within 240
 

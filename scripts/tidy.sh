@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# clang-tidy over the program's sources, on every core. A file that was clean is not read again while
-# nothing that it includes has changed: its preprocessed text and .clang-tidy are the key.
+# clang-tidy over the program's sources, on every core. A clean file is not checked again until it, a file
+# that it includes, or .clang-tidy changes.
 #   scripts/tidy.sh [--within SECONDS] [FILE...]     needs a configured build/
-# --within begins with what changed last, begins no file after that time, and says how many are left.
+# --within begins with the last changes, starts no file after that time, and lists the files that are left.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 within=0
@@ -16,7 +16,7 @@ if [ $# -gt 0 ]; then
   files=("$@")
 else
   mapfile -t files < <(git ls-files 'base/*.cpp' 'gt3x/*.cpp' 'calib/*.cpp' 'sim/*.cpp' \
-    'device/*.cpp' 'mocks/*.cpp' 'db/*.cpp' 'repair/*.cpp' 'gap/*.cpp' 'station/*.cpp' \
+    'device/*.cpp' 'mocks/*.cpp' 'db/*.cpp' 'repair/*.cpp' 'gap/*.cpp' 'station/*.cpp' 'cli/*.cpp' \
     'packaging/*.cpp')
   # In the order of their last change; a clone without history leaves the order as it is.
   mapfile -t files < <({ git log --name-only --diff-filter=d --pretty=format: -n 400 -- '*.cpp'
@@ -73,6 +73,6 @@ export SECONDS_AT_START
 printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "$(nproc)" bash -c 'check_one "$1"' _
 echo "clang-tidy: $((${#files[@]} - $(wc -l <"$left"))) of ${#files[@]} files checked"
 if [ -s "$left" ]; then
-  echo "Not checked, for the time was up; 'scripts/tidy.sh' checks them all:"
+  echo "Not checked, because the time was over; 'scripts/tidy.sh' checks them all:"
   cat "$left"
 fi

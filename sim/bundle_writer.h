@@ -1,9 +1,11 @@
-// A bundle: the folder that a station keeps of a unit's way through a protocol.
+// A bundle: the folder that a station makes of a unit's run through a protocol.
 //
-//   recording.gt3x   what the unit stored, ACTIVITY2 records, segments one after another
-//   protocol.json    schema sixpoint/bundle/1: unit, rate, scale, gravity, segments
-//   temperature.csv  host_time_s,temperature_c: the unit's own log, one a second, 0.1 C noise
-//   host_clock.csv   sample_index,host_time_s: when each one-second packet began, +-2 ms
+//   SIXPOINT_ASSIGN(const BundleReport report, write_bundle(env.files, "bundle", scenario));
+//
+//     recording.gt3x   what the unit stored, ACTIVITY2 records, segments one after another
+//     protocol.json    schema sixpoint/bundle/1: unit, rate, scale, gravity, segments
+//     temperature.csv  host_time_s,temperature_c: the unit's own log, one a second, 0.1 C noise
+//     host_clock.csv   sample_index,host_time_s: when each one-second packet began, +-2 ms
 #pragma once
 
 #include <cstdint>

@@ -37,9 +37,9 @@ FilterConfiguration filter_of_constants(std::string_view serial, UtcTime calibra
 FilterConfiguration filter_of_recording(std::string_view serial, std::string_view firmware,
                                         UtcTime calibrated) {
   constexpr std::array<int, 3> kFirstWithout = {1, 4, 0};
-  constexpr std::array<int, 3> kFirstMended = {1, 8, 0};
+  constexpr std::array<int, 3> kFirstRepaired = {1, 8, 0};
   const auto version = parse_version(firmware).value_or(std::array<int, 3>{});
-  const bool lacks_check = version >= kFirstWithout && version < kFirstMended;
+  const bool lacks_check = version >= kFirstWithout && version < kFirstRepaired;
   return lacks_check ? FilterConfiguration::current : filter_of_constants(serial, calibrated);
 }
 

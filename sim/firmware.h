@@ -1,5 +1,9 @@
 // What the unit's firmware does with a raw reading.
 //
+//   FirmwareScaler firmware(draw_unit(7), 12);                // 12-bit samples
+//   const gt3x::Counts stored = firmware.store({5, 3, 262});  // raw counts of the sensor
+//   firmware.clipped();                                       // 0
+//
 // Written from the paper and the table of the affected versions, on purpose without any code of
 // calib/ (README.md).
 #pragma once
@@ -10,8 +14,8 @@
 #include <string_view>
 
 #include "base/constants.h"
-#include "gt3x/samples.h"
-#include "sim/effect.h"
+#include "gt3x/log/samples.h"
+#include "sim/effects/effect.h"
 #include "sim/unit_truth.h"
 
 namespace sixpoint::sim {

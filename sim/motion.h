@@ -1,5 +1,9 @@
 // Motion: where a unit is, and what acts on it, as a function of time.
 //
+//   auto motion = still(rotation_with_up({0, 0, 1}));
+//   MotionState state;
+//   motion->at(0.5, state);
+//
 // The laboratory's frame has z up; the specific force of a unit at rest is (0, 0, gravity).
 #pragma once
 
@@ -9,7 +13,7 @@
 #include <memory>
 #include <vector>
 
-#include "sim/effect.h"
+#include "sim/effects/effect.h"
 
 namespace sixpoint::sim {
 
@@ -25,8 +29,8 @@ Eigen::Matrix3d rotation_with_up(const Eigen::Vector3d& direction);
 
 std::unique_ptr<Motion> still(const Eigen::Matrix3d& rotation, double gravity_g = 1);
 
-// From one pose to another, smoothly, within `duration_s`, with the tremor of a hand, which fades
-// in and out; before and after at rest. The hand shakes with 0.05 g, between 3 and 9 Hz.
+// From one pose to another, smoothly, within `duration_s`, with a person's tremor of 0.05 g between
+// 3 and 9 Hz, which fades in and out; at rest before and after.
 std::unique_ptr<Motion> turn(const Eigen::Matrix3d& from, const Eigen::Matrix3d& to,
                              double duration_s, std::uint64_t seed, double gravity_g = 1);
 

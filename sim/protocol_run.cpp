@@ -12,6 +12,9 @@ namespace sixpoint::sim {
 
 namespace {
 
+constexpr std::array<std::string_view, 4> kSegmentKindNames = {"still", "vibration", "ramp",
+                                                               "soak"};
+
 constexpr std::uint64_t kNoiseStream = 0x6E6F6973;
 constexpr std::uint64_t kSeatingStream = 0x73656174;
 constexpr std::uint64_t kMostSamples = 100'000'000;
@@ -45,12 +48,9 @@ Status check(const ProtocolRun& run) {
     return fail(ErrorCode::bad_data, "rate, scale, gravity or seating scatter are impossible", {},
                 "rate and scale are positive, the seating scatter is not negative");
   }
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    if (!(std::isfinite(run.gain[axis]) && std::isfinite(run.offset_g[axis]) &&
-          run.noise_mg[axis] >= 0 && std::isfinite(run.noise_mg[axis]))) {
-      return fail(ErrorCode::bad_data, "gain, offset or noise are no finite numbers", {},
-                  "noise must not be negative");
-    }
+  if (!all_finite(run.gain, run.offset_g, run.noise_mg) || std::ranges::min(run.noise_mg) < 0) {
+    return fail(ErrorCode::bad_data, "gain, offset or noise are no finite numbers", {},
+                "noise must not be negative");
   }
   std::uint64_t end = 0;
   for (std::size_t i = 0; i < run.segments.size(); ++i) {
@@ -63,8 +63,8 @@ Status check(const ProtocolRun& run) {
     bool finite = std::isfinite(segment.host_start_s) && segment.rotation.allFinite();
     if (segment.vibration) {
       const Tone& tone = *segment.vibration;
-      finite = finite && tone.direction_lab.allFinite() && std::isfinite(tone.frequency_hz) &&
-               std::isfinite(tone.amplitude_g) && std::isfinite(tone.phase_rad);
+      finite = finite && tone.direction_lab.allFinite() &&
+               all_finite(tone.frequency_hz, tone.amplitude_g, tone.phase_rad);
     }
     if (!finite) {
       return bad("the segment holds a number that is not finite", i);
@@ -213,7 +213,6 @@ class Runner {
     block_.time_s.resize(count);
     block_.motion.resize(count);
     block_.true_g.resize(count);
-    block_.sensed_g.resize(count);
     block_.temperature_c.resize(count);
     block_.stored.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -225,16 +224,21 @@ class Runner {
         effect->on_sampling(block_);
       }
     }
-    const Eigen::Vector3d gravity(0, 0, run_.gravity_g);
-    for (std::size_t i = 0; i < count; ++i) {
-      MotionState& motion = block_.motion[i];
-      motion.rotation = rotation_;
-      motion.force_lab_g = gravity;
+    set_stimulus();
+    sense();
+    if (keep) {
+      store();
+    }
+  }
+
+  void set_stimulus() {
+    for (std::size_t i = 0; i < block_.size(); ++i) {
+      block_.motion[i] = {rotation_, Eigen::Vector3d(0, 0, run_.gravity_g)};
       block_.temperature_c[i] = thermometer_.at(block_.time_s[i]);
     }
     if (tone_) {
       const double omega = 2 * std::numbers::pi * tone_->frequency_hz;
-      for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t i = 0; i < block_.size(); ++i) {
         block_.motion[i].force_lab_g +=
             tone_->amplitude_g *
             std::sin(omega * (block_.time_s[i] - tone_start_s_) + tone_->phase_rad) *
@@ -244,7 +248,10 @@ class Runner {
     for (const auto& effect : effects_) {
       effect->on_stimulus(block_);
     }
-    for (std::size_t i = 0; i < count; ++i) {
+  }
+
+  void sense() {
+    for (std::size_t i = 0; i < block_.size(); ++i) {
       block_.true_g[i] = block_.motion[i].rotation * block_.motion[i].force_lab_g;
     }
     block_.sensed_g = block_.true_g;
@@ -259,11 +266,11 @@ class Runner {
     for (const auto& effect : effects_) {
       effect->on_analog(block_);
     }
-    if (!keep) {
-      return;
-    }
+  }
+
+  void store() {
     bool clipped = false;
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < block_.size(); ++i) {
       for (std::size_t axis = 0; axis < kAxes; ++axis) {
         const double g = run_.gain[axis] * block_.sensed_g[i][static_cast<Eigen::Index>(axis)] +
                          run_.offset_g[axis];
@@ -303,27 +310,14 @@ Result<ProtocolRecord> record(const ProtocolRun& run, bool with_times) {
 }  // namespace
 
 std::string_view to_string(SegmentKind kind) {
-  switch (kind) {
-    case SegmentKind::still:
-      return "still";
-    case SegmentKind::vibration:
-      return "vibration";
-    case SegmentKind::ramp:
-      return "ramp";
-    case SegmentKind::soak:
-      return "soak";
-  }
-  return "?";
+  return kSegmentKindNames[static_cast<std::size_t>(kind)];
 }
 
 std::optional<SegmentKind> parse_segment_kind(std::string_view name) {
-  for (const SegmentKind kind :
-       {SegmentKind::still, SegmentKind::vibration, SegmentKind::ramp, SegmentKind::soak}) {
-    if (to_string(kind) == name) {
-      return kind;
-    }
-  }
-  return std::nullopt;
+  const auto found = std::ranges::find(kSegmentKindNames, name);
+  return found == kSegmentKindNames.end()
+             ? std::nullopt
+             : std::optional(static_cast<SegmentKind>(found - kSegmentKindNames.begin()));
 }
 
 bool follows_without_pause(const ProtocolSegment& before, const ProtocolSegment& next,

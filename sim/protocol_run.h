@@ -1,10 +1,14 @@
-// A unit's way through a calibration protocol: what it would store.
+// A unit's run through a calibration protocol: what it would store.
+//
+//   ProtocolRun run;
+//   run.segments = draw_protocol(StandardProtocol::production, seed);
+//   SIXPOINT_ASSIGN(const auto counts, run_protocol(run));
 //
 // This is the nominal simulator of the gap's diagnosis with effects switched on at will: specific
 // force in the sensor's frame from each segment's pose and vibration; per-axis gain and offset of
 // this unit; white noise; a small seating error, new at every placement; rounding to whole counts
-// and 12 bits. Time runs on between the segments (host time since power-on), the motion between
-// them is left out, the transient after each move is kept. The pose before the first segment is the
+// and 12 bits. Time runs on between the segments (host time since power-on). The motion between
+// them is left out, the transient after each move is not. The pose before the first segment is the
 // pose of the first.
 //
 // Fast on purpose, since a diagnosis calls it often: a hundred nanoseconds or so per sample.
@@ -20,8 +24,8 @@
 
 #include "base/measure.h"
 #include "base/result.h"
-#include "gt3x/samples.h"
-#include "sim/effect.h"
+#include "gt3x/log/samples.h"
+#include "sim/effects/effect.h"
 
 namespace sixpoint::sim {
 
@@ -50,7 +54,7 @@ struct TemperaturePoint {
 struct ProtocolRun {
   double rate_hz = 100;
   double accel_scale_lsb_per_g = 256;
-  double gravity_g = 1;                       // what the operator believes
+  double gravity_g = 1;                       // as the operator entered it
   std::vector<ProtocolSegment> segments;      // in the order of their samples
   std::vector<TemperaturePoint> temperature;  // in the order of time; none: 25 C throughout
   PerAxis<double> gain = {1, 1, 1};
@@ -68,7 +72,7 @@ struct ProtocolRun {
 // on the same axis of the shaker within a few seconds.
 bool same_placement(const ProtocolSegment& before, const ProtocolSegment& next, double rate_hz);
 // True where no sample is missing between them. Sampling effects stretch or shrink a segment by up
-// to 2 %, so this looks at pose, kind and time with that allowance.
+// to 2 %, so pose, kind and time are compared with that allowance.
 bool follows_without_pause(const ProtocolSegment& before, const ProtocolSegment& next,
                            double rate_hz);
 

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "gt3x/parameters.h"
-#include "gt3x/record.h"
+#include "gt3x/forms/parameters.h"
+#include "gt3x/log/record.h"
 #include "gt3x/recording_writer.h"
 #include "sim/simulator.h"
 
@@ -112,37 +112,30 @@ Bytes log_preamble(const UnitTruth& unit, UtcTime start, int rate_hz) {
 
   // Identifiers beyond the named ones: the values of a real wGT3X-BT file.
   gt3x::ParameterValues values = {
-      {{0, 6}, 0},
       {{0, 7}, 54'722'035},
       {{0, 8}, 1},
       {{0, 16}, 1'920'991'232},
-      {{0, 20}, 0},
-      {{0, 21}, 0},
-      {{0, 22}, 0},
-      {{0, 23}, 0},
       {{0, 26}, 2},
       {{0, 28}, 317},
       {{0, 29}, 7},
       {{0, 32}, 16'842'752},
       {{0, 37}, 1282},
-      {{0, 38}, 0},
       {{1, 0}, 1},
       {{1, 1}, unit_number(unit)},
       {{1, 2}, 261},
       {{1, 3}, 4},
-      {{1, 20}, 0},
-      {{1, 21}, 0},
-      {{1, 33}, 0},
-      {{1, 40}, 0},
       {{1, 45}, 122'748'928},
-      {{1, 46}, 0},
   };
+  using Key = gt3x::ParameterKey;
+  for (const Key& zero : {Key(0, 6), Key(0, 20), Key(0, 21), Key(0, 22), Key(0, 23), Key(0, 38),
+                          Key(1, 13), Key(1, 20), Key(1, 21), Key(1, 33), Key(1, 40), Key(1, 46)}) {
+    values[zero] = 0;
+  }
   values[gt3x::kParameterCalibrationTime] = unix_time(unit.calibrated);
   values[gt3x::kParameterFirmwareVersion] = gt3x::encode_firmware(unit.firmware).value_or(0);
   values[gt3x::kParameterAccelScale] = gt3x::encode_float(unit.accel_scale_lsb_per_g);
   values[gt3x::kParameterSampleRate] = static_cast<std::uint32_t>(rate_hz);
   values[{1, 12}] = unix_time(start);
-  values[{1, 13}] = 0;
   values[{1, 14}] = unix_time(initialised);
   gt3x::set_constants(values, unit.constants);
   gt3x::append_record(log, gt3x::RecordType::parameters, unix_time(initialised),

@@ -1,5 +1,8 @@
 // A .gt3x file as a unit of this truth would leave it.
 //
+//   SIXPOINT_ASSIGN(const RecordingReport report, write_recording(files, "unit.gt3x", scenario));
+//   report.duration_s;
+//
 // PARAMETERS, METADATA and info.txt hold what real files of a wGT3X-BT hold.
 #pragma once
 
@@ -8,8 +11,8 @@
 #include <string>
 
 #include "base/env.h"
-#include "gt3x/info.h"
-#include "gt3x/samples.h"
+#include "gt3x/forms/info.h"
+#include "gt3x/log/samples.h"
 #include "sim/scenario.h"
 
 namespace sixpoint::sim {

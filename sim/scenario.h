@@ -1,6 +1,9 @@
 // A scenario: which unit goes through which motion or which protocol, and what it records
 // (docs/scenario.md).
 //
+//   SIXPOINT_ASSIGN(const Scenario scenario, parse_scenario(json));
+//   SIXPOINT_ASSIGN(const auto report, write_recording(env.files, "unit.gt3x", scenario));
+//
 // The same scenario gives the same recording, byte for byte, on every machine.
 #pragma once
 
@@ -12,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-#include "sim/effect.h"
+#include "sim/effects/effect.h"
 #include "sim/motion.h"
 #include "sim/protocol_run.h"
 #include "sim/unit_truth.h"
@@ -39,7 +42,7 @@ struct Scenario {
   std::optional<FilterConfiguration> filter;
   double temperature_c = 25;
   double gravity_g = 1;             // local gravity
-  double turn_s = 2;                // a hand's time from one motion to the next; 0 = no transition
+  double turn_s = 2;                // from one motion to the next; 0 = no transition
   std::vector<MotionSpec> motions;  // empty where there is a protocol
   // A bundle instead of a plain recording; complete, with the scenario's effects and seed.
   std::optional<ProtocolRun> protocol;

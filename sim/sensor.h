@@ -1,4 +1,9 @@
 // The accelerometer: specific force in, raw counts out.
+//
+//   Sensor sensor(draw_unit(7), FilterConfiguration::current, Random(7, 1));
+//   Eigen::Vector3d sensed_g(0, 0, 1);
+//   sensor.add_noise(sensed_g);
+//   const PerAxis<int> raw_lsb = sensor.read(sensed_g);
 #pragma once
 
 #include <Eigen/Core>

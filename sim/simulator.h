@@ -1,10 +1,15 @@
 // The whole chain from motion to stored counts, block by block.
+//
+//   const auto motion = still(rotation_with_up({0, 0, 1}));
+//   Simulator simulator(draw_unit(7), SimulatorOptions{}, *motion);
+//   SimulatedBlock block;
+//   simulator.next(30, block);  // block.stored holds a second
 #pragma once
 
 #include <memory>
 #include <vector>
 
-#include "sim/effect.h"
+#include "sim/effects/effect.h"
 #include "sim/firmware.h"
 #include "sim/motion.h"
 #include "sim/sensor.h"
@@ -34,7 +39,7 @@ class Simulator {
   Simulator(const UnitTruth& unit, const SimulatorOptions& options, Motion& motion,
             std::vector<std::unique_ptr<Effect>> effects = {});
 
-  // The next `samples`; `block` is overwritten and keeps its memory.
+  // The next `samples`; `block` is overwritten; its memory is used again.
   void next(std::size_t samples, SimulatedBlock& block);
   std::uint64_t samples() const { return done_; }
   std::uint64_t clipped() const { return firmware_.clipped(); }

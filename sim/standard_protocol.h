@@ -1,5 +1,8 @@
 // The two standard protocols of a calibration station, as an operator and a jig would run one.
 //
+//   const auto segments = draw_protocol(StandardProtocol::production, 7);  // 100 Hz
+//   const auto temperature = unit_temperature(segments, 100);
+//
 // production: six faces, the same in reverse order, and six placements after the unit was taken
 // off; 10 s each, three minutes. engineering: that, and yaws, oblique poses, the shaker, twenty
 // still minutes, temperature ramps and soaks; 75 minutes of recording in about three hours.

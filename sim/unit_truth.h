@@ -1,4 +1,8 @@
 // A unit as it really is: its sensor under each filter configuration, and what its memory holds.
+//
+//   GivenProperties given;
+//   given.firmware = "1.9.2";
+//   const UnitTruth unit = draw_unit(seed, given);
 #pragma once
 
 #include <cstdint>
@@ -39,8 +43,8 @@ struct UnitTruth {
   }
 };
 
-// What somebody knows of a unit; the rest is drawn.
-struct UnitWishes {
+// What is given of a unit; the rest is drawn.
+struct GivenProperties {
   std::optional<std::string> serial;
   std::optional<std::string> firmware;
   std::optional<UtcTime> calibrated;
@@ -61,9 +65,9 @@ struct UnitWishes {
 // units' PARAMETERS). `current` against `legacy`: a common gain of 0.80 to 0.95 and offsets of 0.1
 // to 0.2 g of either sign (what affected recordings show). The stored constants are those of the
 // configuration that was used on the calibration date, rounded, with zero measured apart: in real
-// units it lies 2 to 7 LSB off the midpoint of positive and negative. Where constants are wished
-// for and the sensor is not, the sensor under the constants' own configuration is what they say:
+// units it lies 2 to 7 LSB off the midpoint of positive and negative. Where constants are given
+// and the sensor is not, the sensor under the constants' own configuration is what they say:
 // sensitivity from their difference, zero from their midpoint.
-UnitTruth draw_unit(std::uint64_t seed, const UnitWishes& wishes = {});
+UnitTruth draw_unit(std::uint64_t seed, const GivenProperties& given = {});
 
 }  // namespace sixpoint::sim

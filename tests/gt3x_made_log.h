@@ -1,9 +1,10 @@
 // Small logs made for tests: known records, so that every damage has a known answer.
 #pragma once
 
-#include "gt3x/parameters.h"
-#include "gt3x/record.h"
-#include "gt3x/samples.h"
+#include "gt3x/forms/parameters.h"
+#include "gt3x/log/record.h"
+#include "gt3x/log/samples.h"
+#include "gt3x/recording_writer.h"
 
 namespace sixpoint::gt3x::tests {
 
@@ -54,6 +55,15 @@ inline std::string made_info(const std::string& rate = "30") {
   return "Serial Number: MOS2A45130450\r\nFirmware: 1.5.0\r\nSample Rate: " + rate +
          "\r\nStart Date: 635641850400000000\r\nAcceleration Scale: 256.0\r\n"
          "Acceleration Min: -8.0\r\nAcceleration Max: 8.0\r\n";
+}
+
+// A .gt3x file of this log.
+inline Status put_recording(FileSystem& files, const std::string& path, const Bytes& log,
+                            const std::string& info = made_info()) {
+  SIXPOINT_ASSIGN(auto out, RecordingWriter::create(files, path));
+  SIXPOINT_CHECK(out.add("log.bin", log));
+  SIXPOINT_CHECK(out.add("info.txt", std::string_view(info)));
+  return out.commit();
 }
 
 }  // namespace sixpoint::gt3x::tests

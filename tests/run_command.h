@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/memory_env.h"
-#include "station/cli/command.h"
+#include "cli/command.h"
 
 namespace sixpoint::tests {
 

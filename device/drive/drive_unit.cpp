@@ -5,8 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "base/serial.h"
 #include "base/sha256.h"
-#include "gt3x/info.h"
+#include "gt3x/forms/info.h"
 #include "gt3x/recording_writer.h"
 
 namespace sixpoint::device {
@@ -41,19 +42,6 @@ class LogSource final : public gt3x::ByteSource {
   std::uint64_t offset_ = 0;
 };
 
-Result<Sha256Digest> hash_of(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(auto file, files.open(path));
-  const auto hash = std::make_shared<Sha256>();
-  LogSource source(std::move(file), hash, {});
-  Bytes piece(1U << 20U);
-  for (;;) {
-    SIXPOINT_ASSIGN(const std::size_t count, source.read(piece));
-    if (count == 0) {
-      return hash->finish();
-    }
-  }
-}
-
 // A name as Identity wants it: printable, without blanks, not too long.
 std::string plain(std::string_view text, std::size_t limit) {
   std::string name;
@@ -87,17 +75,16 @@ Result<Identity> DriveUnit::read_identity() const {
     }
   }
   SIXPOINT_ASSIGN(const Bytes text, read_file(env_.files, path_of(kInfoName), kMostInfo_bytes));
-  SIXPOINT_ASSIGN(const gt3x::Info info,
-                  gt3x::Info::parse({reinterpret_cast<const char*>(text.data()), text.size()}));
+  SIXPOINT_ASSIGN(const gt3x::Info info, gt3x::Info::parse(as_text(text)));
   Identity identity;
   identity.serial = info.serial();
-  if (identity.serial.empty() || identity.serial != plain(identity.serial, 16)) {
+  if (!is_serial(identity.serial)) {
     return fail(ErrorCode::bad_data, "info.txt names no serial number of a unit",
                 path_of(kInfoName), "copy the recording with the vendor's software");
   }
   identity.firmware = plain(info.firmware(), 12);
   identity.model = plain(info.device_type(), 12);
-  // 0 where it is not said: the battery of a unit without commands concerns nobody here.
+  // 0 where info.txt names none: such a unit takes no command that needs charge.
   identity.battery_mv = static_cast<std::uint16_t>(
       std::lround(std::clamp(info.battery_v().value_or(0), 0.0, 60.0) * 1000));
   identity.accel_scale_lsb_per_g = static_cast<std::uint16_t>(
@@ -136,7 +123,7 @@ Result<std::vector<RecordingInfo>> DriveUnit::recordings() {
   RecordingInfo info;
   info.id = 1;
   info.bytes = log.size;
-  SIXPOINT_ASSIGN(info.sha256, hash_of(env_.files, path_of(kLogName)));
+  SIXPOINT_ASSIGN(info.sha256, file_digest(env_.files, path_of(kLogName)));
   return std::vector<RecordingInfo>{info};
 }
 

@@ -1,8 +1,9 @@
 // A unit that offers mass storage and nothing else: a folder with info.txt and log.bin in it
 // (docs/devices/file-monitor.md). It is calibrated by files alone.
 //
-// There is nothing to command: no live samples, no constants to read or write; what it can do is
-// hand out the one recording that it holds. Everything else answers `usage`.
+//   Result<std::unique_ptr<Unit>> unit = DriveUnit::open("/media/UNIT", env);
+//
+// It has one recording to download. It takes no commands: everything else fails with `usage`.
 #pragma once
 
 #include "device/unit_registry.h"

@@ -1,10 +1,12 @@
-#include "device/hid_jig.h"
+#include "device/jigs/hid_jig.h"
 
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "device/payload.h"
+#include "device/usb/discovery.h"
+#include "device/usb/hid_transport.h"
+#include "device/wire/payload.h"
 
 namespace sixpoint::device {
 
@@ -14,69 +16,50 @@ using std::chrono::nanoseconds;
 
 constexpr std::uint8_t kNoPose = 255;
 
-tl::unexpected<Error> nonsense(std::string what) {
+tl::unexpected<Error> bad_answer(std::string what) {
   return fail(ErrorCode::bad_data, std::move(what), "jig",
               "switch the jig off and on; if it stays, the jig or its firmware is faulty");
-}
-
-bool is_plain(const std::string& text) {
-  return !text.empty() &&
-         std::all_of(text.begin(), text.end(), [](char c) { return c > 0x20 && c < 0x7F; });
 }
 
 }  // namespace
 
 std::string_view to_string(JigFault fault) {
-  switch (fault) {
-    case JigFault::none:
-      return "none";
-    case JigFault::overcurrent:
-      return "the motor draws too much current";
-    case JigFault::encoder:
-      return "the angle encoder contradicts itself";
-    case JigFault::obstructed:
-      return "something is in the way";
-    case JigFault::door_open:
-      return "the door is open";
-    case JigFault::not_homed:
-      return "it does not know where it stands";
-    case JigFault::supply_low:
-      return "its supply voltage is too low";
-  }
-  return "a fault of no known code";
+  constexpr std::array<std::string_view, 7> kNames = {"none",
+                                                      "the motor draws too much current",
+                                                      "the angle encoder contradicts itself",
+                                                      "something is in the way",
+                                                      "the door is open",
+                                                      "it does not know where it stands",
+                                                      "its supply voltage is too low"};
+  const auto index = static_cast<std::size_t>(fault);
+  return index < kNames.size() ? kNames[index] : "a fault of no known code";
 }
 
 Bytes encode_jig_identity(const JigIdentity& identity) {
-  return PayloadWriter()
-      .put(identity.version)
-      .put(identity.serial, 16)
-      .put(identity.firmware, 12)
-      .put(identity.model, 12)
-      .take();
+  PayloadWriter writer;
+  writer.put(identity.version);
+  put_names(writer, identity);
+  return writer.take();
 }
 
 Result<JigIdentity> decode_jig_identity(std::span<const std::uint8_t> payload) {
   PayloadReader in(payload);
   JigIdentity identity;
   identity.version = in.get<std::uint8_t>();
-  identity.serial = in.text(16);
-  identity.firmware = in.text(12);
-  identity.model = in.text(12);
-  if (!in.ok() || identity.version == 0 || !is_plain(identity.serial) ||
-      !is_plain(identity.firmware) || !is_plain(identity.model)) {
-    return nonsense("the jig does not say who it is");
+  const bool named = get_names(in, identity);
+  if (!in.ok() || identity.version == 0 || !named || identity.firmware.empty() ||
+      identity.model.empty()) {
+    return bad_answer("the jig does not say who it is");
   }
   return identity;
 }
 
 Bytes encode_jig_state(const JigState& state) {
-  return PayloadWriter()
-      .put(static_cast<std::uint8_t>(state.motion))
-      .put(state.pose ? static_cast<std::uint8_t>(*state.pose) : kNoPose)
-      .put(static_cast<std::int32_t>(std::lround(state.angle_off_deg * 1000)))
-      .put(static_cast<std::uint16_t>(std::lround(state.uncertainty_deg * 1000)))
-      .put(static_cast<std::uint8_t>(state.fault))
-      .take();
+  return payload_of(static_cast<std::uint8_t>(state.motion),
+                    state.pose ? static_cast<std::uint8_t>(*state.pose) : kNoPose,
+                    static_cast<std::int32_t>(std::lround(state.angle_off_deg * 1000)),
+                    static_cast<std::uint16_t>(std::lround(state.uncertainty_deg * 1000)),
+                    static_cast<std::uint8_t>(state.fault));
 }
 
 Result<JigState> decode_jig_state(std::span<const std::uint8_t> payload) {
@@ -88,7 +71,7 @@ Result<JigState> decode_jig_state(std::span<const std::uint8_t> payload) {
   const auto fault = in.get<std::uint8_t>();
   if (!in.ok() || motion > static_cast<std::uint8_t>(JigMotion::fault) ||
       (pose >= kPoses.size() && pose != kNoPose) || std::abs(std::int64_t{angle_mdeg}) > 180'000) {
-    return nonsense("the jig's state cannot be");
+    return bad_answer("the jig's state cannot be");
   }
   JigState state;
   state.motion = static_cast<JigMotion>(motion);
@@ -99,7 +82,7 @@ Result<JigState> decode_jig_state(std::span<const std::uint8_t> payload) {
   state.uncertainty_deg = uncertainty_mdeg / 1000.0;
   state.fault = static_cast<JigFault>(fault);
   if (state.motion == JigMotion::standing && !state.pose) {
-    return nonsense("the jig stands, and in no pose");
+    return bad_answer("the jig stands, and in no pose");
   }
   return state;
 }
@@ -165,26 +148,25 @@ Status HidJig::go_to(Pose pose) {
   const std::lock_guard lock(mutex_);
   // Ends an emergency stop; a fault stays until a person has seen to it.
   SIXPOINT_CHECK(ask_locked(JigCommand::clear, {}, false));
-  SIXPOINT_CHECK(ask_locked(JigCommand::go_to,
-                            PayloadWriter().put(static_cast<std::uint8_t>(pose)).take(), false));
+  SIXPOINT_CHECK(ask_locked(JigCommand::go_to, payload_of(static_cast<std::uint8_t>(pose)), false));
   return {};
 }
 
-Result<JigReport> HidJig::report() {
+Result<JigPosition> HidJig::position() {
   SIXPOINT_ASSIGN(const Bytes payload, ask(JigCommand::state));
   SIXPOINT_ASSIGN(const JigState state, decode_jig_state(payload));
-  JigReport report;
+  JigPosition position;
   if (state.motion == JigMotion::standing) {
-    report.pose = state.pose;
+    position.pose = state.pose;
   }
-  report.angle_off_deg = state.angle_off_deg;
-  report.angle_uncertainty_deg = state.uncertainty_deg;
+  position.angle_off_deg = state.angle_off_deg;
+  position.angle_uncertainty_deg = state.uncertainty_deg;
   if (state.motion == JigMotion::fault) {
-    report.fault = to_string(state.fault);
+    position.fault = to_string(state.fault);
   } else if (state.motion == JigMotion::stopped) {
-    report.fault = "emergency stop";
+    position.fault = "emergency stop";
   }
-  return report;
+  return position;
 }
 
 Status HidJig::stop() {
@@ -194,6 +176,22 @@ Status HidJig::stop() {
   --stopping_;
   SIXPOINT_CHECK(answer);
   return {};
+}
+
+void register_hid_jig(JigRegistry& registry) {
+  registry.add("hid", "hid:SERIAL",
+               [](std::string_view rest, Env& env, Unit&) -> Result<std::unique_ptr<Jig>> {
+                 DiscoveryFilter filter;
+                 filter.product_ids = {kJigProductId};
+                 filter.serial = rest;
+                 SIXPOINT_ASSIGN(const AttachedDevice found, find_device(filter, env.clock));
+                 Link link;
+                 link.address = fmt::format("hid:{}", found.serial);
+                 link.clock = borrow_clock(env.clock);
+                 SIXPOINT_ASSIGN(link.reports, open_hid_transport(found.hidraw_node));
+                 SIXPOINT_ASSIGN(auto jig, HidJig::open(std::move(link)));
+                 return std::unique_ptr<Jig>(std::move(jig));
+               });
 }
 
 }  // namespace sixpoint::device

@@ -1,48 +1,38 @@
-// The motorised jig over USB HID (docs/devices/motorised-jig.md), and its messages, which its twin
-// in software speaks too (mocks/virtual_hid_jig.h).
+// The motorised jig over USB HID (docs/devices/motorised-jig.md) and its messages. The jig in
+// software (mocks/in_process/virtual_hid_jig.h) uses the same messages.
 //
-// Reports are framed as the units' are (protocol.h); the commands are others.
+//   SIXPOINT_ASSIGN(const std::unique_ptr<HidJig> jig, HidJig::open(std::move(link)));
+//   SIXPOINT_CHECK(jig->go_to(Pose::plus_x));
+//
+// Reports have the frame of the units' reports (protocol.h) and other commands.
 #pragma once
 
 #include <atomic>
 #include <mutex>
 
 #include "device/jig.h"
-#include "device/protocol.h"
+#include "device/jig_registry.h"
 #include "device/transport.h"
+#include "device/wire/protocol.h"
 
 namespace sixpoint::device {
 
-enum class JigCommand : std::uint8_t {
-  identify = 64,
-  go_to = 65,
-  state = 66,
-  stop = 67,
-  clear = 68
-};
-enum class JigMotion : std::uint8_t {
-  unknown = 0,
-  standing = 1,
-  turning = 2,
-  stopped = 3,
-  fault = 4
-};
+// Numbers on the wire, counted from the first.
+enum class JigCommand : std::uint8_t { identify = 64, go_to, state, stop, clear };
+enum class JigMotion : std::uint8_t { unknown, standing, turning, stopped, fault };
 enum class JigFault : std::uint8_t {
-  none = 0,
-  overcurrent = 1,
-  encoder = 2,
-  obstructed = 3,
-  door_open = 4,
-  not_homed = 5,
-  supply_low = 6,
+  none,
+  overcurrent,
+  encoder,
+  obstructed,
+  door_open,
+  not_homed,
+  supply_low,
 };
 std::string_view to_string(JigFault fault);
 
-struct JigIdentity {
+struct JigIdentity : DeviceNames {
   std::uint8_t version = 1;
-  std::string serial;    // at most 16 characters, printable ASCII without blanks
-  std::string firmware;  // at most 12
-  std::string model;     // at most 12
 
   bool operator==(const JigIdentity&) const = default;
 };
@@ -68,14 +58,15 @@ struct HidJigOptions {
 
 class HidJig final : public Jig {
  public:
-  // Identifies it. device_unavailable when it does not answer, bad_data when it says nonsense.
+  // Identifies it. device_unavailable when it does not answer, bad_data when its answer is
+  // impossible.
   static Result<std::unique_ptr<HidJig>> open(Link link, HidJigOptions options = {});
 
   const JigIdentity& identity() const { return identity_; }
   std::string name() const override;
   bool turns_by_itself() const override { return true; }
   Status go_to(Pose pose) override;
-  Result<JigReport> report() override;
+  Result<JigPosition> position() override;
   // From any thread; a request that is under way in another ends with device_unavailable.
   Status stop() override;
 
@@ -83,7 +74,7 @@ class HidJig final : public Jig {
   HidJig(Link link, HidJigOptions options) : link_(std::move(link)), options_(options) {}
 
   Result<Bytes> ask(JigCommand command, Bytes payload = {});
-  // The caller holds the mutex. An urgent one takes no notice of stop().
+  // The caller holds the mutex. An urgent request does not end by stop().
   Result<Bytes> ask_locked(JigCommand command, Bytes payload, bool urgent);
 
   Link link_;
@@ -93,5 +84,8 @@ class HidJig final : public Jig {
   std::atomic<int> stopping_ = 0;
   std::uint16_t sequence_ = 0;
 };
+
+// "hid:SERIAL" and "hid:" (the only one that is plugged in): a HidJig.
+void register_hid_jig(JigRegistry& registry);
 
 }  // namespace sixpoint::device

@@ -1,4 +1,4 @@
-#include "device/session.h"
+#include "device/session/session.h"
 
 #include <algorithm>
 #include <memory>
@@ -8,8 +8,8 @@
 #include <zip.h>
 
 #include "base/sha256.h"
-#include "device/session_archive.h"
-#include "device/session_journal.h"
+#include "device/session/session_archive.h"
+#include "device/session/session_journal.h"
 #include "gt3x/recording_writer.h"
 
 namespace sixpoint::device {
@@ -26,40 +26,6 @@ constexpr std::size_t kMostTransferBytes = 1U << 20U;
 tl::unexpected<Error> broken(std::string what, const std::string& where) {
   return fail(ErrorCode::bad_data, std::move(what), where,
               "record the session again; docs/sessions.md describes the form");
-}
-
-std::optional<std::uint8_t> digit_of(char c) {
-  if (c >= '0' && c <= '9') {
-    return static_cast<std::uint8_t>(c - '0');
-  }
-  if (c >= 'a' && c <= 'f') {
-    return static_cast<std::uint8_t>(c - 'a' + 10);
-  }
-  return std::nullopt;
-}
-
-std::optional<Bytes> from_hex(std::string_view text) {
-  if (text.size() % 2 != 0 || text.size() / 2 > kMostTransferBytes) {
-    return std::nullopt;
-  }
-  Bytes bytes(text.size() / 2);
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    const auto high = digit_of(text[2 * i]);
-    const auto low = digit_of(text[2 * i + 1]);
-    if (!high || !low) {
-      return std::nullopt;
-    }
-    bytes[i] = static_cast<std::uint8_t>((*high << 4U) | *low);
-  }
-  return bytes;
-}
-
-void append_hex(std::string& text, const Bytes& bytes) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  for (const std::uint8_t byte : bytes) {
-    text += kDigits[byte >> 4U];
-    text += kDigits[byte & 0xFU];
-  }
 }
 
 constexpr std::array<ErrorCode, 5> kTransferErrors = {ErrorCode::device_unavailable, ErrorCode::io,
@@ -83,7 +49,7 @@ Result<std::string> entry_of(zip_t& zip, const char* name, const std::string& pa
   if (file == nullptr) {
     return broken(fmt::format("{} cannot be read", name), path);
   }
-  // Grown as it comes: what the archive says about its size is only said.
+  // Grows with the data: the size in the archive may be wrong.
   std::string text;
   std::array<char, 65'536> piece{};
   zip_int64_t count = 0;
@@ -99,9 +65,7 @@ Result<std::string> entry_of(zip_t& zip, const char* name, const std::string& pa
   return text;
 }
 
-Sha256Digest digest_of(std::string_view text) {
-  return sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
-}
+Sha256Digest digest_of(std::string_view text) { return sha256(as_bytes(text)); }
 
 }  // namespace
 
@@ -137,7 +101,7 @@ Result<SessionTransfer> parse_line(std::string_view line, const std::string& whe
   }
   transfer.channel = channel == "bulk" ? SessionChannel::bulk : SessionChannel::reports;
   auto bytes = from_hex(text("hex"));
-  if (!bytes) {
+  if (!bytes || bytes->size() > kMostTransferBytes) {
     return broken("a transfer whose bytes are not hexadecimal, or too many", where);
   }
   transfer.bytes = std::move(*bytes);
@@ -166,7 +130,7 @@ std::string to_line(const SessionTransfer& transfer) {
   }
   if (!transfer.bytes.empty()) {
     text += R"(,"hex":")";
-    append_hex(text, transfer.bytes);
+    text += to_hex(transfer.bytes);
     text += '"';
   }
   if (transfer.error) {
@@ -189,18 +153,16 @@ std::string to_lines(const std::vector<SessionTransfer>& transfers) {
 Result<std::vector<SessionTransfer>> parse_lines(std::string_view text) {
   std::vector<SessionTransfer> transfers;
   std::size_t number = 0;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    ++number;
-    if (end > 0) {
-      SIXPOINT_ASSIGN(SessionTransfer transfer,
-                      parse_line(text.substr(0, end), fmt::format("transfer {}", number)));
-      if (!transfers.empty() && transfer.time < transfers.back().time) {
-        return broken("time goes back", fmt::format("transfer {}", number));
-      }
-      transfers.push_back(std::move(transfer));
+  for (const std::string_view line : lines_of(text)) {
+    const std::string where = fmt::format("transfer {}", ++number);
+    if (line.empty()) {
+      continue;
     }
-    text.remove_prefix(std::min(end + 1, text.size()));
+    SIXPOINT_ASSIGN(SessionTransfer transfer, parse_line(line, where));
+    if (!transfers.empty() && transfer.time < transfers.back().time) {
+      return broken("time goes back", where);
+    }
+    transfers.push_back(std::move(transfer));
   }
   return transfers;
 }

@@ -1,6 +1,11 @@
 // A recorded session: every transfer between a program and a device, with its time
 // (docs/sessions.md).
 //
+//   SIXPOINT_ASSIGN(const Session session, read_session(env.files, "session.zip"));
+//   for (const SessionTransfer& transfer : session.transfers) {
+//     std::cout << to_hex(transfer.bytes) << '\n';
+//   }
+//
 // A session file is a zip of session.json (what it is, and the SHA-256 of the rest) and
 // transfers.jsonl, one line per transfer. session_recorder.h makes one, by way of a journal
 // (session_journal.h), session_replay.h plays one back, pcap.h makes one of a USB capture.
@@ -29,7 +34,7 @@ struct SessionTransfer {
   SessionChannel channel = SessionChannel::reports;
   std::chrono::nanoseconds time{0};  // since the session's start
   Bytes bytes;
-  std::optional<Error> error;  // what it ended with instead
+  std::optional<Error> error;  // where it failed
 
   bool operator==(const SessionTransfer& other) const {
     return kind == other.kind && channel == other.channel && time == other.time &&
@@ -38,11 +43,11 @@ struct SessionTransfer {
   }
 };
 
-// What session.json says, but the hash.
+// The content of session.json without the hash.
 struct SessionHead {
   std::string device;  // as it was addressed; of a capture: its place on the bus
   UtcTime started{};
-  bool truncated = false;  // it went on, but was not kept
+  bool truncated = false;  // the device went on, the session did not
   std::uint64_t transfers = 0;
 };
 

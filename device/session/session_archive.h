@@ -1,11 +1,14 @@
 // The archive of a session, piece by piece: what session.cpp and session_journal.cpp share.
+//
+//   const std::string line = to_line(transfer);
+//   SIXPOINT_ASSIGN(const SessionTransfer same, parse_line(line, "session.zip"));
 #pragma once
 
 #include <memory>
 
 #include "base/sha256.h"
-#include "device/session.h"
-#include "gt3x/byte_source.h"
+#include "device/session/session.h"
+#include "gt3x/container/byte_source.h"
 
 namespace sixpoint::device {
 

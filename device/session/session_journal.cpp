@@ -1,11 +1,11 @@
-#include "device/session_journal.h"
+#include "device/session/session_journal.h"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "device/session_archive.h"
+#include "device/session/session_archive.h"
 
 namespace sixpoint::device {
 
@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kJournalSchema = "sixpoint/session-journal/1";
-// A transfer of 1 MiB in hexadecimal, and the words around it.
+// A transfer of 1 MiB in hexadecimal, and its keys.
 constexpr std::size_t kMostLine_bytes = (2U << 20U) + 4096;
 
 // A part of a file, from front to back.
@@ -120,8 +120,7 @@ Result<SessionJournal> SessionJournal::create(FileSystem& files, const std::stri
 }
 
 Status SessionJournal::write(std::string_view text) {
-  SIXPOINT_CHECK(file_->write_at(
-      end_, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  SIXPOINT_CHECK(file_->write_at(end_, as_bytes(text)));
   end_ += text.size();
   if (end_ - synced_ >= kJournalSync_bytes) {
     SIXPOINT_CHECK(file_->sync());
@@ -166,7 +165,7 @@ Status SessionJournal::finish(bool truncated) {
   }
   static_cast<void>(file_->close());  // what it held is in the archive
   const Status removed = files_->remove(name);
-  // Somebody who took it away meanwhile did no harm.
+  // A journal that is gone already is as good.
   return removed || !files_->info(name) ? Status{} : removed;
 }
 
@@ -194,7 +193,7 @@ Result<RecoveredSession> recover_session(FileSystem& files, const std::string& j
   std::chrono::nanoseconds last{0};
   for (;;) {
     SIXPOINT_ASSIGN(const auto line, lines.next());
-    // What a power cut leaves behind the last sync may be anything: it ends where sense ends.
+    // After a power cut any bytes may follow the last sync: stop at the first that is no transfer.
     const auto transfer = line ? parse_line(*line, "") : fail(ErrorCode::bad_data, "no line");
     if (!transfer || transfer->time < last || lines.offset() - begin > kMostText_bytes) {
       break;

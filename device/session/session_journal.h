@@ -4,7 +4,7 @@
 //   SIXPOINT_ASSIGN(auto journal, SessionJournal::create(env.files, "session.zip"));
 //   SIXPOINT_CHECK(journal.begin("hid:MOS2A45130007", env.clock.now()));
 //   SIXPOINT_CHECK(journal.append(transfer));
-//   SIXPOINT_CHECK(journal.finish());   // session.zip is there, the journal is not any more
+//   SIXPOINT_CHECK(journal.finish(false));  // session.zip is there, the journal is not any more
 //
 // The target's name is never on anything but a whole session. A program that is killed leaves the
 // journal with every transfer so far; a loss of power takes what was not yet on the medium, at most
@@ -18,7 +18,7 @@
 
 #include "base/env.h"
 #include "base/sha256.h"
-#include "device/session.h"
+#include "device/session/session.h"
 
 namespace sixpoint::device {
 

@@ -1,8 +1,8 @@
-#include "device/session_recorder.h"
+#include "device/session/session_recorder.h"
 
 #include <optional>
 
-#include "device/session_journal.h"
+#include "device/session/session_journal.h"
 
 namespace sixpoint::device {
 

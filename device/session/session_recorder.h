@@ -1,9 +1,10 @@
-// Writes down every transfer of a link (session.h).
+// Records every transfer of a link (session.h).
 //
 //   SessionRecorder recorder;
 //   SIXPOINT_CHECK(recorder.begin(env.files, "session.zip"));
-//   auto unit = units.open(address, env, [&](Link& link) { recorder.attach(link); });
-//   ... the program's work ...
+//   const auto record = [&](Link& link) { recorder.attach(link); };
+//   SIXPOINT_ASSIGN(const auto unit, units.open("hid:MOS2A45130007", env, record));
+//   SIXPOINT_CHECK(unit->start_stream(100));  // the program's work
 //   SIXPOINT_CHECK(recorder.finish());
 //
 // Each transfer is on disk before the program sees it, in a journal beside the session
@@ -14,25 +15,25 @@
 #include <memory>
 #include <mutex>
 
-#include "device/session.h"
+#include "device/session/session.h"
 #include "device/transport.h"
 
 namespace sixpoint::device {
 
 class SessionRecorder {
  public:
-  // What comes beyond is not kept, and the session says so. Counted are the bytes of transfers and
-  // 64 for each: 100 MiB is what read_session() takes.
+  // Later transfers are dropped, and the session is marked `truncated`. Counted are the bytes of
+  // transfers and 64 for each: read_session() takes 100 MiB.
   explicit SessionRecorder(std::uint64_t most_bytes = 100ULL << 20U);
 
   // Makes the journal: cannot_create as SessionJournal::create(). `files` outlives the links.
   Status begin(FileSystem& files, const std::string& path);
-  // From here on what passes on the link's channels is written down, also after it was opened
-  // again. Once; the recorder may end before the link. Without begin() it does nothing.
+  // Records the link's channels from here on, also after it was opened again. Once; the recorder
+  // may end before the link. Without begin() it does nothing.
   void attach(Link& link);
-  // Makes the session of the journal; what passes afterwards is not kept. Where nothing was
-  // attached there is no session. An error of the journal that came in between is given here: the
-  // program's work went on, and what was written before it is left for recover_session().
+  // Makes the session of the journal and ends the recording. Without a link there is no session. An
+  // earlier error of the journal is returned here: the program's work went on, and the transfers
+  // before the error are left for recover_session().
   Status finish();
   bool truncated() const;
 

@@ -1,4 +1,4 @@
-#include "device/session_replay.h"
+#include "device/session/session_replay.h"
 
 #include <algorithm>
 #include <deque>
@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/memory_env.h"
-#include "device/protocol.h"
+#include "device/wire/protocol.h"
 
 namespace sixpoint::device {
 
@@ -95,7 +95,7 @@ class Player {
                                           : read_by_key(channel, out, time_out);
   }
 
-  // Whether the device came back, when it was looked for then.
+  // Whether the device came back at this place of the recording.
   Status reopen() {
     const std::lock_guard lock(mutex_);
     if (match_ == SessionMatch::by_key) {
@@ -195,7 +195,7 @@ class Player {
     return 0;
   }
 
-  // The next time that it was looked for after it went.
+  // The next attempt to open the device after it went away.
   Status reopen_by_key() {
     if (!gone_at_) {
       return ended();
@@ -318,13 +318,13 @@ class ReplayedTransport final : public Transport {
   SessionChannel channel_;
 };
 
-// Whoever turned the unit then: it turns again as it did, and nobody is asked for it.
+// The unit was turned during the recording: no person is asked again.
 class ReplayedJig final : public Jig {
  public:
   std::string name() const override { return "replayed session"; }
   bool turns_by_itself() const override { return true; }
   Status go_to(Pose /*pose*/) override { return {}; }
-  Result<JigReport> report() override { return JigReport{}; }
+  Result<JigPosition> position() override { return JigPosition{}; }
   Status stop() override { return {}; }
 };
 
@@ -355,13 +355,13 @@ void register_replay(TransportRegistry& registry) {
     constexpr std::string_view kMatch = ",match=";
     SessionMatch match = SessionMatch::strict;
     if (const std::size_t at = rest.rfind(kMatch); at != std::string_view::npos) {
-      const std::string_view word = rest.substr(at + kMatch.size());
-      if (word != "key" && word != "strict") {
+      const std::string_view mode = rest.substr(at + kMatch.size());
+      if (mode != "key" && mode != "strict") {
         return fail(ErrorCode::usage,
-                    fmt::format("match={} is neither strict nor key", printable(word, 40)), {},
+                    fmt::format("match={} is neither strict nor key", printable(mode, 40)), {},
                     "docs/sessions.md describes both");
       }
-      match = word == "key" ? SessionMatch::by_key : SessionMatch::strict;
+      match = mode == "key" ? SessionMatch::by_key : SessionMatch::strict;
       rest = rest.substr(0, at);
     }
     SIXPOINT_ASSIGN(Session session, read_session(env.files, std::string(rest)));

@@ -1,16 +1,16 @@
-// Plays a recorded session back: the program on one side is unmodified, the device on the other is
-// the recording (docs/sessions.md).
+// A device that plays a recorded session back to an unmodified program (docs/sessions.md).
 //
-// strict: the program must write what was written then, byte for byte and in that order, and gets
-// what came then. by_key: every request is answered by what answered the same request (command and
-// payload) in the recording, in whatever order they are asked; the sequence is put in anew. In both
-// the time in START_RECORDING is not compared, for it is the time of day.
+//   Link link = replay_link(session, SessionMatch::strict);
 //
-// Time passes on the link's own clock, which stands at the time of each transfer: a replay of an
-// hour takes moments.
+// strict: the program must write the recorded bytes in their order, and gets the recorded answers.
+// by_key: a request (command and payload) gets the recorded answer to the same request, in any
+// order, with the sequence of the new request. Both ignore the time of day in START_RECORDING.
+//
+// The link has a clock of its own, which stands at the time of each transfer: a replay of an hour
+// takes moments.
 #pragma once
 
-#include "device/session.h"
+#include "device/session/session.h"
 #include "device/transport.h"
 
 namespace sixpoint::device {

@@ -1,6 +1,7 @@
-#include "device/bulk_transport.h"
+#include "device/usb/bulk_transport.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <condition_variable>
@@ -12,9 +13,9 @@
 
 #include <libusb.h>
 
-#include "device/protocol.h"
-#include "device/usb_errors.h"
-#include "device/usb_ids.h"
+#include "device/usb/usb_errors.h"
+#include "device/usb/usb_ids.h"
+#include "device/wire/protocol.h"
 
 namespace sixpoint::device {
 
@@ -26,45 +27,27 @@ using std::chrono::nanoseconds;
 constexpr std::size_t kTransferBytes = (kBulkBlockBytes + 511) / 512 * 512;
 
 int errno_of(int libusb_code) {
-  switch (libusb_code) {
-    case LIBUSB_ERROR_ACCESS:
-      return EACCES;
-    case LIBUSB_ERROR_BUSY:
-      return EBUSY;
-    case LIBUSB_ERROR_NO_DEVICE:
-    case LIBUSB_ERROR_NOT_FOUND:
-      return ENODEV;
-    case LIBUSB_ERROR_PIPE:
-      return EPIPE;
-    case LIBUSB_ERROR_TIMEOUT:
-      return ETIMEDOUT;
-    case LIBUSB_ERROR_OVERFLOW:
-      return EOVERFLOW;
-    case LIBUSB_ERROR_NO_MEM:
-      return ENOMEM;
-    default:
-      return EIO;
+  constexpr std::array<std::pair<int, int>, 8> kErrors = {{{LIBUSB_ERROR_ACCESS, EACCES},
+                                                           {LIBUSB_ERROR_BUSY, EBUSY},
+                                                           {LIBUSB_ERROR_NO_DEVICE, ENODEV},
+                                                           {LIBUSB_ERROR_NOT_FOUND, ENODEV},
+                                                           {LIBUSB_ERROR_PIPE, EPIPE},
+                                                           {LIBUSB_ERROR_TIMEOUT, ETIMEDOUT},
+                                                           {LIBUSB_ERROR_OVERFLOW, EOVERFLOW},
+                                                           {LIBUSB_ERROR_NO_MEM, ENOMEM}}};
+  for (const auto& [code, number] : kErrors) {
+    if (code == libusb_code) {
+      return number;
+    }
   }
+  return EIO;
 }
 
 int errno_of(libusb_transfer_status status) {
-  switch (status) {
-    case LIBUSB_TRANSFER_COMPLETED:
-      return 0;
-    case LIBUSB_TRANSFER_TIMED_OUT:
-      return ETIMEDOUT;
-    case LIBUSB_TRANSFER_CANCELLED:
-      return ECANCELED;
-    case LIBUSB_TRANSFER_STALL:
-      return EPIPE;
-    case LIBUSB_TRANSFER_NO_DEVICE:
-      return ENODEV;
-    case LIBUSB_TRANSFER_OVERFLOW:
-      return EOVERFLOW;
-    case LIBUSB_TRANSFER_ERROR:
-      break;
-  }
-  return EIO;
+  // In the order of the enumeration: completed, error, timed out, cancelled, stall, no device,
+  // overflow.
+  constexpr std::array<int, 7> kErrors = {0, EIO, ETIMEDOUT, ECANCELED, EPIPE, ENODEV, EOVERFLOW};
+  return status < kErrors.size() ? kErrors[status] : EIO;
 }
 
 class BulkTransport;
@@ -139,7 +122,7 @@ class BulkTransport final : public Transport {
     }
     for (auto* list : {&incoming_, &outgoing_}) {
       for (Slot& slot : *list) {
-        slot.transfer->dev_handle = nullptr;  // libusb_free_transfer() would look at it
+        slot.transfer->dev_handle = nullptr;  // libusb_free_transfer() would read it
       }
       list->clear();
     }
@@ -157,7 +140,7 @@ class BulkTransport final : public Transport {
     const int code = submit(slot, kBulkOutEndpoint, bytes.size());
     if (code != LIBUSB_SUCCESS) {
       outgoing_.pop_back();
-      return lost(errno_of(code), "cannot send to the unit");
+      return usb_error(errno_of(code), "cannot send to the unit", node_);
     }
     if (!changed_.wait_for(lock, time_out, [&] { return !slot.under_way || cancelled_; })) {
       libusb_cancel_transfer(slot.transfer);
@@ -173,7 +156,7 @@ class BulkTransport final : public Transport {
     if (error == 0 && all) {
       return {};
     }
-    return lost(error == 0 ? ETIMEDOUT : error, "cannot send to the unit");
+    return usb_error(error == 0 ? ETIMEDOUT : error, "cannot send to the unit", node_);
   }
 
   Result<std::size_t> read(std::span<std::uint8_t> out, nanoseconds time_out) override {
@@ -192,7 +175,7 @@ class BulkTransport final : public Transport {
       if (error == EPIPE) {
         clear_halt(lock);
       }
-      return lost(error, "cannot read from the unit");
+      return usb_error(error, "cannot read from the unit", node_);
     }
     const auto count = static_cast<std::size_t>(slot.transfer->actual_length);
     if (count > out.size()) {
@@ -265,13 +248,13 @@ class BulkTransport final : public Transport {
         if (!done_.empty() || under_way() > 0) {
           break;  // what came before it is delivered first
         }
-        return lost(errno_of(code), "cannot read from the unit");
+        return usb_error(errno_of(code), "cannot read from the unit", node_);
       }
     }
     return {};
   }
 
-  // The halt is cleared when no transfer is under way any more; all start anew then.
+  // The halt is cleared when no transfer is under way any more; then all start again.
   void clear_halt(std::unique_lock<std::mutex>& lock) {
     cancel_transfers();
     changed_.wait_for(lock, std::chrono::milliseconds(80), [&] { return under_way() == 0; });
@@ -299,8 +282,6 @@ class BulkTransport final : public Transport {
     }
     return count;
   }
-
-  tl::unexpected<Error> lost(int error, const char* what) { return usb_error(error, what, node_); }
 
   Status alive() const {
     if (cancelled_) {

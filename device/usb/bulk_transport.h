@@ -1,8 +1,10 @@
 // One vendor bulk interface, by libusb.
 //
-// While somebody reads, several transfers are under way at once, so that the bus does not wait for
-// the program; a thread of its own collects them. It starts with the first transfer and ends in
-// less than 40 ms, so that both channels of a unit are closed in 100.
+//   auto bulk = open_bulk_transport({.bus = 1, .address = 4}, "/dev/bus/usb/001/004");
+//
+// While the program reads, several transfers are under way at once, so that the bus does not wait
+// for the program; a thread collects them. It starts with the first transfer and ends in less than
+// 40 ms, so that both channels of a unit are closed in 100 ms.
 #pragma once
 
 #include <memory>
@@ -25,7 +27,7 @@ struct UsbLocation {
 
 // Claims the bulk interface (usb_ids.h): a second program gets device_unavailable. `node` is named
 // in errors. read() delivers what one short-packet-terminated transfer brought. A stalled endpoint
-// is io, once: the halt is cleared, and the caller may ask the unit anew. Time-outs are real time.
+// is io, once: the halt is cleared, and the caller may repeat its request. Time-outs are real time.
 Result<std::unique_ptr<Transport>> open_bulk_transport(UsbLocation location,
                                                        const std::string& node,
                                                        BulkTransportOptions options = {});

@@ -1,10 +1,11 @@
-#include "device/discovery.h"
+#include "device/usb/discovery.h"
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <memory>
 
@@ -14,9 +15,9 @@
 #include <mntent.h>
 #include <unistd.h>
 
-#include "device/bulk_transport.h"
-#include "device/hid_transport.h"
-#include "device/usb_errors.h"
+#include "device/usb/bulk_transport.h"
+#include "device/usb/hid_transport.h"
+#include "device/usb/usb_errors.h"
 
 namespace sixpoint::device {
 
@@ -51,38 +52,80 @@ std::string plain(std::string_view text) {
   return is_plain ? std::string(text) : std::string();
 }
 
-Result<Enumerate> scan(udev* context, const char* subsystem) {
-  Enumerate list(udev_enumerate_new(context));
+// Calls `visit` for each device of a subsystem.
+Status for_each(udev* context, const char* subsystem,
+                const std::function<void(udev_device*)>& visit) {
+  const Enumerate list(udev_enumerate_new(context));
   if (!list || udev_enumerate_add_match_subsystem(list.get(), subsystem) < 0 ||
       udev_enumerate_scan_devices(list.get()) < 0) {
     return fail(ErrorCode::io, fmt::format("udev does not list the subsystem '{}'", subsystem),
                 "/sys", "is /sys mounted?");
   }
-  return list;
+  for (auto* entry = udev_enumerate_get_list_entry(list.get()); entry != nullptr;
+       entry = udev_list_entry_get_next(entry)) {
+    if (const Device device{
+            udev_device_new_from_syspath(context, udev_list_entry_get_name(entry))}) {
+      visit(device.get());  // else it went away meanwhile
+    }
+  }
+  return {};
+}
+
+// Parents belong to the child and are not unreferenced. Null where there is none.
+udev_device* usb_parent(udev_device* child, const char* type) {
+  return udev_device_get_parent_with_subsystem_devtype(child, "usb", type);
 }
 
 // "/dev/hidraw3" by the path of the USB device that it belongs to.
 Result<std::map<std::string, std::string>> hidraw_nodes(udev* context) {
   std::map<std::string, std::string> nodes;
-  SIXPOINT_ASSIGN(const Enumerate list, scan(context, "hidraw"));
-  for (auto* entry = udev_enumerate_get_list_entry(list.get()); entry != nullptr;
-       entry = udev_list_entry_get_next(entry)) {
-    const Device node(udev_device_new_from_syspath(context, udev_list_entry_get_name(entry)));
-    if (!node) {
-      continue;  // went away meanwhile
-    }
-    // Parents belong to the child and are not unreferenced.
-    udev_device* interface =
-        udev_device_get_parent_with_subsystem_devtype(node.get(), "usb", "usb_interface");
-    udev_device* device =
-        udev_device_get_parent_with_subsystem_devtype(node.get(), "usb", "usb_device");
-    const char* name = udev_device_get_devnode(node.get());
+  SIXPOINT_CHECK(for_each(context, "hidraw", [&](udev_device* node) {
+    udev_device* interface = usb_parent(node, "usb_interface");
+    udev_device* device = usb_parent(node, "usb_device");
+    const char* name = udev_device_get_devnode(node);
     if (interface != nullptr && device != nullptr && name != nullptr &&
         number(attribute(interface, "bInterfaceNumber"), 16) == kHidInterface) {
       nodes[udev_device_get_syspath(device)] = name;
     }
-  }
+  }));
   return nodes;
+}
+
+AttachedDevice read_device(udev_device* device, const std::map<std::string, std::string>& hidraw) {
+  AttachedDevice found;
+  found.vendor_id = static_cast<std::uint16_t>(number(attribute(device, "idVendor"), 16));
+  found.product_id = static_cast<std::uint16_t>(number(attribute(device, "idProduct"), 16));
+  found.serial = plain(attribute(device, "serial"));
+  for (const UsbProduct& product : kUsbProducts) {
+    if (found.vendor_id == kUsbVendorId && product.product_id == found.product_id) {
+      found.model = product.model;
+    }
+  }
+  found.port = udev_device_get_sysname(device);
+  found.bus = number(attribute(device, "busnum"), 10);
+  found.address = number(attribute(device, "devnum"), 10);
+  if (const char* node = udev_device_get_devnode(device); node != nullptr) {
+    found.usb_node = node;
+  }
+  if (const auto node = hidraw.find(udev_device_get_syspath(device)); node != hidraw.end()) {
+    found.hidraw_node = node->second;
+  }
+  return found;
+}
+
+bool passes(const DiscoveryFilter& filter, const AttachedDevice& device) {
+  const auto& ids = filter.product_ids;
+  return device.vendor_id == filter.vendor_id &&
+         (ids.empty() || std::find(ids.begin(), ids.end(), device.product_id) != ids.end()) &&
+         (filter.serial.empty() || device.serial == filter.serial);
+}
+
+Result<Udev> open_udev() {
+  Udev context(udev_new());
+  if (!context) {
+    return fail(ErrorCode::io, "udev does not answer", "/sys", "is /sys mounted?");
+  }
+  return context;
 }
 
 std::string names(const std::vector<AttachedDevice>& devices) {
@@ -102,49 +145,18 @@ bool AttachedDevice::complete() const {
 }
 
 Result<std::vector<AttachedDevice>> attached_devices(const DiscoveryFilter& filter) {
-  const Udev context(udev_new());
-  if (!context) {
-    return fail(ErrorCode::io, "udev does not answer", "/sys", "is /sys mounted?");
-  }
+  SIXPOINT_ASSIGN(const Udev context, open_udev());
   std::vector<AttachedDevice> devices;
-  SIXPOINT_ASSIGN(const Enumerate list, scan(context.get(), "usb"));
   SIXPOINT_ASSIGN(const auto hidraw, hidraw_nodes(context.get()));
-  for (auto* entry = udev_enumerate_get_list_entry(list.get()); entry != nullptr;
-       entry = udev_list_entry_get_next(entry)) {
-    const Device device(
-        udev_device_new_from_syspath(context.get(), udev_list_entry_get_name(entry)));
-    const char* type = device ? udev_device_get_devtype(device.get()) : nullptr;
+  SIXPOINT_CHECK(for_each(context.get(), "usb", [&](udev_device* device) {
+    const char* type = udev_device_get_devtype(device);
     if (type == nullptr || std::string_view(type) != "usb_device") {
-      continue;
+      return;
     }
-    AttachedDevice found;
-    found.vendor_id = static_cast<std::uint16_t>(number(attribute(device.get(), "idVendor"), 16));
-    found.product_id = static_cast<std::uint16_t>(number(attribute(device.get(), "idProduct"), 16));
-    found.serial = plain(attribute(device.get(), "serial"));
-    if (found.vendor_id != filter.vendor_id ||
-        (!filter.product_ids.empty() &&
-         std::find(filter.product_ids.begin(), filter.product_ids.end(), found.product_id) ==
-             filter.product_ids.end()) ||
-        (!filter.serial.empty() && found.serial != filter.serial)) {
-      continue;
+    if (AttachedDevice found = read_device(device, hidraw); passes(filter, found)) {
+      devices.push_back(std::move(found));
     }
-    for (const UsbProduct& product : kUsbProducts) {
-      if (found.vendor_id == kUsbVendorId && product.product_id == found.product_id) {
-        found.model = product.model;
-      }
-    }
-    found.port = udev_device_get_sysname(device.get());
-    found.bus = number(attribute(device.get(), "busnum"), 10);
-    found.address = number(attribute(device.get(), "devnum"), 10);
-    if (const char* node = udev_device_get_devnode(device.get()); node != nullptr) {
-      found.usb_node = node;
-    }
-    if (const auto node = hidraw.find(udev_device_get_syspath(device.get()));
-        node != hidraw.end()) {
-      found.hidraw_node = node->second;
-    }
-    devices.push_back(std::move(found));
-  }
+  }));
   std::sort(devices.begin(), devices.end(),
             [](const AttachedDevice& a, const AttachedDevice& b) { return a.port < b.port; });
   return devices;
@@ -206,25 +218,15 @@ Status check_access(const AttachedDevice& device) {
 }
 
 Result<std::string> mount_point(const AttachedDevice& device) {
-  const Udev context(udev_new());
-  if (!context) {
-    return fail(ErrorCode::io, "udev does not answer", "/sys", "is /sys mounted?");
-  }
-  // The disk, and its partitions where somebody made some.
-  std::vector<std::string> nodes;
-  SIXPOINT_ASSIGN(const Enumerate list, scan(context.get(), "block"));
-  for (auto* entry = udev_enumerate_get_list_entry(list.get()); entry != nullptr;
-       entry = udev_list_entry_get_next(entry)) {
-    const Device block(
-        udev_device_new_from_syspath(context.get(), udev_list_entry_get_name(entry)));
-    udev_device* usb =
-        block ? udev_device_get_parent_with_subsystem_devtype(block.get(), "usb", "usb_device")
-              : nullptr;
-    const char* node = block ? udev_device_get_devnode(block.get()) : nullptr;
+  SIXPOINT_ASSIGN(const Udev context, open_udev());
+  std::vector<std::string> nodes;  // of the disk and of its partitions
+  SIXPOINT_CHECK(for_each(context.get(), "block", [&](udev_device* block) {
+    udev_device* usb = usb_parent(block, "usb_device");
+    const char* node = udev_device_get_devnode(block);
     if (usb != nullptr && node != nullptr && device.port == udev_device_get_sysname(usb)) {
       nodes.emplace_back(node);
     }
-  }
+  }));
   const std::unique_ptr<FILE, int (*)(FILE*)> mounts(::setmntent("/proc/self/mounts", "r"),
                                                      &::endmntent);
   std::array<char, 4096> text{};

@@ -1,7 +1,12 @@
-// Which devices are plugged in, by what the kernel says about them (udev, sysfs).
+// Which devices are plugged in, as the kernel lists them (udev, sysfs).
 //
-// Nothing is opened, so this works without permission to use the devices, and finding a device
-// disturbs nobody who talks to it. Safe from any thread.
+//   SIXPOINT_ASSIGN(const std::vector<AttachedDevice> found, attached_devices());
+//   for (const AttachedDevice& one : found) {
+//     std::cout << one.serial << " in port " << one.port << '\n';
+//   }
+//
+// Nothing is opened: this needs no permission to use a device and does not disturb a program that
+// uses it. Safe from any thread.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +16,7 @@
 
 #include "base/env.h"
 #include "device/transport.h"
-#include "device/usb_ids.h"
+#include "device/usb/usb_ids.h"
 
 namespace sixpoint::device {
 
@@ -44,12 +49,12 @@ Result<std::vector<AttachedDevice>> attached_devices(const DiscoveryFilter& filt
 
 // The one device that `serial` names; with an empty serial the only one there is. Waits up to half
 // a second for nodes that the kernel is still making. device_unavailable when there is none or two
-// say that serial, usage when the serial is empty and there are several.
+// have that serial, usage when the serial is empty and there are several.
 Result<AttachedDevice> find_device(const DiscoveryFilter& filter, Clock& clock);
 
 // Whether this process may use the device's nodes, without opening them. permission names the udev
-// rules; device_unavailable when a node is not there. A file monitor's nodes are the operating
-// system's business.
+// rules; device_unavailable when a node is not there. The nodes of a file monitor belong to the
+// operating system and are not checked.
 Status check_access(const AttachedDevice& device);
 
 // Where the volume of a device with mass storage is mounted; empty where it is not. io when udev
@@ -60,7 +65,7 @@ Result<std::string> mount_point(const AttachedDevice& device);
 Result<Link> open_monitor(const AttachedDevice& monitor, Env& env);
 
 // Registers "hid:SERIAL" and "usb:SERIAL". Both open the composite unit: reports by hidapi, bulk by
-// libusb; two names, so that scripts may say what they think of. Without SERIAL: the only unit.
+// libusb; the two names mean the same. Without SERIAL: the only unit.
 void register_usb(TransportRegistry& registry);
 
 }  // namespace sixpoint::device

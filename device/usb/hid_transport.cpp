@@ -1,4 +1,4 @@
-#include "device/hid_transport.h"
+#include "device/usb/hid_transport.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -13,8 +13,8 @@
 #include <hidapi.h>
 #include <unistd.h>
 
-#include "device/protocol.h"
-#include "device/usb_errors.h"
+#include "device/usb/usb_errors.h"
+#include "device/wire/protocol.h"
 
 namespace sixpoint::device {
 
@@ -41,7 +41,7 @@ Result<Handle> open_handle(const std::string& node) {
   if (handle) {
     return handle;
   }
-  // hidapi says why in words only; the kernel says it by number.
+  // hidapi gives the reason as text only; the kernel gives an errno.
   const int plain = ::open(node.c_str(), O_RDWR | O_CLOEXEC);
   const int reason = plain < 0 ? errno : ENODEV;
   if (plain >= 0) {
@@ -72,7 +72,7 @@ void end_thread(Shared& shared) {
 
 void read_reports(const std::shared_ptr<Shared>& shared, Handle handle, const std::string& node,
                   HidTransportOptions options) {
-  // One byte more than a report, so that a longer one is seen to be too long.
+  // One byte more than a report, so that a longer one is found.
   std::array<std::uint8_t, kReportBytes + 1> buffer{};
   for (;;) {
     const int count = hid_read_timeout(handle.get(), buffer.data(), buffer.size(),
@@ -157,7 +157,7 @@ class HidTransport final : public Transport {
     shared_->to_write = std::move(report);
     shared_->changed.notify_all();
     if (!shared_->changed.wait_until(lock, deadline, free)) {
-      shared_->to_write.reset();  // if it has not begun, it shall not come late
+      shared_->to_write.reset();  // a write that has not begun must not come late
       return usb_error(ETIMEDOUT, "cannot send to the unit", node_);
     }
     SIXPOINT_CHECK(alive());

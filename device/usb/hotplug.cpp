@@ -1,4 +1,4 @@
-#include "device/hotplug.h"
+#include "device/usb/hotplug.h"
 
 #include <algorithm>
 #include <array>
@@ -54,11 +54,11 @@ Result<std::unique_ptr<HotplugWatch>> HotplugWatch::start(DiscoveryFilter filter
                 "does this machine or container allow netlink sockets?");
   }
   std::unique_ptr<HotplugWatch> watch(new HotplugWatch(std::move(filter), std::move(monitor)));
-  SIXPOINT_CHECK(watch->look());
+  SIXPOINT_CHECK(watch->scan());
   return watch;
 }
 
-Status HotplugWatch::look() {
+Status HotplugWatch::scan() {
   SIXPOINT_ASSIGN(auto now, attached_devices(filter_));
   now.erase(std::remove_if(now.begin(), now.end(),
                            [](const AttachedDevice& device) { return !device.complete(); }),
@@ -81,15 +81,15 @@ Status HotplugWatch::look() {
 }
 
 Result<std::optional<HotplugEvent>> HotplugWatch::next(nanoseconds time_out) {
-  // Without events (no udevd in a container) a look every second finds what changed.
-  constexpr nanoseconds kLook = std::chrono::seconds(1);
+  // Without events (no udevd in a container) a scan every second finds what changed.
+  constexpr nanoseconds kScanInterval = std::chrono::seconds(1);
   const auto deadline = steady_clock::now() + time_out;
   while (events_.empty() && !monitor_->cancelled) {
     const nanoseconds left = deadline - steady_clock::now();
     if (left <= nanoseconds::zero()) {
       return std::nullopt;
     }
-    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(std::min(left, kLook));
+    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(std::min(left, kScanInterval));
     std::array<pollfd, 2> wake = {
         {{udev_monitor_get_fd(monitor_->monitor), POLLIN, 0}, {monitor_->cancel_fd, POLLIN, 0}}};
     if (::poll(wake.data(), wake.size(), static_cast<int>(wait.count())) < 0 && errno != EINTR) {
@@ -99,11 +99,11 @@ Result<std::optional<HotplugEvent>> HotplugWatch::next(nanoseconds time_out) {
       monitor_->cancelled = true;
       break;
     }
-    // Events that came together make one look.
+    // Events that came together make one scan.
     while (udev_device* device = udev_monitor_receive_device(monitor_->monitor)) {
       udev_device_unref(device);
     }
-    SIXPOINT_CHECK(look());
+    SIXPOINT_CHECK(scan());
   }
   if (monitor_->cancelled || events_.empty()) {
     return std::nullopt;

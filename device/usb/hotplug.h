@@ -3,10 +3,10 @@
 //   SIXPOINT_ASSIGN(auto watch, HotplugWatch::start());
 //   SIXPOINT_ASSIGN(auto event, watch->next(std::chrono::seconds(1)));
 //
-// What is plugged in at the start is reported as arrived first. After that the kernel's events only
-// say when to look; what is reported is the difference between two looks, so that a lost event, or
-// a machine without udevd, costs a second and nothing else. A device that comes back under another
-// node, and another device in the same port, are one departure and one arrival.
+// Devices that are plugged in at the start are reported as arrived. After that an event of the
+// kernel only starts a scan, and the difference to the last scan is reported: a lost event, or a
+// machine without udevd, costs one second. A device that comes back under another node, and another
+// device in the same port, are one departure and one arrival.
 #pragma once
 
 #include <deque>
@@ -14,14 +14,14 @@
 #include <optional>
 #include <vector>
 
-#include "device/discovery.h"
+#include "device/usb/discovery.h"
 
 namespace sixpoint::device {
 
 struct HotplugEvent {
   enum class Kind { arrived, left };
   Kind kind = Kind::arrived;
-  AttachedDevice device;  // as it was seen last
+  AttachedDevice device;  // as it was found last
 };
 
 // One thread at a time, except cancel().
@@ -41,7 +41,7 @@ class HotplugWatch {
  private:
   struct Monitor;
   HotplugWatch(DiscoveryFilter filter, std::unique_ptr<Monitor> monitor);
-  Status look();
+  Status scan();
 
   DiscoveryFilter filter_;
   std::unique_ptr<Monitor> monitor_;

@@ -1,4 +1,4 @@
-#include "device/usb_errors.h"
+#include "device/usb/usb_errors.h"
 
 #include <cerrno>
 #include <system_error>

@@ -1,4 +1,6 @@
-// What the operating system says about a USB device, as an Error that tells a person what to do.
+// An errno of the operating system about a USB device, as an Error with a hint for people.
+//
+//   return usb_error(EBUSY, "cannot open the unit", "/dev/hidraw3");
 #pragma once
 
 #include <string>

@@ -1,9 +1,10 @@
-// How the project's own devices are told from others on the bus: the one place.
+// The USB ids of the project's own devices. This is their only place in the code.
 //
-// 0x1209 is pid.codes' vendor id, and 0x0001 to 0x0010 its product ids for private testing: nobody
-// may ship hardware under them. Whoever builds devices changes these constants and the same numbers
-// in packaging/udev/60-sixpoint-detect.rules (a test holds the two together); docs/devices says
-// how.
+//   const bool is_monitor = device.product_id == kMonitorProductId;
+//
+// 0x1209 is the vendor id of pid.codes; its product ids 0x0001 to 0x0010 are for private testing
+// and not for hardware on sale. A builder of devices changes these constants and the same numbers
+// in packaging/udev/60-sixpoint-detect.rules (a test compares the two); see docs/devices.
 #pragma once
 
 #include <array>

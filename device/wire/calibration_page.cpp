@@ -1,4 +1,4 @@
-#include "device/calibration_page.h"
+#include "device/wire/calibration_page.h"
 
 #include <algorithm>
 #include <chrono>
@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "calib/constants.h"
-#include "device/payload.h"
-#include "device/protocol.h"
+#include "device/wire/payload.h"
+#include "device/wire/protocol.h"
 
 namespace sixpoint::device {
 

@@ -1,5 +1,8 @@
 // The 512-byte page in which a unit keeps its nine constants (docs/protocol.md, "Memory pages").
 //
+//   SIXPOINT_ASSIGN(const Bytes bytes, encode_calibration_page({constants, calibrated}));
+//   SIXPOINT_ASSIGN(const CalibrationPage page, decode_calibration_page(bytes));
+//
 // The layout is that of the public memory image of the GT3X+ family (eeprom.bin of the NHANES
 // release): "TUNE" at 256, int16 zero, positive, negative (X Y Z each), six bytes of date, and a
 // CRC-CCITT of bytes 256 to 509 at 510, big-endian. The CRC was confirmed on a real image.
@@ -9,21 +12,13 @@
 #include <cstdint>
 #include <span>
 
-#include "base/constants.h"
 #include "base/env.h"
-#include "base/time.h"
+#include "device/unit_types.h"
 
 namespace sixpoint::device {
 
 inline constexpr std::size_t kPageBytes = 512;
 inline constexpr std::uint8_t kCalibrationPage = 0;  // its number on the wire
-
-struct CalibrationPage {
-  StoredConstants constants;
-  UtcTime calibrated{};  // whole seconds, years 2000 to 2255
-
-  bool operator==(const CalibrationPage&) const = default;
-};
 
 // configuration when a constant does not fit into its field or the firmware would divide by zero
 // (positive not above negative), or the date is outside the page's range.

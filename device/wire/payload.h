@@ -1,7 +1,13 @@
 // Little-endian fields in and out of a payload, with every length checked.
+//
+//   const Bytes payload = payload_of(std::uint8_t{0}, std::uint16_t{512});  // 00 00 02
+//   PayloadReader reader(payload);
+//   const auto page = reader.get<std::uint8_t>();
+//   const auto length = reader.get<std::uint16_t>();  // 512; reader.finished() is true
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -9,12 +15,14 @@
 #include <type_traits>
 
 #include "base/env.h"
+#include "base/serial.h"
+#include "device/unit_types.h"
 
 namespace sixpoint::device {
 
 class PayloadWriter {
  public:
-  template <class Integer>
+  template <std::integral Integer>
   PayloadWriter& put(Integer value) {
     auto rest = static_cast<std::make_unsigned_t<Integer>>(value);
     for (std::size_t i = 0; i < sizeof(Integer); ++i) {
@@ -41,6 +49,14 @@ class PayloadWriter {
  private:
   Bytes bytes_;
 };
+
+// Integers and spans of bytes, one behind the other.
+template <class... Fields>
+Bytes payload_of(const Fields&... fields) {
+  PayloadWriter writer;
+  (writer.put(fields), ...);
+  return writer.take();
+}
 
 // Reads beyond the end give zeros and make ok() false: check once, at the end.
 class PayloadReader {
@@ -81,5 +97,16 @@ class PayloadReader {
   std::span<const std::uint8_t> bytes_;
   bool ok_ = true;
 };
+
+inline void put_names(PayloadWriter& writer, const DeviceNames& names) {
+  writer.put(names.serial, 16).put(names.firmware, 12).put(names.model, 12);
+}
+// False where they hold characters that no device has.
+inline bool get_names(PayloadReader& reader, DeviceNames& names) {
+  names.serial = reader.text(16);
+  names.firmware = reader.text(12);
+  names.model = reader.text(12);
+  return is_serial(names.serial) && is_name(names.firmware) && is_name(names.model);
+}
 
 }  // namespace sixpoint::device

@@ -1,4 +1,4 @@
-#include "device/protocol.h"
+#include "device/wire/protocol.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include "device/payload.h"
+#include "device/wire/payload.h"
 
 namespace sixpoint::device {
 
@@ -31,80 +31,33 @@ std::uint8_t to_byte(FilterConfiguration filter) {
   return filter == FilterConfiguration::legacy ? 0 : 1;
 }
 
-bool is_name(std::string_view text) {
-  return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < '\x7f'; });
-}
-
 }  // namespace
 
 std::string_view to_string(Command command) {
-  switch (command) {
-    case Command::none:
-      return "none";
-    case Command::identify:
-      return "identify";
-    case Command::read_page:
-      return "read_page";
-    case Command::begin_write:
-      return "begin_write";
-    case Command::write_staged:
-      return "write_staged";
-    case Command::read_staged:
-      return "read_staged";
-    case Command::commit:
-      return "commit";
-    case Command::abort_write:
-      return "abort_write";
-    case Command::get_filter:
-      return "get_filter";
-    case Command::set_filter:
-      return "set_filter";
-    case Command::start_stream:
-      return "start_stream";
-    case Command::stop_stream:
-      return "stop_stream";
-    case Command::start_recording:
-      return "start_recording";
-    case Command::stop_recording:
-      return "stop_recording";
-    case Command::list_recording:
-      return "list_recording";
-    case Command::download:
-      return "download";
-    case Command::get_time:
-      return "get_time";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 17> kNames = {
+      "none",         "identify",    "read_page",       "begin_write",    "write_staged",
+      "read_staged",  "commit",      "abort_write",     "get_filter",     "set_filter",
+      "start_stream", "stop_stream", "start_recording", "stop_recording", "list_recording",
+      "download",     "get_time"};
+  const auto index = static_cast<std::size_t>(command);
+  return index < kNames.size() ? kNames[index] : "unknown";
 }
 
 std::string_view to_string(ReplyCode code) {
-  switch (code) {
-    case ReplyCode::ok:
-      return "ok";
-    case ReplyCode::unknown_command:
-      return "unknown command";
-    case ReplyCode::bad_length:
-      return "bad length";
-    case ReplyCode::bad_argument:
-      return "bad argument";
-    case ReplyCode::busy:
-      return "busy";
-    case ReplyCode::no_such_recording:
-      return "no such recording";
-    case ReplyCode::storage_full:
-      return "storage full";
-    case ReplyCode::battery_low:
-      return "battery low";
-    case ReplyCode::no_transaction:
-      return "no transaction";
-    case ReplyCode::crc_mismatch:
-      return "CRC mismatch";
-    case ReplyCode::storage_fault:
-      return "storage fault";
-    case ReplyCode::unsupported_version:
-      return "unsupported version";
-  }
-  return "unknown code";
+  constexpr std::array<std::string_view, 12> kNames = {"ok",
+                                                       "unknown command",
+                                                       "bad length",
+                                                       "bad argument",
+                                                       "busy",
+                                                       "no such recording",
+                                                       "storage full",
+                                                       "battery low",
+                                                       "no transaction",
+                                                       "CRC mismatch",
+                                                       "storage fault",
+                                                       "unsupported version"};
+  const auto index = static_cast<std::size_t>(code);
+  return index < kNames.size() ? kNames[index] : "unknown code";
 }
 
 std::uint16_t crc_ccitt(std::span<const std::uint8_t> bytes) {
@@ -165,16 +118,14 @@ Result<Message> decode(std::span<const std::uint8_t> bytes) {
 }
 
 Bytes encode_identity(const Identity& identity) {
-  return PayloadWriter()
-      .put(identity.version)
+  PayloadWriter writer;
+  writer.put(identity.version)
       .put(identity.kind)
       .put(identity.battery_mv)
       .put(identity.accel_scale_lsb_per_g)
-      .put(identity.page_bytes)
-      .put(identity.serial, 16)
-      .put(identity.firmware, 12)
-      .put(identity.model, 12)
-      .take();
+      .put(identity.page_bytes);
+  put_names(writer, identity);
+  return writer.take();
 }
 
 Result<Identity> decode_identity(std::span<const std::uint8_t> payload) {
@@ -185,24 +136,21 @@ Result<Identity> decode_identity(std::span<const std::uint8_t> payload) {
   identity.battery_mv = reader.get<std::uint16_t>();
   identity.accel_scale_lsb_per_g = reader.get<std::uint16_t>();
   identity.page_bytes = reader.get<std::uint16_t>();
-  identity.serial = reader.text(16);
-  identity.firmware = reader.text(12);
-  identity.model = reader.text(12);
+  const bool named = get_names(reader, identity);
   if (!reader.ok()) {
     return damaged("the identity is too short");
   }
   if (identity.version == 0 || identity.accel_scale_lsb_per_g == 0) {
     return damaged("the identity holds a version or a scale of zero");
   }
-  if (identity.serial.empty() || !is_name(identity.serial) || !is_name(identity.firmware) ||
-      !is_name(identity.model)) {
+  if (!named) {
     return damaged("serial, firmware or model hold characters that no unit has");
   }
   return identity;
 }
 
 Bytes encode_filter(const FilterState& state) {
-  return PayloadWriter().put(to_byte(state.stream)).put(to_byte(state.recording)).take();
+  return payload_of(to_byte(state.stream), to_byte(state.recording));
 }
 
 Result<FilterState> decode_filter(std::span<const std::uint8_t> payload) {

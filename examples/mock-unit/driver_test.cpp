@@ -1,13 +1,14 @@
-// A test of a driver that never saw a real unit: Sixpoint's virtual unit answers instead, first as
-// it should, then with every fifth report damaged on the way.
+// A test of a driver without a real unit: Sixpoint's virtual unit answers, first without faults,
+// then with every fifth report damaged.
 #include <cmath>
 #include <cstdio>
 #include <memory>
 
 #include "base/memory_env.h"
 #include "device/unit.h"
-#include "mocks/fault_plan.h"
-#include "mocks/in_process.h"
+#include "device/wire/wire_unit.h"
+#include "mocks/faults/fault_plan.h"
+#include "mocks/in_process/in_process.h"
 #include "sim/unit_truth.h"
 
 using namespace sixpoint;
@@ -23,7 +24,7 @@ void expect(bool holds, const char* what) {
   }
 }
 
-// What would be your own driver: the mean of a second of z, in raw counts.
+// This stands for your own driver: the mean of z over one second, in raw counts.
 Result<double> mean_of_z(device::Unit& unit) {
   SIXPOINT_CHECK(unit.set_filter(device::FilterConfiguration::current));
   SIXPOINT_CHECK(unit.start_stream(100));
@@ -49,14 +50,14 @@ void measure(const char* name, mocks::FaultPlan plan) {
   options.truth = sim::draw_unit(7);
   const auto plugged = std::make_shared<mocks::PluggedUnit>(options, std::move(plan),
                                                             std::make_shared<ManualClock>());
-  auto unit = device::Unit::open(mocks::link_to(plugged, false));
+  auto unit = device::WireUnit::open(mocks::link_to(plugged, false));
   expect(unit.has_value(), "the unit is identified");
   if (!unit) {
     return;
   }
   const auto mean = mean_of_z(**unit);
   expect(mean.has_value(), "a second of samples comes");
-  // It lies with z up: sensitivity and zero of its sensor, which the mock knows.
+  // The unit lies with z up; the mock knows sensitivity and zero of its sensor.
   const sim::SensorTruth& sensor = options.truth.current;
   const double expected = sensor.sensitivity_lsb_per_g[2] + sensor.zero_lsb[2];
   expect(mean && std::abs(*mean - expected) < 1, "z reads 1 g");

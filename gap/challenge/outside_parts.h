@@ -1,66 +1,41 @@
-// What the kinds outside the catalogue are built of (gap_outside.h); nobody else needs it.
+// Building blocks of the kinds outside the catalogue (outside.h), for those files only.
+//
+//   Made step(Draw draw) {
+//     const Eigen::Vector3d step_g = draw.vector_of_mg(2 * draw.severity);
+//     return acting_from(0.5, [step_g](Eigen::Vector3d& sensed) { sensed += step_g; });
+//   }
+//   OutsideKind step_kind() { return outside("step", Stage::sensor, step, "offset"); }
 #pragma once
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <numbers>
 #include <string_view>
 #include <vector>
 
 #include "base/random.h"
-#include "station/gap_outside.h"
+#include "gap/challenge/outside.h"
+#include "sim/effects/parts.h"
 
-namespace sixpoint::station::outside_parts {
+namespace sixpoint::gap::outside_parts {
 
+using sim::acting_at;
+using sim::added_effect;
 using sim::Effect;
-using sim::EffectKind;
+using sim::motion_effect;
 using sim::ParameterSet;
+using sim::Parts;
 using sim::Placement;
 using sim::RecordingPlan;
+using sim::sensed_effect;
 using sim::SimulatedBlock;
 using sim::Stage;
+using sim::stored_effect;
 
 inline constexpr double kTwoPi = 2 * std::numbers::pi;
-
-// An effect out of functions: each kind sets those it needs.
-struct Parts final : Effect {
-  std::function<void(const RecordingPlan&)> recording;
-  std::function<void(const Placement&)> placement;
-  std::function<void(sim::Tone&)> tone;
-  std::function<void(SimulatedBlock&)> sampling, stimulus, sensor, analog, firmware;
-
-  void on_recording(const RecordingPlan& plan) override {
-    if (recording) {
-      recording(plan);
-    }
-  }
-  void on_placement(const Placement& at) override {
-    if (placement) {
-      placement(at);
-    }
-  }
-  void on_tone(sim::Tone& of) const override {
-    if (tone) {
-      tone(of);
-    }
-  }
-  void on_sampling(SimulatedBlock& block) override { run(sampling, block); }
-  void on_stimulus(SimulatedBlock& block) override { run(stimulus, block); }
-  void on_sensor(SimulatedBlock& block) override { run(sensor, block); }
-  void on_analog(SimulatedBlock& block) override { run(analog, block); }
-  void on_firmware(SimulatedBlock& block) override { run(firmware, block); }
-
- private:
-  static void run(const std::function<void(SimulatedBlock&)>& part, SimulatedBlock& block) {
-    if (part) {
-      part(block);
-    }
-  }
-};
 
 using Made = std::unique_ptr<Effect>;
 
@@ -80,8 +55,7 @@ struct Draw {
     Eigen::Vector3d v(between(-1, 1), between(-1, 1), between(-1, 1));
     return v * (size / std::max(v.cwiseAbs().maxCoeff(), 1e-6));
   }
-  // The same in g. A vector, not an expression of Eigen's: a lambda that captures such an
-  // expression refers to a vector that is gone.
+  // The same in g. A vector, not an expression of Eigen's, which would refer to a temporary.
   Eigen::Vector3d vector_of_mg(double size_mg) { return vector(size_mg / kMgPerG); }
 };
 
@@ -100,22 +74,54 @@ struct Moment {
   }
 };
 
-inline Eigen::Index row(std::size_t axis) { return static_cast<Eigen::Index>(axis); }
-
-template <Made (*kMake)(Draw)>
-OutsideKind outside(const char* name, Stage stage, std::string_view family, bool in_faces = true,
-                    bool only_by_name = false) {
-  EffectKind kind = {name,
-                     stage,
-                     "outside the catalogue",
-                     {{"severity", "1", {1}, 0, 10, "drawn"}},
-                     [](const ParameterSet& values, Random random) -> std::unique_ptr<Effect> {
-                       return kMake(Draw{values.at("severity")[0], random});
-                     }};
-  return {std::move(kind), family, in_faces, only_by_name};
+// Changes the specific force, in g, from a share of the recording on: change(sensed).
+template <class Change>
+Made acting_from(double share, Change change) {
+  auto made = std::make_unique<Parts>();
+  auto moment = std::make_shared<Moment>(Moment{share});
+  made->recording = [moment](const RecordingPlan& plan) { moment->in(plan); };
+  made->sensor = [moment, change](SimulatedBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      if (block.first_sample + i >= moment->sample) {
+        change(block.sensed_g[i]);
+      }
+    }
+  };
+  return made;
 }
 
-// gap_outside_serviced.cpp
+// Moves each sample by the sum of step_s(time_s) so far, which starts anew with the sample clock.
+template <class Step>
+Made shifted_effect(Step step_s) {
+  return acting_at(&Parts::sampling,
+                   [step_s, shift_s = 0.0, start_s = -1.0](SimulatedBlock& block) mutable {
+                     if (block.clock_start_s != start_s) {
+                       start_s = block.clock_start_s;
+                       shift_s = 0;
+                     }
+                     for (double& t : block.time_s) {
+                       shift_s += step_s(t);
+                       t += shift_s;
+                     }
+                   });
+}
+
+inline Eigen::Index row(std::size_t axis) { return static_cast<Eigen::Index>(axis); }
+
+// `family` and `in_faces` as OutsideKind has them.
+inline OutsideKind outside(const char* name, Stage stage, Made (*make)(Draw),
+                           std::string_view family = "", bool in_faces = true) {
+  sim::EffectKind kind = {name,
+                          stage,
+                          "outside the catalogue",
+                          {{"severity", "1", {1}, 0, 10, "drawn"}},
+                          [make](const ParameterSet& values, Random random) {
+                            return make(Draw{values.at("severity")[0], random});
+                          }};
+  return {std::move(kind), family, in_faces};
+}
+
+// outside_serviced.cpp
 std::vector<OutsideKind> serviced_kinds();
 
-}  // namespace sixpoint::station::outside_parts
+}  // namespace sixpoint::gap::outside_parts

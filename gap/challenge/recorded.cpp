@@ -1,4 +1,4 @@
-#include "station/gap_recorded.h"
+#include "gap/challenge/recorded.h"
 
 #include <algorithm>
 #include <array>
@@ -7,15 +7,15 @@
 
 #include "base/atomic_file.h"
 #include "base/random.h"
-#include "gap/bundle.h"
+#include "gap/recording/bundle.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
-#include "repair/rescaled_log.h"
-#include "repair/survey.h"
+#include "repair/rescale/rescaled_log.h"
+#include "repair/triage/survey.h"
 #include "sim/recording.h"
 #include "sim/unit_truth.h"
 
-namespace sixpoint::station {
+namespace sixpoint::gap {
 
 namespace {
 
@@ -194,11 +194,11 @@ Status write_recorded_trial(FileSystem& files, const std::string& from, const st
     }
   }
   const std::vector<gt3x::Counts> counts = Adding(bundle, effects, seed).run();
-  sim::UnitWishes wishes;
+  sim::GivenProperties given;
   if (!bundle.header.serial.empty()) {
-    wishes.serial = bundle.header.serial;
+    given.serial = bundle.header.serial;
   }
-  const sim::UnitTruth unit = sim::draw_unit(seed, wishes);
+  const sim::UnitTruth unit = sim::draw_unit(seed, given);
   const UtcTime start = from_unix_seconds(1'640'439'383);
   const auto rate = static_cast<std::size_t>(std::lround(bundle.rate_hz));
   Bytes log = sim::log_preamble(unit, start, static_cast<int>(rate));
@@ -225,4 +225,4 @@ Status write_recorded_trial(FileSystem& files, const std::string& from, const st
   return {};
 }
 
-}  // namespace sixpoint::station
+}  // namespace sixpoint::gap

@@ -1,4 +1,4 @@
-#include "station/gap_trials.h"
+#include "gap/challenge/trials.h"
 
 #include <algorithm>
 #include <array>
@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "base/random.h"
-#include "station/gap_outside.h"
+#include "gap/challenge/outside.h"
 
-namespace sixpoint::station {
+namespace sixpoint::gap {
 
 namespace {
 
@@ -48,113 +48,136 @@ class Drawing {
 
   // What one effect of the catalogue consists of in this trial: mostly one, with a by-product where
   // real ones have it.
-  Result<std::vector<EffectSpec>> effect(const std::string& name, double s) {
+  Result<std::vector<EffectSpec>> effect(const std::string& name, double severity) {
     std::vector<EffectSpec> list;
-    const auto add = [&](const std::string& kind_name, const ParameterSet& given) -> Status {
+    for (const auto& [kind_name, given] : parts(name, severity)) {
       SIXPOINT_ASSIGN(const EffectKind* kind, sim::find_effect(kind_name));
       SIXPOINT_ASSIGN(ParameterSet values, sim::complete_parameters(*kind, given));
       list.push_back({kind, std::move(values)});
-      return {};
-    };
-    if (name == "tilt") {
-      const double direction = random_.uniform(0, 2 * std::numbers::pi);
-      SIXPOINT_CHECK(
-          add(name, {{"rotation_vector_deg",
-                      {0.2 * s * std::cos(direction), 0.2 * s * std::sin(direction), 0}}}));
-    } else if (name == "seating") {
-      SIXPOINT_CHECK(add(name, {{"sd_deg", {0.1 * s}}}));
-    } else if (name == "settling") {
-      SIXPOINT_CHECK(add(name, {{"amplitude", {0.03 * s}},
-                                {"frequency_hz", {random_.uniform(3, 12)}},
-                                {"decay_s", {random_.uniform(0.2, 0.6)}},
-                                {"second_share", {random_.uniform(0, 0.35)}},
-                                {"second_ratio", {random_.uniform(1.7, 2.6)}}}));
-    } else if (name == "floor_vibration" || name == "electrical_line") {
+    }
+    return list;
+  }
+
+ private:
+  using Parts = std::vector<std::pair<std::string, ParameterSet>>;
+
+  static std::vector<double> times(std::vector<double> numbers, double factor) {
+    for (double& x : numbers) {
+      x *= factor;
+    }
+    return numbers;
+  }
+
+  Parts parts(const std::string& name, double s) {
+    if (name == "floor_vibration" || name == "electrical_line") {
       const std::vector<double> vector_mg = axes(1.5 * s);
       const double frequency_hz = random_.uniform(5, 30);
-      SIXPOINT_CHECK(add(name, {{"vector_mg", vector_mg}, {"frequency_hz", {frequency_hz}}}));
+      Parts line = {{name, {{"vector_mg", vector_mg}, {"frequency_hz", {frequency_hz}}}}};
       if (random_.uniform() < 0.5 && frequency_hz < 24) {
-        std::vector<double> harmonic = vector_mg;
-        for (double& x : harmonic) {
-          x *= 0.2;
-        }
-        SIXPOINT_CHECK(add(name, {{"vector_mg", harmonic}, {"frequency_hz", {2 * frequency_hz}}}));
+        line.push_back(
+            {name, {{"vector_mg", times(vector_mg, 0.2)}, {"frequency_hz", {2 * frequency_hz}}}});
       }
-    } else if (name == "soft_mount") {
-      SIXPOINT_CHECK(add(
-          name, {{"frequency_hz", {random_.uniform(8, 25)}}, {"q", {random_.uniform(1.5, 4)}}}));
-    } else if (name == "local_gravity") {
-      SIXPOINT_CHECK(add(name, {{"ratio", {1 + sign() * std::min(0.0027, 0.0015 * s)}}}));
-    } else if (name == "misalignment") {
-      SIXPOINT_CHECK(add(name, {{"rotation_vector_deg", axes(0.4 * s)}}));
-    } else if (name == "non_orthogonality") {
-      SIXPOINT_CHECK(add(name, {{"yz_xz_xy", axes(0.005 * s)}}));
-    } else if (name == "second_order") {
-      SIXPOINT_CHECK(add(name, {{"mg_per_g2", axes(0.4 * s)}}));
-    } else if (name == "third_order") {
-      SIXPOINT_CHECK(add(name, {{"mg_per_g3", axes(0.04 * s)}}));
-    } else if (name == "hysteresis") {
-      SIXPOINT_CHECK(add(name, {{"mg", axes(0.8 * s)}}));
-    } else if (name == "offset_tempco") {
-      SIXPOINT_CHECK(add(name, {{"mg_per_c", axes(0.4 * s)}}));
-    } else if (name == "sensitivity_tempco") {
-      SIXPOINT_CHECK(add(name, {{"percent_per_c", axes(0.03 * s)}}));
-    } else if (name == "warm_up") {
+      return line;
+    }
+    if (name == "warm_up") {
       const double tau_s = random_.uniform(120, 600);
       const std::vector<double> mg = axes(4 * s);
       std::vector<double> quick = mg;
       for (double& x : quick) {
         x *= random_.uniform(0, 0.2);
       }
-      SIXPOINT_CHECK(add(name, {{"mg", mg}, {"tau_s", {tau_s}}}));
-      SIXPOINT_CHECK(add(name, {{"mg", quick}, {"tau_s", {tau_s / 4}}}));
-    } else if (name == "drift") {
+      return {{name, {{"mg", mg}, {"tau_s", {tau_s}}}},
+              {name, {{"mg", quick}, {"tau_s", {tau_s / 4}}}}};
+    }
+    if (name == "drift") {
       const std::vector<double> mg_per_h = axes(3 * s);
       if (random_.uniform() < 0.5) {
-        SIXPOINT_CHECK(add(name, {{"mg_per_h", mg_per_h}}));
-      } else {  // slows down over half a day
-        constexpr double kTau_h = 12;
-        std::vector<double> mg = mg_per_h;
-        for (double& x : mg) {
-          x *= -kTau_h;
-        }
-        SIXPOINT_CHECK(add("warm_up", {{"mg", mg}, {"tau_s", {kTau_h * 3600}}}));
+        return {{name, {{"mg_per_h", mg_per_h}}}};
       }
-    } else if (name == "filter_mismatch") {
+      constexpr double kTau_h = 12;  // slows down over half a day
+      return {{"warm_up", {{"mg", times(mg_per_h, -kTau_h)}, {"tau_s", {kTau_h * 3600}}}}};
+    }
+    return {{name, parameters(name, s)}};
+  }
+
+  ParameterSet parameters(const std::string& name, double s) {
+    if (name == "tilt") {
+      const double direction = random_.uniform(0, 2 * std::numbers::pi);
+      return {{"rotation_vector_deg",
+               {0.2 * s * std::cos(direction), 0.2 * s * std::sin(direction), 0}}};
+    }
+    if (name == "settling") {
+      return {{"amplitude", {0.03 * s}},
+              {"frequency_hz", {random_.uniform(3, 12)}},
+              {"decay_s", {random_.uniform(0.2, 0.6)}},
+              {"second_share", {random_.uniform(0, 0.35)}},
+              {"second_ratio", {random_.uniform(1.7, 2.6)}}};
+    }
+    if (name == "soft_mount") {
+      return {{"frequency_hz", {random_.uniform(8, 25)}}, {"q", {random_.uniform(1.5, 4)}}};
+    }
+    if (name == "filter_mismatch") {
       std::vector<double> offset_g(kAxes);
       for (double& x : offset_g) {
         x = sign() * random_.uniform(0.05, 0.2);
       }
-      SIXPOINT_CHECK(add(
-          name, {{"gain", {1 - std::min(0.25, 0.12 * std::max(0.4, s))}}, {"offset_g", offset_g}}));
-    } else if (name == "bandwidth") {
-      SIXPOINT_CHECK(add(name, {{"corner_hz", {std::clamp(25 / std::sqrt(s), 12.5, 45.0)}},
-                                {"order", {2.0 * static_cast<double>(1 + random_.below(3))}}}));
-    } else if (name == "flicker") {
-      SIXPOINT_CHECK(add(name, {{"mg", {0.5 * s}}}));
-    } else if (name == "random_walk") {
-      SIXPOINT_CHECK(add(name, {{"mg_per_sqrt_s", {0.2 * s}}}));
-    } else if (name == "axis_rotation") {
-      SIXPOINT_CHECK(add(name, {{"matrix", turn()}}));
-    } else if (name == "clock_error") {
-      SIXPOINT_CHECK(add(name, {{"ppm", {sign() * 500 * s}}}));
-    } else if (name == "jitter") {
-      SIXPOINT_CHECK(add(name, {{"rms_ms", {0.7 * s}}}));
-    } else if (name == "dropped_samples" || name == "duplicated_samples") {
-      SIXPOINT_CHECK(add(name, {{"rate", {0.002 * s}}}));
-    } else if (name == "saturation") {
-      SIXPOINT_CHECK(add(name, {{"level_g", {random_.uniform(5, 7.5)}}}));
-    } else if (name == "idle_sleep") {
-      SIXPOINT_CHECK(add(name, {{"fraction", {0.05 * s}}}));
-    } else if (name == "charging_zeros") {
-      SIXPOINT_CHECK(add(name, {{"seconds", {std::max(2.0, 40 * s)}}}));
-    } else {
-      SIXPOINT_CHECK(add(name, {}));
+      return {{"gain", {1 - std::min(0.25, 0.12 * std::max(0.4, s))}}, {"offset_g", offset_g}};
     }
-    return list;
+    if (name == "bandwidth") {
+      return {{"corner_hz", {std::clamp(25 / std::sqrt(s), 12.5, 45.0)}},
+              {"order", {2.0 * static_cast<double>(1 + random_.below(3))}}};
+    }
+    if (name == "local_gravity") {
+      return {{"ratio", {1 + sign() * std::min(0.0027, 0.0015 * s)}}};
+    }
+    if (name == "axis_rotation") {
+      return {{"matrix", turn()}};
+    }
+    if (name == "clock_error") {
+      return {{"ppm", {sign() * 500 * s}}};
+    }
+    if (name == "saturation") {
+      return {{"level_g", {random_.uniform(5, 7.5)}}};
+    }
+    if (name == "charging_zeros") {
+      return {{"seconds", {std::max(2.0, 40 * s)}}};
+    }
+    return sized(name, s);
   }
 
- private:
+  // Effects of one parameter: its size at severity 1, per axis or one for all.
+  ParameterSet sized(const std::string& name, double s) {
+    struct Size {
+      const char* effect;
+      const char* parameter;
+      double size;
+      bool per_axis;
+    };
+    static constexpr std::array kSizes = {
+        Size{"seating", "sd_deg", 0.1, false},
+        Size{"misalignment", "rotation_vector_deg", 0.4, true},
+        Size{"non_orthogonality", "yz_xz_xy", 0.005, true},
+        Size{"second_order", "mg_per_g2", 0.4, true},
+        Size{"third_order", "mg_per_g3", 0.04, true},
+        Size{"hysteresis", "mg", 0.8, true},
+        Size{"offset_tempco", "mg_per_c", 0.4, true},
+        Size{"sensitivity_tempco", "percent_per_c", 0.03, true},
+        Size{"flicker", "mg", 0.5, false},
+        Size{"random_walk", "mg_per_sqrt_s", 0.2, false},
+        Size{"jitter", "rms_ms", 0.7, false},
+        Size{"dropped_samples", "rate", 0.002, false},
+        Size{"duplicated_samples", "rate", 0.002, false},
+        Size{"idle_sleep", "fraction", 0.05, false},
+    };
+    for (const Size& size : kSizes) {
+      if (name == size.effect) {
+        return {{size.parameter,
+                 size.per_axis ? axes(size.size * s) : std::vector<double>{size.size * s}}};
+      }
+    }
+    return {};
+  }
+
   // A signed permutation without reflection that is not the identity.
   std::vector<double> turn() {
     for (;;) {
@@ -184,17 +207,8 @@ class Drawing {
 }  // namespace
 
 std::string_view to_string(TrialKind kind) {
-  switch (kind) {
-    case TrialKind::none:
-      return "none";
-    case TrialKind::single:
-      return "single";
-    case TrialKind::pair:
-      return "pair";
-    case TrialKind::outside:
-      return "outside";
-  }
-  return "?";
+  constexpr std::array<std::string_view, 4> kNames = {"none", "single", "pair", "outside"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 std::string_view family_of(std::string_view effect) {
@@ -247,7 +261,7 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
   Random& random = drawing.random();
   GapTrial trial;
 
-  // The header is drawn without regard to the effects: headers lie.
+  // The header is drawn without regard to the effects: headers can be wrong.
   constexpr std::array kFirmware = {"1.9.2", "1.9.1", "1.9.0", "1.8.0", "1.5.0"};
   const std::string unit = fmt::format(
       R"({{"serial": "MOS2{}{:08}", "firmware": "{}", "calibrated": "201{}-0{}-15T12:00:00Z"}})",
@@ -303,4 +317,4 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
   return trial;
 }
 
-}  // namespace sixpoint::station
+}  // namespace sixpoint::gap

@@ -1,10 +1,15 @@
-// Trials for the diagnosis of the gap: units with known effects, drawn so that they do not share
-// more than the names with what the diagnosis looks for.
+// Trials for the diagnosis of the gap: units with known effects, drawn so that they share only the
+// names with what the diagnosis searches for.
+//
+//   const auto protocol = sim::StandardProtocol::production;
+//   SIXPOINT_ASSIGN(const GapTrial trial, draw_trial(seed, 0, protocol, TrialShares{}));
+//   trial.effects;   // the truth
+//   trial.scenario;  // its simulation is what the diagnosis gets
 //
 // Severity is log-uniform from 0.3 to 3 times a typical size. Forms vary on purpose: mounts ring in
 // two modes, lines have harmonics, drifts bend, low-passes have several orders, warm-ups two time
 // constants. Trials outside the catalogue hold effects that no diagnosis knows by name
-// (gap_outside.h).
+// (outside.h).
 #pragma once
 
 #include <cstdint>
@@ -16,7 +21,7 @@
 #include "sim/scenario.h"
 #include "sim/standard_protocol.h"
 
-namespace sixpoint::station {
+namespace sixpoint::gap {
 
 enum class TrialKind { none, single, pair, outside };
 std::string_view to_string(TrialKind kind);
@@ -46,4 +51,4 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
 // Effects that one recording rarely tells apart answer to one family name.
 std::string_view family_of(std::string_view effect);
 
-}  // namespace sixpoint::station
+}  // namespace sixpoint::gap

@@ -1,4 +1,4 @@
-#include "gap/catalogue.h"
+#include "gap/explain/catalogue.h"
 
 namespace sixpoint::gap {
 

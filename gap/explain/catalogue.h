@@ -1,6 +1,9 @@
 // What the diagnosis knows about each effect of the catalogue beside its forward model: which
 // protocol segments show it, which others look like it, what the sensor's datasheet allows.
 //
+//   const CatalogueEntry* entry = find_entry("drift");  // nullptr for a name that it lacks
+//   const std::string_view segment = entry->segment;    // "still" shows it
+//
 // The list of names is the contract's; sim/ holds the forward models under the same names.
 #pragma once
 
@@ -20,7 +23,7 @@ struct CatalogueEntry {
   // of the first parameter; 0: nothing said.
   double datasheet = 0;
   std::string_view advice;  // one sentence for a technician
-  // The segment that shows it smaller, where `segment` is there already; empty: the same.
+  // The segment that shows smaller sizes, where `segment` is there already; empty: the same.
   std::string_view finer = {};
 };
 
@@ -29,7 +32,7 @@ enum Ability : unsigned {
   kPoses = 1,          // six faces
   kMoves = 2,          // steps between poses with their transients
   kYaws = 4,           // a face at several yaws
-  kRepeats = 8,        // the same pose placed anew
+  kRepeats = 8,        // a pose placed more than once
   kShaker = 16,        // tones
   kHighShaker = 32,    // tones of 4 g and more
   kFullScale = 64,     // tones beyond full scale

@@ -1,8 +1,9 @@
-#include "gap/forward.h"
+#include "gap/explain/forward.h"
 
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
+#include <span>
 
 namespace sixpoint::gap {
 namespace {
@@ -10,6 +11,8 @@ namespace {
 constexpr int kPhases = 24;            // exact for polynomials of third order and their projections
 constexpr int kPhasesTruncated = 720;  // the step about zero is some LSB wide in a swing of 256
 constexpr double kRadPerDeg = M_PI / 180;
+constexpr double kLeastNoise_lsb = 0.3;  // rounding alone scatters by 1 / sqrt(12) LSB
+constexpr double kLeastStep_g = 0.05;
 
 Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
   const double angle = vector_deg.norm() * kRadPerDeg;
@@ -31,7 +34,7 @@ const std::array<std::array<double, 3>, kPhasesTruncated / 2 + 1>& cosines() {
   return kTable;
 }
 
-// Phases that a truncated swing of so many standard deviations of the noise needs: its harmonics
+// Phases that a truncated swing needs; `swing` in standard deviations of the noise. Its harmonics
 // fall as exp(-(k / swing)^2 / 2).
 int phases_of(double swing) {
   for (const int phases : {kPhases, 48, 72, 144, 240}) {
@@ -42,7 +45,8 @@ int phases_of(double swing) {
   return kPhasesTruncated;
 }
 
-// erf to 1e-11, by cubic interpolation with its own derivative: what truncation costs is this.
+// erf to 1e-11, by cubic interpolation with its derivative. std::erf would take most of the time of
+// a diagnosis with truncation.
 double quick_erf(double x) {
   constexpr int kPerUnit = 256;
   constexpr double kEnd = 5;
@@ -73,39 +77,49 @@ double quick_erf(double x) {
   return std::copysign(value, x);
 }
 
+// Steps below kLeastStep_g are none.
 double sign_of_step(double step_g) {
-  return std::abs(step_g) < 0.05 ? 0 : std::copysign(1.0, step_g);
+  return std::abs(step_g) < kLeastStep_g ? 0 : std::copysign(1.0, step_g);
+}
+
+// What temperature, time and hysteresis add to the zero.
+Eigen::Vector3d slow_zero_mg(const ForwardState& s, const Block& block) {
+  const double warm = block.temperature_c - kReference_c;
+  const double hours = block.middle_s / 3600;
+  // Mean of exp(-t/tau) over the block.
+  const double half = block.seconds / (2 * s.warm_up_tau_s);
+  const double decay =
+      std::exp(-block.middle_s / s.warm_up_tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
+  Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
+                            hours * s.drift_mg_per_h + decay * s.warm_up_mg;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    slow_mg[a] +=
+        s.hysteresis_mg[a] * (s.hysteresis_shape == 0   ? 0.5 * block.approach_g[a]
+                              : s.hysteresis_shape == 1 ? sign_of_step(block.approach_g[a])
+                                                        : block.held_sign[a]);
+  }
+  return slow_mg;
+}
+
+template <class... Vectors>
+auto spans_of(Vectors&... vectors) {
+  return std::array{std::span<double>(vectors.data(), static_cast<std::size_t>(vectors.size()))...};
 }
 
 }  // namespace
 
 double& parameter(ForwardState& s, int position) {
-  struct Span {
-    double* data;
-    int count;
-  };
-  const std::array<Span, 15> spans = {{{s.gain.data(), 3},
-                                       {s.offset_mg.data(), 3},
-                                       {s.tilt_deg.data(), 2},
-                                       {s.misalignment_deg.data(), 3},
-                                       {s.cross.data(), 3},
-                                       {s.second_mg_per_g2.data(), 3},
-                                       {s.third_mg_per_g3.data(), 3},
-                                       {s.hysteresis_mg.data(), 3},
-                                       {s.tempco_mg_per_c.data(), 3},
-                                       {s.tempco_curve_mg_per_c2.data(), 3},
-                                       {s.sensitivity_percent_per_c.data(), 3},
-                                       {s.warm_up_mg.data(), 3},
-                                       {s.drift_mg_per_h.data(), 3},
-                                       {&s.gravity_ratio, 1},
-                                       {&s.truncation, 1}}};
-  for (const Span& span : spans) {
-    if (position < span.count) {
-      return span.data[position];
+  auto at = static_cast<std::size_t>(position);
+  for (const std::span<double> values :
+       spans_of(s.gain, s.offset_mg, s.tilt_deg, s.misalignment_deg, s.cross, s.second_mg_per_g2,
+                s.third_mg_per_g3, s.hysteresis_mg, s.tempco_mg_per_c, s.tempco_curve_mg_per_c2,
+                s.sensitivity_percent_per_c, s.warm_up_mg, s.drift_mg_per_h)) {
+    if (at < values.size()) {
+      return values[at];
     }
-    position -= span.count;
+    at -= values.size();
   }
-  return s.truncation;
+  return at == 0 ? s.gravity_ratio : s.truncation;
 }
 
 double parameter(const ForwardState& state, int position) {
@@ -115,22 +129,22 @@ double parameter(const ForwardState& state, int position) {
 
 std::vector<ParameterGroup> parameter_groups() {
   // Nuisances are free here (sd of 0.3): their own priors, 2 % and 35 mg, are judged afterwards.
-  // Effects: prior sd about the middle of the catalogue's realistic sizes, `high` their upper end,
-  // `small` their lower (where the catalogue names none: a third of the typical).
+  // Effects: prior sd about the middle of the catalogue's realistic sizes, `largest` their upper
+  // end, `smallest` their lower (where the catalogue names none: a third of the typical).
   // A zero bends over temperature by some hundredths of its slope per degree.
   std::vector<ParameterGroup> groups = {
-      {"gain", 0, 3, 0.3, 1, 0, 10, 0, 0, 1},
-      {"offset", 3, 3, 300, 0, 0, 1e4, 0, 0, 1},
-      {"tilt", 6, 2, 0.2, 0, 0, 0.5, 0.05, 0, 1},
-      {"misalignment", 8, 3, 0.4, 0, 0, 1, 0.1, 0, 1},
-      {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0.0015, 0, 1},
-      {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0.12, 0, 1},
-      {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0.012, 0, 1},
-      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0.2, 0, 1},
-      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0.01, 0, 1},
-      {"drift", 35, 3, 2.5, 0, 0, 5, 1, 0, 1},
-      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0.0005, 0, 1},
-      {"truncation", 39, 1, 0.05, 1, 0, 0.35, 0, 0, 1},
+      {"gain", 0, 3, 0.3, 1, 0, 10},
+      {"offset", 3, 3, 300, 0, 0, 1e4},
+      {"tilt", 6, 2, 0.2, 0, 0, 0.5, 0.05},
+      {"misalignment", 8, 3, 0.4, 0, 0, 1, 0.1},
+      {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0.0015},
+      {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0.12},
+      {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0.012},
+      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0.2},
+      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0.01},
+      {"drift", 35, 3, 2.5, 0, 0, 5, 1},
+      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0.0005},
+      {"truncation", 39, 1, 0.05, 1, 0, 0.35},
   };
   for (const int shape : {1, 0, 2}) {
     groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0.2, 0, shape});
@@ -148,59 +162,47 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   const Eigen::Matrix3d chain = cross * turn(s.misalignment_deg) * block.rotation * tilt;
   const Eigen::Vector3d rest = chain * (block.gravity_lab_g * (1 + s.gravity_ratio));
   const Eigen::Vector3d swing = chain * block.vibration_lab_g;
-  const double warm = block.temperature_c - kReference_c;
-  const double hours = block.middle_s / 3600;
-  // Mean of exp(-t/tau) over the block.
-  const double half = block.seconds / (2 * s.warm_up_tau_s);
-  const double decay =
-      std::exp(-block.middle_s / s.warm_up_tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
-  Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
-                            hours * s.drift_mg_per_h + decay * s.warm_up_mg;
-  for (Eigen::Index a = 0; a < 3; ++a) {
-    slow_mg[a] +=
-        s.hysteresis_mg[a] * (s.hysteresis_shape == 0   ? 0.5 * block.approach_g[a]
-                              : s.hysteresis_shape == 1 ? sign_of_step(block.approach_g[a])
-                                                        : block.held_sign[a]);
-  }
+  const Eigen::Vector3d slow_mg = slow_zero_mg(s, block);
   const Eigen::Vector3d sensitivity =
-      Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c;
+      Eigen::Vector3d::Ones() +
+      0.01 * (block.temperature_c - kReference_c) * s.sensitivity_percent_per_c;
+  // What axis a shows at the specific force v, in a noise of sigma.
+  const auto stored_mg = [&](Eigen::Index a, double v, double sigma) {
+    double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
+                   sensitivity[a] +
+               slow_mg[a];
+    y = y * s.gain[a] + s.offset_mg[a];
+    return s.truncation == 0 ? y
+                             : y - s.truncation * 0.5 * lsb_mg * quick_erf(y / (sigma * M_SQRT2));
+  };
 
   Eigen::VectorXd out = Eigen::VectorXd::Zero(block.size());
   for (Eigen::Index a = 0; a < 3; ++a) {
-    const double sigma = std::max(0.3 * lsb_mg, block.noise_mg[a]);
-    const int phases = !block.tone         ? 1
-                       : s.truncation == 0 ? kPhases
-                                           : phases_of(1000 * s.gain[a] * swing[a] / sigma);
+    const double sigma = std::max(kLeastNoise_lsb * lsb_mg, block.noise_mg[a]);
+    if (!block.tone) {
+      out[a] = stored_mg(a, rest[a], sigma);
+      continue;
+    }
+    const int phases = s.truncation == 0 ? kPhases : phases_of(1000 * s.gain[a] * swing[a] / sigma);
     const auto stride = static_cast<std::size_t>(kPhasesTruncated / phases);
     // The second half of a period is the first, mirrored.
     for (int k = 0; k <= phases / 2; ++k) {
       const std::array<double, 3>& cosine = cosines()[static_cast<std::size_t>(k) * stride];
       const double share = (k == 0 || 2 * k == phases ? 1.0 : 2.0) / phases;
-      const double c1 = block.tone ? cosine[0] : 0;
-      const double v = rest[a] + c1 * swing[a];
-      double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
-                     sensitivity[a] +
-                 slow_mg[a];
-      y = y * s.gain[a] + s.offset_mg[a];
-      if (s.truncation != 0) {
-        y -= s.truncation * 0.5 * lsb_mg * quick_erf(y / (sigma * M_SQRT2));
-      }
+      const double y = stored_mg(a, rest[a] + cosine[0] * swing[a], sigma);
       out[a] += y * share;
-      if (block.tone) {
-        out[3 + a] += 2 * y * c1 * share;
-        if (block.harmonics && a == block.axis) {
-          out[6] += 2 * y * cosine[1] * share;
-          out[7] += 2 * y * cosine[2] * share;
-        }
+      out[kToneAmplitude + a] += 2 * y * cosine[0] * share;
+      if (block.harmonics && a == block.axis) {
+        out[kSecondHarmonic] += 2 * y * cosine[1] * share;
+        out[kThirdHarmonic] += 2 * y * cosine[2] * share;
       }
     }
   }
-  if (block.tone) {
+  if (block.tone && swing[block.axis] < 0) {
     // In phase with the axis that is moved most: its amplitude is positive by definition.
-    const double sign = swing[block.axis] < 0 ? -1 : 1;
-    out.segment<3>(3) *= sign;
+    out.segment<3>(kToneAmplitude) *= -1;
     if (block.harmonics) {
-      out[7] *= sign;
+      out[kThirdHarmonic] *= -1;
     }
   }
   return out;

@@ -1,6 +1,10 @@
 // The forward model of one block of features: what the simulator would measure there, in closed
 // form.
 //
+//   ForwardState state;                              // the nominal unit
+//   state.drift_mg_per_h = {2, 0, 0};
+//   const Eigen::VectorXd features_mg = predict(state, block, 1000.0 / 256);
+//
 // A block is a dwell (or a piece of a long one), or a tone. Its features are the mean per axis, and
 // for tones the amplitude in phase per axis and the second and third harmonic on the axis that is
 // moved most. The model goes through the same chain as sim/ in the same order - stimulus, sensor,
@@ -12,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "gap/bundle.h"
+#include "gap/recording/bundle.h"
 
 namespace sixpoint::gap {
 
-// Parameters by position. Units: see kParameters in forward.cpp (mg, deg, shares, percent).
+// The parameters; parameter() gives them by position, in this order.
 struct ForwardState {
   Eigen::Vector3d gain = Eigen::Vector3d::Ones();
   Eigen::Vector3d offset_mg = Eigen::Vector3d::Zero();
@@ -46,10 +50,10 @@ struct ParameterGroup {
   double prior_sd = 1;  // of each, from the realistic sizes of the catalogue
   double prior_mean = 0;
   double curve_sd = 0;  // of the fourth number on: what bends the effect's main law
-  double high = 0;      // an estimate beyond four times this is another thing
-  double small = 0;     // smallest realistic size; 0: not asked
-  double tau_s = 0;     // warm_up's shape
-  int shape = 1;        // hysteresis'
+  double largest = 0;   // largest realistic size
+  double smallest = 0;  // smallest realistic size; 0: not used
+  double tau_s = 0;     // shape of warm_up
+  int shape = 1;        // shape of hysteresis
 
   // Prior standard deviation of the group's i-th number.
   double sd_of(int i) const { return i >= 3 && curve_sd > 0 ? curve_sd : prior_sd; }
@@ -61,6 +65,11 @@ inline constexpr double kReference_c = 25;
 
 double& parameter(ForwardState& state, int position);
 double parameter(const ForwardState& state, int position);
+
+// Where the features of a tone begin in Block::value_mg.
+inline constexpr int kToneAmplitude = 3;
+inline constexpr int kSecondHarmonic = 6;
+inline constexpr int kThirdHarmonic = 7;
 
 struct Block {
   std::size_t segment = 0;
@@ -80,7 +89,7 @@ struct Block {
   bool harmonics = false;                                     // 8 features instead of 6
   Eigen::Vector3d noise_mg = Eigen::Vector3d::Zero();         // of one sample, for truncation
 
-  Eigen::VectorXd value_mg;   // 3, 6 or 8: mean XYZ, in phase XYZ, second, third
+  Eigen::VectorXd value_mg;   // 3, 6 or 8: mean XYZ, in phase XYZ, second and third harmonic
   Eigen::MatrixXd white_mg2;  // covariance of the noise
   Eigen::Index size() const { return value_mg.size(); }
 };

@@ -1,4 +1,4 @@
-#include "gap/slow_structure.h"
+#include "gap/explain/slow_structure.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -8,6 +8,16 @@
 
 namespace sixpoint::gap {
 namespace {
+
+// At least so many modes must be slow.
+constexpr double kLeastModes = 8;
+// Parameters that were fitted to the means (gains, offsets and more): modes that they used up.
+constexpr double kFitted = 5;
+// Log odds of each of the three other causes before the data, over the noise: a convention.
+constexpr double kLogPriorOther = -2;
+// Prior variances of the logarithm of an axis' variance: of noise, and of another cause.
+constexpr double kAlikeVariance = 0.25;
+constexpr double kUnlikeVariance = 4;
 
 // Sums over modes: z is each axis' coefficient in units of what noise of the found size would give
 // it, `weight` the share of that which is slow.
@@ -21,7 +31,7 @@ struct Sums {
     weight += w;
     weight2 += w * w;
   }
-  // So many modes of slow noise alone would know as much.
+  // Equivalent number of modes that are slow noise alone.
   double modes() const { return weight2 > 0 ? weight * weight / weight2 : 0; }
 };
 
@@ -54,11 +64,9 @@ void add_means(const std::vector<Block>& blocks, const Fit& fit, double lsb_mg, 
   for (Eigen::Index i = 0; i < n; ++i) {
     const Block& block = blocks[static_cast<std::size_t>(i)];
     const Eigen::VectorXd off = block.value_mg - predict(fit.state, block, lsb_mg);
-    const Eigen::MatrixXd lever = seating_lever(block);
     for (Eigen::Index a = 0; a < 3; ++a) {
       left(i, a) = off[a];
-      white(i, a) =
-          block.white_mg2(a, a) + std::pow(kNominalSeating_deg, 2) * lever.row(a).squaredNorm();
+      white(i, a) = nominal_variance_mg2(block, a);
     }
     for (Eigen::Index j = 0; j < n; ++j) {
       slow(i, j) = fit.scatter_size * fit.scatter_size *
@@ -88,29 +96,27 @@ void add_means(const std::vector<Block>& blocks, const Fit& fit, double lsb_mg, 
 
 SlowStructure slow_structure(const std::vector<Block>& blocks, const Fit& fit,
                              const SlowNoise& records, double lsb_mg) {
-  constexpr double kLogPriorOther = -2;  // of each of the three, less that of the noise
   SlowStructure found;
   Sums sums;
   add_records(records, fit.scatter, fit.scatter_size, sums);
   add_means(blocks, fit, lsb_mg, sums);
   const double modes = sums.modes();
   found.jump_nats = records.jump_nats;
-  if (modes > 8) {
+  if (modes > kLeastModes) {
     const Eigen::Vector3d sd = sums.products.diagonal().cwiseSqrt().cwiseMax(1e-12);
     const Eigen::Matrix3d correlation =
         sd.cwiseInverse().asDiagonal() * sums.products * sd.cwiseInverse().asDiagonal();
-    // Three correlations, uniform before, against none: the determinant's likelihood ratio less
-    // what three free numbers cost (Schwarz).
-    const double free_modes = modes - 5;  // gains, offsets and more were fitted
+    // Three free correlations against none: likelihood ratio by the determinant, less the cost of
+    // three free numbers (Schwarz's criterion).
+    const double free_modes = modes - kFitted;
     found.in_step_nats = -0.5 * free_modes * std::log(std::max(1e-9, correlation.determinant())) -
                          1.5 * std::log(std::max(1.0, free_modes / (2 * M_PI)));
-    // Sizes per axis: noise has them within half a unit of the logarithm of its variance, another
-    // thing within two.
+    // Sizes per axis: those of noise are about alike, those of another cause are not.
     const Eigen::Vector3d size =
         (sums.products.diagonal() / sums.weight).cwiseMax(1e-9).array().log();
     const double square = (size.array() - size.mean()).square().sum();
-    const double like = 2 / modes + 2 / (modes * modes) + 0.25;
-    const double unlike = like + 4;
+    const double like = 2 / modes + 2 / (modes * modes) + kAlikeVariance;
+    const double unlike = like + kUnlikeVariance;
     found.unlike_nats = 0.5 * square * (1 / like - 1 / unlike) - std::log(unlike / like);
   }
   const std::array<std::pair<double, const char*>, 3> others = {

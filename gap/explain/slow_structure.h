@@ -1,22 +1,27 @@
 // Whether slow scatter has the structure of a sensor's own noise.
 //
-// random_walk and flicker absorb whatever is slow: a swinging zero, a supply that couples in, play
-// that grows. Those move several axes in step, or one alone, or jump; noise of the sensor is
-// independent from axis to axis, about alike in all, and Gaussian. Each of the three is a
-// hypothesis with an evidence of its own, and competes with the noise that would be named.
+//   const SlowStructure structure = slow_structure(blocks, explanation.best(), slow, lsb_mg);
+//   if (structure.other_nats > 0) {
+//     std::cout << structure.other << " is likelier than the sensor's noise\n";
+//   }
+//
+// random_walk and flicker can explain anything slow: an oscillating zero, a supply that couples in,
+// growing play. Such causes move several axes together, or one alone, or in jumps. Noise of the
+// sensor is independent from axis to axis, about equal in all, and Gaussian. Each of the three is a
+// hypothesis with its own evidence.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "gap/blocks.h"
-#include "gap/evidence.h"
+#include "gap/explain/blocks.h"
+#include "gap/explain/evidence.h"
 #include "gap/features/slow_noise.h"
 
 namespace sixpoint::gap {
 
 struct SlowStructure {
-  // Log odds of the likeliest other thing over the noise that was found; priors included.
+  // Log odds of the likeliest other cause over the noise that was found; priors included.
   double other_nats = -1e3;
   std::string other;  // in words
   // The three evidences, without priors: axes in step, axes unlike, jumps.

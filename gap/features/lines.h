@@ -1,4 +1,6 @@
-// Lines in the spectrum of still records, and whose they are: the laboratory's or the sensor's.
+// Lines in the spectrum of still records, and their frame: fixed in the laboratory or the sensor.
+//
+//   const auto lines = gap::find_lines(bundle, clean, gap::noise_spectrum(bundle, clean));
 //
 // A line that turns with the unit (a vector fixed in the sensor's frame) is electrical; one whose
 // direction stays in the room is vibration of the floor. Each dwell has a phase of its own, so that
@@ -9,9 +11,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "gap/bundle.h"
-#include "gap/clean.h"
 #include "gap/features/noise.h"
+#include "gap/recording/bundle.h"
+#include "gap/recording/clean.h"
 
 namespace sixpoint::gap {
 
@@ -20,7 +22,7 @@ struct SpectralLine {
   double gain_nats = 0;             // log likelihood over no line, the better hypothesis
   double lab_over_sensor_nats = 0;  // positive: fixed in the laboratory
   bool in_lab = true;
-  bool decidable = false;  // seen in at least three different directions of gravity or yaws
+  bool decidable = false;  // the poses differ, and the data prefer one frame clearly
   Eigen::Vector3d vector_mg = Eigen::Vector3d::Zero();  // in the frame chosen
   double sd_mg = 0;
   // Chi-square per degree of freedom of the dwells about the chosen hypothesis, in sd: a line that
@@ -30,11 +32,8 @@ struct SpectralLine {
   double held_out_nats = 0;
 };
 
-struct LineSearch {
-  std::vector<SpectralLine> lines;  // strongest first, at most four
-  double threshold_nats = 0;        // of the weakest line that would have been found
-};
-
-LineSearch find_lines(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise);
+// Strongest first, at most four.
+std::vector<SpectralLine> find_lines(const Bundle& bundle, const CleanSamples& clean,
+                                     const NoiseSpectrum& noise);
 
 }  // namespace sixpoint::gap

@@ -1,12 +1,16 @@
 // The unit's noise: its spectrum, its spread from dwell to dwell, and what its numbers look like.
+//
+//   const NoiseSpectrum noise = noise_spectrum(bundle, clean);
+//   const double white_x_mg = noise.white_mg[0];  // sd of one sample
+//   const CodeStatistics codes = code_statistics(bundle, clean);
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
 #include <vector>
 
-#include "gap/bundle.h"
-#include "gap/clean.h"
+#include "gap/recording/bundle.h"
+#include "gap/recording/clean.h"
 
 namespace sixpoint::gap {
 
@@ -20,6 +24,9 @@ struct NoiseSpectrum {
   std::array<double, 3> white_mg{};                 // sd of one sample, median over 1.5 to 8 Hz
   bool usable() const { return blocks >= 10; }
   double variance_at(std::size_t axis, double frequency_hz) const;
+  Eigen::Vector3d variances_at(double at_hz) const {
+    return {variance_at(0, at_hz), variance_at(1, at_hz), variance_at(2, at_hz)};
+  }
 };
 NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean);
 
@@ -30,16 +37,13 @@ struct CodeStatistics {
   std::array<double, 3> odd_share{};  // about 0.5
   std::array<double, 3> parity_sd{};  // of odd_share, by chance and by the means' grid
   double repeats = 0;                 // share of samples equal to the one before on all axes
-  double repeats_far = 0;             // ... to the one seven before
-  double repeats_excess_sd = 0;       // (repeats - repeats_far) in standard deviations
+  double repeats_excess_sd = 0;       // more than to the one seven before, in sd
   std::size_t outliers = 0;           // beyond 6 sd of their dwell
-  double outliers_expected = 0;
   // Scatter of the dwells' variances against chance: chi-square per degree of freedom, in sd; and
   // the worst dwell.
   double spread_sd = 0;
   double spread_freedom = 0;
   std::size_t worst_segment = 0;
-  double worst_ratio = 1;
   double kurtosis_sd = 0;  // excess kurtosis over its standard deviation
   // The code whose count is furthest from what Gaussian noise puts there, all dwells together.
   double code_sd = 0;

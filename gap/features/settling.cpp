@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -13,157 +14,207 @@ double StepResponse::Mode::at(double t_s) const {
                               std::cos(2 * M_PI * frequency_hz * t_s + phase_rad);
 }
 
-StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
-                           const NoiseSpectrum& noise, double line_power_mg2,
-                           const std::function<bool(const Segment&)>& use) {
-  StepResponse response;
-  const auto length = static_cast<std::size_t>(3 * bundle.rate_hz);
-  response.share.assign(length, 0);
-  std::vector<double> weight(length, 0);
-  std::size_t steps = 0;
-  for (const Segment& segment : bundle.segments) {
-    if (segment.kind == Segment::Kind::vibration || !segment.may_ring() ||
-        segment.samples < 2 * length || segment.approach_g.cwiseAbs().maxCoeff() < 0.2 ||
-        (use && !use(segment))) {
-      continue;
+namespace {
+
+constexpr double kStep_g = 0.2;        // smaller steps of a pose are not used
+constexpr double kAxisStep_mg = 100;   // nor axes that the step hardly moves
+constexpr double kTwoModes_nats = 20;  // a second mode has four unknowns of its own on a grid
+
+// The mean deviation after all steps, as a share of the step, and the weight of each sample.
+class Deviation {
+ public:
+  explicit Deviation(double rate_hz)
+      : rate_hz_(rate_hz),
+        length_(static_cast<std::size_t>(3 * rate_hz)),
+        share_(length_, 0),
+        weight_(length_, 0) {}
+
+  bool takes(const Segment& segment) const {
+    return segment.at_rest() && segment.may_ring() && segment.samples >= 2 * length_ &&
+           segment.approach_g.cwiseAbs().maxCoeff() >= kStep_g;
+  }
+
+  // One axis of one dwell, its rest taken from what follows; `variance` of one sample.
+  void add(const CleanSamples& clean, const Segment& segment, std::size_t axis, double variance) {
+    constexpr double kLeast = 100;  // samples at rest
+    const double step_mg = 1000 * segment.approach_g[static_cast<Eigen::Index>(axis)];
+    if (std::abs(step_mg) < kAxisStep_mg || !(variance > 0)) {
+      return;
     }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double step_mg = 1000 * segment.approach_g[static_cast<Eigen::Index>(axis)];
-      const double variance = noise.white_mg[axis] * noise.white_mg[axis] + line_power_mg2;
-      if (std::abs(step_mg) < 100 || !(variance > 0)) {
-        continue;
+    double rest = 0;
+    double n = 0;
+    for (std::size_t i = length_; i < std::min(segment.samples, 4 * length_); ++i) {
+      if (clean.usable(segment.first_sample + i)) {
+        rest += clean.value_mg(segment.first_sample + i, axis);
+        n += 1;
       }
-      const auto value = [&](std::size_t i) {
-        return 1000.0 * clean.samples[segment.first_sample + i][axis] /
-               bundle.accel_scale_lsb_per_g;
-      };
-      const auto good = [&](std::size_t i) {
-        return (clean.flags[segment.first_sample + i] &
-                (kSampleZero | kSampleHeld | kSampleClipped)) == 0;
-      };
-      double rest = 0;
-      double n = 0;
-      for (std::size_t i = length; i < std::min(segment.samples, 4 * length); ++i) {
-        if (good(i)) {
-          rest += value(i);
-          n += 1;
-        }
-      }
-      if (n < 100) {
-        continue;
-      }
-      rest /= n;
-      ++steps;
-      for (std::size_t i = 0; i < length; ++i) {
-        if (good(i)) {
-          response.share[i] += step_mg * (value(i) - rest) / variance;
-          weight[i] += step_mg * step_mg / variance;
-        }
+    }
+    if (n < kLeast) {
+      return;
+    }
+    rest /= n;
+    ++steps_;
+    for (std::size_t i = 0; i < length_; ++i) {
+      if (clean.usable(segment.first_sample + i)) {
+        share_[i] += step_mg * (clean.value_mg(segment.first_sample + i, axis) - rest) / variance;
+        weight_[i] += step_mg * step_mg / variance;
       }
     }
   }
-  double most = 0;
-  for (std::size_t i = 0; i < length; ++i) {
-    most = std::max(most, weight[i]);
+
+  // Divides by the weights; false where there were too few steps.
+  bool finish() {
+    constexpr double kLightest = 0.2;  // of the heaviest sample: lighter ones are mostly masked
+    most_ = *std::max_element(weight_.begin(), weight_.end());
+    if (steps_ < 2 || !(most_ > 0)) {
+      return false;
+    }
+    for (std::size_t i = 0; i < length_; ++i) {
+      const bool heavy = weight_[i] > kLightest * most_;
+      share_[i] = heavy ? share_[i] / weight_[i] : 0;
+      weight_[i] = heavy ? weight_[i] : 0;
+    }
+    return true;
   }
-  response.usable = steps >= 2 && most > 0;
-  if (!response.usable) {
-    return response;
+
+  const std::vector<double>& share() const { return share_; }
+  double sd() const { return 1 / std::sqrt(most_); }
+
+  std::vector<double> without(const StepResponse::Mode& mode) const {
+    std::vector<double> data = share_;
+    for (std::size_t i = 0; i < length_; ++i) {
+      data[i] -= mode.at(at_s(i));
+    }
+    return data;
   }
-  response.sd = 1 / std::sqrt(most);
-  for (std::size_t i = 0; i < length; ++i) {
-    response.share[i] = weight[i] > 0.2 * most ? response.share[i] / weight[i] : 0;
-    weight[i] = weight[i] > 0.2 * most ? weight[i] : 0;
-  }
-  const auto at_s = [&](std::size_t i) { return static_cast<double>(i) / bundle.rate_hz; };
-  // Every frequency and decay on a grid; amplitude and phase in closed form.
-  const auto fit_mode = [&](const std::vector<double>& data, double& gain_nats) {
+
+  // Every frequency and decay on a grid, then finer; amplitude and phase in closed form.
+  StepResponse::Mode fit(const std::vector<double>& data, double& gain_nats) const {
     StepResponse::Mode best;
     gain_nats = 0;
-    const auto try_one = [&](double f, double decay) {
-      Eigen::Matrix2d a = Eigen::Matrix2d::Zero();
-      Eigen::Vector2d b = Eigen::Vector2d::Zero();
-      for (std::size_t i = 0; i < length; ++i) {
-        const double e = std::exp(-at_s(i) / decay);
-        if (e < 1e-3) {
-          break;
-        }
-        const double p = 2 * M_PI * f * at_s(i);
-        const Eigen::Vector2d row(e * std::cos(p), -e * std::sin(p));
-        a += weight[i] * row * row.transpose();
-        b += weight[i] * row * data[i];
-      }
-      a.diagonal().array() += 1e-9 * most;
-      const Eigen::Matrix2d inverse = a.inverse();
-      const Eigen::Vector2d x = inverse * b;
-      const double gain = 0.5 * b.dot(x);
-      if (gain > gain_nats) {
-        gain_nats = gain;
-        best = {x.norm(), std::sqrt(inverse.diagonal().maxCoeff()), f, decay,
-                std::atan2(x[1], x[0])};
+    const auto try_one = [&](double frequency_hz, double decay_s) {
+      const auto [mode, nats] = fit_at(data, frequency_hz, decay_s);
+      if (nats > gain_nats) {
+        gain_nats = nats;
+        best = mode;
       }
     };
-    for (const double decay : {0.1, 0.15, 0.2, 0.27, 0.36, 0.48, 0.65, 0.9}) {
-      const auto frequencies = static_cast<int>(4 * (std::min(30.0, 0.4 * bundle.rate_hz) - 2));
+    for (const double decay_s : {0.1, 0.15, 0.2, 0.27, 0.36, 0.48, 0.65, 0.9}) {
+      const auto frequencies = static_cast<int>(4 * (std::min(30.0, 0.4 * rate_hz_) - 2));
       for (int k = 0; k <= frequencies; ++k) {
-        try_one(2 + 0.25 * k, decay);
+        try_one(2 + 0.25 * k, decay_s);
       }
     }
     for (int round = 1; round <= 4; ++round) {
-      const double f0 = best.frequency_hz;
-      const double d0 = best.decay_s;
+      const StepResponse::Mode centre = best;
       for (int i = -3; i <= 3; ++i) {
         for (int k = -3; k <= 3; ++k) {
-          try_one(std::max(0.5, f0 + i * 0.08 / round), std::max(0.03, d0 * (1 + k * 0.1 / round)));
+          try_one(std::max(0.5, centre.frequency_hz + i * 0.08 / round),
+                  std::max(0.03, centre.decay_s * (1 + k * 0.1 / round)));
         }
       }
     }
     return best;
-  };
-  const auto less = [&](const StepResponse::Mode& mode) {
-    std::vector<double> data = response.share;
-    for (std::size_t i = 0; i < length; ++i) {
-      data[i] -= mode.at(at_s(i));
+  }
+
+  // Log likelihood of the best exponential without ringing.
+  double plain_nats() const {
+    double best = 0;
+    for (const double decay_s : {0.05, 0.1, 0.2, 0.4, 0.8}) {
+      double a = 0;
+      double b = 0;
+      for (std::size_t i = 0; i < length_; ++i) {
+        const double e = std::exp(-at_s(i) / decay_s);
+        a += weight_[i] * e * e;
+        b += weight_[i] * e * share_[i];
+      }
+      best = std::max(best, 0.5 * b * b / a);
     }
-    return data;
-  };
-  response.mode = fit_mode(response.share, response.gain_nats);
-  StepResponse::Mode second = fit_mode(less(response.mode), response.second_nats);
-  if (response.second_nats > 20) {
+    return best;
+  }
+
+  // Chi-square of the first second about `model`, in sd over its mean.
+  double left_sd(const std::function<double(double)>& model) const {
+    double chi = 0;
+    double n = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(rate_hz_); ++i) {
+      if (weight_[i] > 0) {
+        chi += weight_[i] * std::pow(share_[i] - model(at_s(i)), 2);
+        n += 1;
+      }
+    }
+    return n > 0 ? (chi - n) / std::sqrt(2 * n) : 0;
+  }
+
+ private:
+  double at_s(std::size_t i) const { return static_cast<double>(i) / rate_hz_; }
+
+  std::pair<StepResponse::Mode, double> fit_at(const std::vector<double>& data, double frequency_hz,
+                                               double decay_s) const {
+    Eigen::Matrix2d a = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d b = Eigen::Vector2d::Zero();
+    for (std::size_t i = 0; i < length_; ++i) {
+      const double e = std::exp(-at_s(i) / decay_s);
+      if (e < 1e-3) {
+        break;
+      }
+      const double p = 2 * M_PI * frequency_hz * at_s(i);
+      const Eigen::Vector2d row(e * std::cos(p), -e * std::sin(p));
+      a += weight_[i] * row * row.transpose();
+      b += weight_[i] * row * data[i];
+    }
+    a.diagonal().array() += 1e-9 * most_;
+    const Eigen::Matrix2d inverse = a.inverse();
+    const Eigen::Vector2d x = inverse * b;
+    return {{x.norm(), std::sqrt(inverse.diagonal().maxCoeff()), frequency_hz, decay_s,
+             std::atan2(x[1], x[0])},
+            0.5 * b.dot(x)};
+  }
+
+  double rate_hz_;
+  std::size_t length_;
+  std::size_t steps_ = 0;
+  double most_ = 0;  // largest weight
+  std::vector<double> share_, weight_;
+};
+
+}  // namespace
+
+StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
+                           const NoiseSpectrum& noise, double line_power_mg2,
+                           const std::function<bool(const Segment&)>& use) {
+  StepResponse response;
+  Deviation deviation(bundle.rate_hz);
+  for (const Segment& segment : bundle.segments) {
+    if (deviation.takes(segment) && (!use || use(segment))) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        deviation.add(clean, segment, axis,
+                      noise.white_mg[axis] * noise.white_mg[axis] + line_power_mg2);
+      }
+    }
+  }
+  response.usable = deviation.finish();
+  response.share = deviation.share();
+  if (!response.usable) {
+    return response;
+  }
+  response.sd = deviation.sd();
+  response.mode = deviation.fit(deviation.share(), response.gain_nats);
+  StepResponse::Mode second = deviation.fit(deviation.without(response.mode), response.second_nats);
+  if (response.second_nats > kTwoModes_nats) {
     // Each once more with the other taken off.
     double nats = 0;
     for (int round = 0; round < 2; ++round) {
-      response.mode = fit_mode(less(second), nats);
-      second = fit_mode(less(response.mode), nats);
+      response.mode = deviation.fit(deviation.without(second), nats);
+      second = deviation.fit(deviation.without(response.mode), nats);
     }
     response.second = second;
   }
   response.amplitude =
       response.second.amplitude > 0 ? std::abs(response.model(0)) : response.mode.amplitude;
-  for (const double decay : {0.05, 0.1, 0.2, 0.4, 0.8}) {
-    double a = 0;
-    double b = 0;
-    for (std::size_t i = 0; i < length; ++i) {
-      const double e = std::exp(-at_s(i) / decay);
-      a += weight[i] * e * e;
-      b += weight[i] * e * response.share[i];
-    }
-    response.plain_nats = std::max(response.plain_nats, 0.5 * b * b / a);
-  }
-  const auto chi_over = [&](bool ringing) {
-    double chi = 0;
-    double n = 0;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(bundle.rate_hz); ++i) {
-      if (weight[i] > 0) {
-        const double model = ringing ? response.model(at_s(i)) : 0;
-        chi += weight[i] * std::pow(response.share[i] - model, 2);
-        n += 1;
-      }
-    }
-    return n > 0 ? (chi - n) / std::sqrt(2 * n) : 0;
-  };
-  response.left_sd = chi_over(true);
-  response.left_without_sd = chi_over(false);
+  response.plain_nats = deviation.plain_nats();
+  response.left_sd = deviation.left_sd([&](double t_s) { return response.model(t_s); });
+  response.left_without_sd = deviation.left_sd([](double) { return 0; });
   return response;
 }
 
@@ -180,12 +231,11 @@ double held_out_step_nats(const Bundle& bundle, const CleanSamples& clean,
   }
   double nats = 0;
   for (std::size_t k = 0; k < 2; ++k) {
-    const StepResponse& seen = half[k];
-    const StepResponse& unseen = half[1 - k];
-    for (std::size_t i = 0; i < unseen.share.size(); ++i) {
-      const double model = seen.model(static_cast<double>(i) / bundle.rate_hz);
-      nats += 0.5 * (std::pow(unseen.share[i], 2) - std::pow(unseen.share[i] - model, 2)) /
-              (unseen.sd * unseen.sd);
+    const StepResponse& other = half[1 - k];
+    for (std::size_t i = 0; i < other.share.size(); ++i) {
+      const double model = half[k].model(static_cast<double>(i) / bundle.rate_hz);
+      nats += 0.5 * (std::pow(other.share[i], 2) - std::pow(other.share[i] - model, 2)) /
+              (other.sd * other.sd);
     }
   }
   return nats;

@@ -1,13 +1,18 @@
 // The mean response to a pose change: every dwell's first seconds, weighted by the step it
 // followed.
+//
+//   const StepResponse step = step_response(bundle, clean, noise);
+//   if (step.usable) {
+//     const double share = step.model(0.1);  // of the step, 0.1 s after the move
+//   }
 #pragma once
 
 #include <functional>
 #include <vector>
 
-#include "gap/bundle.h"
-#include "gap/clean.h"
 #include "gap/features/noise.h"
+#include "gap/recording/bundle.h"
+#include "gap/recording/clean.h"
 
 namespace sixpoint::gap {
 

@@ -1,5 +1,8 @@
 // Noise slower than a second: 1/f and 1/f^2, from records that lie still at one temperature.
 //
+//   const SlowNoise slow = slow_noise(bundle, clean, noise);
+//   const bool jumps = slow.jump_nats > 0;  // likelier than a random walk and 1/f noise
+//
 // Means over one second are turned by a cosine transform (DCT-II), which is the Karhunen-Loeve
 // basis of a random walk less its mean: coefficient k has the variance q^2 / (4 sin^2(k pi / 2K)),
 // white noise the same in all, and 1/f noise about F K / k. Coefficients are independent enough to
@@ -10,9 +13,9 @@
 #include <array>
 #include <vector>
 
-#include "gap/bundle.h"
-#include "gap/clean.h"
 #include "gap/features/noise.h"
+#include "gap/recording/bundle.h"
+#include "gap/recording/clean.h"
 
 namespace sixpoint::gap {
 
@@ -27,17 +30,17 @@ struct SlowNoise {
   // Power in the slow coefficients over that of the fast, in sd, at the best grid point: what is
   // left for something that neither explains.
   double misfit_sd = 0;
-  // The same for the worst axis alone: slow noise of one axis only is no noise of the sensor's
-  // kind.
+  // The same for the worst axis alone: a sensor's own slow noise is alike on all
+  // axes.
   double axis_sd = 0;
   // Excess kurtosis of the differences between means of neighbouring 3 s and 8 s, the worst axis,
   // in sd. Walks and 1/f noise are Gaussian; a zero that jumps is not.
   double jump_sd = 0;
-  // Log evidence, from records cut into pieces of ten seconds, of "now and then the zero jumps"
-  // over the better of "it walks" and "1/f noise"; sizes and rates unknown.
+  // Log evidence, from records cut into pieces of ten seconds, of a zero that jumps now and then
+  // over the better of a random walk and 1/f noise; sizes and rates unknown.
   double jump_nats = 0;
 
-  // The coefficients, axis by axis, for who asks whether the axes go together.
+  // The coefficients, axis by axis: they show whether the axes move together.
   struct Mode {
     std::array<double, 3> value_mg{};
     std::array<double, 3> white_mg2{};
@@ -51,9 +54,7 @@ struct SlowNoise {
     double flicker_mg = 0;
     double nats = 0;
   };
-  Best best_walk() const;     // flicker 0
-  Best best_flicker() const;  // walk 0
-  Best best_both() const;
+  Best best() const;
 };
 
 // Power density at 1 Hz, one-sided, mg^2/Hz: `flicker_mg` is its square root, as in sim/effects.

@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
 namespace sixpoint::gap {
 namespace {
 
-constexpr std::uint8_t kUnusable = kSampleZero | kSampleHeld | kSampleClipped;
 constexpr std::array<std::size_t, 7> kStretches = {1, 2, 4, 8, 16, 32, 64};
 constexpr std::size_t kMoment = 128;  // samples
 constexpr std::size_t kLags = 4;
@@ -43,7 +43,7 @@ struct Sums {
   double correlation(std::size_t axis, std::size_t lag) const {
     return square[axis] > 0 ? lagged[axis][lag] / square[axis] : 0;
   }
-  // So many values count for one in a sum of squares.
+  // How many correlated values count for one in a sum of squares.
   double bunch(std::size_t axis, int power = 2) const {
     double sum = 1;
     for (std::size_t lag = 0; lag < kLags; ++lag) {
@@ -59,71 +59,88 @@ double normal_of(double chi, double freedom) {
   return (std::cbrt(chi / freedom) - (1 - s)) / std::sqrt(s);
 }
 
-Sums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretch) {
-  Sums sums;
-  const auto rate = static_cast<std::size_t>(bundle.rate_hz);
-  const std::size_t piece_length = 10 * rate;
-  const double scale = std::sqrt(static_cast<double>(stretch) / 2);
+// One dwell, or ten seconds of a long record.
+struct Run {
+  std::size_t segment;
+  std::size_t first;  // sample
+  std::size_t length;
+};
+
+std::vector<Run> runs_of(const Bundle& bundle) {
+  std::vector<Run> runs;
+  const std::size_t most = 10 * static_cast<std::size_t>(bundle.rate_hz);
   for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
     const Segment& segment = bundle.segments[s];
-    if (segment.kind == Segment::Kind::vibration) {
+    for (std::size_t first = segment.quiet_start(bundle.rate_hz);
+         segment.at_rest() && first < segment.samples; first += most) {
+      runs.push_back({s, segment.first_sample + first, std::min(most, segment.samples - first)});
+    }
+  }
+  return runs;
+}
+
+// Sum of the second stretch less that of the first, per axis; nothing where a sample is masked.
+std::optional<std::array<int, 3>> difference_at(const CleanSamples& clean, std::size_t at,
+                                                std::size_t stretch) {
+  std::array<int, 3> difference{};
+  for (std::size_t k = 0; k < 2 * stretch; ++k) {
+    if (!clean.usable(at + k)) {
+      return std::nullopt;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      difference[axis] += k < stretch ? -clean.samples[at + k][axis] : clean.samples[at + k][axis];
+    }
+  }
+  return difference;
+}
+
+void add_run(const CleanSamples& clean, const Run& run, std::size_t stretch, Sums& sums) {
+  constexpr double kFewest = 4;  // differences of a piece
+  const double scale = std::sqrt(static_cast<double>(stretch) / 2);
+  std::array<Piece, 3> pieces;
+  std::array<std::array<double, kLags>, 3> before{};
+  std::size_t known = 0;  // of `before`
+  std::size_t moment = static_cast<std::size_t>(-1);
+  for (std::size_t i = 0; i + 2 * stretch <= run.length; i += 2 * stretch) {
+    const auto difference = difference_at(clean, run.first + i, stretch);
+    if (!difference) {
+      known = 0;
       continue;
     }
-    const std::size_t quiet = segment.may_ring() ? 3 * rate : 0;
-    for (std::size_t first = quiet; first < segment.samples; first += piece_length) {
-      const std::size_t length = std::min(piece_length, segment.samples - first);
-      std::array<Piece, 3> pieces;
-      std::array<std::array<double, kLags>, 3> before{};
-      std::size_t known = 0;  // of `before`
-      std::size_t moment = static_cast<std::size_t>(-1);
-      for (std::size_t i = 0; i + 2 * stretch <= length; i += 2 * stretch) {
-        const std::size_t at = segment.first_sample + first + i;
-        std::array<int, 3> difference{};
-        bool whole = true;
-        for (std::size_t k = 0; k < 2 * stretch; ++k) {
-          whole = whole && (clean.flags[at + k] & kUnusable) == 0;
-          for (std::size_t axis = 0; axis < 3; ++axis) {
-            difference[axis] +=
-                k < stretch ? -clean.samples[at + k][axis] : clean.samples[at + k][axis];
-          }
-        }
-        if (!whole) {
-          known = 0;
-          continue;
-        }
-        if (i / kMoment != moment) {
-          moment = i / kMoment;
-          sums.moments.emplace_back();
-          sums.moments.back().segment = s;
-          sums.moments.back().start = segment.first_sample + first + moment * kMoment;
-        }
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const double d = difference[axis] * scale / static_cast<double>(stretch);
-          const double square = d * d;
-          sums.n[axis] += 1;
-          sums.square[axis] += square;
-          sums.fourth[axis] += square * square;
-          pieces[axis].n += 1;
-          pieces[axis].square += square;
-          sums.moments.back().n[axis] += 1;
-          sums.moments.back().square[axis] += square;
-          for (std::size_t lag = 0; lag < std::min(known, kLags); ++lag) {
-            sums.lagged[axis][lag] += d * before[axis][lag];
-          }
-          for (std::size_t lag = kLags - 1; lag > 0; --lag) {
-            before[axis][lag] = before[axis][lag - 1];
-          }
-          before[axis][0] = d;
-        }
-        ++known;
-      }
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        pieces[axis].axis = axis;
-        if (pieces[axis].n >= 4) {
-          sums.pieces.push_back(pieces[axis]);
-        }
-      }
+    if (i / kMoment != moment) {
+      moment = i / kMoment;
+      sums.moments.push_back({run.segment, run.first + moment * kMoment, {}, {}});
     }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double d = (*difference)[axis] * scale / static_cast<double>(stretch);
+      const double square = d * d;
+      sums.n[axis] += 1;
+      sums.square[axis] += square;
+      sums.fourth[axis] += square * square;
+      pieces[axis].n += 1;
+      pieces[axis].square += square;
+      sums.moments.back().n[axis] += 1;
+      sums.moments.back().square[axis] += square;
+      for (std::size_t lag = 0; lag < std::min(known, kLags); ++lag) {
+        sums.lagged[axis][lag] += d * before[axis][lag];
+      }
+      std::shift_right(before[axis].begin(), before[axis].end(), 1);
+      before[axis][0] = d;
+    }
+    ++known;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    pieces[axis].axis = axis;
+    if (pieces[axis].n >= kFewest) {
+      sums.pieces.push_back(pieces[axis]);
+    }
+  }
+}
+
+Sums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretch) {
+  Sums sums;
+  for (const Run& run : runs_of(bundle)) {
+    add_run(clean, run, stretch, sums);
   }
   return sums;
 }

@@ -1,6 +1,11 @@
 // Whether the noise of what lies still is one stationary Gaussian process: at seven time scales,
 // in every dwell, at every moment.
 //
+//   const Texture texture = noise_texture(bundle, clean);
+//   for (const Texture::Scale& scale : texture.scales) {
+//     const bool gaussian = std::abs(scale.tails_sd) < kAlarm_sd;
+//   }
+//
 // Differences between the means of neighbouring stretches (Haar's wavelets) of 1 to 64 samples.
 // Whatever filter stands behind Gaussian noise, each scale's are Gaussian, of one variance in all
 // dwells and at all times; only their correlation is the filter's, and it is measured. Knocks,
@@ -11,8 +16,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "gap/bundle.h"
-#include "gap/clean.h"
+#include "gap/recording/bundle.h"
+#include "gap/recording/clean.h"
 
 namespace sixpoint::gap {
 

@@ -1,5 +1,10 @@
 // What the host's clock says about the unit's: its rate, and lost or repeated samples.
 //
+//   const HostTiming timing = host_timing(bundle);
+//   if (timing.usable) {
+//     std::cout << timing.clock_ppm << " ppm, " << timing.lost << " samples are lost\n";
+//   }
+//
 // The host stamps each one-second packet within +-2 ms, uniform. Inside a segment the stamps grow
 // by (samples) / (rate * (1 + error)); a lost sample moves all later stamps by one sample interval
 // forward, a repeated one backward. An interval of 8 ms and more exceeds what two stamps can be
@@ -9,7 +14,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gap/bundle.h"
+#include "gap/recording/bundle.h"
 
 namespace sixpoint::gap {
 

@@ -9,10 +9,28 @@ namespace sixpoint::gap {
 namespace {
 
 constexpr std::size_t kShortestPiece = 10;  // three unknowns and some to test them
+// In squared residuals over their variance. Of white residuals the best cut gains about 25.
+constexpr double kCut = 60;
+constexpr double kPiece = 8;       // a cut and three unknowns
+constexpr double kEvenDrift = 12;  // a frequency, found on a grid of hundreds
 
 // Sums over samples up to an index: enough to fit 1, cos, sin on any stretch.
 struct Sums {
   double n = 0, c = 0, s = 0, cc = 0, cs = 0, ss = 0, y = 0, yc = 0, ys = 0, yy = 0;
+  void add(double value, double angle) {
+    const double cosine = std::cos(angle);
+    const double sine = std::sin(angle);
+    n += 1;
+    c += cosine;
+    s += sine;
+    cc += cosine * cosine;
+    cs += cosine * sine;
+    ss += sine * sine;
+    y += value;
+    yc += value * cosine;
+    ys += value * sine;
+    yy += value * value;
+  }
   Sums operator-(const Sums& o) const {
     return {n - o.n,   c - o.c, s - o.s,   cc - o.cc, cs - o.cs,
             ss - o.ss, y - o.y, yc - o.yc, ys - o.ys, yy - o.yy};
@@ -48,22 +66,9 @@ std::vector<Sums> prefix_sums(const std::vector<double>& y, const std::vector<st
   std::vector<Sums> sums(y.size() + 1);
   for (std::size_t i = 0; i < y.size(); ++i) {
     sums[i + 1] = sums[i];
-    if (good[i] == 0) {
-      continue;
+    if (good[i] != 0) {
+      sums[i + 1].add(y[i], w * static_cast<double>(i));
     }
-    const double c = std::cos(w * static_cast<double>(i));
-    const double s = std::sin(w * static_cast<double>(i));
-    Sums& to = sums[i + 1];
-    to.n += 1;
-    to.c += c;
-    to.s += s;
-    to.cc += c * c;
-    to.cs += c * s;
-    to.ss += s * s;
-    to.y += y[i];
-    to.yc += y[i] * c;
-    to.ys += y[i] * s;
-    to.yy += y[i] * y[i];
   }
   return sums;
 }
@@ -82,14 +87,14 @@ class ToneAnalysis {
     good_.resize(segment_.samples);
     y_.resize(segment_.samples);
     for (std::size_t i = 0; i < segment_.samples; ++i) {
-      const std::uint8_t flags = clean.flags[segment_.first_sample + i];
+      const std::size_t at = segment_.first_sample + i;
       // What a move or a filter leaves at the start is not of the tone.
       const bool quiet =
           static_cast<double>(i) >= (segment_.starts_placement ? 2 : 0.3) * bundle.rate_hz;
-      good_[i] = quiet && (flags & (kSampleZero | kSampleHeld | kSampleClipped)) == 0 ? 1 : 0;
+      good_[i] = quiet && clean.usable(at) ? 1 : 0;
       fit_.samples += good_[i];
-      y_[i] = value_mg(i, static_cast<std::size_t>(fit_.axis));
-      fit_.clipped_share += (flags & kSampleClipped) != 0 ? 1 : 0;
+      y_[i] = clean.value_mg(at, static_cast<std::size_t>(fit_.axis));
+      fit_.clipped_share += (clean.flags[at] & kSampleClipped) != 0 ? 1 : 0;
     }
     fit_.clipped_share /= static_cast<double>(segment_.samples);
   }
@@ -109,55 +114,55 @@ class ToneAnalysis {
   }
 
  private:
-  double value_mg(std::size_t i, std::size_t axis) const {
-    return 1000.0 * clean_.samples[segment_.first_sample + i][axis] / bundle_.accel_scale_lsb_per_g;
-  }
-
   void find_slips() {
     const auto sums = prefix_sums(y_, good_, w_);
     std::vector<std::size_t> cuts = {0, y_.size()};
     split(sums, 0, y_.size(), cuts, 0);
+    steps_.assign(y_.size(), 0);
     // A tone off its frequency drifts evenly; cut into pieces it would look like a row of slips.
     const double cost_cut = cost(sums, cuts);
     const double even = best_even_drift();
-    if (cuts.size() > 2 && even_cost_ + 12 * noise2_ < cost_cut) {
+    if (cuts.size() > 2 && even_cost_ + kEvenDrift * noise2_ < cost_cut) {
       w_ *= 1 + even;
-      cuts = {0, y_.size()};
-      steps_.assign(y_.size(), 0);
       return;
     }
     std::sort(cuts.begin(), cuts.end());
     merge(sums, cuts);
-    steps_.assign(y_.size(), 0);
     int shift = 0;
     for (std::size_t p = 1; p + 1 < cuts.size(); ++p) {
-      const PieceFit before = fit_piece(sums[cuts[p]] - sums[cuts[p - 1]]);
-      const PieceFit after = fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]);
-      const double step = circle(after.phase() - before.phase());
-      int best = 0;
-      double best_miss = std::abs(step);
-      for (const int k : {1, -1, 2, -2, 3, -3, 4, -4}) {
-        const double miss = std::abs(circle(step - k * w_));
-        if (miss < 0.6 * best_miss) {  // the smaller number wins unless clearly worse
-          best = k;
-          best_miss = miss;
-        }
+      const auto slip = slip_between(fit_piece(sums[cuts[p]] - sums[cuts[p - 1]]),
+                                     fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]));
+      if (slip) {
+        fit_.slips.push_back({cuts[p], *slip});
+        shift += *slip;
       }
-      const double sd = std::sqrt(2 * noise2_ * (1 / before.n + 1 / after.n)) /
-                        std::max(1e-9, 0.5 * (before.amplitude() + after.amplitude()));
-      if (std::abs(step) < 6 * sd) {
-        for (std::size_t i = cuts[p]; i < cuts[p + 1]; ++i) {
-          steps_[i] = shift;
-        }
-        continue;  // the level moved, not the phase
-      }
-      const bool whole = best != 0 && best_miss < std::max(6 * sd, 0.12 * std::abs(w_));
-      fit_.slips.push_back({cuts[p], whole ? best : 0});
-      shift += whole ? best : 0;
-      for (std::size_t i = cuts[p]; i < cuts[p + 1]; ++i) {
-        steps_[i] = shift;
+      std::fill(steps_.begin() + static_cast<std::ptrdiff_t>(cuts[p]),
+                steps_.begin() + static_cast<std::ptrdiff_t>(cuts[p + 1]), shift);
+    }
+  }
+
+  // Samples lost between two pieces, 0 for a step that is no whole number of samples; nothing where
+  // the level moved, not the phase.
+  std::optional<int> slip_between(const PieceFit& before, const PieceFit& after) const {
+    constexpr double kClearlyBetter = 0.6;  // the smaller number wins unless clearly worse
+    constexpr double kStep_sd = 6;
+    constexpr double kWhole = 0.12;  // of a sample
+    const double step = circle(after.phase() - before.phase());
+    int best = 0;
+    double best_miss = std::abs(step);
+    for (const int k : {1, -1, 2, -2, 3, -3, 4, -4}) {
+      const double miss = std::abs(circle(step - k * w_));
+      if (miss < kClearlyBetter * best_miss) {
+        best = k;
+        best_miss = miss;
       }
     }
+    const double sd = std::sqrt(2 * noise2_ * (1 / before.n + 1 / after.n)) /
+                      std::max(1e-9, 0.5 * (before.amplitude() + after.amplitude()));
+    if (std::abs(step) < kStep_sd * sd) {
+      return std::nullopt;
+    }
+    return best_miss < std::max(kStep_sd * sd, kWhole * std::abs(w_)) ? best : 0;
   }
 
   // Takes back cuts that gain nothing against the noise that is there (the halves of split(), or
@@ -182,7 +187,7 @@ class ToneAnalysis {
           at = p;
         }
       }
-      if (least > 60 * variance) {
+      if (least > kCut * variance) {
         return;
       }
       cuts.erase(cuts.begin() + static_cast<std::ptrdiff_t>(at));
@@ -216,7 +221,7 @@ class ToneAnalysis {
     std::sort(cuts.begin(), cuts.end());
     double total = 0;
     for (std::size_t p = 0; p + 1 < cuts.size(); ++p) {
-      total += fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]).squares + 8 * noise2_;
+      total += fit_piece(sums[cuts[p + 1]] - sums[cuts[p]]).squares + kPiece * noise2_;
     }
     return total;
   }
@@ -240,10 +245,10 @@ class ToneAnalysis {
         at = c;
       }
     }
-    // Of white residuals the best cut gains about 25 times their variance at most.
     const double variance = std::max(noise2_, best / static_cast<double>(last - first));
-    if (whole - best < 60 * variance) {
-      // Two slips that undo each other within a period hide from a single cut: look at the halves.
+    if (whole - best < kCut * variance) {
+      // Two slips that undo each other within a period hide from a single cut: the halves are
+      // tried.
       if (whole > 3 * noise2_ * static_cast<double>(last - first) &&
           last - first > 8 * kShortestPiece) {
         const std::size_t middle = (first + last) / 2;
@@ -264,22 +269,9 @@ class ToneAnalysis {
     for (int round = 0; round < 2; ++round) {
       Sums total;
       for (std::size_t i = 0; i < y_.size(); ++i) {
-        if (good_[i] == 0) {
-          continue;
+        if (good_[i] != 0) {
+          total.add(y_[i], angle(i));
         }
-        const double p = angle(i);
-        const double c = std::cos(p);
-        const double s = std::sin(p);
-        total.n += 1;
-        total.c += c;
-        total.s += s;
-        total.cc += c * c;
-        total.cs += c * s;
-        total.ss += s * s;
-        total.y += y_[i];
-        total.yc += y_[i] * c;
-        total.ys += y_[i] * s;
-        total.yy += y_[i] * y_[i];
       }
       const PieceFit first = fit_piece(total);
       phase0 = first.phase();
@@ -303,7 +295,8 @@ class ToneAnalysis {
       const Eigen::Vector3d cross(1, row[1], row[4]);
       a_cross += cross * cross.transpose();
       for (std::size_t k = 0; k < 3; ++k) {
-        b_cross.col(static_cast<Eigen::Index>(k)) += cross * value_mg(i, k);
+        b_cross.col(static_cast<Eigen::Index>(k)) +=
+            cross * clean_.value_mg(segment_.first_sample + i, k);
       }
     }
     // Second and third harmonic fold onto one frequency at a fifth of the rate: a weak prior (50
@@ -324,6 +317,11 @@ class ToneAnalysis {
     fit_.second_mg = x[2];
     fit_.third_mg = x[3];
     fit_.covariance_shape = inverse.topLeftCorner<4, 4>();
+    measure_residuals(x, phase0);
+  }
+
+  // About level, tone, its harmonics and a phase error: `x`.
+  void measure_residuals(const Eigen::Matrix<double, 5, 1>& x, double phase0) {
     double squares = 0;
     double slope = 0;
     double slope_weight = 0;

@@ -1,6 +1,12 @@
 // What the unit made of each tone of the shaker: level, amplitude, harmonics per axis, slips of the
 // sample clock inside it, and what scatter the tone adds to the noise.
 //
+//   ToneOptions options;
+//   options.clock_ppm = host_timing(bundle).clock_ppm;  // timing.h
+//   for (const ToneFit& tone : fit_tones(bundle, clean, options)) {
+//     const double amplitude_mg = tone.in_phase_mg[tone.axis];
+//   }
+//
 // Sinusoids of known frequency are fitted by least squares to the samples that are not masked
 // (a clipped sample is censored, not wrong). The phase at the start is unknown; amplitudes are
 // those in phase with the axis that the shaker moves most. Where samples were lost or repeated the
@@ -13,8 +19,8 @@
 #include <optional>
 #include <vector>
 
-#include "gap/bundle.h"
-#include "gap/clean.h"
+#include "gap/recording/bundle.h"
+#include "gap/recording/clean.h"
 
 namespace sixpoint::gap {
 

@@ -1,4 +1,4 @@
-#include "gap/diagnosis.h"
+#include "gap/judge/diagnosis.h"
 
 #include <cmath>
 
@@ -6,7 +6,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "gap/catalogue.h"
+#include "gap/explain/catalogue.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -52,20 +52,20 @@ Json finding_json(const EffectFinding& finding) {
   return json;
 }
 
+Json findings_json(const std::vector<EffectFinding>& findings) {
+  Json json = Json::array();
+  for (const EffectFinding& finding : findings) {
+    json.push_back(finding_json(finding));
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string_view to_string(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::no_gap:
-      return "no_gap";
-    case Verdict::explained:
-      return "explained";
-    case Verdict::partly_explained:
-      return "partly_explained";
-    case Verdict::unexplained:
-      return "unexplained";
-  }
-  return "";
+  constexpr std::array<std::string_view, 4> kNames = {"no_gap", "explained", "partly_explained",
+                                                      "unexplained"};
+  return kNames[static_cast<std::size_t>(verdict)];
 }
 
 std::string Diagnosis::brief() const {
@@ -115,15 +115,15 @@ std::string Diagnosis::brief() const {
 }
 
 Json augmented_scenario(const Diagnosis& diagnosis) {
-  Json json;
-  json["schema"] = "sixpoint/scenario/1";
-  json["seed"] = diagnosis.seed;
-  json["protocol"] = diagnosis.protocol == "production" ? "production" : "engineering";
-  json["unit"]["serial"] = diagnosis.serial;
-  json["unit"]["gain"] = diagnosis.unit.gain;
-  json["unit"]["offset_g"] = diagnosis.unit.offset_g;
-  json["unit"]["noise_mg"] = diagnosis.unit.noise_mg;
-  json["effects"] = Json::array();
+  Json json = {{"schema", "sixpoint/scenario/1"},
+               {"seed", diagnosis.seed},
+               {"protocol", diagnosis.protocol == "production" ? "production" : "engineering"},
+               {"unit",
+                {{"serial", diagnosis.serial},
+                 {"gain", diagnosis.unit.gain},
+                 {"offset_g", diagnosis.unit.offset_g},
+                 {"noise_mg", diagnosis.unit.noise_mg}}},
+               {"effects", Json::array()}};
   for (const EffectFinding& effect : diagnosis.effects) {
     Json entry;
     entry["name"] = effect.name;
@@ -141,25 +141,19 @@ Json augmented_scenario(const Diagnosis& diagnosis) {
 }
 
 Json Diagnosis::to_json() const {
-  Json json;
-  json["bundle"] = bundle;
-  json["serial"] = serial;
-  json["firmware"] = firmware;
-  json["protocol"] = protocol;
-  json["verdict"] = to_string(verdict);
-  json["inconclusive"] = inconclusive;
-  json["brief"] = brief();
-  json["effects"] = Json::array();
-  for (const EffectFinding& effect : effects) {
-    json["effects"].push_back(finding_json(effect));
-  }
-  json["candidates"] = Json::array();
-  for (const EffectFinding& candidate : candidates) {
-    json["candidates"].push_back(finding_json(candidate));
-  }
-  json["unknown"]["present"] = unknown.present;
-  json["unknown"]["probability"] = finite(unknown.probability);
-  json["unknown"]["where"] = unknown.where;
+  Json json = {{"bundle", bundle},
+               {"serial", serial},
+               {"firmware", firmware},
+               {"protocol", protocol},
+               {"verdict", to_string(verdict)},
+               {"inconclusive", inconclusive},
+               {"brief", brief()},
+               {"effects", findings_json(effects)},
+               {"candidates", findings_json(candidates)},
+               {"unknown",
+                {{"present", unknown.present},
+                 {"probability", finite(unknown.probability)},
+                 {"where", unknown.where}}}};
   json["not_observable"] = Json::array();
   for (const auto& [name, segment] : not_observable) {
     json["not_observable"].push_back({{"name", name}, {"needs_segment", segment}});

@@ -1,4 +1,8 @@
-// The answer: where simulator and recording part, which effect explains it, how much is left.
+// The answer: where simulator and recording differ, which effect explains it, how much is left.
+//
+//   std::cout << diagnosis.brief() << "\n" << diagnosis.to_json().dump(2) << "\n";
+//
+// Plain data. Units are in the names: mg, g, Hz, s, C; sigma: standard deviations.
 #pragma once
 
 #include <array>
@@ -21,19 +25,19 @@ struct NamedValue {
 struct EffectFinding {
   std::string name;
   double probability = 0;
-  double nats = 0;  // evidence for it over its absence, prior included
-  std::vector<NamedValue> parameters;
+  double nats = 0;  // evidence for it over its absence, prior included; see diagnose.h
+  std::vector<NamedValue> parameters = {};
   double held_out_gain_nats = 0;
   bool outside_datasheet = false;
-  std::vector<std::string> confounded_with;
-  // Log odds of something that the catalogue lacks in its place; takes from the probability.
+  std::vector<std::string> confounded_with = {};
+  // Log odds of a cause that the catalogue lacks in its place: they lower the probability.
   double other_nats = -1e3;
 };
 
 struct UnknownFinding {
   bool present = false;
   double probability = 0;
-  std::vector<std::string> where;  // most striking first, in words
+  std::vector<std::string> where;  // strongest first, in words
 };
 
 struct GapSize {

@@ -1,13 +1,13 @@
-// Does the recording follow the protocol at all? Nothing of the catalogue moves the mean of a dwell
-// by 50 mg while it lasts, or holds a dwell 200 mg off every gain and offset that an axis may have:
-// what does is a list of poses or of sample numbers that is not of this recording.
+// Does the recording follow the protocol at all? No effect of the catalogue moves the mean of a
+// dwell by 50 mg while it lasts, or leaves a dwell 200 mg off any gain and offset of its axis: then
+// the list of poses or of sample numbers belongs to another recording.
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "gap/diagnoser.h"
+#include "gap/judge/steps.h"
 
 namespace sixpoint::gap {
 
@@ -15,8 +15,11 @@ namespace {
 
 constexpr double kMoves_g = 0.05;
 constexpr double kElsewhere_g = 0.2;
-constexpr double kRing_s = 2;
-constexpr std::size_t kLeastDwells = 6;
+constexpr double kAlarmUnit_g = 0.005;   // convention: one standard deviation of the alarm
+constexpr double kRing_s = 2;            // left out after a move
+constexpr double kLeastHalf_s = 1;       // unmasked, in each half of a dwell
+constexpr std::size_t kLeastDwells = 6;  // for a gain and an offset per axis
+constexpr std::size_t kFewMoving = 4;    // one dwell in four may move
 
 struct Dwell {
   std::size_t segment = 0;
@@ -46,7 +49,7 @@ std::vector<Dwell> dwells_of(const Bundle& bundle, const CleanSamples& clean) {
         n.at(half) += 1;
       }
     }
-    const double least = bundle.rate_hz;  // a second in each half
+    const double least = kLeastHalf_s * bundle.rate_hz;
     if (n[0] < least || n[1] < least) {
       continue;
     }
@@ -59,22 +62,17 @@ std::vector<Dwell> dwells_of(const Bundle& bundle, const CleanSamples& clean) {
   return dwells;
 }
 
-}  // namespace
+// The dwell that lies furthest from gain * pose + offset on any axis, and by how much.
+struct Worst {
+  std::size_t segment = 0;
+  double off_g = 0;
+};
 
-bool Diagnoser::judge_poses() {
-  const std::vector<Dwell> dwells = dwells_of(bundle_, clean_);
-  const auto moving = static_cast<std::size_t>(
-      std::count_if(dwells.begin(), dwells.end(), [](const Dwell& dwell) { return dwell.moves; }));
-  if (4 * moving > dwells.size()) {
-    return false;
-  }
-  if (dwells.size() < kLeastDwells) {
-    return true;
-  }
-  double worst_g = 0;
-  std::size_t worst = 0;
+Worst worst_of(const std::vector<Dwell>& dwells) {
+  constexpr double kRegular = 1e-9;
+  Worst worst;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * 1e-9;
+    Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * kRegular;
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
     for (const Dwell& dwell : dwells) {
       const Eigen::Vector2d row(dwell.pose[axis], 1);
@@ -84,20 +82,34 @@ bool Diagnoser::judge_poses() {
     const Eigen::Vector2d fit = normal.inverse() * right;
     for (const Dwell& dwell : dwells) {
       const double off_g = std::abs(dwell.mean_g[axis] - fit[0] * dwell.pose[axis] - fit[1]);
-      if (off_g > worst_g) {
-        worst_g = off_g;
-        worst = dwell.segment;
+      if (off_g > worst.off_g) {
+        worst = {dwell.segment, off_g};
       }
     }
   }
-  if (worst_g > kElsewhere_g) {
-    poses_wrong_ = true;
-    alarm(worst_g / 0.005,
-          fmt::format("pose: segment {} ({}) does not lie as the protocol says, by "
-                      "{:.2f} g",
-                      worst, bundle_.segments[worst].name, worst_g));
+  return worst;
+}
+
+}  // namespace
+
+PoseCheck judge_poses(const Bundle& bundle, const CleanSamples& clean) {
+  PoseCheck check;
+  const std::vector<Dwell> dwells = dwells_of(bundle, clean);
+  const auto moving = static_cast<std::size_t>(
+      std::count_if(dwells.begin(), dwells.end(), [](const Dwell& dwell) { return dwell.moves; }));
+  check.moving = kFewMoving * moving > dwells.size();
+  if (check.moving || dwells.size() < kLeastDwells) {
+    return check;
   }
-  return true;
+  const Worst worst = worst_of(dwells);
+  if (worst.off_g > kElsewhere_g) {
+    check.wrong = true;
+    check.found.alarm(
+        worst.off_g / kAlarmUnit_g,
+        fmt::format("pose: segment {} ({}) does not lie as the protocol says, by {:.2f} g",
+                    worst.segment, bundle.segments[worst.segment].name, worst.off_g));
+  }
+  return check;
 }
 
 }  // namespace sixpoint::gap

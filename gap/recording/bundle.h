@@ -1,11 +1,17 @@
 // A bundle: one unit's recording of one protocol, and what the station knew meanwhile.
 //
-// A folder with recording.gt3x, protocol.json, temperature.csv and host_clock.csv. Files are read
-// through the FileSystem that was given. Input is hostile: whatever contradicts itself is
-// `bad_data`, whatever is merely missing becomes a line of `losses`, in words for a person.
+//   SIXPOINT_ASSIGN(const Bundle bundle, read_bundle(env.files, "bundle"));
+//   for (const Segment& segment : bundle.segments) {
+//     const gt3x::Counts& first = bundle.samples[segment.first_sample];
+//   }
+//
+// A folder with recording.gt3x, protocol.json, temperature.csv and host_clock.csv. Files are not
+// trusted: a contradiction is `bad_data`, a missing log becomes a line of `losses`, in words for a
+// person. A Bundle is plain data; it refers to nothing outside itself.
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,7 +20,7 @@
 #include "base/env.h"
 #include "base/measure.h"
 #include "base/result.h"
-#include "gt3x/samples.h"
+#include "gt3x/log/samples.h"
 
 namespace sixpoint::gap {
 
@@ -45,10 +51,16 @@ struct Segment {
   bool settled = false;  // at rest from its first sample on, as a jig's readings are
   // Samples at the start may still ring from the move.
   bool may_ring() const { return starts_placement && !settled; }
+  bool at_rest() const { return kind != Kind::vibration; }
+  // The first sample, counted from the segment's, at which ringing is over.
+  std::size_t quiet_start(double rate_hz) const {
+    constexpr double kRinging_s = 3;  // five times the longest decay of the catalogue, 0.6 s
+    return may_ring() ? std::min(samples, static_cast<std::size_t>(kRinging_s * rate_hz)) : 0;
+  }
   // Specific force now less that of the pose before, sensor's frame, g: how it was approached.
   Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
-  // Per axis the sign of its last step, 0 before the first: a step that leaves an axis where it was
-  // leaves this, too.
+  // Per axis the sign of its last step, 0 before the first. A step that does not move an axis does
+  // not change its sign.
   Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();
 };
 
@@ -65,7 +77,8 @@ struct HostClock {
   bool empty() const { return sample_index.empty(); }
 };
 
-// What the header says. Headers are copied and lie: evidence for a candidate, never a veto.
+// What the header says. Headers are copied and can be wrong: evidence for a candidate, never a
+// veto.
 struct Header {
   std::string serial;
   std::string model;
@@ -77,7 +90,7 @@ struct Bundle {
   std::string path;
   double rate_hz = 100;
   double accel_scale_lsb_per_g = 256;
-  double gravity_g = 1;  // what the operator believes
+  double gravity_g = 1;  // by the protocol
   Header header;         // of the recording
   std::string protocol_serial;
   std::vector<Segment> segments;
@@ -95,16 +108,10 @@ struct Bundle {
   }
 };
 
-struct BundleLimits {
-  std::size_t max_samples = 20'000'000;  // two days at 100 Hz, 120 MB
-  std::size_t max_segments = 5'000;      // fifty times the engineering protocol
-};
-
 // no_input where the folder, protocol.json or recording.gt3x is missing; bad_data where the
 // protocol is no JSON of schema sixpoint/bundle/1, lacks a key, holds a number that can't be, a
 // rotation that is none, segments that overlap or reach beyond the recording, or a scale or sample
-// rate that the header contradicts and the samples do not bear out (header_evidence.h).
-Result<Bundle> read_bundle(FileSystem& files, const std::string& folder,
-                           const BundleLimits& limits = {});
+// rate that header and samples contradict (header_evidence.h).
+Result<Bundle> read_bundle(FileSystem& files, const std::string& folder);
 
 }  // namespace sixpoint::gap

@@ -1,9 +1,14 @@
 // Discrete effects are found and undone in the samples first, before anything is averaged.
 //
+//   const CleanSamples clean = clean_samples(bundle);
+//   double sum_mg = 0;
+//   for (std::size_t i = 0; i < clean.samples.size(); ++i) {
+//     if (clean.usable(i)) sum_mg += clean.value_mg(i, 2);  // axis Z
+//   }
+//
 // A turned axis, a stretch of zeros or a held value ruins every mean that contains it, and none of
-// them needs a fit: each leaves marks that noise cannot make. What is found here is undone (axes)
-// or masked (zeros, held and clipped samples), so that the rest of the diagnosis sees what the unit
-// would have recorded without it.
+// them needs a fit: each leaves marks that noise cannot make. Turned axes and wraps are undone
+// here; zeros, held and clipped samples are masked.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +16,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "gap/bundle.h"
+#include "gap/recording/bundle.h"
 
 namespace sixpoint::gap {
 
@@ -32,13 +37,21 @@ struct RunTally {
 struct CleanSamples {
   std::vector<gt3x::Counts> samples;  // axes turned back, wraps undone
   std::vector<std::uint8_t> flags;    // SampleFlag, one per sample
+  double accel_scale_lsb_per_g = 256;
+
+  bool usable(std::size_t i) const {
+    return (flags[i] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0;
+  }
+  double value_mg(std::size_t i, std::size_t axis) const {
+    return 1000.0 * samples[i][axis] / accel_scale_lsb_per_g;
+  }
 
   bool axes_turned = false;
   Eigen::Matrix3i axis_matrix = Eigen::Matrix3i::Identity();  // maps the right axes to the stored
   // How much worse, in g rms over the poses, the untouched axes fit than the best signed
   // permutation.
   double axes_gain_g = 0;
-  bool axes_decidable = false;  // the poses tell every signed permutation from every other
+  bool axes_decidable = false;  // no two signed permutations fit the poses alike
   // Mean distance, in g, of the poses from what the protocol says, axes as decided.
   double pose_error_g = 0;
 

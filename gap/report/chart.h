@@ -1,16 +1,18 @@
-// Drawings of a diagnosis: axes, ticks and marks as SVG, the same for the page and the sheet.
+// Drawings of a diagnosis, the same for the page and the sheet.
+//
+//   gap::Chart chart("After a move", "s", "share of the step");
+//   chart.line({0, 0.1, 0.2}, {0.03, -0.02, 0.01}, "#2f5fa8", "measured");
+//   page += chart.figure();
 #pragma once
 
 #include <limits>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
-#include "gap/diagnosis.h"
+#include "gap/judge/diagnosis.h"
 
 namespace sixpoint::gap {
-
-std::string escaped(std::string_view text);  // for XML and HTML
 
 class Chart {
  public:
@@ -56,5 +58,12 @@ class Chart {
 // Noise spectrum, Allan deviation, tone response, zero over temperature, what is left over time,
 // the response to a step.
 std::vector<Chart> charts_of(const Diagnosis& diagnosis);
+
+// How strongly a residual of so many sigma is coloured, 0 to 1.
+double sigma_shade(double sigma);
+
+// The gap in mg from "before" over each accepted effect. Squares add: each effect takes its share
+// of what was closed by its evidence.
+std::vector<std::pair<std::string, double>> gap_bars(const Diagnosis& diagnosis);
 
 }  // namespace sixpoint::gap

@@ -1,14 +1,13 @@
-#include "gap/report_html.h"
+#include "gap/report/report_html.h"
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <limits>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "gap/chart.h"
+#include "base/html.h"
+#include "gap/report/chart.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -19,11 +18,11 @@ std::string residual_map(const Diagnosis& d) {
       "first</caption><tr><th>axis</th><th>segment</th><th>factor</th><th>mg</th><th>sigma</th></"
       "tr>";
   for (const Location& w : d.where) {
-    const double share = std::clamp(std::log10(std::max(1.0, w.sigma)) / 2.5, 0.0, 1.0);
     out += fmt::format(
         "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.2f}</td><td "
         "style=\"background:rgba(181,68,46,{:.2f})\">{:.1f}</td></tr>",
-        "XYZ"[w.axis], escaped(w.segment), escaped(w.factor), w.residual_mg, share, w.sigma);
+        "XYZ"[w.axis], html_escaped(w.segment), html_escaped(w.factor), w.residual_mg,
+        sigma_shade(w.sigma), w.sigma);
   }
   return out + "</table>";
 }
@@ -31,25 +30,14 @@ std::string residual_map(const Diagnosis& d) {
 std::string waterfall(const Diagnosis& d) {
   std::string out = "<table><caption>From the gap to the floor</caption>";
   const double most = std::max({d.gap.before_mg, d.gap.after_mg, d.gap.floor_mg, 1e-9});
-  const auto bar = [&](const std::string& name, double mg) {
+  auto bars = gap_bars(d);
+  bars.emplace_back("floor of noise and seating", d.gap.floor_mg);
+  for (const auto& [name, mg] : bars) {
     out += fmt::format(
         "<tr><td>{}</td><td>{:.2f} mg</td><td><div class=\"bar\" "
         "style=\"width:{:.1f}%\"></div></td></tr>",
-        escaped(name), mg, 100 * std::sqrt(mg / most));
-  };
-  bar("before", d.gap.before_mg);
-  // Squares add: each accepted effect takes its share of what was closed, by its evidence.
-  double total = 0;
-  for (const EffectFinding& e : d.effects) {
-    total += e.nats;
+        html_escaped(name), mg, 100 * std::sqrt(mg / most));
   }
-  double square = d.gap.before_mg * d.gap.before_mg;
-  const double closed = square - d.gap.after_mg * d.gap.after_mg;
-  for (const EffectFinding& e : d.effects) {
-    square -= total > 0 ? closed * e.nats / total : 0;
-    bar("with " + e.name, std::sqrt(std::max(0.0, square)));
-  }
-  bar("floor of noise and seating", d.gap.floor_mg);
   return out + "</table>";
 }
 
@@ -90,14 +78,14 @@ std::string report_html(const Diagnosis& d) {
       "svg text{font:11px "
       "system-ui,sans-serif}.bar{background:#b5442e;height:1em}"
       "@media print{figure{break-inside:avoid}}</style>";
-  out +=
-      fmt::format("<h1>Unit {}, firmware {}, protocol {}</h1><p class=\"say\">{}</p>",
-                  escaped(d.serial), escaped(d.firmware), escaped(d.protocol), escaped(d.brief()));
+  out += fmt::format("<h1>Unit {}, firmware {}, protocol {}</h1><p class=\"say\">{}</p>",
+                     html_escaped(d.serial), html_escaped(d.firmware), html_escaped(d.protocol),
+                     html_escaped(d.brief()));
   for (const std::string& where : d.unknown.where) {
-    out += fmt::format("<p>Not explained: {}</p>", escaped(where));
+    out += fmt::format("<p>Not explained: {}</p>", html_escaped(where));
   }
   for (const std::string& loss : d.losses) {
-    out += fmt::format("<p>Note: {}</p>", escaped(loss));
+    out += fmt::format("<p>Note: {}</p>", html_escaped(loss));
   }
   out += effects_table(d.effects, "Accepted effects", 20);
   out += waterfall(d);
@@ -118,7 +106,7 @@ std::string report_html(const Diagnosis& d) {
   for (const NextSegment& n : d.next_segments) {
     out += fmt::format("<p>Next: {} ({:.0f} minutes, {:.2f} nats expected) separates {}</p>",
                        n.name, n.minutes, n.expected_nats,
-                       escaped(fmt::format("{}", fmt::join(n.separates, ", "))));
+                       html_escaped(fmt::format("{}", fmt::join(n.separates, ", "))));
   }
   return out + "</html>\n";
 }

@@ -1,11 +1,13 @@
 // The diagnosis as one sheet of paper (A4, SVG): to be printed, or turned into PNG or PDF.
+//
+//   SIXPOINT_ASSIGN(const Bytes pdf, gap::sheet_pdf(gap::report_sheet(diagnosis)));
 #pragma once
 
 #include <string>
 
 #include "base/env.h"
 #include "base/result.h"
-#include "gap/diagnosis.h"
+#include "gap/judge/diagnosis.h"
 
 namespace sixpoint::gap {
 

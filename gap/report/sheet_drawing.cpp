@@ -1,4 +1,4 @@
-// The seam to librsvg and cairo: nothing else of the project includes them.
+// The only file of this room that includes librsvg and cairo.
 #include <functional>
 #include <memory>
 
@@ -6,7 +6,7 @@
 #include <cairo.h>
 #include <librsvg/rsvg.h>
 
-#include "gap/report_sheet.h"
+#include "gap/report/report_sheet.h"
 
 namespace sixpoint::gap {
 namespace {

@@ -1,11 +1,16 @@
-// Diagnosis of a table of readings: text or CSV, also gzipped, of a sensor that was rested in many
-// directions. No header, no constants, no protocol: gain and zero of each axis are free, and only
-// what the lengths at rest say beyond them is judged, which is whether the axes stand square.
+// Diagnosis of a table of readings: text or CSV, also gzipped, of a sensor that rested in many
+// directions.
 //
-// A line holds time and three readings, or three readings (then the rate must be told), parted by
-// spaces, commas, semicolons or tabs. Time is in seconds; readings are in any unit that is linear
-// in acceleration. A first line that is no numbers names the columns. Lines that begin with # are
-// passed over.
+//   SIXPOINT_ASSIGN(const Diagnosis diagnosis, diagnose_table(env.files, "readings.csv"));
+//   std::cout << diagnosis.brief() << '\n';
+//
+// There is no header, no constants and no protocol: gain and zero of each axis are free. What the
+// lengths at rest say beyond them is judged, which is whether the axes are square.
+//
+// A line holds time and three readings, or three readings (then the rate must be given), separated
+// by spaces, commas, semicolons or tabs. Time is in seconds; readings are in any unit that is
+// linear in acceleration. A first line that is not numbers names the columns. Lines that begin with
+// # are skipped.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,15 +19,15 @@
 #include <vector>
 
 #include "base/env.h"
-#include "gap/diagnose.h"
-#include "gap/diagnosis.h"
+#include "gap/judge/diagnose.h"
+#include "gap/judge/diagnosis.h"
 
 namespace sixpoint::gap {
 
 struct ReadingsTableOptions {
-  double rate_hz = 0;  // of tables without a time column; 0: not told
-  // Half of what the paper's still periods have: people who turn a sensor by hand through forty
-  // directions rest it for three seconds each.
+  double rate_hz = 0;  // of tables without a time column; 0: not given
+  // Half of the paper's still periods: a sensor that is turned through forty directions rests for
+  // about three seconds in each.
   double block_s = 2;
   // Blocks of more than this many times the scatter of the stillest tenth are no rest.
   double still_factor = 2.5;
@@ -45,7 +50,7 @@ struct ReadingsTable {
 // True for the names that such tables have: .txt, .csv, .tsv, also with .gz behind.
 bool is_readings_table(const std::string& path);
 
-// no_input, io; bad_data naming the line for what is no table; usage where the rate must be told.
+// no_input, io; bad_data naming the line for what is no table; usage where the rate must be given.
 // Memory is bounded by the number of blocks, 500,000 at most.
 Result<ReadingsTable> read_readings_table(FileSystem& files, const std::string& path,
                                           const ReadingsTableOptions& options = {});

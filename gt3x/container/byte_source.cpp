@@ -1,4 +1,4 @@
-#include "gt3x/byte_source.h"
+#include "gt3x/container/byte_source.h"
 
 #include <algorithm>
 

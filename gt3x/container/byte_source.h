@@ -1,4 +1,7 @@
 // Bytes that are pulled, piece by piece: how log.bin comes out of a zip and goes into one.
+//
+//   MemorySource source(Bytes{0x1E, 0x06});
+//   SIXPOINT_ASSIGN(const Bytes bytes, read_all(source, 1 << 20));  // at most 1 MiB
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "gt3x/zip_bridge.h"
+#include "gt3x/container/zip_bridge.h"
 
 #include <cerrno>
 
@@ -23,11 +23,7 @@ zip_int64_t pull(void* user, void* data, zip_uint64_t length, zip_source_cmd_t c
       }
       auto count = state->source->read(std::span(static_cast<std::uint8_t*>(data), length));
       if (!count) {
-        if (!*state->failure) {
-          *state->failure = std::move(count).error();
-        }
-        zip_error_set(&state->error, ZIP_ER_READ, EIO);
-        return -1;
+        return refuse(std::move(count).error(), *state->failure, ZIP_ER_READ, state->error);
       }
       return static_cast<zip_int64_t>(*count);
     }
@@ -43,7 +39,7 @@ zip_int64_t pull(void* user, void* data, zip_uint64_t length, zip_source_cmd_t c
     case ZIP_SOURCE_ERROR:
       return zip_error_to_data(&state->error, data, length);
     case ZIP_SOURCE_FREE:
-      delete state;  // NOLINT(cppcoreguidelines-owning-memory): libzip's way to say goodbye
+      delete state;  // NOLINT(cppcoreguidelines-owning-memory): libzip's last call
       return 0;
     case ZIP_SOURCE_SUPPORTS:
       return ZIP_SOURCE_SUPPORTS_READABLE | zip_bit(ZIP_SOURCE_SUPPORTS);
@@ -59,6 +55,24 @@ std::string describe(zip_error_t* error) {
   std::string text = zip_error_strerror(error);
   zip_error_fini(error);
   return text;
+}
+
+zip_int64_t refuse(Error why, std::optional<Error>& first, int code, zip_error_t& error) {
+  if (!first) {
+    first = std::move(why);
+  }
+  zip_error_set(&error, code, EIO);
+  return -1;
+}
+
+zip_int64_t seek(std::uint64_t& at, std::uint64_t size, void* data, zip_uint64_t length,
+                 zip_error_t& error) {
+  const zip_int64_t target = zip_source_seek_compute_offset(at, size, data, length, &error);
+  if (target < 0) {
+    return -1;
+  }
+  at = static_cast<std::uint64_t>(target);
+  return 0;
 }
 
 zip_source_t* make_pulling_source(std::unique_ptr<ByteSource> source,

@@ -1,4 +1,4 @@
-#include "gt3x/agdc.h"
+#include "gt3x/forms/agdc.h"
 
 #include <array>
 #include <cmath>
@@ -70,29 +70,27 @@ Result<TemperatureReading> parse_temperature(std::span<const std::uint8_t> paylo
 }
 
 double TemperatureCalibration::processor_c(double adc) const {
-  return on_line(adc, processor_low_adc, processor_high_adc, low_c, high_c);
+  return on_line(adc, low.processor_adc, high.processor_adc, low.temperature_c, high.temperature_c);
 }
 
 double TemperatureCalibration::accelerometer_c(double adc) const {
-  return on_line(adc, accelerometer_low_adc, accelerometer_high_adc, low_c, high_c);
+  return on_line(adc, low.accelerometer_adc, high.accelerometer_adc, low.temperature_c,
+                 high.temperature_c);
 }
 
 Result<TemperatureCalibration> parse_temperature_calibration(std::string_view text) {
   SIXPOINT_ASSIGN(const Json json, parse_object(text));
   TemperatureCalibration calibration;
-  const std::array<std::pair<const char*, double*>, 6> wanted = {{
-      {"tempLow", &calibration.low_c},
-      {"tempHigh", &calibration.high_c},
-      {"mcuTempLow", &calibration.processor_low_adc},
-      {"mcuTempHigh", &calibration.processor_high_adc},
-      {"adxlTempLow", &calibration.accelerometer_low_adc},
-      {"adxlTempHigh", &calibration.accelerometer_high_adc},
-  }};
-  for (const auto& [key, value] : wanted) {
-    SIXPOINT_ASSIGN(*value, number_at(json, key));
+  using Point = TemperatureCalibration::Point;
+  for (const auto& [name, value] :
+       {std::pair(std::string("temp"), &Point::temperature_c),
+        std::pair(std::string("mcuTemp"), &Point::processor_adc),
+        std::pair(std::string("adxlTemp"), &Point::accelerometer_adc)}) {
+    SIXPOINT_ASSIGN(calibration.low.*value, number_at(json, name + "Low"));
+    SIXPOINT_ASSIGN(calibration.high.*value, number_at(json, name + "High"));
   }
-  if (calibration.processor_low_adc == calibration.processor_high_adc ||
-      calibration.accelerometer_low_adc == calibration.accelerometer_high_adc) {
+  if (calibration.low.processor_adc == calibration.high.processor_adc ||
+      calibration.low.accelerometer_adc == calibration.high.accelerometer_adc) {
     return not_a_calibration("the two points of the temperature calibration are one");
   }
   return calibration;

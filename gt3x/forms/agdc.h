@@ -1,6 +1,9 @@
 // What only .agdc files (CentrePoint Insight) hold: die temperatures in log.bin, and calibrations
 // that the unit does not apply itself.
 //
+//   SIXPOINT_ASSIGN(const AgdcCalibration calibration, parse_agdc_calibration(json, 256));
+//   const PerAxis<double> value_g = calibration.apply({-12, 5, 1024});  // raw counts
+//
 // In an .agdc file the samples (ACTIVITY3) are raw sensor counts. calibration.json says how they
 // become g, per sample rate, in two forms: the six-point form of Eq. 1-6, and an offset with a
 // symmetric sensitivity matrix ("calibrationMethod": 2), which is what the vendor applies.
@@ -15,7 +18,7 @@
 #include "base/constants.h"
 #include "base/measure.h"
 #include "base/result.h"
-#include "gt3x/samples.h"
+#include "gt3x/log/samples.h"
 
 namespace sixpoint::gt3x {
 
@@ -29,12 +32,12 @@ Result<TemperatureReading> parse_temperature(std::span<const std::uint8_t> paylo
 
 // temperature_calibration.json: two points of a straight line per sensor.
 struct TemperatureCalibration {
-  double low_c = 0;
-  double high_c = 0;
-  double processor_low_adc = 0;
-  double processor_high_adc = 0;
-  double accelerometer_low_adc = 0;
-  double accelerometer_high_adc = 0;
+  struct Point {
+    double temperature_c = 0;
+    double processor_adc = 0;
+    double accelerometer_adc = 0;
+  };
+  Point low, high;
 
   double processor_c(double adc) const;
   double accelerometer_c(double adc) const;

@@ -1,4 +1,4 @@
-#include "gt3x/info.h"
+#include "gt3x/forms/info.h"
 
 #include <algorithm>
 #include <charconv>

@@ -1,5 +1,11 @@
 // info.txt: what the vendor's software wrote down about the recording, "Key: value" line by line.
 //
+//   SIXPOINT_ASSIGN(Info info, Info::parse("Serial Number: MOS2A45130450\r\nSample Rate: 30\r\n"));
+//   info.serial();          // "MOS2A45130450"
+//   info.sample_rate_hz();  // 30
+//   info.set("Subject Name", "007");
+//   const std::string text = info.serialise();
+//
 // Read with tolerance (a byte-order mark, either line end, decimal commas, lines that are no pairs)
 // and written back exactly as it was, but for the lines that were set.
 #pragma once

@@ -1,4 +1,4 @@
-#include "gt3x/model.h"
+#include "gt3x/forms/model.h"
 
 #include <array>
 

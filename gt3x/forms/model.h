@@ -1,4 +1,7 @@
 // What a serial number says about the unit.
+//
+//   model_of("MOS2A45130450");                       // "wGT3X-BT"
+//   default_accel_scale_lsb_per_g("MOS2A45130450");  // 256
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-#include "gt3x/parameters.h"
+#include "gt3x/forms/parameters.h"
 
 #include <charconv>
 #include <cmath>
@@ -10,10 +10,6 @@ namespace sixpoint::gt3x {
 namespace {
 
 constexpr std::size_t kEntrySize = 8;
-constexpr std::uint32_t kFractionMask = 0x00FFFFFF;
-constexpr std::uint32_t kTooLarge = 0x007FFFFF;
-constexpr std::uint32_t kTooLargeNegative = 0x00800000;
-constexpr double kFractionUnit = 8388608.0;  // 2^23
 
 std::uint32_t read_le(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t size) {
   std::uint32_t value = 0;
@@ -120,6 +116,15 @@ void set_constants(ParameterValues& values, const StoredConstants& constants) {
     put(kParameterZero, constants.zero_lsb[axis]);
   }
 }
+
+namespace {
+
+constexpr std::uint32_t kFractionMask = 0x00FFFFFF;
+constexpr std::uint32_t kTooLarge = 0x007FFFFF;
+constexpr std::uint32_t kTooLargeNegative = 0x00800000;
+constexpr double kFractionUnit = 8388608.0;  // 2^23
+
+}  // namespace
 
 double decode_float(std::uint32_t code) {
   if (code == kTooLarge) {

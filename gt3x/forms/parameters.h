@@ -1,5 +1,10 @@
 // The PARAMETERS record: how the unit was set up, and the constants it scales with.
 //
+//   SIXPOINT_ASSIGN(const Parameters parameters, parse_parameters(record.payload));
+//   if (parameters.constants) {
+//     parameters.constants->zero_lsb;  // what the unit subtracted
+//   }
+//
 // The payload is a list of 8-byte entries, all little-endian: address space (2), identifier (2),
 // value (4). The record usually stands once near the start; where it is repeated, the last one
 // before a sample holds for that sample.

@@ -1,4 +1,4 @@
-#include "gt3x/log_reader.h"
+#include "gt3x/log/log_reader.h"
 
 #include <algorithm>
 #include <cstring>
@@ -15,7 +15,7 @@ constexpr std::size_t kCapacity = 4 * kLookahead;
 constexpr std::size_t kMaxZerosInChain = 16;
 
 // Times of neighbouring records: the clock may be set back by an hour, and idle sleep or a shelf
-// may last two weeks. What lies outside needs a second witness, the record behind it.
+// may last two weeks. What lies outside is believed when the record behind it agrees.
 constexpr std::int64_t kNearBack_s = 3600;
 constexpr std::int64_t kNearForward_s = std::int64_t{14} * 86400;
 
@@ -127,11 +127,11 @@ class LogReader::Window {
     if (at_end(behind)) {
       return true;
     }
-    const auto witness = frame_at(behind);
-    return witness && witness->checksum_ok && near(witness->time, frame->time);
+    const auto next_frame = frame_at(behind);
+    return next_frame && next_frame->checksum_ok && near(next_frame->time, frame->time);
   }
 
-  // Running sums make the checksum of any stretch a matter of two look-ups, so that looking for a
+  // Running sums make the checksum of any stretch a matter of two look-ups, so that searching for a
   // record at every byte of a hostile file stays linear.
   void prepare_sums() {
     if (!folded_.empty()) {
@@ -272,7 +272,7 @@ class LogReader::Window {
   std::size_t end_ = 0;
   std::uint64_t base_ = 0;  // offset of bytes_[0] in log.bin
   bool end_of_source_ = false;
-  Bytes folded_;  // folded_[i]: exclusive-or of bytes_[0 .. i-1]; empty while nobody needs it
+  Bytes folded_;  // folded_[i]: exclusive-or of bytes_[0 .. i-1]; empty until it is needed
   bool lost_ = false;
   std::optional<std::uint32_t> last_time_;
   std::optional<Loss> open_loss_;

@@ -3,17 +3,17 @@
 //   LogReader log(std::move(source));
 //   for (;;) {
 //     SIXPOINT_ASSIGN(const auto item, log.next());
-//     if (!item) break;                       // the end, and the entry's CRC held
-//     if (item->kind == LogItem::Kind::record && item->record.checksum_ok) ...
+//     if (!item) break;  // the end, and the entry's CRC held
+//     if (item->kind == LogItem::Kind::record && item->record.checksum_ok) ++good_records;
 //   }
 //
 // Every byte of log.bin belongs to exactly one item: the `raw` of all items, one behind the other,
 // are log.bin. Memory is bounded (a few MiB) whatever the input says.
 //
-// How damage is told from data:
+// How damage is distinguished from data:
 //  - Zero bytes between records are legal ("stray").
 //  - A record whose checksum fails but behind which records go on is a record with
-//    checksum_ok = false: count it, carry its bytes on, do not believe its payload.
+//    checksum_ok = false: count it, carry its bytes on, do not use its payload.
 //  - Anything else that is no record starts a damaged stretch. It ends at the next place where a
 //    record begins whose checksum holds, behind which stands a separator, a zero byte or the end,
 //    and whose time lies near that of the last good record or of the record behind it. So at most
@@ -29,8 +29,8 @@
 #include <span>
 #include <vector>
 
-#include "gt3x/byte_source.h"
-#include "gt3x/record.h"
+#include "gt3x/container/byte_source.h"
+#include "gt3x/log/record.h"
 
 namespace sixpoint::gt3x {
 

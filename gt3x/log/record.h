@@ -1,5 +1,9 @@
 // One record of log.bin.
 //
+//   Bytes log;
+//   append_record(log, RecordType::battery, 1'400'000'000, Bytes{0x68, 0x10});  // 4200 mV
+//   record_type_name(log[1]);                                                   // "BATTERY"
+//
 // On disk (vendor's public description of the .gt3x format): separator 0x1E, type (1 byte), Unix
 // time (4 bytes, little-endian), payload size (2, little-endian), payload, checksum (1): the one's
 // complement of the exclusive-or of everything before it. Times are the wearer's local time written
@@ -51,7 +55,7 @@ inline constexpr std::size_t kMaxRecord = kMaxPayload + kRecordOverhead;
 inline constexpr std::uint8_t kEventEnterIdleSleep = 0x08;
 inline constexpr std::uint8_t kEventLeaveIdleSleep = 0x09;
 
-// A view of one record; whoever hands it out says how long the bytes stay.
+// A view of one record; the function that returns it says how long the bytes stay.
 struct Record {
   std::uint8_t type = 0;
   std::uint32_t unix_time = 0;

@@ -1,4 +1,4 @@
-#include "gt3x/samples.h"
+#include "gt3x/log/samples.h"
 
 #include <algorithm>
 

@@ -1,5 +1,11 @@
 // Samples in the payloads of ACTIVITY, ACTIVITY2 and ACTIVITY3 records, both ways.
 //
+//   const std::vector<Counts> second(30, {0, 0, 256});  // 30 Hz, Z up at 256 LSB/g
+//   Bytes payload;
+//   append_activity(payload, second);
+//   std::vector<Counts> samples;
+//   unpack_activity(payload, samples);  // the same again
+//
 // Packed payloads (vendor's public description): 12 bits per value, most significant bit first, two
 // values in three bytes; the order of the axes on disk is Y X Z in ACTIVITY and in activity.bin,
 // X Y Z in ACTIVITY3. After an odd number of values the last nibble is unused. ACTIVITY2 holds

@@ -1,14 +1,12 @@
-#include "mocks/fault_injector.h"
+#include "mocks/faults/fault_injector.h"
 
 #include <algorithm>
+
+#include "base/time.h"
 
 namespace sixpoint::mocks {
 
 namespace {
-
-nanoseconds from_seconds(double time_s) {
-  return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(time_s));
-}
 
 FaultSubject subject_of(std::span<const std::uint8_t> report) {
   return report.size() > 1 && report[1] == static_cast<std::uint8_t>(device::ReportKind::samples)
@@ -119,7 +117,7 @@ void FaultInjector::pass(VirtualUnit& unit, FaultChannel channel, FaultDirection
     switch (fault.kind) {
       case FaultKind::stall:
         stalled = true;
-        copies = fault.count == 0 ? 0 : copies;  // an endpoint that never recovers
+        copies = fault.count == 0 ? 0 : copies;  // the endpoint never recovers
         break;
       case FaultKind::delay:
         due += from_seconds(*fault.seconds);
@@ -166,37 +164,38 @@ void FaultInjector::come_back(VirtualUnit& unit, nanoseconds now) {
   ++enumeration_;
 }
 
+void FaultInjector::leave_bus(VirtualUnit& unit, std::optional<double> seconds, nanoseconds now) {
+  unit.lose_cable();
+  drop_queues();
+  plugged_ = false;
+  back_at_ = seconds ? std::optional(now + from_seconds(*seconds)) : std::nullopt;
+}
+
+void FaultInjector::drop_queues() {
+  reports_.clear();
+  blocks_.clear();
+}
+
 void FaultInjector::strike_unit(const Fault& fault, VirtualUnit& unit, nanoseconds now) {
-  const auto leave = [&](std::optional<double> seconds) {
-    unit.lose_cable();
-    reports_.clear();
-    blocks_.clear();
-    plugged_ = false;
-    back_at_.reset();
-    if (seconds) {
-      back_at_ = now + from_seconds(*seconds);
-    }
-  };
   switch (fault.kind) {
     case FaultKind::reset:
       unit.cut_power(now);
       unit.restore_power(now);
-      reports_.clear();
-      blocks_.clear();
+      drop_queues();
       break;
     case FaultKind::reenumerate:
-      leave(0);
+      leave_bus(unit, 0, now);
       break;
     case FaultKind::unplug:
-      leave(fault.seconds);
+      leave_bus(unit, fault.seconds, now);
       break;
     case FaultKind::swap: {
-      leave(fault.seconds.value_or(0));
+      leave_bus(unit, fault.seconds.value_or(0), now);
       VirtualUnitOptions other;
-      sim::UnitWishes wishes;
-      wishes.serial = fault.serial;
+      sim::GivenProperties given;
+      given.serial = fault.serial;
       other.seed = random_.bits();
-      other.truth = sim::draw_unit(other.seed, wishes);
+      other.truth = sim::draw_unit(other.seed, given);
       other_unit_ = std::move(other);
       break;
     }
@@ -233,11 +232,10 @@ void FaultInjector::strike_unit(const Fault& fault, VirtualUnit& unit, nanosecon
 void FaultInjector::advance(VirtualUnit& unit, nanoseconds now) {
   if (power_back_after_ && !unit.is_powered()) {
     plugged_ = false;
-    reports_.clear();
-    blocks_.clear();
+    drop_queues();
     back_at_ = now + *std::exchange(power_back_after_, std::nullopt);
   }
-  // In the order of their times, each at its own: nobody may have asked for long.
+  // In the order of their times, each at its own time: the last call may be long ago.
   for (;;) {
     State* next = nullptr;
     nanoseconds next_at = back_at_.value_or(nanoseconds::max());
@@ -284,8 +282,8 @@ CableEvent FaultInjector::write_report(VirtualUnit& unit, std::span<const std::u
     if (held.stalled) {
       event.kind = CableEvent::Kind::stalled;
     } else if (plugged_) {
-      // A delay on the way out is seen as a late answer all the same: the unit gets it at once, and
-      // what it says waits.
+      // A delay towards the unit also makes a late answer: the unit gets the report at once, and
+      // its reply waits.
       unit.take_report(held.bytes, now);
       if (held.due > now) {
         reports_.push_back({held.due, false, {}});
@@ -301,7 +299,7 @@ CableEvent FaultInjector::write_report(VirtualUnit& unit, std::span<const std::u
 
 CableEvent FaultInjector::read_report(VirtualUnit& unit, nanoseconds now) {
   advance(unit, now);
-  // A transfer may become none: then the next one.
+  // A transfer may be lost: then take the next one.
   while (plugged_ && reports_.empty()) {
     const auto report = unit.next_report(now);
     if (!report) {
@@ -315,7 +313,7 @@ CableEvent FaultInjector::read_report(VirtualUnit& unit, nanoseconds now) {
   }
   for (;;) {
     CableEvent event = take(reports_, now);
-    // The mark of a delay on the way out is no transfer.
+    // The mark of a delay towards the unit is no transfer.
     if (event.kind != CableEvent::Kind::data || !event.bytes.empty()) {
       return event;
     }
@@ -338,7 +336,7 @@ CableEvent FaultInjector::read_bulk(VirtualUnit& unit, nanoseconds now) {
 }
 
 std::optional<nanoseconds> FaultInjector::next_due(const VirtualUnit& unit) const {
-  // What waits here comes before what the unit has next.
+  // Reports that wait here come before the unit's next one.
   std::optional<nanoseconds> due = reports_.empty() ? unit.next_due() : std::nullopt;
   const auto earlier = [&due](nanoseconds time) { due = due ? std::min(*due, time) : time; };
   if (!reports_.empty()) {

@@ -1,11 +1,12 @@
 // Carries a fault plan out, between a virtual unit and its carrier.
 //
-// A carrier that has one asks it wherever it would ask the unit: write_report() for take_report(),
-// read_report() for next_report(), read_bulk() for next_bulk(), next_due() for next_due(); and
-// looks at plugged() and enumeration(). With an empty plan it passes everything through.
-//
-//   FaultInjector faults(*read_fault_plan(files, "F.json"), clock.elapsed());
+//   SIXPOINT_ASSIGN(FaultPlan plan, read_fault_plan(files, "F.json"));
+//   FaultInjector faults(std::move(plan), clock.elapsed());
 //   const CableEvent event = faults.read_report(unit, clock.elapsed());
+//
+// A carrier calls it in place of the unit: write_report() for take_report(), read_report() for
+// next_report(), read_bulk() for next_bulk(), next_due() for next_due(). It also checks plugged()
+// and enumeration(). With an empty plan everything passes unchanged.
 //
 // One thread at a time; the unit is the same in all calls (a swap replaces what is in it).
 #pragma once
@@ -14,8 +15,8 @@
 #include <deque>
 
 #include "base/random.h"
-#include "mocks/fault_plan.h"
-#include "mocks/virtual_unit.h"
+#include "mocks/faults/fault_plan.h"
+#include "mocks/firmware/virtual_unit.h"
 
 namespace sixpoint::mocks {
 
@@ -32,14 +33,14 @@ struct CableEvent {
 
 class FaultInjector {
  public:
-  FaultInjector() = default;  // nothing goes wrong
+  FaultInjector() = default;  // no faults
   FaultInjector(FaultPlan plan, nanoseconds start);
 
-  // Faults that are due by time. The functions below do it too; a carrier that hears nothing for
-  // long (hot plug) calls it by itself.
+  // Carries out the faults that are due by time. The functions below do it too; a carrier without
+  // transfers for a long time (hot plug) calls it itself.
   void advance(VirtualUnit& unit, nanoseconds now);
   bool plugged() const { return plugged_; }
-  // Rises with every time that the unit came (back) to the bus: open handles of before are dead.
+  // Rises each time the unit comes back to the bus: handles that were opened before are dead.
   std::uint32_t enumeration() const { return enumeration_; }
 
   CableEvent write_report(VirtualUnit& unit, std::span<const std::uint8_t> report, nanoseconds now);
@@ -65,11 +66,14 @@ class FaultInjector {
 
   // Whether the fault strikes this transfer.
   bool strikes(State& state, std::size_t size, nanoseconds now);
-  // Puts what becomes of a transfer at the end of `queue`.
+  // Appends what becomes of a transfer to `queue`.
   void pass(VirtualUnit& unit, FaultChannel channel, FaultDirection direction, Bytes bytes,
             nanoseconds now, Queue& queue);
   void strike_unit(const Fault& fault, VirtualUnit& unit, nanoseconds now);
+  // For good without `seconds`.
+  void leave_bus(VirtualUnit& unit, std::optional<double> seconds, nanoseconds now);
   void come_back(VirtualUnit& unit, nanoseconds now);
+  void drop_queues();
   CableEvent take(Queue& queue, nanoseconds now);
   void spoil(const State& state, Bytes& bytes, FaultChannel channel);
 

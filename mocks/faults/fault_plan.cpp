@@ -1,4 +1,4 @@
-#include "mocks/fault_plan.h"
+#include "mocks/faults/fault_plan.h"
 
 #include <algorithm>
 #include <array>
@@ -8,13 +8,18 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/serial.h"
+
 namespace sixpoint::mocks {
 
 namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array<std::pair<FaultKind, std::string_view>, 20> kNames = {{
+template <class Value, std::size_t kCount>
+using Names = std::array<std::pair<Value, std::string_view>, kCount>;
+
+constexpr Names<FaultKind, 20> kNames = {{
     {FaultKind::stall, "stall"},
     {FaultKind::delay, "delay"},
     {FaultKind::short_packet, "short_packet"},
@@ -59,35 +64,13 @@ class Reader {
 
   template <class Value>
   Status whole(const char* key, Value& value, std::uint64_t low, std::uint64_t high) const {
-    const Json* found = find(key);
-    if (found == nullptr) {
-      return {};
-    }
-    if (!found->is_number_unsigned() || found->get<std::uint64_t>() < low ||
-        found->get<std::uint64_t>() > high) {
-      return wrong(path(key), fmt::format("this must be a whole number from {} to {}", low, high));
-    }
-    if constexpr (std::is_integral_v<Value>) {
-      value = static_cast<Value>(found->get<std::uint64_t>());
-    } else {
-      value = found->get<std::uint64_t>();
-    }
-    return {};
+    return read(key, value, &Json::is_number_unsigned, "a whole number", low, high);
   }
   Status number(const char* key, std::optional<double>& value, double low, double high) const {
-    const Json* found = find(key);
-    if (found == nullptr) {
-      return {};
-    }
-    if (!found->is_number() || !(found->get<double>() >= low && found->get<double>() <= high)) {
-      return wrong(path(key), fmt::format("this must be a number from {} to {}", low, high));
-    }
-    value = found->get<double>();
-    return {};
+    return read(key, value, &Json::is_number, "a number", low, high);
   }
   template <class Value, std::size_t kCount>
-  Status choice(const char* key, Value& value,
-                const std::array<std::pair<Value, std::string_view>, kCount>& names) const {
+  Status choice(const char* key, Value& value, const Names<Value, kCount>& names) const {
     const Json* found = find(key);
     if (found == nullptr) {
       return {};
@@ -106,14 +89,25 @@ class Reader {
   }
 
  private:
+  template <class Number, class Value>
+  Status read(const char* key, Value& value, bool (Json::*is_kind)() const noexcept,
+              const char* kind, Number low, Number high) const {
+    const Json* found = find(key);
+    if (found == nullptr) {
+      return {};
+    }
+    if (!(found->*is_kind)() || !(found->get<Number>() >= low && found->get<Number>() <= high)) {
+      return wrong(path(key), fmt::format("this must be {} from {} to {}", kind, low, high));
+    }
+    value = static_cast<Value>(found->get<Number>());
+    return {};
+  }
+
   const Json& json_;
   std::string path_;
 };
 
-Result<Fault> read_fault(const Json& json, const std::string& path) {
-  if (!json.is_object()) {
-    return wrong(path, "this must be an object");
-  }
+Status check_keys(const Json& json, const std::string& path) {
   constexpr std::array<std::string_view, 16> kKeys = {
       "fault", "at_report", "at_byte", "at_s", "channel",    "direction", "of",     "count",
       "every", "seconds",   "bytes",   "bit",  "battery_mv", "axis",      "serial", "byte"};
@@ -122,40 +116,43 @@ Result<Fault> read_fault(const Json& json, const std::string& path) {
       return wrong(fmt::format("{}/{}", path, key), "this key is not known");
     }
   }
-  const Reader in(json, path);
-  if (in.find("fault") == nullptr) {
-    return wrong(path, "a fault needs the key 'fault'");
-  }
-  Fault fault;
-  SIXPOINT_CHECK(in.choice("fault", fault.kind, kNames));
-  SIXPOINT_CHECK(in.whole("at_report", fault.at.report, 1, kMostCount));
-  SIXPOINT_CHECK(in.whole("at_byte", fault.at.byte, 0, kMostCount));
-  SIXPOINT_CHECK(in.number("at_s", fault.at.time_s, 0, kLongest_s));
-  if (int{fault.at.report.has_value()} + int{fault.at.byte.has_value()} +
-          int{fault.at.time_s.has_value()} !=
-      1) {
-    return wrong(path, "a fault needs exactly one of at_report, at_byte and at_s");
-  }
-  SIXPOINT_CHECK(
-      in.choice("channel", fault.channel,
-                std::array<std::pair<FaultChannel, std::string_view>, 2>{
-                    {{FaultChannel::reports, "reports"}, {FaultChannel::bulk, "bulk"}}}));
-  SIXPOINT_CHECK(in.choice(
-      "direction", fault.direction,
-      std::array<std::pair<FaultDirection, std::string_view>, 2>{
-          {{FaultDirection::from_unit, "from_unit"}, {FaultDirection::to_unit, "to_unit"}}}));
-  SIXPOINT_CHECK(in.choice("of", fault.subject,
-                           std::array<std::pair<FaultSubject, std::string_view>, 3>{
-                               {{FaultSubject::any, "any"},
-                                {FaultSubject::replies, "replies"},
-                                {FaultSubject::samples, "samples"}}}));
-  if (fault.channel == FaultChannel::bulk &&
-      (fault.direction == FaultDirection::to_unit || fault.subject != FaultSubject::any)) {
+  return {};
+}
+
+Status read_time(const Reader& in, const std::string& path, FaultTime& at) {
+  SIXPOINT_CHECK(in.whole("at_report", at.report, 1, kMostCount));
+  SIXPOINT_CHECK(in.whole("at_byte", at.byte, 0, kMostCount));
+  SIXPOINT_CHECK(in.number("at_s", at.time_s, 0, kLongest_s));
+  const int times =
+      int{at.report.has_value()} + int{at.byte.has_value()} + int{at.time_s.has_value()};
+  return times == 1 ? Status{}
+                    : wrong(path, "a fault needs exactly one of at_report, at_byte and at_s");
+}
+
+// Which transfers count.
+Status read_place(const Reader& in, const std::string& path, Fault& fault) {
+  constexpr Names<FaultChannel, 2> kChannels = {
+      {{FaultChannel::reports, "reports"}, {FaultChannel::bulk, "bulk"}}};
+  constexpr Names<FaultDirection, 2> kDirections = {
+      {{FaultDirection::from_unit, "from_unit"}, {FaultDirection::to_unit, "to_unit"}}};
+  constexpr Names<FaultSubject, 3> kSubjects = {{{FaultSubject::any, "any"},
+                                                 {FaultSubject::replies, "replies"},
+                                                 {FaultSubject::samples, "samples"}}};
+  SIXPOINT_CHECK(in.choice("channel", fault.channel, kChannels));
+  SIXPOINT_CHECK(in.choice("direction", fault.direction, kDirections));
+  SIXPOINT_CHECK(in.choice("of", fault.subject, kSubjects));
+  const bool to_unit = fault.direction == FaultDirection::to_unit;
+  const bool some_subject = fault.subject != FaultSubject::any;
+  if (fault.channel == FaultChannel::bulk && (to_unit || some_subject)) {
     return wrong(path, "on the bulk channel there are blocks from the unit only");
   }
-  if (fault.direction == FaultDirection::to_unit && fault.subject != FaultSubject::any) {
-    return wrong(in.path("of"), "what goes to the unit is neither a reply nor a sample");
-  }
+  return to_unit && some_subject
+             ? wrong(in.path("of"), "a transfer to the unit is neither a reply nor a sample")
+             : Status{};
+}
+
+// What the kind of fault needs besides.
+Status read_values(const Reader& in, Fault& fault) {
   SIXPOINT_CHECK(in.whole("count", fault.count, 0, kMostCount));
   SIXPOINT_CHECK(in.whole("every", fault.every, 1, kMostCount));
   SIXPOINT_CHECK(in.number("seconds", fault.seconds,
@@ -164,24 +161,36 @@ Result<Fault> read_fault(const Json& json, const std::string& path) {
   SIXPOINT_CHECK(in.whole("bit", fault.bit, 0, 7));
   SIXPOINT_CHECK(in.whole("byte", fault.byte, 0, 1U << 20U));
   SIXPOINT_CHECK(in.whole("battery_mv", fault.battery_mv, 0, 65'535));
-  SIXPOINT_CHECK(in.choice(
-      "axis", fault.axis,
-      std::array<std::pair<std::size_t, std::string_view>, 3>{{{0U, "x"}, {1U, "y"}, {2U, "z"}}}));
+  constexpr Names<std::size_t, 3> kAxisNames = {{{0U, "x"}, {1U, "y"}, {2U, "z"}}};
+  SIXPOINT_CHECK(in.choice("axis", fault.axis, kAxisNames));
   if (const Json* serial = in.find("serial")) {
-    if (!serial->is_string() || serial->get_ref<const std::string&>().empty() ||
-        serial->get_ref<const std::string&>().size() > 16 ||
-        serial->get_ref<const std::string&>().find_first_not_of(
-            "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_.") !=
-            std::string::npos) {
+    if (!serial->is_string() || !is_serial(serial->get_ref<const std::string&>())) {
       return wrong(in.path("serial"), "this must be a serial number of 1 to 16 letters and digits");
     }
     fault.serial = serial->get<std::string>();
   }
+  return {};
+}
+
+Result<Fault> read_fault(const Json& json, const std::string& path) {
+  if (!json.is_object()) {
+    return wrong(path, "this must be an object");
+  }
+  SIXPOINT_CHECK(check_keys(json, path));
+  const Reader in(json, path);
+  if (in.find("fault") == nullptr) {
+    return wrong(path, "a fault needs the key 'fault'");
+  }
+  Fault fault;
+  SIXPOINT_CHECK(in.choice("fault", fault.kind, kNames));
+  SIXPOINT_CHECK(read_time(in, path, fault.at));
+  SIXPOINT_CHECK(read_place(in, path, fault));
+  SIXPOINT_CHECK(read_values(in, fault));
   const bool needs_seconds = fault.kind == FaultKind::delay || fault.kind == FaultKind::clock_jump;
   if (needs_seconds && !fault.seconds) {
     return wrong(path, "this fault needs the key 'seconds'");
   }
-  if (fault.every && !fault.at.report && !fault.at.byte) {
+  if (fault.every && fault.at.time_s) {
     return wrong(in.path("every"), "this goes with at_report and at_byte only");
   }
   if (fault.every && fault.count >= *fault.every) {
@@ -235,7 +244,7 @@ Result<FaultPlan> parse_fault_plan(std::string_view text) {
 
 Result<FaultPlan> read_fault_plan(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, 1U << 20U));
-  auto plan = parse_fault_plan({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  auto plan = parse_fault_plan(as_text(bytes));
   if (!plan) {
     Error error = std::move(plan).error();
     error.where = printable(path, 200) + ": " + error.where;

@@ -1,11 +1,13 @@
-// What shall go wrong with a virtual unit, and when: a plan in JSON (docs/faults.md).
+// The faults of a virtual unit, and when they come: a plan in JSON (docs/faults.md).
 //
-//   {"schema": "sixpoint/faults/1",
-//    "faults": [{"fault": "unplug", "at_s": 20, "seconds": 2},
-//               {"fault": "bit_flip", "of": "samples", "at_report": 100, "every": 50}]}
+//   SIXPOINT_ASSIGN(const FaultPlan plan, read_fault_plan(env.files, "F.json"));
 //
-// The plan is data; fault_injector.h carries it out between a virtual unit and whatever carrier it
-// is on, so that one plan does the same in-process, over umockdev and over USB/IP.
+//     {"schema": "sixpoint/faults/1",
+//      "faults": [{"fault": "unplug", "at_s": 20, "seconds": 2},
+//                 {"fault": "bit_flip", "of": "samples", "at_report": 100, "every": 50}]}
+//
+// The plan is data; fault_injector.h carries it out between a virtual unit and its carrier, so one
+// plan does the same in-process, over umockdev and over USB/IP.
 #pragma once
 
 #include <cstdint>
@@ -22,16 +24,16 @@ namespace sixpoint::mocks {
 enum class FaultKind {
   // Of a transfer.
   stall,           // the endpoint refuses it; the data stay where they are
-  delay,           // it comes `seconds` late, and all behind it wait
+  delay,           // it comes `seconds` late, and all later ones wait
   short_packet,    // only its first `bytes` come
   garbage,         // random bytes of the same length
-  bit_flip,        // bit `bit` of one byte is turned
+  bit_flip,        // bit `bit` of one byte is inverted
   bad_crc,         // its CRC does not fit
   duplicate,       // it comes twice
   lost,            // it does not come
   wrong_sequence,  // its sequence is another one, and the CRC fits
   // Of the unit.
-  reset,          // the firmware starts anew; the cable stays
+  reset,          // the firmware restarts; the cable stays
   reenumerate,    // it leaves the bus and comes back at once as another node
   unplug,         // the cable is out for `seconds`; for good without
   swap,           // another unit of serial `serial` is put in its place, after `seconds`
@@ -78,11 +80,11 @@ struct Fault {
 };
 
 struct FaultPlan {
-  std::uint64_t seed = 1;  // of garbage and of what is drawn
+  std::uint64_t seed = 1;  // of all random values
   std::vector<Fault> faults;
 };
 
-// configuration on anything that docs/faults.md does not say, with the path of the key.
+// configuration on anything that docs/faults.md does not allow, with the path of the key.
 Result<FaultPlan> parse_fault_plan(std::string_view json);
 // Also no_input; at most 1 MiB.
 Result<FaultPlan> read_fault_plan(FileSystem& files, const std::string& path);

@@ -1,8 +1,8 @@
-#include "mocks/page_memory.h"
+#include "mocks/firmware/page_memory.h"
 
 #include <algorithm>
 
-#include "device/protocol.h"
+#include "device/wire/protocol.h"
 
 namespace sixpoint::mocks {
 

@@ -1,6 +1,10 @@
 // The non-volatile memory of one page: two banks, so that a loss of power leaves the old page or
 // the new one (docs/protocol.md, "Writing a page is a transaction").
 //
+//   PageMemory memory(page);
+//   memory.cut_power_after(100);
+//   memory.write(other_page);  // false: the old page is still in force
+//
 // Bytes are written one at a time, and power may fail before any of them: cut_power_after().
 #pragma once
 
@@ -10,7 +14,7 @@
 #include <span>
 
 #include "base/env.h"
-#include "device/calibration_page.h"
+#include "device/wire/calibration_page.h"
 
 namespace sixpoint::mocks {
 
@@ -25,7 +29,7 @@ class PageMemory {
   // False when the power failed on the way, or the bank did not read back as written.
   bool write(std::span<const std::uint8_t> page);
 
-  // The next `bytes` byte writes succeed; then nothing is written any more until restore_power().
+  // The next `bytes` byte writes succeed; after them all fail until restore_power().
   void cut_power_after(std::uint64_t bytes) { power_left_ = bytes; }
   void restore_power() { power_left_.reset(); }
   bool has_power() const { return !power_left_ || *power_left_ > 0; }

@@ -1,17 +1,19 @@
-// The folder that a unit with mass storage and nothing else shows when it is plugged in.
+// The folder of a unit with mass storage and nothing else.
+//
+//   Status made = make_virtual_drive(env.files, "/media/UNIT", {});  // info.txt and log.bin
 #pragma once
 
 #include <string>
 
-#include "mocks/virtual_unit.h"
+#include "mocks/firmware/virtual_unit.h"
 
 namespace sixpoint::mocks {
 
 struct VirtualDriveOptions {
   VirtualUnitOptions unit;
   int rate_hz = 30;
-  double side_s = 45;  // how long it lies on each of its sides
-  int sides = 6;       // fewer: the person left some out
+  double side_s = 45;  // how long it lies on each side
+  int sides = 6;       // fewer: some sides are missing
 };
 
 // A .gt3x file of a unit that recorded while it lay on its sides, one after the other. usage where

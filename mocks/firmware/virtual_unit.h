@@ -1,12 +1,14 @@
 // A unit in software: what its firmware does, over the simulated sensor.
 //
-// It speaks the wire protocol (docs/protocol.md) and does no input or output of its own: a carrier
-// hands it reports, asks it for reports and bulk blocks, and tells it the time. The same model
-// serves the in-process carrier and any other. Times are those of the carrier's clock
-// (Clock::elapsed) and never go back.
+//   mocks::VirtualUnit unit({.truth = sim::draw_unit(7, {})});
+//   unit.take_report(request, now);
+//   std::optional<device::Report> reply = unit.next_report(now);
 //
-// Samples are made when they are asked for, so a unit that nobody reads costs nothing. One thread
-// at a time.
+// It answers the wire protocol (docs/protocol.md) and has no input or output of its own: a carrier
+// gives it reports and the time, and takes reports and bulk blocks from it. Times are those of the
+// carrier's clock (Clock::elapsed) and never go back.
+//
+// Samples are made on request: a unit that is not read costs nothing. One thread at a time.
 #pragma once
 
 #include <chrono>
@@ -19,9 +21,9 @@
 #include <vector>
 
 #include "base/env.h"
-#include "device/protocol.h"
-#include "mocks/page_memory.h"
-#include "sim/motion.h"
+#include "device/wire/protocol.h"
+#include "mocks/firmware/page_memory.h"
+#include "mocks/firmware/pose_history.h"
 #include "sim/simulator.h"
 #include "sim/unit_truth.h"
 
@@ -31,11 +33,11 @@ using std::chrono::nanoseconds;
 
 struct VirtualUnitOptions {
   sim::UnitTruth truth;
-  std::uint64_t seed = 1;  // of noise and of the hand that turns it
+  std::uint64_t seed = 1;  // of noise and of seating scatter
   std::uint16_t battery_mv = 4100;
   double temperature_c = 24.5;
   double gravity_g = 1;
-  // Seating scatter of every placement, standard deviation per axis: a careful hand on a good jig.
+  // Seating scatter of every placement, standard deviation per axis: a careful person, a good jig.
   double seating_deg = 0.01;
   // Flash for recordings. A recording that does not fit ends where the flash is full.
   std::uint64_t flash_bytes = 64ULL << 20U;
@@ -45,37 +47,37 @@ class VirtualUnit {
  public:
   explicit VirtualUnit(VirtualUnitOptions options, nanoseconds power_on = nanoseconds::zero());
 
-  // Carrier side. Anything may come in; what is no report is dropped.
+  // Carrier side. Any bytes may come in; bytes that are no report are dropped.
   void take_report(std::span<const std::uint8_t> report, nanoseconds now);
   std::optional<device::Report> next_report(nanoseconds now);
   std::optional<Bytes> next_bulk(nanoseconds now);
-  // Counts the requests to download: a new one ends what is on its way.
+  // Number of requests to download: a new one ends the one before.
   std::uint64_t downloads() const { return downloads_; }
-  // When the next report comes by itself; none when nothing will without being asked.
+  // When the next report comes without a request; none where there is no stream.
   std::optional<nanoseconds> next_due() const;
 
-  // The hand or the jig. A turn takes `duration_s`; `tilt_deg` is how far the pose ends off.
+  // A person or a jig turns it in `duration_s`; `tilt_deg` is the error of the final pose.
   void turn_to(const Eigen::Vector3d& up, nanoseconds now, double duration_s, double tilt_deg = 0);
   bool is_turning(nanoseconds now) const;
   void stop_turning(nanoseconds now);  // it stays as it is at that moment
 
-  // Power. What is in RAM is lost: stream, staged page, kept reply, filter. A recording ends.
+  // Power. The content of RAM is lost: stream, staged page, stored reply, filter. A recording ends.
   void cut_power(nanoseconds now);
   void restore_power(nanoseconds now);
 
   bool is_powered() const { return powered_; }
-  // The host is gone (cable, bus reset): stream, staged page, kept reply and download end; a
-  // recording goes on, for the unit has a battery.
+  // The host is gone (cable, bus reset): stream, staged page, stored reply and download end. A
+  // recording goes on: the unit has a battery.
   void lose_cable();
 
-  // What may go wrong inside (fault_plan.h).
+  // Faults inside the unit (fault_plan.h).
   // The flash is full at `now`: a recording that runs ends there, and none begins.
   void fill_flash(nanoseconds now) { flash_full_since_ = now; }
   // From `now` on these axes repeat the reading that they have then.
   void freeze_sensor(const PerAxis<bool>& axes, nanoseconds now);
   // Device time and calendar jump by `jump`, which may be negative.
   void jump_clock(nanoseconds jump, nanoseconds now);
-  // The page in force is whole as memory goes, and its own CRC does not fit its content.
+  // The memory is whole, but the page's own CRC does not fit its content.
   void spoil_page();
 
   const sim::UnitTruth& truth() const { return options_.truth; }
@@ -89,9 +91,6 @@ class VirtualUnit {
   const std::vector<Bytes>& recordings() const { return images_; }
 
  private:
-  struct Turn;
-  // The pose as a function of time: every turn so far.
-  class Hand;
   struct Stream {
     nanoseconds start;
     int rate_hz;
@@ -118,22 +117,23 @@ class VirtualUnit {
     nanoseconds by;
   };
 
+  struct Commands;  // what it answers to each command: virtual_unit_commands.cpp
   device::Message answer(const device::Message& request, nanoseconds now);
-  device::ReplyCode start_stream(int rate_hz, nanoseconds now);
-  device::ReplyCode commit(std::uint16_t crc, Bytes& payload, nanoseconds now);
+  void answer_other_version(std::span<const std::uint8_t> report);
+  sim::SimulatorOptions simulator_options(int rate_hz, sim::FilterConfiguration filter,
+                                          nanoseconds start);
   void finish_recording(nanoseconds now);
   void keep(Bytes image, UtcTime start);
   void load_page();
   std::uint64_t device_time_us(nanoseconds at) const;
   nanoseconds jumped_until(nanoseconds at) const;
-  double seconds_on(nanoseconds at) const;
   std::uint64_t flash_left() const;
 
   VirtualUnitOptions options_;
   PageMemory memory_;
   nanoseconds power_on_;
   bool powered_ = true;
-  std::shared_ptr<Hand> hand_;
+  std::shared_ptr<PoseHistory> poses_;  // simulators of a running stream read it
   sim::FilterConfiguration stream_filter_ = sim::FilterConfiguration::current;
   std::optional<Stream> stream_;
   std::optional<RecordingRun> recording_;
@@ -151,9 +151,8 @@ class VirtualUnit {
   std::vector<ClockJump> clock_jumps_;  // since power-on
   PerAxis<bool> frozen_{};
   nanoseconds frozen_since_{0};
-  PerAxis<std::int16_t> frozen_counts_{};  // of the stream; filled by the first reading
-  bool frozen_counts_known_ = false;
-  std::uint64_t runs_ = 0;  // of streams and recordings: each has its own noise
+  std::optional<device::RawCounts> frozen_counts_;  // of the stream; its first reading
+  std::uint64_t runs_ = 0;                          // streams and recordings so far
 };
 
 }  // namespace sixpoint::mocks

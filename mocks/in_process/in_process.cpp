@@ -1,10 +1,10 @@
-#include "mocks/in_process.h"
+#include "mocks/in_process/in_process.h"
 
 #include <algorithm>
 
-#include "mocks/scaled_clock.h"
-#include "mocks/virtual_jig.h"
-#include "mocks/virtual_settings.h"
+#include "mocks/firmware/virtual_settings.h"
+#include "mocks/in_process/scaled_clock.h"
+#include "mocks/in_process/virtual_jig.h"
 
 namespace sixpoint::mocks {
 
@@ -15,8 +15,14 @@ tl::unexpected<Error> gone() {
               "plug it in again");
 }
 
-tl::unexpected<Error> stalled() {
-  return fail(ErrorCode::io, "the endpoint stalled", "virtual unit", "try again");
+Status check(const CableEvent& event) {
+  if (event.kind == CableEvent::Kind::gone) {
+    return gone();
+  }
+  if (event.kind == CableEvent::Kind::stalled) {
+    return fail(ErrorCode::io, "the endpoint stalled", "virtual unit", "try again");
+  }
+  return {};
 }
 
 class InProcess final : public device::Transport {
@@ -30,19 +36,7 @@ class InProcess final : public device::Transport {
     if (is_gone(now)) {
       return gone();
     }
-    if (bulk_) {
-      return {};
-    }
-    switch (plugged_->faults.write_report(plugged_->unit, bytes, now).kind) {
-      case CableEvent::Kind::gone:
-        return gone();
-      case CableEvent::Kind::stalled:
-        return stalled();
-      case CableEvent::Kind::nothing:
-      case CableEvent::Kind::data:
-        break;
-    }
-    return {};
+    return bulk_ ? Status{} : check(plugged_->faults.write_report(plugged_->unit, bytes, now));
   }
 
   Result<std::size_t> read(std::span<std::uint8_t> out, nanoseconds time_out) override {
@@ -60,15 +54,9 @@ class InProcess final : public device::Transport {
         FaultInjector& faults = plugged_->faults;
         const CableEvent event =
             bulk_ ? faults.read_bulk(plugged_->unit, now) : faults.read_report(plugged_->unit, now);
-        switch (event.kind) {
-          case CableEvent::Kind::data:
-            return copy(event.bytes, out);
-          case CableEvent::Kind::stalled:
-            return stalled();
-          case CableEvent::Kind::gone:
-            return gone();
-          case CableEvent::Kind::nothing:
-            break;
+        SIXPOINT_CHECK(check(event));
+        if (event.kind == CableEvent::Kind::data) {
+          return copy(event.bytes, out);
         }
         wake = std::min(wake, faults.next_due(plugged_->unit).value_or(wake));
       }

@@ -1,5 +1,8 @@
 // The in-process carrier: a virtual unit behind function calls, and the `virtual:` scheme.
 //
+//   auto plugged = std::make_shared<PluggedUnit>(VirtualUnitOptions{}, clock);
+//   Result<std::unique_ptr<device::Unit>> unit = device::WireUnit::open(link_to(plugged, false));
+//
 // With pace=fast (the default) the link has a clock of its own: waiting moves it, so that six poses
 // of ten seconds take milliseconds. With pace=real it is the machine's.
 #pragma once
@@ -8,8 +11,8 @@
 #include <mutex>
 
 #include "device/transport.h"
-#include "mocks/fault_injector.h"
-#include "mocks/virtual_unit.h"
+#include "mocks/faults/fault_injector.h"
+#include "mocks/firmware/virtual_unit.h"
 
 namespace sixpoint::mocks {
 

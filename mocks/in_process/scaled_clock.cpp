@@ -1,8 +1,8 @@
-#include "mocks/scaled_clock.h"
+#include "mocks/in_process/scaled_clock.h"
 
 #include "base/memory_env.h"
 #include "device/transport.h"
-#include "mocks/virtual_settings.h"
+#include "mocks/firmware/virtual_settings.h"
 
 namespace sixpoint::mocks {
 

@@ -1,4 +1,7 @@
 // A clock that runs a whole number of times faster than another.
+//
+//   ScaledClock clock(env.clock, 10);
+//   clock.sleep(std::chrono::seconds(10));  // takes one second
 #pragma once
 
 #include <memory>

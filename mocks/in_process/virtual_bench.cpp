@@ -1,20 +1,25 @@
-#include "mocks/virtual_bench.h"
+#include "mocks/in_process/virtual_bench.h"
 
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "mocks/scaled_clock.h"
-#include "mocks/virtual_settings.h"
+#include "mocks/firmware/virtual_settings.h"
+#include "mocks/in_process/scaled_clock.h"
 
 namespace sixpoint::mocks {
 
 namespace {
 
-// A hand's turn; a hand that slips is quicker.
+// A turn by a person; a knock is quicker.
 constexpr double kTurn_s = 1.5;
 constexpr double kKnock_s = 0.15;
 constexpr double kKnock_deg = 12;
+
+Eigen::Vector3d up_of(device::Pose pose) {
+  const auto up = device::direction_of(pose);
+  return {up[0], up[1], up[2]};
+}
 
 }  // namespace
 
@@ -75,39 +80,37 @@ Result<std::shared_ptr<PluggedUnit>> VirtualBench::unit_of(const std::string& de
   return found->second->plugged;
 }
 
-Status VirtualBench::turn(const std::string& device, device::Pose pose, double tilt_deg) {
+Status VirtualBench::turn_up(const std::string& device, const Eigen::Vector3d& up,
+                             double tilt_deg) const {
   SIXPOINT_ASSIGN(const auto plugged, unit_of(device));
-  {
-    const std::lock_guard lock(mutex_);
-    places_.at(device)->pose = pose;
-  }
-  const auto up = device::direction_of(pose);
   const std::lock_guard lock(plugged->mutex);
-  plugged->unit.turn_to({up[0], up[1], up[2]}, plugged->clock->elapsed(), kTurn_s, tilt_deg);
+  plugged->unit.turn_to(up, plugged->clock->elapsed(), kTurn_s, tilt_deg);
+  return {};
+}
+
+Status VirtualBench::turn(const std::string& device, device::Pose pose, double tilt_deg) {
+  SIXPOINT_CHECK(turn_up(device, up_of(pose), tilt_deg));
+  const std::lock_guard lock(mutex_);
+  places_.at(device)->pose = pose;
   return {};
 }
 
 Status VirtualBench::lean(const std::string& device) {
-  SIXPOINT_ASSIGN(const auto plugged, unit_of(device));
-  const std::lock_guard lock(plugged->mutex);
-  plugged->unit.turn_to(Eigen::Vector3d(1, 0, 1).normalized(), plugged->clock->elapsed(), kTurn_s);
-  return {};
+  return turn_up(device, Eigen::Vector3d(1, 0, 1).normalized(), 0);
 }
 
 Status VirtualBench::knock(const std::string& device) {
   SIXPOINT_ASSIGN(const auto plugged, unit_of(device));
-  device::Pose pose;
+  Eigen::Vector3d up;
   {
     const std::lock_guard lock(mutex_);
-    pose = places_.at(device)->pose;
+    up = up_of(places_.at(device)->pose);
   }
-  const auto up = device::direction_of(pose);
   const std::lock_guard lock(plugged->mutex);
   const nanoseconds now = plugged->clock->elapsed();
-  plugged->unit.turn_to({up[0], up[1], up[2]}, now, kKnock_s, kKnock_deg);
+  plugged->unit.turn_to(up, now, kKnock_s, kKnock_deg);
   plugged->unit.turn_to(
-      {up[0], up[1], up[2]},
-      now + std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(kKnock_s)),
+      up, now + std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(kKnock_s)),
       kKnock_s);
   return {};
 }
@@ -130,11 +133,11 @@ Status VirtualBench::set_plugged(const std::string& device, bool plugged_in) {
 Status VirtualBench::swap(const std::string& device, std::uint64_t seed,
                           const std::string& serial) {
   SIXPOINT_ASSIGN(const auto old, unit_of(device));
-  sim::UnitWishes wishes;
-  wishes.serial = serial;
+  sim::GivenProperties given;
+  given.serial = serial;
   VirtualUnitOptions options;
   options.seed = seed;
-  options.truth = sim::draw_unit(seed, wishes);
+  options.truth = sim::draw_unit(seed, given);
   {
     const std::lock_guard lock(old->mutex);
     old->unplugged = true;

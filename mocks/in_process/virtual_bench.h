@@ -1,10 +1,13 @@
-// Virtual units that stay on the bench when a program lets go of them, and the hand that turns
-// them.
+// Virtual units that stay plugged in when a program closes them, and can be turned.
 //
-// The `virtual:` scheme of in_process.h makes a new unit at every opening. A bench keeps one per
-// device string: it can be closed and opened again as after a replug, turned, knocked, pulled out
-// and swapped while a station works with it. For practice without hardware, and for tests of
-// everything above the wire.
+//   VirtualBench bench;
+//   bench.register_in(links);
+//   SIXPOINT_ASSIGN(const device::Link link, links.open("virtual:seed=7", env));
+//   SIXPOINT_CHECK(bench.turn("virtual:seed=7", device::Pose::plus_x));
+//
+// The `virtual:` scheme of in_process.h makes a new unit at every opening. A bench has one unit per
+// address: it can be closed and opened again, turned, knocked, unplugged and swapped while a
+// station works with it. For practice without hardware, and for tests of everything above the wire.
 #pragma once
 
 #include <map>
@@ -14,7 +17,7 @@
 #include <string_view>
 
 #include "device/jig.h"
-#include "mocks/in_process.h"
+#include "mocks/in_process/in_process.h"
 
 namespace sixpoint::mocks {
 
@@ -25,10 +28,10 @@ class VirtualBench {
   // device_unavailable.
   void register_in(device::TransportRegistry& registry);
 
-  // What a hand does to the unit of a device string ("virtual:..."). usage where the bench has none
-  // such: it was never opened.
+  // Actions on the unit of an address ("virtual:..."). usage where the bench has no such unit: it
+  // was never opened.
   Status turn(const std::string& device, device::Pose pose, double tilt_deg = 0);
-  Status lean(const std::string& device);                       // on an edge: between two faces
+  Status lean(const std::string& device);                       // on an edge, between two faces
   Status knock(const std::string& device);                      // moves it a little and back
   Status set_plugged(const std::string& device, bool plugged);  // its RAM is lost, as by the cable
   // Pulls it out and plugs another in, which has this seed and serial number.
@@ -38,6 +41,7 @@ class VirtualBench {
  private:
   struct Place;
   Result<std::shared_ptr<PluggedUnit>> unit_of(const std::string& device) const;
+  Status turn_up(const std::string& device, const Eigen::Vector3d& up, double tilt_deg) const;
 
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Place>> places_;

@@ -1,4 +1,4 @@
-#include "mocks/virtual_hid_jig.h"
+#include "mocks/in_process/virtual_hid_jig.h"
 
 #include <algorithm>
 #include <charconv>
@@ -7,7 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "device/payload.h"
+#include "base/serial.h"
+#include "device/wire/payload.h"
 
 namespace sixpoint::mocks {
 
@@ -28,31 +29,31 @@ tl::unexpected<Error> wrong(std::string_view key, std::string_view value) {
               {}, "docs/devices/motorised-jig.md lists the settings");
 }
 
-std::optional<JigFault> parse_fault(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, JigFault>, 6> kFaults = {
-      {{"overcurrent", JigFault::overcurrent},
-       {"encoder", JigFault::encoder},
-       {"obstructed", JigFault::obstructed},
-       {"door_open", JigFault::door_open},
-       {"not_homed", JigFault::not_homed},
-       {"supply_low", JigFault::supply_low}}};
-  for (const auto& [name, fault] : kFaults) {
-    if (name == text) {
-      return fault;
-    }
-  }
-  return std::nullopt;
+bool read_fault(std::string_view text, JigFault& fault) {
+  constexpr std::array<std::string_view, 7> kNames = {
+      "", "overcurrent", "encoder", "obstructed", "door_open", "not_homed", "supply_low"};
+  const auto found = std::find(kNames.begin() + 1, kNames.end(), text);
+  fault = static_cast<JigFault>(found == kNames.end() ? 0 : found - kNames.begin());
+  return found != kNames.end();
 }
 
 template <class Number>
-std::optional<Number> number_of(std::string_view text, Number low, Number high) {
-  Number number{};
+bool read_number(std::string_view text, Number low, Number high, Number& number) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || !(number >= low) ||
-      !(number <= high)) {
-    return std::nullopt;
+  return error == std::errc() && end == text.data() + text.size() && number >= low &&
+         number <= high;
+}
+
+bool read_setting(std::string_view key, std::string_view value, VirtualHidJigOptions& options) {
+  if (key == "serial") {
+    options.serial = std::string(value);
+    return is_serial(value);
   }
-  return number;
+  return (key == "fault" && read_fault(value, options.fault)) ||
+         (key == "fault_at" && read_number(value, 1, 1000, options.fault_at)) ||
+         (key == "wrong_pose_at" && read_number(value, 1, 1000, options.wrong_pose_at)) ||
+         (key == "lie_deg" && read_number(value, 0.0, 90.0, options.lie_deg)) ||
+         (key == "uncertainty_deg" && read_number(value, 0.0, 60.0, options.uncertainty_deg));
 }
 
 class JigTransport final : public device::Transport {
@@ -95,29 +96,7 @@ Result<VirtualHidJigOptions> parse_virtual_hid_jig(std::string_view text) {
     const std::size_t equals = std::min(setting.find('='), setting.size());
     const std::string_view key = setting.substr(0, equals);
     const std::string_view value = setting.substr(std::min(equals + 1, setting.size()));
-    bool good = false;
-    if (key == "serial") {
-      good = !value.empty() && value.size() <= 16 &&
-             std::all_of(value.begin(), value.end(), [](char c) { return c > 0x20 && c < 0x7F; });
-      options.serial = std::string(value);
-    } else if (key == "fault") {
-      const auto fault = parse_fault(value);
-      good = fault.has_value();
-      options.fault = fault.value_or(JigFault::none);
-    } else if (key == "fault_at" || key == "wrong_pose_at") {
-      const auto turn = number_of<int>(value, 1, 1000);
-      good = turn.has_value();
-      (key == "fault_at" ? options.fault_at : options.wrong_pose_at) = turn.value_or(0);
-    } else if (key == "lie_deg") {
-      const auto angle = number_of<double>(value, 0, 90);
-      good = angle.has_value();
-      options.lie_deg = angle.value_or(0);
-    } else if (key == "uncertainty_deg") {
-      const auto angle = number_of<double>(value, 0, 60);
-      good = angle.has_value();
-      options.uncertainty_deg = angle.value_or(0);
-    }
-    if (!good) {
+    if (!read_setting(key, value, options)) {
       return wrong(key, value);
     }
   }
@@ -129,10 +108,10 @@ VirtualHidJig::VirtualHidJig(VirtualHidJigOptions options, VirtualJig* physics)
 
 device::JigState VirtualHidJig::state(nanoseconds now) {
   if (motion_ == JigMotion::turning) {
-    // Its own encoder sees the turn, whatever pose it really ends in.
+    // Its encoder measures the turn, not the pose in which it really ends.
     const bool there = physics_ == nullptr
                            ? now - turned_at_ >= kTurnByItself
-                           : physics_->report().value_or(device::JigReport{}).pose.has_value();
+                           : physics_->position().value_or(device::JigPosition{}).pose.has_value();
     motion_ = there ? JigMotion::standing : JigMotion::turning;
   }
   device::JigState state;
@@ -180,7 +159,7 @@ device::Message VirtualHidJig::answer(const device::Message& request, nanosecond
   }
   switch (static_cast<JigCommand>(request.command)) {
     case JigCommand::identify:
-      reply.payload = device::encode_jig_identity({1, options_.serial, "1.0.0", "SixJig"});
+      reply.payload = device::encode_jig_identity({{options_.serial, "1.0.0", "SixJig"}, 1});
       return reply;
     case JigCommand::go_to:
       reply.code = pose < device::kPoses.size() ? turn_to(static_cast<device::Pose>(pose), now)

@@ -1,20 +1,23 @@
 // The motorised jig in software: the firmware that answers docs/devices/motorised-jig.md, over a
 // jig that turns a virtual unit (virtual_jig.h), or over nothing but time.
 //
-// No input or output of its own, as virtual_unit.h: a carrier hands it reports and asks it for
-// replies. link_to_jig() is the in-process carrier, and "virtual:SETTING,..." as a jig's address is
-// its scheme:
-//   serial, fault (a code of the page, such as obstructed), fault_at (the turn at which it comes, 1
-//   the first; 3), lie_deg (it ends so far off and reports none of it), wrong_pose_at (at this turn
-//   it goes elsewhere and reports the pose that was asked for), uncertainty_deg.
+//   auto jig = std::make_shared<VirtualHidJig>(VirtualHidJigOptions{}, nullptr);
+//   auto opened = device::HidJig::open(link_to_jig(jig, clock));
+//
+// It has no input or output of its own, as virtual_unit.h: a carrier gives it reports and takes
+// replies. link_to_jig() is the in-process carrier. The address of such a jig is
+// "virtual:SETTING,...":
+//   serial, fault (a code of the page, such as obstructed), fault_at (the turn at which it comes,
+//   from 1; 3), lie_deg (it ends so far off and does not report it), wrong_pose_at (at this turn it
+//   goes to another pose and reports the one that was asked for), uncertainty_deg.
 #pragma once
 
 #include <memory>
 #include <string_view>
 
-#include "device/hid_jig.h"
 #include "device/jig_registry.h"
-#include "mocks/virtual_jig.h"
+#include "device/jigs/hid_jig.h"
+#include "mocks/in_process/virtual_jig.h"
 
 namespace sixpoint::mocks {
 

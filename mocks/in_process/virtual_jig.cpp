@@ -1,4 +1,4 @@
-#include "mocks/virtual_jig.h"
+#include "mocks/in_process/virtual_jig.h"
 
 #include <utility>
 
@@ -19,14 +19,14 @@ Status VirtualJig::go_to(device::Pose pose) {
   return {};
 }
 
-Result<device::JigReport> VirtualJig::report() {
+Result<device::JigPosition> VirtualJig::position() {
   const std::lock_guard lock(plugged_->mutex);
-  device::JigReport report;
-  report.angle_uncertainty_deg = 0.02;
+  device::JigPosition position;
+  position.angle_uncertainty_deg = 0.02;
   if (!plugged_->unit.is_turning(plugged_->clock->elapsed())) {
-    report.pose = pose_;
+    position.pose = pose_;
   }
-  return report;
+  return position;
 }
 
 Status VirtualJig::stop() {

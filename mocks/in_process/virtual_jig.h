@@ -1,10 +1,14 @@
-// A jig that turns a virtual unit, and slips when a test says so.
+// A jig that turns a virtual unit, and misses the pose when a test asks for it.
+//
+//   VirtualJig jig(plugged);  // in_process.h
+//   jig.tilt_next(3);         // the next pose ends 3 degrees off
+//   Status turning = jig.go_to(device::Pose::plus_x);
 #pragma once
 
 #include <memory>
 
 #include "device/jig.h"
-#include "mocks/in_process.h"
+#include "mocks/in_process/in_process.h"
 
 namespace sixpoint::mocks {
 
@@ -15,7 +19,7 @@ class VirtualJig final : public device::Jig {
   std::string name() const override { return "virtual"; }
   bool turns_by_itself() const override { return true; }
   Status go_to(device::Pose pose) override;
-  Result<device::JigReport> report() override;
+  Result<device::JigPosition> position() override;
   Status stop() override;
 
   // The next placement ends this far off, in a random direction.

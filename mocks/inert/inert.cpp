@@ -1,4 +1,4 @@
-#include "mocks/inert.h"
+#include "mocks/inert/inert.h"
 
 #include <algorithm>
 

@@ -1,4 +1,8 @@
-// Mocks that do nothing by themselves: they return what a test set and keep what they were told.
+// Mocks that do nothing by themselves: they return what a test sets, and record their calls.
+//
+//   InertTransport transport(clock);
+//   transport.to_read.push_back(Bytes{1, 2, 3});
+//   SIXPOINT_ASSIGN(const auto bytes, transport.read(buffer, std::chrono::seconds(1)));  // 3
 #pragma once
 
 #include <deque>
@@ -34,18 +38,18 @@ class InertJig final : public device::Jig {
   std::string name() const override { return "inert"; }
   bool turns_by_itself() const override { return by_itself; }
   Status go_to(device::Pose pose) override;
-  Result<device::JigReport> report() override { return next_report; }
+  Result<device::JigPosition> position() override { return next_position; }
   Status stop() override;
 
   bool by_itself = true;
-  Result<device::JigReport> next_report = device::JigReport{};
+  Result<device::JigPosition> next_position = device::JigPosition{};
   Status next_status;
   std::vector<device::Pose> poses;
   int stops = 0;
 };
 
-// Passes everything through two functions, which may change the bytes, or answer how often they
-// are delivered: 0 loses them, 2 delivers them twice.
+// Passes everything through two functions. They may change the bytes, and return how many times
+// they are delivered: 0 loses them, 2 delivers them twice.
 class TamperingTransport final : public device::Transport {
  public:
   using Tamper = std::function<int(Bytes& bytes)>;

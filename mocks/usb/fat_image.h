@@ -1,8 +1,14 @@
 // A read-only FAT volume made in memory, as the flash of a unit shows it to a file manager.
 //
-// FAT12 or FAT16 by the number of clusters, without a partition table. Files lie one behind the
-// other and stay where they are: a volume of 96 MiB that holds nothing needs a few kilobytes.
-// Layout: Microsoft, "FAT32 File System Specification" 1.03 (FAT12 and FAT16 parts).
+//   SIXPOINT_ASSIGN(const FatImage volume,
+//                   FatImage::make({{"info.txt", text, modified}, {"log.bin", log, modified}}));
+//   std::array<std::uint8_t, kBlockBytes> block{};
+//   volume.read(0, block);  // the boot sector
+//
+// FAT16 of 96 MiB with clusters of 2 KiB and the label SIXPOINT, without a partition table. The
+// contents stay where they are: an empty volume needs a few kilobytes of memory.
+// It is made here and not by mkfs.vfat, because `sixpoint virtual` offers it at run time.
+// Layout: Microsoft, "FAT32 File System Specification" 1.03 (FAT16 parts).
 #pragma once
 
 #include <memory>
@@ -26,30 +32,20 @@ class BlockMedium {
 };
 
 struct FatFile {
-  // "info.txt" or "REC00001/info.txt": names of at most 8.3 characters, letters of one case in each
-  // part, one level of folders.
+  // "info.txt" or "REC00001/info.txt": at most one folder, names of at most 8.3 characters, each in
+  // one case.
   std::string path;
   std::shared_ptr<const Bytes> content;
   UtcTime modified;  // years 1980 to 2107; others become the nearest
 };
 
-struct FatImageOptions {
-  std::string label = "SIXPOINT";    // at most 11 characters
-  std::uint32_t volume_id = 0x36B0;  // shown by file managers
-  // Unit flash of 64 MB and what log.bin is larger than its archive: FAT16 with clusters of 2 KiB.
-  std::uint64_t volume_bytes = 96ULL << 20U;
-};
-
 class FatImage final : public BlockMedium {
  public:
-  // usage when a name does not fit 8.3 or comes twice, or the size is none of FAT12 or FAT16;
-  // configuration when the files do not fit.
-  static Result<FatImage> make(const std::vector<FatFile>& files,
-                               const FatImageOptions& options = {});
+  // configuration when the files do not fit. Precondition: different paths of the form above.
+  static Result<FatImage> make(const std::vector<FatFile>& files);
 
-  std::uint32_t blocks() const override { return blocks_; }
+  std::uint32_t blocks() const override;
   void read(std::uint32_t block, std::span<std::uint8_t, kBlockBytes> out) const override;
-  int fat_bits() const { return fat_bits_; }
 
  private:
   struct Extent {
@@ -57,8 +53,8 @@ class FatImage final : public BlockMedium {
     std::uint32_t blocks;
     std::shared_ptr<const Bytes> content;
   };
-  std::uint32_t blocks_ = 0;
-  int fat_bits_ = 16;
+  class Builder;
+
   Bytes head_;                   // boot sector, both FATs, root folder
   std::vector<Extent> extents_;  // folders and files, in the order of blocks
 };

@@ -1,9 +1,10 @@
-#include "mocks/mass_storage.h"
+#include "mocks/usb/mass_storage.h"
 
 #include <algorithm>
 #include <array>
 
-#include "device/usb_ids.h"
+#include "device/usb/usb_ids.h"
+#include "device/wire/payload.h"
 
 namespace sixpoint::mocks {
 
@@ -13,7 +14,6 @@ constexpr std::uint32_t kCommandSignature = 0x43425355;  // "USBC"
 constexpr std::uint32_t kStatusSignature = 0x53425355;   // "USBS"
 constexpr std::size_t kCommandBlockBytes = 31;
 constexpr std::size_t kStatusBlockBytes = 13;
-constexpr std::size_t kMaxPacket = 512;
 
 constexpr std::uint8_t kPassed = 0;
 constexpr std::uint8_t kFailed = 1;
@@ -45,12 +45,12 @@ enum Operation : std::uint8_t {
   kWrite12 = 0xAA,
 };
 constexpr std::uint8_t kReadCapacity16 = 0x10;  // its service action
-
-std::uint32_t little32(std::span<const std::uint8_t> b, std::size_t at) {
-  return static_cast<std::uint32_t>(b[at]) | (static_cast<std::uint32_t>(b[at + 1]) << 8U) |
-         (static_cast<std::uint32_t>(b[at + 2]) << 16U) |
-         (static_cast<std::uint32_t>(b[at + 3]) << 24U);
-}
+constexpr ScsiSense kBadCommand = {5, 0x20, 0};
+constexpr ScsiSense kOutOfRange = {5, 0x21, 0};
+constexpr ScsiSense kBadField = {5, 0x24, 0};
+constexpr ScsiSense kWriteProtected = {7, 0x27, 0};
+constexpr std::uint8_t kWriteProtectBit = 0x80;
+constexpr std::uint32_t kFormatted = 0x02000000;
 
 std::uint32_t big(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t width) {
   std::uint32_t value = 0;
@@ -58,12 +58,6 @@ std::uint32_t big(std::span<const std::uint8_t> bytes, std::size_t at, std::size
     value = (value << 8U) | bytes[at + i];
   }
   return value;
-}
-
-void put_little32(Bytes& out, std::uint32_t value) {
-  for (unsigned i = 0; i < 4; ++i) {
-    out.push_back(static_cast<std::uint8_t>((value >> (8 * i)) & 0xFFU));
-  }
 }
 
 void put_big32(Bytes& out, std::uint32_t value) {
@@ -82,7 +76,6 @@ void put_text(Bytes& out, std::string_view text, std::size_t width) {
 
 struct MassStorage::Plan {
   std::uint8_t status = kPassed;
-  bool towards_device = false;
   std::uint64_t bytes = 0;
   std::function<Bytes(std::uint64_t, std::size_t)> source;
 
@@ -126,23 +119,24 @@ UsbAnswer MassStorage::request(const SetupPacket& setup, std::uint8_t interface)
 
 UsbAnswer MassStorage::take(std::span<const std::uint8_t> bytes) {
   if (phase_ == Phase::data_out) {
-    // Nothing is ever written: what comes is taken and forgotten.
+    // The medium cannot be written: data are taken and dropped.
     moved_ += std::min<std::uint64_t>(bytes.size(), expected_ - moved_);
-    if (moved_ == expected_ || bytes.size() % kMaxPacket != 0 || bytes.empty()) {
+    if (moved_ == expected_ || bytes.size() % kBulkPacketBytes != 0 || bytes.empty()) {
       moved_ = 0;
       phase_ = Phase::status;
     }
     return UsbAnswer::done();
   }
+  device::PayloadReader in(bytes);
   // A command block is valid and meaningful (bulk-only transport, 6.2), or everything stops.
   if (phase_ != Phase::command || bytes.size() != kCommandBlockBytes ||
-      little32(bytes, 0) != kCommandSignature || (bytes[13] & 0x0FU) != 0 ||
+      in.get<std::uint32_t>() != kCommandSignature || (bytes[13] & 0x0FU) != 0 ||
       (bytes[14] & 0x1FU) < 1 || (bytes[14] & 0x1FU) > 16) {
     phase_ = Phase::broken;
     return UsbAnswer::stall();
   }
-  tag_ = little32(bytes, 4);
-  expected_ = little32(bytes, 8);
+  tag_ = in.get<std::uint32_t>();
+  expected_ = in.get<std::uint32_t>();
   const bool towards_host = (bytes[12] & 0x80U) != 0;
   // Bytes behind the command's own length count as zero.
   std::array<std::uint8_t, 16> command{};
@@ -151,15 +145,11 @@ UsbAnswer MassStorage::take(std::span<const std::uint8_t> bytes) {
 
   status_ = plan.status;
   moved_ = 0;
-  to_move_ = std::min(plan.bytes, expected_);
+  to_move_ = towards_host ? std::min(plan.bytes, expected_) : 0;
   source_ = std::move(plan.source);
   // The thirteen cases (6.7): what the device wants to move against what the host expects.
-  if (plan.bytes > expected_ ||
-      (plan.bytes > 0 && expected_ > 0 && plan.towards_device == towards_host)) {
+  if (plan.bytes > expected_ || (plan.bytes > 0 && !towards_host)) {
     status_ = kPhaseError;
-    if (plan.towards_device == towards_host) {
-      to_move_ = 0;
-    }
   }
   ends_short_ = to_move_ < expected_;
   if (expected_ == 0) {
@@ -176,17 +166,17 @@ UsbAnswer MassStorage::give(std::size_t max_length) {
   switch (phase_) {
     case Phase::data_in: {
       const std::uint64_t left = to_move_ - moved_;
-      if (left > max_length && max_length % kMaxPacket != 0) {
+      if (left > max_length && max_length % kBulkPacketBytes != 0) {
         return {UsbAnswer::Kind::overflow, {}};
       }
       const auto now = static_cast<std::size_t>(std::min<std::uint64_t>(left, max_length));
       Bytes bytes = source_(moved_, now);
       moved_ += now;
       if (moved_ == to_move_) {
-        // A short or empty packet has told the host that this was all; where its buffer ended with
-        // the last packet, only a stall can.
-        const bool told = now < max_length || now % kMaxPacket != 0;
-        phase_ = ends_short_ && !told ? Phase::stalled_in : Phase::status;
+        // A short or empty packet ends the transfer for the host; where its buffer ended with the
+        // last packet, only a stall can.
+        const bool ended = now < max_length || now % kBulkPacketBytes != 0;
+        phase_ = ends_short_ && !ended ? Phase::stalled_in : Phase::status;
       }
       return UsbAnswer::done(std::move(bytes));
     }
@@ -208,16 +198,12 @@ UsbAnswer MassStorage::give(std::size_t max_length) {
   return UsbAnswer::nothing_yet();
 }
 
-Bytes MassStorage::status_block() {
-  Bytes block;
-  put_little32(block, kStatusSignature);
-  put_little32(block, tag_);
-  put_little32(block, static_cast<std::uint32_t>(expected_ - moved_));
-  block.push_back(status_);
-  return block;
+Bytes MassStorage::status_block() const {
+  return device::payload_of(kStatusSignature, tag_, static_cast<std::uint32_t>(expected_ - moved_),
+                            status_);
 }
 
-MassStorage::Plan MassStorage::refuse(Sense sense) {
+MassStorage::Plan MassStorage::refuse(ScsiSense sense) {
   sense_ = sense;
   Plan plan;
   plan.status = kFailed;
@@ -225,7 +211,6 @@ MassStorage::Plan MassStorage::refuse(Sense sense) {
 }
 
 MassStorage::Plan MassStorage::read(std::uint64_t block, std::uint64_t count) {
-  constexpr Sense kOutOfRange = {5, 0x21, 0};
   if (block + count > medium_->blocks()) {
     return refuse(kOutOfRange);
   }
@@ -248,7 +233,6 @@ MassStorage::Plan MassStorage::read(std::uint64_t block, std::uint64_t count) {
 }
 
 MassStorage::Plan MassStorage::inquiry(std::span<const std::uint8_t> command) {
-  constexpr Sense kBadField = {5, 0x24, 0};
   const std::size_t allocation = big(command, 3, 2);
   Bytes answer;
   if ((command[1] & 1U) != 0) {
@@ -274,21 +258,15 @@ MassStorage::Plan MassStorage::inquiry(std::span<const std::uint8_t> command) {
 }
 
 MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
-  constexpr Sense kNoMedium = {2, 0x3A, 0};
-  constexpr Sense kBadCommand = {5, 0x20, 0};
-  constexpr Sense kBadField = {5, 0x24, 0};
-  constexpr Sense kChanged = {6, 0x28, 0};
-  constexpr Sense kWriteProtected = {7, 0x27, 0};
-
   // These answer whatever the state (SPC-2, 5.6.1).
   switch (command[0]) {
     case kInquiry:
       return inquiry(command);
     case kRequestSense: {
-      const Bytes answer = {0x70, 0,           sense_.key,       0, 0, 0, 0, 10, 0, 0, 0,
-                            0,    sense_.code, sense_.qualifier, 0, 0, 0, 0};
-      sense_ = {};
-      return Plan::answer(answer, command[4]);
+      const ScsiSense sense = std::exchange(sense_, {});
+      return Plan::answer(
+          {0x70, 0, sense.key, 0, 0, 0, 0, 10, 0, 0, 0, 0, sense.code, sense.qualifier, 0, 0, 0, 0},
+          command[4]);
     }
     case kReportLuns:
       return Plan::answer({0, 0, 0, 8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, big(command, 6, 4));
@@ -299,6 +277,7 @@ MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
   if (attention_) {
     attention_ = false;
     ejected_ = false;
+    constexpr ScsiSense kChanged = {6, 0x28, 0};
     return refuse(kChanged);
   }
   if (command[0] == kStartStopUnit) {
@@ -312,10 +291,13 @@ MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
     return Plan::passed();
   }
   if (medium_ == nullptr || ejected_) {
+    constexpr ScsiSense kNoMedium = {2, 0x3A, 0};
     return refuse(kNoMedium);
   }
-  constexpr std::uint8_t kWriteProtectBit = 0x80;
-  const std::uint32_t blocks = medium_->blocks();
+  return execute_on_medium(command);
+}
+
+MassStorage::Plan MassStorage::execute_on_medium(std::span<const std::uint8_t> command) {
   switch (command[0]) {
     case kTestUnitReady:
     case kSynchronizeCache:
@@ -324,33 +306,18 @@ MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
       return Plan::answer({3, 0, kWriteProtectBit, 0}, command[4]);
     case kModeSense10:
       return Plan::answer({0, 6, 0, kWriteProtectBit, 0, 0, 0, 0}, big(command, 7, 2));
-    case kReadFormatCapacities: {
-      Bytes answer = {0, 0, 0, 8};
-      put_big32(answer, blocks);
-      put_big32(answer, 0x02000000U | kBlockBytes);  // formatted
-      return Plan::answer(std::move(answer), big(command, 7, 2));
-    }
-    case kReadCapacity10: {
-      Bytes answer;
-      put_big32(answer, blocks - 1);
-      put_big32(answer, kBlockBytes);
-      return Plan::answer(std::move(answer), 8);
-    }
-    case kServiceActionIn: {
-      if ((command[1] & 0x1FU) != kReadCapacity16) {
-        return refuse(kBadField);
-      }
-      Bytes answer;
-      put_big32(answer, 0);
-      put_big32(answer, blocks - 1);
-      put_big32(answer, kBlockBytes);
-      answer.resize(32, 0);
-      return Plan::answer(std::move(answer), big(command, 10, 4));
-    }
-    case kRead6: {
-      const std::uint32_t count = command[4] == 0 ? 256 : command[4];
-      return read(big(command, 1, 3) & 0x1FFFFFU, count);
-    }
+    case kReadFormatCapacities:
+      return capacity({0, 0, 0, 8}, medium_->blocks(), kFormatted | kBlockBytes, 12,
+                      big(command, 7, 2));
+    case kReadCapacity10:
+      return capacity({}, medium_->blocks() - 1, kBlockBytes, 8, 8);
+    case kServiceActionIn:
+      return (command[1] & 0x1FU) == kReadCapacity16
+                 ? capacity({0, 0, 0, 0}, medium_->blocks() - 1, kBlockBytes, 32,
+                            big(command, 10, 4))
+                 : refuse(kBadField);
+    case kRead6:
+      return read(big(command, 1, 3) & 0x1FFFFFU, command[4] == 0 ? 256 : command[4]);
     case kRead10:
       return read(big(command, 2, 4), big(command, 7, 2));
     case kRead12:
@@ -359,8 +326,8 @@ MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
       if ((command[1] & 2U) != 0) {
         return refuse(kBadField);
       }
-      const Plan looked_at = read(big(command, 2, 4), big(command, 7, 2));
-      return looked_at.status == kPassed ? Plan::passed() : looked_at;
+      const Plan checked = read(big(command, 2, 4), big(command, 7, 2));
+      return checked.status == kPassed ? Plan::passed() : checked;
     }
     case kWrite6:
     case kWrite10:
@@ -369,6 +336,16 @@ MassStorage::Plan MassStorage::execute(std::span<const std::uint8_t> command) {
     default:
       return refuse(kBadCommand);
   }
+}
+
+// Number of blocks and block size, behind `begin`, zeros up to `size`.
+MassStorage::Plan MassStorage::capacity(Bytes begin, std::uint32_t blocks,
+                                        std::uint32_t block_bytes, std::size_t size,
+                                        std::size_t allocation) {
+  put_big32(begin, blocks);
+  put_big32(begin, block_bytes);
+  begin.resize(size, 0);
+  return Plan::answer(std::move(begin), allocation);
 }
 
 UsbAnswer StorageUsbDevice::halting(UsbAnswer answer, std::uint8_t endpoint) {

@@ -1,20 +1,27 @@
 // The mass-storage interface of a device: bulk-only transport over a block medium that cannot be
 // written (USB Mass Storage Class Bulk-Only Transport 1.0; SCSI SPC-2, SBC-2).
 //
-// A part of a USB device, which hands over what its two bulk endpoints carry and halts an endpoint
-// that answers stall. One thread at a time.
+//   ScsiIdentity identity;
+//   identity.serial = "MOS2A45130007";
+//   MassStorage storage(identity);
+//   storage.insert(volume);       // fat_image.h
+//   storage.take(command_block);  // 31 bytes
+//   const UsbAnswer data = storage.give(512);
+//
+// A part of a USB device, which passes on the transfers of its two bulk endpoints and halts an
+// endpoint that answers stall. One thread at a time.
 #pragma once
 
 #include <functional>
 #include <memory>
 #include <string>
 
-#include "mocks/fat_image.h"
-#include "mocks/usb_device.h"
+#include "mocks/usb/fat_image.h"
+#include "mocks/usb/usb_device.h"
 
 namespace sixpoint::mocks {
 
-// What INQUIRY says; cut or padded to their widths.
+// The answer to INQUIRY; cut or padded to the widths.
 struct ScsiIdentity {
   std::string vendor = "Sixpoint";  // 8 characters
   std::string product;              // 16
@@ -22,11 +29,18 @@ struct ScsiIdentity {
   std::string serial;               // page 0x80
 };
 
+// Why a command failed (SPC-2, 7.23.1).
+struct ScsiSense {
+  std::uint8_t key = 0;
+  std::uint8_t code = 0;
+  std::uint8_t qualifier = 0;
+};
+
 class MassStorage {
  public:
   explicit MassStorage(ScsiIdentity identity) : identity_(std::move(identity)) {}
 
-  // Another medium, never null: the host is told at its next command (unit attention 28h), unless
+  // Another medium, never null: the next command reports it (unit attention 28h), unless
   // it is the first.
   void insert(std::shared_ptr<const BlockMedium> medium);
 
@@ -34,7 +48,7 @@ class MassStorage {
   UsbAnswer give(std::size_t max_length);               // bulk IN
   // GET_MAX_LUN and the bulk-only reset; stall for everything else.
   UsbAnswer request(const SetupPacket& setup, std::uint8_t interface);
-  // A command block that made no sense: both endpoints stay halted until the bulk-only reset.
+  // After an invalid command block both endpoints stay halted until the bulk-only reset.
   bool needs_reset() const { return phase_ == Phase::broken; }
   // Waits for a command block: the moment to insert() another medium.
   bool is_idle() const { return phase_ == Phase::command; }
@@ -42,37 +56,35 @@ class MassStorage {
 
  private:
   enum class Phase { command, data_in, stalled_in, data_out, status, broken };
-  struct Sense {
-    std::uint8_t key = 0;
-    std::uint8_t code = 0;
-    std::uint8_t qualifier = 0;
-  };
   struct Plan;  // what a command wants to move
 
   Plan execute(std::span<const std::uint8_t> command);
-  Plan refuse(Sense sense);
+  Plan execute_on_medium(std::span<const std::uint8_t> command);
+  static Plan capacity(Bytes begin, std::uint32_t blocks, std::uint32_t block_bytes,
+                       std::size_t size, std::size_t allocation);
+  Plan refuse(ScsiSense sense);
   Plan read(std::uint64_t block, std::uint64_t count);
   Plan inquiry(std::span<const std::uint8_t> command);
-  Bytes status_block();
+  Bytes status_block() const;
 
   ScsiIdentity identity_;
   std::shared_ptr<const BlockMedium> medium_;
   bool ejected_ = false;
   bool attention_ = false;
-  Sense sense_;
+  ScsiSense sense_;
 
   Phase phase_ = Phase::command;
   std::uint32_t tag_ = 0;
   std::uint8_t status_ = 0;
-  std::uint64_t expected_ = 0;  // bytes that the host said would move
+  std::uint64_t expected_ = 0;  // bytes that the host announced
   std::uint64_t moved_ = 0;     // bytes that did
-  std::uint64_t to_move_ = 0;   // what moves in this command's data stage
+  std::uint64_t to_move_ = 0;   // in this command's data stage
   bool ends_short_ = false;     // less than the host expects
   std::function<Bytes(std::uint64_t offset, std::size_t length)> source_;
 };
 
 // A device with mass storage behind the endpoints kStorageInEndpoint and kStorageOutEndpoint
-// (device/usb_ids.h): a command block that made no sense halts both until the reset recovery.
+// (device/usb/usb_ids.h): an invalid command block halts both until the reset recovery.
 class StorageUsbDevice : public StandardUsbDevice {
  protected:
   StorageUsbDevice(UsbDescriptors descriptors, std::shared_ptr<Clock> clock, ScsiIdentity identity)

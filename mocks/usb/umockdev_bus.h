@@ -1,20 +1,20 @@
 // The umockdev carrier: USB devices in software behind the real hidapi, libusb and libudev.
 //
-// umockdev shows programs that were started with its preload library (umockdev-wrapper) another
-// /sys and /dev, and hands their ioctls, reads and writes to a handler: here to a UsbDevice
-// (usb_device.h). That holds for the test process and for programs that it starts. What the mock
-// answers is what Linux 6.1 answers, as far as is known; the same tests run in qemu, where the
-// kernel itself answers.
-//
-//   if (const auto why = UmockdevBus::enter(argv); !why.empty()) { ... return 77; }
-//   SIXPOINT_ASSIGN(auto bus, UmockdevBus::make());
-//   SIXPOINT_ASSIGN(auto nodes, bus->plug_in(device));
-//   ... HotplugWatch, TransportRegistry::open("hid:SERIAL"), a child process ...
+//   if (const std::string why = UmockdevBus::enter(argv); !why.empty()) {
+//     return fail(ErrorCode::device_unavailable, why);  // skip the test
+//   }
+//   SIXPOINT_ASSIGN(const auto bus, UmockdevBus::make());
+//   SIXPOINT_ASSIGN(const PluggedNodes nodes, bus->plug_in(device));
+//   SIXPOINT_ASSIGN(const auto found, device::attached_devices());
 //   bus->unplug(nodes.port);
 //
-// Two departures from the kernel: reports go to whoever reads first, where the kernel gives each
-// open file its own; and a device that left keeps its nodes' numbers to itself, as node numbers
-// only ever grow.
+// umockdev gives programs that were started with its preload library (umockdev-wrapper) another
+// /sys and /dev, and passes their ioctls, reads and writes to a handler: here to a UsbDevice
+// (usb_device.h). It does so in the test process and in programs that it starts. The mock answers
+// as Linux 6.1 does; the same tests run in qemu, where the kernel itself answers.
+//
+// Two departures from the kernel: a report goes to the first reader, where the kernel gives one to
+// each open file; and the numbers of nodes are never used again.
 //
 // Functions may be called from any thread. At most one bus exists at a time in a process.
 #pragma once
@@ -23,17 +23,10 @@
 #include <string>
 
 #include "base/result.h"
-#include "mocks/usb_device.h"
+#include "mocks/usb/plugged_nodes.h"
+#include "mocks/usb/usb_device.h"
 
 namespace sixpoint::mocks {
-
-struct PluggedNodes {
-  std::string port;  // "1-1"
-  int bus = 0;
-  int address = 0;
-  std::string usb_node;     // as programs see it: "/dev/bus/usb/001/002"
-  std::string hidraw_node;  // empty where the device has no HID interface
-};
 
 class UmockdevBus {
  public:
@@ -47,15 +40,15 @@ class UmockdevBus {
   UmockdevBus(const UmockdevBus&) = delete;
   UmockdevBus& operator=(const UmockdevBus&) = delete;
 
-  // Into `port` ("1-3"), or the first free one. The device must be plugged in by its own word
-  // (UsbDevice::is_plugged); a device that unplugs itself stays visible until unplug(), as a
-  // device with a broken plug does. usage where the port is taken.
+  // Into `port` ("1-3"), or the first free one. A device that unplugs itself
+  // (UsbDevice::is_plugged) stays visible until unplug(), as a device with a broken plug does.
+  // usage where the port is taken.
   Result<PluggedNodes> plug_in(std::shared_ptr<UsbDevice> device, std::string port = {});
-  // Transfers under way fail as in the kernel, then the device vanishes. Nothing where the port is
-  // empty. The device itself is told, too (UsbDevice::unplug).
+  // Pending transfers fail as in the kernel, then the device vanishes. Calls UsbDevice::unplug().
+  // Does nothing where the port is empty.
   void unplug(const std::string& port);
 
-  // Without permission (mode 000), or with it for everybody (666).
+  // Without permission (mode 000), or with it for all users (666).
   void allow(const std::string& port, bool allowed);
 
  private:

@@ -1,10 +1,14 @@
-// A USB device in software, with no input or output of its own: descriptors, and what it answers to
-// control requests and on its endpoints. A carrier (USB/IP, umockdev, a test) stands between it and
-// a host; a decorator that implements UsbDevice over another one may change what passes through.
+// A USB device in software, without input or output of its own: descriptors, and the answers to
+// control requests and on its endpoints. A carrier (USB/IP, umockdev, a test) connects it with a
+// host; a class that implements UsbDevice over another one may change what passes.
 //
-// The unit of exchange is the transfer, as the host's USB request block is: what a carrier gets
-// from in() is a whole transfer, ended by a short packet, by a packet of length zero, or because
-// the host's buffer is full.
+//   UsbUnit unit(plugged);                 // usb_unit.h
+//   unit.control({0x00, 9, 1, 0, 0}, {});  // SET_CONFIGURATION
+//   UsbAnswer report = unit.in(device::kHidInEndpoint, 64);
+//
+// The unit of exchange is the transfer, as the host's USB request block is: in() gives a whole
+// transfer, ended by a short packet, by a packet of length zero, or because the host's buffer is
+// full.
 //
 // Time is that of clock(). All functions may be called from any thread.
 #pragma once
@@ -21,6 +25,7 @@
 #include <vector>
 
 #include "base/env.h"
+#include "mocks/usb/usb_descriptors.h"
 
 namespace sixpoint::mocks {
 
@@ -41,7 +46,7 @@ SetupPacket parse_setup(std::span<const std::uint8_t, 8> bytes);
 struct UsbAnswer {
   enum class Kind {
     done,         // OUT: taken; IN: `bytes` are the transfer, perhaps none
-    nothing_yet,  // NAK: the carrier keeps the request and asks again, see next_due()
+    nothing_yet,  // NAK: the carrier repeats the request later, see next_due()
     stall,
     overflow,  // a packet of the device is longer than what is left of the host's buffer
     gone,      // the device is not plugged in
@@ -54,50 +59,6 @@ struct UsbAnswer {
   static UsbAnswer stall() { return {Kind::stall, {}}; }
   static UsbAnswer gone() { return {Kind::gone, {}}; }
 };
-
-enum class UsbSpeed : std::uint8_t { low = 1, full = 2, high = 3 };  // Linux' numbers
-
-// All as bytes on the wire, but the strings, which are text (UTF-8).
-struct UsbDescriptors {
-  UsbSpeed speed = UsbSpeed::high;
-  Bytes device;                       // 18 bytes
-  Bytes configuration;                // the one configuration, with all that belongs to it
-  std::map<std::uint8_t, Bytes> hid;  // report descriptors, by interface
-  std::map<std::uint8_t, std::string> strings;  // by index, from 1
-
-  std::uint16_t vendor_id() const;
-  std::uint16_t product_id() const;
-  std::string serial() const;  // the text of iSerialNumber; empty where there is none
-};
-
-// A string descriptor; index 0 is the table of languages (US English alone). Empty where there is
-// no such string.
-Bytes string_descriptor(const UsbDescriptors& descriptors, std::uint8_t index);
-
-struct UsbEndpoint {
-  enum class Type : std::uint8_t { control = 0, isochronous = 1, bulk = 2, interrupt = 3 };
-  std::uint8_t address = 0;  // with 0x80 for IN
-  Type type = Type::control;
-  std::uint16_t max_packet = 0;
-  std::uint8_t interface = 0;
-};
-struct UsbInterface {
-  std::uint8_t number = 0;
-  std::uint8_t device_class = 0;
-  std::uint8_t subclass = 0;
-  std::uint8_t protocol = 0;
-  Bytes hid_descriptor;  // 9 bytes; empty where it is none
-};
-// What a configuration descriptor says. bad_data when its lengths do not hold.
-struct UsbConfiguration {
-  std::uint8_t value = 0;
-  std::uint8_t attributes = 0;
-  std::vector<UsbInterface> interfaces;
-  std::vector<UsbEndpoint> endpoints;
-
-  const UsbEndpoint* endpoint(std::uint8_t address) const;  // null where there is none
-};
-Result<UsbConfiguration> parse_configuration(std::span<const std::uint8_t> bytes);
 
 class UsbDevice {
  public:
@@ -117,7 +78,7 @@ class UsbDevice {
   // transfer can change that.
   virtual std::optional<std::chrono::nanoseconds> next_due() const = 0;
 
-  // The host resets the port: unconfigured, no halt, what was under way is forgotten.
+  // The host resets the port: unconfigured, no halt, pending transfers are forgotten.
   virtual void bus_reset() = 0;
 
   // The cable. Everything answers `gone` until plug_in(), after which it is as after bus_reset().
@@ -126,9 +87,8 @@ class UsbDevice {
   virtual bool is_plugged() const = 0;
 };
 
-// What every USB device must answer (USB 2.0, chapter 9; HID 1.11, section 7.1), over descriptors;
-// what is particular to one is left to it. What is protected is called with the device's own mutex
-// held.
+// What every USB device must answer (USB 2.0, chapter 9; HID 1.11, section 7.1), over descriptors.
+// A class that derives from it adds the rest. Protected functions are called with the mutex held.
 class StandardUsbDevice : public UsbDevice {
  public:
   // The descriptors are the program's own: that they hold is a precondition.
@@ -171,7 +131,6 @@ class StandardUsbDevice : public UsbDevice {
   UsbAnswer endpoint_request(const SetupPacket& setup);
   UsbAnswer interface_request(const SetupPacket& setup) const;
   std::optional<UsbAnswer> hid_request(const SetupPacket& setup);
-  const UsbInterface* interface(std::uint16_t number) const;
 
   UsbDescriptors descriptors_;
   UsbConfiguration configuration_;

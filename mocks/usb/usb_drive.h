@@ -1,19 +1,21 @@
-// A unit that offers mass storage and nothing else, as the USB device that it is: one interface
-// with a read-only volume (docs/devices/file-monitor.md). What a host mounts is what device/drive/
-// calibrates by files.
+// A unit with mass storage and nothing else, as a USB device: one interface with a read-only volume
+// (docs/devices/file-monitor.md). A host mounts it, and device/drive/ reads the folder.
+//
+//   SIXPOINT_ASSIGN(FatImage volume, unit_volume(unit));  // usb_unit.h
+//   UsbDrive drive(unit.truth(), std::make_shared<const FatImage>(std::move(volume)), clock);
 #pragma once
 
 #include <memory>
 
-#include "mocks/mass_storage.h"
-#include "mocks/usb_device.h"
+#include "mocks/usb/mass_storage.h"
+#include "mocks/usb/usb_device.h"
 #include "sim/unit_truth.h"
 
 namespace sixpoint::mocks {
 
 class UsbDrive final : public StorageUsbDevice {
  public:
-  // Interface 0; the endpoints are those of a monitor's storage (device/usb_ids.h).
+  // Interface 0; the endpoints are those of a monitor's storage (device/usb/usb_ids.h).
   static constexpr std::uint8_t kInterface = 0;
 
   // `volume` is never null: unit_volume() (usb_unit.h) makes one of a unit's recordings.

@@ -1,11 +1,13 @@
-// The virtual motorised jig as the USB device that it is: one HID interface, 64-byte reports in and
-// out (docs/devices/motorised-jig.md).
+// The virtual motorised jig as a USB device: one HID interface, 64-byte reports in and out
+// (docs/devices/motorised-jig.md).
+//
+//   UsbJig jig(VirtualHidJigOptions{}, plugged, clock);
 #pragma once
 
 #include <memory>
 
-#include "mocks/usb_device.h"
-#include "mocks/virtual_hid_jig.h"
+#include "mocks/in_process/virtual_hid_jig.h"
+#include "mocks/usb/usb_device.h"
 
 namespace sixpoint::mocks {
 

@@ -1,11 +1,11 @@
-#include "mocks/usb_unit.h"
+#include "mocks/usb/usb_unit.h"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
 #include "base/memory_env.h"
-#include "device/usb_ids.h"
+#include "device/usb/usb_ids.h"
 #include "gt3x/recording.h"
 #include "sim/recording.h"
 
@@ -13,7 +13,6 @@ namespace sixpoint::mocks {
 
 namespace {
 
-constexpr std::uint16_t kBulkPacketBytes = 512;  // high speed
 // The largest log.bin of a volume; a unit's flash is smaller.
 constexpr std::uint64_t kLongestLog = 1ULL << 30U;
 constexpr int kEmptyRate_hz = 30;
@@ -24,25 +23,6 @@ constexpr std::uint8_t kGetReport = 0x01;
 constexpr std::uint8_t kSetReport = 0x09;
 constexpr std::uint16_t kInputReport = 0x0100;
 constexpr std::uint16_t kOutputReport = 0x0200;
-
-void put16(Bytes& out, std::size_t value) {
-  out.push_back(static_cast<std::uint8_t>(value & 0xFFU));
-  out.push_back(static_cast<std::uint8_t>((value >> 8U) & 0xFFU));
-}
-
-void put_interface(Bytes& out, int number, std::uint8_t device_class, std::uint8_t subclass,
-                   std::uint8_t protocol, std::uint8_t name) {
-  const Bytes bytes = {
-      9, 4, static_cast<std::uint8_t>(number), 0, 2, device_class, subclass, protocol, name};
-  out.insert(out.end(), bytes.begin(), bytes.end());
-}
-
-void put_endpoint(Bytes& out, std::uint8_t address, UsbEndpoint::Type type, std::size_t max_packet,
-                  std::uint8_t interval) {
-  out.insert(out.end(), {7, 5, address, static_cast<std::uint8_t>(type)});
-  put16(out, max_packet);
-  out.push_back(interval);
-}
 
 // What info.txt and log.bin of one recording are, in a folder of the volume.
 Status add_recording(std::vector<FatFile>& files, const std::string& folder, const Bytes& image) {
@@ -60,55 +40,6 @@ Status add_recording(std::vector<FatFile>& files, const std::string& folder, con
 }
 
 }  // namespace
-
-const Bytes& hid_report_descriptor() {
-  static const Bytes kDescriptor = {
-      0x06, 0x00, 0xFF,  // usage page 0xFF00
-      0x09, 0x01,        // usage 1
-      0xA1, 0x01,        // collection (application)
-      0x15, 0x00,        //   logical minimum 0
-      0x26, 0xFF, 0x00,  //   logical maximum 255
-      0x75, 0x08,        //   report size 8
-      0x95, 0x40,        //   report count 64
-      0x09, 0x01,        //   usage 1
-      0x81, 0x02,        //   input (data, variable, absolute)
-      0x09, 0x01,        //   usage 1
-      0x91, 0x02,        //   output (data, variable, absolute)
-      0xC0,              // end collection
-  };
-  return kDescriptor;
-}
-
-UsbDescriptors unit_descriptors(const sim::UnitTruth& truth) {
-  UsbDescriptors usb;
-  usb.device = {18, 1, 0x00, 0x02, 0, 0, 0, 64};
-  put16(usb.device, device::kUsbVendorId);
-  put16(usb.device, device::kMonitorProductId);
-  put16(usb.device, 0x0100);
-  usb.device.insert(usb.device.end(), {1, 2, 3, 1});
-  usb.strings = {{1, "Sixpoint"}, {2, "Activity monitor"}, {3, truth.serial},
-                 {4, "Commands"}, {5, "Downloads"},        {6, "Recordings"}};
-
-  constexpr std::uint8_t kSelfPowered = 0xC0;
-  usb.configuration = {9, 2, 0, 0, 3, 1, 0, kSelfPowered, 50};  // 100 mA to charge
-  Bytes& out = usb.configuration;
-  put_interface(out, device::kHidInterface, 3, 0, 0, 4);
-  out.insert(out.end(), {9, 0x21, 0x11, 0x01, 0, 1, 0x22});
-  put16(out, hid_report_descriptor().size());
-  // Every 2^(4-1) microframes: 1 ms.
-  put_endpoint(out, device::kHidInEndpoint, UsbEndpoint::Type::interrupt, device::kReportBytes, 4);
-  put_endpoint(out, device::kHidOutEndpoint, UsbEndpoint::Type::interrupt, device::kReportBytes, 4);
-  put_interface(out, device::kBulkInterface, 0xFF, 0, 0, 5);
-  put_endpoint(out, device::kBulkInEndpoint, UsbEndpoint::Type::bulk, kBulkPacketBytes, 0);
-  put_endpoint(out, device::kBulkOutEndpoint, UsbEndpoint::Type::bulk, kBulkPacketBytes, 0);
-  put_interface(out, device::kStorageInterface, 8, 6, 0x50, 6);
-  put_endpoint(out, device::kStorageInEndpoint, UsbEndpoint::Type::bulk, kBulkPacketBytes, 0);
-  put_endpoint(out, device::kStorageOutEndpoint, UsbEndpoint::Type::bulk, kBulkPacketBytes, 0);
-  out[2] = static_cast<std::uint8_t>(out.size() & 0xFFU);
-  out[3] = static_cast<std::uint8_t>(out.size() >> 8U);
-  usb.hid = {{device::kHidInterface, hid_report_descriptor()}};
-  return usb;
-}
 
 Result<FatImage> unit_volume(const VirtualUnit& unit) {
   std::vector<FatFile> files;
@@ -131,6 +62,15 @@ Result<FatImage> unit_volume(const VirtualUnit& unit) {
 }
 
 namespace {
+
+UsbDescriptors unit_descriptors(const sim::UnitTruth& truth) {
+  DescriptorBuilder usb(device::kMonitorProductId, "Activity monitor", truth.serial);
+  usb.add_hid_interface("Commands");
+  usb.add_bulk_interface(0xFF, 0, 0, device::kBulkInEndpoint, device::kBulkOutEndpoint,
+                         "Downloads");
+  usb.add_storage_interface();
+  return usb.take();
+}
 
 ScsiIdentity scsi_identity(const sim::UnitTruth& truth) {
   return {.product = "Activity monitor", .serial = truth.serial};

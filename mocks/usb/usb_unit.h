@@ -1,5 +1,9 @@
-// The virtual unit as the composite USB device that it is: interface 0 HID (reports), interface 1
-// vendor bulk (downloads), interface 2 mass storage (info.txt and log.bin), in one configuration.
+// The virtual unit as a composite USB device: interface 0 HID (reports), interface 1 vendor bulk
+// (downloads), interface 2 mass storage (info.txt and log.bin), in one configuration.
+//
+//   auto plugged = std::make_shared<PluggedUnit>(VirtualUnitOptions{}, clock);
+//   auto unit = std::make_shared<UsbUnit>(plugged);
+//   SIXPOINT_ASSIGN(const auto server, UsbipServer::listen({unit}));  // usbip_server.h
 //
 // The volume shows the newest recording as info.txt and log.bin, and older ones the same way in
 // REC00001, REC00002 ... A unit that has recorded nothing shows an empty recording of itself.
@@ -11,24 +15,19 @@
 
 #include <memory>
 
-#include "mocks/in_process.h"
-#include "mocks/mass_storage.h"
-#include "mocks/usb_device.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/usb/mass_storage.h"
+#include "mocks/usb/usb_device.h"
 
 namespace sixpoint::mocks {
 
-// One input and one output report of 64 bytes, without an id, on a vendor's usage page.
-const Bytes& hid_report_descriptor();
-
-UsbDescriptors unit_descriptors(const sim::UnitTruth& truth);
-
-// What a file manager sees of the unit; configuration when the recordings do not fit.
+// The volume that a file manager shows; configuration when the recordings do not fit.
 Result<FatImage> unit_volume(const VirtualUnit& unit);
 
 class UsbUnit final : public StorageUsbDevice {
  public:
-  // The unit is shared with whoever turns it (virtual_jig.h) or looks into it; its mutex is held
-  // while the device answers.
+  // The unit is shared with its jig (virtual_jig.h) and with tests; its mutex is held while the
+  // device answers.
   explicit UsbUnit(std::shared_ptr<PluggedUnit> plugged);
 
   std::optional<std::chrono::nanoseconds> next_due() const override;

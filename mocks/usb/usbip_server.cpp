@@ -1,4 +1,4 @@
-#include "mocks/usbip_server.h"
+#include "mocks/usb/usbip_server.h"
 
 #include <algorithm>
 #include <array>
@@ -77,7 +77,7 @@ class UsbipServer::Sockets {
 
   void stop() {
     const std::uint64_t one = 1;
-    // An eventfd that is full is as good: somebody has asked already.
+    // A full eventfd is as good: stop() was called before.
     [[maybe_unused]] const auto written = ::write(stop_.get(), &one, sizeof one);
   }
 
@@ -87,7 +87,7 @@ class UsbipServer::Sockets {
       if (connections_.size() < options_.connections) {
         watched[1].events = POLLIN;
       }
-      // What another thread does to a device (unplugging, a turn) is seen this late.
+      // Another thread may change a device (unplug it, turn it): check after this time.
       std::chrono::nanoseconds wait = std::chrono::seconds(10);
       for (const Connection& connection : connections_) {
         int events = connection.session.wants_input() ? POLLIN : 0;

@@ -1,22 +1,25 @@
 // USB/IP over TCP: virtual devices for a desktop, a container or a virtual machine on this machine.
 //
-//   SIXPOINT_ASSIGN(auto server, UsbipServer::listen({unit_a, unit_b}, {.port = 0}));
-//   std::thread thread([&] { server->run(); });   ...   server->stop();
+//   SIXPOINT_ASSIGN(const auto server, UsbipServer::listen({unit}));
+//   std::thread thread([&] { (void)server->run(); });
+//   std::cout << "port " << server->port() << '\n';
+//   server->stop();
+//   thread.join();
 //
-// USB/IP knows no passwords, so the server listens on 127.0.0.1 and nowhere else. A device is used
+// USB/IP has no authentication, so the server listens on 127.0.0.1 only. A device is used
 // by one client at a time; when the client goes, the device is free again.
 #pragma once
 
 #include <memory>
 #include <vector>
 
-#include "mocks/usbip_session.h"
+#include "mocks/usb/usbip_session.h"
 
 namespace sixpoint::mocks {
 
 struct UsbipServerOptions {
   std::uint16_t port = 3240;  // the one assigned to USB/IP; 0 = any that is free
-  // One per device, and some that only look at the list.
+  // One per device, and some that only read the list.
   std::size_t connections = 128;
   UsbipLimits limits;
 };

@@ -1,4 +1,4 @@
-#include "mocks/usbip_session.h"
+#include "mocks/usb/usbip_session.h"
 
 #include <algorithm>
 #include <array>
@@ -185,38 +185,35 @@ void UsbipSession::put_device(const UsbipBus::Port& port) {
   const Bytes& device = usb.device;
   put16(output_, static_cast<std::uint16_t>(device[12] | (device[13] << 8U)));
   output_.insert(output_.end(), {device[4], device[5], device[6]});
-  // The exporting host has configured the device (import() does), and says its number.
+  // The number of the configuration that the exporting host has set (import() does).
   output_.push_back(usb.configuration[5]);
   output_.push_back(device[17]);
   output_.push_back(usb.configuration[4]);
 }
 
 void UsbipSession::list_devices() {
-  // A device that nobody uses and that came back to the bus is found anew, as a hub would.
+  // A free device that came back to the bus is found again, as by a hub.
   const auto offered = [](const UsbipBus::Port& port) {
     if (!port.in_use) {
       port.device->bus_reset();
     }
     return port.device->is_plugged();
   };
-  put_operation(output_, kReplyDeviceList, kOk);
-  const std::size_t count_at = output_.size();
-  put32(output_, 0);
-  std::uint32_t count = 0;
+  std::vector<const UsbipBus::Port*> list;
   for (const UsbipBus::Port& port : bus_.ports()) {
-    if (!offered(port)) {
-      continue;
+    if (offered(port)) {
+      list.push_back(&port);
     }
-    ++count;
-    put_device(port);
-    const auto parsed = parse_configuration(port.device->descriptors().configuration);
+  }
+  put_operation(output_, kReplyDeviceList, kOk);
+  put32(output_, static_cast<std::uint32_t>(list.size()));
+  for (const UsbipBus::Port* port : list) {
+    put_device(*port);
+    const auto parsed = parse_configuration(port->device->descriptors().configuration);
     for (const UsbInterface& interface : parsed->interfaces) {
       output_.insert(output_.end(), {interface.device_class, interface.subclass, interface.protocol,
                                      std::uint8_t{0}});
     }
-  }
-  for (unsigned i = 0; i < 4; ++i) {
-    output_[count_at + i] = static_cast<std::uint8_t>((count >> (8 * (3 - i))) & 0xFFU);
   }
 }
 
@@ -260,7 +257,7 @@ bool UsbipSession::take_command(std::span<const std::uint8_t>& bytes) {
       request.length > limits_.transfer_bytes ||
       (request.packets != 0 && request.packets != kNotIsochronous) ||
       requests_ >= limits_.requests) {
-    end();  // there is no telling where the next message would begin, or the peer floods us
+    end();  // the next message cannot be found, or the peer sends too much
     return false;
   }
   const bool towards_device = direction == 0;
@@ -286,7 +283,7 @@ bool UsbipSession::take_command(std::span<const std::uint8_t>& bytes) {
 }
 
 void UsbipSession::unlink(std::uint32_t sequence, std::uint32_t victim) {
-  // What was submitted before is first given its chance.
+  // First serve what was submitted before.
   pump();
   for (auto& [address, queue] : waiting_) {
     const auto found = std::find_if(queue.begin(), queue.end(), [victim](const Request& request) {
@@ -322,7 +319,7 @@ void UsbipSession::pump() {
     return;
   }
   asked_at_ = port_->device->clock().elapsed();
-  // What one endpoint takes may be what another waits for: go round until nothing moves.
+  // A transfer on one endpoint may complete one on another: repeat until nothing moves.
   for (bool moved = true; moved;) {
     moved = false;
     for (auto& [address, queue] : waiting_) {
@@ -386,18 +383,13 @@ void UsbipSession::complete(std::uint8_t address, const Request& request, const 
 
 void UsbipSession::put_reply(std::uint32_t command, std::uint32_t sequence, std::int32_t status,
                              std::uint32_t actual_length, std::uint32_t packets) {
-  put32(output_, command);
-  put32(output_, sequence);
-  put32(output_, 0);  // device, direction and endpoint: the host knows them by the sequence
-  put32(output_, 0);
-  put32(output_, 0);
-  put32(output_, static_cast<std::uint32_t>(status));
-  put32(output_, actual_length);
-  put32(output_, 0);  // start frame
-  put32(output_, packets);
-  put32(output_, 0);  // errors of isochronous packets
-  put32(output_, 0);
-  put32(output_, 0);
+  // Device, direction and endpoint are 0: the host knows them by the sequence. Start frame, errors
+  // and padding are 0.
+  for (const std::uint32_t field :
+       {command, sequence, 0U, 0U, 0U, static_cast<std::uint32_t>(status), actual_length, 0U,
+        packets, 0U, 0U, 0U}) {
+    put32(output_, field);
+  }
 }
 
 std::optional<std::chrono::nanoseconds> UsbipSession::wait() const {
@@ -405,7 +397,7 @@ std::optional<std::chrono::nanoseconds> UsbipSession::wait() const {
     return std::nullopt;
   }
   const auto due = port_->device->next_due();
-  // What is overdue was not asked for: the endpoint that has it has no request.
+  // Overdue data belong to an endpoint without a request.
   if (!due || *due <= asked_at_) {
     return std::nullopt;
   }

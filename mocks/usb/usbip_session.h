@@ -1,9 +1,14 @@
 // USB/IP, the server's side of one connection, as bytes in and bytes out (Linux,
 // Documentation/usb/usbip_protocol.rst, version 1.1.1). The sockets are usbip_server.h.
 //
-// The peer is not trusted: every length is checked before anything is kept on the strength of it,
-// requests under way and answers not yet fetched are bounded, and what breaks the protocol ends the
-// session.
+//   UsbipBus bus({unit});
+//   UsbipSession session(bus);
+//   session.receive(bytes);  // from the peer
+//   const std::span<const std::uint8_t> to_send = session.output();
+//   session.sent(to_send.size());  // when the peer has it
+//
+// The peer is not trusted: every length is checked before memory is used for it, pending requests
+// and waiting answers are bounded, and a breach of the protocol ends the session.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "mocks/usb_device.h"
+#include "mocks/usb/usb_device.h"
 
 namespace sixpoint::mocks {
 
@@ -45,8 +50,8 @@ struct UsbipLimits {
   std::size_t waiting_bytes = 32U << 20U;
 };
 
-// One thread at a time. `bus` must outlive it. The end of a session is the cable pulled on the
-// host's side: what was under way is forgotten and the device can be imported again.
+// One thread at a time. `bus` must outlive it. At the end of a session pending requests are
+// forgotten and the device can be imported again.
 class UsbipSession {
  public:
   explicit UsbipSession(UsbipBus& bus, UsbipLimits limits = {});
@@ -57,15 +62,14 @@ class UsbipSession {
   // False while the peer should be made to wait.
   bool wants_input() const;
   void receive(std::span<const std::uint8_t> bytes);
-  // Asks the device again for what it had nothing for: after receive(), and when time has passed.
+  // Repeats the requests that the device had no data for: after receive(), and as time passes.
   void pump();
   // What is to be sent; sent() takes the first `count` bytes off.
   std::span<const std::uint8_t> output() const { return std::span(output_).subspan(output_taken_); }
   void sent(std::size_t count);
   // The connection is to be closed once output() is empty.
   bool is_over() const { return over_; }
-  // How long the device surely has nothing by itself for the requests that wait; none when time
-  // alone changes nothing.
+  // How long the pending requests will wait at least; none when time alone changes nothing.
   std::optional<std::chrono::nanoseconds> wait() const;
   const UsbDevice* device() const { return port_ == nullptr ? nullptr : port_->device.get(); }
 

@@ -1,24 +1,31 @@
-// What the files of an archive's plan and of its results have in common. For archive_*.cpp alone.
+// What the files of an archive's plan and of its results have in common. For this room alone.
+//
+//   encode_path("100%.gt3x");  // "100%25.gt3x": any bytes as printable ASCII
+//   const auto files = integer_of<std::size_t>(json.at("files"));
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
-#include "base/sha256.h"
-#include "repair/archive_plan.h"
+#include "base/result.h"
 
 namespace sixpoint::repair {
 
-inline std::string hash_of(std::string_view text) {
-  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
-}
+// Every byte that is no printable ASCII, and '%', becomes %NN.
+std::string encode_path(std::string_view path);
+// bad_data for what encode_path() does not write.
+Result<std::string> decode_path(std::string_view text);
 
-// get<T>() would convert a number with a fraction, or beyond T, at any price. Throws as at() does.
+nlohmann::ordered_json error_to_json(const Error& error);
+// bad_data for a code that is none; throws as at() does for what is missing.
+Result<Error> error_from_json(const nlohmann::ordered_json& json);
+
+// get<T>() would convert a number with a fraction, or beyond T, without an error. Throws as at()
+// does.
 template <class T>
 T integer_of(const nlohmann::ordered_json& json) {
   if (json.is_number_unsigned()) {
@@ -31,24 +38,6 @@ T integer_of(const nlohmann::ordered_json& json) {
     }
   }
   return nlohmann::ordered_json().at("an integer").get<T>();
-}
-
-inline nlohmann::ordered_json error_to_json(const Error& error) {
-  return {{"code", static_cast<int>(error.code)},
-          {"what", error.what},
-          {"where", encode_path(error.where)},
-          {"hint", error.hint}};
-}
-
-// bad_data for a code that is none; throws as at() does for what is missing.
-inline Result<Error> error_from_json(const nlohmann::ordered_json& json) {
-  const int code = integer_of<int>(json.at("code"));
-  if (!is_error_code(code)) {
-    return fail(ErrorCode::bad_data, "an error of no known kind", {}, "make the plan anew");
-  }
-  SIXPOINT_ASSIGN(std::string where, decode_path(json.at("where").get<std::string>()));
-  return Error{static_cast<ErrorCode>(code), json.at("what").get<std::string>(), std::move(where),
-               json.at("hint").get<std::string>()};
 }
 
 }  // namespace sixpoint::repair

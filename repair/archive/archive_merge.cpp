@@ -1,4 +1,4 @@
-#include "repair/archive_merge.h"
+#include "repair/archive/archive_merge.h"
 
 #include <algorithm>
 #include <numeric>
@@ -8,7 +8,7 @@
 namespace sixpoint::repair {
 namespace {
 
-// A mended file that is not what its shard wrote counts as failed: running the shard again finds
+// A repaired file that is not what its shard wrote counts as failed: running the shard again finds
 // out what to do.
 void verify(FileSystem& files, RepairReport& report) {
   if (report.status != RepairStatus::repaired) {
@@ -19,7 +19,7 @@ void verify(FileSystem& files, RepairReport& report) {
   if (!digest) {
     error = digest.error();
   } else if (*digest != report.output_sha256) {
-    error = {ErrorCode::bad_data, "the mended file is not what the shard wrote", report.output,
+    error = {ErrorCode::bad_data, "the repaired file is not what the shard wrote", report.output,
              "remove it and run the shard again"};
   } else {
     return;

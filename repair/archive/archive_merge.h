@@ -1,15 +1,20 @@
 // The results of all shards together: one answer, as one `repair` of the same files would give it.
+//
+//   SIXPOINT_ASSIGN(const MergedArchive merged, merge_archive(files, "/data/plan", plan, {}));
+//   if (!merged.complete()) {
+//     std::cout << merged.files_missing() << " files have no result yet\n";
+//   }
 #pragma once
 
 #include <functional>
 #include <vector>
 
-#include "repair/archive_run.h"
+#include "repair/archive/archive_run.h"
 
 namespace sixpoint::repair {
 
 struct MergeOptions {
-  // Also reads every mended file and compares it with the hash that the shard wrote.
+  // Also reads every repaired file and compares it with the hash that the shard wrote.
   bool verify = false;
   // Given every result that there is, in the order of the shards, one in memory at a time. An error
   // of it ends the merge.

@@ -1,17 +1,12 @@
-// The plan of an archive: which files are mended, in how many shards, with which constants.
+// The plan of an archive: which files are repaired, in how many shards, with which constants.
 //
-// A folder that is written once and never changed; plan.json comes last, so the plan is there whole
-// or not at all (docs/archive.md has the layout):
+//   ArchiveDraft draft;
+//   draft.paths = {"/data/archive"};
+//   draft.shards = 4;
+//   SIXPOINT_ASSIGN(PlannedArchive planned, plan_archive(env, draft));
+//   SIXPOINT_CHECK(write_plan(env, "/data/plan", draft, planned));   // plan_folder.h
 //
-//   plan.json           roots, options, shards with the SHA-256 of their manifests
-//   shards/00000.jsonl  one line per file: root, path below it, size, time of its last change
-//   constants.jsonl     what the store held, where there was one
-//   run.sbatch          the shards as a Slurm job array
-//   run_all.sh          the shards on this machine
-//   results/            what the shards answer (archive_run.h)
-//
-// File names may be any bytes: in these files every byte that is no printable ASCII, and '%', is
-// written %NN.
+// Planning reads and writes nothing but names, sizes, times and, where asked for, hashes of files.
 #pragma once
 
 #include <functional>
@@ -21,9 +16,9 @@
 #include <vector>
 
 #include "base/env.h"
-#include "repair/constants_snapshot.h"
-#include "repair/file_tree.h"
-#include "repair/repair_file.h"
+#include "repair/rescale/constants_snapshot.h"
+#include "repair/rescale/repair_file.h"
+#include "repair/triage/file_tree.h"
 
 namespace sixpoint::repair {
 
@@ -51,7 +46,7 @@ struct ArchiveCalibrationFile {
   std::string sha256;
 };
 
-// How the files are mended, as `repair` takes it; the same for every shard.
+// How the files are repaired, as `repair` takes it; the same for every shard.
 struct ArchiveRepair {
   RepairOptions options;  // wide, undo_rotation, allow_prior
   // Constants that the user named: nothing else is asked.
@@ -65,7 +60,7 @@ struct ArchivePlan {
   std::string software;
   std::vector<ArchiveRoot> roots;
   std::vector<ArchiveShard> shards;
-  std::vector<RefusedPath> refused;  // files that no shard can mend, and why
+  std::vector<RefusedPath> refused;  // files that no shard can repair, and why
   ArchiveRepair repair;
   std::string store;  // where the constants came from, without a password; empty: no store
   std::string constants_sha256;  // of constants.jsonl; empty: no store
@@ -104,7 +99,7 @@ struct PlannedArchive {
 inline constexpr std::size_t kUsualMostShards = 1000;
 inline constexpr std::size_t kMostShards = 100'000;
 
-// Looks at everything and writes nothing. no_input where a path is not there or there is no file;
+// Reads the folders and writes nothing. no_input where a path is not there or there is no file;
 // usage where more shards are asked for than kMostShards.
 Result<PlannedArchive> plan_archive(Env& env, const ArchiveDraft& draft);
 
@@ -112,24 +107,5 @@ Result<PlannedArchive> plan_archive(Env& env, const ArchiveDraft& draft);
 // in order. The files stay in order; no shard is empty.
 std::vector<std::size_t> cut_into_shards(const std::vector<std::uint64_t>& bytes,
                                          std::size_t shards);
-
-// Writes the plan into `folder`, which is made, and fills in its id and hashes. cannot_create where
-// there is a plan already.
-Status write_plan(Env& env, const std::string& folder, const ArchiveDraft& draft,
-                  PlannedArchive& planned);
-
-// no_input where there is no plan, bad_data for one that is damaged, configuration for one that was
-// changed by hand or by a newer version.
-Result<ArchivePlan> read_plan(FileSystem& files, const std::string& folder);
-// The files of one shard. usage for a shard that is not in the plan; bad_data for a manifest that
-// names files outside of its root.
-Result<std::vector<ArchiveFile>> read_manifest(FileSystem& files, const std::string& folder,
-                                               const ArchivePlan& plan, std::size_t shard);
-// The constants of the store; nothing where the plan was made without one.
-Result<std::optional<ConstantsSnapshot>> read_snapshot(FileSystem& files, const std::string& folder,
-                                                       const ArchivePlan& plan);
-
-std::string encode_path(std::string_view path);
-Result<std::string> decode_path(std::string_view text);
 
 }  // namespace sixpoint::repair

@@ -1,4 +1,4 @@
-#include "repair/archive_scripts.h"
+#include "repair/archive/archive_scripts.h"
 
 #include <algorithm>
 #include <cctype>
@@ -29,7 +29,7 @@ std::string shell_word(const std::string& text) {
 // No path may stand in a comment: one with a line end would go on as commands.
 std::string slurm_script(const ArchiveScripts& scripts) {
   return fmt::format(R"(#!/bin/bash
-# Mends this plan's files as a Slurm job array, one shard per task:  sbatch run.sbatch OUTDIR
+# Repairs this plan's files as a Slurm job array, one shard per task:  sbatch run.sbatch OUTDIR
 # What is done is not done again, and a task that was killed goes on where it was: submit it again
 # as often as you like. Then: sixpoint archive merge PLANDIR
 #SBATCH --job-name=sixpoint
@@ -46,7 +46,7 @@ output=${{1:?'usage: sbatch run.sbatch OUTDIR'}}
 shard=${{SLURM_ARRAY_TASK_ID:?'run this with sbatch; on one machine use run_all.sh'}}
 status=0
 "$program" archive run "$plan" --shard "$shard" -o "$output" || status=$?
-# 1: the shard is done, and something in it cannot be mended. The task did its work; merge says what.
+# 1: the shard is done, and something in it cannot be repaired. The task did its work; merge says what.
 if [ "$status" -eq 1 ]; then status=0; fi
 exit "$status"
 )",
@@ -56,7 +56,7 @@ exit "$status"
 
 std::string shell_script(const ArchiveScripts& scripts) {
   return fmt::format(R"(#!/bin/bash
-# Mends this plan's files on this machine, without Slurm:  bash run_all.sh OUTDIR
+# Repairs this plan's files on this machine, without Slurm:  bash run_all.sh OUTDIR
 # and merges the results. JOBS says how many shards at a time (default: one per core). Ends with merge's exit code.
 set -euo pipefail
 plan={0}

@@ -1,4 +1,7 @@
 // The two scripts of a plan: its shards as a Slurm job array, and on one machine.
+//
+//   const ArchiveScripts scripts{"/data/plan", "/usr/bin/sixpoint", 100, 64};
+//   const std::string batch = slurm_script(scripts);
 #pragma once
 
 #include <string>
@@ -15,7 +18,7 @@ struct ArchiveScripts {
 std::string slurm_script(const ArchiveScripts& scripts);
 std::string shell_script(const ArchiveScripts& scripts);
 
-// A word of a shell command line, in quotes where it needs them.
+// One argument of a shell command line, in quotes where it needs them.
 std::string shell_word(const std::string& text);
 
 }  // namespace sixpoint::repair

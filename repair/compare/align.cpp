@@ -1,23 +1,19 @@
-#include "repair/compare.h"
+#include "repair/compare/align.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
-#include "base/time.h"
-#include "gt3x/recording.h"
-#include "gt3x/sample_reader.h"
+#include "base/measure.h"
 
 namespace sixpoint::repair {
 namespace {
 
-constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 constexpr double kBlock_s = 60;
 constexpr std::size_t kMaxBlocks = 60;
 constexpr double kFineReach_s = 2;        // about the lag found to the second
@@ -29,49 +25,6 @@ constexpr double kSwellTrust_s = 0.2;  // standard error of the lag found from s
 constexpr double kRivalLine = 0.8;     // a line with so much of the best one's votes is a rival
 constexpr int kMaxDrift_ppm = 100;     // a cold watch crystal is off by 35
 constexpr double kLongEnoughForDrift_s = 600;
-
-// What a second of magnitudes amounts to.
-struct Second {
-  float smallest_g = kMissing;
-  float largest_g = kMissing;
-  float sd_g = kMissing;
-};
-
-// Of the samples in [from_s, from_s + 1); missing where fewer than half are there.
-Second second_at(const Trace& trace, double from_s) {
-  const double first = std::ceil((from_s - trace.start_s()) * trace.rate_hz() - 1e-6);
-  const auto count = static_cast<std::size_t>(std::lround(trace.rate_hz()));
-  Second second;
-  if (first < 0 || first + static_cast<double>(count) > static_cast<double>(trace.size())) {
-    return second;
-  }
-  const auto begin = static_cast<std::size_t>(first);
-  std::size_t present = 0;
-  double sum = 0;
-  double square = 0;
-  float smallest = std::numeric_limits<float>::max();
-  float largest = 0;
-  for (std::size_t i = begin; i < begin + count; ++i) {
-    const float value = trace.magnitude_g(i);
-    if (std::isnan(value)) {
-      continue;
-    }
-    ++present;
-    sum += value;
-    square += static_cast<double>(value) * value;
-    smallest = std::min(smallest, value);
-    largest = std::max(largest, value);
-  }
-  if (2 * present < count || present == 0) {
-    return second;
-  }
-  const double mean = sum / static_cast<double>(present);
-  second.smallest_g = smallest;
-  second.largest_g = largest;
-  second.sd_g = static_cast<float>(
-      std::sqrt(std::max(0.0, square / static_cast<double>(present) - mean * mean)));
-  return second;
-}
 
 // Pearson's correlation of pairs given one by one; pairs with a missing value are left out.
 class Correlation {
@@ -176,22 +129,16 @@ std::vector<Block> lively_blocks(const Trace& a, const CompareOptions& options) 
   const auto steps = std::max<std::size_t>(2, static_cast<std::size_t>(length_s * a.rate_hz()));
   std::vector<Block> blocks;
   for (std::size_t begin = 0; begin + steps <= a.size(); begin += steps) {
-    std::size_t present = 0;
-    double sum = 0;
-    double square = 0;
+    Moments present;
     for (std::size_t i = begin; i < begin + steps; ++i) {
       if (const double value = a.magnitude_g(i); !std::isnan(value)) {
-        ++present;
-        sum += value;
-        square += value * value;
+        present.add(value);
       }
     }
-    if (10 * present < 9 * steps) {
+    if (10 * present.count() < 9 * steps) {
       continue;
     }
-    const double mean = sum / static_cast<double>(present);
-    const double motion =
-        std::sqrt(std::max(0.0, square / static_cast<double>(present) - mean * mean));
+    const double motion = present.sd();
     if (motion * kMgPerG >= options.min_motion_mg) {
       blocks.push_back(
           {begin, begin + steps,
@@ -250,13 +197,6 @@ void add_candidates(const Trace& a, const Trace& b, const Block& block, std::siz
   found.resize(std::min(found.size(), kMaxRivals));
   candidates.insert(candidates.end(), found.begin(), found.end());
 }
-
-struct Line {
-  double lag_s = 0;  // at `middle_s`
-  double slope = 0;
-  double middle_s = 0;
-  double at(double time_s) const { return lag_s + slope * (time_s - middle_s); }
-};
 
 // The line that most blocks agree on: for every drift, lags corrected for it fall into bins; bins
 // near the lag that swelling and fading gave count for more. `rival_s` becomes the distance of the
@@ -401,6 +341,8 @@ void fit_line(const std::vector<std::pair<double, double>>& points, bool with_dr
   result.lag_uncertainty_s = n > 2 ? std::sqrt(rest / (n - 2) / n) : 0;
 }
 
+}  // namespace
+
 Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairComparison& result) {
   Line line{0, 0, a.start_s()};
   const std::vector<Block> blocks = lively_blocks(a, options);
@@ -446,208 +388,6 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
     }
   }
   return line;
-}
-
-Histogram histogram_of(const std::vector<float>& errors_mg, std::size_t bins) {
-  Histogram histogram;
-  if (errors_mg.empty() || bins == 0) {
-    return histogram;
-  }
-  std::vector<float> sizes;
-  sizes.reserve(errors_mg.size());
-  for (const float error : errors_mg) {
-    sizes.push_back(std::abs(error));
-  }
-  const auto at = sizes.begin() + static_cast<std::ptrdiff_t>((sizes.size() - 1) * 99 / 100);
-  std::ranges::nth_element(sizes, at);
-  // A round width that shows 99 of 100 errors, with a fifth to spare.
-  const double width =
-      std::max(1.0, std::ceil(2.4 * static_cast<double>(*at) / static_cast<double>(bins)));
-  const double first = -width * static_cast<double>(bins) / 2;
-  for (std::size_t i = 0; i <= bins; ++i) {
-    histogram.edges_mg.push_back(first + width * static_cast<double>(i));
-  }
-  histogram.counts.assign(bins, 0);
-  for (const float error : errors_mg) {
-    const double bin = std::floor((static_cast<double>(error) - first) / width);
-    ++histogram
-          .counts[static_cast<std::size_t>(std::clamp(bin, 0.0, static_cast<double>(bins - 1)))];
-  }
-  return histogram;
-}
-
-}  // namespace
-
-Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
-  Trace trace;
-  trace.name_ = path;
-  trace.rate_hz_ = recording.info().sample_rate_hz().value_or(0);
-  if (!(trace.rate_hz_ >= 1)) {
-    return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all", path,
-                "download the recording from the unit again");
-  }
-  const auto rate = static_cast<std::uint64_t>(std::lround(trace.rate_hz_));
-  std::optional<std::uint32_t> start;
-  gt3x::SampleReader reader(recording);
-  for (;;) {
-    SIXPOINT_ASSIGN(const auto item, reader.next());
-    if (!item) {
-      break;
-    }
-    if (item->kind != gt3x::SampleItem::Kind::recorded || item->broke_order) {
-      continue;
-    }
-    if (item->type == gt3x::RecordType::activity3) {
-      return fail(ErrorCode::bad_data, "the recording holds raw counts, not g", path,
-                  "compare .gt3x recordings");
-    }
-    const auto scale = gt3x::accel_scale_lsb_per_g(recording.info(), item->parameters);
-    if (!scale) {
-      return fail(ErrorCode::bad_data, "the recording does not say how many LSB make one g", path,
-                  "check that this is a recording of a known unit");
-    }
-    if (!start) {
-      start = item->unix_time;
-      trace.start_s_ = item->unix_time;
-    }
-    const std::uint64_t first = (item->unix_time - *start) * rate;
-    const std::uint64_t count = std::min<std::uint64_t>(item->counts.size(), rate);
-    if (first + count > kMaxTraceSamples) {
-      return fail(ErrorCode::bad_data,
-                  fmt::format("the recording is longer than {} samples", kMaxTraceSamples), path,
-                  "compare recordings of hours, not of weeks");
-    }
-    trace.magnitude_g_.resize(first + count, kMissing);
-    for (std::size_t i = 0; i < count; ++i) {
-      double square = 0;
-      for (const std::int16_t value : item->counts[i]) {
-        square += static_cast<double>(value) * value;
-      }
-      trace.magnitude_g_[first + i] = static_cast<float>(std::sqrt(square) / *scale);
-    }
-  }
-  if (trace.magnitude_g_.empty()) {
-    return fail(ErrorCode::bad_data, "the recording holds no samples", path,
-                "check that the unit was started; download the recording again");
-  }
-  return trace;
-}
-
-Trace Trace::from_magnitudes(std::string name, double start_s, double rate_hz,
-                             std::vector<float> magnitudes_g) {
-  Trace trace;
-  trace.name_ = std::move(name);
-  trace.start_s_ = start_s;
-  trace.rate_hz_ = rate_hz;
-  trace.magnitude_g_ = std::move(magnitudes_g);
-  return trace;
-}
-
-double Trace::at(double time_s) const {
-  const double place = (time_s - start_s_) * rate_hz_;
-  const double floor = std::floor(place);
-  if (!(floor >= 1) || floor + 2 >= static_cast<double>(magnitude_g_.size())) {
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  // Catmull-Rom.
-  const auto i = static_cast<std::size_t>(floor);
-  const double u = place - floor;
-  const double p0 = magnitude_g_[i - 1];
-  const double p1 = magnitude_g_[i];
-  const double p2 = magnitude_g_[i + 1];
-  const double p3 = magnitude_g_[i + 2];
-  return p1 +
-         0.5 * u * (p2 - p0 + u * (2 * p0 - 5 * p1 + 4 * p2 - p3 + u * (3 * (p1 - p2) + p3 - p0)));
-}
-
-Result<PairComparison> compare(const Trace& a, const Trace& b, const CompareOptions& options) {
-  PairComparison result;
-  result.a = a.name();
-  result.b = b.name();
-  const Line line = align(a, b, options, result);
-  result.lag_s = line.lag_s;
-  result.lag_at_s = line.middle_s;
-  result.drift_ppm = line.slope * 1e6;
-
-  double square_mg2 = 0;
-  std::uint64_t samples = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double time_s = a.start_s() + static_cast<double>(i) / a.rate_hz();
-    const double difference = b.at(time_s + line.at(time_s)) - a.magnitude_g(i);
-    if (!std::isnan(difference)) {
-      square_mg2 += difference * difference * kMgPerG * kMgPerG;
-      ++samples;
-    }
-  }
-  if (samples == 0) {
-    return fail(ErrorCode::bad_data, "the two recordings have no moment in common",
-                a.name() + ", " + b.name(), "compare recordings of units that ran together");
-  }
-  result.overlap_s = static_cast<double>(samples) / a.rate_hz();
-  result.rms_mg = std::sqrt(square_mg2 / static_cast<double>(samples));
-
-  std::vector<float> errors_mg;
-  double sum = 0;
-  double square = 0;
-  for (double t = a.start_s(); t + 1 <= a.end_s(); t += 1) {
-    const Second mine = second_at(a, t);
-    const Second theirs = second_at(b, t + line.at(t));
-    if (std::isnan(mine.sd_g) || std::isnan(theirs.sd_g)) {
-      continue;
-    }
-    for (const float error :
-         {theirs.largest_g - mine.largest_g, theirs.smallest_g - mine.smallest_g}) {
-      const double error_mg = static_cast<double>(error) * kMgPerG;
-      errors_mg.push_back(static_cast<float>(error_mg));
-      sum += error_mg;
-      square += error_mg * error_mg;
-    }
-  }
-  result.envelope.errors = errors_mg.size();
-  if (!errors_mg.empty()) {
-    const auto n = static_cast<double>(errors_mg.size());
-    result.envelope.mean_mg = sum / n;
-    result.envelope.sd_mg =
-        std::sqrt(std::max(0.0, square / n - result.envelope.mean_mg * result.envelope.mean_mg));
-    result.histogram = histogram_of(errors_mg, options.histogram_bins);
-    for (float& error : errors_mg) {
-      error = std::abs(error);
-    }
-    const auto p95 =
-        errors_mg.begin() + static_cast<std::ptrdiff_t>((errors_mg.size() - 1) * 95 / 100);
-    std::ranges::nth_element(errors_mg, p95);
-    result.envelope.p95_mg = static_cast<double>(*p95);
-  }
-  return result;
-}
-
-std::string PairComparison::brief() const {
-  return fmt::format(
-      "{} and {}: lag {:.4f} s{}, RMS {:.1f} mg, envelopes {:+.1f} mg (sd {:.1f}, 95 % within "
-      "{:.1f}) over {:.0f} s",
-      a, b, lag_s, aligned ? "" : " (not aligned)", rms_mg, envelope.mean_mg, envelope.sd_mg,
-      envelope.p95_mg, overlap_s);
-}
-
-nlohmann::ordered_json PairComparison::to_json() const {
-  nlohmann::ordered_json json;
-  json["a"] = a;
-  json["b"] = b;
-  json["lag_s"] = lag_s;
-  json["lag_at"] =
-      to_iso8601(UtcTime(std::chrono::nanoseconds(std::llround(lag_at_s * 1e3) * 1'000'000)));
-  json["lag_uncertainty_s"] = lag_uncertainty_s;
-  json["drift_ppm"] = drift_ppm;
-  json["aligned"] = aligned;
-  json["minutes_used"] = minutes_used;
-  json["overlap_s"] = overlap_s;
-  json["rms_mg"] = rms_mg;
-  json["envelope_error_mg"] = {
-      {"mean", envelope.mean_mg}, {"sd", envelope.sd_mg}, {"p95", envelope.p95_mg}};
-  json["histogram"] = {{"edges_mg", histogram.edges_mg}, {"counts", histogram.counts}};
-  json["remarks"] = remarks;
-  return json;
 }
 
 }  // namespace sixpoint::repair

@@ -1,6 +1,11 @@
 // Two recordings of units that were moved together: how far apart are they? (paper, Results and
 // Figures 4-6)
 //
+//   SIXPOINT_ASSIGN(const Trace a, Trace::load(files, "a.gt3x"));
+//   SIXPOINT_ASSIGN(const Trace b, Trace::load(files, "b.gt3x"));
+//   SIXPOINT_ASSIGN(const PairComparison pair, compare(a, b));
+//   pair.envelope.p95_mg;  // how far apart they are
+//
 // Two units on one shaker feel the same acceleration, but their clocks differ, their axes may point
 // elsewhere and their samples fall at other moments. So:
 //
@@ -26,40 +31,10 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "base/env.h"
 #include "base/result.h"
-#include "gt3x/samples.h"
+#include "repair/compare/trace.h"
 
 namespace sixpoint::repair {
-
-inline constexpr std::uint64_t kMaxTraceSamples = 40'000'000;
-
-// The samples of one recording on a grid of equal steps; steps without a sample are missing.
-class Trace {
- public:
-  // As gt3x::Recording and SampleReader have it; bad_data also for a recording without samples,
-  // without a rate or a scale, longer than kMaxTraceSamples, or of raw counts (.agdc).
-  static Result<Trace> load(FileSystem& files, const std::string& path);
-  // From g values at a fixed rate, for tests and for data from elsewhere. The grid begins at
-  // start_s and holds one step per element; a magnitude that is not finite is a missing sample.
-  static Trace from_magnitudes(std::string name, double start_s, double rate_hz,
-                               std::vector<float> magnitudes_g);
-
-  const std::string& name() const { return name_; }
-  double rate_hz() const { return rate_hz_; }
-  double start_s() const { return start_s_; }  // Unix time of step 0
-  double end_s() const { return start_s_ + static_cast<double>(magnitude_g_.size()) / rate_hz_; }
-  std::size_t size() const { return magnitude_g_.size(); }
-  float magnitude_g(std::size_t i) const { return magnitude_g_[i]; }  // NaN where missing
-  // Cubic between samples; NaN where one of the four about it is missing.
-  double at(double time_s) const;
-
- private:
-  std::string name_;
-  double start_s_ = 0;
-  double rate_hz_ = 1;
-  std::vector<float> magnitude_g_;
-};
 
 struct CompareOptions {
   // Clocks are set by the same computer when units are prepared; more than this is no common

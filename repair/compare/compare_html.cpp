@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "repair/compare.h"
+#include "base/html.h"
+#include "base/svg.h"
+#include "repair/compare/compare.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -16,77 +18,44 @@ constexpr double kLeft = 56;
 constexpr double kBottom = 30;
 constexpr std::array<const char*, 2> kColours = {"#1b6ca8", "#d1495b"};
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return printable(out, 400);
-}
+std::string escaped(std::string_view text) { return printable(html_escaped(text), 400); }
 
-// A drawing area with its axes; x and y are in the data's units.
+// A drawing with its axes; x and y are in the data's units.
 class Plot {
  public:
   Plot(double x_low, double x_high, double y_low, double y_high, std::string_view x_name,
        std::string_view y_name)
-      : x_low_(x_low), x_high_(x_high), y_low_(y_low), y_high_(y_high) {
-    svg_ = fmt::format(
-        "<svg viewBox=\"0 0 {} {}\" width=\"{}\" role=\"img\">"
-        "<rect x=\"{}\" y=\"10\" width=\"{}\" height=\"{}\" fill=\"#fff\" stroke=\"#888\"/>",
-        kWidth, kHeight + kBottom, kWidth, kLeft, kWidth - kLeft - 10, kHeight - 20);
+      : across{x_low, x_high, kLeft, kWidth - 10}, up_{y_low, y_high, kHeight - 10, 10} {
+    svg.rect(kLeft, 10, kWidth - kLeft - 10, kHeight - 20, "fill=\"#fff\" stroke=\"#888\"");
     for (int i = 0; i <= 4; ++i) {
       const double x = x_low + (x_high - x_low) * i / 4;
       const double y = y_low + (y_high - y_low) * i / 4;
-      svg_ += fmt::format(
-          "<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{:.4g}</text>"
-          "<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:.3g}</text>",
-          across(x), kHeight + 6, x, kLeft - 5, up(y) + 4, y);
+      svg.text(across(x), kHeight + 6, fmt::format("{:.4g}", x), "text-anchor=\"middle\"");
+      svg.text(kLeft - 5, up(y) + 4, fmt::format("{:.3g}", y), "text-anchor=\"end\"");
     }
-    svg_ += fmt::format(
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>"
-        "<text x=\"12\" y=\"{}\" transform=\"rotate(-90 12 {})\" text-anchor=\"middle\">{}</text>",
-        kWidth / 2, kHeight + 24, x_name, kHeight / 2, kHeight / 2, y_name);
+    svg.text(kWidth / 2, kHeight + 24, x_name, "text-anchor=\"middle\"");
+    svg.text_upward(12, kHeight / 2, y_name);
   }
 
-  double across(double x) const {
-    return kLeft + (x - x_low_) / (x_high_ - x_low_) * (kWidth - kLeft - 10);
+  double up(double y) const { return up_(std::clamp(y, up_.low, up_.high)); }
+  std::string finish() const {
+    return fmt::format("<svg viewBox=\"0 0 {} {}\" width=\"{}\" role=\"img\">{}</svg>\n", kWidth,
+                       kHeight + kBottom, kWidth, svg.marks());
   }
-  double up(double y) const {
-    return kHeight - 10 -
-           (std::clamp(y, y_low_, y_high_) - y_low_) / (y_high_ - y_low_) * (kHeight - 20);
-  }
-  void add(const std::string& element) { svg_ += element; }
-  std::string finish() const { return svg_ + "</svg>\n"; }
+
+  SvgScale across;
+  Svg svg;
 
  private:
-  double x_low_;
-  double x_high_;
-  double y_low_;
-  double y_high_;
-  std::string svg_;
+  SvgScale up_;
 };
 
 // Largest and smallest magnitude of each of the columns of [from_s, to_s), as one closed band.
-std::string band(const Plot& plot, const Trace& trace, double from_s, double to_s, double lag_s,
-                 double zero_s, const char* colour) {
+void draw_band(Plot& plot, const Trace& trace, double from_s, double to_s, double lag_s,
+               double zero_s, const char* colour) {
   constexpr int kColumns = 600;
-  std::string upper;
-  std::string lower;
+  std::vector<std::pair<double, double>> upper;
+  std::vector<std::pair<double, double>> lower;
   for (int column = 0; column < kColumns; ++column) {
     const double begin_s = from_s + (to_s - from_s) * column / kColumns;
     const double end_s = from_s + (to_s - from_s) * (column + 1) / kColumns;
@@ -101,22 +70,21 @@ std::string band(const Plot& plot, const Trace& trace, double from_s, double to_
         largest = std::max(largest, value);
       }
     }
-    if (largest < 0) {
-      continue;
+    if (largest >= 0) {
+      const double x = plot.across((begin_s + end_s) / 2 - zero_s);
+      upper.emplace_back(x, plot.up(static_cast<double>(largest)));
+      lower.emplace_back(x, plot.up(static_cast<double>(smallest)) + 0.7);
     }
-    const double x = plot.across((begin_s + end_s) / 2 - zero_s);
-    upper += fmt::format("{:.1f},{:.1f} ", x, plot.up(static_cast<double>(largest)));
-    lower.insert(0, fmt::format("{:.1f},{:.1f} ", x, plot.up(static_cast<double>(smallest)) + 0.7));
   }
-  return fmt::format(
-      "<polygon points=\"{}{}\" fill=\"{}\" fill-opacity=\"0.5\" stroke=\"{}\" "
-      "stroke-width=\"0.5\"/>",
-      upper, lower, colour, colour);
+  upper.insert(upper.end(), lower.rbegin(), lower.rend());
+  plot.svg.polygon(upper, fmt::format("fill=\"{0}\" fill-opacity=\"0.5\" stroke=\"{0}\" "
+                                      "stroke-width=\"0.5\"",
+                                      colour));
 }
 
-std::string samples(const Plot& plot, const Trace& trace, double from_s, double to_s, double lag_s,
-                    double zero_s, const char* colour) {
-  std::string points;
+void draw_samples(Plot& plot, const Trace& trace, double from_s, double to_s, double lag_s,
+                  double zero_s, const char* colour) {
+  std::vector<std::pair<double, double>> places;
   const double first = std::ceil((from_s + lag_s - trace.start_s()) * trace.rate_hz());
   for (auto i = static_cast<std::size_t>(std::max(0.0, first)); i < trace.size(); ++i) {
     const double time_s = trace.start_s() + static_cast<double>(i) / trace.rate_hz() - lag_s;
@@ -124,15 +92,31 @@ std::string samples(const Plot& plot, const Trace& trace, double from_s, double 
       break;
     }
     if (const float value = trace.magnitude_g(i); !std::isnan(value)) {
-      points += fmt::format("{:.1f},{:.1f} ", plot.across(time_s - zero_s),
-                            plot.up(static_cast<double>(value)));
+      places.emplace_back(plot.across(time_s - zero_s), plot.up(static_cast<double>(value)));
     }
   }
-  return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"/>",
-                     points, colour);
+  plot.svg.polyline(places,
+                    fmt::format("fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"", colour));
 }
 
-// Where A moves most within ten seconds.
+std::string histogram(const PairComparison& pair) {
+  if (pair.histogram.counts.empty()) {
+    return {};
+  }
+  const auto most = static_cast<double>(std::ranges::max(pair.histogram.counts));
+  Plot plot(pair.histogram.edges_mg.front(), pair.histogram.edges_mg.back(), 0, std::max(1.0, most),
+            "error of the envelopes (second minus first) in mg", "count");
+  for (std::size_t i = 0; i < pair.histogram.counts.size(); ++i) {
+    const double left = plot.across(pair.histogram.edges_mg[i]);
+    const double right = plot.across(pair.histogram.edges_mg[i + 1]);
+    const double top = plot.up(static_cast<double>(pair.histogram.counts[i]));
+    plot.svg.rect(left, top, std::max(0.5, right - left - 1), plot.up(0) - top, "fill=\"#555\"");
+  }
+  plot.svg.line(plot.across(0), 10, plot.across(0), kHeight - 10, "stroke=\"#b00\"");
+  return plot.finish();
+}
+
+// Where the first recording moves most within ten seconds.
 double liveliest_s(const Trace& trace, double from_s, double to_s) {
   double best_s = from_s;
   double best = -1;
@@ -176,33 +160,15 @@ std::string draw(const PairComparison& pair, const Trace& a, const Trace& b) {
   const double highest = std::ceil(10 * std::max(largest_of(a), largest_of(b))) / 10;
 
   Plot whole(0, to_s - from_s, 0, highest, "seconds", "magnitude in g");
-  whole.add(band(whole, a, from_s, to_s, 0, from_s, kColours[0]));
-  whole.add(band(whole, b, from_s, to_s, pair.lag_s, from_s, kColours[1]));
+  draw_band(whole, a, from_s, to_s, 0, from_s, kColours[0]);
+  draw_band(whole, b, from_s, to_s, pair.lag_s, from_s, kColours[1]);
 
   const double zoom_s = liveliest_s(a, from_s, to_s);
   const double zoom_lag_s = pair.lag_s + pair.drift_ppm * 1e-6 * (zoom_s - pair.lag_at_s);
   Plot zoom(zoom_s - from_s, zoom_s - from_s + 10, 0, highest, "seconds", "magnitude in g");
-  zoom.add(samples(zoom, a, zoom_s, zoom_s + 10, 0, from_s, kColours[0]));
-  zoom.add(samples(zoom, b, zoom_s, zoom_s + 10, zoom_lag_s, from_s, kColours[1]));
+  draw_samples(zoom, a, zoom_s, zoom_s + 10, 0, from_s, kColours[0]);
+  draw_samples(zoom, b, zoom_s, zoom_s + 10, zoom_lag_s, from_s, kColours[1]);
 
-  std::string bars;
-  if (!pair.histogram.counts.empty()) {
-    const auto most = static_cast<double>(std::ranges::max(pair.histogram.counts));
-    Plot plot(pair.histogram.edges_mg.front(), pair.histogram.edges_mg.back(), 0,
-              std::max(1.0, most), "error of the envelopes (second minus first) in mg", "count");
-    for (std::size_t i = 0; i < pair.histogram.counts.size(); ++i) {
-      const double left = plot.across(pair.histogram.edges_mg[i]);
-      const double right = plot.across(pair.histogram.edges_mg[i + 1]);
-      const double top = plot.up(static_cast<double>(pair.histogram.counts[i]));
-      plot.add(fmt::format(
-          "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#555\"/>",
-          left, top, std::max(0.5, right - left - 1), plot.up(0) - top));
-    }
-    plot.add(
-        fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"10\" y2=\"{1}\" stroke=\"#b00\"/>",
-                    plot.across(0), kHeight - 10));
-    bars = plot.finish();
-  }
   std::string remarks;
   for (const std::string& remark : pair.remarks) {
     remarks += "<p>" + escaped(remark) + "</p>";
@@ -214,7 +180,8 @@ std::string draw(const PairComparison& pair, const Trace& a, const Trace& b) {
       "<h3>Vector magnitude</h3>{}<h3>Ten lively seconds</h3>{}<h3>Histogram of errors</h3>{}",
       kColours[0], escaped(pair.a), kColours[1], escaped(pair.b), pair.lag_s,
       pair.lag_uncertainty_s, pair.drift_ppm, pair.overlap_s, pair.rms_mg, pair.envelope.mean_mg,
-      pair.envelope.sd_mg, pair.envelope.p95_mg, remarks, whole.finish(), zoom.finish(), bars);
+      pair.envelope.sd_mg, pair.envelope.p95_mg, remarks, whole.finish(), zoom.finish(),
+      histogram(pair));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "repair/constants_finder.h"
+#include "repair/rescale/constants_finder.h"
 
 #include <fmt/format.h>
 
@@ -29,7 +29,7 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
   if (survey.already_repaired) {
     return fail(
         ErrorCode::bad_data,
-        "the recording was mended already; its counts no longer come from the unit's constants",
+        "the recording was repaired already; its counts no longer come from the unit's constants",
         path, "use the original recording");
   }
   calib::Calibration file_constants;

@@ -1,10 +1,19 @@
-// Which constants mend a file: the paper's three methods in order of trust.
+// Which constants repair a file: the paper's three methods in order of trust.
 //
-//   given by the user > the store (method 3, the jig) > a calibration file (method 2) > the file's
-//   own still periods (method 1)
+//   ConstantsFinderOptions options;
+//   options.store = &store;
+//   ConstantsFinder finder(env, options);
+//   SIXPOINT_ASSIGN(const ConstantsChoice choice, finder.choose(path, survey));
 //
-// A calibration file is believed only when it was recorded by the same unit under the `current`
-// configuration: one recorded under `legacy` would make the data worse.
+// | source, in this order                        | used when                                   |
+// |----------------------------------------------|---------------------------------------------|
+// | constants that the user named                | given: no other source is asked             |
+// | the store (method 3, the jig) or a snapshot  | it has a set of this unit under `current`   |
+// | a calibration file (method 2)                | it is of this unit, recorded under          |
+// |                                              | `current`, and is solved                    |
+// | the file's own still periods (method 1)      | they suffice                                |
+//
+// A calibration file recorded under `legacy` would make the data worse, so it is refused.
 #pragma once
 
 #include <mutex>
@@ -13,8 +22,8 @@
 
 #include "calib/solve.h"
 #include "db/store.h"
-#include "repair/constants_snapshot.h"
-#include "repair/repair_file.h"
+#include "repair/rescale/constants_snapshot.h"
+#include "repair/rescale/repair_file.h"
 
 namespace sixpoint::repair {
 
@@ -23,7 +32,8 @@ struct ConstantsFinderOptions {
   std::optional<calib::ConstantsRecord> given;
   // Not owned; may be null.
   db::Store* store = nullptr;
-  // The store's word instead of the store (an archive's shards). Not owned; may be null.
+  // What the store answered earlier, instead of the store (an archive's shards). Not owned; may be
+  // null.
   const ConstantsSnapshot* snapshot = nullptr;
   std::optional<std::string> calibration_file;
   // The file's own still periods, where nothing better was found.
@@ -33,11 +43,11 @@ struct ConstantsFinderOptions {
 };
 
 // Solves the still blocks of a surveyed recording; serial and filter of the report are filled in.
-// bad_data where the recording's constants cannot be undone or it was mended already.
+// bad_data where the recording's constants cannot be undone or it was repaired already.
 Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,
                                         const calib::SolveOptions& options);
 
-// Safe to call from several threads: the store and the calibration file are asked one at a time.
+// Safe to call from several threads: store and calibration file are read by one at a time.
 class ConstantsFinder final : public ConstantsSource {
  public:
   ConstantsFinder(Env& env, ConstantsFinderOptions options);

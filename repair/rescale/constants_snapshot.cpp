@@ -1,4 +1,4 @@
-#include "repair/constants_snapshot.h"
+#include "repair/rescale/constants_snapshot.h"
 
 #include <nlohmann/json.hpp>
 
@@ -35,9 +35,7 @@ std::string ConstantsSnapshot::to_json_lines() const {
 
 Result<ConstantsSnapshot> ConstantsSnapshot::parse(std::string_view text) {
   ConstantsSnapshot snapshot;
-  while (!text.empty()) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(text.size(), line.size() + 1));
+  for (const std::string_view line : lines_of(text)) {
     const Json json = Json::parse(line, nullptr, false);
     const auto is_text = [&](const char* key) {
       return json.is_object() && json.contains(key) && json[key].is_string();

@@ -1,6 +1,9 @@
-// The constants of all units as a store held them at one moment: what the shards of an archive use
-// instead of the store, for a hundred tasks on one database file on a network disk is asking for
-// trouble, and for all of them to see the same constants.
+// The constants of all units as a store held them at one moment. The shards of an archive use it
+// instead of the store: a hundred tasks must not share one database file on a network disk, and all
+// of them must use the same constants.
+//
+//   SIXPOINT_ASSIGN(const auto snapshot, ConstantsSnapshot::of_store(store));
+//   snapshot.find("MOS2A1");   // null where the store has none of this unit
 #pragma once
 
 #include <map>
@@ -18,7 +21,7 @@ class ConstantsSnapshot {
     std::string document;  // JSON in the form of constants.json
   };
 
-  // The newest constants under `current` that nobody has withdrawn, of every unit of the store.
+  // The newest constants under `current` that are not withdrawn, of every unit of the store.
   static Result<ConstantsSnapshot> of_store(db::Store& store);
   // What to_json_lines() wrote; bad_data otherwise.
   static Result<ConstantsSnapshot> parse(std::string_view text);

@@ -1,6 +1,7 @@
-#include "repair/repair_file.h"
+#include "repair/rescale/repair_file.h"
 
 #include <algorithm>
+#include <array>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -8,14 +9,25 @@
 #include "base/sha256.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
-#include "repair/rescaled_log.h"
+#include "repair/rescale/rescaled_log.h"
 
 namespace sixpoint::repair {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
+// In the order of RepairStatus.
+constexpr std::array<std::string_view, 5> kStatusNames = {
+    "repaired", "not_affected", "not_repairable", "already_repaired", "failed"};
+
 constexpr std::uint64_t kLargestMark = 1U << 20;
+// Reasons are JSON values that other programs may read, so their words stay as they are.
+constexpr const char* kNotDecided =
+    "what cannot be told affected is not mended: find out what is missing first";
+constexpr const char* kDoneBefore = "mended by an earlier run";
+constexpr const char* kMappedByLine =
+    "the counts cannot have come from whole raw counts by the file's constants (averaged, mended "
+    "before, or resampled): {} of them mapped by the straight line";
 
 Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& chosen,
              const Survey& survey, UtcTime now) {
@@ -35,7 +47,7 @@ Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& c
   return mark;
 }
 
-// The mark of a mended file; nothing where there is no such file or mark.
+// The mark of a repaired file; nothing where there is no such file or mark.
 std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
   auto recording = gt3x::Recording::open(files, path);
   if (!recording || !recording->has_entry(kRepairMark)) {
@@ -57,7 +69,7 @@ std::string text_in(const Json& mark, const char* key) {
   return mark.contains(key) && mark[key].is_string() ? mark[key].get<std::string>() : "";
 }
 
-// The writer owns its source and drops it at commit(); the log's tally is wanted after that.
+// The writer destroys its source at commit(); the log's tally is needed after that.
 class SharedSource final : public gt3x::ByteSource {
  public:
   explicit SharedSource(std::shared_ptr<gt3x::ByteSource> source) : source_(std::move(source)) {}
@@ -98,31 +110,10 @@ class Repair {
     if (survey_.magnitude.blocks > 0) {
       report_.still_error_before_mg = survey_.magnitude.mean_mg;
     }
-    if (survey_.already_repaired) {
-      report_.status = RepairStatus::already_repaired;
-      report_.reasons.emplace_back("the file carries the mark of an earlier repair");
+    if (!needs_work()) {
       return {};
     }
-    const Triage judged = triage(survey_.facts);
-    report_.reasons = judged.reasons;
-    const bool rotation_only = judged.verdict == Verdict::not_affected && judged.axes_rotated;
-    if (judged.verdict == Verdict::not_affected && !(rotation_only && options_.undo_rotation)) {
-      report_.status = RepairStatus::not_affected;
-      if (rotation_only) {
-        report_.reasons.emplace_back(
-            "its constants are right, its axes are not: --undo-rotation turns them back");
-      }
-      return {};
-    }
-    if (judged.verdict == Verdict::cannot_tell) {
-      report_.status = RepairStatus::not_repairable;
-      report_.reasons.emplace_back(
-          "what cannot be told affected is not mended: find out what is missing first");
-      return {};
-    }
-    report_.rotation_undone = judged.axes_rotated;
-    report_.method = rotation_only ? "rotation" : "";
-    if (!rotation_only) {
+    if (report_.method.empty()) {
       if (survey_.constants_problem.has_value()) {
         return fail(*survey_.constants_problem);
       }
@@ -133,6 +124,34 @@ class Repair {
       }
     }
     return write();
+  }
+
+  // The table in repair_file.h up to the constants; false where the status is decided.
+  bool needs_work() {
+    if (survey_.already_repaired) {
+      report_.status = RepairStatus::already_repaired;
+      report_.reasons.emplace_back("the file carries the mark of an earlier repair");
+      return false;
+    }
+    const Triage judged = triage(survey_.facts);
+    report_.reasons = judged.reasons;
+    const bool rotation_only = judged.verdict == Verdict::not_affected && judged.axes_rotated;
+    if (judged.verdict == Verdict::not_affected && !(rotation_only && options_.undo_rotation)) {
+      report_.status = RepairStatus::not_affected;
+      if (rotation_only) {
+        report_.reasons.emplace_back(
+            "its constants are right, its axes are not: --undo-rotation turns them back");
+      }
+      return false;
+    }
+    if (judged.verdict == Verdict::cannot_tell) {
+      report_.status = RepairStatus::not_repairable;
+      report_.reasons.emplace_back(kNotDecided);
+      return false;
+    }
+    report_.rotation_undone = judged.axes_rotated;
+    report_.method = rotation_only ? "rotation" : "";
+    return true;
   }
 
   Status choose() {
@@ -192,10 +211,7 @@ class Repair {
       report_.still_error_after_mg = after.mean_mg;
     }
     if (log.tally().affine_counts > 0) {
-      report_.reasons.push_back(fmt::format(
-          "the counts cannot have come from whole raw counts by the file's constants (averaged, "
-          "mended before, or resampled): {} of them mapped by the straight line",
-          log.tally().affine_counts));
+      report_.reasons.push_back(fmt::format(kMappedByLine, log.tally().affine_counts));
     }
     if (survey_.log.checksum_failures + survey_.log.damaged_stretches > 0) {
       report_.reasons.push_back(fmt::format(
@@ -215,52 +231,33 @@ class Repair {
     SIXPOINT_ASSIGN(auto reader, recording.open_log());
     SIXPOINT_ASSIGN(auto made, RescaledLog::make(std::move(reader), log_options()));
     const std::shared_ptr<RescaledLog> log = std::move(made);
-
     if (options_.dry_run) {
-      Bytes piece(1U << 20);
-      while (true) {
-        SIXPOINT_ASSIGN(const auto count, log->read(piece));
-        if (count == 0) {
-          break;
-        }
-      }
-      take(*log);
-      report_.status = RepairStatus::repaired;
-      return {};
+      SIXPOINT_CHECK(read_through(*log));
+    } else if (env_.files.info(output_)) {
+      return take_earlier_output();
+    } else {
+      SIXPOINT_CHECK(write_output(recording, log));
     }
+    take(*log);
+    report_.status = RepairStatus::repaired;
+    return {};
+  }
 
-    if (env_.files.info(output_)) {
-      const auto mark = options_.resume ? mark_in(env_.files, output_) : std::nullopt;
-      if (mark && text_in(*mark, "input_sha256") == report_.input_sha256) {
-        report_.reasons.emplace_back("mended by an earlier run");
-        report_.resumed = true;
-        // What was used then, whatever would be chosen today.
-        report_.method = text_in(*mark, "method");
-        report_.constants_id = text_in(*mark, "constants_id");
-        if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
-          report_.repaired_at = *then;
-        }
-        report_.output = output_;
-        SIXPOINT_ASSIGN(const auto mended, survey(env_.files, output_, options_.still));
-        if (mended.magnitude.blocks > 0) {
-          report_.still_error_after_mg = mended.magnitude.mean_mg;
-        }
-        report_.clipped_after = mended.clipped_samples;
-        SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
-        report_.status = RepairStatus::repaired;
-        return {};
-      }
-      return fail(ErrorCode::cannot_create, "a file of that name is there already", output_,
-                  "choose another folder, or --resume to go on with an earlier run");
-    }
+  static Status read_through(RescaledLog& log) {
+    Bytes piece(1U << 20);
+    std::size_t count = 0;
+    do {
+      SIXPOINT_ASSIGN(count, log.read(piece));
+    } while (count > 0);
+    return {};
+  }
 
+  Status write_output(gt3x::Recording& recording, const std::shared_ptr<RescaledLog>& log) {
     SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(env_.files, output_));
     for (const gt3x::EntryInfo& entry : recording.entries()) {
-      if (entry.name == "log.bin") {
-        SIXPOINT_CHECK(writer.add(entry.name, std::make_unique<SharedSource>(log)));
-      } else {
-        SIXPOINT_CHECK(writer.copy(recording, entry.name));
-      }
+      SIXPOINT_CHECK(entry.name == "log.bin"
+                         ? writer.add(entry.name, std::make_unique<SharedSource>(log))
+                         : writer.copy(recording, entry.name));
     }
     report_.repaired_at = env_.clock.now();
     SIXPOINT_CHECK(
@@ -268,8 +265,31 @@ class Repair {
                                         .dump(2, ' ', false, Json::error_handler_t::replace) +
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());
-    take(*log);
     report_.output = output_;
+    SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
+    return {};
+  }
+
+  // What an earlier run made of this very input, with the constants that were used then.
+  Status take_earlier_output() {
+    const auto mark = options_.resume ? mark_in(env_.files, output_) : std::nullopt;
+    if (!mark || text_in(*mark, "input_sha256") != report_.input_sha256) {
+      return fail(ErrorCode::cannot_create, "a file of that name is there already", output_,
+                  "choose another folder, or --resume to go on with an earlier run");
+    }
+    report_.reasons.emplace_back(kDoneBefore);
+    report_.resumed = true;
+    report_.method = text_in(*mark, "method");
+    report_.constants_id = text_in(*mark, "constants_id");
+    if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
+      report_.repaired_at = *then;
+    }
+    report_.output = output_;
+    SIXPOINT_ASSIGN(const auto repaired, survey(env_.files, output_, options_.still));
+    if (repaired.magnitude.blocks > 0) {
+      report_.still_error_after_mg = repaired.magnitude.mean_mg;
+    }
+    report_.clipped_after = repaired.clipped_samples;
     SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
     report_.status = RepairStatus::repaired;
     return {};
@@ -287,19 +307,14 @@ class Repair {
 }  // namespace
 
 std::string_view to_string(RepairStatus status) {
-  switch (status) {
-    case RepairStatus::repaired:
-      return "repaired";
-    case RepairStatus::not_affected:
-      return "not_affected";
-    case RepairStatus::not_repairable:
-      return "not_repairable";
-    case RepairStatus::already_repaired:
-      return "already_repaired";
-    case RepairStatus::failed:
-      return "failed";
-  }
-  return "failed";
+  return kStatusNames[static_cast<std::size_t>(status)];
+}
+
+std::optional<RepairStatus> parse_repair_status(std::string_view text) {
+  const auto found = std::ranges::find(kStatusNames, text);
+  return found == kStatusNames.end()
+             ? std::nullopt
+             : std::optional(static_cast<RepairStatus>(found - kStatusNames.begin()));
 }
 
 std::string RepairReport::brief() const {
@@ -318,24 +333,23 @@ Json RepairReport::to_json() const {
   const auto optional_text = [](const std::string& text) {
     return text.empty() ? Json(nullptr) : Json(text);
   };
-  Json json;
-  json["input"] = input;
-  json["output"] = optional_text(output);
-  json["status"] = sixpoint::repair::to_string(status);
-  json["method"] = optional_text(method);
-  json["reasons"] = reasons;
-  json["serial"] = serial;
-  json["samples"] = samples;
-  json["clipped_before"] = clipped_before;
-  json["clipped_after"] = clipped_after;
-  json["still_blocks"] = still_blocks;
-  json["still_error_mg"] = {{"before", optional_number(still_error_before_mg)},
-                            {"after", optional_number(still_error_after_mg)}};
-  json["rotation_undone"] = rotation_undone;
-  json["constants_id"] = optional_text(constants_id);
-  json["input_sha256"] = optional_text(input_sha256);
-  json["output_sha256"] = optional_text(output_sha256);
-  return json;
+  return {{"input", input},
+          {"output", optional_text(output)},
+          {"status", sixpoint::repair::to_string(status)},
+          {"method", optional_text(method)},
+          {"reasons", reasons},
+          {"serial", serial},
+          {"samples", samples},
+          {"clipped_before", clipped_before},
+          {"clipped_after", clipped_after},
+          {"still_blocks", still_blocks},
+          {"still_error_mg",
+           {{"before", optional_number(still_error_before_mg)},
+            {"after", optional_number(still_error_after_mg)}}},
+          {"rotation_undone", rotation_undone},
+          {"constants_id", optional_text(constants_id)},
+          {"input_sha256", optional_text(input_sha256)},
+          {"output_sha256", optional_text(output_sha256)}};
 }
 
 RepairReport repair_file(Env& env, const std::string& input, const std::string& output,

@@ -1,9 +1,27 @@
-// One file mended: triage, constants, the new log, the mark; written whole or not at all.
+// One file repaired: triage, constants, the new log, the mark; written whole or not at all.
+//
+//   ConstantsFinder finder(env, options);  // constants_finder.h
+//   const RepairReport report = repair_file(env, "in.gt3x", "out.gt3x", finder, RepairOptions{});
+//   report.brief();  // "repaired         in.gt3x  still error 112.3 -> 0.8 mg"
 //
 // The original is only ever read. The output is a .gt3x with the same entries in the same order, in
 // which the samples alone differ (rescaled_log.h), and one more entry, the mark (kRepairMark): JSON
-// with what was done, by which constants, to the file of which hash. A file that carries the mark
-// is never mended again.
+// with what was done, by which constants, to the file of which hash. What becomes of a file:
+//
+// | file                                                    | status                             |
+// |---------------------------------------------------------|------------------------------------|
+// | carries the mark                                        | already_repaired                   |
+// | triage: not affected, axes right or undo_rotation off   | not_affected                       |
+// | triage: not affected, axes turned, undo_rotation on     | repaired, method `rotation`        |
+// | triage: cannot tell                                     | not_repairable                     |
+// | affected, no constants that may be used (choose() below)| not_repairable                     |
+// | affected, with constants, output not there              | repaired                           |
+// | ... output there, made from this input, resume on       | repaired, `resumed`; nothing done  |
+// | ... output there, otherwise                             | failed: cannot_create              |
+// | cannot be read or written                               | failed, with the error             |
+//
+// Constants may be used when they are this unit's, were measured under the `current` filter, and do
+// not rest on a prior (allow_prior lets those pass).
 #pragma once
 
 #include <optional>
@@ -14,12 +32,13 @@
 
 #include "base/env.h"
 #include "calib/constants.h"
-#include "repair/survey.h"
+#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 
 enum class RepairStatus { repaired, not_affected, not_repairable, already_repaired, failed };
 std::string_view to_string(RepairStatus status);
+std::optional<RepairStatus> parse_repair_status(std::string_view text);
 
 // Constants for one file, and where they came from.
 struct ChosenConstants {
@@ -35,7 +54,7 @@ struct ConstantsChoice {
 };
 
 // Finds constants for a surveyed file of `path`; called only for files that need them. Must be safe
-// to call from several threads when files are mended side by side.
+// to call from several threads when several files are repaired at a time.
 class ConstantsSource {
  public:
   virtual ~ConstantsSource() = default;
@@ -45,7 +64,7 @@ class ConstantsSource {
 struct RepairOptions {
   // 16-bit records on request only: every reader knows the 12-bit form.
   bool wide = false;
-  // Looks, chooses and computes, but writes nothing.
+  // Reads, chooses and computes, but writes nothing.
   bool dry_run = false;
   // Also turn back the axes of files whose constants are right. Off: a file that 16CPAN03 does not
   // affect is left as it is, and the reasons say that its axes are turned.
@@ -72,7 +91,7 @@ struct RepairReport {
   std::optional<double> still_error_before_mg;  // mean of |magnitude - 1 g| over still blocks
   std::optional<double> still_error_after_mg;
   bool rotation_undone = false;
-  bool resumed = false;  // mended by an earlier run; method and constants are those of its mark
+  bool resumed = false;  // repaired by an earlier run; method and constants are those of its mark
   std::string constants_id;
   std::optional<UtcTime> repaired_at;  // as its mark says
   std::string input_sha256;
@@ -84,9 +103,8 @@ struct RepairReport {
   nlohmann::ordered_json to_json() const;
 };
 
-// Mends `input` into `output`, whose folder must be there. Never fails as a function: what went
-// wrong stands in the report (`failed`, with the error). cannot_create where `output` exists
-// already.
+// Repairs `input` into `output`, whose folder must be there. Never fails as a function: what went
+// wrong stands in the report (`failed`, with the error).
 RepairReport repair_file(Env& env, const std::string& input, const std::string& output,
                          ConstantsSource& source, const RepairOptions& options);
 

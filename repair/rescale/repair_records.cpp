@@ -1,4 +1,4 @@
-#include "repair/repair_records.h"
+#include "repair/rescale/repair_records.h"
 
 #include <algorithm>
 #include <map>
@@ -38,8 +38,8 @@ RepairRecords records_of(db::Store& store, const std::vector<RepairReport>& repo
     }
     db::RepairRecord record = record_of(report, software);
     // One file with a serial number that no store keeps must not stand in the way of the others.
-    if (const auto id = db::id_of(record); !id) {
-      made.refused.push_back({report.input, id.error()});
+    if (const auto rows = db::rows_of(record); !rows) {
+      made.refused.push_back({report.input, rows.error()});
       continue;
     }
     const auto known = store.repair_of_output(report.output_sha256);

@@ -1,9 +1,9 @@
-#include "repair/rescaled_log.h"
+#include "repair/rescale/rescaled_log.h"
 
 #include <algorithm>
 
-#include "gt3x/parameters.h"
-#include "gt3x/record.h"
+#include "gt3x/forms/parameters.h"
+#include "gt3x/log/record.h"
 
 namespace sixpoint::repair {
 namespace {

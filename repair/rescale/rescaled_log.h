@@ -1,6 +1,12 @@
 // A log.bin with other constants: the records of one pulled in, the records of the other pulled
 // out.
 //
+//   SIXPOINT_ASSIGN(auto log, recording.open_log());
+//   RescaledLogOptions options;
+//   options.fresh = constants;
+//   SIXPOINT_ASSIGN(const auto repaired, RescaledLog::make(std::move(log), options));
+//   SIXPOINT_CHECK(repaired->read(bytes));  // log.bin, piece by piece
+//
 // Only ACTIVITY and ACTIVITY2 records with samples in them and a right checksum change; they are
 // packed anew and get their checksum. Every other byte comes out as it went in: other records, USB
 // records, records whose checksum fails, zero bytes and damage between records.
@@ -15,10 +21,10 @@
 #include "base/constants.h"
 #include "calib/constants.h"
 #include "calib/scaling.h"
-#include "gt3x/byte_source.h"
-#include "gt3x/log_reader.h"
-#include "gt3x/samples.h"
-#include "repair/still_scan.h"
+#include "gt3x/container/byte_source.h"
+#include "gt3x/log/log_reader.h"
+#include "gt3x/log/samples.h"
+#include "repair/triage/still_scan.h"
 
 namespace sixpoint::repair {
 

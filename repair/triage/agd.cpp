@@ -1,4 +1,4 @@
-#include "repair/agd.h"
+#include "repair/triage/agd.h"
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>

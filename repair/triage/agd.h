@@ -1,5 +1,8 @@
 // What an .agd file (epochs, an SQLite database) says about the unit that recorded it.
 //
+//   SIXPOINT_ASSIGN(const FileFacts facts, read_agd_facts("epochs.agd"));
+//   const Triage answer = triage(facts);  // triage.h
+//
 // Such a file can be triaged but not repaired: its epochs must be made anew from repaired raw data.
 // It does not say when the unit was calibrated.
 #pragma once
@@ -7,7 +10,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "repair/triage.h"
+#include "repair/triage/triage.h"
 
 namespace sixpoint::repair {
 

@@ -1,4 +1,4 @@
-#include "repair/file_tree.h"
+#include "repair/triage/file_tree.h"
 
 #include <algorithm>
 #include <cctype>
@@ -66,17 +66,17 @@ class Walk {
         continue;
       }
       for (const std::string& name : *names) {
-        look_at({here.path.ends_with('/') ? here.path + name : here.path + "/" + name,
-                 here.relative.empty() ? name : here.relative + "/" + name},
-                open);
+        take({here.path.ends_with('/') ? here.path + name : here.path + "/" + name,
+              here.relative.empty() ? name : here.relative + "/" + name},
+             open);
       }
     }
   }
 
-  void look_at(Place place, std::vector<Place>& open) {
+  void take(Place place, std::vector<Place>& open) {
     const auto info = files_.link_info(place.path);
     if (!info) {
-      // Gone since the folder was listed, or a folder that does not let itself be looked into.
+      // Gone since the folder was listed, or a folder that may not be read.
       if (info.error().code != ErrorCode::no_input && wanted(place.path)) {
         found_.refused.push_back({place.path, info.error()});
       }

@@ -1,5 +1,12 @@
 // Files and folders that a user names become a list of recordings.
 //
+//   FileTreeOptions options;
+//   options.endings = {".gt3x", ".agdc"};
+//   SIXPOINT_ASSIGN(const FileTree tree, find_files(files, "/data/archive", options));
+//   for (const FoundFile& file : tree.files) {
+//     std::cout << file.relative << '\n';
+//   }
+//
 // A tree is walked without ever following a symbolic link to a folder that was walked already, so
 // links that lead back up, or to one another, end. What lies really in the tree is found first,
 // under its own name; then what links lead to.
@@ -37,7 +44,7 @@ struct FileTree {
   std::vector<std::string> not_followed;  // links that lead out of the tree
 };
 
-// A file that is named is taken whatever its name; of a folder, everything below it whose name ends
+// A file that is named is taken with any name; of a folder, everything below it whose name ends
 // in one of the endings. no_input where `path` is not there.
 Result<FileTree> find_files(FileSystem& files, const std::string& path,
                             const FileTreeOptions& options);

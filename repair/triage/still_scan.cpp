@@ -1,4 +1,4 @@
-#include "repair/still_scan.h"
+#include "repair/triage/still_scan.h"
 
 #include <algorithm>
 #include <cmath>

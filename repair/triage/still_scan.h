@@ -1,5 +1,10 @@
 // Still blocks of a recording, record by record: what a calibration can learn from it.
 //
+//   SIXPOINT_ASSIGN(auto scan, StillScan::make(30, 256));  // Hz, LSB/g
+//   SIXPOINT_CHECK(scan.set_constants(stored));
+//   scan.push(unix_time, samples);  // a second of them, again and again
+//   const double error_mg = magnitude_error(scan.finish()).mean_mg;
+//
 // Feeds the sample records of a log to calib::StillBlockFinder and breaks its runs where the
 // samples do: at a gap in the records' times, at idle sleep, at a USB record, and where the
 // constants in the PARAMETERS records change. Used on what a file holds, and on what repair makes
@@ -16,7 +21,7 @@
 #include "base/constants.h"
 #include "calib/scaling.h"
 #include "calib/still_blocks.h"
-#include "gt3x/samples.h"
+#include "gt3x/log/samples.h"
 
 namespace sixpoint::repair {
 

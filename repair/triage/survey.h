@@ -1,5 +1,9 @@
 // One pass over a recording: what it says about itself, and what its still periods say.
 //
+//   SIXPOINT_ASSIGN(const Survey found, survey(env.files, "in.gt3x"));
+//   triage(found.facts);              // is it affected?
+//   found.magnitude.mean_mg;          // how far from 1 g it is at rest
+//
 // Everything that triage, solving and repair need to know before a byte is written. Memory is
 // bounded by the still blocks (calib::StillBlockOptions::max_blocks).
 #pragma once
@@ -12,13 +16,13 @@
 #include "base/constants.h"
 #include "base/env.h"
 #include "calib/still_blocks.h"
-#include "gt3x/log_reader.h"
-#include "repair/still_scan.h"
-#include "repair/triage.h"
+#include "gt3x/log/log_reader.h"
+#include "repair/triage/still_scan.h"
+#include "repair/triage/triage.h"
 
 namespace sixpoint::repair {
 
-// The zip entry that a mended file carries beside log.bin and info.txt (docs/repair.md). Readers
+// The zip entry that a repaired file carries beside log.bin and info.txt (docs/repair.md). Readers
 // that open log.bin and info.txt by name do not see it; its presence is what makes a second repair
 // answer `already_repaired`.
 inline constexpr const char* kRepairMark = "sixpoint-repair.json";
@@ -33,8 +37,8 @@ struct Survey {
   // The constants that were in force for at least one sample, in order; usually one set.
   std::vector<StoredConstants> constants;
   // An .agdc file's samples are raw counts, which nothing has to be undone for and nothing can be
-  // mended in; this is what its calibration.json makes of them (the six-point form, else offset and
-  // the diagonal of the matrix).
+  // repaired in; this is what its calibration.json makes of them (the six-point form, else offset
+  // and the diagonal of the matrix).
   bool raw_counts = false;
   std::optional<calib::Calibration> raw_calibration;
   // Why they cannot be used (none in the file, positive = negative, or no samples to use them on),

@@ -1,4 +1,4 @@
-#include "repair/triage.h"
+#include "repair/triage/triage.h"
 
 #include <algorithm>
 #include <array>
@@ -19,35 +19,28 @@ constexpr FirmwareVersion kRotatingFirmware = {1, 6, 0};
 
 bool is_mos(const std::string& serial) { return serial.starts_with("MOS"); }
 
-enum class Ran { right, wrong, unknown };
+// How firmware sets the filter configuration.
+enum class FilterRule { by_calibration_date, always_current, unknown };
 
-// Whether the firmware chose the configuration by the unit's calibration date.
-Ran firmware_choice(const std::optional<FirmwareVersion>& firmware) {
+FilterRule filter_rule(const std::optional<FirmwareVersion>& firmware) {
   if (!firmware) {
-    return Ran::unknown;
+    return FilterRule::unknown;
   }
   if (std::find(kAffectedFirmware.begin(), kAffectedFirmware.end(), *firmware) !=
       kAffectedFirmware.end()) {
-    return Ran::wrong;
+    return FilterRule::always_current;
   }
   if (*firmware < kCheckRemoved || *firmware >= kCheckRestored) {
-    return Ran::right;
+    return FilterRule::by_calibration_date;
   }
-  return Ran::unknown;  // between the two, but no version that was ever named
+  return FilterRule::unknown;  // between the two, but no version that was ever named
 }
 
 }  // namespace
 
 std::string_view to_string(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::affected:
-      return "affected";
-    case Verdict::not_affected:
-      return "not_affected";
-    case Verdict::cannot_tell:
-      return "cannot_tell";
-  }
-  return "cannot_tell";
+  constexpr std::array<std::string_view, 3> kNames = {"affected", "not_affected", "cannot_tell"};
+  return kNames[static_cast<std::size_t>(verdict)];
 }
 
 UtcTime filter_change() {
@@ -98,12 +91,12 @@ Triage triage(const FileFacts& facts) {
     return result;
   }
   const auto firmware = parse_firmware(facts.firmware);
-  const Ran ran = firmware_choice(firmware);
+  const FilterRule rule = filter_rule(firmware);
   result.axes_rotated = firmware == kRotatingFirmware;
   const bool calibrated_late =
       facts.calibration_time.has_value() && *facts.calibration_time >= filter_change();
 
-  if (ran == Ran::right) {
+  if (rule == FilterRule::by_calibration_date) {
     decide(Verdict::not_affected,
            fmt::format("firmware {} chooses the filter configuration that the constants need",
                        printable(facts.firmware, 40)));
@@ -114,7 +107,7 @@ Triage triage(const FileFacts& facts) {
                        to_iso8601(*facts.calibration_time)));
   }
   if (result.reasons.empty()) {
-    if (ran == Ran::wrong && facts.calibration_time.has_value()) {
+    if (rule == FilterRule::always_current && facts.calibration_time.has_value()) {
       decide(Verdict::affected,
              fmt::format("calibrated on {}, before 2014-03-24, and recorded by firmware {}, which "
                          "set the other filter configuration",
@@ -125,7 +118,7 @@ Triage triage(const FileFacts& facts) {
     }
     if (facts.firmware.empty()) {
       decide(Verdict::cannot_tell, "the file does not say which firmware recorded it");
-    } else if (ran == Ran::unknown) {
+    } else if (rule == FilterRule::unknown) {
       decide(Verdict::cannot_tell, fmt::format("firmware '{}' is none whose behaviour is known",
                                                printable(facts.firmware, 40)));
     }
@@ -148,12 +141,12 @@ std::optional<FilterConfiguration> filter_in_force(const FileFacts& facts) {
   if (!is_mos(facts.serial)) {
     return std::nullopt;
   }
-  switch (firmware_choice(parse_firmware(facts.firmware))) {
-    case Ran::wrong:
+  switch (filter_rule(parse_firmware(facts.firmware))) {
+    case FilterRule::always_current:
       return FilterConfiguration::current;
-    case Ran::right:
+    case FilterRule::by_calibration_date:
       return filter_of_constants(facts);
-    case Ran::unknown:
+    case FilterRule::unknown:
       // Late units are run under `current` by every firmware.
       return filter_of_constants(facts) == FilterConfiguration::current
                  ? std::optional(FilterConfiguration::current)

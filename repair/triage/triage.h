@@ -1,10 +1,23 @@
 // Which files are affected by 16CPAN03, and which cannot be told.
 //
+//   const Triage answer = triage({"MOS2A45130450", "1.5.0", parse_iso8601("2013-11-12").value()});
+//   answer.verdict;   // Verdict::affected
+//
 // A file is affected when all three hold (paper, "16CPAN03 Issue Description"): its unit's serial
 // number begins with MOS; the unit was calibrated before 2014-03-24, so that its constants belong
 // to the `legacy` filter configuration; it was recorded by firmware 1.4.0, 1.4.1, 1.5.0, 1.6.0
-// or 1.7.0, which set `current` regardless. One fact that rules it out suffices to say "not
-// affected"; without such a fact a missing one means "cannot tell".
+// or 1.7.0, which set `current` regardless.
+//
+// | serial number | calibrated         | firmware                        | verdict      |
+// |---------------|--------------------|---------------------------------|--------------|
+// | not said      | any                | any                             | cannot_tell  |
+// | not MOS...    | any                | any                             | not_affected |
+// | MOS...        | from 2014-03-24 on | any                             | not_affected |
+// | MOS...        | any                | below 1.4.0, or from 1.8.0 on   | not_affected |
+// | MOS...        | before             | one of the five                 | affected     |
+// | MOS...        | before or not said | not said, or 1.4.0 to 1.7.x but | cannot_tell  |
+// |               |                    | not one of the five             |              |
+// | MOS...        | not said           | one of the five                 | cannot_tell  |
 #pragma once
 
 #include <optional>

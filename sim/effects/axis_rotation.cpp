@@ -7,47 +7,24 @@
 
 namespace sixpoint::sim {
 
-namespace {
-
-class AxisRotation final : public Effect {
- public:
-  explicit AxisRotation(const ParameterSet& values) {
-    const std::vector<double>& rows = values.at("matrix");
-    for (Eigen::Index row = 0; row < 3; ++row) {
-      for (Eigen::Index column = 0; column < 3; ++column) {
-        matrix_(row, column) = rows[static_cast<std::size_t>(3 * row + column)];
-      }
-    }
-  }
-  void on_firmware(SimulatedBlock& block) override {
-    for (gt3x::Counts& counts : block.stored) {
-      const Eigen::Vector3d turned = matrix_ * Eigen::Vector3d(counts[0], counts[1], counts[2]);
-      for (std::size_t axis = 0; axis < kAxes; ++axis) {
-        counts[axis] = static_cast<std::int16_t>(
-            std::clamp<double>(std::round(turned[static_cast<Eigen::Index>(axis)]), -2048, 2047));
-      }
-    }
-  }
-
- private:
-  Eigen::Matrix3d matrix_;
-};
-
-}  // namespace
-
 EffectKind axis_rotation_kind() {
-  return {"axis_rotation",
-          Stage::sensor,
-          "axes permuted or reversed",
-          {{"matrix",
-            "1",
-            {0, -1, 0, 1, 0, 0, 0, 0, 1},
-            -1,
-            1,
-            "firmware 1.6.0 (16CPAN03); a board mounted the other way round"}},
-          [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
-            return std::make_unique<AxisRotation>(values);
-          }};
+  return effect_kind("axis_rotation", Stage::sensor, "axes permuted or reversed",
+                     [](const ParameterSet& values, Random) {
+                       Eigen::Matrix3d matrix;
+                       for (Eigen::Index i = 0; i < matrix.size(); ++i) {
+                         matrix(i / 3, i % 3) = values.at("matrix")[static_cast<std::size_t>(i)];
+                       }
+                       return stored_effect([matrix](gt3x::Counts& counts) {
+                         const Eigen::Vector3d turned =
+                             matrix * Eigen::Vector3d(counts[0], counts[1], counts[2]);
+                         for (std::size_t axis = 0; axis < kAxes; ++axis) {
+                           counts[axis] = static_cast<std::int16_t>(std::clamp<double>(
+                               std::round(turned[static_cast<Eigen::Index>(axis)]), -2048, 2047));
+                         }
+                       });
+                     },
+                     {parameter("matrix", "1", {0, -1, 0, 1, 0, 0, 0, 0, 1}, -1, 1,
+                                "firmware 1.6.0 (16CPAN03); a board mounted the other way round")});
 }
 
 }  // namespace sixpoint::sim

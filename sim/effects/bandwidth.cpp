@@ -85,20 +85,13 @@ class Bandwidth final : public Effect {
 }  // namespace
 
 EffectKind bandwidth_kind() {
-  return {
-      "bandwidth",
-      Stage::sensor,
-      "lower anti-alias corner, on signal and noise",
-      {{"corner_hz",
-        "Hz",
-        {25},
-        5,
-        50,
-        "ADXL362 datasheet: half or a quarter of the output data rate, 12.5 to 50 Hz at 100 Hz"},
-       {"order", "1", {4}, 1, 8, "steepness; whole number"}},
-      [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
-        return std::make_unique<Bandwidth>(values);
-      }};
+  return effect_kind(
+      "bandwidth", Stage::sensor, "lower anti-alias corner, on signal and noise",
+      make_effect<Bandwidth>,
+      {parameter(
+           "corner_hz", "Hz", {25}, 5, 50,
+           "ADXL362 datasheet: half or a quarter of the output data rate, 12.5 to 50 Hz at 100 Hz"),
+       parameter("order", "1", {4}, 1, 8, "steepness; whole number")});
 }
 
 }  // namespace sixpoint::sim

@@ -1,7 +1,8 @@
-#include "sim/effect.h"
+#include "sim/effects/effect.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -12,19 +13,9 @@
 namespace sixpoint::sim {
 
 std::string_view to_string(Stage stage) {
-  switch (stage) {
-    case Stage::stimulus:
-      return "stimulus";
-    case Stage::sensor:
-      return "sensor";
-    case Stage::sampling:
-      return "sampling";
-    case Stage::digital:
-      return "digital";
-    case Stage::firmware:
-      return "firmware";
-  }
-  return "?";
+  constexpr std::array<std::string_view, 5> kNames = {"stimulus", "sensor", "sampling", "digital",
+                                                      "firmware"};
+  return kNames[static_cast<std::size_t>(stage)];
 }
 
 const std::vector<EffectKind>& effect_catalogue() {
@@ -123,6 +114,32 @@ Eigen::Matrix3d rotation_by_deg(const std::vector<double>& rotation_vector_deg) 
 Eigen::Vector3d vector_of(const ParameterSet& values, std::string_view name) {
   const std::vector<double>& numbers = values.find(name)->second;
   return {numbers[0], numbers[1], numbers[2]};
+}
+
+Parameter RareSamples::rate() {
+  return parameter("rate", "1", {0.002}, 0, 0.02,
+                   "share of samples; a full buffer or a slow flash: 1e-4 to 1e-2");
+}
+
+RareSamples::RareSamples(const ParameterSet& values, Random random)
+    : rate_(std::clamp(values.at("rate")[0], 0.0, 0.5)), random_(random) {
+  draw();
+}
+
+void RareSamples::begin(const SimulatedBlock& block) {
+  if (!started_ || block.clock_start_s != clock_start_s_) {
+    started_ = true;
+    clock_start_s_ = block.clock_start_s;
+    shift_s_ = 0;
+  }
+}
+
+void RareSamples::draw() {
+  until_next_ = ~std::uint64_t{0};
+  if (rate_ > 0) {
+    until_next_ = static_cast<std::uint64_t>(
+        std::min(1e15, std::floor(std::log(1 - random_.uniform()) / std::log(1 - rate_))));
+  }
 }
 
 std::vector<SampleRun> draw_runs(const RecordingPlan& plan, double samples, bool at_rest,

@@ -1,5 +1,9 @@
 // Effects: what the nominal simulator leaves out, one file each under effects/.
 //
+//   SIXPOINT_ASSIGN(const EffectKind* kind, find_effect("drift"));
+//   SIXPOINT_ASSIGN(ParameterSet values, complete_parameters(*kind, {{"mg_per_h", {1, 2, 3}}}));
+//   const auto running = make_effects({{kind, values}}, seed);
+//
 // An effect has a name, parameters (with unit, default, plausible range and source), the stage at
 // which it acts, and its forward model: one of the hooks below. The list of effects is data: a
 // diagnosis iterates it. Adding an effect means one new file in effects/ and one line in
@@ -23,6 +27,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -32,7 +37,7 @@
 #include "base/measure.h"
 #include "base/random.h"
 #include "base/result.h"
-#include "gt3x/samples.h"
+#include "gt3x/log/samples.h"
 
 namespace sixpoint::sim {
 
@@ -150,7 +155,7 @@ class Effect {
   virtual void on_analog(SimulatedBlock& /*block*/) {}
   virtual void on_digital(NumberFormat& /*stored*/) {}
   virtual void on_firmware(SimulatedBlock& /*block*/) {}
-  // True where the effect must have seen the signal for a while before the first kept sample.
+  // True where the effect needs the signal of some time before the first stored sample.
   virtual bool needs_run_in() const { return false; }
 };
 
@@ -161,7 +166,7 @@ struct EffectKind {
   std::string summary;
   std::vector<Parameter> parameters;
   // `random` is a stream of the effect's own.
-  std::unique_ptr<Effect> (*make)(const ParameterSet& values, Random random);
+  std::function<std::unique_ptr<Effect>(const ParameterSet& values, Random random)> make;
 };
 
 const std::vector<EffectKind>& effect_catalogue();

@@ -68,13 +68,13 @@ class Flicker final : public Effect {
       covariance(i, i) *= 1 + 1e-9;
     }
     const PoleMatrix root = covariance.llt().matrixL();
-    const Poles kept = keep_.pow(samples);
+    const Poles left = keep_.pow(samples);
     for (Poles& state : state_) {
       Eigen::Matrix<double, static_cast<int>(kPoles), 1> white;
       for (Eigen::Index i = 0; i < white.size(); ++i) {
         white[i] = random_.normal();
       }
-      state = kept * state + (root * white).array();
+      state = left * state + (root * white).array();
     }
   }
 
@@ -91,18 +91,10 @@ class Flicker final : public Effect {
 }  // namespace
 
 EffectKind flicker_kind() {
-  return {"flicker",
-          Stage::sensor,
-          "1/f noise",
-          {{"mg",
-            "mg",
-            {0.5},
-            0,
-            2,
-            "square root of the power density at 1 Hz; consumer MEMS: 0.2 to 1 mg"}},
-          [](const ParameterSet& values, Random random) -> std::unique_ptr<Effect> {
-            return std::make_unique<Flicker>(values, random);
-          }};
+  return effect_kind(
+      "flicker", Stage::sensor, "1/f noise", make_effect<Flicker>,
+      {parameter("mg", "mg", {0.5}, 0, 2,
+                 "square root of the power density at 1 Hz; consumer MEMS: 0.2 to 1 mg")});
 }
 
 }  // namespace sixpoint::sim

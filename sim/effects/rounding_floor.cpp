@@ -3,23 +3,13 @@
 
 namespace sixpoint::sim {
 
-namespace {
-
-class RoundingFloor final : public Effect {
- public:
-  void on_digital(NumberFormat& stored) override { stored.rounding = NumberFormat::Rounding::down; }
-};
-
-}  // namespace
-
 EffectKind rounding_floor_kind() {
-  return {"rounding_floor",
-          Stage::digital,
-          "stored counts are rounded downward",
-          {},
-          [](const ParameterSet&, Random) -> std::unique_ptr<Effect> {
-            return std::make_unique<RoundingFloor>();
-          }};
+  return effect_kind("rounding_floor", Stage::digital, "stored counts are rounded downward",
+                     [](const ParameterSet&, Random) {
+                       return acting_at(&Parts::digital, [](NumberFormat& format) {
+                         format.rounding = NumberFormat::Rounding::down;
+                       });
+                     });
 }
 
 }  // namespace sixpoint::sim

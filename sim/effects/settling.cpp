@@ -63,23 +63,18 @@ class Settling final : public Effect {
 }  // namespace
 
 EffectKind settling_kind() {
-  return {
-      "settling",
-      Stage::stimulus,
-      "ringing after a change of pose, decaying",
-      {{"amplitude",
-        "1",
-        {0.03},
-        0,
-        0.2,
-        "share of the step; elastic mounts overshoot by 1 to 5 %"},
-       {"frequency_hz", "Hz", {6}, 0.5, 25, "first mode of a jig arm with a 20 g unit: 3 to 12 Hz"},
-       {"decay_s", "s", {0.4}, 0.02, 2, "time constant at 5 % of critical damping: 0.2 to 0.6 s"},
-       {"second_share", "1", {0}, 0, 0.5, "share of the second mode in the amplitude"},
-       {"second_ratio", "1", {2}, 1.1, 6.3, "its frequency over the first; 6.27 for a cantilever"}},
-      [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
-        return std::make_unique<Settling>(values);
-      }};
+  return effect_kind(
+      "settling", Stage::stimulus, "ringing after a change of pose, decaying",
+      make_effect<Settling>,
+      {parameter("amplitude", "1", {0.03}, 0, 0.2,
+                 "share of the step; elastic mounts overshoot by 1 to 5 %"),
+       parameter("frequency_hz", "Hz", {6}, 0.5, 25,
+                 "first mode of a jig arm with a 20 g unit: 3 to 12 Hz"),
+       parameter("decay_s", "s", {0.4}, 0.02, 2,
+                 "time constant at 5 % of critical damping: 0.2 to 0.6 s"),
+       parameter("second_share", "1", {0}, 0, 0.5, "share of the second mode in the amplitude"),
+       parameter("second_ratio", "1", {2}, 1.1, 6.3,
+                 "its frequency over the first; 6.27 for a cantilever")});
 }
 
 }  // namespace sixpoint::sim

@@ -9,37 +9,22 @@
 
 namespace sixpoint::sim {
 
-namespace {
-
-class SoftMount final : public Effect {
- public:
-  explicit SoftMount(const ParameterSet& values)
-      : frequency_hz_(std::max(1e-3, values.at("frequency_hz")[0])),
-        q_(std::max(1e-3, values.at("q")[0])) {}
-  void on_tone(Tone& tone) const override {
-    const double r = tone.frequency_hz / frequency_hz_;
-    const std::complex<double> damping(0, r / q_);
-    const std::complex<double> gain = (1.0 + damping) / (1.0 - r * r + damping);
-    tone.amplitude_g *= std::abs(gain);
-    tone.phase_rad += std::arg(gain);
-  }
-
- private:
-  double frequency_hz_;
-  double q_;
-};
-
-}  // namespace
-
 EffectKind soft_mount_kind() {
-  return {"soft_mount",
-          Stage::stimulus,
-          "resonance of strap or mount on the shaker",
-          {{"frequency_hz", "Hz", {15}, 1, 100, "a 20 g unit on a strap or a pad: 8 to 25 Hz"},
-           {"q", "1", {2.5}, 0.5, 20, "rubber and textile: 1.5 to 4"}},
-          [](const ParameterSet& values, Random) -> std::unique_ptr<Effect> {
-            return std::make_unique<SoftMount>(values);
-          }};
+  return effect_kind(
+      "soft_mount", Stage::stimulus, "resonance of strap or mount on the shaker",
+      [](const ParameterSet& values, Random) {
+        const double frequency_hz = std::max(1e-3, values.at("frequency_hz")[0]);
+        const double q = std::max(1e-3, values.at("q")[0]);
+        return acting_at(&Parts::tone, [frequency_hz, q](Tone& tone) {
+          const double r = tone.frequency_hz / frequency_hz;
+          const std::complex<double> damping(0, r / q);
+          const std::complex<double> gain = (1.0 + damping) / (1.0 - r * r + damping);
+          tone.amplitude_g *= std::abs(gain);
+          tone.phase_rad += std::arg(gain);
+        });
+      },
+      {parameter("frequency_hz", "Hz", {15}, 1, 100, "a 20 g unit on a strap or a pad: 8 to 25 Hz"),
+       parameter("q", "1", {2.5}, 0.5, 20, "rubber and textile: 1.5 to 4")});
 }
 
 }  // namespace sixpoint::sim

@@ -3,25 +3,14 @@
 
 namespace sixpoint::sim {
 
-namespace {
-
-class Truncation final : public Effect {
- public:
-  void on_digital(NumberFormat& stored) override {
-    stored.rounding = NumberFormat::Rounding::toward_zero;
-  }
-};
-
-}  // namespace
-
 EffectKind truncation_kind() {
-  return {"truncation",
-          Stage::digital,
-          "stored counts are cut toward zero instead of rounded",
-          {},
-          [](const ParameterSet&, Random) -> std::unique_ptr<Effect> {
-            return std::make_unique<Truncation>();
-          }};
+  return effect_kind("truncation", Stage::digital,
+                     "stored counts are cut toward zero instead of rounded",
+                     [](const ParameterSet&, Random) {
+                       return acting_at(&Parts::digital, [](NumberFormat& format) {
+                         format.rounding = NumberFormat::Rounding::toward_zero;
+                       });
+                     });
 }
 
 }  // namespace sixpoint::sim

@@ -3,23 +3,11 @@
 
 namespace sixpoint::sim {
 
-namespace {
-
-class Wrap final : public Effect {
- public:
-  void on_digital(NumberFormat& stored) override { stored.wraps = true; }
-};
-
-}  // namespace
-
 EffectKind wrap_kind() {
-  return {"wrap",
-          Stage::digital,
-          "overflows modulo 4096",
-          {},
-          [](const ParameterSet&, Random) -> std::unique_ptr<Effect> {
-            return std::make_unique<Wrap>();
-          }};
+  return effect_kind(
+      "wrap", Stage::digital, "overflows modulo 4096", [](const ParameterSet&, Random) {
+        return acting_at(&Parts::digital, [](NumberFormat& format) { format.wraps = true; });
+      });
 }
 
 }  // namespace sixpoint::sim

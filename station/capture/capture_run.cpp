@@ -1,4 +1,4 @@
-#include "station/capture_run.h"
+#include "station/capture/capture_run.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,30 +6,35 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
+#include "base/time.h"
 #include "gt3x/recording.h"
-#include "repair/constants_finder.h"
-#include "repair/survey.h"
-#include "station/recording_pieces.h"
+#include "repair/rescale/constants_finder.h"
+#include "repair/triage/survey.h"
+#include "station/capture/calibration_file.h"
+#include "station/capture/recording_pieces.h"
 
 namespace sixpoint::station {
 
 namespace {
 
-std::chrono::nanoseconds from_seconds(double time_s) {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-      std::chrono::duration<double>(time_s));
+// By convention: differences up to this come from rounding to whole seconds at the sides' ends.
+constexpr double kShort_s = 5;
+constexpr std::chrono::seconds kCheckUnitEvery{1};
+constexpr std::chrono::milliseconds kAskEvery{200};
+
+bool is_activity(const gt3x::LogItem& item) {
+  return item.kind == gt3x::LogItem::Kind::record && item.record.checksum_ok &&
+         (item.record.type == static_cast<std::uint8_t>(gt3x::RecordType::activity) ||
+          item.record.type == static_cast<std::uint8_t>(gt3x::RecordType::activity2));
 }
 
-// A turn between two seconds may cost one at either end.
-constexpr double kShort_s = 5;
-
+// Traces that a clock or a sensor which failed leaves in a recording.
 struct Oddities {
-  double jumped_s = 0;  // how far the times of the seconds are off one another, summed up
-  int repeated_s = 0;   // the longest stretch of seconds with the very same samples
+  double jumped_s = 0;  // sum of the steps between records, beyond one second each
+  int repeated_s = 0;   // the longest time with the same samples in every second
 };
 
-// What a clock or a sensor that failed leaves in a recording.
-Result<Oddities> look_for_oddities(FileSystem& files, const std::string& path) {
+Result<Oddities> find_oddities(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(gt3x::Recording recording, gt3x::Recording::open(files, path));
   SIXPOINT_ASSIGN(gt3x::LogReader log, recording.open_log());
   Oddities oddities;
@@ -41,9 +46,7 @@ Result<Oddities> look_for_oddities(FileSystem& files, const std::string& path) {
     if (!item) {
       return oddities;
     }
-    if (item->kind != gt3x::LogItem::Kind::record || !item->record.checksum_ok ||
-        (item->record.type != static_cast<std::uint8_t>(gt3x::RecordType::activity) &&
-         item->record.type != static_cast<std::uint8_t>(gt3x::RecordType::activity2))) {
+    if (!is_activity(*item)) {
       continue;
     }
     if (last) {
@@ -59,24 +62,23 @@ Result<Oddities> look_for_oddities(FileSystem& files, const std::string& path) {
   }
 }
 
-// The unit recorded without a pause while it was watched: no two blocks are further apart than a
-// side and a turn. What its clock jumped by is no time in which its zeros could have drifted.
+// The unit recorded without a pause, so two blocks are at most a side and a turn apart. A jump of
+// its clock is no time in which its zeros could have drifted.
 void undo_jumps(std::vector<calib::StillBlock>& blocks, double longest_s) {
   double shift_s = 0;
   for (std::size_t i = 1; i < blocks.size(); ++i) {
     blocks[i].start_time_s += shift_s;
     const double gap_s = blocks[i].start_time_s - blocks[i - 1].start_time_s;
     if (!(gap_s > 0 && gap_s <= longest_s)) {
-      const double put_right_s = longest_s - gap_s;
-      shift_s += put_right_s;
-      blocks[i].start_time_s += put_right_s;
+      shift_s += longest_s - gap_s;
+      blocks[i].start_time_s += longest_s - gap_s;
     }
   }
 }
 
 // True where the clock of the unit jumped.
 Result<bool> note_oddities(FileSystem& files, const std::string& path, CaptureReport& report) {
-  SIXPOINT_ASSIGN(const Oddities oddities, look_for_oddities(files, path));
+  SIXPOINT_ASSIGN(const Oddities oddities, find_oddities(files, path));
   if (std::abs(oddities.jumped_s) > kShort_s) {
     report.notes.push_back(
         fmt::format("the times in the recording jump by {:+.0f} s: the unit's clock was wrong",
@@ -84,12 +86,11 @@ Result<bool> note_oddities(FileSystem& files, const std::string& path, CaptureRe
   }
   if (oddities.repeated_s > kShort_s) {
     report.notes.push_back(fmt::format(
-        "the sensor repeated the very same readings for {} s: it is frozen", oddities.repeated_s));
+        "the sensor repeated the same readings for {} s: it is frozen", oddities.repeated_s));
   }
   return std::abs(oddities.jumped_s) > kShort_s;
 }
 
-// The file is there: what it says about itself, and its constants.
 Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<double> wanted_s,
                        CaptureReport& report) {
   SIXPOINT_ASSIGN(repair::Survey survey, repair::survey(env.files, options.output));
@@ -126,19 +127,6 @@ std::string piece_name(const std::string& output, std::size_t number) {
 
 }  // namespace
 
-std::vector<std::string> why_recording_cannot_help(const device::FilterState& filter,
-                                                   const std::string& serial,
-                                                   const std::string& firmware) {
-  if (filter.recording == calib::FilterConfiguration::current) {
-    return {};
-  }
-  return {fmt::format("{} with firmware {} records under the filter 'legacy', for which its stored "
-                      "constants are right; affected files were recorded under 'current'",
-                      printable(serial, 40), printable(firmware, 40)),
-          "install a firmware from 1.4.0 to 1.7.0 on this unit and capture again, or measure it on "
-          "the jig ('sixpoint jig' sets the filter itself)"};
-}
-
 Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
                                        const CaptureOptions& options) {
   CaptureReport report;
@@ -153,14 +141,12 @@ Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
   report.file = options.output;
   SIXPOINT_ASSIGN(report.file_sha256, file_sha256(env.files, options.output));
   SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(env.files, options.output));
-  if (const auto filter = repair::filter_in_force(survey.facts)) {
-    report.recording_filter = *filter;
-    report.refusal = why_recording_cannot_help({*filter, *filter}, report.serial, report.firmware);
-    if (!report.refusal.empty()) {
-      return report;
-    }
+  const auto filter = repair::filter_in_force(survey.facts);
+  report.recording_filter = filter.value_or(report.recording_filter);
+  report.refusal = why_recording_cannot_help({report.serial, report.firmware, filter, true});
+  if (report.refusal.empty()) {
+    SIXPOINT_CHECK(check_and_solve(env, options, std::nullopt, report));
   }
-  SIXPOINT_CHECK(check_and_solve(env, options, std::nullopt, report));
   return report;
 }
 
@@ -176,13 +162,14 @@ class CaptureRun {
     report_.firmware = unit().identity().firmware;
     SIXPOINT_ASSIGN(const device::FilterState filter, unit().filter());
     report_.recording_filter = filter.recording;
-    report_.refusal = why_recording_cannot_help(filter, report_.serial, report_.firmware);
+    report_.refusal =
+        why_recording_cannot_help({report_.serial, report_.firmware, filter.recording, true});
     if (!report_.refusal.empty()) {
       return report_;
     }
     if (resume) {
       progress_ = *resume;
-      SIXPOINT_CHECK(again([&] { return begin_anew(); }));
+      SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
     } else {
       if (env_.files.info(options_.output)) {
         return fail(ErrorCode::cannot_create, "the file exists already", options_.output,
@@ -191,13 +178,13 @@ class CaptureRun {
       progress_.started = unit().clock().now();
       SIXPOINT_CHECK(begin_recording());
     }
-    const Result<bool> round = go_round();
-    if (!round && (gone_ || round.error().code == ErrorCode::internal)) {
-      return fail(round.error());  // the unit, wherever it is, goes on recording
+    const Result<bool> all_sides = record_sides();
+    if (!all_sides && (gone_ || all_sides.error().code == ErrorCode::internal)) {
+      return fail(all_sides.error());  // the unit records on
     }
     SIXPOINT_CHECK(end_recording());
-    SIXPOINT_CHECK(round);
-    if (!*round) {
+    SIXPOINT_CHECK(all_sides);
+    if (!*all_sides) {
       report_.stopped = true;
       return report_;
     }
@@ -209,11 +196,10 @@ class CaptureRun {
   enum class Step { done, stopped, away };
 
   device::Unit& unit() { return *on_jig_.unit; }
-  bool looks() const { return hooks_.reopen != nullptr; }
 
-  // Does `step` until it succeeds, and waits for the unit in between where that is what failed.
+  // Repeats `step` while it fails because the unit is away; waits for the unit in between.
   template <class Action>
-  auto again(Action step) -> decltype(step()) {
+  auto retry(Action step) -> decltype(step()) {
     for (int attempt = 1;; ++attempt) {
       auto result = step();
       if (result || attempt >= options_.downloads ||
@@ -227,7 +213,7 @@ class CaptureRun {
   }
 
   Status come_back(const Error& why) {
-    if (looks()) {
+    if (hooks_.reopen) {
       gone_ = true;
       SIXPOINT_ASSIGN(on_jig_, hooks_.reopen(why));
       gone_ = false;
@@ -242,7 +228,7 @@ class CaptureRun {
     piece_began_ = unit().clock().now();
     auto begun = unit().start_recording(options_.rate_hz, piece_began_);
     if (!begun && begun.error().code == ErrorCode::io) {
-      // Perhaps a program that was killed left it streaming.
+      // A program that was killed may have left it streaming.
       SIXPOINT_CHECK(unit().stop_stream());
       begun = unit().start_recording(options_.rate_hz, piece_began_);
     }
@@ -251,8 +237,8 @@ class CaptureRun {
     return {};
   }
 
-  // The unit was away, or another program began this: the recording so far is ended and kept, and
-  // the rest gets one of its own. Sides of a recording that the unit lost are asked again.
+  // The unit was away, or another program began this capture: the recording so far is ended and
+  // stays in the unit, and a new one begins. Sides of a recording that the unit lost are repeated.
   Status begin_anew() {
     pieces_ = true;
     if (const auto stopped = unit().stop_recording();
@@ -279,15 +265,18 @@ class CaptureRun {
     }
   }
 
-  // Whether the unit still answers. Its other errors are no sign that it went.
-  Status look() {
-    if (!looks()) {
-      return {};
+  // Sets away_. Only a driver that can reopen the unit is told; other errors do not mean that the
+  // unit is unplugged.
+  bool is_away() {
+    if (!hooks_.reopen) {
+      return false;
     }
     const auto identity = unit().identify();
-    return identity || identity.error().code != ErrorCode::device_unavailable
-               ? Status{}
-               : fail(identity.error());
+    if (identity || identity.error().code != ErrorCode::device_unavailable) {
+      return false;
+    }
+    away_ = identity.error();
+    return true;
   }
 
   Result<Step> place(device::Pose side, std::size_t number) {
@@ -300,8 +289,7 @@ class CaptureRun {
         case SideAnswer::leave:
           return fail(ErrorCode::internal, "the program ends");
         case SideAnswer::waiting:
-          if (Status there = look(); !there) {
-            away_ = there.error();
+          if (is_away()) {
             return Step::away;
           }
           break;
@@ -310,40 +298,35 @@ class CaptureRun {
   }
 
   Result<Step> rest() {
-    Clock* clock = &unit().clock();
-    const auto until = clock->elapsed() + from_seconds(options_.turn_s + options_.side_s);
-    auto looked = clock->elapsed();
-    for (auto now = looked; now < until; now = clock->elapsed()) {
-      const SideAnswer word = hooks_.word ? hooks_.word() : SideAnswer::waiting;
-      if (word == SideAnswer::leave) {
+    Clock& clock = unit().clock();
+    const auto until = clock.elapsed() + from_seconds(options_.turn_s + options_.side_s);
+    auto checked = clock.elapsed();
+    for (auto now = checked; now < until; now = clock.elapsed()) {
+      const SideAnswer answer = hooks_.next_answer ? hooks_.next_answer() : SideAnswer::waiting;
+      if (answer == SideAnswer::leave) {
         return fail(ErrorCode::internal, "the program ends");
       }
-      if (word == SideAnswer::stop || (options_.cancelled && options_.cancelled())) {
+      if (answer == SideAnswer::stop) {
         return Step::stopped;
       }
-      if (now - looked >= kLookEvery) {
-        looked = now;
-        if (Status there = look(); !there) {
-          away_ = there.error();
+      if (now - checked >= kCheckUnitEvery) {
+        checked = now;
+        if (is_away()) {
           return Step::away;
         }
       }
-      clock->sleep(std::min<std::chrono::nanoseconds>(until - now, std::chrono::milliseconds(200)));
+      clock.sleep(std::min<std::chrono::nanoseconds>(until - now, kAskEvery));
     }
-    if (Status there = look(); !there) {
-      away_ = there.error();
-      return Step::away;
-    }
-    return Step::done;
+    return is_away() ? Step::away : Step::done;
   }
 
-  Result<Step> take(device::Pose side, std::size_t number) {
+  Result<Step> record_side(device::Pose side, std::size_t number) {
     SIXPOINT_ASSIGN(const Step placed, place(side, number));
     if (placed != Step::done) {
       return placed;
     }
     if (const Status turned = on_jig_.jig->go_to(side); !turned) {
-      if (!looks() || turned.error().code != ErrorCode::device_unavailable) {
+      if (!hooks_.reopen || turned.error().code != ErrorCode::device_unavailable) {
         return fail(turned.error());
       }
       away_ = turned.error();
@@ -357,21 +340,21 @@ class CaptureRun {
                        [side](const CaptureResume::Side& one) { return one.pose == side; });
   }
 
-  // True when the unit went through all sides; a side that the unit lost is asked again.
-  Result<bool> go_round() {
+  // True when all sides are recorded, false when the person stopped.
+  Result<bool> record_sides() {
     for (std::size_t number = 1; number <= device::kPoses.size();) {
       const device::Pose side = device::kPoses[number - 1];
       if (is_done(side)) {
         ++number;
         continue;
       }
-      SIXPOINT_ASSIGN(const Step step, take(side, number));
+      SIXPOINT_ASSIGN(const Step step, record_side(side, number));
       if (step == Step::stopped) {
         return false;
       }
       if (step == Step::away) {
         SIXPOINT_CHECK(come_back(away_));
-        SIXPOINT_CHECK(again([&] { return begin_anew(); }));
+        SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
         number = 1;
         continue;
       }
@@ -381,16 +364,15 @@ class CaptureRun {
     return true;
   }
 
-  // First of all: a unit left recording runs empty. Perhaps it is another by now: ask.
+  // Also after an error: a unit that is left recording empties its battery.
   Status end_recording() {
-    SIXPOINT_CHECK(again([&] { return unit().identify(); }));
-    const auto stopped = again([&] { return unit().stop_recording(); });
+    SIXPOINT_CHECK(retry([&] { return unit().identify(); }));
+    const auto stopped = retry([&] { return unit().stop_recording(); });
     wanted_s_ = std::chrono::duration<double>(unit().clock().now() - piece_began_).count();
     if (!stopped) {
       if (stopped.error().code != ErrorCode::io) {
         return fail(stopped.error());
       }
-      // It is not recording any more: what there is, is in its list.
       report_.notes.push_back(
           "the unit had stopped recording by itself: it started anew, or its "
           "battery or memory gave out");
@@ -398,23 +380,27 @@ class CaptureRun {
     return {};
   }
 
-  Status fetch() {
-    SIXPOINT_ASSIGN(const auto recordings, again([&] { return unit().recordings(); }));
-    std::vector<device::RecordingInfo> made;
-    for (const device::RecordingInfo& recording : recordings) {
-      if (std::any_of(progress_.done.begin(), progress_.done.end(),
-                      [&](const auto& side) { return side.recording == recording.id; })) {
-        made.push_back(recording);
-      }
-    }
-    const auto is_missing = [&](const CaptureResume::Side& side) {
-      return std::none_of(made.begin(), made.end(),
-                          [&](const auto& one) { return one.id == side.recording; });
-    };
-    if (std::any_of(progress_.done.begin(), progress_.done.end(), is_missing)) {
+  // The recordings of this capture, oldest first.
+  Result<std::vector<device::RecordingInfo>> list_recordings() {
+    SIXPOINT_ASSIGN(auto made, retry([&] { return unit().recordings(); }));
+    const auto& sides = progress_.done;
+    std::erase_if(made, [&](const device::RecordingInfo& recording) {
+      return std::none_of(sides.begin(), sides.end(),
+                          [&](const auto& side) { return side.recording == recording.id; });
+    });
+    const bool complete = std::all_of(sides.begin(), sides.end(), [&](const auto& side) {
+      return std::any_of(made.begin(), made.end(),
+                         [&](const auto& recording) { return recording.id == side.recording; });
+    });
+    if (!complete) {
       return fail(ErrorCode::io, "the unit does not list the recording it made", report_.serial,
                   "plug the unit in again and repeat");
     }
+    return made;
+  }
+
+  Status fetch() {
+    SIXPOINT_ASSIGN(const auto made, list_recordings());
     report_.file = options_.output;
     if (made.size() == 1) {
       SIXPOINT_CHECK(download(made.front(), options_.output));
@@ -440,10 +426,8 @@ class CaptureRun {
         return {};
       }
     }
-    return again([&] { return unit().download(recording, env_.files, path, {}); });
+    return retry([&] { return unit().download(recording, env_.files, path, {}); });
   }
-
-  static constexpr std::chrono::seconds kLookEvery{1};
 
   UnitOnJig on_jig_;
   Env& env_;
@@ -455,20 +439,11 @@ class CaptureRun {
   UtcTime piece_began_{};
   double wanted_s_ = 0;
   bool pieces_ = false;  // the unit was away, or an earlier program began this
-  Error away_;
-  bool gone_ = false;  // and given up: on_jig_ is not to be used any more
+  Error away_;           // why the unit is away
+  bool gone_ = false;    // the unit did not come back: on_jig_ is not valid any more
 };
 
 }  // namespace
-
-Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,
-                                  const CaptureOptions& options, const SidePrompt& prompt) {
-  CaptureHooks hooks;
-  hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
-    return prompt(side, number, of) ? SideAnswer::placed : SideAnswer::stop;
-  };
-  return CaptureRun({&unit, &jig}, env, options, hooks).run({});
-}
 
 Result<CaptureReport> run_capture(UnitOnJig on_jig, Env& env, const CaptureOptions& options,
                                   const CaptureHooks& hooks,

@@ -1,12 +1,21 @@
 // The customer's calibration file (the paper's second method): the unit records while it lies on
 // each of its six sides; the file is downloaded, checked and solved.
 //
-// Sequential, because a unit that records sends no live samples: what can be judged is judged on
-// the file afterwards, and says which sides to repeat.
+//   CaptureOptions options;
+//   options.output = "side.gt3x";
+//   CaptureHooks hooks;
+//   hooks.ask = [](device::Pose side, std::size_t number, std::size_t of) {
+//     return SideAnswer::placed;  // after the person laid the unit on `side`
+//   };
+//   SIXPOINT_ASSIGN(CaptureReport report, run_capture({&unit, &jig}, env, options, hooks));
+//   report.usable();  // report.solved has the constants, report.notes what went wrong
 //
-// A capture outlives a unit that is pulled out and a program that ends: what was recorded until
-// then stays in the unit as a recording of its own, the side under way is asked again, and at the
-// end the pieces are put together (recording_pieces.h).
+// A unit that records sends no live samples, so the file is judged afterwards, and the judgement
+// says which sides to repeat. A capture goes on after the unit was unplugged and after the program
+// was restarted: what was recorded stays in the unit, the side under way is asked for again, and at
+// the end the pieces are joined (recording_pieces.h).
+//
+// Blocking; hooks are called on the calling thread. Unit, jig and Env belong to the caller.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +26,7 @@
 
 #include "calib/solve.h"
 #include "device/unit.h"
-#include "station/jig_session.h"
+#include "station/run/jig_session.h"
 
 namespace sixpoint::station {
 
@@ -27,19 +36,11 @@ struct CaptureOptions {
   // A side needs three still blocks of 4 s, and at 30 Hz a noisy z axis loses half of them to the
   // paper's second criterion.
   double side_s = 40;
-  double turn_s = 5;  // for the hand, after the prompt
-  // Asked several times a second while the unit rests; true ends the recording. May be empty.
-  std::function<bool()> cancelled;
+  double turn_s = 5;  // after the prompt, to let go of the unit
   calib::SolveOptions solve;
-  // A unit that was unplugged to be turned goes on recording: how long it is waited for at the end,
-  // and how often a broken download is gone on with.
-  double replug_patience_s = 60;
-  int downloads = 5;
+  double replug_patience_s = 60;  // for an unplugged unit, when its recording is downloaded
+  int downloads = 5;              // attempts
 };
-
-// Told before each side; answers whether the unit lies there (false: the person gives up). A jig
-// that turns by itself is sent there afterwards.
-using SidePrompt = std::function<bool(device::Pose side, std::size_t number, std::size_t of)>;
 
 // What an earlier program had of this capture.
 struct CaptureResume {
@@ -52,23 +53,23 @@ struct CaptureResume {
 };
 
 enum class SideAnswer {
-  placed,   // it lies there
-  waiting,  // asked again at once, after a look whether the unit is still there
+  placed,   // the unit lies there
+  waiting,  // not yet: ask again, after a check that the unit is still plugged in
   stop,     // the person gives up: the recording is ended
-  leave     // the program ends: the unit goes on, and so does the capture, with a later program
+  leave     // the program ends: the unit records on, and a later program goes on with the capture
 };
 
-// Whoever drives the capture hangs in here; all called on its own thread.
+// What the capture asks of its driver. All but `ask` may be empty.
 struct CaptureHooks {
-  // `number` counts from 1.
+  // Does the unit lie on this side? `number` counts from 1. A jig that turns by itself is sent
+  // there afterwards.
   std::function<SideAnswer(device::Pose side, std::size_t number, std::size_t of)> ask;
-  // Asked several times a second while the unit rests; anything but `stop` and `leave` goes on.
-  std::function<SideAnswer()> word = nullptr;
-  // After every side, for a disk. May be empty.
+  // Asked several times a second while the unit rests; `stop` and `leave` end the rest.
+  std::function<SideAnswer()> next_answer = nullptr;
+  // After every side: save this to go on after a restart.
   std::function<void(const CaptureResume&)> progress = nullptr;
-  // The unit went away. Waits until it is back and answers with it, opened anew, or gives up. Where
-  // this is empty nobody looks: a unit that was unplugged to be turned goes on recording, and is
-  // waited for at the end.
+  // The unit was unplugged. Waits until it is back and returns it, opened anew, or an error. Where
+  // this is empty, the unit may be unplugged while it is turned: only the end waits for it.
   std::function<Result<UnitOnJig>(const Error&)> reopen = nullptr;
 };
 
@@ -76,35 +77,25 @@ struct CaptureReport {
   std::string serial;
   std::string firmware;
   calib::FilterConfiguration recording_filter = calib::FilterConfiguration::current;
-  // Why a recording of this unit cannot help, and what can; then nothing was recorded.
-  std::vector<std::string> refusal;
+  std::vector<std::string> refusal;  // of why_recording_cannot_help(); then nothing was recorded
   bool stopped = false;  // by the person; the recording was stopped and left in the unit
   std::string file;
   std::string file_sha256;
-  std::vector<std::string> pieces;  // the recordings that `file` was put together from, if it was
+  std::vector<std::string> pieces;  // the recordings that `file` was joined from, if it was
   std::optional<calib::SolveReport> solved;
-  // What went wrong on the way and was got over, or explains what is missing.
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;  // trouble on the way, for people
 
   bool usable() const { return solved && solved->usable(); }
 };
 
-// A recording mends affected files only when it was made under `current`: not on a unit calibrated
-// before 2014-03-24 with firmware below 1.4.0 or from 1.8.0 on. Empty when it can help.
-std::vector<std::string> why_recording_cannot_help(const device::FilterState& filter,
-                                                   const std::string& serial,
-                                                   const std::string& firmware);
-
-// For a unit that takes no commands: the recording that it holds, made while somebody laid it on
-// its sides, is copied, checked and solved. bad_data where it holds none.
+// For a unit that takes no commands: its last recording, made while a person laid it on its sides,
+// is copied, checked and solved. bad_data where it holds none.
 Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env, const CaptureOptions& options);
 
 // device_unavailable when the unit goes away; cannot_create when the file exists or cannot be made;
-// `internal` when `leave` was said.
+// internal after SideAnswer::leave.
 Result<CaptureReport> run_capture(UnitOnJig on_jig, Env& env, const CaptureOptions& options,
                                   const CaptureHooks& hooks,
                                   const std::optional<CaptureResume>& resume = {});
-Result<CaptureReport> run_capture(device::Unit& unit, device::Jig& jig, Env& env,
-                                  const CaptureOptions& options, const SidePrompt& prompt);
 
 }  // namespace sixpoint::station

@@ -1,4 +1,4 @@
-#include "station/recording_pieces.h"
+#include "station/capture/recording_pieces.h"
 
 #include <optional>
 
@@ -11,7 +11,7 @@ namespace sixpoint::station {
 
 namespace {
 
-// The log of each piece in turn. A damaged one ends it with its error.
+// The logs of the pieces, read one after the other.
 class Chain final : public gt3x::ByteSource {
  public:
   explicit Chain(std::vector<std::unique_ptr<gt3x::ByteSource>> sources)
@@ -67,7 +67,7 @@ Status join_recordings(FileSystem& files, const std::vector<std::string>& pieces
     logs.push_back(std::move(log));
   }
   if (!info) {
-    return fail(ErrorCode::internal, "no pieces to put together", output);
+    return fail(ErrorCode::internal, "no pieces to join", output);
   }
   SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, output));
   SIXPOINT_CHECK(writer.add("log.bin", std::make_unique<Chain>(std::move(logs))));

@@ -1,4 +1,6 @@
-// Several recordings of one unit as one file, for a capture that was interrupted.
+// Joins several recordings of one unit into one file, for a capture that was interrupted.
+//
+//   SIXPOINT_CHECK(join_recordings(env.files, {"c-1.gt3x", "c-2.gt3x"}, "c.gt3x"));
 #pragma once
 
 #include <string>
@@ -8,9 +10,9 @@
 
 namespace sixpoint::station {
 
-// The records of `pieces`, one behind the other and byte for byte, under the first one's info.txt
-// with the last one's times of its end. `output` appears whole or not at all. bad_data where they
-// are not of one unit.
+// `output` has the records of `pieces` in order, byte for byte, and the info.txt of the first piece
+// with the end times of the last. It appears whole or not at all. bad_data where the pieces are not
+// of one unit.
 Status join_recordings(FileSystem& files, const std::vector<std::string>& pieces,
                        const std::string& output);
 

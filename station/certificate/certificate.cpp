@@ -1,4 +1,4 @@
-#include "station/certificate.h"
+#include "station/certificate/certificate.h"
 
 #include <cmath>
 
@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
-#include "gt3x/model.h"
-#include "station/jig_report.h"
+#include "gt3x/forms/model.h"
+#include "station/run/jig_report.h"
 
 namespace sixpoint::station {
 
@@ -15,8 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Reads a run's document. What is missing or of another type stays as it was: whether what is left
-// makes a certificate is decided at the end.
+// Reads a run's document. What is missing or of another type keeps its value; certificate_of()
+// decides whether the rest makes a certificate.
 class Document {
  public:
   explicit Document(const Json& json) : json_(json) {}
@@ -104,6 +104,19 @@ std::vector<Certificate::Pose> read_poses(const Json* list) {
   return poses;
 }
 
+// False where one of them is missing.
+bool read_results(const Document& document, Certificate& into) {
+  const Document constants = document.in("constants");
+  const Document expanded = document.in("uncertainty").in("expanded");
+  return constants.three("sensitivity_g_per_lsb", into.sensitivity_g_per_lsb) &&
+         constants.three("zero_lsb", into.zero_lsb) &&
+         constants.three("positive_lsb", into.measured.positive_lsb) &&
+         constants.three("negative_lsb", into.measured.negative_lsb) &&
+         constants.three("stored_zero_lsb", into.measured.zero_lsb) &&
+         expanded.three("sensitivity_percent", into.sensitivity_expanded_percent) &&
+         expanded.three("zero_mg", into.zero_expanded_mg);
+}
+
 Json constants_to_json(const std::optional<Certificate::Constants>& constants) {
   if (!constants) {
     return nullptr;
@@ -131,7 +144,7 @@ Json poses_to_json(const std::vector<Certificate::Pose>& poses) {
   return json;
 }
 
-// For ^FH: what ZPL would take for a command, and what no printer prints, in hex.
+// For ^FH: characters that are commands in ZPL, and control characters, in hex.
 std::string zpl_text(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -187,23 +200,13 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
   out.as_left = read_page(document.in("as_left"));
   out.written = document.in("as_left").flag("written");
   out.method = document.text("method");
-  const Document constants = document.in("constants");
-  const Document expanded = document.in("uncertainty").in("expanded");
-  const bool whole = constants.three("sensitivity_g_per_lsb", out.sensitivity_g_per_lsb) &&
-                     constants.three("zero_lsb", out.zero_lsb) &&
-                     constants.three("positive_lsb", out.measured.positive_lsb) &&
-                     constants.three("negative_lsb", out.measured.negative_lsb) &&
-                     constants.three("stored_zero_lsb", out.measured.zero_lsb) &&
-                     expanded.three("sensitivity_percent", out.sensitivity_expanded_percent) &&
-                     expanded.three("zero_mg", out.zero_expanded_mg) && !out.quantities.empty();
-  if (!whole) {
+  if (!read_results(document, out) || out.quantities.empty()) {
     return fail(ErrorCode::bad_data,
                 fmt::format("run {} lacks what a certificate needs", printable(run.id, 60)), {},
-                "it is of an earlier version of the program; measure the unit again");
+                "an earlier version of the program made it; measure the unit again");
   }
   out.poses = read_poses(document.list("poses"));
-  out.verification = read_poses(
-      json["verification"].is_object() ? Document(json["verification"]).list("poses") : nullptr);
+  out.verification = read_poses(document.in("verification").list("poses"));
   out.gravity_m_per_s2 = document.number("gravity_m_per_s2").value_or(0);
   out.gravity_standard_uncertainty_m_per_s2 =
       document.number("gravity_standard_uncertainty_m_per_s2").value_or(0);
@@ -259,22 +262,24 @@ Json Certificate::to_json() const {
   return json;
 }
 
-Status write_certificate(FileSystem& files, const std::string& path, const db::RunRecord& run) {
-  const bool pdf = path.ends_with(".pdf");
-  if (!pdf && !path.ends_with(".json")) {
+Status check_certificate_name(const std::string& path) {
+  if (!path.ends_with(".pdf") && !path.ends_with(".json")) {
     return fail(ErrorCode::usage, "a certificate is a .pdf or a .json", path,
                 "end the file's name with one of them");
   }
+  return {};
+}
+
+Status write_certificate(FileSystem& files, const std::string& path, const db::RunRecord& run) {
+  SIXPOINT_CHECK(check_certificate_name(path));
   SIXPOINT_ASSIGN(const Certificate certificate, certificate_of(run));
-  if (!pdf) {
+  if (path.ends_with(".json")) {
     return write_file(
         files, path,
         certificate.to_json().dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
   }
   SIXPOINT_ASSIGN(const Bytes bytes, certificate_pdf(certificate));
-  SIXPOINT_ASSIGN(auto out, AtomicFile::create(files, path));
-  SIXPOINT_CHECK(out.append(bytes));
-  return out.commit();
+  return write_file(files, path, as_text(bytes));
 }
 
 Result<std::string> label_zpl(const db::RunRecord& run) {

@@ -1,7 +1,11 @@
 // The calibration certificate of a jig run (docs/certificate.md), and the label for the unit.
 //
-// Both are made from what the store keeps of a run and from nothing else, so that they can be made
-// again years later: the same record gives the same bytes. The date of issue is that of the run.
+//   SIXPOINT_ASSIGN(const db::RunRecord run, store.run(id));
+//   SIXPOINT_CHECK(write_certificate(env.files, "certificate.pdf", run));
+//   SIXPOINT_ASSIGN(const std::string label, label_zpl(run));
+//
+// Both are made from the stored record of a run alone, so that they can be made again years later:
+// the same record gives the same bytes. The date of issue is that of the run. Any thread.
 #pragma once
 
 #include <optional>
@@ -15,11 +19,11 @@
 #include "base/env.h"
 #include "base/result.h"
 #include "db/store.h"
-#include "station/verdict.h"
+#include "station/limits/verdict.h"
 
 namespace sixpoint::station {
 
-// The content of a certificate; what is not known is empty and is said to be "not stated".
+// The content of a certificate; what is empty is printed as "not stated".
 struct Certificate {
   std::string run;  // the run's id, the certificate's number
   std::string serial;
@@ -78,18 +82,19 @@ struct Certificate {
   nlohmann::ordered_json to_json() const;  // "sixpoint/certificate/1"
 };
 
-// bad_data where the record is no complete jig run: one that was stopped or is inconclusive has no
-// result to certify (a failed one has).
+// bad_data where the record is no complete jig run. One that was stopped or is inconclusive has no
+// result to certify; a failed one has.
 Result<Certificate> certificate_of(const db::RunRecord& run);
-// A PDF of A4 pages: text that can be searched, a QR code "sixpoint:SERIAL:RUN". Characters that
-// the fonts lack are written as \u{...}.
+// A PDF of A4 pages: text that can be searched, a QR code "sixpoint:SERIAL:RUN".
 Result<Bytes> certificate_pdf(const Certificate& certificate);
-// By the ending of `path`, .pdf or .json; usage for another one.
+// usage where the file's name ends in neither .pdf nor .json.
+Status check_certificate_name(const std::string& path);
+// By the ending of `path`.
 Status write_certificate(FileSystem& files, const std::string& path, const db::RunRecord& run);
 
 // ZPL II for a label of 50 x 25 mm at 203 dpi: serial, date, verdict, run, QR code.
-// bad_data unless the unit passed, its constants were written and what it answered was what was
-// written: a label without that would be a lie.
+// bad_data unless the unit passed, its constants were written, and it returned what was written: a
+// label says that the unit holds what was measured.
 Result<std::string> label_zpl(const db::RunRecord& run);
 
 }  // namespace sixpoint::station

@@ -1,5 +1,5 @@
 // The one place that sees libqrencode.
-#include "station/qr_code.h"
+#include "station/certificate/qr_code.h"
 
 #include <memory>
 

@@ -1,4 +1,7 @@
-// A QR code as a square of modules.
+// A QR code (ISO/IEC 18004) as a square of modules.
+//
+//   SIXPOINT_ASSIGN(const QrCode code, qr_code("sixpoint:SERIAL:RUN"));
+//   code.at(0, 0);  // true: the corner of a finder pattern is dark
 #pragma once
 
 #include <string_view>

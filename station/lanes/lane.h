@@ -1,10 +1,13 @@
-// One lane of the station, for lanes.cpp alone: its thread, its unit, and what it is doing.
+// One lane, for the files of this folder alone: its thread, its unit, and what it is doing.
 //
-//   lane.cpp          commands, what the page shows, the thread's loop, the unit that comes and
-//   goes lane_run.cpp      a jig run, and its going on after a restart of the program
-//   lane_capture.cpp  a calibration file, likewise
+//     lane.cpp          commands of clients
+//     lane_json.cpp     what clients are shown
+//     lane_unit.cpp     the thread's loop; a unit is plugged in, previewed, pulled out
+//     lane_run.cpp      a jig run, and how it continues after a restart of the program
+//     lane_capture.cpp  a calibration file, likewise
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <deque>
@@ -13,15 +16,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "station/lanes.h"
-#include "station/run_folder.h"
+#include "station/lanes/lanes.h"
+#include "station/lanes/run_folder.h"
 
 namespace sixpoint::station {
-
-inline std::chrono::nanoseconds from_seconds(double time_s) {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-      std::chrono::duration<double>(time_s));
-}
 
 inline double unix_ms(UtcTime time) {
   return std::chrono::duration<double, std::milli>(time.time_since_epoch()).count();
@@ -34,20 +32,12 @@ inline tl::unexpected<LaneRefusal> lane_conflict(std::string what, std::string h
 
 // What all lanes use.
 struct Lanes::Shared {
-  Shared(Env& its_env, const device::TransportRegistry& its_devices, LanesOptions its_options,
-         RunKeeper run_keeper, CaptureKeeper capture_keeper)
-      : env(its_env),
-        devices(its_devices),
-        options(std::move(its_options)),
-        keep_run(std::move(run_keeper)),
-        keep_capture(std::move(capture_keeper)) {}
-
   Env& env;
   const device::TransportRegistry& devices;
   LanesOptions options;
-  RunKeeper keep_run;
-  CaptureKeeper keep_capture;
-  std::mutex store;  // one lane at a time
+  StoreRun store_run;
+  StoreConstants store_constants;
+  std::mutex store_mutex;  // one lane at a time uses the callbacks
   std::atomic<std::uint64_t> changes{0};
 };
 
@@ -61,13 +51,9 @@ class Lanes::Lane {
   const std::string& device() const { return device_; }
 
   LaneAnswer<void> start(const StartOrder& order, bool capture);
-
-  LaneAnswer<void> say(const std::string& client, OperatorWord word);
-
-  LaneAnswer<void> side_is_placed(const std::string& client);
-
+  LaneAnswer<void> command(const std::string& client, OperatorCommand command);
+  LaneAnswer<void> confirm_side(const std::string& client);
   LaneAnswer<void> scan(const std::string& serial);
-
   LaneAnswer<void> take_over(const std::string& client, const std::string& operator_name);
 
   bool holds(const std::string& serial) const {
@@ -79,16 +65,14 @@ class Lanes::Lane {
     return state_;
   }
   std::uint64_t changes() const { return changes_; }
-
   nlohmann::ordered_json to_json() const;
-
   LaneTrace trace(std::uint64_t first) const;
   nlohmann::ordered_json live() const;
 
-  // For the queue of hands: when it began to wait, and whether somebody is at it.
+  // Whether the lane waits for the operator, for Lanes::queue().
   struct Wait {
     bool waits = false;
-    bool in_hand = false;
+    bool is_moved = false;  // the operator has the unit in hand
     double since_ms = 0;
   };
   Wait wait() const;
@@ -98,68 +82,115 @@ class Lanes::Lane {
     StartOrder start;
     bool capture = false;
   };
-  struct Line {
+  struct LogLine {
     std::uint64_t id;
     std::string kind;
     std::string text;
     double at_ms;
   };
+  // A jig run as clients are shown it: under way, or the last one.
+  struct RunView {
+    std::optional<Pose> wanted;
+    std::string prompt;
+    std::string last_refusal;
+    JigProgress progress;
+    std::vector<Pose> open;
+  };
+  // A calibration file under way, also while its unit is away.
+  struct CaptureView {
+    std::optional<Pose> side;  // that the operator is asked for
+    std::size_t number = 0;    // of this side, from 1
+    bool placed = false;
+    double until_ms = 0;  // Unix time at which the unit has rested long enough on this side
+  };
 
+  // The thread's loop (lane_unit.cpp).
   void work(const std::stop_token& stop);
+  void continue_unfinished(const std::stop_token& stop);
+  std::optional<Order> next_order();
   void pause(const std::stop_token& stop, double time_s);
   bool open_unit();
   void close_unit();
   void preview(const std::stop_token& stop);
-  void see(const device::SampleBlock& block, const JigLive* live);
-  void run(const std::stop_token& stop, const Order& order,
-           const std::optional<UnfinishedRun>& left);
-  void resume(const std::stop_token& stop);
-  void close_interrupted(const UnfinishedRun& left, const std::string& reason);
-  void conclude(const JigReport& report, const RunLabels& labels);
-  void keep(const std::stop_token& stop);
-  void capture(const std::stop_token& stop, const Order& order,
-               const std::optional<UnfinishedCapture>& left);
-  void resume_capture(const std::stop_token& stop, const UnfinishedCapture& left);
-  void end_capture(nlohmann::ordered_json result);
-  SideAnswer ask_side(const std::stop_token& stop, device::Pose side, std::size_t number);
+  bool start_preview(const std::stop_token& stop);
+  void add_readings(const device::SampleBlock& block, const JigLive* live);
+  UnitOnJig on_jig();
   // Answers with the unit of this serial number, opened anew, and `working` as the lane's state.
+  // device_unavailable after the time-out or a stop by the operator; `internal` when the program
+  // ends.
   Result<UnitOnJig> wait_for_unit(const std::stop_token& stop, const std::string& serial,
                                   const std::string& why, LaneState working);
-  UnitOnJig on_jig();
 
-  // With mutex_ held.
+  Result<UnitOnJig> wait_to_continue(const std::stop_token& stop, const StartOrder& order,
+                                     const char* what, LaneState working);
+
+  // A jig run (lane_run.cpp).
+  void run(const std::stop_token& stop, const StartOrder& order,
+           const std::optional<UnfinishedRun>& left);
+  UnfinishedRun new_run(const StartOrder& order, calib::FilterConfiguration filter);
+  bool check_start(const std::string& serial, bool is_continued, RetestState& retest);
+  JigHooks run_hooks(const std::stop_token& stop, RunSaver& saver);
+  void on_action(const JigAction& action);
+  void end_without_report(const std::string& serial, const Error& error);
+  void end_unmeasured(const std::string& serial, const char* verdict,
+                      std::vector<std::string> reasons, std::string message);
+  void continue_run(const std::stop_token& stop, const UnfinishedRun& left);
+  void end_interrupted(const UnfinishedRun& left, const std::string& reason);
+  // The verdict is shown at once; store_result() follows.
+  void show_result(const JigReport& report, const RunLabels& labels);
+  // Stores the last run. Until that succeeds, the run stays on the disk of this station.
+  void store_result(const std::stop_token& stop);
+
+  // A calibration file (lane_capture.cpp).
+  void capture(const std::stop_token& stop, const StartOrder& order,
+               const std::optional<UnfinishedCapture>& left);
+  UnfinishedCapture new_capture(const StartOrder& order) const;
+  CaptureHooks capture_hooks(const std::stop_token& stop, UnfinishedCapture& state);
+  SideAnswer ask_side(const std::stop_token& stop, device::Pose side, std::size_t number);
+  void continue_capture(const std::stop_token& stop, const UnfinishedCapture& left);
+  void end_capture(nlohmann::ordered_json result);
+
+  bool stop_requested() const {
+    const std::lock_guard lock(mutex_);
+    return has_stop_command();
+  }
+  std::optional<OperatorCommand> next_command();
+
+  // All below: with mutex_ held.
   void changed() {
     ++changes_;
     ++shared_.changes;
   }
+  bool has_stop_command() const {
+    return std::find(commands_.begin(), commands_.end(), OperatorCommand::stop) != commands_.end();
+  }
   bool is_busy() const {
-    return state_ == LaneState::running || state_ == LaneState::unit_away ||
-           state_ == LaneState::wrong_unit || state_ == LaneState::capturing ||
-           state_ == LaneState::resuming;
+    return state_ != LaneState::absent && state_ != LaneState::idle && state_ != LaneState::done;
   }
-  LaneAnswer<void> obeys(const std::string& client) const;
-  void tell(std::string kind, std::string text);
+  // Nothing runs, or this client may command it.
+  LaneAnswer<void> check_client(const std::string& client) const;
+  LaneAnswer<void> check_scanned(const std::string& serial) const;
+  void add_log(std::string kind, std::string text);
   void set_state(LaneState state, std::string message);
-  std::optional<OperatorWord> take_word();
-  bool stop_was_said() const {
-    const std::lock_guard lock(mutex_);
-    return std::find(words_.begin(), words_.end(), OperatorWord::stop) != words_.end();
-  }
+  void set_done(nlohmann::ordered_json result, std::string message);
+  nlohmann::ordered_json run_json() const;
 
   Shared& shared_;
   Env& env_;
   const std::size_t number_;
   const std::string device_;
-  RunFolder folder_;  // the thread's own
-  device::ManualJig by_hand_;
-  bool streaming_ = false;
-  std::chrono::nanoseconds heard_{0};
-  // A report whose storing failed, to be tried again.
-  struct Unkept {
+  // Used by the thread alone:
+  RunFolder folder_;
+  device::ManualJig manual_jig_;
+  bool is_streaming_ = false;
+  std::chrono::nanoseconds last_sample_{0};
+  std::chrono::nanoseconds last_accepted_{0};
+  // The last run until it is stored.
+  struct Unstored {
     JigReport report;
     RunLabels labels;
   };
-  std::optional<Unkept> unkept_;
+  std::optional<Unstored> unstored_;
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;
@@ -174,24 +205,15 @@ class Lanes::Lane {
   std::string client_;
   bool write_ = false;
   std::optional<Order> order_;
-  std::deque<OperatorWord> words_;
-  std::deque<Line> log_;
-  std::uint64_t lines_ = 0;
+  std::deque<OperatorCommand> commands_;
+  std::deque<LogLine> log_;
+  std::uint64_t log_lines_ = 0;
   double waiting_since_ms_ = 0;
-  std::optional<Pose> wanted_;
-  std::string prompt_;
-  std::string last_refusal_;
-  JigProgress progress_;
-  std::vector<Pose> open_;
-  bool has_run_ = false;
+  std::optional<RunView> run_;
+  std::optional<CaptureView> capture_;
   nlohmann::ordered_json result_;  // null until a run has ended
-  bool has_capture_ = false;       // one is under way, whether or not the unit is there
-  std::optional<Pose> asked_side_;
-  std::size_t side_number_ = 0;
-  bool side_placed_ = false;
-  double side_until_ms_ = 0;
   std::deque<PerAxis<std::int16_t>> readings_;
-  std::uint64_t taken_ = 0;
+  std::uint64_t readings_taken_ = 0;
   double newest_ms_ = 0;
   JigLive live_;
   std::atomic<std::uint64_t> changes_{0};

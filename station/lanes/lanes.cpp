@@ -1,10 +1,10 @@
-#include "station/lanes.h"
+#include "station/lanes/lanes.h"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "station/lane.h"
+#include "station/lanes/lane.h"
 
 namespace sixpoint::station {
 
@@ -14,8 +14,8 @@ Lanes::Lanes() = default;
 Lanes::~Lanes() = default;
 
 Result<std::unique_ptr<Lanes>> Lanes::open(Env& env, const device::TransportRegistry& devices,
-                                           LanesOptions options, RunKeeper keep_run,
-                                           CaptureKeeper keep_capture) {
+                                           LanesOptions options, StoreRun store_run,
+                                           StoreConstants store_constants) {
   if (options.devices.empty() || options.devices.size() > kMostLanes) {
     return fail(
         ErrorCode::usage,
@@ -24,8 +24,8 @@ Result<std::unique_ptr<Lanes>> Lanes::open(Env& env, const device::TransportRegi
   }
   SIXPOINT_CHECK(env.files.make_folders(options.state_folder));
   std::unique_ptr<Lanes> lanes(new Lanes);
-  lanes->shared_ = std::make_unique<Shared>(env, devices, std::move(options), std::move(keep_run),
-                                            std::move(keep_capture));
+  lanes->shared_.reset(new Shared{
+      env, devices, std::move(options), std::move(store_run), std::move(store_constants), {}, {}});
   for (const std::string& device : lanes->shared_->options.devices) {
     lanes->lanes_.push_back(
         std::make_unique<Lane>(*lanes->shared_, lanes->lanes_.size() + 1, device));
@@ -48,53 +48,41 @@ LaneAnswer<Lanes::Lane*> Lanes::lane(std::size_t number) const {
 }
 
 LaneAnswer<void> Lanes::start(std::size_t number, const StartOrder& order) {
-  const auto chosen = lane(number);
-  return chosen ? (*chosen)->start(order, false) : LaneAnswer<void>(tl::unexpected(chosen.error()));
+  return lane(number).and_then([&](Lane* chosen) { return chosen->start(order, false); });
 }
 
 LaneAnswer<void> Lanes::start_capture(std::size_t number, const StartOrder& order) {
-  const auto chosen = lane(number);
-  return chosen ? (*chosen)->start(order, true) : LaneAnswer<void>(tl::unexpected(chosen.error()));
+  return lane(number).and_then([&](Lane* chosen) { return chosen->start(order, true); });
 }
 
-LaneAnswer<void> Lanes::say(std::size_t number, const std::string& client, OperatorWord word) {
-  const auto chosen = lane(number);
-  return chosen ? (*chosen)->say(client, word) : LaneAnswer<void>(tl::unexpected(chosen.error()));
+LaneAnswer<void> Lanes::command(std::size_t number, const std::string& client,
+                                OperatorCommand command) {
+  return lane(number).and_then([&](Lane* chosen) { return chosen->command(client, command); });
 }
 
-LaneAnswer<void> Lanes::side_is_placed(std::size_t number, const std::string& client) {
-  const auto chosen = lane(number);
-  return chosen ? (*chosen)->side_is_placed(client)
-                : LaneAnswer<void>(tl::unexpected(chosen.error()));
+LaneAnswer<void> Lanes::confirm_side(std::size_t number, const std::string& client) {
+  return lane(number).and_then([&](Lane* chosen) { return chosen->confirm_side(client); });
 }
 
 LaneAnswer<std::size_t> Lanes::scan(std::size_t number, const std::string& serial) {
   if (number == 0) {
-    for (const auto& each : lanes_) {
-      if (each->holds(serial)) {
-        number = static_cast<std::size_t>(&each - lanes_.data()) + 1;
-      }
-    }
-    if (number == 0) {
+    const auto found = std::find_if(lanes_.begin(), lanes_.end(),
+                                    [&](const auto& each) { return each->holds(serial); });
+    if (found == lanes_.end()) {
       return lane_conflict(fmt::format("no lane holds a unit {}", printable(serial, 40)),
-                           "plug the unit in, or look whether its label is its own");
+                           "plug the unit in, or check that its label is its own");
     }
+    number = static_cast<std::size_t>(found - lanes_.begin()) + 1;
   }
-  const auto chosen = lane(number);
-  if (!chosen) {
-    return tl::unexpected(chosen.error());
-  }
-  if (const auto scanned = (*chosen)->scan(serial); !scanned) {
-    return tl::unexpected(scanned.error());
-  }
-  return number;
+  return lane(number).and_then([&](Lane* chosen) { return chosen->scan(serial); }).map([&] {
+    return number;
+  });
 }
 
 LaneAnswer<void> Lanes::take_over(std::size_t number, const std::string& client,
                                   const std::string& operator_name) {
-  const auto chosen = lane(number);
-  return chosen ? (*chosen)->take_over(client, operator_name)
-                : LaneAnswer<void>(tl::unexpected(chosen.error()));
+  return lane(number).and_then(
+      [&](Lane* chosen) { return chosen->take_over(client, operator_name); });
 }
 
 std::uint64_t Lanes::changes() const { return shared_->changes; }
@@ -115,8 +103,8 @@ std::vector<std::size_t> Lanes::queue() const {
     }
   }
   std::stable_sort(waiting.begin(), waiting.end(), [](const auto& a, const auto& b) {
-    return a.first.in_hand != b.first.in_hand ? a.first.in_hand
-                                              : a.first.since_ms < b.first.since_ms;
+    return a.first.is_moved != b.first.is_moved ? a.first.is_moved
+                                                : a.first.since_ms < b.first.since_ms;
   });
   std::vector<std::size_t> numbers;
   numbers.reserve(waiting.size());

@@ -1,12 +1,24 @@
 // Lanes: up to sixteen units at once, each with a thread and a run of its own.
 //
-// A lane is a device string. While nothing runs, its thread opens the unit, shows what it reads and
-// notices within a second when it goes or another comes. A run is the same state machine as in the
-// terminal (jig_run.h), driven by run_jig(); what it has is on the disk from the first sample, so
-// that it goes on after a restart of the program, and a unit that was pulled out goes on when it is
-// back. A run belongs to the client that started it: others get `conflict` until they take it over.
+//   LanesOptions options;
+//   options.devices = {"virtual:seed=7"};
+//   options.state_folder = "state";
+//   SIXPOINT_ASSIGN(const auto lanes,
+//                   Lanes::open(env, devices, options, store_run, store_constants));
+//   StartOrder order;
+//   order.operator_name = "Ada";
+//   const LaneAnswer<void> started = lanes->start(1, order);
+//   std::cout << lanes->to_json(1);
 //
-// All functions may be called from any thread; none waits for a unit.
+// A lane is a device string (docs/virtual.md). While nothing runs, its thread opens the unit, takes
+// its samples, and notices within a second when the unit is pulled out or exchanged. A jig run is
+// the same state machine as in the terminal (jig_run.h). Its state and its samples are on the disk
+// from the first sample: the run continues after a restart of the program, and when a unit that was
+// pulled out is plugged in again. A run belongs to the client that started it; other clients get
+// `conflict` until they take it over.
+//
+// Threads: all functions may be called from any thread; none waits for a unit. The callbacks are
+// called on the threads of the lanes, StoreRun and StoreConstants by one lane at a time.
 #pragma once
 
 #include <cstdint>
@@ -20,47 +32,40 @@
 
 #include "base/env.h"
 #include "device/transport.h"
-#include "station/capture_run.h"
-#include "station/jig_session.h"
+#include "station/capture/capture_run.h"
+#include "station/records/run_records.h"
+#include "station/run/jig_session.h"
 
 namespace sixpoint::station {
 
 inline constexpr std::size_t kMostLanes = 16;
 
-// Who runs it and where, for the record.
+// Operator and place of a run, for its record.
 struct RunLabels {
   std::string operator_name;
   std::string station;
   std::string retest_of;  // the run that this one repeats, or empty
 };
-struct KeptRun {
-  std::string run_id;
-  std::optional<std::string> constants_id;
-  std::string verdict;  // as it was stored; empty: the report's own
-};
-// Puts a run into the store. Called from any lane's thread, one at a time.
-using RunKeeper = std::function<Result<KeptRun>(const JigReport&, const RunLabels&)>;
-// Before a run: whether this unit may be measured now and what its earlier runs demand. An error is
-// told to the operator and nothing is measured. May be empty.
-using StartGate = std::function<Result<RetestState>(const std::string& serial)>;
-// Keeps the constants of a calibration file; answers with their id in the store.
-using CaptureKeeper = std::function<Result<std::string>(const CaptureReport&)>;
+// Puts a run into the store.
+using StoreRun = std::function<Result<RunIds>(const JigReport&, const RunLabels&)>;
+// Before a run: may this unit be measured now, and what do its earlier runs demand? On an error
+// nothing is measured, and the operator reads why. May be empty.
+using StartCheck = std::function<Result<RetestState>(const std::string& serial)>;
+// Stores the constants of a calibration file; answers with their id in the store.
+using StoreConstants = std::function<Result<std::string>(const CaptureReport&)>;
 
 struct LanesOptions {
   std::vector<std::string> devices;  // one lane each, 1 to kMostLanes
   std::string state_folder;          // of this station; made when it is not there
   std::string station;               // its name, for the record
   JigSessionOptions session;
-  StartGate may_start;
-  // A calibration file: rate, seconds per side, folder.
-  CaptureOptions capture;
+  StartCheck may_start;
+  CaptureOptions capture;  // of a calibration file: rate, seconds per side
   std::string capture_folder = ".";
-  // How long a run waits for its unit. A person who went for a spare cable comes back in that time.
-  double unit_wait_s = 600;
-  // Without an accepted pose. One pair of hands serves sixteen lanes, and goes to lunch.
-  double pose_time_out_s = 3600;
-  double silence_s = 0.9;  // a unit that stopped streaming is noticed within a second
-  double retry_s = 0.3;    // between attempts to open a unit
+  double unit_wait_s = 600;       // a run waits so long for its unit: time to fetch a spare cable
+  double pose_time_out_s = 3600;  // without an accepted pose: one operator serves sixteen lanes
+  double silence_s = 0.9;         // a unit without samples is noticed within a second
+  double retry_s = 0.3;           // between attempts to open a unit
 };
 
 enum class LaneState {
@@ -75,9 +80,9 @@ enum class LaneState {
 };
 std::string_view to_string(LaneState state);
 
-// Why a lane did not do what it was told.
+// Why a lane did not take a command.
 struct LaneRefusal {
-  enum class Kind { no_such_lane, conflict, bad_request } kind = Kind::bad_request;
+  enum class Kind { no_such_lane, conflict } kind = Kind::conflict;
   std::string what;
   std::string hint;
 };
@@ -86,25 +91,25 @@ using LaneAnswer = tl::expected<T, LaneRefusal>;
 
 struct StartOrder {
   std::string operator_name;
-  std::string client;  // who may command the run
-  std::string serial;  // as scanned; empty: not scanned. Must be the unit's own.
+  std::string client;  // that may command the run
+  std::string serial;  // as scanned; the unit must have it. Empty: not scanned.
   bool write = false;
 };
 
-// Calibrated readings for the traces, newest last.
+// Calibrated readings, newest last.
 struct LaneTrace {
-  std::uint64_t first = 0;  // number of the first one since the lane began
+  std::uint64_t first = 0;  // number of the first reading, counted since the lane was opened
   std::vector<PerAxis<std::int16_t>> force_mg;
-  double host_ms = 0;  // Unix time at which the newest came from the unit
+  double host_ms = 0;  // Unix time at which the newest reading came from the unit
 };
 
 class Lanes {
  public:
   // `env` and `devices` outlive the lanes. Starts their threads. usage for no or too many devices.
   static Result<std::unique_ptr<Lanes>> open(Env& env, const device::TransportRegistry& devices,
-                                             LanesOptions options, RunKeeper keep_run,
-                                             CaptureKeeper keep_capture);
-  ~Lanes();  // ends the threads; runs stay on the disk, to be resumed
+                                             LanesOptions options, StoreRun store_run,
+                                             StoreConstants store_constants);
+  ~Lanes();  // ends the threads; runs stay on the disk, to be continued
   Lanes(const Lanes&) = delete;
   Lanes& operator=(const Lanes&) = delete;
 
@@ -114,27 +119,27 @@ class Lanes {
   // Lanes are numbered from 1.
   LaneAnswer<void> start(std::size_t number, const StartOrder& order);
   LaneAnswer<void> start_capture(std::size_t number, const StartOrder& order);
-  LaneAnswer<void> say(std::size_t number, const std::string& client, OperatorWord word);
+  LaneAnswer<void> command(std::size_t number, const std::string& client, OperatorCommand command);
   // The unit lies on the side that the capture asked for.
-  LaneAnswer<void> side_is_placed(std::size_t number, const std::string& client);
-  // A scanned serial number for this lane, or (number 0) for the lane whose unit it is. Answers
-  // with the lane; a mismatch is `conflict` and stays until the right one is scanned.
+  LaneAnswer<void> confirm_side(std::size_t number, const std::string& client);
+  // A scanned serial number for this lane, or (number 0) for the lane that holds this unit. Answers
+  // with the lane. A serial of another unit is `conflict`, until the right one is scanned.
   LaneAnswer<std::size_t> scan(std::size_t number, const std::string& serial);
-  // From now on the run obeys this client.
+  // From now on the run takes commands from this client.
   LaneAnswer<void> take_over(std::size_t number, const std::string& client,
                              const std::string& operator_name);
 
-  // How often anything but the readings changed, over all lanes.
+  // Counts every change but that of the readings, over all lanes or in one.
   std::uint64_t changes() const;
   std::uint64_t changes(std::size_t number) const;
   LaneState state(std::size_t number) const;
   nlohmann::ordered_json to_json(std::size_t number) const;  // docs/station.md
-  // The readings from number `first` on, as many as are kept (six seconds), and beside them where
-  // the unit lies: {stillness, dwell, face, angle_deg}.
+  // Readings from number `first` on; six seconds of them are held.
   LaneTrace trace(std::size_t number, std::uint64_t first) const;
+  // How the unit lies: {stillness, dwell, face, angle_deg}.
   nlohmann::ordered_json live(std::size_t number) const;
-  // Lanes that want a hand, the one to serve first in front: one that is being handled already,
-  // then by how long they have been waiting.
+  // Lanes that wait for the operator, the one to serve next in front: a lane with a unit that is
+  // being moved, then the lane that has waited longest.
   std::vector<std::size_t> queue() const;
 
  private:

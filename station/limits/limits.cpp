@@ -1,4 +1,4 @@
-#include "station/limits.h"
+#include "station/limits/limits.h"
 
 #include <algorithm>
 #include <cassert>
@@ -15,10 +15,6 @@ namespace {
 
 constexpr std::string_view kDegreeCelsius = "\u00b0C";
 constexpr std::string_view kDegree = "\u00b0";
-
-std::string sha256_of(std::string_view text) {
-  return to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
-}
 
 }  // namespace
 
@@ -89,7 +85,7 @@ Limits default_limits() {
   for (const QuantityInfo& info : quantities()) {
     limits.limits.push_back({std::string(info.name), info.low, info.high, 0});
   }
-  limits.sha256 = sha256_of(to_toml(limits));
+  limits.sha256 = text_sha256(to_toml(limits));
   return limits;
 }
 

@@ -1,5 +1,8 @@
 // The limits that a jig run is judged by: a TOML file, or the built-in defaults (docs/limits.md).
 //
+//   SIXPOINT_ASSIGN(const Limits limits, read_limits(env.files, "limits.toml"));
+//   limits.of("zero_offset_mg").high;  // in mg
+//
 // One table per quantity, named as in quantities(), with `low`, `high` (at least one where the
 // quantity has both) and `guard_band`, all in the quantity's unit; beside them `decision`, `retest`
 // and `check_unit`. What the file leaves out keeps its default. The SHA-256 of the file's bytes is
@@ -49,22 +52,18 @@ struct DecisionRule {
   double guard_factor = 1;     // 1: at most 2.5 % of wrong passes at the limit; 0: shared risk
 };
 
-// Testing a unit until it passes is no test.
+// A unit is not simply tested until it passes.
 struct RetestPolicy {
-  // Runs in a row that ended in a fail or a conditional fail; then an engineer decides.
-  int most_failures = 3;
-  // After a failure: so many passes in a row until the unit counts as passed. The ones before are
-  // conditional.
-  int passes_after_failure = 2;
+  int most_failures = 3;         // in a row, conditional or not; then an engineer decides
+  int passes_after_failure = 2;  // in a row, until the unit counts as passed
 };
 
 struct CheckUnitPolicy {
   int baseline_runs = 10;  // runs that the chart's limits are computed from
-  // Nelson's rules (statistics.h) that lock the station; the others are only shown. With all eight
-  // on six charts a station in order would be locked every fourth week.
+  // Nelson's rules (statistics.h) that lock the station. All eight, on six charts, would lock a
+  // good station every fourth week.
   std::vector<int> locking_rules = {1, 2, 5};
-  // Scatter below this does not matter in practice and is not held against the station: seating of
-  // 0.01 degree and the noise of a dwell.
+  // Smaller scatter counts as this: seating of 0.01 degree and the noise of a dwell.
   double least_sigma_zero_mg = 0.3;
   double least_sigma_sensitivity_percent = 0.03;
 };
@@ -84,9 +83,10 @@ Limits default_limits();
 // configuration, with the line in `where` ("limits.toml:12"), for what contradicts itself: a low
 // above its high, a guard band that leaves nothing to pass, an unknown key, a value of the wrong
 // type, negative where that makes no sense, NaN, infinite, or beyond what the quantity can be; and
-// for a file that is no TOML. bad_data never: a limits file is configuration.
+// for a file that is no TOML.
 Result<Limits> parse_limits(std::string_view toml, const std::string& source);
-Result<Limits> read_limits(FileSystem& files, const std::string& path);  // at most 1 MiB
+// At most 1 MiB. An empty path gives the built-in limits.
+Result<Limits> read_limits(FileSystem& files, const std::string& path);
 
 // All of it as TOML with its reasons as comments; parse_limits() gives the same limits back.
 std::string to_toml(const Limits& limits);

@@ -1,11 +1,11 @@
-// Reading limits from TOML: the one place that sees toml++.
+// Reads limits from TOML. The only file that includes toml++.
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "base/sha256.h"
-#include "station/limits.h"
+#include "station/limits/limits.h"
 
 #define TOML_EXCEPTIONS 0
 #define TOML_ENABLE_FORMATTERS 0
@@ -45,7 +45,7 @@ class Reader {
 
   Result<double> number(const toml::node& node, std::string_view key, double least,
                         double most) const {
-    // A whole number that no double holds exactly is one all the same.
+    // Also whole numbers that a double does not hold exactly.
     const auto whole = node.value_exact<std::int64_t>();
     const auto value = whole              ? std::optional(static_cast<double>(*whole))
                        : node.is_number() ? node.value<double>()
@@ -72,15 +72,15 @@ class Reader {
   Status read_table(const std::string& name, const toml::table& table,
                     const toml::source_region& place) {
     for (const auto& [key, node] : table) {
-      const std::string_view word = key.str();
+      const std::string_view entry = key.str();
       if (name == "decision") {
-        SIXPOINT_CHECK(read_decision(word, node));
+        SIXPOINT_CHECK(read_decision(entry, node));
       } else if (name == "retest") {
-        SIXPOINT_CHECK(read_retest(word, node));
+        SIXPOINT_CHECK(read_retest(entry, node));
       } else if (name == "check_unit") {
-        SIXPOINT_CHECK(read_check_unit(word, node));
+        SIXPOINT_CHECK(read_check_unit(entry, node));
       } else if (find_quantity(name) != nullptr) {
-        SIXPOINT_CHECK(read_limit(name, word, node));
+        SIXPOINT_CHECK(read_limit(name, entry, node));
       }
     }
     const QuantityInfo* info = find_quantity(name);
@@ -201,22 +201,23 @@ Result<Limits> parse_limits(std::string_view text, const std::string& source) {
   }
   Limits limits = default_limits();
   limits.source = source;
-  limits.sha256 =
-      to_hex(sha256(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  limits.sha256 = text_sha256(text);
   SIXPOINT_CHECK(Reader(source, limits).read(parsed.table()));
   return limits;
 }
 
 Result<Limits> read_limits(FileSystem& files, const std::string& path) {
+  if (path.empty()) {
+    return default_limits();
+  }
   SIXPOINT_ASSIGN(const FileInfo info, files.info(path));
   if (info.size > kLargestFile) {
     return fail(ErrorCode::configuration, fmt::format("{} bytes are no limits file", info.size),
                 path, "a limits file has a few kilobytes");
   }
   SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, kLargestFile));
-  // The name alone: the same file gives the same certificate wherever it lay.
-  return parse_limits(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
-                      file_name_of(path));
+  // The name alone: the same file gives the same certificate from every folder.
+  return parse_limits(as_text(bytes), file_name_of(path));
 }
 
 }  // namespace sixpoint::station

@@ -1,4 +1,4 @@
-#include "station/verdict.h"
+#include "station/limits/verdict.h"
 
 #include <algorithm>
 #include <array>
@@ -8,39 +8,18 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "station/jig_report.h"
-
 namespace sixpoint::station {
 
 namespace {
 
-constexpr std::array<std::pair<JigVerdict, std::string_view>, 6> kVerdictNames = {{
-    {JigVerdict::pass, "pass"},
-    {JigVerdict::conditional_pass, "conditional_pass"},
-    {JigVerdict::conditional_fail, "conditional_fail"},
-    {JigVerdict::fail, "fail"},
-    {JigVerdict::inconclusive, "inconclusive"},
-    {JigVerdict::stopped, "stopped"},
-}};
+// In the order of the enumerators.
+constexpr std::array<std::string_view, 6> kNames = {"pass", "conditional_pass", "conditional_fail",
+                                                    "fail", "inconclusive",     "stopped"};
+constexpr std::array<int, 6> kExitCodes = {0, 0, 1, 1, 2, 3};
+// A run has the most severe verdict of its quantities.
+constexpr std::array<int, 6> kSeverities = {0, 1, 3, 4, 2, 5};
 
-// Which of two verdicts a run has that has both.
-int severity(JigVerdict verdict) {
-  switch (verdict) {
-    case JigVerdict::pass:
-      return 0;
-    case JigVerdict::conditional_pass:
-      return 1;
-    case JigVerdict::inconclusive:
-      return 2;
-    case JigVerdict::conditional_fail:
-      return 3;
-    case JigVerdict::fail:
-      return 4;
-    case JigVerdict::stopped:
-      return 5;
-  }
-  return 5;
-}
+int severity(JigVerdict verdict) { return kSeverities[static_cast<std::size_t>(verdict)]; }
 
 std::string shown(double value, std::string_view unit) {
   return unit == "%" || unit.empty() || unit == "\u00b0"
@@ -102,44 +81,20 @@ std::string sentence(const JudgedQuantity& judged) {
 
 }  // namespace
 
-std::string_view to_string(JigVerdict verdict) {
-  for (const auto& [value, name] : kVerdictNames) {
-    if (value == verdict) {
-      return name;
-    }
-  }
-  return "?";
-}
+std::string_view to_string(JigVerdict verdict) { return kNames[static_cast<std::size_t>(verdict)]; }
 
 std::optional<JigVerdict> parse_jig_verdict(std::string_view text) {
-  for (const auto& [value, name] : kVerdictNames) {
-    if (name == text) {
-      return value;
-    }
-  }
-  return std::nullopt;
+  const auto found = std::find(kNames.begin(), kNames.end(), text);
+  return found == kNames.end() ? std::nullopt
+                               : std::optional(static_cast<JigVerdict>(found - kNames.begin()));
 }
 
-int exit_code_of(JigVerdict verdict) {
-  switch (verdict) {
-    case JigVerdict::pass:
-    case JigVerdict::conditional_pass:
-      return 0;
-    case JigVerdict::conditional_fail:
-    case JigVerdict::fail:
-      return 1;
-    case JigVerdict::inconclusive:
-      return 2;
-    case JigVerdict::stopped:
-      return 3;
-  }
-  return 1;
-}
+int exit_code_of(JigVerdict verdict) { return kExitCodes[static_cast<std::size_t>(verdict)]; }
 
 const std::vector<FailureCode>& failure_codes() {
   static const std::vector<FailureCode> kCodes = {
       {"sensitivity_low", "an axis gives more counts per g than the limits allow",
-       "a stronger sensor than the type has, or poses mixed up by hand",
+       "a sensor with too high a gain, or poses that were exchanged",
        "Repeat the run once. If it stays, send the unit to repair."},
       {"sensitivity_high", "an axis gives fewer counts per g than the limits allow",
        "a damaged sensor, or the wrong filter configuration",
@@ -152,7 +107,7 @@ const std::vector<FailureCode>& failure_codes() {
       {"midpoint_off",
        "the midpoint of +1 g and -1 g is not where the axis reads when it lies level",
        "the sensor's response is curved, the case or a seat leans, or the unit was seated badly",
-       "Clean the seats of jig and unit, look whether the case is whole, repeat. If it stays, send "
+       "Clean the seats of jig and unit, check the case for damage, repeat. If it stays, send "
        "the unit to repair."},
       {"noise_high", "samples scatter too much while the unit lies still",
        "the bench trembles, the unit is loose on the jig, or the sensor is broken",
@@ -165,7 +120,7 @@ const std::vector<FailureCode>& failure_codes() {
       {"temperature_high", "the unit is warmer than the limits allow",
        "it charged, or lay in the sun", "Leave it on the bench for an hour and repeat."},
       {"temperature_unsteady", "the unit's temperature changed during the run",
-       "it charged, was held in the hand, or came in from the cold",
+       "it charged, was held in a hand, or came in from the cold",
        "Leave it on the bench for an hour and repeat."},
       {"tilt_high", "a pose lies too far from the jig's direction",
        "the unit was not seated, or dirt lies in the seat", "Clean the seats and repeat."},
@@ -177,7 +132,7 @@ const std::vector<FailureCode>& failure_codes() {
        "Repeat once. If it stays, send the unit to repair."},
       {"rounded_residual_high", "the nine integers are wrong where the constants are not",
        "sensitivity so low that a count is large", "Send the unit to repair."},
-      {"recheck_residual_high", "with what it now holds the unit reads wrong",
+      {"recheck_residual_high", "with the constants that it now holds the unit reads wrong",
        "the unit keeps other numbers than it was given, or was turned during the recheck",
        "Repeat with --write. If it stays, keep the unit back: its memory is faulty."},
       {"uncertainty_high", "the result is too uncertain to judge the unit",
@@ -197,13 +152,13 @@ const std::vector<FailureCode>& failure_codes() {
       {"too_many_refusals", "too many placements were refused",
        "dirt in the seat, a loose cable that pulls, a bench that trembles",
        "Look at jig, seat and cable, repeat."},
-      {"stopped", "the operator stopped the run", "somebody wished so", "Repeat."},
+      {"stopped", "the operator stopped the run", "the operator chose to stop", "Repeat."},
       {"unit_gone", "the unit went away", "the cable was pulled, or the battery is empty",
        "Plug it in and repeat."},
       {"sensor_stuck", "the sensor repeats itself: an axis is stuck, or all are frozen",
        "the sensor is broken, or its supply", "Keep the unit back: its sensor is faulty."},
       {"interrupted", "the run ended on an error", "the unit, the jig or a cable failed",
-       "See to what the message names, repeat."},
+       "Repair what the message names, repeat."},
       {"retest", "a unit that failed needs more passes in a row", "it failed before",
        "Measure it again."},
   };
@@ -349,153 +304,6 @@ std::vector<JudgedQuantity> quantities_from_json(const nlohmann::ordered_json& j
     quantities.push_back(std::move(quantity));
   }
   return quantities;
-}
-
-// --- the budget (docs/verdicts.md has it in words) ---
-
-namespace {
-
-// Scatter of one level reading, standard deviation. An axis lies level in two pairs of opposite
-// poses; a sensor askew in its case cancels within a pair and curvature touches neither, so what
-// the means of the two pairs differ by is seating and draft angle. Their variance is that of one
-// reading: 2 / 4 + 2 / 4. One degree of freedom per axis.
-double level_scatter_mg(const JigReport& report) {
-  double square = 0;
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    double difference_lsb = 0;
-    for (const PoseReading& face : report.faces) {
-      const calib::NearestSide nearest = calib::nearest_side(device::direction_of(face.pose));
-      const std::size_t upright = nearest.side / 2;
-      if (upright != axis) {
-        difference_lsb += (upright == (axis + 1) % kAxes ? 0.5 : -0.5) * face.mean_lsb[axis];
-      }
-    }
-    const double mg =
-        kMgPerG * difference_lsb * report.six->best().calibration.sensitivity_g_per_lsb[axis];
-    square += mg * mg / kAxes;
-  }
-  return std::sqrt(square);
-}
-
-}  // namespace
-
-std::vector<Measured> measured_quantities(const JigReport& report) {
-  if (!report.six || !report.six->missing_directions.empty() || report.faces.empty()) {
-    return {};
-  }
-  constexpr double kNominal_g_per_lsb = 0.004;  // ADXL362 at its range of 8 g
-  // What six samples of a second and quantisation leave of a mean, whatever the noise.
-  constexpr double kFloor_mg = 0.2;
-  constexpr double kThermometer_c = 1;  // the sensor's own, adjusted at one temperature
-  constexpr double kStep_c = 0.065;     // of it (ADXL362 datasheet)
-  constexpr double kRadian = M_PI / 180;
-  constexpr double kSeating_rad = 0.02 * kRadian;  // a careful hand on a clean jig, twice
-  // Student's factor for 95.45 % and three degrees of freedom, where the coverage factor says 2.
-  constexpr double kStudent3 = 3.31 / 2;
-  const calib::SixPoseSolution& best = report.six->best();
-  const auto count = static_cast<double>(report.faces.size());
-
-  std::vector<Measured> measured;
-  PerAxis<double> noise_mg{};
-  double samples = 0;
-  double coldest_c = HUGE_VAL;
-  double warmest_c = -HUGE_VAL;
-  double mean_c = 0;
-  double tilt_deg = 0;
-  for (const PoseReading& face : report.faces) {
-    samples += face.samples;
-    mean_c += face.temperature_c / count;
-    tilt_deg = std::max(tilt_deg, face.tilt_deg);
-    for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      const double sd_mg =
-          kMgPerG * face.sd_lsb[axis] * best.calibration.sensitivity_g_per_lsb[axis];
-      noise_mg[axis] += sd_mg * sd_mg / count;
-    }
-  }
-  double worst_noise_mg = 0;
-  for (double& noise : noise_mg) {
-    noise = std::sqrt(noise);
-    worst_noise_mg = std::max(worst_noise_mg, noise);
-  }
-  const auto see = [&](double temperature_c) {
-    coldest_c = std::min(coldest_c, temperature_c);
-    warmest_c = std::max(warmest_c, temperature_c);
-  };
-  for (const PoseReading& face : report.faces) {
-    see(face.temperature_c);
-  }
-  for (const JudgedPose& pose : report.verification.poses) {
-    see(pose.reading.temperature_c);
-  }
-  const double mean_noise_mg =
-      std::hypot(kFloor_mg, worst_noise_mg / std::sqrt(std::max(1.0, samples / count)));
-
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const double ratio = best.calibration.sensitivity_g_per_lsb[axis] / kNominal_g_per_lsb;
-    measured.push_back({"sensitivity_deviation_percent", std::string(kAxisNames[axis]),
-                        100 * (ratio - 1),
-                        100 * ratio * report.combined.sensitivity_relative[axis]});
-  }
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    measured.push_back(
-        {"zero_offset_mg", std::string(kAxisNames[axis]),
-         kMgPerG * best.calibration.zero_lsb[axis] * best.calibration.sensitivity_g_per_lsb[axis],
-         report.combined.zero_mg[axis]});
-  }
-  const double level_mg = level_scatter_mg(report);
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    // A mean of two readings, in which tilt counts in second order, minus a mean of four.
-    measured.push_back(
-        {"midpoint_minus_zero_mg", std::string(kAxisNames[axis]),
-         kMgPerG * report.six->midpoint_minus_zero_lsb[axis] *
-             best.calibration.sensitivity_g_per_lsb[axis],
-         std::hypot(mean_noise_mg / std::sqrt(2.0),
-                    std::hypot(kStudent3 * level_mg, kMgPerG * kSeating_rad, mean_noise_mg) / 2)});
-  }
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    measured.push_back({"noise_mg", std::string(kAxisNames[axis]), noise_mg[axis],
-                        noise_mg[axis] / std::sqrt(2 * std::max(1.0, samples - count))});
-  }
-  // Scatter of the seating from what level readings disagree by: 6 degrees of freedom in six poses,
-  // for which Student's factor for 95.45 % is 2.52 where the coverage factor says 2.
-  const calib::VectorSolution& vector = report.six->vector;
-  double square = 0;
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const double residual_g =
-        vector.residual_lsb[axis] * best.calibration.sensitivity_g_per_lsb[axis];
-    square += residual_g * residual_g * count / std::max(1, vector.degrees_of_freedom);
-  }
-  constexpr double kStudent = 2.52 / 2;
-  constexpr std::array<std::string_view, 3> kPairs = {"xy", "xz", "yz"};
-  for (std::size_t pair = 0; pair < kPairs.size(); ++pair) {
-    measured.push_back({"cross_axis_percent", std::string(kPairs[pair]),
-                        100 * vector.cross_axis[pair],
-                        100 * std::hypot(kSeating_rad, kStudent * std::sqrt(square))});
-  }
-  measured.push_back({"temperature_c", "", mean_c, kThermometer_c});
-  measured.push_back({"temperature_change_c", "", warmest_c - coldest_c, kStep_c});
-  measured.push_back({"tilt_deg", "", tilt_deg, mean_noise_mg / kMgPerG / kRadian});
-  measured.push_back({"fit_residual_mg", "", best.own_rms_mg, mean_noise_mg / std::sqrt(count)});
-  measured.push_back({"verification_residual_mg", "", report.verification.worst_mg, mean_noise_mg});
-  measured.push_back({"rounded_residual_mg", "", report.rounded_residual_mg, mean_noise_mg});
-  if (report.written) {
-    measured.push_back({"recheck_residual_mg", "", report.recheck.worst_mg, mean_noise_mg});
-  }
-  const double coverage = report.limits.decision.coverage_factor;
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    measured.push_back({"sensitivity_uncertainty_percent", std::string(kAxisNames[axis]),
-                        100 * coverage * report.combined.sensitivity_relative[axis], 0});
-  }
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    measured.push_back({"zero_uncertainty_mg", std::string(kAxisNames[axis]),
-                        coverage * report.combined.zero_mg[axis], 0});
-  }
-  const auto sent =
-      static_cast<double>(report.stream.samples) + static_cast<double>(report.stream.lost_samples);
-  measured.push_back({"lost_samples_percent", "",
-                      sent > 0 ? 100 * static_cast<double>(report.stream.lost_samples) / sent : 0,
-                      0});
-  return measured;
 }
 
 // --- retest policy ---

@@ -1,13 +1,24 @@
 // The verdict on a run: every quantity against its limits with a guard band, and all of them
 // together (docs/verdicts.md).
 //
-// ILAC-G8:09/2019, 4.2.3 (non-binary statement with a guard band w): at a distance of w or more
-// inside the limit a value passes; inside it, but nearer, it passes conditionally; beyond it by
-// less than w it fails conditionally; beyond that it fails. w is the expanded uncertainty times the
-// decision rule's factor, and at least the limit's own guard band.
+//   const Measured zero{"zero_offset_mg", "x", 120.0, 0.8};
+//   const Verdict verdict = judge_quantities({zero}, default_limits());
+//   verdict.usable();  // true
 //
-// Where the expanded uncertainty is so large that no value could pass, the quantity is
-// inconclusive, unless it is beyond its limit by more than that: nothing is said against the unit.
+// ILAC-G8:09/2019, 4.2.3 (non-binary statement with a guard band w). w is the expanded uncertainty
+// times the decision rule's factor, and at least the limit's own guard band.
+//
+// | value                                                  | verdict          | constants | exit |
+// |--------------------------------------------------------|------------------|-----------|------|
+// | inside the limits by w or more                         | pass             | used      | 0    |
+// | inside, but nearer                                     | conditional_pass | used      | 0    |
+// | beyond a limit by less than w                          | conditional_fail | not used  | 1    |
+// | beyond by w or more                                    | fail             | not used  | 1    |
+// | not finite; or so uncertain that no value could pass,  | inconclusive     | not used  | 2    |
+// | unless it is beyond its limit by w or more             |                  |           |      |
+// | (the operator stopped the run)                         | stopped          | not used  | 3    |
+//
+// Pure functions and plain data; any thread.
 #pragma once
 
 #include <optional>
@@ -17,23 +28,20 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "station/limits.h"
+#include "station/limits/limits.h"
 
 namespace sixpoint::station {
-
-struct JigReport;  // jig_report.h
 
 enum class JigVerdict { pass, conditional_pass, conditional_fail, fail, inconclusive, stopped };
 std::string_view to_string(JigVerdict verdict);  // "pass", "conditional_pass" ...
 std::optional<JigVerdict> parse_jig_verdict(std::string_view text);
-// The constants of such a run may be used.
+// May the constants of such a run be used?
 inline bool is_passed(JigVerdict verdict) {
   return verdict == JigVerdict::pass || verdict == JigVerdict::conditional_pass;
 }
-// 0 passed, conditionally or not; 1 failed; 2 inconclusive; 3 stopped (the contract's exit codes).
 int exit_code_of(JigVerdict verdict);
 
-// What goes wrong, from a fixed catalogue.
+// A kind of failure, from a fixed catalogue.
 struct FailureCode {
   std::string_view code;  // "zero_high": fixed, for programs and statistics
   std::string_view meaning;
@@ -42,7 +50,7 @@ struct FailureCode {
 };
 const std::vector<FailureCode>& failure_codes();
 const FailureCode* find_failure_code(std::string_view code);
-// What the person at the station does about a run's codes: each once, in their order.
+// The next actions for a run's codes: each once, in their order.
 std::vector<std::string> next_actions(const std::vector<std::string>& codes);
 
 // A value to be judged.
@@ -68,30 +76,24 @@ struct JudgedQuantity {
 struct Verdict {
   JigVerdict verdict = JigVerdict::inconclusive;
   std::vector<JudgedQuantity> quantities;
-  std::vector<std::string> codes;  // of the catalogue, each once, worst first
-  // One sentence for each quantity that did not pass.
-  std::vector<std::string> reasons;
+  std::vector<std::string> codes;    // of the catalogue, each once, worst first
+  std::vector<std::string> reasons;  // one sentence for each quantity that did not pass
 
   std::string brief() const;
   bool usable() const { return is_passed(verdict); }
 };
 nlohmann::ordered_json to_json(const JudgedQuantity& quantity);
-// Of a run's document; what is no quantity of this program is left out.
+// Of a run's document; names that this program does not know are left out.
 std::vector<JudgedQuantity> quantities_from_json(const nlohmann::ordered_json& json);
 
-// One quantity against its limits. A value that is not finite is inconclusive. An uncertainty that
-// is too large, of a quantity or judged by itself, makes the run inconclusive, not the unit bad.
+// One quantity against its limits, by the table above.
 JudgedQuantity judge_quantity(const Measured& measured, const Limits& limits);
 // All of them; the worst one is the verdict (inconclusive before conditional passes, after fails).
 Verdict judge_quantities(const std::vector<Measured>& measured, const Limits& limits);
 
-// What a report of a complete run holds that has limits, with its standard uncertainty
-// (docs/verdicts.md has the budget). Empty without a solution.
-std::vector<Measured> measured_quantities(const JigReport& report);
-
 // --- retest policy ---
 
-// A run of the same unit that ended earlier. Runs that were stopped or inconclusive say nothing.
+// An earlier run of the same unit. Runs that were stopped or inconclusive do not count.
 struct EarlierRun {
   std::string id;
   JigVerdict verdict = JigVerdict::pass;

@@ -1,4 +1,4 @@
-#include "station/api.h"
+#include "station/page/api.h"
 
 #include <algorithm>
 #include <charconv>
@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "station/api_answers.h"
-#include "station/station_desk.h"
+#include "station/page/api_answers.h"
+#include "station/page/quality_control.h"
 
 namespace sixpoint::station {
 
@@ -16,15 +16,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 ApiAnswer lane_refusal(const LaneRefusal& why) {
-  switch (why.kind) {
-    case LaneRefusal::Kind::no_such_lane:
-      return refusal(404, "no_such_lane", why.what, why.hint);
-    case LaneRefusal::Kind::conflict:
-      return refusal(409, "conflict", why.what, why.hint);
-    case LaneRefusal::Kind::bad_request:
-      break;
-  }
-  return refusal(400, "bad_request", why.what, why.hint);
+  return why.kind == LaneRefusal::Kind::no_such_lane
+             ? refusal(404, "no_such_lane", why.what, why.hint)
+             : refusal(409, "conflict", why.what, why.hint);
 }
 
 // Compares in a time that does not depend on where two texts differ.
@@ -55,8 +49,7 @@ bool is_loopback(std::string_view name) {
   return name == "127.0.0.1" || name == "localhost" || name == "[::1]" || name == "::1";
 }
 
-// An address in figures. A page of another name that was made to point here (DNS rebinding) still
-// says its own name.
+// A numeric address. A name that was made to point here (DNS rebinding) is not one.
 bool is_address(std::string_view name) {
   if (name.starts_with('[') && name.ends_with(']')) {
     return true;
@@ -112,8 +105,37 @@ Api::Api(ApiOptions options, ApiParts parts)
     : options_(std::move(options)), parts_(std::move(parts)) {}
 Api::~Api() = default;
 
+std::string ApiRequest::parameter(const std::string& name) const {
+  const auto found = parameters.find(name);
+  return found == parameters.end() ? std::string() : found->second;
+}
+
+// The first call of the page brings the token in its address; later ones in a cookie.
+std::optional<ApiAnswer> Api::check_token(const ApiRequest& request) const {
+  constexpr std::string_view kBearer = "Bearer ";
+  const std::string_view sent = request.authorization;
+  const bool by_header =
+      sent.starts_with(kBearer) && same_secret(sent.substr(kBearer.size()), options_.token);
+  if (options_.token.empty() || by_header ||
+      same_secret(cookie_value(request.cookie, "sixpoint_token"), options_.token)) {
+    return std::nullopt;
+  }
+  if (request.method == "GET" && request.path == "/" &&
+      same_secret(request.parameter("token"), options_.token)) {
+    return ApiAnswer{
+        303,
+        "text/plain",
+        "",
+        {{"Location", "/"},
+         {"Set-Cookie",
+          fmt::format("sixpoint_token={}; HttpOnly; SameSite=Strict; Path=/", options_.token)}}};
+  }
+  return refusal(401, "token_needed", "this station wants its token",
+                 "open it as http://ADDRESS:PORT/?token=TOKEN");
+}
+
 std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
-  // Host: a name that somebody made to point here is not ours (DNS rebinding).
+  // Host: another name may have been made to point here (DNS rebinding).
   std::string_view name = request.host;
   const std::string port = fmt::format(":{}", port_.load());
   if (name.ends_with(port)) {
@@ -127,7 +149,7 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
     return with_headers(refusal(421, "wrong_host", "this station does not answer to that name",
                                 "open it by the address that it printed"));
   }
-  // Origin and Sec-Fetch-Site: other pages in the same browser have no business here (CSRF).
+  // Origin and Sec-Fetch-Site: another page in the same browser sent this (CSRF).
   const bool other_origin =
       !request.origin.empty() && request.origin != fmt::format("http://{}", request.host);
   const bool other_site = request.path.starts_with("/api/") && !request.fetch_site.empty() &&
@@ -135,29 +157,8 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
   if (other_origin || other_site) {
     return with_headers(refusal(403, "wrong_origin", "another page may not command this station"));
   }
-  if (!options_.token.empty()) {
-    constexpr std::string_view kBearer = "Bearer ";
-    const std::string_view sent = request.authorization;
-    const bool by_header =
-        sent.starts_with(kBearer) && same_secret(sent.substr(kBearer.size()), options_.token);
-    const bool by_cookie =
-        same_secret(cookie_value(request.cookie, "sixpoint_token"), options_.token);
-    if (!by_header && !by_cookie) {
-      if (request.method == "GET" && request.path == "/" &&
-          same_secret(request.token_parameter, options_.token)) {
-        // The page's first call: from here on the cookie speaks, and the address shows nothing.
-        ApiAnswer redirect{303, "text/plain", "", {}};
-        redirect.headers.emplace_back("Location", "/");
-        redirect.headers.emplace_back(
-            "Set-Cookie",
-            fmt::format("sixpoint_token={}; HttpOnly; SameSite=Strict; Path=/", options_.token));
-        return with_headers(redirect);
-      }
-      return with_headers(refusal(401, "token_needed", "this station wants its token",
-                                  "open it as http://ADDRESS:PORT/?token=TOKEN"));
-    }
-  }
-  return std::nullopt;
+  auto refused = check_token(request);
+  return refused ? std::optional(with_headers(*std::move(refused))) : std::nullopt;
 }
 
 Json Api::state() const {
@@ -177,7 +178,7 @@ Json Api::state() const {
   }
   json["queue"] = parts_.lanes.queue();
   json["job"] = parts_.repairs.to_json();
-  json["lock"] = parts_.desk != nullptr ? parts_.desk->lock() : Json(nullptr);
+  json["lock"] = parts_.quality != nullptr ? parts_.quality->lock() : Json(nullptr);
   return json;
 }
 
@@ -208,13 +209,13 @@ ApiAnswer Api::get(const ApiRequest& request) {
     return answer(200, state());
   }
   if (parts.size() == 1 && parts[0] == "files") {
-    return list_files(request.path_parameter);
+    return list_files(request.parameter("path"));
   }
   if (parts.size() == 1 && parts[0] == "job") {
     return answer(200, parts_.repairs.to_json());
   }
   if (parts.size() == 1) {
-    return desk_view(request, parts[0]).value_or(unknown_route());
+    return get_quality(request, parts[0]).value_or(unknown_route());
   }
   if (parts.size() == 2 && parts[0] == "lanes") {
     const auto lane = number_of(parts[1]);
@@ -223,23 +224,27 @@ ApiAnswer Api::get(const ApiRequest& request) {
     }
     return answer(200, parts_.lanes.to_json(*lane));
   }
-  if (parts.size() == 3 && parts[0] == "runs" && parts_.run_document) {
-    // A run's id is hex; anything else is no run and no path either.
-    if (parts[1].empty() || parts[1].size() > 64 ||
-        parts[1].find_first_not_of("0123456789abcdef") != std::string::npos) {
-      return unknown_route();
-    }
-    const auto document = parts_.run_document(parts[1], parts[2]);
-    if (!document) {
-      return refusal(document.error());
-    }
-    ApiAnswer given{200, document->content_type, document->body, {}};
-    given.headers.emplace_back(
-        "Content-Disposition",
-        fmt::format("attachment; filename=\"sixpoint-{}-{}\"", parts[1].substr(0, 12), parts[2]));
-    return given;
+  if (parts.size() == 3 && parts[0] == "runs") {
+    return get_document(parts[1], parts[2]);
   }
   return unknown_route();
+}
+
+ApiAnswer Api::get_document(const std::string& run, const std::string& kind) const {
+  // The id of a run is hexadecimal; anything else could be a path.
+  if (!parts_.run_document || run.empty() || run.size() > 64 ||
+      run.find_first_not_of("0123456789abcdef") != std::string::npos) {
+    return unknown_route();
+  }
+  const auto document = parts_.run_document(run, kind);
+  if (!document) {
+    return refusal(document.error());
+  }
+  return {200,
+          document->content_type,
+          document->body,
+          {{"Content-Disposition",
+            fmt::format("attachment; filename=\"sixpoint-{}-{}\"", run.substr(0, 12), kind)}}};
 }
 
 ApiAnswer Api::post(const ApiRequest& request) {
@@ -255,7 +260,7 @@ ApiAnswer Api::post(const ApiRequest& request) {
     }
   }
   if (parts.size() == 1 && (parts[0] == "run" || parts[0] == "capture")) {
-    return run(request, body);
+    return start_run(request, body);
   }
   if (parts.size() == 1 && parts[0] == "scan") {
     const auto serial = text_of(body, "serial");
@@ -272,7 +277,7 @@ ApiAnswer Api::post(const ApiRequest& request) {
     return start_repair(body);
   }
   if (parts.size() == 1) {
-    return desk_decision(request, parts[0], body).value_or(unknown_route());
+    return post_decision(request, parts[0], body).value_or(unknown_route());
   }
   if (parts.size() == 2 && parts[0] == "repair" && parts[1] == "cancel") {
     parts_.repairs.cancel();
@@ -283,12 +288,12 @@ ApiAnswer Api::post(const ApiRequest& request) {
     if (!lane) {
       return refusal(404, "no_such_lane", "there is no such lane");
     }
-    return lane_word(*lane, parts[2], request, body);
+    return command_lane(*lane, parts[2], request, body);
   }
   return unknown_route();
 }
 
-ApiAnswer Api::run(const ApiRequest& request, const Json& body) {
+ApiAnswer Api::start_run(const ApiRequest& request, const Json& body) {
   std::size_t lane = 1;
   if (body.contains("lane")) {
     if (!body["lane"].is_number_unsigned()) {
@@ -314,26 +319,29 @@ ApiAnswer Api::run(const ApiRequest& request, const Json& body) {
   return started ? answer(202, {{"lane", lane}, {"started", true}}) : lane_refusal(started.error());
 }
 
-ApiAnswer Api::lane_word(std::size_t lane, const std::string& word, const ApiRequest& request,
-                         const Json& body) {
+ApiAnswer Api::command_lane(std::size_t lane, const std::string& command, const ApiRequest& request,
+                            const Json& body) {
   const std::string client = request.client.substr(0, kMostText);
   LaneAnswer<void> done;
-  if (word == "undo" || word == "stop") {
-    done = parts_.lanes.say(lane, client, word == "undo" ? OperatorWord::undo : OperatorWord::stop);
-  } else if (word == "placed") {
-    done = parts_.lanes.side_is_placed(lane, client);
-  } else if (word == "take" || word == "scan") {
-    const auto text = text_of(body, word == "take" ? "operator" : "serial");
-    if (!text || (word == "scan" && (lane == 0 || text->empty()))) {
-      return bad_field(word == "take" ? "operator" : "serial", "a text of at most 200 bytes");
+  if (command == "undo" || command == "stop") {
+    done = parts_.lanes.command(lane, client,
+                                command == "undo" ? OperatorCommand::undo : OperatorCommand::stop);
+  } else if (command == "placed") {
+    done = parts_.lanes.confirm_side(lane, client);
+  } else if (command == "take") {
+    const auto operator_name = text_of(body, "operator");
+    if (!operator_name) {
+      return bad_field("operator", "a text of at most 200 bytes");
     }
-    if (word == "take") {
-      done = parts_.lanes.take_over(lane, client, *text);
-    } else if (const auto scanned = parts_.lanes.scan(lane, *text); !scanned) {
-      done = tl::unexpected(scanned.error());
+    done = parts_.lanes.take_over(lane, client, *operator_name);
+  } else if (command == "scan") {
+    const auto serial = text_of(body, "serial");
+    if (!serial || serial->empty() || lane == 0) {
+      return bad_field("serial", "a text of at most 200 bytes");
     }
-  } else if (word == "hand") {
-    return hand(lane, body);
+    done = parts_.lanes.scan(lane, *serial).map([](std::size_t) {});
+  } else if (command == "hand") {
+    return move_virtual_unit(lane, body);
   } else {
     return unknown_route();
   }
@@ -341,46 +349,43 @@ ApiAnswer Api::lane_word(std::size_t lane, const std::string& word, const ApiReq
 }
 
 // A virtual unit is turned by buttons of the page: for practice, and for tests.
-ApiAnswer Api::hand(std::size_t lane, const Json& body) {
+ApiAnswer Api::move_virtual_unit(std::size_t lane, const Json& body) {
   if (lane < 1 || lane > parts_.lanes.size() || parts_.bench == nullptr ||
       !parts_.bench->has(parts_.lanes.device(lane))) {
     return refusal(404, "no_such_lane", "this lane has no virtual unit",
                    "a real unit is turned by hand");
   }
   const std::string& device = parts_.lanes.device(lane);
-  const auto what = text_of(body, "do");
+  const auto what = text_of(body, "do").value_or("");
   const auto pose_text = text_of(body, "pose");
   const auto serial = text_of(body, "serial");
-  if (!what || !pose_text || !serial) {
+  Status done;
+  if (!pose_text || !serial) {
     return bad_field("do", "turn, lean, knock, unplug, plug or swap");
   }
-  Status done;
-  if (*what == "turn") {
+  if (what == "turn") {
     const auto pose = device::parse_pose(*pose_text);
     if (!pose) {
       return bad_field("pose", "one of +x -x +y -y +z -z");
     }
-    double tilt_deg = 0;
-    if (body.contains("tilt_deg")) {
-      if (!body["tilt_deg"].is_number() || std::abs(body["tilt_deg"].get<double>()) > 90) {
-        return bad_field("tilt_deg", "an angle from -90 to 90");
-      }
-      tilt_deg = body["tilt_deg"].get<double>();
+    const Json tilt_deg = body.value("tilt_deg", Json(0.0));
+    if (!tilt_deg.is_number() || std::abs(tilt_deg.get<double>()) > 90) {
+      return bad_field("tilt_deg", "an angle from -90 to 90");
     }
-    done = parts_.bench->turn(device, *pose, tilt_deg);
-  } else if (*what == "lean") {
+    done = parts_.bench->turn(device, *pose, tilt_deg.get<double>());
+  } else if (what == "lean") {
     done = parts_.bench->lean(device);
-  } else if (*what == "knock") {
+  } else if (what == "knock") {
     done = parts_.bench->knock(device);
-  } else if (*what == "unplug" || *what == "plug") {
-    done = parts_.bench->set_plugged(device, *what == "plug");
-  } else if (*what == "swap") {
+  } else if (what == "unplug" || what == "plug") {
+    done = parts_.bench->set_plugged(device, what == "plug");
+  } else if (what == "swap") {
     const std::string other = serial->empty() ? "MOS2A99999999" : *serial;
     if (other.size() > 16 ||
         other.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789") != std::string::npos) {
       return bad_field("serial", "up to 16 capital letters and digits");
     }
-    done = parts_.bench->swap(device, std::hash<std::string>{}(other), other);
+    done = parts_.bench->swap(device, other);
   } else {
     return bad_field("do", "turn, lean, knock, unplug, plug or swap");
   }

@@ -1,7 +1,17 @@
-// What the page may ask the station: routes, JSON and the rules of who may ask (docs/station.md).
+// The page's interface: routes, JSON, events, and which requests are permitted (docs/station.md).
 //
-// No sockets here: server.h brings requests and carries answers, tests call handle() themselves.
-// Threads: handle() and event streams may be used from many at once.
+//   ApiOptions options;
+//   options.station = "bench-1";
+//   Api api(options, {env, lanes, repairs});
+//   api.set_port(6020);
+//   ApiRequest request;
+//   request.method = "GET";
+//   request.path = "/api/state";
+//   request.host = "127.0.0.1:6020";
+//   const ApiAnswer answer = api.handle(request);
+//
+// No sockets here: the server (server.h) brings requests and sends answers.
+// Threads: handle(), guard() and open_events() may be called from many at once.
 #pragma once
 
 #include <atomic>
@@ -14,9 +24,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "mocks/virtual_bench.h"
-#include "station/lanes.h"
-#include "station/repair_job.h"
+#include "station/lanes/lanes.h"
+#include "station/page/practice_bench.h"
+#include "station/page/repair_job.h"
 
 namespace sixpoint::station {
 
@@ -24,16 +34,16 @@ struct ApiRequest {
   std::string method;  // GET, POST ...
   std::string path;    // decoded, without the query
   std::string body;
-  // Headers that matter, empty where they were not sent.
+  // Headers, empty where they were not sent.
   std::string host;
   std::string origin;
   std::string fetch_site;     // Sec-Fetch-Site
   std::string authorization;  // Authorization
   std::string cookie;
-  std::string client;  // X-Sixpoint-Client: who may command a run
-  std::string path_parameter;
+  std::string client;  // X-Sixpoint-Client: the page that may command a run
   std::map<std::string, std::string> parameters;  // of the query, the first of each name
-  std::string token_parameter;                    // ?token=, on the first call of the page
+
+  std::string parameter(const std::string& name) const;  // empty where it was not sent
 };
 
 struct ApiAnswer {
@@ -48,7 +58,7 @@ struct ApiOptions {
   std::string version;
   std::string bind = "127.0.0.1";
   std::string token;  // empty: none is needed, on the loopback address only
-  // Below this folder files are listed, checked and mended, and nowhere else.
+  // Files are listed, checked and repaired below this folder, and nowhere else.
   std::string files_folder = ".";
   int most_streams = 24;
 };
@@ -61,16 +71,17 @@ struct RunDocument {
 using RunDocuments =
     std::function<Result<RunDocument>(const std::string& run, const std::string& kind)>;
 
-class StationDesk;  // station_desk.h
+class QualityControl;  // quality_control.h
 
+// What the routes lead to; all of it outlives the Api.
 struct ApiParts {
   Env& env;
   Lanes& lanes;
   RepairJob& repairs;
-  mocks::VirtualBench* bench = nullptr;  // null: no virtual units
-  CaptureKeeper keep_capture;            // constants of a file that was checked
-  RunDocuments run_document;
-  StationDesk* desk = nullptr;  // null: no check units, no statistics
+  PracticeBench* bench = nullptr;       // null: no virtual units
+  StoreConstants store_constants = {};  // of a file that was checked
+  RunDocuments run_document = {};
+  QualityControl* quality = nullptr;  // null: no check units, no statistics
 };
 
 class EventStream;
@@ -85,10 +96,10 @@ class Api {
   // Known once the server listens: the Host header must name it.
   void set_port(int port) { port_ = port; }
 
-  // Nothing where the request may go on; otherwise the answer that refuses it. To be asked before
-  // the body is read.
+  // The answer that refuses the request, or nothing where it is permitted. Needs no body: to be
+  // called before the body is read.
   std::optional<ApiAnswer> guard(const ApiRequest& request) const;
-  // Any request but that for events. Guards first.
+  // Any request but that for events. Calls guard() first.
   ApiAnswer handle(const ApiRequest& request);
   // Null beyond the limit of streams.
   std::unique_ptr<EventStream> open_events();
@@ -96,16 +107,18 @@ class Api {
 
  private:
   friend class EventStream;
+  std::optional<ApiAnswer> check_token(const ApiRequest& request) const;
   nlohmann::ordered_json state() const;
   ApiAnswer get(const ApiRequest& request);
   ApiAnswer post(const ApiRequest& request);
-  ApiAnswer run(const ApiRequest& request, const nlohmann::ordered_json& body);
-  ApiAnswer lane_word(std::size_t lane, const std::string& word, const ApiRequest& request,
-                      const nlohmann::ordered_json& body);
-  ApiAnswer hand(std::size_t lane, const nlohmann::ordered_json& body);
+  ApiAnswer get_document(const std::string& run, const std::string& kind) const;
+  ApiAnswer start_run(const ApiRequest& request, const nlohmann::ordered_json& body);
+  ApiAnswer command_lane(std::size_t lane, const std::string& command, const ApiRequest& request,
+                         const nlohmann::ordered_json& body);
+  ApiAnswer move_virtual_unit(std::size_t lane, const nlohmann::ordered_json& body);
   // Nothing where `what` is no route of theirs.
-  std::optional<ApiAnswer> desk_view(const ApiRequest& request, const std::string& what);
-  std::optional<ApiAnswer> desk_decision(const ApiRequest& request, const std::string& what,
+  std::optional<ApiAnswer> get_quality(const ApiRequest& request, const std::string& what);
+  std::optional<ApiAnswer> post_decision(const ApiRequest& request, const std::string& what,
                                          const nlohmann::ordered_json& body);
   ApiAnswer list_files(const std::string& relative) const;
   ApiAnswer check_file(const nlohmann::ordered_json& body);
@@ -124,22 +137,24 @@ class EventStream {
   ~EventStream();
   EventStream(const EventStream&) = delete;
   EventStream& operator=(const EventStream&) = delete;
-  // What is new since the last call, empty when nothing is: call it every 40 ms. Memory does not
-  // grow with a page that is slow to read: what it misses is left out.
+  // What is new since the last call; empty when nothing is. To be called about thirty times a
+  // second. A page that reads slowly misses readings; they are not stored for it.
   std::string next();
 
  private:
   friend class Api;
   explicit EventStream(Api& api);
+  void add_changes(std::string& text);
+  void add_live(std::string& text);
 
   Api& api_;
-  bool greeted_ = false;
+  bool started_ = false;
   std::vector<std::uint64_t> seen_changes_;
   std::vector<std::uint64_t> next_reading_;
   std::uint64_t seen_job_ = 0;
   std::uint64_t seen_lock_ = 0;
   std::vector<std::size_t> seen_queue_;
-  std::chrono::nanoseconds last_word_{0};
+  std::chrono::nanoseconds last_sent_{0};
 };
 
 // The page's files: "/", "/page.js" and "/page.css", as they were built into the program.

@@ -1,10 +1,33 @@
-#include "station/api_answers.h"
+#include "station/page/api_answers.h"
 
 #include <fmt/format.h>
 
 namespace sixpoint::station {
 
 using Json = nlohmann::ordered_json;
+
+namespace {
+
+int http_status(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::usage:
+    case ErrorCode::bad_data:
+    case ErrorCode::configuration:
+      return 400;
+    case ErrorCode::no_input:
+      return 404;
+    case ErrorCode::permission:
+      return 403;
+    case ErrorCode::cannot_create:
+      return 409;
+    case ErrorCode::device_unavailable:
+      return 503;
+    default:
+      return 500;
+  }
+}
+
+}  // namespace
 
 std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -23,32 +46,9 @@ ApiAnswer refusal(int status, std::string_view code, std::string_view what, std:
 }
 
 ApiAnswer refusal(const Error& error) {
-  int status = 500;
-  switch (error.code) {
-    case ErrorCode::usage:
-    case ErrorCode::bad_data:
-    case ErrorCode::configuration:
-      status = 400;
-      break;
-    case ErrorCode::no_input:
-      status = 404;
-      break;
-    case ErrorCode::permission:
-      status = 403;
-      break;
-    case ErrorCode::cannot_create:
-      status = 409;
-      break;
-    case ErrorCode::device_unavailable:
-      status = 503;
-      break;
-    case ErrorCode::internal:
-    case ErrorCode::io:
-      break;
-  }
   const std::string what =
       error.where.empty() ? error.what : fmt::format("{}: {}", error.where, error.what);
-  return refusal(status, to_string(error.code), what, error.hint);
+  return refusal(http_status(error.code), to_string(error.code), what, error.hint);
 }
 
 ApiAnswer unknown_route() {

@@ -1,4 +1,11 @@
-// How the API's parts answer and read bodies; for api*.cpp and event_stream.cpp alone.
+// Answers and the fields of bodies, for api*.cpp and event_stream.cpp alone.
+//
+//   ApiAnswer scanned(const nlohmann::ordered_json& body) {
+//     if (const auto serial = text_of(body, "serial")) {
+//       return answer(200, {{"serial", *serial}});
+//     }
+//     return bad_field("serial", "a text");
+//   }
 #pragma once
 
 #include <optional>
@@ -7,20 +14,22 @@
 
 #include <nlohmann/json.hpp>
 
-#include "station/api.h"
+#include "station/page/api.h"
 
 namespace sixpoint::station {
 
-inline constexpr std::size_t kMostText = 200;  // of names and serial numbers that come in
+inline constexpr std::size_t kMostText = 200;  // bytes of a name or serial number in a request
 
 std::string dump(const nlohmann::ordered_json& json);
 ApiAnswer answer(int status, const nlohmann::ordered_json& json);
 ApiAnswer refusal(int status, std::string_view code, std::string_view what,
                   std::string_view hint = "");
+// With the HTTP status of the error's code, and 500 for defects and disks.
 ApiAnswer refusal(const Error& error);
 ApiAnswer bad_field(std::string_view key, std::string_view wanted);
 ApiAnswer unknown_route();
-// A text of a JSON body; empty where it is not there. Nothing where it is no text or too long.
+// A text field of a JSON body; empty where it is missing. Nothing where it is no text or longer
+// than kMostText.
 std::optional<std::string> text_of(const nlohmann::ordered_json& body, const char* key);
 
 }  // namespace sixpoint::station

@@ -1,11 +1,11 @@
-// Files below the station's folder: listed, checked, mended.
+// Files below the station's folder: listed, checked, repaired.
 #include <algorithm>
 
 #include "base/env.h"
 #include "calib/solve.h"
-#include "repair/file_tree.h"
-#include "station/api_answers.h"
-#include "station/calibration_file.h"
+#include "repair/triage/file_tree.h"
+#include "station/capture/calibration_file.h"
+#include "station/page/api_answers.h"
 
 namespace sixpoint::station {
 
@@ -17,19 +17,13 @@ constexpr std::size_t kMostListed = 2000;  // files of one folder
 
 }  // namespace
 
-// A path that the page named, below the folder that this station may touch.
+// The path that a request names, below the one folder that the station may read and write.
 Result<std::string> Api::inside(const std::string& relative) const {
   const bool plain = relative.size() < 1000 && !relative.starts_with('/') &&
                      std::none_of(relative.begin(), relative.end(), [](char c) {
                        return static_cast<unsigned char>(c) < 0x20 || c == '\\';
                      });
-  std::string_view rest = relative;
-  bool up = false;
-  while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find('/'), rest.size());
-    up = up || rest.substr(0, end) == "..";
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
+  const bool up = ("/" + relative + "/").find("/../") != std::string::npos;
   if (!plain || up) {
     return fail(ErrorCode::permission, "this path leads out of the station's folder",
                 printable(relative, 100), "choose a folder below it (--files)");
@@ -99,7 +93,7 @@ ApiAnswer Api::check_file(const Json& body) {
     report.file = *path;
     report.file_sha256 = check->sha256;
     report.solved = check->solved;
-    const auto id = parts_.keep_capture(report);
+    const auto id = parts_.store_constants(report);
     if (!id) {
       return refusal(id.error());
     }
@@ -116,7 +110,6 @@ ApiAnswer Api::start_repair(const Json& body) {
   if (!folder || !output || !calibration || output->empty()) {
     return bad_field("folder, output", "folders below the station's folder");
   }
-  RepairOrder order;
   const auto from = inside(*folder);
   const auto into = inside(*output);
   const auto file = inside(*calibration);
@@ -125,9 +118,7 @@ ApiAnswer Api::start_repair(const Json& body) {
       return refusal(path->error());
     }
   }
-  order.folder = *from;
-  order.output = *into;
-  order.calibration_file = calibration->empty() ? "" : *file;
+  const RepairOrder order = {*from, *into, calibration->empty() ? "" : *file};
   if (const Status started = parts_.repairs.start(order); !started) {
     return started.error().code == ErrorCode::usage
                ? refusal(409, "conflict", started.error().what, started.error().hint)

@@ -1,8 +1,9 @@
-// Check units, the lock, statistics, gage studies: the routes of station_desk.h.
+// Check units, the lock, statistics, gage studies: the routes of quality_control.h.
 #include <charconv>
 
-#include "station/api_answers.h"
-#include "station/station_desk.h"
+#include "base/serial.h"
+#include "station/page/api_answers.h"
+#include "station/page/quality_control.h"
 
 namespace sixpoint::station {
 
@@ -11,62 +12,54 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string parameter(const ApiRequest& request, const char* name) {
-  const auto found = request.parameters.find(name);
-  return found == request.parameters.end() ? std::string() : found->second.substr(0, kMostText);
+  return request.parameter(name).substr(0, kMostText);
 }
 
 ApiAnswer answer_of(const Result<Json>& json) {
   return json ? answer(200, *json) : refusal(json.error());
 }
 
-bool is_serial(const std::string& text) {
-  return !text.empty() && text.size() <= 16 &&
-         text.find_first_not_of(
-             "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-") ==
-             std::string::npos;
-}
-
 }  // namespace
 
-std::optional<ApiAnswer> Api::desk_view(const ApiRequest& request, const std::string& what) {
-  if (parts_.desk == nullptr) {
+std::optional<ApiAnswer> Api::get_quality(const ApiRequest& request, const std::string& what) {
+  if (parts_.quality == nullptr) {
     return std::nullopt;
   }
   if (what == "check-units") {
-    return answer_of(parts_.desk->check_units());
+    return answer_of(parts_.quality->check_units());
   }
   if (what == "statistics") {
-    return answer_of(parts_.desk->statistics(
+    return answer_of(parts_.quality->statistics(
         {parameter(request, "by"), parameter(request, "from"), parameter(request, "to")}));
   }
   if (what == "gage-rr") {
-    GageQuestion question;
-    question.study = parameter(request, "study");
-    if (question.study.empty()) {
-      return answer_of(parts_.desk->studies());
+    GageQuery query;
+    query.study = parameter(request, "study");
+    if (query.study.empty()) {
+      return answer_of(parts_.quality->studies());
     }
     if (const auto quantity = parameter(request, "quantity"); !quantity.empty()) {
-      question.quantity = quantity;
-      question.axis = parameter(request, "axis");
+      query.quantity = quantity;
+      query.axis = parameter(request, "axis");
     }
     if (const std::string text = parameter(request, "tolerance"); !text.empty()) {
       const char* const end = text.data() + text.size();
-      const auto [stop, error] = std::from_chars(text.data(), end, question.tolerance);
-      if (error != std::errc() || stop != end || !(question.tolerance > 0)) {
+      const auto [stop, error] = std::from_chars(text.data(), end, query.tolerance);
+      if (error != std::errc() || stop != end || !(query.tolerance > 0)) {
         return bad_field("tolerance", "a width above 0");
       }
     }
-    return answer_of(parts_.desk->gage_study(question));
+    return answer_of(parts_.quality->gage_study(query));
   }
   return std::nullopt;
 }
 
-std::optional<ApiAnswer> Api::desk_decision(const ApiRequest& request, const std::string& what,
+std::optional<ApiAnswer> Api::post_decision(const ApiRequest& request, const std::string& what,
                                             const Json& body) {
-  if (parts_.desk == nullptr || (what != "station-lock" && what != "check-units")) {
+  if (parts_.quality == nullptr || (what != "station-lock" && what != "check-units")) {
     return std::nullopt;
   }
-  // Beyond what the guard asks of every request: no form of another page can send this header.
+  // In addition to guard(): a form of another page cannot send this header.
   if (request.client.empty()) {
     return refusal(403, "client_needed", "a decision comes from the station's own page",
                    "send the header X-Sixpoint-Client");
@@ -76,7 +69,7 @@ std::optional<ApiAnswer> Api::desk_decision(const ApiRequest& request, const std
   if (!operator_name || !reason) {
     return bad_field(operator_name ? "reason" : "operator", "a text of at most 200 bytes");
   }
-  Decision decision;
+  db::StationEvent decision;
   decision.operator_name = *operator_name;
   decision.reason = *reason;
   if (what == "station-lock") {
@@ -96,11 +89,11 @@ std::optional<ApiAnswer> Api::desk_decision(const ApiRequest& request, const std
     decision.serial = *serial;
     decision.action = *action == "add" ? "check_unit" : "check_unit_end";
   }
-  const auto id = parts_.desk->decide(decision);
+  const auto id = parts_.quality->decide(decision);
   if (!id) {
     return refusal(id.error());
   }
-  return answer(200, {{"stored_id", *id}, {"lock", parts_.desk->lock()}});
+  return answer(200, {{"stored_id", *id}, {"lock", parts_.quality->lock()}});
 }
 
 }  // namespace sixpoint::station

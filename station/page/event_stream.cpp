@@ -1,6 +1,6 @@
-// What the page is told as it happens.
-#include "station/api_answers.h"
-#include "station/station_desk.h"
+// Server-sent events: what changed, as it happens.
+#include "station/page/api_answers.h"
+#include "station/page/quality_control.h"
 
 namespace sixpoint::station {
 
@@ -34,24 +34,43 @@ EventStream::~EventStream() { --api_.streams_; }
 
 std::string EventStream::next() {
   std::string text;
-  Lanes& lanes = api_.parts_.lanes;
-  const auto now = api_.parts_.env.clock.elapsed();
-  if (!greeted_) {
-    greeted_ = true;
-    for (std::size_t i = 0; i < lanes.size(); ++i) {
-      seen_changes_[i] = lanes.changes(i + 1);
-    }
-    seen_job_ = api_.parts_.repairs.changes();
-    seen_lock_ = api_.parts_.desk != nullptr ? api_.parts_.desk->changes() : 0;
+  add_changes(text);
+  if (!std::exchange(started_, true)) {
+    text.clear();  // the state has all of it
     add_event(text, "state", api_.state());
   }
-  for (std::size_t i = 0; i < lanes.size(); ++i) {
-    const std::uint64_t changes = lanes.changes(i + 1);
-    if (changes != seen_changes_[i]) {
-      seen_changes_[i] = changes;
-      add_event(text, "lane", lanes.to_json(i + 1));
+  add_live(text);
+  const auto now = api_.parts_.env.clock.elapsed();
+  if (text.empty() && now - last_sent_ > kHeartbeat) {
+    text = ": still here\n\n";
+  }
+  if (!text.empty()) {
+    last_sent_ = now;
+  }
+  return text;
+}
+
+void EventStream::add_changes(std::string& text) {
+  const ApiParts& parts = api_.parts_;
+  const auto has_changed = [](std::uint64_t& seen, std::uint64_t changes) {
+    return std::exchange(seen, changes) != changes;
+  };
+  for (std::size_t i = 0; i < seen_changes_.size(); ++i) {
+    if (has_changed(seen_changes_[i], parts.lanes.changes(i + 1))) {
+      add_event(text, "lane", parts.lanes.to_json(i + 1));
     }
   }
+  if (has_changed(seen_job_, parts.repairs.changes())) {
+    add_event(text, "job", parts.repairs.to_json());
+  }
+  if (parts.quality != nullptr && has_changed(seen_lock_, parts.quality->changes())) {
+    add_event(text, "lock", parts.quality->lock());
+  }
+}
+
+// The readings since the last call, where there are any, and the queue.
+void EventStream::add_live(std::string& text) {
+  const Lanes& lanes = api_.parts_.lanes;
   Json live;
   live["lanes"] = Json::array();
   for (std::size_t i = 0; i < lanes.size(); ++i) {
@@ -60,18 +79,17 @@ std::string EventStream::next() {
       continue;
     }
     next_reading_[i] = trace.first + trace.force_mg.size();
-    Json lane;
-    lane["lane"] = i + 1;
-    lane["first"] = trace.first;
-    lane["host_ms"] = trace.host_ms;
-    Json& flat = lane["mg"] = Json::array();
+    Json flat = Json::array();
     for (const auto& force_mg : trace.force_mg) {
       for (const std::int16_t mg : force_mg) {
         flat.push_back(mg);
       }
     }
-    lane["live"] = lanes.live(i + 1);
-    live["lanes"].push_back(std::move(lane));
+    live["lanes"].push_back({{"lane", i + 1},
+                             {"first", trace.first},
+                             {"host_ms", trace.host_ms},
+                             {"mg", std::move(flat)},
+                             {"live", lanes.live(i + 1)}});
   }
   auto queue = lanes.queue();
   if (!live["lanes"].empty() || queue != seen_queue_) {
@@ -79,22 +97,6 @@ std::string EventStream::next() {
     seen_queue_ = std::move(queue);
     add_event(text, "live", live);
   }
-  if (const std::uint64_t job = api_.parts_.repairs.changes(); job != seen_job_) {
-    seen_job_ = job;
-    add_event(text, "job", api_.parts_.repairs.to_json());
-  }
-  if (const StationDesk* desk = api_.parts_.desk;
-      desk != nullptr && desk->changes() != seen_lock_) {
-    seen_lock_ = desk->changes();
-    add_event(text, "lock", desk->lock());
-  }
-  if (text.empty() && now - last_word_ > kHeartbeat) {
-    text = ": still here\n\n";
-  }
-  if (!text.empty()) {
-    last_word_ = now;
-  }
-  return text;
 }
 
 }  // namespace sixpoint::station

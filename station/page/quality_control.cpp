@@ -1,15 +1,7 @@
-#include "station/station_desk.h"
+#include "station/page/quality_control.h"
 
-#include <atomic>
-#include <condition_variable>
-#include <mutex>
+#include <map>
 #include <set>
-#include <thread>
-
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
-
-#include "station/station_records.h"
 
 namespace sixpoint::station {
 
@@ -17,19 +9,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Signatures from elsewhere come seldom, and a chart of every check unit is computed for each look.
-constexpr std::chrono::seconds kBetweenLooks{15};
-
-Result<std::optional<UtcTime>> day(const std::string& text, const char* key) {
-  if (text.empty()) {
-    return std::nullopt;
-  }
-  const auto time = parse_iso8601(text);
-  if (!time) {
-    return fail(ErrorCode::usage, time.error().what, key, "write it as 2027-03-31");
-  }
-  return *time;
-}
+// Signatures from elsewhere are rare, and each refresh computes the charts of all check units.
+constexpr std::chrono::seconds kBetweenRefreshes{15};
 
 Json title_of(const QuantityInfo& info) {
   return {{"name", info.name}, {"title", info.title}, {"unit", info.unit}};
@@ -50,126 +31,99 @@ Json titles_for(const std::vector<std::string>& names) {
 
 }  // namespace
 
-struct StationDesk::Impl {
-  Impl(Env& its_env, StoreOpener opener, std::string its_station, Limits its_limits)
-      : env(its_env),
-        open_store(std::move(opener)),
-        station(std::move(its_station)),
-        limits(std::move(its_limits)) {
-    seen = {{"locked", false},
-            {"reasons", Json::array()},
-            {"check_units", Json::array()},
-            {"signature", nullptr},
-            {"problem", ""}};
-    thread = std::jthread([this](const std::stop_token& stop) { watch(stop); });
-  }
-
-  Result<StationState> state() {
-    SIXPOINT_ASSIGN(auto store, open_store());
-    return station_state(store, station, limits.check_unit);
-  }
-
-  void watch(const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      look();
-      std::unique_lock lock(mutex);
-      wake.wait_for(lock, stop, kBetweenLooks, [&] { return asked; });
-      asked = false;
-    }
-  }
-
-  void look() {
-    const auto found = state();
-    const std::lock_guard lock(mutex);
-    Json now = seen;
-    if (found) {
-      now = found->to_json();
-      now.erase("charts");
-      now.erase("station");
-      now["problem"] = "";
-    } else {
-      // What was known stays: a store that is away neither locks a station nor opens it.
-      now["problem"] = found.error().brief();
-    }
-    if (now != seen) {
-      seen = std::move(now);
-      ++changes;
-    }
-  }
-
-  Env& env;
-  const StoreOpener open_store;
-  const std::string station;
-  const Limits limits;
-
-  mutable std::mutex mutex;  // guards what follows
-  std::condition_variable_any wake;
-  bool asked = false;
-  Json seen;
-  std::atomic<std::uint64_t> changes{0};
-  std::jthread thread;  // last: it uses all of the above
-};
-
-StationDesk::StationDesk(Env& env, StoreOpener open_store, std::string station, Limits limits)
-    : impl_(std::make_unique<Impl>(env, std::move(open_store), std::move(station),
-                                   std::move(limits))) {}
-StationDesk::~StationDesk() = default;
-
-Json StationDesk::lock() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->seen;
+QualityControl::QualityControl(StoreOpener open_store, std::string station, Limits limits)
+    : open_store_(std::move(open_store)),
+      station_(std::move(station)),
+      limits_(std::move(limits)),
+      lock_({{"locked", false},
+             {"reasons", Json::array()},
+             {"check_units", Json::array()},
+             {"signature", nullptr},
+             {"problem", ""}}) {
+  thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
 }
 
-std::uint64_t StationDesk::changes() const { return impl_->changes; }
+Result<StationState> QualityControl::read_state() {
+  SIXPOINT_ASSIGN(auto store, open_store_());
+  return station_state(store, station_, limits_.check_unit);
+}
 
-void StationDesk::look_soon() {
+void QualityControl::watch(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    refresh();
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, stop, kBetweenRefreshes, [&] { return refresh_asked_; });
+    refresh_asked_ = false;
+  }
+}
+
+void QualityControl::refresh() {
+  const auto state = read_state();
+  const std::lock_guard lock(mutex_);
+  Json now = lock_;
+  if (state) {
+    now = state->to_json();
+    now.erase("charts");
+    now.erase("station");
+    now["problem"] = "";
+  } else {
+    // The last state stays: a store that does not answer neither locks a station nor opens it.
+    now["problem"] = state.error().brief();
+  }
+  if (now != lock_) {
+    lock_ = std::move(now);
+    ++changes_;
+  }
+}
+
+Json QualityControl::lock() const {
+  const std::lock_guard lock(mutex_);
+  return lock_;
+}
+
+std::uint64_t QualityControl::changes() const { return changes_; }
+
+void QualityControl::refresh_soon() {
   {
-    const std::lock_guard lock(impl_->mutex);
-    impl_->asked = true;
+    const std::lock_guard lock(mutex_);
+    refresh_asked_ = true;
   }
-  impl_->wake.notify_all();
+  wake_.notify_all();
 }
 
-Result<Json> StationDesk::check_units() {
-  SIXPOINT_ASSIGN(const StationState state, impl_->state());
+Result<Json> QualityControl::check_units() {
+  SIXPOINT_ASSIGN(const StationState state, read_state());
   Json json = state.to_json();
   std::vector<std::string> names;
   for (const CheckUnitChart& chart : state.charts) {
     names.push_back(chart.chart.name);
   }
   json["titles"] = titles_for(names);
-  json["baseline_runs"] = impl_->limits.check_unit.baseline_runs;
-  json["locking_rules"] = impl_->limits.check_unit.locking_rules;
+  json["baseline_runs"] = limits_.check_unit.baseline_runs;
+  json["locking_rules"] = limits_.check_unit.locking_rules;
   return json;
 }
 
-Result<std::string> StationDesk::decide(const Decision& decision) {
+Result<std::string> QualityControl::decide(db::StationEvent decision) {
   const auto is_blank = [](const std::string& text) {
     return text.find_first_not_of(" \t") == std::string::npos;
   };
   if (is_blank(decision.operator_name) || is_blank(decision.reason)) {
     return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
-                "both are kept with it");
+                "both are stored with it");
   }
-  SIXPOINT_ASSIGN(auto store, impl_->open_store());
-  db::StationEvent event;
-  event.station = impl_->station;
-  event.serial = decision.serial;
-  event.action = decision.action;
-  event.operator_name = decision.operator_name;
-  event.reason = decision.reason;
-  SIXPOINT_ASSIGN(const std::string id, store.add_station_event(event));
-  impl_->look();
+  decision.station = station_;
+  SIXPOINT_ASSIGN(auto store, open_store_());
+  SIXPOINT_ASSIGN(const std::string id, store.add_station_event(decision));
+  refresh();
   return id;
 }
 
-Result<Json> StationDesk::statistics(const StatisticsQuestion& question) {
-  db::RunFilter filter;
-  SIXPOINT_ASSIGN(filter.from, day(question.from, "from"));
-  SIXPOINT_ASSIGN(filter.to, day(question.to, "to"));
-  SIXPOINT_ASSIGN(auto store, impl_->open_store());
+Result<Json> QualityControl::statistics(const StatisticsQuery& query) {
+  SIXPOINT_ASSIGN(const auto filter, runs_between(query.from, query.to, ""));
+  SIXPOINT_ASSIGN(auto store, open_store_());
   SIXPOINT_ASSIGN(const auto runs, summaries(store, filter));
-  SIXPOINT_ASSIGN(const StatisticsReport report, station::statistics(runs, question.by));
+  SIXPOINT_ASSIGN(const StatisticsReport report, station::statistics(runs, query.by));
   Json json = report.to_json();
   json["codes"] = Json::object();
   for (const auto& [code, count] : report.all.failure_codes) {
@@ -187,8 +141,8 @@ Result<Json> StationDesk::statistics(const StatisticsQuestion& question) {
   return json;
 }
 
-Result<Json> StationDesk::studies() {
-  SIXPOINT_ASSIGN(auto store, impl_->open_store());
+Result<Json> QualityControl::studies() {
+  SIXPOINT_ASSIGN(auto store, open_store_());
   std::set<std::string> names;
   std::map<std::string, std::set<std::string>> axes;
   db::RunFilter filter;
@@ -216,19 +170,19 @@ Result<Json> StationDesk::studies() {
   return json;
 }
 
-Result<Json> StationDesk::gage_study(const GageQuestion& question) {
-  SIXPOINT_ASSIGN(auto store, impl_->open_store());
+Result<Json> QualityControl::gage_study(const GageQuery& query) {
+  SIXPOINT_ASSIGN(auto store, open_store_());
   SIXPOINT_ASSIGN(const auto readings,
-                  gage_readings(store, question.study, question.quantity, question.axis));
+                  gage_readings(store, query.study, query.quantity, query.axis));
   GageOptions options;
-  if (question.tolerance > 0) {
-    options.tolerance = question.tolerance;
+  if (query.tolerance > 0) {
+    options.tolerance = query.tolerance;
   }
   SIXPOINT_ASSIGN(const GageReport report, gage_rr(readings, options));
   Json json;
-  json["study"] = question.study;
-  json["quantity"] = question.quantity;
-  json["axis"] = question.axis;
+  json["study"] = query.study;
+  json["quantity"] = query.quantity;
+  json["axis"] = query.axis;
   json.update(report.to_json());
   return json;
 }

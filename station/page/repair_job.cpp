@@ -1,4 +1,4 @@
-#include "station/repair_job.h"
+#include "station/page/repair_job.h"
 
 #include <atomic>
 #include <mutex>
@@ -6,8 +6,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "repair/constants_finder.h"
-#include "repair/file_tree.h"
+#include "repair/rescale/constants_finder.h"
+#include "repair/rescale/repair_file.h"
+#include "repair/rescale/repair_records.h"
+#include "repair/triage/file_tree.h"
+#include "station/records/software.h"
 
 namespace sixpoint::station {
 
@@ -16,25 +19,51 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr std::size_t kShownFiles = 2000;
 
-}  // namespace
-
-db::RepairRecord repair_record_of(const repair::RepairReport& report, UtcTime made_at) {
-  db::RepairRecord record;
-  record.serial = report.serial;
-  record.made_at = made_at;
-  record.input = report.input;
-  record.input_sha256 = report.input_sha256;
-  record.output_sha256 = report.output_sha256;
-  record.method = report.method;
-  record.constants_id = report.constants_id;
-  record.document = report.to_json().dump(-1, ' ', false, Json::error_handler_t::replace);
-  return record;
+// Adds what the store does not know yet of this file; the reason where it does not take it.
+std::string store_problem(db::Store& store, const repair::RepairReport& report) {
+  const auto made = repair::records_of(store, {report}, software_and_build());
+  if (!made.refused.empty()) {
+    return made.refused.front().error.brief();
+  }
+  for (const db::RepairRecord& record : made.records) {
+    if (const auto added = store.add_repair(record); !added) {
+      return added.error().brief();
+    }
+  }
+  return {};
 }
+
+repair::RepairReport repair_one(Env& env, const repair::FoundFile& file, const std::string& folder,
+                                repair::ConstantsSource& constants) {
+  const std::string output = folder + "/" + file.relative;
+  if (const Status made = env.files.make_folders(folder_of(output)); !made) {
+    repair::RepairReport report;
+    report.input = file.path;
+    report.reasons.push_back(made.error().brief());
+    return report;
+  }
+  repair::RepairOptions options;
+  options.resume = true;  // a job that was cancelled goes on
+  return repair::repair_file(env, file.path, output, constants, options);
+}
+
+// What the page shows of one file.
+Json shown(const std::string& name, const repair::RepairReport& report) {
+  const Json all = report.to_json();
+  return {{"input", printable(name)},
+          {"status", all["status"]},
+          {"method", report.method},
+          {"reasons", report.reasons},
+          {"still_error_mg", all["still_error_mg"]}};
+}
+
+}  // namespace
 
 struct RepairJob::Impl {
   Impl(Env& its_env, StoreOpener opener) : env(its_env), open_store(std::move(opener)) {}
 
   void work(const std::stop_token& stop, const RepairOrder& order, const repair::FileTree& tree);
+  void add(const std::string& name, const repair::RepairReport& report);  // under the mutex
   void end(std::string how, std::string problem) {
     const std::lock_guard lock(mutex);
     state = std::move(how);
@@ -57,6 +86,15 @@ struct RepairJob::Impl {
   std::jthread thread;
 };
 
+void RepairJob::Impl::add(const std::string& name, const repair::RepairReport& report) {
+  const std::string status(repair::to_string(report.status));
+  summary[status] = summary.value(status, 0) + 1;
+  if (files.size() < kShownFiles) {
+    files.push_back(shown(name, report));
+  }
+  ++changes;
+}
+
 void RepairJob::Impl::work(const std::stop_token& stop, const RepairOrder& order,
                            const repair::FileTree& tree) {
   Result<db::Store> store = open_store();
@@ -71,16 +109,10 @@ void RepairJob::Impl::work(const std::stop_token& stop, const RepairOrder& order
   }
   repair::ConstantsFinder finder(env, options);
   for (const repair::RefusedPath& refused : tree.refused) {
+    repair::RepairReport report;
+    report.reasons.push_back(refused.error.brief());
     const std::lock_guard lock(mutex);
-    summary["failed"] = summary.value("failed", 0) + 1;
-    if (files.size() < kShownFiles) {
-      files.push_back({{"input", printable(refused.path)},
-                       {"status", "failed"},
-                       {"method", ""},
-                       {"reasons", {refused.error.brief()}},
-                       {"still_error_mg", {{"before", nullptr}, {"after", nullptr}}}});
-    }
-    ++changes;
+    add(refused.path, report);
   }
   for (const repair::FoundFile& file : tree.files) {
     if (stop.stop_requested()) {
@@ -92,40 +124,13 @@ void RepairJob::Impl::work(const std::stop_token& stop, const RepairOrder& order
       current = file.relative;
       ++changes;
     }
-    const std::string output = order.output + "/" + file.relative;
-    repair::RepairReport report;
-    if (const Status made = env.files.make_folders(folder_of(output)); !made) {
-      report.input = file.path;
-      report.reasons.push_back(made.error().brief());
-    } else {
-      repair::RepairOptions how;
-      how.resume = true;  // a job that was cancelled goes on
-      report = repair::repair_file(env, file.path, output, finder, how);
-    }
-    std::string problem;
-    if (report.status == repair::RepairStatus::repaired) {
-      const auto kept = store->add_repair(repair_record_of(report, env.clock.now()));
-      problem = kept ? "" : kept.error().brief();
+    repair::RepairReport report = repair_one(env, file, order.output, finder);
+    if (const std::string problem = store_problem(*store, report); !problem.empty()) {
+      report.reasons.push_back(problem);
     }
     const std::lock_guard lock(mutex);
     ++done;
-    const std::string status(repair::to_string(report.status));
-    summary[status] = summary.value(status, 0) + 1;
-    if (files.size() < kShownFiles) {
-      Json row{{"input", printable(file.relative)},
-               {"status", status},
-               {"method", report.method},
-               {"reasons", report.reasons}};
-      if (!problem.empty()) {
-        row["reasons"].push_back(problem);
-      }
-      row["still_error_mg"]["before"] =
-          report.still_error_before_mg ? Json(*report.still_error_before_mg) : Json(nullptr);
-      row["still_error_mg"]["after"] =
-          report.still_error_after_mg ? Json(*report.still_error_after_mg) : Json(nullptr);
-      files.push_back(std::move(row));
-    }
-    ++changes;
+    add(file.relative, report);
   }
   end("done", "");
 }
@@ -136,13 +141,14 @@ RepairJob::~RepairJob() = default;
 
 Status RepairJob::start(const RepairOrder& order) {
   SIXPOINT_ASSIGN(auto tree, repair::find_files(impl_->env.files, order.folder, {{".gt3x"}}));
-  // What an earlier job made lies below the folder when the output does: not mended again.
+  // What an earlier job made lies below the folder when the output does: not repaired again.
   std::erase_if(tree.files, [&](const repair::FoundFile& file) {
     return file.path.starts_with(order.output + "/");
   });
   const std::lock_guard lock(impl_->mutex);
   if (impl_->state == "running") {
-    return fail(ErrorCode::usage, "files are being mended already", {}, "wait, or cancel that job");
+    return fail(ErrorCode::usage, "files are being repaired already", {},
+                "wait, or cancel that job");
   }
   if (tree.files.empty()) {
     return fail(ErrorCode::no_input, "there is no .gt3x file in this folder", order.folder,

@@ -1,19 +1,22 @@
-// "Repair my files": mends a folder in the background and says how far it is.
+// "Repair my files": repairs a folder in the background and says how far it is.
 //
-// The same as `sixpoint repair FOLDER -o OUTPUT`, one file at a time, for the page. One job at a
-// time. All functions may be called from any thread.
+//   RepairJob job(env, [&] { return db::Store::open(env, "plant.db"); });
+//   SIXPOINT_CHECK(job.start({"/data/archive", "/data/repaired", ""}));
+//   job.to_json();   // {"state": "running", "done": 3, "total": 12, ...}
+//
+// The same as `sixpoint repair FOLDER -o OUTPUT`, one file at a time, for the page; the store gets
+// the same rows (repair/rescale/repair_records.h). One job at a time. All functions may be called
+// from any thread.
 #pragma once
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "base/env.h"
 #include "db/store.h"
-#include "repair/repair_file.h"
 
 namespace sixpoint::station {
 
@@ -45,8 +48,5 @@ class RepairJob {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-// What the store is told about a file that was mended.
-db::RepairRecord repair_record_of(const repair::RepairReport& report, UtcTime made_at);
 
 }  // namespace sixpoint::station

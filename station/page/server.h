@@ -1,4 +1,16 @@
-// The seam to cpp-httplib: sockets in, Api (api.h) behind them.
+// The HTTP server of the page: sockets here, routes and answers in Api (api.h).
+//
+//   ServerOptions options;
+//   options.port = 6020;
+//   SIXPOINT_ASSIGN(const auto server, Server::open(env, api, options));
+//   std::jthread ender([&] {
+//     end.wait(false);  // until a signal sets it
+//     server->stop();
+//   });
+//   server->serve();
+//
+// One request per connection. A connection that sends nothing, or sends slowly, costs a descriptor
+// and no thread. Boost.Beast is used in server.cpp alone.
 #pragma once
 
 #include <memory>
@@ -6,7 +18,7 @@
 
 #include "base/env.h"
 #include "base/result.h"
-#include "station/api.h"
+#include "station/page/api.h"
 
 namespace sixpoint::station {
 
@@ -15,18 +27,22 @@ struct ServerOptions {
   int port = 0;  // 0: any that is free
   // Requests are small JSON objects.
   std::size_t most_body_bytes = 64U << 10U;
-  // Threads that answer; every event stream holds one of them.
-  std::size_t threads = 48;
-  // For a request, from connecting to its end, and for every write that the client does not take.
+  // Threads that answer. An answer may wait for the store.
+  std::size_t threads = 16;
+  // From connecting to the end of the request, and for every write.
   int request_time_out_s = 5;
-  // Connections whose request is not there yet. Below the 1,024 descriptors that a process usually
-  // has; sixteen lanes and their pages need two hundred.
-  std::size_t most_waiting = 512;
+  // Connections without a complete request; above this the oldest is closed. Below the 1,024
+  // descriptors that a process usually has; sixteen lanes and their pages need two hundred.
+  std::size_t most_idle = 512;
+  // Events that wait for a page that does not read them. The time-out above begins when they are
+  // more; a page that reads has a few KiB waiting.
+  int most_unread_bytes = 128 << 10;
 };
 
 class Server {
  public:
   // Listens; answers once serve() runs. device_unavailable when the address or port is taken.
+  // `env` and `api` outlive the server.
   static Result<std::unique_ptr<Server>> open(Env& env, Api& api, const ServerOptions& options);
   ~Server();
   Server(const Server&) = delete;

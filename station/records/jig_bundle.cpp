@@ -1,4 +1,4 @@
-#include "station/jig_bundle.h"
+#include "station/records/jig_bundle.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -21,7 +21,7 @@ using Json = nlohmann::json;
 constexpr const char* kDamaged = "'sixpoint audit verify' says whether the store was changed";
 constexpr std::size_t kMostSamples = 2'000'000;  // five hours at 100 Hz
 
-// A turn that brings gravity's reaction onto the pose's axis. The report knows no yaw.
+// A rotation that brings "up" onto the axis of the pose. The report does not hold the yaw.
 Eigen::Matrix3d rotation_of(device::Pose pose) {
   const PerAxis<double> up = device::direction_of(pose);
   const Eigen::Vector3d direction(up[0], up[1], up[2]);
@@ -79,41 +79,127 @@ Result<Samples> read_samples(std::string_view csv) {
   return samples;
 }
 
+// A reading and where its samples are.
 struct Reading {
-  std::string name;
-  device::Pose pose = device::Pose::plus_z;
+  std::string round;  // "faces" or "reseat"
+  StoredReading stored;
   std::array<std::int64_t, 3> sum{};
-  std::size_t samples = 0;
+  std::size_t first_sample = 0;
 };
 
-Status add_readings(const Json& list, const char* name, std::vector<Reading>& readings) {
-  if (!list.is_array()) {
-    return {};
-  }
-  for (const Json& item : list) {
-    Reading reading;
-    reading.name = name;
-    const bool whole = item.is_object() && item.contains("pose") && item["pose"].is_string() &&
-                       item.contains("samples") && item["samples"].is_number_unsigned() &&
-                       item.contains("mean_lsb") && item["mean_lsb"].is_array() &&
-                       item["mean_lsb"].size() == 3;
-    if (!whole) {
-      return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name,
-                  kDamaged);
-    }
-    SIXPOINT_ASSIGN(reading.pose, device::parse_pose(item["pose"].get<std::string>()));
-    reading.samples = item["samples"].get<std::size_t>();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const Json& mean = item["mean_lsb"][axis];
-      if (!mean.is_number() || reading.samples > kMostSamples) {
-        return fail(ErrorCode::bad_data, "the run's report holds a reading that is none", name,
-                    kDamaged);
-      }
-      reading.sum[axis] = std::llround(mean.get<double>() * static_cast<double>(reading.samples));
+Status add_readings(const Json& list, const char* round, std::vector<Reading>& readings) {
+  SIXPOINT_ASSIGN(const auto stored, stored_readings(list));
+  for (const StoredReading& each : stored) {
+    Reading reading{round, each, {}, 0};
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      reading.sum[axis] = std::llround(each.mean_lsb[axis] * static_cast<double>(each.samples));
     }
     readings.push_back(std::move(reading));
   }
   return {};
+}
+
+Result<std::vector<Reading>> readings_of(const Json& report) {
+  std::vector<Reading> readings;
+  SIXPOINT_CHECK(add_readings(report["poses"], "faces", readings));
+  if (report.contains("verification") && report["verification"].is_object() &&
+      report["verification"].contains("poses")) {
+    SIXPOINT_CHECK(add_readings(report["verification"]["poses"], "reseat", readings));
+  }
+  return readings;
+}
+
+// Sets `first_sample` and sorts by it; answers with the number of readings that were found.
+std::size_t find_readings(const Samples& samples, std::vector<Reading>& readings) {
+  const std::size_t count = samples.counts.size();
+  std::vector<std::array<std::int64_t, 3>> sums(count + 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      sums[i + 1][axis] = sums[i][axis] + samples.counts[i][axis];
+    }
+  }
+  std::size_t found = 0;
+  for (Reading& reading : readings) {
+    const std::size_t length = reading.stored.samples;
+    for (std::size_t i = 0; length > 0 && i + length <= count; ++i) {
+      const auto& a = sums[i];
+      const auto& b = sums[i + length];
+      if (b[0] - a[0] == reading.sum[0] && b[1] - a[1] == reading.sum[1] &&
+          b[2] - a[2] == reading.sum[2]) {
+        reading.first_sample = i;
+        ++found;
+        break;
+      }
+    }
+  }
+  std::sort(readings.begin(), readings.end(),
+            [](const Reading& a, const Reading& b) { return a.first_sample < b.first_sample; });
+  return found;
+}
+
+// The middle of each axis, from its two faces; 0 where they are not there.
+std::array<std::int16_t, 3> middle_of_axes(const std::vector<Reading>& readings) {
+  std::array<std::int16_t, 3> middle{};
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    double sum = 0;
+    int faces = 0;
+    for (const Reading& reading : readings) {
+      if (reading.round == "faces" && device::axis_of(reading.stored.pose) == axis) {
+        sum += static_cast<double>(reading.sum[axis]) / static_cast<double>(reading.stored.samples);
+        ++faces;
+      }
+    }
+    middle[axis] = static_cast<std::int16_t>(faces == 2 ? std::lround(sum / 2) : 0);
+  }
+  return middle;
+}
+
+void add_segments(gap::Bundle& bundle, const Samples& samples,
+                  const std::vector<Reading>& readings) {
+  constexpr double kMoved_g = 0.05;  // a change of the pose moves an axis by 1 g
+  const std::array<std::int16_t, 3> middle = middle_of_axes(readings);
+  Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();
+  for (const Reading& reading : readings) {
+    const std::size_t first = reading.first_sample;
+    gap::Segment segment;
+    segment.name = reading.round;
+    segment.first_sample = bundle.samples.size();
+    segment.samples = reading.stored.samples;
+    segment.host_start_s = samples.device_time_s[first] - samples.device_time_s.front();
+    segment.rotation = rotation_of(reading.stored.pose);
+    segment.temperature_start_c = samples.temperature_c[first];
+    segment.temperature_end_c = segment.temperature_start_c;
+    segment.settled = true;
+    segment.pose = static_cast<int>(reading.stored.pose);
+    segment.placement = static_cast<int>(bundle.segments.size());
+    segment.approach_g = Eigen::Vector3d::Zero();
+    if (!bundle.segments.empty()) {
+      segment.approach_g = segment.rotation.col(2) - bundle.segments.back().rotation.col(2);
+    }
+    for (Eigen::Index a = 0; a < 3; ++a) {
+      if (std::abs(segment.approach_g[a]) > kMoved_g) {
+        held_sign[a] = std::copysign(1.0, segment.approach_g[a]);
+      }
+    }
+    segment.held_sign = held_sign;
+    for (std::size_t i = first; i < first + reading.stored.samples; ++i) {
+      gt3x::Counts counts = samples.counts[i];
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        counts[axis] = static_cast<std::int16_t>(counts[axis] - middle[axis]);
+      }
+      bundle.samples.push_back(counts);
+    }
+    bundle.segments.push_back(std::move(segment));
+  }
+}
+
+// Within a block of samples the unit's own clock is exact to a microsecond. 0 where the times are
+// not those of a sample clock.
+double rate_of(const Samples& samples) {
+  const auto& time_s = samples.device_time_s;
+  const double rate_hz =
+      time_s.size() > 1 && time_s[1] > time_s[0] ? std::round(1 / (time_s[1] - time_s[0])) : 100;
+  return rate_hz >= 10 && rate_hz <= 400 && time_s.back() > time_s.front() ? rate_hz : 0;
 }
 
 Result<StoredRun> run_of(const db::Row& row) {
@@ -165,56 +251,47 @@ Result<std::string> samples_of_run(db::Store& store, const std::string& id) {
   const Bytes* bytes =
       rows.size() == 1 && rows[0].size() == 1 ? std::get_if<Bytes>(rows[0].data()) : nullptr;
   if (bytes == nullptr) {
-    return fail(ErrorCode::no_input, "the run kept no samples", printable(id, 80),
-                "runs of kind 'jig' keep them");
+    return fail(ErrorCode::no_input, "the run has no samples in the store", printable(id, 80),
+                "runs of kind 'jig' have them");
   }
   return std::string(bytes->begin(), bytes->end());
 }
 
+Result<std::vector<StoredReading>> stored_readings(const Json& list) {
+  std::vector<StoredReading> readings;
+  for (const Json& item : list.is_array() ? list : Json::array()) {
+    StoredReading reading;
+    try {
+      SIXPOINT_ASSIGN(reading.pose, device::parse_pose(item.at("pose").get<std::string>()));
+      reading.mean_lsb = item.at("mean_lsb").get<PerAxis<double>>();
+      reading.samples = item.at("samples").get<std::size_t>();
+    } catch (const Json::exception&) {
+      reading.samples = kMostSamples + 1;
+    }
+    if (reading.samples > kMostSamples) {
+      return fail(ErrorCode::bad_data, "the run's report holds an incomplete reading", "poses",
+                  kDamaged);
+    }
+    readings.push_back(reading);
+  }
+  return readings;
+}
+
 Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples_csv) {
+  constexpr std::size_t kTemperatures = 2000;  // in the bundle, spread over the run
   const Json report = Json::parse(run.document, nullptr, false);
   if (!report.is_object() || !report.contains("poses")) {
     return fail(ErrorCode::bad_data, "the run's document is no jig report", run.id, kDamaged);
   }
-  std::vector<Reading> readings;
-  SIXPOINT_CHECK(add_readings(report["poses"], "faces", readings));
-  if (report.contains("verification") && report["verification"].is_object() &&
-      report["verification"].contains("poses")) {
-    SIXPOINT_CHECK(add_readings(report["verification"]["poses"], "reseat", readings));
-  }
+  SIXPOINT_ASSIGN(std::vector<Reading> readings, readings_of(report));
   SIXPOINT_ASSIGN(const Samples samples, read_samples(samples_csv));
-  const std::size_t count = samples.counts.size();
-  std::vector<std::array<std::int64_t, 3>> sums(count + 1);
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      sums[i + 1][axis] = sums[i][axis] + samples.counts[i][axis];
-    }
+  const std::size_t found = find_readings(samples, readings);
+  if (found < readings.size() || readings.size() < device::kPoses.size()) {
+    return fail(
+        ErrorCode::bad_data,
+        fmt::format("{} of the report's {} readings are in the samples", found, readings.size()),
+        run.id, "a jig run has six at least");
   }
-  struct Found {
-    const Reading* reading;
-    std::size_t first;
-  };
-  std::vector<Found> found;
-  for (const Reading& reading : readings) {
-    for (std::size_t i = 0; reading.samples > 0 && i + reading.samples <= count; ++i) {
-      const auto& a = sums[i];
-      const auto& b = sums[i + reading.samples];
-      if (b[0] - a[0] == reading.sum[0] && b[1] - a[1] == reading.sum[1] &&
-          b[2] - a[2] == reading.sum[2]) {
-        found.push_back({&reading, i});
-        break;
-      }
-    }
-  }
-  if (found.size() < readings.size() || readings.size() < 6) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("{} of the report's {} readings are in the samples", found.size(),
-                            readings.size()),
-                run.id, "a jig run has six at least");
-  }
-  std::sort(found.begin(), found.end(),
-            [](const Found& a, const Found& b) { return a.first < b.first; });
-
   gap::Bundle bundle;
   bundle.path = "run " + run.id;
   bundle.protocol_serial = run.serial;
@@ -222,60 +299,13 @@ Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples
   if (report.contains("firmware") && report["firmware"].is_string()) {
     bundle.header.firmware = report["firmware"].get<std::string>();
   }
-  const double span_s = samples.device_time_s.back() - samples.device_time_s.front();
-  // Between the first two samples of a block the unit's own clock is exact to a microsecond.
-  bundle.rate_hz = count > 1 && samples.device_time_s[1] > samples.device_time_s[0]
-                       ? std::round(1 / (samples.device_time_s[1] - samples.device_time_s[0]))
-                       : 100;
-  if (!(bundle.rate_hz >= 10 && bundle.rate_hz <= 400) || !(span_s > 0)) {
+  bundle.rate_hz = rate_of(samples);
+  if (bundle.rate_hz == 0) {
     return fail(ErrorCode::bad_data, "the capture's times are no sample clock's", run.id, kDamaged);
   }
-  // The middle of each axis, from its two faces.
-  std::array<double, 3> middle{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    double sum = 0;
-    double n = 0;
-    for (const Reading& reading : readings) {
-      if (reading.name == "faces" && device::axis_of(reading.pose) == axis) {
-        sum += static_cast<double>(reading.sum[axis]) / static_cast<double>(reading.samples);
-        n += 1;
-      }
-    }
-    middle[axis] = n == 2 ? std::round(sum / 2) : 0;
-  }
-  Eigen::Vector3d pose_before = Eigen::Vector3d::Zero();
-  Eigen::Vector3d held = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    const Reading& reading = *found[k].reading;
-    gap::Segment segment;
-    segment.name = reading.name;
-    segment.first_sample = bundle.samples.size();
-    segment.samples = reading.samples;
-    segment.host_start_s = samples.device_time_s[found[k].first] - samples.device_time_s.front();
-    segment.rotation = rotation_of(reading.pose);
-    segment.temperature_start_c = samples.temperature_c[found[k].first];
-    segment.temperature_end_c = segment.temperature_start_c;
-    segment.settled = true;
-    segment.pose = static_cast<int>(reading.pose);
-    segment.placement = static_cast<int>(k);
-    const Eigen::Vector3d pose = segment.rotation.col(2);
-    segment.approach_g = k == 0 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(pose - pose_before);
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      held[a] = std::abs(segment.approach_g[a]) > 0.05 ? std::copysign(1.0, segment.approach_g[a])
-                                                       : held[a];
-    }
-    segment.held_sign = held;
-    pose_before = pose;
-    for (std::size_t i = 0; i < reading.samples; ++i) {
-      gt3x::Counts counts = samples.counts[found[k].first + i];
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        counts[axis] = static_cast<std::int16_t>(counts[axis] - std::lround(middle[axis]));
-      }
-      bundle.samples.push_back(counts);
-    }
-    bundle.segments.push_back(std::move(segment));
-  }
-  for (std::size_t i = 0; i < count; i += std::max<std::size_t>(1, count / 2000)) {
+  add_segments(bundle, samples, readings);
+  const std::size_t count = samples.counts.size();
+  for (std::size_t i = 0; i < count; i += std::max<std::size_t>(1, count / kTemperatures)) {
     bundle.temperature.host_time_s.push_back(samples.device_time_s[i] -
                                              samples.device_time_s.front());
     bundle.temperature.temperature_c.push_back(samples.temperature_c[i]);

@@ -1,10 +1,10 @@
-#include "station/run_records.h"
+#include "station/records/run_records.h"
 
 #include <nlohmann/json.hpp>
 
-#include "gt3x/model.h"
-#include "station/software.h"
-#include "station/station_records.h"
+#include "gt3x/forms/model.h"
+#include "station/records/software.h"
+#include "station/records/station_records.h"
 
 namespace sixpoint::station {
 
@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The limits that the verdict used, whole: a verdict is nothing without them.
+// All limits that the verdict used: without them a verdict cannot be checked later.
 Json limits_of(const JigSessionOptions& session) {
   Json json = to_json(session.limits);
   json["run"] = {{"tilt_deg", session.run.tilt_limit_deg},
@@ -47,7 +47,7 @@ void complete_run_record(db::RunRecord& run, const JigReport& report, const std:
   run.started = report.started;
   run.ended = report.ended;
   run.verdict = to_string(report.verdict);
-  // The unit's own words may hold anything; a run is kept whatever they are.
+  // Texts of the unit may hold any bytes; the run is stored all the same.
   Json document = report.to_json();
   if (!study.empty()) {
     document["study"] = study;
@@ -63,12 +63,22 @@ void complete_run_record(db::RunRecord& run, const JigReport& report, const std:
   }
 }
 
-Result<RunIds> add_run_records(db::Keeper& keeper, const JigReport& report,
+db::ConstantsRecord constants_row(const calib::ConstantsRecord& record) {
+  db::ConstantsRecord row;
+  row.made_at = record.made_at;
+  row.serial = record.serial;
+  row.filter = calib::to_string(record.filter);
+  row.method = record.method;
+  row.document = calib::to_json(record).dump();
+  return row;
+}
+
+Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report,
                                const db::RunRecord& run) {
   RunIds done;
   SIXPOINT_ASSIGN(
       done.run_id,
-      keeper.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
+      writer.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
   if (report.written) {
     db::UnitWrite write;
     write.run_id = done.run_id;
@@ -78,19 +88,14 @@ Result<RunIds> add_run_records(db::Keeper& keeper, const JigReport& report,
         report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
     write.as_left = calib::to_json(report.six->best().stored).dump();
     write.read_back = calib::to_json(report.as_left->constants).dump();
-    SIXPOINT_CHECK(keeper.add_unit_write(write));
+    SIXPOINT_CHECK(writer.add_unit_write(write));
   }
   if (report.usable() && run.kind != kStudyKind) {
     calib::ConstantsRecord constants = report.record();
     constants.made_from.station = run.station;
-    db::ConstantsRecord row;
-    row.made_at = report.ended;
-    row.serial = report.serial;
-    row.filter = calib::to_string(report.filter);
-    row.method = constants.method;
+    db::ConstantsRecord row = constants_row(constants);
     row.run_id = done.run_id;
-    row.document = calib::to_json(constants).dump();
-    SIXPOINT_ASSIGN(done.constants_id, keeper.add_constants(row, run.model));
+    SIXPOINT_ASSIGN(done.constants_id, writer.add_constants(row, run.model));
   }
   return done;
 }

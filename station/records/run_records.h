@@ -1,11 +1,18 @@
-// What the store is told about a jig run, from the terminal and from the page alike.
+// The records of a jig run for the store, from the terminal and from the station alike.
+//
+//   db::RunRecord run = run_record_before(session, serial, jig);
+//   run.operator_name = "Ada";
+//   complete_run_record(run, report);
+//   SIXPOINT_ASSIGN(const RunIds stored, add_run_records(recorder, report, run));
+//
+// Times are UTC; errors are those of the store.
 #pragma once
 
 #include <optional>
 #include <string>
 
 #include "db/store.h"
-#include "station/jig_session.h"
+#include "station/run/jig_session.h"
 
 namespace sixpoint::station {
 
@@ -16,12 +23,15 @@ db::RunRecord run_record_before(const JigSessionOptions& session, const std::str
 void complete_run_record(db::RunRecord& run, const JigReport& report,
                          const std::string& study = {});
 
+// A row for the store; the run's id is still empty.
+db::ConstantsRecord constants_row(const calib::ConstantsRecord& record);
+
 struct RunIds {
   std::string run_id;
   std::optional<std::string> constants_id;  // of a usable report that is no study
 };
 // The run with its samples, what was written into the unit, and the constants (none of a study).
-Result<RunIds> add_run_records(db::Keeper& keeper, const JigReport& report,
+Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report,
                                const db::RunRecord& run);
 
 }  // namespace sixpoint::station

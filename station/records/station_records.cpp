@@ -1,4 +1,4 @@
-#include "station/station_records.h"
+#include "station/records/station_records.h"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// What a check unit's charts show; all else follows from these.
+// The charts of a check unit: of the quantities that the constants consist of.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kCharted = {{
     {"sensitivity_deviation_percent", "x"},
     {"sensitivity_deviation_percent", "y"},
@@ -45,10 +45,6 @@ std::optional<double> value_in(const RunSummary& run, std::string_view name,
     }
   }
   return std::nullopt;
-}
-
-bool is_signature(const db::StationEvent& event) {
-  return event.action == "sign" || event.action == "sign_new_baseline";
 }
 
 }  // namespace
@@ -87,6 +83,88 @@ Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter&
   return out;
 }
 
+Result<db::RunFilter> runs_between(const std::string& from, const std::string& to,
+                                   const std::string& prefix) {
+  const auto day = [&](const std::string& text,
+                       const char* name) -> Result<std::optional<UtcTime>> {
+    if (text.empty()) {
+      return std::nullopt;
+    }
+    const auto time = parse_iso8601(text);
+    if (!time) {
+      return fail(ErrorCode::usage, time.error().what, prefix + name, "write it as 2027-03-31");
+    }
+    return *time;
+  };
+  db::RunFilter filter;
+  SIXPOINT_ASSIGN(filter.from, day(from, "from"));
+  SIXPOINT_ASSIGN(filter.to, day(to, "to"));
+  return filter;
+}
+
+namespace {
+
+// The latest signature of this station goes into the state; answers with the time of the latest one
+// that asked for a new baseline.
+std::optional<UtcTime> read_signatures(const std::vector<db::StationEvent>& events,
+                                       StationState& state) {
+  std::optional<UtcTime> baseline_from;
+  for (const db::StationEvent& event : events) {
+    const bool new_baseline = event.action == "sign_new_baseline";
+    if (event.station == state.station && (new_baseline || event.action == "sign")) {
+      state.signature = event;
+      if (new_baseline) {
+        baseline_from = event.made_at;
+      }
+    }
+  }
+  return baseline_from;
+}
+
+CheckUnitChart chart_of(const std::vector<RunSummary>& runs, std::string_view name,
+                        std::string_view axis, const StationState& state,
+                        const CheckUnitPolicy& policy) {
+  CheckUnitChart chart;
+  std::vector<double> values;
+  std::size_t signed_up_to = 0;
+  for (const RunSummary& run : runs) {
+    if (const auto value = value_in(run, name, axis)) {
+      chart.serial = run.serial;
+      values.push_back(*value);
+      chart.times.push_back(run.started);
+      if (state.signature && run.started <= state.signature->made_at) {
+        signed_up_to = values.size();
+      }
+    }
+  }
+  chart.chart = control_chart(fmt::format("{} {}", name, axis), std::move(values),
+                              static_cast<std::size_t>(policy.baseline_runs),
+                              name == "zero_offset_mg" ? policy.least_sigma_zero_mg
+                                                       : policy.least_sigma_sensitivity_percent,
+                              signed_up_to);
+  return chart;
+}
+
+// Why this chart locks the station; nothing where it does not.
+std::optional<std::string> lock_reason(const CheckUnitChart& one, std::string_view name,
+                                       std::string_view axis,
+                                       const std::vector<int>& locking_rules) {
+  const auto& signals = one.chart.signals;
+  const auto last = std::find_if(signals.rbegin(), signals.rend(), [&](const ChartSignal& signal) {
+    return std::find(locking_rules.begin(), locking_rules.end(), signal.rule) !=
+           locking_rules.end();
+  });
+  if (last == signals.rend()) {
+    return std::nullopt;
+  }
+  const std::string time = to_iso8601(one.times[last->point]);
+  return fmt::format("check unit {}, {} {}: {} on {} at {} UTC", one.serial,
+                     find_quantity(name)->title, axis, nelson_rule(last->rule), time.substr(0, 10),
+                     time.substr(11, 5));
+}
+
+}  // namespace
+
 Result<StationState> station_state(db::Store& store, const std::string& station,
                                    const CheckUnitPolicy& policy) {
   SIXPOINT_ASSIGN(const auto events, store.station_events());
@@ -94,20 +172,11 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
   state.station = station;
   const std::set<std::string> units = check_units_of(events);
   state.check_units.assign(units.begin(), units.end());
-  std::optional<UtcTime> baseline_from;
-  for (const db::StationEvent& event : events) {
-    if (event.station == station && is_signature(event)) {
-      state.signature = event;
-      if (event.action == "sign_new_baseline") {
-        baseline_from = event.made_at;
-      }
-    }
-  }
+  db::RunFilter filter;
+  filter.from = read_signatures(events, state);
   for (const std::string& serial : state.check_units) {
-    std::vector<RunSummary> runs;
-    db::RunFilter filter;
     filter.serial = serial;
-    filter.from = baseline_from;
+    std::vector<RunSummary> runs;
     SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
       if (run.station == station) {
         runs.push_back(summary_of(run));
@@ -115,40 +184,13 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
       return {};
     }));
     for (const auto& [name, axis] : kCharted) {
-      CheckUnitChart chart;
-      chart.serial = serial;
-      std::vector<double> values;
-      std::size_t signed_up_to = 0;
-      for (const RunSummary& run : runs) {
-        if (const auto value = value_in(run, name, axis)) {
-          values.push_back(*value);
-          chart.times.push_back(run.started);
-          if (state.signature && run.started <= state.signature->made_at) {
-            signed_up_to = values.size();
-          }
-        }
-      }
-      if (values.empty()) {
+      CheckUnitChart chart = chart_of(runs, name, axis, state, policy);
+      if (chart.times.empty()) {
         continue;
       }
-      chart.chart = control_chart(fmt::format("{} {}", name, axis), std::move(values),
-                                  static_cast<std::size_t>(policy.baseline_runs),
-                                  name == "zero_offset_mg" ? policy.least_sigma_zero_mg
-                                                           : policy.least_sigma_sensitivity_percent,
-                                  signed_up_to);
-      const ChartSignal* last = nullptr;
-      for (const ChartSignal& signal : chart.chart.signals) {
-        if (std::find(policy.locking_rules.begin(), policy.locking_rules.end(), signal.rule) !=
-            policy.locking_rules.end()) {
-          last = &signal;
-        }
-      }
-      if (last != nullptr) {
+      if (auto reason = lock_reason(chart, name, axis, policy.locking_rules)) {
         state.locked = true;
-        const std::string time = to_iso8601(chart.times[last->point]);
-        state.reasons.push_back(fmt::format(
-            "check unit {}, {} {}: {} on {} at {} UTC", serial, find_quantity(name)->title, axis,
-            nelson_rule(last->rule), time.substr(0, 10), time.substr(11, 5)));
+        state.reasons.push_back(*std::move(reason));
       }
       state.charts.push_back(std::move(chart));
     }
@@ -169,12 +211,11 @@ std::string StationState::brief() const {
 }
 
 Json StationState::to_json() const {
-  Json json;
-  json["station"] = station;
-  json["locked"] = locked;
-  json["reasons"] = reasons;
-  json["check_units"] = check_units;
-  json["signature"] = nullptr;
+  Json json = {{"station", station},
+               {"locked", locked},
+               {"reasons", reasons},
+               {"check_units", check_units},
+               {"signature", nullptr}};
   if (signature) {
     json["signature"] = {{"made_at", to_iso8601(signature->made_at)},
                          {"operator", signature->operator_name},
@@ -223,7 +264,7 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
   SIXPOINT_ASSIGN(const auto events, store.station_events());
   const std::set<std::string> check_units = check_units_of(events);
   if (check_units.contains(serial)) {
-    return RetestState{};  // the one that is measured to find out
+    return RetestState{};  // it is measured to check the station
   }
   if (!check_units.empty()) {
     SIXPOINT_ASSIGN(const StationState state, station_state(store, station, limits.check_unit));
@@ -239,7 +280,7 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
   SIXPOINT_ASSIGN(RetestState state, unit_retest_state(store, serial, limits.retest));
   if (!state.may_start) {
     return fail(ErrorCode::configuration, state.reason, printable(serial, 60),
-                fmt::format("an engineer looks at it; then: sixpoint retest {} --release "
+                fmt::format("an engineer checks it; then: sixpoint retest {} --release "
                             "--operator NAME --reason WHY",
                             printable(serial, 60)));
   }

@@ -1,5 +1,10 @@
-// What the store says about a station's work: its runs for statistics, its check units, whether it
-// is locked, and whether a unit may be measured again.
+// A station's work as the store has it: its runs for statistics, its check units, its lock, and
+// whether a unit may be measured again.
+//
+//   SIXPOINT_ASSIGN(const StationState state, station_state(store, "bench-1", limits.check_unit));
+//   if (state.locked) { std::cout << state.brief(); }
+//   SIXPOINT_ASSIGN(const auto runs, summaries(store, {}));
+//   SIXPOINT_ASSIGN(const StatisticsReport report, statistics(runs, "station"));
 //
 // A check unit is a unit that stays at the station and is measured regularly. Its sensitivities and
 // zeros are charted; when a chart is out of control (a locking rule of the limits, statistics.h),
@@ -13,16 +18,21 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "db/store.h"
-#include "station/limits.h"
-#include "station/statistics.h"
-#include "station/verdict.h"
+#include "station/limits/limits.h"
+#include "station/limits/verdict.h"
+#include "station/statistics/statistics.h"
 
 namespace sixpoint::station {
 
 RunSummary summary_of(const db::RunRecord& run);
 
-// Of all runs that `filter` takes, without those of check units.
+// Of the runs that `filter` selects, without those of check units. Oldest first.
 Result<std::vector<RunSummary>> summaries(db::Store& store, const db::RunFilter& filter);
+
+// Runs that started on or after the day `from` ("2027-03-31") and before the day `to`; empty: no
+// limit. usage where a text is no day; `prefix` and from or to is then where ("--from").
+Result<db::RunFilter> runs_between(const std::string& from, const std::string& to,
+                                   const std::string& prefix);
 
 struct CheckUnitChart {
   std::string serial;
@@ -32,7 +42,7 @@ struct CheckUnitChart {
 
 struct StationState {
   std::string station;
-  std::vector<std::string> check_units;  // of any station: they are carried about
+  std::vector<std::string> check_units;  // of all stations: a check unit may be moved
   std::vector<CheckUnitChart> charts;    // six for each check unit that was measured here
   bool locked = false;
   std::vector<std::string> reasons;           // why, for people
@@ -49,13 +59,18 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
 Result<RetestState> unit_retest_state(db::Store& store, const std::string& serial,
                                       const RetestPolicy& policy);
 
-// Before a run: configuration error where the station is locked (unless the unit is a check unit)
-// or the unit failed too often, with what to do; else what its earlier runs demand of this one.
+// The rule that decides whether a unit may be measured now, in this order:
+//
+//   unit                        station   answer
+//   a check unit                any       yes, without demands
+//   any other                   locked    configuration error: an engineer signs for the station
+//   failed too often (limits)   open      configuration error: an engineer releases the unit
+//   any other                   open      yes, with what its earlier runs demand of this one
 Result<RetestState> may_start(db::Store& store, const std::string& serial,
                               const std::string& station, const Limits& limits);
 
-// Runs of a gage study are kept under this kind, with the study's name as `study` in the document:
-// they count neither for yields nor as retests, and make no constants.
+// Runs of a gage study are stored under this kind, with the study's name as `study` in the
+// document: they count neither for yields nor as retests, and make no constants.
 inline constexpr const char* kStudyKind = "study";
 
 // The readings of a gage study: `quantity` and `axis` as in JudgedQuantity, part = serial, operator

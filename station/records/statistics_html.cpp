@@ -4,34 +4,13 @@
 
 #include <fmt/format.h>
 
-#include "station/station_records.h"
+#include "base/html.h"
+#include "base/svg.h"
+#include "station/records/station_records.h"
 
 namespace sixpoint::station {
 
 namespace {
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 std::string shown(const Proportion& part) {
   return part.of == 0 ? std::string("\u2013")
@@ -60,7 +39,7 @@ std::string title_of(std::string_view chart_name) {
 std::string group_row(const GroupStatistics& group) {
   return fmt::format(
       "<tr><th scope=row>{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-      group.name.empty() ? "<i>not stated</i>" : escaped(group.name), group.runs, group.units,
+      group.name.empty() ? "<i>not stated</i>" : html_escaped(group.name), group.runs, group.units,
       shown(group.yield), shown(group.first_pass_yield), shown(group.seconds_per_unit_median, "s"));
 }
 
@@ -76,8 +55,8 @@ std::string failure_bars(const GroupStatistics& all) {
     html += fmt::format(
         "<tr><th scope=row>{}</th><td><svg width={:.0f} height=14 role=img aria-label='{} runs'>"
         "<rect width={:.1f} height=14 fill='#2b5c8a'/></svg> {}</td><td>{}</td></tr>\n",
-        escaped(code), kBar_px, count, kBar_px * static_cast<double>(count) / most, count,
-        known != nullptr ? escaped(known->next_action) : "");
+        html_escaped(code), kBar_px, count, kBar_px * static_cast<double>(count) / most, count,
+        known != nullptr ? html_escaped(known->next_action) : "");
   }
   return html + "</table>\n";
 }
@@ -93,108 +72,116 @@ constexpr std::string_view kStyle =
     ".open{background:#eef5ee;border-left:6px solid #2e7d32;padding:.6em 1em}"
     "svg text{font:11px sans-serif;fill:#333}";
 
-}  // namespace
+constexpr double kLeft = 64;
+constexpr double kRight = 790;
+constexpr double kTop = 26;
+constexpr double kBottom = 196;
+constexpr double kRangeTop = 226;
+constexpr double kRangeBottom = 286;
 
-std::string chart_svg(const CheckUnitChart& one) {
-  const ControlChart& chart = one.chart;
-  constexpr double kWidth = 860;
-  constexpr double kLeft = 64;
-  constexpr double kRight = 790;
-  constexpr double kTop = 26;
-  constexpr double kBottom = 196;
-  constexpr double kRangeTop = 226;
-  constexpr double kRangeBottom = 286;
-  double low = chart.baseline > 0 ? chart.lower : HUGE_VAL;
-  double high = chart.baseline > 0 ? chart.upper : -HUGE_VAL;
-  for (const double value : chart.values) {
-    low = std::min(low, value);
-    high = std::max(high, value);
+// Values on top, their moving ranges below, over the number of the point.
+class ControlDrawing {
+ public:
+  explicit ControlDrawing(const CheckUnitChart& one) : one_(one), chart_(one.chart) {
+    double low = chart_.baseline > 0 ? chart_.lower : HUGE_VAL;
+    double high = chart_.baseline > 0 ? chart_.upper : -HUGE_VAL;
+    for (const double value : chart_.values) {
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    double most_range = chart_.upper_range;
+    for (const double range : chart_.moving_ranges) {
+      most_range = std::max(most_range, range);
+    }
+    const double margin = high > low ? 0.08 * (high - low) : 1;
+    y_ = {low - margin, high + margin, kBottom, kTop};
+    range_y_ = {0, most_range > 0 ? 1.1 * most_range : 1, kRangeBottom, kRangeTop};
   }
-  double most_range = chart.upper_range;
-  for (const double range : chart.moving_ranges) {
-    most_range = std::max(most_range, range);
-  }
-  const double margin = high > low ? 0.08 * (high - low) : 1;
-  low -= margin;
-  high += margin;
-  most_range = most_range > 0 ? 1.1 * most_range : 1;
-  const auto x = [&](std::size_t point) {
-    return chart.values.size() < 2 ? (kLeft + kRight) / 2
-                                   : kLeft + (kRight - kLeft) * static_cast<double>(point) /
-                                                 static_cast<double>(chart.values.size() - 1);
-  };
-  const auto y = [&](double value) {
-    return kBottom - (kBottom - kTop) * (value - low) / (high - low);
-  };
-  const auto range_y = [&](double value) {
-    return kRangeBottom - (kRangeBottom - kRangeTop) * value / most_range;
-  };
-  const int places = std::clamp(2 - static_cast<int>(std::floor(std::log10(high - low))), 0, 6);
 
-  std::string svg = fmt::format(
-      "<svg viewBox='0 0 {:.0f} 308' width='100%' role=img aria-label='{} of check unit {}'>\n"
-      "<text x={:.0f} y=14 style='font-weight:bold'>{} \u2013 {}</text>\n",
-      kWidth, escaped(title_of(chart.name)), escaped(one.serial), kLeft, escaped(one.serial),
-      escaped(title_of(chart.name)));
-  const auto level = [&](double at, double value, const char* label, const char* style) {
-    svg += fmt::format(
-        "<line x1={:.1f} x2={:.1f} y1={:.1f} y2={:.1f} stroke='#777' {}/>"
-        "<text x={:.1f} y={:.1f}>{} {:.{}f}</text>\n",
-        kLeft, kRight, at, at, style, kRight + 6, at + 4, label, value, places);
-  };
-  if (chart.baseline > 0) {
+  std::string draw() {
+    const std::string title = title_of(chart_.name);
+    svg_.text(kLeft, 14, one_.serial + " \u2013 " + title, "style='font-weight:bold'");
+    if (chart_.baseline > 0) {
+      draw_limits();
+    }
+    std::vector<std::pair<double, double>> values;
+    for (std::size_t i = 0; i < chart_.values.size(); ++i) {
+      values.emplace_back(x(i), y_(chart_.values[i]));
+    }
+    std::vector<std::pair<double, double>> ranges;
+    for (std::size_t i = 0; i < chart_.moving_ranges.size(); ++i) {
+      ranges.emplace_back(x(i + 1), range_y_(chart_.moving_ranges[i]));
+    }
+    svg_.polyline(values, "fill='none' stroke='#2b5c8a' stroke-width='1.4'");
+    svg_.polyline(ranges, "fill='none' stroke='#2b5c8a' stroke-width='1.2'");
+    svg_.line(kLeft, kRangeBottom, kRight, kRangeBottom, "stroke='#777'");
+    svg_.text(4, kRangeTop + 20, "moving");
+    svg_.text(4, kRangeTop + 33, "range");
+    for (std::size_t i = 0; i < chart_.values.size(); ++i) {
+      draw_point(i);
+    }
+    if (!one_.times.empty()) {
+      svg_.text(kLeft, 302, to_iso8601(one_.times.front()).substr(0, 10));
+      svg_.text(kRight, 302, to_iso8601(one_.times.back()).substr(0, 10), "text-anchor='end'");
+    }
+    return fmt::format(
+        "<svg viewBox=\"0 0 860 308\" width=\"100%\" role=\"img\" aria-label=\"{} of check unit "
+        "{}\">{}</svg>\n",
+        html_escaped(title), html_escaped(one_.serial), svg_.marks());
+  }
+
+ private:
+  double x(std::size_t point) const {
+    return chart_.values.size() < 2 ? (kLeft + kRight) / 2
+                                    : kLeft + (kRight - kLeft) * static_cast<double>(point) /
+                                                  static_cast<double>(chart_.values.size() - 1);
+  }
+
+  void draw_limits() {
+    constexpr const char* kDashed = "stroke='#777' stroke-dasharray='6 4'";
     const double edge =
-        (x(chart.baseline - 1) + x(std::min(chart.baseline, chart.values.size() - 1))) / 2;
-    svg += fmt::format(
-        "<rect x={:.1f} y={:.1f} width={:.1f} height={:.1f} fill='#f1f1f1'/>"
-        "<text x={:.1f} y={:.1f}>baseline</text>\n",
-        kLeft, kTop, edge - kLeft, kBottom - kTop, kLeft + 4, kBottom + 12);
-    level(y(chart.upper), chart.upper, "+3\u03c3", "stroke-dasharray='6 4'");
-    level(y(chart.centre), chart.centre, "mean", "");
-    level(y(chart.lower), chart.lower, "\u22123\u03c3", "stroke-dasharray='6 4'");
-    level(range_y(chart.upper_range), chart.upper_range, "D4", "stroke-dasharray='6 4'");
+        (x(chart_.baseline - 1) + x(std::min(chart_.baseline, chart_.values.size() - 1))) / 2;
+    svg_.rect(kLeft, kTop, edge - kLeft, kBottom - kTop, "fill='#f1f1f1'");
+    svg_.text(kLeft + 4, kBottom + 12, "baseline");
+    const int places =
+        std::clamp(2 - static_cast<int>(std::floor(std::log10(y_.high - y_.low))), 0, 6);
+    const auto level = [&](double at, double value, const char* label, const char* style) {
+      svg_.line(kLeft, at, kRight, at, style);
+      svg_.text(kRight + 6, at + 4, fmt::format("{} {:.{}f}", label, value, places));
+    };
+    level(y_(chart_.upper), chart_.upper, "+3\u03c3", kDashed);
+    level(y_(chart_.centre), chart_.centre, "mean", "stroke='#777'");
+    level(y_(chart_.lower), chart_.lower, "\u22123\u03c3", kDashed);
+    level(range_y_(chart_.upper_range), chart_.upper_range, "D4", kDashed);
   }
-  std::string line;
-  for (std::size_t i = 0; i < chart.values.size(); ++i) {
-    line += fmt::format("{:.1f},{:.1f} ", x(i), y(chart.values[i]));
-  }
-  std::string ranges;
-  for (std::size_t i = 0; i < chart.moving_ranges.size(); ++i) {
-    ranges += fmt::format("{:.1f},{:.1f} ", x(i + 1), range_y(chart.moving_ranges[i]));
-  }
-  svg += fmt::format(
-      "<polyline points='{}' fill='none' stroke='#2b5c8a' stroke-width='1.4'/>\n"
-      "<polyline points='{}' fill='none' stroke='#2b5c8a' stroke-width='1.2'/>\n"
-      "<line x1={:.1f} x2={:.1f} y1={:.1f} y2={:.1f} stroke='#777'/>"
-      "<text x=4 y={:.1f}>moving</text><text x=4 y={:.1f}>range</text>\n",
-      line, ranges, kLeft, kRight, kRangeBottom, kRangeBottom, kRangeTop + 20, kRangeTop + 33);
-  for (std::size_t i = 0; i < chart.values.size(); ++i) {
-    // Which rules a point breaks stands beside it: colour is never alone.
+
+  // The rules that a point breaks stand beside it: colour is never alone.
+  void draw_point(std::size_t i) {
     std::string rules;
-    for (const ChartSignal& signal : chart.signals) {
+    for (const ChartSignal& signal : chart_.signals) {
       if (signal.point == i) {
         rules += fmt::format("{}{}", rules.empty() ? "" : ",", signal.rule);
       }
     }
-    const double at_x = x(i);
-    const double at_y = y(chart.values[i]);
+    const double at_y = y_(chart_.values[i]);
     if (rules.empty()) {
-      svg += fmt::format("<circle cx={:.1f} cy={:.1f} r=3 fill='#2b5c8a'/>\n", at_x, at_y);
+      svg_.circle(x(i), at_y, 3, "fill='#2b5c8a'");
     } else {
-      svg += fmt::format(
-          "<rect x={:.1f} y={:.1f} width=10 height=10 fill='#b71c1c'/>"
-          "<text x={:.1f} y={:.1f} text-anchor=middle>{}</text>\n",
-          at_x - 5, at_y - 5, at_x, at_y - 8, rules);
+      svg_.rect(x(i) - 5, at_y - 5, 10, 10, "fill='#b71c1c'");
+      svg_.text(x(i), at_y - 8, rules, "text-anchor='middle'");
     }
   }
-  if (!one.times.empty()) {
-    svg += fmt::format(
-        "<text x={:.1f} y=302>{}</text><text x={:.1f} y=302 text-anchor=end>{}</text>\n", kLeft,
-        to_iso8601(one.times.front()).substr(0, 10), kRight,
-        to_iso8601(one.times.back()).substr(0, 10));
-  }
-  return svg + "</svg>\n";
-}
+
+  const CheckUnitChart& one_;
+  const ControlChart& chart_;
+  SvgScale y_;
+  SvgScale range_y_;
+  Svg svg_;
+};
+
+}  // namespace
+
+std::string chart_svg(const CheckUnitChart& one) { return ControlDrawing(one).draw(); }
 
 std::string statistics_html(const StatisticsReport& report,
                             const std::vector<StationState>& states) {
@@ -202,12 +189,10 @@ std::string statistics_html(const StatisticsReport& report,
       "<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>Statistics of the "
       "station</title><style>{}</style></head><body>\n<h1>Statistics of the "
       "station</h1>\n<p>{}</p>\n",
-      kStyle, escaped(report.brief()));
-  html +=
-      "<h2>Yield</h2>\n<table><thead><tr><th>{}</th><th>runs</th><th>units</th>"
-      "<th>yield</th><th>first pass</th><th>time per unit (median)</th></tr></thead>\n<tbody>";
-  html.replace(html.find("<th>{}</th>"), 11,
-               fmt::format("<th>{}</th>", report.by.empty() ? "" : escaped(report.by)));
+      kStyle, html_escaped(report.brief()));
+  html += "<h2>Yield</h2>\n<table><thead><tr><th>" + html_escaped(report.by) +
+          "</th><th>runs</th><th>units</th><th>yield</th><th>first pass</th>"
+          "<th>time per unit (median)</th></tr></thead>\n<tbody>";
   for (const GroupStatistics& group : report.groups) {
     html += group_row(group);
   }
@@ -221,14 +206,15 @@ std::string statistics_html(const StatisticsReport& report,
     html += fmt::format(
         "<tr><th scope=row>{}</th><td>{}</td><td>{:.4g}</td><td>{:.3g}</td><td>{}</td><td>{:.2f} "
         "<small>({:.2f} to {:.2f})</small></td></tr>\n",
-        escaped(title_of(name)), one.n, one.mean, one.sd,
+        html_escaped(title_of(name)), one.n, one.mean, one.sd,
         one.cp ? fmt::format("{:.2f}", *one.cp) : "\u2013", one.cpk, one.cpk_low, one.cpk_high);
   }
   html += "</tbody></table>\n";
   for (const StationState& state : states) {
-    html += fmt::format("<h2>Check units: {}</h2>\n<p class={}>{}</p>\n",
-                        state.station.empty() ? "station without a name" : escaped(state.station),
-                        state.locked ? "locked" : "open", escaped(state.brief()));
+    html +=
+        fmt::format("<h2>Check units: {}</h2>\n<p class={}>{}</p>\n",
+                    state.station.empty() ? "station without a name" : html_escaped(state.station),
+                    state.locked ? "locked" : "open", html_escaped(state.brief()));
     for (const CheckUnitChart& chart : state.charts) {
       html += chart_svg(chart);
     }

@@ -1,4 +1,4 @@
-#include "station/jig_judgement.h"
+#include "station/run/jig_judgement.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,13 +6,15 @@
 
 #include <fmt/format.h>
 
+#include "station/run/budget.h"
+
 namespace sixpoint::station {
 
 Result<calib::SixPoseReport> solve_faces(const std::vector<PoseReading>& faces,
                                          const std::vector<PoseReading>& held_out,
                                          const calib::LocalGravity& gravity, const Limits& limits) {
   const auto readings = [](const std::vector<PoseReading>& from) {
-    std::vector<calib::PoseReading> to;
+    std::vector<calib::PoseMean> to;
     to.reserve(from.size());
     for (const PoseReading& reading : from) {
       to.push_back({device::direction_of(reading.pose), reading.mean_lsb, reading.sd_lsb,
@@ -22,7 +24,7 @@ Result<calib::SixPoseReport> solve_faces(const std::vector<PoseReading>& faces,
   };
   calib::SixPoseOptions options;
   options.gravity = gravity;
-  // Ranges and residuals are judged by the limits, with their guard bands; the solver only says
+  // Ranges and residuals are judged by the limits, with their guard bands. The solver only judges
   // whether the readings contradict each other.
   options.gain_range = HUGE_VAL;
   options.zero_range_g = HUGE_VAL;
@@ -62,45 +64,54 @@ Result<bool> judge_readings(JigReport& report, const JigRun& run) {
          judge_quantities(measured_quantities(report), report.limits).usable();
 }
 
-void conclude_report(JigReport& report, const JigRun& run, const JigEnding& ending) {
-  switch (run.outcome()) {
+namespace {
+
+// The end of a run that did not get through all poses. False where it did.
+bool conclude_early(JigReport& report, JigOutcome outcome, const JigEnding& ending) {
+  const auto end = [&report](JigVerdict verdict, const char* code, std::string reason) {
+    report.verdict = verdict;
+    report.codes = {code};
+    report.reasons.push_back(std::move(reason));
+  };
+  switch (outcome) {
     case JigOutcome::sensor_stuck:
-      report.verdict = JigVerdict::fail;
-      report.codes = {"sensor_stuck"};
-      report.reasons.push_back(ending.last_words);
-      return;
+      end(JigVerdict::fail, "sensor_stuck", ending.last_text);
+      return true;
     case JigOutcome::stopped:
-      report.verdict = JigVerdict::stopped;
-      report.codes = {"stopped"};
-      report.reasons.push_back("stopped by the operator");
-      return;
+      end(JigVerdict::stopped, "stopped", "stopped by the operator");
+      return true;
     case JigOutcome::timed_out:
-    case JigOutcome::too_many_refusals:
-    case JigOutcome::unit_gone:
-      report.verdict = JigVerdict::inconclusive;
-      if (run.outcome() == JigOutcome::unit_gone) {
-        report.ended_by = ending.gone;
-      }
-      report.codes = {run.outcome() == JigOutcome::timed_out           ? "time_out"
-                      : run.outcome() == JigOutcome::too_many_refusals ? "too_many_refusals"
-                                                                       : "unit_gone"};
-      report.reasons.push_back(
-          run.outcome() == JigOutcome::timed_out
-              ? "no pose was accepted in time; is the unit on the jig, and does the jig turn it?"
-          : run.outcome() == JigOutcome::unit_gone
-              ? fmt::format("the unit went away in mid-run and did not come back ({})",
-                            ending.gone ? ending.gone->what : std::string())
-              : "too many placements were refused; look at jig, seat and cable");
-      if (run.outcome() == JigOutcome::timed_out && report.stream.lost_samples > 0) {
+      end(JigVerdict::inconclusive, "time_out",
+          "no pose was accepted in time; is the unit on the jig, and does the jig turn it?");
+      if (report.stream.lost_samples > 0) {
         report.reasons.push_back(
             fmt::format("{} samples were lost or damaged on the way, and every reading begins anew "
                         "then: look at the cable",
                         report.stream.lost_samples));
       }
-      return;
+      return true;
+    case JigOutcome::too_many_refusals:
+      end(JigVerdict::inconclusive, "too_many_refusals",
+          "too many placements were refused; look at jig, seat and cable");
+      return true;
+    case JigOutcome::unit_gone:
+      report.ended_by = ending.gone;
+      end(JigVerdict::inconclusive, "unit_gone",
+          fmt::format("the unit went away in mid-run and did not come back ({})",
+                      ending.gone ? ending.gone->what : std::string()));
+      return true;
     case JigOutcome::running:
     case JigOutcome::complete:
       break;
+  }
+  return false;
+}
+
+}  // namespace
+
+void conclude_report(JigReport& report, const JigRun& run, const JigEnding& ending) {
+  if (conclude_early(report, run.outcome(), ending)) {
+    return;
   }
   if (report.written) {
     const auto left = calib::calibration_from(report.as_left->constants);

@@ -1,21 +1,47 @@
 // How the machine of jig_run.h judges a placement: whether the unit is still, on which face it
-// lies, how far it is tilted, and whether what was read there may be taken.
+// lies, how far it is tilted, and whether the reading may be accepted.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
 
-#include "station/jig_run.h"
+#include "station/run/jig_run.h"
 
 namespace sixpoint::station {
 
 namespace {
 
 constexpr double kDegPerRad = 180 / std::numbers::pi;
-// The ADXL362's 12 bits: at these a reading says nothing.
+// The ends of the ADXL362's 12 bits: a reading there is clipped.
 constexpr int kRawMin = -2048;
 constexpr int kRawMax = 2047;
+// Half a count: below it rounding hides the noise of a quiet sensor.
+constexpr double kLeastNoise_mg = 2;
+constexpr double kSamePlacement_g =
+    0.01;  // 0.6 degree: a person does not repeat a placement so well
+// What a working ADXL362 can have (datasheet, and the effect of the two filter configurations).
+constexpr double kLeast_lsb_per_g = 150;
+constexpr double kMost_lsb_per_g = 350;
+constexpr double kMostZero_g = 0.75;
+// The mean of the units whose constants are known.
+constexpr double kNominal_lsb_per_g = 256;
+constexpr double kNominalZero_lsb = 40;
+
+bool is_possible(const calib::Calibration& calibration) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const double lsb_per_g = 1 / calibration.sensitivity_g_per_lsb[axis];
+    if (!(lsb_per_g >= kLeast_lsb_per_g && lsb_per_g <= kMost_lsb_per_g &&
+          std::abs(calibration.zero_lsb[axis]) <= kMostZero_g * lsb_per_g)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool is_clipped(int count) { return count <= kRawMin || count >= kRawMax; }
+
+double degrees_of(double sine) { return std::asin(std::min(1.0, sine)) * kDegPerRad; }
 
 }  // namespace
 
@@ -36,83 +62,76 @@ NearestFace nearest_face(const PerAxis<double>& force_g) {
 
 FirstApproximation first_approximation(const std::optional<StoredConstants>& stored) {
   if (stored) {
-    if (const auto own = calib::calibration_from(*stored)) {
-      bool is_possible = true;
-      for (std::size_t axis = 0; axis < kAxes; ++axis) {
-        const double lsb_per_g = 1 / own->sensitivity_g_per_lsb[axis];
-        is_possible = is_possible && lsb_per_g >= 150 && lsb_per_g <= 350 &&
-                      std::abs(own->zero_lsb[axis]) <= 0.75 * lsb_per_g;
-      }
-      if (is_possible) {
-        return {*own, false};
-      }
+    if (const auto own = calib::calibration_from(*stored); own && is_possible(*own)) {
+      return {*own, false};
     }
   }
-  constexpr double kNominal_lsb_per_g = 256;
-  constexpr double kNominalZero_lsb = 40;  // of the units whose constants are known
   FirstApproximation nominal;
   nominal.calibration.sensitivity_g_per_lsb.fill(1 / kNominal_lsb_per_g);
   nominal.calibration.zero_lsb.fill(kNominalZero_lsb);
   return nominal;
 }
 
-JigRun::Window JigRun::window() const {
-  Window window;
-  const auto n = static_cast<double>(recent_.size());
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const auto sum = static_cast<double>(sum_[axis]);
-    window.mean_lsb[axis] = sum / n;
-    const double variance =
-        (static_cast<double>(sum_square_[axis]) - sum * sum / n) / std::max(1.0, n - 1);
-    window.sd_mg[axis] = std::sqrt(std::max(0.0, variance)) * g_per_lsb(axis) * kMgPerG;
-  }
-  return window;
+double JigRun::to_g(double lsb, std::size_t axis) const {
+  return lsb * approximation_.sensitivity_g_per_lsb[axis];
 }
+double JigRun::to_mg(double lsb, std::size_t axis) const { return to_g(lsb, axis) * kMgPerG; }
 
-bool JigRun::is_still(const Window& window, bool already) const {
+bool JigRun::is_still() const {
+  const PerAxis<double> sd_lsb = window_.sd_lsb();
+  const double factor =
+      stillness_ == JigStillness::moving ? options_.still_factor : options_.moved_factor;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const double own = own_noise_mg_[axis];
-    const double factor = already ? options_.moved_factor : options_.still_factor;
-    // 2 mg: half a count; a quiet sensor's noise sinks into its rounding.
-    const double limit = own > 0 ? factor * std::max(own, 2.0) : options_.first_noise_limit_mg;
-    if (window.sd_mg[axis] > std::min(limit, options_.first_noise_limit_mg)) {
+    const double own_mg = own_noise_mg_[axis];
+    const double limit_mg =
+        own_mg > 0 ? factor * std::max(own_mg, kLeastNoise_mg) : options_.first_noise_limit_mg;
+    if (to_mg(sd_lsb[axis], axis) > std::min(limit_mg, options_.first_noise_limit_mg)) {
       return false;
     }
   }
   return true;
 }
 
-bool JigRun::is_stuck(const device::RawCounts& counts) {
+bool JigRun::has_moved(const PerAxis<double>& from_lsb, double limit_mg) const {
+  const PerAxis<double> mean_lsb = window_.mean_lsb();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    repeats_[axis] = counts[axis] == repeated_[axis] ? repeats_[axis] + 1 : 0;
-    // At its limit a sensor repeats itself for another reason, which finish_dwell() names.
-    if (repeats_[axis] > static_cast<int>(options_.stuck_s * options_.rate_hz) &&
-        counts[axis] > kRawMin && counts[axis] < kRawMax) {
-      const bool all = std::all_of(repeats_.begin(), repeats_.end(),
-                                   [&](int repeats) { return repeats >= repeats_[axis] / 2; });
-      finish(JigOutcome::sensor_stuck,
-             all ? fmt::format("the sensor is frozen: no axis has changed for {:.0f} s",
-                               options_.stuck_s)
-                 : fmt::format("the sensor's {} axis is stuck: it has read {} for {:.0f} s",
-                               kAxisNames[axis], counts[axis], options_.stuck_s));
+    if (to_mg(std::abs(mean_lsb[axis] - from_lsb[axis]), axis) > limit_mg) {
       return true;
     }
   }
-  repeated_ = counts;
   return false;
 }
 
-std::optional<calib::Calibration> JigRun::seen_by_faces() const {
-  if (faces_.empty()) {
+bool JigRun::is_stuck(const device::RawCounts& counts) {
+  const PerAxis<int>& repeats = window_.repeats();
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    // A clipped sensor repeats itself too; why_unusable() names that.
+    if (repeats[axis] <= static_cast<int>(options_.stuck_s * options_.rate_hz) ||
+        is_clipped(counts[axis])) {
+      continue;
+    }
+    const bool all = *std::min_element(repeats.begin(), repeats.end()) >= repeats[axis] / 2;
+    finish(JigOutcome::sensor_stuck,
+           all ? fmt::format("the sensor is frozen: no axis has changed for {:.0f} s",
+                             options_.stuck_s)
+               : fmt::format("the sensor's {} axis is stuck: it has read {} for {:.0f} s",
+                             kAxisNames[axis], counts[axis], options_.stuck_s));
+    return true;
+  }
+  return false;
+}
+
+std::optional<calib::Calibration> JigRun::constants_of_faces() const {
+  if (progress_.faces.empty()) {
     return std::nullopt;
   }
-  calib::Calibration seen = approximation_;
+  calib::Calibration constants = approximation_;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    // An axis reads its zero where it lies level. One that never did reads it off its face, but for
-    // its sensitivity.
+    // An axis reads its zero where it lies level. One that never lay level gives it from its
+    // upright readings and its approximate sensitivity.
     double sum_lsb = 0;
     int count = 0;
-    for (const PoseReading& face : faces_) {
+    for (const PoseReading& face : progress_.faces) {
       if (device::axis_of(face.pose) == axis) {
         sum_lsb += face.mean_lsb[axis] -
                    device::sign_of(face.pose) / approximation_.sensitivity_g_per_lsb[axis];
@@ -120,39 +139,41 @@ std::optional<calib::Calibration> JigRun::seen_by_faces() const {
       }
     }
     const std::optional<double> level = level_lsb(axis, std::nullopt);
-    seen.zero_lsb[axis] = level ? *level : sum_lsb / count;
+    constants.zero_lsb[axis] = level ? *level : sum_lsb / count;
   }
-  return seen;
+  return constants;
 }
 
 NearestFace JigRun::recognise(const PerAxis<double>& mean_lsb) const {
-  std::optional<NearestFace> seen;
-  if (const auto constants = seen_by_faces()) {
-    seen = nearest_face(constants->to_g(mean_lsb));
-    // Two readings that agree leave no doubt about the zeros; one may itself be the tilted one.
-    if (seen->angle_deg <= options_.between_faces_deg || faces_.size() > 1) {
-      return *seen;
+  std::optional<NearestFace> by_faces;
+  if (const auto constants = constants_of_faces()) {
+    by_faces = nearest_face(constants->to_g(mean_lsb));
+    // Two readings that agree settle the zeros; a single one may itself be tilted.
+    if (by_faces->angle_deg <= options_.between_faces_deg || progress_.faces.size() > 1) {
+      return *by_faces;
     }
   }
+  static const calib::Calibration kNominal = first_approximation(std::nullopt).calibration;
   const NearestFace own = nearest_face(approximation_.to_g(mean_lsb));
-  const NearestFace nominal = nearest_face(nominal_.to_g(mean_lsb));
+  const NearestFace nominal = nearest_face(kNominal.to_g(mean_lsb));
   const bool own_near = own.angle_deg <= options_.between_faces_deg;
   const bool nominal_near = nominal.angle_deg <= options_.between_faces_deg;
   if (own_near && nominal_near && own.pose != nominal.pose) {
-    // One of them is wrong: more likely the one that sees what nobody asked for.
+    // Most likely the unit lies as it was asked for.
     return !open_.empty() && nominal.pose == detour_.value_or(open_.front()) ? nominal : own;
   }
   if (own_near || nominal_near) {
     return own_near ? own : nominal;
   }
   const NearestFace& nearer = own.angle_deg <= nominal.angle_deg ? own : nominal;
-  return seen && seen->angle_deg < nearer.angle_deg ? *seen : nearer;
+  return by_faces && by_faces->angle_deg < nearer.angle_deg ? *by_faces : nearer;
 }
 
+// Mean reading of an axis in the accepted poses in which it lies level.
 std::optional<double> JigRun::level_lsb(std::size_t axis, std::optional<Pose> except) const {
   double sum = 0;
   int count = 0;
-  for (const PoseReading& face : faces_) {
+  for (const PoseReading& face : progress_.faces) {
     if (face.pose != except && device::axis_of(face.pose) != axis) {
       sum += face.mean_lsb[axis];
       ++count;
@@ -161,7 +182,7 @@ std::optional<double> JigRun::level_lsb(std::size_t axis, std::optional<Pose> ex
   return count > 0 ? std::optional(sum / count) : std::nullopt;
 }
 
-// Angle by the level axes, against their readings in the other poses.
+// Angle by the level axes, against their readings in the other poses. 0 where there are none.
 double JigRun::tilt_of(const PoseReading& reading) const {
   double square = 0;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -169,11 +190,11 @@ double JigRun::tilt_of(const PoseReading& reading) const {
       continue;
     }
     if (const auto level = level_lsb(axis, reading.pose)) {
-      const double component_g = (reading.mean_lsb[axis] - *level) * g_per_lsb(axis);
+      const double component_g = to_g(reading.mean_lsb[axis] - *level, axis);
       square += component_g * component_g;
     }
   }
-  return std::asin(std::min(1.0, std::sqrt(square))) * kDegPerRad;
+  return degrees_of(std::sqrt(square));
 }
 
 bool JigRun::repeats_refused(const PoseReading& reading) const {
@@ -182,82 +203,100 @@ bool JigRun::repeats_refused(const PoseReading& reading) const {
 }
 
 bool JigRun::same_placement(const PerAxis<double>& a_lsb, const PerAxis<double>& b_lsb) const {
-  constexpr double kSamePlacement_g = 0.01;  // 0.6 degree
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    if (std::abs(a_lsb[axis] - b_lsb[axis]) * g_per_lsb(axis) > kSamePlacement_g) {
+    if (to_g(std::abs(a_lsb[axis] - b_lsb[axis]), axis) > kSamePlacement_g) {
       return false;
     }
   }
   return true;
 }
 
-void JigRun::drop_disagreeing(const PoseReading& reading) {
+// Takes the faces back that disagree with a repeated reading, unless the reading is the tilted one:
+// several faces disagree with it and the midpoints do too. False then, and nothing is changed.
+bool JigRun::drop_disagreeing(const PoseReading& reading) {
   const double limit_g = std::sin(options_.tilt_limit_deg / kDegPerRad);
-  std::erase_if(faces_, [&](const PoseReading& face) {
+  std::vector<PoseReading> agreeing;
+  std::vector<JigAction> dropped;
+  for (const PoseReading& face : progress_.faces) {
     double worst_g = 0;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       if (axis != device::axis_of(reading.pose) && axis != device::axis_of(face.pose)) {
-        worst_g = std::max(
-            worst_g, std::abs(face.mean_lsb[axis] - reading.mean_lsb[axis]) * g_per_lsb(axis));
+        worst_g =
+            std::max(worst_g, to_g(std::abs(face.mean_lsb[axis] - reading.mean_lsb[axis]), axis));
       }
     }
     if (worst_g <= limit_g) {
-      return false;
+      agreeing.push_back(face);
+      continue;
     }
-    open_.push_back(face.pose);
-    actions_.push_back(
+    dropped.push_back(
         {JigAction::Kind::dropped, face.pose,
          fmt::format("{} was tilted about {:.1f} degrees, as two placements of {} agree; it is "
                      "needed again",
-                     device::to_string(face.pose), std::asin(std::min(1.0, worst_g)) * kDegPerRad,
+                     device::to_string(face.pose), degrees_of(worst_g),
                      device::to_string(reading.pose))});
-    return true;
-  });
+  }
+  std::swap(progress_.faces, agreeing);
+  if (dropped.size() > 1 && !progress_.faces.empty() && !midpoints_agree_with(reading)) {
+    std::swap(progress_.faces, agreeing);
+    return false;
+  }
+  for (JigAction& action : dropped) {
+    open_.push_back(action.pose);
+    actions_.push_back(std::move(action));
+  }
+  return true;
 }
 
-// An axis' readings at +1 g and -1 g have its zero in their midpoint, whatever the tilt of those
-// two placements (it acts in second order). Does that speak for this reading, against the level
-// ones?
+// Midpoint of an axis' readings at +1 g and -1 g: its zero, whatever the tilt of those two
+// placements (it acts in second order). None where one of them is missing.
+std::optional<double> JigRun::midpoint_lsb(std::size_t axis) const {
+  double sum_lsb = 0;
+  int count = 0;
+  for (const PoseReading& face : progress_.faces) {
+    if (device::axis_of(face.pose) == axis) {
+      sum_lsb += face.mean_lsb[axis];
+      ++count;
+    }
+  }
+  return count == 2 ? std::optional(sum_lsb / 2) : std::nullopt;
+}
+
+// True where the midpoints of its level axes confirm the reading.
 bool JigRun::midpoints_agree_with(const PoseReading& reading) const {
   const double limit_g = std::sin(options_.tilt_limit_deg / kDegPerRad);
-  bool supported = false;
+  bool confirmed = false;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    double sum_lsb = 0;
-    int count = 0;
-    for (const PoseReading& face : faces_) {
-      if (device::axis_of(face.pose) == axis) {
-        sum_lsb += face.mean_lsb[axis];
-        ++count;
-      }
+    const auto zero_lsb = midpoint_lsb(axis);
+    if (axis == device::axis_of(reading.pose) || !zero_lsb) {
+      continue;
     }
-    if (axis != device::axis_of(reading.pose) && count == 2 &&
-        std::abs(reading.mean_lsb[axis] - sum_lsb / 2) * g_per_lsb(axis) > limit_g) {
+    if (to_g(std::abs(reading.mean_lsb[axis] - *zero_lsb), axis) > limit_g) {
       return false;
     }
-    supported = supported || (axis != device::axis_of(reading.pose) && count == 2);
+    confirmed = true;
   }
-  return supported;
+  return confirmed;
 }
 
-// Two readings of one pose differ by how the unit was seated, and by nothing of the sensor's own:
-// where one of them was tilted they say so even when the mean of all level readings does not, into
-// which a tilted one went itself. The newer is asked for again; when it repeats itself, the older
-// one of the first round goes, and the newer stands for it.
+// Two readings of one pose differ by the seating only, so they show a tilt in the first round that
+// the mean of all level readings hides. The newer is asked for again; when it repeats itself, it
+// replaces the older one of the first round. True where the reading may be accepted.
 bool JigRun::agrees_with_first_round(const PoseReading& reading) {
-  const auto first = std::find_if(faces_.begin(), faces_.end(), [&](const PoseReading& face) {
-    return face.pose == reading.pose;
-  });
-  if (first == faces_.end()) {
+  const auto first =
+      std::find_if(progress_.faces.begin(), progress_.faces.end(),
+                   [&](const PoseReading& face) { return face.pose == reading.pose; });
+  if (first == progress_.faces.end()) {
     return true;
   }
   double square_g2 = 0;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     if (axis != device::axis_of(reading.pose)) {
-      const double apart_g = (reading.mean_lsb[axis] - first->mean_lsb[axis]) * g_per_lsb(axis);
+      const double apart_g = to_g(reading.mean_lsb[axis] - first->mean_lsb[axis], axis);
       square_g2 += apart_g * apart_g;
     }
   }
-  const double apart_deg = std::asin(std::min(1.0, std::sqrt(square_g2))) * kDegPerRad;
+  const double apart_deg = degrees_of(std::sqrt(square_g2));
   if (apart_deg <= options_.tilt_limit_deg) {
     return true;
   }
@@ -283,19 +322,52 @@ bool JigRun::agrees_with_first_round(const PoseReading& reading) {
   return false;
 }
 
-void JigRun::finish_dwell() {
+// The unit was still for settle_s: a reading begins, if one is wanted here.
+void JigRun::on_settled() {
+  const PerAxis<double> mean_lsb = window_.mean_lsb();
+  const PerAxis<double> sd_lsb = window_.sd_lsb();
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const double sd_mg = to_mg(sd_lsb[axis], axis);
+    double& own_mg = own_noise_mg_[axis];
+    own_mg = own_mg > 0 ? std::min(own_mg, sd_mg) : sd_mg;
+  }
+  const NearestFace face = recognise(mean_lsb);
+  const bool between = face.angle_deg > options_.between_faces_deg;
+  if (between && !(progress_.phase == JigPhase::measuring && between_faces_lsb_ &&
+                   same_placement(mean_lsb, *between_faces_lsb_))) {
+    between_faces_lsb_ = mean_lsb;
+    refuse(face.pose, fmt::format("lies on none of its six faces: tilted {:.1f} degrees from {}",
+                                  face.angle_deg, device::to_string(face.pose)));
+    return;
+  }
+  if (last_face_ != face.pose) {
+    came_from_ = std::exchange(last_face_, face.pose);
+  }
+  if (detour_ == face.pose) {
+    leave();
+    ask_next();
+    return;
+  }
+  if (const std::string reason = why_not_wanted(face.pose); !reason.empty()) {
+    refuse(face.pose, reason);
+    return;
+  }
+  dwell_.clear();
+  dwell_start_lsb_ = mean_lsb;
+  stillness_ = JigStillness::dwelling;
+}
+
+PoseReading JigRun::read_dwell() const {
   PoseReading reading;
   reading.pose = recognise(dwell_start_lsb_).pose;
   reading.samples = static_cast<int>(dwell_.size());
   reading.start_s = dwell_.front().time_s;
   reading.from = came_from_;
   const auto n = static_cast<double>(dwell_.size());
-  bool clipped = false;
   for (const Sample& sample : dwell_) {
     reading.temperature_c += sample.temperature_c / n;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       reading.mean_lsb[axis] += sample.counts[axis] / n;
-      clipped = clipped || sample.counts[axis] <= kRawMin || sample.counts[axis] >= kRawMax;
     }
   }
   for (const Sample& sample : dwell_) {
@@ -307,67 +379,55 @@ void JigRun::finish_dwell() {
   for (double& sd_lsb : reading.sd_lsb) {
     sd_lsb = std::sqrt(sd_lsb);
   }
+  return reading;
+}
 
-  if (clipped) {
-    refuse(reading.pose, "the sensor is at its limit (clipped)");
-    return;
+// Why the samples of the dwell cannot be a reading; empty when they can.
+std::string JigRun::why_unusable() const {
+  for (const Sample& sample : dwell_) {
+    if (std::any_of(sample.counts.begin(), sample.counts.end(), is_clipped)) {
+      return "the sensor is at its limit (clipped)";
+    }
   }
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const auto first = dwell_.front().counts[axis];
     if (std::all_of(dwell_.begin(), dwell_.end(),
                     [&](const Sample& sample) { return sample.counts[axis] == first; })) {
-      refuse(reading.pose, fmt::format("the {} axis does not change at all: the sensor is stuck",
-                                       kAxisNames[axis]));
-      return;
+      return fmt::format("the {} axis does not change at all: the sensor is stuck",
+                         kAxisNames[axis]);
     }
   }
-  reading.tilt_deg = tilt_of(reading);
-  if (reading.tilt_deg > options_.tilt_limit_deg) {
-    // A placement that repeats itself against a single witness convicts the witness.
-    const bool repeats = repeats_refused(reading);
-    if (phase_ == JigPhase::measuring && repeats) {
-      std::vector<PoseReading> before = faces_;
-      drop_disagreeing(reading);
-      const bool overruled =
-          before.size() - faces_.size() > 1 && !faces_.empty() && !midpoints_agree_with(reading);
-      if (overruled) {  // several agree with each other: it is this one after all
-        for (const PoseReading& face : before) {
-          std::erase(open_, face.pose);
-        }
-        faces_ = std::move(before);
-        std::erase_if(actions_, [](const JigAction& action) {
-          return action.kind == JigAction::Kind::dropped;
-        });
-        refuse(reading.pose, fmt::format("tilted {:.1f} degrees", reading.tilt_deg));
-        return;
-      }
-      reading.tilt_deg = tilt_of(reading);
-    } else {
-      last_refused_ = reading;
-      refuse(reading.pose, fmt::format("tilted {:.1f} degrees", reading.tilt_deg));
-      return;
-    }
-  }
+  return {};
+}
 
-  if (phase_ == JigPhase::verifying && !agrees_with_first_round(reading)) {
+// Sets the tilt and refuses the reading where it is too large. A tilt that repeats itself in the
+// first round means that the faces before were the tilted ones: they are dropped.
+bool JigRun::tilt_is_accepted(PoseReading& reading) {
+  reading.tilt_deg = tilt_of(reading);
+  if (reading.tilt_deg <= options_.tilt_limit_deg) {
+    return true;
+  }
+  const bool repeated = progress_.phase == JigPhase::measuring && repeats_refused(reading);
+  if (repeated && drop_disagreeing(reading)) {
+    reading.tilt_deg = tilt_of(reading);
+    return true;
+  }
+  if (!repeated) {
+    last_refused_ = reading;
+  }
+  refuse(reading.pose, fmt::format("tilted {:.1f} degrees", reading.tilt_deg));
+  return false;
+}
+
+void JigRun::finish_dwell() {
+  PoseReading reading = read_dwell();
+  if (const std::string reason = why_unusable(); !reason.empty()) {
+    refuse(reading.pose, reason);
     return;
   }
-
-  if (last_refused_ && last_refused_->pose == reading.pose) {
-    last_refused_.reset();  // another pose's may come again, and is then a repeat
-  }
-  between_faces_lsb_.reset();
-  refusals_in_row_ = 0;
-  last_progress_s_ = now_s_;
-  std::erase(open_, reading.pose);
-  readings_of_phase().push_back(reading);
-  actions_.push_back({JigAction::Kind::accepted, reading.pose,
-                      fmt::format("{} is taken", device::to_string(reading.pose))});
-  leave();
-  if (open_.empty()) {
-    next_phase();
-  } else {
-    ask_next();
+  if (tilt_is_accepted(reading) &&
+      (progress_.phase != JigPhase::verifying || agrees_with_first_round(reading))) {
+    accept(reading);
   }
 }
 

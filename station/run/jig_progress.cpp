@@ -1,4 +1,4 @@
-#include "station/jig_progress.h"
+#include "station/run/jig_progress.h"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

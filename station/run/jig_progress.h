@@ -1,11 +1,14 @@
-// A run's readings and its state as JSON: for the report, and for the disk that a run is resumed
-// from.
+// A run's readings and its state as JSON: for the report, and for the file that a run goes on from.
+//
+//   SIXPOINT_ASSIGN(const JigProgress progress, parse_jig_progress(to_json(run.progress())));
+//
+// Readings in LSB, tilt in degrees.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "base/result.h"
-#include "station/jig_run.h"
+#include "station/run/jig_run.h"
 
 namespace sixpoint::station {
 

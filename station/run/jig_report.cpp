@@ -1,4 +1,4 @@
-#include "station/jig_report.h"
+#include "station/run/jig_report.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
-#include "station/jig_progress.h"
+#include "station/run/jig_progress.h"
 
 namespace sixpoint::station {
 
@@ -49,7 +49,9 @@ nlohmann::ordered_json uncertainty_to_json(const JigReport& report) {
   return json;
 }
 
-nlohmann::ordered_json json_of(const std::optional<device::CalibrationPage>& page) {
+}  // namespace
+
+nlohmann::ordered_json page_to_json(const std::optional<device::CalibrationPage>& page) {
   if (!page) {
     return nullptr;
   }
@@ -57,8 +59,6 @@ nlohmann::ordered_json json_of(const std::optional<device::CalibrationPage>& pag
   json["calibrated"] = to_iso8601(page->calibrated);
   return json;
 }
-
-}  // namespace
 
 JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& calibration,
                   double gravity_g) {
@@ -108,17 +108,14 @@ nlohmann::ordered_json JigReport::to_json() const {
   for (const PoseReading& face : faces) {
     json["poses"].push_back(station::to_json(face));
   }
-  if (six) {
-    json["constants"] = calib::to_json(six->best().calibration, six->best().stored);
-  } else {
-    json["constants"] = nullptr;
-  }
+  json["constants"] = six ? calib::to_json(six->best().calibration, six->best().stored)
+                          : nlohmann::ordered_json(nullptr);
   json["method"] = method;
-  json["as_found"] = json_of(as_found);
+  json["as_found"] = page_to_json(as_found);
   if (as_found) {
     json["as_found"]["residual_mg"] = as_found_residual_mg;
   }
-  json["as_left"] = json_of(as_left);
+  json["as_left"] = page_to_json(as_left);
   if (as_left) {
     json["as_left"]["written"] = written;
     json["as_left"]["residual_mg"] = written ? nlohmann::ordered_json(recheck.worst_mg)
@@ -135,19 +132,16 @@ nlohmann::ordered_json JigReport::to_json() const {
   }
   json["solutions"] = six ? calib::to_json(*six) : nlohmann::ordered_json(nullptr);
   json["refusals"] = refusals;
-  json["stream"]["samples"] = stream.samples;
-  json["stream"]["lost_samples"] = stream.lost_samples;
-  json["stream"]["duplicate_reports"] = stream.duplicate_reports;
-  json["stream"]["damaged_reports"] = stream.damaged_reports;
-  json["stream"]["failed_transfers"] = stream.failed_transfers;
-  json["stream"]["clock_jumps"] = stream.clock_jumps;
+  json["stream"] = {{"samples", stream.samples},
+                    {"lost_samples", stream.lost_samples},
+                    {"duplicate_reports", stream.duplicate_reports},
+                    {"damaged_reports", stream.damaged_reports},
+                    {"failed_transfers", stream.failed_transfers},
+                    {"clock_jumps", stream.clock_jumps}};
   return json;
 }
 
-std::string JigReport::raw_sha256() const {
-  return to_hex(
-      sha256(std::span(reinterpret_cast<const std::uint8_t*>(raw_csv.data()), raw_csv.size())));
-}
+std::string JigReport::raw_sha256() const { return text_sha256(raw_csv); }
 
 calib::ConstantsRecord JigReport::record() const {
   calib::ConstantsRecord record;

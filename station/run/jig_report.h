@@ -1,7 +1,12 @@
-// What a jig run ends with: the constants, how they did on readings that they were not made from,
-// the verdict, and everything that the store and the certificate need to say so again years later.
+// The result of a jig run: the constants, their residuals on readings that the fit did not use, the
+// verdict, and all that the store and the certificate need.
 //
-// Made by run_jig() (jig_session.h); a value, of any thread.
+//   SIXPOINT_ASSIGN(const JigReport report, run_jig({&unit, &jig}, env, options, hooks));
+//   if (report.usable()) {
+//     const calib::Calibration& constants = report.six->best().calibration;
+//   }
+//
+// Made by run_jig() (jig_session.h). Plain data; any thread.
 #pragma once
 
 #include <optional>
@@ -15,13 +20,13 @@
 #include "calib/gravity.h"
 #include "calib/six_pose.h"
 #include "device/unit.h"
-#include "station/jig_run.h"
-#include "station/limits.h"
-#include "station/verdict.h"
+#include "station/limits/limits.h"
+#include "station/limits/verdict.h"
+#include "station/run/jig_run.h"
 
 namespace sixpoint::station {
 
-// One reading judged by constants: magnitude against local gravity.
+// One reading against constants: the length of the vector minus local gravity.
 struct JudgedPose {
   PoseReading reading;
   double magnitude_g = 0;
@@ -34,6 +39,9 @@ struct JudgedPoses {
 };
 JudgedPoses judge(const std::vector<PoseReading>& readings, const calib::Calibration& calibration,
                   double gravity_g);
+
+// null where there is none.
+nlohmann::ordered_json page_to_json(const std::optional<device::CalibrationPage>& page);
 
 struct JigReport {
   std::string serial;

@@ -1,33 +1,63 @@
 // The technician's run: a state machine that turns samples into accepted poses.
 //
-// It is fed with events (a sample, samples were lost, the operator said something, time passed, the
-// unit is gone, constants were written) and answers each with actions (turn the jig, tell the
-// person, write the constants, done). It neither waits nor reads nor prints: the terminal, the page
-// and the tests drive the same machine. One thread at a time.
+//   JigRun run(JigRunOptions{}, first_approximation(stored).calibration);
+//   std::vector<JigAction> actions = run.start(now_s);
+//   while (run.phase() != JigPhase::finished) {
+//     actions = run.on_sample({now_s, counts, temperature_c});  // turn the jig, show the text ...
+//   }
 //
-// Phases, which are the production protocol of `gap/`: measuring (`faces`: six, any order) ->
-// verifying (`faces_reversed`: six again, each reached from another face than before, so that what
-// depends on the side of approach shows) -> reseating (`reseat`: two taken off and put back) ->
-// [writing -> rechecking (with what the unit then holds)] -> finished. The fit sees the first six
-// readings only; the eight others judge it.
+// It is fed with events and answers each with actions. It neither waits nor reads nor prints, so
+// that the terminal, the page and the tests drive the same machine. Times in seconds on any scale
+// that does not go back. One thread at a time.
 //
-// resume() starts a machine with what an earlier one had accepted: the program was restarted.
+// | phase      | poses that are asked for          | when all of them are accepted             |
+// |------------|-----------------------------------|-------------------------------------------|
+// | measuring  | the six, in any order             | action `fit`, -> verifying                |
+// | verifying  | the six, each from another side   | -> reseating                              |
+// | reseating  | two; the unit is taken off before | with `write`: action `write`, -> writing; |
+// |            |                                   | else -> finished (complete)               |
+// | writing    | none                              | on_written() -> rechecking                |
+// | rechecking | two, with the unit's constants    | -> finished (complete)                    |
 //
-// A pose is recognised from the readings by what the accepted ones say of the unit, by the unit's
-// own constants, which may be off by 20 % and 0.2 g, or by nominal ones. Where all of them see a
-// unit between its faces, and the same placement comes again, a hand would not have repeated it to
-// half a degree but a jig would: then the constants are what is wrong (an ADXL362's zero may lie
-// 0.45 g off), and the placement is taken; the tilt is judged as for every other. Stillness is
-// judged by the unit's own noise, with hysteresis. Tilt is judged by the two level axes: an axis
-// reads its zero in all four poses in which it lies level, so a placement that is off by an angle
-// disagrees with the others. Where one placement disagrees with one other, either may be the tilted
-// one: the newer is asked for again, and when it repeats itself the older goes.
+// The fit has the first six readings only; the eight others judge it.
+//
+// | event        | in a phase that asks for poses            | writing             | finished |
+// |--------------|-------------------------------------------|---------------------|----------|
+// | on_sample    | see the next table                        | -                   | -        |
+// | on_loss      | a reading under way begins again          | -                   | -        |
+// | undo         | the last reading is asked for again       | -                   | -        |
+// | stop         | -> finished (stopped)                     | -> finished         | -        |
+// | on_time      | -> finished (timed_out) when no reading   | -> finished         | -        |
+// |              | was accepted for pose_time_out_s          |                     |          |
+// | on_unit_back | time-out and stillness begin again        | the time-out, too   | -        |
+// | on_unit_gone | -> finished (unit_gone)                   | -> finished         | -        |
+// | on_written   | -                                         | -> rechecking       | -        |
+//
+// | stillness | ends when                                      | then                             |
+// |-----------|------------------------------------------------|----------------------------------|
+// | moving    | the window is still                            | settling                         |
+// | settling  | it was still for settle_s                      | dwelling where a reading of this |
+// |           |                                                | face is wanted, else refused     |
+// | dwelling  | dwell_s are over: accepted or refused          | leaving                          |
+// |           | the unit moved: refused                        | moving                           |
+// | leaving   | the unit moved, or lies on another face        | moving, settling                 |
+//
+// How a placement is judged (jig_placement.cpp):
+//  - Still: by the unit's own noise, with hysteresis.
+//  - Face: by the faces that were accepted, by the unit's own constants (which may be wrong by 20 %
+//    and 0.2 g), or by nominal ones.
+//  - Between two faces by all of these: refused. When the same placement comes again, to half a
+//    degree, it is taken: a person would not repeat it, a jig does, so the constants are wrong (the
+//    zero of an ADXL362 may be 0.45 g off).
+//  - Tilt: an axis reads its zero in all four poses in which it lies level, so a tilted placement
+//    disagrees with the others. Where one disagrees with one, the newer is asked for again; when it
+//    repeats itself, the older is dropped.
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/constants.h"
@@ -35,7 +65,8 @@
 #include "base/result.h"
 #include "calib/constants.h"
 #include "device/jig.h"
-#include "device/protocol.h"
+#include "device/unit_types.h"
+#include "station/run/sample_window.h"
 
 namespace sixpoint::station {
 
@@ -43,13 +74,12 @@ using device::Pose;
 
 struct JigRunOptions {
   int rate_hz = 100;
-  // Mean of 6 s: noise of 5.5 mg falls to 0.2 mg, below the 0.17 mg per 0.01 degree of seating.
-  // Fourteen placements, and two after a write, then cost two minutes of dwell, of the three that
-  // production allows.
+  // In the mean of 6 s, noise of 5.5 mg falls to 0.2 mg; 0.01 degree of seating are 0.17 mg.
+  // Sixteen placements then take two of the three minutes that production allows.
   double dwell_s = 6;
-  double settle_s = 0.5;  // still for this long before the dwell: straps and jigs ring that long
+  double settle_s = 0.5;  // still for this long before the dwell: straps and jigs vibrate that long
   double window_s = 1;    // over which noise is judged
-  double first_noise_limit_mg = 25;  // until the unit's own noise is known; a hand trembles more
+  double first_noise_limit_mg = 25;  // until the unit's own noise is known; below a hand's tremor
   double still_factor = 1.6;         // enters stillness below this many times its own noise
   double moved_factor = 2.5;         // leaves it above
   double moved_mg = 8;               // or when the mean has moved by this
@@ -58,18 +88,14 @@ struct JigRunOptions {
   double tilt_limit_deg = 4;
   double between_faces_deg = 30;  // further from every face than this: lies on none
   double pose_time_out_s = 180;   // without any accepted pose
-  // So many in a row, or five times as many in all, end the run: something is wrong that
-  // patience does not mend.
-  int refusals_in_row = 8;
-  // The first round backwards, its last face last: asked for in this order, every face is reached
-  // from another one than in the first round.
+  int refusals_in_row = 8;        // this many in a row, or five times as many in all, end the run
+  // In this order every face is reached from another one than in the first round.
   std::vector<Pose> verification = {Pose::plus_y,  Pose::minus_x, Pose::plus_x,
                                     Pose::minus_z, Pose::plus_z,  Pose::minus_y};
   std::vector<Pose> reseat = {Pose::plus_z, Pose::minus_x};
   std::vector<Pose> recheck = {Pose::minus_z, Pose::plus_x};  // after a write
   bool write = false;
-  // An axis that repeats one count for so long is stuck: a working one has noise of a count, and a
-  // turn falls into the time of every pose.
+  // An axis that repeats one count for so long is stuck: a working one has noise of one count.
   double stuck_s = 15;
 };
 
@@ -86,9 +112,8 @@ struct PoseReading {
   int samples = 0;
   double temperature_c = 0;
   double start_s = 0;
-  double tilt_deg = 0;  // by the level axes, against what was known when it was taken
-  // The face it lay on before; none where that was not seen.
-  std::optional<Pose> from = {};
+  double tilt_deg = 0;            // by the level axes, against what was known when it was taken
+  std::optional<Pose> from = {};  // the face it lay on before, where that is known
 };
 
 enum class JigPhase { measuring, verifying, reseating, writing, rechecking, finished };
@@ -101,7 +126,6 @@ enum class JigOutcome {
   unit_gone,
   sensor_stuck,
 };
-// What the unit is doing: still counts from a second without movement on.
 enum class JigStillness { moving, settling, dwelling, leaving };
 std::string_view to_string(JigPhase phase);
 std::string_view to_string(JigStillness stillness);
@@ -130,9 +154,9 @@ struct NearestFace {
 };
 NearestFace nearest_face(const PerAxis<double>& force_g);
 
-enum class OperatorWord { undo, stop };
+enum class OperatorCommand { undo, stop };
 
-// What a run has so far: all that a later program needs to go on.
+// The state of a run that a later program needs to go on with it.
 struct JigProgress {
   JigPhase phase = JigPhase::measuring;
   std::vector<PoseReading> faces;
@@ -149,9 +173,9 @@ struct JigLive {
   double dwell_fraction = 0;        // of the reading under way
 };
 
-// What a run recognises a unit's faces by at first: its stored constants where a working ADXL362
-// could have them (150 to 350 LSB/g, zero within 0.75 g: the datasheet's limits and what the two
-// filter configurations do), nominal ones otherwise. `is_nominal` says which.
+// The constants that recognise a unit's faces before the first reading: the stored ones where a
+// working ADXL362 can have them (150 to 350 LSB/g, zero within 0.75 g: the datasheet's limits and
+// the effect of the two filter configurations), nominal ones otherwise.
 struct FirstApproximation {
   calib::Calibration calibration;
   bool is_nominal = true;
@@ -163,103 +187,91 @@ class JigRun {
   // `approximation`: first_approximation() of the unit's stored constants.
   JigRun(JigRunOptions options, const calib::Calibration& approximation);
 
-  // Before start(): goes on where another machine was. A write that was under way is done anew.
+  // Before start(): goes on where another machine was. A write that was under way is repeated.
   void resume(const JigProgress& progress);
-  JigProgress progress() const;
+  const JigProgress& progress() const { return progress_; }
 
   std::vector<JigAction> start(double now_s);
   std::vector<JigAction> on_sample(const Sample& sample);
-  std::vector<JigAction> on_loss();  // samples were lost: a reading under way begins anew
-  std::vector<JigAction> on_operator(OperatorWord word);
+  std::vector<JigAction> on_loss();  // samples were lost
+  std::vector<JigAction> on_operator(OperatorCommand command);
   std::vector<JigAction> on_time(double now_s);
-  std::vector<JigAction> on_unit_gone();  // for good
-  // It was away and is back: it may have been turned meanwhile, and nobody was slow.
-  std::vector<JigAction> on_unit_back(double now_s);
+  std::vector<JigAction> on_unit_gone();              // and will not come back
+  std::vector<JigAction> on_unit_back(double now_s);  // it may have been turned meanwhile
   std::vector<JigAction> on_written(double now_s);
-  // Better knowledge of the unit, from the six faces: tilt is judged against it from here on.
+  // Constants from the six faces: tilt is judged by them from here on.
   void set_approximation(const calib::Calibration& calibration) { approximation_ = calibration; }
 
-  // What is known of the unit so far, for a picture of how it lies: by the faces that were taken,
-  // where there are any, and what the machine was given otherwise.
-  calib::Calibration approximation() const { return seen_by_faces().value_or(approximation_); }
+  // The best constants so far, for a picture of how the unit lies.
+  calib::Calibration approximation() const { return constants_of_faces().value_or(approximation_); }
 
-  JigPhase phase() const { return phase_; }
+  JigPhase phase() const { return progress_.phase; }
   JigOutcome outcome() const { return outcome_; }
   const std::vector<Pose>& open_poses() const { return open_; }
-  const std::vector<PoseReading>& faces() const { return faces_; }
+  const std::vector<PoseReading>& faces() const { return progress_.faces; }
   std::vector<PoseReading> verification() const;  // both sides of approach, then the reseated
-  const std::vector<PoseReading>& recheck() const { return recheck_; }
-  int refusals() const { return refusals_; }
+  const std::vector<PoseReading>& recheck() const { return progress_.recheck; }
+  int refusals() const { return progress_.refusals; }
   JigLive live() const;
 
  private:
-  using State = JigStillness;
-  struct Window {
-    PerAxis<double> mean_lsb{};
-    PerAxis<double> sd_mg{};
-  };
+  std::vector<JigAction> answer() { return std::exchange(actions_, {}); }
 
-  const std::vector<PoseReading>& readings_of(JigPhase phase) const;
-  const std::vector<PoseReading>& readings_of_phase() const { return readings_of(phase_); }
-  std::vector<PoseReading>& readings_of_phase() {
-    return const_cast<std::vector<PoseReading>&>(readings_of(phase_));
-  }
+  // The protocol (jig_run.cpp).
+  std::vector<PoseReading>& readings();  // of the phase
   const std::vector<Pose>& wanted_in(JigPhase phase) const;
-  std::string why_not_open(Pose pose) const;
+  std::string why_not_wanted(Pose pose) const;
   bool from_other_side(Pose pose, Pose from) const;
-  double g_per_lsb(std::size_t axis) const { return approximation_.sensitivity_g_per_lsb[axis]; }
-  NearestFace recognise(const PerAxis<double>& mean_lsb) const;
-  // What the accepted faces say of the unit; none before the first.
-  std::optional<calib::Calibration> seen_by_faces() const;
-  Window window() const;
-  bool is_still(const Window& window, bool already) const;
-  void leave();
-  void begin_dwell();
-  void finish_dwell();
-  void refuse(Pose pose, std::string reason);
   void ask_next();
+  bool ask_detour();
+  void ask_next_or_end_phase();
   void next_phase();
+  void accept(const PoseReading& reading);
+  void refuse(Pose pose, std::string reason);
+  void leave();
   void finish(JigOutcome outcome, std::string text);
+
+  // The judgement of a placement (jig_placement.cpp).
+  double to_g(double lsb, std::size_t axis) const;
+  double to_mg(double lsb, std::size_t axis) const;
   bool is_stuck(const device::RawCounts& counts);
-  // Reading of a level axis in the accepted poses; nothing where there is none yet.
+  bool is_still() const;
+  bool has_moved(const PerAxis<double>& from_lsb, double limit_mg) const;
+  NearestFace recognise(const PerAxis<double>& mean_lsb) const;
+  std::optional<calib::Calibration> constants_of_faces() const;  // none before the first
+  void on_settled();
+  void finish_dwell();
+  PoseReading read_dwell() const;
+  std::string why_unusable() const;
+  bool tilt_is_accepted(PoseReading& reading);
   std::optional<double> level_lsb(std::size_t axis, std::optional<Pose> except) const;
+  std::optional<double> midpoint_lsb(std::size_t axis) const;
   double tilt_of(const PoseReading& reading) const;
   bool repeats_refused(const PoseReading& reading) const;
   bool same_placement(const PerAxis<double>& a_lsb, const PerAxis<double>& b_lsb) const;
-  void drop_disagreeing(const PoseReading& reading);
+  bool drop_disagreeing(const PoseReading& reading);
   bool midpoints_agree_with(const PoseReading& reading) const;
-  // False when it asked for the pose again instead.
   bool agrees_with_first_round(const PoseReading& reading);
 
   JigRunOptions options_;
   calib::Calibration approximation_;
-  calib::Calibration nominal_;
-  JigPhase phase_ = JigPhase::measuring;
+  JigProgress progress_;
   JigOutcome outcome_ = JigOutcome::running;
-  State state_ = State::moving;
-  std::optional<PerAxis<double>> between_faces_lsb_;  // where it was refused for that last
   std::vector<Pose> open_;
-  std::vector<PoseReading> faces_;
-  std::vector<PoseReading> reversed_;
-  std::vector<PoseReading> reseat_;
-  std::vector<PoseReading> recheck_;
   std::optional<Pose> detour_;     // asked for only to come from there
   std::optional<Pose> last_face_;  // where it lay still last
   std::optional<Pose> came_from_;  // and before that
   std::optional<PoseReading> last_refused_;
-  int refusals_ = 0;
+  std::optional<PerAxis<double>> between_faces_lsb_;  // the last placement refused for that
   int refusals_in_row_ = 0;
 
-  std::deque<device::RawCounts> recent_;  // the window
-  PerAxis<std::int64_t> sum_{};
-  PerAxis<std::int64_t> sum_square_{};
-  PerAxis<double> own_noise_mg_{};  // the least seen; 0 = not known yet
+  JigStillness stillness_ = JigStillness::moving;
+  SampleWindow window_;
+  PerAxis<double> own_noise_mg_{};  // the least so far; 0: not known yet
   int still_samples_ = 0;
-  device::RawCounts repeated_{};  // the counts that came last
-  PerAxis<int> repeats_{};        // and how often in a row
-  PerAxis<double> dwell_start_lsb_{};
-  PerAxis<double> left_lsb_{};  // where the unit lay when it was told to leave
   std::vector<Sample> dwell_;
+  PerAxis<double> dwell_start_lsb_{};
+  PerAxis<double> left_lsb_{};  // mean when the reading there ended
   double last_progress_s_ = 0;
   double now_s_ = 0;
   std::vector<JigAction> actions_;

@@ -1,4 +1,4 @@
-#include "station/jig_session.h"
+#include "station/run/jig_session.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "station/jig_judgement.h"
+#include "station/run/jig_judgement.h"
 
 namespace sixpoint::station {
 
@@ -21,6 +21,12 @@ constexpr int kWritable_mv = 3300;  // docs/protocol.md, code 7
 
 double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
+}
+
+void add_losses(device::StreamStatistics& to, const device::StreamStatistics& of) {
+  to.lost_samples += of.lost_samples;
+  to.clock_jumps += of.clock_jumps;
+  to.clock_jumped_s += of.clock_jumped_s;
 }
 
 // A returned unit of 2013-14: the firmware knows two configurations for it.
@@ -57,12 +63,14 @@ class Session {
   Status prepare(const std::optional<JigResume>& resume);
   Status come_back(JigRun& run, const Error& error);
   Status ask_jig(double now_s);
-  // What the jig says about a placement that the unit has judged.
+  // The jig's own position against a placement that the unit's readings have judged.
   Status compare_with_jig(const JigAction& action);
-  void say_what_is_left();
+  void settle_as_left();
   void keep_interrupted(const JigRun& run, const Error& error);
   void keep_rows(std::string_view rows);
   Status stream(JigRun& run);
+  Status take_block(JigRun& run, const device::SampleBlock& block, double now_s);
+  Status end_stream(const JigRun& run);
   Status handle(JigRun& run, const std::vector<JigAction>& actions);
   void keep_raw(const device::SampleBlock& block);
   Status write_constants(JigRun& run);
@@ -77,14 +85,15 @@ class Session {
   JigReport report_;
   Calibration approximation_ = first_approximation(std::nullopt).calibration;
   bool ended_ = false;
-  bool write_unknown_ = false;  // a write was begun, and the page not read since
-  std::optional<Error> gone_;   // why the unit was given up
-  std::string last_words_;      // what the machine said when it ended
+  bool write_unknown_ = false;  // a write was begun, and the page was not read since
+  std::optional<Error> gone_;   // why the unit did not come back
+  std::string last_text_;       // text of the machine's last action
   std::optional<double> jig_asked_s_;
   int jig_disagreements_ = 0;
-  std::uint64_t clock_jumps_before_ = 0;
-  double clock_jumped_before_s_ = 0;
-  std::uint64_t lost_before_ = 0;
+  // Of this stream, already reported to the machine.
+  std::uint64_t lost_ = 0;
+  std::uint64_t clock_jumps_ = 0;
+  device::StreamStatistics before_;  // of the streams before the unit was unplugged
 };
 
 Status Session::prepare(const std::optional<JigResume>& resume) {
@@ -111,8 +120,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
     return fail(page.error());
   }
   if (resume) {
-    // Tilt and faces are judged by what the unit held when the run began; the reading above is what
-    // it holds now.
+    // As found is what the unit held when the run began; it may have been written since.
     const auto now = report_.as_found;
     report_.as_found = resume->as_found;
     if (resume->written && now && now->constants == resume->written->constants) {
@@ -157,25 +165,22 @@ void Session::keep_raw(const device::SampleBlock& block) {
 
 // Waits for the unit and goes on with it. Ends the run when it does not come back.
 Status Session::come_back(JigRun& run, const Error& error) {
-  // reopen() may let go of the unit.
+  // Read now: reopen() may close the unit.
   const device::StreamStatistics until_now = unit_->stream_statistics();
-  lost_before_ += until_now.lost_samples;
-  clock_jumps_before_ += until_now.clock_jumps;
-  clock_jumped_before_s_ += until_now.clock_jumped_s;
+  add_losses(before_, until_now);
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error);
     if (!again) {
       report_.stream = until_now;
-      unit_ = nullptr;  // whoever kept them let go of them
+      unit_ = nullptr;  // not valid any more
       jig_ = nullptr;
-    }
-    if (!again && again.error().code != ErrorCode::device_unavailable) {
-      return fail(again.error());  // whoever drives the run ends it himself
-    }
-    if (!again) {
+      if (again.error().code != ErrorCode::device_unavailable) {
+        return fail(again.error());  // the driver ends the run
+      }
       gone_ = again.error();
-      const auto word = hooks_.words ? hooks_.words() : std::nullopt;
-      return handle(run, word == OperatorWord::stop ? run.on_operator(*word) : run.on_unit_gone());
+      const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt;
+      return handle(
+          run, command == OperatorCommand::stop ? run.on_operator(*command) : run.on_unit_gone());
     }
     unit_ = again->unit;
     jig_ = again->jig;
@@ -194,22 +199,22 @@ Status Session::come_back(JigRun& run, const Error& error) {
     }
   }
   SIXPOINT_CHECK(handle(run, run.on_unit_back(seconds(unit_->clock().elapsed()))));
-  // A jig by itself does not know where the unit lies after a power cut.
+  // After a power cut the jig does not know where the unit lies.
   return run.open_poses().empty() ? Status{} : jig_->go_to(run.open_poses().front());
 }
 
-// A jig that is in trouble ends the run: nothing that it turns from here on means anything.
+// A fault of the jig ends the run: no placement after it is certain.
 Status Session::ask_jig(double now_s) {
   if (jig_ == nullptr || !jig_->turns_by_itself() ||
       (jig_asked_s_ && now_s - *jig_asked_s_ < options_.jig_poll_s)) {
     return {};
   }
   jig_asked_s_ = now_s;
-  SIXPOINT_ASSIGN(const device::JigReport jig, jig_->report());
+  SIXPOINT_ASSIGN(const device::JigPosition jig, jig_->position());
   if (!jig.fault.empty()) {
     return fail(ErrorCode::device_unavailable,
                 fmt::format("the jig stopped: {}", printable(jig.fault, 120)), jig_->name(),
-                "see to the jig, then begin the run anew");
+                "repair the fault, then begin the run again");
   }
   return {};
 }
@@ -222,28 +227,29 @@ Status Session::compare_with_jig(const JigAction& action) {
   if (action.kind != JigAction::Kind::accepted && !tilted) {
     return {};
   }
-  SIXPOINT_ASSIGN(const device::JigReport jig, jig_->report());
+  SIXPOINT_ASSIGN(const device::JigPosition jig, jig_->position());
   if (!jig.pose) {
-    return {};  // it does not claim to know
+    return {};  // it does not know
   }
+  const auto disagree = [&](std::string what) {
+    return fail(ErrorCode::bad_data, std::move(what), jig_->name(),
+                "look how the unit is seated, and whether the jig turns truly");
+  };
   if (*jig.pose != action.pose) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("the jig says it stands at {} and the unit reads {}",
-                            device::to_string(*jig.pose), device::to_string(action.pose)),
-                jig_->name(), "look how the unit is seated, and whether the jig turns truly");
+    return disagree(fmt::format("the jig says it stands at {} and the unit reads {}",
+                                device::to_string(*jig.pose), device::to_string(action.pose)));
   }
   jig_disagreements_ = tilted ? jig_disagreements_ + 1 : 0;
   if (jig_disagreements_ >= options_.jig_disagreements) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("the jig says it stands at {} to {:.2g} degrees, and the unit was {} "
-                            "time after time",
-                            device::to_string(*jig.pose), jig.angle_uncertainty_deg, action.text),
-                jig_->name(), "look how the unit is seated, and whether the jig turns truly");
+    return disagree(
+        fmt::format("the jig says it stands at {} to {:.2g} degrees, and the unit was {} time "
+                    "after time",
+                    device::to_string(*jig.pose), jig.angle_uncertainty_deg, action.text));
   }
   return {};
 }
 
-void Session::say_what_is_left() {
+void Session::settle_as_left() {
   if (write_unknown_) {
     report_.as_left.reset();
     report_.reasons.emplace_back(
@@ -254,7 +260,7 @@ void Session::say_what_is_left() {
   }
 }
 
-// What was measured until the error; nothing of it is judged.
+// The report of what was measured until the error; no verdict on the unit.
 void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
@@ -262,23 +268,46 @@ void Session::keep_interrupted(const JigRun& run, const Error& error) {
   if (unit_ != nullptr) {
     report_.stream = unit_->stream_statistics();
   }
-  say_what_is_left();
+  settle_as_left();
   report_.verdict = JigVerdict::inconclusive;
   report_.codes = {error.code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted"};
   report_.reasons.push_back(error.what);
   report_.ended_by = error;
 }
 
+Status Session::take_block(JigRun& run, const device::SampleBlock& block, double now_s) {
+  if (block.filter != options_.filter) {
+    return fail(ErrorCode::io,
+                fmt::format("the unit changed its filter to '{}' in mid-run",
+                            calib::to_string(block.filter)),
+                report_.serial, "begin the run again");
+  }
+  const device::StreamStatistics now = unit_->stream_statistics();
+  // A reading does not go across lost samples or a jump of the clock. A new stream counts from 0.
+  if (now.lost_samples > std::exchange(lost_, now.lost_samples)) {
+    SIXPOINT_CHECK(handle(run, run.on_loss()));
+  }
+  if (now.clock_jumps > std::exchange(clock_jumps_, now.clock_jumps)) {
+    SIXPOINT_CHECK(handle(run, run.on_loss()));
+  }
+  keep_raw(block);
+  for (const device::RawCounts& counts : block.counts) {
+    SIXPOINT_CHECK(handle(run, run.on_sample({now_s, counts, block.temperature_c})));
+  }
+  if (hooks_.samples) {
+    hooks_.samples(block, run);
+  }
+  return {};
+}
+
 Status Session::stream(JigRun& run) {
   SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
   SIXPOINT_CHECK(handle(run, run.start(seconds(unit_->clock().elapsed()))));
-  double heard_s = seconds(unit_->clock().elapsed());
-  std::uint64_t lost = 0;
-  std::uint64_t clock_jumps = 0;
+  double last_block_s = seconds(unit_->clock().elapsed());
   while (run.phase() != JigPhase::finished && !ended_) {
     auto block = unit_->next_samples(kReadFor);
     const double now_s = seconds(unit_->clock().elapsed());
-    if (block && !*block && now_s - heard_s > options_.silence_s) {
+    if (block && !*block && now_s - last_block_s > options_.silence_s) {
       block = fail(ErrorCode::device_unavailable, "the unit stopped sending samples",
                    unit_->address(), "plug the unit in again and begin the run anew");
     }
@@ -291,64 +320,40 @@ Status Session::stream(JigRun& run) {
       if (unit_ == nullptr) {
         break;
       }
-      heard_s = seconds(unit_->clock().elapsed());
-      lost = 0;
+      last_block_s = seconds(unit_->clock().elapsed());
+      lost_ = 0;
       continue;
     }
     if (*block) {
-      heard_s = now_s;
-      if ((*block)->filter != options_.filter) {
-        return fail(ErrorCode::io,
-                    fmt::format("the unit changed its filter to '{}' in mid-run",
-                                calib::to_string((*block)->filter)),
-                    report_.serial, "begin the run anew");
-      }
-      lost = std::min(lost, unit_->stream_statistics().lost_samples);  // a new stream counts anew
-      if (unit_->stream_statistics().lost_samples > lost) {
-        lost = unit_->stream_statistics().lost_samples;
-        SIXPOINT_CHECK(handle(run, run.on_loss()));
-      }
-      clock_jumps = std::min(clock_jumps, unit_->stream_statistics().clock_jumps);
-      if (unit_->stream_statistics().clock_jumps > clock_jumps) {
-        clock_jumps = unit_->stream_statistics().clock_jumps;
-        SIXPOINT_CHECK(handle(run, run.on_loss()));  // no reading goes across it
-      }
-      keep_raw(**block);
-      for (const device::RawCounts& counts : (*block)->counts) {
-        SIXPOINT_CHECK(handle(run, run.on_sample({now_s, counts, (*block)->temperature_c})));
-      }
-      if (hooks_.samples) {
-        hooks_.samples(**block, run);
-      }
+      last_block_s = now_s;
+      SIXPOINT_CHECK(take_block(run, **block, now_s));
     }
-    while (const auto word = hooks_.words ? hooks_.words() : std::nullopt) {
-      SIXPOINT_CHECK(handle(run, run.on_operator(*word)));
+    while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
+      SIXPOINT_CHECK(handle(run, run.on_operator(*command)));
     }
     SIXPOINT_CHECK(ask_jig(now_s));
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
-  if (unit_ == nullptr) {
-    return {};
-  }
+  return unit_ == nullptr ? Status{} : end_stream(run);
+}
+
+Status Session::end_stream(const JigRun& run) {
   report_.stream = unit_->stream_statistics();
-  report_.stream.lost_samples += lost_before_;
-  report_.stream.clock_jumps += clock_jumps_before_;
-  report_.stream.clock_jumped_s += clock_jumped_before_s_;
-  if (run.outcome() == JigOutcome::unit_gone || run.outcome() == JigOutcome::stopped) {
-    static_cast<void>(unit_->stop_stream());  // it may be gone
-    return {};
-  }
+  add_losses(report_.stream, before_);
   const Status stopped = unit_->stop_stream();
-  // The readings are taken: a unit that is pulled out at once does no harm.
-  return stopped || stopped.error().code == ErrorCode::device_unavailable ? Status{} : stopped;
+  // The readings are complete: a unit that is unplugged now is no error.
+  const bool may_fail = run.outcome() == JigOutcome::unit_gone ||
+                        run.outcome() == JigOutcome::stopped ||
+                        (!stopped && stopped.error().code == ErrorCode::device_unavailable);
+  return may_fail ? Status{} : stopped;
 }
 
 Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
-  // A machine that asks twice at once means the last.
+  // Where the machine asks for two poses at once, the last one counts.
   std::optional<Pose> place;
   for (const JigAction& action : actions) {
-    if (hooks_.tell) {
-      hooks_.tell(action);
+    if (hooks_.on_action) {
+      hooks_.on_action(action);
     }
     switch (action.kind) {
       case JigAction::Kind::place:
@@ -357,7 +362,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
       case JigAction::Kind::fit: {
         SIXPOINT_ASSIGN(const calib::SixPoseReport first,
                         solve_faces(run.faces(), {}, options_.gravity, options_.limits));
-        run.set_approximation(first.pair.calibration);
+        run.set_approximation(first.per_axis.calibration);
         break;
       }
       case JigAction::Kind::write: {
@@ -375,7 +380,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
       case JigAction::Kind::dropped:
         break;
       case JigAction::Kind::finished:
-        last_words_ = action.text;
+        last_text_ = action.text;
         break;
     }
   }
@@ -386,14 +391,13 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
 }
 
 Status Session::write_constants(JigRun& run) {
-  static_cast<void>(unit_->stop_stream());  // a unit that is gone says so below
-  // The date is today's: from it the firmware concludes the filter, and these constants belong to
-  // `current`.
+  static_cast<void>(unit_->stop_stream());  // an unplugged unit gives an error below
+  // Today's date: the firmware concludes from it that the constants belong to `current`.
   const device::CalibrationPage page{
       report_.six->best().stored, std::chrono::floor<std::chrono::seconds>(unit_->clock().now())};
   write_unknown_ = true;
   Status written_status = unit_->write_calibration(page);
-  // Whatever came between, the unit holds the old page or the new one: the whole is repeated, once.
+  // The unit holds the old page or the new one, whole: the write is repeated, once.
   if (!written_status) {
     if (written_status.error().code == ErrorCode::device_unavailable && hooks_.reopen) {
       SIXPOINT_CHECK(come_back(run, written_status.error()));
@@ -425,7 +429,7 @@ Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
   SIXPOINT_CHECK(judge_readings(report_, run));
-  say_what_is_left();
+  settle_as_left();
   if (report_.as_found) {
     if (const auto found = calib::calibration_from(report_.as_found->constants)) {
       report_.as_found_residual_mg = judge(report_.faces, *found, gravity_g_).worst_mg;
@@ -437,7 +441,7 @@ Status Session::conclude(const JigRun& run) {
                     "depend on it, recordings of this unit may",
                     report_.stream.clock_jumped_s, report_.stream.clock_jumps));
   }
-  conclude_report(report_, run, {options_.run.write, options_.retest, last_words_, gone_});
+  conclude_report(report_, run, {options_.run.write, options_.retest, last_text_, gone_});
   return {};
 }
 
@@ -447,7 +451,7 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
   if (resume) {
     JigProgress progress = resume->progress;
     if (progress.phase == JigPhase::rechecking && !report_.written) {
-      progress.phase = JigPhase::writing;  // the unit holds another page: written anew
+      progress.phase = JigPhase::writing;  // the unit holds another page: write again
       progress.recheck.clear();
     }
     machine.resume(progress);
@@ -457,7 +461,6 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
   }
   const Status streamed = stream(machine);
   if (!streamed) {
-    // Whatever happened, leave the jig at rest.
     if (jig_ != nullptr) {
       static_cast<void>(jig_->stop());
     }
@@ -472,36 +475,6 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
 }
 
 }  // namespace
-
-JigReport interrupted_report(const JigResume& resume, const std::string& serial,
-                             const std::string& firmware, const JigSessionOptions& options,
-                             UtcTime ended, const std::string& reason) {
-  JigReport report;
-  report.serial = serial;
-  report.firmware = firmware;
-  report.filter = options.filter;
-  report.gravity = options.gravity;
-  report.started = resume.started;
-  report.ended = ended;
-  report.verdict = JigVerdict::inconclusive;
-  report.codes = {"unit_gone"};
-  report.limits = options.limits;
-  report.reasons.push_back(reason);
-  report.faces = resume.progress.faces;
-  report.as_found = resume.as_found;
-  report.as_left = resume.written ? resume.written : resume.as_found;
-  report.written = resume.written.has_value();
-  report.refusals = resume.progress.refusals;
-  report.raw_csv = resume.raw_csv;
-  return report;
-}
-
-Result<JigReport> run_jig(device::Unit& unit, device::Jig& jig, Env& env,
-                          const JigSessionOptions& options, const JigTeller& tell) {
-  JigHooks hooks;
-  hooks.tell = tell;
-  return run_jig({&unit, &jig}, env, options, hooks);
-}
 
 Result<JigReport> run_jig(UnitOnJig on_jig, Env& env, const JigSessionOptions& options,
                           const JigHooks& hooks, const std::optional<JigResume>& resume) {

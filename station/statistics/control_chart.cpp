@@ -1,8 +1,9 @@
-#include "station/control_chart.h"
+#include "station/statistics/control_chart.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <span>
 
 #include <nlohmann/json.hpp>
@@ -17,14 +18,9 @@ using Json = nlohmann::ordered_json;
 constexpr double kD2 = 1.128;
 constexpr double kD4 = 3.267;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-double mean_of(const std::vector<double>& values, std::size_t count) {
-  double sum = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    sum += values[i];
-  }
-  return sum / static_cast<double>(count);
+double mean_of_first(const std::vector<double>& values, std::size_t count) {
+  const auto end = values.begin() + static_cast<std::ptrdiff_t>(count);
+  return std::accumulate(values.begin(), end, 0.0) / static_cast<double>(count);
 }
 
 // The rules on distances from the centre in sigma. `z` holds the points that count, oldest first;
@@ -40,9 +36,9 @@ class NelsonRules {
       case 2:
         return one_side(9, 9, 0);
       case 3:
-        return rising(1) || rising(-1);
+        return steps(6, 1, false) || steps(6, -1, false);
       case 4:
-        return alternating();
+        return steps(14, 1, true) || steps(14, -1, true);
       case 5:
         return one_side(2, 3, 2);
       case 6:
@@ -77,26 +73,15 @@ class NelsonRules {
     return false;
   }
 
-  bool rising(double sign) const {
-    if (z_.size() < 6) {
+  // Every step between the last `count` points goes up (sign 1) or down (sign -1); with
+  // `alternating`, the sign changes at each step.
+  bool steps(std::size_t count, double sign, bool alternating) const {
+    if (z_.size() < count) {
       return false;
     }
-    const auto points = last(6);
-    for (std::size_t i = 1; i < points.size(); ++i) {
+    const auto points = last(count);
+    for (std::size_t i = 1; i < count; ++i, sign = alternating ? -sign : sign) {
       if (!(sign * (points[i] - points[i - 1]) > 0)) {
-        return false;
-      }
-    }
-    return true;
-  }
-
-  bool alternating() const {
-    if (z_.size() < 14) {
-      return false;
-    }
-    const auto points = last(14);
-    for (std::size_t i = 2; i < points.size(); ++i) {
-      if (!((points[i] - points[i - 1]) * (points[i - 1] - points[i - 2]) < 0)) {
         return false;
       }
     }
@@ -133,8 +118,8 @@ ControlChart control_chart(std::string name, std::vector<double> values, std::si
     return chart;
   }
   chart.baseline = baseline;
-  chart.centre = mean_of(chart.values, baseline);
-  chart.mean_range = mean_of(chart.moving_ranges, baseline - 1);
+  chart.centre = mean_of_first(chart.values, baseline);
+  chart.mean_range = mean_of_first(chart.moving_ranges, baseline - 1);
   chart.sigma = std::max(chart.mean_range / kD2, least_sigma);
   chart.lower = chart.centre - 3 * chart.sigma;
   chart.upper = chart.centre + 3 * chart.sigma;
@@ -155,21 +140,17 @@ ControlChart control_chart(std::string name, std::vector<double> values, std::si
 }
 
 Json ControlChart::to_json() const {
-  Json json;
-  json["name"] = name;
-  json["points"] = values.size();
-  json["in_force"] = baseline > 0;
-  json["baseline"] = baseline;
-  json["centre"] = number(centre);
-  json["sigma"] = number(sigma);
-  json["lower"] = number(lower);
-  json["upper"] = number(upper);
-  json["mean_range"] = number(mean_range);
-  json["upper_range"] = number(upper_range);
-  json["values"] = Json::array();
-  for (const double value : values) {
-    json["values"].push_back(number(value));
-  }
+  Json json = {{"name", name},
+               {"points", values.size()},
+               {"in_force", baseline > 0},
+               {"baseline", baseline},
+               {"centre", centre},
+               {"sigma", sigma},
+               {"lower", lower},
+               {"upper", upper},
+               {"mean_range", mean_range},
+               {"upper_range", upper_range},
+               {"values", values}};
   json["signals"] = Json::array();
   for (const ChartSignal& signal : signals) {
     json["signals"].push_back(

@@ -1,4 +1,11 @@
 // Individuals and moving range charts with Nelson's rules (docs/statistics.md).
+//
+//   const ControlChart chart = control_chart("zero_offset_mg x", values_mg, 10);
+//   for (const ChartSignal& signal : chart.signals) {
+//     std::cout << chart.values[signal.point] << ": " << nelson_rule(signal.rule) << '\n';
+//   }
+//
+// Pure functions. Limits: Shewhart's, from the mean moving range of the baseline (ASTM STP 15D).
 #pragma once
 
 #include <string>
@@ -38,7 +45,7 @@ struct ControlChart {
   nlohmann::ordered_json to_json() const;
 };
 // Limits from the first `baseline` values. `from`: signals need all their points at or after this
-// index (what an engineer has signed is not held against the station again).
+// index (points that an engineer has signed give no signal again).
 ControlChart control_chart(std::string name, std::vector<double> values, std::size_t baseline,
                            double least_sigma = 0, std::size_t from = 0);
 

@@ -1,5 +1,4 @@
-// The one place that sees Boost.Math.
-#include "station/distributions.h"
+#include "station/statistics/distributions.h"
 
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>

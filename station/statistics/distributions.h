@@ -1,4 +1,10 @@
-// Quantiles and tails of the distributions that statistics need. NaN for arguments that have none.
+// Quantiles and tail probabilities, by Boost.Math (used in distributions.cpp alone).
+//
+//   normal_quantile(0.975);            // 1.96
+//   chi_square_quantile(0.975, 19);    // 32.85
+//   f_upper_tail(3.885, 2, 12);        // 0.05
+//
+// Pure functions. NaN for arguments outside the distribution's domain.
 #pragma once
 
 namespace sixpoint::station {

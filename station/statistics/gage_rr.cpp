@@ -1,15 +1,16 @@
-#include "station/gage_rr.h"
+#include "station/statistics/gage_rr.h"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <sstream>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "station/distributions.h"
+#include "station/statistics/distributions.h"
 
 namespace sixpoint::station {
 
@@ -17,8 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+constexpr double kMostCategories = 1e6;  // of a gage without any scatter
 
 struct Balanced {
   std::vector<std::string> parts;
@@ -33,7 +33,7 @@ struct Balanced {
 Result<Balanced> balance(const std::vector<GageReading>& readings) {
   std::map<std::pair<std::string, std::string>, std::vector<double>> cells;
   Balanced out;
-  const auto remember = [](std::vector<std::string>& names, const std::string& name) {
+  const auto add_new = [](std::vector<std::string>& names, const std::string& name) {
     if (std::find(names.begin(), names.end(), name) == names.end()) {
       names.push_back(name);
     }
@@ -43,8 +43,8 @@ Result<Balanced> balance(const std::vector<GageReading>& readings) {
       return fail(ErrorCode::bad_data, "a reading is not a finite number", "gage study",
                   "measure it again");
     }
-    remember(out.parts, reading.part);
-    remember(out.operators, reading.operator_name);
+    add_new(out.parts, reading.part);
+    add_new(out.operators, reading.operator_name);
     cells[{reading.part, reading.operator_name}].push_back(reading.value);
   }
   constexpr std::size_t kMost = 1000;
@@ -66,7 +66,7 @@ Result<Balanced> balance(const std::vector<GageReading>& readings) {
             ErrorCode::bad_data,
             fmt::format("operator '{}' measured part '{}' {} times, others {} times",
                         printable(person, 60), printable(part, 60), values.size(), out.trials),
-            "gage study", "everybody measures every part equally often, at least twice each");
+            "gage study", "every operator measures every part equally often, at least twice");
       }
       out.values.insert(out.values.end(), values.begin(), values.end());
     }
@@ -87,15 +87,62 @@ void test_against(AnovaRow& row, const AnovaRow& error) {
   }
 }
 
+struct SumsOfSquares {
+  double parts = 0;
+  double operators = 0;
+  double interaction = 0;
+  double repeatability = 0;
+};
+
+SumsOfSquares sums_of_squares(const Balanced& study) {
+  const std::size_t operators = study.operators.size();
+  const auto p = static_cast<double>(study.parts.size());
+  const auto o = static_cast<double>(operators);
+  const auto t = static_cast<double>(study.trials);
+  std::vector<double> part_mean(study.parts.size());
+  std::vector<double> operator_mean(operators);
+  std::vector<double> cell_mean(study.parts.size() * operators);
+  double grand = 0;
+  for (std::size_t i = 0; i < part_mean.size(); ++i) {
+    for (std::size_t j = 0; j < operators; ++j) {
+      for (std::size_t k = 0; k < study.trials; ++k) {
+        const double value = study.at(i, j, k);
+        cell_mean[i * operators + j] += value / t;
+        part_mean[i] += value / (o * t);
+        operator_mean[j] += value / (p * t);
+        grand += value / (p * o * t);
+      }
+    }
+  }
+  const auto square = [](double value) { return value * value; };
+  SumsOfSquares sums;
+  for (std::size_t i = 0; i < part_mean.size(); ++i) {
+    sums.parts += o * t * square(part_mean[i] - grand);
+    for (std::size_t j = 0; j < operators; ++j) {
+      const double cell = cell_mean[i * operators + j];
+      sums.interaction += t * square(cell - part_mean[i] - operator_mean[j] + grand);
+      for (std::size_t k = 0; k < study.trials; ++k) {
+        sums.repeatability += square(study.at(i, j, k) - cell);
+      }
+    }
+  }
+  for (const double mean : operator_mean) {
+    sums.operators += p * t * square(mean - grand);
+  }
+  return sums;
+}
+
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
 Json json_of(const std::vector<AnovaRow>& rows) {
   Json json = Json::array();
   for (const AnovaRow& row : rows) {
     json.push_back({{"source", row.source},
                     {"degrees_of_freedom", row.degrees_of_freedom},
-                    {"sum_of_squares", number(row.sum_of_squares)},
-                    {"mean_square", number(row.mean_square)},
-                    {"f", number(row.f)},
-                    {"p", number(row.p)}});
+                    {"sum_of_squares", row.sum_of_squares},
+                    {"mean_square", row.mean_square},
+                    {"f", or_null(row.f)},
+                    {"p", or_null(row.p)}});
   }
   return json;
 }
@@ -110,55 +157,22 @@ std::string_view GageReport::judgement() const {
 
 Result<GageReport> gage_rr(const std::vector<GageReading>& readings, const GageOptions& options) {
   SIXPOINT_ASSIGN(const Balanced study, balance(readings));
-  const std::size_t parts = study.parts.size();
-  const std::size_t operators = study.operators.size();
-  const std::size_t trials = study.trials;
-  const auto p = static_cast<double>(parts);
-  const auto o = static_cast<double>(operators);
-  const auto t = static_cast<double>(trials);
-
-  std::vector<double> part_mean(parts);
-  std::vector<double> operator_mean(operators);
-  std::vector<double> cell_mean(parts * operators);
-  double grand = 0;
-  for (std::size_t i = 0; i < parts; ++i) {
-    for (std::size_t j = 0; j < operators; ++j) {
-      for (std::size_t k = 0; k < trials; ++k) {
-        const double value = study.at(i, j, k);
-        cell_mean[i * operators + j] += value / t;
-        part_mean[i] += value / (o * t);
-        operator_mean[j] += value / (p * t);
-        grand += value / (p * o * t);
-      }
-    }
-  }
-  const auto square = [](double value) { return value * value; };
-  double of_parts = 0;
-  double of_operators = 0;
-  double of_interaction = 0;
-  double of_error = 0;
-  for (std::size_t i = 0; i < parts; ++i) {
-    of_parts += o * t * square(part_mean[i] - grand);
-    for (std::size_t j = 0; j < operators; ++j) {
-      const double cell = cell_mean[i * operators + j];
-      of_interaction += t * square(cell - part_mean[i] - operator_mean[j] + grand);
-      for (std::size_t k = 0; k < trials; ++k) {
-        of_error += square(study.at(i, j, k) - cell);
-      }
-    }
-  }
-  for (const double mean : operator_mean) {
-    of_operators += p * t * square(mean - grand);
-  }
+  // By the values themselves: through rounding, their sums of squares are never exactly zero.
+  const auto [least, most] = std::minmax_element(study.values.begin(), study.values.end());
+  const bool all_equal = *least == *most;
+  const auto p = static_cast<double>(study.parts.size());
+  const auto o = static_cast<double>(study.operators.size());
+  const auto t = static_cast<double>(study.trials);
+  const SumsOfSquares sums = sums_of_squares(study);
 
   GageReport report;
-  report.parts = static_cast<int>(parts);
-  report.operators = static_cast<int>(operators);
-  report.trials = static_cast<int>(trials);
-  AnovaRow part = row_of("part", p - 1, of_parts);
-  AnovaRow person = row_of("operator", o - 1, of_operators);
-  AnovaRow interaction = row_of("part x operator", (p - 1) * (o - 1), of_interaction);
-  const AnovaRow error = row_of("repeatability", p * o * (t - 1), of_error);
+  report.parts = static_cast<int>(study.parts.size());
+  report.operators = static_cast<int>(study.operators.size());
+  report.trials = static_cast<int>(study.trials);
+  AnovaRow part = row_of("part", p - 1, sums.parts);
+  AnovaRow person = row_of("operator", o - 1, sums.operators);
+  AnovaRow interaction = row_of("part x operator", (p - 1) * (o - 1), sums.interaction);
+  AnovaRow error = row_of("repeatability", p * o * (t - 1), sums.repeatability);
   test_against(part, interaction);
   test_against(person, interaction);
   test_against(interaction, error);
@@ -166,26 +180,20 @@ Result<GageReport> gage_rr(const std::vector<GageReading>& readings, const GageO
 
   report.pooled = interaction.p && *interaction.p > options.pool_above_p;
   if (report.pooled) {
-    const AnovaRow pool =
-        row_of("repeatability", interaction.degrees_of_freedom + error.degrees_of_freedom,
-               of_interaction + of_error);
-    test_against(part, pool);
-    test_against(person, pool);
-    report.anova_pooled = {part, person, pool};
-    report.repeatability = pool.mean_square;
-    report.operator_variance = std::max(0.0, (person.mean_square - pool.mean_square) / (p * t));
-    report.part_variance = std::max(0.0, (part.mean_square - pool.mean_square) / (o * t));
+    error = row_of("repeatability", interaction.degrees_of_freedom + error.degrees_of_freedom,
+                   sums.interaction + sums.repeatability);
+    test_against(part, error);
+    test_against(person, error);
+    report.anova_pooled = {part, person, error};
   } else {
-    report.repeatability = error.mean_square;
     report.interaction = std::max(0.0, (interaction.mean_square - error.mean_square) / t);
-    report.operator_variance =
-        std::max(0.0, (person.mean_square - interaction.mean_square) / (p * t));
-    report.part_variance = std::max(0.0, (part.mean_square - interaction.mean_square) / (o * t));
   }
+  const double tested = (report.pooled ? error : interaction).mean_square;
+  report.repeatability = error.mean_square;
+  report.operator_variance = std::max(0.0, (person.mean_square - tested) / (p * t));
+  report.part_variance = std::max(0.0, (part.mean_square - tested) / (o * t));
   report.reproducibility = report.operator_variance + report.interaction;
-  // By the values themselves: their sums of squares are never quite zero.
-  const auto [least, most] = std::minmax_element(study.values.begin(), study.values.end());
-  if (*least == *most || !(report.total() > 0)) {
+  if (all_equal || !(report.total() > 0)) {
     return fail(ErrorCode::bad_data, "all readings are alike", "gage study",
                 "record more digits, or take parts that differ");
   }
@@ -194,8 +202,7 @@ Result<GageReport> gage_rr(const std::vector<GageReading>& readings, const GageO
     report.grr_percent_of_tolerance =
         100 * options.study_factor * std::sqrt(report.grr()) / *options.tolerance;
   }
-  // AIAG: 1.41 of the ratio, truncated. A gage without any scatter tells all apart.
-  constexpr double kMostCategories = 1e6;
+  // AIAG: 1.41 times the ratio, truncated.
   report.ndc = static_cast<int>(
       std::min(kMostCategories, 1.41 * std::sqrt(report.part_variance / report.grr())));
   return report;
@@ -207,32 +214,31 @@ std::string GageReport::brief() const {
 }
 
 Json GageReport::to_json() const {
-  Json json;
-  json["parts"] = parts;
-  json["operators"] = operators;
-  json["trials"] = trials;
-  json["grr_percent"] = number(grr_percent);
-  json["grr_percent_of_tolerance"] = number(grr_percent_of_tolerance);
-  json["ndc"] = ndc;
-  json["judgement"] = judgement();
-  json["usable"] = usable();
-  json["pooled"] = pooled;
-  json["anova"] = json_of(anova);
-  json["anova_pooled"] = pooled ? json_of(anova_pooled) : Json(nullptr);
   const auto component = [&](double variance) {
     return Json{{"variance", variance},
                 {"sd", std::sqrt(variance)},
                 {"contribution_percent", 100 * variance / total()},
                 {"study_percent", 100 * std::sqrt(variance / total())}};
   };
-  json["components"] = {{"grr", component(grr())},
-                        {"repeatability", component(repeatability)},
-                        {"reproducibility", component(reproducibility)},
-                        {"operator", component(operator_variance)},
-                        {"part x operator", component(interaction)},
-                        {"part", component(part_variance)},
-                        {"total", component(total())}};
-  return json;
+  return {{"parts", parts},
+          {"operators", operators},
+          {"trials", trials},
+          {"grr_percent", grr_percent},
+          {"grr_percent_of_tolerance", or_null(grr_percent_of_tolerance)},
+          {"ndc", ndc},
+          {"judgement", judgement()},
+          {"usable", usable()},
+          {"pooled", pooled},
+          {"anova", json_of(anova)},
+          {"anova_pooled", pooled ? json_of(anova_pooled) : Json(nullptr)},
+          {"components",
+           {{"grr", component(grr())},
+            {"repeatability", component(repeatability)},
+            {"reproducibility", component(reproducibility)},
+            {"operator", component(operator_variance)},
+            {"part x operator", component(interaction)},
+            {"part", component(part_variance)},
+            {"total", component(total())}}}};
 }
 
 Result<std::vector<GageReading>> parse_gage_csv(std::string_view csv, const std::string& where) {
@@ -243,24 +249,18 @@ Result<std::vector<GageReading>> parse_gage_csv(std::string_view csv, const std:
     return fail(ErrorCode::bad_data, std::move(what), fmt::format("{}:{}", where, line_number),
                 "the first line is 'part,operator,value', and every line below has the three");
   };
-  while (!csv.empty()) {
-    const std::size_t end = std::min(csv.find('\n'), csv.size());
-    std::string_view line = csv.substr(0, end);
-    csv.remove_prefix(std::min(csv.size(), end + 1));
+  std::istringstream lines{std::string(csv)};
+  for (std::string line; std::getline(lines, line);) {
     ++line_number;
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) {
-      line.remove_suffix(1);
-    }
+    line.erase(line.find_last_not_of("\r ") + 1);
+    std::erase(line, '"');
     if (line.empty()) {
       continue;
     }
-    std::vector<std::string> fields(1);
-    for (const char c : line) {
-      if (c == ',') {
-        fields.emplace_back();
-      } else if (c != '"') {
-        fields.back() += c;
-      }
+    std::vector<std::string> fields;
+    std::istringstream cells(line + ",");
+    for (std::string cell; std::getline(cells, cell, ',');) {
+      fields.push_back(std::move(cell));
     }
     if (line_number == 1) {
       constexpr std::array<std::string_view, 3> kNames = {"part", "operator", "value"};
@@ -277,14 +277,12 @@ Result<std::vector<GageReading>> parse_gage_csv(std::string_view csv, const std:
       return wrong("a line is too short");
     }
     const std::string& text = fields[column[2]];
-    GageReading reading{fields[column[0]], fields[column[1]], 0};
-    const auto [stop, status] =
-        std::from_chars(text.data(), text.data() + text.size(), reading.value);
-    if (status != std::errc() || stop != text.data() + text.size() ||
-        !std::isfinite(reading.value)) {
+    double value = 0;
+    const auto [stop, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (status != std::errc() || stop != text.data() + text.size() || !std::isfinite(value)) {
       return wrong(fmt::format("'{}' is no number", printable(text, 60)));
     }
-    readings.push_back(std::move(reading));
+    readings.push_back({fields[column[0]], fields[column[1]], value});
   }
   if (readings.empty()) {
     return wrong("no readings");

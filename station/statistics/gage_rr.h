@@ -1,4 +1,12 @@
-// Gage R&R by crossed analysis of variance (docs/statistics.md).
+// Gage R&R by crossed analysis of variance (docs/statistics.md): which part of the scatter of
+// readings comes from the gage and the operators, and which from the parts.
+//
+//   SIXPOINT_ASSIGN(const auto readings, parse_gage_csv(csv, "study.csv"));
+//   SIXPOINT_ASSIGN(const GageReport report, gage_rr(readings));
+//   std::cout << report.brief();
+//
+// Values in any one unit; variances in its square. Source of the formulas: AIAG, Measurement
+// Systems Analysis, 4th edition, chapter III. Pure functions.
 #pragma once
 
 #include <optional>
@@ -28,8 +36,8 @@ struct AnovaRow {
 };
 
 struct GageOptions {
-  // The interaction is pooled into repeatability above this: where it is plainly chance. Both the
-  // textbook's 0.05 and this pool the AIAG example (p = 0.97).
+  // Above this p, the interaction is chance and is pooled into repeatability. The AIAG example
+  // (p = 0.97) is pooled with this and with the textbook's 0.05.
   double pool_above_p = 0.25;
   std::optional<double> tolerance;  // width of the specification, for %GRR of tolerance
   double study_factor = 6;          // study variation in standard deviations

@@ -1,13 +1,14 @@
-#include "station/statistics.h"
+#include "station/statistics/statistics.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "station/distributions.h"
+#include "station/statistics/distributions.h"
 
 namespace sixpoint::station {
 
@@ -15,15 +16,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+// Below this relative standard deviation the scatter is that of the arithmetic.
+constexpr double kLeastRelativeSd = 1e-12;
 
-double mean_of(const std::vector<double>& values, std::size_t count) {
-  double sum = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    sum += values[i];
-  }
-  return sum / static_cast<double>(count);
+Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 double median_of(std::vector<double> values) {
@@ -48,15 +47,13 @@ std::optional<Capability> capability(const std::vector<double>& values, std::opt
   out.n = values.size();
   out.confidence = confidence;
   const auto n = static_cast<double>(out.n);
-  out.mean = mean_of(values, values.size());
+  out.mean = mean_of(values);
   double square = 0;
   for (const double value : values) {
     square += (value - out.mean) * (value - out.mean);
   }
   out.sd = std::sqrt(square / (n - 1));
-  // Below that it is the arithmetic's scatter and not the units'.
-  constexpr double kLeastRelative = 1e-12;
-  if (!(out.sd > kLeastRelative * std::abs(out.mean)) || !std::isfinite(out.sd)) {
+  if (!(out.sd > kLeastRelativeSd * std::abs(out.mean)) || !std::isfinite(out.sd)) {
     return std::nullopt;
   }
   const double tail = (1 - confidence) / 2;
@@ -75,16 +72,14 @@ std::optional<Capability> capability(const std::vector<double>& values, std::opt
 }
 
 Json Capability::to_json() const {
-  Json json;
-  json["n"] = n;
-  json["mean"] = number(mean);
-  json["sd"] = number(sd);
-  json["cp"] = number(cp);
-  json["cp_interval"] = cp ? Json{number(cp_low), number(cp_high)} : Json(nullptr);
-  json["cpk"] = number(cpk);
-  json["cpk_interval"] = {number(cpk_low), number(cpk_high)};
-  json["confidence"] = confidence;
-  return json;
+  return {{"n", n},
+          {"mean", mean},
+          {"sd", sd},
+          {"cp", or_null(cp)},
+          {"cp_interval", cp ? Json{*cp_low, *cp_high} : Json(nullptr)},
+          {"cpk", cpk},
+          {"cpk_interval", {cpk_low, cpk_high}},
+          {"confidence", confidence}};
 }
 
 // --- yields ---
@@ -162,15 +157,14 @@ GroupStatistics group_of(std::string name, const std::vector<const RunSummary*>&
   std::stable_sort(group.failure_codes.begin(), group.failure_codes.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
   group.seconds_per_unit_median = median_of(seconds);
-  group.seconds_per_unit_mean =
-      seconds.empty() ? std::numeric_limits<double>::quiet_NaN() : mean_of(seconds, seconds.size());
+  group.seconds_per_unit_mean = mean_of(seconds);
   return group;
 }
 
 Json json_of(const Proportion& proportion) {
   return {{"count", proportion.count},
           {"of", proportion.of},
-          {"value", number(proportion.value())},
+          {"value", proportion.value()},
           {"interval", {proportion.low, proportion.high}}};
 }
 
@@ -186,12 +180,12 @@ Json json_of(const GroupStatistics& group) {
   for (const auto& [code, count] : group.failure_codes) {
     json["failure_codes"].push_back({{"code", code}, {"runs", count}});
   }
-  json["seconds_per_unit"] = {{"median", number(group.seconds_per_unit_median)},
-                              {"mean", number(group.seconds_per_unit_mean)}};
+  json["seconds_per_unit"] = {{"median", group.seconds_per_unit_median},
+                              {"mean", group.seconds_per_unit_mean}};
   return json;
 }
 
-// Of every unit its last complete run: repeats of one unit are no sample of the units.
+// Of every unit its last complete run: repeated runs of one unit say nothing about the other units.
 std::vector<std::pair<std::string, Capability>> capabilities_of(
     const std::vector<RunSummary>& runs) {
   std::map<std::string, const RunSummary*> last;
@@ -201,31 +195,31 @@ std::vector<std::pair<std::string, Capability>> capabilities_of(
     }
   }
   struct Series {
+    std::string name;
     std::vector<double> values;
     std::optional<double> low, high;
   };
-  std::vector<std::string> order;
-  std::map<std::string, Series> series;
+  std::vector<Series> all;  // in the order of the first report
   for (const auto& [serial, run] : last) {
     for (const JudgedQuantity& quantity : run->quantities) {
       const std::string name =
           quantity.axis.empty() ? quantity.name : quantity.name + " " + quantity.axis;
-      if (series.find(name) == series.end()) {
-        order.push_back(name);
+      auto one = std::find_if(all.begin(), all.end(),
+                              [&](const Series& series) { return series.name == name; });
+      if (one == all.end()) {
+        one = all.insert(one, {name, {}, {}, {}});
       }
-      Series& one = series[name];
       if (std::isfinite(quantity.value)) {
-        one.values.push_back(quantity.value);
+        one->values.push_back(quantity.value);
       }
-      one.low = quantity.low;
-      one.high = quantity.high;
+      one->low = quantity.low;
+      one->high = quantity.high;
     }
   }
   std::vector<std::pair<std::string, Capability>> out;
-  for (const std::string& name : order) {
-    const Series& one = series[name];
+  for (const Series& one : all) {
     if (const auto found = capability(one.values, one.low, one.high)) {
-      out.emplace_back(name, *found);
+      out.emplace_back(one.name, *found);
     }
   }
   return out;

@@ -1,6 +1,10 @@
-// Statistics of a station's work (docs/statistics.md): capability and yields; control charts and
-// gage R&R are in control_chart.h and gage_rr.h. Pure functions of numbers; what reads the store is
-// in station_records.h.
+// Yields and capability of a station's work (docs/statistics.md).
+//
+//   SIXPOINT_ASSIGN(const StatisticsReport report, statistics(runs, "operator"));
+//   std::cout << report.brief() << '\n' << report.to_json();
+//
+// Pure functions. station_records.h reads the runs from the store; control charts are in
+// control_chart.h, gage R&R in gage_rr.h. Numbers that are not finite become null in JSON.
 #pragma once
 
 #include <map>
@@ -13,9 +17,9 @@
 
 #include "base/result.h"
 #include "base/time.h"
-#include "station/control_chart.h"
-#include "station/gage_rr.h"
-#include "station/verdict.h"
+#include "station/limits/verdict.h"
+#include "station/statistics/control_chart.h"
+#include "station/statistics/gage_rr.h"
 
 namespace sixpoint::station {
 
@@ -40,7 +44,7 @@ std::optional<Capability> capability(const std::vector<double>& values, std::opt
 
 // --- yields ---
 
-// A run as statistics see it, from a db::RunRecord.
+// What the statistics need of a run; summary_of() in station_records.h makes it.
 struct RunSummary {
   std::string id;
   std::string serial;

@@ -7,14 +7,10 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "text_of.h"
 
 namespace sixpoint {
 namespace {
-
-std::string text_of(FileSystem& files, const std::string& path) {
-  const auto bytes = read_file(files, path);
-  return bytes ? std::string(bytes->begin(), bytes->end()) : "<" + bytes.error().what + ">";
-}
 
 TEST(AtomicFile, ReplacesTheOldFileOnlyOnCommit) {
   MemoryEnv memory;
@@ -56,22 +52,6 @@ TEST(AtomicFile, StepsAsideForALeftoverTemporaryFile) {
   ASSERT_OK(memory.files.create("./.f.0.tmp"));
   ASSERT_OK(write_file(memory.files, "f", "text"));
   EXPECT_EQ(text_of(memory.files, "f"), "text");
-}
-
-TEST(PosixFiles, WritesReadsListsAndRefuses) {
-  std::string folder = (std::filesystem::temp_directory_path() / "sixpoint-XXXXXX").string();
-  ASSERT_NE(::mkdtemp(folder.data()), nullptr);
-  FileSystem& files = posix_env().files;
-  ASSERT_OK(files.make_folders(folder + "/x/y"));
-  ASSERT_OK(write_file(files, folder + "/x/y/f", "12345"));
-  EXPECT_EQ(text_of(files, folder + "/x/y/f"), "12345");
-  EXPECT_EQ(files.info(folder + "/x/y/f")->size, 5U);
-  EXPECT_EQ(files.list(folder + "/x/y").value(), std::vector<std::string>{"f"});
-  EXPECT_FAILS(files.open(folder + "/none"), ErrorCode::no_input);
-  EXPECT_FAILS(files.open(folder), ErrorCode::no_input);
-  EXPECT_FAILS(files.create(folder + "/x/y/f"), ErrorCode::cannot_create);
-  EXPECT_FAILS(read_file(files, folder + "/x/y/f", 4), ErrorCode::bad_data);
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -272,6 +272,21 @@ std::vector<std::array<double, 4>> read_rows(const std::string& path, int column
   return rows;
 }
 
+struct Sums {
+  double values = 0;
+  double squares = 0;
+};
+// Of value(begin) ... value(begin + count - 1).
+template <class Value>
+Sums sums_of(std::size_t begin, std::size_t count, const Value& value) {
+  Sums sums;
+  for (std::size_t i = begin; i < begin + count; ++i) {
+    sums.values += value(i);
+    sums.squares += value(i) * value(i);
+  }
+  return sums;
+}
+
 // GGIR's windows: 10 s, standard deviation below 13 mg on every axis, mean below 2 g. GGIR's error:
 // mean of | |a| - 1 |.
 TEST(PublishedOracle, GgirsErrorOnGgirsWindows) {
@@ -285,14 +300,9 @@ TEST(PublishedOracle, GgirsErrorOnGgirsWindows) {
     GravityPoint point;
     bool still = true;
     for (std::size_t a = 0; a < 3; ++a) {
-      double sum = 0;
-      double square = 0;
-      for (std::size_t i = begin; i < begin + 300; ++i) {
-        sum += rows[i][a];
-        square += rows[i][a] * rows[i][a];
-      }
-      const double mean = sum / 300;
-      const double sd = std::sqrt(std::max(0.0, (square - 300 * mean * mean) / 299));
+      const Sums sums = sums_of(begin, 300, [&](std::size_t i) { return double{rows[i][a]}; });
+      const double mean = sums.values / 300;
+      const double sd = std::sqrt(std::max(0.0, (sums.squares - 300 * mean * mean) / 299));
       still = still && sd < 13 && std::abs(mean) < 2000;
       point.mean_lsb[a] = mean;
     }
@@ -476,15 +486,10 @@ TEST(PublishedOracle, Lis3dhOrientationsAgainstCeresAndNormalEquations) {
     GravityPoint point;
     bool still = true;
     for (std::size_t a = 0; a < 3; ++a) {
-      double sum = 0;
-      double square = 0;
-      for (std::size_t i = begin; i < begin + 50; ++i) {
-        const double value = values[a * kRows + i] / unit * 250;
-        sum += value;
-        square += value * value;
-      }
-      point.mean_lsb[a] = sum / 50;
-      still = still && square / 50 - point.mean_lsb[a] * point.mean_lsb[a] < 25;  // 20 mg
+      const Sums sums =
+          sums_of(begin, 50, [&](std::size_t i) { return values[a * kRows + i] / unit * 250; });
+      point.mean_lsb[a] = sums.values / 50;
+      still = still && sums.squares / 50 - point.mean_lsb[a] * point.mean_lsb[a] < 25;  // 20 mg
     }
     if (still) {
       points.push_back(point);

@@ -5,13 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/least_squares.h"
+#include "exact_blocks.h"
 #include "expect_result.h"
-#include "synthetic_unit.h"
 
 namespace sixpoint::calib {
 namespace {
 
 using tests::SyntheticUnit;
+using tests::truth;
 using tests::Vector;
 
 struct Session {
@@ -22,10 +23,10 @@ struct Session {
 };
 
 // A reading in one pose: the case lies `tilt_deg` askew, in a direction of its own each time.
-PoseReading measure(const SyntheticUnit& unit, std::size_t side, const Session& session,
-                    std::mt19937_64& random) {
-  PoseReading reading;
-  reading.up = side_direction(side);
+PoseMean measure(const SyntheticUnit& unit, std::size_t side, const Session& session,
+                 std::mt19937_64& random) {
+  PoseMean reading;
+  reading.up = tests::kSixSides[side];
   Vector up = tests::wobbled(reading.up, session.tilt_deg, random);
   const Vector& r = session.case_tilt;
   up = {up[0] + r[2] * up[1] - r[1] * up[2], up[1] - r[2] * up[0] + r[0] * up[2],
@@ -50,22 +51,32 @@ PoseReading measure(const SyntheticUnit& unit, std::size_t side, const Session& 
   return reading;
 }
 
-std::vector<PoseReading> all_sides(const SyntheticUnit& unit, const Session& session,
-                                   std::mt19937_64& random) {
-  std::vector<PoseReading> readings;
+std::vector<PoseMean> all_sides(const SyntheticUnit& unit, const Session& session,
+                                std::mt19937_64& random) {
+  std::vector<PoseMean> readings;
   for (std::size_t side = 0; side < kSides; ++side) {
     readings.push_back(measure(unit, side, session, random));
   }
   return readings;
 }
 
-Calibration truth(const SyntheticUnit& unit) {
-  Calibration out;
-  for (std::size_t a = 0; a < 3; ++a) {
-    out.sensitivity_g_per_lsb[a] = 1 / unit.counts_per_g[a];
-    out.zero_lsb[a] = unit.zero_counts[a];
-  }
-  return out;
+// The six sides twice, on a jig that is off by a degree.
+SixPoseReport solved_askew(const SyntheticUnit& unit, unsigned seed) {
+  std::mt19937_64 random(seed);
+  const Session session{.tilt_deg = 1.0};
+  const auto used = all_sides(unit, session, random);
+  auto report = solve_six_poses(used, all_sides(unit, session, random));
+  EXPECT_OK(report);
+  EXPECT_TRUE(report->verified) << report->brief();
+  return *std::move(report);
+}
+
+// Whether the pair's zero of an axis lies within twice its uncertainty.
+bool zero_is_inside(const SixPoseReport& report, const SyntheticUnit& unit, std::size_t axis) {
+  const double off_mg = 1000 *
+                        (report.per_axis.calibration.zero_lsb[axis] - unit.zero_counts[axis]) /
+                        unit.counts_per_g[axis];
+  return std::abs(off_mg) < 2 * report.per_axis.uncertainty.zero_mg[axis];
 }
 
 // Oracle: the constants that the generator used, on a perfect jig.
@@ -77,7 +88,8 @@ TEST(SixPose, AllThreeSolutionsOnAPerfectJig) {
   const auto report = solve_six_poses(used, held_out);
   ASSERT_OK(report);
   EXPECT_TRUE(report->verified) << report->brief();
-  for (const SixPoseSolution* solution : {&report->letter, &report->pair, &report->vector.six}) {
+  for (const SixPoseSolution* solution :
+       {&report->as_published, &report->per_axis, &report->all_axes.six}) {
     // 4 mg over 90 samples is 0.42 mg per reading.
     EXPECT_LT(difference_over_sphere(truth(unit), solution->calibration).worst_mg, 1.5);
     EXPECT_LT(*solution->held_out_rms_mg, 1.0);
@@ -93,20 +105,14 @@ TEST(SixPose, TiltHurtsTheLetterAndNotThePair) {
   double letter_square = 0;
   double pair_square = 0;
   for (unsigned seed = 1; seed <= 50; ++seed) {
-    std::mt19937_64 random(seed);
     const SyntheticUnit unit;
-    Session session;
-    session.tilt_deg = 1.0;
-    const auto report =
-        solve_six_poses(all_sides(unit, session, random), all_sides(unit, session, random));
-    ASSERT_OK(report);
-    EXPECT_TRUE(report->verified) << report->brief();
+    const SixPoseReport report = solved_askew(unit, seed);
     letter_square +=
-        std::pow(difference_over_sphere(truth(unit), report->letter.calibration).worst_mg, 2);
+        std::pow(difference_over_sphere(truth(unit), report.as_published.calibration).worst_mg, 2);
     pair_square +=
-        std::pow(difference_over_sphere(truth(unit), report->pair.calibration).worst_mg, 2);
-    EXPECT_LE(report->best().held_out_rms_mg.value(), report->letter.held_out_rms_mg.value());
-    for (const PoseResidual& pose : report->poses) {
+        std::pow(difference_over_sphere(truth(unit), report.per_axis.calibration).worst_mg, 2);
+    EXPECT_LE(report.best().held_out_rms_mg.value(), report.as_published.held_out_rms_mg.value());
+    for (const PoseResidual& pose : report.poses) {
       EXPECT_LT(pose.tilt_deg, 3);
     }
   }
@@ -129,9 +135,7 @@ TEST(SixPose, UncertaintyOfThePairIsHonest) {
     ASSERT_OK(report);
     EXPECT_FALSE(report->verified);  // nothing was kept back
     for (std::size_t a = 0; a < kAxes; ++a) {
-      const double off_mg = 1000 * (report->pair.calibration.zero_lsb[a] - unit.zero_counts[a]) /
-                            unit.counts_per_g[a];
-      inside += std::abs(off_mg) < 2 * report->pair.uncertainty.zero_mg[a] ? 1 : 0;
+      inside += zero_is_inside(*report, unit, a) ? 1 : 0;
       ++all;
     }
   }
@@ -145,22 +149,15 @@ TEST(SixPose, CrossAxisOfRealUnitsDoesNoHarm) {
   int inside = 0;
   constexpr int kUnits = 100;
   for (unsigned seed = 1; seed <= kUnits; ++seed) {
-    std::mt19937_64 random(seed);
     SyntheticUnit unit;
     unit.cross_axis = {seed % 2 == 0 ? 0.029 : -0.029, 0.009, -0.0035};
-    Session session;
-    session.tilt_deg = 1.0;
-    const auto report =
-        solve_six_poses(all_sides(unit, session, random), all_sides(unit, session, random));
-    ASSERT_OK(report);
-    EXPECT_TRUE(report->verified) << report->brief();
-    square += std::pow(difference_over_sphere(truth(unit), report->pair.calibration).worst_mg, 2);
+    const SixPoseReport report = solved_askew(unit, seed);
+    square +=
+        std::pow(difference_over_sphere(truth(unit), report.per_axis.calibration).worst_mg, 2);
     for (std::size_t a = 0; a < kAxes; ++a) {
-      const double off_mg = 1000 * (report->pair.calibration.zero_lsb[a] - unit.zero_counts[a]) /
-                            unit.counts_per_g[a];
-      inside += std::abs(off_mg) < 2 * report->pair.uncertainty.zero_mg[a] ? 1 : 0;
+      inside += zero_is_inside(report, unit, a) ? 1 : 0;
     }
-    EXPECT_NEAR(report->vector.cross_axis[0], 2 * unit.cross_axis[0], 0.05);
+    EXPECT_NEAR(report.all_axes.cross_axis[0], 2 * unit.cross_axis[0], 0.05);
   }
   EXPECT_LT(std::sqrt(square / kUnits), 2);
   EXPECT_GT(inside, 0.93 * 3 * kUnits);
@@ -179,12 +176,12 @@ TEST(SixPose, VectorSolutionSeesRotationAndCrossAxis) {
   ASSERT_OK(report);
   EXPECT_TRUE(report->verified) << report->brief();
   // Two rows with c in each other's place have a cosine of 2 c.
-  EXPECT_NEAR(report->vector.cross_axis[0], 0.028, 0.002);
-  EXPECT_NEAR(report->vector.cross_axis[1], -0.008, 0.002);
-  EXPECT_NEAR(report->vector.cross_axis[2], 0.004, 0.002);
-  EXPECT_NEAR(report->vector.rotation_deg[0], 0.02 * 57.3, 0.1);
-  EXPECT_NEAR(report->vector.rotation_deg[1], -0.01 * 57.3, 0.1);
-  EXPECT_NEAR(report->vector.rotation_deg[2], 0.03 * 57.3, 0.1);
+  EXPECT_NEAR(report->all_axes.cross_axis[0], 0.028, 0.002);
+  EXPECT_NEAR(report->all_axes.cross_axis[1], -0.008, 0.002);
+  EXPECT_NEAR(report->all_axes.cross_axis[2], 0.004, 0.002);
+  EXPECT_NEAR(report->all_axes.rotation_deg[0], 0.02 * 57.3, 0.1);
+  EXPECT_NEAR(report->all_axes.rotation_deg[1], -0.01 * 57.3, 0.1);
+  EXPECT_NEAR(report->all_axes.rotation_deg[2], 0.03 * 57.3, 0.1);
 }
 
 TEST(SixPose, LocalGravityIsTakenOut) {
@@ -200,10 +197,10 @@ TEST(SixPose, LocalGravityIsTakenOut) {
   options.gravity = equator;
   const auto right = solve_six_poses(used, held_out, options);
   ASSERT_OK(right);
-  EXPECT_LT(difference_over_sphere(truth(unit), right->pair.calibration).worst_mg, 0.5);
+  EXPECT_LT(difference_over_sphere(truth(unit), right->per_axis.calibration).worst_mg, 0.5);
   const auto wrong = solve_six_poses(used, held_out);
   ASSERT_OK(wrong);
-  EXPECT_NEAR(difference_over_sphere(truth(unit), wrong->pair.calibration).rms_mg, 2.7, 0.4);
+  EXPECT_NEAR(difference_over_sphere(truth(unit), wrong->per_axis.calibration).rms_mg, 2.7, 0.4);
 }
 
 TEST(SixPose, RefusesWhatCannotBe) {
@@ -259,8 +256,8 @@ TEST(SixPose, RefusesWhatCannotBe) {
 
 TEST(SixPose, NearestSide) {
   for (std::size_t side = 0; side < kSides; ++side) {
-    EXPECT_EQ(nearest_side(side_direction(side)).side, side);
-    EXPECT_NEAR(nearest_side(side_direction(side)).tilt_deg, 0, 1e-9);
+    EXPECT_EQ(nearest_side(tests::kSixSides[side]).side, side);
+    EXPECT_NEAR(nearest_side(tests::kSixSides[side]).tilt_deg, 0, 1e-9);
   }
   EXPECT_EQ(nearest_side({0.1, -0.9, 0.2}).side, 3U);
   EXPECT_NEAR(nearest_side({0, 1, 1}).tilt_deg, 45, 1e-9);

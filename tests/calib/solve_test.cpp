@@ -7,21 +7,28 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/scaling.h"
+#include "exact_blocks.h"
 #include "expect_result.h"
 #include "sanitized.h"
-#include "synthetic_unit.h"
 
 namespace sixpoint::calib {
 namespace {
 
+using tests::file_constants;
 using tests::Sample;
 using tests::SyntheticUnit;
+using tests::truth;
 using tests::Vector;
 
-const std::vector<Vector> kSides = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
-                                    {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
-
 unsigned of_units(unsigned count) { return tests::kSanitized ? std::max(1U, count / 5) : count; }
+
+std::vector<Vector> random_poses(unsigned count, std::mt19937_64& random) {
+  std::vector<Vector> poses;
+  for (unsigned i = 0; i < count; ++i) {
+    poses.push_back(tests::random_direction(random));
+  }
+  return poses;
+}
 
 // A unit under the wrong filter: stored constants off by 0.1 to 0.2 g and 5 to 20 %.
 SyntheticUnit mismatched(unsigned seed) {
@@ -75,19 +82,6 @@ std::vector<StillBlock> blocks_of(const SyntheticUnit& unit, const std::vector<V
   return finder->finish();
 }
 
-Calibration file_constants(const SyntheticUnit& unit) {
-  return *calibration_from({unit.positive, unit.negative, unit.zero});
-}
-
-Calibration truth(const SyntheticUnit& unit) {
-  Calibration out;
-  for (std::size_t a = 0; a < 3; ++a) {
-    out.sensitivity_g_per_lsb[a] = 1 / unit.counts_per_g[a];
-    out.zero_lsb[a] = unit.zero_counts[a];
-  }
-  return out;
-}
-
 // Oracle: the constants that the generator used.
 TEST(Solve, SixSidesOfAMismatchedUnit) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
@@ -95,7 +89,7 @@ TEST(Solve, SixSidesOfAMismatchedUnit) {
     unit.noise_mg = 4 + 0.1 * (seed % 16);
     const double rate = std::array{30.0, 50.0, 90.0, 100.0}[seed % 4];
     const double wobble = std::array{0.0, 1.0, 2.0, 3.0, 2.5}[seed % 5];
-    const auto blocks = blocks_of(unit, kSides, {rate, 60, wobble}, seed + 1000);
+    const auto blocks = blocks_of(unit, tests::kSixSides, {rate, 60, wobble}, seed + 1000);
     const auto report = solve_from_still_blocks(blocks, file_constants(unit));
     ASSERT_OK(report);
     EXPECT_TRUE(report->verification.verified) << "seed " << seed << ": " << report->brief()
@@ -117,7 +111,7 @@ TEST(Solve, SixSidesOfAMismatchedUnit) {
 TEST(Solve, ExactDirectionsAreNamed) {
   const SyntheticUnit unit = mismatched(7);
   for (std::size_t left_out = 0; left_out < 6; ++left_out) {
-    std::vector<Vector> poses = kSides;
+    std::vector<Vector> poses = tests::kSixSides;
     poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(left_out));
     const auto report =
         solve_from_still_blocks(blocks_of(unit, poses, {30, 60, 3}, 5), file_constants(unit));
@@ -203,7 +197,7 @@ TEST(Solve, OnePoseAndNothing) {
 // even show that it repeats.
 TEST(Solve, SixBlocksAreNotVerifiedByTheirOwnResidual) {
   const SyntheticUnit unit = mismatched(9);
-  auto blocks = blocks_of(unit, kSides, {30, 4.6, 0}, 5);
+  auto blocks = blocks_of(unit, tests::kSixSides, {30, 4.6, 0}, 5);
   ASSERT_GE(blocks.size(), 6U);
   const auto report = solve_from_still_blocks(blocks, file_constants(unit));
   ASSERT_OK(report);
@@ -216,7 +210,7 @@ TEST(Solve, SixBlocksAreNotVerifiedByTheirOwnResidual) {
 // halves disagree.
 TEST(Solve, ASideThatDoesNotRepeatIsRefused) {
   const SyntheticUnit unit = mismatched(10);
-  auto blocks = blocks_of(unit, kSides, {30, 60, 0}, 5);
+  auto blocks = blocks_of(unit, tests::kSixSides, {30, 60, 0}, 5);
   int seen = 0;
   for (StillBlock& block : blocks) {
     if (block.mean_g[2] < -0.5 && seen++ >= 7) {
@@ -234,8 +228,8 @@ TEST(Solve, TwoUnitsMixedAreRefused) {
   other.positive = one.positive;
   other.negative = one.negative;
   other.zero = one.zero;
-  auto blocks = blocks_of(one, kSides, {30, 60, 5}, 5);
-  const auto more = blocks_of(other, kSides, {30, 60, 5}, 6);
+  auto blocks = blocks_of(one, tests::kSixSides, {30, 60, 5}, 5);
+  const auto more = blocks_of(other, tests::kSixSides, {30, 60, 5}, 6);
   blocks.insert(blocks.end(), more.begin(), more.end());
   const auto report = solve_from_still_blocks(blocks, file_constants(one));
   ASSERT_OK(report);
@@ -245,7 +239,7 @@ TEST(Solve, TwoUnitsMixedAreRefused) {
 TEST(Solve, GeneticAlgorithmAgreesAndIsReproducible) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const SyntheticUnit unit = mismatched(seed);
-    std::vector<Vector> poses = kSides;
+    std::vector<Vector> poses = tests::kSixSides;
     std::mt19937_64 random(seed);
     for (int i = 0; i < 12; ++i) {
       poses.push_back(tests::random_direction(random));
@@ -307,7 +301,7 @@ TEST(Solve, PriorIsMarkedAndNeverVerified) {
         1000 * (weak->calibration->zero_lsb[a] - unit.zero_counts[a]) / unit.counts_per_g[a];
     EXPECT_LT(std::abs(zero_off_mg), 4 * weak->uncertainty.zero_mg[a]);
   }
-  const auto whole = solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 2}, 5),
+  const auto whole = solve_from_still_blocks(blocks_of(unit, tests::kSixSides, {30, 60, 2}, 5),
                                              file_constants(unit), options);
   ASSERT_OK(whole);
   EXPECT_FALSE(whole->from_prior);
@@ -319,7 +313,7 @@ TEST(Solve, PriorIsMarkedAndNeverVerified) {
 
 TEST(Solve, JsonHasTheContractsKeys) {
   const SyntheticUnit unit = mismatched(3);
-  const auto blocks = blocks_of(unit, kSides, {30, 60, 4}, 5);
+  const auto blocks = blocks_of(unit, tests::kSixSides, {30, 60, 4}, 5);
   auto report = solve_from_still_blocks(blocks, file_constants(unit));
   ASSERT_OK(report);
   report->serial = "MOS2A45130450";
@@ -361,7 +355,7 @@ TEST(Solve, AMovingCarIsNotVerified) {
     std::normal_distribution<double> road(0, shake_g);
     auto finder = StillBlockFinder::make(*reversal, 30);
     double time = 0;
-    for (const Vector& side : kSides) {
+    for (const Vector& side : tests::kSixSides) {
       std::vector<Sample> samples;
       double sway = 0;
       for (int i = 0; i < 1800; ++i) {
@@ -388,8 +382,8 @@ TEST(Solve, ATemperatureRampIsWithinTheStatedUncertainty) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     SyntheticUnit unit = mismatched(seed);
     unit.drift_mg_per_c = {-0.16, -0.40, 0.43};
-    std::vector<Vector> poses = kSides;
-    poses.insert(poses.end(), kSides.begin(), kSides.end());
+    std::vector<Vector> poses = tests::kSixSides;
+    poses.insert(poses.end(), tests::kSixSides.begin(), tests::kSixSides.end());
     const auto blocks = blocks_of(unit, poses, {30, 60, 5, 20}, seed);
     const auto report = solve_from_still_blocks(blocks, file_constants(unit));
     ASSERT_OK(report);
@@ -446,7 +440,7 @@ TEST(Solve, ADriftWithinTheSidesIsNotVerified) {
   const std::vector<Vector> mixed_up = {{0, 0, 1},  {0, 1, 0}, {-1, 0, 0},
                                         {0, -1, 0}, {1, 0, 0}, {0, 0, -1}};
   for (const auto& shape : {steady_ramp_c, falling_ramp_c, warm_up_c, quick_warm_up_c}) {
-    for (const auto& sides : {kSides, mixed_up}) {
+    for (const auto& sides : {tests::kSixSides, mixed_up}) {
       for (const Vector& drift :
            {Vector{-0.5, 0.6, -0.7}, Vector{0.5, -0.6, 0.7}, Vector{0.5, 0.5, 0.5}}) {
         for (unsigned seed = 1; seed <= of_units(3); ++seed) {
@@ -476,8 +470,8 @@ TEST(Solve, ADriftOfOneAxisIsMeasured) {
     for (const double sign : {-1.0, 1.0}) {
       SyntheticUnit unit = mismatched(7);
       unit.drift_mg_per_c[axis] = sign * 0.7;
-      const auto report = solve_from_still_blocks(warming_sides(unit, kSides, steady_ramp_c, 11),
-                                                  file_constants(unit));
+      const auto report = solve_from_still_blocks(
+          warming_sides(unit, tests::kSixSides, steady_ramp_c, 11), file_constants(unit));
       ASSERT_OK(report);
       ASSERT_TRUE(report->fit->drift);
       const ZeroDrift& drift = *report->fit->drift;
@@ -498,7 +492,7 @@ TEST(Solve, SidesThatDoNotDriftStayVerified) {
   for (unsigned seed = 1; seed <= of_units(300); ++seed) {
     const SyntheticUnit unit = mismatched(seed);
     const auto report = solve_from_still_blocks(
-        warming_sides(unit, kSides, no_warming_c, seed + 500), file_constants(unit));
+        warming_sides(unit, tests::kSixSides, no_warming_c, seed + 500), file_constants(unit));
     ASSERT_OK(report);
     EXPECT_TRUE(report->usable()) << seed << report->brief();
     EXPECT_TRUE(report->fit->drift);
@@ -516,8 +510,8 @@ TEST(Solve, AClippedSideIsMissing) {
   unit.counts_per_g = {260, 230, 230};
   unit.zero_counts = {20, 0, 0};
   unit.noise_mg = 2;
-  const auto report =
-      solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 3}, 5), file_constants(unit));
+  const auto report = solve_from_still_blocks(blocks_of(unit, tests::kSixSides, {30, 60, 3}, 5),
+                                              file_constants(unit));
   ASSERT_OK(report);
   EXPECT_FALSE(report->verification.verified);
   EXPECT_THAT(report->verification.missing_directions, testing::ElementsAre("+x"));
@@ -528,7 +522,7 @@ TEST(Solve, CrossAxisIsFoundByHeldOutError) {
   SyntheticUnit unit = mismatched(16);
   unit.cross_axis = {0.014, 0, 0};
   std::mt19937_64 random(9);
-  std::vector<Vector> poses = kSides;
+  std::vector<Vector> poses = tests::kSixSides;
   for (int i = 0; i < 30; ++i) {
     poses.push_back(tests::random_direction(random));
   }
@@ -551,10 +545,7 @@ TEST(Solve, WhatFewDirectionsHideIsStated) {
     std::mt19937_64 random(seed);
     SyntheticUnit unit = mismatched(seed);
     unit.cross_axis = {0.007, -0.0045, 0.006};
-    std::vector<Vector> poses;
-    for (unsigned i = 0; i < 8 + seed % 7; ++i) {
-      poses.push_back(tests::random_direction(random));
-    }
+    const std::vector<Vector> poses = random_poses(8 + seed % 7, random);
     SolveOptions options;
     options.method = seed % 2 == 0 ? SolveMethod::genetic : SolveMethod::least_squares;
     const auto report = solve_from_still_blocks(blocks_of(unit, poses, {30, 30}, seed),
@@ -577,8 +568,8 @@ TEST(Solve, NoGoodFileOfSixSidesIsRefused) {
   for (unsigned seed = 1; seed <= of_units(150); ++seed) {
     SyntheticUnit unit = mismatched(seed);
     unit.cross_axis = {0.003, -0.002, 0.003};
-    const auto report = solve_from_still_blocks(blocks_of(unit, kSides, {30, 60, 2}, seed + 77),
-                                                file_constants(unit));
+    const auto report = solve_from_still_blocks(
+        blocks_of(unit, tests::kSixSides, {30, 60, 2}, seed + 77), file_constants(unit));
     ASSERT_OK(report);
     EXPECT_TRUE(report->fit->fit.converged) << seed;
     EXPECT_TRUE(report->usable()) << seed << report->brief();
@@ -601,8 +592,9 @@ TEST(Solve, CrossAxisOfRealUnitsOnTiltedSidesIsStated) {
       unit.cross_axis = {seed % 2 == 0 ? 0.024 : -0.024, 0.005, -0.005};
       SolveOptions options;
       options.method = seed % 4 == 0 ? SolveMethod::genetic : SolveMethod::least_squares;
-      const auto report = solve_from_still_blocks(
-          blocks_of(unit, kSides, {30, 60, tilt_deg}, seed + 300), file_constants(unit), options);
+      const auto report =
+          solve_from_still_blocks(blocks_of(unit, tests::kSixSides, {30, 60, tilt_deg}, seed + 300),
+                                  file_constants(unit), options);
       ASSERT_OK(report);
       const double off_mg = difference_over_sphere(truth(unit), *report->calibration).worst_mg;
       within_two += off_mg <= 2 * report->verification.worst_direction_mg ? 1 : 0;
@@ -629,10 +621,7 @@ TEST(Solve, CrossAxisOfRealUnitsIsNoReasonToRefuse) {
     SyntheticUnit unit = mismatched(seed);
     unit.cross_axis = {seed % 2 == 0 ? 0.024 : -0.024, 0.005, -0.005};
     std::mt19937_64 random(seed);
-    std::vector<Vector> poses;
-    for (int i = 0; i < 45; ++i) {
-      poses.push_back(tests::random_direction(random));
-    }
+    const std::vector<Vector> poses = random_poses(45, random);
     SolveOptions options;
     options.method = seed % 2 == 0 ? SolveMethod::genetic : SolveMethod::least_squares;
     const auto report = solve_from_still_blocks(blocks_of(unit, poses, {30, 25}, seed),
@@ -660,7 +649,8 @@ std::vector<StillBlock> paused_sides(const SyntheticUnit& unit, double rest_s, d
   const double length_s = 6 * rounds * (rest_s + pause_s);
   double time = 0;
   for (int i = 0; i < 6 * rounds; ++i) {
-    const Vector pose = tests::wobbled(kSides[static_cast<std::size_t>(i % 6)], 1.5, random);
+    const Vector pose =
+        tests::wobbled(tests::kSixSides[static_cast<std::size_t>(i % 6)], 1.5, random);
     for (double end = time + rest_s; time < end; time += 1) {
       finder->push(time,
                    tests::at_rest(unit, pose, 1, 30, random, warming_c * (time / length_s - 0.5)));
@@ -731,7 +721,7 @@ TEST(Solve, ASecondRoundShowsTheDrift) {
 
 TEST(Solve, HostileNumbers) {
   const SyntheticUnit unit = mismatched(3);
-  auto blocks = blocks_of(unit, kSides, {30, 60, 4}, 5);
+  auto blocks = blocks_of(unit, tests::kSixSides, {30, 60, 4}, 5);
   blocks[3].mean_lsb[1] = std::nan("");
   EXPECT_FAILS(solve_from_still_blocks(blocks, file_constants(unit)), ErrorCode::bad_data);
   Calibration broken = file_constants(unit);

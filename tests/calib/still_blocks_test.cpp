@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/coverage.h"
 #include "expect_result.h"
 #include "synthetic_unit.h"
 
@@ -25,6 +24,19 @@ std::size_t blocks_in(const std::vector<Sample>& samples, double rate_hz,
   finder.push(0, samples);
   finder.break_run();
   return finder.blocks().size();
+}
+
+struct Rest {
+  SyntheticUnit unit;
+  std::vector<Sample> samples;
+  Reversal reversal;
+};
+// A unit that lies on its back.
+Rest rest_of(double noise_mg, double seconds, double rate_hz, unsigned seed) {
+  std::mt19937_64 random(seed);
+  SyntheticUnit unit;
+  unit.noise_mg = noise_mg;
+  return {unit, tests::at_rest(unit, {0, 0, 1}, seconds, rate_hz, random), reversal_of(unit)};
 }
 
 // Stored counts straight: value per sample and axis.
@@ -112,11 +124,7 @@ TEST(StillBlocks, ClippedIsUnusable) {
 }
 
 TEST(StillBlocks, NeverSpanAGapAndDoNotDependOnHowTheyArrive) {
-  std::mt19937_64 random(3);
-  SyntheticUnit unit;
-  unit.noise_mg = 3;
-  const auto samples = tests::at_rest(unit, {0, 0, 1}, 301, 30, random);
-  const Reversal reversal = reversal_of(unit);
+  const auto [unit, samples, reversal] = rest_of(3, 301, 30, 3);
   auto whole = *StillBlockFinder::make(reversal, 30);
   whole.push(5, samples);
   auto pieces = *StillBlockFinder::make(reversal, 30);
@@ -142,11 +150,7 @@ TEST(StillBlocks, NeverSpanAGapAndDoNotDependOnHowTheyArrive) {
 }
 
 TEST(StillBlocks, NoiseAloneIsKeptApartAndMarked) {
-  std::mt19937_64 random(4);
-  SyntheticUnit unit;
-  unit.noise_mg = 5.5;
-  const auto samples = tests::at_rest(unit, {0, 0, 1}, 60, 100, random);
-  const Reversal reversal = reversal_of(unit);
+  const auto [unit, samples, reversal] = rest_of(5.5, 60, 100, 4);
   auto paper = *StillBlockFinder::make(reversal, 100, {.noisy_sd_g = 0});
   paper.push(0, samples);
   auto tolerant = *StillBlockFinder::make(reversal, 100);
@@ -173,25 +177,6 @@ TEST(StillBlocks, NonsenseOptions) {
   EXPECT_FAILS(StillBlockFinder::make(reversal, 30, {.block_s = -1}), ErrorCode::usage);
   EXPECT_FAILS(StillBlockFinder::make(reversal, 30, {.max_residual_g = std::nan("")}),
                ErrorCode::usage);
-}
-
-TEST(Coverage, NineSubsetsAndTheThirtyPercentRule) {
-  EXPECT_EQ(value_subset(1.0), ValueSubset::high);
-  EXPECT_EQ(value_subset(0.69), ValueSubset::middle);
-  EXPECT_EQ(value_subset(-0.7), ValueSubset::low);
-  EXPECT_EQ(value_subset(1.31), ValueSubset::outside);
-  EXPECT_EQ(value_subset(std::nan("")), ValueSubset::outside);
-  std::vector<PerAxis<double>> means = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}};
-  Coverage coverage = coverage_of(means);
-  EXPECT_EQ(coverage.missing_directions(), std::vector<std::string>{"-z"});
-  EXPECT_EQ(coverage.subset_blocks[0][0], 1U);
-  EXPECT_EQ(coverage.subset_blocks[0][1], 3U);
-  means.push_back({0.95, 0, -0.3});
-  EXPECT_FALSE(coverage_of(means).complete());
-  means.push_back({0.95, 0, -0.301});
-  EXPECT_TRUE(coverage_of(means).complete());
-  const std::vector<std::string> all = {"+x", "-x", "+y", "-y", "+z", "-z"};
-  EXPECT_EQ(coverage_of(std::span<const PerAxis<double>>{}).missing_directions(), all);
 }
 
 }  // namespace

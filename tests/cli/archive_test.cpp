@@ -11,22 +11,20 @@
 #include <unistd.h>
 
 #include "base/random.h"
+#include "command_fixture.h"
 #include "db/store.h"
 #include "expect_result.h"
+#include "repair/jig_constants.h"
 #include "repair/made_recording.h"
-#include "run_command.h"
 #include "shared_data.h"
-#include "temporary_folder.h"
 
 namespace sixpoint::cli {
 namespace {
 
 using testing::HasSubstr;
 using tests::Answer;
+using tests::kConstants;
 using tests::MadeRecording;
-
-constexpr const char* kConstants = R"({"serial": "MOS2A45130450", "filter": "current",
-  "constants": {"sensitivity_g_per_lsb": [0.0042, 0.004, 0.0041], "zero_lsb": [90.5, 50.25, 88]}})";
 
 MadeRecording some_minutes(std::uint64_t seed, std::size_t samples) {
   MadeRecording made;
@@ -41,7 +39,7 @@ MadeRecording some_minutes(std::uint64_t seed, std::size_t samples) {
   return made;
 }
 
-class ArchiveCommand : public testing::Test {
+class ArchiveCommand : public tests::CommandTest {
  protected:
   ArchiveCommand() {
     std::filesystem::create_directories(archive_ + "/sub");
@@ -60,9 +58,6 @@ class ArchiveCommand : public testing::Test {
     stranger.serial = "MOS2A45130451";
     EXPECT_OK(stranger.write(files_, archive_ + "/sub/stranger.gt3x"));
     std::ofstream(archive_ + "/sub/broken.gt3x") << "this is no zip";
-  }
-  static Answer run(const std::vector<std::string>& arguments) {
-    return tests::run_command(posix_env(), arguments);
   }
   Answer plan(std::vector<std::string> more = {}) {
     std::vector<std::string> arguments = {"archive", "plan",        archive_,   "-o",
@@ -121,7 +116,6 @@ class ArchiveCommand : public testing::Test {
     }
   }
 
-  tests::TemporaryFolder folder_;
   std::string archive_ = folder_ / "archive";
   std::string plan_ = folder_ / "plan";
   std::string out_ = folder_ / "out";
@@ -183,7 +177,7 @@ TEST_F(ArchiveCommand, MissingAndFailedShardsAreNamedWithTheirCommand) {
   const std::string line = std::string(SIXPOINT_PROGRAM) + command.substr(8) + " >/dev/null 2>&1";
   EXPECT_EQ(std::system(line.c_str()), 0);
   EXPECT_EQ(merge().json()["complete"], true);
-  // The shard with the file that is no zip is named, too; mend the cause, and it is done.
+  // The shard with the file that is no zip is named, too; remove the cause, and it is done.
   std::string again;
   const Json shards = merge().json()["shards"];
   for (const Json& one : shards) {
@@ -221,7 +215,7 @@ TEST_F(ArchiveCommand, TheSlurmScriptRunsOneShardPerTask) {
   EXPECT_NE(task("-u SLURM_ARRAY_TASK_ID"), 0) << "without sbatch it says what to do";
   for (std::size_t shard = 0; shard < 3; ++shard) {
     EXPECT_EQ(task("SLURM_ARRAY_TASK_ID=" + std::to_string(shard)), shard == broken ? 65 : 0)
-        << "the file that is no zip makes its task fail; one that cannot be mended does not";
+        << "the file that is no zip makes its task fail; one that cannot be repaired does not";
   }
   EXPECT_EQ(task("SLURM_ARRAY_TASK_ID=3"), 64) << "no such shard";
   EXPECT_EQ(merge().json()["complete"], true);
@@ -236,7 +230,7 @@ TEST_F(ArchiveCommand, ThePlainScriptRunsAllAndMerges) {
   const std::string line = "env SIXPOINT=" SIXPOINT_PROGRAM " JOBS=2 bash " + plan_ +
                            "/run_all.sh " + out_ + " >/dev/null 2>&1";
   const int status = std::system(line.c_str());
-  EXPECT_EQ(WEXITSTATUS(status), 1) << "one file cannot be mended";
+  EXPECT_EQ(WEXITSTATUS(status), 1) << "one file cannot be repaired";
   EXPECT_EQ(merge().json()["complete"], true);
 }
 
@@ -282,19 +276,13 @@ TEST_F(ArchiveCommand, SurvivesKillNine) {
   EXPECT_EQ(run_shard(0).json()["shards"][0]["done_before"], 24) << "nothing is left to do";
 }
 
-TEST_F(ArchiveCommand, TheStoreIsToldOnceAtTheMerge) {
+TEST_F(ArchiveCommand, TheMergeAddsToTheStoreOnce) {
   fill();
   const std::string store = folder_ / "store.db";
   {
     auto made = db::Store::open(posix_env(), store);
     ASSERT_OK(made);
-    db::ConstantsRecord record;
-    record.serial = "MOS2A45130450";
-    record.filter = "current";
-    record.method = "jig";
-    record.made_at = from_unix_seconds(1'700'000'000);
-    record.document = kConstants;
-    ASSERT_OK(made->add_constants(record, "wGT3X-BT"));
+    ASSERT_OK(made->add_constants(tests::jig_constants(), "wGT3X-BT"));
   }
   ASSERT_EQ(
       run({"archive", "plan", archive_, "-o", plan_, "--store", store, "--shards", "2"}).exit_code,
@@ -398,8 +386,8 @@ TEST_F(ArchiveCommand, RealRecordings) {
   EXPECT_EQ(comparable(merged.json()).size(), comparable(expected.json()).size());
 }
 
-// The recordings' own still periods do not suffice; with constants, all of them is mended.
-TEST_F(ArchiveCommand, RealRecordingsMended) {
+// The recordings' own still periods do not suffice; with constants, all of them are repaired.
+TEST_F(ArchiveCommand, RealRecordingsRepaired) {
   SIXPOINT_NEED_SHARED("data/wgt3x-bt-affected");
   const std::string real = tests::shared_file("data/wgt3x-bt-affected");
   const Json scanned = run({"scan", real, "--json"}).json();
@@ -422,10 +410,10 @@ TEST_F(ArchiveCommand, RealRecordingsMended) {
     ASSERT_EQ(run({"archive", "run", its_plan, "--shard", "0", "-o", its_out}).exit_code, 0);
     const Answer merged = run({"archive", "merge", its_plan, "--json"});
     EXPECT_EQ(merged.json()["summary"], expected.json()["summary"]);
-    const std::string mended = merged.json()["files"][0]["output"];
+    const std::string repaired = merged.json()["files"][0]["output"];
     const std::string whole = expected.json()["files"][0]["output"];
-    EXPECT_FALSE(tests::entry_of(files_, mended, "log.bin").empty());
-    EXPECT_EQ(tests::entry_of(files_, mended, "log.bin"),
+    EXPECT_FALSE(tests::entry_of(files_, repaired, "log.bin").empty());
+    EXPECT_EQ(tests::entry_of(files_, repaired, "log.bin"),
               tests::entry_of(files_, whole, "log.bin"));
   }
 }

@@ -6,13 +6,14 @@
 #include <nlohmann/json.hpp>
 
 #include "base/memory_env.h"
+#include "cli/known_devices.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "faults_page.h"
-#include "mocks/fault_plan.h"
-#include "mocks/in_process.h"
-#include "mocks/virtual_jig.h"
+#include "mocks/faults/fault_plan.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/in_process/virtual_jig.h"
 #include "run_command.h"
-#include "station/devices.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::cli {
@@ -215,7 +216,7 @@ TEST_F(Faults, PowerLossAtAnyByteOfAWriteEndsWithAWholePage) {
     options.truth = sim::draw_unit(7);
     const auto plugged =
         std::make_shared<mocks::PluggedUnit>(options, plan, std::make_shared<ManualClock>());
-    const auto unit = *device::Unit::open(mocks::link_to(plugged, true));
+    const auto unit = *device::WireUnit::open(mocks::link_to(plugged, true));
     station::JigSessionOptions session;
     session.run.write = true;
     station::JigHooks hooks;

@@ -1,9 +1,9 @@
+// sixpoint inspect by its contract; bad recordings also of export.
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "gt3x/recording_writer.h"
 #include "gt3x_made_log.h"
 #include "run_command.h"
 #include "shared_data.h"
@@ -16,17 +16,10 @@ using gt3x::tests::kStart;
 using gt3x::tests::made_info;
 using gt3x::tests::made_log;
 using gt3x::tests::made_parameters;
+using gt3x::tests::put_recording;
 using testing::HasSubstr;
 using tests::run_command;
 using tests::shared_file;
-
-Status put_recording(FileSystem& files, const std::string& path, const Bytes& log,
-                     const std::string& info = made_info()) {
-  SIXPOINT_ASSIGN(auto out, gt3x::RecordingWriter::create(files, path));
-  SIXPOINT_CHECK(out.add("log.bin", log));
-  SIXPOINT_CHECK(out.add("info.txt", std::string_view(info)));
-  return out.commit();
-}
 
 TEST(Inspect, SaysWhatTheContractAsks) {
   MemoryEnv memory;
@@ -123,9 +116,7 @@ TEST(BadInput, InspectAndExportRefuseWithACodeALineAndNoFile) {
   ASSERT_OK(put_recording(files, "good", made_log(2)));
   Bytes damaged = *read_file(files, "good");
   damaged[300] ^= 0xFF;  // inside log.bin: the entry's CRC no longer holds
-  ASSERT_OK(
-      write_file(files, "bad_crc",
-                 std::string_view(reinterpret_cast<const char*>(damaged.data()), damaged.size())));
+  ASSERT_OK(write_file(files, "bad_crc", as_text(damaged)));
   ASSERT_OK(write_file(
       files, "cut",
       std::string_view(reinterpret_cast<const char*>(damaged.data()), damaged.size() / 2)));
@@ -150,25 +141,6 @@ TEST(BadInput, InspectAndExportRefuseWithACodeALineAndNoFile) {
   EXPECT_EQ(run_command(memory.env, {"export", "good"}).exit_code, 64);
   EXPECT_EQ(run_command(memory.env, {"inspect"}).exit_code, 64);
   EXPECT_EQ(files.list(".")->size(), before);
-}
-
-TEST(Export, WritesWholeFilesAndNeverOverARecording) {
-  MemoryEnv memory;
-  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(2)));
-  ASSERT_OK(put_recording(memory.files, "other.gt3x", made_log(1)));
-  const Bytes original = *read_file(memory.files, "f.gt3x");
-  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "f.gt3x"}).exit_code, 73);
-  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "./f.gt3x"}).exit_code, 73);
-  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "other.gt3x"}).exit_code, 73);
-  EXPECT_EQ(*read_file(memory.files, "f.gt3x"), original);
-  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "out.csv"}).exit_code, 0);
-  const Bytes csv = *read_file(memory.files, "out.csv");
-  const auto standard = run_command(memory.env, {"export", "f.gt3x", "--csv", "-"});
-  EXPECT_EQ(standard.out, std::string(csv.begin(), csv.end()));
-  memory.files.fail_after(2);
-  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "late.csv"}).exit_code, 74);
-  memory.files.stop_failing();
-  EXPECT_FALSE(memory.files.info("late.csv"));
 }
 
 // Oracles: readings of the real file that its publisher documents (firmware, calibration), and the

@@ -3,10 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include "command_fixture.h"
 #include "expect_result.h"
-#include "mocks/virtual_drive.h"
-#include "run_command.h"
-#include "temporary_folder.h"
+#include "mocks/firmware/virtual_drive.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -16,16 +15,11 @@ using testing::HasSubstr;
 
 constexpr const char* kUnit = "virtual:seed=7,true_sensitivity_lsb_per_g=237.7/251.8/242.3";
 
-class OtherDevices : public testing::Test {
+class OtherDevices : public tests::CommandTest {
  protected:
-  std::string path(const std::string& name) { return folder_ / name; }
-  tests::Answer run(const std::vector<std::string>& arguments) {
-    return tests::run_command(posix_env(), arguments);
-  }
   tests::Answer jig(const std::string& jig) {
     return run({"jig", "--device", kUnit, "--jig", jig, "--store", path("s.db"), "--json"});
   }
-  tests::TemporaryFolder folder_;
 };
 
 // Oracle: the sensor that the device string names.
@@ -102,9 +96,9 @@ TEST_F(OtherDevices, AUnitWithoutCommandsIsCalibratedByItsFile) {
 
 TEST_F(OtherDevices, AFileThatCannotHelpIsRefused) {
   mocks::VirtualDriveOptions options;
-  sim::UnitWishes wishes;
-  wishes.firmware = "1.8.0";
-  options.unit.truth = sim::draw_unit(7, wishes);
+  sim::GivenProperties given;
+  given.firmware = "1.8.0";
+  options.unit.truth = sim::draw_unit(7, given);
   ASSERT_OK(mocks::make_virtual_drive(posix_env().files, path("usb"), options));
   const auto answer = run({"capture", "--device", "drive:" + path("usb"), "--store", path("s.db"),
                            "-o", path("c.gt3x"), "--json"});

@@ -1,4 +1,4 @@
-// scan, repair, units, history, audit by their contract, on the real disk.
+// sixpoint repair and scan by their contract, on the real disk.
 #include <filesystem>
 #include <fstream>
 
@@ -7,24 +7,20 @@
 #include <sys/stat.h>
 
 #include "base/random.h"
+#include "command_fixture.h"
 #include "db/store.h"
 #include "expect_result.h"
+#include "repair/jig_constants.h"
 #include "repair/made_recording.h"
-#include "run_command.h"
 #include "shared_data.h"
-#include "temporary_folder.h"
 
 namespace sixpoint::cli {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using tests::kConstants;
 using tests::MadeRecording;
-using tests::run_command;
-
-// Constants near the truth of what half_hour() made; the doubles hold.
-constexpr const char* kConstants = R"({"serial": "MOS2A45130450", "filter": "current",
-  "constants": {"sensitivity_g_per_lsb": [0.0042, 0.004, 0.0041], "zero_lsb": [90.5, 50.25, 88]}})";
 
 // At rest in many directions.
 MadeRecording half_hour() {
@@ -47,7 +43,7 @@ MadeRecording half_hour() {
   return made;
 }
 
-class RepairCommand : public testing::Test {
+class RepairCommand : public tests::CommandTest {
  protected:
   RepairCommand() {
     std::filesystem::create_directories(archive_ + "/sub");
@@ -58,11 +54,7 @@ class RepairCommand : public testing::Test {
     EXPECT_OK(sound.write(files_, archive_ + "/sub/sound.gt3x"));
     std::ofstream(folder_ / "constants.json") << kConstants;
   }
-  tests::Answer run(const std::vector<std::string>& arguments) {
-    return run_command(posix_env(), arguments);
-  }
 
-  tests::TemporaryFolder folder_;
   std::string archive_ = folder_ / "archive";
   std::string out_ = folder_ / "out";
   FileSystem& files_ = posix_env().files;
@@ -71,7 +63,7 @@ class RepairCommand : public testing::Test {
 TEST_F(RepairCommand, ScanSaysWhichFilesAreAffected) {
   std::ofstream(archive_ + "/broken.gt3x") << "this is no zip";
   const auto answer = run({"scan", archive_, "--json"});
-  EXPECT_EQ(answer.exit_code, 65) << "the worst wins: unreadable";
+  EXPECT_EQ(answer.exit_code, 65) << "the worst counts: unreadable";
   const Json json = answer.json();
   EXPECT_EQ(json["schema"], "sixpoint/scan/1");
   ASSERT_EQ(json["files"].size(), 3U);
@@ -90,20 +82,20 @@ TEST_F(RepairCommand, ScanSaysWhichFilesAreAffected) {
   EXPECT_EQ(run({"scan"}).exit_code, 64);
 }
 
-TEST_F(RepairCommand, MendsATreeAndIsDoneOnce) {
+TEST_F(RepairCommand, RepairsATreeOnce) {
   const auto answer =
       run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", "--json"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   const Json json = answer.json();
   ASSERT_EQ(json["files"].size(), 2U);
-  const Json& mended = json["files"][0];
-  EXPECT_EQ(mended["status"], "repaired");
-  EXPECT_EQ(mended["output"], out_ + "/affected.gt3x");
-  EXPECT_EQ(mended["method"], "constants");
-  EXPECT_GT(mended["still_error_mg"]["before"].get<double>(), 100);
-  EXPECT_LT(mended["still_error_mg"]["after"].get<double>(), 2);
-  EXPECT_EQ(mended["samples"], 54'000);
-  EXPECT_EQ(mended["output_sha256"].get<std::string>().size(), 64U);
+  const Json& repaired = json["files"][0];
+  EXPECT_EQ(repaired["status"], "repaired");
+  EXPECT_EQ(repaired["output"], out_ + "/affected.gt3x");
+  EXPECT_EQ(repaired["method"], "constants");
+  EXPECT_GT(repaired["still_error_mg"]["before"].get<double>(), 100);
+  EXPECT_LT(repaired["still_error_mg"]["after"].get<double>(), 2);
+  EXPECT_EQ(repaired["samples"], 54'000);
+  EXPECT_EQ(repaired["output_sha256"].get<std::string>().size(), 64U);
   EXPECT_EQ(json["files"][1]["status"], "not_affected");
   EXPECT_FALSE(std::filesystem::exists(out_ + "/sub/sound.gt3x"));
 
@@ -118,7 +110,7 @@ TEST_F(RepairCommand, MendsATreeAndIsDoneOnce) {
       run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", "--resume"})
           .exit_code,
       0);
-  EXPECT_EQ(run({"scan", out_}).exit_code, 0) << "a mended file is affected no more";
+  EXPECT_EQ(run({"scan", out_}).exit_code, 0) << "a repaired file is not affected any more";
 }
 
 TEST_F(RepairCommand, ScanOfTheFileItselfIsTheLastResort) {
@@ -164,7 +156,7 @@ TEST_F(RepairCommand, CalibrationFileOfTheSameUnitUnderCurrentOnly) {
 }
 
 // A tree as disks hold them: links in circles and into nothing, a FIFO, a device.
-TEST_F(RepairCommand, OddThingsInATreeGetTheirLinesAndTheRestIsMended) {
+TEST_F(RepairCommand, UnusualFilesGetTheirLinesAndTheRestIsRepaired) {
   std::filesystem::create_symlink("..", archive_ + "/sub/up");
   std::filesystem::create_symlink(".", archive_ + "/sub/here");
   std::filesystem::create_symlink("nowhere", archive_ + "/dangling.gt3x");
@@ -174,12 +166,12 @@ TEST_F(RepairCommand, OddThingsInATreeGetTheirLinesAndTheRestIsMended) {
   EXPECT_EQ(scanned.exit_code, 66);
   EXPECT_EQ(scanned.json()["files"].size(), 5U) << "no file by two names: " << scanned.out;
   EXPECT_EQ(scanned.json()["summary"]["unreadable"], 3);
-  const auto mended =
+  const auto repaired =
       run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", "--json"});
-  EXPECT_EQ(mended.exit_code, 66);
-  EXPECT_EQ(mended.json()["summary"]["repaired"], 1);
-  EXPECT_EQ(mended.json()["summary"]["not_affected"], 1);
-  EXPECT_EQ(mended.json()["summary"]["failed"], 3);
+  EXPECT_EQ(repaired.exit_code, 66);
+  EXPECT_EQ(repaired.json()["summary"]["repaired"], 1);
+  EXPECT_EQ(repaired.json()["summary"]["not_affected"], 1);
+  EXPECT_EQ(repaired.json()["summary"]["failed"], 3);
 }
 
 TEST_F(RepairCommand, DryRunWritesNothing) {
@@ -195,13 +187,7 @@ TEST_F(RepairCommand, StoreCommandsAnswerByContract) {
   {
     auto store = db::Store::open(posix_env(), path);
     ASSERT_OK(store);
-    db::ConstantsRecord record;
-    record.serial = "MOS2A45130450";
-    record.filter = "current";
-    record.method = "jig";
-    record.made_at = from_unix_seconds(1'700'000'000);
-    record.document = kConstants;
-    ASSERT_OK(store->add_constants(record, "wGT3X-BT"));
+    ASSERT_OK(store->add_constants(tests::jig_constants(), "wGT3X-BT"));
   }
   const Json units = run({"units", "--store", path, "--json"}).json();
   EXPECT_EQ(units["units"][0]["serial"], "MOS2A45130450");
@@ -211,10 +197,10 @@ TEST_F(RepairCommand, StoreCommandsAnswerByContract) {
        {"id", "serial", "filter", "constants", "standard_uncertainty", "method", "made_at"}) {
     EXPECT_TRUE(history["constants"][0].contains(key)) << key;
   }
-  const Json mended =
+  const Json repaired =
       run({"repair", archive_, "-o", out_, "--store", path, "--json"}).json()["files"][0];
-  EXPECT_EQ(mended["method"], "store");
-  EXPECT_EQ(mended["constants_id"], history["constants"][0]["id"]);
+  EXPECT_EQ(repaired["method"], "store");
+  EXPECT_EQ(repaired["constants_id"], history["constants"][0]["id"]);
   const auto audit = run({"audit", "verify", "--store", path, "--json"});
   EXPECT_EQ(audit.exit_code, 0);
   EXPECT_EQ(audit.json()["ok"], true);
@@ -239,7 +225,7 @@ TEST_F(RepairCommand, RealFilesAreJudged) {
 
 // Serial numbers of files come from outside: quotes are kept as they are, and one that no store
 // keeps does not stand in the way of the others.
-TEST_F(RepairCommand, OddSerialNumbersAreMendedAndKeptOrNamed) {
+TEST_F(RepairCommand, FilesWithUnusualSerialNumbersAreRepairedAndKeptOrNamed) {
   const std::string quoted = "MOS\"';-- \\\\ %s";
   const std::string place = folder_ / "odd";
   MadeRecording made = half_hour();
@@ -259,8 +245,10 @@ TEST_F(RepairCommand, OddSerialNumbersAreMendedAndKeptOrNamed) {
   EXPECT_EQ(answer.exit_code, 65) << answer.people;
   EXPECT_EQ(answer.json()["summary"]["repaired"], 3) << answer.out;
   EXPECT_EQ(answer.json()["kept"]["in"], "store");
-  EXPECT_THAT(answer.people, HasSubstr("long.gt3x: mended, but the store cannot keep it"));
-  EXPECT_THAT(answer.people, HasSubstr("control.gt3x: mended, but the store cannot keep it"));
+  EXPECT_THAT(answer.people,
+              HasSubstr("long.gt3x: repaired, but the store cannot keep its record"));
+  EXPECT_THAT(answer.people,
+              HasSubstr("control.gt3x: repaired, but the store cannot keep its record"));
   EXPECT_THAT(answer.people, testing::Not(HasSubstr("\x1b")));
   const auto history = run({"history", quoted, "--store", store, "--json"});
   EXPECT_EQ(history.exit_code, 0) << history.people;

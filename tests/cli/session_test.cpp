@@ -1,33 +1,28 @@
 // --record, replay: and `sixpoint session` through the program.
+#include "device/session/session.h"
+
 #include <fstream>
 
 #include <gmock/gmock.h>
 
-#include "device/session.h"
-#include "device/session_journal.h"
+#include "cli/session_minimiser.h"
+#include "command_fixture.h"
+#include "device/session/session_journal.h"
 #include "expect_result.h"
-#include "run_command.h"
-#include "station/session_minimiser.h"
-#include "temporary_folder.h"
 
 namespace sixpoint::cli {
 namespace {
 
 using testing::HasSubstr;
 
-class SessionCommand : public testing::Test {
+class SessionCommand : public tests::CommandTest {
  protected:
-  std::string path(const std::string& name) { return folder_ / name; }
-  tests::Answer run(const std::vector<std::string>& arguments) {
-    return tests::run_command(posix_env(), arguments);
-  }
   tests::Answer jig(const std::string& device, const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments = {"jig",     "--device",   device,
                                           "--store", path("s.db"), "--json"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
-  tests::TemporaryFolder folder_;
 };
 
 // Oracle: the run that was recorded.
@@ -134,8 +129,7 @@ TEST_F(SessionCommand, TheMinimiserKeepsTheOutcome) {
   const auto whole = *device::read_session(posix_env().files, path("r.zip"));
   const auto small = *device::read_session(posix_env().files, path("m.zip"));
   EXPECT_EQ(small.transfers.size(), 2U) << "one request, one reply";
-  EXPECT_EQ(station::outcome_of(small, station::SessionWork::identify),
-            station::outcome_of(whole, station::SessionWork::identify));
+  EXPECT_EQ(outcome_of(small, SessionWork::identify), outcome_of(whole, SessionWork::identify));
   const auto show = run({"session", "show", path("m.zip"), "--json"});
   EXPECT_EQ(show.json()["transfers"], 2);
   EXPECT_EQ(show.json()["requests"]["identify"], 1);
@@ -147,7 +141,6 @@ TEST_F(SessionCommand, TheMinimiserKeepsTheOutcome) {
 // Jig runs and a download that fail: the small session ends as the whole one did, in the program
 // too, and each of its transfers is needed.
 TEST_F(SessionCommand, TheMinimiserKeepsHowAndWhereARunFailed) {
-  using station::SessionWork;
   const struct {
     const char* fault;
     SessionWork work;
@@ -180,20 +173,20 @@ TEST_F(SessionCommand, TheMinimiserKeepsHowAndWhereARunFailed) {
     EXPECT_EQ(recorded.exit_code, one.exit_code);
     const auto whole = *device::read_session(posix_env().files, path(name + ".zip"));
 
-    station::MinimiseOptions options;
+    MinimiseOptions options;
     options.work = one.work;
     options.most_replays = 20'000;
-    const auto report = station::minimise(whole, options);
+    const auto report = minimise(whole, options);
     ASSERT_TRUE(report.finished) << report.brief();
     const device::Session& small = report.session;
     EXPECT_LE(small.transfers.size(), one.most);
     EXPECT_LT(small.transfers.size(), whole.transfers.size());
-    const std::string outcome = station::outcome_of(whole, one.work);
-    EXPECT_EQ(station::outcome_of(small, one.work), outcome);
+    const std::string outcome = outcome_of(whole, one.work);
+    EXPECT_EQ(outcome_of(small, one.work), outcome);
     for (std::size_t i = 0; i < small.transfers.size(); ++i) {
       device::Session without = small;
       without.transfers.erase(without.transfers.begin() + static_cast<std::ptrdiff_t>(i));
-      EXPECT_NE(station::outcome_of(without, one.work), outcome)
+      EXPECT_NE(outcome_of(without, one.work), outcome)
           << "transfer " << i << " of " << small.transfers.size();
     }
     // Oracle: the program itself, on the small session.
@@ -216,13 +209,13 @@ TEST_F(SessionCommand, TheMinimiserMayLeaveNothing) {
                                  Bytes(8),
                                  {}});
   }
-  const auto report = station::minimise(session, {});
+  const auto report = minimise(session, {});
   EXPECT_TRUE(report.finished);
   EXPECT_TRUE(report.session.transfers.empty()) << report.brief();
 }
 
-// What a killed program leaves (device/session_journal.h): the next open says what to do, recover
-// does it, and the run is replayed as far as it went.
+// What a killed program leaves (device/session/session_journal.h): the next open says what to do,
+// recover does it, and the run is replayed as far as it went.
 TEST_F(SessionCommand, ABrokenOffRecordingIsRecovered) {
   ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--record", path("r.zip")}).exit_code, 0);
   const auto whole = *device::read_session(posix_env().files, path("r.zip"));

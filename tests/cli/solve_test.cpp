@@ -6,11 +6,10 @@
 
 #include "base/random.h"
 #include "calib/constants.h"
+#include "command_fixture.h"
 #include "expect_result.h"
 #include "repair/made_recording.h"
-#include "run_command.h"
 #include "shared_data.h"
-#include "temporary_folder.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -18,7 +17,6 @@ namespace {
 using testing::ElementsAre;
 using testing::UnorderedElementsAre;
 using tests::MadeRecording;
-using tests::run_command;
 
 constexpr PerAxis<double> kSensitivity = {0.0042, 0.00405, 0.0043};
 constexpr PerAxis<double> kZero = {90.5, 50.25, 88};
@@ -46,17 +44,13 @@ MadeRecording sides_recording(const std::vector<int>& sides, unsigned rate_hz = 
   return made;
 }
 
-class SolveCommand : public testing::Test {
+class SolveCommand : public tests::CommandTest {
  protected:
-  tests::Answer run(const std::vector<std::string>& arguments) {
-    return run_command(posix_env(), arguments);
-  }
   std::string write(const MadeRecording& made, const std::string& name) {
     const std::string path = folder_ / name;
     EXPECT_OK(made.write(posix_env().files, path));
     return path;
   }
-  tests::TemporaryFolder folder_;
 };
 
 TEST_F(SolveCommand, SixSidesAreSolvedStoredAndWritten) {

@@ -1,299 +1,57 @@
-// sixpoint store ... by its contract, on the real disk.
+// --store: the places of a store and of its journal, and where records go when the store fails.
+#include "cli/store_option.h"
+
 #include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <sqlite3.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "base/env.h"
+#include "command_fixture.h"
 #include "db/journal.h"
-#include "db/store.h"
-#include "expect_result.h"
-#include "run_command.h"
-#include "station/cli/store_option.h"
-#include "station/limits.h"
-#include "station/software.h"
-#include "temporary_folder.h"
+#include "station/records/software.h"
 
 namespace sixpoint {
 namespace {
 
 using testing::HasSubstr;
+using tests::StoreTest;
 
-class StoreCommandTest : public testing::Test {
- protected:
-  tests::Answer run(const std::vector<std::string>& arguments) {
-    return tests::run_command(posix_env(), arguments);
-  }
-  std::string path(const std::string& name) const { return folder_ / name; }
-  std::string fill(const std::string& name) {
-    auto store = db::Store::open(posix_env(), path(name)).value();
-    db::ConstantsRecord record;
-    record.serial = "MOS2A1";
-    record.filter = "current";
-    record.made_at = from_unix_seconds(1000);
-    record.document = R"({"constants":{"zero_lsb":[1,2,3]}})";
-    const std::string id = store.add_constants(record, "w").value();
-    db::RepairRecord repair;
-    repair.serial = "MOS2A1";
-    repair.input = "a.gt3x";
-    repair.constants_id = id;
-    repair.document = "{}";
-    store.add_repair(repair).value();
-    return id;
-  }
-  void statements(const std::string& name, const std::string& sql) {
-    sqlite3* handle = nullptr;
-    EXPECT_EQ(sqlite3_open(path(name).c_str(), &handle), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
-    sqlite3_close(handle);
-  }
-  tests::TemporaryFolder folder_;
-};
-
-TEST_F(StoreCommandTest, ExportImportAndBackupKeepTheHead) {
-  fill("a.db");
-  const auto head = [&](const std::string& name) {
-    return run({"audit", "verify", "--store", path(name), "--json"}).json()["head"];
-  };
-  const auto out =
-      run({"store", "export", "--store", path("a.db"), "-o", path("a.jsonl"), "--json"});
-  EXPECT_EQ(out.exit_code, 0) << out.people;
-  EXPECT_EQ(out.json()["schema"], "sixpoint/store/1");
-  EXPECT_EQ(out.json()["head"], head("a.db"));
-  EXPECT_EQ(run({"store", "import", path("a.jsonl"), "--store", path("b.db")}).exit_code, 0);
-  EXPECT_EQ(head("b.db"), head("a.db"));
-  EXPECT_EQ(run({"store", "backup", "--store", path("a.db"), "-o", path("c.db")}).exit_code, 0);
-  EXPECT_EQ(head("c.db"), head("a.db"));
-  EXPECT_EQ(run({"store", "export", "--csv", "--store", path("a.db"), "-o", path("csv")}).exit_code,
-            0);
-  EXPECT_TRUE(std::filesystem::exists(path("csv") + "/constants.csv"));
-  EXPECT_EQ(run({"store", "backup", "--store", path("a.db"), "-o", path("a.db")}).exit_code, 73);
-  EXPECT_EQ(run({"store", "export", "--store", path("none.db"), "-o", path("x")}).exit_code, 66);
-  EXPECT_EQ(run({"store", "import", path("none.jsonl"), "--store", path("d.db")}).exit_code, 66);
-  EXPECT_FALSE(std::filesystem::exists(path("d.db")));
-  std::ofstream(path("bad.jsonl")) << "{}\n";
-  EXPECT_EQ(run({"store", "import", path("bad.jsonl"), "--store", path("d.db")}).exit_code, 65);
-  EXPECT_FALSE(std::filesystem::exists(path("d.db"))) << "a refused import leaves no empty store";
-  EXPECT_EQ(run({"store", "import", path("csv"), "--store", path("e.db")}).exit_code, 0);
-  EXPECT_EQ(head("e.db"), head("a.db"));
-  EXPECT_EQ(
-      run({"store", "import", path("csv"), "--store", path("a.db"), "--json"}).json()["added"], 0);
+TEST_F(StoreTest, OneStoreHasOneJournalHoweverItIsNamed) {
+  EXPECT_EQ(cli::journal_folder(path("a.db")), cli::journal_folder(path("./sub/../a.db")));
+  EXPECT_NE(cli::journal_folder(path("a.db")), cli::journal_folder(path("b.db")));
+  const std::string server = "postgresql://ada:secret@plant.example/units";
+  EXPECT_EQ(cli::journal_folder(server),
+            cli::journal_folder("postgresql://ada:changed@plant.example/units"));
+  EXPECT_NE(cli::journal_folder(server), cli::journal_folder("postgresql://plant.example/other"));
+  EXPECT_EQ(cli::journal_folder(server).find("secret"), std::string::npos);
 }
 
-TEST_F(StoreCommandTest, WithdrawnConstantsRecallTheirFiles) {
-  const std::string id = fill("a.db");
-  EXPECT_EQ(run({"store", "recall", "--store", path("a.db"), "--json"}).json()["files"].size(), 0U);
-  EXPECT_EQ(run({"store", "withdraw", id, "--store", path("a.db")}).exit_code, 64) << "no reason";
-  const auto withdrawn = run({"store", "withdraw", id, "--reason", "out of level", "--operator",
-                              "Ada", "--store", path("a.db"), "--json"});
-  EXPECT_EQ(withdrawn.json()["recall"], 1);
-  const auto recall = run({"store", "recall", "--store", path("a.db"), "--json"}).json();
-  EXPECT_EQ(recall["files"][0]["input"], "a.gt3x");
-  EXPECT_EQ(recall["files"][0]["reason"], "out of level");
-  const auto trend = run({"store", "trend", "MOS2A1", "--store", path("a.db"), "--json"}).json();
-  EXPECT_EQ(trend["points"][0]["withdrawn"], true);
-  EXPECT_EQ(trend["points"][0]["constants"]["zero_lsb"][2], 3);
-  const auto due = run({"store", "due", "--store", path("a.db"), "--json"}).json();
-  EXPECT_EQ(due["units"][0]["serial"], "MOS2A1");
-  EXPECT_TRUE(due["units"][0]["last_constants"].is_null()) << "the only set was withdrawn";
-  const auto yield = run({"store", "yield", "--store", path("a.db"), "--json"}).json();
-  EXPECT_EQ(yield["units"], 0);
-  EXPECT_TRUE(yield["yield"].is_null());
-  EXPECT_EQ(run({"store", "trend", "nobody", "--store", path("a.db")}).exit_code, 66);
-}
-
-TEST_F(StoreCommandTest, CorrectionsAreSaidWithTheirReason) {
-  const std::string id = fill("a.db");
-  const auto correct = [&](std::vector<std::string> words) {
-    for (const char* more : {"--operator", "Ada", "--store"}) {
-      words.emplace_back(more);
-    }
-    words.push_back(path("a.db"));
-    words.insert(words.begin(), "store");
-    return run(words).exit_code;
-  };
-  const auto constants = [&] {
-    return run({"history", "MOS2A1", "--store", path("a.db"), "--json"}).json()["constants"][0];
-  };
-  EXPECT_EQ(correct({"withdraw", id, "--reason", "wrong jig"}), 0);
-  EXPECT_EQ(constants()["withdrawn"], true);
-  EXPECT_EQ(correct({"reinstate", id, "--reason", "it was right"}), 0);
-  EXPECT_EQ(constants()["withdrawn"], false);
-  EXPECT_EQ(correct({"note", "units", "MOS2A1", "--reason", "came back twice"}), 0);
-  EXPECT_EQ(correct({"note", "units", "MOS2A1"}), 64);
-  EXPECT_EQ(correct({"note", "units", "nobody", "--reason", "x"}), 66);
-  EXPECT_EQ(correct({"note", "nothing", "MOS2A1", "--reason", "x"}), 64);
-  const auto history = run({"history", "MOS2A1", "--store", path("a.db"), "--json"}).json();
-  ASSERT_EQ(history["corrections"].size(), 3U);
-  EXPECT_EQ(history["corrections"][2]["about"]["table"], "units");
-  EXPECT_EQ(history["corrections"][2]["reason"], "came back twice");
-  EXPECT_EQ(history["repairs"][0]["input"], "a.gt3x");
-}
-
-TEST_F(StoreCommandTest, AHeadThatWasWrittenDownMustBeInTheChain) {
-  fill("a.db");
-  const auto verify = [&](const std::string& head) {
-    return run({"audit", "verify", "--store", path("a.db"), "--head", head, "--json"});
-  };
-  const std::string head = verify("").json()["head"];
-  EXPECT_EQ(verify(head).exit_code, 0);
-  EXPECT_EQ(verify(std::string(64, 'a')).exit_code, 1);
-  EXPECT_EQ(verify("abc").exit_code, 64);
-}
-
-// What goes wrong with a store, by the exit codes of the contract and in words that name the place.
-TEST_F(StoreCommandTest, StoresThatCannotBeUsedAreNamedWithTheirReason) {
-  const auto expect = [&](const std::vector<std::string>& command, int code,
-                          const std::string& words) {
-    SCOPED_TRACE(testing::PrintToString(command));
-    const auto answer = run(command);
-    EXPECT_EQ(answer.exit_code, code) << answer.people;
-    EXPECT_THAT(answer.people, HasSubstr(words));
-    if (code >= 64) {
-      EXPECT_THAT(answer.people, HasSubstr("; ")) << "what to do";
-    }
-  };
-  fill("newer.db");
-  statements("newer.db", "PRAGMA user_version=99");
-  std::ofstream(path("text.db")) << std::string(2000, 'x');
-  fill("damaged.db");
-  {
-    // Every page but the first: whatever is asked, a damaged one is met.
-    std::fstream file(path("damaged.db"), std::ios::in | std::ios::out | std::ios::binary);
-    const auto size = std::filesystem::file_size(path("damaged.db"));
-    file.seekp(4096);
-    file << std::string(size - 4096, '\x5a');
-  }
-  fill("touched.db");
-  statements("touched.db",
-             "DROP TRIGGER constants_no_update; UPDATE constants SET method = 'other'");
-  for (const auto& command :
-       std::vector<std::vector<std::string>>{{"units", "--store"},
-                                             {"history", "MOS2A1", "--store"},
-                                             {"audit", "verify", "--store"}}) {
-    const auto on = [&](const std::string& name) {
-      auto words = command;
-      words.push_back(path(name));
-      return words;
-    };
-    expect(on("newer.db"), 78, "version 99");
-    expect(on("text.db"), 65, "text.db");
-    expect(on("damaged.db"), 65, "damaged.db");
-    expect(on("none.db"), 66, "none.db");
-  }
-  expect({"audit", "verify", "--store", path("touched.db")}, 1, "does not fit the chain");
-  EXPECT_EQ(run({"store", "backup", "--store", path("touched.db"), "-o", path("b.db")}).exit_code,
-            65);
-  EXPECT_FALSE(std::filesystem::exists(path("b.db"))) << "no backup of a damaged store";
-  expect({"store", "export", "--store", path("touched.db"), "-o", path("t.jsonl")}, 0, "rows");
-  expect({"store", "import", path("t.jsonl"), "--store", path("new.db")}, 65, "line ");
-  EXPECT_FALSE(std::filesystem::exists(path("new.db")));
-  expect({"store", "export", "--store", path("newer.db"), "-o", path("n.jsonl")}, 78, "version 99");
-}
-
-TEST_F(StoreCommandTest, AFileOrFolderThatMayNotBeWrittenIsSaidSo) {
-  fill("a.db");
-  std::filesystem::create_directory(path("locked"));
-  std::filesystem::copy_file(path("a.db"), path("locked/a.db"));
-  std::filesystem::permissions(path("a.db"), std::filesystem::perms(0444));
-  std::filesystem::permissions(path("locked/a.db"), std::filesystem::perms(0444));
-  std::filesystem::permissions(path("locked"), std::filesystem::perms(0555));
-  std::filesystem::permissions(folder_.path(), std::filesystem::perms(0555));
-  const auto as_nobody = [&](const std::vector<std::string>& words) {
-    const pid_t child = ::fork();
-    if (child == 0) {
-      // Root may write everywhere: be nobody.
-      if (::geteuid() == 0 && ::setuid(65534) != 0) {
-        ::_exit(100);
-      }
-      ::_exit(run(words).exit_code);
-    }
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    return WEXITSTATUS(status);
-  };
-  const std::vector<std::string> withdraw = {"store", "withdraw",   "x", "--reason",
-                                             "y",     "--operator", "z", "--store"};
-  for (const char* name : {"a.db", "locked/a.db"}) {
-    auto words = withdraw;
-    words.push_back(path(name));
-    EXPECT_EQ(as_nobody(words), 77) << name;
-  }
-  EXPECT_EQ(as_nobody({"store", "import", path("none"), "--store", path("locked/b.db")}), 66);
-  std::filesystem::permissions(folder_.path(), std::filesystem::perms(0755));
-  std::filesystem::permissions(path("locked"), std::filesystem::perms(0755));
-}
-
-constexpr const char* kDevice =
-    "virtual:seed=7,serial=MOS2A45130007,firmware=1.5.0,calibrated=2013-11-12,jig=auto";
-
-TEST_F(StoreCommandTest, AJigRunIsStoredWithWhatItWasJudgedBy) {
-  const auto jig = [&](std::vector<std::string> more) {
-    std::vector<std::string> words = {"jig",     "--device",   kDevice,      "--jig",
-                                      "virtual", "--operator", "Ada",        "--jig-id",
-                                      "J-17",    "--store",    path("a.db"), "--json"};
-    words.insert(words.end(), more.begin(), more.end());
-    return run(words);
-  };
-  EXPECT_EQ(jig({"--retest-of", "last"}).exit_code, 66) << "there is none yet";
-  const auto first = jig({"--jig-due", "2027-03-31"});
-  EXPECT_EQ(first.exit_code, 0) << first.people;
-  EXPECT_EQ(first.json()["kept"]["in"], "store");
-  const auto second = jig({"--jig-due", "2001-01-01", "--retest-of", "last", "--write"});
-  EXPECT_EQ(second.exit_code, 0) << second.people;
-  EXPECT_THAT(second.people, HasSubstr("2001-01-01"));
-  EXPECT_EQ(jig({"--jig-due", "soon"}).exit_code, 64);
-  EXPECT_EQ(jig({"--retest-of", "no such run"}).exit_code, 66);
-  EXPECT_EQ(jig({"--operator", std::string(300, 'x')}).exit_code, 64) << "given twice";
-  EXPECT_EQ(jig({"--station", std::string(300, 'x')}).exit_code, 65)
-      << "refused before anything is measured";
-
-  const auto history = run({"history", "MOS2A45130007", "--store", path("a.db"), "--json"}).json();
-  ASSERT_EQ(history["runs"].size(), 2U);
-  const auto& run_1 = history["runs"][0];
-  const auto& run_2 = history["runs"][1];
-  EXPECT_EQ(run_1["id"], first.json()["run"]);
-  EXPECT_EQ(run_1["jig"], "J-17");
-  EXPECT_EQ(run_1["jig_due"], "2027-03-31T00:00:00Z");
-  EXPECT_EQ(run_1["software"], station::software_name());
-  EXPECT_EQ(run_1["build"], station::software_build().empty()
-                                ? cli::Json(nullptr)
-                                : cli::Json(station::software_build()));
-  EXPECT_EQ(run_1["limits"]["limits"]["verification_residual_mg"]["high"], 10);
-  EXPECT_EQ(run_1["limits_sha256"], run_2["limits_sha256"]);
-  EXPECT_EQ(run_1["limits_sha256"], station::default_limits().sha256);
-  EXPECT_TRUE(run_1["temperature_c"].is_number());
-  EXPECT_TRUE(run_1["retest_of"].is_null());
-  EXPECT_EQ(run_2["retest_of"], run_1["id"]);
-  EXPECT_EQ(history["constants"][0]["run"], run_1["id"]);
-  EXPECT_EQ(history["constants"][0]["id"], first.json()["stored_id"]);
-  ASSERT_EQ(history["writes"].size(), 1U);
-  EXPECT_EQ(history["writes"][0]["run"], run_2["id"]);
-  EXPECT_EQ(history["writes"][0]["as_left"], history["writes"][0]["read_back"]);
-  const auto of_jig = run({"store", "jig", "J-17", "--store", path("a.db"), "--json"}).json();
-  EXPECT_EQ(of_jig["units"][0]["runs"], 2);
-  const auto yield = run({"store", "yield", "--store", path("a.db"), "--json"}).json();
-  EXPECT_EQ(yield["retests"], 1);
-  EXPECT_EQ(yield["units"], 1);
+TEST_F(StoreTest, TheDefaultStoreIsThatOfTheEnvironment) {
+  ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
+  ::setenv("SIXPOINT_STORE", path("chosen.db").c_str(), 1);
+  EXPECT_EQ(cli::default_store(), path("chosen.db"));
+  ::unsetenv("SIXPOINT_STORE");
+  EXPECT_EQ(cli::default_store(), path("data/sixpoint/store.db"));
+  EXPECT_EQ(run({"units"}).exit_code, 66) << "reading makes no store";
+  EXPECT_FALSE(std::filesystem::exists(path("data")));
+  ::unsetenv("XDG_DATA_HOME");
 }
 
 // Runs the jig on a store that refuses; what was measured must be in the journal, and in the store
 // once that is as it should be.
-class RefusingStore : public StoreCommandTest {
+class RefusingStore : public StoreTest {
  protected:
   RefusingStore() { ::setenv("XDG_DATA_HOME", (folder_ / "data").c_str(), 1); }
   ~RefusingStore() override { ::unsetenv("XDG_DATA_HOME"); }
   tests::Answer jig(const std::string& store) {
-    return run({"jig", "--device", kDevice, "--jig", "virtual", "--store", store, "--json"});
+    return run(
+        {"jig", "--device", tests::kUnitInJig, "--jig", "virtual", "--store", store, "--json"});
   }
   void expect_in_journal(const std::string& store, const tests::Answer& answer) {
     const auto json = answer.json();
@@ -350,7 +108,7 @@ TEST_F(RefusingStore, ADamagedEntryOfTheJournalLosesNoLaterRun) {
   EXPECT_THAT(doctor.out, HasSubstr("entries wait in"));
 }
 
-// The store is there when the files are mended, and gone or damaged when it should be told.
+// The store can be read when the files are repaired, and refuses the records afterwards.
 TEST_F(RefusingStore, ARepairThatTheStoreDoesNotTakeIsJournalledAndResumedOnce) {
   const std::string store = path("a.db");
   EXPECT_EQ(jig(store).exit_code, 0);
@@ -366,12 +124,12 @@ TEST_F(RefusingStore, ARepairThatTheStoreDoesNotTakeIsJournalledAndResumedOnce) 
               0);
   }
   const auto repair = [&](std::vector<std::string> more) {
-    std::vector<std::string> words = {"repair",  path("archive"), "-o",    path("mended"),
+    std::vector<std::string> words = {"repair",  path("archive"), "-o",    path("repaired"),
                                       "--store", store,           "--json"};
     words.insert(words.end(), more.begin(), more.end());
     return run(words);
   };
-  // Somebody else's statement in front of it: the store refuses every repair.
+  // A trigger of another program: the store refuses every repair.
   statements("a.db",
              "CREATE TRIGGER full BEFORE INSERT ON repairs BEGIN SELECT RAISE(ABORT, 'no'); END");
   const auto refused = repair({});
@@ -383,7 +141,7 @@ TEST_F(RefusingStore, ARepairThatTheStoreDoesNotTakeIsJournalledAndResumedOnce) 
   statements("a.db", "DROP TRIGGER full");
   EXPECT_EQ(run({"store", "catch-up", "--store", store}).exit_code, 0);
   EXPECT_EQ(journal.pending().value(), 0U);
-  // Again: what the store knows is not told twice.
+  // Again: a repair is stored once.
   const auto again = repair({"--resume"});
   EXPECT_EQ(again.exit_code, 0) << again.people;
   EXPECT_EQ(again.json()["summary"]["repaired"], 2);
@@ -397,7 +155,7 @@ TEST_F(RefusingStore, ARepairThatTheStoreDoesNotTakeIsJournalledAndResumedOnce) 
 TEST_F(RefusingStore, CaptureAndSolveKeepTheirConstantsInTheJournal) {
   const std::string away = "postgresql://station@127.0.0.1:1/plant";
   auto journal = db::Journal::open(posix_env().files, cli::journal_folder(away)).value();
-  const auto capture = run({"capture", "--device", kDevice, "--jig", "virtual", "-o",
+  const auto capture = run({"capture", "--device", tests::kUnitInJig, "--jig", "virtual", "-o",
                             path("c.gt3x"), "--store", away, "--json"});
   EXPECT_EQ(capture.exit_code, 0) << capture.people;
   EXPECT_EQ(capture.json()["kept"]["in"], "journal");
@@ -483,7 +241,7 @@ TEST_F(RefusingStore, AReadOnlyDiskLosesNoRun) {
   expect_in_journal(mount + "/a.db", answer);
 }
 
-TEST_F(StoreCommandTest, AJigRunIsKeptInTheJournalWhileTheServerIsAway) {
+TEST_F(StoreTest, AJigRunIsKeptInTheJournalWhileTheServerIsAway) {
   ::setenv("XDG_DATA_HOME", folder_.path().c_str(), 1);
   const std::string away = "postgresql://station:s3cret@127.0.0.1:1/plant";
   const auto answer =

@@ -8,12 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
-#include "device/hid_jig.h"
-#include "device/protocol.h"
-#include "gap/diagnosis.h"
-#include "mocks/usbip_client.h"
+#include "device/jigs/hid_jig.h"
+#include "device/wire/protocol.h"
+#include "gap/judge/diagnosis.h"
+#include "mocks/usb/usbip_client.h"
 #include "run_command.h"
-#include "sim/effect.h"
+#include "sim/effects/effect.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::cli {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "place.h"
@@ -155,8 +156,7 @@ TEST_F(JournalTest, KeepsTheOrderWhenAnEntryIsDamagedOrRefused) {
   ASSERT_OK(memory_.files.remove("journal/" + names->front()));
   auto damaged = memory_.files.create("journal/" + names->front());
   const std::string text = R"({"schema":"sixpoint/journal-entry/1","record":"{}","sha256":"00"})";
-  ASSERT_OK((*damaged)->write_at(
-      0, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  ASSERT_OK((*damaged)->write_at(0, as_bytes(text)));
   const auto refused = journal.catch_up(store);
   EXPECT_FAILS(refused, ErrorCode::bad_data);
   EXPECT_THAT(refused.error().brief(), testing::HasSubstr(names->front()));
@@ -166,21 +166,122 @@ TEST_F(JournalTest, KeepsTheOrderWhenAnEntryIsDamagedOrRefused) {
   EXPECT_EQ(*rest, 1U);
 }
 
+class OldJournalTest : public JournalTest {
+ protected:
+  // A file as the program wrote it before version 2 of the journal.
+  void write_entry(int number, const nlohmann::ordered_json& record) {
+    const std::string text = record.dump();
+    const nlohmann::ordered_json line = {
+        {"schema", "sixpoint/journal-entry/1"}, {"sha256", text_sha256(text)}, {"record", text}};
+    ASSERT_OK(write_file(memory_.files, "journal/000000000" + std::to_string(number) + "-x.json",
+                         line.dump() + "\n"));
+  }
+};
+
+TEST_F(OldJournalTest, EveryKindOfEntryIsRead) {
+  Journal journal = open_journal();
+  RunRecord measured = run(1);
+  measured.model = "w";
+  measured.gravity_m_per_s2 = 9.0;
+  Store direct = open_store("direct");
+  const std::string id = direct.add_run(measured, {{"raw", Bytes{1, 255}}}).value();
+  ASSERT_OK(direct.add_unit_write({id, "MOS2A1", from_unix_seconds(5), "null", "{}", "{}"}));
+  const std::string constants_id = direct.add_constants(constants(2, id), "w").value();
+  RepairRecord repair;
+  repair.serial = "MOS2A1";
+  repair.made_at = from_unix_seconds(7);
+  repair.input = "/a/b.gt3x";
+  repair.input_sha256 = "11";
+  repair.output_sha256 = "22";
+  repair.method = "store";
+  repair.constants_id = constants_id;
+  repair.document = "{}";
+  ASSERT_OK(direct.add_repair(repair));
+
+  write_entry(1, {{"kind", "run"},
+                  {"serial", "MOS2A1"},
+                  {"model", "w"},
+                  {"run_kind", "jig"},
+                  {"filter", "current"},
+                  {"started_ns", 1'000'000'000},
+                  {"ended_ns", 0},
+                  {"operator", "Zo\xc3\xab"},
+                  {"station", ""},
+                  {"jig", ""},
+                  {"verdict", ""},
+                  {"software", ""},
+                  {"retest_of", ""},
+                  {"document", "{}"},
+                  {"jig_due_ns", 99'000'000'000},
+                  {"build", ""},
+                  {"limits", ""},
+                  {"gravity_m_per_s2", 9.0},
+                  {"temperature_c", 21.3},
+                  {"codes", {"tilted"}},
+                  {"captures", {{{"name", "raw"}, {"bytes", "01ff"}}}}});
+  write_entry(2, {{"kind", "unit_write"},
+                  {"run_id", id},
+                  {"serial", "MOS2A1"},
+                  {"written_ns", 5'000'000'000},
+                  {"as_found", "null"},
+                  {"as_left", "{}"},
+                  {"read_back", "{}"}});
+  write_entry(3, {{"kind", "constants"},
+                  {"model", "w"},
+                  {"serial", "MOS2A1"},
+                  {"filter", "current"},
+                  {"made_at_ns", 2'000'000'000},
+                  {"method", ""},
+                  {"run_id", id},
+                  {"document", R"({"made_from":{"n":1}})"}});
+  write_entry(4, {{"kind", "repair"},
+                  {"serial", "MOS2A1"},
+                  {"made_at_ns", 7'000'000'000},
+                  {"input", "/a/b.gt3x"},
+                  {"input_sha256", "11"},
+                  {"output_sha256", "22"},
+                  {"method", "store"},
+                  {"constants_id", constants_id},
+                  {"document", "{}"},
+                  {"software", ""}});
+  Store store = open_store("late");
+  const auto taken = journal.catch_up(store);
+  ASSERT_OK(taken);
+  EXPECT_EQ(*taken, 4U);
+  EXPECT_EQ(store.audit()->head, direct.audit()->head) << "the same rows, to the bit";
+}
+
+TEST_F(OldJournalTest, AnEntryThatLacksAKeyOrIsOfNoKnownKindIsRefused) {
+  Journal journal = open_journal();
+  Store store = open_store("main");
+  const nlohmann::ordered_json bad[] = {
+      {{"kind", "run"}, {"serial", "MOS2A1"}},
+      {{"kind", "correction"}},
+      {{"kind", 3}},
+      {{"id", "x"}, {"rows", {{{"table", "none"}, {"row", nullptr}}}}, {"attachments", nullptr}},
+      {{"id", "x"},
+       {"rows",
+        {{{"table", "units"}, {"row", {{"serial", ""}, {"model", "w"}, {"first_seen_ns", 1}}}}}},
+       {"attachments", nullptr}}};
+  for (const auto& record : bad) {
+    write_entry(1, record);
+    EXPECT_FAILS(journal.catch_up(store), ErrorCode::bad_data);
+    EXPECT_EQ(journal.pending().value(), 1U);
+    ASSERT_OK(memory_.files.remove("journal/0000000001-x.json"));
+  }
+  EXPECT_EQ(store.audit()->rows, 0);
+}
+
 // Found by the fuzzer: a time that fits no 64 bits, under a checksum that holds.
 TEST_F(JournalTest, ATimeBeyondAllTimesIsRefused) {
   Journal journal = open_journal();
   const std::string record =
       R"({"kind":"constants","model":"w","serial":"MOS2A1","filter":"current","made_at_ns":1e80,)"
       R"("method":"ls","run_id":"","document":"{}"})";
-  const std::string line = nlohmann::json{
-      {"record", record},
-      {"sha256",
-       to_hex(sha256(std::span(
-           reinterpret_cast<const std::uint8_t*>(record.data()),
-           record.size())))}}.dump();
+  const std::string line =
+      nlohmann::json{{"record", record}, {"sha256", text_sha256(record)}}.dump();
   auto file = memory_.files.create("journal/0000000001-x.json");
-  ASSERT_OK((*file)->write_at(
-      0, std::span(reinterpret_cast<const std::uint8_t*>(line.data()), line.size())));
+  ASSERT_OK((*file)->write_at(0, as_bytes(line)));
   Store store = open_store("main");
   EXPECT_FAILS(journal.catch_up(store), ErrorCode::bad_data);
   EXPECT_EQ(store.audit()->rows, 0);

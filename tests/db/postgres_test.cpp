@@ -12,12 +12,12 @@
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "db/exchange.h"
-#include "db/keeping.h"
+#include "db/save.h"
 #include "db/schema.h"
 #include "db/store.h"
 #include "expect_result.h"
-#include "place.h"
 #include "postgres_server.h"
+#include "store_fixture.h"
 
 namespace sixpoint::db {
 namespace {
@@ -26,21 +26,9 @@ using testing::HasSubstr;
 using testing::Not;
 using tests::server;
 
-ConstantsRecord constants(int number) {
-  ConstantsRecord record;
-  record.made_at = from_unix_seconds(number);
-  record.serial = "MOS2A1";
-  record.filter = "current";
-  record.document = "{}";
-  return record;
-}
+ConstantsRecord constants(int number) { return db::constants("MOS2A1", "current", number); }
 
-class PostgresStoreTest : public testing::Test {
- protected:
-  std::string location() { return place_->location("main"); }
-  std::unique_ptr<tests::Place> place_ = tests::make_place();
-  MemoryEnv memory_;
-};
+class PostgresStoreTest : public StoreTest {};
 
 TEST_F(PostgresStoreTest, SaysWhatIsWrongAndNeverThePassword) {
   const auto refused = [&](const std::string& where, ErrorCode code) {
@@ -189,11 +177,11 @@ TEST_F(PostgresStoreTest, AFullDiskLosesNothingThatWasAcknowledged) {
 TEST_F(PostgresStoreTest, AWrongPasswordOrAServerThatIsAwayLosesNoRun) {
   auto direct = Store::open(memory_.env, location());
   ASSERT_OK(direct);
-  const KeepingPlaces places{"journal", {}};
+  const SavePlaces places{"journal", {}};
   int number = 0;
   const auto keep_one = [&](Result<Store> store) {
-    return keep(memory_.files, store, places, [&](Keeper& keeper) -> Status {
-      SIXPOINT_CHECK(keeper.add_constants(constants(++number), "w"));
+    return save(memory_.files, store, places, [&](RecordWriter& writer) -> Status {
+      SIXPOINT_CHECK(writer.add_constants(constants(++number), "w"));
       return {};
     });
   };

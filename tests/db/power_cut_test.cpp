@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
-#include "db/keeping.h"
+#include "db/save.h"
 #include "expect_result.h"
 #include "power_cut_disk.h"
 #include "temporary_folder.h"
@@ -17,16 +17,18 @@ namespace {
 
 using tests::PowerCutDisk;
 
+void write(const PowerCutDisk::Image& image, const sixpoint::tests::TemporaryFolder& folder) {
+  for (const auto& [name, bytes] : image) {
+    std::ofstream(folder / name, std::ios::binary) << as_text(bytes);
+  }
+}
+
 class PowerCutTest : public testing::Test {
  protected:
   // Opens the image with SQLite's own file system and looks for every acknowledged row.
   void check(const PowerCutDisk::Image& image) {
     const sixpoint::tests::TemporaryFolder folder;
-    for (const auto& [name, bytes] : image) {
-      std::ofstream(folder / name, std::ios::binary)
-          .write(reinterpret_cast<const char*>(bytes.data()),
-                 static_cast<std::streamsize>(bytes.size()));
-    }
+    write(image, folder);
     auto store = Store::open(memory_.env, folder / "store.db");
     ASSERT_OK(store);
     const auto history = store->unit_history("MOS2A1");
@@ -135,11 +137,7 @@ TEST_F(PowerCutTest, AStoreThatDoesNotSyncWouldBeFoundOut) {
   const auto image = disk.image(PowerCutDisk::Unsynced::dropped, random);
   ASSERT_TRUE(image.contains("store.db"));
   const sixpoint::tests::TemporaryFolder after;
-  for (const auto& [name, bytes] : image) {
-    std::ofstream(after / name, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-  }
+  write(image, after);
   auto lost = Store::open(memory_.env, after / "store.db");
   ASSERT_OK(lost);
   EXPECT_EQ(

@@ -1,4 +1,4 @@
-#include "db/keeping.h"
+#include "db/save.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,6 +6,7 @@
 #include "base/memory_env.h"
 #include "db/journal.h"
 #include "expect_result.h"
+#include "forwarding_files.h"
 #include "place.h"
 
 namespace sixpoint::db {
@@ -13,7 +14,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class KeepingTest : public testing::Test {
+class SaveTest : public testing::Test {
  protected:
   Result<Store> open(const std::string& name) {
     return Store::open(memory_.env, place_->location(name));
@@ -21,29 +22,29 @@ class KeepingTest : public testing::Test {
   static Result<Store> refused(ErrorCode code) { return fail(code, "no", "there", "try"); }
 
   // A run, what it wrote into the unit, and its constants.
-  static std::function<Status(Keeper&)> work(int number) {
-    return [number](Keeper& keeper) -> Status {
+  static std::function<Status(RecordWriter&)> work(int number) {
+    return [number](RecordWriter& writer) -> Status {
       RunRecord run;
       run.serial = "MOS2A1";
       run.kind = "jig";
       run.filter = "current";
       run.started = from_unix_seconds(number);
       run.document = "{}";
-      SIXPOINT_ASSIGN(const std::string id, keeper.add_run(run, {{"raw", Bytes{1, 2}}}));
+      SIXPOINT_ASSIGN(const std::string id, writer.add_run(run, {{"raw", Bytes{1, 2}}}));
       SIXPOINT_CHECK(
-          keeper.add_unit_write({id, "MOS2A1", from_unix_seconds(number), "null", "{}", "{}"}));
+          writer.add_unit_write({id, "MOS2A1", from_unix_seconds(number), "null", "{}", "{}"}));
       ConstantsRecord constants;
       constants.serial = "MOS2A1";
       constants.filter = "current";
       constants.made_at = from_unix_seconds(number);
       constants.run_id = id;
       constants.document = "{}";
-      SIXPOINT_CHECK(keeper.add_constants(constants, "w"));
+      SIXPOINT_CHECK(writer.add_constants(constants, "w"));
       return {};
     };
   }
-  Result<Kept> keep_on(Result<Store>& store, int number) {
-    return keep(memory_.files, store, places_, work(number));
+  Result<Saved> keep_on(Result<Store>& store, int number) {
+    return save(memory_.files, store, places_, work(number));
   }
   std::size_t pending(const std::string& folder) {
     return Journal::open(memory_.files, folder).value().pending().value();
@@ -51,10 +52,10 @@ class KeepingTest : public testing::Test {
 
   std::unique_ptr<tests::Place> place_ = tests::make_place();
   MemoryEnv memory_;
-  KeepingPlaces places_{"journal", {"last", "very-last"}};
+  SavePlaces places_{"journal", {"last", "very-last"}};
 };
 
-TEST_F(KeepingTest, AStoreThatTakesItNeedsNoJournal) {
+TEST_F(SaveTest, AStoreThatTakesItNeedsNoJournal) {
   auto store = open("main");
   const auto kept = keep_on(store, 1);
   ASSERT_OK(kept);
@@ -64,7 +65,7 @@ TEST_F(KeepingTest, AStoreThatTakesItNeedsNoJournal) {
   EXPECT_EQ(store->history("MOS2A1")->size(), 1U);
 }
 
-TEST_F(KeepingTest, WhateverTheStoreAnswersNothingIsLostAndTheOrderIsKept) {
+TEST_F(SaveTest, WhateverTheStoreAnswersNothingIsLostAndTheOrderIsKept) {
   auto direct = open("direct");
   int number = 0;
   for (const ErrorCode code :
@@ -92,18 +93,18 @@ TEST_F(KeepingTest, WhateverTheStoreAnswersNothingIsLostAndTheOrderIsKept) {
       << "as if the store had taken every run at once";
 }
 
-TEST_F(KeepingTest, AStoreThatGivesUpHalfWayIsGivenTheRestOnce) {
+TEST_F(SaveTest, AStoreThatGivesUpHalfWayIsGivenTheRestOnce) {
   auto store = open("main");
   auto direct = open("direct");
   ASSERT_OK(work(1)(*direct));
   bool gone = true;
-  const auto kept = keep(memory_.files, store, places_, [&](Keeper& keeper) -> Status {
+  const auto kept = save(memory_.files, store, places_, [&](RecordWriter& writer) -> Status {
     if (std::exchange(gone, false)) {
       // The store took everything, and its last answer was lost.
-      SIXPOINT_CHECK(work(1)(keeper));
+      SIXPOINT_CHECK(work(1)(writer));
       return fail(ErrorCode::device_unavailable, "the server went away", "there", "wait");
     }
-    return work(1)(keeper);
+    return work(1)(writer);
   });
   ASSERT_OK(kept);
   EXPECT_EQ(kept->folder, "journal");
@@ -112,7 +113,7 @@ TEST_F(KeepingTest, AStoreThatGivesUpHalfWayIsGivenTheRestOnce) {
   EXPECT_EQ(store->audit()->head, direct->audit()->head) << "stored once";
 }
 
-TEST_F(KeepingTest, ADamagedEarlierEntryBlocksTheStoreButLosesNoRun) {
+TEST_F(SaveTest, ADamagedEarlierEntryBlocksTheStoreButLosesNoRun) {
   auto away = refused(ErrorCode::device_unavailable);
   ASSERT_OK(keep_on(away, 1));
   const std::string first = "journal/" + memory_.files.list("journal")->front();
@@ -137,38 +138,24 @@ TEST_F(KeepingTest, ADamagedEarlierEntryBlocksTheStoreButLosesNoRun) {
 }
 
 // A disk on which one folder cannot be written.
-class OneBadFolder final : public FileSystem {
+class OneBadFolder final : public sixpoint::tests::ForwardingFiles {
  public:
-  OneBadFolder(FileSystem& files, std::string bad) : files_(files), bad_(std::move(bad)) {}
-  Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
-    return files_.open(path);
-  }
+  OneBadFolder(FileSystem& files, std::string bad) : ForwardingFiles(files), bad_(std::move(bad)) {}
   Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
     if (path.starts_with(bad_)) {
       return fail(ErrorCode::io, "no space left on the device", path, "free some space");
     }
-    return files_.create(path);
+    return ForwardingFiles::create(path);
   }
-  Result<FileInfo> info(const std::string& path) override { return files_.info(path); }
-  Result<std::vector<std::string>> list(const std::string& folder) override {
-    return files_.list(folder);
-  }
-  Status make_folders(const std::string& path) override { return files_.make_folders(path); }
-  Status rename(const std::string& from, const std::string& to) override {
-    return files_.rename(from, to);
-  }
-  Status remove(const std::string& path) override { return files_.remove(path); }
-  Status sync_folder(const std::string& path) override { return files_.sync_folder(path); }
 
  private:
-  FileSystem& files_;
   std::string bad_;
 };
 
-TEST_F(KeepingTest, WhereTheJournalsDiskFailsAnotherFolderTakesItAndIsNamed) {
+TEST_F(SaveTest, WhereTheJournalsDiskFailsAnotherFolderTakesItAndIsNamed) {
   OneBadFolder files(memory_.files, "journal");
   auto away = refused(ErrorCode::permission);
-  const auto kept = keep(files, away, places_, work(1));
+  const auto kept = save(files, away, places_, work(1));
   ASSERT_OK(kept);
   EXPECT_TRUE(kept->last_resort);
   EXPECT_EQ(kept->folder, "last");
@@ -178,7 +165,7 @@ TEST_F(KeepingTest, WhereTheJournalsDiskFailsAnotherFolderTakesItAndIsNamed) {
   EXPECT_EQ(journal->catch_up(*store).value(), 3U);
 }
 
-TEST_F(KeepingTest, WhereNoDiskTakesItBothReasonsAreSaid) {
+TEST_F(SaveTest, WhereNoDiskTakesItBothReasonsAreSaid) {
   auto away = refused(ErrorCode::permission);
   memory_.files.fail_after(0);
   const auto kept = keep_on(away, 1);
@@ -186,10 +173,10 @@ TEST_F(KeepingTest, WhereNoDiskTakesItBothReasonsAreSaid) {
   EXPECT_THAT(kept.error().brief(), HasSubstr("there: no"));
 }
 
-TEST_F(KeepingTest, ARecordThatNoStoreTakesIsRefusedAsSuch) {
+TEST_F(SaveTest, ARecordThatNoStoreTakesIsRefusedAsSuch) {
   auto store = open("main");
-  const auto kept = keep(memory_.files, store, places_, [](Keeper& keeper) -> Status {
-    SIXPOINT_CHECK(keeper.add_constants(ConstantsRecord{}, "w"));
+  const auto kept = save(memory_.files, store, places_, [](RecordWriter& writer) -> Status {
+    SIXPOINT_CHECK(writer.add_constants(ConstantsRecord{}, "w"));
     return {};
   });
   EXPECT_FAILS(kept, ErrorCode::bad_data);

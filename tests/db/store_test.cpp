@@ -1,45 +1,9 @@
 #include "db/store.h"
 
-#include <atomic>
-#include <cmath>
-#include <thread>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
-
-#include "base/memory_env.h"
-#include "expect_result.h"
-#include "place.h"
+#include "store_fixture.h"
 
 namespace sixpoint::db {
 namespace {
-
-ConstantsRecord constants(const std::string& serial, const std::string& filter, std::int64_t time_s,
-                          const std::string& document = "{}") {
-  ConstantsRecord record;
-  record.made_at = from_unix_seconds(time_s);
-  record.serial = serial;
-  record.filter = filter;
-  record.method = "jig";
-  record.document = document;
-  return record;
-}
-
-class StoreTest : public testing::Test {
- protected:
-  Store open() {
-    auto store = Store::open(memory_.env, location());
-    if (!store) {
-      throw std::runtime_error(store.error().brief());
-    }
-    return *std::move(store);
-  }
-  std::string location() const { return place_->location("main"); }
-
-  std::unique_ptr<tests::Place> place_ = tests::make_place();
-  MemoryEnv memory_;
-};
 
 TEST_F(StoreTest, KeepsConstantsPerSerialAndFilterWithTheirHistory) {
   std::string first;
@@ -95,10 +59,7 @@ TEST_F(StoreTest, ACorrectionIsANewRowWithAReason) {
   repair.constants_id = id;
   repair.document = "{}";
   ASSERT_OK(store.add_repair(repair));
-  RunRecord run;
-  run.serial = "MOS2A1";
-  run.filter = "current";
-  run.document = "{}";
+  RunRecord run = jig_run("MOS2A1");
   const auto run_id = store.add_run(run, {}).value();
 
   const auto word = [](const std::string& table, const std::string& row, const std::string& action,
@@ -147,34 +108,9 @@ TEST_F(StoreTest, ACorrectionIsANewRowWithAReason) {
   EXPECT_TRUE(store.audit()->ok);
 }
 
-TEST_F(StoreTest, AHeadThatWasWrittenDownFindsAHistoryThatWasWrittenAnew) {
-  std::string written_down;
-  {
-    Store store = open();
-    ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 100, "1"), "w"));
-    written_down = store.audit()->head;
-    ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 200, "2"), "w"));
-    EXPECT_TRUE(store.audit(written_down)->ok);
-    EXPECT_TRUE(store.audit(std::string(64, '0'))->ok) << "the head of an empty store";
-    EXPECT_FAILS(store.audit("no head"), ErrorCode::usage);
-  }
-  place_->erase("main");
-  Store forged = open();
-  ASSERT_OK(forged.add_constants(constants("MOS2A1", "current", 100, "1.1"), "w"));
-  ASSERT_OK(forged.add_constants(constants("MOS2A1", "current", 200, "2"), "w"));
-  EXPECT_TRUE(forged.audit()->ok) << "the chain alone cannot know";
-  const auto audit = forged.audit(written_down);
-  ASSERT_OK(audit);
-  EXPECT_FALSE(audit->ok);
-}
-
 TEST_F(StoreTest, RunsKeepTheirCaptures) {
   Store store = open();
-  RunRecord run;
-  run.serial = "MOS2A1";
-  run.kind = "jig";
-  run.filter = "current";
-  run.document = "{}";
+  RunRecord run = jig_run("MOS2A1");
   const auto id = store.add_run(run, {{"raw", Bytes{1, 2, 3}}, {"again", Bytes{1, 2, 3}}});
   ASSERT_OK(id);
   auto with_run = constants("MOS2A1", "current", 5);
@@ -185,44 +121,6 @@ TEST_F(StoreTest, RunsKeepTheirCaptures) {
   ASSERT_OK(audit);
   EXPECT_TRUE(audit->ok) << audit->brief();
   EXPECT_EQ(audit->rows, 6) << "unit, filter, run, two captures, constants";
-}
-
-TEST_F(StoreTest, AuditFindsWhatWasTouched) {
-  const auto fill = [&] {
-    Store store = open();
-    for (int i = 0; i < 5; ++i) {
-      ASSERT_OK(store.add_constants(constants("MOS2A1", "current", i), "w"));
-    }
-    RunRecord run;
-    run.serial = "MOS2A1";
-    run.kind = "jig";
-    run.filter = "current";
-    run.document = "{}";
-    ASSERT_OK(store.add_run(run, {{"raw", Bytes{1, 2, 3}}}));
-    const auto audit = store.audit();
-    EXPECT_TRUE(audit->ok);
-    EXPECT_EQ(audit->head.size(), 64U);
-  };
-  for (const std::string& change : std::vector<std::string>{
-           "UPDATE constants SET document = '{\"a\":1}' WHERE seq = 3",
-           "UPDATE constants SET made_at_ns = 7 WHERE seq = 4",
-           "DELETE FROM constants WHERE seq = 3", "DELETE FROM constants WHERE seq = 7",
-           "UPDATE constants SET seq = 100 WHERE seq = 3; UPDATE constants SET seq = 3 WHERE seq = "
-           "4; "
-           "UPDATE constants SET seq = 4 WHERE seq = 100",
-           "UPDATE units SET serial = 'X' WHERE seq = 1",
-           "UPDATE attachments SET bytes = " + place_->empty_bytes(), "DELETE FROM attachments",
-           "UPDATE head SET rows = 3", "UPDATE constants SET filter = 'legacy' WHERE seq = 3",
-           "UPDATE runs SET temperature_c = '21' WHERE serial = 'MOS2A1'",
-           "UPDATE constants SET origin = '{}' WHERE seq = 4"}) {
-    place_->erase("main");
-    fill();
-    place_->tamper("main", change);
-    const auto audit = open().audit();
-    ASSERT_OK(audit);
-    EXPECT_FALSE(audit->ok) << change;
-    EXPECT_FALSE(audit->findings.empty());
-  }
 }
 
 TEST_F(StoreTest, TheDatabaseItselfRefusesToChangeHistory) {
@@ -257,9 +155,7 @@ TEST_F(StoreTest, RefusesWhatItCannotKeep) {
 TEST_F(StoreTest, KeepsOddTextsAsTheyAre) {
   Store store = open();
   const std::string odd = "Zo\u00eb '; -- \\x41 $1 \U0001F600 \"\n\t";
-  RunRecord run;
-  run.serial = "MOS2A1";
-  run.filter = "current";
+  RunRecord run = jig_run("MOS2A1");
   run.operator_name = odd;
   run.document = R"({"text":"\u0000\\"})";
   ASSERT_OK(store.add_run(run, {{odd, Bytes{0, 1, 255, '\\', '\''}}}));
@@ -285,10 +181,7 @@ TEST_F(StoreTest, KeepsOddTextsAsTheyAre) {
 
 TEST_F(StoreTest, KeepsWhatARunWasJudgedBy) {
   Store store = open();
-  RunRecord run;
-  run.serial = "MOS2A1";
-  run.filter = "current";
-  run.document = "{}";
+  RunRecord run = jig_run("MOS2A1");
   const auto plain = store.add_run(run, {});
   run.jig_due = from_unix_seconds(1'500'000'000);
   run.build = "e21f353";
@@ -326,101 +219,6 @@ TEST_F(StoreTest, KeepsWhatARunWasJudgedBy) {
   const auto history = store.history("MOS2A1");
   EXPECT_EQ(history->front().standard_uncertainty, R"({"zero_mg":[1,1,1]})");
   EXPECT_EQ(history->front().origin, R"({"sha256":"ab"})");
-}
-
-TEST_F(StoreTest, AnswersWhatPeopleAsk) {
-  Store store = open();
-  const auto run = [&](const std::string& serial, const std::string& verdict, std::int64_t time_s,
-                       const std::string& jig = "J1") {
-    RunRecord record;
-    record.serial = serial;
-    record.kind = "jig";
-    record.filter = "current";
-    record.jig = jig;
-    record.verdict = verdict;
-    record.started = from_unix_seconds(time_s);
-    record.ended = from_unix_seconds(time_s + 60);
-    record.document = "{}";
-    return store.add_run(record, {}).value();
-  };
-  // A passes at once, B at its second run, C never; D is of another time and jig.
-  const auto first = run("A", "pass", 1000);
-  run("B", "fail", 1100);
-  run("C", "fail", 1200);
-  run("B", "pass", 1300);
-  run("D", "pass", 9000, "J2");
-  const auto yield = store.yield(from_unix_seconds(0), from_unix_seconds(5000));
-  ASSERT_OK(yield);
-  EXPECT_EQ(yield->runs, 4U);
-  EXPECT_EQ(yield->units, 3U);
-  EXPECT_DOUBLE_EQ(yield->yield(), 2.0 / 3);
-  EXPECT_DOUBLE_EQ(yield->first_pass_yield(), 1.0 / 3);
-  EXPECT_TRUE(std::isnan(store.yield(from_unix_seconds(0), from_unix_seconds(1))->yield()));
-
-  const auto of_jig = store.units_of_jig("J1");
-  ASSERT_EQ(of_jig->size(), 3U);
-  EXPECT_EQ((*of_jig)[1].serial, "B");
-  EXPECT_EQ((*of_jig)[1].runs, 2U);
-  EXPECT_EQ((*of_jig)[1].last_verdict, "pass");
-  EXPECT_EQ((*of_jig)[1].last_run, from_unix_seconds(1360));
-
-  auto of_a = constants("A", "current", 1060);
-  of_a.run_id = first;
-  const auto old_set = store.add_constants(of_a, "w").value();
-  const auto new_set = store.add_constants(constants("A", "current", 4000), "w").value();
-  ASSERT_OK(store.add_constants(constants("B", "current", 1360), "w"));
-  RepairRecord repair;
-  repair.document = "{}";
-  repair.serial = "A";
-  for (const auto& [input, id] :
-       {std::pair("one", old_set), {"two", new_set}, {"three", old_set}}) {
-    repair.input = input;
-    repair.constants_id = id;
-    ASSERT_OK(store.add_repair(repair));
-  }
-  EXPECT_TRUE(store.recall_list()->empty());
-  ASSERT_OK(store.withdraw_constants(old_set, "Ada", "jig out of level"));
-  ASSERT_OK(store.withdraw_constants(old_set, "Bob", "again"));
-  const auto recall = store.recall_list();
-  ASSERT_EQ(recall->size(), 2U);
-  EXPECT_EQ((*recall)[0].repair.input, "one");
-  EXPECT_EQ((*recall)[1].repair.input, "three");
-  EXPECT_EQ((*recall)[1].reason, "jig out of level");
-  EXPECT_EQ(store.recall_list(old_set)->size(), 2U);
-  EXPECT_TRUE(store.recall_list(new_set)->empty());
-
-  const auto trend = store.trend("A");
-  ASSERT_EQ(trend->size(), 2U);
-  EXPECT_EQ((*trend)[0].jig, "J1");
-  EXPECT_TRUE((*trend)[0].withdrawn);
-  EXPECT_EQ((*trend)[1].jig, "");
-  EXPECT_FALSE((*trend)[1].withdrawn);
-
-  // C and D have no constants, B's are old, A's new ones are not.
-  const auto due = store.units_due(from_unix_seconds(2000));
-  ASSERT_EQ(due->size(), 3U);
-  EXPECT_EQ((*due)[0].serial, "C");
-  EXPECT_FALSE((*due)[0].last_constants.has_value());
-  EXPECT_EQ((*due)[1].serial, "D");
-  EXPECT_EQ((*due)[2].serial, "B");
-}
-
-TEST_F(StoreTest, AnAuditSeesOneMomentWhileOthersWrite) {
-  Store store = open();
-  std::atomic<bool> stop = false;
-  std::thread writer([&] {
-    MemoryEnv env;
-    auto other = Store::open(env.env, place_->location("main"));
-    for (int i = 0; !stop; ++i) {
-      static_cast<void>(other->add_constants(constants("MOS", "current", i), "w"));
-    }
-  });
-  for (int i = 0; i < 20; ++i) {
-    const auto audit = store.audit();
-    EXPECT_TRUE(audit && audit->ok) << (audit ? audit->brief() : audit.error().brief());
-  }
-  stop = true;
-  writer.join();
 }
 
 TEST_F(StoreTest, ManyWritersLoseNothing) {

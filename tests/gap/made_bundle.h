@@ -7,7 +7,7 @@
 #include <functional>
 #include <random>
 
-#include "gap/bundle.h"
+#include "gap/recording/bundle.h"
 
 namespace sixpoint::tests {
 

@@ -38,10 +38,7 @@ Result<std::string> csv_of(Recording& recording, const RawCsvOptions& options = 
 Result<std::string> csv_of(const Bytes& log, const std::string& info,
                            const RawCsvOptions& options = {}, RawCsvTally* tally = nullptr) {
   MemoryEnv memory;
-  SIXPOINT_ASSIGN(auto out, RecordingWriter::create(memory.files, "f"));
-  SIXPOINT_CHECK(out.add("log.bin", log));
-  SIXPOINT_CHECK(out.add("info.txt", std::string_view(info)));
-  SIXPOINT_CHECK(out.commit());
+  SIXPOINT_CHECK(tests::put_recording(memory.files, "f", log, info));
   SIXPOINT_ASSIGN(auto recording, Recording::open(memory.files, "f"));
   return csv_of(recording, options, tally);
 }

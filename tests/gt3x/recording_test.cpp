@@ -7,6 +7,7 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "forwarding_files.h"
 #include "gt3x/recording_writer.h"
 #include "gt3x_made_log.h"
 #include "shared_data.h"
@@ -183,25 +184,15 @@ class FailingFile final : public ReadableFile {
   std::uint64_t limit_;
 };
 
-class FailingFiles final : public FileSystem {
+class FailingFiles final : public sixpoint::tests::ForwardingFiles {
  public:
-  FailingFiles(FileSystem& inner, std::uint64_t limit) : inner_(inner), limit_(limit) {}
+  FailingFiles(FileSystem& inner, std::uint64_t limit) : ForwardingFiles(inner), limit_(limit) {}
   Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
-    SIXPOINT_ASSIGN(auto file, inner_.open(path));
+    SIXPOINT_ASSIGN(auto file, ForwardingFiles::open(path));
     return std::make_unique<FailingFile>(std::move(file), limit_);
   }
-  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
-    return inner_.create(path);
-  }
-  Result<FileInfo> info(const std::string& path) override { return inner_.info(path); }
-  Result<std::vector<std::string>> list(const std::string& f) override { return inner_.list(f); }
-  Status make_folders(const std::string& path) override { return inner_.make_folders(path); }
-  Status rename(const std::string& a, const std::string& b) override { return inner_.rename(a, b); }
-  Status remove(const std::string& path) override { return inner_.remove(path); }
-  Status sync_folder(const std::string& path) override { return inner_.sync_folder(path); }
 
  private:
-  FileSystem& inner_;
   std::uint64_t limit_;
 };
 

@@ -5,15 +5,13 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "gt3x_made_log.h"
 
 namespace sixpoint::gt3x {
 namespace {
 
 Status write_pair(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(auto out, RecordingWriter::create(files, path));
-  SIXPOINT_CHECK(out.add("log.bin", Bytes(1000, 0x55)));
-  SIXPOINT_CHECK(out.add("info.txt", std::string_view("Serial Number: X\r\n")));
-  return out.commit();
+  return tests::put_recording(files, path, Bytes(1000, 0x55), "Serial Number: X\r\n");
 }
 
 TEST(RecordingWriter, SameEntriesSameBytes) {

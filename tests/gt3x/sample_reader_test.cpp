@@ -58,10 +58,7 @@ Result<Run> run(Recording& recording) {
 
 Result<Run> run(const Bytes& log, const std::string& info = made_info()) {
   MemoryEnv memory;
-  SIXPOINT_ASSIGN(auto out, RecordingWriter::create(memory.files, "f"));
-  SIXPOINT_CHECK(out.add("log.bin", log));
-  SIXPOINT_CHECK(out.add("info.txt", std::string_view(info)));
-  SIXPOINT_CHECK(out.commit());
+  SIXPOINT_CHECK(tests::put_recording(memory.files, "f", log, info));
   SIXPOINT_ASSIGN(auto recording, Recording::open(memory.files, "f"));
   return run(recording);
 }

@@ -103,7 +103,7 @@ async function launch() {
   }
 }
 
-// A page of somebody else, on another port of this machine.
+// Another page, on another port of this machine.
 export async function serve(page) {
   const server = createHttpServer((request, response) => response.setHeader('Content-Type', 'text/html').end(page(request)));
   await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));

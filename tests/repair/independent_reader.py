@@ -4,7 +4,7 @@ description of log.bin, read as the common readers do it: entries by name, recor
 
     independent_reader.py SIXPOINT SCENARIO FOLDER
 
-Makes a recording, mends it, and checks the mended file against the original.
+Makes a recording, repairs it, and checks the repaired file against the original.
 """
 import json
 import math
@@ -70,12 +70,12 @@ def still_error_mg(recording, scale):
 
 def main():
     program, scenario, folder = sys.argv[1:]
-    original, mended = f"{folder}/original.gt3x", f"{folder}/mended/original.gt3x"
+    original, repaired = f"{folder}/original.gt3x", f"{folder}/repaired/original.gt3x"
     subprocess.run([program, "simulate", "--scenario", scenario, "-o", original], check=True)
-    subprocess.run([program, "repair", original, "-o", f"{folder}/mended", "--scan"], check=True)
+    subprocess.run([program, "repair", original, "-o", f"{folder}/repaired", "--scan"], check=True)
 
     before, info_before, log_before = read(original)
-    after, info_after, log_after = read(mended)
+    after, info_after, log_after = read(repaired)
     assert info_before == info_after
     assert set(after) - set(before) == {"sixpoint-repair.json"}
     assert json.loads(after["sixpoint-repair.json"])["schema"] == "sixpoint/repair-mark/1"

@@ -10,12 +10,12 @@
 
 #include "base/constants.h"
 #include "base/env.h"
-#include "gt3x/info.h"
-#include "gt3x/parameters.h"
-#include "gt3x/record.h"
+#include "gt3x/forms/info.h"
+#include "gt3x/forms/parameters.h"
+#include "gt3x/log/record.h"
+#include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
-#include "gt3x/samples.h"
 
 namespace sixpoint::tests {
 

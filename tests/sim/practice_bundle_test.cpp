@@ -214,6 +214,19 @@ const ProtocolSegment& segment_of(const Scenario& scenario, std::string_view nam
   return scenario.protocol->segments.front();
 }
 
+struct Simulated {
+  Practice practice;
+  Scenario scenario;
+  std::vector<gt3x::Counts> counts;
+};
+Simulated simulated_practice(const std::string& name) {
+  Practice practice = read_practice(name);
+  Scenario scenario = practice.scenario(true);
+  auto counts = run_protocol(*scenario.protocol);
+  EXPECT_OK(counts);
+  return {std::move(practice), std::move(scenario), *std::move(counts)};
+}
+
 #define SIXPOINT_NEED_PRACTICE() SIXPOINT_NEED_SHARED("gap/practice/labels.json")
 
 // With the label's parameters on, the model meets the means of every dwell at rest: what is left is
@@ -246,10 +259,7 @@ TEST(PracticeBundles, LabelledEffectsExplainTheMeans) {
 // colour.
 TEST(PracticeBundles, BandwidthShapesTonesAndNoise) {
   SIXPOINT_NEED_PRACTICE();
-  const Practice practice = read_practice("engineering/b0008");
-  const Scenario scenario = practice.scenario(true);
-  const auto simulated = run_protocol(*scenario.protocol);
-  ASSERT_OK(simulated);
+  const auto [practice, scenario, simulated] = simulated_practice("engineering/b0008");
   PerAxis<std::complex<double>> real_low{};
   PerAxis<std::complex<double>> model_low{};
   for (const ProtocolSegment& segment : scenario.protocol->segments) {
@@ -262,7 +272,7 @@ TEST(PracticeBundles, BandwidthShapesTonesAndNoise) {
     const double frequency_hz = segment.vibration->frequency_hz;
     const auto real =
         tone_of(practice.counts, segment.first_sample, segment.samples, a, frequency_hz);
-    const auto model = tone_of(*simulated, segment.first_sample, segment.samples, a, frequency_hz);
+    const auto model = tone_of(simulated, segment.first_sample, segment.samples, a, frequency_hz);
     if (frequency_hz == 2) {
       real_low[a] = real / segment.vibration->amplitude_g;
       model_low[a] = model / segment.vibration->amplitude_g;
@@ -273,7 +283,7 @@ TEST(PracticeBundles, BandwidthShapesTonesAndNoise) {
   const ProtocolSegment& still = segment_of(scenario, "still");
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const Noise real = noise_of(practice.counts, still.first_sample, still.samples, axis);
-    const Noise model = noise_of(*simulated, still.first_sample, still.samples, axis);
+    const Noise model = noise_of(simulated, still.first_sample, still.samples, axis);
     EXPECT_NEAR(real.sd_mg / model.sd_mg, 1, 0.1);  // the unit's noise is free within 10 %
     EXPECT_NEAR(real.lag1, model.lag1, 0.03);
     EXPECT_GT(real.lag1, 0.4);
@@ -282,17 +292,14 @@ TEST(PracticeBundles, BandwidthShapesTonesAndNoise) {
 
 TEST(PracticeBundles, FloorVibrationHasItsSizeAndDirection) {
   SIXPOINT_NEED_PRACTICE();
-  const Practice practice = read_practice("engineering/b0007");
-  const Scenario scenario = practice.scenario(true);
-  const auto simulated = run_protocol(*scenario.protocol);
-  ASSERT_OK(simulated);
+  const auto [practice, scenario, simulated] = simulated_practice("engineering/b0007");
   const double frequency_hz = practice.effects[0]["parameters"]["frequency_hz"];
   const ProtocolSegment& still = segment_of(scenario, "still");
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const double real =
         std::abs(tone_of(practice.counts, still.first_sample, still.samples, axis, frequency_hz));
     const double model =
-        std::abs(tone_of(*simulated, still.first_sample, still.samples, axis, frequency_hz));
+        std::abs(tone_of(simulated, still.first_sample, still.samples, axis, frequency_hz));
     EXPECT_NEAR(real, model, 0.05 * model + 0.0001) << axis;
   }
 }
@@ -344,10 +351,7 @@ TEST(PracticeBundles, SettlingTakesMostOfTheRinging) {
 
 TEST(PracticeBundles, SaturationCutsAtTheSameCounts) {
   SIXPOINT_NEED_PRACTICE();
-  const Practice practice = read_practice("engineering/b0016");
-  const Scenario scenario = practice.scenario(true);
-  const auto simulated = run_protocol(*scenario.protocol);
-  ASSERT_OK(simulated);
+  const auto [practice, scenario, simulated] = simulated_practice("engineering/b0016");
   for (const ProtocolSegment& segment : scenario.protocol->segments) {
     if (segment.name != "shaker_high" || segment.vibration->amplitude_g < 10) {
       continue;
@@ -371,7 +375,7 @@ TEST(PracticeBundles, SaturationCutsAtTheSameCounts) {
       return std::pair(high - low, at_limits);
     };
     const auto [real_span, real_hits] = span(practice.counts);
-    const auto [model_span, model_hits] = span(*simulated);
+    const auto [model_span, model_hits] = span(simulated);
     EXPECT_NEAR(static_cast<double>(real_span) / model_span, 1, 0.06);  // the unit's gain
     EXPECT_NEAR(real_hits, model_hits, 25);
   }

@@ -37,12 +37,12 @@ TEST(UnitTruth, DrawnUnitsAreReal) {
 
 TEST(UnitTruth, AWishChangesOnlyWhatItNames) {
   const UnitTruth drawn = draw_unit(7);
-  UnitWishes wishes;
-  wishes.serial = "MOS2A45130007";
-  wishes.current_zero_lsb = PerAxis<double>{49.9, 95.8, 60.8};
-  const UnitTruth unit = draw_unit(7, wishes);
+  GivenProperties given;
+  given.serial = "MOS2A45130007";
+  given.current_zero_lsb = PerAxis<double>{49.9, 95.8, 60.8};
+  const UnitTruth unit = draw_unit(7, given);
   EXPECT_EQ(unit.serial, "MOS2A45130007");
-  EXPECT_EQ(unit.current.zero_lsb, *wishes.current_zero_lsb);
+  EXPECT_EQ(unit.current.zero_lsb, *given.current_zero_lsb);
   EXPECT_EQ(unit.current.sensitivity_lsb_per_g, drawn.current.sensitivity_lsb_per_g);
   EXPECT_EQ(unit.legacy, drawn.legacy);
   EXPECT_EQ(unit.constants, drawn.constants);
@@ -50,18 +50,18 @@ TEST(UnitTruth, AWishChangesOnlyWhatItNames) {
 }
 
 TEST(UnitTruth, TheSensorFollowsWishedConstantsUnderTheirOwnConfiguration) {
-  UnitWishes wishes;
-  wishes.positive_lsb = PerAxis<int>{311, 310, 287};
-  wishes.negative_lsb = PerAxis<int>{-204, -216, -234};
-  wishes.zero_lsb = PerAxis<int>{54, 47, 26};
-  wishes.calibrated = *parse_iso8601("2013-11-12");
-  UnitTruth unit = draw_unit(7, wishes);
+  GivenProperties given;
+  given.positive_lsb = PerAxis<int>{311, 310, 287};
+  given.negative_lsb = PerAxis<int>{-204, -216, -234};
+  given.zero_lsb = PerAxis<int>{54, 47, 26};
+  given.calibrated = *parse_iso8601("2013-11-12");
+  UnitTruth unit = draw_unit(7, given);
   EXPECT_EQ(unit.legacy.sensitivity_lsb_per_g, (PerAxis<double>{257.5, 263, 260.5}));
   EXPECT_EQ(unit.legacy.zero_lsb, (PerAxis<double>{53.5, 47, 26.5}));
   EXPECT_NE(unit.current, unit.legacy);
-  EXPECT_EQ(unit.constants.zero_lsb, *wishes.zero_lsb);
-  wishes.calibrated = *parse_iso8601("2018-01-01");
-  unit = draw_unit(7, wishes);
+  EXPECT_EQ(unit.constants.zero_lsb, *given.zero_lsb);
+  given.calibrated = *parse_iso8601("2018-01-01");
+  unit = draw_unit(7, given);
   EXPECT_EQ(unit.current.sensitivity_lsb_per_g, (PerAxis<double>{257.5, 263, 260.5}));
 }
 

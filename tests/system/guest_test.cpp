@@ -10,9 +10,10 @@
 #include <sys/mount.h>
 
 #include "base/sha256.h"
-#include "device/discovery.h"
-#include "device/payload.h"
 #include "device/unit.h"
+#include "device/usb/discovery.h"
+#include "device/wire/payload.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "system/vhci_bench.h"
 #include "temporary_folder.h"
@@ -96,9 +97,9 @@ TEST(Kernel, HidrawAndUsbfsAtOnce) {
   device::register_usb(registry);
   auto link = registry.open(bench_unit.usb_address(), posix_env());
   ASSERT_OK(link);
-  device::UnitOptions patient;
+  device::WireOptions patient;
   patient.reply_time_out = std::chrono::seconds(10);
-  auto unit = device::Unit::open(std::move(*link), patient);
+  auto unit = device::WireUnit::open(std::move(*link), patient);
   ASSERT_OK(unit);
   ASSERT_OK((*unit)->start_recording(100, from_unix_seconds(1'500'000'000)));
   bench_unit.clock->forward(std::chrono::minutes(5));

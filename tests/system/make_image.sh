@@ -64,7 +64,7 @@ version=$(basename kernel/lib/modules/*)
 root=$folder/root
 rm -rf "$root"
 mkdir -p "$root"/{bin,dev,etc,lib64,mnt,proc,run,sys,tmp,usr/bin,usr/sbin,var/run} "$root/lib/modules/$version"
-ln -s usr/lib/udev "$root/udev-rules" # for a reader who looks around
+ln -s usr/lib/udev "$root/udev-rules" # for people who inspect the image
 cp "$(command -v busybox)" "$root/bin/busybox"
 
 # Modules and what they depend on.

@@ -7,7 +7,7 @@
 #include <memory>
 #include <thread>
 
-#include "mocks/usbip_server.h"
+#include "mocks/usb/usbip_server.h"
 #include "usb/bench.h"
 
 namespace sixpoint::tests {

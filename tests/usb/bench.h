@@ -1,4 +1,4 @@
-// What the USB tests need of a carrier: units that can be plugged in, pulled out and looked into.
+// What the USB tests need of a carrier: units that can be plugged in, pulled out and inspected.
 //
 // The bodies (bodies.h) run over umockdev, where the kernel is played, and in qemu, where it is
 // real. A carrier implements UsbBench; the units are virtual in both and live in the test's
@@ -9,9 +9,9 @@
 #include <memory>
 #include <string>
 
-#include "mocks/in_process.h"
-#include "mocks/scaled_clock.h"
-#include "mocks/usb_unit.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/in_process/scaled_clock.h"
+#include "mocks/usb/usb_unit.h"
 #include "sim/unit_truth.h"
 
 namespace sixpoint::tests {
@@ -34,7 +34,7 @@ class LeapingClock final : public Clock {
   std::atomic<std::int64_t> leap_ns_ = 0;
 };
 
-// A unit on the bench. Lock unit->mutex to look into unit->unit.
+// A unit on the bench. Lock unit->mutex to read unit->unit.
 struct BenchUnit {
   std::string serial;
   std::shared_ptr<LeapingClock> clock;

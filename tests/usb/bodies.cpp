@@ -9,10 +9,11 @@
 #include <libusb.h>
 #include <unistd.h>
 
-#include "device/discovery.h"
-#include "device/hotplug.h"
-#include "device/payload.h"
 #include "device/unit.h"
+#include "device/usb/discovery.h"
+#include "device/usb/hotplug.h"
+#include "device/wire/payload.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "skip_unless.h"
 #include "temporary_folder.h"
@@ -160,7 +161,7 @@ void opens_by_serial(UsbBench& bench) {
 void writes_constants_as_a_transaction(UsbBench& bench) {
   Plugged plugged(bench, make_unit(31));
   ASSERT_OK(plugged.status());
-  device::UnitOptions options;
+  device::WireOptions options;
   options.reply_time_out = milliseconds(100);
   options.commit_time_out = milliseconds(100);
   auto opened = open(plugged->hid_address(), options);
@@ -220,7 +221,7 @@ void streams_and_sees_loss(UsbBench& bench) {
   EXPECT_EQ(unit.stream_statistics().lost_samples, 0U);
   EXPECT_EQ(unit.stream_statistics().damaged_reports, 0U);
 
-  // A report that never reaches the cable: somebody takes it out of the unit before the host does.
+  // A report that never reaches the cable: the test takes it from the unit before the host does.
   bool taken = false;
   for (int i = 0; i < 2000 && !taken; ++i) {
     {
@@ -280,8 +281,8 @@ void several_units_stream_at_once(UsbBench& bench) {
   }
 }
 
-device::UnitOptions patient() {
-  device::UnitOptions options;
+device::WireOptions patient() {
+  device::WireOptions options;
   options.reply_time_out = seconds(5);  // packing an hour takes the virtual unit a moment
   return options;
 }
@@ -353,7 +354,7 @@ void hotplug_arrives_leaves_and_replugs(UsbBench& bench) {
   EXPECT_EQ((*again)->identity().serial, plugged->serial);
   EXPECT_FAILS((*unit)->identify(), ErrorCode::device_unavailable);
 
-  // A watch that starts later is told of what is there; a cancelled one waits no more.
+  // A watch that starts later reports the devices that are there; a cancelled one waits no more.
   auto late = HotplugWatch::start();
   ASSERT_OK(late);
   EXPECT_TRUE(event_of(**late, HotplugEvent::Kind::arrived, plugged->serial));
@@ -405,7 +406,7 @@ void cancel_ends_what_waits(UsbBench& bench) {
     EXPECT_FAILS(reading.get(), ErrorCode::device_unavailable);
     EXPECT_FAILS(transport->write(Bytes(64), seconds(1)), ErrorCode::device_unavailable);
   }
-  // After it the unit can be opened anew.
+  // After it the unit can be opened again.
   *link = {};
   EXPECT_OK(open(plugged->hid_address()));
 }
@@ -426,7 +427,7 @@ void a_second_program_is_told_who_is_in_the_way(UsbBench& bench) {
 }
 
 void permission_errors_name_the_rule(UsbBench& bench) {
-  SIXPOINT_SKIP_UNLESS(::geteuid() == 0, "needs root, to become somebody who may not");
+  SIXPOINT_SKIP_UNLESS(::geteuid() == 0, "needs root, to become a user without access");
   Plugged plugged(bench, make_unit(111));
   ASSERT_OK(plugged.status());
   const auto found = wait_for(1);
@@ -459,7 +460,7 @@ void a_swapped_unit_is_never_taken_for_the_first(UsbBench& bench) {
   const auto arrived = event_of(**watch, HotplugEvent::Kind::arrived, second->serial);
   ASSERT_TRUE(arrived);
   EXPECT_EQ(arrived->port, port);
-  // The old handle gives what had come and then says so; it never speaks of the second unit.
+  // The old handle gives the reports that had come and then fails; it never reads the second unit.
   for (;;) {
     const auto block = (*unit)->next_samples(seconds(2));
     if (!block) {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/sha256.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "temporary_folder.h"
 #include "usb/bodies.h"
@@ -29,8 +30,8 @@ BenchUnit faulty_unit(std::uint64_t seed, const std::string& faults) {
 }
 
 // An emulated processor packs a recording in a second or two.
-device::UnitOptions patient() {
-  device::UnitOptions options;
+device::WireOptions patient() {
+  device::WireOptions options;
   options.reply_time_out = seconds(2);
   return options;
 }

@@ -4,8 +4,9 @@
 #include <string>
 #include <thread>
 
-#include "device/discovery.h"
 #include "device/unit.h"
+#include "device/usb/discovery.h"
+#include "device/wire/wire_unit.h"
 #include "usb/bench.h"
 
 namespace sixpoint::tests {
@@ -45,12 +46,12 @@ inline const device::TransportRegistry& registry() {
 
 // The kernel may still be at it: what the device needs for its nodes is part of opening.
 inline Result<std::unique_ptr<device::Unit>> open(const std::string& address,
-                                                  device::UnitOptions options = {}) {
+                                                  device::WireOptions options = {}) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   for (;;) {
     auto link = registry().open(address, posix_env());
     if (link) {
-      return device::Unit::open(std::move(*link), options);
+      return device::WireUnit::open(std::move(*link), options);
     }
     // In a kernel that has not enumerated it yet there is no such device.
     if (link.error().code != ErrorCode::device_unavailable ||

@@ -78,7 +78,7 @@ Ended run_under_plan(UmockdevBench& bench, const ProgramFault& fault, std::uint6
                    {"--device", "hid:" + serial, "--jig", "manual", "--json", "--store", store});
   arguments.insert(arguments.end(), fault.more.begin(), fault.more.end());
   ended.answer = run_child(
-      arguments, [&](const std::string& line) { technician.hear(line); }, input);
+      arguments, [&](const std::string& line) { technician.on_line(line); }, input);
   over = true;
   EXPECT_OK(cable.get());
   if (!unit.port.empty()) {
@@ -318,12 +318,12 @@ void run_rows(const std::string& suite, const std::vector<ProgramFault>& rows) {
   }
 }
 
-TEST(ProgramFaults, EndJigRunsAsTheTableSays) { run_rows("JigFault", jig_rows()); }
-TEST(ProgramFaults, EndCapturesAsTheTableSays) { run_rows("CaptureFault", capture_rows()); }
+TEST(ProgramFaults, EndJigRunsAsInTheTable) { run_rows("JigFault", jig_rows()); }
+TEST(ProgramFaults, EndCapturesAsInTheTable) { run_rows("CaptureFault", capture_rows()); }
 
-// docs/faults.md says where each fault is tested: its columns of this file are those of the rows
+// docs/faults.md lists where each fault is tested: its columns of this file are those of the rows
 // above.
-TEST(ProgramFaultsPage, SaysWhatIsTestedHere) {
+TEST(ProgramFaultsPage, ListsTheTestsOfThisFile) {
   EXPECT_EQ(faults_of_column("umockdev: `jig`"), faults_of_rows(jig_rows()));
   EXPECT_EQ(faults_of_column("umockdev: `capture`"), faults_of_rows(capture_rows()));
 }

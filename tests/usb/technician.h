@@ -1,4 +1,4 @@
-// Who turns a virtual unit as the program's prompts say, as a technician would.
+// Turns a virtual unit as the program's prompts ask for, as a technician would.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace sixpoint::tests {
 class Technician {
  public:
   explicit Technician(BenchUnit& unit) : unit_(unit) {}
-  void hear(const std::string& line) {
+  void on_line(const std::string& line) {
     // "turn the unit to +x: ...", "lay the unit on -z ...", "take the unit off, ... turn it to +y
     // ...", and of a capture "side 2 of 6: -x - its x axis ..."
     constexpr std::array<std::string_view, 4> kPrompts = {"turn the unit to ", "lay the unit on ",

@@ -12,13 +12,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "device/bulk_transport.h"
-#include "device/discovery.h"
-#include "device/hid_transport.h"
 #include "device/jig.h"
 #include "device/unit.h"
+#include "device/usb/bulk_transport.h"
+#include "device/usb/discovery.h"
+#include "device/usb/hid_transport.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
-#include "mocks/usb_drive.h"
+#include "mocks/usb/usb_drive.h"
 #include "skip_unless.h"
 #include "temporary_folder.h"
 #include "usb/bodies.h"
@@ -123,9 +124,9 @@ TEST_F(Misbehaving, AStalledBulkEndpointIsClearedAndTheDownloadGoesOn) {
   EXPECT_NE(stalled.error().what.find("stalled"), std::string::npos) << stalled.error().brief();
   EXPECT_GE(wilful->cleared_halts, 1);
   stalls = 2;
-  device::UnitOptions options;
+  device::WireOptions options;
   options.reply_time_out = seconds(5);
-  auto opened = device::Unit::open(std::move(*link), options);
+  auto opened = device::WireUnit::open(std::move(*link), options);
   ASSERT_OK(opened);
   ASSERT_OK((*opened)->start_recording(100, from_unix_seconds(1'500'000'000)));
   unit.clock->forward(seconds(600));
@@ -182,13 +183,13 @@ TEST_F(Misbehaving, GarbageOnReportsIsCountedAndSurvived) {
   };
   auto link = open();
   ASSERT_OK(link);
-  auto opened = device::Unit::open(std::move(*link));
+  auto opened = device::WireUnit::open(std::move(*link));
   ASSERT_OK(opened);
   EXPECT_EQ((*opened)->identity().serial, unit.serial);
   EXPECT_EQ((*opened)->stream_statistics().damaged_reports, 5U);
 }
 
-// Reports of a unit that nobody answers fill the queue, and no more than that.
+// Reports that are not read fill the queue, and no more than that.
 TEST_F(Misbehaving, AFloodFillsTheQueueAndNothingElse) {
   std::atomic<int> flood = 60;
   wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
@@ -229,10 +230,10 @@ TEST_F(Misbehaving, AHangingDownloadIsStopped) {
   };
   auto link = open();
   ASSERT_OK(link);
-  device::UnitOptions options;
+  device::WireOptions options;
   options.reply_time_out = seconds(5);
   options.bulk_time_out = std::chrono::hours(1);
-  auto opened = device::Unit::open(std::move(*link), options);
+  auto opened = device::WireUnit::open(std::move(*link), options);
   ASSERT_OK(opened);
   const auto info = record(unit, **opened, seconds(600));
   ASSERT_OK(info);
@@ -276,7 +277,7 @@ TEST_F(Misbehaving, TheThreadsOfAUnitStopWhateverTheyWaitFor) {
       Bytes buffer(device::kBulkBlockBytes);
       return bulk.read(buffer, std::chrono::hours(1));
     });
-    auto opened = device::Unit::open(std::move(*link));
+    auto opened = device::WireUnit::open(std::move(*link));
     ASSERT_OK(opened);
     ASSERT_OK((*opened)->start_stream(100));
     ASSERT_OK((*opened)->next_samples(seconds(5)));
@@ -291,7 +292,7 @@ TEST_F(Misbehaving, TheThreadsOfAUnitStopWhateverTheyWaitFor) {
   }
 }
 
-// What a device says of itself reaches no terminal as it is, and opens nothing that it should not.
+// Strings of a device are not printed to a terminal unchanged, and open no other device.
 TEST_F(Misbehaving, HostileSerialNumbersNameNothing) {
   for (const std::string& serial :
        {std::string("A\x1b[2JB"), std::string("two words"), std::string("\xc5\xbelut\xc3\xbd"),
@@ -319,14 +320,14 @@ TEST_F(Misbehaving, HostileSerialNumbersNameNothing) {
       EXPECT_EQ((listed.out + listed.people).find('\x1b'), std::string::npos);
       EXPECT_EQ(std::count(listed.out.begin(), listed.out.end(), '\n') == 1, more.empty());
     }
-    // By its own name, and as the only one there is: that unit, or a refusal in words.
+    // By its own name, and as the only one there is: that unit, or a refusal with its reason.
     for (const std::string& address : {"hid:" + serial, std::string("hid:")}) {
       auto link = registry().open(address, posix_env());
       if (!link) {
         EXPECT_EQ(link.error().brief().find('\x1b'), std::string::npos);
         continue;
       }
-      const auto unit_or_not = device::Unit::open(std::move(*link));
+      const auto unit_or_not = device::WireUnit::open(std::move(*link));
       if (unit_or_not) {
         EXPECT_EQ((*unit_or_not)->identity().serial, serial);
       } else {
@@ -433,7 +434,7 @@ TEST_F(Program, SaysWhichSerialsThereAre) {
 // As a person without the udev rules: the message names them, `devices` says it of each device, and
 // with permission the same person gets on.
 TEST_F(Program, WithoutPermissionNamesTheUdevRules) {
-  SIXPOINT_SKIP_UNLESS(::geteuid() == 0, "needs root, to start the program as somebody else");
+  SIXPOINT_SKIP_UNLESS(::geteuid() == 0, "needs root, to start the program as another user");
   auto unit = make_unit(1);
   ASSERT_OK(bench->plug_in(unit));
   bench->bus().allow(unit.port, false);
@@ -475,7 +476,7 @@ TEST_F(Program, MeasuresAUnitOnTheJigAndWritesItsConstants) {
   const ChildAnswer answer =
       run_child({"jig", "--device", unit.hid_address(), "--jig", "manual", "--filter", "current",
                  "--dwell", "0.5", "--write", "--json", "--store", folder / "store.db"},
-                [&](const std::string& line) { technician.hear(line); });
+                [&](const std::string& line) { technician.on_line(line); });
   ASSERT_EQ(answer.exit_code, 0) << answer.people << answer.out;
   EXPECT_GE(technician.turns, 11) << "six faces, three to verify, two after writing";
   const auto json = nlohmann::json::parse(answer.out);
@@ -512,7 +513,7 @@ TEST_F(Program, RecordsASessionThatReplaysWithoutTheUnit) {
                                           "manual",  "--dwell",          "0.5",  "--json",
                                           "--store", folder / "store.db"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_child(arguments, [&](const std::string& line) { technician.hear(line); });
+    return run_child(arguments, [&](const std::string& line) { technician.on_line(line); });
   };
   const ChildAnswer recorded = jig(unit.hid_address(), {"--record", session});
   ASSERT_EQ(recorded.exit_code, 0) << recorded.people;

@@ -33,7 +33,7 @@ export function ResultBox({ result }: { result: Result }) {
   );
 }
 
-// For practice without hardware: what a hand does to a real unit, buttons do to a virtual one.
+// For practice without hardware: buttons turn and unplug a virtual unit.
 export function VirtualHand({ lane, setProblem }: { lane: number; setProblem: (problem: Refusal | null) => void }) {
   const [tilt, setTilt] = useState(false);
   const hand = async (body: object) => {

@@ -9,7 +9,7 @@ import { Statistics } from './statistics';
 import { S } from './strings';
 import { ask, current, subscribe, type Refusal } from './station';
 
-// A label scanner is a keyboard that types a serial number and Enter faster than any hand.
+// A label scanner is a keyboard that types a serial number and Enter faster than a person.
 function useScanner(found: (serial: string) => void) {
   const text = useRef('');
   const last = useRef(0);
@@ -51,7 +51,7 @@ function Page() {
   useScanner(scan);
 
   const queue = state?.queue ?? [];
-  // One pair of hands: the lane in front is the one that needs it, until somebody chooses another.
+  // Shows the lane that waits longest for the operator, until the operator chooses one.
   const busyHere = queue.includes(chosen) || state?.lanes[chosen - 1]?.state === 'idle';
   useEffect(() => { if (follow && queue.length && !busyHere) setChosen(queue[0]); }, [follow, queue.join(), busyHere]);
   useEffect(() => {

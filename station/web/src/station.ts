@@ -45,9 +45,9 @@ function change(part: Partial<Snapshot>) {
 
 function connect() {
   const events = new EventSource('/api/events');
-  let heard = Date.now();
+  let lastEventMs = Date.now();
   const on = <T>(name: string, use: (data: T) => void) =>
-    events.addEventListener(name, (event) => { heard = Date.now(); use(JSON.parse((event as MessageEvent<string>).data)); });
+    events.addEventListener(name, (event) => { lastEventMs = Date.now(); use(JSON.parse((event as MessageEvent<string>).data)); });
   on<State>('state', (state) => change({ state, connected: true }));
   on<Lane>('lane', (lane) => {
     if (!snapshot.state) return;
@@ -79,7 +79,7 @@ function connect() {
   // The browser tries again by itself, except after an answer that is no stream.
   events.onerror = () => change({ connected: false });
   const watch = setInterval(() => {
-    if (events.readyState === EventSource.CLOSED || Date.now() - heard > 15000) {
+    if (events.readyState === EventSource.CLOSED || Date.now() - lastEventMs > 15000) {
       clearInterval(watch);
       events.close();
       change({ connected: false });

@@ -16,7 +16,7 @@ export const S = {
   scan: 'Scan a label',
   scanGo: 'Find',
   lanes: 'Lanes',
-  follow: 'Show the lane that needs a hand',
+  follow: 'Show the lane that waits for me',
   lane: (n: number) => `Lane ${n}`,
   traces: 'Readings of the last six seconds, in g',
   axis: (name: string, g: string) => `${name} ${g} g`,
@@ -28,7 +28,7 @@ export const S = {
   wantedTitle: 'Turn it to',
   nowTitle: 'It lies',
   nowFace: (pose: Pose, angle: number) =>
-    // By the unit's old constants an angle may be wrong by 20 degrees: only what is certain is said.
+    // With the unit's old constants an angle may be wrong by 20 degrees: the text gives only the side.
     angle > 30 ? 'on none of its sides' : `${faceName(pose)} side up`,
   nowUnknown: 'unknown yet',
 
@@ -40,7 +40,7 @@ export const S = {
     refused: 'Turn it.',
   } as Record<string, string>,
 
-  // What to do next, the biggest words on the page.
+  // What to do next, in the largest letters of the page.
   prompt(lane: Lane): string {
     switch (lane.state) {
       case 'absent': return 'Plug a unit in';
@@ -77,7 +77,7 @@ export const S = {
   undo: 'Undo the last one',
   undoKey: 'Undo the last one (Backspace)',
   stop: 'Stop this run',
-  stopSure: 'Really stop? What was measured is kept.',
+  stopSure: 'Really stop? What was measured is stored.',
   stopYes: 'Yes, stop',
   stopNo: 'No, go on',
   held: (who: string) => `${who || 'Someone else'} is at work on this lane.`,
@@ -194,7 +194,7 @@ export const S = {
     captureStart: 'Start recording',
     captureNone: 'No unit is plugged in.',
     captureStop: 'Stop recording',
-    kept: 'What was recorded is kept; the side that was under way is asked again.',
+    kept: 'What was recorded stays; the side that was under way is asked for again.',
     placed: 'It lies there',
     sideOf: (n: number, of: number) => `Side ${n} of ${of}`,
     rest: (s: number) => `Leave it alone for ${s} s`,
@@ -210,10 +210,10 @@ export const S = {
     sideOk: 'recorded', sideMissing: 'repeat',
     cannotHelp: 'A recording of this unit cannot help.',
     repairTitle: '3. Repair my files',
-    repairText: 'Every affected recording of the folder is mended into another folder. Your originals stay as they are.',
+    repairText: 'Every affected recording of the folder is repaired into another folder. Your originals are not changed.',
     folder: 'Folder with recordings',
     thisFolder: 'this folder',
-    output: 'Folder for mended files',
+    output: 'Folder for repaired files',
     repair: 'Repair my files',
     cancel: 'Stop after this file',
     progress: (done: number, total: number) => `${done} of ${total} files`,

@@ -4,9 +4,10 @@
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "gt3x/recording.h"
-#include "mocks/virtual_drive.h"
+#include "mocks/firmware/virtual_drive.h"
 
 namespace sixpoint::device {
 namespace {
@@ -17,7 +18,8 @@ struct Bench {
   Bench() {
     options.unit.truth = sim::draw_unit(7);
     EXPECT_OK(mocks::make_virtual_drive(memory.files, "usb", options));
-    registry.emplace(TransportRegistry());
+    registry.emplace(TransportRegistry(),
+                     [](Link link) { return WireUnit::open(std::move(link)); });
     register_drive(*registry);
   }
   MemoryEnv memory;
@@ -75,9 +77,9 @@ TEST(DriveUnit, AnotherUnitInItsPlaceIsNoticed) {
   const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
   const auto recordings = *unit->recordings();
   Bench other;
-  sim::UnitWishes wishes;
-  wishes.serial = "MOS2B99990001";
-  other.options.unit.truth = sim::draw_unit(8, wishes);
+  sim::GivenProperties given;
+  given.serial = "MOS2B99990001";
+  other.options.unit.truth = sim::draw_unit(8, given);
   ASSERT_OK(mocks::make_virtual_drive(bench.memory.files, "usb", other.options));
   const auto copied = unit->download(recordings.front(), bench.memory.files, "r.gt3x");
   EXPECT_FAILS(copied, ErrorCode::device_unavailable);

@@ -1,4 +1,4 @@
-#include "device/hid_jig.h"
+#include "device/jigs/hid_jig.h"
 
 #include <thread>
 
@@ -6,9 +6,9 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "mocks/in_process.h"
-#include "mocks/inert.h"
-#include "mocks/virtual_hid_jig.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/in_process/virtual_hid_jig.h"
+#include "mocks/inert/inert.h"
 
 namespace sixpoint::device {
 namespace {
@@ -37,13 +37,13 @@ struct Bench {
 TEST(HidJig, TurnsSettlesAndReports) {
   Bench bench;
   EXPECT_EQ(bench.jig->name(), "SixJig J600001");
-  EXPECT_FALSE(bench.jig->report()->pose) << "it has not been sent anywhere";
+  EXPECT_FALSE(bench.jig->position()->pose) << "it has not been sent anywhere";
   for (const Pose pose : kPoses) {
     ASSERT_OK(bench.jig->go_to(pose));
-    EXPECT_FALSE(bench.jig->report()->pose) << "it turns";
+    EXPECT_FALSE(bench.jig->position()->pose) << "it turns";
     EXPECT_TRUE(bench.plugged->unit.is_turning(bench.clock->elapsed()));
     bench.clock->sleep(std::chrono::seconds(2));
-    const auto report = bench.jig->report();
+    const auto report = bench.jig->position();
     ASSERT_OK(report);
     EXPECT_EQ(report->pose, pose);
     EXPECT_EQ(report->angle_uncertainty_deg, 0.05);
@@ -61,14 +61,13 @@ TEST(HidJig, AnEmergencyStopIsAtTheMotorWithin100Ms) {
   ASSERT_OK(bench.jig->stop());
   EXPECT_LE(bench.clock->elapsed() - called, std::chrono::milliseconds(100));
   EXPECT_FALSE(bench.plugged->unit.is_turning(bench.clock->elapsed()));
-  EXPECT_EQ(bench.jig->report()->fault, "emergency stop");
+  EXPECT_EQ(bench.jig->position()->fault, "emergency stop");
   // No movement until the next go_to().
   ASSERT_OK(bench.jig->go_to(Pose::plus_x));
   EXPECT_TRUE(bench.plugged->unit.is_turning(bench.clock->elapsed()));
 }
 
-// A jig that says nothing keeps nobody waiting: reads are cut into slices, and a request that waits
-// gives way to the stop.
+// A silent jig does not delay a stop: reads are cut into slices, and a request that waits ends.
 class SilentTransport final : public Transport {
  public:
   Status write(std::span<const std::uint8_t> bytes, std::chrono::nanoseconds) override {
@@ -88,7 +87,7 @@ class SilentTransport final : public Transport {
             encode({ReportKind::reply, static_cast<std::uint16_t>(answered),
                     static_cast<Command>(commands.back()), ReplyCode::ok,
                     commands.back() == static_cast<std::uint8_t>(JigCommand::identify)
-                        ? encode_jig_identity({1, "J1", "1.0", "SixJig"})
+                        ? encode_jig_identity({{"J1", "1.0", "SixJig"}, 1})
                         : Bytes{}});
         std::copy(reply.begin(), reply.end(), out.begin());
         return reply.size();
@@ -139,7 +138,7 @@ TEST(HidJig, FaultsHaveTheirReasons) {
   ASSERT_OK(bench.jig->go_to(Pose::plus_x));
   bench.clock->sleep(std::chrono::seconds(3));
   ASSERT_OK(bench.jig->go_to(Pose::plus_y));
-  EXPECT_EQ(bench.jig->report()->fault, "something is in the way");
+  EXPECT_EQ(bench.jig->position()->fault, "something is in the way");
   const auto refused = bench.jig->go_to(Pose::plus_z);
   EXPECT_FAILS(refused, ErrorCode::device_unavailable);
 }

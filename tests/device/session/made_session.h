@@ -2,10 +2,11 @@
 #pragma once
 
 #include "base/memory_env.h"
-#include "device/session_recorder.h"
+#include "device/session/session_recorder.h"
 #include "device/unit.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
-#include "mocks/in_process.h"
+#include "mocks/in_process/in_process.h"
 
 namespace sixpoint::tests {
 
@@ -19,7 +20,7 @@ inline device::Session made_session(int blocks = 20) {
   device::SessionRecorder recorder;
   EXPECT_OK(recorder.begin(files, "made.zip"));
   recorder.attach(link);
-  const auto unit = *device::Unit::open(std::move(link));
+  const auto unit = *device::WireUnit::open(std::move(link));
   EXPECT_OK(unit->read_calibration());
   EXPECT_OK(unit->start_stream(100));
   for (int i = 0; i < blocks; ++i) {

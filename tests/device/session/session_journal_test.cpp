@@ -1,4 +1,4 @@
-#include "device/session_journal.h"
+#include "device/session/session_journal.h"
 
 #include <csignal>
 
@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "device/wire/wire_unit.h"
 #include "made_session.h"
 #include "temporary_folder.h"
 
@@ -200,7 +201,7 @@ TEST(SessionJournal, RecoveryOverwritesNothingAndAnOpenSaysWhatToDo) {
   EXPECT_FAILS(recover_session(files, "other.journal", "n.zip"), ErrorCode::bad_data);
 }
 
-// A disk that is full in mid-run: the work goes on, the recorder says so at the end.
+// A disk that is full in mid-run: the work goes on, the recorder fails at the end.
 TEST(SessionJournal, AFullDiskDoesNotDisturbTheWork) {
   MemoryFiles files;
   mocks::VirtualUnitOptions options;
@@ -210,7 +211,7 @@ TEST(SessionJournal, AFullDiskDoesNotDisturbTheWork) {
   SessionRecorder recorder;
   ASSERT_OK(recorder.begin(files, "s.zip"));
   recorder.attach(link);
-  const auto unit = *Unit::open(std::move(link));
+  const auto unit = *WireUnit::open(std::move(link));
   files.fail_after(0);
   EXPECT_EQ(unit->read_calibration()->constants, sim::draw_unit(7).constants);
   files.stop_failing();

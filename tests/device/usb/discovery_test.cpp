@@ -1,13 +1,14 @@
 // What of discovery needs no bus: addresses, and a unit that is not the one that was found. The
 // rest runs over umockdev and in qemu (tests/usb).
-#include "device/discovery.h"
+#include "device/usb/discovery.h"
 
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
 #include "device/unit.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
-#include "mocks/in_process.h"
+#include "mocks/in_process/in_process.h"
 
 namespace sixpoint::device {
 namespace {
@@ -38,7 +39,7 @@ TEST(Discovery, ADeviceIsCompleteWithTheNodesOfItsKind) {
   EXPECT_TRUE(monitor.complete());
 }
 
-// Somebody may plug in another unit between finding a device and opening it.
+// Another unit may be plugged in between finding a device and opening it.
 TEST(Discovery, AUnitThatIsNotTheOneThatWasFoundIsRefused) {
   mocks::VirtualUnitOptions options;
   options.truth = sim::draw_unit(7);
@@ -46,10 +47,10 @@ TEST(Discovery, AUnitThatIsNotTheOneThatWasFoundIsRefused) {
       std::make_shared<mocks::PluggedUnit>(options, std::make_shared<ManualClock>());
   Link link = mocks::link_to(plugged, false);
   link.serial = options.truth.serial;
-  EXPECT_OK(Unit::open(std::move(link)));
+  EXPECT_OK(WireUnit::open(std::move(link)));
   link = mocks::link_to(plugged, false);
   link.serial = "MOS2A00000000";
-  const auto refused = Unit::open(std::move(link));
+  const auto refused = WireUnit::open(std::move(link));
   EXPECT_FAILS(refused, ErrorCode::bad_data);
   EXPECT_NE(refused.error().what.find("MOS2A00000000"), std::string::npos);
 }

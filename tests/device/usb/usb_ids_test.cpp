@@ -1,5 +1,5 @@
-// What must agree with device/usb_ids.h, and what the errors of the operating system become.
-#include "device/usb_ids.h"
+// What must agree with device/usb/usb_ids.h, and what the errors of the operating system become.
+#include "device/usb/usb_ids.h"
 
 #include <cerrno>
 #include <fstream>
@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "base/env.h"
-#include "device/usb_errors.h"
+#include "device/usb/usb_errors.h"
 #include "expect_result.h"
 
 namespace sixpoint::device {

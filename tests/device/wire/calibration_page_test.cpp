@@ -1,4 +1,4 @@
-#include "device/calibration_page.h"
+#include "device/wire/calibration_page.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 Reads a recorded session (docs/sessions.md), decodes every transfer by the text of docs/protocol.md
 alone, follows the sequence rules, and prints what it understood as JSON: one word per transfer, and
 what the transfers add up to (the stream, the calibration page, the download). Every message that it
-decodes it also encodes again; a difference is an error. The test holds it against device/protocol.h.
+decodes it also encodes again; a difference is an error. The test holds it against device/wire/protocol.h.
 Exit code 1 where the session contradicts the protocol.
 """
 import hashlib

@@ -15,11 +15,12 @@
 
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
-#include "device/session_recorder.h"
+#include "device/session/session_recorder.h"
 #include "device/unit.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
-#include "mocks/fault_plan.h"
-#include "mocks/in_process.h"
+#include "mocks/faults/fault_plan.h"
+#include "mocks/in_process/in_process.h"
 #include "skip_unless.h"
 #include "temporary_folder.h"
 
@@ -30,13 +31,13 @@ using std::chrono::nanoseconds;
 using std::chrono::seconds;
 using testing::IsEmpty;
 
-const std::string kFolder = SIXPOINT_SOURCE_DIR "/tests/device/";
+const std::string kFolder = SIXPOINT_SOURCE_DIR "/tests/device/wire/";
 
 bool has_python() { return std::system("python3 -c 'import zlib' 2>/dev/null") == 0; }
 
 std::string hex(std::span<const std::uint8_t> bytes) { return bytes.empty() ? "-" : to_hex(bytes); }
 
-// The oracle's word for a transfer, by device/protocol.h.
+// The oracle's word for a transfer, by device/wire/protocol.h.
 std::string word_for(const SessionTransfer& transfer) {
   if (transfer.kind == SessionTransfer::Kind::reopened) {
     return "reopened";
@@ -92,7 +93,7 @@ class ProtocolOracle : public testing::Test {
     EXPECT_OK(recorder.begin(posix_env().files, path_));
     recorder.attach(link);
     {
-      const auto unit = *Unit::open(std::move(link));
+      const auto unit = *WireUnit::open(std::move(link));
       const auto page = unit->read_calibration();
       EXPECT_OK(page);
       EXPECT_OK(unit->set_filter(FilterConfiguration::current));
@@ -310,7 +311,7 @@ class UnitInPython : public ProtocolOracle {
 
 // The page is enough to write a unit that the station works with.
 TEST_F(UnitInPython, IsCalibratedStreamsRecordsAndIsDownloaded) {
-  const auto opened = Unit::open(link());
+  const auto opened = WireUnit::open(link());
   ASSERT_OK(opened);
   Unit& unit = **opened;
   EXPECT_EQ(unit.identity().serial, "PYTHON00001");

@@ -1,21 +1,17 @@
-#include "device/protocol.h"
+#include "device/wire/protocol.h"
 
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "device/payload.h"
+#include "device/wire/payload.h"
 #include "expect_result.h"
 
 namespace sixpoint::device {
 namespace {
 
-std::span<const std::uint8_t> bytes_of(std::string_view text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
-
 // Oracle: the check value of CRC-16/CCITT-FALSE in the catalogue of CRC algorithms.
 TEST(Protocol, CrcHasItsPublishedCheckValue) {
-  EXPECT_EQ(crc_ccitt(bytes_of("123456789")), 0x29B1);
+  EXPECT_EQ(crc_ccitt(as_bytes("123456789")), 0x29B1);
   EXPECT_EQ(crc_ccitt({}), 0xFFFF);
 }
 
@@ -120,7 +116,7 @@ TEST(Protocol, EveryFlippedByteOfABulkBlockIsRefused) {
   EXPECT_FAILS(decode_bulk(Bytes(kBulkBlockBytes + 1)), ErrorCode::bad_data);
 }
 
-// With a right CRC the content may still be nonsense: a hostile unit computes CRCs too.
+// With a right CRC the content may still be impossible: a hostile unit computes CRCs too.
 TEST(Protocol, WellFormedNonsenseIsRefused) {
   const auto refused = [](Report report) {
     const std::uint16_t crc = crc_ccitt(std::span(report).first(62));
@@ -182,7 +178,7 @@ TEST(Protocol, RandomBytesNeverPassAndNeverCrash) {
   EXPECT_EQ(accepted, 0);
 }
 
-// Found by the fuzzer: the field can say -325 degrees.
+// Found by the fuzzer: the field can hold -325 degrees.
 TEST(Samples, ColderThanAbsoluteZeroIsDamage) {
   SampleBlock block;
   block.counts.push_back({1, 2, 3});

@@ -7,25 +7,25 @@
 #include <gtest/gtest.h>
 
 #include "expect_result.h"
+#include "gap/challenge/trials.h"
 #include "run_command.h"
 #include "sanitized.h"
 #include "shared_data.h"
-#include "station/gap_trials.h"
 #include "temporary_folder.h"
 
 namespace sixpoint {
 namespace {
 
-using station::TrialKind;
+using gap::TrialKind;
 
 TEST(GapTrials, SameSeedSameTrialAndEveryEffectComesUp) {
   std::set<std::string> seen;
   std::array<int, 4> kinds{};
   for (std::uint64_t i = 0; i < 400; ++i) {
-    const auto trial = station::draw_trial(7, i, sim::StandardProtocol::production, {});
+    const auto trial = gap::draw_trial(7, i, sim::StandardProtocol::production, {});
     ASSERT_OK(trial);
     ++kinds[static_cast<std::size_t>(trial->kind)];
-    const auto again = station::draw_trial(7, i, sim::StandardProtocol::production, {});
+    const auto again = gap::draw_trial(7, i, sim::StandardProtocol::production, {});
     ASSERT_EQ(trial->effects.size(), again->effects.size());
     for (std::size_t k = 0; k < trial->effects.size(); ++k) {
       EXPECT_EQ(trial->effects[k].name, again->effects[k].name);

@@ -1,4 +1,6 @@
 // The way back: what the diagnosis found goes into the simulator again, for every effect.
+#include "sim/scenario.h"
+
 #include <fstream>
 
 #include <gtest/gtest.h>
@@ -6,12 +8,11 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "gap/catalogue.h"
-#include "gap/diagnosis.h"
+#include "gap/challenge/trials.h"
+#include "gap/explain/catalogue.h"
+#include "gap/judge/diagnosis.h"
 #include "run_command.h"
 #include "sanitized.h"
-#include "sim/scenario.h"
-#include "station/gap_trials.h"
 #include "temporary_folder.h"
 
 namespace sixpoint {

@@ -1,5 +1,5 @@
 // The forward model against closed forms.
-#include "gap/forward.h"
+#include "gap/explain/forward.h"
 
 #include <gtest/gtest.h>
 

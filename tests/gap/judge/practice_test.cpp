@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "expect_result.h"
-#include "gap/diagnose.h"
+#include "gap/judge/diagnose.h"
 #include "sanitized.h"
 #include "shared_data.h"
 

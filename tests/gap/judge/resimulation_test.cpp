@@ -7,8 +7,8 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "gap/blocks.h"
-#include "gap/diagnose.h"
+#include "gap/explain/blocks.h"
+#include "gap/judge/diagnose.h"
 #include "sim/bundle_writer.h"
 #include "sim/scenario.h"
 

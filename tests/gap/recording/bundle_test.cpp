@@ -1,5 +1,5 @@
 // Hostile bundles: a clear error or a stated loss, never a confident guess.
-#include "gap/bundle.h"
+#include "gap/recording/bundle.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "expect_result.h"
-#include "gap/diagnose.h"
+#include "gap/judge/diagnose.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
 #include "sim/bundle_writer.h"
@@ -171,7 +171,7 @@ TEST_F(BundleTest, AForeignHostClockIsALoss) {
 }
 
 // A unit in six faces whose samples are of 256 LSB/g or not, with what header and protocol say.
-class Clerks : public ::testing::Test {
+class HeaderAndProtocol : public ::testing::Test {
  protected:
   // `true_scale` is what the samples are of; a unit of `header` whose gain is off by the ratio.
   Result<Bundle> bundle(double true_scale, double header, double protocol,
@@ -198,10 +198,18 @@ class Clerks : public ::testing::Test {
   }
   static constexpr const char* kMismatch =
       R"({"name": "filter_mismatch", "parameters": {"gain": [0.88], "offset_g": [0.1, -0.12, 0.15]}})";
+  void expect_mismatch(double true_scale, double header, double protocol) {
+    const auto mismatched = bundle(true_scale, header, protocol, kMismatch);
+    ASSERT_OK(mismatched);
+    const auto diagnosis = diagnose(*mismatched);
+    ASSERT_OK(diagnosis);
+    ASSERT_FALSE(diagnosis->effects.empty());
+    EXPECT_EQ(diagnosis->effects.front().name, "filter_mismatch");
+  }
   MemoryEnv memory_;
 };
 
-TEST_F(Clerks, AProtocolWhoseScaleIsWrongIsRefused) {
+TEST_F(HeaderAndProtocol, AProtocolWhoseScaleIsWrongIsRefused) {
   EXPECT_FAILS(bundle(256, 256, 341), ErrorCode::bad_data);
   EXPECT_FAILS(bundle(341, 341, 256), ErrorCode::bad_data);
   EXPECT_FAILS(bundle(256, 256, 341, kMismatch), ErrorCode::bad_data);
@@ -212,7 +220,7 @@ TEST_F(Clerks, AProtocolWhoseScaleIsWrongIsRefused) {
   EXPECT_NE(refused.error().what.find("341"), std::string::npos);
 }
 
-TEST_F(Clerks, AHeaderWhoseScaleIsWrongIsSetAside) {
+TEST_F(HeaderAndProtocol, AHeaderWhoseScaleIsWrongIsSetAside) {
   for (const double header : {341.0, 200.0, 290.0}) {
     const auto plain = bundle(256, header, 256);
     ASSERT_OK(plain);
@@ -223,15 +231,10 @@ TEST_F(Clerks, AHeaderWhoseScaleIsWrongIsSetAside) {
     EXPECT_FALSE(diagnosis->unknown.present);
   }
   // A unit in the wrong mode under a header that lies: it is found as ever.
-  const auto mismatched = bundle(256, 341, 256, kMismatch);
-  ASSERT_OK(mismatched);
-  const auto diagnosis = diagnose(*mismatched);
-  ASSERT_OK(diagnosis);
-  ASSERT_FALSE(diagnosis->effects.empty());
-  EXPECT_EQ(diagnosis->effects.front().name, "filter_mismatch");
+  expect_mismatch(256, 341, 256);
 }
 
-TEST_F(Clerks, ASmallDifferenceIsALossAndCutDigitsAreNone) {
+TEST_F(HeaderAndProtocol, ASmallDifferenceIsALossAndCutDigitsAreNone) {
   const auto near = bundle(256, 256, 250);
   ASSERT_OK(near);
   EXPECT_NE(first_loss(*near).find("in doubt by 2.4 %"), std::string::npos) << first_loss(*near);
@@ -242,7 +245,7 @@ TEST_F(Clerks, ASmallDifferenceIsALossAndCutDigitsAreNone) {
 
 // Three public recordings have 2 to 2.9 % between X and Y (docs/constants.md): named, and said to
 // be more than the datasheet has.
-TEST_F(Clerks, TheCrossAxisOfARealUnitIsNamed) {
+TEST_F(HeaderAndProtocol, TheCrossAxisOfARealUnitIsNamed) {
   const auto real = bundle(
       256, 256, 256,
       R"({"name": "non_orthogonality", "parameters": {"yz_xz_xy": [0.0035, -0.0015, 0.0288]}})");
@@ -257,7 +260,7 @@ TEST_F(Clerks, TheCrossAxisOfARealUnitIsNamed) {
 }
 
 // Nothing contradicts: but a clerk's 341 for 256 is no filter mismatch either.
-TEST_F(Clerks, AWrongScaleThatBothSayIsAnUnknown) {
+TEST_F(HeaderAndProtocol, AWrongScaleThatBothSayIsAnUnknown) {
   const auto both = bundle(256, 341, 341);
   ASSERT_OK(both);
   const auto diagnosis = diagnose(*both);
@@ -266,15 +269,10 @@ TEST_F(Clerks, AWrongScaleThatBothSayIsAnUnknown) {
   ASSERT_TRUE(diagnosis->unknown.present);
   EXPECT_EQ(diagnosis->unknown.where.front().find("scale"), 0U);
   // A true mismatch of a unit of 341 stays what it is: its zeros give it away.
-  const auto mismatched = bundle(341, 341, 341, kMismatch);
-  ASSERT_OK(mismatched);
-  const auto named = diagnose(*mismatched);
-  ASSERT_OK(named);
-  ASSERT_FALSE(named->effects.empty());
-  EXPECT_EQ(named->effects.front().name, "filter_mismatch");
+  expect_mismatch(341, 341, 341);
 }
 
-TEST_F(Clerks, TheSampleRateIsWeighedByStampsAndRecords) {
+TEST_F(HeaderAndProtocol, TheSampleRateIsWeighedByStampsAndRecords) {
   ASSERT_OK(bundle(256, 256, 256));
   set("sample_rate_hz", 30);
   EXPECT_FAILS(read_bundle(memory_.files, "b"), ErrorCode::bad_data);
@@ -319,7 +317,7 @@ TEST_F(Clerks, TheSampleRateIsWeighedByStampsAndRecords) {
 }
 
 // Poses, sample numbers and samples that do not belong together: said, and no effect is named.
-TEST_F(Clerks, AProtocolOfAnotherRecordingNamesNothing) {
+TEST_F(HeaderAndProtocol, AProtocolOfAnotherRecordingNamesNothing) {
   const auto read = bundle(256, 256, 256);
   ASSERT_OK(read);
   const auto named_nothing = [](const Bundle& wrong, bool inconclusive, const char* why) {
@@ -364,13 +362,13 @@ TEST_F(Clerks, AProtocolOfAnotherRecordingNamesNothing) {
     counts = {static_cast<std::int16_t>(3 + random.below(2)), -4,
               static_cast<std::int16_t>(257 + random.below(2))};
   }
-  const auto lying = diagnose(wrong);  // it never left one pose
-  ASSERT_OK(lying);
-  EXPECT_TRUE(lying->effects.empty());
-  EXPECT_TRUE(lying->unknown.present);
+  const auto contradicted = diagnose(wrong);  // it never left one pose
+  ASSERT_OK(contradicted);
+  EXPECT_TRUE(contradicted->effects.empty());
+  EXPECT_TRUE(contradicted->unknown.present);
 }
 
-TEST_F(Clerks, LogsThatCoverHalfOrContradictAreLosses) {
+TEST_F(HeaderAndProtocol, LogsThatCoverHalfOrContradictAreLosses) {
   ASSERT_OK(bundle(256, 256, 256));
   const auto said = [&](const char* words) {
     const auto read = read_bundle(memory_.files, "b");

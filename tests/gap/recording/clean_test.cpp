@@ -1,4 +1,4 @@
-#include "gap/clean.h"
+#include "gap/recording/clean.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,8 @@
 // Plain recordings: real files of others, with what their makers say of them as the oracle.
-#include "gap/plain.h"
-
-#include <cstdio>
+#include "gap/unguided/plain.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
@@ -68,54 +65,6 @@ TEST(Plain, ChamberRunHasTheVendorsDrift) {
   EXPECT_LT(d->gap.after_mg, d->gap.before_mg);
 }
 
-// Factory values of this Xsens unit: scale 415, 413, 415 counts per m/s2, bias 33123, 33276, 32360,
-// cross-axis terms of 0.01 to 0.02; local gravity 9.81744 m/s2.
-TEST(Plain, XsensLengthsGiveTheFactorysScalesAndCrossTerms) {
-  const char* name = "data/multiposition/xsens_acc.txt.gz";
-  SIXPOINT_NEED_SHARED(name);
-  gzFile file = gzopen(tests::shared_file(name).c_str(), "rb");
-  ASSERT_NE(file, nullptr);
-  std::vector<Eigen::Vector3d> rows;
-  std::array<char, 256> line{};
-  while (gzgets(file, line.data(), static_cast<int>(line.size())) != nullptr) {
-    double t = 0;
-    Eigen::Vector3d x;
-    if (std::sscanf(line.data(), "%lf %lf %lf %lf", &t, &x[0], &x[1], &x[2]) == 4) {
-      rows.push_back(x);
-    }
-  }
-  gzclose(file);
-  ASSERT_GT(rows.size(), 50'000U);
-  // Positions: stretches of two seconds without movement, neighbours of one direction joined.
-  std::vector<Eigen::Vector3d> positions;
-  for (std::size_t i = 0; i + 200 <= rows.size(); i += 200) {
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    Eigen::Vector3d square = Eigen::Vector3d::Zero();
-    for (std::size_t k = i; k < i + 200; ++k) {
-      mean += rows[k] / 200;
-    }
-    for (std::size_t k = i; k < i + 200; ++k) {
-      square += (rows[k] - mean).cwiseAbs2() / 200;
-    }
-    if (std::sqrt(square.maxCoeff()) < 12) {
-      positions.push_back(mean);
-    }
-  }
-  ASSERT_GT(positions.size(), 40U);
-  const auto fit = fit_lengths(positions, 9.81744);
-  ASSERT_OK(fit);
-  const std::array<double, 3> scale = {415, 413, 415};
-  const std::array<double, 3> bias = {33123, 33276, 32360};
-  for (Eigen::Index a = 0; a < 3; ++a) {
-    EXPECT_NEAR(1 / fit->sensitivity(a, a), scale[static_cast<std::size_t>(a)], 4) << a;
-    EXPECT_NEAR(fit->zero[a], bias[static_cast<std::size_t>(a)], 60) << a;
-    EXPECT_LT(std::abs(fit->cross[a]), 0.025) << a;
-    EXPECT_LT(fit->cross_sd[a], 0.002) << a;
-  }
-  EXPECT_GT(fit->cross.cwiseAbs().maxCoeff(), 0.003);
-  EXPECT_LT(fit->residual, 0.02);
-}
-
 // Semi-synthetic: a mismatch of known size put into a real recording of a unit that has none. What
 // the recording really holds - wear, movement, its own constants - stays.
 TEST(Plain, KnownMismatchInARealRecordingIsFoundAndMeasured) {
@@ -176,13 +125,6 @@ TEST(Plain, KnownMismatchInARealRecordingIsFoundAndMeasured) {
     right += (found != nullptr) == c.there ? 1 : 0;
   }
   EXPECT_EQ(right, 5);
-}
-
-TEST(Plain, TooFewPositionsAreRefused) {
-  EXPECT_FAILS(fit_lengths(std::vector<Eigen::Vector3d>(5, Eigen::Vector3d::UnitX()), 1),
-               ErrorCode::bad_data);
-  EXPECT_FAILS(fit_lengths(std::vector<Eigen::Vector3d>(40, Eigen::Vector3d::UnitX()), 1),
-               ErrorCode::bad_data);
 }
 
 TEST(Plain, MissingFileIsNoInput) {

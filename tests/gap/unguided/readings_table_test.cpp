@@ -1,4 +1,4 @@
-#include "gap/readings_table.h"
+#include "gap/unguided/readings_table.h"
 
 #include <cmath>
 #include <string>
@@ -149,7 +149,7 @@ TEST(ReadingsTable, BadTablesAreNamed) {
   EXPECT_THAT(message(std::string(100'000, '1')), HasSubstr("longer than 4096"));
   EXPECT_THAT(message("3,1,2,3\n2,1,2,3\n1,1,2,3\n"), HasSubstr("rate"));  // time goes back
   EXPECT_THAT(message("5,1,2,3\n5,1,2,3\n5,1,2,3\n"), HasSubstr("rate"));  // or stands
-  EXPECT_THAT(message("1,2,3\n1,2,3\n"), HasSubstr("rate must be told"));
+  EXPECT_THAT(message("1,2,3\n1,2,3\n"), HasSubstr("rate must be given"));
   EXPECT_THAT(message(std::string("\x1F\x8B\x08 broken", 10)), HasSubstr("gzip"));
 }
 

@@ -1,4 +1,4 @@
-#include "gt3x/agdc.h"
+#include "gt3x/forms/agdc.h"
 
 #include <cmath>
 #include <fstream>

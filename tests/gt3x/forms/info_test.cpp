@@ -1,9 +1,8 @@
-#include "gt3x/info.h"
+#include "gt3x/forms/info.h"
 
 #include <gtest/gtest.h>
 
 #include "expect_result.h"
-#include "gt3x/model.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -63,19 +62,6 @@ TEST(Info, TicksBothWays) {
   ASSERT_TRUE(time);
   EXPECT_EQ(to_iso8601(*time), "2015-04-09T14:04:00Z");
   EXPECT_EQ(to_ticks(*time), 635'641'850'400'000'000);
-}
-
-TEST(Model, ByPrefix) {
-  EXPECT_EQ(model_of("MOS2A45130450"), "wGT3X-BT");
-  EXPECT_EQ(model_of("MOS4A1"), "wActiSleep-BT");
-  EXPECT_EQ(model_of("MOS3A1"), "wActiSleep+");
-  EXPECT_EQ(model_of("CLE2A1"), "wGT3X+");
-  EXPECT_EQ(model_of("TAS1"), "GT9X Link");
-  EXPECT_EQ(model_of("CPW1"), "CentrePoint Insight Watch");
-  EXPECT_EQ(model_of(""), "unknown");
-  EXPECT_EQ(default_accel_scale_lsb_per_g("NEO1"), 341.0);
-  EXPECT_EQ(default_accel_scale_lsb_per_g("MOS0"), 256.0);
-  EXPECT_FALSE(default_accel_scale_lsb_per_g("CPW1"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "gt3x/parameters.h"
+#include "gt3x/forms/parameters.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "gt3x/log_reader.h"
+#include "gt3x/log/log_reader.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "gt3x/record.h"
+#include "gt3x/log/record.h"
 
 #include <gtest/gtest.h>
 

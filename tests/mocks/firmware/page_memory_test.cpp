@@ -1,11 +1,12 @@
-#include "mocks/page_memory.h"
+#include "mocks/firmware/page_memory.h"
 
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
 #include "device/unit.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
-#include "mocks/in_process.h"
+#include "mocks/in_process/in_process.h"
 
 namespace sixpoint::mocks {
 namespace {
@@ -36,7 +37,7 @@ TEST(PageMemory, PowerLossLeavesOldOrNewNeverAMixture) {
   EXPECT_GT(news, 0);
 }
 
-// The same through the whole protocol, and what the station says about it.
+// The same through the whole protocol, and the station's error.
 TEST(PageMemory, PowerLossDuringAWriteThroughTheProtocol) {
   const device::CalibrationPage wanted{{{300, 301, 302}, {-200, -201, -202}, {50, 51, 52}},
                                        from_unix_seconds(1'600'000'000)};
@@ -45,7 +46,7 @@ TEST(PageMemory, PowerLossDuringAWriteThroughTheProtocol) {
     options.truth = sim::draw_unit(7);
     const auto clock = std::make_shared<ManualClock>();
     const auto plugged = std::make_shared<PluggedUnit>(options, clock);
-    auto unit = *device::Unit::open(link_to(plugged, false));
+    auto unit = *device::WireUnit::open(link_to(plugged, false));
     const auto before = *unit->read_calibration();
     plugged->unit.memory().cut_power_after(cut);
     const Status written = unit->write_calibration(wanted);

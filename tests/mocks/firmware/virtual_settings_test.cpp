@@ -1,10 +1,10 @@
-#include "mocks/virtual_settings.h"
+#include "mocks/firmware/virtual_settings.h"
 
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "mocks/in_process.h"
+#include "mocks/in_process/in_process.h"
 
 namespace sixpoint::mocks {
 namespace {

@@ -1,4 +1,4 @@
-#include "mocks/virtual_unit.h"
+#include "mocks/firmware/virtual_unit.h"
 
 #include <cmath>
 
@@ -6,14 +6,14 @@
 
 #include "base/memory_env.h"
 #include "device/unit.h"
+#include "device/wire/wire_unit.h"
 #include "expect_result.h"
-#include "gt3x/record.h"
+#include "gt3x/log/record.h"
+#include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
-#include "gt3x/samples.h"
-#include "mocks/in_process.h"
-#include "mocks/inert.h"
-#include "mocks/virtual_jig.h"
+#include "mocks/in_process/in_process.h"
+#include "mocks/in_process/virtual_jig.h"
 
 namespace sixpoint::mocks {
 namespace {
@@ -24,13 +24,13 @@ using sim::FilterConfiguration;
 struct Bench {
   explicit Bench(const char* firmware = "1.5.0") {
     VirtualUnitOptions options;
-    sim::UnitWishes wishes;
-    wishes.firmware = firmware;
-    options.truth = sim::draw_unit(7, wishes);
+    sim::GivenProperties given;
+    given.firmware = firmware;
+    options.truth = sim::draw_unit(7, given);
     clock = std::make_shared<ManualClock>();
     plugged = std::make_shared<PluggedUnit>(options, clock);
     jig = std::make_unique<VirtualJig>(plugged);
-    unit = *device::Unit::open(link_to(plugged, false));
+    unit = *device::WireUnit::open(link_to(plugged, false));
   }
   std::shared_ptr<ManualClock> clock;
   std::shared_ptr<PluggedUnit> plugged;
@@ -65,9 +65,9 @@ TEST(VirtualUnit, TheJigTurnsItAndTheFilterChangesIt) {
     const sim::SensorTruth& truth = bench.plugged->unit.truth().sensor(filter);
     for (const Pose pose : device::kPoses) {
       ASSERT_OK(bench.jig->go_to(pose));
-      EXPECT_FALSE(bench.jig->report()->pose.has_value()) << "still turning";
+      EXPECT_FALSE(bench.jig->position()->pose.has_value()) << "still turning";
       bench.clock->sleep(std::chrono::seconds(2));
-      EXPECT_EQ(bench.jig->report()->pose, pose);
+      EXPECT_EQ(bench.jig->position()->pose, pose);
       ASSERT_OK(bench.unit->start_stream(100));
       const auto mean = mean_of_stream(bench, 100);
       ASSERT_OK(bench.unit->stop_stream());
@@ -158,7 +158,7 @@ TEST(VirtualUnit, FullFlashEndsTheRecording) {
   options.flash_bytes = 200'000;
   const auto clock = std::make_shared<ManualClock>();
   const auto plugged = std::make_shared<PluggedUnit>(options, clock);
-  auto unit = *device::Unit::open(link_to(plugged, false));
+  auto unit = *device::WireUnit::open(link_to(plugged, false));
   ASSERT_OK(unit->start_recording(100, from_unix_seconds(0)));
   clock->sleep(std::chrono::hours(10));
   ASSERT_OK(unit->stop_recording());
@@ -178,23 +178,6 @@ TEST(VirtualUnit, PowerLossForgetsWhatIsInRam) {
   const auto filter = bench.unit->filter();
   ASSERT_OK(filter);
   EXPECT_EQ(filter->stream, FilterConfiguration::current) << "the firmware's own choice again";
-}
-
-TEST(Inert, KeepsWhatItWasTold) {
-  const auto clock = std::make_shared<ManualClock>();
-  InertTransport transport(clock);
-  transport.to_read.push_back(Bytes{1, 2, 3});
-  transport.to_read.push_back(fail(ErrorCode::io, "as set", "test", "none needed"));
-  std::array<std::uint8_t, 64> buffer{};
-  EXPECT_EQ(*transport.read(buffer, std::chrono::seconds(1)), 3U);
-  EXPECT_FAILS(transport.read(buffer, std::chrono::seconds(1)), ErrorCode::io);
-  EXPECT_EQ(*transport.read(buffer, std::chrono::seconds(1)), 0U);
-  EXPECT_EQ(clock->elapsed(), std::chrono::seconds(1));
-  ASSERT_OK(transport.write(Bytes{9}, std::chrono::seconds(1)));
-  EXPECT_EQ(transport.written, (std::vector<Bytes>{{9}}));
-  InertJig jig;
-  ASSERT_OK(jig.go_to(Pose::minus_y));
-  EXPECT_EQ(jig.poses, (std::vector<Pose>{Pose::minus_y}));
 }
 
 }  // namespace

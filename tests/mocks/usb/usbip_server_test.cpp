@@ -1,4 +1,4 @@
-#include "mocks/usbip_server.h"
+#include "mocks/usb/usbip_server.h"
 
 #include <csignal>
 #include <fstream>
@@ -10,10 +10,10 @@
 #include "base/env.h"
 #include "base/memory_env.h"
 #include "base/random.h"
-#include "device/payload.h"
-#include "device/protocol.h"
+#include "device/wire/payload.h"
+#include "device/wire/protocol.h"
 #include "expect_result.h"
-#include "mocks/usb_unit.h"
+#include "mocks/usb/usb_unit.h"
 #include "usbip_client.h"
 
 namespace sixpoint::mocks {

@@ -1,4 +1,4 @@
-#include "repair/compare.h"
+#include "repair/compare/compare.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,4 @@
-#include "repair/repair_file.h"
+#include "repair/rescale/repair_file.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -6,7 +6,7 @@
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "expect_result.h"
-#include "made_recording.h"
+#include "repair/six_sides.h"
 #include "shared_data.h"
 
 namespace sixpoint::repair {
@@ -14,11 +14,11 @@ namespace {
 
 using gt3x::Counts;
 using tests::entry_of;
+using tests::kTrue;
 using tests::MadeRecording;
 using tests::samples_of;
-
-// What the sensor really is under `current`; the stored constants are 0.1 to 0.2 g off it.
-const calib::Calibration kTrue = {{1 / 237.7, 1 / 251.8, 1 / 242.3}, {95.2, 52.3, 90.8}};
+using tests::sense;
+using tests::six_sides;
 
 class FixedConstants final : public ConstantsSource {
  public:
@@ -35,42 +35,21 @@ class FixedConstants final : public ConstantsSource {
   ConstantsChoice choice;
 };
 
-PerAxis<int> sense(const PerAxis<double>& g) {
-  PerAxis<int> raw{};
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    raw[a] =
-        static_cast<int>(std::lround(g[a] / kTrue.sensitivity_g_per_lsb[a] + kTrue.zero_lsb[a]));
-  }
-  return raw;
-}
-
-// Six sides of ten seconds and ten seconds of movement.
-MadeRecording six_sides() {
-  MadeRecording made;
-  Random random(3);
-  for (int side = 0; side < 7; ++side) {
-    for (int i = 0; i < 300; ++i) {
-      PerAxis<double> g{};
-      if (side < 6) {
-        g[static_cast<std::size_t>(side / 2)] = side % 2 == 0 ? 1 : -1;
-      } else {
-        g = {2 * std::sin(i * 0.2), 1.5 * std::cos(i * 0.3), 6 * std::sin(i * 0.1)};
-      }
-      for (double& value : g) {
-        value += 0.004 * random.normal();
-      }
-      made.raw.push_back(sense(g));
-    }
-  }
-  return made;
-}
-
 class RepairFile : public testing::Test {
  protected:
   RepairReport repair(const RepairOptions& options = {}) {
     return repair_file(memory_.env, "in.gt3x", "out.gt3x", source_, options);
   }
   bool exists(const std::string& path) { return memory_.files.info(path).has_value(); }
+  // The repair fails and gives no output. Returns what the error says.
+  std::string expect_bad_data() {
+    const RepairReport report = repair();
+    EXPECT_EQ(report.status, RepairStatus::failed);
+    EXPECT_FALSE(exists("out.gt3x"));
+    const Error error = report.error.value_or(Error{});
+    EXPECT_EQ(error.code, ErrorCode::bad_data);
+    return error.what;
+  }
 
   MemoryEnv memory_;
   FixedConstants source_;
@@ -86,19 +65,20 @@ TEST_F(RepairFile, EverySampleIsWhatTheRightConstantsWouldHaveStored) {
   EXPECT_GT(report.still_error_before_mg.value(), 100);
   EXPECT_LT(report.still_error_after_mg.value(), 1);
   EXPECT_EQ(report.samples, made.raw.size());
-  const auto mended = samples_of(memory_.files, "out.gt3x");
-  ASSERT_EQ(mended.size(), made.raw.size());
+  const auto repaired = samples_of(memory_.files, "out.gt3x");
+  ASSERT_EQ(repaired.size(), made.raw.size());
   // Oracle: the right constants applied to the raw counts themselves. Where the firmware sent two
   // raw counts to one stored count, half a raw count may be missing.
   std::size_t exact = 0;
-  for (std::size_t i = 0; i < mended.size(); ++i) {
+  for (std::size_t i = 0; i < repaired.size(); ++i) {
     for (std::size_t a = 0; a < kAxes; ++a) {
       const double wanted = 256 * kTrue.to_g(a, made.raw[i][a]);
-      EXPECT_LE(std::abs(mended[i][a] - wanted), 0.5 + 0.5 * 256 * kTrue.sensitivity_g_per_lsb[a]);
-      exact += mended[i][a] == std::lround(wanted) ? 1U : 0U;
+      EXPECT_LE(std::abs(repaired[i][a] - wanted),
+                0.5 + 0.5 * 256 * kTrue.sensitivity_g_per_lsb[a]);
+      exact += repaired[i][a] == std::lround(wanted) ? 1U : 0U;
     }
   }
-  EXPECT_GT(static_cast<double>(exact) / static_cast<double>(3 * mended.size()), 0.95);
+  EXPECT_GT(static_cast<double>(exact) / static_cast<double>(3 * repaired.size()), 0.95);
 }
 
 TEST_F(RepairFile, OnlySampleRecordsAndTheMarkDiffer) {
@@ -217,9 +197,9 @@ TEST_F(RepairFile, CountsClippedSamplesAndKeepsThemAtTheLimit) {
   const auto narrow = repair();
   ASSERT_EQ(narrow.status, RepairStatus::repaired) << narrow.to_json().dump(1);
   EXPECT_EQ(narrow.clipped_before, 2U);
-  const auto mended = samples_of(memory_.files, "out.gt3x");
-  EXPECT_EQ(mended[3][0], 2047);
-  EXPECT_EQ(mended[4][2], -2048);
+  const auto repaired = samples_of(memory_.files, "out.gt3x");
+  EXPECT_EQ(repaired[3][0], 2047);
+  EXPECT_EQ(repaired[4][2], -2048);
   // 1952 counts at 1/237.7 g are 8.21 g: more than 12 bits hold.
   EXPECT_EQ(narrow.clipped_after, 60U);
   RepairOptions options;
@@ -247,40 +227,34 @@ TEST_F(RepairFile, RefusesConstantsThatAreNotForThisFile) {
   EXPECT_FALSE(exists("out.gt3x"));
 }
 
+// The log of a recording with other parameters.
+Bytes log_with(const MadeRecording& made, const Bytes& parameters) {
+  Bytes log;
+  gt3x::append_record(log, gt3x::RecordType::parameters, made.start, parameters);
+  const Bytes whole = made.log();
+  log.insert(
+      log.end(),
+      whole.begin() + static_cast<std::ptrdiff_t>(made.parameters().size() + gt3x::kRecordOverhead),
+      whole.end());
+  return log;
+}
+
 TEST_F(RepairFile, DividesByNoZero) {
   MadeRecording made = six_sides();
-  const Bytes log = made.log();
-  made.constants.positive_lsb[1] = made.constants.negative_lsb[1];
-  Bytes broken;
-  gt3x::append_record(broken, gt3x::RecordType::parameters, made.start, made.parameters());
-  broken.insert(
-      broken.end(),
-      log.begin() + static_cast<std::ptrdiff_t>(made.parameters().size() + gt3x::kRecordOverhead),
-      log.end());
+  MadeRecording other = made;
+  other.constants.positive_lsb[1] = other.constants.negative_lsb[1];
+  const Bytes broken = log_with(made, other.parameters());
   ASSERT_OK(made.write(memory_.files, "in.gt3x", broken));
-  const auto report = repair();
-  EXPECT_EQ(report.status, RepairStatus::failed);
-  EXPECT_EQ(report.error->code, ErrorCode::bad_data);
-  EXPECT_FALSE(exists("out.gt3x"));
+  expect_bad_data();
 }
 
 TEST_F(RepairFile, AffectedFileWithoutConstantsIsBadData) {
   MadeRecording made = six_sides();
   gt3x::ParameterValues values;
   values[gt3x::kParameterCalibrationTime] = static_cast<std::uint32_t>(made.calibrated);
-  Bytes log;
-  gt3x::append_record(log, gt3x::RecordType::parameters, made.start,
-                      gt3x::encode_parameters(values));
-  const Bytes whole = made.log();
-  log.insert(
-      log.end(),
-      whole.begin() + static_cast<std::ptrdiff_t>(made.parameters().size() + gt3x::kRecordOverhead),
-      whole.end());
+  const Bytes log = log_with(made, gt3x::encode_parameters(values));
   ASSERT_OK(made.write(memory_.files, "in.gt3x", log));
-  const auto report = repair();
-  ASSERT_EQ(report.status, RepairStatus::failed);
-  EXPECT_EQ(report.error->code, ErrorCode::bad_data);
-  EXPECT_NE(report.error->what.find("constants"), std::string::npos);
+  EXPECT_NE(expect_bad_data().find("constants"), std::string::npos);
 }
 
 // At every disk operation in turn the power goes: the original is whole, the output whole or
@@ -317,10 +291,7 @@ TEST_F(RepairFile, ADamagedZipGivesNoOutput) {
   bytes[bytes.size() / 2] ^= 0x40U;  // inside log.bin: its CRC no longer holds
   auto out = memory_.files.create("in.gt3x").value();
   ASSERT_OK(out->write_at(0, bytes));
-  const auto report = repair();
-  EXPECT_EQ(report.status, RepairStatus::failed);
-  EXPECT_EQ(report.error->code, ErrorCode::bad_data);
-  EXPECT_FALSE(exists("out.gt3x"));
+  expect_bad_data();
 }
 
 TEST_F(RepairFile, SecondParametersHoldFromThereOn) {
@@ -335,11 +306,11 @@ TEST_F(RepairFile, SecondParametersHoldFromThereOn) {
   ASSERT_OK(made.write(memory_.files, "in.gt3x", log));
   const auto report = repair();
   ASSERT_EQ(report.status, RepairStatus::repaired);
-  const auto mended = samples_of(memory_.files, "out.gt3x");
-  ASSERT_EQ(mended.size(), 2 * made.raw.size());
+  const auto repaired = samples_of(memory_.files, "out.gt3x");
+  ASSERT_EQ(repaired.size(), 2 * made.raw.size());
   for (std::size_t i = 0; i < made.raw.size(); ++i) {
     for (std::size_t a = 0; a < kAxes; ++a) {
-      EXPECT_NEAR(mended[i][a], mended[i + made.raw.size()][a], 1.01);
+      EXPECT_NEAR(repaired[i][a], repaired[i + made.raw.size()][a], 1.01);
     }
   }
 }

@@ -1,6 +1,6 @@
 // Trees that real disks hold: links in circles, folders that cannot be read, things that are no
 // files.
-#include "repair/file_tree.h"
+#include "repair/triage/file_tree.h"
 
 #include <filesystem>
 #include <fstream>

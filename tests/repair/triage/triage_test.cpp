@@ -1,4 +1,4 @@
-#include "repair/triage.h"
+#include "repair/triage/triage.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim/effect.h"
+#include "sim/effects/effect.h"
 
 #include <cmath>
 #include <fstream>
@@ -17,9 +17,9 @@ namespace {
 SimulatedBlock run(const char* name, const ParameterSet& given, const Eigen::Vector3d& up,
                    double temperature_c = 25) {
   const EffectKind* kind = *find_effect(name);
-  UnitWishes wishes;
-  wishes.noise_mg = PerAxis<double>{};
-  const UnitTruth unit = draw_unit(1, wishes);
+  GivenProperties properties;
+  properties.noise_mg = PerAxis<double>{};
+  const UnitTruth unit = draw_unit(1, properties);
   std::vector<std::unique_ptr<Effect>> effects;
   effects.push_back(kind->make(*complete_parameters(*kind, given), Random(1)));
   SimulatorOptions options;

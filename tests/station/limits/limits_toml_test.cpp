@@ -1,5 +1,4 @@
-#include "station/limits.h"
-
+// Limits as TOML: read, refused with the line, printed.
 #include <algorithm>
 
 #include <gmock/gmock.h>
@@ -8,24 +7,12 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "run_command.h"
+#include "station/limits/limits.h"
 
 namespace sixpoint::station {
 namespace {
 
 using testing::HasSubstr;
-
-TEST(Limits, TheBuiltInOnesAreCompleteAndInThemselvesConsistent) {
-  const Limits limits = default_limits();
-  ASSERT_EQ(limits.limits.size(), quantities().size());
-  for (const QuantityInfo& info : quantities()) {
-    const Limit& limit = limits.of(info.name);
-    EXPECT_TRUE(limit.low || limit.high) << info.name;
-    EXPECT_FALSE(info.reason.empty()) << info.name;
-    EXPECT_FALSE(info.high && info.code_high.empty()) << info.name;
-    EXPECT_FALSE(info.low && info.code_low.empty()) << info.name;
-  }
-  EXPECT_EQ(limits.sha256.size(), 64U);
-}
 
 TEST(Limits, WhatIsPrintedIsRead) {
   Limits limits = default_limits();
@@ -80,8 +67,7 @@ TEST_P(BadLimits, EndEveryCommandWithOneLine) {
   const std::string text = GetParam().text;
   auto file = env.files.create("l.toml");
   ASSERT_OK(file);
-  ASSERT_OK((*file)->write_at(
-      0, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+  ASSERT_OK((*file)->write_at(0, as_bytes(text)));
   ASSERT_OK((*file)->close());
   const std::vector<std::vector<std::string>> commands = {
       {"limits", "check", "l.toml"},
@@ -151,8 +137,7 @@ TEST(Limits, AFileIsNamedWithoutItsFolderAndAHugeOneIsRefused) {
   const auto put = [&](const std::string& path, const std::string& text) {
     auto file = env.files.create(path);
     ASSERT_OK(file);
-    ASSERT_OK((*file)->write_at(
-        0, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size())));
+    ASSERT_OK((*file)->write_at(0, as_bytes(text)));
     ASSERT_OK((*file)->close());
   };
   put("l.toml", "[noise_mg]\nhigh = 3\n");

@@ -1,4 +1,4 @@
-#include "station/station_records.h"
+#include "station/records/station_records.h"
 
 #include <filesystem>
 #include <fstream>
@@ -106,7 +106,7 @@ TEST_F(StationRecords, ACheckUnitOutOfControlLocksItsStationUntilAnEngineerSigns
   EXPECT_OK(start("CHECK1")) << "a check unit may always be measured";
   EXPECT_OK(start("MOS2A1", "B")) << "another station is not concerned";
   add_run("CHECK1", JigVerdict::pass, 100);
-  EXPECT_FAILS(start("MOS2A1"), ErrorCode::configuration);  // one good point mends nothing
+  EXPECT_FAILS(start("MOS2A1"), ErrorCode::configuration);  // one good point does not unlock it
   decide("sign");
   EXPECT_OK(start("MOS2A1"));
   const auto state = station_state(store_, "A", default_limits().check_unit);

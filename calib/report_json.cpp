@@ -1,0 +1,163 @@
+// The JSON of the two reports: of solve_from_still_blocks() and of solve_six_poses().
+#include <nlohmann/json.hpp>
+
+#include "calib/six_pose.h"
+#include "calib/solve.h"
+
+namespace sixpoint::calib {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void add_constants(Json& json, const SolveReport& report) {
+  json["constants"] = nullptr;
+  json["standard_uncertainty"] = nullptr;
+  if (!report.calibration) {
+    return;
+  }
+  if (report.stored) {
+    json["constants"] = to_json(*report.calibration, *report.stored);
+  } else {
+    json["constants"] = to_json(*report.calibration);
+  }
+  json["standard_uncertainty"] = to_json(report.uncertainty);
+  json["standard_uncertainty"]["of_the_data_alone"] = to_json(report.statistical);
+}
+
+Json to_json(const Coverage& coverage) {
+  Json json;
+  json["min"] = coverage.min_g;
+  json["max"] = coverage.max_g;
+  // Blocks at -1.3 .. -0.7, -0.7 .. 0.7 and 0.7 .. 1.3 g of each axis.
+  for (const auto& [name, subset] :
+       {std::pair{"low", ValueSubset::low}, std::pair{"middle", ValueSubset::middle},
+        std::pair{"high", ValueSubset::high}}) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      json["value_subsets"][name].push_back(
+          coverage.subset_blocks[a][static_cast<std::size_t>(subset)]);
+    }
+  }
+  return json;
+}
+
+void add_fit(Json& json, const BlockFit& fit) {
+  json["least_squares"] = {{"converged", fit.fit.converged},
+                           {"condition", fit.fit.condition},
+                           {"degrees_of_freedom", fit.fit.degrees_of_freedom},
+                           {"blocks_left_out", fit.blocks_left_out},
+                           {"block_sd_mg", fit.block_sd_mg},
+                           {"structural_mg", fit.structural_mg}};
+  if (!fit.richer) {
+    return;
+  }
+  const LeastSquaresFit& more = fit.richer->fit;
+  Json& richer = json["richer_model"];
+  richer = to_json(more.calibration);
+  richer["cross_axis"] = more.model.cross_axis ? Json(more.cross_axis) : Json(nullptr);
+  richer["zero_lsb_per_c"] = more.model.temperature ? Json(more.zero_lsb_per_c) : Json(nullptr);
+  richer["reference_temperature_c"] =
+      more.model.temperature ? Json(fit.reference_temperature_c) : Json(nullptr);
+  richer["held_out_rms_mg"] = fit.richer->held_out_rms_mg;
+}
+
+Json to_json(const GeneticResult& search) {
+  return {{"settled", search.settled},   {"fitness_mg", search.fitness_mg},
+          {"level_mg", search.level_mg}, {"spread_mg", search.spread_mg},
+          {"trend_mg", search.trend_mg}, {"constants", to_json(search.calibration)}};
+}
+
+}  // namespace
+
+Json to_json(const SolveReport& report) {
+  const bool any = report.points > 0;
+  Json json;
+  json["serial"] = report.serial;
+  json["filter"] = report.filter ? Json(to_string(*report.filter)) : Json(nullptr);
+  json["method"] = to_string(report.method);
+  add_constants(json, report);
+  json["points"] = report.points;
+  json["points_found"] = report.points_found;
+  json["noisy_points"] = report.noisy_points;
+  json["coverage_g"] = any ? to_json(report.coverage) : Json({{"min", nullptr}, {"max", nullptr}});
+  json["residual_mg"]["before"] = any ? Json(report.residual_before_mg) : Json(nullptr);
+  json["residual_mg"]["after"] = number_or_null(report.residual_after_mg);
+  json["residual_mg"]["rounded"] = number_or_null(report.residual_rounded_mg);
+  json["verified"] = report.verification.verified;
+  json["verdict"] = to_string(report.verification.verdict);
+  json["reasons"] = report.verification.reasons;
+  json["missing_directions"] = report.verification.missing_directions;
+  json["notes"] = report.notes;
+  json["iterations"] = report.iterations;
+  json["seconds"] = report.seconds;
+  json["gravity_m_per_s2"] = report.gravity_g * kStandardGravity_m_per_s2;
+  json["from_prior"] = report.from_prior;
+  json["verification"] = to_json(report.verification);
+  if (report.fit) {
+    add_fit(json, *report.fit);
+  }
+  if (report.search) {
+    json["genetic"] = to_json(*report.search);
+  }
+  if (report.temperature) {
+    const TemperatureDrift& drift = *report.temperature;
+    json["temperature"] = {{"low_c", drift.low_c},
+                           {"high_c", drift.high_c},
+                           {"zero_mg_per_c", drift.zero_mg_per_c},
+                           {"standard_uncertainty_mg_per_c", drift.standard_uncertainty_mg_per_c},
+                           {"blocks", drift.blocks}};
+  }
+  if (report.partial) {
+    const PartialKnowledge& partial = *report.partial;
+    json["partial"] = {{"zero_mg", partial.zero_mg},
+                       {"sensitivity_relative", partial.sensitivity_relative},
+                       {"zero_determined", partial.zero_determined},
+                       {"sensitivity_determined", partial.sensitivity_determined}};
+  }
+  return json;
+}
+
+Json to_json(const SixPoseSolution& solution) {
+  return {{"constants", to_json(solution.calibration, solution.stored)},
+          {"standard_uncertainty", to_json(solution.uncertainty)},
+          {"own_rms_mg", solution.own_rms_mg},
+          {"held_out_rms_mg", number_or_null(solution.held_out_rms_mg)},
+          {"held_out_worst_mg", number_or_null(solution.held_out_worst_mg)},
+          {"rounded_rms_mg", number_or_null(solution.rounded_rms_mg)}};
+}
+
+Json to_json(const AllAxesSolution& all_axes) {
+  Json json = to_json(all_axes.six);
+  json["lsb_per_g"] = all_axes.lsb_per_g;
+  json["cross_axis"] = all_axes.cross_axis;
+  json["rotation_deg"] = all_axes.rotation_deg;
+  json["degrees_of_freedom"] = all_axes.degrees_of_freedom;
+  return json;
+}
+
+Json to_json(const SixPoseReport& report) {
+  Json json = {{"verified", report.verified},
+               {"reasons", report.reasons},
+               {"missing_directions", report.missing_directions},
+               {"gravity_m_per_s2", report.gravity.m_per_s2}};
+  if (!report.missing_directions.empty()) {
+    return json;
+  }
+  Json poses = Json::array();
+  for (const PoseResidual& pose : report.poses) {
+    poses.push_back({{"pose", pose.side},
+                     {"magnitude_mg", pose.magnitude_mg},
+                     {"tilt_deg", pose.tilt_deg},
+                     {"held_out", pose.held_out}});
+  }
+  json.update({{"chosen", to_string(report.chosen)},
+               {"better_by_mg", report.better_by_mg},
+               {"letter", to_json(report.as_published)},
+               {"pair", to_json(report.per_axis)},
+               {"vector", to_json(report.all_axes)},
+               {"midpoint_minus_zero_lsb", report.midpoint_minus_zero_lsb},
+               {"poses", std::move(poses)}});
+  return json;
+}
+
+}  // namespace sixpoint::calib

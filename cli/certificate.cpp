@@ -1,0 +1,50 @@
+// sixpoint certificate: makes the certificate (or the label) of a run again, from the store alone.
+#include "station/certificate/certificate.h"
+
+#include <fmt/format.h>
+
+#include "base/atomic_file.h"
+#include "cli/command.h"
+#include "cli/store_option.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+struct Options {
+  std::string run;
+  std::string store;
+  std::string output;
+  std::string label;
+  bool json = false;
+};
+
+Status run(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const db::RunRecord record, store.run(options.run));
+  SIXPOINT_ASSIGN(const auto certificate, station::certificate_of(record));
+  if (!options.output.empty()) {
+    SIXPOINT_CHECK(station::write_certificate(context.env.files, options.output, record));
+  }
+  if (!options.label.empty()) {
+    SIXPOINT_ASSIGN(const std::string label, station::label_zpl(record));
+    SIXPOINT_CHECK(write_file(context.env.files, options.label, label));
+  }
+  return print_answer(
+      context, options.json, certificate.to_json(),
+      fmt::format("{}: {}{}\n", printable(certificate.serial), to_string(certificate.verdict),
+                  options.output.empty() ? "" : ", certificate in " + options.output));
+}
+
+}  // namespace
+
+void add_certificate(CLI::App& app, Context& context) {
+  auto [command, options] = add_command<Options>(app, context, "certificate",
+                                                 "make the certificate of a jig run again", run);
+  command.add_option("RUN", options.run, "the run's id, as 'sixpoint jig' said it")->required();
+  command.add_option("-o,--output", options.output, "the .pdf or .json to make");
+  command.add_option("--label", options.label, "and a label for the unit, as ZPL");
+  add_store_option(command, options.store);
+}
+
+}  // namespace sixpoint::cli

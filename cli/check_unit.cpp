@@ -1,0 +1,174 @@
+// sixpoint check-unit, station-lock, retest: checks of the station, and the decisions of engineers.
+#include <fmt/format.h>
+
+#include "base/atomic_file.h"
+#include "cli/command.h"
+#include "cli/store_option.h"
+#include "station/records/station_records.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+struct Options {
+  std::string serial;
+  std::string station;
+  std::string operator_name;
+  std::string reason;
+  std::string limits;
+  std::string store;
+  std::string html;
+  bool new_baseline = false;
+  bool release = false;
+  bool json = false;
+};
+
+// Adds an engineer's decision to the store and answers `done`.
+Status decide(const Options& options, Context& context, const char* command,
+              const std::string& action, const std::string& done) {
+  SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
+  const db::StationEvent event{.station = options.station,
+                               .serial = options.serial,
+                               .action = action,
+                               .operator_name = options.operator_name,
+                               .reason = options.reason};
+  Json json = document(command);
+  SIXPOINT_ASSIGN(json["stored_id"], store.add_station_event(event));
+  json["action"] = action;
+  json["serial"] = options.serial;
+  json["station"] = options.station;
+  return print_answer(context, options.json, json, done + "\n");
+}
+
+Status show_state(const Options& options, Context& context, const char* command) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
+  SIXPOINT_ASSIGN(const auto state,
+                  station::station_state(store, options.station, limits.check_unit));
+  if (!options.html.empty()) {
+    std::string page = "<!doctype html>\n<meta charset=utf-8><title>Check units</title>\n";
+    for (const station::CheckUnitChart& chart : state.charts) {
+      page += station::chart_svg(chart);
+    }
+    SIXPOINT_CHECK(write_file(context.env.files, options.html, page));
+  }
+  context.worsen(state.locked ? kExitFailed : kExitPassed);
+  Json json = document(command);
+  json.update(state.to_json());
+  std::string text = printable(state.brief(), 4000) + "\n";
+  for (const station::CheckUnitChart& chart : state.charts) {
+    const station::ControlChart& one = chart.chart;
+    text +=
+        fmt::format("  {} {}: {} points, ", printable(chart.serial), one.name, one.values.size());
+    text += one.baseline == 0
+                ? std::string("too few for limits yet\n")
+                : fmt::format("{:.3f} within {:.3f} and {:.3f}{}\n", one.values.back(), one.lower,
+                              one.upper, one.signals.empty() ? "" : ", out of control");
+  }
+  return print_answer(context, options.json, json, text);
+}
+
+Status sign(const Options& options, Context& context) {
+  return decide(options, context, "station-lock",
+                options.new_baseline ? "sign_new_baseline" : "sign",
+                "signed; the station may go on");
+}
+
+Status retest(const Options& options, Context& context) {
+  if (options.release) {
+    return decide(options, context, "retest", "release",
+                  printable(options.serial) + " may be measured again");
+  }
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
+  SIXPOINT_ASSIGN(const auto state,
+                  station::unit_retest_state(store, options.serial, limits.retest));
+  context.worsen(state.may_start ? kExitPassed : kExitFailed);
+  Json json = document("retest");
+  json["serial"] = options.serial;
+  json["may_start"] = state.may_start;
+  json["failures_in_row"] = state.failures_in_row;
+  json["passes_needed"] = state.passes_needed;
+  json["retest_of"] = text_or_null(state.retest_of);
+  return print_answer(
+      context, options.json, json,
+      fmt::format("{}: {}; {} pass{} in a row until it counts as passed\n",
+                  printable(options.serial), state.may_start ? "may be measured" : state.reason,
+                  state.passes_needed, state.passes_needed == 1 ? "" : "es"));
+}
+
+void add_decision_options(CLI::App& command, Options& options) {
+  command.add_option("--operator", options.operator_name, "who decides")->required();
+  command.add_option("--reason", options.reason, "why, for the record")->required();
+}
+
+void add_limits_option(CLI::App& command, Options& options) {
+  command.add_option("--limits", options.limits, "a limits file with a [check_unit] table");
+}
+
+void add_place_options(CLI::App& command, Options& options) {
+  command.add_option("--station", options.station, "the station, as given to 'sixpoint jig'");
+  add_store_option(command, options.store);
+}
+
+Declared<Options> add_state(CLI::App& group, Context& context, const char* group_name,
+                            const char* name, const char* about) {
+  const auto declared = add_command<Options>(group, context, group_name, name, about,
+                                             [group_name](const Options& options, Context& here) {
+                                               return show_state(options, here, group_name);
+                                             });
+  add_limits_option(declared.command, declared.options);
+  add_place_options(declared.command, declared.options);
+  return declared;
+}
+
+}  // namespace
+
+void add_check_unit(CLI::App& app, Context& context) {
+  CLI::App& group = add_group(
+      app, "check-unit", "units that check the station, and their charts (docs/statistics.md)");
+  const auto add_action = [&](const char* name, const char* about, const char* action,
+                              const char* done) {
+    auto [command, options] = add_command<Options>(
+        group, context, "check-unit", name, about,
+        [action, done](const Options& its, Context& here) {
+          return decide(its, here, "check-unit", action, printable(its.serial) + done);
+        });
+    command.add_option("SERIAL", options.serial)->required();
+    add_decision_options(command, options);
+    add_place_options(command, options);
+  };
+  add_action("add", "from now on this unit checks the station", "check_unit",
+             " is a check unit now");
+  add_action("remove", "this unit is no longer a check unit", "check_unit_end",
+             " is no longer a check unit");
+  auto [chart, options] = add_state(group, context, "check-unit", "chart",
+                                    "individuals and moving range charts; exit 1: locked");
+  chart.add_option("--html", options.html, "the charts as a page");
+}
+
+void add_station_lock(CLI::App& app, Context& context) {
+  CLI::App& group =
+      add_group(app, "station-lock", "is the station locked by its check units; sign for it");
+  add_state(group, context, "station-lock", "status", "exit 1 when it is locked");
+  auto [command, options] =
+      add_command<Options>(group, context, "station-lock", "sign",
+                           "an engineer has checked it; the station may go on", sign);
+  add_decision_options(command, options);
+  command.add_flag("--new-baseline", options.new_baseline,
+                   "the jig was changed: earlier runs of the check units do not count any more");
+  add_place_options(command, options);
+}
+
+void add_retest(CLI::App& app, Context& context) {
+  auto [command, options] = add_command<Options>(
+      app, context, "retest", "may this unit be measured again (docs/verdicts.md)", retest);
+  command.add_option("SERIAL", options.serial)->required();
+  command.add_flag("--release", options.release, "an engineer has checked it: it may");
+  command.add_option("--operator", options.operator_name, "who decides");
+  command.add_option("--reason", options.reason, "why, for the record");
+  command.add_option("--limits", options.limits, "a limits file with a [retest] table");
+  add_store_option(command, options.store);
+}
+
+}  // namespace sixpoint::cli

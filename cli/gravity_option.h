@@ -1,0 +1,31 @@
+// --gravity, --latitude, --altitude: local gravity, for every command that computes constants.
+//
+//   add_gravity_options(command, options);
+//   SIXPOINT_ASSIGN(const auto gravity, local_gravity(options));
+//   const double gravity_g = gravity ? gravity->g() : 1.0;
+#pragma once
+
+#include <optional>
+
+#include <CLI/App.hpp>
+
+#include "calib/gravity.h"
+
+namespace sixpoint::cli {
+
+struct GravityOptions {
+  std::optional<double> m_per_s2;
+  std::optional<double> latitude_deg;
+  double altitude_m = 0;
+};
+
+void add_gravity_options(CLI::App& command, GravityOptions& options);
+
+//   --gravity  --latitude  answer
+//   given      any         the value of --gravity
+//   -          given       computed from latitude and altitude (calib/gravity.h)
+//   -          -           none: gravity is unknown
+// usage where a value is impossible.
+Result<std::optional<calib::LocalGravity>> local_gravity(const GravityOptions& options);
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,41 @@
+// The options that `sixpoint jig` and `sixpoint capture` share, and the unit and jig that they
+// name.
+//
+//   add_jig_options(command, options);
+//   device::SessionRecorder recorder;
+//   SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, recorder));
+//   SIXPOINT_CHECK(station::run_jig(opened.on_jig(), context.env, session, hooks));
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "cli/command.h"
+#include "cli/gravity_option.h"
+#include "device/session/session_recorder.h"
+#include "station/run/jig_session.h"
+
+namespace sixpoint::cli {
+
+struct JigOptions {
+  std::string device;
+  std::string jig;
+  std::string record;
+  std::string store;
+  GravityOptions gravity;
+  bool json = false;
+};
+// --device, --jig, --store, --record, and those of gravity
+void add_jig_options(CLI::App& command, JigOptions& options);
+
+struct JiggedUnit {
+  std::unique_ptr<device::Unit> unit;
+  std::unique_ptr<device::Jig> own_jig;  // where the jig is not part of the unit
+  device::Jig* jig = nullptr;
+  station::UnitOnJig on_jig() const { return {unit.get(), jig}; }
+};
+// Begins the session that `--record` names, and opens unit and jig.
+Result<JiggedUnit> open_unit(Context& context, const JigOptions& options,
+                             device::SessionRecorder& recorder);
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,78 @@
+// What the commands that repair recordings (repair, archive) have in common: options, the line per
+// file, the summary, the records for the store.
+//
+//   add_source_options(command, sources);
+//   SIXPOINT_ASSIGN(auto store, store_of(context, sources));
+//   RepairTally tally;
+//   for (const repair::RepairReport& report : reports) {
+//     tally.add(context, report);
+//     print_report(context, report);
+//   }
+//   context.people << tally.brief(dry_run);
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "cli/command.h"
+#include "cli/store_option.h"
+#include "repair/rescale/repair_file.h"
+
+namespace sixpoint::cli {
+
+// Where the constants come from.
+struct RepairSources {
+  std::string constants;         // --constants C.json
+  std::string store;             // --store
+  std::string calibration_file;  // --calibration-file FILE.gt3x
+  bool scan = false;             // --scan
+};
+void add_source_options(CLI::App& command, RepairSources& sources);
+// --wide, --undo-rotation, --allow-prior
+void add_repair_options(CLI::App& command, repair::RepairOptions& options);
+
+// The store that is asked for constants:
+//
+//   --store  --scan  --calibration-file  store
+//   given    any     any                 the one that is named; an error where it is missing
+//   -        given   -                   none
+//   -        other cases                 the default store, where it exists
+Result<std::optional<db::Store>> store_of(Context& context, const RepairSources& sources);
+
+Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path);
+
+// The report of a file that could not be read at all.
+repair::RepairReport failed_report(const std::string& input, const Error& error);
+
+// Counts reports by their status.
+class RepairTally {
+ public:
+  // Counts the report, and keeps the worst exit code:
+  //
+  //   repaired, not_affected, already_repaired   0
+  //   not_repairable                             1
+  //   failed                                     the error's
+  void add(Context& context, const repair::RepairReport& report);
+  // {files, repaired, not_affected, not_repairable, already_repaired, failed, dry_run}
+  Json to_json(bool dry_run) const;
+  std::string brief(bool dry_run) const;  // one line, with its line end
+
+ private:
+  std::size_t of(repair::RepairStatus status) const;
+  std::size_t files_ = 0;
+  std::map<repair::RepairStatus, std::size_t> counts_;
+};
+
+// One line on stdout, and the reasons where the file was not repaired.
+void print_report(Context& context, const repair::RepairReport& report);
+
+// Adds the files that were repaired to the store, each once. `store` is the result of open_store().
+// An error is reported with the hint `again`; it counts into the exit code. `software`: what
+// repaired the files; empty stands for this program. Returns kept_to_json(), {"in": null, "error"},
+// or null where there was nothing to add.
+Json keep_repairs(Context& context, const std::string& location, Result<db::Store>& store,
+                  const std::vector<repair::RepairReport>& reports, const std::string& again,
+                  const std::string& software = {});
+
+}  // namespace sixpoint::cli

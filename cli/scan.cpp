@@ -1,0 +1,96 @@
+// sixpoint scan PATH...: which files are affected by 16CPAN03, and whether their samples show it.
+#include <fmt/format.h>
+
+#include "cli/command.h"
+#include "cli/workers.h"
+#include "repair/triage/scan_file.h"
+
+namespace sixpoint::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> paths;
+  unsigned jobs = 0;
+  bool json = false;
+};
+
+using repair::ScannedFile;
+
+//   verdict         exit code
+//   not_affected    0
+//   affected        1
+//   cannot_tell     2
+//   unreadable      the error's
+void judge(Context& context, const ScannedFile& file) {
+  if (file.error) {
+    context.worsen(file.error->code);
+  } else if (file.verdict != to_string(repair::Verdict::not_affected)) {
+    context.worsen(file.verdict == to_string(repair::Verdict::affected) ? kExitFailed
+                                                                        : kExitInconclusive);
+  }
+}
+
+Json to_json(const ScannedFile& answer) {
+  Json json;
+  json["path"] = answer.path;
+  json["verdict"] = answer.verdict;
+  json["reasons"] = answer.reasons;
+  json["serial"] = answer.facts.serial;
+  json["firmware"] = answer.facts.firmware;
+  json["calibration_time"] = value_or_null(answer.facts.calibration_time);
+  json["evidence_mg"] = answer.evidence_mg ? number(*answer.evidence_mg) : Json(nullptr);
+  json["axes_rotated"] = answer.axes_rotated;
+  return json;
+}
+
+Json summary_of(const std::vector<ScannedFile>& answers) {
+  Json summary = {{"files", answers.size()}, {"affected", 0},   {"not_affected", 0},
+                  {"cannot_tell", 0},        {"unreadable", 0}, {"axes_rotated", 0}};
+  for (const ScannedFile& answer : answers) {
+    summary[answer.verdict] = summary[answer.verdict].get<int>() + 1;
+    summary["axes_rotated"] = summary["axes_rotated"].get<int>() + (answer.axes_rotated ? 1 : 0);
+  }
+  return summary;
+}
+
+Status run(const Options& options, Context& context) {
+  const auto files = named_files(context, options.paths, {".gt3x", ".agdc", ".agd"});
+  const auto answers = for_each_file<ScannedFile>(
+      context, "scanning", files, options.jobs, [&context](const NamedFile& file) {
+        return file.error ? repair::unreadable_file(file.path, *file.error)
+                          : repair::scan_file(context.env.files, file.path);
+      });
+  Json json = document("scan");
+  Json& list = json["files"] = Json::array();
+  std::string text;
+  for (const ScannedFile& answer : answers) {
+    judge(context, answer);
+    list.push_back(to_json(answer));
+    text += fmt::format("{:<13} {}", answer.verdict, printable(answer.path));
+    for (const std::string& reason : answer.reasons) {
+      text += "\n              " + printable(reason);
+    }
+    text += '\n';
+  }
+  const Json& summary = json["summary"] = summary_of(answers);
+  print_answer(context, options.json, json, text);
+  if (!options.json) {
+    const auto count = [&](const char* key) { return summary[key].get<int>(); };
+    context.people << fmt::format(
+        "{} files: {} affected, {} not, {} cannot be told, {} unreadable\n", answers.size(),
+        count("affected"), count("not_affected"), count("cannot_tell"), count("unreadable"));
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_scan(CLI::App& app, Context& context) {
+  auto [command, options] =
+      add_command<Options>(app, context, "scan", "find the files that 16CPAN03 affects", run);
+  command.add_option("path", options.paths, "recordings (.gt3x, .agdc, .agd) or folders of them")
+      ->required();
+  add_jobs_option(command, options.jobs);
+}
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,317 @@
+// sixpoint store: moving, saving and asking the whole store.
+#include <fmt/format.h>
+
+#include "cli/command.h"
+#include "cli/store_option.h"
+#include "db/exchange.h"
+#include "db/journal.h"
+
+namespace sixpoint::cli {
+namespace {
+
+struct Options {
+  std::string store;
+  std::string path;
+  std::string id;
+  std::string table = "constants";
+  std::string journal;
+  std::string operator_name;
+  std::string reason;
+  std::string from;
+  std::string to;
+  int days = 365;
+  bool csv = false;
+  bool json = false;
+};
+
+// `text` is for stdout without --json, `note` for people in any case.
+struct Answer {
+  Json json = document("store");
+  std::string text;
+  std::string note;
+};
+
+Answer answer_of(const db::ExchangeReport& report, const std::string& file,
+                 const std::string& note) {
+  Answer answer;
+  answer.json["file"] = file;
+  answer.json.update(report.to_json());
+  answer.note = note;
+  return answer;
+}
+
+Result<Answer> export_store(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto report,
+                  options.csv ? db::export_csv(store, context.env.files, options.path)
+                              : db::export_json_lines(store, context.env.files, options.path));
+  return answer_of(report, options.path, report.brief());
+}
+
+Result<Answer> import_store(const Options& options, Context& context) {
+  // A missing input must not leave an empty store behind.
+  SIXPOINT_CHECK(context.env.files.info(options.path));
+  db::ExchangeReport report;
+  if (store_exists(context, options.store)) {
+    SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
+    SIXPOINT_ASSIGN(report, db::import_json_lines(store, context.env.files, options.path));
+  } else {
+    SIXPOINT_ASSIGN(const std::string path, place_of_new_store(context, options.store));
+    SIXPOINT_ASSIGN(report, db::import_into_new_file(context.env, options.path, path));
+  }
+  return answer_of(report, options.path,
+                   fmt::format("{}; {} were new", report.brief(), report.added));
+}
+
+Result<Answer> back_up(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto report, db::backup(store, context.env, options.path));
+  return answer_of(report, options.path, report.brief());
+}
+
+Result<Answer> catch_up(const Options& options, Context& context) {
+  const std::string folder =
+      options.journal.empty() ? journal_folder(options.store) : options.journal;
+  if (!options.journal.empty()) {
+    SIXPOINT_CHECK(context.env.files.info(folder));
+  }
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  std::size_t taken = 0;
+  if (context.env.files.info(folder)) {
+    SIXPOINT_ASSIGN(auto journal, db::Journal::open(context.env.files, folder));
+    SIXPOINT_ASSIGN(taken, journal.catch_up(store));
+  }
+  Answer answer;
+  answer.json["taken"] = taken;
+  answer.note = fmt::format("{} entries of the journal are in the store now", taken);
+  return answer;
+}
+
+// Adds a row about an old one: withdraw, reinstate, note.
+Result<Answer> correct(db::Store& store, const Options& options, const std::string& action) {
+  const db::Correction correction{.table = options.table,
+                                  .row_id = options.id,
+                                  .action = action,
+                                  .operator_name = options.operator_name,
+                                  .reason = options.reason};
+  Answer answer;
+  SIXPOINT_ASSIGN(answer.json["correction"], store.correct(correction));
+  answer.json["action"] = action;
+  answer.json["about"] = {{"table", options.table}, {"id", options.id}};
+  return answer;
+}
+
+Result<Answer> withdraw(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(Answer answer, correct(store, options, "withdraw"));
+  SIXPOINT_ASSIGN(const auto recall, store.recall_list(options.id));
+  answer.json["withdrawn"] = options.id;
+  answer.json["recall"] = recall.size();
+  answer.note =
+      fmt::format("withdrawn; {} files were repaired with these constants", recall.size());
+  return answer;
+}
+
+Result<Answer> reinstate(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(Answer answer, correct(store, options, "reinstate"));
+  answer.note = "these constants apply again";
+  return answer;
+}
+
+Result<Answer> note(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(Answer answer, correct(store, options, "note"));
+  answer.note = fmt::format("noted about {} {}", options.table, printable(options.id));
+  return answer;
+}
+
+Result<Answer> recall(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto entries, store.recall_list(options.id));
+  Answer answer;
+  Json& files = answer.json["files"] = Json::array();
+  for (const auto& entry : entries) {
+    files.push_back({{"input", entry.repair.input},
+                     {"serial", entry.repair.serial},
+                     {"mended_at", to_iso8601(entry.repair.made_at)},
+                     {"input_sha256", entry.repair.input_sha256},
+                     {"output_sha256", entry.repair.output_sha256},
+                     {"method", entry.repair.method},
+                     {"constants", entry.repair.constants_id},
+                     {"software", entry.repair.software},
+                     {"withdrawn_at", to_iso8601(entry.withdrawn_at)},
+                     {"reason", entry.reason}});
+    answer.text +=
+        fmt::format("{}  {:<16} {}  ({})\n", to_iso8601(entry.repair.made_at), entry.repair.serial,
+                    printable(entry.repair.input), printable(entry.reason));
+  }
+  return answer;
+}
+
+Result<Answer> jig_units(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto units, store.units_of_jig(options.id));
+  Answer answer;
+  answer.json["jig"] = options.id;
+  Json& list = answer.json["units"] = Json::array();
+  for (const auto& unit : units) {
+    list.push_back({{"serial", unit.serial},
+                    {"runs", unit.runs},
+                    {"last_run", to_iso8601(unit.last_run)},
+                    {"last_verdict", unit.last_verdict}});
+    answer.text += fmt::format("{:<16} {:>3} runs  last {}  {}\n", unit.serial, unit.runs,
+                               to_iso8601(unit.last_run), unit.last_verdict);
+  }
+  return answer;
+}
+
+Result<Answer> yield(const Options& options, Context& context) {
+  UtcTime from = UtcTime::min();
+  UtcTime to = UtcTime::max();
+  if (!options.from.empty()) {
+    SIXPOINT_ASSIGN(from, parse_iso8601(options.from));
+  }
+  if (!options.to.empty()) {
+    SIXPOINT_ASSIGN(to, parse_iso8601(options.to));
+  }
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto report, store.yield(from, to));
+  Answer answer;
+  answer.json.update({{"runs", report.runs},
+                      {"retests", report.retests},
+                      {"units", report.units},
+                      {"passed", report.passed},
+                      {"passed_first_time", report.passed_first_time},
+                      {"yield", number(report.yield())},
+                      {"first_pass_yield", number(report.first_pass_yield())}});
+  answer.text = fmt::format(
+      "{} units in {} runs ({} retests): {} passed, {} of them at the first run\n", report.units,
+      report.runs, report.retests, report.passed, report.passed_first_time);
+  return answer;
+}
+
+Result<Answer> due(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto units,
+                  store.units_due(context.env.clock.now() - std::chrono::hours(24) * options.days));
+  Answer answer;
+  Json& list = answer.json["units"] = Json::array();
+  for (const auto& unit : units) {
+    list.push_back({{"serial", unit.serial},
+                    {"model", unit.model},
+                    {"last_constants", value_or_null(unit.last_constants)}});
+    answer.text +=
+        fmt::format("{:<16} {:<18} {}\n", unit.serial, unit.model,
+                    unit.last_constants ? to_iso8601(*unit.last_constants) : "no constants");
+  }
+  return answer;
+}
+
+Result<Answer> trend(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto points, store.trend(options.id));
+  if (points.empty()) {
+    return fail(ErrorCode::no_input, "the store has no constants of this unit", options.id,
+                "'sixpoint units' lists the units in the store");
+  }
+  Answer answer;
+  answer.json["serial"] = options.id;
+  Json& list = answer.json["points"] = Json::array();
+  for (const auto& point : points) {
+    const Json constants = Json::parse(point.constants.document, nullptr, false);
+    list.push_back({{"made_at", to_iso8601(point.constants.made_at)},
+                    {"id", point.constants.id},
+                    {"filter", point.constants.filter},
+                    {"method", point.constants.method},
+                    {"jig", point.jig},
+                    {"station", point.station},
+                    {"verdict", point.verdict},
+                    {"withdrawn", point.withdrawn},
+                    {"constants", constants.is_object() && constants.contains("constants")
+                                      ? constants["constants"]
+                                      : Json(nullptr)}});
+    answer.text +=
+        fmt::format("{}  {:<8} {:<10} {:<12} {}{}\n", to_iso8601(point.constants.made_at),
+                    point.constants.filter, point.constants.method, point.jig, point.constants.id,
+                    point.withdrawn ? "  withdrawn" : "");
+  }
+  return answer;
+}
+
+Declared<Options> add(CLI::App& parent, Context& context, const char* name, const char* about,
+                      Result<Answer> (*work)(const Options&, Context&)) {
+  const auto declared =
+      add_command<Options>(parent, context, "store", name, about,
+                           [work](const Options& options, Context& here) -> Status {
+                             SIXPOINT_ASSIGN(const Answer answer, work(options, here));
+                             if (!answer.note.empty()) {
+                               here.people << answer.note << '\n';
+                             }
+                             return print_answer(here, options.json, answer.json, answer.text);
+                           });
+  add_store_option(declared.command, declared.options.store);
+  return declared;
+}
+
+// --reason and --operator, for rows about other rows.
+void add_correction_options(const Declared<Options>& correction) {
+  auto [command, options] = correction;
+  command.add_option("--reason", options.reason, "why, or what")->required();
+  command.add_option("--operator", options.operator_name, "who decides")->required();
+}
+
+}  // namespace
+
+void add_store(CLI::App& app, Context& context) {
+  CLI::App& group = add_group(app, "store", "move, save and ask the whole store");
+  const auto sub = [&](const char* name, const char* about,
+                       Result<Answer> (*work)(const Options&, Context&)) {
+    return add(group, context, name, about, work);
+  };
+  // Declares the first argument of a subcommand, or its -o.
+  const auto with = [](Declared<Options> declared, const char* name, std::string Options::*value,
+                       const char* about) {
+    return declared.command.add_option(name, declared.options.*value, about);
+  };
+  auto out = sub("export", "write the whole store as JSON Lines or CSV", export_store);
+  with(out, "-o,--output", &Options::path, "the file; with --csv the folder")->required();
+  out.command.add_flag("--csv", out.options.csv, "one CSV file per table instead of JSON Lines");
+  with(sub("import", "continue a store with the rows of an export", import_store), "file",
+       &Options::path, "what 'store export' wrote: JSON Lines")
+      ->required();
+  with(sub("backup", "copy the store into an SQLite file while others work", back_up),
+       "-o,--output", &Options::path, "the copy")
+      ->required();
+  with(sub("catch-up", "store what the store did not take when it was measured", catch_up),
+       "--journal", &Options::journal,
+       "the folder of a journal that was written elsewhere (default: this station's)");
+  for (const auto& correction :
+       {sub("withdraw", "constants apply no more; they stay in the history", withdraw),
+        sub("reinstate", "withdrawn constants apply again", reinstate)}) {
+    with(correction, "id", &Options::id, "the constants' id ('sixpoint history')")->required();
+    add_correction_options(correction);
+  }
+  const auto noted = sub("note", "add what is wrong or missing in a row", note);
+  with(noted, "table", &Options::table,
+       "the row's table: units, runs, constants, unit_writes, repairs ...")
+      ->required();
+  with(noted, "id", &Options::id, "the row's id; of a unit its serial number")->required();
+  add_correction_options(noted);
+  with(sub("recall", "files repaired with constants that were withdrawn", recall), "id",
+       &Options::id, "only these constants");
+  with(sub("jig", "units that were on a jig", jig_units), "jig", &Options::id, "the jig's name")
+      ->required();
+  const auto passed = sub("yield", "how many units passed, and how many at once", yield);
+  with(passed, "--from", &Options::from, "runs from this date on (ISO 8601, UTC)");
+  with(passed, "--to", &Options::to, "runs before this date");
+  auto old = sub("due", "units whose constants are old or missing", due);
+  old.command.add_option("--days", old.options.days, "how old constants may be")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str();
+  with(sub("trend", "all calibrations of one unit, for its control chart", trend), "serial",
+       &Options::id, "the unit's serial number")
+      ->required();
+}
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,80 @@
+// --store PATH|postgresql://...: how every command names, opens and writes the store.
+//
+//   add_store_option(command, location);
+//   SIXPOINT_ASSIGN(auto store, open_existing_store(context, location));  // to read
+//   Result<db::Store> written = open_store(context, location);            // to write
+//   SIXPOINT_ASSIGN(const auto saved, keep_records(context, location, written, add_the_records));
+//
+// A location is a path of an SQLite file or the address of a server; empty stands for the default:
+// $SIXPOINT_STORE, else store.db in $XDG_DATA_HOME/sixpoint (~/.local/share/sixpoint).
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <CLI/App.hpp>
+
+#include "calib/constants.h"
+#include "calib/solve.h"
+#include "cli/command.h"
+#include "db/save.h"
+#include "station/capture/capture_run.h"
+
+namespace sixpoint::cli {
+
+CLI::Option* add_store_option(CLI::App& command, std::string& location);
+
+// Opens the store and makes it where it is missing. Only the folder of the default store is made.
+Result<db::Store> open_store(Context& context, const std::string& location);
+
+// To read: no_input where there is no store, so that a wrong name makes no empty one.
+Result<db::Store> open_existing_store(Context& context, const std::string& location);
+
+// Is there a file? A store on a server always exists.
+bool store_exists(Context& context, const std::string& location);
+// The path of a store that is to be made; makes the folder of the default one.
+Result<std::string> place_of_new_store(Context& context, const std::string& location);
+
+// The user's folder for the program's data: $XDG_DATA_HOME/sixpoint (~/.local/share/sixpoint).
+std::string data_folder();
+// Of the store where none is named.
+std::string default_store();
+// Names the folder of a run under way: `who` (a unit, a station) and the store that it goes into.
+std::string run_folder_name(const std::string& location, const std::string& who);
+
+// The folder of the journal: it keeps what the store at `location` did not take. One folder per
+// store, in journal/ of data_folder().
+std::string journal_folder(const std::string& location);
+
+// Calls `work` with the store, or with the journal where the store fails (db/save.h). `store` is
+// the result of open_store().
+//
+//   where the records are     reported as       exit code
+//   in the store              -                 0
+//   journal, server is away   warning           0: this is planned for
+//   journal, other reasons    warning           the store's error
+//   journal of last resort    warning           74
+Result<db::Saved> keep_records(Context& context, const std::string& location,
+                               Result<db::Store>& store,
+                               const std::function<Status(db::RecordWriter&)>& work);
+// {"in": "store" | "journal", "folder", "error"}
+Json kept_to_json(const db::Saved& kept);
+
+// Constants that were solved just now, as a record; also written to the file `path` (none: empty).
+Result<calib::ConstantsRecord> record_constants(Context& context, const calib::SolveReport& solved,
+                                                const calib::ConstantsOrigin& origin,
+                                                const std::string& path);
+
+// A set of constants that is in the store or in the journal.
+struct SavedConstants {
+  std::string id;
+  db::Saved place;
+};
+Result<SavedConstants> save_constants(Context& context, const std::string& location,
+                                      const calib::ConstantsRecord& record,
+                                      const std::string& model);
+// Those of a calibration file that was made just now; also written to the file `path`.
+Result<SavedConstants> save_capture(Context& context, const std::string& location,
+                                    const station::CaptureReport& report, const std::string& path);
+
+}  // namespace sixpoint::cli

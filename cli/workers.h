@@ -1,0 +1,53 @@
+// Many files on several threads, with a progress bar; the answers keep the order of the files.
+//
+//   const auto named = named_files(context, paths, {".gt3x"});
+//   const auto scan = [&](const NamedFile& file) {
+//     return file.error ? repair::unreadable_file(file.path, *file.error)
+//                       : repair::scan_file(context.env.files, file.path);
+//   };
+//   const auto scanned = for_each_file<repair::ScannedFile>(context, "scanning", named, 0, scan);
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "cli/command.h"
+#include "repair/triage/file_tree.h"
+
+namespace sixpoint::cli {
+
+// A file that the user named, or one below a folder that the user named.
+struct NamedFile : repair::FoundFile {
+  std::optional<Error> error;  // why it cannot be used; `relative` is then empty
+};
+
+// In the order of `paths`. A folder without a file of these endings gives a warning.
+std::vector<NamedFile> named_files(Context& context, const std::vector<std::string>& paths,
+                                   const std::vector<std::string>& endings);
+
+// --jobs N
+void add_jobs_option(CLI::App& command, unsigned& jobs);
+
+// Calls work(i) for every i below `count`, on up to `jobs` threads (0: one per core). Meanwhile
+// `watch(done)` is called on the calling thread. `work` must be safe to call from several threads
+// for different i.
+void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& work,
+                  const std::function<void(std::size_t)>& watch);
+
+// The answers of `work(file)`, which runs on up to `jobs` threads; `doing` names the progress bar.
+template <class Answer, class Work>
+std::vector<Answer> for_each_file(Context& context, const std::string& doing,
+                                  const std::vector<NamedFile>& files, unsigned jobs, Work work) {
+  std::vector<Answer> answers(files.size());
+  Progress progress(context, doing, files.size());
+  for_each_job(
+      files.size(), jobs, [&](std::size_t i) { answers[i] = work(files[i]); },
+      [&](std::size_t done) { progress.at(done); });
+  return answers;
+}
+
+}  // namespace sixpoint::cli

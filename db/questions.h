@@ -1,0 +1,92 @@
+// What people ask the store: which files to repair again, how many units passed, which are due. The
+// functions are members of Store (store.h); docs/store.md has the SQL statements.
+//
+//   SIXPOINT_ASSIGN(const YieldReport report, store.yield(from, to));
+//   report.yield();   // 0.97: of the units, those whose last run passed
+#pragma once
+
+#include "db/records.h"
+
+namespace sixpoint::db {
+
+struct UnitRecord {
+  std::string serial;
+  std::string model;
+  UtcTime first_seen;
+  std::size_t constants = 0;  // how many sets the store holds, withdrawn ones included
+};
+
+// Everything that the store holds about one unit, each list oldest first.
+struct UnitHistory {
+  std::vector<ConstantsRecord> constants;  // withdrawn sets included
+  std::vector<RunRecord> runs;
+  std::vector<UnitWrite> writes;
+  std::vector<RepairRecord> repairs;    // of this unit's files
+  std::vector<Correction> corrections;  // about any of these rows
+
+  bool empty() const;
+  // Do these constants apply no more? The last correction decides:
+  //
+  // | corrections of the set, oldest first (notes do not count) | withdrawn |
+  // |------------------------------------------------------------|-----------|
+  // | none                                                       | no        |
+  // | ..., withdraw                                              | yes       |
+  // | ..., withdraw, reinstate                                   | no        |
+  bool is_withdrawn(const std::string& constants_id) const;
+};
+
+// A file that was repaired with constants that are withdrawn: repair it again.
+struct RecallEntry {
+  RepairRecord repair;
+  UtcTime withdrawn_at;
+  std::string reason;
+};
+
+// A unit that was on a jig.
+struct JigUnit {
+  std::string serial;
+  std::size_t runs = 0;
+  UtcTime last_run;
+  std::string last_verdict;
+};
+
+// Of the jig runs that started in a period.
+struct YieldReport {
+  std::size_t runs = 0;
+  std::size_t retests = 0;  // runs that name the run which they repeat
+  std::size_t units = 0;
+  std::size_t passed = 0;             // units whose last run passed
+  std::size_t passed_first_time = 0;  // units whose first run passed
+  double yield() const;               // NaN where there were no units
+  double first_pass_yield() const;
+};
+
+// A unit whose newest constants (of any configuration, not withdrawn) are old, or that has none.
+struct DueUnit {
+  std::string serial;
+  std::string model;
+  std::optional<UtcTime> last_constants;
+};
+
+// One calibration of a check unit, for its control chart.
+struct TrendPoint {
+  ConstantsRecord constants;
+  std::string jig;
+  std::string station;
+  std::string verdict;
+  bool withdrawn = false;
+};
+
+// Which runs are asked for; an empty member does not restrict.
+struct RunFilter {
+  std::string kind = "jig";
+  std::string serial;
+  std::string station;
+  std::optional<UtcTime> from = {};  // started then or later
+  std::optional<UtcTime> to = {};    // started before
+};
+
+// SQL that holds for rows of `constants` that are not withdrawn (UnitHistory::is_withdrawn()).
+std::string not_withdrawn();
+
+}  // namespace sixpoint::db

@@ -1,0 +1,160 @@
+// Exact Gaussian evidence of subsets of effects for a list of blocks.
+//
+//   EvidenceOptions options;
+//   options.lsb_mg = 1000 / bundle.accel_scale_lsb_per_g;
+//   const EvidenceModel model(blocks, options);
+//   const Whitened data = model.whiten(model.linearise(model.first_guess()), Scatter::nominal, 0);
+//   std::vector<Subset> tried;
+//   const Subset best = model.search(data, tried);  // best.nats: log evidence and log prior
+//   const Fit fit = model.make_fit(data, best, model.first_guess());
+//
+// Model: value = forward(parameters) + seating + scatter + noise. Parameters have Gaussian priors
+// from the catalogue's realistic sizes, so that the evidence of a subset has a closed form
+// (Bayesian linear regression) and contains its own penalty for parameters that the data do not
+// need. Linearised about an estimate.
+//
+// Units: mg for values, nats for evidence. The model refers to `blocks`, which must outlive it.
+// Constant after construction, but for set_time_constant(); safe to read from several threads.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "gap/explain/decisions.h"
+#include "gap/explain/forward.h"
+#include "gap/explain/scatter.h"
+
+namespace sixpoint::gap {
+
+inline constexpr int kNuisances = 2;           // groups: gain, offset
+inline constexpr int kNuisanceParameters = 6;  // their parameters, which come first everywhere
+inline constexpr double kNoEvidence_nats = -1e300;
+
+// Normal equations of whitened rows; every subset takes its part of them.
+struct NormalSums {
+  Eigen::MatrixXd a;
+  Eigen::VectorXd b;
+  double yy = 0;
+};
+
+// The blocks under one covariance: rows divided by its square root.
+struct Whitened {
+  Scatter scatter = Scatter::nominal;
+  double size = 0;          // deg, mg/sqrt(s) or mg
+  double outside_nats = 0;  // evidence for this size from records (slow noise), and its prior
+  Eigen::MatrixXd x;        // a column for each parameter of every group
+  Eigen::VectorXd y;
+  NormalSums sums;
+  double half_log_det = 0;
+};
+
+struct Subset {
+  std::vector<int> groups;  // ascending positions in EvidenceModel::groups(), without nuisances
+  double nats = 0;          // log evidence and log prior
+};
+
+struct Posterior {
+  Eigen::VectorXd mean;  // per column used
+  Eigen::MatrixXd covariance;
+  std::vector<int> columns;
+};
+
+struct EvidenceOptions {
+  double lsb_mg = 3.90625;
+  std::function<bool(const std::string&)> allowed = {};  // catalogue name; empty: all
+  // Log likelihood of a size of random_walk or flicker from the records themselves.
+  std::function<double(Scatter, double)> record_nats = {};
+};
+
+struct Fit {
+  ForwardState state;
+  Subset subset;
+  std::vector<ParameterGroup> groups;  // of the subset
+  Posterior posterior;                 // nuisances first, then the subset's columns
+  Scatter scatter = Scatter::nominal;
+  double scatter_size = 0;
+  double nats = 0;
+  Eigen::VectorXd residual;    // whitened, per row
+  std::vector<int> row_block;  // the block that each row belongs to
+
+  bool contains(const std::string& effect) const;
+};
+
+class EvidenceModel {
+ public:
+  EvidenceModel(const std::vector<Block>& blocks, EvidenceOptions options);
+
+  const std::vector<Block>& blocks() const { return blocks_; }
+  const EvidenceOptions& options() const { return options_; }
+  bool allowed(const std::string& effect) const {
+    return !options_.allowed || options_.allowed(effect);
+  }
+  // Nuisances first; an effect with several shapes has one group for each.
+  int group_count() const { return static_cast<int>(groups_.size()); }
+  const ParameterGroup& group(int g) const { return groups_[static_cast<std::size_t>(g)]; }
+  int first_column(int g) const { return first_column_[static_cast<std::size_t>(g)]; }
+  std::vector<int> groups_of(const std::string& effect) const;
+  void set_time_constant(int g, double tau_s) {
+    groups_[static_cast<std::size_t>(g)].tau_s = tau_s;
+  }
+  int columns() const { return columns_; }
+  int rows() const { return static_cast<int>(row_block_.size()); }
+  const std::vector<int>& row_block() const { return row_block_; }
+  // Which of its block's features a row is: see Block::value_mg.
+  int feature_of_row(int row) const;
+  const Block& block_of_row(Eigen::Index row) const {
+    return blocks_[static_cast<std::size_t>(row_block_[static_cast<std::size_t>(row)])];
+  }
+
+  // Least squares of gain and offset from the means.
+  ForwardState first_guess() const;
+
+  // evidence_whiten.cpp
+  // Columns of all parameters, and in the last one the values that they add up to.
+  Eigen::MatrixXd linearise(const ForwardState& at) const;
+  // Divides rows by the square root of their covariance; half the logarithm of its determinant.
+  double whiten_rows(Scatter scatter, double size, Eigen::MatrixXd& rows) const;
+  Whitened whiten(Eigen::MatrixXd linear, Scatter scatter, double size) const;
+
+  // evidence_subsets.cpp
+  // Log evidence of these groups beside the nuisances, without the covariance's determinant.
+  double evidence_of(const NormalSums& sums, const std::vector<int>& groups,
+                     Posterior* posterior = nullptr) const;
+  // The same with it; an estimate far beyond an effect's largest size has none.
+  double evidence(const Whitened& w, const std::vector<int>& groups,
+                  Posterior* posterior = nullptr) const;
+  double log_prior(const std::vector<int>& groups) const;
+  // The likeliest subset; every subset that was tried is added to `tried`.
+  Subset search(const Whitened& w, std::vector<Subset>& tried) const;
+  Fit make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const;
+
+ private:
+  Eigen::Index whiten_blocks(std::size_t first, std::size_t last, Scatter scatter, double size,
+                             Eigen::Index first_row, double& half_log_det,
+                             Eigen::MatrixXd& rows) const;
+  void add_columns(const ForwardState& at, const Block& block, const Eigen::VectorXd& base, int g,
+                   Eigen::Index row, Eigen::MatrixXd& x, Eigen::VectorXd& theta) const;
+
+  const std::vector<Block>& blocks_;
+  EvidenceOptions options_;
+  std::vector<ParameterGroup> groups_;
+  std::vector<int> first_column_;
+  int columns_ = 0;
+  std::vector<int> row_block_;
+};
+
+// Nuisances and the subset's groups.
+std::vector<int> with_nuisances(const std::vector<int>& groups);
+std::vector<int> with_group(std::vector<int> groups, int g);
+// The columns of x that a posterior speaks of.
+Eigen::MatrixXd used_columns(const Eigen::MatrixXd& x, const Posterior& posterior);
+Eigen::VectorXd residual_of(const Whitened& w, const Posterior& posterior);
+// Sum of the logarithms of a Cholesky factor's diagonal: half the log determinant.
+template <typename Cholesky>
+double half_log_determinant(const Cholesky& llt) {
+  return llt.matrixLLT().diagonal().array().log().sum();
+}
+
+}  // namespace sixpoint::gap

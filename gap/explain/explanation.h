@@ -1,0 +1,124 @@
+// The subset of effects and the kind of scatter that explain the blocks best, and what can be asked
+// about them.
+//
+//   const Explanation explanation(blocks, {.lsb_mg = 1000 / bundle.accel_scale_lsb_per_g});
+//   if (explanation.best().contains("tilt")) {
+//     const double nats = explanation.gain_nats("tilt");
+//     const auto estimate = explanation.estimate("tilt");  // value and standard uncertainty, deg
+//   }
+//
+// Scatter between dwells is nominal seating (0.01 deg per placement) and at most one more kind: one
+// of the catalogue (seating, random_walk, flicker), or one that the catalogue lacks and that stands
+// for unknown causes (scatter.h). If an unknown kind wins, no random effect of the catalogue has
+// the structure of this scatter.
+//
+// The object refers to `blocks`, which must outlive it. It is constant after construction.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gap/explain/evidence.h"
+
+namespace sixpoint::gap {
+
+// A parameter that is not constant throughout the recording.
+struct Inconstancy {
+  std::string term;    // "the zero", "the gain", "the seat", "the jig's level", or an effect
+  std::string factor;  // what it changes with
+  double nats = 0;     // mean of the Bayes factors of all changes with this factor
+};
+
+class Explanation {
+ public:
+  Explanation(const std::vector<Block>& blocks, EvidenceOptions options);
+
+  const EvidenceModel& model() const { return model_; }
+  // Scatter of the catalogue only.
+  const Fit& best_known() const { return best_known_; }
+  const std::optional<Fit>& best_unknown() const { return best_unknown_; }
+  // best_known(), unless an unknown kind of scatter is twenty times as likely.
+  const Fit& best() const { return unknown_wins() ? *best_unknown_ : best_known_; }
+  bool unknown_wins() const {
+    return best_unknown_ && best_unknown_->nats > best_known_.nats + kUnknownWins_nats;
+  }
+  // Nuisances alone, scatter nominal.
+  const Fit& nominal() const { return nominal_; }
+
+  // Log evidence of the best explanation with this effect over the best without it; 0 if only one
+  // of the two was tried. `known_only`: scatter that the catalogue lacks does not compete.
+  double gain_nats(const std::string& effect, bool known_only = false) const;
+  // Log odds of the best explanation with an unknown kind of scatter over the best known one.
+  double unknown_nats() const {
+    return best_unknown_ ? best_unknown_->nats - best_known_.nats : kExcluded_nats;
+  }
+  struct Estimate {
+    std::vector<double> value;
+    std::vector<double> sd;
+    double tau_s = 0;
+  };
+  // Of an effect of the best explanation, or of any other added to it.
+  std::optional<Estimate> estimate(const std::string& effect) const;
+  // Posterior over prior standard deviation of the effect's worst parameter: 1 = the data say
+  // nothing.
+  double undetermined(const std::string& effect) const;
+  // Log evidence to be expected of this effect at its smallest realistic size, prior included.
+  // Below kAccept_nats this recording can't show it at that size.
+  double expected_nats(const std::string& effect) const;
+  // Log evidence that an effect of the best explanation (or "gain") changes in proportion to time,
+  // over the best explanation, in which it is constant.
+  double changing_nats(const std::string& effect) const;
+  // Per factor (time, temperature, session, pose, approach, vibration) the evidence that a
+  // parameter changes with it; likeliest first. Means of Bayes factors: if all is constant, one
+  // exceeds e^x with a probability below e^-x (Markov's inequality).
+  std::vector<Inconstancy> inconstancies() const;
+  // Per row of best(): expected square of the whitened residual, 1 less the leverage.
+  std::vector<double> row_freedom() const;
+  // Log predictive likelihood of held-out conditions with the effect less without it.
+  double held_out_nats(const std::string& effect) const;
+
+  // Root mean squares of what was predicted from the other conditions, before (nuisances only) and
+  // after (best explanation); sigma: in standard deviations of noise and nominal seating.
+  struct HeldOut {
+    double before_mg = 0, after_mg = 0;
+    double floor_mg = 0;  // what noise and seating leave
+    double before_sigma = 0, after_sigma = 0;
+    double tone_before_sigma = 0, tone_after_sigma = 0;
+    double mean_before_sigma = 0, mean_after_sigma = 0;
+    int rows = 0;
+  };
+  HeldOut held_out() const;
+
+ private:
+  struct Tried {
+    Scatter scatter;
+    Subset subset;
+  };
+  // What one kind of scatter explains.
+  struct Trial {
+    std::optional<Fit> fit;
+    Whitened data;
+  };
+  void remember(Scatter scatter, const std::vector<Subset>& tried);
+  ForwardState explain_nominal();
+  bool records_show_slow_noise() const;
+  Trial explain_by(Scatter scatter, const Eigen::MatrixXd& linear);
+  void compete(Scatter scatter, Trial trial, Whitened& unknown_data);
+
+  EvidenceModel model_;
+  std::vector<Tried> tried_;
+  Fit nominal_;
+  Fit best_known_;
+  Fit best_nominal_;  // of the catalogue, without scatter
+  std::optional<Fit> best_unknown_;
+  Whitened data_;           // at best()'s covariance and state
+  Eigen::MatrixXd linear_;  // linearise() at best()'s state
+};
+
+// evidence_zero_step.cpp: the best explanation with a zero that moves once, at an unknown moment.
+// `nominal`: whitened with nominal scatter at `at`. None with fewer than three blocks.
+std::optional<Fit> fit_zero_step(const EvidenceModel& model, const Whitened& nominal,
+                                 const ForwardState& at);
+
+}  // namespace sixpoint::gap

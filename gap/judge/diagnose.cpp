@@ -1,0 +1,156 @@
+#include "gap/judge/diagnose.h"
+
+#include <cmath>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "gap/explain/catalogue.h"
+#include "gap/judge/steps.h"
+
+namespace sixpoint::gap {
+namespace {
+
+// Tones whose amplitudes follow no known response, by so many standard deviations, would bend all
+// other estimates: they are left out.
+constexpr double kNoResponse_sd = 20;
+// Poses this far from the protocol's, on average, are other poses.
+constexpr double kOtherPoses_g = 0.45;
+constexpr double kOtherPosesAlarm_sd = 50;
+// Gains and offsets are six numbers of three axes: fewer directions do not determine them.
+constexpr std::size_t kLeastPoses = 4;
+
+Records judge_records(const Request& request, CleanSamples clean, NoiseSpectrum noise,
+                      Findings& found) {
+  Timing timing = judge_timing(request, clean, noise);
+  const CodeStatistics codes = code_statistics(request.bundle, clean);
+  Lines lines = judge_lines(request, clean, noise, codes);
+  ResponseStep response = judge_response(request, noise, timing.tones, lines);
+  Settling settling = judge_settling(request, clean, noise, lines);
+  for (Findings* step : {&timing.found, &lines.found, &response.found, &settling.found}) {
+    found.append(std::move(*step));
+  }
+  if (response.response.tone_left_sd > kNoResponse_sd) {
+    for (ToneFit& tone : timing.tones) {
+      tone.usable = tone.usable && tone.clipped_share == 0;
+    }
+  }
+  SlowNoise slow = slow_noise(request.bundle, clean, noise);
+  return {std::move(clean),
+          std::move(noise),
+          codes,
+          timing.host,
+          std::move(timing.tones),
+          timing.jitter_s,
+          std::move(lines),
+          std::move(response.response),
+          std::move(settling),
+          std::move(slow)};
+}
+
+std::vector<Block> blocks_of(const Bundle& bundle, const Records& records) {
+  std::vector<ToneFit> tones = records.tones;
+  if (records.response.tone_left_sd > kNoResponse_sd) {
+    for (ToneFit& tone : tones) {
+      tone.usable = false;
+    }
+  }
+  return make_blocks(bundle, records.clean, records.noise, tones, records.response);
+}
+
+// Directions of gravity, on a grid of half a g.
+std::size_t poses_of(const std::vector<Block>& blocks) {
+  std::set<std::array<long, 3>> poses;
+  for (const Block& block : blocks) {
+    const Eigen::Vector3d up = 2 * block.rotation.col(2);
+    poses.insert({std::lround(up[0]), std::lround(up[1]), std::lround(up[2])});
+  }
+  return poses.size();
+}
+
+Diagnosis header_of(const Request& request, const ProtocolKind& kind) {
+  const Bundle& bundle = request.bundle;
+  Diagnosis out;
+  out.bundle = bundle.path;
+  out.protocol = kind.name;
+  out.serial = bundle.protocol_serial.empty() ? bundle.header.serial : bundle.protocol_serial;
+  out.firmware = bundle.header.firmware;
+  out.losses = bundle.losses;
+  out.seed = request.options.seed;
+  return out;
+}
+
+Diagnosis diagnose(const Request& request) {
+  const Bundle& bundle = request.bundle;
+  const ProtocolKind kind = protocol_kind(bundle);
+  Diagnosis out = header_of(request, kind);
+  CleanSamples clean = clean_samples(bundle);
+  Findings found = judge_marks(request, clean);
+  PoseCheck poses = judge_poses(bundle, clean);
+  if (poses.moving) {
+    return inconclusive(
+        request, std::move(found),
+        "the unit moves inside the segments: the protocol's sample numbers are not of this "
+        "recording",
+        std::move(out));
+  }
+  found.append(std::move(poses.found));
+  NoiseSpectrum noise = noise_spectrum(bundle, clean);
+  if (!noise.usable()) {
+    return inconclusive(
+        request, std::move(found),
+        "too little of the recording lies still and unmasked to know even its noise",
+        std::move(out));
+  }
+  const Records records = judge_records(request, std::move(clean), std::move(noise), found);
+  out.unit.noise_mg = records.response.white_mg;
+  const std::vector<Block> blocks = blocks_of(bundle, records);
+  if (blocks.empty()) {
+    return inconclusive(request, std::move(found), "no dwell of two unmasked seconds is left",
+                        std::move(out));
+  }
+  if (records.clean.pose_error_g > kOtherPoses_g) {
+    poses.wrong = true;
+    found.alarm(kOtherPosesAlarm_sd,
+                "pose: the recording's axes do not follow the protocol's poses");
+  }
+  const std::size_t pose_count = poses_of(blocks);
+  if (pose_count < kLeastPoses) {
+    out.losses.push_back(fmt::format(
+        "{} poses only: gains and offsets of the unit can't be told from effects", pose_count));
+  }
+
+  const Explanation explanation = explain(request, blocks, records.slow);
+  found.append(judge_means(request, explanation, records.slow, found));
+  Nuisances nuisances =
+      judge_nuisances(request, explanation.best().state,
+                      pose_count >= kLeastPoses && !poses.wrong && !request.options.uncalibrated);
+  out.unit.gain = nuisances.unit.gain;
+  out.unit.offset_g = nuisances.unit.offset_g;
+  found.append(std::move(nuisances.found));
+  found.append(judge_left_over(request, records, blocks, explanation, found));
+
+  list_not_observable(request, kind, records, explanation, found, out);
+  out.gap = measure_gap(records, explanation, found);
+  Residuals residuals = locate_residuals(request, records, explanation, found);
+  out.plots = make_plots(request, records, explanation.best(), found);
+  out.plots.residuals = std::move(residuals.plot);
+  out.where = std::move(residuals.where);
+  finish(request, std::move(found), out);
+  return out;
+}
+
+}  // namespace
+
+Result<Diagnosis> diagnose(const Bundle& bundle, const DiagnoseOptions& options) {
+  for (const std::string& name : options.without) {
+    if (find_entry(name) == nullptr) {
+      return fail(ErrorCode::usage,
+                  fmt::format("the catalogue has no effect '{}'", printable(name, 60)), "--without",
+                  "sixpoint gap diagnose lists all names under `candidates`");
+    }
+  }
+  return diagnose(Request{bundle, options});
+}
+
+}  // namespace sixpoint::gap

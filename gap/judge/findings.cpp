@@ -1,0 +1,165 @@
+#include "gap/judge/findings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "gap/explain/catalogue.h"
+
+namespace sixpoint::gap {
+namespace {
+
+// Log odds beyond these say no more: e^9 is 8000 to one.
+constexpr double kLeast_nats = -40;
+constexpr double kMost_nats = 9;
+
+bool contains(const std::vector<EffectFinding>& list, const std::string& name) {
+  return std::any_of(list.begin(), list.end(),
+                     [&](const EffectFinding& f) { return f.name == name; });
+}
+
+// Adds what no step has judged, in the catalogue's order; strongest first.
+void complete(const Request& request, Findings& found) {
+  for (const CatalogueEntry& entry : catalogue()) {
+    const std::string name(entry.name);
+    if (request.allowed(name) && !contains(found.candidates, name)) {
+      found.candidates.push_back(
+          {.name = name, .probability = probability_of(kLogPriorEffect), .nats = kLogPriorEffect});
+    }
+  }
+  for (auto* list : {&found.effects, &found.candidates}) {
+    std::stable_sort(
+        list->begin(), list->end(),
+        [](const EffectFinding& a, const EffectFinding& b) { return a.nats > b.nats; });
+    for (EffectFinding& f : *list) {
+      const CatalogueEntry* entry = find_entry(f.name);
+      if (entry != nullptr && entry->datasheet > 0 && !f.parameters.empty()) {
+        const std::vector<double>& values = f.parameters.front().value;
+        f.outside_datasheet |= std::any_of(
+            values.begin(), values.end(), [&](double v) { return std::abs(v) > entry->datasheet; });
+      }
+    }
+  }
+}
+
+// Of something unknown, by convention.
+double unknown_probability(const Findings& found) {
+  if (!found.alarms.empty()) {
+    constexpr double kAlarm = 0.9;  // of a weak one
+    constexpr double kPerSd = 0.02, kMost = 0.999;
+    return std::min(kMost, kAlarm + kPerSd * (found.alarms.front().sd - kAlarm_sd));
+  }
+  // Without a suspicious test, and what a test just below the threshold adds.
+  constexpr double kQuiet = 0.03, kSuspect = 0.3;
+  constexpr double kChance_sd = 3;  // the largest of some forty tests reaches it by chance
+  return kQuiet +
+         kSuspect * std::clamp((found.worst_sd - kChance_sd) / (kAlarm_sd - kChance_sd), 0.0, 1.0);
+}
+
+}  // namespace
+
+double probability_of(double nats) {
+  return 1 / (1 + std::exp(-std::clamp(nats, kLeast_nats, kMost_nats)));
+}
+
+double chi_to_sd(double chi, double freedom) {
+  if (freedom < 1) {
+    return 0;
+  }
+  const double s = 2 / (9 * freedom);
+  return (std::cbrt(chi / freedom) - (1 - s)) / std::sqrt(s);
+}
+
+std::string parameter_name(const std::string& effect) {
+  static const std::map<std::string, std::string> kNames = {{"tilt", "rotation_vector_deg"},
+                                                            {"misalignment", "rotation_vector_deg"},
+                                                            {"non_orthogonality", "yz_xz_xy"},
+                                                            {"second_order", "mg_per_g2"},
+                                                            {"third_order", "mg_per_g3"},
+                                                            {"hysteresis", "mg"},
+                                                            {"offset_tempco", "mg_per_c"},
+                                                            {"sensitivity_tempco", "percent_per_c"},
+                                                            {"warm_up", "mg"},
+                                                            {"drift", "mg_per_h"},
+                                                            {"local_gravity", "ratio"},
+                                                            {"seating", "sd_deg"},
+                                                            {"random_walk", "mg_per_sqrt_s"},
+                                                            {"flicker", "mg"}};
+  const auto found = kNames.find(effect);
+  return found == kNames.end() ? "" : found->second;
+}
+
+void Findings::add(const Request& request, EffectFinding finding) {
+  if (!request.allowed(finding.name)) {
+    return;
+  }
+  finding.probability =
+      1 / (1 / probability_of(finding.nats) + std::exp(std::min(kMost_nats, finding.other_nats)));
+  if (finding.nats > kAccept_nats) {
+    effects.push_back(finding);
+  }
+  candidates.push_back(std::move(finding));
+}
+
+void Findings::test(double sd, const std::string& where) {
+  worst_sd = std::max(worst_sd, sd);
+  if (sd > kAlarm_sd) {
+    alarm(sd, where);
+  }
+}
+
+void Findings::append(Findings later) {
+  const auto join = [](auto& list, auto& more) {
+    list.insert(list.end(), std::make_move_iterator(more.begin()),
+                std::make_move_iterator(more.end()));
+  };
+  join(effects, later.effects);
+  join(candidates, later.candidates);
+  join(alarms, later.alarms);
+  join(outside_means_mg2, later.outside_means_mg2);
+  worst_sd = std::max(worst_sd, later.worst_sd);
+}
+
+bool Findings::accepted(const std::string& effect) const { return contains(effects, effect); }
+
+void finish(const Request& request, Findings found, Diagnosis& out) {
+  complete(request, found);
+  std::sort(found.alarms.begin(), found.alarms.end(),
+            [](const Alarm& a, const Alarm& b) { return a.sd > b.sd; });
+  constexpr std::size_t kMostPlaces = 8;
+  for (std::size_t i = 0; i < std::min(kMostPlaces, found.alarms.size()); ++i) {
+    out.unknown.where.push_back(found.alarms[i].where);
+  }
+  out.unknown.present = !found.alarms.empty();
+  out.unknown.probability = unknown_probability(found);
+  out.verdict = out.unknown.present
+                    ? (found.effects.empty() ? Verdict::unexplained : Verdict::partly_explained)
+                    : (found.effects.empty() ? Verdict::no_gap : Verdict::explained);
+  out.effects = std::move(found.effects);
+  out.candidates = std::move(found.candidates);
+}
+
+Diagnosis inconclusive(const Request& request, Findings found, const std::string& why,
+                       Diagnosis out) {
+  constexpr double kProbability = 0.5;  // nothing is known
+  out.inconclusive = true;
+  out.losses.push_back(why);
+  // A recording that is held or zero throughout has several possible causes: none is named.
+  found.effects.clear();
+  for (EffectFinding& candidate : found.candidates) {
+    candidate.nats = std::min(candidate.nats, 0.0);
+    candidate.probability = std::min(candidate.probability, kProbability);
+  }
+  complete(request, found);
+  out.candidates = std::move(found.candidates);
+  out.verdict = Verdict::unexplained;
+  out.unknown = {true, kProbability, {why}};
+  for (const CatalogueEntry& entry : catalogue()) {
+    if (request.allowed(std::string(entry.name))) {
+      out.not_observable.emplace_back(entry.name, entry.segment);
+    }
+  }
+  return out;
+}
+
+}  // namespace sixpoint::gap

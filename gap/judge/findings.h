@@ -1,0 +1,74 @@
+// What the steps of the diagnosis report: effects with their evidence, and alarms.
+//
+//   EffectFinding drift;
+//   drift.name = "drift";
+//   drift.nats = 8.1;
+//   Findings found;
+//   found.add(request, drift);                        // accepted: above kAccept_nats
+//   found.test(6.2, "tone: residual at 20 Hz, 1 g");  // an alarm: above kAlarm_sd
+//   all.append(std::move(found));
+//
+// Internal to gap/judge. Units: nats, standard deviations, mg^2.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gap/explain/decisions.h"
+#include "gap/judge/diagnose.h"
+
+namespace sixpoint::gap {
+
+// What is to be diagnosed. Refers to both, which must outlive it.
+struct Request {
+  const Bundle& bundle;
+  const DiagnoseOptions& options;
+
+  bool allowed(const std::string& effect) const { return options.without.count(effect) == 0; }
+  double lsb_mg() const { return 1000 / bundle.accel_scale_lsb_per_g; }
+  double segments() const { return static_cast<double>(bundle.segments.size()); }
+};
+
+// Something is not explained.
+struct Alarm {
+  double sd = 0;  // beyond chance
+  std::string where;
+};
+
+struct Findings {
+  std::vector<EffectFinding> effects;     // accepted ones
+  std::vector<EffectFinding> candidates;  // all that were judged
+  std::vector<Alarm> alarms;
+  double worst_sd = 0;  // of all tests, alarms or not
+  // Mean squares per axis of what effects add to the gap that the means do not show.
+  std::vector<double> outside_means_mg2;
+
+  // Sets the probability; an effect that is not allowed is left out.
+  void add(const Request& request, EffectFinding finding);
+  void alarm(double sd, std::string where) { alarms.push_back({sd, std::move(where)}); }
+  void test(double sd, const std::string& where);
+  void append(Findings later);
+  bool accepted(const std::string& effect) const;
+};
+
+// Probability for log odds, kept within what the model can be trusted with: at most 1 - 1e-4.
+double probability_of(double nats);
+
+// Chi-square in standard deviations of a normal variable: its cube root is nearly normal (Wilson
+// and Hilferty 1931). 0 without freedom.
+double chi_to_sd(double chi, double freedom);
+
+// An alarm for something whose log odds are known: a likelihood ratio of e^x is sqrt(2 x) standard
+// deviations of one free number (Wilks 1938).
+inline double nats_to_sd(double nats) { return std::sqrt(2 * nats); }
+
+// The contract's name of the parameters that the forward model estimates; empty for other effects.
+std::string parameter_name(const std::string& effect);
+
+// Completes the answer: candidates for the whole catalogue, order, unknown, verdict.
+void finish(const Request& request, Findings found, Diagnosis& out);
+// The answer where the recording does not allow a diagnosis. Names no effect.
+Diagnosis inconclusive(const Request& request, Findings found, const std::string& why,
+                       Diagnosis out);
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,318 @@
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "gap/explain/catalogue.h"
+#include "gap/explain/slow_structure.h"
+#include "gap/judge/steps.h"
+
+namespace sixpoint::gap {
+namespace {
+
+// Nats that are set, not computed: an effect of the best explanation counts as present, one that is
+// not in it or fails a later test as absent, and one that was never tried as hardly possible.
+constexpr double kPresent_nats = 0.1;
+constexpr double kAbsent_nats = -0.1;
+constexpr double kNeverTried_nats = -5;
+// Beside scatter of an unknown kind only effects this strong count.
+constexpr double kStandsOut_nats = 50;
+// From here on an effect is certain beside a change of another parameter: by this much, a tenth of
+// its evidence pays for the change.
+constexpr double kCertain_nats = 20;
+constexpr double kPaysForChange = 0.1;
+// What a free spectrum costs, against the best slow noise.
+constexpr double kFreeSpectrumCost_nats = 4;
+// Real effects keep to the catalogue's straight lines within this share.
+constexpr double kFormShare = 0.03;
+constexpr double kTauShare = 0.2;           // relative uncertainty of a time constant
+constexpr double kScatterSizeShare = 0.12;  // and of a scatter's size
+// Effects whose evidence is at most so much below zero could stand in for one that has at most so
+// much itself.
+constexpr double kStandIn_nats = -3;
+constexpr double kConfoundable_nats = 12;
+// An explanation whose parts are all below the threshold is an alarm from this gain on.
+constexpr double kMuch_nats = 6;
+constexpr double kSeveralAlike_sd = 2;
+
+// An alarm for another cause that has won: above any test of the residuals.
+double other_wins_sd(double nats) { return nats_to_sd(nats) + kAlarm_sd; }
+
+// Whether the zero's curve over temperature is significantly more than belongs to its slope: a zero
+// bends by one per cent of its slope per degree.
+bool zero_bends(const Fit& fit) {
+  constexpr double kShare = 0.01;
+  constexpr double kLeast_mg_per_c2 = 0.001;
+  constexpr double kBeyond = 4;  // standard deviations of that
+  constexpr double kSurely_sd = 3;
+  const double slope = fit.state.tempco_mg_per_c.cwiseAbs().maxCoeff();
+  Eigen::Index at = kNuisanceParameters;
+  for (const ParameterGroup& group : fit.groups) {
+    for (int i = 0; i < group.count; ++i, ++at) {
+      if (group.effect == "offset_tempco" && i >= 3 &&
+          std::abs(fit.posterior.mean[at]) -
+                  kSurely_sd * std::sqrt(fit.posterior.covariance(at, at)) >
+              kBeyond * std::min(group.curve_sd, std::max(kLeast_mg_per_c2, kShare * slope))) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+// Log likelihood over white noise of one kind of slow noise, along the sizes that were tried.
+struct SizeCurve {
+  std::vector<double> sizes;  // ascending
+  std::vector<double> nats;
+
+  double at(double size) const {
+    for (std::size_t i = 1; i < sizes.size(); ++i) {
+      if (size <= sizes[i]) {
+        const double share = (size - sizes[i - 1]) / (sizes[i] - sizes[i - 1]);
+        return nats[i - 1] * (1 - share) + nats[i] * share;
+      }
+    }
+    return nats.back();
+  }
+};
+
+SizeCurve curve_of(const SlowNoise& slow, Scatter kind) {
+  if (kind == Scatter::flicker) {
+    return {slow.flicker_mg, slow.nats[0]};
+  }
+  SizeCurve walk{slow.walk_mg, {}};
+  for (const std::vector<double>& row : slow.nats) {
+    walk.nats.push_back(row[0]);
+  }
+  return walk;
+}
+
+// Slow noise has one size, within dwells and between them: log odds of a size of its own for each,
+// less the cost of the free number. `size`: between the dwells.
+double other_size_nats(const SlowNoise& slow, Scatter kind, double size) {
+  constexpr double kCost_nats = 1.5;
+  // The two sizes come from different approximations, and other things add to one of them: sizes
+  // within a factor of two are the same.
+  constexpr double kAlike = 2;
+  if (kind == Scatter::seating) {
+    return -kCost_nats;
+  }
+  const SizeCurve curve = curve_of(slow, kind);
+  double best = 0;
+  double here = std::max(curve.at(size / kAlike), curve.at(size * kAlike));
+  for (std::size_t i = 0; i < curve.sizes.size(); ++i) {
+    best = std::max(best, curve.nats[i]);
+    if (curve.sizes[i] > size / kAlike && curve.sizes[i] < size * kAlike) {
+      here = std::max(here, curve.nats[i]);
+    }
+  }
+  return best - here - kCost_nats;
+}
+
+// Other effects that would do nearly as well in its place.
+std::vector<std::string> confounded(const Request& request, const Explanation& explanation,
+                                    const std::string& name, const Findings& found,
+                                    const Findings& before) {
+  std::vector<std::string> others;
+  const bool weak = explanation.gain_nats(name) < kConfoundable_nats;
+  for (const CatalogueEntry& entry : catalogue()) {
+    const std::string other(entry.name);
+    if (weak && other != name && request.allowed(other) && !found.accepted(other) &&
+        !before.accepted(other)) {
+      // Measured against the best without it, which holds this effect; 0: not tried.
+      const double gain = explanation.gain_nats(other);
+      if (gain > kStandIn_nats && gain != 0) {
+        others.push_back(other);
+      }
+    }
+  }
+  if (name == "local_gravity") {
+    others.emplace_back("gain");
+  }
+  return others;
+}
+
+std::vector<NamedValue> parameters_of(const std::string& name,
+                                      const Explanation::Estimate& estimate) {
+  std::vector<NamedValue> parameters;
+  if (name != "truncation") {
+    std::vector<double> sd = estimate.sd;
+    if (name == "drift" || name == "warm_up" || name == "offset_tempco") {
+      for (std::size_t i = 0; i < sd.size(); ++i) {
+        sd[i] = std::hypot(sd[i], kFormShare * estimate.value[i]);
+      }
+    }
+    parameters.push_back({parameter_name(name), estimate.value, std::move(sd)});
+  }
+  if (name == "tilt") {
+    const double angle = std::hypot(estimate.value[0], estimate.value[1]);
+    parameters[0].value.push_back(0);
+    parameters[0].sd.push_back(0);
+    parameters.push_back({"angle_deg", {angle}, {std::max(estimate.sd[0], estimate.sd[1])}});
+  }
+  if (name == "warm_up") {
+    parameters.push_back({"tau_s", {estimate.tau_s}, {kTauShare * estimate.tau_s}});
+  }
+  return parameters;
+}
+
+// The largest log odds of any parameter that changes; alarms for those that win.
+double judge_changes(const Explanation& explanation, Findings& found) {
+  double most = kExcluded_nats;
+  for (const Inconstancy& change : explanation.inconstancies()) {
+    const double nats = change.nats + kLogPriorUnknown;
+    most = std::max(most, nats);
+    if (nats > kUnknownWins_nats) {
+      found.alarm(other_wins_sd(change.nats),
+                  fmt::format("mean: {} changes with {}", change.term, change.factor));
+    }
+  }
+  return most;
+}
+
+// Log odds of other causes in the place of an accepted effect. `changing`: of any change.
+double other_causes(const Explanation& explanation, const EffectFinding& f, double changing,
+                    Findings& found) {
+  double other = std::min(
+      changing, kUnknownWins_nats - kPaysForChange * std::max(0.0, f.nats - kCertain_nats));
+  if (f.name != "drift" && f.name != "warm_up") {
+    const double grows = explanation.changing_nats(f.name) + kLogPriorUnknown;
+    if (grows > kUnknownWins_nats) {
+      found.alarm(other_wins_sd(grows),
+                  fmt::format("mean: {} that changes while the recording runs", f.name));
+    }
+    other = std::max(other, grows);
+  }
+  if (f.name == "offset_tempco" && zero_bends(explanation.best())) {
+    found.alarm(2 * kAlarm_sd,
+                "mean: the zero bends over temperature more than a zero's drift does");
+    other = kUnknownWins_nats;
+  }
+  return other;
+}
+
+void judge_effect(const Request& request, const Explanation& explanation, const std::string& name,
+                  double changing, const Findings& before, Findings& found) {
+  const auto estimate = explanation.estimate(name);
+  if (!estimate) {
+    return;
+  }
+  const bool in = explanation.best().contains(name);
+  const double gain = explanation.gain_nats(name);
+  EffectFinding f{.name = name,
+                  .nats = in ? std::max(kPresent_nats, gain) : std::min(kAbsent_nats, gain),
+                  .parameters = parameters_of(name, *estimate),
+                  .held_out_gain_nats = explanation.held_out_nats(name)};
+  if (in) {
+    f.confounded_with = confounded(request, explanation, name, found, before);
+    // It must stand out beside unknown scatter, and help where it was not fitted.
+    if ((explanation.unknown_wins() && f.nats < kStandsOut_nats) || f.held_out_gain_nats <= 0) {
+      f.nats = kAbsent_nats;
+    }
+    f.other_nats = other_causes(explanation, f, changing, found);
+  }
+  found.add(request, std::move(f));
+}
+
+// Random effects: scatter of the whole recording, which must have the structure of its kind.
+void judge_scatter(const Request& request, const Explanation& explanation, const SlowNoise& slow,
+                   Scatter kind, Findings& found) {
+  const std::string name(to_string(kind));
+  const Fit& fit = explanation.best();
+  const bool in = fit.scatter == kind;
+  const double gain = explanation.gain_nats(name, in);
+  const double size = in ? fit.scatter_size : 0;
+  EffectFinding f{.name = name,
+                  .nats = in          ? std::max(kPresent_nats, gain)
+                          : gain == 0 ? kNeverTried_nats
+                                      : std::min(kAbsent_nats, gain),
+                  .parameters = {{parameter_name(name), {size}, {kScatterSizeShare * size}}},
+                  .held_out_gain_nats = in ? gain : std::min(0.0, gain)};
+  if (in) {
+    const SlowStructure structure = kind == Scatter::seating
+                                        ? SlowStructure{}
+                                        : slow_structure(explanation.model().blocks(), fit, slow,
+                                                         explanation.model().options().lsb_mg);
+    f.other_nats = std::max(explanation.unknown_nats(), structure.other_nats);
+    const double other_size = other_size_nats(slow, kind, size) + kLogPriorUnknown;
+    // Even odds are enough for another cause: then neither is named.
+    if (other_size > std::max(0.0, f.other_nats)) {
+      found.alarm(other_wins_sd(other_size),
+                  fmt::format("mean: {} between dwells, but not of that size within them", name));
+      f.other_nats = other_size;
+      f.nats = kAbsent_nats;
+    } else if (f.other_nats > 0) {
+      found.alarm(other_wins_sd(f.other_nats),
+                  structure.other_nats >= f.other_nats
+                      ? "mean: slow, but " + structure.other
+                      : fmt::format("mean: scatter by {}, or {}",
+                                    to_string(explanation.best_unknown()->scatter), name));
+      f.nats = kAbsent_nats;
+    }
+  }
+  found.add(request, std::move(f));
+}
+
+}  // namespace
+
+Explanation explain(const Request& request, const std::vector<Block>& blocks,
+                    const SlowNoise& slow) {
+  const auto record_nats = [&slow](Scatter scatter, double size) {
+    switch (scatter) {
+      case Scatter::random_walk:
+      case Scatter::flicker:
+        return curve_of(slow, scatter).at(size);
+      case Scatter::by_time:
+      case Scatter::by_time_fast:
+        // Unknown in time: any spectrum that the records show.
+        return std::max({0.0, slow.best().nats - kFreeSpectrumCost_nats, slow.free_nats});
+      default:
+        return 0.0;
+    }
+  };
+  return Explanation(
+      blocks, {request.lsb_mg(),
+               [&request](const std::string& name) { return request.allowed(name); }, record_nats});
+}
+
+Findings judge_means(const Request& request, const Explanation& explanation, const SlowNoise& slow,
+                     const Findings& before) {
+  Findings found;
+  const Fit& fit = explanation.best();
+  const double changing = judge_changes(explanation, found);
+  // Every linear effect becomes a candidate, judged against the best explanation.
+  std::set<std::string> names;
+  for (const ParameterGroup& group : parameter_groups()) {
+    if (group.effect != "gain" && group.effect != "offset" && request.allowed(group.effect)) {
+      names.insert(group.effect);
+    }
+  }
+  for (const std::string& name : names) {
+    judge_effect(request, explanation, name, changing, before, found);
+  }
+  if (const double nats = explanation.changing_nats("gain") + kLogPriorUnknown;
+      nats > kUnknownWins_nats) {
+    found.alarm(other_wins_sd(nats), "mean: gains that change while the recording runs");
+  }
+  for (const Scatter kind : {Scatter::seating, Scatter::random_walk, Scatter::flicker}) {
+    if (request.allowed(std::string(to_string(kind)))) {
+      judge_scatter(request, explanation, slow, kind, found);
+    }
+  }
+  // Nothing separates it from an offset of half an LSB: what is known is the prior.
+  found.add(request,
+            {.name = "rounding_floor", .nats = kLogPriorEffect, .confounded_with = {"offset"}});
+  // What explains much, but so do others, is a gap all the same.
+  const bool named =
+      std::any_of(found.effects.begin(), found.effects.end(), [&](const EffectFinding& e) {
+        return e.name == to_string(fit.scatter) || fit.contains(e.name);
+      });
+  const double much = fit.nats - explanation.nominal().nats;
+  if (!named && before.alarms.empty() && found.alarms.empty() && much > kMuch_nats) {
+    found.alarm(nats_to_sd(much) + kSeveralAlike_sd, "mean: several explanations do alike");
+  }
+  return found;
+}
+
+}  // namespace sixpoint::gap

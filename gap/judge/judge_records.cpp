@@ -1,0 +1,204 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "gap/judge/steps.h"
+
+namespace sixpoint::gap {
+namespace {
+
+// What the search among frequencies, corners or frequencies with decays costs (conventions, set so
+// that `gap challenge --none 1` finds none).
+constexpr double kResponseCost_nats = 10;
+constexpr double kNoLowPassCost_nats = 14;  // where the corner is not significant
+// Relative uncertainties of a resonance's and a filter's parameters: how far their forms differ.
+constexpr double kResonanceFrequency = 0.01;
+constexpr double kResonanceQ = 0.03;
+constexpr double kCorner = 1e-3;
+
+// Mean square per axis that a gain of `h` instead of 1 adds to a tone.
+double tone_gap_mg2(const Request& request, const Segment& segment, double h) {
+  constexpr double kRmsPerG_mg = 707;
+  return std::pow(kRmsPerG_mg * segment.vibration->amplitude_g * (1 - h), 2) / 3 /
+         request.segments();
+}
+
+// Tones without slips know their amplitude best; if most have slips, all count.
+std::vector<ToneFit> whole_tones(const std::vector<ToneFit>& tones) {
+  std::vector<ToneFit> whole;
+  std::copy_if(tones.begin(), tones.end(), std::back_inserter(whole),
+               [](const ToneFit& tone) { return tone.slips.empty(); });
+  return 2 * whole.size() < tones.size() ? tones : whole;
+}
+
+void judge_low_pass(const Request& request, const Response& response,
+                    const std::vector<ToneFit>& tones, Findings& found) {
+  const LowPass& l = response.low_pass;
+  const double gain_nats = l.noise_nats + l.tone_nats;
+  if (!response.low_pass_significant) {
+    found.add(request,
+              {.name = "bandwidth",
+               .nats = std::min(kLogPriorEffect, gain_nats - kNoLowPassCost_nats + kLogPriorEffect),
+               .parameters = {{"corner_hz", {l.corner_hz}, {}}}});
+    return;
+  }
+  found.add(request, {.name = "bandwidth",
+                      .nats = gain_nats - kResponseCost_nats + kLogPriorEffect,
+                      .parameters = {{"corner_hz",
+                                      {l.corner_hz},
+                                      {std::max(l.corner_sd_hz, kCorner * l.corner_hz)}},
+                                     {"order", {static_cast<double>(l.order)}, {}}},
+                      .held_out_gain_nats = l.held_out_nats});
+  for (const ToneFit& tone : tones) {
+    const Segment& s = request.bundle.segments[tone.segment];
+    const double h = l.tone_gain(s.vibration->frequency_hz, request.bundle.rate_hz);
+    found.outside_means_mg2.push_back(tone_gap_mg2(request, s, h));
+  }
+}
+
+void judge_resonance(const Request& request, const Response& response,
+                     const std::vector<ToneFit>& tones, Findings& found) {
+  const Resonance& r = response.resonance;
+  const bool there = response.resonance_significant;
+  const double nats = r.tone_nats - kResponseCost_nats + kLogPriorEffect;
+  found.add(
+      request,
+      {.name = "soft_mount",
+       .nats = there ? nats : std::min(kLogPriorEffect, nats),
+       .parameters = {{"frequency_hz", {r.frequency_hz}, {kResonanceFrequency * r.frequency_hz}},
+                      {"q", {r.q}, {kResonanceQ * r.q}}},
+       .held_out_gain_nats = there ? r.held_out_nats : 0.0});
+  for (const ToneFit& tone : tones) {
+    const Segment& s = request.bundle.segments[tone.segment];
+    if (there) {
+      found.outside_means_mg2.push_back(
+          tone_gap_mg2(request, s, resonance_gain(s.vibration->frequency_hz, r)));
+    }
+  }
+}
+
+}  // namespace
+
+Lines judge_lines(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise,
+                  const CodeStatistics& codes) {
+  // Noise that changes from dwell to dwell makes lines in the dwells where it is loud.
+  constexpr double kUnsteady_sd = 10, kStrongLine_nats = 60, kMisfit_sd = 3;
+  // A line was found at a threshold of its own: it counts as accepted by this much at least.
+  constexpr double kLineCost_nats = 15, kFoundLine_nats = kAccept_nats + 0.5;
+  constexpr double kLineFrequencySd_hz = 0.002;
+  Lines lines;
+  lines.list = find_lines(request.bundle, clean, noise);
+  if (codes.spread_sd > kUnsteady_sd) {
+    std::erase_if(lines.list, [](const SpectralLine& line) {
+      return line.gain_nats < kStrongLine_nats && line.misfit_sd > kMisfit_sd;
+    });
+  }
+  std::map<std::string, EffectFinding> by_name;  // the strongest line of each
+  for (const SpectralLine& line : lines.list) {
+    const double power_mg2 = line.vector_mg.squaredNorm() / 2;
+    lines.power_mg2 += power_mg2;
+    lines.found.outside_means_mg2.push_back(line.vector_mg.squaredNorm() / 6);
+    std::string name = "floor_vibration";
+    std::string other = "electrical_line";
+    if (!line.in_lab) {
+      name.swap(other);
+    }
+    if (!request.allowed(name)) {
+      if (line.decidable || !request.allowed(other)) {
+        lines.found.alarm(nats_to_sd(line.gain_nats),
+                          fmt::format("spectrum: a line at {:.2f} Hz, {:.2f} mg", line.frequency_hz,
+                                      line.vector_mg.norm()));
+        continue;
+      }
+    }
+    const bool own = request.allowed(name);
+    EffectFinding f{
+        .name = own ? name : other,
+        .nats = std::max(line.gain_nats - kLineCost_nats + kLogPriorEffect, kFoundLine_nats),
+        .held_out_gain_nats = line.held_out_nats};
+    f.parameters = {{"vector_mg",
+                     {line.vector_mg[0], line.vector_mg[1], line.vector_mg[2]},
+                     {line.sd_mg, line.sd_mg, line.sd_mg}},
+                    {"frequency_hz", {line.frequency_hz}, {kLineFrequencySd_hz}}};
+    if (!line.decidable) {
+      f.confounded_with.push_back(other);
+    }
+    by_name.emplace(f.name, f);
+  }
+  for (auto& [name, f] : by_name) {
+    lines.found.add(request, std::move(f));
+  }
+  return lines;
+}
+
+ResponseStep judge_response(const Request& request, const NoiseSpectrum& noise,
+                            const std::vector<ToneFit>& tones, const Lines& lines) {
+  ResponseOptions options;
+  for (const SpectralLine& line : lines.list) {
+    options.lines_hz.push_back(line.frequency_hz);
+  }
+  options.allow_low_pass = request.allowed("bandwidth");
+  options.allow_resonance = request.allowed("soft_mount");
+  const std::vector<ToneFit> whole = whole_tones(tones);
+  ResponseStep step;
+  step.response = find_response(request.bundle, noise, whole, options);
+  judge_low_pass(request, step.response, whole, step.found);
+  if (step.response.has_tones && options.allow_resonance) {
+    judge_resonance(request, step.response, whole, step.found);
+  }
+  return step;
+}
+
+Settling judge_settling(const Request& request, const CleanSamples& clean,
+                        const NoiseSpectrum& noise, const Lines& lines) {
+  // Conventions: prior of the amplitude (and phase), number of independent pairs of frequency and
+  // decay, gain of ringing over a plain decay, how strong ringing is surely no rest of a line, and
+  // how near a line is.
+  constexpr double kAmplitudePrior = 0.03, kPairs = 60, kRings_nats = 3;
+  constexpr double kSurelyRings_sd = 4.5, kNearLine_hz = 2.5;
+  // Mean square of a decaying sine over a dwell; share of the dwells that ring: a convention.
+  constexpr double kDwell_s = 10, kRingingShare = 0.6;
+  Settling settling;
+  settling.step = step_response(request.bundle, clean, noise, lines.power_mg2);
+  const StepResponse& step = settling.step;
+  if (!step.usable) {
+    return settling;
+  }
+  const StepResponse::Mode& mode = step.mode;
+  const double sd = std::max(1e-9, mode.amplitude_sd);
+  const double relative = sd / std::max(1e-9, mode.amplitude);
+  EffectFinding f{.name = "settling",
+                  .nats = step.gain_nats - 2 * std::log1p(kAmplitudePrior / sd) - std::log(kPairs) +
+                          kLogPriorEffect};
+  const bool significant = f.nats > kAccept_nats;
+  if (significant) {
+    f.held_out_gain_nats = held_out_step_nats(request.bundle, clean, noise, lines.power_mg2);
+  }
+  f.parameters = {
+      {"amplitude", {step.amplitude}, {sd}},
+      {"frequency_hz", {mode.frequency_hz}, {relative / (2 * M_PI * std::max(0.03, mode.decay_s))}},
+      {"decay_s", {mode.decay_s}, {2 * relative * mode.decay_s}}};
+  // A line has a phase of its own in every dwell; the rest of it in their mean looks like ringing
+  // at its frequency.
+  const bool is_line =
+      mode.amplitude < kSurelyRings_sd * step.sd &&
+      std::any_of(lines.list.begin(), lines.list.end(), [&](const SpectralLine& line) {
+        return std::abs(line.frequency_hz - mode.frequency_hz) < kNearLine_hz;
+      });
+  const bool there = significant && !is_line;
+  const bool rings = step.gain_nats > step.plain_nats + kRings_nats;
+  const bool named = there && rings && request.allowed("settling");
+  settling.unexplained = there && !named;
+  if (named || !there) {
+    settling.found.add(request, std::move(f));
+  }
+  if (named) {
+    settling.found.outside_means_mg2.push_back(std::pow(1000 * step.amplitude, 2) * mode.decay_s /
+                                               4 / kDwell_s * kRingingShare);
+  }
+  return settling;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,263 @@
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "gap/judge/steps.h"
+
+namespace sixpoint::gap {
+namespace {
+
+// Uncertainties beside the statistical ones (conventions): of a tone's frequency, and of the host's
+// clock or the shaker's oscillator, which are known to a few ppm.
+constexpr double kToneFloor_ppm = 0.5;
+constexpr double kClockFloor_ppm = 1.5;
+constexpr double kClockRange_ppm = 1500;  // prior range of a clock's error
+constexpr double kPossibleClock_ppm = 20'000;
+constexpr double kDatasheetClock_ppm = 200;  // also in the catalogue
+constexpr double kNoClock_ppm = 1e9;         // uncertainty where nothing shows it
+constexpr double kChance_sd = 1;             // what small effects of the catalogue add to a test
+constexpr double kRmsPerG_mg = 707;          // of a sine of 1 g
+
+// Slips (conventions): evidence of one, odds of none where each would show, alarms.
+constexpr double kPerSlip_nats = 12;
+constexpr double kNoSlip_nats = -9;
+constexpr double kSlipAlarm_sd = 30;
+constexpr double kPhaseStepAlarm_sd = 20;
+constexpr double kOddStepAlarm_sd = 15;
+constexpr std::size_t kEnoughSamples = 5000;
+
+// What the tones say of the clock.
+struct ToneClock {
+  double ppm = 0, sd_ppm = kNoClock_ppm;
+  double chi = 0, count = 0;  // about the mean
+  std::size_t samples = 0;
+  std::size_t lost = 0, repeated = 0;
+  std::size_t odd = 0;  // steps that are no whole number of samples
+  std::size_t slip_segment = 0;
+};
+
+bool shows_clock(const ToneFit& tone) {
+  return tone.usable && tone.slips.empty() && tone.frequency_sd_ppm > 0;
+}
+
+ToneClock tone_clock(const std::vector<ToneFit>& tones) {
+  ToneClock clock;
+  double weight = 0, sum = 0;
+  for (const ToneFit& tone : tones) {
+    if (!tone.usable) {
+      continue;
+    }
+    clock.samples += tone.samples;
+    for (const Slip& slip : tone.slips) {
+      (slip.steps > 0   ? clock.lost
+       : slip.steps < 0 ? clock.repeated
+                        : clock.odd) += static_cast<std::size_t>(std::max(1, std::abs(slip.steps)));
+      clock.slip_segment = tone.segment;
+    }
+    if (shows_clock(tone)) {
+      const double sd = std::hypot(tone.frequency_sd_ppm, kToneFloor_ppm);
+      weight += 1 / (sd * sd);
+      sum += clock_ppm_of(tone) / (sd * sd);
+    }
+  }
+  if (weight > 0) {
+    clock.ppm = sum / weight;
+    clock.sd_ppm = 1 / std::sqrt(weight);
+  }
+  for (const ToneFit& tone : tones) {
+    if (shows_clock(tone)) {
+      const double sd = std::hypot(tone.frequency_sd_ppm, kToneFloor_ppm);
+      clock.chi += std::pow((clock_ppm_of(tone) - clock.ppm) / sd, 2);
+      clock.count += 1;
+    }
+  }
+  return clock;
+}
+
+ToneOptions tone_options(const NoiseSpectrum& noise, const HostTiming& host) {
+  // A rate that is neither significant nor known well is better left out.
+  constexpr double kSignificant_sd = 5;
+  constexpr double kKnown_ppm = 20;
+  constexpr double kLeastNoise_mg = 0.5;
+  ToneOptions options;
+  for (std::size_t a = 0; a < 3; ++a) {
+    options.noise_mg[a] = std::max(kLeastNoise_mg, noise.white_mg[a]);
+  }
+  const bool vague = std::abs(host.clock_ppm) < kSignificant_sd * host.clock_sd_ppm &&
+                     host.clock_sd_ppm > kKnown_ppm;
+  options.clock_ppm = host.usable && !vague ? host.clock_ppm : 0;
+  return options;
+}
+
+// Mean square that a clock error adds to the tones: it turns their phase by at most a full swing.
+double clock_gap_mg2(const Request& request, const std::vector<ToneFit>& tones, double ppm) {
+  constexpr double kMostTurn = 1.4;  // of the swing: two sines without a common phase
+  double mismatch = 0;
+  for (const ToneFit& tone : tones) {
+    const Segment& s = request.bundle.segments[tone.segment];
+    const double turn = 2 * M_PI * s.vibration->frequency_hz * ppm * 1e-6 *
+                        static_cast<double>(s.samples) / request.bundle.rate_hz / std::sqrt(12.0);
+    mismatch +=
+        std::pow(kRmsPerG_mg * s.vibration->amplitude_g * std::min(kMostTurn, std::abs(turn)), 2);
+  }
+  return mismatch / std::max<double>(1, request.segments()) / 3;
+}
+
+void judge_clock(const Request& request, const HostTiming& host, const std::vector<ToneFit>& tones,
+                 const ToneClock& by_tones, Findings& found) {
+  double ppm = host.clock_ppm;
+  double sd = host.clock_sd_ppm;
+  if (!host.usable) {
+    ppm = by_tones.ppm;
+    sd = std::max(by_tones.sd_ppm, 1.0);
+  } else if (by_tones.count >= 3) {
+    found.test(std::abs(by_tones.ppm - ppm) / std::hypot(by_tones.sd_ppm, sd) - kChance_sd,
+               "timing: the tones' frequencies are off against the host's clock");
+  }
+  if (by_tones.count >= 4 && by_tones.lost + by_tones.repeated == 0) {
+    found.test(chi_to_sd(by_tones.chi, by_tones.count - 1) - kChance_sd,
+               "timing: the tones' frequencies contradict each other");
+  }
+  if (sd >= 0.1 * kNoClock_ppm) {
+    return;
+  }
+  const double known_ppm = std::hypot(sd, kClockFloor_ppm);
+  const double z = ppm / known_ppm;
+  const double nats =
+      0.5 * z * z - std::log(std::max(2.0, kClockRange_ppm / known_ppm)) + kLogPriorEffect;
+  if (nats > kAccept_nats) {
+    found.outside_means_mg2.push_back(clock_gap_mg2(request, tones, ppm));
+  }
+  if (!request.allowed("clock_error") && nats > kAccept_nats) {
+    found.alarm(std::abs(z), fmt::format("timing: the sample clock is off by {:.0f} ppm", ppm));
+  } else if (std::abs(ppm) < kPossibleClock_ppm) {
+    found.add(request, {.name = "clock_error",
+                        .nats = nats,
+                        .parameters = {{"ppm", {ppm}, {known_ppm}}},
+                        .held_out_gain_nats =
+                            host.usable ? host.clock_held_out_nats : nats - kLogPriorEffect - 1,
+                        .outside_datasheet = std::abs(ppm) > kDatasheetClock_ppm});
+  }
+}
+
+// Lost and repeated samples: exact by the host's clock where it shows them, else by the tones.
+void judge_slips(const Request& request, const HostTiming& host, const ToneClock& by_tones,
+                 Findings& found) {
+  const bool by_host = host.usable && host.slips_visible;
+  const std::size_t samples = by_host ? host.samples : by_tones.samples;
+  const std::size_t lost = by_host ? host.lost : by_tones.lost;
+  const std::size_t repeated = by_host ? host.repeated : by_tones.repeated;
+  const auto judge = [&](const char* name, std::size_t count, const char* words) {
+    const double rate = share_of(count, samples);
+    const double nats = count == 0 ? (by_host ? kNoSlip_nats : kLogPriorEffect - 1)
+                                   : kPerSlip_nats * static_cast<double>(count) + kLogPriorEffect;
+    if (count > 0) {
+      found.outside_means_mg2.push_back(rate * 1e6);  // 1 g rms for each sample out of place
+    }
+    if (count > 0 && !request.allowed(name)) {
+      found.alarm(kSlipAlarm_sd, fmt::format("timing: {} samples {}", count, words));
+    } else if (samples > 0) {
+      const double sd =
+          std::sqrt(static_cast<double>(count) + 1) / static_cast<double>(samples);  // Poisson
+      found.add(request, {.name = name,
+                          .nats = nats,
+                          .parameters = {{"rate", {rate}, {sd}}},
+                          .held_out_gain_nats = nats});
+    }
+  };
+  judge("dropped_samples", lost, "are missing");
+  judge("duplicated_samples", repeated, "are there twice");
+  if (by_host && by_tones.samples > kEnoughSamples && lost + repeated == 0 &&
+      by_tones.lost + by_tones.repeated > 0) {
+    found.alarm(kPhaseStepAlarm_sd,
+                fmt::format("timing: phase steps in tones ({}) without slips on the host's clock",
+                            request.bundle.segments[by_tones.slip_segment].name));
+  }
+  if (by_tones.odd > 0 && lost + repeated == 0) {
+    found.alarm(
+        kOddStepAlarm_sd,
+        fmt::format("timing: {} phase steps in tones that are no whole sample", by_tones.odd));
+  }
+}
+
+// Variance of the sample times by weighted least squares over the tones: the residual's excess on
+// the slopes over that on the crests is (rate * jitter)^2 / 2.
+struct JitterSums {
+  double up = 0;    // per s^2
+  double down = 0;  // per s^4
+};
+
+JitterSums jitter_sums(const Request& request, const std::vector<ToneFit>& tones,
+                       const NoiseSpectrum& noise) {
+  constexpr std::size_t kLeastSamples = 200;
+  JitterSums sums;
+  for (const ToneFit& tone : tones) {
+    if (!tone.usable || !tone.slips.empty() || tone.samples < kLeastSamples) {
+      continue;
+    }
+    const double frequency_hz = request.bundle.segments[tone.segment].vibration->frequency_hz;
+    const double rate = 2 * M_PI * frequency_hz * tone.in_phase_mg[tone.axis];  // mg/s
+    const double white = noise.variance_at(static_cast<std::size_t>(tone.axis), frequency_hz);
+    const double level = std::max(white, tone.residual_mg * tone.residual_mg);
+    const double sd = level * std::sqrt(4.0 / static_cast<double>(tone.samples));
+    const double lever = 0.5 * rate * rate;
+    sums.up += lever * (tone.on_slope_mg2 - tone.on_crest_mg2) / (sd * sd);
+    sums.down += lever * lever / (sd * sd);
+  }
+  return sums;
+}
+
+// Adds accepted jitter to `timing`, and frees the tones' amplitudes of what it takes off.
+void judge_jitter(const Request& request, const NoiseSpectrum& noise, Timing& timing) {
+  constexpr double kCost_nats = 4;  // convention: of its size, and of heavy tails
+  constexpr double kNoJitterSd_ms = 0.05;
+  const JitterSums sums = jitter_sums(request, timing.tones, noise);
+  if (sums.down == 0) {
+    return;
+  }
+  const double z = sums.up / std::sqrt(sums.down);
+  const double jitter_ms = 1e3 * std::sqrt(std::max(0.0, sums.up / sums.down));
+  const double sd_ms =
+      jitter_ms > 0 ? 1e3 / std::sqrt(sums.down) / (2 * jitter_ms / 1e3) : kNoJitterSd_ms;
+  const double nats = (z > 0 ? 0.5 * z * z : 0) - kCost_nats + kLogPriorEffect;
+  const bool there = nats > kAccept_nats;
+  if (there && !request.allowed("jitter")) {
+    timing.found.alarm(z, "timing: scatter on the slopes of the tones");
+    return;
+  }
+  timing.found.add(
+      request,
+      {.name = "jitter",
+       .nats = nats,
+       .parameters = {{"rms_ms", {jitter_ms}, {there ? std::min(sd_ms, jitter_ms) : sd_ms}}},
+       .held_out_gain_nats = nats - kLogPriorEffect});
+  if (!there) {
+    return;
+  }
+  timing.jitter_s = jitter_ms / 1e3;
+  for (ToneFit& tone : timing.tones) {
+    const double f =
+        2 * M_PI * request.bundle.segments[tone.segment].vibration->frequency_hz * timing.jitter_s;
+    tone.in_phase_mg *= std::exp(f * f / 2);
+    timing.found.outside_means_mg2.push_back(std::pow(f * tone.in_phase_mg[tone.axis], 2) / 2 / 3 /
+                                             request.segments());
+  }
+}
+
+}  // namespace
+
+double clock_ppm_of(const ToneFit& tone) { return 1e6 * (1 / (1 + 1e-6 * tone.frequency_ppm) - 1); }
+
+Timing judge_timing(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise) {
+  Timing timing;
+  timing.host = host_timing(request.bundle);
+  timing.tones = fit_tones(request.bundle, clean, tone_options(noise, timing.host));
+  const ToneClock by_tones = tone_clock(timing.tones);
+  judge_clock(request, timing.host, timing.tones, by_tones, timing.found);
+  judge_slips(request, timing.host, by_tones, timing.found);
+  judge_jitter(request, noise, timing);
+  return timing;
+}
+
+}  // namespace sixpoint::gap

@@ -1,0 +1,187 @@
+// The gap's places, for people: residuals by axis and segment, and the series of the report.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "gap/judge/steps.h"
+
+namespace sixpoint::gap {
+namespace {
+
+constexpr std::size_t kMostPlaces = 20;
+constexpr double kHighAmplitude_g = 1.5;  // tones above show what depends on the amplitude
+constexpr double kLongDwell_s = 60;
+
+std::string_view factor_of(const Block& block, const Segment& segment, double rate_hz) {
+  if (block.tone) {
+    return segment.vibration->amplitude_g > kHighAmplitude_g ? "amplitude" : "frequency";
+  }
+  if (segment.kind != Segment::Kind::still) {
+    return "temperature";
+  }
+  return segment.name == "yaw"                                           ? "yaw"
+         : static_cast<double>(segment.samples) > kLongDwell_s * rate_hz ? "time"
+                                                                         : "pose";
+}
+
+// Mean squares of one axis in one segment.
+struct Cell {
+  double square_mg2 = 0, square = 0, n = 0;
+  std::string factor;
+};
+
+// Overlapping estimate over means of one second (IEEE 1139-2008). `sum`: their running sums.
+double allan_variance(const std::vector<double>& sum, std::size_t seconds) {
+  double square = 0;
+  double n = 0;
+  for (std::size_t i = 0; i + 2 * seconds < sum.size(); ++i) {
+    const double d =
+        (sum[i + 2 * seconds] - 2 * sum[i + seconds] + sum[i]) / static_cast<double>(seconds);
+    square += d * d;
+    n += 1;
+  }
+  return square / std::max(1.0, 2 * n);
+}
+
+// Running sums of the means of one second, mg; masked seconds repeat the one before.
+std::vector<double> running_sums(const Request& request, const CleanSamples& clean,
+                                 const Segment& segment, std::size_t axis) {
+  const auto second = static_cast<std::size_t>(request.bundle.rate_hz);
+  std::vector<double> sum = {0};
+  double last = 0;
+  for (std::size_t k = 0; k < segment.samples / second; ++k) {
+    double total = 0;
+    double n = 0;
+    for (std::size_t i = 0; i < second; ++i) {
+      const std::size_t at = segment.first_sample + k * second + i;
+      if ((clean.flags[at] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0) {
+        total += 1000.0 * clean.samples[at][axis] / request.bundle.accel_scale_lsb_per_g;
+        n += 1;
+      }
+    }
+    last = n > 0 ? total / n : last;
+    sum.push_back(sum.back() + last);
+  }
+  return sum;
+}
+
+void plot_allan(const Request& request, const Records& records, const Fit& fit, Plots& plots) {
+  constexpr std::size_t kLeast_s = 60;
+  const Segment* longest = nullptr;
+  for (const Segment& segment : request.bundle.segments) {
+    if (segment.kind == Segment::Kind::still &&
+        (longest == nullptr || segment.samples > longest->samples)) {
+      longest = &segment;
+    }
+  }
+  const auto second = static_cast<std::size_t>(request.bundle.rate_hz);
+  if (longest == nullptr || second == 0 || longest->samples < kLeast_s * second) {
+    return;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double> sum = running_sums(request, records.clean, *longest, axis);
+    for (std::size_t m = 1; 4 * m < sum.size(); m *= 2) {
+      const auto tau = static_cast<double>(m);
+      const double white =
+          std::pow(records.response.white_mg[axis], 2) / (tau * request.bundle.rate_hz);
+      // Allan variances of 1/f noise and of a random walk (IEEE 1139-2008).
+      const double size2 = fit.scatter_size * fit.scatter_size;
+      const double slow = fit.scatter == Scatter::flicker
+                              ? 2 * std::log(2.0) * flicker_density_mg2(fit.scatter_size)
+                          : fit.scatter == Scatter::random_walk ? size2 * tau / 3
+                                                                : 0;
+      if (axis == 0) {
+        plots.allan_s.push_back(tau);
+      }
+      plots.allan_mg[axis].push_back(std::sqrt(allan_variance(sum, m)));
+      plots.allan_nominal_mg[axis].push_back(std::sqrt(white));
+      plots.allan_model_mg[axis].push_back(std::sqrt(white + slow));
+    }
+  }
+}
+
+}  // namespace
+
+Residuals locate_residuals(const Request& request, const Records& records,
+                           const Explanation& explanation, const Findings& found) {
+  Residuals out;
+  const Fit& nominal = explanation.nominal();
+  const Fit& best = explanation.best();
+  std::map<std::pair<int, std::string>, Cell> cells;
+  for (int row = 0; row < explanation.model().rows(); ++row) {
+    const Block& block = explanation.model().block_of_row(row);
+    const Segment& segment = request.bundle.segments[block.segment];
+    const int feature = explanation.model().feature_of_row(row);
+    const int axis = feature < kSecondHarmonic ? feature % 3 : block.axis;
+    const double before = nominal.residual[row];
+    const double scale_mg = std::sqrt(nominal_variance_mg2(block, feature));
+    Cell& cell = cells[{axis, segment.name}];
+    cell.square += std::pow(before, 2);
+    cell.square_mg2 += std::pow(before * scale_mg, 2);
+    cell.n += 1;
+    cell.factor = factor_of(block, segment, request.bundle.rate_hz);
+    if (feature < kToneAmplitude) {
+      const double after = best.residual[row];
+      out.plot.push_back({axis, segment.name, static_cast<int>(block.segment), block.temperature_c,
+                          block.middle_s / 60, before * scale_mg, before, after * scale_mg, after});
+    }
+  }
+  for (const auto& [key, cell] : cells) {
+    out.where.push_back({key.first, key.second, cell.factor, std::sqrt(cell.square_mg2 / cell.n),
+                         std::sqrt(cell.square / cell.n)});
+  }
+  for (const SpectralLine& line : records.lines.list) {
+    for (int a = 0; a < 3; ++a) {
+      const double size_mg = std::abs(line.vector_mg[a]);
+      out.where.push_back({a, "still", fmt::format("frequency {:.2f} Hz", line.frequency_hz),
+                           size_mg / M_SQRT2, size_mg / std::max(1e-6, line.sd_mg)});
+    }
+  }
+  const StepResponse& step = records.settling.step;
+  if (found.accepted("settling") || step.left_without_sd > kAlarm_sd) {
+    out.where.push_back({0, "faces", "time since move", 1000 * step.amplitude / 2,
+                         step.amplitude / std::max(1e-9, step.mode.amplitude_sd)});
+  }
+  std::sort(out.where.begin(), out.where.end(),
+            [](const Location& a, const Location& b) { return a.sigma > b.sigma; });
+  out.where.resize(std::min(kMostPlaces, out.where.size()));
+  return out;
+}
+
+Plots make_plots(const Request& request, const Records& records, const Fit& best,
+                 const Findings& found) {
+  const double rate_hz = request.bundle.rate_hz;
+  const Response& response = records.response;
+  Plots plots;
+  plot_allan(request, records, best, plots);
+  plots.frequency_hz = records.noise.frequency_hz;
+  plots.noise_mg2 = records.noise.variance_mg2;
+  const double rounding_mg2 = std::pow(request.lsb_mg(), 2) / 12;
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (const double f : plots.frequency_hz) {
+      plots.noise_model_mg2[a].push_back(
+          std::pow(response.white_mg[a] * response.noise_gain(f, rate_hz), 2) + rounding_mg2);
+    }
+  }
+  const StepResponse& step = records.settling.step;
+  for (std::size_t i = 0; i < step.share.size(); i += 2) {
+    const double t = static_cast<double>(i) / rate_hz;
+    plots.step_s.push_back(t);
+    plots.step_share.push_back(step.share[i]);
+    plots.step_model.push_back(found.accepted("settling") ? step.model(t) : 0);
+  }
+  for (const ToneFit& tone : records.tones) {
+    if (tone.usable) {
+      const Vibration& v = *request.bundle.segments[tone.segment].vibration;
+      const double nominal_mg = best.state.gain[tone.axis] * 1000 * v.amplitude_g;
+      plots.tones.push_back({tone.axis, v.frequency_hz, v.amplitude_g,
+                             nominal_mg > 0 ? tone.in_phase_mg[tone.axis] / nominal_mg : 0,
+                             response.tone_gain(v.frequency_hz, rate_hz)});
+    }
+  }
+  return plots;
+}
+
+}  // namespace sixpoint::gap

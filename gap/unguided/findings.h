@@ -1,0 +1,35 @@
+// What the diagnoses without a protocol share: when an effect is accepted, and how they end.
+//
+//   if (is_allowed(options, finding.name) && finding.nats > kAccept_nats) {
+//     diagnosis.effects.push_back(finding);
+//   }
+//   finish(diagnosis, options);
+#pragma once
+
+#include <string>
+
+#include "gap/explain/decisions.h"
+#include "gap/judge/diagnose.h"
+#include "gap/judge/diagnosis.h"
+#include "gap/judge/findings.h"
+
+namespace sixpoint::gap {
+
+// False for an effect that the options take out of the catalogue.
+bool is_allowed(const DiagnoseOptions& options, const std::string& name);
+// before_sigma and after_sigma from the milligravities and the floor.
+void set_sigmas(GapSize& gap);
+// The share of the square of the gap that is explained.
+double closed_fraction(const GapSize& gap);
+
+// Lists the effects that were not judged as not observable, suggests the next segment, and sets the
+// verdict:
+//
+//   something unknown | effects found | verdict
+//   yes               | none          | unexplained
+//   yes               | some          | partly_explained
+//   no                | none          | no_gap
+//   no                | some          | explained
+void finish(Diagnosis& diagnosis, const DiagnoseOptions& options);
+
+}  // namespace sixpoint::gap

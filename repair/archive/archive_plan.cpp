@@ -1,0 +1,204 @@
+#include "repair/archive/archive_plan.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "base/sha256.h"
+
+namespace sixpoint::repair {
+namespace {
+
+constexpr std::uint64_t kUsualShardBytes = 4ULL << 30;
+// What a file costs beside its bytes: opening, the mark, two syncs.
+constexpr std::uint64_t kBytesPerFile = 64ULL << 10;
+// Sizes above this count as this: a million sparse files must not overflow a sum.
+constexpr std::uint64_t kLargestFile = 1ULL << 40;
+
+// How many shards a list of files makes when none may hold more than `most` (but for one file).
+std::size_t shards_within(const std::vector<std::uint64_t>& bytes, std::uint64_t most) {
+  std::size_t shards = 0;
+  std::uint64_t left = 0;
+  for (const std::uint64_t size : bytes) {
+    if (shards == 0 || size > left) {
+      ++shards;
+      left = std::max(most, size);
+    }
+    left -= size;
+  }
+  return shards;
+}
+
+class Planner {
+ public:
+  Planner(Env& env, const ArchiveDraft& draft) : env_(env), draft_(draft) {}
+
+  Result<PlannedArchive> make() {
+    ArchivePlan& plan = made_.plan;
+    plan.made_at = env_.clock.now();
+    plan.software = draft_.software;
+    plan.repair = draft_.repair;
+    plan.store = draft_.store;
+    for (const std::string& path : draft_.paths) {
+      SIXPOINT_CHECK(add(path));
+    }
+    if (made_.files.empty()) {
+      return fail(ErrorCode::no_input, "there is no .gt3x file to repair", draft_.paths.front(),
+                  "name the folder with your recordings");
+    }
+    if (draft_.hash) {
+      SIXPOINT_CHECK(hash());
+    }
+    SIXPOINT_CHECK(cut());
+    return std::move(made_);
+  }
+
+ private:
+  Status add(const std::string& path) {
+    SIXPOINT_ASSIGN(const auto info, env_.files.info(path));
+    SIXPOINT_ASSIGN(auto tree, find_files(env_.files, path, {{".gt3x"}, /*follow_out=*/false}));
+    made_.not_followed.insert(made_.not_followed.end(), tree.not_followed.begin(),
+                              tree.not_followed.end());
+    made_.plan.refused.insert(made_.plan.refused.end(), tree.refused.begin(), tree.refused.end());
+    const std::size_t root = root_of({info.is_folder ? path : folder_of(path), info.is_folder});
+    for (FoundFile& file : tree.files) {
+      const auto [other, fresh] = taken_.emplace(file.relative, file.path);
+      if (!fresh) {
+        made_.plan.refused.push_back(
+            {file.path,
+             Error{ErrorCode::cannot_create,
+                   fmt::format("{} would have the same name in the output folder",
+                               printable(other->second)),
+                   file.path, "make separate plans of the two, with separate output folders"}});
+        continue;
+      }
+      made_.files.push_back({root, std::move(file.relative), file.size, file.modified_ns, ""});
+    }
+    return {};
+  }
+
+  std::size_t root_of(ArchiveRoot root) {
+    const auto [known, fresh] =
+        roots_.emplace(std::pair(root.path, root.whole), made_.plan.roots.size());
+    if (fresh) {
+      made_.plan.roots.push_back(std::move(root));
+    }
+    return known->second;
+  }
+
+  Status hash() {
+    std::size_t done = 0;
+    std::vector<ArchiveFile> readable;
+    for (ArchiveFile& file : made_.files) {
+      draft_.progress(done++, made_.files.size());
+      auto digest = file_sha256(env_.files, made_.plan.input_of(file));
+      if (!digest) {
+        made_.plan.refused.push_back({made_.plan.input_of(file), digest.error()});
+        continue;
+      }
+      file.sha256 = *std::move(digest);
+      readable.push_back(std::move(file));
+    }
+    made_.files = std::move(readable);
+    if (made_.files.empty()) {
+      return fail(made_.plan.refused.front().error);
+    }
+    return {};
+  }
+
+  Status cut() {
+    std::vector<std::uint64_t> bytes;
+    bytes.reserve(made_.files.size());
+    for (const ArchiveFile& file : made_.files) {
+      bytes.push_back(std::min(file.size, kLargestFile) + kBytesPerFile);
+    }
+    std::size_t shards = draft_.shards;
+    if (shards == 0) {
+      const std::uint64_t most = draft_.shard_bytes > 0 ? draft_.shard_bytes : kUsualShardBytes;
+      shards = shards_within(bytes, most);
+      if (draft_.shard_bytes == 0) {
+        shards = std::min(shards, kUsualMostShards);
+      }
+    }
+    shards = std::min(shards, made_.files.size());
+    if (shards > kMostShards) {
+      return fail(
+          ErrorCode::usage,
+          fmt::format("{} shards are more than the {} that a plan may have", shards, kMostShards),
+          {}, "choose fewer or larger ones");
+    }
+    std::size_t from = 0;
+    for (const std::size_t to : cut_into_shards(bytes, shards)) {
+      const auto shard_files = std::span(made_.files).subspan(from, to - from);
+      ArchiveShard shard;
+      shard.files = shard_files.size();
+      for (const ArchiveFile& file : shard_files) {
+        shard.bytes += file.size;
+      }
+      made_.plan.shards.push_back(shard);
+      from = to;
+    }
+    return {};
+  }
+
+  Env& env_;
+  const ArchiveDraft& draft_;
+  PlannedArchive made_;
+  std::map<std::pair<std::string, bool>, std::size_t> roots_;
+  std::map<std::string, std::string> taken_;  // output -> input
+};
+
+}  // namespace
+
+std::size_t ArchivePlan::files() const {
+  return std::accumulate(
+      shards.begin(), shards.end(), std::size_t{0},
+      [](std::size_t sum, const ArchiveShard& shard) { return sum + shard.files; });
+}
+
+std::uint64_t ArchivePlan::bytes() const {
+  return std::accumulate(
+      shards.begin(), shards.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const ArchiveShard& shard) { return sum + shard.bytes; });
+}
+
+std::vector<std::size_t> cut_into_shards(const std::vector<std::uint64_t>& bytes,
+                                         std::size_t shards) {
+  shards = std::min(shards, bytes.size());
+  std::vector<std::size_t> ends;
+  if (shards == 0) {
+    return ends;
+  }
+  // The smallest size of the largest shard, by bisection.
+  std::uint64_t low = *std::max_element(bytes.begin(), bytes.end());
+  std::uint64_t high = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
+  while (low < high) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    if (shards_within(bytes, middle) <= shards) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const bool full = sum + bytes[i] > low;
+    // As many files left as shards: one each, so that none is empty.
+    const bool spread = bytes.size() - i <= shards - ends.size() - 1;
+    if ((full || spread) && i > (ends.empty() ? 0 : ends.back())) {
+      ends.push_back(i);
+      sum = 0;
+    }
+    sum += bytes[i];
+  }
+  ends.push_back(bytes.size());
+  return ends;
+}
+
+Result<PlannedArchive> plan_archive(Env& env, const ArchiveDraft& draft) {
+  return Planner(env, draft).make();
+}
+
+}  // namespace sixpoint::repair

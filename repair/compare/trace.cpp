@@ -1,0 +1,127 @@
+#include "repair/compare/trace.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "gt3x/recording.h"
+#include "gt3x/sample_reader.h"
+
+namespace sixpoint::repair {
+
+constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
+
+Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+  Trace trace;
+  trace.name_ = path;
+  trace.rate_hz_ = recording.info().sample_rate_hz().value_or(0);
+  if (!(trace.rate_hz_ >= 1)) {
+    return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all", path,
+                "download the recording from the unit again");
+  }
+  const auto rate = static_cast<std::uint64_t>(std::lround(trace.rate_hz_));
+  std::optional<std::uint32_t> start;
+  gt3x::SampleReader reader(recording);
+  for (;;) {
+    SIXPOINT_ASSIGN(const auto item, reader.next());
+    if (!item) {
+      break;
+    }
+    if (item->kind != gt3x::SampleItem::Kind::recorded || item->broke_order) {
+      continue;
+    }
+    if (item->type == gt3x::RecordType::activity3) {
+      return fail(ErrorCode::bad_data, "the recording holds raw counts, not g", path,
+                  "compare .gt3x recordings");
+    }
+    const auto scale = gt3x::accel_scale_lsb_per_g(recording.info(), item->parameters);
+    if (!scale) {
+      return fail(ErrorCode::bad_data, "the recording does not say how many LSB make one g", path,
+                  "check that this is a recording of a known unit");
+    }
+    if (!start) {
+      start = item->unix_time;
+      trace.start_s_ = item->unix_time;
+    }
+    const std::uint64_t first = (item->unix_time - *start) * rate;
+    const std::uint64_t count = std::min<std::uint64_t>(item->counts.size(), rate);
+    if (first + count > kMaxTraceSamples) {
+      return fail(ErrorCode::bad_data,
+                  fmt::format("the recording is longer than {} samples", kMaxTraceSamples), path,
+                  "compare recordings of hours, not of weeks");
+    }
+    trace.magnitude_g_.resize(first + count, kMissing);
+    for (std::size_t i = 0; i < count; ++i) {
+      double square = 0;
+      for (const std::int16_t value : item->counts[i]) {
+        square += static_cast<double>(value) * value;
+      }
+      trace.magnitude_g_[first + i] = static_cast<float>(std::sqrt(square) / *scale);
+    }
+  }
+  if (trace.magnitude_g_.empty()) {
+    return fail(ErrorCode::bad_data, "the recording holds no samples", path,
+                "check that the unit was started; download the recording again");
+  }
+  return trace;
+}
+
+Trace Trace::from_magnitudes(std::string name, double start_s, double rate_hz,
+                             std::vector<float> magnitudes_g) {
+  Trace trace;
+  trace.name_ = std::move(name);
+  trace.start_s_ = start_s;
+  trace.rate_hz_ = rate_hz;
+  trace.magnitude_g_ = std::move(magnitudes_g);
+  return trace;
+}
+
+double Trace::at(double time_s) const {
+  const double place = (time_s - start_s_) * rate_hz_;
+  const double floor = std::floor(place);
+  if (!(floor >= 1) || floor + 2 >= static_cast<double>(magnitude_g_.size())) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  // Catmull-Rom.
+  const auto i = static_cast<std::size_t>(floor);
+  const double u = place - floor;
+  const double p0 = magnitude_g_[i - 1];
+  const double p1 = magnitude_g_[i];
+  const double p2 = magnitude_g_[i + 1];
+  const double p3 = magnitude_g_[i + 2];
+  return p1 +
+         0.5 * u * (p2 - p0 + u * (2 * p0 - 5 * p1 + 4 * p2 - p3 + u * (3 * (p1 - p2) + p3 - p0)));
+}
+
+Second second_at(const Trace& trace, double from_s) {
+  const double first = std::ceil((from_s - trace.start_s()) * trace.rate_hz() - 1e-6);
+  const auto count = static_cast<std::size_t>(std::lround(trace.rate_hz()));
+  Second second;
+  if (first < 0 || first + static_cast<double>(count) > static_cast<double>(trace.size())) {
+    return second;
+  }
+  const auto begin = static_cast<std::size_t>(first);
+  Moments present;
+  float smallest = std::numeric_limits<float>::max();
+  float largest = 0;
+  for (std::size_t i = begin; i < begin + count; ++i) {
+    const float value = trace.magnitude_g(i);
+    if (std::isnan(value)) {
+      continue;
+    }
+    present.add(value);
+    smallest = std::min(smallest, value);
+    largest = std::max(largest, value);
+  }
+  if (2 * present.count() < count || present.count() == 0) {
+    return second;
+  }
+  second.smallest_g = smallest;
+  second.largest_g = largest;
+  second.sd_g = static_cast<float>(present.sd());
+  return second;
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,261 @@
+#include "repair/triage/inspection.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "base/time.h"
+#include "gt3x/forms/agdc.h"
+#include "repair/triage/agd.h"
+#include "repair/triage/file_tree.h"
+#include "repair/triage/survey.h"
+
+namespace sixpoint::repair {
+namespace {
+
+void add_gap(Inspection& found, const gt3x::SampleItem& item) {
+  const bool usb_record = item.kind == gt3x::SampleItem::Kind::usb;
+  const gt3x::GapKind kind = usb_record ? gt3x::GapKind::usb : item.gap;
+  found.gap_seconds += item.seconds;
+  found.end_s = std::max(found.end_s, static_cast<double>(item.unix_time) + item.seconds);
+  if (!found.gaps.empty() && found.gaps.size() == found.gap_count) {
+    InspectedGap& last = found.gaps.back();
+    // A USB record and the missing seconds after it are one stretch of charging.
+    if (last.kind == gt3x::GapKind::usb && kind == gt3x::GapKind::usb &&
+        last.start + last.seconds == item.unix_time) {
+      last.seconds += item.seconds;
+      return;
+    }
+  }
+  ++found.gap_count;
+  if (found.gaps.size() < Inspection::kMostGapsListed) {
+    found.gaps.push_back({item.unix_time, item.seconds, kind});
+  }
+}
+
+// The constants that an .agdc file carries beside its raw counts.
+std::optional<StoredConstants> agdc_constants(gt3x::Recording& recording, double rate_hz) {
+  auto source = recording.open_entry("calibration.json");
+  if (!source) {
+    return std::nullopt;
+  }
+  const auto bytes = gt3x::read_all(**source, 1 << 20);
+  if (!bytes) {
+    return std::nullopt;
+  }
+  const auto calibration = gt3x::parse_agdc_calibration(as_text(*bytes), static_cast<int>(rate_hz));
+  return calibration ? calibration->constants : std::nullopt;
+}
+
+// Finds still blocks while the samples are read, so that no recording must fit into memory.
+class StillWatch {
+ public:
+  StillWatch(bool use_constants, std::vector<std::string>& warnings)
+      : use_constants_(use_constants), warnings_(warnings) {}
+
+  void start(double rate_hz, double scale) {
+    if (auto made = StillScan::make(rate_hz, scale)) {
+      scan_.emplace(*std::move(made));
+    }
+  }
+
+  void push(const gt3x::SampleItem& item, bool rotated) {
+    if (!scan_) {
+      return;
+    }
+    if (item.parameters != parameters_ && item.parameters != nullptr &&
+        item.parameters->constants && use_constants_) {
+      if (auto status = scan_->set_constants(*item.parameters->constants); !status) {
+        warnings_.push_back("still periods cannot be judged: " + status.error().what);
+        scan_.reset();
+        return;
+      }
+    }
+    parameters_ = item.parameters;
+    if (item.broke_order) {
+      scan_->break_run();
+    }
+    if (rotated) {
+      turned_.assign(item.counts.begin(), item.counts.end());
+      undo_rotation(turned_);
+      scan_->push(item.unix_time, turned_);
+    } else {
+      scan_->push(item.unix_time, item.counts);
+    }
+  }
+
+  void break_run() {
+    if (scan_) {
+      scan_->break_run();
+    }
+  }
+
+  std::optional<InspectedStill> finish() {
+    if (!scan_) {
+      return std::nullopt;
+    }
+    const auto blocks = scan_->finish();
+    return InspectedStill{calib::coverage_of(blocks), magnitude_error(blocks)};
+  }
+
+ private:
+  bool use_constants_;
+  std::vector<std::string>& warnings_;
+  std::optional<StillScan> scan_;
+  const gt3x::Parameters* parameters_ = nullptr;
+  std::vector<gt3x::Counts> turned_;
+};
+
+void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& item,
+                  const gt3x::Info& info) {
+  if (found.samples == 0) {  // the first sample decides
+    found.start = item.unix_time;
+    found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, item.parameters);
+    if (item.parameters != nullptr) {
+      found.constants = item.parameters->constants;
+      found.facts.calibration_time = item.parameters->calibration_time;
+      if (found.facts.firmware.empty()) {
+        found.facts.firmware = item.parameters->firmware.value_or("");
+      }
+    }
+    if (found.rate_hz.value_or(0) > 0 && found.accel_scale_lsb_per_g &&
+        item.type != gt3x::RecordType::activity3) {
+      still.start(*found.rate_hz, *found.accel_scale_lsb_per_g);
+    }
+  }
+  found.samples += item.counts.size();
+  found.clipped_samples += static_cast<std::uint64_t>(std::ranges::count_if(
+      item.counts, [&](const gt3x::Counts& sample) { return item.clipped(sample); }));
+  if (found.rate_hz.value_or(0) > 0) {
+    found.end_s = std::max(
+        found.end_s, item.unix_time + static_cast<double>(item.counts.size()) / *found.rate_hz);
+  }
+  const bool rotated = triage(found.facts).axes_rotated && !found.already_repaired;
+  still.push(item, rotated);
+}
+
+std::string time_or_dash(std::optional<std::uint32_t> unix_time) {
+  return unix_time ? to_iso8601(from_unix_seconds(*unix_time)) : "-";
+}
+
+void add_warnings(Inspection& found, const gt3x::SampleReader& reader, std::uint64_t steps_back) {
+  const auto warn = [&](std::string text) { found.warnings.push_back(std::move(text)); };
+  const gt3x::LogStatistics& log = reader.statistics();
+  if (log.checksum_failures > 0) {
+    warn(fmt::format("{} records have a wrong checksum; their samples are not used",
+                     log.checksum_failures));
+  }
+  for (const gt3x::Loss& loss : log.losses) {
+    if (found.warnings.size() > 20) {
+      warn(fmt::format("... {} damaged stretches in all", log.damaged_stretches));
+      break;
+    }
+    warn(fmt::format("{} bytes at {} are damaged, between {} and {}", loss.bytes, loss.offset,
+                     time_or_dash(loss.time_before), time_or_dash(loss.time_after)));
+  }
+  if (found.form == "gt3x" && reader.parameter_sets().empty()) {
+    warn("there are no PARAMETERS: the recording does not say which constants it was scaled with");
+  } else if (found.form == "gt3x" && !found.constants && found.samples > 0) {
+    warn("the first sample has no complete set of constants (PARAMETERS) before it");
+  }
+  if (reader.constants_changed()) {
+    warn("PARAMETERS are repeated with other constants; for each sample the last before it hold");
+  }
+  if (reader.unreadable_parameters() > 0) {
+    warn(fmt::format("{} PARAMETERS records cannot be read", reader.unreadable_parameters()));
+  }
+  for (const auto& set : reader.parameter_sets()) {
+    if (set->parameters.has_zero_range()) {
+      warn("an axis has the same positive and negative reading: Eq. 1-3 divide by zero");
+      break;
+    }
+  }
+  if (steps_back > 0) {
+    warn(fmt::format("the time does not go forward at {} records", steps_back));
+  }
+}
+
+Error bad_recording(const std::string& path, const char* what, const char* hint) {
+  return {ErrorCode::bad_data, what, path, hint};
+}
+
+Error without_rate(const std::string& path) {
+  return bad_recording(path, "info.txt names no sample rate above 0",
+                       "download the recording from the unit again");
+}
+
+Result<Inspection> inspect_recording(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+  const gt3x::Info& info = recording.info();
+  Inspection found;
+  found.form = recording.has_log() ? "gt3x" : "gt3x_old";
+  found.facts.serial = info.serial();
+  found.facts.firmware = info.firmware();
+  found.device_type = info.device_type();
+  found.rate_hz = info.sample_rate_hz();
+  found.entries = recording.entries();
+  found.already_repaired = recording.has_entry(kRepairMark);
+  found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, nullptr);
+  if (found.rate_hz.value_or(0) <= 0 && !recording.has_log()) {
+    return fail(without_rate(path));
+  }
+
+  // A repaired file keeps its PARAMETERS, but its counts come from other constants.
+  StillWatch still(!found.already_repaired, found.warnings);
+  gt3x::SampleReader reader(recording);
+  std::uint64_t steps_back = 0;
+  for (;;) {
+    SIXPOINT_ASSIGN(const auto item, reader.next());
+    if (!item) {
+      break;
+    }
+    if (item->kind != gt3x::SampleItem::Kind::recorded) {
+      still.break_run();
+      add_gap(found, *item);
+      continue;
+    }
+    if (item->type == gt3x::RecordType::activity3) {
+      found.form = "agdc";
+    }
+    steps_back += item->broke_order ? 1 : 0;
+    take_samples(found, still, *item, info);
+  }
+  found.log = reader.statistics();
+  found.still = still.finish();
+  if (found.samples == 0 && !reader.parameter_sets().empty()) {
+    const gt3x::Parameters& last = reader.parameter_sets().back()->parameters;
+    found.constants = last.constants;
+    found.facts.calibration_time = last.calibration_time;
+  }
+  if (found.form == "agdc") {
+    found.constants = agdc_constants(recording, found.rate_hz.value_or(0));
+  }
+  add_warnings(found, reader, steps_back);
+  if (found.rate_hz.value_or(0) <= 0) {
+    found.problem = without_rate(path);
+  } else if (found.samples == 0) {
+    found.problem = bad_recording(path, "the recording holds no samples",
+                                  "check that the unit was started, and download it again");
+  }
+  return found;
+}
+
+Result<Inspection> inspect_agd(const std::string& path) {
+  SIXPOINT_ASSIGN(auto facts, read_agd_facts(path));
+  Inspection found;
+  found.form = "agd";
+  found.facts = std::move(facts);
+  found.warnings.emplace_back(
+      "an .agd holds epochs, no samples; make it again from its repaired recording");
+  return found;
+}
+
+}  // namespace
+
+double Inspection::duration_s() const { return start ? std::max(0.0, end_s - *start) : 0; }
+
+Result<Inspection> inspect(FileSystem& files, const std::string& path) {
+  return has_ending(path, ".agd") ? inspect_agd(path) : inspect_recording(files, path);
+}
+
+}  // namespace sixpoint::repair

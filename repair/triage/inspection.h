@@ -1,0 +1,69 @@
+// What a recording holds: facts of its header, samples, gaps, damage, still periods. No verdict.
+//
+//   SIXPOINT_ASSIGN(const Inspection found, inspect(env.files, "a.gt3x"));
+//   if (!found.problem) {  // the file can be used
+//     for (const InspectedGap& gap : found.gaps) {
+//       std::cout << gap.seconds << " s are missing\n";
+//     }
+//   }
+//
+// One pass, in bounded memory: the samples themselves are not kept.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/constants.h"
+#include "base/env.h"
+#include "calib/coverage.h"
+#include "gt3x/recording.h"
+#include "gt3x/sample_reader.h"
+#include "repair/triage/still_scan.h"
+#include "repair/triage/triage.h"
+
+namespace sixpoint::repair {
+
+struct InspectedGap {
+  std::uint32_t start = 0;  // Unix time
+  std::uint64_t seconds = 0;
+  gt3x::GapKind kind = gt3x::GapKind::unexplained;
+};
+
+struct InspectedStill {
+  calib::Coverage coverage;
+  MagnitudeError magnitude;
+};
+
+struct Inspection {
+  static constexpr std::size_t kMostGapsListed = 10'000;
+
+  std::string form;  // gt3x, gt3x_old, agdc or agd
+  FileFacts facts;
+  std::string device_type;
+  std::optional<double> rate_hz;
+  std::optional<double> accel_scale_lsb_per_g;
+  std::optional<std::uint32_t> start;  // Unix time of the first sample
+  double end_s = 0;  // Unix time after the last sample, or after the last gap where that is later
+  std::uint64_t samples = 0;
+  std::uint64_t clipped_samples = 0;
+  gt3x::LogStatistics log;
+  std::optional<StoredConstants> constants;
+  std::vector<InspectedGap> gaps;
+  std::uint64_t gap_count = 0;
+  std::uint64_t gap_seconds = 0;
+  std::optional<InspectedStill> still;
+  bool already_repaired = false;
+  std::vector<gt3x::EntryInfo> entries;
+  std::vector<std::string> warnings;
+  std::optional<Error> problem;  // the file can be read, but not used
+
+  double duration_s() const;
+};
+
+// A .gt3x, .agdc or .agd file. Errors as Recording::open() and read_agd_facts(); bad_data for an
+// old form without a sample rate.
+Result<Inspection> inspect(FileSystem& files, const std::string& path);
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,43 @@
+// The triage of one file: is it affected by 16CPAN03, and do its samples show it?
+//
+//   const ScannedFile file = scan_file(env.files, "a.gt3x");
+//   file.verdict;      // "affected"
+//   file.evidence_mg;  // 83.1
+//
+//     file                                             verdict
+//     cannot be read                                   unreadable, with `error`
+//     repaired by this program                         not_affected
+//     any other                                        as triage() says (repair/triage/triage.h)
+//
+// The samples are reported as a reason and never change the verdict. Safe to call from several
+// threads.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/env.h"
+#include "repair/triage/triage.h"
+
+namespace sixpoint::repair {
+
+// Paper, Step 2: still points further than this from 1 g show that a file needs repair.
+inline constexpr double kEvidenceLimit_mg = 64;
+
+struct ScannedFile {
+  std::string path;
+  std::string verdict;  // affected, not_affected, cannot_tell, unreadable
+  std::vector<std::string> reasons;
+  FileFacts facts;
+  // 95th percentile of the distance of the still blocks' magnitude from 1 g.
+  std::optional<double> evidence_mg;
+  bool axes_rotated = false;
+  std::optional<Error> error;
+};
+
+// Never fails as a function: what went wrong is in the answer.
+ScannedFile scan_file(FileSystem& files, const std::string& path);
+ScannedFile unreadable_file(const std::string& path, const Error& error);
+
+}  // namespace sixpoint::repair

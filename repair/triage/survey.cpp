@@ -1,0 +1,305 @@
+#include "repair/triage/survey.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "gt3x/container/byte_source.h"
+#include "gt3x/forms/agdc.h"
+#include "gt3x/forms/model.h"
+#include "gt3x/forms/parameters.h"
+#include "gt3x/log/samples.h"
+#include "gt3x/recording.h"
+
+namespace sixpoint::repair {
+namespace {
+
+constexpr double kUsualScale_lsb_per_g = 256;
+constexpr double kHum_g = 0.04;  // standard deviation under a climate chamber's fan
+
+void take_parameters(const gt3x::Parameters& parameters, FileFacts& facts) {
+  if (!facts.calibration_time.has_value()) {
+    facts.calibration_time = parameters.calibration_time;
+  }
+  if (facts.firmware.empty() && parameters.firmware.has_value()) {
+    facts.firmware = *parameters.firmware;
+  }
+}
+
+// The first PARAMETERS record of the log whose checksum holds; nothing when there is none.
+Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& recording) {
+  SIXPOINT_ASSIGN(auto log, recording.open_log());
+  while (true) {
+    SIXPOINT_ASSIGN(const auto item, log.next());
+    if (!item.has_value()) {
+      return std::nullopt;
+    }
+    if (item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok &&
+        item->record.is(gt3x::RecordType::parameters)) {
+      if (auto parameters = gt3x::parse_parameters(item->record.payload)) {
+        return *std::move(parameters);
+      }
+    }
+  }
+}
+
+// A small entry of an .agdc file; empty where it is missing or too large.
+std::string text_of(gt3x::Recording& recording, const std::string& name) {
+  if (!recording.has_entry(name)) {
+    return {};
+  }
+  auto source = recording.open_entry(name);
+  if (!source) {
+    return {};
+  }
+  const auto bytes = gt3x::read_all(**source, 1U << 20U);
+  return bytes ? std::string(bytes->begin(), bytes->end()) : std::string();
+}
+
+// What an .agdc file says about its raw counts.
+std::optional<calib::Calibration> raw_calibration_of(gt3x::Recording& recording, double rate_hz) {
+  const auto calibration = gt3x::parse_agdc_calibration(text_of(recording, "calibration.json"),
+                                                        static_cast<int>(rate_hz));
+  if (!calibration || calibration->already_applied) {
+    return std::nullopt;
+  }
+  if (calibration->constants) {
+    if (const auto six_point = calib::calibration_from(*calibration->constants)) {
+      return *six_point;
+    }
+  }
+  calib::Calibration out;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    out.sensitivity_g_per_lsb[a] = calibration->sensitivity_g_per_lsb[a][a];
+    out.zero_lsb[a] = calibration->offset_lsb[a];
+  }
+  return calib::validate(out) ? std::optional(out) : std::nullopt;
+}
+
+std::optional<double> celsius_of(const gt3x::Record& record,
+                                 const gt3x::TemperatureCalibration& thermometer) {
+  const auto reading = gt3x::parse_temperature(record.payload);
+  if (!reading || !reading->accelerometer_adc) {
+    return std::nullopt;
+  }
+  const double celsius = thermometer.accelerometer_c(*reading->accelerometer_adc);
+  return std::isfinite(celsius) && std::abs(celsius) < 200 ? std::optional(celsius) : std::nullopt;
+}
+
+Error no_constants(std::string what, const std::string& path, std::string hint) {
+  return {ErrorCode::bad_data, std::move(what), path, std::move(hint)};
+}
+
+// One pass over the log of a recording.
+class LogSurvey {
+ public:
+  LogSurvey(gt3x::Recording& recording, const calib::StillBlockOptions& options, Survey& result)
+      : recording_(recording), options_(options), result_(result) {}
+
+  Status run() {
+    SIXPOINT_CHECK(begin());
+    SIXPOINT_ASSIGN(auto log, recording_.open_log());
+    while (true) {
+      SIXPOINT_ASSIGN(const auto item, log.next());
+      if (!item.has_value()) {
+        break;
+      }
+      result_.log_bytes += item->raw.size();
+      result_.log_bytes_wide += item->raw.size();
+      if (item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok) {
+        SIXPOINT_CHECK(take(item->record));
+      } else if (item->kind != gt3x::LogItem::Kind::stray) {
+        // Zero bytes between records are legal and end no run.
+        still_->break_run();
+        break_raw_run();
+      }
+    }
+    result_.log = log.statistics();
+    finish();
+    return {};
+  }
+
+ private:
+  // Finds out the scale, and the constants of the samples before the first PARAMETERS record.
+  Status begin() {
+    SIXPOINT_ASSIGN(const auto first, first_parameters(recording_));
+    std::optional<double> scale = first ? first->accel_scale_lsb_per_g : std::nullopt;
+    if (!scale) {
+      scale = recording_.info().accel_scale_lsb_per_g();
+    }
+    if (!scale) {
+      scale = gt3x::default_accel_scale_lsb_per_g(result_.facts.serial);
+    }
+    result_.accel_scale_known = scale.has_value();
+    result_.accel_scale_lsb_per_g = scale.value_or(kUsualScale_lsb_per_g);
+    if (first.has_value()) {
+      take_parameters(*first, result_.facts);
+    }
+    rotated_ = triage(result_.facts).axes_rotated && !result_.already_repaired;
+    SIXPOINT_ASSIGN(still_, make_scan(result_.accel_scale_lsb_per_g, options_));
+    if (first.has_value()) {
+      use_constants(*first);
+    }
+    return {};
+  }
+
+  Result<StillScan> make_scan(double scale_lsb_per_g, const calib::StillBlockOptions& options) {
+    return StillScan::make(result_.rate_hz, scale_lsb_per_g, options);
+  }
+
+  void use_constants(const gt3x::Parameters& parameters) {
+    // A repaired file's counts come from other constants than its PARAMETERS say.
+    if (!parameters.constants.has_value() || result_.already_repaired) {
+      return;
+    }
+    if (auto status = still_->set_constants(*parameters.constants); !status) {
+      result_.constants_problem = status.error();
+      result_.constants_problem->where = recording_.path();
+    }
+    if (std::ranges::find(result_.constants, *parameters.constants) == result_.constants.end()) {
+      result_.constants.push_back(*parameters.constants);
+    }
+  }
+
+  Status take(const gt3x::Record& record) {
+    // A one-byte payload in place of samples is a USB event.
+    const bool has_samples = record.payload.size() > 1;
+    if (record.is(gt3x::RecordType::parameters)) {
+      if (const auto parameters = gt3x::parse_parameters(record.payload)) {
+        use_constants(*parameters);
+      }
+    } else if (record.is(gt3x::RecordType::activity) || record.is(gt3x::RecordType::activity2)) {
+      if (has_samples) {
+        take_samples(record);
+      } else {
+        still_->break_run();
+      }
+    } else if (record.is(gt3x::RecordType::activity3)) {
+      if (has_samples) {
+        return take_raw_samples(record);
+      }
+      break_raw_run();
+    } else if (record.is(gt3x::RecordType::temperature) && thermometer_ && raw_still_) {
+      const auto celsius = celsius_of(record, *thermometer_);
+      raw_still_->set_temperature(celsius);
+      raw_resting_->set_temperature(celsius);
+    } else if (record.is(gt3x::RecordType::event) && record.payload.size() == 1) {
+      still_->break_run();  // idle sleep
+    }
+    return {};
+  }
+
+  void take_samples(const gt3x::Record& record) {
+    if (record.is(gt3x::RecordType::activity)) {
+      gt3x::unpack_activity(record.payload, samples_);
+      result_.log_bytes_wide += samples_.size() * sizeof(gt3x::Counts) - record.payload.size();
+    } else {
+      gt3x::unpack_activity2(record.payload, samples_);
+    }
+    ++result_.sample_records;
+    result_.samples += samples_.size();
+    for (const gt3x::Counts& sample : samples_) {
+      const auto [low, high] = std::ranges::minmax(sample);
+      result_.clipped_samples += low <= gt3x::kMin12 || high >= gt3x::kMax12 ? 1 : 0;
+      result_.beyond_12_bits = result_.beyond_12_bits || low < gt3x::kMin12 || high > gt3x::kMax12;
+    }
+    if (rotated_) {
+      undo_rotation(samples_);
+    }
+    still_->push(record.unix_time, samples_);
+  }
+
+  Status take_raw_samples(const gt3x::Record& record) {
+    if (!raw_still_) {
+      result_.raw_counts = true;
+      result_.raw_calibration = raw_calibration_of(recording_, result_.rate_hz);
+      const auto parsed =
+          gt3x::parse_temperature_calibration(text_of(recording_, "temperature_calibration.json"));
+      thermometer_ = parsed ? std::optional(*parsed) : std::nullopt;
+      calib::StillBlockOptions humming = options_;
+      humming.noisy_sd_g = kHum_g;
+      SIXPOINT_ASSIGN(raw_still_, make_scan(kUsualScale_lsb_per_g, options_));
+      SIXPOINT_ASSIGN(raw_resting_, make_scan(kUsualScale_lsb_per_g, humming));
+    }
+    gt3x::unpack_activity3(record.payload, samples_);
+    result_.samples += samples_.size();
+    raw_still_->push(record.unix_time, samples_);
+    raw_resting_->push(record.unix_time, samples_);
+    return {};
+  }
+
+  void break_raw_run() {
+    if (raw_still_) {
+      raw_still_->break_run();
+      raw_resting_->break_run();
+    }
+  }
+
+  void finish() {
+    StillScan& scan = raw_still_ ? *raw_still_ : *still_;
+    result_.blocks = scan.finish();
+    result_.plausibility = scan.plausibility();
+    result_.still_tally = scan.tally();
+    if (raw_resting_) {
+      result_.resting = raw_resting_->finish();
+    }
+    if (result_.raw_calibration) {
+      for (calib::StillBlock& block : result_.blocks) {
+        block.mean_g = result_.raw_calibration->to_g(block.mean_lsb);
+      }
+    }
+    result_.magnitude = magnitude_error(result_.blocks);
+    result_.duration_s = static_cast<double>(result_.samples) / result_.rate_hz;
+    if (result_.samples == 0) {
+      result_.constants_problem =
+          no_constants("the recording holds no samples", recording_.path(),
+                       "it can be neither solved nor repaired; download it from the unit again");
+    } else if (result_.raw_counts) {
+      result_.constants_problem = no_constants(
+          result_.raw_calibration
+              ? "the recording holds raw counts, which no constants have been applied to"
+              : "the recording holds raw counts and no calibration.json that fits them",
+          recording_.path(), "it needs no repair");
+    } else if (result_.constants.empty() && !result_.already_repaired) {
+      result_.constants_problem = no_constants(
+          "the recording holds no complete set of constants (PARAMETERS)", recording_.path(),
+          "without them the scaling cannot be undone; download the recording from the unit again");
+    }
+  }
+
+  gt3x::Recording& recording_;
+  const calib::StillBlockOptions& options_;
+  Survey& result_;
+  bool rotated_ = false;
+  std::optional<StillScan> still_;
+  std::optional<StillScan> raw_still_;  // of raw counts (.agdc)
+  std::optional<StillScan> raw_resting_;
+  std::optional<gt3x::TemperatureCalibration> thermometer_;
+  std::vector<gt3x::Counts> samples_;
+};
+
+}  // namespace
+
+Result<Survey> survey(FileSystem& files, const std::string& path,
+                      const calib::StillBlockOptions& options) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+  Survey result;
+  result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
+  result.model = gt3x::model_of(result.facts.serial);
+  result.already_repaired = recording.has_entry(kRepairMark);
+  result.rate_hz = recording.info().sample_rate_hz().value_or(0);
+  if (!recording.has_log()) {
+    result.constants_problem =
+        no_constants("the recording has the old form (activity.bin), which holds no constants",
+                     path, "only recordings with a log.bin can be worked on");
+    return result;
+  }
+  if (result.rate_hz <= 0) {
+    return fail(ErrorCode::bad_data, "info.txt gives no sample rate above 0", path,
+                "download the recording from the unit again");
+  }
+  SIXPOINT_CHECK(LogSurvey(recording, options, result).run());
+  return result;
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,148 @@
+// An object of a scenario's JSON: its known keys, and its values with their limits.
+//
+//   SIXPOINT_ASSIGN(const Section unit, Section::of(json, "/unit", {"seed", "gain"}));
+//   double gain = 1;
+//   SIXPOINT_CHECK(unit.number("gain", gain, 0, 10));  // stays 1 where the key is missing
+//
+// Every error is `configuration` and names the path of the key. Private to scenario_json.cpp.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/measure.h"
+#include "base/result.h"
+#include "base/time.h"
+
+namespace sixpoint::sim {
+
+using Json = nlohmann::json;
+
+inline tl::unexpected<Error> wrong(const std::string& path, std::string what) {
+  return fail(ErrorCode::configuration, std::move(what), "scenario: " + printable(path, 100),
+              "docs/scenario.md describes every key");
+}
+
+// Refers to the JSON, which must outlive it.
+class Section {
+ public:
+  static Result<Section> of(const Json& json, std::string path,
+                            std::initializer_list<std::string_view> keys) {
+    if (!json.is_object()) {
+      return wrong(path, "this must be an object");
+    }
+    for (const auto& [key, value] : json.items()) {
+      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+        return wrong(fmt::format("{}/{}", path, key), "this key is not known");
+      }
+    }
+    return Section(json, std::move(path));
+  }
+
+  const Json* find(std::string_view key) const {
+    const auto found = json_->find(std::string(key));
+    return found == json_->end() ? nullptr : &*found;
+  }
+  std::string path(std::string_view key) const { return fmt::format("{}/{}", path_, key); }
+
+  Status number(std::string_view key, double& value, double low, double high) const {
+    const Json* found = find(key);
+    if (found == nullptr) {
+      return {};
+    }
+    if (!found->is_number() || !(found->get<double>() >= low && found->get<double>() <= high)) {
+      return wrong(path(key), fmt::format("this must be a number from {} to {}", low, high));
+    }
+    value = found->get<double>();
+    return {};
+  }
+  Status seed(std::string_view key, std::uint64_t& value) const {
+    const Json* found = find(key);
+    if (found == nullptr) {
+      return {};
+    }
+    if (!found->is_number_unsigned()) {
+      return wrong(path(key), "this must be a whole number that is not negative");
+    }
+    value = found->get<std::uint64_t>();
+    return {};
+  }
+  Status text(std::string_view key, std::optional<std::string>& value, std::size_t limit) const {
+    const Json* found = find(key);
+    if (found == nullptr) {
+      return {};
+    }
+    const bool good = found->is_string() && !found->get_ref<const std::string&>().empty() &&
+                      found->get_ref<const std::string&>().size() <= limit;
+    if (!good || !std::all_of(found->get_ref<const std::string&>().begin(),
+                              found->get_ref<const std::string&>().end(),
+                              [](char c) { return c >= ' ' && c <= '~'; })) {
+      return wrong(path(key),
+                   fmt::format("this must be a text of 1 to {} ASCII characters", limit));
+    }
+    value = found->get<std::string>();
+    return {};
+  }
+  Status time(std::string_view key, std::optional<UtcTime>& value) const {
+    std::optional<std::string> spelled;
+    SIXPOINT_CHECK(text(key, spelled, 40));
+    if (spelled) {
+      const auto parsed = parse_iso8601(*spelled);
+      if (!parsed || *parsed < from_unix_seconds(0) ||
+          *parsed >= from_unix_seconds(std::int64_t{1} << 32U)) {
+        return wrong(path(key), "this must be a time such as 2015-04-09T14:00:00Z, 1970 to 2106");
+      }
+      value = std::chrono::floor<std::chrono::seconds>(*parsed);
+    }
+    return {};
+  }
+  template <class Number>
+  Status axes(std::string_view key, std::optional<PerAxis<Number>>& value, double low,
+              double high) const {
+    const Json* found = find(key);
+    if (found == nullptr) {
+      return {};
+    }
+    bool good = found->is_array() && found->size() == kAxes;
+    PerAxis<Number> numbers{};
+    for (std::size_t axis = 0; good && axis < kAxes; ++axis) {
+      const Json& item = (*found)[axis];
+      good = (std::is_integral_v<Number> ? item.is_number_integer() : item.is_number()) &&
+             item.get<double>() >= low && item.get<double>() <= high;
+      if (good) {
+        numbers[axis] = item.get<Number>();
+      }
+    }
+    if (!good) {
+      return wrong(path(key), fmt::format("this must be three {}numbers from {} to {}",
+                                          std::is_integral_v<Number> ? "whole " : "", low, high));
+    }
+    value = numbers;
+    return {};
+  }
+  // A vector of any length but 0.
+  Status direction(std::string_view key, Eigen::Vector3d& value) const {
+    std::optional<PerAxis<double>> numbers;
+    SIXPOINT_CHECK(axes(key, numbers, -1e6, 1e6));
+    if (numbers) {
+      value = {(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+    }
+    return value.norm() < 1e-6 ? Status(wrong(path(key), "this must have a direction")) : Status();
+  }
+
+ private:
+  Section(const Json& json, std::string path) : json_(&json), path_(std::move(path)) {}
+  const Json* json_;
+  std::string path_;
+};
+
+}  // namespace sixpoint::sim

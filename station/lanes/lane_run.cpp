@@ -1,0 +1,282 @@
+// A jig run in a lane, and how it continues after a restart of the program.
+#include <array>
+
+#include "station/lanes/lane.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kStoreRetry_s = 2;
+
+// In the order of JigAction::Kind.
+constexpr std::array<const char*, 7> kLogKinds = {"place", "accepted", "refused", "dropped",
+                                                  "fit",   "write",    "finished"};
+
+Json json_of(const JigReport& report) {
+  Json json;
+  json["kind"] = "jig";
+  json["serial"] = report.serial;
+  json["verdict"] = to_string(report.verdict);
+  json["reasons"] = report.reasons;
+  json["next_actions"] = report.usable() ? Json::array() : Json(next_actions(report.codes));
+  json["residual_mg"] =
+      report.verification.poses.empty() ? Json(nullptr) : Json(report.verification.worst_mg);
+  json["as_found_residual_mg"] =
+      report.as_found ? Json(report.as_found_residual_mg) : Json(nullptr);
+  json["written"] = report.written;
+  json["refusals"] = report.refusals;
+  json["stored"] = false;
+  return json;
+}
+
+// The inconclusive report of a run that ended with its program and whose unit did not come back.
+JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions& options,
+                             UtcTime ended, const std::string& reason) {
+  const JigResume& resume = left.resume;
+  JigReport report;
+  report.codes = {"unit_gone"};
+  report.reasons.push_back(reason);
+  report.serial = left.serial;
+  report.firmware = left.firmware;
+  report.filter = left.filter;
+  report.started = resume.started;
+  report.ended = ended;
+  report.gravity = options.gravity;
+  report.limits = options.limits;
+  report.faces = resume.progress.faces;
+  report.as_found = resume.as_found;
+  report.as_left = resume.written ? resume.written : resume.as_found;
+  report.written = resume.written.has_value();
+  report.refusals = resume.progress.refusals;
+  report.raw_csv = resume.raw_csv;
+  return report;
+}
+
+}  // namespace
+
+void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
+                      const std::optional<UnfinishedRun>& left) {
+  JigSessionOptions session = shared_.options.session;
+  session.run.write = order.write;
+  session.run.pose_time_out_s = shared_.options.pose_time_out_s;
+  session.silence_s = shared_.options.silence_s;
+  RunSaver saver(folder_, left ? *left : new_run(order, session.filter),
+                 [this](const std::string& warning) {
+                   const std::lock_guard lock(mutex_);
+                   add_log("problem", warning);
+                 });
+  const UnfinishedRun& state = saver.state();
+  session.filter = state.filter;
+  if (!check_start(state.serial, left.has_value(), session.retest)) {
+    return;
+  }
+  last_accepted_ = env_.clock.elapsed();
+  if (const std::lock_guard lock(mutex_); !run_) {
+    run_.emplace();
+  }
+  const auto report = run_jig(on_jig(), env_, session, run_hooks(stop, saver),
+                              left ? std::optional(left->resume) : std::nullopt);
+  if (stop.stop_requested()) {
+    static_cast<void>(folder_.close());  // the next program continues it
+    return;
+  }
+  if (!report) {
+    return end_without_report(state.serial, report.error());
+  }
+  show_result(*report, {state.operator_name, state.station, session.retest.retest_of});
+  const std::lock_guard lock(mutex_);
+  result_["verdict_ms"] =
+      std::chrono::duration<double, std::milli>(env_.clock.elapsed() - last_accepted_).count();
+  if (report->six && report->usable()) {
+    approximation_ = report->six->best().calibration;  // the preview shows calibrated readings
+  }
+  changed();
+}
+
+UnfinishedRun Lanes::Lane::new_run(const StartOrder& order, calib::FilterConfiguration filter) {
+  UnfinishedRun run;
+  run.device = device_;
+  run.serial = identity_.serial;
+  run.firmware = identity_.firmware;
+  run.operator_name = order.operator_name;
+  run.station = shared_.options.station;
+  run.client = order.client;
+  run.write = order.write;
+  run.filter = filter;
+  return run;
+}
+
+// False where the station is locked or the unit failed too often: an engineer decides. A run that
+// is continued was checked when it started.
+bool Lanes::Lane::check_start(const std::string& serial, bool is_continued, RetestState& retest) {
+  if (!shared_.options.may_start) {
+    return true;
+  }
+  const std::lock_guard lock(shared_.store_mutex);
+  auto found = shared_.options.may_start(serial);
+  if (found) {
+    retest = *std::move(found);
+  } else if (!is_continued) {
+    end_unmeasured(serial, "refused", {found.error().what, found.error().hint},
+                   found.error().brief());
+    return false;
+  }
+  return true;
+}
+
+JigHooks Lanes::Lane::run_hooks(const std::stop_token& stop, RunSaver& saver) {
+  JigHooks hooks;
+  hooks.on_action = [this](const JigAction& action) { on_action(action); };
+  hooks.samples = [this](const device::SampleBlock& block, const JigRun& machine) {
+    const JigLive live = machine.live();
+    {
+      // The unit's own constants may be wrong by 25 degrees; those that the run has found are not.
+      const calib::Calibration found = machine.approximation();
+      const std::lock_guard lock(mutex_);
+      approximation_ = found;
+    }
+    add_readings(block, &live);
+  };
+  hooks.raw = [&saver](std::string_view rows) { saver.add_rows(rows); };
+  hooks.progress = [this, &saver](const JigReport& report, const JigRun& machine) {
+    saver.save(report, machine);
+    const std::lock_guard lock(mutex_);
+    run_->progress = machine.progress();
+    run_->open = machine.open_poses();
+    changed();
+  };
+  hooks.next_command = [this] { return next_command(); };
+  hooks.reopen = [this, &stop, &saver](const Error& error) {
+    return wait_for_unit(stop, saver.state().serial, error.what, LaneState::running);
+  };
+  return hooks;
+}
+
+void Lanes::Lane::on_action(const JigAction& action) {
+  const std::lock_guard lock(mutex_);
+  switch (action.kind) {
+    case JigAction::Kind::place:
+      run_->wanted = action.pose;
+      run_->prompt = action.text;
+      waiting_since_ms_ = unix_ms(env_.clock.now());
+      break;
+    case JigAction::Kind::refused:
+      run_->last_refusal = action.text;
+      break;
+    case JigAction::Kind::accepted:
+      run_->last_refusal.clear();
+      last_accepted_ = env_.clock.elapsed();
+      break;
+    case JigAction::Kind::write:
+    case JigAction::Kind::finished:
+      run_->wanted.reset();
+      run_->prompt = action.text;
+      break;
+    case JigAction::Kind::dropped:
+    case JigAction::Kind::fit:
+      break;
+  }
+  add_log(kLogKinds.at(static_cast<std::size_t>(action.kind)), action.text);
+}
+
+// What is on the disk becomes an interrupted run, with its data.
+void Lanes::Lane::end_without_report(const std::string& serial, const Error& error) {
+  static_cast<void>(folder_.close());
+  if (const auto saved = folder_.load(); saved && *saved) {
+    end_interrupted(**saved, error.brief());
+  } else {
+    end_unmeasured(serial, "inconclusive", {error.brief()}, error.brief());
+  }
+  if (error.code == ErrorCode::device_unavailable) {
+    close_unit();
+  }
+}
+
+void Lanes::Lane::end_unmeasured(const std::string& serial, const char* verdict,
+                                 std::vector<std::string> reasons, std::string message) {
+  const std::lock_guard lock(mutex_);
+  run_.reset();
+  set_done({{"kind", "jig"},
+            {"serial", serial},
+            {"verdict", verdict},
+            {"reasons", std::move(reasons)},
+            {"stored", false}},
+           std::move(message));
+}
+
+void Lanes::Lane::show_result(const JigReport& report, const RunLabels& labels) {
+  unstored_ = Unstored{report, labels};
+  const std::lock_guard lock(mutex_);
+  if (run_) {
+    run_->wanted.reset();
+    run_->open.clear();
+    run_->progress.phase = JigPhase::finished;
+  }
+  live_ = {};
+  set_done(json_of(report), "");
+}
+
+void Lanes::Lane::store_result(const std::stop_token& stop) {
+  if (!unstored_) {
+    return;
+  }
+  const auto stored = [this] {
+    const std::lock_guard lock(shared_.store_mutex);
+    return shared_.store_run(unstored_->report, unstored_->labels);
+  }();
+  const Status cleared = stored ? folder_.clear() : Status();
+  {
+    const std::lock_guard lock(mutex_);
+    const bool is_shown = result_.is_object() && result_["serial"] == unstored_->report.serial;
+    if (!stored) {
+      const std::string problem = "not stored yet: " + stored.error().brief();
+      if (is_shown) {
+        result_["problem"] = problem;
+      }
+      add_log("problem", problem);
+    } else {
+      if (!cleared) {
+        add_log("problem", cleared.error().brief());
+      }
+      if (is_shown) {
+        result_["stored"] = true;
+        result_["run"] = stored->run_id;
+        result_["constants_id"] =
+            stored->constants_id ? Json(*stored->constants_id) : Json(nullptr);
+        result_.erase("problem");
+      }
+      unstored_.reset();
+      changed();
+    }
+  }
+  if (!stored) {
+    pause(stop, kStoreRetry_s);
+  }
+}
+
+void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun& left) {
+  const StartOrder order = {left.operator_name, left.client, left.serial, left.write};
+  {
+    const std::lock_guard lock(mutex_);
+    run_.emplace().progress = left.resume.progress;
+    identity_.firmware = left.firmware;
+  }
+  const auto unit = wait_to_continue(stop, order, "run", LaneState::running);
+  if (stop.stop_requested()) {
+    return;
+  }
+  if (!unit) {
+    return end_interrupted(left, "interrupted: " + unit.error().what);
+  }
+  run(stop, order, left);
+}
+
+void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& reason) {
+  show_result(interrupted_report(left, shared_.options.session, env_.clock.now(), reason),
+              {left.operator_name, left.station, {}});
+}
+
+}  // namespace sixpoint::station

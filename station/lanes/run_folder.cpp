@@ -1,0 +1,277 @@
+#include "station/lanes/run_folder.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.h"
+#include "station/run/jig_progress.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view kSamples = "samples-";
+constexpr const char* kRun = "/run.json";
+constexpr const char* kCapture = "/capture.json";
+constexpr std::uint64_t kMostState_bytes = 4U << 20U;
+// Eight hours: more than any run.
+constexpr std::uint64_t kMostSamples_bytes = 256ULL << 20U;
+
+Result<std::optional<device::CalibrationPage>> parse_page(const Json& json) {
+  if (json.is_null()) {
+    return std::nullopt;
+  }
+  device::CalibrationPage page;
+  page.constants.positive_lsb = json.at("positive_lsb").get<PerAxis<int>>();
+  page.constants.negative_lsb = json.at("negative_lsb").get<PerAxis<int>>();
+  page.constants.zero_lsb = json.at("zero_lsb").get<PerAxis<int>>();
+  SIXPOINT_ASSIGN(const UtcTime time, parse_iso8601(json.at("calibrated").get<std::string>()));
+  page.calibrated = std::chrono::floor<std::chrono::seconds>(time);
+  return page;
+}
+
+// What the states of a run and of a capture have in common.
+template <class Unfinished>
+Status parse_common(const Json& json, Unfinished& work) {
+  json.at("serial").get_to(work.serial);
+  json.at("operator").get_to(work.operator_name);
+  json.at("client").get_to(work.client);
+  SIXPOINT_ASSIGN(work.resume.started, parse_iso8601(json.at("started").get<std::string>()));
+  return {};
+}
+
+Result<UnfinishedRun> parse_run(const Json& json) {
+  UnfinishedRun run;
+  SIXPOINT_CHECK(parse_common(json, run));
+  json.at("device").get_to(run.device);
+  json.at("firmware").get_to(run.firmware);
+  json.at("station").get_to(run.station);
+  json.at("write").get_to(run.write);
+  SIXPOINT_ASSIGN(run.filter,
+                  calib::parse_filter_configuration(json.at("filter").get<std::string>()));
+  SIXPOINT_ASSIGN(run.resume.as_found, parse_page(json.at("as_found")));
+  SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
+  SIXPOINT_ASSIGN(run.resume.progress, parse_jig_progress(json.at("progress")));
+  return run;
+}
+
+Result<UnfinishedCapture> parse_capture(const Json& json) {
+  UnfinishedCapture capture;
+  SIXPOINT_CHECK(parse_common(json, capture));
+  json.at("output").get_to(capture.output);
+  for (const Json& side : json.at("done")) {
+    SIXPOINT_ASSIGN(const auto pose, device::parse_pose(side.at("pose").get<std::string>()));
+    capture.resume.done.push_back({pose, side.at("recording").get<std::uint16_t>()});
+  }
+  return capture;
+}
+
+// Nothing where the file is not there.
+template <class Unfinished>
+Result<std::optional<Unfinished>> read_state(FileSystem& files, const std::string& path,
+                                             Result<Unfinished> (*parse)(const Json&)) {
+  if (!files.info(path)) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(const Bytes bytes, read_file(files, path, kMostState_bytes));
+  try {
+    SIXPOINT_ASSIGN(Unfinished work, parse(Json::parse(bytes, nullptr, false)));
+    return work;
+  } catch (const std::exception&) {
+    return fail(ErrorCode::bad_data, "this is not the state of a run or capture", path,
+                "check the file, then remove the folder");
+  }
+}
+
+Status write_state(FileSystem& files, const std::string& folder, const char* name,
+                   const Json& json) {
+  SIXPOINT_CHECK(files.make_folders(folder));
+  return write_file(files, folder + name,
+                    json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+// samples-12.csv -> 12; 0 for other names.
+int number_of(std::string_view name) {
+  constexpr std::string_view kEnding = ".csv";
+  int number = 0;
+  if (name.starts_with(kSamples) && name.ends_with(kEnding)) {
+    const std::string_view digits =
+        name.substr(kSamples.size(), name.size() - kSamples.size() - kEnding.size());
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    if (error != std::errc() || end != digits.data() + digits.size()) {
+      return 0;
+    }
+  }
+  return number;
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> RunFolder::sample_files() const {
+  std::vector<std::string> found;
+  if (env_.files.info(folder_)) {
+    SIXPOINT_ASSIGN(found, env_.files.list(folder_));
+    std::erase_if(found, [](const std::string& name) { return number_of(name) == 0; });
+    std::sort(found.begin(), found.end(), [](const std::string& a, const std::string& b) {
+      return number_of(a) < number_of(b);
+    });
+  }
+  return found;
+}
+
+Result<std::optional<UnfinishedRun>> RunFolder::load() {
+  SIXPOINT_ASSIGN(auto run, read_state(env_.files, folder_ + kRun, parse_run));
+  if (!run) {
+    return run;
+  }
+  SIXPOINT_ASSIGN(const auto names, sample_files());
+  for (const std::string& name : names) {
+    SIXPOINT_ASSIGN(const Bytes rows,
+                    read_file(env_.files, folder_ + "/" + name, kMostSamples_bytes));
+    // The last row may be incomplete after a power cut.
+    const auto end = std::find(rows.rbegin(), rows.rend(), std::uint8_t{'\n'}).base();
+    run->resume.raw_csv.append(rows.begin(), end);
+  }
+  return run;
+}
+
+Status RunFolder::save(const UnfinishedRun& run) {
+  const Json json = {{"schema", "sixpoint/unfinished-run/1"},
+                     {"device", run.device},
+                     {"serial", run.serial},
+                     {"firmware", run.firmware},
+                     {"operator", run.operator_name},
+                     {"station", run.station},
+                     {"client", run.client},
+                     {"write", run.write},
+                     {"filter", calib::to_string(run.filter)},
+                     {"started", to_iso8601(run.resume.started)},
+                     {"as_found", page_to_json(run.resume.as_found)},
+                     {"written", page_to_json(run.resume.written)},
+                     {"progress", to_json(run.resume.progress)}};
+  return write_state(env_.files, folder_, kRun, json);
+}
+
+Status RunFolder::append(std::string_view rows) {
+  if (!file_) {
+    SIXPOINT_CHECK(env_.files.make_folders(folder_));
+    SIXPOINT_ASSIGN(const auto names, sample_files());
+    const int next = names.empty() ? 1 : number_of(names.back()) + 1;
+    SIXPOINT_ASSIGN(file_, env_.files.create(fmt::format("{}/{}{}.csv", folder_, kSamples, next)));
+    SIXPOINT_CHECK(env_.files.sync_folder(folder_));
+    size_ = 0;
+  }
+  SIXPOINT_CHECK(file_->write_at(size_, as_bytes(rows)));
+  size_ += rows.size();
+  if (env_.clock.elapsed() - synced_ > std::chrono::seconds(1)) {
+    synced_ = env_.clock.elapsed();
+    return file_->sync();
+  }
+  return {};
+}
+
+Status RunFolder::close() {
+  if (!file_) {
+    return {};
+  }
+  const auto file = std::move(file_);
+  SIXPOINT_CHECK(file->sync());
+  return file->close();
+}
+
+Status RunFolder::clear() {
+  SIXPOINT_CHECK(close());
+  if (!env_.files.info(folder_)) {
+    return {};
+  }
+  // The state goes first: without it, the samples belong to no run.
+  if (env_.files.info(folder_ + kRun)) {
+    SIXPOINT_CHECK(env_.files.remove(folder_ + kRun));
+  }
+  SIXPOINT_ASSIGN(const auto names, sample_files());
+  for (const std::string& name : names) {
+    SIXPOINT_CHECK(env_.files.remove(folder_ + "/" + name));
+  }
+  return env_.files.sync_folder(folder_);
+}
+
+Result<std::optional<UnfinishedCapture>> RunFolder::load_capture() {
+  return read_state(env_.files, folder_ + kCapture, parse_capture);
+}
+
+Status RunFolder::save_capture(const UnfinishedCapture& capture) {
+  Json json = {{"schema", "sixpoint/unfinished-capture/1"},
+               {"serial", capture.serial},
+               {"operator", capture.operator_name},
+               {"client", capture.client},
+               {"output", capture.output},
+               {"started", to_iso8601(capture.resume.started)}};
+  json["done"] = Json::array();
+  for (const CaptureResume::Side& side : capture.resume.done) {
+    json["done"].push_back({{"pose", device::to_string(side.pose)}, {"recording", side.recording}});
+  }
+  return write_state(env_.files, folder_, kCapture, json);
+}
+
+Status RunFolder::clear_capture() {
+  if (!env_.files.info(folder_ + kCapture)) {
+    return {};
+  }
+  SIXPOINT_CHECK(env_.files.remove(folder_ + kCapture));
+  return env_.files.sync_folder(folder_);
+}
+
+Status RunFolder::set_aside() {
+  SIXPOINT_ASSIGN(auto names, sample_files());
+  names.emplace_back(kRun + 1);
+  names.emplace_back(kCapture + 1);
+  for (const std::string& name : names) {
+    const std::string path = folder_ + "/" + name;
+    if (env_.files.info(path)) {
+      SIXPOINT_CHECK(env_.files.rename(
+          path, fmt::format("{}.{}.bad", path, to_unix_seconds(env_.clock.now()))));
+    }
+  }
+  return {};
+}
+
+void RunSaver::check(const Status& status) {
+  if (!status && !std::exchange(has_failed_, true)) {
+    warn_("this run would not survive a restart: " + status.error().brief());
+  }
+}
+
+std::optional<JigResume> RunSaver::take_left_over(bool begin_again) {
+  auto left = folder_.load();
+  if (!left) {
+    warn_(left.error().brief() + "; it is set aside");
+    check(folder_.set_aside());
+    return std::nullopt;
+  }
+  if (!*left) {
+    return std::nullopt;
+  }
+  if ((*left)->serial != state_.serial || (*left)->filter != state_.filter || begin_again) {
+    check(folder_.clear());
+    return std::nullopt;
+  }
+  return std::move((*left)->resume);
+}
+
+void RunSaver::save(const JigReport& report, const JigRun& run) {
+  state_.resume.started = report.started;
+  state_.resume.as_found = report.as_found;
+  state_.resume.written = report.written ? report.as_left : std::nullopt;
+  state_.resume.progress = run.progress();
+  if (run.phase() != JigPhase::finished) {
+    check(folder_.save(state_));
+  }
+}
+
+}  // namespace sixpoint::station

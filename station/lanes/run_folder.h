@@ -1,0 +1,99 @@
+// A run under way on the disk: its state after every step, and its samples.
+//
+//   RunFolder folder(env, "state/lane-1");
+//   SIXPOINT_CHECK(folder.save(run));              // at each step
+//   SIXPOINT_CHECK(folder.append("1,2,3,4,25\n"));  // rows of samples
+//   SIXPOINT_ASSIGN(const auto left, folder.load());  // in a later program
+//
+//     FOLDER/run.json       who, which unit, which poses are taken; written anew at each step
+//     FOLDER/samples-1.csv  rows since the first sample; -2 and so on after each restart
+//     FOLDER/capture.json   a calibration file under way: which sides are done, in which recordings
+//
+// A power cut loses at most the samples of the last second. To be used by one thread at a time.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/env.h"
+#include "station/capture/capture_run.h"
+#include "station/run/jig_session.h"
+
+namespace sixpoint::station {
+
+// A run that an earlier program did not finish.
+struct UnfinishedRun {
+  std::string device;
+  std::string serial;
+  std::string firmware;
+  std::string operator_name;
+  std::string station;
+  std::string client = {};
+  bool write = false;
+  calib::FilterConfiguration filter = calib::FilterConfiguration::current;
+  JigResume resume = {};
+};
+
+// A calibration file, likewise. Its samples are in the unit.
+struct UnfinishedCapture {
+  std::string serial;
+  std::string operator_name;
+  std::string client;
+  std::string output;  // the .gt3x to make
+  CaptureResume resume;
+};
+
+class RunFolder {
+ public:
+  RunFolder(Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
+
+  // Nothing where there is no unfinished run. bad_data where the state is damaged; the files stay.
+  Result<std::optional<UnfinishedRun>> load();
+  Status save(const UnfinishedRun& run);  // all but resume.raw_csv
+  Status append(std::string_view rows);   // synced once a second
+  Status close();                         // syncs what is open
+  // Removes the run: it is in the store.
+  Status clear();
+  Result<std::optional<UnfinishedCapture>> load_capture();  // as load()
+  Status save_capture(const UnfinishedCapture& capture);
+  Status clear_capture();
+  // Renames files that load() cannot read to names that end in `.bad`.
+  Status set_aside();
+
+ private:
+  Result<std::vector<std::string>> sample_files() const;  // names, oldest first
+
+  Env& env_;
+  std::string folder_;
+  std::unique_ptr<WritableFile> file_;
+  std::uint64_t size_ = 0;
+  std::chrono::nanoseconds synced_{0};
+};
+
+// Saves a run in a folder while it is under way, so that the next program can go on with it. Where
+// the disk fails, the run goes on; `warn` gets one sentence about it, once.
+class RunSaver {
+ public:
+  RunSaver(RunFolder& folder, UnfinishedRun state, std::function<void(const std::string&)> warn)
+      : folder_(folder), state_(std::move(state)), warn_(std::move(warn)) {}
+
+  const UnfinishedRun& state() const { return state_; }
+  // What an earlier program left of this unit's run under this filter. All else is removed; what
+  // cannot be read is set aside, with a warning.
+  std::optional<JigResume> take_left_over(bool begin_again);
+  void add_rows(std::string_view rows) { check(folder_.append(rows)); }  // for JigHooks::raw
+  void save(const JigReport& report, const JigRun& run);                 // for JigHooks::progress
+  void end() { check(folder_.clear()); }                                 // the run is stored
+
+ private:
+  void check(const Status& status);
+
+  RunFolder& folder_;
+  UnfinishedRun state_;
+  std::function<void(const std::string&)> warn_;
+  bool has_failed_ = false;
+};
+
+}  // namespace sixpoint::station

@@ -1,0 +1,347 @@
+// The one file that uses Boost.Asio and Boost.Beast.
+#include "station/page/server.h"
+
+#include <array>
+#include <charconv>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <fmt/format.h>
+
+namespace sixpoint::station {
+
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+using asio::ip::tcp;
+using NetworkError = boost::system::error_code;
+
+constexpr std::chrono::milliseconds kBetweenEvents{33};
+constexpr std::uint32_t kMostHead_bytes = 16U << 10U;  // a browser's request is below 2 KiB
+constexpr std::size_t kMostTarget_bytes = 8192;
+
+// "%2Fetc" -> "/etc". In a query, a plus stands for a blank.
+std::string decoded(std::string_view text, bool plus_is_blank) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char* const at = text.data() + i;
+    unsigned code = 0;
+    if (*at == '%' && i + 2 < text.size() &&
+        std::from_chars(at + 1, at + 3, code, 16).ptr == at + 3) {
+      out += static_cast<char>(code);
+      i += 2;
+    } else {
+      out += plus_is_blank && *at == '+' ? ' ' : *at;
+    }
+  }
+  return out;
+}
+
+ApiRequest request_of(const http::request_header<>& head) {
+  const auto text = [](beast::string_view view) { return std::string(view.data(), view.size()); };
+  ApiRequest request;
+  request.method = text(head.method_string());
+  request.host = text(head[http::field::host]);
+  request.origin = text(head[http::field::origin]);
+  request.fetch_site = text(head["Sec-Fetch-Site"]);
+  request.authorization = text(head[http::field::authorization]);
+  request.cookie = text(head[http::field::cookie]);
+  request.client = text(head["X-Sixpoint-Client"]);
+  const std::string target = text(head.target());
+  const std::size_t path_end = std::min(target.find('?'), target.size());
+  request.path = decoded(std::string_view(target).substr(0, path_end), false);
+  std::string_view query = std::string_view(target).substr(std::min(path_end + 1, target.size()));
+  while (!query.empty()) {
+    const std::string_view item = query.substr(0, query.find('&'));
+    query.remove_prefix(std::min(item.size() + 1, query.size()));
+    const std::size_t name_end = std::min(item.find('='), item.size());
+    request.parameters.emplace(decoded(item.substr(0, name_end), true),
+                               decoded(item.substr(std::min(name_end + 1, item.size())), true));
+  }
+  return request;
+}
+
+ApiAnswer refused(int status, std::string_view code, std::string_view what) {
+  return {status,
+          "application/json",
+          fmt::format(R"({{"error":{{"code":"{}","what":"{}","hint":""}}}})", code, what),
+          {{"X-Content-Type-Options", "nosniff"}, {"Cache-Control", "no-store"}}};
+}
+
+bool is_malformed(const NetworkError& error) {
+  return error.category() == http::make_error_code(http::error::bad_method).category() &&
+         error != http::error::end_of_stream && error != http::error::partial_message;
+}
+
+}  // namespace
+
+struct Server::Impl {
+  class Connection;
+
+  Impl(Env& its_env, Api& its_api, const ServerOptions& its_options)
+      : env(its_env), api(its_api), options(its_options) {}
+  Status listen();
+  void accept();
+
+  Env& env;
+  Api& api;
+  const ServerOptions options;
+  std::mutex mutex;  // guards `idle`
+  // By order of arrival: connections whose request is not complete, or whose answer was sent.
+  std::map<std::uint64_t, std::weak_ptr<Connection>> idle;
+  std::uint64_t arrivals = 0;
+  asio::io_context io;  // its destructor ends the connections, which use the members above
+  tcp::acceptor acceptor{io};
+};
+
+// One request and its answer, or one event stream. Everything runs on the connection's strand, and
+// every pending operation holds a shared_ptr to the connection.
+class Server::Impl::Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  Connection(Impl& server, std::uint64_t number, tcp::socket socket)
+      : server_(server),
+        number_(number),
+        stream_(std::move(socket)),
+        timer_(stream_.get_executor()) {
+    NetworkError ignored;  // neither is needed for a right answer
+    stream_.socket().set_option(tcp::no_delay(true), ignored);
+    stream_.socket().set_option(tcp::socket::send_buffer_size(server_.options.most_unread_bytes),
+                                ignored);
+    parser_.header_limit(kMostHead_bytes);
+    parser_.body_limit(std::numeric_limits<std::uint64_t>::max());  // on_head() has the limit
+  }
+  ~Connection() { set_idle(false); }
+
+  void start() {
+    asio::dispatch(stream_.get_executor(), [self = shared_from_this()] {
+      self->limit_time();
+      http::async_read_header(
+          self->stream_, self->buffer_, self->parser_,
+          [self](const NetworkError& error, std::size_t /*bytes*/) { self->on_head(error); });
+    });
+  }
+
+  // There are too many idle connections, and this is the oldest.
+  void close_oldest() {
+    asio::post(stream_.get_executor(), [self = shared_from_this()] {
+      if (!self->busy_) {
+        self->stream_.close();
+      }
+    });
+  }
+
+  void set_idle(bool is_idle) {
+    const std::lock_guard lock(server_.mutex);
+    if (is_idle) {
+      server_.idle.emplace(number_, weak_from_this());
+    } else {
+      server_.idle.erase(number_);
+    }
+  }
+
+ private:
+  // Handler of an operation: goes on with `next`; closes the connection on an error.
+  auto then(void (Connection::*next)()) {
+    return [self = shared_from_this(), next](const NetworkError& error, std::size_t /*bytes*/ = 0) {
+      error ? self->stream_.close() : (self.get()->*next)();
+    };
+  }
+  void limit_time() {
+    stream_.expires_after(std::chrono::seconds(server_.options.request_time_out_s));
+  }
+
+  void on_head(const NetworkError& error) {
+    if (is_malformed(error)) {
+      return respond(refused(400, "bad_request", "the request makes no sense"));
+    }
+    if (error) {
+      return stream_.close();
+    }
+    const auto& head = parser_.get();
+    request_ = request_of(head);
+    // Before the body is read: a client without permission does not send a body either.
+    if (const auto refusal = server_.api.guard(request_)) {
+      return respond(*refusal);
+    }
+    if (head.target().size() > kMostTarget_bytes) {
+      return respond(refused(414, "bad_request", "the request makes no sense"));
+    }
+    // A chunked body has no length in advance; a compressed one unpacks to a hundred times its
+    // size.
+    if (head.count(http::field::transfer_encoding) + head.count(http::field::content_encoding) >
+        0) {
+      return respond(refused(411, "length_required", "send the body plain and with its length"));
+    }
+    const std::uint64_t body_bytes = parser_.content_length().value_or(0);
+    if (head.method() != http::verb::post || body_bytes == 0) {
+      return handle();
+    }
+    if (body_bytes > server_.options.most_body_bytes) {
+      return respond(refused(413, "too_large", "the body is too large"));
+    }
+    http::async_read(stream_, buffer_, parser_, then(&Connection::handle));
+  }
+
+  void handle() {
+    busy_ = true;
+    set_idle(false);
+    request_.body = std::move(parser_.get().body());
+    try {
+      if (request_.path == "/api/events" && request_.method == "GET") {
+        return stream_events();
+      }
+      respond(server_.api.handle(request_));
+    } catch (const std::exception&) {
+      respond(refused(500, "internal", "a defect of this program"));
+    }
+  }
+
+  void respond(const ApiAnswer& answer) {
+    response_.result(static_cast<unsigned>(answer.status));
+    response_.set(http::field::content_type, answer.content_type);
+    for (const auto& [name, value] : answer.headers) {
+      response_.set(name, value);
+    }
+    response_.keep_alive(false);
+    response_.content_length(answer.body.size());
+    response_.body() = request_.method == "HEAD" ? std::string() : answer.body;
+    limit_time();
+    http::async_write(stream_, response_, then(&Connection::finish));
+  }
+
+  // The client may still send a body that was refused. To close now would reset the connection, and
+  // the client would lose the answer.
+  void finish() {
+    NetworkError ignored;
+    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    busy_ = false;
+    set_idle(true);
+    limit_time();
+    discard_input();
+  }
+  void discard_input() {
+    stream_.async_read_some(asio::buffer(discarded_), then(&Connection::discard_input));
+  }
+
+  void stream_events() {
+    events_ = server_.api.open_events();
+    if (!events_) {
+      ApiAnswer refusal = refused(503, "too_many_streams", "too many pages are open; close some");
+      refusal.headers.emplace_back("Retry-After", "5");
+      return respond(refusal);
+    }
+    stream_.expires_never();
+    discard_input();  // ends the connection when the client closes it
+    write_events(
+        "HTTP/1.1 200 OK\r\nCache-Control: no-store\r\nConnection: close\r\n"
+        "Content-Type: text/event-stream\r\nTransfer-Encoding: chunked\r\n"
+        "X-Content-Type-Options: nosniff\r\n\r\n");
+  }
+  void write_events(std::string text) {
+    text_ = std::move(text);
+    limit_time();  // of the write alone: the read of discard_input() is under way
+    asio::async_write(stream_, asio::buffer(text_), then(&Connection::wait_for_events));
+  }
+  void wait_for_events() {
+    timer_.expires_after(kBetweenEvents);
+    timer_.async_wait(then(&Connection::send_events));
+  }
+  void send_events() {
+    if (!stream_.socket().is_open()) {
+      return;
+    }
+    const std::string text = events_->next();
+    text.empty() ? wait_for_events()
+                 : write_events(fmt::format("{:x}\r\n{}\r\n", text.size(), text));
+  }
+
+  Impl& server_;
+  const std::uint64_t number_;
+  beast::tcp_stream stream_;
+  asio::steady_timer timer_;
+  beast::flat_buffer buffer_;
+  http::request_parser<http::string_body> parser_;
+  ApiRequest request_;
+  http::response<http::string_body> response_;
+  std::unique_ptr<EventStream> events_;
+  std::string text_;  // of events, while it is written
+  std::array<char, 4096> discarded_{};
+  bool busy_ = false;
+};
+
+Status Server::Impl::listen() {
+  NetworkError error;
+  tcp::resolver resolver(io);
+  for (const auto& found : resolver.resolve(options.bind, std::to_string(options.port),
+                                            tcp::resolver::passive, error)) {
+    try {
+      acceptor = tcp::acceptor(io, found.endpoint());
+      return {};
+    } catch (const boost::system::system_error&) {
+      continue;  // the name may have another address
+    }
+  }
+  return fail(ErrorCode::device_unavailable, "this address and port cannot be listened on",
+              fmt::format("{}:{}", options.bind, options.port),
+              "another station may be running; choose another --port");
+}
+
+void Server::Impl::accept() {
+  acceptor.async_accept(
+      asio::make_strand(io), [this](const NetworkError& error, tcp::socket socket) {
+        if (error) {
+          env.clock.sleep(std::chrono::milliseconds(1));  // no descriptor is free
+        } else {
+          auto connection = std::make_shared<Connection>(*this, ++arrivals, std::move(socket));
+          connection->set_idle(true);
+          connection->start();
+          std::shared_ptr<Connection> oldest;
+          {
+            const std::lock_guard lock(mutex);
+            if (idle.size() > options.most_idle) {
+              oldest = idle.begin()->second.lock();
+              idle.erase(idle.begin());
+            }
+          }
+          if (oldest) {
+            oldest->close_oldest();
+          }
+        }
+        accept();
+      });
+}
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Server::~Server() { stop(); }
+
+Result<std::unique_ptr<Server>> Server::open(Env& env, Api& api, const ServerOptions& options) {
+  auto impl = std::make_unique<Impl>(env, api, options);
+  SIXPOINT_CHECK(impl->listen());
+  std::unique_ptr<Server> server(new Server(std::move(impl)));
+  api.set_port(server->port());
+  return server;
+}
+
+int Server::port() const { return impl_->acceptor.local_endpoint().port(); }
+
+void Server::serve() {
+  impl_->accept();
+  std::vector<std::jthread> threads;
+  for (std::size_t i = 0; i < impl_->options.threads; ++i) {
+    threads.emplace_back([this] { impl_->io.run(); });
+  }
+}
+
+void Server::stop() { impl_->io.stop(); }
+
+}  // namespace sixpoint::station

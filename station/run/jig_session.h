@@ -1,0 +1,81 @@
+// A jig run on a real link: the unit, the jig and the state machine (jig_run.h) together.
+//
+//   JigSessionOptions options;
+//   options.gravity = *calib::gravity_at(52.1, 40);
+//   JigHooks hooks;
+//   hooks.on_action = [](const JigAction& action) { std::cout << action.text << '\n'; };
+//   SIXPOINT_ASSIGN(const JigReport report, run_jig({unit, jig}, env, options, hooks));
+//
+// Sets and checks the filter configuration, streams, asks for the poses, computes the constants
+// from six faces and judges them on readings that the fit did not use. On request it writes them
+// into the unit, reads them back and measures two poses again with the constants of the unit.
+// Stores nothing: the report has all there is to store. Blocking; one thread a run.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "base/env.h"
+#include "calib/constants.h"
+#include "calib/gravity.h"
+#include "device/unit.h"
+#include "station/limits/limits.h"
+#include "station/limits/verdict.h"
+#include "station/run/jig_report.h"
+#include "station/run/jig_run.h"
+
+namespace sixpoint::station {
+
+struct JigSessionOptions {
+  JigRunOptions run;
+  calib::FilterConfiguration filter = calib::FilterConfiguration::current;
+  calib::LocalGravity gravity = calib::gravity_unknown();  // where the jig stands
+  Limits limits = default_limits();
+  RetestState retest;    // of the unit's earlier runs (verdict.h)
+  double silence_s = 3;  // of a streaming unit, then it counts as unplugged
+  // An error in mid-run gives a report with `ended_by`, so that the readings can be stored. Without
+  // it, run_jig() returns the error alone.
+  bool keep_interrupted = false;
+  double jig_poll_s = 0.25;  // between two questions to a motorised jig for faults
+  // After so many tilted placements in a row that the jig calls exact, its position is not trusted.
+  int jig_disagreements = 3;
+};
+
+// Both belong to the caller and live until the next reopen().
+struct UnitOnJig {
+  device::Unit* unit = nullptr;
+  device::Jig* jig = nullptr;
+};
+
+// What an earlier program left of this run.
+struct JigResume {
+  JigProgress progress;
+  UtcTime started{};
+  std::optional<device::CalibrationPage> as_found;
+  std::optional<device::CalibrationPage> written;  // what the run wrote into the unit, if it did
+  std::string raw_csv;                             // with its headline
+};
+
+// Calls of a run to its driver, on the run's own thread; all may be empty.
+struct JigHooks {
+  std::function<void(const JigAction&)> on_action;  // every action, for the person
+  // After every block of samples: for live pictures.
+  std::function<void(const device::SampleBlock&, const JigRun&)> samples;
+  // Rows of the raw data as they come, the headline first: for a disk.
+  std::function<void(std::string_view rows)> raw;
+  // After every action: for a disk, so that the run can be resumed.
+  std::function<void(const JigReport&, const JigRun&)> progress;
+  // The operator's next command since the last call; asked after every block.
+  std::function<std::optional<OperatorCommand>()> next_command;
+  // The unit was unplugged. Waits until it is back and returns it, opened anew, or an error.
+  // Where this is empty, the run ends with the error; otherwise with an inconclusive report.
+  std::function<Result<UnitOnJig>(const Error&)> reopen;
+};
+
+// usage where constants of this filter do not help this unit; device_unavailable when it is
+// unplugged; otherwise a report with any verdict.
+Result<JigReport> run_jig(UnitOnJig on_jig, Env& env, const JigSessionOptions& options,
+                          const JigHooks& hooks, const std::optional<JigResume>& resume = {});
+
+}  // namespace sixpoint::station

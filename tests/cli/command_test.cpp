@@ -1,0 +1,107 @@
+// What all commands have in common: exit codes, error documents, options that are declared alike.
+#include "cli/command.h"
+
+#include <functional>
+#include <limits>
+#include <map>
+#include <set>
+
+#include <CLI/Option.hpp>
+
+#include "command_fixture.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using tests::CommandTest;
+
+// Oracle: the order of the contract, 0 < 2 < 1 < 3 < 64 and above.
+TEST(Command, TheWorseExitCodeIsKept) {
+  const std::vector<int> order = {0, 2, 1, 3, 64, 65, 66, 69, 70, 73, 74, 77, 78};
+  std::ostringstream stream;
+  std::istringstream in;
+  for (std::size_t first = 0; first < order.size(); ++first) {
+    for (std::size_t second = 0; second < order.size(); ++second) {
+      Context context{posix_env(), stream, stream, in};
+      context.worsen(order[first]);
+      context.worsen(order[second]);
+      EXPECT_EQ(context.exit_code, order[std::max(first, second)]);
+    }
+  }
+}
+
+TEST(Command, AnErrorIsOneLineForPeopleAndADocumentWithJson) {
+  std::ostringstream out;
+  std::ostringstream people;
+  std::istringstream in;
+  Context context{posix_env(), out, people, in};
+  const Error error{ErrorCode::no_input, "it is not there", "a.gt3x", "name another file"};
+  report_error(context, "scan", error, false);
+  EXPECT_EQ(out.str(), "");
+  EXPECT_EQ(people.str(), "sixpoint: a.gt3x: it is not there; name another file\n");
+  EXPECT_EQ(context.exit_code, 66);
+  report_error(context, "scan", error, true);
+  EXPECT_EQ(Json::parse(out.str()), Json::parse(R"({"schema": "sixpoint/scan/1", "error": {
+      "code": "no_input", "what": "it is not there", "where": "a.gt3x",
+      "hint": "name another file"}})"));
+}
+
+TEST(Command, JsonHasNoNumberThatItCannotWrite) {
+  EXPECT_EQ(number(1.5), 1.5);
+  EXPECT_TRUE(number(std::numeric_limits<double>::quiet_NaN()).is_null());
+  EXPECT_TRUE(number(-std::numeric_limits<double>::infinity()).is_null());
+  EXPECT_TRUE(text_or_null("").is_null());
+  EXPECT_EQ(text_or_null("a"), "a");
+  EXPECT_TRUE(value_or_null(std::optional<int>()).is_null());
+  EXPECT_EQ(value_or_null(std::optional(7)), 7);
+  EXPECT_EQ(value_or_null(std::optional(UtcTime{})), "1970-01-01T00:00:00Z");
+}
+
+void visit(const CLI::App& app, const std::function<void(const CLI::App&)>& work) {
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    work(*command);
+    visit(*command, work);
+  }
+}
+
+TEST_F(CommandTest, EveryCommandHasHelpAndRefusesAnUnknownOption) {
+  for (const CommandEntry& entry : commands()) {
+    CLI::App app;
+    std::ostringstream stream;
+    std::istringstream in;
+    Context context{posix_env(), stream, stream, in};
+    entry.add(app, context);
+    visit(app, [](const CLI::App& command) {
+      EXPECT_FALSE(command.get_description().empty()) << command.get_name();
+    });
+    const CLI::App* command = app.get_subcommands([](const CLI::App*) { return true; }).front();
+    const auto help = run({command->get_name(), "--help"});
+    EXPECT_EQ(help.exit_code, 0) << command->get_name();
+    EXPECT_EQ(run({command->get_name(), "--no-such-option"}).exit_code, 64) << command->get_name();
+  }
+}
+
+// The same option is described by the same words, wherever one function declares it.
+TEST(Command, SharedOptionsAreDescribedAlike) {
+  std::map<std::string, std::set<std::string>> descriptions;
+  std::ostringstream stream;
+  std::istringstream in;
+  Context context{posix_env(), stream, stream, in};
+  CLI::App app;
+  for (const CommandEntry& entry : commands()) {
+    entry.add(app, context);
+  }
+  visit(app, [&](const CLI::App& command) {
+    for (const CLI::Option* option : command.get_options()) {
+      for (const std::string& name : option->get_lnames()) {
+        descriptions[name].insert(option->get_description());
+      }
+    }
+  });
+  for (const char* name : {"record", "wide", "undo-rotation", "allow-prior", "calibration-file"}) {
+    EXPECT_EQ(descriptions[name].size(), 1U) << name;
+  }
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

@@ -1,0 +1,36 @@
+// sixpoint export by its contract: the CSV, and what it never writes over.
+#include <gmock/gmock.h>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "gt3x_made_log.h"
+#include "run_command.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using gt3x::tests::made_log;
+using gt3x::tests::put_recording;
+using tests::run_command;
+
+TEST(Export, WritesWholeFilesAndNeverOverARecording) {
+  MemoryEnv memory;
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(2)));
+  ASSERT_OK(put_recording(memory.files, "other.gt3x", made_log(1)));
+  const Bytes original = *read_file(memory.files, "f.gt3x");
+  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "f.gt3x"}).exit_code, 73);
+  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "./f.gt3x"}).exit_code, 73);
+  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "other.gt3x"}).exit_code, 73);
+  EXPECT_EQ(*read_file(memory.files, "f.gt3x"), original);
+  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "out.csv"}).exit_code, 0);
+  const Bytes csv = *read_file(memory.files, "out.csv");
+  const auto standard = run_command(memory.env, {"export", "f.gt3x", "--csv", "-"});
+  EXPECT_EQ(standard.out, std::string(csv.begin(), csv.end()));
+  memory.files.fail_after(2);
+  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "late.csv"}).exit_code, 74);
+  memory.files.stop_failing();
+  EXPECT_FALSE(memory.files.info("late.csv"));
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

@@ -1,0 +1,31 @@
+// sixpoint limits by its contract; tests/station/limits has the rules themselves.
+#include <fstream>
+
+#include "command_fixture.h"
+
+namespace sixpoint {
+namespace {
+
+using tests::CommandTest;
+
+TEST_F(CommandTest, LimitsThatArePrintedAreLimitsThatAreRead) {
+  const auto printed = run({"limits", "print"});
+  EXPECT_EQ(printed.exit_code, 0);
+  std::ofstream(path("l.toml")) << printed.out;
+  const auto checked = run({"limits", "check", path("l.toml"), "--json"});
+  EXPECT_EQ(checked.exit_code, 0) << checked.people;
+  EXPECT_EQ(checked.json()["schema"], "sixpoint/limits/1");
+  EXPECT_EQ(checked.json()["sha256"].get<std::string>().size(), 64U);
+  EXPECT_EQ(checked.json()["limits"], run({"limits", "print", "--json"}).json()["limits"]);
+  EXPECT_EQ(run({"limits", "print", path("l.toml")}).out, printed.out);
+
+  EXPECT_EQ(run({"limits", "check", path("none.toml")}).exit_code, 66);
+  std::ofstream(path("bad.toml")) << "this is no limits file";
+  const auto bad = run({"limits", "check", path("bad.toml"), "--json"});
+  EXPECT_EQ(bad.exit_code, 78);
+  EXPECT_THAT(bad.json()["error"]["where"].get<std::string>(), testing::EndsWith("bad.toml:1"));
+  EXPECT_EQ(run({"limits"}).exit_code, 64);
+}
+
+}  // namespace
+}  // namespace sixpoint

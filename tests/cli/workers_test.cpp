@@ -1,0 +1,66 @@
+// Files by name or folder, and work on many of them.
+#include "cli/workers.h"
+
+#include <atomic>
+
+#include "base/atomic_file.h"
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "run_command.h"
+
+namespace sixpoint::cli {
+namespace {
+
+class Workers : public testing::Test {
+ protected:
+  MemoryEnv memory_;
+  std::ostringstream out_;
+  std::ostringstream people_;
+  std::istringstream in_;
+  Context context_{memory_.env, out_, people_, in_};
+};
+
+TEST_F(Workers, NamedFilesKeepTheOrderInWhichTheyWereNamed) {
+  FileSystem& files = memory_.env.files;
+  for (const char* folder : {"tree", "tree/sub", "empty"}) {
+    ASSERT_OK(files.make_folders(folder));
+  }
+  for (const char* name : {"b.gt3x", "tree/a.GT3X", "tree/sub/c.gt3x", "tree/notes.txt"}) {
+    ASSERT_OK(write_file(files, name, "x"));
+  }
+  const auto found = named_files(context_, {"b.gt3x", "none", "tree", "empty"}, {".gt3x"});
+  std::vector<std::string> names;
+  for (const NamedFile& file : found) {
+    names.push_back(file.path + (file.error ? " refused" : " as " + file.relative));
+  }
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"b.gt3x as b.gt3x", "none refused", "tree/a.GT3X as a.GT3X",
+                                      "tree/sub/c.gt3x as sub/c.gt3x"}));
+  EXPECT_EQ(found[1].error->code, ErrorCode::no_input);
+  EXPECT_NE(people_.str().find("empty: no .gt3x file below this folder"), std::string::npos);
+}
+
+TEST_F(Workers, EveryFileIsAnsweredOnceAndInOrder) {
+  std::vector<NamedFile> files(100);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    files[i].path = std::to_string(i);
+  }
+  for (const unsigned jobs : {0U, 1U, 7U}) {
+    std::atomic<int> calls{0};
+    const auto answers =
+        for_each_file<std::string>(context_, "working", files, jobs, [&](const NamedFile& file) {
+          ++calls;
+          return file.path + "!";
+        });
+    EXPECT_EQ(calls, 100);
+    ASSERT_EQ(answers.size(), 100U);
+    EXPECT_EQ(answers[0], "0!");
+    EXPECT_EQ(answers[99], "99!");
+  }
+  EXPECT_TRUE(
+      for_each_file<int>(context_, "working", {}, 4, [](const NamedFile&) { return 1; }).empty());
+  EXPECT_EQ(people_.str(), "") << "a bar belongs on a terminal only";
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

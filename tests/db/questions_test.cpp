@@ -1,0 +1,86 @@
+#include "db/questions.h"
+
+#include "store_fixture.h"
+
+namespace sixpoint::db {
+namespace {
+
+TEST_F(StoreTest, AnswersWhatPeopleAsk) {
+  Store store = open();
+  const auto run = [&](const std::string& serial, const std::string& verdict, std::int64_t time_s,
+                       const std::string& jig = "J1") {
+    RunRecord record;
+    record.serial = serial;
+    record.kind = "jig";
+    record.filter = "current";
+    record.jig = jig;
+    record.verdict = verdict;
+    record.started = from_unix_seconds(time_s);
+    record.ended = from_unix_seconds(time_s + 60);
+    record.document = "{}";
+    return store.add_run(record, {}).value();
+  };
+  // A passes at once, B at its second run, C never; D is of another time and jig.
+  const auto first = run("A", "pass", 1000);
+  run("B", "fail", 1100);
+  run("C", "fail", 1200);
+  run("B", "pass", 1300);
+  run("D", "pass", 9000, "J2");
+  const auto yield = store.yield(from_unix_seconds(0), from_unix_seconds(5000));
+  ASSERT_OK(yield);
+  EXPECT_EQ(yield->runs, 4U);
+  EXPECT_EQ(yield->units, 3U);
+  EXPECT_DOUBLE_EQ(yield->yield(), 2.0 / 3);
+  EXPECT_DOUBLE_EQ(yield->first_pass_yield(), 1.0 / 3);
+  EXPECT_TRUE(std::isnan(store.yield(from_unix_seconds(0), from_unix_seconds(1))->yield()));
+
+  const auto of_jig = store.units_of_jig("J1");
+  ASSERT_EQ(of_jig->size(), 3U);
+  EXPECT_EQ((*of_jig)[1].serial, "B");
+  EXPECT_EQ((*of_jig)[1].runs, 2U);
+  EXPECT_EQ((*of_jig)[1].last_verdict, "pass");
+  EXPECT_EQ((*of_jig)[1].last_run, from_unix_seconds(1360));
+
+  auto of_a = constants("A", "current", 1060);
+  of_a.run_id = first;
+  const auto old_set = store.add_constants(of_a, "w").value();
+  const auto new_set = store.add_constants(constants("A", "current", 4000), "w").value();
+  ASSERT_OK(store.add_constants(constants("B", "current", 1360), "w"));
+  RepairRecord repair;
+  repair.document = "{}";
+  repair.serial = "A";
+  for (const auto& [input, id] :
+       {std::pair("one", old_set), {"two", new_set}, {"three", old_set}}) {
+    repair.input = input;
+    repair.constants_id = id;
+    ASSERT_OK(store.add_repair(repair));
+  }
+  EXPECT_TRUE(store.recall_list()->empty());
+  ASSERT_OK(store.withdraw_constants(old_set, "Ada", "jig out of level"));
+  ASSERT_OK(store.withdraw_constants(old_set, "Bob", "again"));
+  const auto recall = store.recall_list();
+  ASSERT_EQ(recall->size(), 2U);
+  EXPECT_EQ((*recall)[0].repair.input, "one");
+  EXPECT_EQ((*recall)[1].repair.input, "three");
+  EXPECT_EQ((*recall)[1].reason, "jig out of level");
+  EXPECT_EQ(store.recall_list(old_set)->size(), 2U);
+  EXPECT_TRUE(store.recall_list(new_set)->empty());
+
+  const auto trend = store.trend("A");
+  ASSERT_EQ(trend->size(), 2U);
+  EXPECT_EQ((*trend)[0].jig, "J1");
+  EXPECT_TRUE((*trend)[0].withdrawn);
+  EXPECT_EQ((*trend)[1].jig, "");
+  EXPECT_FALSE((*trend)[1].withdrawn);
+
+  // C and D have no constants, B's are old, A's new ones are not.
+  const auto due = store.units_due(from_unix_seconds(2000));
+  ASSERT_EQ(due->size(), 3U);
+  EXPECT_EQ((*due)[0].serial, "C");
+  EXPECT_FALSE((*due)[0].last_constants.has_value());
+  EXPECT_EQ((*due)[1].serial, "D");
+  EXPECT_EQ((*due)[2].serial, "B");
+}
+
+}  // namespace
+}  // namespace sixpoint::db

@@ -1,0 +1,33 @@
+#include "gap/features/lines.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/made_bundle.h"
+
+namespace sixpoint::gap {
+namespace {
+
+TEST(Lines, FrameIsTold) {
+  const Eigen::Vector3d v(1.2e-3, -0.4e-3, 0.8e-3);
+  for (const bool lab : {true, false}) {
+    const Bundle bundle = tests::made_production({}, [&](const Segment& s, double t) {
+      const Eigen::Vector3d line = std::cos(2 * M_PI * 17.3 * (s.host_start_s + t)) * v;
+      return Eigen::Vector3d(s.rotation.col(2) + (lab ? Eigen::Vector3d(s.rotation * line) : line));
+    });
+    const CleanSamples clean = clean_samples(bundle);
+    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+    ASSERT_EQ(lines.size(), 1U);
+    EXPECT_EQ(lines[0].in_lab, lab);
+    EXPECT_TRUE(lines[0].decidable);
+    EXPECT_NEAR(lines[0].frequency_hz, 17.3, 0.02);
+    const double apart =
+        std::min((lines[0].vector_mg - 1000 * v).norm(), (lines[0].vector_mg + 1000 * v).norm());
+    EXPECT_LT(apart, 6 * lines[0].sd_mg);
+  }
+  const Bundle none = tests::made_production({});
+  const CleanSamples clean = clean_samples(none);
+  EXPECT_TRUE(find_lines(none, clean, noise_spectrum(none, clean)).empty());
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

@@ -1,0 +1,67 @@
+#include "gap/features/noise.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/made_bundle.h"
+
+namespace sixpoint::gap {
+namespace {
+
+TEST(Noise, WhiteLevelIncludesRounding) {
+  const Bundle bundle = tests::made_production({});
+  const NoiseSpectrum noise = noise_spectrum(bundle, clean_samples(bundle));
+  ASSERT_TRUE(noise.usable());
+  const double rounding = 1000.0 / 256 / std::sqrt(12.0);
+  EXPECT_NEAR(noise.white_mg[0], std::hypot(3.9 * 1.01, rounding), 0.25);
+  EXPECT_NEAR(noise.white_mg[2], std::hypot(5.5 * 1.02, rounding), 0.3);
+  const CodeStatistics codes = code_statistics(bundle, clean_samples(bundle));
+  EXPECT_LT(codes.spread_sd, 4);
+  EXPECT_EQ(codes.outliers, 0U);
+}
+
+// Counts of Gaussian noise of 1.5 LSB about `mean`, one dwell of 10 s per axis alike.
+Bundle counts_about(double mean, const std::function<int(int)>& stored) {
+  Bundle bundle;
+  Segment segment;
+  segment.samples = 1000;
+  segment.settled = true;
+  std::mt19937_64 random(21);
+  std::normal_distribution<double> normal(mean, 1.5);
+  for (std::size_t n = 0; n < segment.samples; ++n) {
+    gt3x::Counts counts;
+    for (std::int16_t& x : counts) {
+      x = static_cast<std::int16_t>(stored(static_cast<int>(std::lround(normal(random)))));
+    }
+    bundle.samples.push_back(counts);
+  }
+  bundle.segments.push_back(segment);
+  return bundle;
+}
+
+TEST(Noise, OddAndEvenCodesAreAlikeUnlessABitIsStuck) {
+  const Bundle plain = counts_about(100.3, [](int x) { return x; });
+  const CodeStatistics codes = code_statistics(plain, clean_samples(plain));
+  EXPECT_EQ(codes.samples, 1000U);  // two pieces of five seconds
+  // Half of 1000, sd sqrt(1000 / 4).
+  EXPECT_NEAR(codes.odd_share[0], 0.5, 5 * std::sqrt(0.25 / 1000));
+  const Bundle stuck = counts_about(100.3, [](int x) { return x & ~1; });
+  EXPECT_EQ(code_statistics(stuck, clean_samples(stuck)).odd_share[1], 0);
+}
+
+TEST(Noise, AnOutlierIsCounted) {
+  Bundle bundle = counts_about(100.3, [](int x) { return x; });
+  bundle.samples[250][2] = 130;  // 20 sd
+  EXPECT_EQ(code_statistics(bundle, clean_samples(bundle)).outliers, 1U);
+}
+
+TEST(Noise, VarianceAtIsTheMedianOfNineBins) {
+  NoiseSpectrum spectrum;
+  for (int k = 0; k < 20; ++k) {
+    spectrum.frequency_hz.push_back(1.5 + 0.5 * k);
+    spectrum.variance_mg2[0].push_back(k == 7 ? 1000 : 16);  // one line
+  }
+  EXPECT_EQ(spectrum.variance_at(0, 5), 16);  // the line's own bin
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

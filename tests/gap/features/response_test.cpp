@@ -1,0 +1,56 @@
+#include "gap/features/response.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/made_bundle.h"
+
+namespace sixpoint::gap {
+namespace {
+
+TEST(Response, ClosedForms) {
+  EXPECT_NEAR(low_pass_gain(20, 20, 4, 100), M_SQRT1_2, 1e-12);
+  EXPECT_NEAR(low_pass_gain(1, 30, 4, 100), 1, 1e-6);
+  const Resonance plain{12, 3, ResonanceForm::second_order, 0};
+  EXPECT_NEAR(resonance_gain(12, plain), 3, 1e-12);  // Q at resonance
+  EXPECT_NEAR(resonance_gain(12, Resonance{12, 3, ResonanceForm::base_excited, 0}), std::sqrt(10.0),
+              1e-12);  // sqrt(1 + Q^2)
+  EXPECT_NEAR(resonance_gain(0.01, plain), 1, 1e-5);
+  EXPECT_NEAR(resonance_gain(12, Resonance{12, 3, ResonanceForm::peak, 0}), 3, 1e-12);
+  LowPass analogue;
+  analogue.corner_hz = 20;
+  analogue.order = 2;
+  analogue.form = LowPassForm::analogue;
+  EXPECT_NEAR(analogue.tone_gain(20, 100), M_SQRT1_2, 1e-12);
+  // What lies beyond half the rate comes back: at half of it twice the power.
+  EXPECT_NEAR(std::pow(analogue.noise_gain(50, 100), 2),
+              2 / (1 + std::pow(2.5, 4)) + 1 / (1 + std::pow(7.5, 4)), 1e-12);
+}
+
+// Tones at 0.9 of their amplitude on a mount of 14 Hz; the gain is of the axis, not of the mount.
+TEST(Response, TonesBehindAResonanceGiveItsFrequencyAndQ) {
+  Bundle bundle;
+  std::vector<ToneFit> tones;
+  const Resonance mount{14, 2.5, ResonanceForm::second_order, 0};
+  for (const double f : {2.0, 4.0, 7.0, 10.0, 13.0, 16.0, 25.0, 40.0}) {
+    Segment segment;
+    segment.kind = Segment::Kind::vibration;
+    segment.vibration = Vibration{Eigen::Vector3d::UnitZ(), f, 0.5};
+    ToneFit tone;
+    tone.segment = bundle.segments.size();
+    tone.axis = 2;
+    tone.usable = true;
+    tone.samples = 1000;
+    tone.in_phase_mg[2] = 500 * 0.9 * resonance_gain(f, mount);
+    tone.residual_mg = 4;
+    bundle.segments.push_back(segment);
+    tones.push_back(tone);
+  }
+  const Response response = find_response(bundle, {}, tones, {});
+  ASSERT_TRUE(response.resonance_significant);
+  EXPECT_NEAR(response.resonance.frequency_hz, 14, 0.01);
+  EXPECT_NEAR(response.resonance.q, 2.5, 0.01);
+  EXPECT_FALSE(response.low_pass_significant);
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

@@ -1,0 +1,88 @@
+#include "gap/features/texture.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/made_bundle.h"
+
+namespace sixpoint::gap {
+namespace {
+
+// Gaussian noise of 3.9 mg, on top of the pose.
+struct MadeNoise {
+  std::mt19937_64 random{11};
+  std::normal_distribution<double> normal{0, 0.0039};
+  Eigen::Vector3d operator()() { return {normal(random), normal(random), normal(random)}; }
+};
+
+Texture texture_of(const tests::MadeForce& force) {
+  tests::MadeUnit unit;
+  unit.noise_g.setConstant(1e-6);
+  const Bundle bundle = tests::made_production(unit, force);
+  return noise_texture(bundle, clean_samples(bundle));
+}
+
+struct Worst {
+  double tails = 0, dwells = 0, moments = 0, loudest = 0;
+};
+Worst worst_of(const Texture& texture) {
+  Worst worst;
+  for (const Texture::Scale& scale : texture.scales) {
+    worst.tails = std::max(worst.tails, std::abs(scale.tails_sd));
+    worst.dwells = std::max(worst.dwells, scale.dwells_sd);
+    worst.moments = std::max(worst.moments, scale.moments_sd);
+    worst.loudest = std::max(worst.loudest, scale.loudest_sd);
+  }
+  return worst;
+}
+
+// Thirty deviates by chance: beyond 4.5 once in ten thousand such tests.
+void expect_plain(const Texture& texture) {
+  EXPECT_EQ(texture.scales.size(), 8U);
+  const Worst worst = worst_of(texture);
+  EXPECT_LT(worst.tails, 4.5);
+  EXPECT_LT(worst.dwells, 4.5);
+  EXPECT_LT(worst.moments, 4.5);
+  EXPECT_LT(worst.loudest, 4.5);
+}
+
+TEST(Texture, WhiteAndFilteredGaussianNoiseArePlain) {
+  MadeNoise noise;
+  expect_plain(texture_of(
+      [&](const Segment& s, double) { return Eigen::Vector3d(s.rotation.col(2) + noise()); }));
+  Eigen::Vector3d smooth = Eigen::Vector3d::Zero();
+  expect_plain(texture_of([&](const Segment& s, double) {
+    smooth = 0.6 * smooth + noise();
+    return Eigen::Vector3d(s.rotation.col(2) + smooth);
+  }));
+}
+
+TEST(Texture, WhatIsNoLinearFilterHasTails) {
+  MadeNoise noise;
+  Eigen::Vector3d held = Eigen::Vector3d::Constant(9);
+  const Texture texture = texture_of([&](const Segment& s, double) {
+    constexpr double kPlay_g = 0.002;
+    const Eigen::Vector3d now = s.rotation.col(2) + noise();
+    held =
+        held.cwiseMax((now.array() - kPlay_g).matrix()).cwiseMin((now.array() + kPlay_g).matrix());
+    return held;
+  });
+  EXPECT_GT(texture.scales.front().tails_sd, 8);
+}
+
+TEST(Texture, KnocksAndSpellsAreFoundWhereTheyAre) {
+  MadeNoise noise;
+  const Texture knock = texture_of([&](const Segment& s, double t) {
+    const double ring = s.placement == 7 && t > 5 && t < 5.5 ? 0.03 * std::exp(-(t - 5) / 0.1) : 0;
+    return Eigen::Vector3d(s.rotation.col(2) + noise() +
+                           Eigen::Vector3d::Constant(ring * std::cos(2 * M_PI * 20 * t)));
+  });
+  EXPECT_GT(worst_of(knock).loudest, 6);
+  EXPECT_EQ(knock.scales.back().loudest_segment, 7U);
+  const Texture spells = texture_of([&](const Segment& s, double) {
+    return Eigen::Vector3d(s.rotation.col(2) + (s.placement % 3 == 0 ? 1.3 : 1.0) * noise());
+  });
+  EXPECT_GT(worst_of(spells).dwells, 6);
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

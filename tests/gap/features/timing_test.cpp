@@ -1,0 +1,54 @@
+#include "gap/features/timing.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/made_bundle.h"
+
+namespace sixpoint::gap {
+namespace {
+
+TEST(HostTiming, ReadsRateAndSlipsExactly) {
+  Bundle bundle = tests::made_production({});
+  const HostTiming nominal = host_timing(bundle);
+  EXPECT_NEAR(nominal.clock_ppm, 0, 4 * nominal.clock_sd_ppm);
+  EXPECT_EQ(nominal.lost + nominal.repeated, 0U);
+  EXPECT_NEAR(nominal.scatter_ms, 2 / std::sqrt(3.0), 5 * nominal.scatter_sd_ms);
+
+  // 3000 ppm fast, two samples lost in the third second of segment 4, one repeated in segment 9.
+  for (std::size_t i = 0; i < bundle.host_clock.sample_index.size(); ++i) {
+    const std::size_t segment = i / 10;
+    const auto second = static_cast<double>(i % 10);
+    double& t = bundle.host_clock.host_time_s[i];
+    t += second * (1 / 1.003 - 1);
+    t += segment == 4 && i % 10 >= 3 ? 0.02 : 0;
+    t -= segment == 9 && i % 10 >= 7 ? 0.01 : 0;
+  }
+  const HostTiming timing = host_timing(bundle);
+  EXPECT_NEAR(timing.clock_ppm, 3000, 5 * timing.clock_sd_ppm);
+  EXPECT_EQ(timing.lost, 2U);
+  EXPECT_EQ(timing.repeated, 1U);
+}
+
+TEST(HostTiming, NothingWithoutStamps) {
+  Bundle bundle = tests::made_production({});
+  bundle.host_clock = {};
+  EXPECT_FALSE(host_timing(bundle).usable);
+}
+
+// Stamps that are exact: the rate is the slope to the digit.
+TEST(HostTiming, ExactStampsGiveTheExactRate) {
+  Bundle bundle = tests::made_production({});
+  for (std::size_t i = 0; i < bundle.host_clock.sample_index.size(); ++i) {
+    const Segment& segment = bundle.segments[i / 10];
+    bundle.host_clock.host_time_s[i] =
+        segment.host_start_s + static_cast<double>(i % 10) / 1.0005;  // 500 ppm fast
+  }
+  const HostTiming timing = host_timing(bundle);
+  EXPECT_NEAR(timing.clock_ppm, 500, 1e-6);
+  EXPECT_NEAR(timing.scatter_ms, 0, 1e-6);
+  EXPECT_EQ(timing.packets, 18U * 9U);
+  EXPECT_EQ(timing.samples, 18U * 900U);
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

@@ -1,0 +1,65 @@
+#include "gap/features/tones.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/made_bundle.h"
+
+namespace sixpoint::gap {
+namespace {
+
+Bundle one_tone(double frequency_hz, double amplitude_g,
+                const std::function<double(std::size_t)>& slip) {
+  Bundle bundle;
+  Segment segment;
+  segment.name = "shaker";
+  segment.kind = Segment::Kind::vibration;
+  segment.samples = 1000;
+  segment.starts_placement = false;
+  segment.vibration = Vibration{Eigen::Vector3d::UnitZ(), frequency_hz, amplitude_g};
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal(0, 1);
+  for (std::size_t n = 0; n < 1000; ++n) {
+    const double t = (static_cast<double>(n) + slip(n)) / 100;
+    const double z = 1 + amplitude_g * std::cos(2 * M_PI * frequency_hz * t + 1);
+    bundle.samples.push_back({static_cast<std::int16_t>(std::lround(normal(random))),
+                              static_cast<std::int16_t>(std::lround(normal(random))),
+                              static_cast<std::int16_t>(std::lround(256 * z + normal(random)))});
+  }
+  bundle.segments.push_back(segment);
+  return bundle;
+}
+
+TEST(Tones, AmplitudeAndSlips) {
+  for (const double f : {2.0, 7.0, 16.0, 40.0}) {
+    for (const int steps : {0, 1, -1, 2}) {
+      const Bundle bundle = one_tone(f, 0.6, [&](std::size_t n) { return n >= 430 ? steps : 0; });
+      const auto fits = fit_tones(bundle, clean_samples(bundle), {});
+      ASSERT_EQ(fits.size(), 1U);
+      SCOPED_TRACE(testing::Message() << f << " Hz, " << steps << " steps");
+      ASSERT_TRUE(fits[0].usable);
+      if (steps == 0) {
+        EXPECT_TRUE(fits[0].slips.empty());
+        EXPECT_NEAR(fits[0].in_phase_mg[2], 600, 5 * 4.1 * std::sqrt(2.0 / 1000));
+        EXPECT_NEAR(fits[0].frequency_ppm, 0, 5 * fits[0].frequency_sd_ppm);
+        EXPECT_NEAR(fits[0].level_mg[2], 1000, 0.7);
+      } else {
+        ASSERT_EQ(fits[0].slips.size(), 1U);
+        EXPECT_EQ(fits[0].slips[0].steps, steps);
+        EXPECT_NEAR(static_cast<double>(fits[0].slips[0].sample), 430, 8);
+      }
+    }
+  }
+}
+
+TEST(Tones, JitterShowsOnSlopes) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal(0, 0.05);  // 0.5 ms
+  const Bundle bundle = one_tone(16, 1, [&](std::size_t) { return normal(random); });
+  const auto fit = fit_tones(bundle, clean_samples(bundle), {}).front();
+  const double rate = 2 * M_PI * 16 * 1000 * 0.5e-3;  // mg of jitter at the steepest
+  EXPECT_TRUE(fit.slips.empty());
+  EXPECT_NEAR(fit.on_slope_mg2 - fit.on_crest_mg2, rate * rate / 2, 0.2 * rate * rate / 2);
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

@@ -1,0 +1,117 @@
+#include "gap/judge/findings.h"
+
+#include <gtest/gtest.h>
+
+#include "gap/explain/catalogue.h"
+
+namespace sixpoint::gap {
+namespace {
+
+struct Asked {
+  DiagnoseOptions options;
+  Bundle bundle{};
+  Request request{bundle, options};
+};
+
+TEST(Findings, ProbabilityFromNats) {
+  const Asked asked;
+  Findings found;
+  found.add(asked.request, {.name = "drift", .nats = std::log(19.0)});
+  EXPECT_NEAR(found.effects.front().probability, 0.95, 1e-12);
+  // Another cause at even odds with the effect: of 19 : 1 : 19.
+  found.add(asked.request, {.name = "tilt", .nats = std::log(19.0), .other_nats = 0});
+  EXPECT_NEAR(found.effects.back().probability, 19.0 / 39, 1e-12);
+  EXPECT_NEAR(probability_of(1000), 1 / (1 + std::exp(-9)), 1e-15) << "never quite certain";
+}
+
+TEST(Findings, NineToOneIsAccepted) {
+  const Asked asked{{.without = {"flicker"}}};
+  Findings found;
+  found.add(asked.request, {.name = "drift", .nats = 2.3});
+  found.add(asked.request, {.name = "tilt", .nats = 2.1});
+  found.add(asked.request, {.name = "flicker", .nats = 50});
+  EXPECT_TRUE(found.accepted("drift"));
+  EXPECT_FALSE(found.accepted("tilt"));
+  EXPECT_EQ(found.candidates.size(), 2U) << "what is not allowed is no candidate";
+}
+
+TEST(Findings, TestsAlarmBeyondTheirThreshold) {
+  Findings found;
+  found.test(5.4, "quiet");
+  EXPECT_TRUE(found.alarms.empty());
+  found.test(5.6, "loud");
+  ASSERT_EQ(found.alarms.size(), 1U);
+  EXPECT_EQ(found.alarms.front().where, "loud");
+  Findings more;
+  more.test(3, "later");
+  more.outside_means_mg2 = {4};
+  found.append(std::move(more));
+  EXPECT_EQ(found.worst_sd, 5.6);
+  EXPECT_EQ(found.outside_means_mg2.size(), 1U);
+}
+
+// Quantiles of chi-square from tables (Abramowitz and Stegun, table 26.8).
+TEST(Findings, ChiSquareInStandardDeviations) {
+  EXPECT_NEAR(chi_to_sd(18.307, 10), 1.645, 0.01);  // 95 %
+  EXPECT_NEAR(chi_to_sd(29.588, 10), 3.090, 0.03);  // 99.9 %
+  EXPECT_NEAR(chi_to_sd(99.334, 100), 0, 0.01);     // median
+  EXPECT_EQ(chi_to_sd(5, 0), 0);
+}
+
+TEST(Findings, VerdictFromEffectsAndAlarms) {
+  const Asked asked;
+  for (const bool effect : {false, true}) {
+    for (const bool alarm : {false, true}) {
+      Findings found;
+      if (effect) {
+        found.add(asked.request, {.name = "drift", .nats = 9});
+      }
+      if (alarm) {
+        found.alarm(6.5, "somewhere");
+      }
+      Diagnosis out;
+      finish(asked.request, found, out);
+      EXPECT_EQ(out.verdict, alarm ? (effect ? Verdict::partly_explained : Verdict::unexplained)
+                                   : (effect ? Verdict::explained : Verdict::no_gap));
+      EXPECT_NEAR(out.unknown.probability, alarm ? 0.92 : 0.03, 1e-12);
+      EXPECT_EQ(out.candidates.size(), catalogue().size());
+    }
+  }
+}
+
+TEST(Findings, BeyondTheDatasheetIsSaid) {
+  const Asked asked;
+  Findings found;
+  found.add(asked.request,
+            {.name = "offset_tempco", .nats = 9, .parameters = {{"mg_per_c", {0.2, -1.4, 0}, {}}}});
+  found.add(asked.request, {.name = "sensitivity_tempco",
+                            .nats = 8,
+                            .parameters = {{"percent_per_c", {0.04, 0, 0}, {}}}});
+  Diagnosis out;
+  finish(asked.request, found, out);
+  EXPECT_TRUE(out.effects[0].outside_datasheet) << "1 mg/C is the limit";
+  EXPECT_FALSE(out.effects[1].outside_datasheet) << "0.05 %/C is the limit";
+}
+
+TEST(Findings, InconclusiveNamesNothing) {
+  const Asked asked{{.without = {"tilt"}}};
+  Findings found;
+  found.add(asked.request, {.name = "idle_sleep", .nats = 1000});
+  const Diagnosis d = inconclusive(asked.request, found, "too little", {});
+  EXPECT_FALSE(d.usable());
+  EXPECT_TRUE(d.effects.empty());
+  EXPECT_EQ(d.unknown.where.front(), "too little");
+  EXPECT_EQ(d.not_observable.size(), catalogue().size() - 1);
+  for (const EffectFinding& candidate : d.candidates) {
+    EXPECT_LE(candidate.probability, 0.5);
+  }
+}
+
+TEST(Findings, ParametersHaveTheContractsNames) {
+  EXPECT_EQ(parameter_name("tilt"), "rotation_vector_deg");
+  EXPECT_EQ(parameter_name("random_walk"), "mg_per_sqrt_s");
+  EXPECT_EQ(parameter_name("wrap"), "");
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

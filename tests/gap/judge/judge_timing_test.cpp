@@ -1,0 +1,51 @@
+#include <gtest/gtest.h>
+
+#include "gap/judge/made_step.h"
+
+namespace sixpoint::gap {
+namespace {
+
+using tests::effect;
+using tests::Made;
+
+TEST(JudgeTiming, AToneAtADifferentFrequencyIsAClock) {
+  ToneFit tone;
+  tone.frequency_ppm = 100;
+  EXPECT_NEAR(clock_ppm_of(tone), -100 / 1.0001, 1e-9);
+}
+
+TEST(JudgeTiming, AFastClockIsMeasured) {
+  Bundle bundle = tests::made_production({});
+  constexpr double kPpm = 600;
+  // Stamps of a clock that runs fast come earlier: a second of samples lasts 1 / (1 + e).
+  for (std::size_t k = 0; k < bundle.host_clock.host_time_s.size(); ++k) {
+    const Segment& s = bundle.segments[bundle.host_clock.sample_index[k] / 1000];
+    double& t = bundle.host_clock.host_time_s[k];
+    t = s.host_start_s + (t - s.host_start_s) / (1 + 1e-6 * kPpm);
+  }
+  const Made made(std::move(bundle));
+  const Timing timing = judge_timing(made.request, made.clean, made.noise);
+  const EffectFinding* clock = effect(timing.found, "clock_error");
+  ASSERT_NE(clock, nullptr);
+  EXPECT_NEAR(clock->parameters[0].value[0], kPpm, 4 * clock->parameters[0].sd[0]);
+  EXPECT_TRUE(clock->outside_datasheet);
+  EXPECT_EQ(effect(timing.found, "dropped_samples"), nullptr);
+}
+
+TEST(JudgeTiming, LostSamplesAreCounted) {
+  Bundle bundle = tests::made_production({});
+  for (const std::size_t segment : {3U, 11U}) {
+    for (std::size_t packet = 5; packet < 10; ++packet) {
+      bundle.host_clock.host_time_s[10 * segment + packet] += 0.01;  // one sample at 100 Hz
+    }
+  }
+  const Made made(std::move(bundle));
+  const Timing timing = judge_timing(made.request, made.clean, made.noise);
+  const EffectFinding* lost = effect(timing.found, "dropped_samples");
+  ASSERT_NE(lost, nullptr);
+  EXPECT_EQ(lost->nats, 12 * 2 - 3.5);
+  EXPECT_NEAR(lost->parameters[0].value[0], 2.0 / static_cast<double>(timing.host.samples), 1e-12);
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

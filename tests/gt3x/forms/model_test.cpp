@@ -1,0 +1,31 @@
+#include "gt3x/forms/model.h"
+
+#include <utility>
+
+#include <gtest/gtest.h>
+
+namespace sixpoint::gt3x {
+namespace {
+
+// The vendor's public descriptions, as model.h names them.
+TEST(Model, FollowsThePrefix) {
+  using Row = std::pair<const char*, const char*>;
+  for (const auto& [serial, model] :
+       {Row{"NEO1F12345678", "GT3X+"}, Row{"MOS2A45130450", "wGT3X-BT"},
+        Row{"MOS3A1", "wActiSleep+"}, Row{"MOS4A1", "wActiSleep-BT"},
+        Row{"MOS9", "wGT3X-BT family"}, Row{"CLE2A1", "wGT3X+"}, Row{"TAS1", "GT9X Link"},
+        Row{"CPW1", "CentrePoint Insight Watch"}, Row{"", "unknown"}}) {
+    EXPECT_EQ(model_of(serial), model);
+  }
+}
+
+TEST(Model, ScaleOnlyWhereItIsKnown) {
+  EXPECT_EQ(default_accel_scale_lsb_per_g("NEO1"), 341);
+  EXPECT_EQ(default_accel_scale_lsb_per_g("MOS0"), 256);
+  EXPECT_EQ(default_accel_scale_lsb_per_g("MOS2A1"), 256);
+  EXPECT_EQ(default_accel_scale_lsb_per_g("MRA1"), std::nullopt);
+  EXPECT_EQ(default_accel_scale_lsb_per_g("CPW1"), std::nullopt);
+}
+
+}  // namespace
+}  // namespace sixpoint::gt3x

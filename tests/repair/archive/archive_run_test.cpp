@@ -1,0 +1,213 @@
+// An archive in shards against one `repair` of the same files, and with the power cut at every
+// step.
+#include "repair/archive/archive_run.h"
+
+#include "repair/archive/archive_fixture.h"
+
+namespace sixpoint::repair {
+namespace {
+
+TEST_F(Archive, EqualsOneRepairForRandomTreesAndShardCounts) {
+  std::set<std::string> statuses;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    Random random(seed, 1);
+    const std::size_t count = 1 + random.below(20);
+    MemoryEnv whole;
+    fill(whole.files, seed, count);
+    const Outcome expected = repaired(whole);
+    ASSERT_EQ(expected.reports.size(), count);
+
+    MemoryEnv memory;
+    fill(memory.files, seed, count);
+    const auto planned = plan(memory, draft(1 + random.below(7)));
+    ASSERT_OK(planned);
+    const auto read = read_plan(memory.files, "/plan");
+    ASSERT_OK(read);
+    // Any order of the tasks, some of them twice.
+    std::vector<std::size_t> order(read->shards.size());
+    std::iota(order.begin(), order.end(), 0);
+    for (std::size_t i = order.size(); i > 1; --i) {
+      std::swap(order[i - 1], order[random.below(i)]);
+    }
+    order.push_back(order.front());
+    for (const std::size_t number : order) {
+      ASSERT_OK(run_shard(memory.env, "/plan", *read, shard(number)));
+    }
+    const Outcome got = merged(memory.files, *read);
+    EXPECT_EQ(got.reports, expected.reports) << "seed " << seed;
+    EXPECT_EQ(got.outputs, expected.outputs) << "seed " << seed;
+    for (const auto& [input, text] : expected.reports) {
+      statuses.insert(nlohmann::json::parse(text)["status"]);
+    }
+  }
+  EXPECT_EQ(statuses,
+            (std::set<std::string>{"repaired", "not_affected", "not_repairable", "failed"}))
+      << "the trees must hold every kind of file";
+}
+
+TEST_F(Archive, APowerCutAtEveryStepOfAShardLosesAndDoublesNothing) {
+  MemoryEnv whole;
+  fill(whole.files, 11, 4);
+  const Outcome expected = repaired(whole);
+  ASSERT_GE(expected.outputs.size(), 2U);
+  std::size_t cuts = 0;
+  for (std::size_t stop = 0;; ++stop) {
+    MemoryEnv memory;
+    fill(memory.files, 11, 4);
+    for (const auto& [input, text] : expected.reports) {  // the archive is on the medium
+      if (auto file = memory.files.info(input); file) {
+        ASSERT_OK(memory.files.sync_folder(folder_of(input)));
+      }
+    }
+    std::map<std::string, Bytes> originals;
+    for (const auto& [input, text] : expected.reports) {
+      originals[input] = read_file(memory.files, input).value();
+    }
+    const auto planned = plan(memory, draft(1));
+    ASSERT_OK(planned);
+    memory.files.fail_after(stop);
+    const auto first = run_shard(memory.env, "/plan", planned->plan, shard(0));
+    memory.files.stop_failing();
+    const bool survived =
+        first && std::none_of(first->files.begin(), first->files.end(), [](const auto& report) {
+          return report.error && report.error->code == ErrorCode::io;
+        });
+    memory.files.lose_power();
+    const auto read = read_plan(memory.files, "/plan");
+    ASSERT_OK(read);
+    if (survived) {
+      EXPECT_OK(read_result(memory.files, "/plan", *read, 0)) << "acknowledged, then lost";
+    }
+    // Broken recordings of the tree were never synced: their bytes are gone with the power.
+    for (const auto& [input, bytes] : originals) {
+      if (bytes.size() > 6) {
+        EXPECT_EQ(read_file(memory.files, input).value(), bytes);
+      }
+    }
+    const auto second = run_shard(memory.env, "/plan", *read, shard(0));
+    ASSERT_OK(second);
+    const Outcome got = merged(memory.files, *read);
+    EXPECT_EQ(got.outputs, expected.outputs) << "stopped at " << stop;
+    for (const auto& [input, text] : expected.reports) {
+      if (originals[input].size() > 6) {
+        EXPECT_EQ(got.reports.at(input), text) << "stopped at " << stop;
+      }
+    }
+    // Nothing half-written is left over, neither beside the outputs nor beside the results.
+    EXPECT_TRUE(memory.files.list("/plan/results/00000.parts").value().empty()) << stop;
+    for (const std::string folder : {"/repaired", "/plan/results"}) {
+      const auto names = memory.files.list(folder).value();
+      for (const std::string& name : names) {
+        EXPECT_FALSE(name.ends_with(".tmp")) << folder << "/" << name << " at " << stop;
+      }
+    }
+    ++cuts;
+    if (survived) {
+      break;
+    }
+  }
+  EXPECT_GT(cuts, 40U);
+}
+
+TEST_F(Archive, WhatAStoppedRunDidIsNotDoneAgain) {
+  MemoryEnv memory;
+  fill(memory.files, 4, 12);
+  const auto planned = plan(memory, draft(1));
+  ASSERT_OK(planned);
+  // Stopped while the ninth file is looked at: eight are written down, two by two.
+  struct Stop {};
+  ShardRunOptions options = shard(0);
+  options.progress = [](std::size_t done, std::size_t) {
+    if (done == 9) {
+      throw Stop{};
+    }
+  };
+  EXPECT_THROW(static_cast<void>(run_shard(memory.env, "/plan", planned->plan, options)), Stop);
+  auto standing = standing_of(memory.files, "/plan", planned->plan, 0);
+  EXPECT_EQ(standing.state, ShardState::partly);
+  EXPECT_EQ(standing.files_done, 8U);
+  EXPECT_FAILS(read_result(memory.files, "/plan", planned->plan, 0), ErrorCode::no_input);
+  const auto again = run_shard(memory.env, "/plan", planned->plan, shard(0));
+  ASSERT_OK(again);
+  std::size_t failed = 0;
+  for (std::size_t i = 0; i < 8; ++i) {
+    failed += again->files[i].status == RepairStatus::failed ? 1 : 0;
+  }
+  EXPECT_EQ(again->done_before, 8 - failed) << "what failed is tried again";
+  standing = standing_of(memory.files, "/plan", planned->plan, 0);
+  EXPECT_EQ(standing.state, ShardState::done);
+}
+
+TEST_F(Archive, TwoRunsOfOneShardAtATimeAreRefused) {
+  MemoryEnv memory;
+  fill(memory.files, 6, 4);
+  const auto planned = plan(memory, draft(2));
+  ASSERT_OK(planned);
+  std::size_t refused = 0;
+  ShardRunOptions options = shard(0);
+  options.progress = [&](std::size_t done, std::size_t) {
+    if (done == 0) {
+      const auto other = run_shard(memory.env, "/plan", planned->plan, shard(0));
+      EXPECT_FAILS(other, ErrorCode::cannot_create);
+      EXPECT_EQ(standing_of(memory.files, "/plan", planned->plan, 0).state, ShardState::running);
+      EXPECT_OK(run_shard(memory.env, "/plan", planned->plan, shard(1))) << "another shard may";
+      ++refused;
+    }
+  };
+  EXPECT_OK(run_shard(memory.env, "/plan", planned->plan, options));
+  EXPECT_EQ(refused, 1U);
+}
+
+TEST_F(Archive, AFileThatChangedSinceThePlanIsReportedAndNotRepaired) {
+  for (const bool hash : {false, true}) {
+    MemoryEnv memory;
+    Random random(1);
+    ASSERT_OK(memory.files.make_folders("/archive"));
+    MadeRecording made = few_seconds(random);
+    made.firmware = "1.5.0";
+    made.serial = "MOS2A45130450";
+    for (const char* name : {"changed", "gone", "same", "touched"}) {
+      ASSERT_OK(made.write(memory.files, std::string("/archive/") + name + ".gt3x"));
+    }
+    ArchiveDraft how = draft(1);
+    how.hash = hash;
+    const auto planned = plan(memory, how);
+    ASSERT_OK(planned);
+    made.raw[3][1] += 1;  // the size is the same
+    ASSERT_OK(memory.files.remove("/archive/changed.gt3x"));
+    ASSERT_OK(made.write(memory.files, "/archive/changed.gt3x"));
+    made.raw[3][1] -= 1;
+    ASSERT_OK(memory.files.remove("/archive/touched.gt3x"));
+    ASSERT_OK(made.write(memory.files, "/archive/touched.gt3x"));  // the same bytes, another time
+    ASSERT_OK(memory.files.remove("/archive/gone.gt3x"));
+    const auto result = run_shard(memory.env, "/plan", planned->plan, shard(0));
+    ASSERT_OK(result);
+    EXPECT_EQ(result->files[0].status, RepairStatus::failed);
+    EXPECT_EQ(result->files[0].error->code, ErrorCode::bad_data);
+    EXPECT_THAT(result->files[0].reasons.front(), HasSubstr("changed"));
+    EXPECT_FALSE(memory.files.info("/repaired/changed.gt3x"));
+    EXPECT_EQ(result->files[1].status, RepairStatus::failed);
+    EXPECT_EQ(result->files[1].error->code, ErrorCode::no_input);
+    EXPECT_EQ(result->files[2].status, RepairStatus::repaired);
+    EXPECT_EQ(result->files[3].status, hash ? RepairStatus::repaired : RepairStatus::failed)
+        << "where there is a hash, the hash decides";
+  }
+}
+
+TEST_F(HostilePlan, OutputFoldersThatCannotBe) {
+  for (const char* folder : {"/archive", "/archive/repaired", "/"}) {
+    ShardRunOptions options = shard(0);
+    options.output_folder = folder;
+    SCOPED_TRACE(folder);
+    EXPECT_FAILS(run_shard(memory_.env, "/plan", plan_, options), ErrorCode::usage);
+  }
+  EXPECT_OK(run_first());
+  ShardRunOptions elsewhere = shard(1);
+  elsewhere.output_folder = "/elsewhere";
+  const auto other = run_shard(memory_.env, "/plan", plan_, elsewhere);
+  EXPECT_FAILS(other, ErrorCode::usage);
+  EXPECT_THAT(other.error().brief(), HasSubstr("/repaired"));
+}
+
+}  // namespace
+}  // namespace sixpoint::repair

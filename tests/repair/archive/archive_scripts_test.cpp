@@ -1,0 +1,18 @@
+#include "repair/archive/archive_scripts.h"
+
+#include "repair/archive/archive_fixture.h"
+
+namespace sixpoint::repair {
+namespace {
+
+TEST_F(Archive, ScriptsKeepAnyFolderOneWord) {
+  EXPECT_EQ(shell_word("/plain/path-1.2"), "/plain/path-1.2");
+  EXPECT_EQ(shell_word(""), "''");
+  EXPECT_EQ(shell_word("it's; rm -rf $HOME\n"), "'it'\\''s; rm -rf $HOME\n'");
+  const std::string script = slurm_script({"/p", "sixpoint", 12, 5});
+  EXPECT_THAT(script, HasSubstr("#SBATCH --array=0-11%5\n"));
+  EXPECT_THAT(slurm_script({"/p", "sixpoint", 12, 0}), HasSubstr("#SBATCH --array=0-11\n"));
+}
+
+}  // namespace
+}  // namespace sixpoint::repair

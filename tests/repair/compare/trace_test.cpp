@@ -1,0 +1,46 @@
+#include "repair/compare/trace.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace sixpoint::repair {
+namespace {
+
+// Catmull-Rom gives every parabola exactly.
+TEST(Trace, InterpolatesAParabolaExactly) {
+  std::vector<float> values;
+  for (int i = 0; i < 8; ++i) {
+    values.push_back(static_cast<float>(i * i));
+  }
+  const Trace trace = Trace::from_magnitudes("a", 100, 2, values);
+  EXPECT_EQ(trace.end_s(), 104);
+  EXPECT_NEAR(trace.at(101.25), 2.5 * 2.5, 1e-12);
+  EXPECT_NEAR(trace.at(102), 16, 1e-12);
+  EXPECT_TRUE(std::isnan(trace.at(100.25))) << "no sample before the first";
+  EXPECT_TRUE(std::isnan(trace.at(99)));
+  EXPECT_TRUE(std::isnan(trace.at(103.5)));
+}
+
+TEST(Trace, ASecondHasItsExtremesAndItsDeviation) {
+  std::vector<float> values;
+  for (int i = 0; i < 40; ++i) {
+    values.push_back(i % 2 == 0 ? 0.75F : 1.25F);
+  }
+  values[21] = std::nanf("");
+  Trace trace = Trace::from_magnitudes("a", 1000, 20, values);
+  const Second first = second_at(trace, 1000);
+  EXPECT_EQ(first.smallest_g, 0.75F);
+  EXPECT_EQ(first.largest_g, 1.25F);
+  EXPECT_NEAR(first.sd_g, 0.25, 1e-6) << "half of the samples at either side of the mean";
+  EXPECT_FALSE(std::isnan(second_at(trace, 1001).sd_g)) << "one of twenty is missing";
+  EXPECT_TRUE(std::isnan(second_at(trace, 1001.5).sd_g)) << "beyond the end";
+  for (std::size_t i = 20; i < 31; ++i) {
+    values[i] = std::nanf("");
+  }
+  trace = Trace::from_magnitudes("a", 1000, 20, values);
+  EXPECT_TRUE(std::isnan(second_at(trace, 1001).sd_g)) << "more than half are missing";
+}
+
+}  // namespace
+}  // namespace sixpoint::repair

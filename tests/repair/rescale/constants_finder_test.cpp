@@ -1,0 +1,91 @@
+#include "repair/rescale/constants_finder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "repair/jig_constants.h"
+#include "repair/six_sides.h"
+
+namespace sixpoint::repair {
+namespace {
+
+using testing::HasSubstr;
+
+class Finder : public testing::Test {
+ protected:
+  Finder() {
+    EXPECT_OK(tests::six_sides().write(memory_.files, "in.gt3x"));
+    survey_ = survey(memory_.files, "in.gt3x").value();
+    id_ = store_.add_constants(tests::jig_constants(), "").value();
+  }
+  ConstantsChoice choose(ConstantsFinderOptions options) {
+    ConstantsFinder finder(memory_.env, std::move(options));
+    return finder.choose("in.gt3x", survey_).value();
+  }
+  // No constants, and one reason that holds `text`.
+  void expect_none(ConstantsFinderOptions options, const char* text) {
+    options.scan = false;
+    const auto choice = choose(options);
+    EXPECT_FALSE(choice.chosen);
+    EXPECT_THAT(choice.reasons, testing::ElementsAre(HasSubstr(text)));
+  }
+
+  MemoryEnv memory_;
+  db::Store store_ = db::Store::open(memory_.env, ":memory:").value();
+  db::Store empty_ = db::Store::open(memory_.env, ":memory:").value();
+  Survey survey_;
+  std::string id_;
+};
+
+TEST_F(Finder, NamedConstantsComeBeforeTheStore) {
+  ConstantsFinderOptions options;
+  options.given = calib::parse_constants_record(tests::kConstants).value();
+  options.store = &store_;
+  EXPECT_EQ(choose(options).chosen->method, "constants");
+}
+
+TEST_F(Finder, TheStoreComesBeforeTheFile) {
+  ConstantsFinderOptions options;
+  options.store = &store_;
+  const auto choice = choose(options);
+  ASSERT_TRUE(choice.chosen);
+  EXPECT_EQ(choice.chosen->method, "store");
+  EXPECT_EQ(choice.chosen->constants_id, id_);
+  EXPECT_EQ(choice.chosen->record.calibration.zero_lsb[1], 50.25);
+  const auto snapshot = ConstantsSnapshot::of_store(store_).value();
+  options.store = nullptr;
+  options.snapshot = &snapshot;
+  EXPECT_EQ(choose(options).chosen->constants_id, id_) << "a snapshot answers as the store does";
+}
+
+TEST_F(Finder, SaysWhyThereIsNothing) {
+  ConstantsFinderOptions options;
+  options.store = &empty_;
+  expect_none(options, "MOS2A45130450");
+}
+
+TEST_F(Finder, ACalibrationFileMustBeOfThisUnit) {
+  tests::MadeRecording other = tests::six_sides();
+  other.serial = "MOS2A45130999";
+  ASSERT_OK(other.write(memory_.files, "other.gt3x"));
+  ConstantsFinderOptions options;
+  options.calibration_file = "other.gt3x";
+  expect_none(options, "MOS2A45130999");
+}
+
+TEST_F(Finder, ACalibrationFileThatIsMissingIsAReasonAndNoError) {
+  ConstantsFinderOptions options;
+  options.calibration_file = "none.gt3x";
+  expect_none(options, "cannot be used");
+}
+
+TEST_F(Finder, ARepairedRecordingIsNotSolved) {
+  Survey repaired = survey_;
+  repaired.already_repaired = true;
+  EXPECT_FAILS(solve_survey("in.gt3x", repaired, {}), ErrorCode::bad_data);
+}
+
+}  // namespace
+}  // namespace sixpoint::repair

@@ -1,0 +1,61 @@
+#include "repair/triage/still_scan.h"
+
+#include <gtest/gtest.h>
+
+#include "expect_result.h"
+
+namespace sixpoint::repair {
+namespace {
+
+using gt3x::Counts;
+
+// Firmware 1.6.0 stored x' = -y, y' = x.
+TEST(StillScan, UndoesTheRotation) {
+  std::vector<Counts> samples = {{-20, 10, 30}, {2047, 5, 0}, {-2048, 5, 0}};
+  undo_rotation(samples);
+  EXPECT_EQ(samples[0], (Counts{10, 20, 30}));
+  EXPECT_EQ(samples[1], (Counts{5, -2048, 0})) << "at the limit it stays at the limit";
+  EXPECT_EQ(samples[2], (Counts{5, 2047, 0}));
+}
+
+TEST(StillScan, MagnitudeErrorsByHand) {
+  EXPECT_EQ(magnitude_error({}).blocks, 0U);
+  std::vector<calib::StillBlock> blocks(3);
+  blocks[0].mean_g = {0.6, 0.8, 0};  // 1 g
+  blocks[1].mean_g = {0, 0, -1.01};  // 10 mg
+  blocks[2].mean_g = {0.98, 0, 0};   // 20 mg
+  const MagnitudeError error = magnitude_error(blocks);
+  EXPECT_EQ(error.blocks, 3U);
+  EXPECT_NEAR(error.mean_mg, 10, 1e-9);
+  EXPECT_NEAR(error.p95_mg, 20, 1e-9);
+  EXPECT_NEAR(error.worst_mg, 20, 1e-9);
+}
+
+TEST(StillScan, RefusesWhatCannotBe) {
+  EXPECT_FALSE(StillScan::make(0, 256));
+  EXPECT_FALSE(StillScan::make(30, 0));
+  auto scan = StillScan::make(30, 256);
+  ASSERT_OK(scan);
+  EXPECT_FALSE(scan->set_constants({{10, 300, 300}, {10, -300, -300}, {0, 0, 0}}));
+}
+
+// Twenty seconds at rest, in one run and with two seconds missing in the middle.
+TEST(StillScan, AGapEndsARun) {
+  const std::vector<Counts> second(30, Counts{0, 0, 256});
+  const auto blocks_with = [&](std::uint32_t gap_s) {
+    StillScan scan = StillScan::make(30, 256).value();
+    for (std::uint32_t t = 0; t < 20; ++t) {
+      scan.push(1000 + t + (t < 10 ? 0 : gap_s), second);
+    }
+    return scan.finish();
+  };
+  const auto whole = blocks_with(0);
+  ASSERT_FALSE(whole.empty());
+  EXPECT_NEAR(whole[0].mean_g[2], 1, 1e-12) << "raw counts over 256";
+  EXPECT_NEAR(whole[0].mean_lsb[2], 256, 1e-9);
+  const auto split = blocks_with(2);
+  EXPECT_GE(split.size(), whole.size() == 1 ? 2U : 1U);
+}
+
+}  // namespace
+}  // namespace sixpoint::repair

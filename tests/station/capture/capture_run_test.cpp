@@ -1,0 +1,112 @@
+#include "station/capture/capture_run.h"
+
+#include <gmock/gmock.h>
+
+#include "expect_result.h"
+#include "mocks/inert/inert.h"
+#include "station/virtual_bench.h"
+
+namespace sixpoint::station {
+namespace {
+
+using calib::FilterConfiguration;
+using testing::Contains;
+using testing::HasSubstr;
+
+const CaptureHooks kAlwaysPlaced{
+    .ask = [](device::Pose, std::size_t, std::size_t) { return SideAnswer::placed; }};
+
+// Oracle: the virtual unit's truth. Still blocks of a six-sided file: 2 mg.
+TEST(CaptureRun, RecordsDownloadsAndSolves) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    VirtualBench bench(seed);
+    CaptureOptions options;
+    options.output = "c.gt3x";
+    const auto report = run_capture(bench.on_jig(), bench.env.env, options, kAlwaysPlaced);
+    ASSERT_OK(report);
+    ASSERT_TRUE(report->solved);
+    EXPECT_TRUE(report->usable()) << report->solved->brief();
+    EXPECT_EQ(report->solved->filter, FilterConfiguration::current);
+    const sim::SensorTruth& truth = bench.plugged->unit.truth().current;
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      EXPECT_NEAR(report->solved->calibration->sensitivity_g_per_lsb[axis] *
+                      truth.sensitivity_lsb_per_g[axis],
+                  1, 3e-3);
+      EXPECT_NEAR(report->solved->calibration->zero_lsb[axis], truth.zero_lsb[axis], 0.8);
+    }
+    EXPECT_TRUE(bench.env.files.info("c.gt3x"));
+  }
+}
+
+TEST(CaptureRun, RefusesAUnitWhoseRecordingCannotHelp) {
+  for (const char* firmware : {"1.2.0", "1.8.0"}) {
+    sim::GivenProperties given;
+    given.firmware = firmware;
+    VirtualBench bench(7, given);
+    CaptureOptions options;
+    options.output = "c.gt3x";
+    const auto report = run_capture(bench.on_jig(), bench.env.env, options, kAlwaysPlaced);
+    ASSERT_OK(report);
+    EXPECT_FALSE(report->usable());
+    EXPECT_THAT(report->refusal, Contains(HasSubstr("firmware from 1.4.0 to 1.7.0")));
+    EXPECT_FALSE(bench.env.files.info("c.gt3x"));
+    EXPECT_TRUE(bench.unit->recordings()->empty()) << "nothing was recorded";
+  }
+  sim::GivenProperties later;
+  later.firmware = "1.8.0";
+  later.calibrated = *parse_iso8601("2015-01-01");
+  VirtualBench bench(7, later);
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  EXPECT_TRUE(run_capture(bench.on_jig(), bench.env.env, options, kAlwaysPlaced)->usable());
+}
+
+TEST(CaptureRun, SidesThatWereLeftOutAreNamed) {
+  VirtualBench bench;
+  mocks::InertJig lazy;  // never turns it
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  const auto report = run_capture({bench.unit.get(), &lazy}, bench.env.env, options, kAlwaysPlaced);
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->usable());
+  const auto& missing = report->solved->verification.missing_directions;
+  EXPECT_THAT(missing, Contains("-z"));
+  EXPECT_GE(missing.size(), 4U);
+}
+
+TEST(CaptureRun, ThePersonMayStopAndTheUnitIsNotLeftRecording) {
+  VirtualBench bench;
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  CaptureHooks hooks;
+  hooks.ask = [](device::Pose, std::size_t number, std::size_t) {
+    return number < 3 ? SideAnswer::placed : SideAnswer::stop;
+  };
+  const auto report = run_capture(bench.on_jig(), bench.env.env, options, hooks);
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->stopped);
+  ASSERT_OK(bench.unit->start_stream(100));  // not busy
+}
+
+TEST(CaptureRun, AUnitThatWasLeftStreamingRecords) {
+  VirtualBench bench;
+  ASSERT_OK(bench.unit->start_stream(50));
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  const auto report = run_capture(bench.on_jig(), bench.env.env, options, kAlwaysPlaced);
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->usable());
+}
+
+TEST(CaptureRun, DoesNotWriteOverAFile) {
+  VirtualBench bench;
+  ASSERT_OK(bench.env.files.create("c.gt3x"));
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  EXPECT_FAILS(run_capture(bench.on_jig(), bench.env.env, options, kAlwaysPlaced),
+               ErrorCode::cannot_create);
+  EXPECT_TRUE(bench.unit->recordings()->empty());
+}
+
+}  // namespace
+}  // namespace sixpoint::station

@@ -1,0 +1,127 @@
+// Calibration files recorded in a lane.
+#include "station/page/station_in_process.h"
+
+namespace sixpoint::station {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kCaptured = "virtual:seed=7,serial=MOS2A45130007,pace=100";
+
+TEST(LaneCapture, RecordsACalibrationFileSideAfterSide) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.start("/api/capture", {{"lane", 1}});
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["kind"], "capture");
+  EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
+  EXPECT_EQ(lane["result"]["stored"], true);
+  const Json files = station.get("/api/files?path=");
+  ASSERT_EQ(files["files"].size(), 1U);
+  const std::string name = files["files"][0]["name"];
+  const auto answer =
+      station.client().Post("/api/check", Json{{"file", name}}.dump(), "text/plain");
+  ASSERT_EQ(answer->status, 200) << answer->body;
+  const Json check = Json::parse(answer->body);
+  EXPECT_EQ(check["usable"], true);
+  EXPECT_TRUE(check["repeat_sides"].empty());
+}
+
+TEST(LaneCapture, ACaptureSurvivesAReplugAndAsksTheSideUnderWayAgain) {
+  const tests::TemporaryFolder folder;
+  Station station({kCaptured}, folder.path());
+  station.start("/api/capture");
+  EXPECT_THAT(place_sides(station, 2), testing::ElementsAre("+z", "-z"));
+  const auto hand = [&](const Json& body) { return station.post("/api/lanes/1/hand", body); };
+  // Pulled out while it rests on the third side.
+  const Json third = station.wait(1, [](const Json& json) {
+    return json["capture"].is_object() && json["capture"]["number"] == 3;
+  });
+  ASSERT_EQ(station.post("/api/lanes/1/placed", Json::object()), 200);
+  hand({{"do", "unplug"}});
+  const Json away = station.wait_state(1, "unit_away");
+  EXPECT_TRUE(away["capture"].is_object()) << "the capture is still there";
+  hand({{"do", "plug"}});
+  const Json back = station.wait(1, [](const Json& json) {
+    return json["state"] == "capturing" && json["capture"]["side"].is_string();
+  });
+  EXPECT_EQ(back["capture"]["side"], third["capture"]["side"]) << "asked again";
+  EXPECT_EQ(back["capture"]["placed"], false);
+  // Once more, while it waits for the operator: it is noticed without any button.
+  hand({{"do", "unplug"}});
+  station.wait_state(1, "unit_away");
+  hand({{"do", "plug"}});
+  station.wait_state(1, "capturing");
+  const auto rest = place_sides(station, 6);
+  ASSERT_EQ(rest.size(), 4U) << "the two that were done are not asked again";
+  EXPECT_EQ(rest.front(), third["capture"]["side"].get<std::string>());
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
+  EXPECT_TRUE(lane["capture"].is_null());
+  // The file that was put together from the pieces is a calibration file like any other.
+  std::string file = lane["result"]["file"];
+  file = file.substr(folder.path().size() + 1);
+  const auto answer =
+      station.client().Post("/api/check", Json{{"file", file}}.dump(), "application/json");
+  ASSERT_EQ(answer->status, 200) << answer->body;
+  EXPECT_EQ(Json::parse(answer->body)["usable"], true);
+}
+
+TEST(LaneCapture, AnotherUnitInACaptureIsNoticedAndNothingIsMixed) {
+  const tests::TemporaryFolder folder;
+  Station station({kCaptured}, folder.path());
+  station.start("/api/capture");
+  place_sides(station, 1);
+  expect_swap_is_noticed(station);
+}
+
+TEST(LaneCapture, ACaptureSurvivesTheProgram) {
+  const tests::TemporaryFolder folder;
+  const auto bench = std::make_shared<mocks::VirtualBench>();  // the units go on without it
+  {
+    Station station({kCaptured}, folder.path(), "", 24, bench);
+    station.start("/api/capture", {{"operator", "Ada"}});
+    EXPECT_EQ(place_sides(station, 3).size(), 3U);
+  }
+  {
+    Station station({kCaptured}, folder.path(), "", 24, bench);
+    station.wait(1, [](const Json& json) {
+      return json["state"] == "capturing" && json["capture"]["number"] == 4;
+    });
+    EXPECT_EQ(station.lane(1)["operator"], "Ada");
+    EXPECT_EQ(place_sides(station, 6).size(), 3U) << "the first three stay";
+    const Json lane = station.wait_state(1, "done");
+    EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
+    EXPECT_EQ(lane["result"]["stored"], true);
+  }
+  Station station({kCaptured}, folder.path(), "", 24, bench);
+  station.wait_state(1, "idle");  // nothing is left to go on with
+}
+
+// A unit that lost its memory meanwhile: a note says so, and all sides are asked for again.
+TEST(LaneCapture, ACaptureStartsAgainWhenTheUnitHasLostItsRecording) {
+  const tests::TemporaryFolder folder;
+  {
+    Station station({kCaptured}, folder.path());
+    station.start("/api/capture");
+    EXPECT_EQ(place_sides(station, 2).size(), 2U);
+  }
+  Station station({kCaptured}, folder.path());  // a unit that knows nothing of it
+  station.wait_state(1, "capturing");
+  EXPECT_EQ(place_sides(station, 6).size(), 6U);
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
+  EXPECT_THAT(lane["result"]["notes"].dump(), HasSubstr("lost its recording; 2 sides are"));
+}
+
+TEST(LaneCapture, AUnitOfTheWrongFilterIsRefused) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto,firmware=1.8.0"}, folder.path());
+  station.start("/api/capture");
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "refused");
+  EXPECT_THAT(lane["result"]["reasons"].dump(), HasSubstr("firmware from 1.4.0 to 1.7.0"));
+}
+
+}  // namespace
+}  // namespace sixpoint::station

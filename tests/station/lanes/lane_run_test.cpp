@@ -1,0 +1,149 @@
+// Jig runs in a lane: they survive a replug and a restart of the program, and are stored.
+#include <algorithm>
+
+#include "station/page/station_in_process.h"
+
+namespace sixpoint::station {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(LaneRun, MeasuresAUnitAndStoresTheRunWithItsSamples) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.start("/api/run", {{"lane", 1}, {"operator", "Ada"}});
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  EXPECT_EQ(lane["result"]["verdict"], "pass") << lane.dump(1);
+  EXPECT_EQ(lane["result"]["run"], "abc123");
+  EXPECT_EQ(lane["run"]["taken"].size(), 14U);
+  ASSERT_EQ(station.reports.size(), 1U);
+  EXPECT_EQ(station.operators.front(), "Ada");
+  EXPECT_THAT(station.reports.front().raw_csv, testing::StartsWith("device_time_us,"));
+  EXPECT_EQ(station.reports.front().verification.poses.size(), 8U);
+}
+
+TEST(LaneRun, AsksForEachPlacementAndRefusesWrongOnesWithTheReason) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,pace=50"}, folder.path());
+  station.start("/api/run", {{"operator", "Ada"}});
+  const auto hand = [&](const Json& body) { return station.post("/api/lanes/1/hand", body); };
+  const auto refusal_of = [&](const std::string& text) {
+    station.wait(1, [&](const Json& json) {
+      return json["run"].is_object() &&
+             json["run"]["last_refusal"].get<std::string>().find(text) != std::string::npos;
+    });
+  };
+  place_unit(station, 1, 3);
+  station.wait(1, [](const Json& json) { return json["run"]["taken"].size() == 3; });
+  EXPECT_EQ(hand({{"do", "turn"}, {"pose", "+z"}}), 200);
+  refusal_of("+z is done already");
+  EXPECT_EQ(hand({{"do", "lean"}}), 200);
+  refusal_of("lies on none of its six faces");
+  EXPECT_EQ(hand({{"do", "turn"}, {"pose", "-x"}, {"tilt_deg", 7.2}}), 200);
+  refusal_of("tilted");
+  // Undo, and the pose is wanted again.
+  EXPECT_EQ(station.post("/api/lanes/1/undo", Json::object()), 200);
+  station.wait(1, [](const Json& json) { return json["run"]["taken"].size() == 2; });
+  place_unit(station, 1, 40);
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "pass") << lane.dump(1);
+}
+
+TEST(LaneRun, ContinuesAfterAReplugAndNoticesAnotherUnit) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,pace=50"}, folder.path());
+  station.start("/api/run");
+  place_unit(station, 1, 4);
+  station.wait(1, [](const Json& json) { return json["run"]["taken"].size() == 4; });
+  const auto hand = [&](const Json& body) { return station.post("/api/lanes/1/hand", body); };
+  hand({{"do", "unplug"}});
+  const auto before = std::chrono::steady_clock::now();
+  station.wait_state(1, "unit_away");
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(5));
+  hand({{"do", "plug"}});
+  station.wait_state(1, "running");
+  EXPECT_EQ(station.lane(1)["run"]["taken"].size(), 4U) << "nothing is lost";
+  // Another unit in its place: nothing of it gets into the run.
+  expect_swap_is_noticed(station);
+}
+
+TEST(LaneRun, ARunSurvivesTheProgram) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,pace=50";
+  std::size_t rows = 0;
+  {
+    Station station({device}, folder.path());
+    station.start("/api/run", {{"operator", "Ada"}});
+    place_unit(station, 1, 7);
+    station.wait(1, [](const Json& json) { return json["run"]["taken"].size() == 7; });
+    EXPECT_TRUE(station.reports.empty());
+  }
+  {
+    Station station({device}, folder.path());
+    const Json lane = station.wait_state(1, "running");
+    EXPECT_EQ(lane["operator"], "Ada");
+    station.wait(1, [](const Json& json) {
+      return json["run"].is_object() && json["run"]["taken"].size() == 7;
+    });
+    place_unit(station, 1, 20);
+    const Json done = station.wait(1, [](const Json& json) {
+      return json["result"].is_object() && json["result"]["stored"] == true;
+    });
+    EXPECT_EQ(done["result"]["verdict"], "pass") << done.dump(1);
+    ASSERT_EQ(station.reports.size(), 1U);
+    const std::string& raw = station.reports.front().raw_csv;
+    rows = static_cast<std::size_t>(std::count(raw.begin(), raw.end(), '\n'));
+    EXPECT_GT(rows, 14U * 600U) << "the samples of both programs";
+    EXPECT_EQ(raw.find("device_time_us", 1), std::string::npos) << "one headline";
+  }
+  Station station({device}, folder.path());
+  station.wait_state(1, "idle");  // nothing is left to go on with
+}
+
+TEST(LaneRun, AnInterruptedRunWithoutItsUnitEndsWithItsData) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,pace=50";
+  {
+    Station station({device}, folder.path());
+    station.start("/api/run");
+    place_unit(station, 1, 2);
+    station.wait(1, [](const Json& json) { return json["run"]["taken"].size() == 2; });
+    station.post("/api/lanes/1/hand", {{"do", "unplug"}});
+    station.wait_state(1, "unit_away");
+  }
+  // The same lane, another unit at its address.
+  Station station({device}, folder.path());
+  station.wait_state(1, "running");
+  station.post("/api/lanes/1/hand", {{"do", "unplug"}});
+  station.wait_state(1, "unit_away");
+  EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  ASSERT_EQ(station.reports.size(), 1U);
+  EXPECT_EQ(station.reports.front().faces.size(), 2U);
+  EXPECT_GT(station.reports.front().raw_csv.size(), 20'000U);
+}
+
+TEST(LaneRun, AStoreThatFailsIsTriedAgain) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.store_is_away = true;
+  station.start("/api/run");
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("problem");
+  });
+  EXPECT_EQ(lane["result"]["verdict"], "pass");
+  EXPECT_EQ(lane["result"]["stored"], false);
+  {
+    const std::lock_guard lock(station.mutex);
+    station.store_is_away = false;
+  }
+  station.wait(1, [](const Json& json) { return json["result"]["stored"] == true; });
+  EXPECT_EQ(station.reports.size(), 1U);
+}
+
+}  // namespace
+}  // namespace sixpoint::station

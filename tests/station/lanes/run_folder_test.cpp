@@ -1,0 +1,112 @@
+#include "station/lanes/run_folder.h"
+
+#include <fstream>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "expect_result.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::station {
+namespace {
+
+UnfinishedRun a_run() {
+  UnfinishedRun run;
+  run.device = "virtual:seed=7";
+  run.serial = "MOS2A45130007";
+  run.firmware = "1.5.0";
+  run.operator_name = "Łukasz";
+  run.station = "bench-1";
+  run.client = "tab-1";
+  run.write = true;
+  run.filter = calib::FilterConfiguration::legacy;
+  run.resume.started = *parse_iso8601("2026-01-02T03:04:05");
+  run.resume.as_found = device::CalibrationPage{};
+  run.resume.as_found->constants.zero_lsb = {1, -2, 3};
+  run.resume.progress.refusals = 4;
+  return run;
+}
+
+std::string text_of_file(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+TEST(RunFolder, AnotherProgramFindsTheRunWithItsSamples) {
+  const tests::TemporaryFolder folder;
+  {
+    RunFolder first(posix_env(), folder / "lane");
+    ASSERT_OK(first.save(a_run()));
+    ASSERT_OK(first.append("t,x,y,z,c\n1,2,3,4,25\n"));
+    ASSERT_OK(first.close());
+  }
+  {
+    RunFolder second(posix_env(), folder / "lane");
+    ASSERT_OK(second.append("2,2,3,4,25\n"));
+    ASSERT_OK(second.close());
+  }
+  RunFolder third(posix_env(), folder / "lane");
+  const auto left = third.load();
+  ASSERT_OK(left);
+  ASSERT_TRUE(left->has_value());
+  const UnfinishedRun& run = **left;
+  EXPECT_EQ(run.serial, "MOS2A45130007");
+  EXPECT_EQ(run.operator_name, "Łukasz");
+  EXPECT_EQ(run.filter, calib::FilterConfiguration::legacy);
+  EXPECT_TRUE(run.write);
+  EXPECT_EQ(to_iso8601(run.resume.started), "2026-01-02T03:04:05Z");
+  ASSERT_TRUE(run.resume.as_found);
+  EXPECT_EQ(run.resume.as_found->constants.zero_lsb, (PerAxis<int>{1, -2, 3}));
+  EXPECT_FALSE(run.resume.written);
+  EXPECT_EQ(run.resume.progress.refusals, 4);
+  EXPECT_EQ(run.resume.raw_csv, "t,x,y,z,c\n1,2,3,4,25\n2,2,3,4,25\n");
+  ASSERT_OK(third.clear());
+  EXPECT_FALSE(third.load()->has_value());
+}
+
+TEST(RunFolder, AnIncompleteLastRowIsLeftOut) {
+  const tests::TemporaryFolder folder;
+  RunFolder lane(posix_env(), folder / "lane");
+  ASSERT_OK(lane.save(a_run()));
+  ASSERT_OK(lane.append("t,x,y,z,c\n1,2,3,4,25\n2,2,"));
+  ASSERT_OK(lane.close());
+  EXPECT_EQ((**lane.load()).resume.raw_csv, "t,x,y,z,c\n1,2,3,4,25\n");
+}
+
+TEST(RunFolder, ADamagedStateIsRefusedAndSetAside) {
+  const tests::TemporaryFolder folder;
+  RunFolder lane(posix_env(), folder / "lane");
+  ASSERT_OK(lane.save(a_run()));
+  std::ofstream(folder / "lane/run.json") << R"({"device": "virtual:seed=7", "serial": 7})";
+  EXPECT_FAILS(lane.load(), ErrorCode::bad_data);
+  ASSERT_OK(lane.set_aside());
+  const auto left = lane.load();
+  ASSERT_OK(left);
+  EXPECT_FALSE(left->has_value());
+}
+
+TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
+  const tests::TemporaryFolder folder;
+  RunFolder lane(posix_env(), folder / "lane");
+  EXPECT_FALSE(lane.load_capture()->has_value());
+  UnfinishedCapture capture;
+  capture.serial = "MOS2A45130007";
+  capture.output = "out.gt3x";
+  capture.resume.done = {{device::Pose::plus_z, 3}, {device::Pose::minus_x, 4}};
+  ASSERT_OK(lane.save_capture(capture));
+  const std::string json = text_of_file(folder / "lane/capture.json");
+  EXPECT_NE(json.find("\"-x\""), std::string::npos) << json;
+  const auto left = lane.load_capture();
+  ASSERT_OK(left);
+  ASSERT_TRUE(left->has_value());
+  ASSERT_EQ((*left)->resume.done.size(), 2U);
+  EXPECT_EQ((*left)->resume.done[1].pose, device::Pose::minus_x);
+  EXPECT_EQ((*left)->resume.done[1].recording, 4);
+  ASSERT_OK(lane.clear_capture());
+  EXPECT_FALSE(lane.load_capture()->has_value());
+}
+
+}  // namespace
+}  // namespace sixpoint::station

@@ -1,0 +1,36 @@
+// The files that the page may list: those below one folder.
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "station/page/station_in_process.h"
+
+namespace sixpoint::station {
+namespace {
+
+TEST(ApiFiles, ListsRecordingsAndFoldersBelowTheStationsFolder) {
+  const tests::TemporaryFolder folder;
+  ASSERT_OK(posix_env().files.make_folders(folder / "clients/b"));
+  std::ofstream(folder / "clients/a.gt3x") << "12345";
+  std::ofstream(folder / "clients/notes.txt") << "x";
+  std::ofstream(folder / "clients/.hidden.gt3x") << "x";
+  Station station({"virtual:seed=7"}, folder.path());
+  const Json listed = station.get("/api/files?path=clients");
+  EXPECT_EQ(listed["folders"], Json::array({"b"}));
+  EXPECT_EQ(listed["files"], Json::array({Json{{"name", "a.gt3x"}, {"bytes", 5}}}));
+  EXPECT_EQ(listed["cut"], false);
+}
+
+// The escapes are decoded before the path is checked.
+TEST(ApiFiles, PathsThatLeadOutOfTheFolderAreRefused) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  auto client = station.client();
+  for (const char* path : {"..", "a%2F..%2F..", "%2e%2e%2f", "%2Fetc", "a%00b", "a%5Cb"}) {
+    EXPECT_EQ(client.Get(std::string("/api/files?path=") + path)->status, 403) << path;
+  }
+  EXPECT_EQ(client.Get("/api/files?path=..a")->status, 404) << "a name that begins with two dots";
+}
+
+}  // namespace
+}  // namespace sixpoint::station

@@ -1,0 +1,77 @@
+#include "station/page/quality_control.h"
+
+#include <chrono>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "expect_result.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::station {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+db::StationEvent check_unit(const std::string& serial, const std::string& reason) {
+  db::StationEvent event;
+  event.action = "check_unit";
+  event.serial = serial;
+  event.operator_name = "Eve";
+  event.reason = reason;
+  return event;
+}
+
+class QualityControlTest : public testing::Test {
+ protected:
+  Result<db::Store> open() { return db::Store::open(posix_env(), folder_ / "s.db"); }
+
+  tests::TemporaryFolder folder_;
+  QualityControl quality_{[this] { return open(); }, "bench-1", default_limits()};
+};
+
+TEST_F(QualityControlTest, ADecisionNeedsANameAndAReasonAndIsInTheStore) {
+  db::StationEvent decision = check_unit("MOS2A1", " \t");
+  EXPECT_FAILS(quality_.decide(decision), ErrorCode::usage);
+  decision.reason = "checks bench 1";
+  decision.operator_name = "";
+  EXPECT_FAILS(quality_.decide(decision), ErrorCode::usage);
+  decision.operator_name = "Eve";
+  ASSERT_OK(quality_.decide(decision));
+  const auto events = open()->station_events();
+  ASSERT_OK(events);
+  ASSERT_EQ(events->size(), 1U);
+  EXPECT_EQ(events->front().station, "bench-1");
+  EXPECT_EQ(events->front().operator_name, "Eve");
+  EXPECT_EQ(quality_.lock()["check_units"], Json::array({"MOS2A1"}));
+  EXPECT_EQ(quality_.lock()["locked"], false);
+}
+
+TEST_F(QualityControlTest, ADecisionOfAnotherStationIsFoundAfterARefresh) {
+  db::StationEvent event = check_unit("MOS2A2", "checks bench 2");
+  event.station = "bench-2";
+  ASSERT_OK(open()->add_station_event(event));
+  quality_.refresh_soon();
+  const Json expected = Json::array({"MOS2A2"});
+  for (int i = 0; i < 1000 && quality_.lock()["check_units"] != expected; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_EQ(quality_.lock()["check_units"], expected);
+  EXPECT_GT(quality_.changes(), 0U);
+}
+
+TEST_F(QualityControlTest, AnEmptyStoreHasNoRunsAndNoStudies) {
+  const auto statistics = quality_.statistics({});
+  ASSERT_OK(statistics);
+  EXPECT_EQ((*statistics)["all"]["runs"], 0);
+  EXPECT_EQ((*quality_.studies())["studies"], Json::array());
+  EXPECT_FAILS(quality_.statistics({"station", "31.3.2027", ""}), ErrorCode::usage);
+  EXPECT_FAILS(quality_.statistics({"moon", "", ""}), ErrorCode::usage);
+  GageQuery query;
+  query.study = "autumn";
+  EXPECT_FAILS(quality_.gage_study(query), ErrorCode::no_input);
+}
+
+}  // namespace
+}  // namespace sixpoint::station

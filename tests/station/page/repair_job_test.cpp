@@ -1,0 +1,108 @@
+#include "station/page/repair_job.h"
+
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "repair/made_recording.h"
+#include "repair/rescale/constants_finder.h"
+#include "repair/rescale/repair_records.h"
+#include "station/records/software.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::station {
+namespace {
+
+constexpr const char* kConstants =
+    R"({"serial":"MOS2A45130450","filter":"current","constants":)"
+    R"({"sensitivity_g_per_lsb":[0.004,0.004,0.004],"zero_lsb":[60,5,60]},)"
+    R"("method":"jig","made_at":"2014-05-01T00:00:00Z","gravity_m_per_s2":9.81})";
+
+// One machine: an archive with an affected recording, and a store with its unit's constants.
+class Machine {
+ public:
+  Machine() {
+    tests::MadeRecording made;
+    for (int i = 0; i < 3000; ++i) {
+      made.raw.push_back({61 + i % 2, 4, 308});
+    }
+    EXPECT_OK(memory.files.make_folders("archive"));
+    EXPECT_OK(made.write(memory.files, "archive/a.gt3x"));
+    auto store = open();
+    db::ConstantsRecord record;
+    record.serial = made.serial;
+    record.filter = "current";
+    record.method = "jig";
+    record.document = kConstants;
+    EXPECT_OK(store->add_constants(record, "wGT3XBT"));
+  }
+
+  Result<db::Store> open() { return db::Store::open(memory.env, folder / "store.db"); }
+
+  nlohmann::ordered_json repair_by_the_page() {
+    RepairJob job(memory.env, [this] { return open(); });
+    EXPECT_OK(job.start({"archive", "out", ""}));
+    while (job.to_json()["state"] == "running") {
+      std::this_thread::yield();
+    }
+    return job.to_json();
+  }
+
+  // As `sixpoint repair archive -o out --store store.db` does it.
+  void repair_by_the_command() {
+    auto store = open();
+    repair::ConstantsFinderOptions options;
+    options.store = &*store;
+    repair::ConstantsFinder finder(memory.env, options);
+    ASSERT_OK(memory.files.make_folders("out"));
+    const auto report = repair::repair_file(memory.env, "archive/a.gt3x", "out/a.gt3x", finder, {});
+    for (const auto& record : repair::records_of(*store, {report}, software_and_build()).records) {
+      ASSERT_OK(store->add_repair(record));
+    }
+  }
+
+  MemoryEnv memory;
+  sixpoint::tests::TemporaryFolder folder;
+};
+
+TEST(RepairJobTest, TheStoreGetsTheRowsOfTheCommand) {
+  Machine page;
+  Machine command;
+  const UtcTime now = page.memory.clock.now();
+  const auto answer = page.repair_by_the_page();
+  EXPECT_EQ(answer["state"], "done") << answer;
+  EXPECT_EQ(answer["summary"]["repaired"], 1) << answer;
+  command.repair_by_the_command();
+  auto store = page.open();
+  EXPECT_EQ(store->audit()->head, command.open()->audit()->head) << "the same rows, to the bit";
+
+  const auto repairs = store->unit_history("MOS2A45130450")->repairs;
+  ASSERT_EQ(repairs.size(), 1U);
+  EXPECT_EQ(repairs[0].made_at, now);
+  EXPECT_EQ(repairs[0].method, "store");
+  EXPECT_EQ(repairs[0].constants_id, store->history("MOS2A45130450")->front().id);
+  EXPECT_EQ(repairs[0].software, software_and_build());
+}
+
+TEST(RepairJobTest, ARepeatedJobAddsNoRow) {
+  Machine machine;
+  machine.repair_by_the_page();
+  const std::string head = machine.open()->audit()->head;
+  machine.memory.clock.set(machine.memory.clock.now() + std::chrono::hours(24));
+  EXPECT_EQ(machine.repair_by_the_page()["summary"]["repaired"], 1) << "taken as done";
+  EXPECT_EQ(machine.open()->audit()->head, head);
+}
+
+TEST(RepairJobTest, RefusesASecondJobAndAnEmptyFolder) {
+  Machine machine;
+  RepairJob job(machine.memory.env, [&] { return machine.open(); });
+  EXPECT_FAILS(job.start({"none", "out", ""}), ErrorCode::no_input);
+  EXPECT_EQ(job.to_json()["state"], "none");
+}
+
+}  // namespace
+}  // namespace sixpoint::station

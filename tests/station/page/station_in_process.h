@@ -1,0 +1,194 @@
+// A whole station in this process, for the tests of lanes and page: virtual units, lanes, Api and
+// server. The reports of its runs are in `reports`.
+//
+//   Station station({"virtual:seed=7,jig=auto"}, folder.path());
+//   station.wait_state(1, "idle");
+//   station.post("/api/run", {{"lane", 1}});
+#pragma once
+
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <httplib.h>
+#include <nlohmann/json.hpp>
+#undef _res  // a macro of resolv.h, and the name of a parameter in Eigen
+
+#include "cli/known_devices.h"
+#include "cli/practice_bench.h"
+#include "expect_result.h"
+#include "station/page/server.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::station {
+
+using Json = nlohmann::ordered_json;
+
+class Station {
+ public:
+  // `its_bench`: one that outlives this program, where the units shall.
+  explicit Station(std::vector<std::string> devices, const std::string& folder,
+                   std::string token = {}, int most_streams = 24,
+                   std::shared_ptr<mocks::VirtualBench> its_bench = {},
+                   const ServerOptions& server_options = {})
+      : bench_(its_bench ? std::move(its_bench) : std::make_shared<mocks::VirtualBench>()),
+        registry_(known_devices()) {
+    bench_->register_in(registry_);
+    LanesOptions options;
+    options.devices = std::move(devices);
+    options.state_folder = folder + "/state";
+    options.capture_folder = folder;
+    options.station = "bench-1";
+    options.retry_s = 0.02;
+    auto opened = Lanes::open(
+        posix_env(), registry_, options,
+        [this](const JigReport& report, const RunLabels& labels) -> Result<RunIds> {
+          const std::lock_guard lock(mutex);
+          if (store_is_away) {
+            return fail(ErrorCode::io, "the disk is full");
+          }
+          reports.push_back(report);
+          operators.push_back(labels.operator_name);
+          return RunIds{"abc123", "def456"};
+        },
+        [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); });
+    EXPECT_OK(opened);
+    lanes = *std::move(opened);
+    repairs = std::make_unique<RepairJob>(
+        posix_env(), [folder] { return db::Store::open(posix_env(), folder + "/store.db"); });
+    ApiOptions api_options;
+    api_options.token = std::move(token);
+    api_options.files_folder = folder;
+    api_options.most_streams = most_streams;
+    api = std::make_unique<Api>(
+        api_options,
+        ApiParts{posix_env(),
+                 *lanes,
+                 *repairs,
+                 &practice_bench_,
+                 [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); },
+                 {}});
+    auto listening = Server::open(posix_env(), *api, server_options);
+    EXPECT_OK(listening);
+    server = *std::move(listening);
+    thread_ = std::thread([this] { server->serve(); });
+  }
+  ~Station() {
+    server->stop();
+    thread_.join();
+  }
+  httplib::Client client() const {
+    httplib::Client client("127.0.0.1", server->port());
+    client.set_read_timeout(10);
+    return client;
+  }
+  Json get(const std::string& path) const {
+    const auto answer = client().Get(path);
+    return answer ? Json::parse(answer->body, nullptr, false) : Json();
+  }
+  int post(const std::string& path, const Json& body, const std::string& who = "me") const {
+    const auto answer =
+        client().Post(path, {{"X-Sixpoint-Client", who}}, body.dump(), "application/json");
+    return answer ? answer->status : 0;
+  }
+  // Starts a run or a capture in the first lane, once its unit is there.
+  void start(const std::string& path, const Json& body = Json::object()) const {
+    wait_state(1, "idle");
+    EXPECT_EQ(post(path, body), 202);
+  }
+  Json lane(int number) const { return get("/api/lanes/" + std::to_string(number)); }
+  // Asks for the lane until `ready` likes it, 30 s at most.
+  template <class Ready>
+  Json wait(int number, Ready ready) const {
+    Json json;
+    for (int i = 0; i < 3000; ++i) {
+      json = lane(number);
+      if (ready(json)) {
+        return json;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    ADD_FAILURE() << "never came: " << json.dump(1);
+    return json;
+  }
+  Json wait_state(int number, const std::string& state) const {
+    return wait(number, [&](const Json& json) { return json["state"] == state; });
+  }
+
+  std::mutex mutex;
+  std::vector<JigReport> reports;
+  std::vector<std::string> operators;
+  bool store_is_away = false;
+
+ private:
+  std::shared_ptr<mocks::VirtualBench> bench_;
+  cli::VirtualPracticeBench practice_bench_{*bench_};
+  device::TransportRegistry registry_;  // the lanes' threads use it
+
+ public:
+  std::unique_ptr<Lanes> lanes;
+  std::unique_ptr<RepairJob> repairs;
+  std::unique_ptr<Api> api;
+  std::unique_ptr<Server> server;
+
+ private:
+  std::thread thread_;
+};
+
+// Does what an operator does: turns the unit to the side that the run asks for.
+inline void place_unit(const Station& station, int lane, int placements) {
+  std::string last;
+  for (int done = 0; done < placements;) {
+    const Json json = station.wait(lane, [&](const Json& now) {
+      return now["state"] == "done" ||
+             (now["run"].is_object() && now["run"]["wanted"].is_string() &&
+              now["run"]["prompt"] != last);
+    });
+    if (json["state"] == "done") {
+      return;
+    }
+    last = json["run"]["prompt"].get<std::string>();
+    EXPECT_EQ(station.post("/api/lanes/" + std::to_string(lane) + "/hand",
+                           {{"do", "turn"}, {"pose", json["run"]["wanted"]}}),
+              200);
+    ++done;
+  }
+}
+
+// Another unit comes in place of MOS2A45130007, in the middle of its run or capture: the station
+// notices it, and what is stopped then is the first unit's.
+inline void expect_swap_is_noticed(const Station& station) {
+  EXPECT_EQ(station.post("/api/lanes/1/hand", {{"do", "swap"}, {"serial", "MOS2A45139999"}}), 200);
+  const Json wrong = station.wait_state(1, "wrong_unit");
+  EXPECT_THAT(wrong["message"].get<std::string>(), testing::HasSubstr("MOS2A45139999"));
+  EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["result"]["verdict"], "stopped");
+  EXPECT_EQ(lane["result"]["serial"], "MOS2A45130007");
+}
+
+// Places the unit on the sides that a capture asks for, up to and with side `last`. Answers with
+// the sides in the order in which they were asked.
+inline std::vector<std::string> place_sides(const Station& station, std::size_t last) {
+  std::vector<std::string> asked;
+  for (;;) {
+    const Json lane = station.wait(1, [&](const Json& now) {
+      return now["state"] == "done" ||
+             (now["capture"].is_object() && now["capture"]["side"].is_string() &&
+              now["capture"]["placed"] == false);
+    });
+    if (lane["state"] == "done" || lane["capture"]["number"] > last) {
+      return asked;
+    }
+    asked.push_back(lane["capture"]["side"]);
+    EXPECT_EQ(station.post("/api/lanes/1/hand", {{"do", "turn"}, {"pose", asked.back()}}), 200);
+    EXPECT_EQ(station.post("/api/lanes/1/placed", Json::object()), 200);
+    station.wait(1, [&](const Json& now) {
+      return now["state"] != "capturing" || now["capture"]["placed"] == true ||
+             now["capture"]["side"] != asked.back();
+    });
+  }
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,145 @@
+#include "station/run/budget.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "station/run/jig_report.h"
+
+namespace sixpoint::station {
+namespace {
+
+struct Standing {
+  double k2_g = 0;        // second order of X, g per g squared
+  double turned_rad = 0;  // of the sensor in its case about Y
+  double lean_y_rad = 0;  // of the sides +y and -y towards +Z
+  double lean_x_rad = 0;  // of the sides +x and -x
+};
+
+// A sensor of 250 LSB per g without noise in its six poses, not rounded to whole counts.
+std::vector<Measured> midpoints(const Standing& standing) {
+  constexpr double kLsbPerG = 250;
+  JigReport report;
+  std::vector<calib::PoseMean> used;
+  for (const device::Pose pose : device::kPoses) {
+    const auto up = device::direction_of(pose);
+    const double lean = up[0] != 0 ? standing.lean_x_rad : up[1] != 0 ? standing.lean_y_rad : 0;
+    const PerAxis<double> stands = {up[0] * std::cos(lean), up[1] * std::cos(lean),
+                                    up[2] + std::sin(lean)};
+    const PerAxis<double> force_g = {
+        stands[0] * std::cos(standing.turned_rad) + stands[2] * std::sin(standing.turned_rad),
+        stands[1],
+        stands[2] * std::cos(standing.turned_rad) - stands[0] * std::sin(standing.turned_rad)};
+    calib::PoseMean reading;
+    reading.up = up;
+    reading.samples = 600;
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const double curved = axis == 0 ? standing.k2_g * force_g[0] * force_g[0] : 0;
+      reading.mean_lsb[axis] = 20 + kLsbPerG * (force_g[axis] + curved);
+    }
+    used.push_back(reading);
+    PoseReading face;
+    face.pose = pose;
+    face.mean_lsb = reading.mean_lsb;
+    face.samples = reading.samples;
+    report.faces.push_back(face);
+  }
+  calib::SixPoseOptions options;
+  options.gravity = calib::LocalGravity{kStandardGravity_m_per_s2, 1e-6};
+  report.six = *calib::solve_six_poses(used, {}, options);
+  std::vector<Measured> found;
+  for (const Measured& measured : measured_quantities(report)) {
+    if (measured.name == "midpoint_minus_zero_mg") {
+      found.push_back(measured);
+    }
+  }
+  return found;
+}
+
+// Oracle: closed form. At +1 g and -1 g a second order adds K2 to both readings and nothing to the
+// level ones.
+TEST(MidpointMinusZero, IsTheSecondOrder) {
+  for (const double k2_mg : {60.0, -60.0, 29.0, 0.0}) {
+    Standing standing;
+    standing.k2_g = k2_mg / kMgPerG;
+    const auto found = midpoints(standing);
+    ASSERT_EQ(found.size(), kAxes);
+    EXPECT_NEAR(found[0].value, k2_mg, 1e-6);
+    EXPECT_NEAR(found[1].value, 0, 1e-6);
+    EXPECT_NEAR(found[2].value, 0, 1e-6);
+    const JudgedQuantity judged = judge_quantity(found[0], default_limits());
+    const bool bad = std::abs(k2_mg) > 45;
+    EXPECT_EQ(judged.verdict, bad ? JigVerdict::fail : JigVerdict::pass) << k2_mg;
+    EXPECT_EQ(judged.code, bad ? "midpoint_off" : "");
+    // 0.2 mg of floor in the means, 0.02 degrees of seating in each of four level readings.
+    const double seating_mg = kMgPerG * 0.02 * M_PI / 180;
+    EXPECT_NEAR(judged.expanded_uncertainty,
+                2 * std::hypot(0.2 / std::sqrt(2.0), std::hypot(seating_mg, 0.2) / 2), 1e-6);
+  }
+}
+
+// Oracle: closed form. A sensor askew in its case reads opposite signs in opposite poses; sides
+// that lean towards the same end read the same sign.
+TEST(MidpointMinusZero, AskewCancelsAndALeaningCaseDoesNot) {
+  for (const double degrees : {1.0, 4.0, 10.0}) {
+    const double radian = degrees * M_PI / 180;
+    Standing askew;
+    askew.turned_rad = radian;
+    for (const Measured& measured : midpoints(askew)) {
+      EXPECT_NEAR(measured.value, 0, 1e-6) << degrees << " degrees, " << measured.axis;
+    }
+    Standing tapered;
+    tapered.lean_x_rad = radian;
+    tapered.lean_y_rad = radian;
+    const auto found = midpoints(tapered);
+    EXPECT_NEAR(found[2].value, -kMgPerG * std::sin(radian), 1e-6);
+    EXPECT_NEAR(found[0].value, 0, 1e-6);
+    EXPECT_NEAR(found[1].value, 0, 1e-6);
+  }
+  // One pair of sides only: half of it, and the two pairs' disagreement is in the uncertainty, by
+  // Student's factor for 3 degrees of freedom.
+  Standing one;
+  one.lean_y_rad = 0.02;
+  const auto found = midpoints(one);
+  const double lean_mg = kMgPerG * std::sin(0.02);
+  EXPECT_NEAR(found[2].value, -lean_mg / 2, 1e-6);
+  EXPECT_NEAR(found[2].standard_uncertainty, 3.31 / 2 * lean_mg / std::sqrt(3.0) / 2, 0.01);
+}
+
+// Oracle: closed form. Two of 200 samples are 1 %.
+TEST(Budget, CountsLostSamplesAndTheTemperatureRange) {
+  JigReport report;
+  report.six.emplace();
+  for (const device::Pose pose : device::kPoses) {
+    PoseReading face;
+    face.pose = pose;
+    face.temperature_c = pose == device::Pose::plus_x ? 22 : 20;
+    face.tilt_deg = pose == device::Pose::minus_y ? 1.5 : 0.5;
+    report.faces.push_back(face);
+  }
+  JudgedPose warm;
+  warm.reading.temperature_c = 25;
+  report.verification.poses.push_back(warm);
+  report.stream.samples = 198;
+  report.stream.lost_samples = 2;
+  const auto value_of = [&](std::string_view name) {
+    for (const Measured& measured : measured_quantities(report)) {
+      if (measured.name == name) {
+        return measured.value;
+      }
+    }
+    return -1.0;
+  };
+  EXPECT_DOUBLE_EQ(value_of("lost_samples_percent"), 1);
+  EXPECT_DOUBLE_EQ(value_of("temperature_change_c"), 5);
+  EXPECT_NEAR(value_of("temperature_c"), 20 + 2.0 / 6, 1e-12) << "of the faces alone";
+  EXPECT_DOUBLE_EQ(value_of("tilt_deg"), 1.5);
+  EXPECT_EQ(value_of("recheck_residual_mg"), -1) << "nothing was written";
+}
+
+TEST(Budget, WithoutASolutionThereIsNothingToJudge) {
+  EXPECT_TRUE(measured_quantities(JigReport{}).empty());
+}
+
+}  // namespace
+}  // namespace sixpoint::station

@@ -1,0 +1,59 @@
+#include "station/run/jig_report.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "base/sha256.h"
+#include "expect_result.h"
+#include "station/virtual_bench.h"
+
+namespace sixpoint::station {
+namespace {
+
+// Oracle: closed form. At 250 LSB/g and zero 20, counts of (20, 20, 275) are 1.02 g: 20 mg more
+// than gravity; (20, 20, -240) are 1.04 g.
+TEST(JigReport, ReadingsAreJudgedByTheirLength) {
+  calib::Calibration calibration;
+  calibration.sensitivity_g_per_lsb.fill(1 / 250.0);
+  calibration.zero_lsb = {20, 20, 20};
+  PoseReading up;
+  up.mean_lsb = {20, 20, 275};
+  PoseReading down;
+  down.mean_lsb = {20, 20, -240};
+  const JudgedPoses judged = judge({up, down}, calibration, 1);
+  ASSERT_EQ(judged.poses.size(), 2U);
+  EXPECT_NEAR(judged.poses[0].magnitude_g, 1.02, 1e-12);
+  EXPECT_NEAR(std::abs(judged.poses[0].error_mg), 20, 1e-9);
+  EXPECT_NEAR(judged.worst_mg, 40, 1e-9);
+  EXPECT_NEAR(judged.rms_mg, std::sqrt((20.0 * 20 + 40 * 40) / 2), 1e-9);
+}
+
+// Oracle: FIPS 180-4, SHA-256 of "abc".
+TEST(JigReport, NamesItsSamplesByTheirHash) {
+  JigReport report;
+  report.raw_csv = "abc";
+  EXPECT_EQ(report.raw_sha256(),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+TEST(JigReportJson, HasTheContractsKeys) {
+  VirtualBench bench;
+  const auto report = bench.run();
+  ASSERT_OK(report);
+  const auto json = report->to_json();
+  for (const char* key : {"serial", "filter", "verdict", "poses", "constants", "as_found",
+                          "as_left", "verification", "uncertainty"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+  EXPECT_EQ(json["poses"].size(), 6U);
+  for (const char* key : {"pose", "mean_lsb", "sd_lsb", "samples", "temperature_c", "tilt_deg"}) {
+    EXPECT_TRUE(json["poses"][0].contains(key)) << key;
+  }
+  EXPECT_TRUE(json["verification"].contains("residual_mg"));
+  EXPECT_EQ(json["verification"]["poses"].size(), 8U);
+}
+
+}  // namespace
+}  // namespace sixpoint::station
