@@ -148,6 +148,7 @@ double held_out_line_nats(const std::vector<Phasor>& phasors, bool in_lab) {
 std::vector<Phasor> phasors_at(double rate_hz, const std::vector<Stretch>& all,
                                const NoiseSpectrum& noise, double frequency_hz) {
   std::vector<Phasor> phasors;
+  phasors.reserve(all.size());
   for (const Stretch& s : all) {
     phasors.push_back({amplitude_at(s, 2 * M_PI * frequency_hz / rate_hz),
                        weights_at(s, noise, frequency_hz), s.rotation, s.pose});

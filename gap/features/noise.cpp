@@ -291,6 +291,7 @@ class CodeSums {
     double worst = 0;
     for (const std::vector<Dwell>& dwells : dwells_) {
       std::vector<double> all;
+      all.reserve(dwells.size());
       for (const Dwell& d : dwells) {
         all.push_back(d.variance);
       }
