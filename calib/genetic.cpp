@@ -231,7 +231,7 @@ class Search {
     double square = 0;
     double moment = 0;
     double index_square = 0;
-    double wander = 0;
+    double square_apart = 0;
     for (std::size_t r = begin; r < bests.size(); ++r) {
       const double off = result.fitness_mg[r] - result.level_mg;
       const double index = static_cast<double>(r - begin) - 0.5 * (count - 1);
@@ -240,11 +240,11 @@ class Search {
       index_square += index * index;
       const double apart =
           difference_over_sphere(result.calibration, calibration_of(bests[r], base_)).rms_mg;
-      wander += apart * apart;
+      square_apart += apart * apart;
     }
     result.spread_mg = count > 1 ? std::sqrt(square / (count - 1)) : HUGE_VAL;
     result.trend_mg = index_square > 0 ? moment / index_square * (count - 1) : HUGE_VAL;
-    result.scatter_mg = std::sqrt(wander / count);
+    result.scatter_mg = std::sqrt(square_apart / count);
     if (!(result.level_mg <= options_.most_level_mg)) {
       result.reasons.push_back(
           fmt::format("the best fitness dithers about {:.1f} mg and not about 0 (limit {:.1f} mg)",

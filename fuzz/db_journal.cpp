@@ -1,4 +1,4 @@
-// An entry of the journal: damaged, or whole with a record that nobody wrote. What the store does
+// An entry of the journal: damaged, or whole with a record that no run wrote. What the store does
 // not take stays in the journal, and what it takes leaves the chain whole.
 #include <cstdlib>
 

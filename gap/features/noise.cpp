@@ -146,7 +146,7 @@ struct Piece {
   std::size_t last;
 };
 
-// Long records in pieces, so that slow wander does not pass for noise; every fourth is enough.
+// Long records in pieces, so that slow drift does not count as noise; every fourth is enough.
 std::vector<Piece> pieces_of(const Bundle& bundle) {
   constexpr double kPiece_s = 7;
   constexpr double kSettledPiece_s = 5;  // a jig's readings are shorter

@@ -17,7 +17,7 @@ struct SyntheticUnit {
   // The sensor as it is.
   Vector counts_per_g = {250.0, 252.0, 247.0};
   Vector zero_counts = {12.0, -20.0, 31.0};
-  // What the firmware believes: positive, negative, zero.
+  // What the firmware takes for true: positive, negative, zero.
   std::array<int, 3> positive = {300, 290, 280};
   std::array<int, 3> negative = {-210, -220, -230};
   std::array<int, 3> zero = {45, 35, 25};

@@ -128,7 +128,7 @@ struct PowerCutDisk::Methods {
   }
 
   static int open(sqlite3_vfs* /*vfs*/, const char* name, sqlite3_file* file, int flags, int* out) {
-    // Version 2: without memory-mapped reading and writing, which nobody could see.
+    // Version 2: without memory-mapped reading and writing, which this disk could not see.
     static const sqlite3_io_methods kMethods = {2,
                                                 &close,
                                                 &read,

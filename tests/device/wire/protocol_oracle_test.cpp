@@ -1,4 +1,4 @@
-// docs/protocol.md as it reads to somebody else: a decoder and a unit in Python, written from the
+// docs/protocol.md as an outside reader takes it: a decoder and a unit in Python, written from the
 // page alone (protocol_oracle.py, protocol_unit.py), against device/.
 #include <array>
 #include <cstdio>

@@ -259,7 +259,7 @@ TEST_F(HeaderAndProtocol, TheCrossAxisOfARealUnitIsNamed) {
   EXPECT_FALSE(diagnosis->unknown.present);
 }
 
-// Nothing contradicts: but a clerk's 341 for 256 is no filter mismatch either.
+// Nothing contradicts: but a wrongly typed 341 for 256 is no filter mismatch either.
 TEST_F(HeaderAndProtocol, AWrongScaleThatBothSayIsAnUnknown) {
   const auto both = bundle(256, 341, 341);
   ASSERT_OK(both);
