@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
-#include "cli/stop_signals.h"
+#include "cli/devices/stop_signals.h"
 #include "device/usb/discovery.h"
 #include "device/usb/hotplug.h"
 

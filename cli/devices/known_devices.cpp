@@ -1,4 +1,4 @@
-#include "cli/known_devices.h"
+#include "cli/devices/known_devices.h"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
-#include "cli/session_minimiser.h"
+#include "cli/devices/session_minimiser.h"
 #include "device/session/pcap.h"
 #include "device/session/session_journal.h"
 #include "device/wire/protocol.h"

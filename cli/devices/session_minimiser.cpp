@@ -1,4 +1,4 @@
-#include "cli/session_minimiser.h"
+#include "cli/devices/session_minimiser.h"
 
 #include <algorithm>
 #include <functional>

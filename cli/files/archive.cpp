@@ -6,7 +6,7 @@
 
 #include "base/sha256.h"
 #include "cli/command.h"
-#include "cli/repair_answer.h"
+#include "cli/files/repair_answer.h"
 #include "cli/store_option.h"
 #include "repair/archive/archive_merge.h"
 #include "repair/archive/archive_plan.h"

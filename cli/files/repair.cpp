@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
-#include "cli/repair_answer.h"
+#include "cli/files/repair_answer.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/rescale/constants_finder.h"

@@ -1,4 +1,4 @@
-#include "cli/repair_answer.h"
+#include "cli/files/repair_answer.h"
 
 #include <fmt/format.h>
 

@@ -9,8 +9,8 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
-#include "cli/gap_challenge.h"
-#include "cli/gap_trends.h"
+#include "cli/gap/gap_challenge.h"
+#include "cli/gap/gap_trends.h"
 #include "cli/store_option.h"
 #include "gap/judge/diagnose.h"
 #include "gap/recording/bundle.h"

@@ -2,7 +2,7 @@
 //
 // Each trial is a bundle in a temporary folder; `gap diagnose` runs as a process of its own that
 // gets nothing but that folder, and with --strip a catalogue without the true effects.
-#include "cli/gap_challenge.h"
+#include "cli/gap/gap_challenge.h"
 
 #include <algorithm>
 #include <csignal>

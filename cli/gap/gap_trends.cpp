@@ -1,5 +1,5 @@
 // sixpoint gap trends --store DB: whether a skew belongs to the units, the jig or the station.
-#include "cli/gap_trends.h"
+#include "cli/gap/gap_trends.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,6 @@
-// The list of commands. A new command is one file, one line in the list and one in CMakeLists.txt.
-#include "cli/command.h"
+// The list of commands. A new command is one file in the room of its kind, one line in the list and
+// one in that room's CMakeLists.txt.
+#include "cli/program/program.h"
 
 namespace sixpoint::cli {
 

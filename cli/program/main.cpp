@@ -2,7 +2,7 @@
 
 #include <unistd.h>
 
-#include "cli/command.h"
+#include "cli/program/program.h"
 
 int main(int argc, char** argv) {
   sixpoint::cli::Context context{sixpoint::posix_env(), std::cout, std::cerr, std::cin,

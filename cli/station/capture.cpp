@@ -5,8 +5,8 @@
 #include <fmt/ranges.h>
 
 #include "cli/command.h"
-#include "cli/jig_options.h"
-#include "cli/record_option.h"
+#include "cli/station/jig_options.h"
+#include "cli/station/record_option.h"
 #include "cli/store_option.h"
 #include "station/capture/capture_run.h"
 

@@ -10,9 +10,9 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
-#include "cli/jig_options.h"
-#include "cli/known_devices.h"
-#include "cli/record_option.h"
+#include "cli/devices/known_devices.h"
+#include "cli/station/jig_options.h"
+#include "cli/station/record_option.h"
 #include "cli/store_option.h"
 #include "device/unit.h"
 #include "station/certificate/certificate.h"

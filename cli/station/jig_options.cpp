@@ -1,7 +1,7 @@
-#include "cli/jig_options.h"
+#include "cli/station/jig_options.h"
 
-#include "cli/known_devices.h"
-#include "cli/record_option.h"
+#include "cli/devices/known_devices.h"
+#include "cli/station/record_option.h"
 #include "cli/store_option.h"
 
 namespace sixpoint::cli {

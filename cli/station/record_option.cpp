@@ -1,4 +1,4 @@
-#include "cli/record_option.h"
+#include "cli/station/record_option.h"
 
 namespace sixpoint::cli {
 

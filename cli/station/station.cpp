@@ -7,10 +7,10 @@
 #include <sys/resource.h>
 
 #include "cli/command.h"
+#include "cli/devices/known_devices.h"
+#include "cli/devices/stop_signals.h"
 #include "cli/gravity_option.h"
-#include "cli/known_devices.h"
-#include "cli/practice_bench.h"
-#include "cli/stop_signals.h"
+#include "cli/station/practice_bench.h"
 #include "cli/store_option.h"
 #include "station/certificate/certificate.h"
 #include "station/lanes/lanes.h"

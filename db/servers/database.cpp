@@ -1,4 +1,4 @@
-#include "db/database.h"
+#include "db/servers/database.h"
 
 namespace sixpoint::db {
 

@@ -1,4 +1,4 @@
-#include "db/postgres_address.h"
+#include "db/servers/postgres_address.h"
 
 #include <map>
 #include <memory>

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "db/database.h"
-#include "db/postgres_address.h"
+#include "db/servers/database.h"
+#include "db/servers/postgres_address.h"
 
 namespace sixpoint::db {
 namespace {

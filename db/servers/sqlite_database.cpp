@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
-#include "db/database.h"
+#include "db/servers/database.h"
 
 namespace sixpoint::db {
 namespace {

@@ -1,4 +1,4 @@
-#include "mocks/usb/umockdev_bus.h"
+#include "mocks/umockdev/umockdev_bus.h"
 
 #include <thread>
 
@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "mocks/usb/umockdev_port.h"
+#include "mocks/umockdev/umockdev_port.h"
 
 namespace sixpoint::mocks {
 

@@ -23,7 +23,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "mocks/usb/plugged_nodes.h"
+#include "mocks/umockdev/plugged_nodes.h"
 #include "mocks/usb/usb_device.h"
 
 namespace sixpoint::mocks {

@@ -1,4 +1,4 @@
-#include "mocks/usb/umockdev_client.h"
+#include "mocks/umockdev/umockdev_client.h"
 
 #include <filesystem>
 

@@ -5,7 +5,7 @@
 #include <linux/hidraw.h>
 #include <sys/ioctl.h>
 
-#include "mocks/usb/umockdev_port.h"
+#include "mocks/umockdev/umockdev_port.h"
 
 namespace sixpoint::mocks {
 

@@ -1,4 +1,4 @@
-#include "mocks/usb/umockdev_port.h"
+#include "mocks/umockdev/umockdev_port.h"
 
 #include <cerrno>
 

@@ -19,8 +19,8 @@
 
 #include <linux/usbdevice_fs.h>
 
-#include "mocks/usb/plugged_nodes.h"
-#include "mocks/usb/umockdev_client.h"
+#include "mocks/umockdev/plugged_nodes.h"
+#include "mocks/umockdev/umockdev_client.h"
 #include "mocks/usb/usb_device.h"
 
 namespace sixpoint::mocks {

@@ -1,7 +1,7 @@
 // A device as udev finds it in sysfs.
 #include <fmt/format.h>
 
-#include "mocks/usb/umockdev_port.h"
+#include "mocks/umockdev/umockdev_port.h"
 
 namespace sixpoint::mocks {
 

@@ -4,7 +4,7 @@
 
 #include <sys/ioctl.h>
 
-#include "mocks/usb/umockdev_port.h"
+#include "mocks/umockdev/umockdev_port.h"
 
 namespace sixpoint::mocks {
 

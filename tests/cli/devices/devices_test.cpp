@@ -1,5 +1,5 @@
 // sixpoint devices by its contract; tests/usb has devices that are plugged in.
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint {
 namespace {

@@ -1,7 +1,7 @@
 // sixpoint doctor by its contract; store_option_test.cpp has a journal with a damaged entry.
 #include <map>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <gmock/gmock.h>
 
-#include "cli/session_minimiser.h"
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
+#include "cli/devices/session_minimiser.h"
 #include "device/session/session_journal.h"
 #include "expect_result.h"
 

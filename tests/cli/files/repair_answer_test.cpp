@@ -1,9 +1,9 @@
 // The rules that repair and archive share: which store is asked, which exit code a report has.
-#include "cli/repair_answer.h"
+#include "cli/files/repair_answer.h"
 
 #include <fstream>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 #include "expect_result.h"
 
 namespace sixpoint::cli {

@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 
 #include "base/random.h"
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 #include "db/store.h"
 #include "expect_result.h"
 #include "repair/jig_constants.h"

@@ -6,7 +6,7 @@
 
 #include "base/random.h"
 #include "calib/constants.h"
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 #include "expect_result.h"
 #include "repair/made_recording.h"
 #include "shared_data.h"

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint {
 namespace {

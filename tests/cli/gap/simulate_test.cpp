@@ -1,7 +1,7 @@
 // sixpoint simulate by its contract, on the real disk.
 #include <fstream>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint::cli {
 namespace {

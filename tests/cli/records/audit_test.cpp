@@ -3,7 +3,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint {
 namespace {

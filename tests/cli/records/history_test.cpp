@@ -1,5 +1,5 @@
 // sixpoint history by its contract: the records of a run as the command shows them.
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 #include "station/limits/limits.h"
 #include "station/records/software.h"
 

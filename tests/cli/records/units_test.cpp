@@ -1,5 +1,5 @@
 // sixpoint units by its contract.
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint {
 namespace {

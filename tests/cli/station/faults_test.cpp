@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/memory_env.h"
-#include "cli/known_devices.h"
+#include "cli/devices/known_devices.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "faults_page.h"

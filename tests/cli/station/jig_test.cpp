@@ -1,5 +1,5 @@
 // sixpoint jig by its contract, on the real disk.
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint::cli {
 namespace {

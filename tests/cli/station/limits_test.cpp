@@ -1,7 +1,7 @@
 // sixpoint limits by its contract; tests/station/limits has the rules themselves.
 #include <fstream>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint {
 namespace {

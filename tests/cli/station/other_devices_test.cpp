@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 #include "expect_result.h"
 #include "mocks/firmware/virtual_drive.h"
 

@@ -1,7 +1,7 @@
 // sixpoint statistics and gage-rr by their contract; tests/station/statistics has the numbers.
 #include <fstream>
 
-#include "command_fixture.h"
+#include "cli/command_fixture.h"
 
 namespace sixpoint {
 namespace {

@@ -1,6 +1,6 @@
-#include "db/database.h"
+#include "db/servers/database.h"
 
-#include "store_fixture.h"
+#include "db/store_fixture.h"
 
 namespace sixpoint::db {
 namespace {

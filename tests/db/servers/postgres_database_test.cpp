@@ -12,12 +12,12 @@
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "db/exchange.h"
+#include "db/postgres_server.h"
 #include "db/save.h"
 #include "db/schema.h"
 #include "db/store.h"
+#include "db/store_fixture.h"
 #include "expect_result.h"
-#include "postgres_server.h"
-#include "store_fixture.h"
 
 namespace sixpoint::db {
 namespace {
@@ -118,10 +118,10 @@ TEST_F(PostgresStoreTest, BringsStoresOfEveryVersionUpToDateAndTheirHashesHold) 
     const char* filter;
   } versions[] = {
       {
-#include "store_version_1.sql.inc"
+#include "db/store_version_1.sql.inc"
           , "74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d", "legacy"},
       {
-#include "store_version_2.sql.inc"
+#include "db/store_version_2.sql.inc"
           , "b88f65e21c3f51132480dc74ef7f68d9c281037c02b63880f9e4a018855351dd", "current"}};
   int version = 0;
   for (const auto& early : versions) {

@@ -64,7 +64,7 @@ TEST_F(SqliteStoreTest, OpensOnlyStores) {
 // hashes were computed by another program (Python's hashlib) from the description in docs/store.md.
 TEST_F(SqliteStoreTest, BringsAStoreOfVersion1UpToDateAndItsHashesHold) {
   run_sql(
-#include "store_version_1.sql.inc"
+#include "db/store_version_1.sql.inc"
   );
   const auto before =
       std::string("74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d");
@@ -85,7 +85,7 @@ TEST_F(SqliteStoreTest, BringsAStoreOfVersion1UpToDateAndItsHashesHold) {
 
 TEST_F(SqliteStoreTest, BringsAStoreOfVersion2UpToDateAndItsHashesHold) {
   run_sql(
-#include "store_version_2.sql.inc"
+#include "db/store_version_2.sql.inc"
   );
   auto store = open();
   ASSERT_OK(store);
