@@ -2,7 +2,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "base/atomic_file.h"
 #include "cli/command_fixture.h"
+#include "expect_result.h"
 
 namespace sixpoint {
 namespace {
@@ -34,6 +36,15 @@ TEST_F(CommandTest, GapRefusesWhatItCannotRead) {
   EXPECT_EQ(run({"gap", "diagnose", "--run", "x", "--store", path("none.db")}).exit_code, 66);
   EXPECT_EQ(run({"gap", "trends", "--store", path("none.db")}).exit_code, 66);
   EXPECT_EQ(run({"gap"}).exit_code, 64);
+}
+
+TEST(GapCommand, TakesATableOfReadings) {
+  tests::TemporaryFolder folder;
+  const std::string table = folder / "t.csv";
+  ASSERT_OK(write_file(posix_env().files, table, "x,y,z\n1,2,3\n"));
+  EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table}).exit_code, 64);
+  EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table, "--rate", "30"}).exit_code,
+            2);
 }
 
 }  // namespace

@@ -2,10 +2,13 @@
 #include <fstream>
 
 #include "cli/command_fixture.h"
+#include "cli/station/station_fixture.h"
 
 namespace sixpoint {
 namespace {
 
+using station::StationCommands;
+using testing::HasSubstr;
 using tests::CommandTest;
 
 TEST_F(CommandTest, LimitsThatArePrintedAreLimitsThatAreRead) {
@@ -25,6 +28,19 @@ TEST_F(CommandTest, LimitsThatArePrintedAreLimitsThatAreRead) {
   EXPECT_EQ(bad.exit_code, 78);
   EXPECT_THAT(bad.json()["error"]["where"].get<std::string>(), testing::EndsWith("bad.toml:1"));
   EXPECT_EQ(run({"limits"}).exit_code, 64);
+}
+
+TEST_F(StationCommands, LimitsAreCheckedAndPrinted) {
+  const auto limits = [&](const std::vector<std::string>& arguments) {
+    return tests::run_command(posix_env(), arguments);
+  };
+  write("own.toml", limits({"limits", "print"}).out);
+  EXPECT_EQ(limits({"limits", "check", folder_ / "own.toml"}).exit_code, 0);
+  EXPECT_EQ(limits({"limits", "print", folder_ / "own.toml"}).out, limits({"limits", "print"}).out);
+  write("bad.toml", "[noise_mg]\nhigh = 3\nlow = 4\n");
+  const auto bad = limits({"limits", "check", folder_ / "bad.toml", "--json"});
+  EXPECT_EQ(bad.exit_code, 78);
+  EXPECT_THAT(bad.json()["error"]["where"], HasSubstr("bad.toml:3"));
 }
 
 }  // namespace

@@ -2,10 +2,12 @@
 #include <fstream>
 
 #include "cli/command_fixture.h"
+#include "cli/station/station_fixture.h"
 
 namespace sixpoint {
 namespace {
 
+using station::StationCommands;
 using tests::CommandTest;
 
 TEST_F(CommandTest, StatisticsCountsTheRunsOfTheStore) {
@@ -49,6 +51,32 @@ TEST_F(CommandTest, GageRrReadsItsTable) {
   EXPECT_EQ(answer.json()["schema"], "sixpoint/gage-rr/1");
   EXPECT_EQ(run({"gage-rr"}).exit_code, 64) << "no readings are named";
   EXPECT_EQ(run({"gage-rr", path("none.csv")}).exit_code, 66);
+}
+
+TEST_F(StationCommands, StatisticsAndTheGageStudy) {
+  for (int part = 1; part <= 3; ++part) {
+    for (const char* person : {"Ada", "Bo"}) {
+      for (int trial = 0; trial < 2; ++trial) {
+        const auto answer = run({"jig", "--device", "virtual:seed=" + std::to_string(part), "--jig",
+                                 "virtual", "--operator", person, "--study", "spring"});
+        EXPECT_EQ(answer.exit_code, 0) << answer.people;
+      }
+    }
+    EXPECT_EQ(measure("seed=" + std::to_string(part)).exit_code, 0);
+  }
+  const auto gage = run({"gage-rr", "--study", "spring", "--axis", "y", "--json"});
+  EXPECT_EQ(gage.exit_code, 0) << gage.people << gage.out;
+  EXPECT_EQ(gage.json()["parts"], 3);
+  EXPECT_LT(gage.json()["grr_percent"].get<double>(), 5);
+  const auto statistics =
+      run({"statistics", "--by", "station", "--html", folder_ / "s.html", "--json"});
+  EXPECT_EQ(statistics.exit_code, 0);
+  EXPECT_EQ(statistics.json()["all"]["runs"], 3) << "the study's runs do not count";
+  EXPECT_EQ(statistics.json()["groups"][0]["name"], "A");
+  EXPECT_TRUE(statistics.json()["capability"].contains("zero_offset_mg x"));
+  EXPECT_EQ(run({"statistics", "--by", "moon"}).exit_code, 64);
+  EXPECT_EQ(run({"gage-rr", "--study", "autumn"}).exit_code, 66);
+  EXPECT_EQ(run({"gage-rr"}).exit_code, 64);
 }
 
 }  // namespace

@@ -1,84 +1,12 @@
-#include "db/exchange.h"
-
+// Import: what an export says becomes rows again, whole or not at all.
 #include <fstream>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
-
-#include "base/memory_env.h"
-#include "db/store.h"
-#include "expect_result.h"
-#include "place.h"
+#include "db/exchange_fixture.h"
 
 namespace sixpoint::db {
 namespace {
 
 using testing::HasSubstr;
-
-class ExchangeTest : public testing::Test {
- protected:
-  Store open(const std::string& name) {
-    auto store = Store::open(memory_.env, place_->location(name));
-    if (!store) {
-      throw std::runtime_error(store.error().brief());
-    }
-    return *std::move(store);
-  }
-
-  // A little of everything: NULLs, empty texts, an attachment, a withdrawal.
-  static void fill(Store& store, int constants = 3) {
-    RunRecord run;
-    run.serial = "MOS2A1";
-    run.kind = "jig";
-    run.filter = "current";
-    run.operator_name = "Zoë \"Z\", O'Hara\n";
-    run.document = R"({"a":[1,2.5,"x"]})";
-    run.temperature_c = 21.5;
-    ASSERT_OK(store.add_run(run, {{"raw", Bytes{0, 1, 255}}, {"empty", Bytes{}}}));
-    std::string last;
-    for (int i = 0; i < constants; ++i) {
-      ConstantsRecord record;
-      record.serial = "MOS2A1";
-      record.filter = i % 2 == 0 ? "current" : "legacy";
-      record.made_at = from_unix_seconds(i);
-      record.document = R"({"made_from":{"n":1}})";
-      const auto id = store.add_constants(record, "w");
-      ASSERT_OK(id);
-      last = *id;
-    }
-    ASSERT_OK(store.withdraw_constants(last, "Ada", "wrong jig"));
-  }
-
-  std::vector<std::string> lines(const std::string& path) {
-    const auto bytes = read_file(memory_.files, path);
-    std::istringstream text(std::string(bytes->begin(), bytes->end()));
-    std::vector<std::string> all;
-    for (std::string line; std::getline(text, line);) {
-      all.push_back(line);
-    }
-    return all;
-  }
-  void write(const std::string& path, const std::vector<std::string>& all) {
-    std::string text;
-    for (const std::string& line : all) {
-      text += line + "\n";
-    }
-    ASSERT_OK(write_file_again(path, text));
-  }
-  Status write_file_again(const std::string& path, const std::string& text) {
-    if (memory_.files.info(path)) {
-      SIXPOINT_CHECK(memory_.files.remove(path));
-    }
-    SIXPOINT_ASSIGN(auto file, memory_.files.create(path));
-    return file->write_at(0, as_bytes(text));
-  }
-
-  std::unique_ptr<tests::Place> place_ = tests::make_place();
-  MemoryEnv memory_;
-  sixpoint::tests::TemporaryFolder folder_;
-};
 
 TEST_F(ExchangeTest, OutAndInAgainKeepsEveryRowAndTheHead) {
   Store first = open("first");
@@ -191,42 +119,6 @@ TEST_F(ExchangeTest, RefusesEveryBrokenFileWhole) {
   EXPECT_OK(import_json_lines(second, memory_.files, "good.jsonl"));
 }
 
-TEST_F(ExchangeTest, AnExportIsWholeOrNotThere) {
-  Store store = open("first");
-  fill(store);
-  const auto before = memory_.files.changing_operations();
-  ASSERT_OK(export_json_lines(store, memory_.files, "whole.jsonl"));
-  const auto operations = memory_.files.changing_operations() - before;
-  const auto whole = lines("whole.jsonl");
-  ASSERT_OK(memory_.files.remove("whole.jsonl"));
-  for (std::size_t stop = 0; stop < operations; ++stop) {
-    memory_.files.fail_after(stop);
-    EXPECT_FAILS(export_json_lines(store, memory_.files, "whole.jsonl"), ErrorCode::io);
-    memory_.files.stop_failing();
-    memory_.files.lose_power();
-    if (memory_.files.info("whole.jsonl")) {
-      EXPECT_EQ(lines("whole.jsonl"), whole) << stop;
-    }
-  }
-}
-
-TEST_F(ExchangeTest, CsvHasATablePerFileAndTellsNullFromEmpty) {
-  Store store = open("first");
-  fill(store);
-  const auto report = export_csv(store, memory_.files, "csv");
-  ASSERT_OK(report);
-  EXPECT_EQ(report->attachments, 2);
-  const auto bytes = read_file(memory_.files, "csv/runs.csv");
-  ASSERT_OK(bytes);
-  const std::string text(bytes->begin(), bytes->end());
-  EXPECT_THAT(text, testing::StartsWith("seq,id,serial,kind,filter,started_ns,"));
-  EXPECT_THAT(text, HasSubstr(",\"Zoë \"\"Z\"\", O'Hara\n\",\"\",\"\",\"\",\"\",,"));
-  EXPECT_THAT(text, HasSubstr(",21.5,,"));
-  const auto raw = read_file(memory_.files, "csv/attachments/" + to_hex(sha256(Bytes{0, 1, 255})));
-  ASSERT_OK(raw);
-  EXPECT_EQ(*raw, (Bytes{0, 1, 255}));
-}
-
 TEST_F(ExchangeTest, CsvIsNotImported) {
   Store first = open("first");
   fill(first);
@@ -257,29 +149,6 @@ TEST_F(ExchangeTest, IntoANewFileAnImportIsWholeOrNotThere) {
   }
   EXPECT_EQ(posix_env().files.list(folder_.path()).value(), names_before)
       << "neither a store nor a temporary file is left";
-}
-
-TEST_F(ExchangeTest, ABackupIsAStoreWithTheSameHead) {
-  Store store = open("first");
-  fill(store);
-  const std::string path = folder_ / "backup.db";
-  for (int round = 0; round < 2; ++round) {
-    Env env{memory_.clock, posix_env().files};
-    const auto report = backup(store, env, path);
-    ASSERT_OK(report);
-    EXPECT_EQ(report->attachments, 2);
-    auto copy = Store::open(memory_.env, path);
-    ASSERT_OK(copy);
-    const auto audit = copy->audit();
-    EXPECT_TRUE(audit->ok) << audit->brief();
-    EXPECT_EQ(audit->head, store.audit()->head);
-    EXPECT_EQ(report->head, audit->head);
-    fill(store, 6);
-  }
-  const auto names = posix_env().files.list(folder_.path());
-  EXPECT_THAT(*names, testing::ElementsAre("backup.db")) << "nothing else is left beside it";
-  Env env{memory_.clock, posix_env().files};
-  EXPECT_FAILS(backup(store, env, folder_ / "none/backup.db"), ErrorCode::cannot_create);
 }
 
 }  // namespace
