@@ -8,8 +8,6 @@
 
 #include <CLI/Option.hpp>
 
-
-
 namespace sixpoint::cli {
 namespace {
 

@@ -1,4 +1,5 @@
-// A virtual unit in a virtual jig, on a clock that the test moves, and the program's end of its cable.
+// A virtual unit in a virtual jig, on a clock that the test moves, and the program's end of its
+// cable.
 #pragma once
 
 #include <chrono>

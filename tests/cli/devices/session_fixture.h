@@ -14,4 +14,4 @@ class SessionCommand : public tests::CommandTest {
     std::vector<std::string> arguments = {"jig",     "--device",   device,
                                           "--store", path("s.db"), "--json"};
 
-}  // namespace sixpoint::cli
+  }  // namespace sixpoint::cli

@@ -24,4 +24,4 @@ class StationCommands : public testing::Test {
         "jig",       "--device", "virtual:" + unit, "--jig", "virtual",
         "--station", "A",        "--operator",      "Ada",   "--json"};
 
-}  // namespace sixpoint::station
+  }  // namespace sixpoint::station

@@ -83,8 +83,8 @@ TEST(VirtualDrive, AUnitThatRecordsNothingIsRefused) {
   EXPECT_FAILS(virtual_drive_recording(odd), ErrorCode::usage);
 }
 
-// A folder as the unit's volume shows it. Oracle: info.txt's own lines, and the byte 0x1E with which
-// every record of a log begins (docs/recordings.md).
+// A folder as the unit's volume shows it. Oracle: info.txt's own lines, and the byte 0x1E with
+// which every record of a log begins (docs/recordings.md).
 TEST(VirtualDrive, TheFolderHoldsWhatTheRecordingSays) {
   MemoryEnv memory;
   const VirtualDriveOptions options = drawn();

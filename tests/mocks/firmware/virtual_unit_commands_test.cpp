@@ -1,5 +1,5 @@
-// What a unit answers to each command, as raw reports. Oracle: the tables of docs/protocol.md; every
-// payload here is written down from them.
+// What a unit answers to each command, as raw reports. Oracle: the tables of docs/protocol.md;
+// every payload here is written down from them.
 #include <functional>
 #include <numeric>
 #include <optional>
@@ -270,8 +270,8 @@ TEST(VirtualUnitCommands, TheFilterOfTheStreamIsSetAndThatOfRecordingsIsNot) {
   EXPECT_EQ(asked.ask(kGetFilter), (Reply{0, {0, 1}}));
 }
 
-// The sequence rule: "a request with the same sequence, command and payload as the one before is not
-// executed again", and sequence 0 always is.
+// The sequence rule: "a request with the same sequence, command and payload as the one before is
+// not executed again", and sequence 0 always is.
 TEST(VirtualUnitCommands, ARepeatedRequestIsAnsweredAgainAndNotDoneAgain) {
   Asked asked;
   const Bytes record = report_of(1, 5, kStartRecording, kRecord);
@@ -314,8 +314,7 @@ TEST(VirtualUnitCommands, TheClockIsSetByTheRecording) {
   const Reply list = asked.ask(kListRecording, {0, 0});
   ASSERT_EQ(list.payload.size(), 48U);
   EXPECT_EQ(Bytes(list.payload.begin(), list.payload.begin() + 4), (Bytes{1, 0, 1, 0}));
-  EXPECT_EQ(Bytes(list.payload.begin() + 12, list.payload.begin() + 16),
-            (Bytes{0x10, 0, 0, 0x60}));
+  EXPECT_EQ(Bytes(list.payload.begin() + 12, list.payload.begin() + 16), (Bytes{0x10, 0, 0, 0x60}));
   // A length beyond the end is cut there: what will come is what LIST_RECORDING says there is.
   const Reply download =
       asked.ask(kDownload, {1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF});

@@ -17,8 +17,8 @@ class UmockdevBus : public UmockdevTest {
   }
 };
 
-// Ports and nodes as Linux names them: bus-port, /dev/bus/usb/BUS/DEVICE with three digits. The root
-// hub is device 1.
+// Ports and nodes as Linux names them: bus-port, /dev/bus/usb/BUS/DEVICE with three digits. The
+// root hub is device 1.
 TEST_F(UmockdevBus, NamesPortsAndNodesAsTheKernelDoes) {
   const auto first = plug_in();
   EXPECT_EQ(first.port, "1-1");

@@ -53,8 +53,7 @@ TEST_F(UmockdevPort, ANewDeviceIsConfigured) {
   for (int i = 0; i < 2; ++i) {
     const auto nodes = plug_in();
     const OpenFile usb(nodes.usb_node);
-    Transfer asked(USBDEVFS_URB_TYPE_CONTROL, 0,
-                   Transfer::control_in({0x80, 8, 0, 0, 0, 0, 1, 0}));
+    Transfer asked(USBDEVFS_URB_TYPE_CONTROL, 0, Transfer::control_in({0x80, 8, 0, 0, 0, 0, 1, 0}));
     ASSERT_EQ(usb.ask(USBDEVFS_SUBMITURB, &asked.urb), 0);
     ASSERT_TRUE(usb.is_ready(POLLOUT));
     ASSERT_EQ(reap(usb), &asked.urb);

@@ -1,5 +1,5 @@
-// A unit in sysfs. Oracle: Linux, Documentation/ABI/stable/sysfs-bus-usb (names and number formats),
-// and the table of docs/devices/wgt3x-bt-bench-unit.md (values).
+// A unit in sysfs. Oracle: Linux, Documentation/ABI/stable/sysfs-bus-usb (names and number
+// formats), and the table of docs/devices/wgt3x-bt-bench-unit.md (values).
 #include <array>
 
 #include "mocks/umockdev/umockdev_fixture.h"
