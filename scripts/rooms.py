@@ -9,6 +9,7 @@ What must hold:
   is included by at least one file. cli/program/commands.cpp lists the commands and declares them itself:
   the room that defines add_NAME counts as included.
 - No include runs up: a room's neighbours stand before it in the order in which CMake adds them.
+- A room that CMake adds only where a library is installed (mocks/umockdev) is a room as any other.
 - The text between the two marks in docs/architecture.md is what this script writes.
 """
 import pathlib
