@@ -24,7 +24,7 @@
 #include "device/usb/hotplug.h"
 #include "device/wire/payload.h"
 #include "device/wire/wire_unit.h"
-#include "mocks/usb/umockdev_bus.h"
+#include "mocks/umockdev/umockdev_bus.h"
 #include "mocks/usb/usb_unit.h"
 
 namespace {

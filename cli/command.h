@@ -20,7 +20,8 @@
 //
 // An error that run() returns is reported and becomes the exit code. A judgement (failed,
 // inconclusive) goes into context.worsen(). Commands hold no state between calls: a test can run
-// the whole program many times in one process (run_program()). One thread at a time uses a Context.
+// the whole program many times in one process (cli/program/program.h). One thread at a time uses a
+// Context.
 #pragma once
 
 #include <istream>
@@ -30,7 +31,6 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
-#include <vector>
 
 #include <CLI/App.hpp>
 #include <nlohmann/json.hpp>
@@ -160,16 +160,5 @@ class Progress {
   int last_percent_ = -1;
   std::chrono::nanoseconds start_;
 };
-
-// The commands, in the order in which `sixpoint --help` lists them.
-struct CommandEntry {
-  std::string_view name;
-  void (*add)(CLI::App& app, Context& context);
-};
-const std::vector<CommandEntry>& commands();
-
-// The whole program: parses, runs, returns the exit code. `arguments` do not hold the program's
-// name.
-int run_program(const std::vector<std::string>& arguments, Context& context);
 
 }  // namespace sixpoint::cli

@@ -5,7 +5,7 @@ set(reference ${PROJECT_BINARY_DIR}/packaging)
 file(MAKE_DIRECTORY ${reference})
 
 add_executable(sixpoint_reference ${PROJECT_SOURCE_DIR}/packaging/reference.cpp)
-target_link_libraries(sixpoint_reference PRIVATE sixpoint::cli fmt::fmt sixpoint_warnings)
+target_link_libraries(sixpoint_reference PRIVATE sixpoint::cli_program fmt::fmt sixpoint_warnings)
 configure_file(packaging/man/sixpoint.1.in ${reference}/sixpoint.1.in @ONLY)
 configure_file(packaging/deb/changelog.in ${reference}/changelog @ONLY)
 # Packed without a time stamp: the same sources give the same package.
@@ -54,13 +54,13 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "fonts-dejavu-core")  # the fonts of the certificate
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "udev")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "calibrate activity monitors and mend their recordings")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "calibrate activity monitors and repair their recordings")
 set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
 "Activity monitors of the kind wGT3X-BT that were calibrated before 2014-03-24
 and later run by firmware 1.4.0 to 1.7.0 wrote recordings that are wrong by
 100 mg and more. Sixpoint measures the right constants on a six-orientation
 jig, in a calibration file or in the recordings themselves, finds the affected
-files, and mends them without touching the originals.")
+files, and repairs them without touching the originals.")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/deb/conffiles)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 include(CPack)

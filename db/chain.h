@@ -18,8 +18,8 @@
 #include <string_view>
 
 #include "base/sha256.h"
-#include "db/database.h"
 #include "db/schema.h"
+#include "db/servers/database.h"
 
 namespace sixpoint::db {
 

@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "db/chain.h"
-#include "db/database.h"
 #include "db/schema.h"
+#include "db/servers/database.h"
 
 namespace sixpoint::db {
 

@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "base/env.h"
-#include "db/database.h"
 #include "db/schema.h"
+#include "db/servers/database.h"
 
 namespace sixpoint::db {
 

@@ -17,7 +17,7 @@
 #include <string_view>
 #include <vector>
 
-#include "db/database.h"
+#include "db/servers/database.h"
 
 namespace sixpoint::db {
 

@@ -22,9 +22,9 @@
 #include "base/env.h"
 #include "base/sha256.h"
 #include "db/audit.h"
-#include "db/database.h"
 #include "db/questions.h"
 #include "db/records.h"
+#include "db/servers/database.h"
 
 namespace sixpoint::db {
 

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "cli/command.h"
+#include "cli/program/program.h"
 
 namespace sixpoint {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "base/memory_env.h"
 #include "cli/command.h"
+#include "cli/program/program.h"
 
 namespace sixpoint::tests {
 

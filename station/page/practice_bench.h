@@ -1,5 +1,5 @@
 // Virtual units that are turned and unplugged by buttons of the page, for practice. An interface,
-// so that the station does not include the mocks; cli/practice_bench.h implements it.
+// so that the station does not include the mocks; cli/station/practice_bench.h implements it.
 //
 //   if (bench.has("virtual:seed=7")) {
 //     SIXPOINT_CHECK(bench.turn("virtual:seed=7", device::Pose::plus_x, 0));

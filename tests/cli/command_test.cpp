@@ -1,4 +1,4 @@
-// What all commands have in common: exit codes, error documents, options that are declared alike.
+// What all commands have in common: exit codes, error documents, numbers in JSON.
 #include "cli/command.h"
 
 #include <functional>
@@ -8,12 +8,8 @@
 
 #include <CLI/Option.hpp>
 
-#include "command_fixture.h"
-
 namespace sixpoint::cli {
 namespace {
-
-using tests::CommandTest;
 
 // Oracle: the order of the contract, 0 < 2 < 1 < 3 < 64 and above.
 TEST(Command, TheWorseExitCodeIsKept) {
@@ -55,52 +51,6 @@ TEST(Command, JsonHasNoNumberThatItCannotWrite) {
   EXPECT_TRUE(value_or_null(std::optional<int>()).is_null());
   EXPECT_EQ(value_or_null(std::optional(7)), 7);
   EXPECT_EQ(value_or_null(std::optional(UtcTime{})), "1970-01-01T00:00:00Z");
-}
-
-void visit(const CLI::App& app, const std::function<void(const CLI::App&)>& work) {
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
-    work(*command);
-    visit(*command, work);
-  }
-}
-
-TEST_F(CommandTest, EveryCommandHasHelpAndRefusesAnUnknownOption) {
-  for (const CommandEntry& entry : commands()) {
-    CLI::App app;
-    std::ostringstream stream;
-    std::istringstream in;
-    Context context{posix_env(), stream, stream, in};
-    entry.add(app, context);
-    visit(app, [](const CLI::App& command) {
-      EXPECT_FALSE(command.get_description().empty()) << command.get_name();
-    });
-    const CLI::App* command = app.get_subcommands([](const CLI::App*) { return true; }).front();
-    const auto help = run({command->get_name(), "--help"});
-    EXPECT_EQ(help.exit_code, 0) << command->get_name();
-    EXPECT_EQ(run({command->get_name(), "--no-such-option"}).exit_code, 64) << command->get_name();
-  }
-}
-
-// The same option is described by the same words, wherever one function declares it.
-TEST(Command, SharedOptionsAreDescribedAlike) {
-  std::map<std::string, std::set<std::string>> descriptions;
-  std::ostringstream stream;
-  std::istringstream in;
-  Context context{posix_env(), stream, stream, in};
-  CLI::App app;
-  for (const CommandEntry& entry : commands()) {
-    entry.add(app, context);
-  }
-  visit(app, [&](const CLI::App& command) {
-    for (const CLI::Option* option : command.get_options()) {
-      for (const std::string& name : option->get_lnames()) {
-        descriptions[name].insert(option->get_description());
-      }
-    }
-  });
-  for (const char* name : {"record", "wide", "undo-rotation", "allow-prior", "calibration-file"}) {
-    EXPECT_EQ(descriptions[name].size(), 1U) << name;
-  }
 }
 
 }  // namespace

@@ -1,10 +1,10 @@
-// The carrier that needs no kernel: umockdev (mocks/usb/umockdev_bus.h).
+// The carrier that needs no kernel: umockdev (mocks/umockdev/umockdev_bus.h).
 #pragma once
 
 #include <memory>
 #include <thread>
 
-#include "mocks/usb/umockdev_bus.h"
+#include "mocks/umockdev/umockdev_bus.h"
 #include "usb/bench.h"
 
 namespace sixpoint::tests {

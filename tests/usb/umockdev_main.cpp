@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mocks/usb/umockdev_bus.h"
+#include "mocks/umockdev/umockdev_bus.h"
 
 // umockdev's own thread, in which the virtual units hash, may still be ending when the leak
 // sanitizer looks: libcrypto's error state of a thread goes with the thread. Leaks of contexts show

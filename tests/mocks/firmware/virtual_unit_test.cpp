@@ -5,57 +5,18 @@
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
-#include "device/unit.h"
-#include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "gt3x/log/record.h"
 #include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
-#include "mocks/in_process/in_process.h"
-#include "mocks/in_process/virtual_jig.h"
+#include "mocks/made_bench.h"
 
 namespace sixpoint::mocks {
 namespace {
 
 using device::Pose;
 using sim::FilterConfiguration;
-
-struct Bench {
-  explicit Bench(const char* firmware = "1.5.0") {
-    VirtualUnitOptions options;
-    sim::GivenProperties given;
-    given.firmware = firmware;
-    options.truth = sim::draw_unit(7, given);
-    clock = std::make_shared<ManualClock>();
-    plugged = std::make_shared<PluggedUnit>(options, clock);
-    jig = std::make_unique<VirtualJig>(plugged);
-    unit = *device::WireUnit::open(link_to(plugged, false));
-  }
-  std::shared_ptr<ManualClock> clock;
-  std::shared_ptr<PluggedUnit> plugged;
-  std::unique_ptr<VirtualJig> jig;
-  std::unique_ptr<device::Unit> unit;
-};
-
-PerAxis<double> mean_of_stream(Bench& bench, int reports) {
-  PerAxis<double> sum{};
-  double count = 0;
-  for (int i = 0; i < reports; ++i) {
-    const auto block = bench.unit->next_samples(std::chrono::seconds(1));
-    if (!block || !block->has_value()) {
-      ADD_FAILURE() << "the stream dried up";
-      return {};
-    }
-    for (const auto& counts : (*block)->counts) {
-      for (std::size_t axis = 0; axis < kAxes; ++axis) {
-        sum[axis] += counts[axis];
-      }
-      ++count;
-    }
-  }
-  return {sum[0] / count, sum[1] / count, sum[2] / count};
-}
 
 // Oracle: closed form of the sensor under the filter that is set, in all six poses.
 TEST(VirtualUnit, TheJigTurnsItAndTheFilterChangesIt) {
@@ -81,21 +42,6 @@ TEST(VirtualUnit, TheJigTurnsItAndTheFilterChangesIt) {
       }
     }
   }
-}
-
-TEST(VirtualUnit, ATiltedPlacementIsTilted) {
-  Bench bench;
-  ASSERT_OK(bench.unit->set_filter(FilterConfiguration::current));
-  bench.jig->tilt_next(7.2);
-  ASSERT_OK(bench.jig->go_to(Pose::plus_z));
-  bench.clock->sleep(std::chrono::seconds(2));
-  ASSERT_OK(bench.unit->start_stream(100));
-  const auto mean = mean_of_stream(bench, 100);
-  const sim::SensorTruth& truth = bench.plugged->unit.truth().current;
-  const auto g = [&](std::size_t axis) {
-    return (mean[axis] - truth.zero_lsb[axis]) / truth.sensitivity_lsb_per_g[axis];
-  };
-  EXPECT_NEAR(std::atan2(std::hypot(g(0), g(1)), g(2)) * 180 / std::acos(-1.0), 7.2, 0.1);
 }
 
 // What firmware 1.5.0 records of an old unit is the sensor under `current`, scaled with constants

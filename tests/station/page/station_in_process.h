@@ -15,8 +15,8 @@
 #include <nlohmann/json.hpp>
 #undef _res  // a macro of resolv.h, and the name of a parameter in Eigen
 
-#include "cli/known_devices.h"
-#include "cli/practice_bench.h"
+#include "cli/devices/known_devices.h"
+#include "cli/station/practice_bench.h"
 #include "expect_result.h"
 #include "station/page/server.h"
 #include "temporary_folder.h"

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "base/atomic_file.h"
 #include "expect_result.h"
 #include "run_command.h"
 #include "station/records/made_run.h"
@@ -40,15 +39,6 @@ TEST(JigBundle, AStoredRunIsDiagnosed) {
       tests::run_command(posix_env(), {"gap", "trends", "--store", store, "--json"});
   EXPECT_EQ(trends.exit_code, 2) << "one unit is too few";
   EXPECT_EQ(Json::parse(trends.out)["jigs"][0]["belongs_to"], "too_few_units");
-}
-
-TEST(GapCommand, TakesATableOfReadings) {
-  tests::TemporaryFolder folder;
-  const std::string table = folder / "t.csv";
-  ASSERT_OK(write_file(posix_env().files, table, "x,y,z\n1,2,3\n"));
-  EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table}).exit_code, 64);
-  EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table, "--rate", "30"}).exit_code,
-            2);
 }
 
 TEST(JigBundle, WhatDoesNotBelongTogetherIsRefused) {

@@ -1,0 +1,135 @@
+#include "cli/files/repair_answer.h"
+
+#include <fmt/format.h>
+
+#include "repair/rescale/repair_records.h"
+#include "station/records/software.h"
+
+namespace sixpoint::cli {
+
+using repair::RepairReport;
+using repair::RepairStatus;
+
+void add_source_options(CLI::App& command, RepairSources& sources) {
+  command.add_option("--constants", sources.constants, "use these constants (constants.json)");
+  add_store_option(command, sources.store);
+  command.add_option("--calibration-file", sources.calibration_file,
+                     "a recording of the unit lying still on each of its six sides");
+  command.add_flag("--scan", sources.scan,
+                   "use the still periods of the file itself (also the last resort without it)");
+}
+
+void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
+  command.add_flag("--wide", options.wide,
+                   "write 16-bit records (ACTIVITY2), in which nothing needs clipping");
+  command.add_flag("--undo-rotation", options.undo_rotation,
+                   "also turn back the axes of firmware 1.6.0 where the constants are right");
+  command.add_flag("--allow-prior", options.allow_prior,
+                   "also use constants that rest on a population prior");
+}
+
+Result<std::optional<db::Store>> store_of(Context& context, const RepairSources& sources) {
+  const bool only_scan = sources.scan && sources.calibration_file.empty();
+  if (sources.store.empty() && (only_scan || !store_exists(context, ""))) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, sources.store));
+  return store;
+}
+
+Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const auto bytes, read_file(files, path, 1U << 20));
+  auto record = calib::parse_constants_record(as_text(bytes));
+  if (!record) {
+    Error error = record.error();
+    error.where = path;
+    return fail(std::move(error));
+  }
+  return record;
+}
+
+RepairReport failed_report(const std::string& input, const Error& error) {
+  RepairReport report;
+  report.input = input;
+  report.error = error;
+  report.reasons.push_back(error.brief());
+  return report;
+}
+
+void RepairTally::add(Context& context, const RepairReport& report) {
+  ++files_;
+  ++counts_[report.status];
+  if (report.status == RepairStatus::failed) {
+    context.worsen(report.error ? report.error->code : ErrorCode::internal);
+  } else if (report.status == RepairStatus::not_repairable) {
+    context.worsen(kExitFailed);
+  }
+}
+
+std::size_t RepairTally::of(RepairStatus status) const {
+  const auto found = counts_.find(status);
+  return found == counts_.end() ? 0 : found->second;
+}
+
+Json RepairTally::to_json(bool dry_run) const {
+  Json summary = {{"files", files_}};
+  for (const RepairStatus status :
+       {RepairStatus::repaired, RepairStatus::not_affected, RepairStatus::not_repairable,
+        RepairStatus::already_repaired, RepairStatus::failed}) {
+    summary[std::string(repair::to_string(status))] = of(status);
+  }
+  summary["dry_run"] = dry_run;
+  return summary;
+}
+
+std::string RepairTally::brief(bool dry_run) const {
+  return fmt::format(
+      "{} files: {} repaired{}, {} not affected, {} already repaired, {} not repairable, {} "
+      "failed\n",
+      files_, of(RepairStatus::repaired), dry_run ? " (dry run: nothing was written)" : "",
+      of(RepairStatus::not_affected), of(RepairStatus::already_repaired),
+      of(RepairStatus::not_repairable), of(RepairStatus::failed));
+}
+
+void print_report(Context& context, const RepairReport& report) {
+  context.out << report.brief() << '\n';
+  if (report.status != RepairStatus::repaired) {
+    for (const std::string& reason : report.reasons) {
+      context.out << "                 " << printable(reason) << '\n';
+    }
+  }
+}
+
+Json keep_repairs(Context& context, const std::string& location, Result<db::Store>& store,
+                  const std::vector<RepairReport>& reports, const std::string& again,
+                  const std::string& software) {
+  const auto failed = [&](const Error& error) -> Json {
+    context.log().error("the files are repaired, but the store has no record of them: {}; {}",
+                        error.brief(), again);
+    context.worsen(error.code);
+    return {{"in", nullptr}, {"error", error_to_json(error)}};
+  };
+  if (!store) {
+    return failed(store.error());
+  }
+  const auto made = repair::records_of(*store, reports,
+                                       software.empty() ? station::software_and_build() : software);
+  for (const repair::RefusedPath& refused : made.refused) {
+    context.log().error("{}: repaired, but the store cannot keep its record: {}",
+                        printable(refused.path), refused.error.brief());
+    context.worsen(refused.error.code);
+  }
+  if (made.records.empty()) {
+    return nullptr;
+  }
+  std::size_t acknowledged = 0;
+  const auto kept = keep_records(context, location, store, [&](db::RecordWriter& writer) -> Status {
+    for (; acknowledged < made.records.size(); ++acknowledged) {
+      SIXPOINT_CHECK(writer.add_repair(made.records[acknowledged]));
+    }
+    return {};
+  });
+  return kept ? kept_to_json(*kept) : failed(kept.error());
+}
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,169 @@
+// sixpoint gap diagnose BUNDLE: where simulator and recording differ, and which effect explains it.
+#include <chrono>
+#include <memory>
+#include <set>
+#include <string>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "base/atomic_file.h"
+#include "cli/command.h"
+#include "cli/gap/gap_challenge.h"
+#include "cli/gap/gap_trends.h"
+#include "cli/store_option.h"
+#include "gap/judge/diagnose.h"
+#include "gap/recording/bundle.h"
+#include "gap/report/report_html.h"
+#include "gap/report/report_sheet.h"
+#include "gap/unguided/plain.h"
+#include "gap/unguided/readings_table.h"
+#include "station/records/jig_bundle.h"
+
+namespace sixpoint::cli {
+namespace {
+
+struct Options {
+  std::string bundle;
+  std::string run;
+  std::string store;
+  std::vector<std::string> without;
+  std::string html;
+  std::string png;
+  std::string pdf;
+  std::string scenario;
+  std::uint64_t seed = 0;
+  double rate_hz = 0;  // 0: not given
+  bool json = false;
+};
+
+int exit_code_of(const gap::Diagnosis& diagnosis) {
+  if (!diagnosis.usable()) {
+    return kExitInconclusive;
+  }
+  return diagnosis.verdict == gap::Verdict::no_gap || diagnosis.verdict == gap::Verdict::explained
+             ? kExitPassed
+             : kExitFailed;
+}
+
+Result<gap::Diagnosis> diagnose_input(const Options& options, gap::DiagnoseOptions how,
+                                      Context& context) {
+  FileSystem& files = context.env.files;
+  if (!options.run.empty()) {
+    SIXPOINT_ASSIGN(db::Store store, open_existing_store(context, options.store));
+    SIXPOINT_ASSIGN(const station::StoredRun run, station::stored_run(store, options.run));
+    SIXPOINT_ASSIGN(const std::string samples, station::samples_of_run(store, run.id));
+    SIXPOINT_ASSIGN(const gap::Bundle bundle, station::bundle_of_run(run, samples));
+    how.uncalibrated = true;
+    return gap::diagnose(bundle, how);
+  }
+  SIXPOINT_ASSIGN(const FileInfo info, files.info(options.bundle));
+  if (info.is_folder) {
+    SIXPOINT_ASSIGN(const gap::Bundle bundle, gap::read_bundle(files, options.bundle));
+    return gap::diagnose(bundle, how);
+  }
+  if (gap::is_readings_table(options.bundle)) {
+    gap::ReadingsTableOptions table;
+    table.rate_hz = options.rate_hz;
+    return gap::diagnose_table(files, options.bundle, how, table);
+  }
+  return gap::diagnose_plain(files, options.bundle, how);
+}
+
+Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
+  const auto start = context.env.clock.elapsed();
+  gap::DiagnoseOptions how;
+  how.without = std::set<std::string>(options.without.begin(), options.without.end());
+  how.seed = options.seed;
+  SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, diagnose_input(options, std::move(how), context));
+  diagnosis.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
+  return diagnosis;
+}
+
+void print(const gap::Diagnosis& d, Context& context) {
+  context.out << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
+  for (const gap::EffectFinding& effect : d.effects) {
+    context.out << fmt::format("  {:<20} p {:.3f}  held out {:+.1f} nats", effect.name,
+                               effect.probability, effect.held_out_gain_nats);
+    for (const gap::NamedValue& p : effect.parameters) {
+      context.out << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
+    }
+    context.out << (effect.outside_datasheet ? "  (outside the datasheet)\n" : "\n");
+  }
+  for (const std::string& where : d.unknown.where) {
+    context.out << "  unknown: " << printable(where, 300) << '\n';
+  }
+  for (const gap::NextSegment& next : d.next_segments) {
+    context.out << fmt::format("  next: {} ({:.0f} min) would show {}\n", next.name, next.minutes,
+                               fmt::join(next.separates, ", "));
+  }
+  for (const std::string& loss : d.losses) {
+    context.people << "sixpoint: " << printable(loss, 1000) << '\n';
+  }
+}
+
+Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, Context& context) {
+  FileSystem& files = context.env.files;
+  if (!options.html.empty()) {
+    SIXPOINT_CHECK(write_file(files, options.html, gap::report_html(diagnosis)));
+  }
+  if (!options.png.empty()) {
+    SIXPOINT_ASSIGN(const Bytes png, gap::sheet_png(gap::report_sheet(diagnosis)));
+    SIXPOINT_CHECK(write_file(files, options.png, as_text(png)));
+  }
+  if (!options.pdf.empty()) {
+    SIXPOINT_ASSIGN(const Bytes pdf, gap::sheet_pdf(gap::report_sheet(diagnosis)));
+    SIXPOINT_CHECK(write_file(files, options.pdf, as_text(pdf)));
+  }
+  if (!options.scenario.empty()) {
+    SIXPOINT_CHECK(
+        write_file(files, options.scenario, gap::augmented_scenario(diagnosis).dump(2) + "\n"));
+  }
+  return {};
+}
+
+Status run(const Options& options, Context& context) {
+  if (options.bundle.empty() && options.run.empty()) {
+    return fail(ErrorCode::usage, "BUNDLE or --run is required", {}, "name one of them");
+  }
+  SIXPOINT_ASSIGN(const gap::Diagnosis diagnosis, diagnose(options, context));
+  context.worsen(exit_code_of(diagnosis));
+  SIXPOINT_CHECK(write_reports(options, diagnosis, context));
+  if (!options.json) {
+    print(diagnosis, context);
+    return {};
+  }
+  Json json = document("gap-diagnose");
+  json.update(diagnosis.to_json());
+  return print_json(context, json);
+}
+
+}  // namespace
+
+void add_gap(CLI::App& app, Context& context) {
+  CLI::App& group = add_group(app, "gap", "simulator and recording: where they differ, and why");
+  auto [diagnosis, options] =
+      add_command<Options>(group, context, "gap-diagnose", "diagnose",
+                           "which effect explains a recording of a known protocol", run);
+  CLI::Option* bundle = diagnosis.add_option(
+      "BUNDLE", options.bundle,
+      "folder with recording.gt3x and protocol.json, a plain recording, or a table of readings "
+      "(.txt, .csv, also .gz: time in seconds and three axes)");
+  diagnosis
+      .add_option("--rate", options.rate_hz, "readings a second of a table without a time column")
+      ->check(CLI::Range(5.0, 10'000.0));
+  diagnosis.add_option("--run", options.run, "a stored jig run instead of a bundle")
+      ->excludes(bundle);
+  add_store_option(diagnosis, options.store);
+  diagnosis.add_option("--without", options.without, "effects taken out of the catalogue")
+      ->delimiter(',');
+  diagnosis.add_option("--html", options.html, "write the report as one page to this file");
+  diagnosis.add_option("--png", options.png, "write the report as one sheet, PNG");
+  diagnosis.add_option("--pdf", options.pdf, "write the report as one sheet, PDF");
+  diagnosis.add_option("--seed", options.seed, "seed of the augmented scenario");
+  diagnosis.add_option("--scenario", options.scenario, "write the augmented scenario to this file");
+  add_gap_challenge(group, context);
+  add_gap_trends(group, context);
+}
+
+}  // namespace sixpoint::cli

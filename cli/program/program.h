@@ -1,0 +1,29 @@
+// The whole program: its commands, and one run of it.
+//
+//   std::ostringstream out;
+//   Context context{env, out, std::cerr, std::cin};
+//   const int exit_code = run_program({"inspect", path, "--json"}, context);
+//
+// A command is defined in one of the rooms below; commands.cpp lists all of them.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cli/command.h"
+
+namespace sixpoint::cli {
+
+// The commands, in the order in which `sixpoint --help` lists them.
+struct CommandEntry {
+  std::string_view name;
+  void (*add)(CLI::App& app, Context& context);
+};
+const std::vector<CommandEntry>& commands();
+
+// Parses, runs, returns the exit code. `arguments` do not hold the program's name. No state is left
+// behind: a test calls it many times in one process.
+int run_program(const std::vector<std::string>& arguments, Context& context);
+
+}  // namespace sixpoint::cli

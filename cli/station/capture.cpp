@@ -1,0 +1,183 @@
+// sixpoint capture: the customer's calibration file, in the terminal.
+#include <optional>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cli/command.h"
+#include "cli/station/jig_options.h"
+#include "cli/station/record_option.h"
+#include "cli/store_option.h"
+#include "station/capture/capture_run.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+struct Options : JigOptions {
+  std::string output;
+  std::string constants_file;
+  int rate_hz = 30;
+  double side_s = 40;
+  double turn_s = 5;
+  int patience_s = 60;
+};
+
+struct Done {
+  station::CaptureReport report;
+  std::optional<SavedConstants> saved;
+};
+
+Result<station::CaptureOptions> capture_options(Context& context, const Options& options,
+                                                const std::string& serial) {
+  station::CaptureOptions capture;
+  capture.rate_hz = options.rate_hz;
+  capture.side_s = options.side_s;
+  capture.turn_s = options.turn_s;
+  capture.replug_patience_s = options.patience_s;
+  capture.output = options.output;
+  if (capture.output.empty()) {
+    const std::string day = to_iso8601(context.env.clock.now()).substr(0, 10);
+    capture.output = fmt::format("{}-calibration-{}.gt3x", printable(serial, 20), day);
+  }
+  SIXPOINT_ASSIGN(const auto gravity, local_gravity(options.gravity));
+  if (gravity) {
+    capture.solve.gravity_g = gravity->g();
+    capture.solve.gravity_sd_g = gravity->sd_g();
+  }
+  return capture;
+}
+
+// Asks the person to lay the unit on a side; a jig that turns by itself needs no answer.
+station::SideAnswer ask_side(Context& context, double side_s, bool by_itself, device::Pose side,
+                             std::size_t number, std::size_t of) {
+  context.people << fmt::format(
+                        "side {} of {}: {} - its {} axis points {}; then leave it alone for "
+                        "{:.0f} s{}\n",
+                        number, of, device::to_string(side), kAxisNames[device::axis_of(side)],
+                        device::sign_of(side) > 0 ? "up" : "down", side_s,
+                        by_itself ? "" : ". Lay it down, then press Enter (q and Enter: stop)")
+                 << std::flush;
+  std::string line;
+  return by_itself || (std::getline(context.in, line) && line != "q") ? station::SideAnswer::placed
+                                                                      : station::SideAnswer::stop;
+}
+
+Result<Done> capture(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, recorder));
+  device::Unit& unit = *opened.unit;
+  SIXPOINT_ASSIGN(const auto how, capture_options(context, options, unit.identity().serial));
+  context.people << fmt::format("unit {} with firmware {}\n", printable(unit.identity().serial),
+                                printable(unit.identity().firmware));
+  Done done;
+  if (unit.abilities().records_on_command) {
+    station::CaptureHooks hooks;
+    hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
+      return ask_side(context, options.side_s, opened.jig->turns_by_itself(), side, number, of);
+    };
+    SIXPOINT_ASSIGN(done.report, station::run_capture(opened.on_jig(), context.env, how, hooks));
+  } else {
+    context.people << "this unit offers files only: the recording that it holds is taken\n";
+    SIXPOINT_ASSIGN(done.report, station::run_file_capture(unit, context.env, how));
+  }
+  if (done.report.usable()) {
+    SIXPOINT_ASSIGN(done.saved,
+                    save_capture(context, options.store, done.report, options.constants_file));
+  }
+  return done;
+}
+
+Json to_json(const Done& done) {
+  Json json = document("capture");
+  if (done.report.solved) {
+    json.update(calib::to_json(*done.report.solved));
+  } else {
+    json["serial"] = done.report.serial;
+    json["filter"] = calib::to_string(done.report.recording_filter);
+    json["verified"] = false;
+    json["verdict"] = done.report.stopped ? "stopped" : "refused";
+    json["reasons"] = done.report.refusal;
+  }
+  json["notes"] = done.report.notes;
+  json["file"] = text_or_null(done.report.file);
+  json["sha256"] = text_or_null(done.report.file_sha256);
+  json["stored_id"] = done.saved ? Json(done.saved->id) : Json(nullptr);
+  json["kept"] = done.saved ? kept_to_json(done.saved->place) : Json(nullptr);
+  return json;
+}
+
+void print(Context& context, const Done& done) {
+  const station::CaptureReport& report = done.report;
+  for (const std::string& note : report.notes) {
+    context.people << "note: " << note << '\n';
+  }
+  if (report.stopped) {
+    context.people << "stopped; the recording so far stays in the unit\n";
+    return;
+  }
+  if (!report.refusal.empty()) {
+    context.log().error("{}", fmt::join(report.refusal, "; "));
+    return;
+  }
+  context.out << fmt::format("{}: {}\n", printable(report.file), report.solved->brief());
+  const auto& missing = report.solved->verification.missing_directions;
+  if (!missing.empty()) {
+    context.out << fmt::format("repeat these sides: {}\n", fmt::join(missing, " "));
+  }
+  if (done.saved) {
+    context.out << fmt::format("constants stored as {}\n", done.saved->id);
+  }
+}
+
+int exit_code_of(const station::CaptureReport& report) {
+  if (report.stopped) {
+    return kExitStopped;
+  }
+  if (report.usable()) {
+    return kExitPassed;
+  }
+  // Sides that are missing can be repeated; everything else is a verdict.
+  return report.solved && !report.solved->verification.missing_directions.empty()
+             ? kExitInconclusive
+             : kExitFailed;
+}
+
+Status run(const Options& options, Context& context) {
+  device::SessionRecorder recorder;
+  const Result<Done> done = capture(context, options, recorder);
+  finish_session(context, recorder, options.record);
+  if (!done) {
+    return fail(done.error());
+  }
+  context.worsen(exit_code_of(done->report));
+  if (options.json) {
+    print_json(context, to_json(*done));
+  } else {
+    print(context, *done);
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_capture(CLI::App& app, Context& context) {
+  auto [command, options] = add_command<Options>(
+      app, context, "capture",
+      "make a calibration file: the unit records on its six sides, and is solved", run);
+  add_jig_options(command, options);
+  command.add_option("-o,--output", options.output,
+                     "the .gt3x to make (default: SERIAL-calibration-DAY.gt3x)");
+  command.add_option("--constants", options.constants_file,
+                     "also write the constants into this constants.json");
+  const auto add_number = [&command = command](const char* name, auto& value, auto least, auto most,
+                                               const char* about) {
+    command.add_option(name, value, about)->check(CLI::Range(least, most))->capture_default_str();
+  };
+  add_number("--rate", options.rate_hz, 30, 100, "sample rate in Hz");
+  add_number("--side-seconds", options.side_s, 1.0, 3600.0, "how long the unit rests on a side");
+  add_number("--turn-seconds", options.turn_s, 0.0, 60.0, "and before that, to let go of it");
+  add_number("--patience", options.patience_s, 0, 3600,
+             "seconds to wait for a unit that is not plugged in when its recording is fetched");
+}
+
+}  // namespace sixpoint::cli

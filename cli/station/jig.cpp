@@ -1,0 +1,455 @@
+// sixpoint jig: the technician's six-orientation run, in the terminal.
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include "base/atomic_file.h"
+#include "cli/command.h"
+#include "cli/devices/known_devices.h"
+#include "cli/station/jig_options.h"
+#include "cli/station/record_option.h"
+#include "cli/store_option.h"
+#include "device/unit.h"
+#include "station/certificate/certificate.h"
+#include "station/lanes/run_folder.h"
+#include "station/records/run_records.h"
+#include "station/records/station_records.h"
+#include "station/run/jig_session.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+struct Options : JigOptions {
+  std::string jig_id;
+  std::string jig_due;
+  std::string retest_of;
+  std::string operator_name;
+  std::string station;
+  std::string filter = "current";
+  std::string limits;
+  std::string study;
+  std::string certificate;
+  std::string label;
+  std::string state;
+  bool anew = false;
+  double dwell_s = station::JigRunOptions{}.dwell_s;
+  int patience_s = static_cast<int>(station::kReturnPatience.count());
+  bool write = false;
+};
+
+struct Done {
+  station::JigReport report;
+  std::string run_id;
+  std::optional<std::string> constants_id;
+  bool certified = false;
+  bool labelled = false;
+  Result<db::Saved> kept = db::Saved{};
+};
+
+// The id of the jig run that `--retest-of` names: an id, or the unit's last.
+Result<std::string> retested_run(const Options& options, const std::string& serial,
+                                 Result<db::Store>& store) {
+  if (!store) {
+    return fail(store.error());
+  }
+  SIXPOINT_ASSIGN(const auto history, store->unit_history(serial));
+  const auto earlier =
+      std::find_if(history.runs.rbegin(), history.runs.rend(), [&](const db::RunRecord& candidate) {
+        return candidate.kind == "jig" &&
+               (options.retest_of == "last" || options.retest_of == candidate.id);
+      });
+  if (earlier == history.runs.rend()) {
+    return fail(ErrorCode::no_input,
+                fmt::format("the store has no such jig run of unit {}", printable(serial)),
+                "--retest-of " + printable(options.retest_of, 60),
+                "'sixpoint history SERIAL' lists its runs; or leave the option out");
+  }
+  return earlier->id;
+}
+
+// What is known before the unit is measured. What can be refused is refused here, before the work.
+Result<db::RunRecord> record_before(Context& context, const Options& options,
+                                    const station::JigSessionOptions& session,
+                                    const std::string& serial, const std::string& jig,
+                                    Result<db::Store>& store) {
+  db::RunRecord run =
+      station::run_record_before(session, serial, options.jig_id.empty() ? jig : options.jig_id);
+  if (!options.study.empty()) {
+    run.kind = station::kStudyKind;
+  }
+  run.operator_name = options.operator_name;
+  run.station = options.station;
+  if (!options.jig_due.empty()) {
+    const auto due = parse_iso8601(options.jig_due);
+    if (!due) {
+      return fail(ErrorCode::usage, due.error().what, "--jig-due", "write it as 2027-03-31");
+    }
+    run.jig_due = *due;
+    if (*due < context.env.clock.now()) {
+      context.log().warn("the jig was due for its own calibration on {}", to_iso8601(*due));
+    }
+  }
+  if (options.retest_of.empty()) {
+    run.retest_of = session.retest.retest_of;
+  } else {
+    SIXPOINT_ASSIGN(run.retest_of, retested_run(options, serial, store));
+  }
+  SIXPOINT_CHECK(db::rows_of(run, {}));
+  return run;
+}
+
+Status check_outputs(const Options& options) {
+  if (!options.certificate.empty()) {
+    SIXPOINT_CHECK(station::check_certificate_name(options.certificate));
+  }
+  if (!options.label.empty() && !options.write) {
+    return fail(ErrorCode::usage, "a label says that the unit holds what was measured", "--label",
+                "add --write, which writes the constants and reads them back");
+  }
+  if (!options.study.empty() &&
+      (options.operator_name.empty() || !options.certificate.empty() || options.write)) {
+    return fail(ErrorCode::usage, "a gage study compares operators and changes no unit", "--study",
+                "name the --operator, and leave out --write and --certificate");
+  }
+  return {};
+}
+
+// Certificate and label from the record as it is stored, so that they can be made again from there.
+// An error is reported, and the run goes on.
+void make_papers(Context& context, const Options& options, const db::RunRecord& run, Done& done) {
+  const auto report = [&](const Status& made, bool& flag) {
+    flag = made.has_value();
+    if (!made) {
+      context.log().error("{}", made.error().brief());
+      if (made.error().code != ErrorCode::bad_data) {
+        context.worsen(static_cast<int>(made.error().code));
+      }
+    }
+  };
+  if (!options.certificate.empty()) {
+    report(station::write_certificate(context.env.files, options.certificate, run), done.certified);
+  }
+  if (!options.label.empty()) {
+    const auto label = station::label_zpl(run);
+    report(
+        label ? write_file(context.env.files, options.label, *label) : Status(fail(label.error())),
+        done.labelled);
+  }
+}
+
+// The operator's line since the last call, without waiting: u undoes, s or q stops.
+std::optional<station::OperatorCommand> operator_at_terminal() {
+  pollfd keyboard{STDIN_FILENO, POLLIN, 0};
+  if (poll(&keyboard, 1, 0) <= 0 || (keyboard.revents & POLLIN) == 0) {
+    return std::nullopt;
+  }
+  std::array<char, 80> line{};
+  if (read(STDIN_FILENO, line.data(), line.size()) <= 0) {
+    return std::nullopt;
+  }
+  switch (line[0]) {
+    case 'u':
+      return station::OperatorCommand::undo;
+    case 's':
+    case 'q':
+      return station::OperatorCommand::stop;
+    default:
+      return std::nullopt;
+  }
+}
+
+// The folder of the run on disk; empty where the run is not saved: a jig that turns by itself
+// begins again in two minutes, and a gage study measures each run whole.
+std::string run_folder(const Context& context, const Options& options, const device::Jig& jig,
+                       const std::string& serial) {
+  const bool has_person = context.people_at_terminal && !jig.turns_by_itself();
+  if (!options.study.empty() || (options.state.empty() && !has_person)) {
+    return {};
+  }
+  return (options.state.empty() ? data_folder() + "/jig" : options.state) + "/" +
+         run_folder_name(options.store, serial);
+}
+
+station::UnfinishedRun unfinished_run(const Options& options, const device::Identity& identity,
+                                      calib::FilterConfiguration filter) {
+  return {.device = options.device,
+          .serial = identity.serial,
+          .firmware = identity.firmware,
+          .operator_name = options.operator_name,
+          .station = options.station,
+          .write = options.write,
+          .filter = filter};
+}
+
+Result<station::JigSessionOptions> session_options(Context& context, const Options& options) {
+  station::JigSessionOptions session;
+  SIXPOINT_ASSIGN(session.limits, station::read_limits(context.env.files, options.limits));
+  SIXPOINT_ASSIGN(session.filter, calib::parse_filter_configuration(options.filter));
+  SIXPOINT_ASSIGN(const auto gravity, local_gravity(options.gravity));
+  session.gravity = gravity.value_or(session.gravity);
+  session.run.write = options.write;
+  session.run.dwell_s = options.dwell_s;
+  session.keep_interrupted = true;
+  return session;
+}
+
+// What the unit's earlier runs demand of this one. A store that does not answer stops no run.
+Result<station::RetestState> retest_state(Context& context, const Options& options,
+                                          const std::string& serial, const station::Limits& limits,
+                                          Result<db::Store>& store) {
+  if (store && !options.study.empty()) {
+    return station::RetestState{};
+  }
+  if (store) {
+    auto allowed = station::may_start(*store, serial, options.station, limits);
+    if (allowed || allowed.error().code == ErrorCode::configuration) {
+      return allowed;
+    }
+  }
+  context.log().warn(
+      "the store does not answer: whether the station is locked and how often the "
+      "unit failed is not known");
+  return station::RetestState{};
+}
+
+void show(Context& context, const station::JigAction& action) {
+  switch (action.kind) {
+    case station::JigAction::Kind::refused:
+      context.people << fmt::format("  refused: {}; once more\n", action.text);
+      break;
+    case station::JigAction::Kind::place:
+      context.people << action.text << '\n';
+      break;
+    default:
+      context.people << "  " << action.text << '\n';
+      break;
+  }
+  context.people << std::flush;
+}
+
+station::JigHooks terminal_hooks(Context& context, const Options& options,
+                                 const JiggedUnit& opened) {
+  station::JigHooks hooks;
+  hooks.on_action = [&context](const station::JigAction& action) { show(context, action); };
+  hooks.reopen = station::wait_for_unit(
+      *opened.unit, *opened.jig,
+      [&context](const std::string& text) { context.people << text << '\n'
+                                                           << std::flush; },
+      std::chrono::seconds(options.patience_s));
+  if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
+    context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
+    hooks.next_command = operator_at_terminal;
+  }
+  return hooks;
+}
+
+// The run itself. It is saved in a folder while it is under way, so that the next program can go on
+// with it, until `store_run` has stored the report.
+Result<station::JigReport> run_and_store(
+    Context& context, const Options& options, const JiggedUnit& opened,
+    const station::JigSessionOptions& session,
+    const std::function<Status(const station::JigReport&)>& store_run) {
+  station::JigHooks hooks = terminal_hooks(context, options, opened);
+  const device::Identity& identity = opened.unit->identity();
+  const std::string path = run_folder(context, options, *opened.jig, identity.serial);
+  station::RunFolder folder(context.env, path);
+  station::RunSaver saver(
+      folder, unfinished_run(options, identity, session.filter),
+      [&context](const std::string& warning) { context.log().warn("{}", warning); });
+  std::optional<station::JigResume> left;
+  if (!path.empty()) {
+    left = saver.take_left_over(options.anew);
+    hooks.raw = [&saver](std::string_view rows) { saver.add_rows(rows); };
+    hooks.progress = [&saver](const station::JigReport& report, const station::JigRun& run) {
+      saver.save(report, run);
+    };
+  }
+  if (left) {
+    const station::JigProgress& had = left->progress;
+    context.people << fmt::format(
+                          "the run of {} goes on; it has {} placements (--anew begins anew)\n",
+                          to_iso8601(left->started),
+                          had.faces.size() + had.reversed.size() + had.reseat.size() +
+                              had.recheck.size())
+                   << std::flush;
+  }
+  SIXPOINT_ASSIGN(auto report,
+                  station::run_jig(opened.on_jig(), context.env, session, hooks, left));
+  if (store_run(report) && !path.empty()) {
+    saver.end();
+  }
+  return report;
+}
+
+Result<Done> measure(Context& context, const Options& options, device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(check_outputs(options));
+  SIXPOINT_ASSIGN(auto session, session_options(context, options));
+  SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, recorder));
+  const device::Unit& unit = *opened.unit;
+  const device::Identity& identity = unit.identity();
+  if (!unit.abilities().streams || !unit.abilities().holds_constants) {
+    return fail(ErrorCode::usage, "this unit offers files and no live samples", unit.address(),
+                "calibrate it by a file: 'sixpoint capture'");
+  }
+  context.people << fmt::format("unit {} with firmware {}; jig: {}\n", printable(identity.serial),
+                                printable(identity.firmware), opened.jig->name());
+  // Opened before the work, so that a wrong store is reported now. Without its store a unit is
+  // measured all the same.
+  auto store = open_store(context, options.store);
+  if (!store && store.error().code == ErrorCode::usage) {
+    return fail(store.error());
+  }
+  SIXPOINT_ASSIGN(session.retest,
+                  retest_state(context, options, identity.serial, session.limits, store));
+  SIXPOINT_ASSIGN(auto record, record_before(context, options, session, identity.serial,
+                                             opened.jig->name(), store));
+  Done done;
+  const auto store_run = [&](const station::JigReport& report) -> Status {
+    station::complete_run_record(record, report, options.study);
+    station::RunIds stored;
+    done.kept =
+        keep_records(context, options.store, store, [&](db::RecordWriter& writer) -> Status {
+          SIXPOINT_ASSIGN(stored, station::add_run_records(writer, report, record));
+          return {};
+        });
+    done.run_id = stored.run_id;
+    done.constants_id = stored.constants_id;
+    record.id = done.run_id;
+    return done.kept ? Status{} : fail(done.kept.error());
+  };
+  SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, store_run));
+  if (done.kept) {
+    make_papers(context, options, record, done);
+  }
+  return done;
+}
+
+Json to_json(const Options& options, const Done& done) {
+  Json json = document("jig");
+  json["run"] = done.run_id;
+  json.update(done.report.to_json());
+  if (done.report.ended_by) {
+    json["error"] = error_to_json(*done.report.ended_by);
+  }
+  json["stored_id"] = value_or_null(done.constants_id);
+  json["certificate"] = done.certified ? Json(options.certificate) : Json(nullptr);
+  json["label"] = done.labelled ? Json(options.label) : Json(nullptr);
+  json["kept"] = done.kept ? kept_to_json(*done.kept) : Json(nullptr);
+  if (!done.kept) {
+    json["error"] = error_to_json(done.kept.error());
+  }
+  return json;
+}
+
+void print(Context& context, const Done& done) {
+  const station::JigReport& report = done.report;
+  context.out << report.brief() << '\n';
+  if (!report.usable()) {
+    for (const std::string& action : station::next_actions(report.codes)) {
+      context.out << "  what to do: " << action << '\n';
+    }
+  }
+  if (report.six) {
+    const calib::SixPoseSolution& best = report.six->best();
+    context.out << "     sensitivity         zero        +1 g   -1 g    0 g\n";
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      context.out << fmt::format("  {}  {:8.3f} LSB/g {:8.3f} LSB {:6} {:6} {:6}\n",
+                                 kAxisNames[axis], 1 / best.calibration.sensitivity_g_per_lsb[axis],
+                                 best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
+                                 best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
+    }
+  }
+  if (!done.kept) {
+    return;
+  }
+  context.out << fmt::format("run {}\n", done.run_id);
+  if (done.constants_id) {
+    context.out << fmt::format("constants stored as {}\n", *done.constants_id);
+  }
+}
+
+int exit_code_of(const Done& done) {
+  const std::optional<Error>& ended_by = done.report.ended_by;
+  return ended_by ? static_cast<int>(ended_by->code) : station::exit_code_of(done.report.verdict);
+}
+
+Status run(const Options& options, Context& context) {
+  device::SessionRecorder recorder;
+  const Result<Done> done = measure(context, options, recorder);
+  finish_session(context, recorder, options.record);
+  if (!done) {
+    return fail(done.error());
+  }
+  if (done->report.ended_by) {
+    context.log().error("{}", done->report.ended_by->brief());
+  }
+  context.worsen(exit_code_of(*done));
+  if (!done->kept) {
+    report_error(context, done->kept.error());  // the report below is then the only copy
+  }
+  if (options.json) {
+    print_json(context, to_json(options, *done));
+  } else {
+    print(context, *done);
+  }
+  return {};
+}
+
+// The options that are texts.
+struct TextOption {
+  const char* name;
+  std::string Options::*text;
+  const char* about;
+};
+constexpr std::array<TextOption, 10> kTextOptions = {{
+    {"--jig-id", &Options::jig_id,
+     "the jig's own number, for the record (which units were on it?)"},
+    {"--jig-due", &Options::jig_due,
+     "when the jig itself is due for calibration (2027-03-31), for the record"},
+    {"--retest-of", &Options::retest_of,
+     "the run that this one repeats: its id, or 'last' for the unit's last one"},
+    {"--operator", &Options::operator_name, "who runs it, for the record"},
+    {"--station", &Options::station, "where it is run, for the record"},
+    {"--limits", &Options::limits,
+     "a TOML file of limits (docs/limits.md); else the built-in ones"},
+    {"--certificate", &Options::certificate,
+     "the calibration certificate: a .pdf or .json to make"},
+    {"--label", &Options::label, "a label for the unit, as ZPL; after a read-back only (--write)"},
+    {"--state", &Options::state,
+     "the folder that keeps the run while it is under way, so that the next program goes on with "
+     "it; a person at a terminal has one by default"},
+    {"--study", &Options::study,
+     "this run belongs to a gage study of that name (sixpoint gage-rr)"},
+}};
+
+}  // namespace
+
+void add_jig(CLI::App& app, Context& context) {
+  auto [command, options] = add_command<Options>(
+      app, context, "jig", "measure a unit in its six poses and store its constants", run);
+  add_jig_options(command, options);
+  for (const TextOption& option : kTextOptions) {
+    command.add_option(option.name, options.*option.text, option.about);
+  }
+  command.add_option("--filter", options.filter, "filter configuration: current or legacy")
+      ->capture_default_str();
+  command.add_option("--dwell", options.dwell_s, "seconds that each pose is measured for")
+      ->check(CLI::Range(0.5, 600.0))
+      ->capture_default_str();
+  command
+      .add_option("--patience", options.patience_s,
+                  "seconds to wait for a unit that went away in mid-run")
+      ->check(CLI::Range(0, 3600))
+      ->capture_default_str();
+  command.add_flag("--anew", options.anew, "begin anew where an earlier program left a run");
+  command.add_flag("--write", options.write,
+                   "write the constants into the unit, read them back and measure again");
+}
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,265 @@
+// sixpoint station: serves the technician's page.
+#include <algorithm>
+#include <mutex>
+#include <thread>
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include "cli/command.h"
+#include "cli/devices/known_devices.h"
+#include "cli/devices/stop_signals.h"
+#include "cli/gravity_option.h"
+#include "cli/station/practice_bench.h"
+#include "cli/store_option.h"
+#include "station/certificate/certificate.h"
+#include "station/lanes/lanes.h"
+#include "station/page/api.h"
+#include "station/page/quality_control.h"
+#include "station/page/server.h"
+#include "station/records/run_records.h"
+#include "station/records/software.h"
+#include "station/records/station_records.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+struct Options {
+  int port = 6020;
+  std::string bind = "127.0.0.1";
+  std::string token;
+  std::vector<std::string> devices;
+  std::string store;
+  std::string station;
+  std::string state;
+  std::string files = ".";
+  std::string limits;
+  GravityOptions gravity;
+  double side_s = station::CaptureOptions{}.side_s;
+};
+
+bool is_loopback(const std::string& bind) {
+  return bind == "127.0.0.1" || bind == "localhost" || bind == "::1";
+}
+
+// The folder of runs under way. Another store or another station's name is another station.
+std::string state_folder(const Options& options) {
+  return options.state.empty()
+             ? data_folder() + "/station/" + run_folder_name(options.store, options.station)
+             : options.state;
+}
+
+// What the threads of the station ask of the command: the store, one thread at a time, because the
+// command's streams and exit code belong to one thread.
+class StationStore {
+ public:
+  StationStore(Context& context, const Options& options, const station::JigSessionOptions& session)
+      : context_(context), options_(options), session_(session) {}
+
+  Result<db::Store> open() {
+    const std::lock_guard lock(mutex_);
+    return open_store(context_, options_.store);
+  }
+  Result<station::RetestState> may_start(const std::string& serial) {
+    const std::lock_guard lock(mutex_);
+    auto store = open_store(context_, options_.store);
+    // A store that does not answer is no reason not to measure: keep_records() has a journal.
+    return store ? station::may_start(*store, serial, options_.station, session_.limits)
+                 : Result<station::RetestState>(station::RetestState{});
+  }
+  Result<station::RunIds> add_run(const station::JigReport& report,
+                                  const station::RunLabels& labels);
+  // Constants of a calibration file: beside it as FILE.constants.json, and in the store.
+  Result<std::string> add_constants(const station::CaptureReport& report) {
+    const std::lock_guard lock(mutex_);
+    SIXPOINT_ASSIGN(const auto saved, save_capture(context_, options_.store, report,
+                                                   report.file + ".constants.json"));
+    return saved.id;
+  }
+  Result<station::RunDocument> document(const std::string& run_id, const std::string& kind);
+
+ private:
+  Context& context_;
+  const Options& options_;
+  const station::JigSessionOptions session_;
+  std::mutex mutex_;
+};
+
+Result<station::RunIds> StationStore::add_run(const station::JigReport& report,
+                                              const station::RunLabels& labels) {
+  const std::lock_guard lock(mutex_);
+  db::RunRecord run = station::run_record_before(session_, report.serial, report.jig);
+  run.operator_name = labels.operator_name;
+  run.station = labels.station;
+  run.retest_of = labels.retest_of;
+  station::complete_run_record(run, report);
+  station::RunIds stored;
+  auto store = open_store(context_, options_.store);
+  SIXPOINT_CHECK(
+      keep_records(context_, options_.store, store, [&](db::RecordWriter& writer) -> Status {
+        SIXPOINT_ASSIGN(stored, station::add_run_records(writer, report, run));
+        return {};
+      }));
+  return stored;
+}
+
+Result<station::RunDocument> StationStore::document(const std::string& run_id,
+                                                    const std::string& kind) {
+  const std::lock_guard lock(mutex_);
+  SIXPOINT_ASSIGN(db::Store store, open_existing_store(context_, options_.store));
+  SIXPOINT_ASSIGN(const db::RunRecord run, store.run(run_id));
+  if (kind == "report.json") {
+    return station::RunDocument{"application/json", run.document};
+  }
+  if (kind == "label.zpl") {
+    SIXPOINT_ASSIGN(auto label, station::label_zpl(run));
+    return station::RunDocument{"text/plain; charset=utf-8", std::move(label)};
+  }
+  if (kind == "certificate.pdf" || kind == "certificate.json") {
+    SIXPOINT_ASSIGN(const auto certificate, station::certificate_of(run));
+    if (kind == "certificate.json") {
+      return station::RunDocument{"application/json", certificate.to_json().dump(2) + "\n"};
+    }
+    SIXPOINT_ASSIGN(const Bytes pdf, station::certificate_pdf(certificate));
+    return station::RunDocument{"application/pdf", std::string(pdf.begin(), pdf.end())};
+  }
+  return fail(ErrorCode::no_input, "a run has no such document", printable(kind, 40),
+              "ask for report.json, certificate.pdf, certificate.json or label.zpl");
+}
+
+Result<station::LanesOptions> lanes_options(Context& context, const Options& options) {
+  station::LanesOptions lanes;
+  lanes.devices = options.devices;
+  lanes.state_folder = state_folder(options);
+  lanes.station = options.station;
+  lanes.capture_folder = options.files;
+  lanes.capture.side_s = options.side_s;
+  SIXPOINT_ASSIGN(const auto gravity, local_gravity(options.gravity));
+  lanes.session.gravity = gravity.value_or(lanes.session.gravity);
+  SIXPOINT_ASSIGN(lanes.session.limits, station::read_limits(context.env.files, options.limits));
+  if (!is_loopback(options.bind) && options.token.size() < 8) {
+    return fail(ErrorCode::usage,
+                fmt::format("on {} others can reach this station: it needs a --token of at least "
+                            "8 characters",
+                            printable(options.bind, 60)),
+                {}, "choose one, or leave --bind out");
+  }
+  if (options.token.find_first_not_of(
+          "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+          "-_.~") != std::string::npos) {
+    return fail(ErrorCode::usage, "a token is letters, digits and -_.~", "--token",
+                "for example the output of 'openssl rand -hex 16'");
+  }
+  return lanes;
+}
+
+// A burst of pages must not take the descriptors that samples and store need.
+void raise_descriptor_limit() {
+  constexpr rlim_t kDescriptors = 8192;
+  rlimit descriptors{};
+  if (getrlimit(RLIMIT_NOFILE, &descriptors) == 0) {
+    descriptors.rlim_cur = std::min(descriptors.rlim_max, kDescriptors);
+    setrlimit(RLIMIT_NOFILE, &descriptors);
+  }
+}
+
+void serve_until_signal(station::Server& server, const sigset_t& signals) {
+  std::jthread waiter([&](const std::stop_token& stop) {
+    const timespec between_checks{0, 200'000'000};
+    while (!stop.stop_requested() && sigtimedwait(&signals, nullptr, &between_checks) < 0) {
+    }
+    server.stop();
+  });
+  server.serve();
+}
+
+Status serve(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto lanes_asked, lanes_options(context, options));
+  // A store that cannot be used is refused before anything is measured.
+  if (const auto store = open_store(context, options.store);
+      !store && store.error().code == ErrorCode::usage) {
+    return fail(store.error());
+  }
+  const sigset_t signals = block_stop_signals();
+  raise_descriptor_limit();
+
+  mocks::VirtualBench bench;
+  device::TransportRegistry devices = station::known_devices();
+  bench.register_in(devices);
+  VirtualPracticeBench practice_bench(bench);
+  StationStore store(context, options, lanes_asked.session);
+  const auto open = [&] { return store.open(); };
+  station::QualityControl quality(open, options.station, lanes_asked.session.limits);
+  lanes_asked.may_start = [&](const std::string& serial) { return store.may_start(serial); };
+  const station::StoreConstants store_constants = [&](const station::CaptureReport& report) {
+    return store.add_constants(report);
+  };
+  const station::StoreRun store_run = [&](const station::JigReport& report,
+                                          const station::RunLabels& labels) {
+    auto stored = store.add_run(report, labels);
+    quality.refresh_soon();  // it may have been a check unit
+    return stored;
+  };
+  SIXPOINT_ASSIGN(const auto lanes,
+                  station::Lanes::open(context.env, devices, std::move(lanes_asked), store_run,
+                                       store_constants));
+  station::RepairJob repairs(context.env, open);
+  station::ApiOptions api_options;
+  api_options.station = options.station;
+  api_options.version = station::software_name();
+  api_options.bind = options.bind;
+  api_options.token = options.token;
+  api_options.files_folder = options.files;
+  station::Api api(api_options, {context.env, *lanes, repairs, &practice_bench, store_constants,
+                                 [&](const std::string& run, const std::string& kind) {
+                                   return store.document(run, kind);
+                                 },
+                                 &quality});
+  station::ServerOptions server_options;
+  server_options.bind = options.bind;
+  server_options.port = options.port;
+  SIXPOINT_ASSIGN(const auto server, station::Server::open(context.env, api, server_options));
+  context.out << fmt::format("http://{}:{}/{}\n", options.bind, server->port(),
+                             options.token.empty() ? "" : "?token=" + options.token)
+              << std::flush;
+  context.people << fmt::format(
+                        "{} lane{}; Ctrl-C ends the station, runs go on at the next start\n",
+                        lanes->size(), lanes->size() == 1 ? "" : "s")
+                 << std::flush;
+  serve_until_signal(*server, signals);
+  return {};
+}
+
+}  // namespace
+
+void add_station(CLI::App& app, Context& context) {
+  auto [command, options] =
+      add_command<Options>(app, context, "station", "serve the technician's page", serve);
+  command.add_option("--port", options.port, "0: any that is free; the address is printed")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  command
+      .add_option("--device", options.devices, "a lane's unit (docs/virtual.md); repeatable, to 16")
+      ->required();
+  add_store_option(command, options.store);
+  command.add_option("--bind", options.bind, "address to listen on; another one needs --token")
+      ->capture_default_str();
+  command.add_option("--token", options.token, "a page must send it to be served");
+  command.add_option("--station", options.station, "the station's name, for the record");
+  command.add_option("--state", options.state,
+                     "folder for runs under way (default: in the user's data folder)");
+  command
+      .add_option("--files", options.files,
+                  "folder below which the page may check and repair files")
+      ->capture_default_str();
+  command.add_option("--limits", options.limits, "limits of the verdict (TOML)");
+  command
+      .add_option("--side-seconds", options.side_s,
+                  "how long a unit rests on each side of a calibration file")
+      ->check(CLI::Range(10.0, 3600.0))
+      ->capture_default_str();
+  add_gravity_options(command, options.gravity);
+}
+
+}  // namespace sixpoint::cli

@@ -1,0 +1,306 @@
+#include <map>
+
+#include <SQLiteCpp/Backup.h>
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include "db/servers/database.h"
+
+namespace sixpoint::db {
+namespace {
+
+// "sixp" in ASCII: tells our file from any other SQLite file.
+constexpr std::int64_t kApplicationId = 0x73697870;
+constexpr int kBusyTimeout_ms = 30'000;
+
+Error to_error(const SQLite::Exception& exception, const std::string& path) {
+  const std::string what = fmt::format("the store answers: {}", exception.what());
+  switch (exception.getErrorCode()) {
+    case SQLITE_CANTOPEN:
+      return {ErrorCode::cannot_create, what, path, "check that the folder exists and is writable"};
+    case SQLITE_READONLY:
+    case SQLITE_PERM:
+    case SQLITE_AUTH:
+      return {ErrorCode::permission, what, path,
+              "make the file and its folder writable for this user"};
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+      return {ErrorCode::bad_data, what, path,
+              "restore the last backup; keep the damaged file, 'audit verify' can say how far it "
+              "holds"};
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return {ErrorCode::io, what, path, "another program keeps the store busy; try again"};
+    case SQLITE_FULL:
+    case SQLITE_IOERR:
+      return {ErrorCode::io, what, path, "free some space on the disk and run the command again"};
+    case SQLITE_CONSTRAINT:
+      return {ErrorCode::bad_data, what, path,
+              "the store keeps its history as it is; write a correction instead"};
+    default:
+      return {ErrorCode::internal, what, path, "please report this with the command line"};
+  }
+}
+
+void bind(SQLite::Statement& statement, std::span<const Value> parameters) {
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const std::string name = fmt::format("${}", i + 1);
+    std::visit(
+        [&](const auto& value) {
+          using T = std::decay_t<decltype(value)>;
+          if constexpr (std::is_same_v<T, std::monostate>) {
+            statement.bind(name);
+          } else if constexpr (std::is_same_v<T, Bytes>) {
+            // A null pointer would be NULL; no bytes are bytes.
+            statement.bind(name, value.empty() ? static_cast<const void*>("") : value.data(),
+                           static_cast<int>(value.size()));
+          } else {
+            statement.bind(name, value);
+          }
+        },
+        parameters[i]);
+  }
+}
+
+// The T in `value`, put there first when it holds something else: its memory is used again.
+template <class T>
+T& storage(Value& value) {
+  if (auto* held = std::get_if<T>(&value)) {
+    return *held;
+  }
+  return value.emplace<T>();
+}
+
+void read_row(SQLite::Statement& statement, Row& row) {
+  row.resize(static_cast<std::size_t>(statement.getColumnCount()));
+  for (int i = 0; i < statement.getColumnCount(); ++i) {
+    const SQLite::Column column = statement.getColumn(i);
+    Value& value = row[static_cast<std::size_t>(i)];
+    switch (column.getType()) {
+      case SQLITE_NULL:
+        value = std::monostate{};
+        break;
+      case SQLITE_INTEGER:
+        value = static_cast<std::int64_t>(column.getInt64());
+        break;
+      case SQLITE_BLOB: {
+        const auto* begin = static_cast<const std::uint8_t*>(column.getBlob());
+        storage<Bytes>(value).assign(begin, begin + column.getBytes());
+        break;
+      }
+      default: {
+        const char* begin = column.getText();
+        storage<std::string>(value).assign(begin, static_cast<std::size_t>(column.getBytes()));
+      }
+    }
+  }
+}
+
+// A compiled statement goes back to its start whether it succeeded or not: one that failed would
+// hold its locks and say the same error again at its next use.
+class Reset {
+ public:
+  explicit Reset(SQLite::Statement& statement) : statement_(statement) {}
+  Reset(const Reset&) = delete;
+  Reset& operator=(const Reset&) = delete;
+  ~Reset() { statement_.tryReset(); }
+
+ private:
+  SQLite::Statement& statement_;
+};
+
+class SqliteRows final : public RowStream {
+ public:
+  SqliteRows(SQLite::Database& database, const std::string& sql, std::span<const Value> parameters,
+             std::string path)
+      : statement_(database, sql), path_(std::move(path)) {
+    bind(statement_, parameters);
+  }
+  Result<bool> next(Row& row) override {
+    try {
+      if (!statement_.executeStep()) {
+        return false;
+      }
+      read_row(statement_, row);
+      return true;
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path_));
+    }
+  }
+
+ private:
+  SQLite::Statement statement_;
+  std::string path_;
+};
+
+class SqliteDatabase final : public Database {
+ public:
+  explicit SqliteDatabase(const std::string& path)
+      : database_(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout_ms),
+        path_(path) {}
+
+  Status prepare() {
+    const auto read_only = [&](const std::string& what) {
+      return fail(ErrorCode::permission, what, path_,
+                  "make the file and its folder writable for this user; a store on a read-only "
+                  "disk is read from a copy elsewhere");
+    };
+    if (sqlite3_db_readonly(database_.getHandle(), "main") == 1) {
+      return read_only("the store may only be read here");
+    }
+    try {
+      database_.exec("PRAGMA journal_mode=WAL");
+      database_.exec("PRAGMA synchronous=FULL");
+      database_.exec("PRAGMA foreign_keys=ON");
+      // Views and triggers of a file from elsewhere must not run functions of ours.
+      database_.exec("PRAGMA trusted_schema=OFF");
+    } catch (const SQLite::Exception& exception) {
+      // The file itself was opened: it is the files beside it that cannot be made.
+      if (exception.getErrorCode() == SQLITE_CANTOPEN) {
+        return read_only("nothing can be written beside the store");
+      }
+      return fail(to_error(exception, path_));
+    }
+    return check_owner();
+  }
+
+  // Ours, empty, or another program's file that must not be changed.
+  Status check_owner() {
+    const std::int64_t id = database_.execAndGet("PRAGMA application_id").getInt64();
+    if (id == kApplicationId) {
+      return {};
+    }
+    const bool empty =
+        database_.execAndGet("SELECT count(*) FROM sqlite_schema").getInt() == 0 && id == 0;
+    if (!empty) {
+      return fail(ErrorCode::bad_data,
+                  "the file is an SQLite database, but not a store of sixpoint", path_,
+                  "name another file with --store");
+    }
+    database_.exec(fmt::format("PRAGMA application_id={}", kApplicationId));
+    return {};
+  }
+
+  Status begin_writing() override { return run("BEGIN IMMEDIATE"); }
+  Status begin_reading() override {
+    SIXPOINT_CHECK(run("BEGIN"));
+    // The snapshot is taken by the first reading statement, so read something now.
+    SIXPOINT_CHECK(query("SELECT count(*) FROM sqlite_schema", {}));
+    return {};
+  }
+  Status commit() override { return run("COMMIT"); }
+  void roll_back() override {
+    if (sqlite3_get_autocommit(database_.getHandle()) == 0) {
+      static_cast<void>(run("ROLLBACK"));
+    }
+  }
+
+  Status execute(const std::string& sql, std::span<const Value> parameters) override {
+    SIXPOINT_CHECK(query(sql, parameters));
+    return {};
+  }
+
+  Result<std::unique_ptr<RowStream>> stream(const std::string& sql,
+                                            std::span<const Value> parameters) override {
+    try {
+      return std::make_unique<SqliteRows>(database_, sql, parameters, path_);
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path_));
+    }
+  }
+
+  Result<std::vector<Row>> query(const std::string& sql,
+                                 std::span<const Value> parameters) override {
+    try {
+      auto& statement = prepared(sql);
+      const Reset reset(statement);
+      bind(statement, parameters);
+      std::vector<Row> rows;
+      while (statement.executeStep()) {
+        read_row(statement, rows.emplace_back());
+      }
+      return rows;
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path_));
+    }
+  }
+
+  Result<bool> copy_to_file(const std::string& path) override {
+    try {
+      SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout_ms);
+      copy.exec("PRAGMA synchronous=FULL");
+      SQLite::Backup backup(copy, database_);
+      // In one step: a copy in many steps begins again whenever another process writes.
+      backup.executeStep(-1);
+      return true;
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path));
+    }
+  }
+
+  Result<std::int64_t> schema_version() override {
+    try {
+      return database_.execAndGet("PRAGMA user_version").getInt64();
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path_));
+    }
+  }
+
+  Status set_schema_version(std::int64_t version) override {
+    return run(fmt::format("PRAGMA user_version={}", version));
+  }
+
+  std::vector<std::string> append_only_statements(const std::string& table) const override {
+    std::vector<std::string> statements;
+    for (const std::string change : {"UPDATE", "DELETE"}) {
+      statements.push_back(fmt::format(
+          "CREATE TRIGGER {0}_no_{1} BEFORE {1} ON {0} BEGIN "
+          "SELECT RAISE(ABORT, 'history never changes: write a correction instead'); END",
+          table, change));
+    }
+    return statements;
+  }
+  std::string blob_type() const override { return "BLOB"; }
+  std::string integer_type() const override { return "INTEGER"; }
+  std::string table_options() const override { return " STRICT"; }
+  const std::string& location() const override { return path_; }
+
+ private:
+  Status run(const std::string& sql) {
+    try {
+      database_.exec(sql);
+      return {};
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path_));
+    }
+  }
+
+  // The store has a few dozen statements; each is compiled once.
+  SQLite::Statement& prepared(const std::string& sql) {
+    const auto found = prepared_.find(sql);
+    if (found != prepared_.end()) {
+      return *found->second;
+    }
+    return *prepared_.emplace(sql, std::make_unique<SQLite::Statement>(database_, sql))
+                .first->second;
+  }
+
+  SQLite::Database database_;
+  std::map<std::string, std::unique_ptr<SQLite::Statement>> prepared_;
+  std::string path_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Database>> open_sqlite(const std::string& path) {
+  try {
+    auto database = std::make_unique<SqliteDatabase>(path);
+    SIXPOINT_CHECK(database->prepare());
+    return database;
+  } catch (const SQLite::Exception& exception) {
+    return fail(to_error(exception, path));
+  }
+}
+
+}  // namespace sixpoint::db

@@ -1,0 +1,422 @@
+// archive by its contract, on the real disk: against one repair, through its scripts, with kill -9.
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/random.h"
+#include "cli/command_fixture.h"
+#include "db/store.h"
+#include "expect_result.h"
+#include "repair/jig_constants.h"
+#include "repair/made_recording.h"
+#include "shared_data.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::HasSubstr;
+using tests::Answer;
+using tests::kConstants;
+using tests::MadeRecording;
+
+MadeRecording some_minutes(std::uint64_t seed, std::size_t samples) {
+  MadeRecording made;
+  Random random(seed);
+  for (std::size_t i = 0; i < samples; ++i) {
+    PerAxis<int> raw{};
+    for (int& value : raw) {
+      value = static_cast<int>(random.below(700)) - 300;
+    }
+    made.raw.push_back(raw);
+  }
+  return made;
+}
+
+class ArchiveCommand : public tests::CommandTest {
+ protected:
+  ArchiveCommand() {
+    std::filesystem::create_directories(archive_ + "/sub");
+    std::ofstream(constants_) << kConstants;
+  }
+  void fill() {
+    const std::string odd[] = {"plain", "line\nend", "\xff\xfe", "it's 100%", "$(touch X)"};
+    std::uint64_t seed = 0;
+    for (const std::string& name : odd) {
+      EXPECT_OK(some_minutes(++seed, 3000).write(files_, archive_ + "/" + name + ".gt3x"));
+    }
+    MadeRecording sound = some_minutes(6, 900);
+    sound.firmware = "1.8.0";
+    EXPECT_OK(sound.write(files_, archive_ + "/sub/sound.gt3x"));
+    MadeRecording stranger = some_minutes(7, 900);
+    stranger.serial = "MOS2A45130451";
+    EXPECT_OK(stranger.write(files_, archive_ + "/sub/stranger.gt3x"));
+    std::ofstream(archive_ + "/sub/broken.gt3x") << "this is no zip";
+  }
+  Answer plan(std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"archive", "plan",        archive_,   "-o",
+                                          plan_,     "--constants", constants_, "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  Answer run_shard(std::size_t shard) {
+    return run({"archive", "run", plan_, "--shard", std::to_string(shard), "-o", out_, "--json"});
+  }
+  Answer merge(std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"archive", "merge", plan_, "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  // {input: [status, reasons, still errors, ...]} without what differs between two runs.
+  static std::map<std::string, Json> comparable(const Json& json) {
+    std::map<std::string, Json> files;
+    for (Json file : json["files"]) {
+      file.erase("output");
+      file.erase("output_sha256");  // the mark holds the time of the repair
+      std::erase(file["reasons"].get_ref<Json::array_t&>(), Json("mended by an earlier run"));
+      files[file["input"]] = file;
+    }
+    return files;
+  }
+  static std::size_t shard_of(const Json& plan, const std::string& name) {
+    for (const Json& file : plan["files"]) {
+      if (file["input"].get<std::string>().ends_with(name)) {
+        return file["shard"];
+      }
+    }
+    ADD_FAILURE() << name << " is in no shard";
+    return 0;
+  }
+  static std::vector<std::string> tree_of(const std::string& folder) {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+      if (entry.is_regular_file()) {
+        names.push_back(entry.path().string().substr(folder.size()));
+      }
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  void expect_same_outputs(const std::string& expected, const std::string& got) {
+    const auto names = tree_of(expected);
+    ASSERT_EQ(tree_of(got), names);
+    ASSERT_FALSE(names.empty());
+    for (const std::string& name : names) {
+      for (const char* entry : {"log.bin", "info.txt", "extra.bin"}) {
+        EXPECT_EQ(tests::entry_of(files_, got + name, entry),
+                  tests::entry_of(files_, expected + name, entry))
+            << name << " " << entry;
+      }
+    }
+  }
+
+  std::string archive_ = folder_ / "archive";
+  std::string plan_ = folder_ / "plan";
+  std::string out_ = folder_ / "out";
+  std::string constants_ = folder_ / "constants.json";
+  FileSystem& files_ = posix_env().files;
+};
+
+TEST_F(ArchiveCommand, AnswersAsOneRepairWould) {
+  fill();
+  const Answer expected =
+      run({"repair", archive_, "-o", folder_ / "whole", "--constants", constants_, "--json"});
+  const Answer planned = plan({"--shards", "3"});
+  EXPECT_EQ(planned.exit_code, 0) << planned.people;
+  EXPECT_EQ(planned.json()["schema"], "sixpoint/archive/1");
+  EXPECT_EQ(planned.json()["shards"].size(), 3U);
+  EXPECT_EQ(planned.json()["files"].size(), 8U);
+  EXPECT_EQ(planned.json()["summary"]["files"], 8);
+  for (std::size_t shard = 0; shard < 3; ++shard) {
+    const Answer done = run_shard(shard);
+    EXPECT_EQ(done.json()["shards"][0]["shard"], shard) << done.people;
+    EXPECT_EQ(done.json()["summary"]["files"], done.json()["files"].size());
+  }
+  const Answer merged = merge();
+  EXPECT_EQ(merged.exit_code, expected.exit_code) << merged.people;
+  EXPECT_EQ(merged.exit_code, 65) << "one file is no zip";
+  EXPECT_EQ(merged.json()["schema"], "sixpoint/archive/1");
+  EXPECT_EQ(merged.json()["summary"], expected.json()["summary"]);
+  EXPECT_EQ(comparable(merged.json()), comparable(expected.json()));
+  EXPECT_EQ(merged.json()["complete"], true);
+  expect_same_outputs(folder_ / "whole", out_);
+  // For people the two say the same, line by line.
+  const Answer words = run({"archive", "merge", plan_});
+  const Answer as_repair =
+      run({"repair", archive_, "-o", folder_ / "whole", "--constants", constants_, "--resume"});
+  EXPECT_EQ(words.out, as_repair.out);
+}
+
+TEST_F(ArchiveCommand, MissingAndFailedShardsAreNamedWithTheirCommand) {
+  fill();
+  const std::size_t broken = shard_of(plan({"--shards", "4"}).json(), "broken.gt3x");
+  ASSERT_NE(broken, 1U);
+  EXPECT_EQ(merge().exit_code, 2) << "nothing ran yet";
+  EXPECT_THAT(merge().json()["shards"][0]["rerun"].get<std::string>(), HasSubstr("-o OUTDIR"));
+  const Answer before = run({"archive", "status", plan_, "--json"});
+  EXPECT_EQ(before.exit_code, 2);
+  EXPECT_EQ(before.json()["summary"]["missing"], 4);
+  run_shard(0);
+  run_shard(2);
+  run_shard(3);
+  const Answer merged = merge();
+  const Json shard = merged.json()["shards"][1];
+  EXPECT_EQ(shard["state"], "missing");
+  EXPECT_EQ(merged.json()["complete"], false);
+  EXPECT_EQ(merged.json()["files_missing"], shard["files"]);
+  const std::string command = shard["rerun"];
+  EXPECT_EQ(command, "sixpoint archive run " + plan_ + " --shard 1 -o " + out_);
+  EXPECT_THAT(run({"archive", "merge", plan_}).people, HasSubstr(command));
+  // The command as it is printed.
+  const std::string line = std::string(SIXPOINT_PROGRAM) + command.substr(8) + " >/dev/null 2>&1";
+  EXPECT_EQ(std::system(line.c_str()), 0);
+  EXPECT_EQ(merge().json()["complete"], true);
+  // The shard with the file that is no zip is named, too; remove the cause, and it is done.
+  std::string again;
+  const Json shards = merge().json()["shards"];
+  for (const Json& one : shards) {
+    if (!one["rerun"].is_null()) {
+      EXPECT_EQ(one["failed"], 1);
+      EXPECT_TRUE(again.empty());
+      again = one["rerun"];
+    }
+  }
+  EXPECT_THAT(again, HasSubstr(" --shard " + std::to_string(broken) + " "));
+  EXPECT_EQ(run({"archive", "status", plan_, "--json"}).json()["summary"]["failed"], 1);
+}
+
+TEST_F(ArchiveCommand, TheSlurmScriptRunsOneShardPerTask) {
+  plan_ = folder_ / "it's a\nplan; exit 9";
+  out_ = folder_ / "out put";
+  fill();
+  const Answer planned = plan({"--shards", "3", "--at-once", "2"});
+  ASSERT_EQ(planned.exit_code, 0) << planned.people;
+  const std::size_t broken = shard_of(planned.json(), "broken.gt3x");
+  const Bytes bytes = read_file(files_, plan_ + "/run.sbatch").value();
+  const std::string script(bytes.begin(), bytes.end());
+  EXPECT_TRUE(script.starts_with("#!/bin/bash\n"));
+  EXPECT_THAT(script, HasSubstr("\n#SBATCH --array=0-2%2\n"));
+  // Slurm runs a copy of the script, somewhere else.
+  std::filesystem::create_directories(folder_ / "spool");
+  std::filesystem::copy(plan_ + "/run.sbatch", folder_ / "spool/slurm_script");
+  const auto task = [&](const std::string& environment) {
+    const std::string line = "cd " + (folder_ / "spool") + " && env " + environment +
+                             " SIXPOINT=" SIXPOINT_PROGRAM " bash ./slurm_script '" + out_ +
+                             "' >/dev/null 2>&1";
+    const int status = std::system(line.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  EXPECT_NE(task("-u SLURM_ARRAY_TASK_ID"), 0) << "without sbatch it says what to do";
+  for (std::size_t shard = 0; shard < 3; ++shard) {
+    EXPECT_EQ(task("SLURM_ARRAY_TASK_ID=" + std::to_string(shard)), shard == broken ? 65 : 0)
+        << "the file that is no zip makes its task fail; one that cannot be repaired does not";
+  }
+  EXPECT_EQ(task("SLURM_ARRAY_TASK_ID=3"), 64) << "no such shard";
+  EXPECT_EQ(merge().json()["complete"], true);
+  EXPECT_EQ(merge().json()["summary"]["repaired"], 5);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "spool/X")) << "a file name was run as a command";
+}
+
+TEST_F(ArchiveCommand, ThePlainScriptRunsAllAndMerges) {
+  fill();
+  std::filesystem::remove(archive_ + "/sub/broken.gt3x");
+  ASSERT_EQ(plan({"--shards", "3"}).exit_code, 0);
+  const std::string line = "env SIXPOINT=" SIXPOINT_PROGRAM " JOBS=2 bash " + plan_ +
+                           "/run_all.sh " + out_ + " >/dev/null 2>&1";
+  const int status = std::system(line.c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 1) << "one file cannot be repaired";
+  EXPECT_EQ(merge().json()["complete"], true);
+}
+
+// The real program, killed again and again at any moment; what it leaves is what one repair leaves.
+TEST_F(ArchiveCommand, SurvivesKillNine) {
+  for (int i = 0; i < 24; ++i) {
+    ASSERT_OK(some_minutes(static_cast<std::uint64_t>(i), 20'000)
+                  .write(files_, archive_ + "/" + std::to_string(i) + ".gt3x"));
+  }
+  const Answer expected =
+      run({"repair", archive_, "-o", folder_ / "whole", "--constants", constants_, "--json"});
+  ASSERT_EQ(expected.exit_code, 0);
+  ASSERT_EQ(plan({"--shards", "1"}).exit_code, 0);
+  Random random(1);
+  int killed = 0;
+  for (int round = 0; round < 60; ++round) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      std::freopen("/dev/null", "w", stdout);
+      std::freopen("/dev/null", "w", stderr);
+      ::execl(SIXPOINT_PROGRAM, "sixpoint", "archive", "run", plan_.c_str(), "--shard", "0", "-o",
+              out_.c_str(), nullptr);
+      ::_exit(127);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2 + random.below(60)));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    if (WIFEXITED(status)) {
+      EXPECT_EQ(WEXITSTATUS(status), 0);
+      break;
+    }
+    ++killed;
+  }
+  EXPECT_GT(killed, 0);
+  const Answer last = run_shard(0);
+  EXPECT_EQ(last.exit_code, 0) << last.people;
+  const Answer merged = merge({"--verify"});
+  EXPECT_EQ(merged.exit_code, 0) << merged.people;
+  EXPECT_EQ(merged.json()["summary"], expected.json()["summary"]);
+  expect_same_outputs(folder_ / "whole", out_);
+  EXPECT_EQ(run_shard(0).json()["shards"][0]["done_before"], 24) << "nothing is left to do";
+}
+
+TEST_F(ArchiveCommand, TheMergeAddsToTheStoreOnce) {
+  fill();
+  const std::string store = folder_ / "store.db";
+  {
+    auto made = db::Store::open(posix_env(), store);
+    ASSERT_OK(made);
+    ASSERT_OK(made->add_constants(tests::jig_constants(), "wGT3X-BT"));
+  }
+  ASSERT_EQ(
+      run({"archive", "plan", archive_, "-o", plan_, "--store", store, "--shards", "2"}).exit_code,
+      0);
+  const auto rows = [&] {
+    return run({"audit", "verify", "--store", store, "--json"}).json()["rows"];
+  };
+  const Json before = rows();
+  run_shard(0);
+  run_shard(1);
+  EXPECT_EQ(rows(), before) << "no shard touches the store";
+  const Answer dry = merge({"--dry-run"});
+  EXPECT_EQ(rows(), before);
+  const Answer merged = merge();
+  EXPECT_EQ(merged.json()["kept"]["in"], "store") << merged.people;
+  EXPECT_EQ(rows(), before.get<int>() + 5);
+  EXPECT_EQ(merged.json()["files"][0]["method"], "store");
+  merge();
+  // A shard that is lost and run again made nothing new: the outputs are there.
+  std::filesystem::remove(plan_ + "/results/00000.jsonl");
+  run_shard(0);
+  merge({"--store", store});
+  EXPECT_EQ(rows(), before.get<int>() + 5) << "each repair is in the store once";
+  {
+    auto opened = db::Store::open(posix_env(), store);
+    ASSERT_OK(opened);
+    const auto history = opened->unit_history("MOS2A45130450");
+    ASSERT_OK(history);
+    ASSERT_EQ(history->repairs.size(), 5U);
+    for (const db::RepairRecord& repair : history->repairs) {
+      EXPECT_EQ(repair.constants_id, history->constants.front().id);
+      EXPECT_FALSE(repair.software.empty());
+      const Json document = Json::parse(repair.document);
+      EXPECT_EQ(document["status"], "repaired");
+    }
+  }
+  // Another store may be told; constants that it does not have are not named.
+  const std::string other = folder_ / "other.db";
+  ASSERT_OK(db::Store::open(posix_env(), other));
+  EXPECT_EQ(merge({"--store", other}).json()["kept"]["in"], "store");
+  EXPECT_EQ(merge({"--store", folder_ / "none.db"}).exit_code, 66);
+}
+
+TEST_F(ArchiveCommand, TwoInputsOfOneNameAndLinksOut) {
+  fill();
+  std::filesystem::remove(archive_ + "/sub/broken.gt3x");
+  std::filesystem::create_directories(folder_ / "second");
+  EXPECT_OK(some_minutes(1, 300).write(files_, folder_ / "second/plain.gt3x"));
+  EXPECT_OK(some_minutes(2, 300).write(files_, folder_ / "second/other.gt3x"));
+  std::filesystem::create_symlink(folder_ / "second/other.gt3x", archive_ + "/link.gt3x");
+  const Answer planned = plan({folder_ / "second"});
+  EXPECT_EQ(planned.exit_code, 73) << planned.people;
+  EXPECT_EQ(planned.json()["summary"]["refused"], 1);
+  EXPECT_EQ(planned.json()["summary"]["links_not_followed"], 1);
+  EXPECT_THAT(planned.people, HasSubstr("link.gt3x"));
+  EXPECT_EQ(run_shard(0).exit_code, 1);
+  const Answer merged = merge();
+  EXPECT_EQ(merged.exit_code, 73);
+  EXPECT_EQ(merged.json()["summary"]["failed"], 1);
+  EXPECT_EQ(merged.json()["summary"]["repaired"], 6);
+}
+
+TEST_F(ArchiveCommand, WrongCommandsHaveTheirExitCodes) {
+  fill();
+  EXPECT_EQ(run({"archive"}).exit_code, 64);
+  EXPECT_EQ(run({"archive", "plan", archive_}).exit_code, 64);
+  EXPECT_EQ(run({"archive", "plan", folder_ / "none", "-o", plan_}).exit_code, 66);
+  std::filesystem::create_directories(folder_ / "empty");
+  EXPECT_EQ(run({"archive", "plan", folder_ / "empty", "-o", plan_}).exit_code, 66);
+  EXPECT_EQ(plan({"--shards", "0"}).exit_code, 64);
+  EXPECT_EQ(plan({"--shards", "2", "--shard-bytes", "1MB"}).exit_code, 64);
+  EXPECT_EQ(plan({"--dry-run"}).exit_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(plan_));
+  EXPECT_EQ(plan({"--shard-bytes", "100kB"}).exit_code, 0);
+  EXPECT_GT(run({"archive", "status", plan_, "--json"}).json()["shards"].size(), 2U);
+  EXPECT_EQ(plan().exit_code, 73) << "a plan is never changed";
+  EXPECT_EQ(run_shard(999).exit_code, 64);
+  EXPECT_EQ(run({"archive", "run", plan_, "--shard", "-1", "-o", out_}).exit_code, 64);
+  EXPECT_EQ(run({"archive", "run", folder_ / "empty", "--shard", "0", "-o", out_}).exit_code, 66);
+  EXPECT_EQ(run({"archive", "run", plan_, "--shard", "0", "-o", archive_ + "/out"}).exit_code, 64);
+  EXPECT_EQ(run({"archive", "run", plan_, "--shard", "0", "-o", out_, "--dry-run"}).exit_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(out_));
+  EXPECT_EQ(merge().exit_code, 2);
+  std::ofstream(folder_ / "file") << "x";
+  EXPECT_EQ(run({"archive", "run", plan_, "--shard", "0", "-o", folder_ / "file"}).exit_code, 73);
+}
+
+TEST_F(ArchiveCommand, RealRecordings) {
+  SIXPOINT_NEED_SHARED("data/wgt3x-bt-affected");
+  const std::string real = tests::shared_file("data/wgt3x-bt-affected");
+  const Answer expected = run({"repair", real, "-o", folder_ / "whole", "--scan", "--json"});
+  ASSERT_GE(expected.json()["files"].size(), 2U);
+  ASSERT_EQ(
+      run({"archive", "plan", real, "-o", plan_, "--scan", "--shards", "2", "--hash"}).exit_code,
+      0);
+  run_shard(0);
+  run_shard(1);
+  const Answer merged = merge({"--verify"});
+  EXPECT_EQ(merged.exit_code, expected.exit_code);
+  EXPECT_EQ(merged.json()["summary"], expected.json()["summary"]);
+  EXPECT_EQ(comparable(merged.json()).size(), comparable(expected.json()).size());
+}
+
+// The recordings' own still periods do not suffice; with constants, all of them are repaired.
+TEST_F(ArchiveCommand, RealRecordingsRepaired) {
+  SIXPOINT_NEED_SHARED("data/wgt3x-bt-affected");
+  const std::string real = tests::shared_file("data/wgt3x-bt-affected");
+  const Json scanned = run({"scan", real, "--json"}).json();
+  for (const Json& file : scanned["files"]) {
+    if (file["verdict"] != "affected") {
+      continue;
+    }
+    const std::string serial = file["serial"];
+    std::string constants = kConstants;
+    constants.replace(constants.find("MOS2A45130450"), 13, serial);
+    std::ofstream(constants_, std::ios::trunc) << constants;
+    const std::string path = file["path"];
+    const Answer expected = run(
+        {"repair", path, "-o", folder_ / ("whole" + serial), "--constants", constants_, "--json"});
+    ASSERT_EQ(expected.json()["summary"]["repaired"], 1) << expected.people;
+    const std::string its_plan = folder_ / ("plan" + serial);
+    const std::string its_out = folder_ / ("out" + serial);
+    ASSERT_EQ(run({"archive", "plan", path, "-o", its_plan, "--constants", constants_}).exit_code,
+              0);
+    ASSERT_EQ(run({"archive", "run", its_plan, "--shard", "0", "-o", its_out}).exit_code, 0);
+    const Answer merged = run({"archive", "merge", its_plan, "--json"});
+    EXPECT_EQ(merged.json()["summary"], expected.json()["summary"]);
+    const std::string repaired = merged.json()["files"][0]["output"];
+    const std::string whole = expected.json()["files"][0]["output"];
+    EXPECT_FALSE(tests::entry_of(files_, repaired, "log.bin").empty());
+    EXPECT_EQ(tests::entry_of(files_, repaired, "log.bin"),
+              tests::entry_of(files_, whole, "log.bin"));
+  }
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

@@ -1,0 +1,68 @@
+// The rules that repair and archive share: which store is asked, which exit code a report has.
+#include "cli/files/repair_answer.h"
+
+#include <fstream>
+
+#include "cli/command_fixture.h"
+#include "expect_result.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using tests::StoreTest;
+
+class RepairAnswer : public StoreTest {
+ protected:
+  std::ostringstream out_;
+  std::ostringstream people_;
+  std::istringstream in_;
+  Context context_{posix_env(), out_, people_, in_};
+};
+
+TEST_F(RepairAnswer, TheStoreByItsTable) {
+  ::setenv("SIXPOINT_STORE", path("default.db").c_str(), 1);
+  EXPECT_FALSE(store_of(context_, {}).value()) << "there is no default store yet";
+  fill("default.db");
+  fill("named.db");
+  const std::string named = path("named.db");
+  EXPECT_TRUE(store_of(context_, {}).value());
+  EXPECT_FALSE(store_of(context_, {"", "", "", true}).value()) << "--scan alone";
+  EXPECT_TRUE(store_of(context_, {"", "", "c.gt3x", true}).value()) << "a calibration file too";
+  EXPECT_EQ(store_of(context_, {"", named, "", true}).value()->database().location(), named);
+  EXPECT_FAILS(store_of(context_, {"", path("none.db"), "", false}), ErrorCode::no_input);
+  ::unsetenv("SIXPOINT_STORE");
+}
+
+TEST_F(RepairAnswer, TheTallyKeepsTheWorstExitCode) {
+  using repair::RepairStatus;
+  RepairTally tally;
+  const auto add = [&](RepairStatus status) {
+    repair::RepairReport report;
+    report.status = status;
+    tally.add(context_, report);
+    return context_.exit_code;
+  };
+  EXPECT_EQ(add(RepairStatus::repaired), 0);
+  EXPECT_EQ(add(RepairStatus::not_affected), 0);
+  EXPECT_EQ(add(RepairStatus::already_repaired), 0);
+  EXPECT_EQ(add(RepairStatus::not_repairable), 1);
+  tally.add(context_,
+            failed_report("a.gt3x", {ErrorCode::io, "cannot be read", "a.gt3x", "retry"}));
+  EXPECT_EQ(context_.exit_code, 74);
+  EXPECT_EQ(add(RepairStatus::repaired), 74);
+  EXPECT_EQ(tally.to_json(true), Json::parse(R"({"files": 6, "repaired": 2, "not_affected": 1,
+      "not_repairable": 1, "already_repaired": 1, "failed": 1, "dry_run": true})"));
+  EXPECT_EQ(tally.brief(true),
+            "6 files: 2 repaired (dry run: nothing was written), 1 not affected, 1 already "
+            "repaired, 1 not repairable, 1 failed\n");
+}
+
+TEST_F(RepairAnswer, ConstantsThatCannotBeReadNameTheirFile) {
+  std::ofstream(path("c.json")) << "{}";
+  const auto read = read_constants(posix_env().files, path("c.json"));
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().where, path("c.json"));
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

@@ -1,0 +1,264 @@
+// sixpoint repair and scan by their contract, on the real disk.
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <sys/stat.h>
+
+#include "base/random.h"
+#include "cli/command_fixture.h"
+#include "db/store.h"
+#include "expect_result.h"
+#include "repair/jig_constants.h"
+#include "repair/made_recording.h"
+#include "shared_data.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using tests::kConstants;
+using tests::MadeRecording;
+
+// At rest in many directions.
+MadeRecording half_hour() {
+  MadeRecording made;
+  Random random(5);
+  for (int pose = 0; pose < 60; ++pose) {
+    PerAxis<double> up = {random.normal(), random.normal(), random.normal()};
+    const double length = std::sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]);
+    for (int i = 0; i < 900; ++i) {
+      PerAxis<int> raw{};
+      const PerAxis<double> sensitivity = {0.0042, 0.004, 0.0041};
+      const PerAxis<double> zero = {90.5, 50.25, 88};
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        raw[a] = static_cast<int>(
+            std::lround((up[a] / length + 0.004 * random.normal()) / sensitivity[a] + zero[a]));
+      }
+      made.raw.push_back(raw);
+    }
+  }
+  return made;
+}
+
+class RepairCommand : public tests::CommandTest {
+ protected:
+  RepairCommand() {
+    std::filesystem::create_directories(archive_ + "/sub");
+    MadeRecording affected = half_hour();
+    EXPECT_OK(affected.write(files_, archive_ + "/affected.gt3x"));
+    MadeRecording sound = affected;
+    sound.firmware = "1.8.0";
+    EXPECT_OK(sound.write(files_, archive_ + "/sub/sound.gt3x"));
+    std::ofstream(folder_ / "constants.json") << kConstants;
+  }
+
+  std::string archive_ = folder_ / "archive";
+  std::string out_ = folder_ / "out";
+  FileSystem& files_ = posix_env().files;
+};
+
+TEST_F(RepairCommand, ScanSaysWhichFilesAreAffected) {
+  std::ofstream(archive_ + "/broken.gt3x") << "this is no zip";
+  const auto answer = run({"scan", archive_, "--json"});
+  EXPECT_EQ(answer.exit_code, 65) << "the worst counts: unreadable";
+  const Json json = answer.json();
+  EXPECT_EQ(json["schema"], "sixpoint/scan/1");
+  ASSERT_EQ(json["files"].size(), 3U);
+  EXPECT_EQ(json["files"][0]["verdict"], "affected");
+  EXPECT_EQ(json["files"][0]["serial"], "MOS2A45130450");
+  EXPECT_EQ(json["files"][0]["firmware"], "1.5.0");
+  EXPECT_EQ(json["files"][0]["calibration_time"], "2013-11-12T14:32:13Z");
+  EXPECT_GT(json["files"][0]["evidence_mg"].get<double>(), 64);
+  EXPECT_EQ(json["files"][1]["verdict"], "unreadable");
+  EXPECT_FALSE(json["files"][1]["reasons"].empty());
+  EXPECT_EQ(json["files"][2]["verdict"], "not_affected");
+  EXPECT_EQ(json["summary"]["affected"], 1);
+  EXPECT_EQ(run({"scan", archive_ + "/affected.gt3x"}).exit_code, 1);
+  EXPECT_EQ(run({"scan", archive_ + "/sub"}).exit_code, 0);
+  EXPECT_EQ(run({"scan", folder_ / "none"}).exit_code, 66);
+  EXPECT_EQ(run({"scan"}).exit_code, 64);
+}
+
+TEST_F(RepairCommand, RepairsATreeOnce) {
+  const auto answer =
+      run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  const Json json = answer.json();
+  ASSERT_EQ(json["files"].size(), 2U);
+  const Json& repaired = json["files"][0];
+  EXPECT_EQ(repaired["status"], "repaired");
+  EXPECT_EQ(repaired["output"], out_ + "/affected.gt3x");
+  EXPECT_EQ(repaired["method"], "constants");
+  EXPECT_GT(repaired["still_error_mg"]["before"].get<double>(), 100);
+  EXPECT_LT(repaired["still_error_mg"]["after"].get<double>(), 2);
+  EXPECT_EQ(repaired["samples"], 54'000);
+  EXPECT_EQ(repaired["output_sha256"].get<std::string>().size(), 64U);
+  EXPECT_EQ(json["files"][1]["status"], "not_affected");
+  EXPECT_FALSE(std::filesystem::exists(out_ + "/sub/sound.gt3x"));
+
+  const Json again = run({"repair", out_, "-o", folder_ / "twice", "--constants",
+                          folder_ / "constants.json", "--json"})
+                         .json();
+  EXPECT_EQ(again["files"][0]["status"], "already_repaired");
+  const auto in_the_way =
+      run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json"});
+  EXPECT_EQ(in_the_way.exit_code, 73);
+  EXPECT_EQ(
+      run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", "--resume"})
+          .exit_code,
+      0);
+  EXPECT_EQ(run({"scan", out_}).exit_code, 0) << "a repaired file is not affected any more";
+}
+
+TEST_F(RepairCommand, ScanOfTheFileItselfIsTheLastResort) {
+  const Json json = run({"repair", archive_, "-o", out_, "--scan", "--json"}).json();
+  EXPECT_EQ(json["files"][0]["status"], "repaired") << json.dump(1);
+  EXPECT_EQ(json["files"][0]["method"], "scan");
+  EXPECT_LT(json["files"][0]["still_error_mg"]["after"].get<double>(), 2);
+}
+
+TEST_F(RepairCommand, SaysWhatIsMissing) {
+  MadeRecording made = half_hour();
+  made.raw.resize(900);  // one pose
+  ASSERT_OK(made.write(files_, folder_ / "one.gt3x"));
+  const auto answer = run({"repair", folder_ / "one.gt3x", "-o", out_, "--scan", "--json"});
+  EXPECT_EQ(answer.exit_code, 1);
+  const Json file = answer.json()["files"][0];
+  EXPECT_EQ(file["status"], "not_repairable");
+  EXPECT_THAT(file["reasons"].dump(), HasSubstr("sides"));
+  EXPECT_FALSE(std::filesystem::exists(out_ + "/one.gt3x"));
+}
+
+TEST_F(RepairCommand, CalibrationFileOfTheSameUnitUnderCurrentOnly) {
+  MadeRecording one = half_hour();
+  one.raw.resize(900);
+  ASSERT_OK(one.write(files_, folder_ / "one.gt3x"));
+  const auto repair = [&](const std::string& calibration_file, const std::string& out) {
+    return run({"repair", folder_ / "one.gt3x", "-o", folder_ / out, "--calibration-file",
+                calibration_file, "--json"})
+        .json()["files"][0];
+  };
+  const Json good = repair(archive_ + "/affected.gt3x", "good");
+  EXPECT_EQ(good["status"], "repaired") << good.dump(1);
+  EXPECT_EQ(good["method"], "calibration_file");
+  const Json legacy = repair(archive_ + "/sub/sound.gt3x", "legacy");
+  EXPECT_EQ(legacy["status"], "not_repairable");
+  EXPECT_THAT(legacy["reasons"].dump(), HasSubstr("legacy"));
+  MadeRecording other = half_hour();
+  other.serial = "MOS2A45130451";
+  ASSERT_OK(other.write(files_, folder_ / "other.gt3x"));
+  const Json stranger = repair(folder_ / "other.gt3x", "stranger");
+  EXPECT_EQ(stranger["status"], "not_repairable");
+  EXPECT_THAT(stranger["reasons"].dump(), HasSubstr("MOS2A45130451"));
+}
+
+// A tree as disks hold them: links in circles and into nothing, a FIFO, a device.
+TEST_F(RepairCommand, UnusualFilesGetTheirLinesAndTheRestIsRepaired) {
+  std::filesystem::create_symlink("..", archive_ + "/sub/up");
+  std::filesystem::create_symlink(".", archive_ + "/sub/here");
+  std::filesystem::create_symlink("nowhere", archive_ + "/dangling.gt3x");
+  std::filesystem::create_symlink("/dev/zero", archive_ + "/endless.gt3x");
+  ASSERT_EQ(::mkfifo((archive_ + "/fifo.gt3x").c_str(), 0600), 0);
+  const auto scanned = run({"scan", archive_, "--json"});
+  EXPECT_EQ(scanned.exit_code, 66);
+  EXPECT_EQ(scanned.json()["files"].size(), 5U) << "no file by two names: " << scanned.out;
+  EXPECT_EQ(scanned.json()["summary"]["unreadable"], 3);
+  const auto repaired =
+      run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json", "--json"});
+  EXPECT_EQ(repaired.exit_code, 66);
+  EXPECT_EQ(repaired.json()["summary"]["repaired"], 1);
+  EXPECT_EQ(repaired.json()["summary"]["not_affected"], 1);
+  EXPECT_EQ(repaired.json()["summary"]["failed"], 3);
+}
+
+TEST_F(RepairCommand, DryRunWritesNothing) {
+  const auto answer = run({"repair", archive_, "-o", out_, "--constants",
+                           folder_ / "constants.json", "--dry-run", "--json"});
+  EXPECT_EQ(answer.exit_code, 0);
+  EXPECT_EQ(answer.json()["files"][0]["status"], "repaired");
+  EXPECT_FALSE(std::filesystem::exists(out_));
+}
+
+TEST_F(RepairCommand, StoreCommandsAnswerByContract) {
+  const std::string path = folder_ / "store.db";
+  {
+    auto store = db::Store::open(posix_env(), path);
+    ASSERT_OK(store);
+    ASSERT_OK(store->add_constants(tests::jig_constants(), "wGT3X-BT"));
+  }
+  const Json units = run({"units", "--store", path, "--json"}).json();
+  EXPECT_EQ(units["units"][0]["serial"], "MOS2A45130450");
+  const Json history = run({"history", "MOS2A45130450", "--store", path, "--json"}).json();
+  ASSERT_EQ(history["constants"].size(), 1U);
+  for (const char* key :
+       {"id", "serial", "filter", "constants", "standard_uncertainty", "method", "made_at"}) {
+    EXPECT_TRUE(history["constants"][0].contains(key)) << key;
+  }
+  const Json repaired =
+      run({"repair", archive_, "-o", out_, "--store", path, "--json"}).json()["files"][0];
+  EXPECT_EQ(repaired["method"], "store");
+  EXPECT_EQ(repaired["constants_id"], history["constants"][0]["id"]);
+  const auto audit = run({"audit", "verify", "--store", path, "--json"});
+  EXPECT_EQ(audit.exit_code, 0);
+  EXPECT_EQ(audit.json()["ok"], true);
+  EXPECT_EQ(audit.json()["rows"], 4) << "unit, filter, constants, repair";
+  EXPECT_EQ(audit.json()["head"].get<std::string>().size(), 64U);
+  EXPECT_EQ(run({"history", "NONE", "--store", path}).exit_code, 66);
+  EXPECT_EQ(run({"units", "--store", folder_ / "none.db"}).exit_code, 66);
+}
+
+TEST_F(RepairCommand, RealFilesAreJudged) {
+  SIXPOINT_NEED_SHARED("data/wgt3x-bt-affected");
+  const auto answer = run({"scan", tests::shared_file("data"), "--json"});
+  EXPECT_EQ(answer.exit_code, 1);
+  const Json json = answer.json();
+  for (const Json& file : json["files"]) {
+    const std::string path = file["path"];
+    EXPECT_EQ(file["verdict"],
+              path.find("wgt3x-bt-affected") != std::string::npos ? "affected" : "not_affected")
+        << file.dump(1);
+  }
+}
+
+// Serial numbers of files come from outside: quotes are kept as they are, and one that no store
+// keeps does not stand in the way of the others.
+TEST_F(RepairCommand, FilesWithUnusualSerialNumbersAreRepairedAndKeptOrNamed) {
+  const std::string quoted = "MOS\"';-- \\\\ %s";
+  const std::string place = folder_ / "odd";
+  MadeRecording made = half_hour();
+  made.serial = quoted;
+  ASSERT_OK(files_.make_folders(place));
+  ASSERT_OK(made.write(files_, place + "/quoted.gt3x"));
+  made.serial = "MOS" + std::string(10'000, 'x');
+  ASSERT_OK(made.write(files_, place + "/long.gt3x"));
+  made.serial = "MOS2A\x07\x1b[31m";
+  ASSERT_OK(made.write(files_, place + "/control.gt3x"));
+  const std::string store = folder_ / "store.db";
+  {
+    // Made by the first use, and empty.
+    ASSERT_OK(db::Store::open(posix_env(), store));
+  }
+  const auto answer = run({"repair", place, "-o", out_, "--scan", "--store", store, "--json"});
+  EXPECT_EQ(answer.exit_code, 65) << answer.people;
+  EXPECT_EQ(answer.json()["summary"]["repaired"], 3) << answer.out;
+  EXPECT_EQ(answer.json()["kept"]["in"], "store");
+  EXPECT_THAT(answer.people,
+              HasSubstr("long.gt3x: repaired, but the store cannot keep its record"));
+  EXPECT_THAT(answer.people,
+              HasSubstr("control.gt3x: repaired, but the store cannot keep its record"));
+  EXPECT_THAT(answer.people, testing::Not(HasSubstr("\x1b")));
+  const auto history = run({"history", quoted, "--store", store, "--json"});
+  EXPECT_EQ(history.exit_code, 0) << history.people;
+  EXPECT_EQ(history.json()["repairs"].size(), 1U);
+  const auto nothing = run({"history", made.serial, "--store", store});
+  EXPECT_EQ(nothing.exit_code, 66);
+  EXPECT_THAT(nothing.people, testing::Not(HasSubstr("\x1b")));
+  EXPECT_LT(run({"history", std::string(10'000, 'x'), "--store", store}).people.size(), 2000U);
+  EXPECT_EQ(run({"audit", "verify", "--store", store}).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

@@ -1,0 +1,62 @@
+// The program as a process: arguments, both streams, exit code. Oracle: the contract's exit codes
+// (sysexits.h, and 0 to 3), and the version that CMake was given.
+#include <cstdlib>
+#include <fstream>
+
+#include <gmock/gmock.h>
+
+#include "cli/run_child.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::HasSubstr;
+
+class Main : public testing::Test {
+ protected:
+  // By the shell, which can send streams anywhere.
+  int run(const std::string& arguments) const {
+    const std::string line = std::string(SIXPOINT_PROGRAM) + " " + arguments;
+    const int status = std::system(line.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string text(const std::string& name) const {
+    std::ifstream in(folder_ / name);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  std::string to(const std::string& out, const std::string& people) const {
+    return " >" + (folder_ / out) + " 2>" + (folder_ / people);
+  }
+  tests::TemporaryFolder folder_;
+};
+
+TEST_F(Main, AnswersOnStandardOutputAndEndsWithItsCode) {
+  EXPECT_EQ(run("--version" + to("o", "e")), 0);
+  EXPECT_EQ(text("o"), "sixpoint " SIXPOINT_VERSION "\n");
+  EXPECT_EQ(text("e"), "");
+  EXPECT_EQ(run("inspect " + (folder_ / "none.gt3x") + to("o", "e")), 66);
+  EXPECT_EQ(text("o"), "") << "stdout is for data";
+  EXPECT_THAT(text("e"), testing::AllOf(testing::StartsWith("sixpoint: "), HasSubstr("none.gt3x")));
+}
+
+TEST_F(Main, ArgumentsOfTheProgramAreNotItsName) {
+  EXPECT_EQ(run(to("o", "e")), 64) << "no command";
+  EXPECT_EQ(run("sixpoint --version" + to("o", "e")), 64);
+  EXPECT_EQ(run("units ''" + to("o", "e")), 64) << "an empty argument is one";
+}
+
+TEST_F(Main, AnOutputThatTakesNothingIsAnError) {
+  EXPECT_EQ(run("limits print >/dev/full 2>" + (folder_ / "e")), 74);
+  EXPECT_THAT(text("e"), HasSubstr("standard output"));
+}
+
+// A bar is for a terminal, and a file is none.
+TEST_F(Main, NoProgressIsDrawnIntoAFile) {
+  std::ofstream(folder_ / "x.gt3x") << "no recording";
+  run("scan " + folder_.path() + to("o", "e"));
+  EXPECT_EQ(text("e").find('\r'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sixpoint::cli

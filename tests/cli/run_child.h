@@ -1,0 +1,75 @@
+// The program as people start it: a child process, its first line, its end.
+//
+//   Child station({"station", "--port", "0", "--device", "virtual:seed=7"});
+//   const std::string line = station.line();
+//   EXPECT_EQ(station.stop(SIGINT), 0);
+#pragma once
+
+#include <array>
+#include <csignal>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace sixpoint::tests {
+
+class Child {
+ public:
+  explicit Child(std::vector<std::string> arguments) {
+    std::array<int, 2> ends{};
+    EXPECT_EQ(::pipe(ends.data()), 0);
+    arguments.insert(arguments.begin(), SIXPOINT_PROGRAM);
+    child_ = ::fork();
+    if (child_ == 0) {
+      ::dup2(ends[1], STDOUT_FILENO);
+      ::close(ends[0]);
+      ::close(ends[1]);
+      std::vector<char*> argv;
+      for (std::string& argument : arguments) {
+        argv.push_back(argument.data());
+      }
+      argv.push_back(nullptr);
+      ::execv(SIXPOINT_PROGRAM, argv.data());
+      ::_exit(127);
+    }
+    ::close(ends[1]);
+    out_ = ends[0];
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  ~Child() {
+    if (child_ > 0) {
+      stop(SIGTERM);
+    }
+    ::close(out_);
+  }
+  // The next line on its standard output, without the line's end.
+  std::string line() {
+    std::string text;
+    char one = 0;
+    while (::read(out_, &one, 1) == 1 && one != '\n') {
+      text += one;
+    }
+    return text;
+  }
+  // Its exit code; -1 where a signal ended it.
+  int stop(int signal) {
+    ::kill(child_, signal);
+    return wait();
+  }
+  int wait() {
+    int status = 0;
+    ::waitpid(child_, &status, 0);
+    child_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  pid_t child_ = -1;
+  int out_ = -1;
+};
+
+}  // namespace sixpoint::tests

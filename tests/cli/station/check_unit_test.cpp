@@ -1,0 +1,78 @@
+// check-unit, station-lock and retest by their contract; tests/station/records has the rules.
+#include <filesystem>
+
+#include "cli/station/station_fixture.h"
+
+namespace sixpoint::station {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
+  const std::string check =
+      "serial=MOS2A00000001,true_sensitivity_lsb_per_g=240/240/240,"
+      "true_zero_lsb=20/20/20,seed=";
+  ASSERT_EQ(run({"check-unit", "add", "MOS2A00000001", "--operator", "Eve", "--reason", "watch"})
+                .exit_code,
+            0);
+  write("l.toml", "[check_unit]\nbaseline_runs = 4\n");
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(measure(check + std::to_string(i + 1)).exit_code, 0);
+  }
+  const std::vector<std::string> limits = {"--limits", folder_ / "l.toml"};
+  EXPECT_EQ(measure("seed=9", limits).exit_code, 0);
+  // The check unit changes by 5 mg: or is it the jig?
+  EXPECT_EQ(measure("serial=MOS2A00000001,true_sensitivity_lsb_per_g=240/240/240,"
+                    "true_zero_lsb=21.2/20/20,seed=8",
+                    limits)
+                .exit_code,
+            0);
+  const auto refused = measure("seed=9", limits);
+  EXPECT_EQ(refused.exit_code, 78);
+  EXPECT_THAT(refused.people, HasSubstr("station A is locked"));
+  EXPECT_THAT(refused.people, HasSubstr("station-lock sign"));
+  EXPECT_EQ(refused.json()["error"]["code"], "configuration");
+  auto status =
+      run({"station-lock", "status", "--station", "A", "--limits", folder_ / "l.toml", "--json"});
+  EXPECT_EQ(status.exit_code, 1);
+  EXPECT_TRUE(status.json()["locked"].get<bool>());
+  EXPECT_EQ(run({"station-lock", "sign", "--station", "A"}).exit_code, 64) << "who, and why?";
+  EXPECT_EQ(run({"station-lock", "sign", "--station", "A", "--operator", "Eve", "--reason",
+                 "seat cleaned"})
+                .exit_code,
+            0);
+  EXPECT_EQ(measure("seed=9", limits).exit_code, 0);
+  const auto chart = run({"check-unit", "chart", "--station", "A", "--limits", folder_ / "l.toml",
+                          "--html", folder_ / "c.html", "--json"});
+  EXPECT_EQ(chart.exit_code, 0);
+  EXPECT_EQ(chart.json()["charts"].size(), 6U);
+  EXPECT_GT(std::filesystem::file_size(folder_ / "c.html"), 1000U);
+}
+
+TEST_F(StationCommands, AUnitThatFailedIsMeasuredTwiceAndNotForever) {
+  write("tight.toml", "[zero_offset_mg]\nlow = -1\nhigh = 1\n");
+  const std::vector<std::string> tight = {"--limits", folder_ / "tight.toml"};
+  const std::string unit = "seed=9,serial=MOS2A00000009";
+  EXPECT_EQ(measure(unit, tight).exit_code, 1);
+  const auto first = measure(unit);
+  EXPECT_EQ(first.exit_code, 0);
+  EXPECT_EQ(first.json()["verdict"], "conditional_pass");
+  EXPECT_THAT(first.json()["codes"], Contains("retest"));
+  EXPECT_EQ(measure(unit).json()["verdict"], "pass");
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(measure(unit, tight).exit_code, 1);
+  }
+  EXPECT_EQ(measure(unit).exit_code, 78);
+  const auto state = run({"retest", "MOS2A00000009", "--json"});
+  EXPECT_EQ(state.exit_code, 1);
+  EXPECT_EQ(state.json()["failures_in_row"], 3);
+  EXPECT_EQ(
+      run({"retest", "MOS2A00000009", "--release", "--operator", "Eve", "--reason", "new battery"})
+          .exit_code,
+      0);
+  EXPECT_EQ(measure(unit).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace sixpoint::station

@@ -1,0 +1,27 @@
+// The commands of the station, on the real disk with virtual units.
+#pragma once
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "run_command.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::station {
+
+class StationCommands : public testing::Test {
+ protected:
+  tests::Answer run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--store", folder_ / "s.db"});
+    return tests::run_command(posix_env(), arguments);
+  }
+  tests::Answer measure(const std::string& unit, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {
+        "jig",       "--device", "virtual:" + unit, "--jig", "virtual",
+        "--station", "A",        "--operator",      "Ada",   "--json"};
+
+  }  // namespace sixpoint::station

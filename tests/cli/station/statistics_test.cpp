@@ -1,0 +1,83 @@
+// sixpoint statistics and gage-rr by their contract; tests/station/statistics has the numbers.
+#include <fstream>
+
+#include "cli/command_fixture.h"
+#include "cli/station/station_fixture.h"
+
+namespace sixpoint {
+namespace {
+
+using station::StationCommands;
+using tests::CommandTest;
+
+TEST_F(CommandTest, StatisticsCountsTheRunsOfTheStore) {
+  const std::string store = path("a.db");
+  for (const char* station : {"east", "east", "west"}) {
+    ASSERT_EQ(run({"jig", "--device", tests::kUnitInJig, "--station", station, "--store", store})
+                  .exit_code,
+              0);
+  }
+  const auto answer =
+      run({"statistics", "--by", "station", "--html", path("p.html"), "--store", store, "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  const auto json = answer.json();
+  EXPECT_EQ(json["schema"], "sixpoint/statistics/1");
+  ASSERT_EQ(json["groups"].size(), 2U);
+  EXPECT_EQ(json["groups"][0]["runs"], 2);
+  EXPECT_EQ(json["groups"][1]["runs"], 1);
+  EXPECT_EQ(json["all"]["runs"], 3);
+  EXPECT_EQ(json["all"]["units"], 1);
+  EXPECT_TRUE(std::ifstream(path("p.html")).good());
+  EXPECT_EQ(run({"statistics", "--from", "soon", "--store", store}).exit_code, 64);
+  EXPECT_EQ(run({"statistics", "--by", "colour", "--store", store}).exit_code, 64);
+  EXPECT_EQ(run({"statistics", "--store", path("none.db")}).exit_code, 66);
+}
+
+// Two parts, two operators, two readings each. All readings of a part are equal, so repeatability
+// and reproducibility are zero.
+TEST_F(CommandTest, GageRrReadsItsTable) {
+  std::ofstream csv(path("g.csv"));
+  csv << "part,operator,value\n";
+  for (const char* part : {"A,", "B,"}) {
+    for (const char* who : {"ada,", "max,"}) {
+      for (int repeat = 0; repeat < 2; ++repeat) {
+        csv << part << who << (part[0] == 'A' ? "1.0" : "2.0") << '\n';
+      }
+    }
+  }
+  csv.close();
+  const auto answer = run({"gage-rr", path("g.csv"), "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  EXPECT_EQ(answer.json()["schema"], "sixpoint/gage-rr/1");
+  EXPECT_EQ(run({"gage-rr"}).exit_code, 64) << "no readings are named";
+  EXPECT_EQ(run({"gage-rr", path("none.csv")}).exit_code, 66);
+}
+
+TEST_F(StationCommands, StatisticsAndTheGageStudy) {
+  for (int part = 1; part <= 3; ++part) {
+    for (const char* person : {"Ada", "Bo"}) {
+      for (int trial = 0; trial < 2; ++trial) {
+        const auto answer = run({"jig", "--device", "virtual:seed=" + std::to_string(part), "--jig",
+                                 "virtual", "--operator", person, "--study", "spring"});
+        EXPECT_EQ(answer.exit_code, 0) << answer.people;
+      }
+    }
+    EXPECT_EQ(measure("seed=" + std::to_string(part)).exit_code, 0);
+  }
+  const auto gage = run({"gage-rr", "--study", "spring", "--axis", "y", "--json"});
+  EXPECT_EQ(gage.exit_code, 0) << gage.people << gage.out;
+  EXPECT_EQ(gage.json()["parts"], 3);
+  EXPECT_LT(gage.json()["grr_percent"].get<double>(), 5);
+  const auto statistics =
+      run({"statistics", "--by", "station", "--html", folder_ / "s.html", "--json"});
+  EXPECT_EQ(statistics.exit_code, 0);
+  EXPECT_EQ(statistics.json()["all"]["runs"], 3) << "the study's runs do not count";
+  EXPECT_EQ(statistics.json()["groups"][0]["name"], "A");
+  EXPECT_TRUE(statistics.json()["capability"].contains("zero_offset_mg x"));
+  EXPECT_EQ(run({"statistics", "--by", "moon"}).exit_code, 64);
+  EXPECT_EQ(run({"gage-rr", "--study", "autumn"}).exit_code, 66);
+  EXPECT_EQ(run({"gage-rr"}).exit_code, 64);
+}
+
+}  // namespace
+}  // namespace sixpoint

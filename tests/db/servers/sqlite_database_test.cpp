@@ -1,0 +1,258 @@
+// What only a store in a file can meet: other files, no rights, full disks, damage, early versions.
+#include <csignal>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/memory_env.h"
+#include "base/random.h"
+#include "db/schema.h"
+#include "db/store.h"
+#include "expect_result.h"
+#include "temporary_folder.h"
+
+namespace sixpoint::db {
+namespace {
+
+class SqliteStoreTest : public testing::Test {
+ protected:
+  Result<Store> open() { return Store::open(memory_.env, path()); }
+  std::string path() const { return folder_ / "store.db"; }
+  static ConstantsRecord constants(std::int64_t time_s) {
+    ConstantsRecord record;
+    record.made_at = from_unix_seconds(time_s);
+    record.serial = "MOS2A1";
+    record.filter = "current";
+    record.method = "jig";
+    record.document = R"({"n":)" + std::to_string(time_s) + "}";
+    return record;
+  }
+  void run_sql(const std::string& sql) const {
+    sqlite3* handle = nullptr;
+    ASSERT_EQ(sqlite3_open(path().c_str(), &handle), SQLITE_OK);
+    char* message = nullptr;
+    ASSERT_EQ(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(handle);
+  }
+
+  sixpoint::tests::TemporaryFolder folder_;
+  MemoryEnv memory_;
+};
+
+TEST_F(SqliteStoreTest, OpensOnlyStores) {
+  std::ofstream(path()) << "this is a text file, long enough to be looked at as a database header "
+                           "of one hundred bytes and more";
+  EXPECT_FAILS(open(), ErrorCode::bad_data);
+  EXPECT_FAILS(Store::open(memory_.env, folder_ / "none/store.db"), ErrorCode::cannot_create);
+  const std::string other = folder_ / "other.db";
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open(other.c_str(), &handle), SQLITE_OK);
+  sqlite3_exec(handle, "CREATE TABLE mine (a)", nullptr, nullptr, nullptr);
+  sqlite3_close(handle);
+  EXPECT_FAILS(Store::open(memory_.env, other), ErrorCode::bad_data);
+  ASSERT_OK(open_sqlite(folder_ / "newer.db").value()->set_schema_version(99));
+  EXPECT_FAILS(Store::open(memory_.env, folder_ / "newer.db"), ErrorCode::configuration);
+}
+
+// The text of version 1, as the first program wrote it, with three rows and their hashes. The
+// hashes were computed by another program (Python's hashlib) from the description in docs/store.md.
+TEST_F(SqliteStoreTest, BringsAStoreOfVersion1UpToDateAndItsHashesHold) {
+  run_sql(
+#include "db/store_version_1.sql.inc"
+  );
+  const auto before =
+      std::string("74f4943fa1dd97ddebe9c81a3d40776ef9b0ee4af156aa10d9e7766429e3d57d");
+  auto store = open();
+  ASSERT_OK(store);
+  auto audit = store->audit();
+  ASSERT_OK(audit);
+  EXPECT_TRUE(audit->ok) << audit->brief();
+  EXPECT_EQ(audit->rows, 3);
+  EXPECT_EQ(audit->head, before);
+  EXPECT_EQ(store->constants_for("MOS2A1", "legacy").value()->document, R"({"n":1})");
+  ASSERT_OK(store->add_constants(constants(7), "w"));
+  audit = store->audit();
+  EXPECT_TRUE(audit->ok) << audit->brief();
+  EXPECT_EQ(audit->rows, 5) << "and the filter configuration, and the constants";
+  EXPECT_TRUE(open()->audit()->ok);
+}
+
+TEST_F(SqliteStoreTest, BringsAStoreOfVersion2UpToDateAndItsHashesHold) {
+  run_sql(
+#include "db/store_version_2.sql.inc"
+  );
+  auto store = open();
+  ASSERT_OK(store);
+  const auto audit = store->audit();
+  ASSERT_OK(audit);
+  EXPECT_TRUE(audit->ok) << audit->brief();
+  EXPECT_EQ(audit->rows, 5);
+  EXPECT_EQ(audit->head, "b88f65e21c3f51132480dc74ef7f68d9c281037c02b63880f9e4a018855351dd");
+  const auto history = store->unit_history("MOS2A1");
+  EXPECT_EQ(history->runs.front().build, "e21f353");
+  EXPECT_EQ(history->repairs.front().input, "O'Hara.gt3x");
+  EXPECT_EQ(store->database().schema_version().value(), kSchemaVersion);
+  ASSERT_OK(store->add_constants(constants(7), "w"));
+  EXPECT_TRUE(open()->audit()->ok);
+}
+
+TEST_F(SqliteStoreTest, ADamagedPageIsNamedAndNothingCrashes) {
+  {
+    auto store = open();
+    for (int i = 0; i < 300; ++i) {
+      ASSERT_OK(store->add_constants(constants(i), "w"));
+    }
+  }
+  std::ifstream whole(path(), std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(whole), {}};
+  ASSERT_GT(bytes.size(), 8U * 4096);
+  std::size_t noticed = 0;
+  std::size_t pages = 0;
+  for (std::size_t page = 1; page < bytes.size() / 4096; ++page) {
+    std::string damaged = bytes;
+    for (std::size_t i = 0; i < 4096; i += 3) {
+      damaged[page * 4096 + i] = static_cast<char>(damaged[page * 4096 + i] ^ 0x5A);
+    }
+    std::ofstream(path(), std::ios::binary) << damaged;
+    auto store = open();
+    if (!store) {
+      EXPECT_EQ(store.error().code, ErrorCode::bad_data) << store.error().brief();
+      ++noticed;
+    } else {
+      const auto audit = store->audit();
+      if (!audit) {
+        EXPECT_EQ(audit.error().code, ErrorCode::bad_data) << audit.error().brief();
+      }
+      noticed += !audit || !audit->ok ? 1 : 0;
+    }
+    ++pages;
+  }
+  // Pages that hold no row of the history (indexes, the free list) may go unnoticed by the audit.
+  EXPECT_GE(noticed, pages / 3);
+}
+
+TEST_F(SqliteStoreTest, AFullDiskLosesNothingThatWasAcknowledged) {
+  constexpr int kMost = 3000;
+  { ASSERT_OK(open()); }
+  int pipe_ends[2];
+  ASSERT_EQ(::pipe(pipe_ends), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    // No file of this process grows beyond 400 kB: the disk is full from then on.
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{400'000, 400'000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    auto store = open();
+    int acknowledged = 0;
+    for (; store && acknowledged < kMost; ++acknowledged) {
+      const auto id = store->add_constants(constants(acknowledged), "w");
+      if (!id) {
+        const auto code = static_cast<char>(id.error().code);
+        static_cast<void>(!::write(pipe_ends[1], &code, 1));
+        static_cast<void>(!::write(pipe_ends[1], &acknowledged, sizeof acknowledged));
+        break;
+      }
+    }
+    ::_exit(0);
+  }
+  ::close(pipe_ends[1]);
+  char code = 0;
+  int acknowledged = 0;
+  ASSERT_EQ(::read(pipe_ends[0], &code, 1), 1);
+  ASSERT_EQ(::read(pipe_ends[0], &acknowledged, sizeof acknowledged),
+            static_cast<ssize_t>(sizeof acknowledged));
+  ::close(pipe_ends[0]);
+  ::waitpid(child, nullptr, 0);
+  EXPECT_EQ(code, static_cast<char>(ErrorCode::io));
+  EXPECT_GT(acknowledged, 10);
+  auto store = open();
+  ASSERT_OK(store);
+  EXPECT_EQ(store->history("MOS2A1")->size(), static_cast<std::size_t>(acknowledged));
+  EXPECT_TRUE(store->audit()->ok);
+}
+
+TEST_F(SqliteStoreTest, AFileThatMayNotBeWrittenIsReadOnlyWithAClearError) {
+  { ASSERT_OK(open()->add_constants(constants(1), "w")); }
+  ASSERT_EQ(::chmod(path().c_str(), 0444), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    // Root may write everywhere: be nobody.
+    if (::geteuid() == 0 && (::chmod(folder_.path().c_str(), 0555) != 0 || ::setuid(65534) != 0)) {
+      ::_exit(100);
+    }
+    auto store = open();
+    if (!store) {
+      ::_exit(static_cast<int>(store.error().code));
+    }
+    const auto id = store->add_constants(constants(2), "w");
+    ::_exit(id ? 0 : static_cast<int>(id.error().code));
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), static_cast<int>(ErrorCode::permission));
+  ::chmod(folder_.path().c_str(), 0755);
+  EXPECT_EQ(open()->history("MOS2A1")->size(), 1U);
+}
+
+// Kills a writing child at a random moment, again and again on one file. What the child said is
+// stored must be there. SIXPOINT_KILLS sets how often.
+TEST_F(SqliteStoreTest, KilledAtRandomMomentsItKeepsEveryAcknowledgedRow) {
+  { ASSERT_OK(open()); }
+  const char* wanted = std::getenv("SIXPOINT_KILLS");
+  const int kills = wanted == nullptr ? 50 : std::atoi(wanted);
+  Random random(5);
+  int next = 0;
+  for (int kill = 0; kill < kills; ++kill) {
+    int pipe_ends[2];
+    ASSERT_EQ(::pipe(pipe_ends), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      auto store = open();
+      for (int i = next; store; ++i) {
+        if (!store->add_constants(constants(i), "w") ||
+            ::write(pipe_ends[1], &i, sizeof i) != static_cast<ssize_t>(sizeof i)) {
+          break;
+        }
+      }
+      ::_exit(1);
+    }
+    ::close(pipe_ends[1]);
+    // Random in the number of rows and in the moment within one.
+    const std::uint64_t rows = random.below(12);
+    int acknowledged = next - 1;
+    for (std::uint64_t i = 0; i < rows; ++i) {
+      ASSERT_EQ(::read(pipe_ends[0], &acknowledged, sizeof acknowledged),
+                static_cast<ssize_t>(sizeof acknowledged));
+    }
+    ::usleep(static_cast<useconds_t>(random.below(4000)));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    while (::read(pipe_ends[0], &acknowledged, sizeof acknowledged) > 0) {
+    }
+    ::close(pipe_ends[0]);
+    auto store = open();
+    ASSERT_OK(store);
+    const auto audit = store->audit();
+    ASSERT_OK(audit);
+    ASSERT_TRUE(audit->ok) << "after kill " << kill << ": " << audit->brief();
+    const auto history = store->history("MOS2A1");
+    ASSERT_OK(history);
+    const auto stored = static_cast<int>(history->size());
+    ASSERT_GE(stored, acknowledged + 1);
+    ASSERT_LE(stored, acknowledged + 2) << "at most the one that was being written";
+    for (int i = 0; i < stored; ++i) {
+      ASSERT_EQ((*history)[static_cast<std::size_t>(i)].made_at, from_unix_seconds(i));
+    }
+    next = stored;
+  }
+  EXPECT_GT(next, kills);
+}
+
+}  // namespace
+}  // namespace sixpoint::db

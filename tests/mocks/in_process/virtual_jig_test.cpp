@@ -1,0 +1,92 @@
+#include "mocks/in_process/virtual_jig.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "expect_result.h"
+#include "mocks/made_bench.h"
+
+namespace sixpoint::mocks {
+namespace {
+
+using device::Pose;
+using sim::FilterConfiguration;
+
+TEST(VirtualUnit, ATiltedPlacementIsTilted) {
+  Bench bench;
+  ASSERT_OK(bench.unit->set_filter(FilterConfiguration::current));
+  bench.jig->tilt_next(7.2);
+  ASSERT_OK(bench.jig->go_to(Pose::plus_z));
+  bench.clock->sleep(std::chrono::seconds(2));
+  ASSERT_OK(bench.unit->start_stream(100));
+  const auto mean = mean_of_stream(bench, 100);
+  const sim::SensorTruth& truth = bench.plugged->unit.truth().current;
+  const auto g = [&](std::size_t axis) {
+    return (mean[axis] - truth.zero_lsb[axis]) / truth.sensitivity_lsb_per_g[axis];
+  };
+  EXPECT_NEAR(std::atan2(std::hypot(g(0), g(1)), g(2)) * 180 / std::acos(-1.0), 7.2, 0.1);
+}
+
+// The reading of the unit as it stands, in g, by the sensor that it was made of.
+PerAxis<double> reading_g(Bench& bench) {
+  EXPECT_OK(bench.unit->start_stream(100));
+  const auto mean = mean_of_stream(bench, 50);
+  EXPECT_OK(bench.unit->stop_stream());
+  const sim::SensorTruth& truth = bench.plugged->unit.truth().current;
+  PerAxis<double> g{};
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    g[axis] = (mean[axis] - truth.zero_lsb[axis]) / truth.sensitivity_lsb_per_g[axis];
+  }
+  return g;
+}
+
+// device/jig.h: after stop() nothing moves until the next go_to(). Oracle: gravity is 1 g in any
+// pose, and half-way from +z to +x it lies between the two.
+TEST(VirtualJig, StoppedInMidTurnItStaysThere) {
+  Bench bench;
+  ASSERT_OK(bench.unit->set_filter(FilterConfiguration::current));
+  ASSERT_OK(bench.jig->go_to(Pose::plus_z));
+  bench.clock->sleep(std::chrono::seconds(5));
+  ASSERT_OK(bench.jig->go_to(Pose::plus_x));
+  bench.clock->sleep(std::chrono::milliseconds(750));
+  ASSERT_OK(bench.jig->stop());
+  EXPECT_FALSE(bench.jig->position()->pose.has_value());
+  const auto first = reading_g(bench);
+  EXPECT_NEAR(std::hypot(first[0], first[1], first[2]), 1, 0.01);
+  EXPECT_GT(first[0], 0.1);
+  EXPECT_GT(first[2], 0.1);
+  bench.clock->sleep(std::chrono::minutes(1));
+  EXPECT_FALSE(bench.jig->position()->pose.has_value()) << "it does not know where it stands";
+  const auto later = reading_g(bench);
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    EXPECT_NEAR(later[axis], first[axis], 0.01);  // noise of 300 samples, 0.3 mg
+  }
+  ASSERT_OK(bench.jig->go_to(Pose::plus_x));
+  bench.clock->sleep(std::chrono::seconds(5));
+  EXPECT_EQ(bench.jig->position()->pose, Pose::plus_x);
+  EXPECT_NEAR(reading_g(bench)[0], 1, 0.01);
+}
+
+TEST(VirtualJig, AStopAtRestChangesNothing) {
+  Bench bench;
+  ASSERT_OK(bench.jig->go_to(Pose::minus_y));
+  bench.clock->sleep(std::chrono::seconds(5));
+  ASSERT_OK(bench.jig->stop());
+  EXPECT_EQ(bench.jig->position()->pose, Pose::minus_y);
+}
+
+TEST(VirtualJig, OnlyTheNextPoseIsTilted) {
+  Bench bench;
+  ASSERT_OK(bench.unit->set_filter(FilterConfiguration::current));
+  bench.jig->tilt_next(20);
+  ASSERT_OK(bench.jig->go_to(Pose::plus_z));
+  bench.clock->sleep(std::chrono::seconds(5));
+  EXPECT_NEAR(reading_g(bench)[2], std::cos(20 * std::acos(-1.0) / 180), 0.005);
+  ASSERT_OK(bench.jig->go_to(Pose::plus_z));
+  bench.clock->sleep(std::chrono::seconds(5));
+  EXPECT_NEAR(reading_g(bench)[2], 1, 0.005);
+}
+
+}  // namespace
+}  // namespace sixpoint::mocks
