@@ -1,15 +1,11 @@
-// What every command of the program gets, and how it answers. A command is one file with one
-// function add_NAME(app, context), which declares the options and names the function that does the
-// work:
+// How a command is declared. A command is one file with one function add_NAME(app, context), which
+// declares the options and names the function that does the work:
 //
 //   struct Options { std::string store; bool json = false; };
 //
 //   Status run(const Options& options, Context& context) {
 //     SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-//     SIXPOINT_ASSIGN(const auto units, store.units());
-//     Json json = document("units");
-//     json["units"] = units.size();
-//     return print_answer(context, options.json, json, fmt::format("{} units\n", units.size()));
+//     return print_answer(context, options.json, document("units"), "a store\n");
 //   }
 //
 //   void add_units(CLI::App& app, Context& context) {
@@ -18,93 +14,20 @@
 //     add_store_option(command, options.store);
 //   }
 //
-// An error that run() returns is reported and becomes the exit code. A judgement (failed,
-// inconclusive) goes into context.worsen(). Commands hold no state between calls: a test can run
-// the whole program many times in one process (cli/program/program.h). One thread at a time uses a
-// Context.
+// An error that run() returns is reported and becomes the exit code. Commands hold no state between
+// calls: a test can run the whole program many times in one process.
 #pragma once
 
-#include <istream>
 #include <memory>
-#include <optional>
-#include <ostream>
-#include <string>
 #include <string_view>
-#include <type_traits>
 
 #include <CLI/App.hpp>
-#include <nlohmann/json.hpp>
+// For context.log().
 #include <spdlog/logger.h>
 
-#include "base/env.h"
-#include "base/result.h"
-#include "base/time.h"
+#include "cli/context.h"
 
 namespace sixpoint::cli {
-
-// Keys keep the order in which they were added: `schema` comes first.
-using Json = nlohmann::ordered_json;
-
-// Exit codes beyond those of ErrorCode (contract: exit codes). With several inputs the worst wins.
-inline constexpr int kExitPassed = 0;
-inline constexpr int kExitFailed = 1;
-inline constexpr int kExitInconclusive = 2;
-inline constexpr int kExitStopped = 3;
-
-struct Context {
-  Env& env;
-  std::ostream& out;     // standard output: the data that the command was asked for
-  std::ostream& people;  // standard error: prompts, progress, warnings, errors
-  std::istream& in;
-  bool people_at_terminal = false;  // progress bars only when true
-  int exit_code = 0;
-  std::shared_ptr<spdlog::logger> logger = nullptr;  // made by log() at its first use
-
-  // Warnings and errors: lines "sixpoint: ..." on `people`. Prompts, summaries and bars are written
-  // to `people` directly.
-  spdlog::logger& log();
-
-  // Keeps the worse of two exit codes:
-  //
-  //   better                                             worse
-  //   0 passed < 2 inconclusive < 1 failed < 3 stopped < 64 ... 78 errors, by their number
-  void worsen(int code);
-  void worsen(ErrorCode code) { worsen(static_cast<int>(code)); }
-};
-
-// {"schema": "sixpoint/NAME/1"}, to which a command adds its keys.
-Json document(std::string_view command);
-
-// Prints one JSON document and a line end on stdout. This and the next one give a success, for
-// `return print_answer(...)` at the end of a command: run_program() reports an output that fails.
-Status print_json(Context& context, const Json& json);
-
-// The answer of a command on stdout: `json` with --json, else `text`.
-Status print_answer(Context& context, bool as_json, const Json& json, std::string_view text);
-
-// Prints the error for people ("sixpoint: where: what; hint") and keeps its exit code.
-void report_error(Context& context, const Error& error);
-// The same; with --json also a document with the key `error` {code, what, where, hint}.
-void report_error(Context& context, std::string_view command, const Error& error, bool json);
-
-Json error_to_json(const Error& error);
-
-// A number for JSON: NaN and infinities become null, because JSON does not have them.
-Json number(double value);
-
-// The value, or null where there is none. A time is written as ISO 8601, UTC.
-Json text_or_null(const std::string& text);
-template <class Value>
-Json value_or_null(const std::optional<Value>& value) {
-  if (!value) {
-    return nullptr;
-  }
-  if constexpr (std::is_same_v<Value, UtcTime>) {
-    return to_iso8601(*value);
-  } else {
-    return *value;
-  }
-}
 
 // A command that was declared, and its options.
 template <class Options>
@@ -140,25 +63,5 @@ Declared<Options> add_command(CLI::App& parent, Context& context, const char* na
 
 // Declares a command that is a name for its subcommands.
 CLI::App& add_group(CLI::App& parent, const char* name, const char* about);
-
-// The path of the program that runs; "sixpoint" where the system does not say.
-std::string this_program();
-
-// A bar such as "repairing  [=====>    ]  52 %  ETA 00:12" on a terminal, nothing elsewhere.
-class Progress {
- public:
-  Progress(Context& context, std::string doing, std::uint64_t total);
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-  void at(std::uint64_t done);
-
- private:
-  Context& context_;
-  std::string doing_;
-  std::uint64_t total_;
-  int last_percent_ = -1;
-  std::chrono::nanoseconds start_;
-};
 
 }  // namespace sixpoint::cli

@@ -1,5 +1,7 @@
 #include "cli/gravity_option.h"
 
+#include <CLI/App.hpp>
+
 namespace sixpoint::cli {
 
 void add_gravity_options(CLI::App& command, GravityOptions& options) {

@@ -7,9 +7,11 @@
 
 #include <optional>
 
-#include <CLI/App.hpp>
-
 #include "calib/gravity.h"
+
+namespace CLI {
+class App;
+}
 
 namespace sixpoint::cli {
 

@@ -5,6 +5,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "cli/command.h"
 #include "gt3x/forms/model.h"
 #include "station/records/run_records.h"
 

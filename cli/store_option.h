@@ -12,13 +12,16 @@
 #include <functional>
 #include <string>
 
-#include <CLI/App.hpp>
-
 #include "calib/constants.h"
 #include "calib/solve.h"
-#include "cli/command.h"
+#include "cli/context.h"
 #include "db/save.h"
 #include "station/capture/capture_run.h"
+
+namespace CLI {
+class App;
+class Option;
+}
 
 namespace sixpoint::cli {
 

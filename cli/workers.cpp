@@ -2,6 +2,8 @@
 
 #include <fmt/ranges.h>
 
+#include "cli/command.h"
+
 namespace sixpoint::cli {
 
 std::vector<NamedFile> named_files(Context& context, const std::vector<std::string>& paths,

@@ -15,8 +15,12 @@
 #include <thread>
 #include <vector>
 
-#include "cli/command.h"
+#include "cli/context.h"
 #include "repair/triage/file_tree.h"
+
+namespace CLI {
+class App;
+}
 
 namespace sixpoint::cli {
 

@@ -20,6 +20,12 @@ if(SIXPOINT_FUZZ)
   target_compile_options(sixpoint_warnings INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# What ccache needs to keep objects that were compiled with a precompiled header.
+add_library(sixpoint_precompiled_flags INTERFACE)
+target_compile_options(sixpoint_precompiled_flags INTERFACE
+  $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>
+  "SHELL:$<$<CXX_COMPILER_ID:Clang>:-Xclang -fno-pch-timestamp>")
+
 function(sixpoint_room FOLDER)
   cmake_parse_arguments(ROOM "" "" "SOURCES;NEIGHBOURS;PRIVATE_NEIGHBOURS" ${ARGN})
   string(REPLACE / _ name ${FOLDER})

@@ -8,6 +8,7 @@
 #include <iostream>
 #include <sstream>
 
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include "cli/program/program.h"

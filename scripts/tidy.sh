@@ -24,6 +24,10 @@ else
     awk 'NR == FNR { known[$0]; next } ($0 in known) && !seen[$0]++' \
       <(printf '%s\n' "${files[@]}") -)
 fi
+# clang does not read g++'s precompiled headers.
+mkdir -p build/tidy
+sed -E 's| -fpch-preprocess||; s| -Winvalid-pch -include [^ ]*/cmake_pch\.hxx||' \
+  build/compile_commands.json >build/tidy/compile_commands.json
 left=$(mktemp)
 trap 'rm -f "$left"' EXIT
 
@@ -37,7 +41,7 @@ check_one() {
   command=$(python3 - "$file" <<'PY'
 import json, os, shlex, sys
 wanted = os.path.realpath(sys.argv[1])
-for entry in json.load(open("build/compile_commands.json")):
+for entry in json.load(open("build/tidy/compile_commands.json")):
     if os.path.realpath(os.path.join(entry["directory"], entry["file"])) == wanted:
         words = shlex.split(entry["command"])
         keep, skip = [], False
@@ -60,7 +64,7 @@ PY
   key=$( (cat .clang-tidy; cd "$(head -n 1 <<<"$command")" && eval "$(tail -n 1 <<<"$command") -E -P") |
         sed "s|$PWD||g" | sha256sum | cut -d' ' -f1)
   [ -e "$cache/$key" ] && return 0
-  if clang-tidy --quiet -p build "$file" 2>/dev/null; then
+  if clang-tidy --quiet -p build/tidy "$file" 2>/dev/null; then
     touch "$cache/$key"
   else
     return 1

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/memory_env.h"
-#include "cli/command.h"
+#include "cli/context.h"
 #include "cli/program/program.h"
 
 namespace sixpoint::tests {

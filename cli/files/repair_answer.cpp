@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/command.h"
 #include "repair/rescale/repair_records.h"
 #include "station/records/software.h"
 

@@ -15,9 +15,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/command.h"
+#include "cli/context.h"
 #include "cli/store_option.h"
 #include "repair/rescale/repair_file.h"
+
+namespace CLI {
+class App;
+}
 
 namespace sixpoint::cli {
 

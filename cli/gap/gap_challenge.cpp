@@ -19,6 +19,7 @@
 
 #include "base/atomic_file.h"
 #include "base/html.h"
+#include "cli/command.h"
 #include "cli/workers.h"
 #include "gap/challenge/outside.h"
 #include "gap/challenge/recorded.h"

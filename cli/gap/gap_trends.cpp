@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/command.h"
 #include "cli/store_option.h"
 #include "station/records/gap_trends.h"
 

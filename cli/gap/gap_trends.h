@@ -4,9 +4,11 @@
 //   add_gap_trends(*gap, context);
 #pragma once
 
-#include <CLI/App.hpp>
+#include "cli/context.h"
 
-#include "cli/command.h"
+namespace CLI {
+class App;
+}
 
 namespace sixpoint::cli {
 

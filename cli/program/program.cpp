@@ -1,7 +1,9 @@
 #include "cli/program/program.h"
 
+#include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <spdlog/logger.h>
 
 #include "station/records/software.h"
 

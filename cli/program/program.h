@@ -11,7 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include "cli/command.h"
+#include "cli/context.h"
+
+namespace CLI {
+class App;
+}
 
 namespace sixpoint::cli {
 

@@ -1,5 +1,6 @@
 #include "cli/station/jig_options.h"
 
+#include "cli/command.h"
 #include "cli/devices/known_devices.h"
 #include "cli/station/record_option.h"
 #include "cli/store_option.h"

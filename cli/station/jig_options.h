@@ -10,10 +10,14 @@
 #include <memory>
 #include <string>
 
-#include "cli/command.h"
+#include "cli/context.h"
 #include "cli/gravity_option.h"
 #include "device/session/session_recorder.h"
 #include "station/run/jig_session.h"
+
+namespace CLI {
+class App;
+}
 
 namespace sixpoint::cli {
 

@@ -1,5 +1,7 @@
 #include "cli/station/record_option.h"
 
+#include "cli/command.h"
+
 namespace sixpoint::cli {
 
 void add_record_option(CLI::App& command, std::string& path) {

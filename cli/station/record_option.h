@@ -9,8 +9,12 @@
 // An empty path records nothing.
 #pragma once
 
-#include "cli/command.h"
+#include "cli/context.h"
 #include "device/session/session_recorder.h"
+
+namespace CLI {
+class App;
+}
 
 namespace sixpoint::cli {
 

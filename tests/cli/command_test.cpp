@@ -1,56 +1,74 @@
-// What all commands have in common: exit codes, error documents, numbers in JSON.
+// How a command is declared: what the command line gives is what the work gets.
 #include "cli/command.h"
 
-#include <functional>
-#include <limits>
-#include <map>
-#include <set>
+#include <sstream>
 
-#include <CLI/Option.hpp>
+#include <gtest/gtest.h>
 
 namespace sixpoint::cli {
 namespace {
 
-// Oracle: the order of the contract, 0 < 2 < 1 < 3 < 64 and above.
-TEST(Command, TheWorseExitCodeIsKept) {
-  const std::vector<int> order = {0, 2, 1, 3, 64, 65, 66, 69, 70, 73, 74, 77, 78};
-  std::ostringstream stream;
-  std::istringstream in;
-  for (std::size_t first = 0; first < order.size(); ++first) {
-    for (std::size_t second = 0; second < order.size(); ++second) {
-      Context context{posix_env(), stream, stream, in};
-      context.worsen(order[first]);
-      context.worsen(order[second]);
-      EXPECT_EQ(context.exit_code, order[std::max(first, second)]);
-    }
-  }
+struct Options {
+  int count = 0;
+  bool json = false;
+};
+
+struct WithoutJson {
+  int count = 0;
+};
+
+class Command : public testing::Test {
+ protected:
+  std::ostringstream out_;
+  std::ostringstream people_;
+  std::istringstream in_;
+  Context context_{posix_env(), out_, people_, in_};
+  CLI::App app_;
+};
+
+TEST_F(Command, TheWorkGetsItsOptionsOnce) {
+  int calls = 0;
+  const auto work = [&](const Options& options, Context&) -> Status {
+    ++calls;
+    EXPECT_EQ(options.count, 7);
+    EXPECT_TRUE(options.json);
+    return {};
+  };
+  auto [command, options] = add_command<Options>(app_, context_, "count", "counts", work);
+  command.add_option("--count", options.count, "how many");
+  app_.parse("count --count 7 --json");
+  EXPECT_EQ(calls, 1);
+  EXPECT_EQ(context_.exit_code, 0);
+  app_.parse("");
+  EXPECT_EQ(calls, 1) << "a command that was not chosen does not run";
 }
 
-TEST(Command, AnErrorIsOneLineForPeopleAndADocumentWithJson) {
-  std::ostringstream out;
-  std::ostringstream people;
-  std::istringstream in;
-  Context context{posix_env(), out, people, in};
-  const Error error{ErrorCode::no_input, "it is not there", "a.gt3x", "name another file"};
-  report_error(context, "scan", error, false);
-  EXPECT_EQ(out.str(), "");
-  EXPECT_EQ(people.str(), "sixpoint: a.gt3x: it is not there; name another file\n");
-  EXPECT_EQ(context.exit_code, 66);
-  report_error(context, "scan", error, true);
-  EXPECT_EQ(Json::parse(out.str()), Json::parse(R"({"schema": "sixpoint/scan/1", "error": {
-      "code": "no_input", "what": "it is not there", "where": "a.gt3x",
-      "hint": "name another file"}})"));
+TEST_F(Command, AnErrorOfTheWorkIsReportedAndBecomesTheExitCode) {
+  const auto work = [](const Options&, Context&) -> Status {
+    return fail(ErrorCode::no_input, "it is not there", "a.gt3x", "name another file");
+  };
+  add_command<Options>(app_, context_, "files count", "count", "counts", work);
+  app_.parse("count");
+  EXPECT_EQ(context_.exit_code, 66);
+  EXPECT_EQ(out_.str(), "");
+  EXPECT_EQ(people_.str(), "sixpoint: a.gt3x: it is not there; name another file\n");
+  app_.parse("count --json");
+  EXPECT_EQ(Json::parse(out_.str())["schema"], "sixpoint/files count/1");
+  EXPECT_EQ(Json::parse(out_.str())["error"]["code"], "no_input");
 }
 
-TEST(Command, JsonHasNoNumberThatItCannotWrite) {
-  EXPECT_EQ(number(1.5), 1.5);
-  EXPECT_TRUE(number(std::numeric_limits<double>::quiet_NaN()).is_null());
-  EXPECT_TRUE(number(-std::numeric_limits<double>::infinity()).is_null());
-  EXPECT_TRUE(text_or_null("").is_null());
-  EXPECT_EQ(text_or_null("a"), "a");
-  EXPECT_TRUE(value_or_null(std::optional<int>()).is_null());
-  EXPECT_EQ(value_or_null(std::optional(7)), 7);
-  EXPECT_EQ(value_or_null(std::optional(UtcTime{})), "1970-01-01T00:00:00Z");
+TEST_F(Command, OnlyOptionsWithJsonHaveTheFlag) {
+  add_command<WithoutJson>(app_, context_, "count", "counts",
+                           [](const WithoutJson&, Context&) -> Status { return {}; });
+  EXPECT_THROW(app_.parse("count --json"), CLI::ExtrasError);
+}
+
+TEST_F(Command, AGroupNeedsOneOfItsCommands) {
+  CLI::App& group = add_group(app_, "files", "what is done to files");
+  add_command<Options>(group, context_, "count", "counts",
+                       [](const Options&, Context&) -> Status { return {}; });
+  EXPECT_THROW(app_.parse("files"), CLI::RequiredError);
+  EXPECT_NO_THROW(app_.parse("files count"));
 }
 
 }  // namespace

@@ -1,0 +1,123 @@
+#include "cli/context.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <spdlog/sinks/ostream_sink.h>
+
+namespace sixpoint::cli {
+
+namespace {
+
+// The rank of an exit code in the table of Context::worsen().
+int rank(int code) {
+  switch (code) {
+    case kExitInconclusive:
+      return 1;
+    case kExitFailed:
+      return 2;
+    default:
+      return code;
+  }
+}
+
+}  // namespace
+
+spdlog::logger& Context::log() {
+  if (logger == nullptr) {
+    logger = std::make_shared<spdlog::logger>(
+        "sixpoint", std::make_shared<spdlog::sinks::ostream_sink_mt>(people, /*force_flush=*/true));
+    logger->set_pattern("sixpoint: %v");
+  }
+  return *logger;
+}
+
+void Context::worsen(int code) {
+  if (rank(code) > rank(exit_code)) {
+    exit_code = code;
+  }
+}
+
+Json document(std::string_view command) {
+  Json json;
+  json["schema"] = fmt::format("sixpoint/{}/1", command);
+  return json;
+}
+
+Status print_json(Context& context, const Json& json) {
+  // A file may hold bytes that are not UTF-8: they are replaced.
+  context.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+  return {};
+}
+
+Status print_answer(Context& context, bool as_json, const Json& json, std::string_view text) {
+  if (as_json) {
+    return print_json(context, json);
+  }
+  context.out << text;
+  return {};
+}
+
+Json error_to_json(const Error& error) {
+  return {{"code", to_string(error.code)},
+          {"what", error.what},
+          {"where", error.where},
+          {"hint", error.hint}};
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+void report_error(Context& context, const Error& error) {
+  context.log().error(error.brief());
+  context.worsen(error.code);
+}
+
+void report_error(Context& context, std::string_view command, const Error& error, bool json) {
+  report_error(context, error);
+  if (json) {
+    Json document_of_error = document(command);
+    document_of_error["error"] = error_to_json(error);
+    print_json(context, document_of_error);
+  }
+}
+
+std::string this_program() {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  return error ? "sixpoint" : program.string();
+}
+
+Progress::Progress(Context& context, std::string doing, std::uint64_t total)
+    : context_(context),
+      doing_(std::move(doing)),
+      total_(total),
+      start_(context.env.clock.elapsed()) {}
+
+Progress::~Progress() {
+  if (last_percent_ >= 0) {
+    context_.people << "\r\x1b[K" << std::flush;
+  }
+}
+
+void Progress::at(std::uint64_t done) {
+  if (!context_.people_at_terminal || total_ == 0) {
+    return;
+  }
+  const auto percent = static_cast<int>(std::min<std::uint64_t>(100, done * 100 / total_));
+  if (percent == last_percent_) {
+    return;
+  }
+  last_percent_ = percent;
+  const double elapsed_s =
+      std::chrono::duration<double>(context_.env.clock.elapsed() - start_).count();
+  const int left_s = percent > 0 ? static_cast<int>(elapsed_s * (100 - percent) / percent) : 0;
+  const int filled = percent / 5;
+  context_.people << fmt::format("\r{}  [{:=<{}}{: <{}}] {:3} %  {:02}:{:02} left", doing_, "",
+                                 filled, "", 20 - filled, percent, left_s / 60, left_s % 60)
+                  << std::flush;
+}
+
+}  // namespace sixpoint::cli

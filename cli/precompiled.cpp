@@ -1,0 +1,1 @@
+// An object needs a source; what it is for is precompiled.h.

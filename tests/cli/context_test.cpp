@@ -1,0 +1,57 @@
+// What all commands have in common: exit codes, error documents, numbers in JSON.
+#include "cli/context.h"
+
+#include <functional>
+#include <limits>
+#include <map>
+#include <set>
+
+#include <CLI/Option.hpp>
+
+namespace sixpoint::cli {
+namespace {
+
+// Oracle: the order of the contract, 0 < 2 < 1 < 3 < 64 and above.
+TEST(Context, TheWorseExitCodeIsKept) {
+  const std::vector<int> order = {0, 2, 1, 3, 64, 65, 66, 69, 70, 73, 74, 77, 78};
+  std::ostringstream stream;
+  std::istringstream in;
+  for (std::size_t first = 0; first < order.size(); ++first) {
+    for (std::size_t second = 0; second < order.size(); ++second) {
+      Context context{posix_env(), stream, stream, in};
+      context.worsen(order[first]);
+      context.worsen(order[second]);
+      EXPECT_EQ(context.exit_code, order[std::max(first, second)]);
+    }
+  }
+}
+
+TEST(Context, AnErrorIsOneLineForPeopleAndADocumentWithJson) {
+  std::ostringstream out;
+  std::ostringstream people;
+  std::istringstream in;
+  Context context{posix_env(), out, people, in};
+  const Error error{ErrorCode::no_input, "it is not there", "a.gt3x", "name another file"};
+  report_error(context, "scan", error, false);
+  EXPECT_EQ(out.str(), "");
+  EXPECT_EQ(people.str(), "sixpoint: a.gt3x: it is not there; name another file\n");
+  EXPECT_EQ(context.exit_code, 66);
+  report_error(context, "scan", error, true);
+  EXPECT_EQ(Json::parse(out.str()), Json::parse(R"({"schema": "sixpoint/scan/1", "error": {
+      "code": "no_input", "what": "it is not there", "where": "a.gt3x",
+      "hint": "name another file"}})"));
+}
+
+TEST(Context, JsonHasNoNumberThatItCannotWrite) {
+  EXPECT_EQ(number(1.5), 1.5);
+  EXPECT_TRUE(number(std::numeric_limits<double>::quiet_NaN()).is_null());
+  EXPECT_TRUE(number(-std::numeric_limits<double>::infinity()).is_null());
+  EXPECT_TRUE(text_or_null("").is_null());
+  EXPECT_EQ(text_or_null("a"), "a");
+  EXPECT_TRUE(value_or_null(std::optional<int>()).is_null());
+  EXPECT_EQ(value_or_null(std::optional(7)), 7);
+  EXPECT_EQ(value_or_null(std::optional(UtcTime{})), "1970-01-01T00:00:00Z");
+}
+
+}  // namespace
+}  // namespace sixpoint::cli
