@@ -1,216 +1,32 @@
-// Effects outside the catalogue: does each do what its form says? The oracle is the form itself, in
-// closed form, for many draws. Nothing here diagnoses them: they have to stay blind.
-#include "gap/challenge/outside.h"
-
+// The kinds outside the catalogue that occur in service: does each do what its form says? The
+// oracle is the form itself, in closed form, for many draws. Nothing here diagnoses them: they have
+// to stay blind.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <set>
 
 #include <gtest/gtest.h>
 
-#include "expect_result.h"
-#include "gap/challenge/trials.h"
-#include "sanitized.h"
+#include "gap/challenge/made_rig.h"
+#include "gap/challenge/outside.h"
 
 namespace sixpoint::gap {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
+using tests::expect_some;
+using tests::forms_where;
+using tests::kForms;
+using tests::kLsbPerG;
+using tests::kRate_hz;
+using tests::Matrix3d;
+using tests::pose;
+using tests::Rig;
+using tests::Vector3d;
 
-constexpr double kRate_hz = 100;
-constexpr double kLsbPerG = 256;
-constexpr int kForms = tests::kSanitized ? 20 : 40;
-constexpr std::array kServiced = {
-    "stress_creep",     "bit_weight",        "channel_crosstalk",
-    "beating_ripple",   "magnet_pull",       "cable_pull",
-    "loose_battery",    "regulator_dropout", "torn_reads",
-    "thermal_gradient", "wrong_pose",        "bit_errors",
-    "self_calibration", "reference_noise",   "vibration_rectification",
-    "transverse_shaker"};
-
-const OutsideKind& kind_of(std::string_view name) {
-  const auto& kinds = outside_kinds();
-  const auto found = std::find_if(kinds.begin(), kinds.end(), [&](const OutsideKind& kind) {
-    return kind.effect.name == name;
-  });
-  EXPECT_NE(found, kinds.end()) << name;
-  return *found;
-}
-
-// The rotation under which `up` of the sensor's frame points up, turned by `yaw_deg` on the spot.
-Matrix3d pose(const Vector3d& up, double yaw_deg = 0) {
-  return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), up).toRotationMatrix() *
-         Eigen::AngleAxisd(yaw_deg * std::numbers::pi / 180, Vector3d::UnitZ()).toRotationMatrix();
-}
-
-// Of the forms, a part and not nearly all.
-void expect_some(int forms) {
-  EXPECT_GT(forms, kForms / 5);
-  EXPECT_LT(forms, kForms * 4 / 5);
-}
-
-// A unit with one effect and without noise, moved by hand.
-class Rig {
- public:
-  Rig(std::string_view name, std::uint64_t form, double severity = 1)
-      : effect_(kind_of(name).effect.make({{"severity", {severity}}}, Random(form, 7))) {}
-
-  void plan(const sim::RecordingPlan& plan) { effect_->on_recording(plan); }
-
-  void place(const Matrix3d& rotation, double pause_s = 5) {
-    sim::Placement at;
-    time_s_ += pause_s;
-    temperature_c += ramp_c_per_s * pause_s;
-    at.start_s = time_s_;
-    at.previous = started_ ? rotation_ : rotation;
-    at.rotation = rotation_ = rotation;
-    at.anew = true;
-    at.contiguous = false;
-    started_ = true;
-    effect_->on_placement(at);
-  }
-
-  // With a tone: along the laboratory's vertical.
-  const sim::SimulatedBlock& record(std::size_t samples, double tone_g = 0, double tone_hz = 20) {
-    block_.first_sample = sample_;
-    block_.clock_start_s = time_s_;
-    block_.time_s.clear();
-    block_.temperature_c.clear();
-    for (std::size_t i = 0; i < samples; ++i) {
-      block_.time_s.push_back(time_s_);
-      block_.temperature_c.push_back(temperature_c);
-      time_s_ += 1 / kRate_hz;
-      temperature_c += ramp_c_per_s / kRate_hz;
-    }
-    sample_ += samples;
-    block_.motion.assign(samples, {rotation_, Vector3d::UnitZ()});
-    for (std::size_t i = 0; i < samples; ++i) {
-      block_.motion[i].force_lab_g.z() +=
-          tone_g * std::sin(2 * std::numbers::pi * tone_hz * block_.time_s[i]);
-    }
-    effect_->on_sampling(block_);
-    effect_->on_stimulus(block_);
-    block_.true_g.clear();
-    for (const sim::MotionState& motion : block_.motion) {
-      block_.true_g.push_back(motion.rotation * motion.force_lab_g);
-    }
-    block_.sensed_g = block_.true_g;
-    effect_->on_sensor(block_);
-    effect_->on_analog(block_);
-    return block_;
-  }
-  Vector3d change(std::size_t sample) const {
-    return block_.sensed_g[sample] - block_.true_g[sample];
-  }
-  // What record() would give at this pose, as the change of its first sample.
-  Vector3d change_here() {
-    record(1);
-    return change(0);
-  }
-
-  std::vector<gt3x::Counts> store(std::vector<gt3x::Counts> counts) {
-    record(counts.size());
-    block_.stored = std::move(counts);
-    effect_->on_firmware(block_);
-    return block_.stored;
-  }
-  sim::Tone tone(double frequency_hz) const {
-    sim::Tone made{Vector3d::UnitZ(), frequency_hz, 1, 0};
-    effect_->on_tone(made);
-    return made;
-  }
-
-  double temperature_c = 23;
-  double ramp_c_per_s = 0;
-
- private:
-  std::unique_ptr<sim::Effect> effect_;
-  sim::SimulatedBlock block_;
-  Matrix3d rotation_ = Matrix3d::Identity();
-  std::uint64_t sample_ = 0;
-  double time_s_ = 30;
-  bool started_ = false;
-};
-
-int forms_where(std::string_view kind, const std::function<bool(Rig&)>& holds) {
-  int count = 0;
-  for (std::uint64_t form = 0; form < kForms; ++form) {
-    Rig rig(kind, form);
-    count += holds(rig) ? 1 : 0;
-  }
-  return count;
-}
-
-TEST(OutsideKinds, ServicedOnesAreDrawnByNameOnly) {
-  std::set<std::string> names;
-  std::set<std::string_view> families;
-  for (const sim::EffectKind& kind : sim::effect_catalogue()) {
-    families.insert(family_of(kind.name));
-  }
-  for (const OutsideKind& kind : outside_kinds()) {
-    EXPECT_TRUE(names.insert(kind.effect.name).second) << kind.effect.name;
-    EXPECT_FALSE(static_cast<bool>(sim::find_effect(kind.effect.name))) << kind.effect.name;
-    EXPECT_TRUE(kind.family.empty() || families.contains(kind.family)) << kind.effect.name;
-    EXPECT_EQ(kind.only_by_name,
-              std::find(kServiced.begin(), kServiced.end(), kind.effect.name) != kServiced.end())
-        << kind.effect.name;
-  }
-  EXPECT_EQ(names.size(), 36 + kServiced.size());
-  const std::vector<std::string> asked(kServiced.begin(), kServiced.end());
-  std::set<std::string> seen;
-  for (std::uint64_t i = 0; i < 300; ++i) {
-    const auto unasked = draw_trial(5, i, sim::StandardProtocol::engineering, {0, 0, 1});
-    const auto named = draw_trial(5, i, sim::StandardProtocol::engineering, {0, 0, 1}, asked);
-    ASSERT_OK(unasked);
-    ASSERT_OK(named);
-    EXPECT_FALSE(kind_of(unasked->effects[0].name).only_by_name);
-    EXPECT_TRUE(kind_of(named->effects[0].name).only_by_name);
-    seen.insert(named->effects[0].name);
-  }
-  EXPECT_EQ(seen.size(), kServiced.size());
-}
-
-// Both protocols, noise and all: severity zero is the nominal unit, the same seed the same
-// recording, and what six faces can show is in the recording of six faces.
-TEST(OutsideKinds, AProtocolRunHoldsWhatTheKindSays) {
-  const auto counts = [](const OutsideKind& kind, std::uint64_t seed, double severity,
-                         sim::StandardProtocol protocol) {
-    sim::ProtocolRun run;
-    run.segments = sim::draw_protocol(protocol, 11);
-    run.temperature = sim::unit_temperature(run.segments, run.rate_hz);
-    run.gain = {1.01, 0.99, 1.015};
-    run.offset_g = {0.02, -0.03, 0.01};
-    run.seed = seed;
-    run.effects = {{&kind.effect, {{"severity", {severity}}}}};
-    const auto made = sim::run_protocol(run);
-    EXPECT_OK(made);
-    return *made;
-  };
-  for (const char* name : kServiced) {
-    const OutsideKind& kind = kind_of(name);
-    const auto production = sim::StandardProtocol::production;
-    const auto nothing = counts(kind, 3, 0, production);
-    EXPECT_EQ(nothing, counts(kind_of("stress_creep"), 3, 0, production)) << name;
-    EXPECT_EQ(counts(kind, 3, 1, production), counts(kind, 3, 1, production)) << name;
-    int visible = 0;
-    for (std::uint64_t seed = 0; seed < 6; ++seed) {
-      visible += counts(kind, seed, 3, production) != counts(kind, seed, 0, production) ? 1 : 0;
-    }
-    if (kind.in_faces) {
-      EXPECT_GE(visible, 5) << name;
-    } else {
-      const auto engineering = sim::StandardProtocol::engineering;
-      EXPECT_NE(counts(kind, 3, 3, engineering), counts(kind, 3, 0, engineering)) << name;
-    }
-  }
-}
-
-TEST(OutsideKinds, StressCreepFollowsTheLoadAndForgets) {
+TEST(OutsideServiced, StressCreepFollowsTheLoadAndForgets) {
   std::set<int> half_times_s;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Rig rig("stress_creep", form);
@@ -237,7 +53,7 @@ TEST(OutsideKinds, StressCreepFollowsTheLoadAndForgets) {
   EXPECT_GE(*half_times_s.begin(), 3);  // 5 s x ln 2
 }
 
-TEST(OutsideKinds, BitWeightStepsWhereABitTurnsOver) {
+TEST(OutsideServiced, BitWeightStepsWhereABitTurnsOver) {
   std::set<std::size_t> steps;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Rig rig("bit_weight", form);
@@ -267,7 +83,7 @@ TEST(OutsideKinds, BitWeightStepsWhereABitTurnsOver) {
   EXPECT_GE(steps.size(), 4U);
 }
 
-TEST(OutsideKinds, CrosstalkIsOneCrossTermPerAxisAtRest) {
+TEST(OutsideServiced, CrosstalkIsOneCrossTermPerAxisAtRest) {
   std::set<std::string> patterns;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Matrix3d terms;
@@ -305,7 +121,7 @@ TEST(OutsideKinds, CrosstalkIsOneCrossTermPerAxisAtRest) {
   EXPECT_GT(late, 50);
 }
 
-TEST(OutsideKinds, BeatingRippleIsASlowLineThatWanders) {
+TEST(OutsideServiced, BeatingRippleIsASlowLineThatWanders) {
   std::set<int> frequencies;
   int wanders = 0;
   for (std::uint64_t form = 0; form < kForms; ++form) {
@@ -333,7 +149,7 @@ TEST(OutsideKinds, BeatingRippleIsASlowLineThatWanders) {
   EXPECT_GT(wanders, kForms / 2);
 }
 
-TEST(OutsideKinds, MagnetPullsByHowTheUnitStandsInTheRoom) {
+TEST(OutsideServiced, MagnetPullsByHowTheUnitStandsInTheRoom) {
   expect_some(forms_where("magnet_pull", [](Rig& rig) {
     const auto zero = [&](const Matrix3d& rotation) {
       rig.place(rotation);
@@ -353,7 +169,7 @@ TEST(OutsideKinds, MagnetPullsByHowTheUnitStandsInTheRoom) {
   }));
 }
 
-TEST(OutsideKinds, CableTurnsTheUnitByPoseAlone) {
+TEST(OutsideServiced, CableTurnsTheUnitByPoseAlone) {
   expect_some(forms_where("cable_pull", [](Rig& rig) {
     const auto tipped_deg = [&](const Matrix3d& rotation) {
       rig.place(rotation);
@@ -379,7 +195,7 @@ TEST(OutsideKinds, CableTurnsTheUnitByPoseAlone) {
   }));
 }
 
-TEST(OutsideKinds, LooseBatteryLiesAtOneOfTwoEndsAndRemembers) {
+TEST(OutsideServiced, LooseBatteryLiesAtOneOfTwoEndsAndRemembers) {
   int remembers = 0;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Rig rig("loose_battery", form);
@@ -409,7 +225,7 @@ TEST(OutsideKinds, LooseBatteryLiesAtOneOfTwoEndsAndRemembers) {
   EXPECT_GT(remembers, kForms / 4);
 }
 
-TEST(OutsideKinds, RegulatorLetsGoAtAMomentAndGoesOn) {
+TEST(OutsideServiced, RegulatorLetsGoAtAMomentAndGoesOn) {
   constexpr std::size_t kSamples = 20'000;
   std::set<std::size_t> moments;
   for (std::uint64_t form = 0; form < kForms; ++form) {
@@ -433,7 +249,7 @@ TEST(OutsideKinds, RegulatorLetsGoAtAMomentAndGoesOn) {
   EXPECT_GT(moments.size(), 6U);
 }
 
-TEST(OutsideKinds, TornReadsMixTwoNeighbours) {
+TEST(OutsideServiced, TornReadsMixTwoNeighbours) {
   std::set<int> rates;
   std::array<int, 2> new_high_old_low{};
   for (std::uint64_t form = 0; form < kForms; ++form) {
@@ -467,7 +283,7 @@ TEST(OutsideKinds, TornReadsMixTwoNeighbours) {
   EXPECT_GT(new_high_old_low[1], 5);
 }
 
-TEST(OutsideKinds, GradientFollowsTheRateOfTheTemperature) {
+TEST(OutsideServiced, GradientFollowsTheRateOfTheTemperature) {
   std::set<int> lags;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Rig rig("thermal_gradient", form);
@@ -496,7 +312,7 @@ TEST(OutsideKinds, GradientFollowsTheRateOfTheTemperature) {
   EXPECT_GT(lags.size(), 6U);
 }
 
-TEST(OutsideKinds, WrongPosesAreOneToThree) {
+TEST(OutsideServiced, WrongPosesAreOneToThree) {
   constexpr std::size_t kRests = 18;
   constexpr std::size_t kEach = 1000;
   std::set<std::size_t> where;
@@ -528,7 +344,7 @@ TEST(OutsideKinds, WrongPosesAreOneToThree) {
   EXPECT_GT(where.size(), 10U);
 }
 
-TEST(OutsideKinds, BitErrorsAreFewAndStayWithinTwelveBits) {
+TEST(OutsideServiced, BitErrorsAreFewAndStayWithinTwelveBits) {
   std::array<int, 3> laws{};
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Rig rig("bit_errors", form);
@@ -566,7 +382,7 @@ TEST(OutsideKinds, BitErrorsAreFewAndStayWithinTwelveBits) {
   }
 }
 
-TEST(OutsideKinds, VibrationShiftsTheZeroAndRestDoesNot) {
+TEST(OutsideServiced, VibrationShiftsTheZeroAndRestDoesNot) {
   int of_all = 0;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     const auto shift = [form](double tone_g) {
@@ -590,7 +406,7 @@ TEST(OutsideKinds, VibrationShiftsTheZeroAndRestDoesNot) {
   expect_some(of_all);
 }
 
-TEST(OutsideKinds, SelfCalibrationPullsARestTowardsOneG) {
+TEST(OutsideServiced, SelfCalibrationPullsARestTowardsOneG) {
   std::set<int> speeds;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Rig rig("self_calibration", form, 1);  // half of the way
@@ -618,7 +434,7 @@ TEST(OutsideKinds, SelfCalibrationPullsARestTowardsOneG) {
   EXPECT_GT(speeds.size(), 8U);
 }
 
-TEST(OutsideKinds, ReferenceNoiseIsCommonAndGrowsWithTheLoad) {
+TEST(OutsideServiced, ReferenceNoiseIsCommonAndGrowsWithTheLoad) {
   int white = 0;
   for (std::uint64_t form = 0; form < kForms; ++form) {
     Rig rig("reference_noise", form);
@@ -640,7 +456,7 @@ TEST(OutsideKinds, ReferenceNoiseIsCommonAndGrowsWithTheLoad) {
   EXPECT_LT(white, kForms * 5 / 6);
 }
 
-TEST(OutsideKinds, ShakerMovesSidewaysAsWell) {
+TEST(OutsideServiced, ShakerMovesSidewaysAsWell) {
   std::array<int, 3> laws{};  // alike, rising, resonant
   for (std::uint64_t form = 0; form < kForms; ++form) {
     const Rig rig("transverse_shaker", form);
