@@ -1,4 +1,7 @@
 // What can be asked about the best explanation.
+#include <Eigen/LU>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "gap/explain/explanation.h"
@@ -32,6 +35,73 @@ TEST(EvidenceAnswers, UndeterminedIsPosteriorOverPrior) {
   EXPECT_GT(explanation.expected_nats("tilt"), kAccept_nats);
   EXPECT_LT(explanation.expected_nats("third_order"), kAccept_nats);
   EXPECT_GT(explanation.expected_nats("truncation"), 1e200) << "not asked for: no smallest size";
+}
+
+// Generalised least squares with the whole covariance of the values: (X' V^-1 X + P^-1)^-1, P of
+// the priors.
+TEST(EvidenceAnswers, EstimateHasTheUncertaintyOfLeastSquares) {
+  const Eigen::Vector3d drift_mg_per_h(9, -6, 7);
+  const auto blocks = tests::made_dwells(
+      [&](const Block& b) -> Eigen::Vector3d { return b.middle_s / 3600 * drift_mg_per_h; }, 5,
+      120);
+  const Explanation explanation(blocks, only({"drift"}));
+  const EvidenceModel& model = explanation.model();
+  const int drift = model.groups_of("drift").front();
+  const Eigen::MatrixXd linear = model.linearise(explanation.best().state);
+  Eigen::MatrixXd v = Eigen::MatrixXd::Zero(model.rows(), model.rows());
+  for (Eigen::Index i = 0; i < model.rows(); i += 3) {
+    const Eigen::MatrixXd lever = kNominalSeating_deg * seating_lever(model.block_of_row(i));
+    v.block<3, 3>(i, i) = model.block_of_row(i).white_mg2 + lever * lever.transpose();
+  }
+  const Eigen::MatrixXd x = linear.leftCols(9);  // gain, offset, drift
+  ASSERT_EQ(model.first_column(drift), 6);
+  Eigen::MatrixXd information = x.transpose() * v.inverse() * x;
+  for (int i = 0; i < 9; ++i) {
+    information(i, i) += 1 / std::pow(model.group(i / 3).prior_sd, 2);
+  }
+  const Eigen::MatrixXd covariance = information.inverse();
+  const auto estimate = explanation.estimate("drift");
+  ASSERT_TRUE(estimate);
+  ASSERT_EQ(estimate->value.size(), 3U);
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const auto axis = static_cast<std::size_t>(a);
+    const double sd = std::sqrt(covariance(6 + a, 6 + a));
+    EXPECT_NEAR(estimate->sd[axis], sd, 1e-3 * sd);
+    EXPECT_NEAR(estimate->value[axis], drift_mg_per_h[a], 4 * sd);
+  }
+}
+
+// One effect allowed, scatter nominal: what is tried are the subsets with and without it. Their
+// evidence has a closed form (evidence_subsets_test.cpp), about one state each.
+TEST(EvidenceAnswers, GainIsTheEvidenceOverTheBestWithout) {
+  const auto blocks = tests::made_dwells(
+      [](const Block& b) -> Eigen::Vector3d {
+        return b.middle_s / 3600 * Eigen::Vector3d(9, -6, 7);
+      },
+      5, 120);
+  const Explanation explanation(blocks, only({"drift"}));
+  const EvidenceModel& model = explanation.model();
+  const std::vector<int> drift = model.groups_of("drift");
+  const Whitened data =
+      model.whiten(model.linearise(explanation.best().state), Scatter::nominal, 0);
+  const double with = model.evidence(data, drift) + kLogPriorEffect;
+  EXPECT_NEAR(explanation.best().nats, with, 0.1);
+  // The best without it is one with scatter: no better than the evidence without scatter allows.
+  EXPECT_GT(explanation.gain_nats("drift"), 10);
+  EXPECT_LE(explanation.gain_nats("drift", true), with - model.evidence(data, {}) + 0.1);
+  EXPECT_EQ(explanation.gain_nats("clock_error"), 0) << "never tried";
+}
+
+// A gain that grows by half a per cent, several hundred times what a dwell's noise hides.
+TEST(EvidenceAnswers, GainThatGrowsChanges) {
+  const auto growing = tests::made_dwells(
+      [](const Block& b) -> Eigen::Vector3d { return 5 * (b.middle_s / 1050) * b.rotation.col(2); },
+      3);
+  EvidenceOptions nothing = only({});
+  EXPECT_GT(Explanation(growing, nothing).changing_nats("gain"), 10);
+  const auto constant = tests::made_dwells({}, 3);
+  EXPECT_LT(Explanation(constant, nothing).changing_nats("gain"), 1);
+  EXPECT_EQ(Explanation(constant, nothing).changing_nats("tilt"), 0) << "not in the explanation";
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Derivatives by the parameters, and rows divided by the root of their covariance.
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -42,6 +43,55 @@ TEST(EvidenceWhiten, WhiteningGivesUnitVariance) {
     chi += rows.squaredNorm() / kSeeds;
   }
   EXPECT_NEAR(chi, 54, 4 * std::sqrt(2 * 54.0 / kSeeds));
+}
+
+// A matrix L with V = L L' takes the unit matrix to its inverse: R V R' is the unit matrix, and
+// half the logarithm of det V is known from V itself. V by hand: noise, nominal seating of the
+// placement, and the kernel of the scatter on each axis, which scatter_test.cpp checks.
+TEST(EvidenceWhiten, RowsAreDividedByTheRootOfTheCovariance) {
+  const auto blocks = tests::made_dwells();
+  const EvidenceModel model(blocks, {});
+  const double start_s = blocks.front().middle_s - blocks.front().seconds / 2;
+  const Eigen::Index n = model.rows();
+  for (const Scatter scatter :
+       {Scatter::nominal, Scatter::seating, Scatter::random_walk, Scatter::flicker,
+        Scatter::by_placement, Scatter::by_session, Scatter::by_temperature, Scatter::by_time}) {
+    constexpr double kSize = 0.3;
+    const bool seats = scatter == Scatter::seating;
+    const double seat_deg = seats ? std::hypot(kNominalSeating_deg, kSize) : kNominalSeating_deg;
+    const bool zeros = scatter != Scatter::nominal && !seats;
+    Eigen::MatrixXd v = Eigen::MatrixXd::Zero(n, n);
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const auto ri = static_cast<Eigen::Index>(3 * i);
+      const Eigen::MatrixXd lever = seat_deg * seating_lever(blocks[i]);
+      v.block<3, 3>(ri, ri) = blocks[i].white_mg2 + lever * lever.transpose();
+      for (std::size_t j = 0; j < blocks.size() && zeros; ++j) {
+        const auto rj = static_cast<Eigen::Index>(3 * j);
+        v.block<3, 3>(ri, rj).diagonal().array() +=
+            kSize * kSize * scatter_kernel(scatter, blocks[i], blocks[j], start_s);
+      }
+    }
+    Eigen::MatrixXd root = Eigen::MatrixXd::Identity(n, n);
+    const double half_log_det = model.whiten_rows(scatter, kSize, root);
+    const Eigen::MatrixXd unit = root * v * root.transpose();
+    EXPECT_LT((unit - Eigen::MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-5)
+        << to_string(scatter);
+    const Eigen::VectorXd eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(v).eigenvalues();
+    EXPECT_NEAR(half_log_det, 0.5 * eigenvalues.array().log().sum(), 1e-5) << to_string(scatter);
+  }
+}
+
+// What the records say of a size, and the size's prior, are added outside of the rows.
+TEST(EvidenceWhiten, RecordsAndPriorOfTheSizeStandOutside) {
+  const auto blocks = tests::made_dwells();
+  EvidenceOptions options;
+  options.record_nats = [](Scatter, double size) { return 100 * size; };
+  const EvidenceModel model(blocks, options);
+  const Eigen::MatrixXd linear = model.linearise({});
+  EXPECT_EQ(model.whiten(linear, Scatter::nominal, 0).outside_nats, 0);
+  EXPECT_NEAR(model.whiten(linear, Scatter::flicker, 0.2).outside_nats,
+              20 + scatter_log_prior(Scatter::flicker), 1e-12);
 }
 
 }  // namespace
