@@ -147,18 +147,11 @@ Eigen::VectorXd second_means(const CleanSamples& clean, std::size_t first, std::
                              std::size_t rate, std::size_t axis) {
   Eigen::VectorXd y(static_cast<Eigen::Index>(seconds));
   for (std::size_t b = 0; b < seconds; ++b) {
-    double sum = 0;
-    double n = 0;
-    for (std::size_t at = first + b * rate; at < first + (b + 1) * rate; ++at) {
-      if (clean.usable(at)) {
-        sum += clean.value_mg(at, axis);
-        n += 1;
-      }
-    }
-    if (n <= 0.9 * static_cast<double>(rate)) {
+    const std::size_t at = first + b * rate;
+    if (static_cast<double>(clean.count_usable(at, rate)) <= 0.9 * static_cast<double>(rate)) {
       return {};
     }
-    y[static_cast<Eigen::Index>(b)] = sum / n;
+    y[static_cast<Eigen::Index>(b)] = clean.mean_mg(at, rate, axis);
   }
   return y;
 }

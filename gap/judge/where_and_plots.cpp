@@ -52,16 +52,8 @@ std::vector<double> running_sums(const Request& request, const CleanSamples& cle
   std::vector<double> sum = {0};
   double last = 0;
   for (std::size_t k = 0; k < segment.samples / second; ++k) {
-    double total = 0;
-    double n = 0;
-    for (std::size_t i = 0; i < second; ++i) {
-      const std::size_t at = segment.first_sample + k * second + i;
-      if ((clean.flags[at] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0) {
-        total += 1000.0 * clean.samples[at][axis] / request.bundle.accel_scale_lsb_per_g;
-        n += 1;
-      }
-    }
-    last = n > 0 ? total / n : last;
+    const std::size_t at = segment.first_sample + k * second;
+    last = clean.count_usable(at, second) > 0 ? clean.mean_mg(at, second, axis) : last;
     sum.push_back(sum.back() + last);
   }
   return sum;
