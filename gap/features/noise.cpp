@@ -209,7 +209,6 @@ class CodeSums {
       find_odd_code(axis);
     }
     if (pairs_ > 0) {
-      codes_.repeats = repeats_ / pairs_;
       codes_.repeats_excess_sd = (repeats_ - repeats_far_) / std::sqrt(repeats_ + repeats_far_ + 1);
     }
     codes_.kurtosis_sd = fourth_ / fourth_n_ / std::sqrt(24 / fourth_n_);
