@@ -194,10 +194,10 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
   }
   response.sd = deviation.sd();
   response.mode = deviation.fit(deviation.share(), response.gain_nats);
-  StepResponse::Mode second = deviation.fit(deviation.without(response.mode), response.second_nats);
-  if (response.second_nats > kTwoModes_nats) {
+  double nats = 0;
+  StepResponse::Mode second = deviation.fit(deviation.without(response.mode), nats);
+  if (nats > kTwoModes_nats) {
     // Each once more with the other taken off.
-    double nats = 0;
     for (int round = 0; round < 2; ++round) {
       response.mode = deviation.fit(deviation.without(second), nats);
       second = deviation.fit(deviation.without(response.mode), nats);
