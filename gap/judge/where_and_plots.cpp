@@ -115,9 +115,8 @@ Residuals locate_residuals(const Request& request, const Records& records,
     cell.n += 1;
     cell.factor = factor_of(block, segment, request.bundle.rate_hz);
     if (feature < kToneAmplitude) {
-      const double after = best.residual[row];
-      out.plot.push_back({axis, segment.name, static_cast<int>(block.segment), block.temperature_c,
-                          block.middle_s / 60, before * scale_mg, before, after * scale_mg, after});
+      out.plot.push_back({axis, segment.name, block.temperature_c, block.middle_s / 60,
+                          before * scale_mg, before, best.residual[row] * scale_mg});
     }
   }
   for (const auto& [key, cell] : cells) {
@@ -168,7 +167,7 @@ Plots make_plots(const Request& request, const Records& records, const Fit& best
     if (tone.usable) {
       const Vibration& v = *request.bundle.segments[tone.segment].vibration;
       const double nominal_mg = best.state.gain[tone.axis] * 1000 * v.amplitude_g;
-      plots.tones.push_back({tone.axis, v.frequency_hz, v.amplitude_g,
+      plots.tones.push_back({tone.axis, v.frequency_hz,
                              nominal_mg > 0 ? tone.in_phase_mg[tone.axis] / nominal_mg : 0,
                              response.tone_gain(v.frequency_hz, rate_hz)});
     }
