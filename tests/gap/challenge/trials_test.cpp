@@ -1,8 +1,11 @@
 #include "gap/challenge/trials.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 

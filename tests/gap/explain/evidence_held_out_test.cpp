@@ -6,6 +6,7 @@
 
 #include "gap/explain/explanation.h"
 #include "gap/explain/made_blocks.h"
+#include "gap/explain/made_marginal.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -24,30 +25,6 @@ TEST(EvidenceHeldOut, HeldOutFloorInClosedForm) {
   EXPECT_EQ(held.tone_before_sigma, 0) << "no tones";
 }
 
-// The values' mean and covariance with the parameters integrated out, scatter nominal.
-struct Predicted {
-  Eigen::VectorXd off;  // values less their prior mean
-  Eigen::MatrixXd covariance;
-};
-
-Predicted predicted(const EvidenceModel& model, const Eigen::MatrixXd& linear,
-                    const std::vector<int>& groups) {
-  Predicted all{linear.col(model.columns()), Eigen::MatrixXd::Zero(model.rows(), model.rows())};
-  for (Eigen::Index i = 0; i < model.rows(); i += 3) {
-    const Block& block = model.block_of_row(i);
-    const Eigen::MatrixXd lever = kNominalSeating_deg * seating_lever(block);
-    all.covariance.block<3, 3>(i, i) = block.white_mg2 + lever * lever.transpose();
-  }
-  for (const int g : with_nuisances(groups)) {
-    for (int k = 0; k < model.group(g).count; ++k) {
-      const Eigen::VectorXd column = linear.col(model.first_column(g) + k);
-      all.covariance += std::pow(model.group(g).sd_of(k), 2) * column * column.transpose();
-      all.off -= model.group(g).prior_mean * column;
-    }
-  }
-  return all;
-}
-
 // Rows of one condition, given all others: a conditional Gaussian.
 struct Conditional {
   Eigen::VectorXd residual;
@@ -58,7 +35,7 @@ struct Conditional {
   }
 };
 
-Conditional conditional(const EvidenceModel& model, const Predicted& all, int condition) {
+Conditional conditional(const EvidenceModel& model, const tests::Marginal& all, int condition) {
   std::vector<Eigen::Index> own, others;
   for (Eigen::Index row = 0; row < model.rows(); ++row) {
     (model.block_of_row(row).condition == condition ? own : others).push_back(row);
@@ -81,8 +58,8 @@ TEST(EvidenceHeldOut, PredictsEachConditionFromTheOthers) {
   ASSERT_EQ(explanation.best().scatter, Scatter::nominal);
   const EvidenceModel& model = explanation.model();
   const Eigen::MatrixXd linear = model.linearise(explanation.best().state);
-  const Predicted with = predicted(model, linear, model.groups_of("drift"));
-  const Predicted without = predicted(model, linear, {});
+  const tests::Marginal with = tests::marginal(model, linear, model.groups_of("drift"));
+  const tests::Marginal without = tests::marginal(model, linear, {});
   double nats = 0;
   double before2_mg2 = 0;
   double after2_mg2 = 0;
@@ -97,11 +74,10 @@ TEST(EvidenceHeldOut, PredictsEachConditionFromTheOthers) {
   }
   EXPECT_GT(nats, 20);
   EXPECT_NEAR(explanation.held_out_nats("drift"), nats, 1e-3 * nats);
-  // In mg the whitened residuals are scaled by each row's own sd: alike but for the seat's
-  // correlation of two axes.
+  // Each face is up along an axis: rows are independent, and whitening is a division by their sd.
   const Explanation::HeldOut held = explanation.held_out();
-  EXPECT_NEAR(held.before_mg, std::sqrt(before2_mg2 / 54), 0.05 * held.before_mg);
-  EXPECT_NEAR(held.after_mg, std::sqrt(after2_mg2 / 54), 0.05 * held.after_mg);
+  EXPECT_NEAR(held.before_mg, std::sqrt(before2_mg2 / 54), 1e-3 * held.before_mg);
+  EXPECT_NEAR(held.after_mg, std::sqrt(after2_mg2 / 54), 1e-3 * held.after_mg);
   EXPECT_GT(held.before_sigma, 2 * held.after_sigma);
   EXPECT_EQ(held.mean_after_sigma, held.after_sigma) << "dwells have means alone";
 }

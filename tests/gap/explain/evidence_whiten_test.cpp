@@ -74,11 +74,11 @@ TEST(EvidenceWhiten, RowsAreDividedByTheRootOfTheCovariance) {
     Eigen::MatrixXd root = Eigen::MatrixXd::Identity(n, n);
     const double half_log_det = model.whiten_rows(scatter, kSize, root);
     const Eigen::MatrixXd unit = root * v * root.transpose();
-    EXPECT_LT((unit - Eigen::MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-5)
+    EXPECT_LT((unit - Eigen::MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-4)
         << to_string(scatter);
     const Eigen::VectorXd eigenvalues =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(v).eigenvalues();
-    EXPECT_NEAR(half_log_det, 0.5 * eigenvalues.array().log().sum(), 1e-5) << to_string(scatter);
+    EXPECT_NEAR(half_log_det, 0.5 * eigenvalues.array().log().sum(), 1e-3) << to_string(scatter);
   }
 }
 
