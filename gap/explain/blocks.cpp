@@ -113,7 +113,7 @@ void add_dwell(Block block, const Bundle& bundle, const CleanSamples& clean,
   double index = 0;
   for (std::size_t i = first; i < last; ++i) {
     const std::size_t at = segment.first_sample + i;
-    if ((clean.flags[at] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0) {
+    if (clean.usable(at)) {
       const gt3x::Counts& counts = clean.samples[at];
       sum += Eigen::Vector3d(counts[0], counts[1], counts[2]);
       n += 1;

@@ -76,8 +76,7 @@ struct Fit {
   Scatter scatter = Scatter::nominal;
   double scatter_size = 0;
   double nats = 0;
-  Eigen::VectorXd residual;    // whitened, per row
-  std::vector<int> row_block;  // the block that each row belongs to
+  Eigen::VectorXd residual;  // whitened, per row
 
   bool contains(const std::string& effect) const;
 };

@@ -178,7 +178,6 @@ Fit EvidenceModel::make_fit(const Whitened& w, const Subset& subset, const Forwa
     }
   }
   fit.residual = residual_of(w, fit.posterior);
-  fit.row_block = row_block_;
   return fit;
 }
 

@@ -104,48 +104,6 @@ SumCovariance sum_covariance(const std::vector<const Stretch*>& set,
 
 }  // namespace
 
-std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) {
-  constexpr double kShortest_s = 4;
-  constexpr std::size_t kLongest = 1U << 17;  // 22 minutes at 100 Hz
-  std::vector<Stretch> all;
-  for (const Segment& segment : bundle.segments) {
-    const std::size_t skip = segment.quiet_start(bundle.rate_hz);
-    if (!segment.at_rest() || segment.kind == Segment::Kind::ramp ||
-        segment.samples < skip + static_cast<std::size_t>(kShortest_s * bundle.rate_hz)) {
-      continue;
-    }
-    Stretch stretch;
-    stretch.samples = std::min(segment.samples - skip, kLongest);
-    stretch.start_s = segment.host_start_s + static_cast<double>(skip) / bundle.rate_hz;
-    stretch.rotation = segment.rotation;
-    stretch.pose = segment.pose;
-    const std::size_t first = segment.first_sample + skip;
-    std::size_t good = 0;
-    for (std::size_t i = 0; i < stretch.samples; ++i) {
-      good += clean.usable(first + i) ? 1 : 0;
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      auto& x = stretch.x[axis];
-      x.assign(stretch.samples, 0);
-      double mean = 0;
-      for (std::size_t i = 0; i < stretch.samples; ++i) {
-        if (clean.usable(first + i)) {
-          x[i] = clean.value_mg(first + i, axis);
-          mean += x[i];
-        }
-      }
-      mean /= static_cast<double>(std::max<std::size_t>(1, good));
-      for (std::size_t i = 0; i < stretch.samples; ++i) {
-        x[i] -= clean.usable(first + i) ? mean : 0;
-      }
-    }
-    if (good * 10 >= stretch.samples * 9) {
-      all.push_back(std::move(stretch));
-    }
-  }
-  return all;
-}
-
 LineScan scan_powers(double rate_hz, const std::vector<const Stretch*>& set,
                      const NoiseSpectrum& noise) {
   LineScan out;

@@ -5,27 +5,12 @@
 //   scan.nats;  // one per frequency, scan.step_hz apart
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
-#include <complex>
-#include <cstddef>
 #include <vector>
 
 #include "gap/features/noise.h"
-#include "gap/recording/bundle.h"
-#include "gap/recording/clean.h"
+#include "gap/recording/at_rest.h"
 
 namespace sixpoint::gap {
-
-// A stretch at rest in one pose, mean removed, masked samples zero, in mg.
-struct Stretch {
-  std::size_t samples = 0;
-  double start_s = 0;  // by the host's clock
-  Eigen::Matrix3d rotation;
-  int pose = 0;
-  std::array<std::vector<double>, 3> x;
-};
-std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean);
 
 struct LineScan {
   std::vector<double> nats;  // -log of the chance, per frequency

@@ -48,11 +48,13 @@ struct Phasor {
   Eigen::Vector3d weight;  // 1 / variance of the real part
   Eigen::Matrix3d rotation;
   int pose = 0;
-
-  Eigen::Matrix3d to_sensor(bool in_lab) const {
-    return in_lab ? rotation : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-  }
 };
+
+// Turns a vector of the frame in question into the frame of a dwell, a Phasor or a Stretch.
+template <class Dwell>
+Eigen::Matrix3d to_sensor(const Dwell& dwell, bool in_lab) {
+  return in_lab ? dwell.rotation : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+}
 
 // A predicted amplitude against a dwell's, weighted.
 struct Overlap {
@@ -83,7 +85,7 @@ VectorFit fit_vector(const std::vector<Phasor>& phasors, bool in_lab) {
   Eigen::Matrix3cd outer = Eigen::Matrix3cd::Zero();
   double weight = 0;
   for (const Phasor& p : phasors) {
-    const Vector3c back = p.to_sensor(in_lab).transpose().cast<Complex>() * p.amplitude;
+    const Vector3c back = to_sensor(p, in_lab).transpose().cast<Complex>() * p.amplitude;
     outer += p.weight.mean() * back * back.adjoint();
     weight += p.weight.mean();
   }
@@ -97,7 +99,7 @@ VectorFit fit_vector(const std::vector<Phasor>& phasors, bool in_lab) {
     fit.nats = 0;
     fit.chi = 0;
     for (const Phasor& p : phasors) {
-      const Eigen::Matrix3d r = p.to_sensor(in_lab);
+      const Eigen::Matrix3d r = to_sensor(p, in_lab);
       const Eigen::Matrix3d rw = r.transpose() * p.weight.asDiagonal();
       const auto [overlap, square, power] = overlap_of(r.cast<Complex>() * fit.vector, p);
       fit.nats += std::abs(overlap) - 0.5 * square;
@@ -138,7 +140,7 @@ double held_out_line_nats(const std::vector<Phasor>& phasors, bool in_lab) {
   for (std::size_t k = 0; k < 2; ++k) {
     const Vector3c vector = fit_vector(half[k], in_lab).vector;
     for (const Phasor& p : half[1 - k]) {
-      const Overlap sums = overlap_of(p.to_sensor(in_lab).cast<Complex>() * vector, p);
+      const Overlap sums = overlap_of(to_sensor(p, in_lab).cast<Complex>() * vector, p);
       nats += log_bessel(std::abs(sums.overlap)) - 0.5 * sums.square;
     }
   }
@@ -164,11 +166,9 @@ VectorFit fit_in_step(double rate_hz, const std::vector<Stretch>& all, const Noi
   Vector3c b = Vector3c::Zero();
   for (const Stretch& s : all) {
     const double t = s.start_s - all.front().start_s;
-    const Eigen::Matrix3d to_sensor =
-        in_lab ? s.rotation : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-    const Eigen::Matrix3d back =
-        to_sensor.transpose() * weights_at(s, noise, frequency_hz).asDiagonal();
-    a += back * to_sensor;
+    const Eigen::Matrix3d r = to_sensor(s, in_lab);
+    const Eigen::Matrix3d back = r.transpose() * weights_at(s, noise, frequency_hz).asDiagonal();
+    a += back * r;
     b += back.cast<Complex>() * (amplitude_at(s, w / rate_hz) * std::polar(1.0, -w * t));
   }
   VectorFit fit;

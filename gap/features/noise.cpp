@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <iterator>
 #include <map>
 #include <unsupported/Eigen/FFT>
 
+#include "gap/recording/at_rest.h"
 #include "gap/recording/median.h"
 
 namespace sixpoint::gap {
@@ -18,16 +20,10 @@ constexpr std::size_t kMaxBlocks = 1200;  // the level is then known to 0.1 %
 std::vector<std::size_t> block_starts(const Bundle& bundle, const CleanSamples& clean,
                                       std::size_t length) {
   std::vector<std::size_t> starts;
-  for (const Segment& segment : bundle.segments) {
-    for (std::size_t i = segment.quiet_start(bundle.rate_hz);
-         segment.at_rest() && i + length <= segment.samples; i += length) {
-      const std::size_t first = segment.first_sample + i;
-      std::size_t good = 0;
-      while (good < length && clean.usable(first + good)) {
-        ++good;
-      }
-      if (good == length) {
-        starts.push_back(first);
+  for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
+    for (const RestPiece& piece : rest_pieces(bundle, s, length)) {
+      if (clean.count_usable(piece.first, piece.samples) == length) {
+        starts.push_back(piece.first);
       }
     }
   }
@@ -139,28 +135,18 @@ void expect_codes(double mean, double variance, double samples, std::map<int, Co
   }
 }
 
-// Samples [first, last) of the recording, of one dwell.
-struct Piece {
-  std::size_t segment;
-  std::size_t first;
-  std::size_t last;
-};
-
 // Long records in pieces, so that slow drift does not count as noise; every fourth is enough.
-std::vector<Piece> pieces_of(const Bundle& bundle) {
+std::vector<RestPiece> pieces_of(const Bundle& bundle) {
   constexpr double kPiece_s = 7;
   constexpr double kSettledPiece_s = 5;  // a jig's readings are shorter
-  std::vector<Piece> pieces;
+  std::vector<RestPiece> pieces;
   for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
     const Segment& segment = bundle.segments[s];
     const auto length =
         static_cast<std::size_t>((segment.settled ? kSettledPiece_s : kPiece_s) * bundle.rate_hz);
-    const std::size_t hop = segment.samples > 4 * length ? 4 * length : length;
-    for (std::size_t first = segment.quiet_start(bundle.rate_hz);
-         segment.at_rest() && first + length <= segment.samples; first += hop) {
-      const std::size_t at = segment.first_sample + first;
-      pieces.push_back({s, at, at + length});
-    }
+    const std::size_t every = segment.samples > 4 * length ? 4 : 1;
+    std::ranges::copy_if(rest_pieces(bundle, s, length, every), std::back_inserter(pieces),
+                         [&](const RestPiece& piece) { return piece.samples == length; });
   }
   return pieces;
 }
@@ -170,11 +156,12 @@ class CodeSums {
  public:
   explicit CodeSums(const CleanSamples& clean) : clean_(clean) {}
 
-  void add(const Piece& piece) {
+  void add(const RestPiece& piece) {
     constexpr double kLeast = 100;  // samples: a variance is then known to 14 %
     std::array<double, 3> sum{}, square{}, odd{};
     double n = 0;
-    for (std::size_t at = piece.first; at < piece.last; ++at) {
+    const std::size_t last = piece.first + piece.samples;
+    for (std::size_t at = piece.first; at < last; ++at) {
       if (!clean_.usable(at)) {
         continue;
       }
@@ -204,7 +191,7 @@ class CodeSums {
       parity_grid_[axis] += std::exp(-M_PI * M_PI * variance / 2) * n * 2 / M_PI;
       expect_codes(mean[axis], variance, n, by_code_[axis]);
     }
-    for (std::size_t at = piece.first; at < piece.last; ++at) {
+    for (std::size_t at = piece.first; at < last; ++at) {
       if (clean_.usable(at)) {
         add_deviations(clean_.samples[at], mean, sd);
       }
@@ -222,7 +209,6 @@ class CodeSums {
       find_odd_code(axis);
     }
     if (pairs_ > 0) {
-      codes_.repeats = repeats_ / pairs_;
       codes_.repeats_excess_sd = (repeats_ - repeats_far_) / std::sqrt(repeats_ + repeats_far_ + 1);
     }
     codes_.kurtosis_sd = fourth_ / fourth_n_ / std::sqrt(24 / fourth_n_);
@@ -244,7 +230,7 @@ class CodeSums {
   };
 
   // A sample against the one before, and against one so far back that a filter has forgotten it.
-  void count_repeats(const Piece& piece, std::size_t at) {
+  void count_repeats(const RestPiece& piece, std::size_t at) {
     constexpr std::size_t kFar = 7;
     if (at >= piece.first + kFar && clean_.usable(at - kFar) && clean_.usable(at - 1)) {
       pairs_ += 1;
@@ -325,7 +311,7 @@ class CodeSums {
 
 CodeStatistics code_statistics(const Bundle& bundle, const CleanSamples& clean) {
   CodeSums sums(clean);
-  for (const Piece& piece : pieces_of(bundle)) {
+  for (const RestPiece& piece : pieces_of(bundle)) {
     sums.add(piece);
   }
   return sums.finish();

@@ -36,9 +36,9 @@ struct CodeStatistics {
   std::size_t samples = 0;
   std::array<double, 3> odd_share{};  // about 0.5
   std::array<double, 3> parity_sd{};  // of odd_share, by chance and by the means' grid
-  double repeats = 0;                 // share of samples equal to the one before on all axes
-  double repeats_excess_sd = 0;       // more than to the one seven before, in sd
-  std::size_t outliers = 0;           // beyond 6 sd of their dwell
+  // Samples equal to the one before on all axes: more than to the one seven before, in sd.
+  double repeats_excess_sd = 0;
+  std::size_t outliers = 0;  // beyond 6 sd of their dwell
   // Scatter of the dwells' variances against chance: chi-square per degree of freedom, in sd; and
   // the worst dwell.
   double spread_sd = 0;

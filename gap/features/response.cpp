@@ -94,17 +94,16 @@ class Search {
       fit_noise_behind_low_pass();
       out_.low_pass.held_out_nats = held_out_low_pass(out_.low_pass);
     }
-    out_.tone_left_chi = find_resonance(low_pass_log, base_chi);
+    const double chi = find_resonance(low_pass_log, base_chi);
     const Resonance& mount = out_.resonance;
-    out_.resonance_significant = options_.allow_resonance && mount.tone_nats > kSignificant_nats &&
-                                 mount.frequency_hz > kMountLowest_hz &&
-                                 mount.frequency_hz < kMountHighest_hz &&
-                                 mount.q < kMountHighest_q &&
-                                 out_.tone_left_chi - freedom_ < kFormLeft * (base_chi - freedom_);
+    out_.resonance_significant =
+        options_.allow_resonance && mount.tone_nats > kSignificant_nats &&
+        mount.frequency_hz > kMountLowest_hz && mount.frequency_hz < kMountHighest_hz &&
+        mount.q < kMountHighest_q && chi - freedom_ < kFormLeft * (base_chi - freedom_);
     if (out_.resonance_significant) {
       out_.resonance.held_out_nats = held_out_resonance(out_.resonance, low_pass_log);
     }
-    measure_left_over(out_.resonance_significant ? out_.tone_left_chi : base_chi);
+    measure_left_over(out_.resonance_significant ? chi : base_chi);
     return out_;
   }
 

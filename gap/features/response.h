@@ -28,7 +28,6 @@ struct Response {
   double noise_flat_sd = 0;  // chi-square of flat noise, in sd
   double noise_left_sd = 0;  // ... of the low-pass, without 1/f noise
   double tone_left_sd = 0;   // ... of tones, less what is significant of low-pass and resonance
-  double tone_left_chi = 0;  // of the best resonance, whether it is accepted or not
   bool low_pass_significant = false;
   bool resonance_significant = false;
   // What is left of the tones' amplitudes beyond noise, as a share: how well the form is known.

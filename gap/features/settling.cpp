@@ -36,23 +36,17 @@ class Deviation {
 
   // One axis of one dwell, its rest taken from what follows; `variance` of one sample.
   void add(const CleanSamples& clean, const Segment& segment, std::size_t axis, double variance) {
-    constexpr double kLeast = 100;  // samples at rest
+    constexpr std::size_t kLeast = 100;  // samples at rest
     const double step_mg = 1000 * segment.approach_g[static_cast<Eigen::Index>(axis)];
     if (std::abs(step_mg) < kAxisStep_mg || !(variance > 0)) {
       return;
     }
-    double rest = 0;
-    double n = 0;
-    for (std::size_t i = length_; i < std::min(segment.samples, 4 * length_); ++i) {
-      if (clean.usable(segment.first_sample + i)) {
-        rest += clean.value_mg(segment.first_sample + i, axis);
-        n += 1;
-      }
-    }
-    if (n < kLeast) {
+    const std::size_t from = segment.first_sample + length_;
+    const std::size_t samples = std::min(segment.samples, 4 * length_) - length_;
+    if (clean.count_usable(from, samples) < kLeast) {
       return;
     }
-    rest /= n;
+    const double rest = clean.mean_mg(from, samples, axis);
     ++steps_;
     for (std::size_t i = 0; i < length_; ++i) {
       if (clean.usable(segment.first_sample + i)) {
@@ -200,10 +194,10 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
   }
   response.sd = deviation.sd();
   response.mode = deviation.fit(deviation.share(), response.gain_nats);
-  StepResponse::Mode second = deviation.fit(deviation.without(response.mode), response.second_nats);
-  if (response.second_nats > kTwoModes_nats) {
+  double nats = 0;
+  StepResponse::Mode second = deviation.fit(deviation.without(response.mode), nats);
+  if (nats > kTwoModes_nats) {
     // Each once more with the other taken off.
-    double nats = 0;
     for (int round = 0; round < 2; ++round) {
       response.mode = deviation.fit(deviation.without(second), nats);
       second = deviation.fit(deviation.without(response.mode), nats);

@@ -30,11 +30,10 @@ struct StepResponse {
     double phase_rad = 0;
     double at(double t_s) const;
   };
-  Mode mode;               // the stronger
-  Mode second;             // amplitude 0 where there is none
-  double amplitude = 0;    // of the deviation just after the move, both modes, unsigned
-  double gain_nats = 0;    // of the first mode, over nothing
-  double second_nats = 0;  // of the second, over the first
+  Mode mode;             // the stronger
+  Mode second;           // amplitude 0 where there is none
+  double amplitude = 0;  // of the deviation just after the move, both modes, unsigned
+  double gain_nats = 0;  // of the first mode, over nothing
   double model(double t_s) const { return mode.at(t_s) + second.at(t_s); }
   double plain_nats = 0;  // of the best a exp(-t/decay) without ringing, over nothing
   // Chi-square of `share` (first second) less the ringing, in sd over its mean.

@@ -147,18 +147,11 @@ Eigen::VectorXd second_means(const CleanSamples& clean, std::size_t first, std::
                              std::size_t rate, std::size_t axis) {
   Eigen::VectorXd y(static_cast<Eigen::Index>(seconds));
   for (std::size_t b = 0; b < seconds; ++b) {
-    double sum = 0;
-    double n = 0;
-    for (std::size_t at = first + b * rate; at < first + (b + 1) * rate; ++at) {
-      if (clean.usable(at)) {
-        sum += clean.value_mg(at, axis);
-        n += 1;
-      }
-    }
-    if (n <= 0.9 * static_cast<double>(rate)) {
+    const std::size_t at = first + b * rate;
+    if (static_cast<double>(clean.count_usable(at, rate)) <= 0.9 * static_cast<double>(rate)) {
       return {};
     }
-    y[static_cast<Eigen::Index>(b)] = sum / n;
+    y[static_cast<Eigen::Index>(b)] = clean.mean_mg(at, rate, axis);
   }
   return y;
 }
@@ -293,7 +286,6 @@ SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const Nois
   }
   slow.modes = records.modes;
   slow.jump_nats = records.pieces.jump_over_noise();
-  slow.coefficients = coefficients.size();
   slow.free_nats = free_spectrum_nats(coefficients);
   slow.walk_mg = {0, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16, 0.2, 0.25, 0.3, 0.38, 0.5, 0.8};
   slow.flicker_mg = {0, 0.02, 0.035, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5, 0.7, 1, 1.4, 2.2};

@@ -20,7 +20,6 @@
 namespace sixpoint::gap {
 
 struct SlowNoise {
-  std::size_t coefficients = 0;
   // Log likelihood over white noise alone on the grid walk x flicker.
   std::vector<double> walk_mg;            // mg per sqrt(s); first is 0
   std::vector<double> flicker_mg;         // first is 0

@@ -6,6 +6,8 @@
 #include <map>
 #include <optional>
 
+#include "gap/recording/at_rest.h"
+
 namespace sixpoint::gap {
 namespace {
 
@@ -59,26 +61,6 @@ double normal_of(double chi, double freedom) {
   return (std::cbrt(chi / freedom) - (1 - s)) / std::sqrt(s);
 }
 
-// One dwell, or ten seconds of a long record.
-struct Run {
-  std::size_t segment;
-  std::size_t first;  // sample
-  std::size_t length;
-};
-
-std::vector<Run> runs_of(const Bundle& bundle) {
-  std::vector<Run> runs;
-  const std::size_t most = 10 * static_cast<std::size_t>(bundle.rate_hz);
-  for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
-    const Segment& segment = bundle.segments[s];
-    for (std::size_t first = segment.quiet_start(bundle.rate_hz);
-         segment.at_rest() && first < segment.samples; first += most) {
-      runs.push_back({s, segment.first_sample + first, std::min(most, segment.samples - first)});
-    }
-  }
-  return runs;
-}
-
 // Sum of the second stretch less that of the first, per axis; nothing where a sample is masked.
 std::optional<std::array<int, 3>> difference_at(const CleanSamples& clean, std::size_t at,
                                                 std::size_t stretch) {
@@ -94,14 +76,15 @@ std::optional<std::array<int, 3>> difference_at(const CleanSamples& clean, std::
   return difference;
 }
 
-void add_run(const CleanSamples& clean, const Run& run, std::size_t stretch, Sums& sums) {
+// `run`: one dwell, or ten seconds of a long record.
+void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretch, Sums& sums) {
   constexpr double kFewest = 4;  // differences of a piece
   const double scale = std::sqrt(static_cast<double>(stretch) / 2);
   std::array<Piece, 3> pieces;
   std::array<std::array<double, kLags>, 3> before{};
   std::size_t known = 0;  // of `before`
   std::size_t moment = static_cast<std::size_t>(-1);
-  for (std::size_t i = 0; i + 2 * stretch <= run.length; i += 2 * stretch) {
+  for (std::size_t i = 0; i + 2 * stretch <= run.samples; i += 2 * stretch) {
     const auto difference = difference_at(clean, run.first + i, stretch);
     if (!difference) {
       known = 0;
@@ -138,9 +121,12 @@ void add_run(const CleanSamples& clean, const Run& run, std::size_t stretch, Sum
 }
 
 Sums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretch) {
+  const std::size_t most = 10 * static_cast<std::size_t>(bundle.rate_hz);
   Sums sums;
-  for (const Run& run : runs_of(bundle)) {
-    add_run(clean, run, stretch, sums);
+  for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
+    for (const RestPiece& run : rest_pieces(bundle, s, most)) {
+      add_run(clean, run, stretch, sums);
+    }
   }
   return sums;
 }

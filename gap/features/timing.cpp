@@ -250,9 +250,6 @@ HostTiming host_timing(const Bundle& bundle) {
   timing.scatter_ms = 1e3 * std::sqrt(squares_about(segments, fitted) / freedom);
   timing.clock_sd_ppm =
       all.xx > 0 ? 1e6 * std::max(kUniformSd_s, timing.scatter_ms / 1e3) / std::sqrt(all.xx) : 1e6;
-  // The square of a uniform variable has the variance 0.8 of its mean squared; the sd of a root is
-  // half of that of its square.
-  timing.scatter_sd_ms = 1e3 * kUniformSd_s * std::sqrt(0.8 / freedom) / 2;
   return timing;
 }
 

@@ -28,10 +28,9 @@ struct HostTiming {
   double clock_held_out_nats = 0;  // each half of the segments predicted from the rate of the other
   std::size_t lost = 0;            // samples, summed over packets that miss some
   std::size_t repeated = 0;
-  std::size_t packets = 0;   // pairs of stamps looked at
-  std::size_t samples = 0;   // between them
-  double scatter_ms = 0;     // rms of the stamps about the line, slips taken out
-  double scatter_sd_ms = 0;  // of the above where stamps are uniform +-2 ms
+  std::size_t packets = 0;  // pairs of stamps looked at
+  std::size_t samples = 0;  // between them
+  double scatter_ms = 0;    // rms of the stamps about the line, slips taken out
 };
 
 HostTiming host_timing(const Bundle& bundle);

@@ -128,7 +128,7 @@ Diagnosis diagnose(const Request& request) {
   out.unit.gain = nuisances.unit.gain;
   out.unit.offset_g = nuisances.unit.offset_g;
   found.append(std::move(nuisances.found));
-  found.append(judge_left_over(request, records, blocks, explanation, found));
+  found.append(judge_left_over(request, records, explanation, found));
 
   list_not_observable(request, kind, records, explanation, found, out);
   out.gap = measure_gap(records, explanation, found);

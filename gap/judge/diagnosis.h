@@ -91,7 +91,6 @@ struct Plots {
   struct Tone {
     int axis;
     double frequency_hz;
-    double amplitude_g;
     double ratio;  // to the nominal amplitude
     double model;
   };
@@ -99,10 +98,9 @@ struct Plots {
   struct Residual {
     int axis;
     std::string segment;
-    int index;  // of the segment
     double temperature_c;
     double minutes;
-    double before_mg, before_sigma, after_mg, after_sigma;
+    double before_mg, before_sigma, after_mg;
   };
   std::vector<Residual> residuals;
 };

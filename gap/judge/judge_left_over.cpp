@@ -19,8 +19,8 @@ constexpr double kKnownForm = 0.01;
 constexpr double kKnownRinging = 0.03;  // share of the ringing's own test
 
 // Chi-square of the means, as a whole and by segments.
-void test_means(const Request& request, const std::vector<Block>& blocks,
-                const Explanation& explanation, bool truncated, Findings& found) {
+void test_means(const Request& request, const Explanation& explanation, bool truncated,
+                Findings& found) {
   const Fit& fit = explanation.best();
   const double n = static_cast<double>(fit.residual.size());
   const double p = static_cast<double>(fit.posterior.columns.size());
@@ -31,12 +31,11 @@ void test_means(const Request& request, const std::vector<Block>& blocks,
   std::map<std::string, Group> groups;
   const std::vector<double> freedom = explanation.row_freedom();
   for (Eigen::Index row = 0; row < fit.residual.size(); ++row) {
-    const auto r = static_cast<std::size_t>(row);
-    const Block& block = blocks[static_cast<std::size_t>(fit.row_block[r])];
+    const Block& block = explanation.model().block_of_row(row);
     Group& group = groups[request.bundle.segments[block.segment].name];
     group.chi += fit.residual[row] * fit.residual[row];
     group.rows += 1;
-    group.freedom += freedom[r];
+    group.freedom += freedom[static_cast<std::size_t>(row)];
   }
   // Random scatter has its size in every part of the recording: too little of it counts as too much
   // does.
@@ -208,15 +207,14 @@ double slow_variance_mg2(const Fit& fit, const Findings& found, double seconds, 
 }
 
 Findings judge_left_over(const Request& request, const Records& records,
-                         const std::vector<Block>& blocks, const Explanation& explanation,
-                         const Findings& before) {
+                         const Explanation& explanation, const Findings& before) {
   Findings found;
   const Fit& fit = explanation.best();
   const bool truncated = before.accepted("truncation");
   const auto slow_mg2 = [&](double seconds) {
     return slow_variance_mg2(fit, before, seconds, request.bundle.rate_hz);
   };
-  test_means(request, blocks, explanation, truncated, found);
+  test_means(request, explanation, truncated, found);
   test_spectrum(records, explanation, before, found);
   // Slow noise adds to the response to a move over three seconds, to a dwell's variance over seven.
   test_settling(records, slow_mg2(3), before.accepted("settling"), found);

@@ -107,8 +107,7 @@ Nuisances judge_nuisances(const Request& request, const ForwardState& state, boo
 
 // judge_left_over.cpp, judge_samples.cpp: what the explanation leaves, against chance.
 Findings judge_left_over(const Request& request, const Records& records,
-                         const std::vector<Block>& blocks, const Explanation& explanation,
-                         const Findings& before);
+                         const Explanation& explanation, const Findings& before);
 Findings judge_codes(const Request& request, const Records& records, double slow_mg2,
                      const Findings& before);
 Findings judge_texture(const Request& request, const Records& records, const Findings& before);

@@ -52,16 +52,8 @@ std::vector<double> running_sums(const Request& request, const CleanSamples& cle
   std::vector<double> sum = {0};
   double last = 0;
   for (std::size_t k = 0; k < segment.samples / second; ++k) {
-    double total = 0;
-    double n = 0;
-    for (std::size_t i = 0; i < second; ++i) {
-      const std::size_t at = segment.first_sample + k * second + i;
-      if ((clean.flags[at] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0) {
-        total += 1000.0 * clean.samples[at][axis] / request.bundle.accel_scale_lsb_per_g;
-        n += 1;
-      }
-    }
-    last = n > 0 ? total / n : last;
+    const std::size_t at = segment.first_sample + k * second;
+    last = clean.count_usable(at, second) > 0 ? clean.mean_mg(at, second, axis) : last;
     sum.push_back(sum.back() + last);
   }
   return sum;
@@ -123,9 +115,8 @@ Residuals locate_residuals(const Request& request, const Records& records,
     cell.n += 1;
     cell.factor = factor_of(block, segment, request.bundle.rate_hz);
     if (feature < kToneAmplitude) {
-      const double after = best.residual[row];
-      out.plot.push_back({axis, segment.name, static_cast<int>(block.segment), block.temperature_c,
-                          block.middle_s / 60, before * scale_mg, before, after * scale_mg, after});
+      out.plot.push_back({axis, segment.name, block.temperature_c, block.middle_s / 60,
+                          before * scale_mg, before, best.residual[row] * scale_mg});
     }
   }
   for (const auto& [key, cell] : cells) {
@@ -176,7 +167,7 @@ Plots make_plots(const Request& request, const Records& records, const Fit& best
     if (tone.usable) {
       const Vibration& v = *request.bundle.segments[tone.segment].vibration;
       const double nominal_mg = best.state.gain[tone.axis] * 1000 * v.amplitude_g;
-      plots.tones.push_back({tone.axis, v.frequency_hz, v.amplitude_g,
+      plots.tones.push_back({tone.axis, v.frequency_hz,
                              nominal_mg > 0 ? tone.in_phase_mg[tone.axis] / nominal_mg : 0,
                              response.tone_gain(v.frequency_hz, rate_hz)});
     }

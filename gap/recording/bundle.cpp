@@ -22,7 +22,6 @@ Status read_recording(FileSystem& files, const std::string& path, Bundle& bundle
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
   const gt3x::Info& info = recording.info();
   bundle.header.serial = info.serial();
-  bundle.header.model = info.device_type();
   bundle.header.firmware = info.firmware();
   const auto claim_scale = [&claims](const char* source, std::optional<double> lsb_per_g) {
     const bool known = std::any_of(claims.scales.begin(), claims.scales.end(),
@@ -51,7 +50,6 @@ Status read_recording(FileSystem& files, const std::string& path, Bundle& bundle
       bundle.samples.insert(bundle.samples.end(), item->counts.begin(), item->counts.end());
       ++records_by_samples[item->counts.size()];
       if (item->parameters != nullptr) {
-        bundle.header.calibration_time = item->parameters->calibration_time;
         claim_scale("PARAMETERS record", item->parameters->accel_scale_lsb_per_g);
       }
     } else if (item->gap == gt3x::GapKind::damaged) {

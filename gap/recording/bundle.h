@@ -81,9 +81,7 @@ struct HostClock {
 // veto.
 struct Header {
   std::string serial;
-  std::string model;
   std::string firmware;
-  std::optional<UtcTime> calibration_time;
 };
 
 struct Bundle {

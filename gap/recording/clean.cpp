@@ -340,6 +340,22 @@ void mark_clipped(CleanSamples& clean) {
 
 }  // namespace
 
+std::size_t CleanSamples::count_usable(std::size_t first, std::size_t count) const {
+  std::size_t good = 0;
+  for (std::size_t i = first; i < first + count; ++i) {
+    good += usable(i) ? 1 : 0;
+  }
+  return good;
+}
+
+double CleanSamples::mean_mg(std::size_t first, std::size_t count, std::size_t axis) const {
+  double sum = 0;
+  for (std::size_t i = first; i < first + count; ++i) {
+    sum += usable(i) ? value_mg(i, axis) : 0;
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(1, count_usable(first, count)));
+}
+
 CleanSamples clean_samples(const Bundle& bundle) {
   CleanSamples clean;
   clean.samples = bundle.samples;

@@ -45,6 +45,9 @@ struct CleanSamples {
   double value_mg(std::size_t i, std::size_t axis) const {
     return 1000.0 * samples[i][axis] / accel_scale_lsb_per_g;
   }
+  // Of `count` samples from `first` on: how many are usable, and their mean; 0 where none is.
+  std::size_t count_usable(std::size_t first, std::size_t count) const;
+  double mean_mg(std::size_t first, std::size_t count, std::size_t axis) const;
 
   bool axes_turned = false;
   Eigen::Matrix3i axis_matrix = Eigen::Matrix3i::Identity();  // maps the right axes to the stored

@@ -20,9 +20,8 @@ namespace {
 using Means = std::vector<Eigen::Vector3d>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-// What units are like whose constants belong to the mode in force (domain figures).
-constexpr double kGainSd = 0.02;
-constexpr double kOffsetSd_g = 0.035;
+// What units are like whose constants belong to the mode in force (domain figures), beside kGainSd.
+constexpr double kOffsetSd_g = kOffsetSd_mg / kMgPerG;
 constexpr double kLength_sd = 0.006;  // temperature, curvature, gravity at an unknown place
 // And under the other mode (16CPAN03): a common gain, and offsets of 0.1 to 0.2 g of either sign.
 constexpr double kLowestGain = 0.79;

@@ -17,6 +17,11 @@ constexpr std::size_t kMostBlocks = 500'000;
 constexpr std::size_t kLongestLine = 4096;
 constexpr std::size_t kToKnowTheRate = 100;  // lines
 constexpr double kLongestStep = 3;           // of the rate's; beyond it there is a gap
+// Half of the paper's still periods: a sensor that is turned through forty directions rests for
+// about three seconds in each.
+constexpr double kBlock_s = 2;
+// Blocks of more than this many times the scatter of the stillest tenth are no rest.
+constexpr double kStillFactor = 2.5;
 constexpr const char* kHint =
     "give a table: a line holds time and three readings, or three readings";
 
@@ -169,8 +174,7 @@ Block block_of(const std::vector<Eigen::Vector3d>& readings, bool follows) {
 
 // Stretches of still blocks of one direction. What is still is measured on the table itself, since
 // its unit is not known.
-std::vector<RestingReading> rests_of(const std::vector<Block>& blocks, double still_factor,
-                                     double per_block) {
+std::vector<RestingReading> rests_of(const std::vector<Block>& blocks, double per_block) {
   std::vector<double> scatter;
   for (const Block& block : blocks) {
     if (block.sd.minCoeff() > 0) {  // an axis that repeats one value measures nothing
@@ -182,7 +186,7 @@ std::vector<RestingReading> rests_of(const std::vector<Block>& blocks, double st
   }
   const auto tenth = scatter.begin() + static_cast<std::ptrdiff_t>(scatter.size() / 10);
   std::nth_element(scatter.begin(), tenth, scatter.end());
-  const double most = still_factor * *tenth;
+  const double most = kStillFactor * *tenth;
   std::vector<RestingReading> rests;
   bool open = false;
   for (const Block& block : blocks) {
@@ -225,7 +229,7 @@ class TableReader {
 
   ReadingsTable table() {
     table_.blocks = blocks_.size();
-    table_.rests = rests_of(blocks_, options_.still_factor, static_cast<double>(length_));
+    table_.rests = rests_of(blocks_, static_cast<double>(length_));
     return std::move(table_);
   }
 
@@ -272,7 +276,7 @@ class TableReader {
                  "the first of four columns must be time in seconds, 5 to 10000 readings in each");
     }
     table_.rate_hz = rate_hz;
-    length_ = static_cast<std::size_t>(std::max(10.0, std::round(options_.block_s * rate_hz)));
+    length_ = static_cast<std::size_t>(std::max(10.0, std::round(kBlock_s * rate_hz)));
     return {};
   }
 

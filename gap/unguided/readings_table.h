@@ -26,11 +26,6 @@ namespace sixpoint::gap {
 
 struct ReadingsTableOptions {
   double rate_hz = 0;  // of tables without a time column; 0: not given
-  // Half of the paper's still periods: a sensor that is turned through forty directions rests for
-  // about three seconds in each.
-  double block_s = 2;
-  // Blocks of more than this many times the scatter of the stillest tenth are no rest.
-  double still_factor = 2.5;
 };
 
 // A stretch of blocks in which the sensor lay still in one direction.

@@ -1,13 +1,10 @@
 // gap challenge: trials, and scores of a diagnosis of which everything is known.
 #include <filesystem>
 #include <fstream>
-#include <set>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "expect_result.h"
-#include "gap/challenge/trials.h"
 #include "run_command.h"
 #include "sanitized.h"
 #include "shared_data.h"
@@ -15,39 +12,6 @@
 
 namespace sixpoint {
 namespace {
-
-using gap::TrialKind;
-
-TEST(GapTrials, SameSeedSameTrialAndEveryEffectComesUp) {
-  std::set<std::string> seen;
-  std::array<int, 4> kinds{};
-  for (std::uint64_t i = 0; i < 400; ++i) {
-    const auto trial = gap::draw_trial(7, i, sim::StandardProtocol::production, {});
-    ASSERT_OK(trial);
-    ++kinds[static_cast<std::size_t>(trial->kind)];
-    const auto again = gap::draw_trial(7, i, sim::StandardProtocol::production, {});
-    ASSERT_EQ(trial->effects.size(), again->effects.size());
-    for (std::size_t k = 0; k < trial->effects.size(); ++k) {
-      EXPECT_EQ(trial->effects[k].name, again->effects[k].name);
-      EXPECT_GE(trial->effects[k].severity, 0.3);
-      EXPECT_LE(trial->effects[k].severity, 3.0);
-      seen.insert(trial->effects[k].name);
-      EXPECT_EQ(static_cast<bool>(sim::find_effect(trial->effects[k].name)),
-                trial->kind != TrialKind::outside);
-    }
-    EXPECT_EQ(trial->effects.empty(), trial->kind == TrialKind::none);
-    if (i < 40) {
-      EXPECT_EQ(*sim::run_protocol(*trial->scenario.protocol),
-                *sim::run_protocol(*again->scenario.protocol));
-    }
-  }
-  for (const sim::EffectKind& kind : sim::effect_catalogue()) {
-    EXPECT_TRUE(seen.contains(kind.name)) << kind.name;
-  }
-  for (const int count : kinds) {
-    EXPECT_GT(count, 30);
-  }
-}
 
 class GapChallenge : public ::testing::Test {
  protected:

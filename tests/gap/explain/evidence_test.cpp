@@ -1,7 +1,4 @@
-// Evidence, priors and search against closed forms.
 #include "gap/explain/evidence.h"
-
-#include <Eigen/Cholesky>
 
 #include <gtest/gtest.h>
 
@@ -9,68 +6,6 @@
 
 namespace sixpoint::gap {
 namespace {
-
-// log N(y; X mu, V + X S X'), without the constant: the same number by way of the covariance of the
-// values instead of the normal equations of the parameters.
-double marginal_nats(const EvidenceModel& model, const Eigen::MatrixXd& linear,
-                     const std::vector<int>& groups) {
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(model.rows(), model.rows());
-  Eigen::VectorXd off = linear.col(model.columns());
-  for (Eigen::Index i = 0; i < model.rows(); i += 3) {
-    const Block& block = model.block_of_row(i);
-    const Eigen::MatrixXd lever = kNominalSeating_deg * seating_lever(block);
-    covariance.block<3, 3>(i, i) = block.white_mg2 + lever * lever.transpose();
-  }
-  for (const int g : with_nuisances(groups)) {
-    for (int k = 0; k < model.group(g).count; ++k) {
-      const Eigen::VectorXd column = linear.col(model.first_column(g) + k);
-      covariance += std::pow(model.group(g).sd_of(k), 2) * column * column.transpose();
-      off -= model.group(g).prior_mean * column;
-    }
-  }
-  const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
-  return -0.5 * off.dot(llt.solve(off)) - half_log_determinant(llt);
-}
-
-TEST(EvidenceModel, EvidenceIsTheMarginalLikelihood) {
-  const auto blocks = tests::made_dwells();
-  const EvidenceModel model(blocks, {});
-  const Eigen::MatrixXd linear = model.linearise(model.first_guess());
-  const Whitened data = model.whiten(linear, Scatter::nominal, 0);
-  const int tilt = model.groups_of("tilt").front();
-  const int drift = model.groups_of("drift").front();
-  for (const std::vector<int>& groups :
-       {std::vector<int>{}, std::vector<int>{tilt}, std::vector<int>{tilt, drift}}) {
-    EXPECT_NEAR(model.evidence(data, groups), marginal_nats(model, linear, groups), 1e-3);
-  }
-}
-
-TEST(EvidenceModel, ShapesShareThePriorOfTheirEffect) {
-  const auto blocks = tests::made_dwells();
-  const EvidenceModel model(blocks, {});
-  const std::vector<int> warm_up = model.groups_of("warm_up");
-  ASSERT_EQ(warm_up.size(), 6U);
-  EXPECT_NEAR(model.log_prior({warm_up[2]}), -3.5 - std::log(6), 1e-12);
-  EXPECT_NEAR(model.log_prior(model.groups_of("tilt")), -3.5, 1e-12);
-  EXPECT_TRUE(model.groups_of("clock_error").empty()) << "it does not act on the means";
-}
-
-TEST(EvidenceModel, ColumnsAreTheDerivatives) {
-  const auto blocks = tests::made_dwells();
-  const EvidenceModel model(blocks, {});
-  const Eigen::MatrixXd x = model.linearise({});
-  const int gain = model.first_column(0);
-  const int offset = model.first_column(1);
-  const int drift = model.first_column(model.groups_of("drift").front());
-  for (Eigen::Index i = 0; i < model.rows(); i += 3) {
-    const Block& block = model.block_of_row(i);
-    EXPECT_NEAR(x(i, gain), 1000 * block.rotation(0, 2), 1e-6);
-    EXPECT_NEAR(x(i + 1, offset + 1), 1, 1e-9);
-    EXPECT_NEAR(x(i + 2, drift + 2), block.middle_s / 3600, 1e-8);
-    EXPECT_NEAR(x(i, drift + 2), 0, 1e-9) << "another axis";
-    EXPECT_EQ(model.feature_of_row(static_cast<int>(i) + 2), 2);
-  }
-}
 
 TEST(EvidenceModel, FirstGuessIsTheLineThroughTheMeans) {
   auto blocks = tests::made_dwells();
@@ -83,57 +18,51 @@ TEST(EvidenceModel, FirstGuessIsTheLineThroughTheMeans) {
   EXPECT_NEAR(state.offset_mg[1], -10, 1e-3);
 }
 
-TEST(EvidenceModel, WhiteningGivesUnitVariance) {
-  // Chi-square of 54 rows whose covariance is the model's own: 54 +- 10.
-  double chi = 0;
-  constexpr int kSeeds = 20;
-  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
-    const auto blocks = tests::made_dwells({}, seed);
-    const EvidenceModel model(blocks, {});
-    Eigen::MatrixXd rows(model.rows(), 1);
-    for (Eigen::Index i = 0; i < rows.rows(); i += 3) {
-      const Block& block = model.block_of_row(i);
-      rows.block<3, 1>(i, 0) = block.value_mg - 1000 * block.rotation.col(2);
-    }
-    model.whiten_rows(Scatter::nominal, 0, rows);
-    chi += rows.squaredNorm() / kSeeds;
+// The list of the catalogue by hand: gain 3, offset 3, tilt 2, drift 3 numbers, in this order.
+TEST(EvidenceModel, OnlyAllowedEffectsHaveColumns) {
+  const auto blocks = tests::made_dwells();
+  const EvidenceModel model(blocks, tests::only({"tilt", "drift"}));
+  ASSERT_EQ(model.group_count(), 4);
+  EXPECT_EQ(model.group(0).effect, "gain");
+  EXPECT_EQ(model.group(1).effect, "offset");
+  EXPECT_EQ(model.columns(), 3 + 3 + 2 + 3);
+  EXPECT_EQ(model.rows(), 18 * 3);
+  for (const char* effect : {"tilt", "drift"}) {
+    ASSERT_EQ(model.groups_of(effect).size(), 1U) << effect;
+    EXPECT_GE(model.groups_of(effect).front(), kNuisances);
   }
-  EXPECT_NEAR(chi, 54, 4 * std::sqrt(2 * 54.0 / kSeeds));
+  EXPECT_TRUE(model.groups_of("warm_up").empty());
+  EXPECT_TRUE(model.allowed("tilt"));
+  EXPECT_FALSE(model.allowed("warm_up"));
 }
 
-TEST(EvidenceModel, SearchFindsAPairOfEffects) {
-  const Eigen::Vector3d tempco(0.4, -0.3, 0.5);
-  const Eigen::Vector3d drift(8, -6, 9);
-  const auto blocks = tests::made_dwells(
-      [&](const Block& b) -> Eigen::Vector3d {
-        return (b.temperature_c - kReference_c) * tempco + b.middle_s / 3600 * drift;
-      },
-      2, 300);
+// Three rows a dwell: row 7 is the Y of the third one.
+TEST(EvidenceModel, RowsAreCountedByBlocks) {
+  const auto blocks = tests::made_dwells();
   const EvidenceModel model(blocks, {});
-  const ForwardState at = model.first_guess();
-  const Whitened data = model.whiten(model.linearise(at), Scatter::nominal, 0);
-  std::vector<Subset> tried;
-  const Subset best = model.search(data, tried);
-  const Fit fit = model.make_fit(data, best, at);
-  EXPECT_TRUE(fit.contains("offset_tempco"));
-  EXPECT_TRUE(fit.contains("drift"));
-  for (Eigen::Index a = 0; a < 3; ++a) {
-    EXPECT_NEAR(fit.state.tempco_mg_per_c[a], tempco[a], 0.1);
-    EXPECT_NEAR(fit.state.drift_mg_per_h[a], drift[a], 0.6);
-  }
-  for (const Subset& subset : tried) {
-    EXPECT_LE(subset.nats, best.nats);
-  }
+  EXPECT_EQ(model.feature_of_row(7), 1);
+  EXPECT_EQ(&model.block_of_row(7), &blocks[2]);
 }
 
-TEST(EvidenceModel, AnEstimateFarBeyondAnEffectsSizeHasNoEvidence) {
-  const auto blocks = tests::made_dwells([](const Block& b) -> Eigen::Vector3d {
-    return (b.temperature_c - kReference_c) * Eigen::Vector3d(15, 0, 0);
-  });
-  const EvidenceModel model(blocks, {});
-  const Whitened data = model.whiten(model.linearise(model.first_guess()), Scatter::nominal, 0);
-  EXPECT_LT(model.evidence(data, model.groups_of("offset_tempco")), -1e5)
-      << "15 mg/C is more than four times the largest size";
+TEST(EvidenceModel, GroupsStayInOrderBehindTheNuisances) {
+  EXPECT_EQ(with_group({2, 5}, 3), (std::vector<int>{2, 3, 5}));
+  EXPECT_EQ(with_group({}, 4), std::vector<int>{4});
+  EXPECT_EQ(with_nuisances({4, 7}), (std::vector<int>{0, 1, 4, 7}));
+}
+
+// By hand: y - 2 x0 - 3 x2.
+TEST(EvidenceModel, ResidualTakesOffTheColumnsOfThePosterior) {
+  Whitened w;
+  w.x.resize(2, 3);
+  w.x << 1, 10, 4,  //
+      2, 20, 5;
+  w.y = Eigen::Vector2d(100, 200);
+  const Posterior posterior{Eigen::Vector2d(2, 3), Eigen::Matrix2d::Identity(), {0, 2}};
+  EXPECT_EQ(residual_of(w, posterior), Eigen::Vector2d(100 - 2 - 12, 200 - 4 - 15));
+  Eigen::Matrix2d used;
+  used << 1, 4,  //
+      2, 5;
+  EXPECT_EQ(used_columns(w.x, posterior), used);
 }
 
 }  // namespace

@@ -3,8 +3,11 @@
 
 #include <functional>
 #include <random>
+#include <set>
+#include <string>
 #include <vector>
 
+#include "gap/explain/evidence.h"
 #include "gap/explain/forward.h"
 #include "gap/explain/scatter.h"
 #include "gap/made_bundle.h"
@@ -12,6 +15,13 @@
 namespace sixpoint::tests {
 
 inline constexpr double kMeanNoise_mg = 0.13;  // of a mean of ten seconds
+
+// These effects of the catalogue and no others.
+inline gap::EvidenceOptions only(const std::set<std::string>& effects) {
+  gap::EvidenceOptions options;
+  options.allowed = [effects](const std::string& name) { return effects.count(name) != 0; };
+  return options;
+}
 
 // Added to the nominal unit's mean, mg.
 using MadeExcess = std::function<Eigen::Vector3d(const gap::Block&)>;

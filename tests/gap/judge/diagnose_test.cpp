@@ -6,8 +6,6 @@
 #include "expect_result.h"
 #include "gap/explain/catalogue.h"
 #include "gap/made_bundle.h"
-#include "gap/report/report_html.h"
-#include "gap/report/report_sheet.h"
 #include "sanitized.h"
 
 namespace sixpoint::gap {
@@ -124,35 +122,6 @@ TEST(Diagnose, NoTemperatureAndNoHostClockAreBorne) {
     clock = clock || name == "clock_error";
   }
   EXPECT_TRUE(clock);
-}
-
-Diagnosis diagnosed_as(const char* serial) {
-  Bundle bundle = tests::made_production({});
-  bundle.protocol_serial = serial;
-  auto d = diagnose(bundle);
-  EXPECT_OK(d);
-  return *std::move(d);
-}
-
-TEST(ReportHtml, OnePageWithTheSentenceAndNothingFromOutside) {
-  const std::string page = report_html(diagnosed_as("<script>alert(1)</script>"));
-  EXPECT_NE(page.find("no gap"), std::string::npos);
-  EXPECT_NE(page.find("<svg"), std::string::npos);
-  EXPECT_EQ(page.find("<script"), std::string::npos);
-  EXPECT_EQ(page.find("http"), std::string::npos) << "the page must need nothing else";
-}
-
-TEST(ReportSheet, PictureAndPaper) {
-  const std::string svg = report_sheet(diagnosed_as("<A&B>"));
-  EXPECT_NE(svg.find("no gap"), std::string::npos);
-  EXPECT_NE(svg.find("&lt;A&amp;B&gt;"), std::string::npos);
-  const auto png = sheet_png(svg);
-  ASSERT_OK(png);
-  EXPECT_EQ(std::string(png->begin() + 1, png->begin() + 4), "PNG");
-  const auto pdf = sheet_pdf(svg);
-  ASSERT_OK(pdf);
-  EXPECT_EQ(std::string(pdf->begin(), pdf->begin() + 5), "%PDF-");
-  EXPECT_FAILS(sheet_png("no drawing"), ErrorCode::internal);
 }
 
 // A zero that moves once is in no catalogue. It must not be named random walk, drift or warming up.

@@ -96,5 +96,20 @@ TEST(Clean, SaturationWrapAndFullScaleAreToldApart) {
   EXPECT_NEAR(highest, 12 * 256, 40);
 }
 
+// By hand: 3 and 5 LSB of 250 LSB/g are 12 and 20 mg; the clipped 2000 does not count, the wrapped
+// 7 does.
+TEST(Clean, MeansAreOfUsableSamples) {
+  CleanSamples clean;
+  clean.accel_scale_lsb_per_g = 250;
+  clean.samples = {{0, 0, 3}, {0, 0, 5}, {0, 0, 2000}, {0, 0, 7}};
+  clean.flags = {kSampleGood, kSampleGood, kSampleClipped, kSampleWrapped};
+  EXPECT_EQ(clean.count_usable(0, 3), 2U);
+  EXPECT_NEAR(clean.mean_mg(0, 3, 2), 16, 1e-12);
+  EXPECT_EQ(clean.count_usable(1, 3), 2U);
+  EXPECT_NEAR(clean.mean_mg(1, 3, 2), 24, 1e-12);
+  EXPECT_EQ(clean.count_usable(2, 1), 0U);
+  EXPECT_EQ(clean.mean_mg(2, 1, 2), 0);
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

@@ -1,0 +1,126 @@
+// What can be asked about the best explanation.
+#include <Eigen/LU>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "gap/explain/explanation.h"
+#include "gap/explain/made_blocks.h"
+#include "gap/explain/made_marginal.h"
+
+namespace sixpoint::gap {
+namespace {
+
+using tests::only;
+
+// Leverages of a least-squares fit add up to its number of parameters; the priors of six nuisances
+// are wide.
+TEST(EvidenceAnswers, FreedomOfRowsIsRowsLessParameters) {
+  const auto blocks = tests::made_dwells({}, 3);
+  const Explanation explanation(blocks, only({}));
+  double sum = 0;
+  for (const double freedom : explanation.row_freedom()) {
+    EXPECT_GE(freedom, 0);
+    EXPECT_LE(freedom, 1);
+    sum += freedom;
+  }
+  EXPECT_NEAR(sum, 54 - 6, 0.01);
+}
+
+// One group of parameters with prior sd p, measured with sd s: the posterior is s p / hypot(s, p).
+TEST(EvidenceAnswers, UndeterminedIsPosteriorOverPrior) {
+  const auto blocks = tests::made_dwells({}, 4);
+  const Explanation explanation(blocks, only({"tilt", "third_order"}));
+  EXPECT_LT(explanation.undetermined("tilt"), 0.1);
+  EXPECT_GT(explanation.undetermined("third_order"), 0.9) << "1 g alone: it looks like a gain";
+  EXPECT_GT(explanation.expected_nats("tilt"), kAccept_nats);
+  EXPECT_LT(explanation.expected_nats("third_order"), kAccept_nats);
+  EXPECT_GT(explanation.expected_nats("truncation"), 1e200) << "not asked for: no smallest size";
+}
+
+// Generalised least squares with the whole covariance of the values: (X' V^-1 X + P^-1)^-1, P of
+// the priors.
+TEST(EvidenceAnswers, EstimateHasTheUncertaintyOfLeastSquares) {
+  const Eigen::Vector3d drift_mg_per_h(9, -6, 7);
+  const auto blocks = tests::made_dwells(
+      [&](const Block& b) -> Eigen::Vector3d { return b.middle_s / 3600 * drift_mg_per_h; }, 5,
+      120);
+  const Explanation explanation(blocks, only({"drift"}));
+  const EvidenceModel& model = explanation.model();
+  const int drift = model.groups_of("drift").front();
+  const Eigen::MatrixXd linear = model.linearise(explanation.best().state);
+  Eigen::MatrixXd v = Eigen::MatrixXd::Zero(model.rows(), model.rows());
+  for (Eigen::Index i = 0; i < model.rows(); i += 3) {
+    const Eigen::MatrixXd lever = kNominalSeating_deg * seating_lever(model.block_of_row(i));
+    v.block<3, 3>(i, i) = model.block_of_row(i).white_mg2 + lever * lever.transpose();
+  }
+  const Eigen::MatrixXd x = linear.leftCols(9);  // gain, offset, drift
+  ASSERT_EQ(model.first_column(drift), 6);
+  Eigen::MatrixXd information = x.transpose() * v.inverse() * x;
+  for (int i = 0; i < 9; ++i) {
+    information(i, i) += 1 / std::pow(model.group(i / 3).prior_sd, 2);
+  }
+  const Eigen::MatrixXd covariance = information.inverse();
+  const auto estimate = explanation.estimate("drift");
+  ASSERT_TRUE(estimate);
+  ASSERT_EQ(estimate->value.size(), 3U);
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const auto axis = static_cast<std::size_t>(a);
+    const double sd = std::sqrt(covariance(6 + a, 6 + a));
+    EXPECT_NEAR(estimate->sd[axis], sd, 1e-3 * sd);
+    EXPECT_NEAR(estimate->value[axis], drift_mg_per_h[a], 4 * sd);
+  }
+}
+
+// One effect allowed, scatter nominal: what is tried are the subsets with and without it. Their
+// evidence has a closed form (evidence_subsets_test.cpp), about one state each.
+TEST(EvidenceAnswers, GainIsTheEvidenceOverTheBestWithout) {
+  const auto blocks = tests::made_dwells(
+      [](const Block& b) -> Eigen::Vector3d {
+        return b.middle_s / 3600 * Eigen::Vector3d(9, -6, 7);
+      },
+      5, 120);
+  const Explanation explanation(blocks, only({"drift"}));
+  const EvidenceModel& model = explanation.model();
+  const std::vector<int> drift = model.groups_of("drift");
+  const Whitened data =
+      model.whiten(model.linearise(explanation.best().state), Scatter::nominal, 0);
+  const double with = model.evidence(data, drift) + kLogPriorEffect;
+  EXPECT_NEAR(explanation.best().nats, with, 0.1);
+  // The best without it is one with scatter: no better than the evidence without scatter allows.
+  EXPECT_GT(explanation.gain_nats("drift"), 10);
+  EXPECT_LE(explanation.gain_nats("drift", true), with - model.evidence(data, {}) + 0.5);
+  EXPECT_EQ(explanation.gain_nats("clock_error"), 0) << "never tried";
+}
+
+// A gain that grows by 0.03 %: the log Bayes factor of three more regressors, each axis' gain times
+// the time from -1 to 1, of prior size a thousandth (the header's convention), from the covariance
+// of the values.
+TEST(EvidenceAnswers, ChangeOfTheGainIsABayesFactor) {
+  const auto blocks = tests::made_dwells(
+      [](const Block& b) -> Eigen::Vector3d {
+        return 0.3 * (b.middle_s / 1050) * b.rotation.col(2);
+      },
+      3);
+  const Explanation explanation(blocks, only({}));
+  ASSERT_EQ(explanation.best().scatter, Scatter::nominal);
+  const EvidenceModel& model = explanation.model();
+  const Eigen::MatrixXd linear = model.linearise(explanation.best().state);
+  const tests::Marginal constant = tests::marginal(model, linear, {});
+  tests::Marginal changing = constant;
+  const double first_s = blocks.front().middle_s;
+  const double half_s = (blocks.back().middle_s - first_s) / 2;
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::VectorXd column = linear.col(axis);
+    for (Eigen::Index row = 0; row < column.size(); ++row) {
+      column[row] *= (model.block_of_row(row).middle_s - first_s) / half_s - 1;
+    }
+    changing.covariance += 1e-3 * 1e-3 * column * column.transpose();
+  }
+  const double nats = changing.nats() - constant.nats();
+  EXPECT_NEAR(explanation.changing_nats("gain"), nats, 1e-3 + 1e-3 * std::abs(nats));
+  EXPECT_EQ(explanation.changing_nats("tilt"), 0) << "not in the explanation";
+}
+
+}  // namespace
+}  // namespace sixpoint::gap

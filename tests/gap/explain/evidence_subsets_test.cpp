@@ -1,0 +1,93 @@
+// Evidence, priors and search against closed forms.
+#include <Eigen/Cholesky>
+
+#include <gtest/gtest.h>
+
+#include "gap/explain/evidence.h"
+#include "gap/explain/made_blocks.h"
+
+namespace sixpoint::gap {
+namespace {
+
+// log N(y; X mu, V + X S X'), without the constant: the same number by way of the covariance of the
+// values instead of the normal equations of the parameters.
+double marginal_nats(const EvidenceModel& model, const Eigen::MatrixXd& linear,
+                     const std::vector<int>& groups) {
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(model.rows(), model.rows());
+  Eigen::VectorXd off = linear.col(model.columns());
+  for (Eigen::Index i = 0; i < model.rows(); i += 3) {
+    const Block& block = model.block_of_row(i);
+    const Eigen::MatrixXd lever = kNominalSeating_deg * seating_lever(block);
+    covariance.block<3, 3>(i, i) = block.white_mg2 + lever * lever.transpose();
+  }
+  for (const int g : with_nuisances(groups)) {
+    for (int k = 0; k < model.group(g).count; ++k) {
+      const Eigen::VectorXd column = linear.col(model.first_column(g) + k);
+      covariance += std::pow(model.group(g).sd_of(k), 2) * column * column.transpose();
+      off -= model.group(g).prior_mean * column;
+    }
+  }
+  const Eigen::LLT<Eigen::MatrixXd> llt(covariance);
+  return -0.5 * off.dot(llt.solve(off)) - half_log_determinant(llt);
+}
+
+TEST(EvidenceSubsets, EvidenceIsTheMarginalLikelihood) {
+  const auto blocks = tests::made_dwells();
+  const EvidenceModel model(blocks, {});
+  const Eigen::MatrixXd linear = model.linearise(model.first_guess());
+  const Whitened data = model.whiten(linear, Scatter::nominal, 0);
+  const int tilt = model.groups_of("tilt").front();
+  const int drift = model.groups_of("drift").front();
+  for (const std::vector<int>& groups :
+       {std::vector<int>{}, std::vector<int>{tilt}, std::vector<int>{tilt, drift}}) {
+    EXPECT_NEAR(model.evidence(data, groups), marginal_nats(model, linear, groups), 1e-3);
+  }
+}
+
+TEST(EvidenceSubsets, ShapesShareThePriorOfTheirEffect) {
+  const auto blocks = tests::made_dwells();
+  const EvidenceModel model(blocks, {});
+  const std::vector<int> warm_up = model.groups_of("warm_up");
+  ASSERT_EQ(warm_up.size(), 6U);
+  EXPECT_NEAR(model.log_prior({warm_up[2]}), -3.5 - std::log(6), 1e-12);
+  EXPECT_NEAR(model.log_prior(model.groups_of("tilt")), -3.5, 1e-12);
+  EXPECT_TRUE(model.groups_of("clock_error").empty()) << "it does not act on the means";
+}
+
+TEST(EvidenceSubsets, SearchFindsAPairOfEffects) {
+  const Eigen::Vector3d tempco(0.4, -0.3, 0.5);
+  const Eigen::Vector3d drift(8, -6, 9);
+  const auto blocks = tests::made_dwells(
+      [&](const Block& b) -> Eigen::Vector3d {
+        return (b.temperature_c - kReference_c) * tempco + b.middle_s / 3600 * drift;
+      },
+      2, 300);
+  const EvidenceModel model(blocks, {});
+  const ForwardState at = model.first_guess();
+  const Whitened data = model.whiten(model.linearise(at), Scatter::nominal, 0);
+  std::vector<Subset> tried;
+  const Subset best = model.search(data, tried);
+  const Fit fit = model.make_fit(data, best, at);
+  EXPECT_TRUE(fit.contains("offset_tempco"));
+  EXPECT_TRUE(fit.contains("drift"));
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    EXPECT_NEAR(fit.state.tempco_mg_per_c[a], tempco[a], 0.1);
+    EXPECT_NEAR(fit.state.drift_mg_per_h[a], drift[a], 0.6);
+  }
+  for (const Subset& subset : tried) {
+    EXPECT_LE(subset.nats, best.nats);
+  }
+}
+
+TEST(EvidenceSubsets, AnEstimateFarBeyondAnEffectsSizeHasNoEvidence) {
+  const auto blocks = tests::made_dwells([](const Block& b) -> Eigen::Vector3d {
+    return (b.temperature_c - kReference_c) * Eigen::Vector3d(15, 0, 0);
+  });
+  const EvidenceModel model(blocks, {});
+  const Whitened data = model.whiten(model.linearise(model.first_guess()), Scatter::nominal, 0);
+  EXPECT_LT(model.evidence(data, model.groups_of("offset_tempco")), -1e5)
+      << "15 mg/C is more than four times the largest size";
+}
+
+}  // namespace
+}  // namespace sixpoint::gap
