@@ -24,8 +24,8 @@ TEST(KnownDevices, EverySchemeOfTheManualIsThere) {
                                     StartsWith("replay:"), StartsWith("drive:")));
   MemoryEnv memory;
   EXPECT_FAILS(known_devices().open("serial:1", memory.env), ErrorCode::usage);
-  EXPECT_FAILS(known_devices().open("drive:media/UNIT", memory.env), ErrorCode::usage)
-      << "a folder is a unit, but no link";
+  // A folder is a unit, but no link.
+  EXPECT_FAILS(known_devices().open("drive:media/UNIT", memory.env), ErrorCode::usage);
   EXPECT_FAILS(known_units().open("drive:media/UNIT", memory.env), ErrorCode::no_input);
   EXPECT_FAILS(known_units().open("replay:none.zip", memory.env), ErrorCode::no_input);
 }

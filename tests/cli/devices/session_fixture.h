@@ -13,5 +13,9 @@ class SessionCommand : public tests::CommandTest {
   tests::Answer jig(const std::string& device, const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments = {"jig",     "--device",   device,
                                           "--store", path("s.db"), "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+};
 
-  }  // namespace sixpoint::cli
+}  // namespace sixpoint::cli

@@ -14,16 +14,6 @@ namespace {
 
 using testing::HasSubstr;
 
-class SessionCommand : public tests::CommandTest {
- protected:
-  tests::Answer jig(const std::string& device, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"jig",     "--device",   device,
-                                          "--store", path("s.db"), "--json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run(arguments);
-  }
-};
-
 // Oracle: the run that was recorded.
 TEST_F(SessionCommand, AReplayedJigRunGivesTheSameConstants) {
   for (const bool write : {false, true}) {

@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Run {
+struct Program {
   int operator()(const std::vector<std::string>& arguments) {
     out.str("");
     people.str("");
@@ -25,8 +25,8 @@ struct Run {
 };
 
 // Exit code 64 is EX_USAGE of sysexits.h.
-TEST(Program, ACommandThatThereIsNotIsUsage) {
-  Run run;
+TEST(ProgramRun, ACommandThatThereIsNotIsUsage) {
+  Program run;
   EXPECT_EQ(run({"mend"}), 64);
   EXPECT_EQ(run.out.str(), "");
   EXPECT_THAT(run.people.str(), HasSubstr("sixpoint --help"));
@@ -34,8 +34,8 @@ TEST(Program, ACommandThatThereIsNotIsUsage) {
   EXPECT_EQ(run.people.str().find('\x1b'), std::string::npos) << "a terminal is not written to";
 }
 
-TEST(Program, HelpListsEveryCommandInTheOrderOfTheList) {
-  Run run;
+TEST(ProgramRun, HelpListsEveryCommandInTheOrderOfTheList) {
+  Program run;
   EXPECT_EQ(run({"--help"}), 0);
   std::size_t at = 0;
   for (const char* name :
@@ -50,8 +50,8 @@ TEST(Program, HelpListsEveryCommandInTheOrderOfTheList) {
   EXPECT_EQ(commands().size(), 27U);
 }
 
-TEST(Program, ARunLeavesNoCodeToTheNext) {
-  Run run;
+TEST(ProgramRun, ARunLeavesNoCodeToTheNext) {
+  Program run;
   EXPECT_EQ(run({"inspect", "none.gt3x"}), 66);
   EXPECT_EQ(run({"--version"}), 0);
   EXPECT_EQ(run({"limits", "print"}), 0);
@@ -59,8 +59,8 @@ TEST(Program, ARunLeavesNoCodeToTheNext) {
 }
 
 // 74 is EX_IOERR.
-TEST(Program, AnOutputThatFailsIsAnError) {
-  Run run;
+TEST(ProgramRun, AnOutputThatFailsIsAnError) {
+  Program run;
   run.out.setstate(std::ios::badbit);
   EXPECT_EQ(run({"limits", "print"}), 74);
   EXPECT_THAT(run.people.str(), HasSubstr("standard output"));

@@ -92,8 +92,8 @@ TEST(JigOptions, TheSessionBeginsBeforeTheUnitIsOpened) {
 
   Opening refused;
   ASSERT_OK(write_file(refused.memory.files, "r.zip", "mine"));
-  EXPECT_FAILS(refused.open("virtual:colour=red", "manual", "r.zip"), ErrorCode::cannot_create)
-      << "before the unit's own error";
+  // Before the unit's own error.
+  EXPECT_FAILS(refused.open("virtual:colour=red", "manual", "r.zip"), ErrorCode::cannot_create);
 }
 
 }  // namespace

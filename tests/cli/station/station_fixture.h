@@ -23,5 +23,13 @@ class StationCommands : public testing::Test {
     std::vector<std::string> arguments = {
         "jig",       "--device", "virtual:" + unit, "--jig", "virtual",
         "--station", "A",        "--operator",      "Ada",   "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+  }
+  tests::TemporaryFolder folder_;
+};
 
-  }  // namespace sixpoint::station
+}  // namespace sixpoint::station

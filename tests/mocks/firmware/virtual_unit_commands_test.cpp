@@ -73,13 +73,12 @@ Bytes report_of(std::uint8_t version, std::uint16_t sequence, std::uint8_t comma
 
 // A unit, and requests whose sequence is counted as a station counts it.
 struct Asked {
-  explicit Asked(VirtualUnitOptions options = {}) : unit(with_serial(std::move(options))) {}
-
-  static VirtualUnitOptions with_serial(VirtualUnitOptions options) {
+  static VirtualUnitOptions of_known_identity() {
     sim::GivenProperties given;
     given.serial = "MOS2A45130007";
     given.firmware = "1.5.0";
     given.accel_scale_lsb_per_g = 341;
+    VirtualUnitOptions options;
     options.truth = sim::draw_unit(7, given);
     return options;
   }
@@ -99,7 +98,7 @@ struct Asked {
     return {(*answer)[5], Bytes(answer->begin() + 8, answer->begin() + 8 + (*answer)[6])};
   }
 
-  VirtualUnit unit;
+  VirtualUnit unit{of_known_identity()};
   std::uint16_t sequence = 0;
   nanoseconds now{0};
 };
@@ -203,9 +202,10 @@ TEST(VirtualUnitCommands, RefusesAsTheTableSays) {
 }
 
 TEST(VirtualUnitCommands, BelowThreeThousandThreeHundredMillivoltsNothingIsRecordedOrWritten) {
-  for (const std::uint16_t battery_mv : {3299, 3300}) {
+  for (const std::uint16_t battery_mv : {std::uint16_t{3299}, std::uint16_t{3300}}) {
     const int code = battery_mv < 3300 ? 7 : 0;
-    Asked asked({.battery_mv = battery_mv});
+    Asked asked;
+    asked.unit.set_battery_mv(battery_mv);
     const Bytes empty(512, 0xFF);
     const std::uint16_t crc = crc_of(empty);
     ASSERT_EQ(asked.ask(kBeginWrite, {0, 0x00, 0x02, low(crc), high(crc)}).code, 0);

@@ -96,7 +96,7 @@ TEST(InProcess, AFaultPlanPullsTheCableAndPutsItBack) {
   cable.clock->sleep(seconds(3));
   auto again = cable.link.reopen();
   ASSERT_OK(again);
-  EXPECT_FAILS(cable.read(), ErrorCode::device_unavailable) << "the channel of before";
+  EXPECT_FAILS(cable.read(), ErrorCode::device_unavailable);  // the channel of before
   EXPECT_OK(device::WireUnit::open(std::move(*again)));
 }
 
