@@ -1,5 +1,5 @@
 // While it charges, the unit stores zero on all axes (paper, Step 2, third criterion).
-// Either one stretch from `start_s` on, or up to three whose places are drawn.
+// Either one stretch from `start_s` on, or up to six whose places are drawn.
 #include <algorithm>
 #include <cmath>
 

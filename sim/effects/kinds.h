@@ -139,7 +139,7 @@ struct SampleRun {
   std::uint64_t end = 0;
 };
 
-// Runs of whole seconds that together hold about `samples`, in order and apart: up to three, or, at
+// Runs of whole seconds that together hold about `samples`, in order and apart: up to six, or, at
 // rest only, as many as it takes of 1 to 20 s, each within one rest.
 std::vector<SampleRun> draw_runs(const RecordingPlan& plan, double samples, bool at_rest,
                                  Random& random);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "calib/made_blocks.h"
 #include "calib/scaling.h"
 #include "exact_blocks.h"
 #include "expect_result.h"
@@ -14,7 +15,9 @@
 namespace sixpoint::calib {
 namespace {
 
+using tests::blocks_of;
 using tests::file_constants;
+using tests::mismatched;
 using tests::Sample;
 using tests::SyntheticUnit;
 using tests::truth;
@@ -28,58 +31,6 @@ std::vector<Vector> random_poses(unsigned count, std::mt19937_64& random) {
     poses.push_back(tests::random_direction(random));
   }
   return poses;
-}
-
-// A unit under the wrong filter: stored constants off by 0.1 to 0.2 g and 5 to 20 %.
-SyntheticUnit mismatched(unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> gain(0.80, 0.95);
-  std::uniform_real_distribution<double> shift(0.1, 0.2);
-  std::uniform_int_distribution<int> near(-12, 12);
-  std::bernoulli_distribution sign(0.5);
-  SyntheticUnit unit;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const int half = 250 + near(random);
-    unit.zero[a] = 3 * near(random);
-    unit.positive[a] = unit.zero[a] + half + near(random) / 4;
-    unit.negative[a] = unit.positive[a] - 2 * half;
-    unit.counts_per_g[a] = half * gain(random);
-    unit.zero_counts[a] = unit.zero[a] + (sign(random) ? 1 : -1) * shift(random) * half;
-  }
-  return unit;
-}
-
-struct Wearing {
-  double rate_hz = 30;
-  double seconds = 60;
-  double wobble_deg = 0;
-  double warming_c = 0;  // from the first to the last pose
-};
-
-std::vector<StillBlock> blocks_of(const SyntheticUnit& unit, const std::vector<Vector>& poses,
-                                  const Wearing& how, unsigned seed) {
-  std::mt19937_64 random(seed);
-  const auto reversal = Reversal::make({unit.positive, unit.negative, unit.zero}, unit.accel_scale,
-                                       RecordWidth::bits12);
-  EXPECT_OK(reversal);
-  auto finder = StillBlockFinder::make(*reversal, how.rate_hz);
-  EXPECT_OK(finder);
-  double time = 0;
-  Vector before = poses.front();
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Vector pose =
-        how.wobble_deg > 0 ? tests::wobbled(poses[i], how.wobble_deg, random) : poses[i];
-    const double warm = how.warming_c * static_cast<double>(i) /
-                        static_cast<double>(std::max<std::size_t>(1, poses.size() - 1));
-    for (const auto& samples :
-         {tests::turning(unit, before, pose, 3, how.rate_hz, random),
-          tests::at_rest(unit, pose, how.seconds, how.rate_hz, random, warm)}) {
-      finder->push(time, samples);
-      time += static_cast<double>(samples.size()) / how.rate_hz;
-    }
-    before = pose;
-  }
-  return finder->finish();
 }
 
 // Oracle: the constants that the generator used.
@@ -309,38 +260,6 @@ TEST(Solve, PriorIsMarkedAndNeverVerified) {
   EXPECT_THAT(whole->notes, testing::Contains(testing::HasSubstr("was not used")));
   EXPECT_FAILS(population_prior("NEO1B34100019", FilterConfiguration::current),
                ErrorCode::bad_data);
-}
-
-TEST(Solve, JsonHasTheContractsKeys) {
-  const SyntheticUnit unit = mismatched(3);
-  const auto blocks = blocks_of(unit, tests::kSixSides, {30, 60, 4}, 5);
-  auto report = solve_from_still_blocks(blocks, file_constants(unit));
-  ASSERT_OK(report);
-  report->serial = "MOS2A45130450";
-  report->filter = FilterConfiguration::current;
-  const auto json = to_json(*report);
-  for (const char* key : {"serial", "filter", "method", "constants", "standard_uncertainty",
-                          "points", "coverage_g", "residual_mg", "verified", "verdict", "reasons",
-                          "missing_directions", "iterations", "seconds"}) {
-    EXPECT_TRUE(json.contains(key)) << key;
-  }
-  // As the file's own, wrong constants have it.
-  const auto& subsets = json["coverage_g"]["value_subsets"];
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto between = [&](double low_g, double high_g) {
-      return std::count_if(blocks.begin(), blocks.end(), [&](const StillBlock& block) {
-        return !block.noisy && block.mean_g[a] > low_g && block.mean_g[a] < high_g;
-      });
-    };
-    EXPECT_EQ(subsets["low"][a], between(-1.3, -0.7));
-    EXPECT_EQ(subsets["middle"][a], between(-0.7, 0.7));
-    EXPECT_EQ(subsets["high"][a], between(0.7, 1.3));
-  }
-  const auto record = record_of(*report, *parse_iso8601("2016-05-16"), {"00", "a.gt3x", ""});
-  ASSERT_OK(record);
-  const auto back = parse_constants_record(to_json(*record).dump());
-  ASSERT_OK(back);
-  EXPECT_EQ(back->calibration, *report->calibration);
 }
 
 // A car: the engine's vibration and the road keep every block from being still, or, when they are

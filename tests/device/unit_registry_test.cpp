@@ -3,22 +3,15 @@
 #include <gmock/gmock.h>
 
 #include "base/memory_env.h"
-#include "device/jig_registry.h"
-#include "device/wire/wire_unit.h"
+#include "device/made_units.h"
 #include "expect_result.h"
-#include "mocks/in_process/in_process.h"
 
 namespace sixpoint::device {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-UnitRegistry virtual_units() {
-  TransportRegistry links;
-  mocks::register_virtual(links);
-  return {std::move(links), [](Link link) { return WireUnit::open(std::move(link)); }};
-}
+using tests::virtual_units;
 
 Status stream(const UnitRegistry& registry, Env& env) {
   SIXPOINT_ASSIGN(const auto unit, registry.open("virtual:seed=7", env));
@@ -56,21 +49,6 @@ TEST(UnitRegistry, ALinkIsWrappedBeforeTheFirstTransfer) {
                                          [&](Link& link) { addresses.push_back(link.address); });
   ASSERT_OK(unit);
   EXPECT_THAT(addresses, ElementsAre("virtual:seed=7"));
-}
-
-TEST(JigRegistry, OpensBySchemeAndNamesAllKinds) {
-  MemoryEnv memory;
-  const auto unit = *virtual_units().open("virtual:seed=7", memory.env);
-  JigRegistry jigs;
-  jigs.add("test", "test:SERIAL", [&](std::string_view rest, Env&, Unit& in_jig) {
-    EXPECT_EQ(&in_jig, unit.get());
-    EXPECT_EQ(rest, "J1");
-    return Result<std::unique_ptr<Jig>>(std::make_unique<ManualJig>());
-  });
-  EXPECT_OK(jigs.open("test:J1", memory.env, *unit));
-  const auto none = jigs.open("crane", memory.env, *unit);
-  EXPECT_FAILS(none, ErrorCode::usage);
-  EXPECT_EQ(none.error().hint, "use one of: manual, test:SERIAL");
 }
 
 }  // namespace

@@ -1,81 +1,18 @@
 #include "sim/scenario.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "sim/made_scenario.h"
 #include "sim/recording.h"
 
 namespace sixpoint::sim {
 namespace {
 
-constexpr const char* kWhole = R"({
-  "schema": "sixpoint/scenario/1", "seed": 7,
-  "unit": {"serial": "MOS2A45130007", "firmware": "1.5.0", "calibrated": "2013-11-12",
-           "constants": {"positive_lsb": [311, 310, 287], "negative_lsb": [-204, -216, -234],
-                         "zero_lsb": [54, 47, 26]},
-           "sensor": {"current": {"sensitivity_lsb_per_g": [237.7, 251.8, 242.3],
-                                  "zero_lsb": [49.9, 95.8, 60.8]}}},
-  "start": "2015-04-09T14:04:00Z", "rate_hz": 30,
-  "motions": [{"kind": "still", "duration_s": 20, "pose": "+z"},
-              {"kind": "shaker", "duration_s": 5, "direction_lab": [1, 0, 0], "frequency_hz": 4},
-              {"kind": "free_living", "duration_s": 60}],
-  "effects": [{"name": "clock_error", "parameters": {"ppm": 40}},
-              {"name": "tilt", "parameters": {"rotation_vector_deg": [0.1, 0, 0]}}]
-})";
-
-TEST(Scenario, ReadsAWholeOne) {
-  const auto scenario = parse_scenario(kWhole);
-  ASSERT_OK(scenario);
-  EXPECT_EQ(scenario->unit.serial, "MOS2A45130007");
-  EXPECT_EQ(scenario->unit.current.zero_lsb, (PerAxis<double>{49.9, 95.8, 60.8}));
-  EXPECT_EQ(scenario->filter_in_force(), FilterConfiguration::current);
-  EXPECT_EQ(scenario->motions.size(), 3U);
-  EXPECT_EQ(scenario->effects.size(), 2U);
-  EXPECT_DOUBLE_EQ(scenario->motion()->duration_s(), 20 + 2 + 5 + 2 + 60);
-}
-
-TEST(Scenario, RefusesWhatItDoesNotKnow) {
-  for (
-      const char* text : {
-          "",
-          "[]",
-          "{}",
-          R"({"motions": []})",
-          R"({"motions": [{"kind": "fly"}]})",
-          R"({"motions": [{}]})",
-          R"({"motion": [{"kind": "still"}]})",
-          R"({"motions": [{"kind": "still", "pose": "+w"}]})",
-          R"({"motions": [{"kind": "still", "pose": "up"}]})",
-          R"({"motions": [{"kind": "still", "pose": "+x", "up": [1, 0, 0]}]})",
-          R"({"motions": [{"kind": "still", "up": [0, 0, 0]}]})",
-          R"({"motions": [{"kind": "still", "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}]})",
-          R"({"motions": [{"kind": "still", "rotation": [[1, 0], [0, 1]]}]})",
-          R"({"motions": [{"kind": "still", "rotation": 5}]})",
-          R"({"motions": [{"kind": "still", "duration_s": -1}]})",
-          R"({"motions": [{"kind": "still", "duration_s": 1e300}]})",
-          R"({"rate_hz": 0, "motions": [{"kind": "still"}]})",
-          R"({"rate_hz": 30.5, "motions": [{"kind": "still"}]})",
-          R"({"seed": -1, "motions": [{"kind": "still"}]})",
-          R"({"schema": "sixpoint/scenario/2", "motions": [{"kind": "still"}]})",
-          R"({"start": "1900-01-01", "motions": [{"kind": "still"}]})",
-          R"({"filter": "new", "motions": [{"kind": "still"}]})",
-          R"({"unit": 7, "motions": [{"kind": "still"}]})",
-          R"({"unit": {"firmware": "beta"}, "motions": [{"kind": "still"}]})",
-          R"({"unit": {"constants": {"zero_lsb": [1, 2]}}, "motions": [{"kind": "still"}]})",
-          R"({"unit": {"constants": {"zero_lsb": [1, 2, 9999]}}, "motions": [{"kind": "still"}]})",
-          R"({"unit": {"constants": {"positive_lsb": [1, 1, 1], "negative_lsb": [1, 1, 1]}},
-               "motions": [{"kind": "still"}]})",
-          R"({"effects": [{"name": "gremlins"}], "motions": [{"kind": "still"}]})",
-          R"({"effects": [{"name": "tilt", "parameters": {"x": 1}}], "motions": [{"kind": "still"}]})",
-      }) {
-    SCOPED_TRACE(text);
-    EXPECT_FAILS(parse_scenario(text), ErrorCode::configuration);
-  }
-}
-
 TEST(Scenario, SameScenarioSameBytesAndTruth) {
-  const Scenario scenario = *parse_scenario(kWhole);
+  const Scenario scenario = *parse_scenario(tests::kWholeScenario);
   MemoryEnv env;
   std::size_t truths = 0;
   double last_norm = 0;
@@ -107,6 +44,71 @@ TEST(Scenario, ATruthThatCannotBeWrittenStopsTheRecording) {
       });
   EXPECT_FAILS(report, ErrorCode::io);
   EXPECT_FALSE(env.files.info("a.gt3x"));
+}
+
+// Oracle: the times added up by hand: three motions of 20, 5 and 60 s with two turns of 2 s between
+// them. Free-living motion counts as the pose before it.
+TEST(Scenario, PlacementsAreWhereTheMotionsBegin) {
+  const Scenario scenario = *parse_scenario(tests::kWholeScenario);
+  const auto placements = scenario.placements();
+  ASSERT_EQ(placements.size(), 3U);
+  EXPECT_EQ(placements[0].start_s, 0);
+  EXPECT_EQ(placements[1].start_s, 22);
+  EXPECT_EQ(placements[2].start_s, 29);
+  EXPECT_TRUE(placements[0].anew) << "the unit was laid down before the recording began";
+  EXPECT_EQ(placements[0].previous, placements[0].rotation);
+  EXPECT_EQ(placements[1].previous, placements[0].rotation);
+  EXPECT_EQ(placements[2].rotation, placements[1].rotation) << "free-living";
+  EXPECT_FALSE(placements[2].anew);
+  EXPECT_FALSE(placements[2].contiguous) << "two seconds lie between";
+}
+
+TEST(Scenario, WithoutATurnTheSamePoseGoesOn) {
+  const Scenario scenario = *parse_scenario(
+      R"({"turn_s": 0, "motions": [{"kind": "still", "duration_s": 10, "pose": "+x"},
+          {"kind": "shaker", "duration_s": 10, "pose": "+x"},
+          {"kind": "still", "duration_s": 10, "pose": "-x"}]})");
+  const auto placements = scenario.placements();
+  ASSERT_EQ(placements.size(), 3U);
+  EXPECT_EQ(placements[1].start_s, 10);
+  EXPECT_TRUE(placements[1].contiguous);
+  EXPECT_FALSE(placements[1].anew);
+  EXPECT_FALSE(placements[2].contiguous);
+  EXPECT_TRUE(placements[2].anew);
+}
+
+// Oracle: sample numbers by hand at 30 Hz; only the unit at rest rests, not the one that is shaken.
+TEST(Scenario, ThePlanCountsWholeSecondsAndTheRests) {
+  const RecordingPlan plan = parse_scenario(tests::kWholeScenario)->plan();
+  EXPECT_EQ(plan.rate_hz, 30);
+  EXPECT_EQ(plan.samples, 89U * 30);
+  ASSERT_EQ(plan.rests.size(), 1U);
+  EXPECT_EQ(plan.rests[0].first_sample, 0U);
+  EXPECT_EQ(plan.rests[0].samples, 600U);
+  const RecordingPlan two =
+      parse_scenario(R"({"rate_hz": 100, "motions": [{"kind": "still", "duration_s": 1.5},
+          {"kind": "still", "duration_s": 3, "pose": "+x"}]})")
+          ->plan();
+  EXPECT_EQ(two.samples, 600U) << "6.5 s, cut to whole seconds";
+  ASSERT_EQ(two.rests.size(), 2U);
+  EXPECT_EQ(two.rests[1].first_sample, 350U);
+  EXPECT_EQ(two.rests[1].samples, 300U);
+}
+
+TEST(Scenario, TheFilterInForceIsTheGivenOneElseTheFirmwares) {
+  const char* const kUnit = R"("unit": {"serial": "MOS2A45130007", "calibrated": "2013-11-12",
+      "firmware": )";
+  const auto filter_of = [&](const std::string& firmware, const std::string& given) {
+    const auto scenario = parse_scenario(
+        fmt::format(R"({{"motions": [{{"kind": "still"}}], {}"{}"}}{}}})", kUnit, firmware, given));
+    EXPECT_OK(scenario);
+    return scenario->filter_in_force();
+  };
+  // The paper's table: firmware 1.4.0 to 1.7.0 sets `current` on units of 2013, 1.8.0 does not.
+  EXPECT_EQ(filter_of("1.5.0", ""), FilterConfiguration::current);
+  EXPECT_EQ(filter_of("1.8.0", ""), FilterConfiguration::legacy);
+  EXPECT_EQ(filter_of("1.5.0", R"(, "filter": "legacy")"), FilterConfiguration::legacy);
+  EXPECT_EQ(filter_of("1.8.0", R"(, "filter": "current")"), FilterConfiguration::current);
 }
 
 }  // namespace

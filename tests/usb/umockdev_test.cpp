@@ -1,6 +1,5 @@
 // The USB tests over umockdev, and what only this carrier can do: devices that misbehave, and the
 // installed program as a child process.
-#include <array>
 #include <atomic>
 #include <csignal>
 #include <filesystem>
@@ -14,9 +13,7 @@
 
 #include "device/jig.h"
 #include "device/unit.h"
-#include "device/usb/bulk_transport.h"
 #include "device/usb/discovery.h"
-#include "device/usb/hid_transport.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "mocks/usb/usb_drive.h"
@@ -24,6 +21,7 @@
 #include "temporary_folder.h"
 #include "usb/bodies.h"
 #include "usb/child.h"
+#include "usb/misbehaving.h"
 #include "usb/plugged.h"
 #include "usb/technician.h"
 #include "usb/umockdev_bench.h"
@@ -50,129 +48,6 @@ INSTANTIATE_TEST_SUITE_P(Usb, Umockdev, testing::ValuesIn(usb_bodies()),
 INSTANTIATE_TEST_SUITE_P(Faults, Umockdev, testing::ValuesIn(usb_fault_bodies()),
                          [](const auto& one) { return std::string(one.param.name); });
 
-// A unit whose answers on endpoints a test may replace.
-class Wilful final : public mocks::UsbDevice {
- public:
-  explicit Wilful(std::shared_ptr<mocks::UsbDevice> inner) : inner_(std::move(inner)) {}
-
-  const mocks::UsbDescriptors& descriptors() const override { return inner_->descriptors(); }
-  Clock& clock() override { return inner_->clock(); }
-  UsbAnswer control(const mocks::SetupPacket& setup, std::span<const std::uint8_t> data) override {
-    if (setup.request_type == 0x02 && setup.request == 1) {
-      ++cleared_halts;
-    }
-    return inner_->control(setup, data);
-  }
-  UsbAnswer out(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) override {
-    const auto own = on_out ? on_out(endpoint) : std::nullopt;
-    return own ? *own : inner_->out(endpoint, bytes);
-  }
-  UsbAnswer in(std::uint8_t endpoint, std::size_t max_length) override {
-    const auto own = on_in ? on_in(endpoint) : std::nullopt;
-    return own ? *own : inner_->in(endpoint, max_length);
-  }
-  std::optional<std::chrono::nanoseconds> next_due() const override { return inner_->next_due(); }
-  void bus_reset() override { inner_->bus_reset(); }
-  void unplug() override { inner_->unplug(); }
-  void plug_in() override { inner_->plug_in(); }
-  bool is_plugged() const override { return inner_->is_plugged(); }
-
-  // Called by the carrier's threads; set before the device is plugged in.
-  std::function<std::optional<UsbAnswer>(std::uint8_t)> on_out;
-  std::function<std::optional<UsbAnswer>(std::uint8_t)> on_in;
-  std::atomic<int> cleared_halts = 0;
-
- private:
-  std::shared_ptr<mocks::UsbDevice> inner_;
-};
-
-class Misbehaving : public testing::Test {
- protected:
-  void SetUp() override {
-    auto made = mocks::UmockdevBus::make();
-    ASSERT_OK(made);
-    bus = std::move(*made);
-    unit = make_unit(7);
-    wilful = std::make_shared<Wilful>(unit.device);
-  }
-  // Plugs it in as it is set now.
-  Result<device::Link> open() {
-    SIXPOINT_ASSIGN(nodes, bus->plug_in(wilful));
-    device::TransportRegistry registry;
-    device::register_usb(registry);
-    return registry.open(unit.hid_address(), posix_env());
-  }
-
-  std::unique_ptr<mocks::UmockdevBus> bus;
-  BenchUnit unit;
-  std::shared_ptr<Wilful> wilful;
-  mocks::PluggedNodes nodes;
-};
-
-TEST_F(Misbehaving, AStalledBulkEndpointIsClearedAndTheDownloadGoesOn) {
-  std::atomic<int> stalls = 3;
-  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
-    const bool now = endpoint == device::kBulkInEndpoint && stalls > 0;
-    stalls -= now ? 1 : 0;
-    return now ? std::optional(UsbAnswer::stall()) : std::nullopt;
-  };
-  auto link = open();
-  ASSERT_OK(link);
-  Bytes buffer(device::kBulkBlockBytes);
-  const auto stalled = link->bulk->read(buffer, seconds(2));
-  EXPECT_FAILS(stalled, ErrorCode::io);
-  EXPECT_NE(stalled.error().what.find("stalled"), std::string::npos) << stalled.error().brief();
-  EXPECT_GE(wilful->cleared_halts, 1);
-  stalls = 2;
-  device::WireOptions options;
-  options.reply_time_out = seconds(5);
-  auto opened = device::WireUnit::open(std::move(*link), options);
-  ASSERT_OK(opened);
-  ASSERT_OK((*opened)->start_recording(100, from_unix_seconds(1'500'000'000)));
-  unit.clock->forward(seconds(600));
-  ASSERT_OK((*opened)->stop_recording());
-  const auto list = (*opened)->recordings();
-  ASSERT_OK(list);
-  TemporaryFolder folder;
-  ASSERT_OK((*opened)->download(list->front(), posix_env().files, folder / "x.gt3x"));
-  EXPECT_EQ(sha256(*read_file(posix_env().files, folder / "x.gt3x")), list->front().sha256);
-  EXPECT_EQ(stalls, 0);
-}
-
-TEST_F(Misbehaving, AStalledReportIsAnIoError) {
-  wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
-    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::stall()) : std::nullopt;
-  };
-  auto link = open();
-  ASSERT_OK(link);
-  EXPECT_FAILS(link->reports->write(Bytes(64), seconds(1)), ErrorCode::io);
-}
-
-// A device that takes no report holds a hidraw write for five seconds; the program does not wait.
-TEST_F(Misbehaving, ADeviceThatTakesNothingHoldsNobody) {
-  wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
-    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::nothing_yet())
-                                               : std::nullopt;
-  };
-  auto link = open();
-  ASSERT_OK(link);
-  EXPECT_FAILS(link->reports->write(Bytes(64), milliseconds(50)), ErrorCode::io);
-  EXPECT_FAILS(link->reports->write(Bytes(64), milliseconds(50)), ErrorCode::io);
-  *link = {};  // ends although the kernel still has the first
-}
-
-TEST_F(Misbehaving, ATransferLongerThanAnyBlockIsBadData) {
-  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
-    return endpoint == device::kBulkInEndpoint
-               ? std::optional(UsbAnswer::done(Bytes(device::kBulkBlockBytes + 200)))
-               : std::nullopt;
-  };
-  auto link = open();
-  ASSERT_OK(link);
-  Bytes buffer(device::kBulkBlockBytes);
-  EXPECT_FAILS(link->bulk->read(buffer, seconds(2)), ErrorCode::bad_data);
-}
-
 TEST_F(Misbehaving, GarbageOnReportsIsCountedAndSurvived) {
   std::atomic<int> garbage = 5;
   wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
@@ -187,82 +62,6 @@ TEST_F(Misbehaving, GarbageOnReportsIsCountedAndSurvived) {
   ASSERT_OK(opened);
   EXPECT_EQ((*opened)->identity().serial, unit.serial);
   EXPECT_EQ((*opened)->stream_statistics().damaged_reports, 5U);
-}
-
-// Reports that are not read fill the queue, and no more than that.
-TEST_F(Misbehaving, AFloodFillsTheQueueAndNothingElse) {
-  std::atomic<int> flood = 60;
-  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
-    if (endpoint != device::kHidInEndpoint) {
-      return std::nullopt;
-    }
-    return flood-- > 0 ? UsbAnswer::done(Bytes(64, 1)) : UsbAnswer::nothing_yet();
-  };
-  ASSERT_OK(bus->plug_in(wilful));
-  const auto found = device::attached_devices();
-  ASSERT_OK(found);
-  ASSERT_EQ(found->size(), 1U);
-  device::HidTransportOptions options;
-  options.waiting_reports = 10;
-  auto reports = device::open_hid_transport(found->front().hidraw_node, options);
-  ASSERT_OK(reports);
-  while (flood > 0) {
-    std::this_thread::sleep_for(milliseconds(5));
-  }
-  std::this_thread::sleep_for(milliseconds(100));
-  Bytes buffer(device::kReportBytes);
-  int count = 0;
-  while ((*reports)->read(buffer, milliseconds(100)).value_or(0) == device::kReportBytes) {
-    ++count;
-  }
-  EXPECT_EQ(count, 10);
-}
-
-// A download whose blocks stop coming, with a patience of an hour: cancel() and the end of the unit
-// do not wait for the transfers that hang (bench/usb_bench measures how long they take).
-TEST_F(Misbehaving, AHangingDownloadIsStopped) {
-  std::atomic<bool> hang = false;
-  std::atomic<int> asked = 0;
-  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
-    const bool now = endpoint == device::kBulkInEndpoint && hang;
-    asked += now ? 1 : 0;
-    return now ? std::optional(UsbAnswer::nothing_yet()) : std::nullopt;
-  };
-  auto link = open();
-  ASSERT_OK(link);
-  device::WireOptions options;
-  options.reply_time_out = seconds(5);
-  options.bulk_time_out = std::chrono::hours(1);
-  auto opened = device::WireUnit::open(std::move(*link), options);
-  ASSERT_OK(opened);
-  const auto info = record(unit, **opened, seconds(600));
-  ASSERT_OK(info);
-  hang = true;
-  TemporaryFolder folder;
-  auto downloading = std::async(std::launch::async, [&] {
-    return (*opened)->download(*info, posix_env().files, folder / "x.gt3x");
-  });
-  while (asked == 0) {
-    std::this_thread::sleep_for(milliseconds(5));
-  }
-  (*opened)->cancel();
-  EXPECT_FAILS(downloading.get(), ErrorCode::device_unavailable);
-  opened->reset();
-  EXPECT_FALSE(posix_env().files.info(folder / "x.gt3x"));
-  // Without cancel(): the unit ends while its transfers hang, and the reports with them.
-  auto reports_too = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
-    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::nothing_yet())
-                                               : std::nullopt;
-  };
-  bus->unplug(nodes.port);
-  wilful->on_out = reports_too;
-  wilful->plug_in();
-  auto again = open();
-  ASSERT_OK(again);
-  Bytes buffer(device::kBulkBlockBytes);
-  EXPECT_EQ(*again->bulk->read(buffer, milliseconds(20)), 0U) << "transfers are under way";
-  EXPECT_FAILS(again->reports->write(Bytes(64), milliseconds(20)), ErrorCode::io);
-  *again = {};
 }
 
 // docs/devices/wgt3x-bt-bench-unit.md: a thread per unit, stopped whatever it waits for. The

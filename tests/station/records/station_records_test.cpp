@@ -9,6 +9,7 @@
 #include "base/random.h"
 #include "expect_result.h"
 #include "run_command.h"
+#include "station/records/made_station.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::station {
@@ -18,78 +19,7 @@ using testing::Contains;
 using testing::HasSubstr;
 using Json = nlohmann::ordered_json;
 
-// A store with runs as jig runs leave them, one an hour.
-class StationRecords : public testing::Test {
- protected:
-  StationRecords() : store_(*db::Store::open(env_.env, folder_ / "s.db")) {}
-
-  void add_run(const std::string& serial, JigVerdict verdict, double zero_mg = 100,
-               const std::string& station = "A", const std::string& study = {}) {
-    env_.clock.set(env_.clock.now() + std::chrono::hours(1));
-    Json document = {{"firmware", "1.5.0"}, {"quantities", Json::array()}};
-    if (!study.empty()) {
-      document["study"] = study;
-    }
-    for (const char* axis : {"x", "y", "z"}) {
-      for (const char* name : {"sensitivity_deviation_percent", "zero_offset_mg"}) {
-        document["quantities"].push_back(
-            {{"name", name},
-             {"axis", axis},
-             {"value", std::string(name) == "zero_offset_mg" ? zero_mg : 3.0},
-             {"expanded_uncertainty", 0.7},
-             {"low", -700},
-             {"high", 700},
-             {"verdict", "pass"},
-             {"code", ""}});
-      }
-    }
-    db::RunRecord run;
-    run.serial = serial;
-    run.model = "wGT3X-BT";
-    run.kind = study.empty() ? "jig" : kStudyKind;
-    run.filter = "current";
-    run.started = env_.clock.now();
-    run.ended = env_.clock.now() + std::chrono::seconds(90);
-    run.operator_name = study.empty() ? "Ada" : station;
-    run.station = station;
-    run.jig = "J1";
-    run.verdict = to_string(verdict);
-    run.software = "test";
-    run.document = document.dump();
-    if (!is_passed(verdict)) {
-      run.codes = {"zero_high"};
-    }
-    ASSERT_OK(store_.add_run(run, {}));
-  }
-  void decide(const std::string& action, const std::string& serial = {},
-              const std::string& station = "A") {
-    env_.clock.set(env_.clock.now() + std::chrono::minutes(10));
-    db::StationEvent event;
-    event.station = station;
-    event.serial = serial;
-    event.action = action;
-    event.operator_name = "Eve";
-    event.reason = "looked at it";
-    ASSERT_OK(store_.add_station_event(event));
-  }
-  // Ten runs of a check unit with a scatter of a milligravity.
-  void baseline(const std::string& serial = "CHECK1", const std::string& station = "A") {
-    for (int i = 0; i < 10; ++i) {
-      add_run(serial, JigVerdict::pass, 100 + (i % 2 == 0 ? 0.5 : -0.5), station);
-    }
-  }
-  Result<RetestState> start(const std::string& serial, const std::string& station = "A") {
-    return may_start(store_, serial, station, default_limits());
-  }
-
-  tests::TemporaryFolder folder_;
-  struct Place {
-    Place() : env{clock, posix_env().files} { clock.set(*parse_iso8601("2026-01-01")); }
-    ManualClock clock;
-    Env env;
-  } env_;
-  db::Store store_;
-};
+using tests::StationRecords;
 
 TEST_F(StationRecords, ACheckUnitOutOfControlLocksItsStationUntilAnEngineerSigns) {
   decide("check_unit", "CHECK1");
@@ -206,25 +136,6 @@ TEST_F(StationRecords, EventsAreChainedAndNeedAName) {
   decide("sign");
   const auto audit = store_.audit();
   EXPECT_TRUE(audit->ok) << audit->brief();
-}
-
-TEST_F(StationRecords, ThePageHoldsWhatItSaysAndEscapesNames) {
-  decide("check_unit", "CHECK1");
-  baseline();
-  add_run("CHECK1", JigVerdict::pass, 110);
-  for (int i = 0; i < 6; ++i) {
-    add_run("MOS2A" + std::to_string(i), i == 0 ? JigVerdict::fail : JigVerdict::pass, 90 + i,
-            "<script>alert(1)</script>");
-  }
-  const auto report = statistics(*summaries(store_, {}), "station");
-  const auto state = station_state(store_, "A", default_limits().check_unit);
-  const std::string html = statistics_html(*report, {*state});
-  EXPECT_THAT(html, HasSubstr("83.3 %"));
-  EXPECT_THAT(html, HasSubstr("zero_high"));
-  EXPECT_THAT(html, HasSubstr("class=locked"));
-  EXPECT_THAT(html, HasSubstr("&lt;script&gt;"));
-  EXPECT_EQ(html.find("<script"), std::string::npos);
-  EXPECT_EQ(html.find("nan"), std::string::npos);
 }
 
 }  // namespace

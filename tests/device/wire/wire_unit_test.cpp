@@ -1,42 +1,21 @@
-#include "device/unit.h"
+#include "device/wire/wire_unit.h"
 
 #include <set>
 
 #include <gtest/gtest.h>
 
-#include "base/memory_env.h"
+#include "device/wire/made_bench.h"
 #include "device/wire/payload.h"
-#include "device/wire/wire_unit.h"
 #include "expect_result.h"
-#include "mocks/in_process/in_process.h"
 #include "mocks/inert/inert.h"
 
 namespace sixpoint::device {
 namespace {
 
 using mocks::InertTransport;
-using mocks::PluggedUnit;
-using mocks::TamperingTransport;
+using tests::Bench;
 
-struct Bench {
-  Bench() {
-    mocks::VirtualUnitOptions options;
-    options.truth = sim::draw_unit(7);
-    clock = std::make_shared<ManualClock>();
-    plugged = std::make_shared<PluggedUnit>(options, clock);
-  }
-  Link link() { return mocks::link_to(plugged, false); }
-  Link tampered(TamperingTransport::Tamper on_write, TamperingTransport::Tamper on_read) {
-    Link result = link();
-    result.reports = std::make_unique<TamperingTransport>(std::move(result.reports),
-                                                          std::move(on_write), std::move(on_read));
-    return result;
-  }
-  std::shared_ptr<ManualClock> clock;
-  std::shared_ptr<PluggedUnit> plugged;
-};
-
-TEST(Unit, IdentifiesAndReadsItsConstants) {
+TEST(WireUnit, IdentifiesAndReadsItsConstants) {
   Bench bench;
   auto unit = WireUnit::open(bench.link());
   ASSERT_OK(unit);
@@ -55,7 +34,7 @@ TEST(Unit, IdentifiesAndReadsItsConstants) {
   EXPECT_EQ((*unit)->filter()->recording, FilterConfiguration::current);
 }
 
-TEST(Unit, WritesConstantsAndReadsThemBack) {
+TEST(WireUnit, WritesConstantsAndReadsThemBack) {
   Bench bench;
   auto unit = *WireUnit::open(bench.link());
   const CalibrationPage page{{{300, 301, 302}, {-200, -201, -202}, {50, 51, 52}},
@@ -69,7 +48,7 @@ TEST(Unit, WritesConstantsAndReadsThemBack) {
 }
 
 // Every request or reply lost once, in turn: the same result, and nothing executed twice.
-TEST(Unit, LostRequestsAndRepliesAreRepeated) {
+TEST(WireUnit, LostRequestsAndRepliesAreRepeated) {
   for (const bool lose_request : {true, false}) {
     for (std::size_t victim = 0; victim < 40; ++victim) {
       Bench bench;
@@ -90,7 +69,7 @@ TEST(Unit, LostRequestsAndRepliesAreRepeated) {
 }
 
 // Every byte of every reply flipped, one at a time: the request is repeated and the answer right.
-TEST(Unit, EveryFlippedByteOfAReplyIsSurvived) {
+TEST(WireUnit, EveryFlippedByteOfAReplyIsSurvived) {
   for (std::size_t at = 0; at < kReportBytes; ++at) {
     Bench bench;
     bool done = false;
@@ -108,7 +87,7 @@ TEST(Unit, EveryFlippedByteOfAReplyIsSurvived) {
   }
 }
 
-TEST(Unit, ASilentUnitIsUnavailableAfterItsTimeOuts) {
+TEST(WireUnit, ASilentUnitIsUnavailableAfterItsTimeOuts) {
   const auto clock = std::make_shared<ManualClock>();
   Link link;
   auto transport = std::make_unique<InertTransport>(clock);
@@ -123,7 +102,7 @@ TEST(Unit, ASilentUnitIsUnavailableAfterItsTimeOuts) {
 }
 
 // A hostile unit that sends whole reports with right checksums for ever must not stop the station.
-TEST(Unit, ChatterDoesNotHang) {
+TEST(WireUnit, ChatterDoesNotHang) {
   const auto clock = std::make_shared<ManualClock>();
   class Chatter final : public Transport {
    public:
@@ -147,7 +126,7 @@ TEST(Unit, ChatterDoesNotHang) {
   EXPECT_FAILS(WireUnit::open(std::move(link)), ErrorCode::device_unavailable);
 }
 
-TEST(Unit, UnknownCommandsAndWrongLengthsAreRefusedByCode) {
+TEST(WireUnit, UnknownCommandsAndWrongLengthsAreRefusedByCode) {
   Bench bench;
   const auto ask = [&](Command command, Bytes payload) {
     bench.plugged->unit.take_report(
@@ -185,7 +164,7 @@ TEST(Unit, UnknownCommandsAndWrongLengthsAreRefusedByCode) {
             ReplyCode::unsupported_version);
 }
 
-TEST(Unit, StreamsRawCountsInOrderWithTimeAndTemperature) {
+TEST(WireUnit, StreamsRawCountsInOrderWithTimeAndTemperature) {
   Bench bench;
   auto unit = *WireUnit::open(bench.link());
   ASSERT_OK(unit->set_filter(FilterConfiguration::current));
@@ -222,7 +201,7 @@ TEST(Unit, StreamsRawCountsInOrderWithTimeAndTemperature) {
   EXPECT_FALSE(none->has_value());
 }
 
-TEST(Unit, LostAndDuplicatedReportsAreSeen) {
+TEST(WireUnit, LostAndDuplicatedReportsAreSeen) {
   Bench bench;
   int samples_reports = 0;
   auto unit = *WireUnit::open(
@@ -247,7 +226,7 @@ TEST(Unit, LostAndDuplicatedReportsAreSeen) {
   EXPECT_EQ(unit->stream_statistics().duplicate_reports, 1U);
 }
 
-TEST(Unit, UnpluggingIsSeenAtOnce) {
+TEST(WireUnit, UnpluggingIsSeenAtOnce) {
   Bench bench;
   auto unit = *WireUnit::open(bench.link());
   ASSERT_OK(unit->start_stream(100));
@@ -257,92 +236,7 @@ TEST(Unit, UnpluggingIsSeenAtOnce) {
   EXPECT_FAILS(unit->stop_stream(), ErrorCode::device_unavailable);
 }
 
-// Bytes of a recording of `seconds`, and its entry.
-RecordingInfo record(Bench& bench, Unit& unit, int recording_s) {
-  const auto id = unit.start_recording(100, from_unix_seconds(1'500'000'000));
-  EXPECT_OK(id);
-  bench.clock->sleep(std::chrono::seconds(recording_s));
-  EXPECT_OK(unit.stop_recording());
-  const auto list = unit.recordings();
-  EXPECT_OK(list);
-  return list->back();
-}
-
-TEST(Unit, RecordsListsAndDownloads) {
-  Bench bench;
-  auto unit = *WireUnit::open(bench.link());
-  EXPECT_TRUE(unit->recordings()->empty());
-  const RecordingInfo info = record(bench, *unit, 300);
-  record(bench, *unit, 10);
-  EXPECT_EQ(unit->recordings()->size(), 2U);
-  MemoryEnv env;
-  std::uint64_t reported = 0;
-  ASSERT_OK(unit->download(info, env.files, "x.gt3x", [&](std::uint64_t at) { reported = at; }));
-  EXPECT_EQ(reported, info.bytes);
-  EXPECT_EQ(sha256(*read_file(env.files, "x.gt3x")), info.sha256);
-  EXPECT_EQ(*read_file(env.files, "x.gt3x"), bench.plugged->unit.recordings()[0]);
-  EXPECT_EQ(env.files.list(".")->size(), 1U) << "no .part is left";
-  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x"), ErrorCode::cannot_create);
-}
-
-TEST(Unit, ABrokenDownloadResumes) {
-  Bench bench;
-  auto unit = *WireUnit::open(bench.link());
-  const RecordingInfo info = record(bench, *unit, 300);
-  MemoryEnv env;
-  // The unit goes away in mid-download.
-  const auto pull = [&](std::uint64_t at) { bench.plugged->unplugged = at > info.bytes / 2; };
-  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x", pull), ErrorCode::device_unavailable);
-  EXPECT_FALSE(env.files.info("x.gt3x"));
-  const auto left = env.files.list(".");
-  ASSERT_EQ(left->size(), 1U);
-  const std::uint64_t kept = env.files.info(left->front())->size;
-  EXPECT_GT(kept, info.bytes / 2);
-  env.files.lose_power();  // what was kept was synced
-  EXPECT_EQ(env.files.info(left->front())->size, kept);
-
-  bench.plugged->unplugged = false;
-  std::uint64_t first = 0;
-  ASSERT_OK(unit->download(info, env.files, "x.gt3x",
-                           [&](std::uint64_t at) { first = first == 0 ? at : first; }));
-  EXPECT_GT(first, kept) << "went on where it broke";
-  EXPECT_EQ(sha256(*read_file(env.files, "x.gt3x")), info.sha256);
-  EXPECT_EQ(env.files.list(".")->size(), 1U);
-}
-
-// Blocks lost, doubled and damaged on the way; the file is right or there is none.
-TEST(Unit, DownloadSurvivesLossDamageAndRepetition) {
-  Bench bench;
-  Link link = bench.link();
-  int block = 0;
-  link.bulk =
-      std::make_unique<TamperingTransport>(std::move(link.bulk), nullptr, [&](Bytes& bytes) {
-        ++block;
-        if (block % 5 == 2) {
-          bytes[bytes.size() / 2] ^= 1;
-        }
-        return block % 7 == 3 ? 0 : block % 4 == 1 ? 2 : 1;
-      });
-  auto unit = *WireUnit::open(std::move(link));
-  const RecordingInfo info = record(bench, *unit, 600);
-  MemoryEnv env;
-  ASSERT_OK(unit->download(info, env.files, "x.gt3x"));
-  EXPECT_EQ(sha256(*read_file(env.files, "x.gt3x")), info.sha256);
-}
-
-TEST(Unit, ADownloadThatIsNotWhatWasAnnouncedIsThrownAway) {
-  Bench bench;
-  auto unit = *WireUnit::open(bench.link());
-  RecordingInfo info = record(bench, *unit, 60);
-  info.sha256[0] ^= 1;
-  MemoryEnv env;
-  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x"), ErrorCode::bad_data);
-  EXPECT_TRUE(env.files.list(".")->empty());
-  info.bytes += 5;
-  EXPECT_FAILS(unit->download(info, env.files, "y.gt3x"), ErrorCode::bad_data);
-}
-
-TEST(Unit, RefusalsSayWhatToDo) {
+TEST(WireUnit, RefusalsSayWhatToDo) {
   Bench bench;
   auto unit = *WireUnit::open(bench.link());
   bench.plugged->unit.set_battery_mv(3200);

@@ -1,0 +1,171 @@
+// Downloads of a WireUnit: what is saved is what the unit holds, or nothing is.
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "base/atomic_file.h"
+#include "base/memory_env.h"
+#include "base/sha256.h"
+#include "device/wire/made_bench.h"
+#include "device/wire/wire_unit.h"
+#include "expect_result.h"
+
+namespace sixpoint::device {
+namespace {
+
+using mocks::TamperingTransport;
+using tests::Bench;
+using tests::record;
+
+TEST(WireDownload, RecordsListsAndDownloads) {
+  Bench bench;
+  auto unit = *WireUnit::open(bench.link());
+  EXPECT_TRUE(unit->recordings()->empty());
+  const RecordingInfo info = record(bench, *unit, 300);
+  record(bench, *unit, 10);
+  EXPECT_EQ(unit->recordings()->size(), 2U);
+  MemoryEnv env;
+  std::uint64_t reported = 0;
+  ASSERT_OK(unit->download(info, env.files, "x.gt3x", [&](std::uint64_t at) { reported = at; }));
+  EXPECT_EQ(reported, info.bytes);
+  EXPECT_EQ(sha256(*read_file(env.files, "x.gt3x")), info.sha256);
+  EXPECT_EQ(*read_file(env.files, "x.gt3x"), bench.plugged->unit.recordings()[0]);
+  EXPECT_EQ(env.files.list(".")->size(), 1U) << "no .part is left";
+  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x"), ErrorCode::cannot_create);
+}
+
+TEST(WireDownload, ABrokenDownloadResumes) {
+  Bench bench;
+  auto unit = *WireUnit::open(bench.link());
+  const RecordingInfo info = record(bench, *unit, 300);
+  MemoryEnv env;
+  // The unit goes away in mid-download.
+  const auto pull = [&](std::uint64_t at) { bench.plugged->unplugged = at > info.bytes / 2; };
+  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x", pull), ErrorCode::device_unavailable);
+  EXPECT_FALSE(env.files.info("x.gt3x"));
+  const auto left = env.files.list(".");
+  ASSERT_EQ(left->size(), 1U);
+  const std::uint64_t kept = env.files.info(left->front())->size;
+  EXPECT_GT(kept, info.bytes / 2);
+  env.files.lose_power();  // what was kept was synced
+  EXPECT_EQ(env.files.info(left->front())->size, kept);
+
+  bench.plugged->unplugged = false;
+  std::uint64_t first = 0;
+  ASSERT_OK(unit->download(info, env.files, "x.gt3x",
+                           [&](std::uint64_t at) { first = first == 0 ? at : first; }));
+  EXPECT_GT(first, kept) << "went on where it broke";
+  EXPECT_EQ(sha256(*read_file(env.files, "x.gt3x")), info.sha256);
+  EXPECT_EQ(env.files.list(".")->size(), 1U);
+}
+
+// Blocks lost, doubled and damaged on the way; the file is right or there is none.
+TEST(WireDownload, DownloadSurvivesLossDamageAndRepetition) {
+  Bench bench;
+  Link link = bench.link();
+  int block = 0;
+  link.bulk =
+      std::make_unique<TamperingTransport>(std::move(link.bulk), nullptr, [&](Bytes& bytes) {
+        ++block;
+        if (block % 5 == 2) {
+          bytes[bytes.size() / 2] ^= 1;
+        }
+        return block % 7 == 3 ? 0 : block % 4 == 1 ? 2 : 1;
+      });
+  auto unit = *WireUnit::open(std::move(link));
+  const RecordingInfo info = record(bench, *unit, 600);
+  MemoryEnv env;
+  ASSERT_OK(unit->download(info, env.files, "x.gt3x"));
+  EXPECT_EQ(sha256(*read_file(env.files, "x.gt3x")), info.sha256);
+}
+
+TEST(WireDownload, ADownloadThatIsNotWhatWasAnnouncedIsThrownAway) {
+  Bench bench;
+  auto unit = *WireUnit::open(bench.link());
+  RecordingInfo info = record(bench, *unit, 60);
+  info.sha256[0] ^= 1;
+  MemoryEnv env;
+  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x"), ErrorCode::bad_data);
+  EXPECT_TRUE(env.files.list(".")->empty());
+  info.bytes += 5;
+  EXPECT_FAILS(unit->download(info, env.files, "y.gt3x"), ErrorCode::bad_data);
+}
+
+std::string text_of(const Bytes& bytes) { return {bytes.begin(), bytes.end()}; }
+
+// A device on reports alone, over Bluetooth for example.
+TEST(WireDownload, WithoutABulkChannelThereIsNoDownload) {
+  Bench bench;
+  Link link = bench.link();
+  link.bulk.reset();
+  auto unit = *WireUnit::open(std::move(link));
+  EXPECT_FALSE(unit->abilities().offers_recordings);
+  const RecordingInfo info = record(bench, *unit, 60);
+  MemoryEnv env;
+  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x"), ErrorCode::device_unavailable);
+  EXPECT_TRUE(env.files.list(".")->empty());
+}
+
+// Oracle: the unit's own bytes. What an earlier call kept may be of any length; a part of another
+// recording has another name and is left alone.
+TEST(WireDownload, APartOfAnyLengthIsContinued) {
+  Bench bench;
+  auto unit = *WireUnit::open(bench.link());
+  const RecordingInfo info = record(bench, *unit, 300);
+  const Bytes whole = bench.plugged->unit.recordings()[0];
+  ASSERT_EQ(whole.size(), info.bytes);
+  const std::string part = "x.gt3x." + to_hex(info.sha256).substr(0, 12) + ".part";
+  for (const std::size_t kept :
+       {std::size_t{0}, std::size_t{1}, whole.size() / 2, whole.size() - 1, whole.size()}) {
+    MemoryEnv env;
+    ASSERT_OK(write_file(env.files, part, text_of(whole).substr(0, kept)));
+    ASSERT_OK(write_file(env.files, "x.gt3x.000000000000.part", "another"));
+    std::uint64_t first = 0;
+    ASSERT_OK(unit->download(info, env.files, "x.gt3x",
+                             [&](std::uint64_t at) { first = first == 0 ? at : first; }));
+    EXPECT_EQ(*read_file(env.files, "x.gt3x"), whole) << kept;
+    EXPECT_TRUE(kept == whole.size() ? first == 0 : first > kept) << kept;
+    EXPECT_EQ(env.files.info("x.gt3x.000000000000.part")->size, 7U);
+    EXPECT_FALSE(env.files.info(part));
+  }
+}
+
+// Nothing that is wrong stays: a part with other bytes makes the hash fail, and the next call
+// begins anew.
+TEST(WireDownload, ADamagedPartIsThrownAwayAndTheNextCallBeginsAnew) {
+  Bench bench;
+  auto unit = *WireUnit::open(bench.link());
+  const RecordingInfo info = record(bench, *unit, 60);
+  Bytes damaged = bench.plugged->unit.recordings()[0];
+  damaged.resize(damaged.size() / 2);
+  damaged[100] ^= 1;
+  MemoryEnv env;
+  const std::string part = "x.gt3x." + to_hex(info.sha256).substr(0, 12) + ".part";
+  ASSERT_OK(write_file(env.files, part, text_of(damaged)));
+  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x"), ErrorCode::bad_data);
+  EXPECT_TRUE(env.files.list(".")->empty());
+  EXPECT_OK(unit->download(info, env.files, "x.gt3x"));
+  EXPECT_EQ(*read_file(env.files, "x.gt3x"), bench.plugged->unit.recordings()[0]);
+}
+
+// A unit whose blocks never come: the download ends after its attempts and says how far it came.
+TEST(WireDownload, SilenceOnTheBulkChannelEndsTheDownload) {
+  Bench bench;
+  Link link = bench.link();
+  link.bulk =
+      std::make_unique<TamperingTransport>(std::move(link.bulk), nullptr, [](Bytes&) { return 0; });
+  WireOptions options;
+  options.download_attempts = 3;
+  auto unit = *WireUnit::open(std::move(link), options);
+  const RecordingInfo info = record(bench, *unit, 60);
+  MemoryEnv env;
+  const Status came = unit->download(info, env.files, "x.gt3x");
+  EXPECT_FAILS(came, ErrorCode::device_unavailable);
+  EXPECT_NE(came.error().what.find("stopped at byte 0 of " + std::to_string(info.bytes)),
+            std::string::npos)
+      << came.error().what;
+  EXPECT_FALSE(env.files.info("x.gt3x"));
+}
+
+}  // namespace
+}  // namespace sixpoint::device

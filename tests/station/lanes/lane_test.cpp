@@ -1,0 +1,115 @@
+// Commands to one lane: who may give them, and when.
+#include "station/page/station_in_process.h"
+
+namespace sixpoint::station {
+namespace {
+
+TEST(Lane, TwoOperatorsOnOneLane) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,pace=20"}, folder.path());
+  station.wait_state(1, "idle");
+  ASSERT_EQ(station.post("/api/run", {{"operator", "Ada"}}, "page-a"), 202);
+  EXPECT_EQ(station.post("/api/run", {{"operator", "Bob"}}, "page-b"), 409);
+  station.wait_state(1, "running");
+  EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object(), "page-b"), 409);
+  EXPECT_EQ(station.post("/api/lanes/1/take", {{"operator", "Bob"}}, "page-b"), 200);
+  EXPECT_EQ(station.post("/api/lanes/1/undo", Json::object(), "page-a"), 409);
+  EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object(), "page-b"), 200);
+  const Json lane = station.wait_state(1, "done");
+  EXPECT_EQ(lane["operator"], "Bob");
+  EXPECT_EQ(lane["result"]["verdict"], "stopped");
+}
+
+StartOrder order_of(const std::string& client) {
+  StartOrder order;
+  order.operator_name = "Ada";
+  order.client = client;
+  return order;
+}
+
+// Each row is a command that makes no sense now: a conflict that says what to do, and no change.
+TEST(Lane, WhereNothingRunsThereIsNothingToCommand) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  station.wait_state(1, "idle");
+  Lanes& lanes = *station.lanes;
+  const auto expect_conflict = [](const LaneAnswer<void>& answer) {
+    ASSERT_FALSE(answer.has_value());
+    EXPECT_EQ(answer.error().kind, LaneRefusal::Kind::conflict);
+    EXPECT_FALSE(answer.error().what.empty());
+    EXPECT_FALSE(answer.error().hint.empty());
+  };
+  const std::uint64_t changes = lanes.changes(1);
+  expect_conflict(lanes.command(1, "page-a", OperatorCommand::stop));
+  expect_conflict(lanes.command(1, "page-a", OperatorCommand::undo));
+  expect_conflict(lanes.confirm_side(1, "page-a"));
+  expect_conflict(lanes.take_over(1, "page-a", "Ada"));
+  EXPECT_EQ(lanes.state(1), LaneState::idle);
+  EXPECT_EQ(lanes.changes(1), changes);
+}
+
+TEST(Lane, WithoutAUnitNothingStarts) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  station.wait_state(1, "idle");
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
+  station.wait_state(1, "absent");
+  const auto refused = station.lanes->start(1, order_of("page-a"));
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().what, "no unit is plugged in here");
+  EXPECT_FALSE(station.lanes->start_capture(1, order_of("page-a")).has_value());
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "plug"}}), 200);
+  station.wait_state(1, "idle");
+  EXPECT_TRUE(station.lanes->start(1, order_of("page-a")).has_value());
+  station.wait_state(1, "running");
+}
+
+TEST(Lane, OneRunAtATimeAndNoOtherLabelDuringIt) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007"}, folder.path());
+  station.wait_state(1, "idle");
+  Lanes& lanes = *station.lanes;
+  ASSERT_TRUE(lanes.start(1, order_of("page-a")).has_value());
+  const auto second = lanes.start(1, order_of("page-a"));
+  ASSERT_FALSE(second.has_value()) << "also from the same page, also before the thread took it";
+  EXPECT_THAT(second.error().what, testing::HasSubstr("Ada"));
+  station.wait_state(1, "running");
+  EXPECT_FALSE(lanes.start_capture(1, order_of("page-a")).has_value());
+  EXPECT_FALSE(lanes.scan(1, "MOS2A45130007").has_value());
+  EXPECT_FALSE(lanes.confirm_side(1, "page-a").has_value()) << "a jig run asks for no side";
+}
+
+// An order names the unit that was scanned: another one is not measured.
+TEST(Lane, AnOrderForAnotherUnitIsRefusedUntilTheRightOneIsScanned) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007"}, folder.path());
+  station.wait_state(1, "idle");
+  StartOrder order = order_of("page-a");
+  order.serial = "MOS2A45130008";
+  const auto refused = station.lanes->start(1, order);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error().what, testing::HasSubstr("MOS2A45130008"));
+  EXPECT_THAT(refused.error().what, testing::HasSubstr("MOS2A45130007"));
+  order.serial.clear();
+  EXPECT_FALSE(station.lanes->start(1, order).has_value()) << "the wrong label still counts";
+  EXPECT_TRUE(station.lanes->scan(1, "MOS2A45130007").has_value());
+  EXPECT_TRUE(station.lanes->start(1, order).has_value());
+}
+
+// The client that takes a run over commands it from then on; without a name the operator stays.
+TEST(Lane, TakingOverChangesTheClientAndTheOperatorWhereOneIsNamed) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  station.wait_state(1, "idle");
+  ASSERT_TRUE(station.lanes->start(1, order_of("page-a")).has_value());
+  station.wait_state(1, "running");
+  ASSERT_TRUE(station.lanes->take_over(1, "page-b", "").has_value());
+  EXPECT_EQ(station.lane(1)["client"], "page-b");
+  EXPECT_EQ(station.lane(1)["operator"], "Ada");
+  EXPECT_FALSE(station.lanes->command(1, "page-a", OperatorCommand::stop).has_value());
+  EXPECT_TRUE(station.lanes->command(1, "page-b", OperatorCommand::stop).has_value());
+  station.wait_state(1, "done");
+}
+
+}  // namespace
+}  // namespace sixpoint::station
