@@ -9,7 +9,8 @@
 //     return print_answer(context, as_json, json, fmt::format("{} units\n", units.size()));
 //   }
 //
-// A judgement (failed, inconclusive) goes into context.worsen(). One thread at a time uses a Context.
+// A judgement (failed, inconclusive) goes into context.worsen(). One thread at a time uses a
+// Context.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,5 @@
-// What every command includes, compiled once for all of them; a command still includes what it uses:
-// the build with the sanitizers reads every file without this.
+// What every command includes, compiled once for all of them; a command still includes what it
+// uses: the build with the sanitizers reads every file without this.
 #include <algorithm>
 #include <array>
 #include <functional>

@@ -38,7 +38,7 @@ class Header:
         self.lines = code_lines([line[2:] for line in comment])  # (number, code)
         first_paragraph = next(number for number, line in enumerate(comment) if not line[2:].strip())
         self.begins_with_example = bool(self.lines) and self.lines[0][0] == first_paragraph + 2
-        found = re.search(r"^namespace ([\w:]+) \{", text, re.MULTILINE)
+        found = re.search(r"^namespace (sixpoint[\w:]*) \{", text, re.MULTILINE)
         self.namespace = found.group(1) if found else "sixpoint"
 
     def compiled(self, parameters, wing_parameters):

@@ -10,7 +10,7 @@
 
 #include "device/usb/discovery.h"
 #include "expect_result.h"
-#include "mocks/usb/umockdev_bus.h"
+#include "mocks/umockdev/umockdev_bus.h"
 #include "usb/bench.h"
 
 namespace sixpoint::tests {

@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 
+#include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
 #include "cli/command_fixture.h"

@@ -2,6 +2,7 @@
 
 #include <sstream>
 
+#include <CLI/App.hpp>
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"

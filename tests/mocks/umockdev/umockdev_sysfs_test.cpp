@@ -2,6 +2,8 @@
 // formats), and the table of docs/devices/wgt3x-bt-bench-unit.md (values).
 #include <array>
 
+#include <fmt/format.h>
+
 #include "mocks/umockdev/umockdev_fixture.h"
 
 namespace sixpoint::tests {
@@ -57,9 +59,8 @@ TEST_F(UmockdevSysfs, HasAFolderForEachInterface) {
   const auto nodes = plug_in();
   const char* const classes[] = {"03", "ff", "08"};
   for (int i = 0; i < 3; ++i) {
-    const std::string folder =
-        "/sys/bus/usb/devices/" + nodes.port + ":1." + std::to_string(i) + "/";
-    EXPECT_EQ(text_of(folder + "bInterfaceNumber"), "0" + std::to_string(i));
+    const std::string folder = fmt::format("/sys/bus/usb/devices/{}:1.{}/", nodes.port, i);
+    EXPECT_EQ(text_of(folder + "bInterfaceNumber"), fmt::format("0{}", i));
     EXPECT_EQ(text_of(folder + "bInterfaceClass"), classes[i]) << i;
   }
   const std::string storage = "/sys/bus/usb/devices/" + nodes.port + ":1.2/";

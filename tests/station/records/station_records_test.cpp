@@ -1,23 +1,15 @@
 #include "station/records/station_records.h"
 
-#include <filesystem>
-#include <fstream>
-
 #include <gmock/gmock.h>
-#include <nlohmann/json.hpp>
 
 #include "base/random.h"
 #include "expect_result.h"
-#include "run_command.h"
 #include "station/records/made_station.h"
-#include "temporary_folder.h"
 
 namespace sixpoint::station {
 namespace {
 
-using testing::Contains;
 using testing::HasSubstr;
-using Json = nlohmann::ordered_json;
 
 using tests::StationRecords;
 
