@@ -39,7 +39,7 @@ TEST_F(CommandTest, EveryCommandHasHelpAndRefusesAnUnknownOption) {
 }
 
 // The same option is described by the same words, wherever one function declares it.
-TEST(Command, SharedOptionsAreDescribedAlike) {
+TEST(Commands, SharedOptionsAreDescribedAlike) {
   std::map<std::string, std::set<std::string>> descriptions;
   std::ostringstream stream;
   std::istringstream in;

@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 
-#include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "cli/devices/known_devices.h"
 #include "device/session/session.h"
@@ -58,17 +57,6 @@ TEST(RecordOption, WithoutANameNothingIsWritten) {
   EXPECT_EQ(recorded.memory.files.changing_operations(), 0U);
   EXPECT_EQ(recorded.context.exit_code, 0);
   EXPECT_EQ(recorded.people.str(), "");
-}
-
-// What is there is not overwritten, and that is said before anything is opened.
-TEST(RecordOption, AFileThatIsThereIsRefusedAtOnce) {
-  Recorded recorded;
-  ASSERT_OK(write_file(recorded.memory.files, "s.zip", "mine"));
-  EXPECT_FAILS(begin_session(recorded.context, recorded.recorder, "s.zip"),
-               ErrorCode::cannot_create);
-  const auto bytes = read_file(recorded.memory.files, "s.zip");
-  ASSERT_OK(bytes);
-  EXPECT_EQ(as_text(*bytes), "mine");
 }
 
 // The exit code of the contract for a disk that fails is 74.

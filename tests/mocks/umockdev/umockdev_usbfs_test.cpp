@@ -44,21 +44,6 @@ TEST_F(UmockdevUsbfs, AnInterfaceHasOneOwner) {
   EXPECT_EQ(claim(second, kBulk), 0);
 }
 
-// A file that is closed gives up what it claimed; the bus hears of it a little later.
-TEST_F(UmockdevUsbfs, AClosedFileGivesUpItsInterface) {
-  const auto nodes = plug_in();
-  OpenFile first(nodes.usb_node);
-  const OpenFile second(nodes.usb_node);
-  ASSERT_EQ(claim(first, kBulk), 0);
-  first.close();
-  int answer = -EBUSY;
-  for (int i = 0; i < 1000 && answer != 0; ++i) {
-    ::usleep(2000);
-    answer = claim(second, kBulk);
-  }
-  EXPECT_EQ(answer, 0);
-}
-
 TEST_F(UmockdevUsbfs, DriversAreNamedDetachedAndAttached) {
   const auto nodes = plug_in();
   const OpenFile usb(nodes.usb_node);

@@ -141,22 +141,5 @@ TEST(LaneJson, TheTraceGoesOnFromTheNumberThatIsAskedFor) {
   EXPECT_GE(future.first, end) << "the number of the next one";
 }
 
-// Oracle: the pose into which the unit was turned.
-TEST(LaneJson, LiveNamesTheFaceThatIsUp) {
-  const tests::TemporaryFolder folder;
-  Station station({kDevice}, folder.path());
-  station.wait_state(1, "idle");
-  for (const char* pose : {"-x", "+y", "-z"}) {
-    ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "turn"}, {"pose", pose}}), 200);
-    Json live;
-    for (int i = 0; i < 3000 && live["face"] != pose; ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-      live = station.lanes->live(1);
-    }
-    EXPECT_EQ(live["face"], pose);
-    EXPECT_TRUE(live["angle_deg"].is_number());
-  }
-}
-
 }  // namespace
 }  // namespace sixpoint::station
