@@ -83,6 +83,7 @@ Result<std::vector<UnitRecord>> Store::units() {
                        "(SELECT count(*) FROM constants WHERE constants.serial = units.serial) "
                        "FROM units"));
   std::vector<UnitRecord> records;
+  records.reserve(rows.size());
   for (const Row& row : rows) {
     records.push_back({text_of(row[0]), text_of(row[1]), from_ns(integer_of(row[2])),
                        static_cast<std::size_t>(integer_of(row[3]))});
@@ -131,6 +132,7 @@ Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
     unit = {text_of(row[0]), unit.runs + 1, from_ns(integer_of(row[1])), text_of(row[2])};
   }
   std::vector<JigUnit> list;
+  list.reserve(units.size());
   for (auto& [serial, unit] : units) {
     list.push_back(std::move(unit));
   }

@@ -115,6 +115,7 @@ Result<std::vector<Record>> Store::select(const std::string& clauses,
   sql.append(from.name).append(" ").append(clauses);
   SIXPOINT_ASSIGN(const auto rows, database_->query(sql, parameters));
   std::vector<Record> records;
+  records.reserve(rows.size());
   for (const Row& row : rows) {
     records.push_back(record_of<Record>(row));
   }

@@ -37,6 +37,7 @@ struct Term {
 template <std::size_t N>
 std::vector<double> scaled(const std::array<double, N>& sizes, double factor = 1) {
   std::vector<double> list;
+  list.reserve(N);
   for (const double size : sizes) {
     list.push_back(size * factor);
   }
@@ -256,6 +257,7 @@ std::vector<Inconstancy> Explanation::inconstancies() const {
     add_changes(model_, best_nominal_, linear_of(best_nominal_), factors, certain_nats, by_factor);
   }
   std::vector<Inconstancy> found;
+  found.reserve(by_factor.size());
   for (const auto& [factor, changes] : by_factor) {
     found.push_back({changes.term, factor, log_mean(changes.nats)});
   }

@@ -110,6 +110,7 @@ std::vector<Pose> recorded_poses(const Bundle& bundle, const CleanSamples& clean
     Pose pose{Eigen::Vector3d::Zero(), bundle.gravity_in_sensor(segment)};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       std::vector<int> values;
+      values.reserve(usable.size());
       for (const std::size_t i : usable) {
         values.push_back(bundle.samples[i][axis]);
       }

@@ -119,6 +119,7 @@ namespace {
 
 std::vector<double> roots(const std::vector<double>& squares) {
   std::vector<double> values;
+  values.reserve(squares.size());
   for (const double v : squares) {
     values.push_back(std::sqrt(v));
   }

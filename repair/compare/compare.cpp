@@ -17,6 +17,7 @@ namespace {
 // Of the absolute values.
 double size_percentile(const std::vector<float>& errors, std::size_t percent) {
   std::vector<float> sizes;
+  sizes.reserve(errors.size());
   for (const float error : errors) {
     sizes.push_back(std::abs(error));
   }
