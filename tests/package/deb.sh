@@ -69,6 +69,12 @@ offered() { # offered WORD...: what Tab gives after these words, the last one ha
   _sixpoint
   printf '%s\n' "${COMPREPLY[@]}"
 }
+# grep reads all of it (no -q): with pipefail, one that stops at the first hit makes the writer fail.
+offers() { # offers WORD WORD...: the first word is among what Tab gives after the others
+  local wanted=$1
+  shift
+  offered "$@" | grep -xF -- "$wanted" >/dev/null || failed "the shell does not offer $wanted after ${*:1:$#-1}"
+}
 commands_of() { "$program" "$@" --help | awk '/^Subcommands:/ { inside = 1; next } /^$/ { inside = 0 } inside && /^  [a-z]/ { print $1 }'; }
 options_of() { "$program" "$@" --help | grep -oE '^  (-[a-z],)?--[a-z0-9-]+' | grep -oE -- '--[a-z0-9-]+$'; }
 checked=0
@@ -77,17 +83,17 @@ check_command() {
   section=$(awk -v head=".SS sixpoint $*" '$0 == head { inside = 1; next } /^\.S[SH]/ { inside = 0 } inside' <<<"$page")
   [ -n "$section" ] || failed "the manual page has no section 'sixpoint $*'"
   for option in $(options_of "$@"); do
-    offered sixpoint "$@" "$option" | grep -qxF -- "$option" || failed "the shell does not offer $* $option"
+    offers "$option" sixpoint "$@" "$option"
     [ "$option" = --help ] || grep -qF -- "$option" <<<"$section" || failed "the manual page's section $* lacks $option"
   done
   checked=$((checked + 1))
   for sub in $(commands_of "$@"); do
-    offered sixpoint "$@" "${sub:0:2}" | grep -qxF -- "$sub" || failed "the shell does not offer $* $sub"
+    offers "$sub" sixpoint "$@" "${sub:0:2}"
     check_command "$@" "$sub"
   done
 }
 for command in $(commands_of); do
-  offered sixpoint "${command:0:1}" | grep -qxF -- "$command" || failed "the shell does not offer $command"
+  offers "$command" sixpoint "${command:0:1}"
   check_command "$command"
 done
 [ "$checked" -gt 40 ] || failed "only $checked commands were looked at"
@@ -119,10 +125,10 @@ for _ in $(seq 100); do
   grep -q 'http://127.0.0.1:' "$scratch/station" && break
   sleep 0.1
 done
-port=$(grep -oE 'http://127.0.0.1:[0-9]+' "$scratch/station" | head -n 1 | grep -oE '[0-9]+$' || true)
+port=$(grep -oE 'http://127.0.0.1:[0-9]+' "$scratch/station" | sed -n '1s/.*://p' || true)
 if [ -n "$port" ] && exec 3<>"/dev/tcp/127.0.0.1/$port"; then
   printf 'GET / HTTP/1.1\r\nHost: 127.0.0.1:%s\r\nConnection: close\r\n\r\n' "$port" >&3
-  head -n 1 <&3 | grep -q '200 OK' || failed "the page is not served"
+  head -n 1 <&3 | grep '200 OK' >/dev/null || failed "the page is not served"
   exec 3>&-
 else
   failed "the service's command line does not start the station: $(cat "$scratch/station")"

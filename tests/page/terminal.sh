@@ -9,10 +9,12 @@ folder=$(mktemp -d)
 tmux=(tmux -S "$folder/socket" -f /dev/null)
 trap '"${tmux[@]}" kill-server 2>/dev/null || true; rm -rf "$folder"' EXIT
 
+# grep reads the whole screen (no -q): with pipefail, one that stops at the first hit makes the writer fail.
+shows() { screen | grep -F -- "$1" >/dev/null; }
 screen() { "${tmux[@]}" capture-pane -p -S - -t t 2>/dev/null; }
 wait_for() { # TEXT
   for _ in $(seq 600); do
-    if screen | grep -qF -- "$1"; then return 0; fi
+    if shows "$1"; then return 0; fi
     sleep 0.1
   done
   echo "FAILED: '$1' never came; the terminal shows:"
@@ -31,7 +33,7 @@ wait_for "is taken back"
 wait_for "run is complete"
 wait_for ": pass"
 wait_for "ended with 0"
-screen | grep -q "constants stored as" || { echo "FAILED: nothing was stored"; screen; exit 1; }
+shows "constants stored as" || { echo "FAILED: nothing was stored"; screen; exit 1; }
 
 "${tmux[@]}" send-keys -t t "clear" Enter
 "${tmux[@]}" clear-history -t t

@@ -31,7 +31,7 @@ cd "$folder"
 
 # The kernel: what linux-image-amd64 depends on today.
 kernel_package() {
-  apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/.*Depends: \(linux-image-[0-9].*\)/\1/p' | head -n 1
+  apt-cache depends linux-image-amd64 2>/dev/null | awk '/Depends: linux-image-[0-9]/ && !seen { print $2; seen = 1 }'
 }
 if [ ! -e kernel/complete ]; then
   rm -rf kernel
@@ -54,7 +54,7 @@ if [ ! -e kernel/complete ]; then
     './lib/modules/*/kernel/block/*' './lib/modules/*/kernel/arch/*'
   rm kernel/*.deb
   # vmlinuz holds an xz stream behind its loader; the kernel inside boots in half the time.
-  offset=$(LC_ALL=C grep -abo -m 1 $'\xFD7zXZ' kernel/boot/vmlinuz-* | head -n 1 | cut -d: -f1)
+  offset=$(LC_ALL=C grep -abo -m 1 $'\xFD7zXZ' kernel/boot/vmlinuz-* | sed -n '1s/:.*//p')
   tail -c "+$((offset + 1))" kernel/boot/vmlinuz-* | xz -dc >kernel/vmlinux 2>/dev/null || true
   [ "$(head -c 4 kernel/vmlinux | tail -c 3)" = ELF ] || skip "no kernel was found in vmlinuz"
   touch kernel/complete
