@@ -15,7 +15,7 @@ namespace {
 using tests::SyntheticUnit;
 using tests::Vector;
 
-const std::array<Vector, 6> kSides = {
+const std::array<Vector, 6> kSideDirections = {
     {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 const std::array<const char*, 6> kNames = {"+x", "-x", "+y", "-y", "+z", "-z"};
 
@@ -107,7 +107,8 @@ RC_GTEST_PROP(Properties, NeverWrongAndVerified, ()) {
   };
   for (unsigned side = 0; side < 6; ++side) {
     if ((sides >> side & 1) != 0) {
-      rest(wobble_deg > 0 ? tests::wobbled(kSides[side], wobble_deg, random) : kSides[side]);
+      rest(wobble_deg > 0 ? tests::wobbled(kSideDirections[side], wobble_deg, random)
+                          : kSideDirections[side]);
     }
   }
   const bool all_sides = sides == 63;

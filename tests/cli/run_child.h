@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -55,19 +56,44 @@ class Child {
     }
     return text;
   }
+  // The JSON document that comes next on its standard output; null where the output ends before it.
+  nlohmann::json next_document() {
+    std::string text;
+    std::array<char, 4096> part{};
+    while (!nlohmann::json::accept(text)) {
+      const auto count = ::read(out_, part.data(), part.size());
+      if (count <= 0) {
+        return nullptr;
+      }
+      text.append(part.data(), static_cast<std::size_t>(count));
+    }
+    return nlohmann::json::parse(text);
+  }
   // Its exit code; -1 where a signal ended it.
   int stop(int signal) {
     ::kill(child_, signal);
     return wait();
   }
+  // As timeout(1) and impatient people do it: again and again until it has ended.
+  int stop_repeatedly(int signal) {
+    int status = 0;
+    do {
+      ::kill(child_, signal);
+    } while (::waitpid(child_, &status, WNOHANG) == 0);
+    return exit_code(status);
+  }
   int wait() {
     int status = 0;
     ::waitpid(child_, &status, 0);
+    return exit_code(status);
+  }
+
+ private:
+  int exit_code(int status) {
     child_ = -1;
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
- private:
   pid_t child_ = -1;
   int out_ = -1;
 };

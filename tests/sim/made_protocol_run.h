@@ -24,8 +24,8 @@ inline Eigen::Matrix3d up(int axis, bool down = false) {
   return down ? Eigen::Matrix3d(rotation * Eigen::Vector3d(1, -1, -1).asDiagonal()) : rotation;
 }
 
-inline sim::ProtocolSegment still(const Eigen::Matrix3d& rotation, std::uint64_t first,
-                                  double start_s, std::uint64_t samples = 1000) {
+inline sim::ProtocolSegment at_rest(const Eigen::Matrix3d& rotation, std::uint64_t first,
+                                    double start_s, std::uint64_t samples = 1000) {
   sim::ProtocolSegment segment;
   segment.name = "faces";
   segment.first_sample = first;
@@ -55,7 +55,7 @@ inline double mean_mg(const std::vector<gt3x::Counts>& counts, std::size_t first
 }
 
 inline sim::ProtocolSegment tone(double frequency_hz, double amplitude_g) {
-  sim::ProtocolSegment segment = still(up(2), 0, 50, 1000);
+  sim::ProtocolSegment segment = at_rest(up(2), 0, 50, 1000);
   segment.kind = sim::SegmentKind::vibration;
   segment.vibration = sim::Tone{Eigen::Vector3d(0, 0, 2), frequency_hz, amplitude_g, 0.3};
   return segment;

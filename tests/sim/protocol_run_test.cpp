@@ -12,15 +12,11 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::mean_mg;
-using tests::quiet;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 // Oracle: closed forms.
 TEST(ProtocolRun, GainOffsetAndRounding) {
-  ProtocolRun run = quiet({still(up(0), 0, 30), still(up(1), 1000, 45)});
+  ProtocolRun run = quiet({at_rest(up(0), 0, 30), at_rest(up(1), 1000, 45)});
   run.accel_scale_lsb_per_g = 256;
   run.gain = {1.1, 1, 1};
   run.offset_g = {0, 0.02, 0};
@@ -34,7 +30,8 @@ TEST(ProtocolRun, NoiseAndSeatingHaveTheirSize) {
   ProtocolRun run;
   run.seating_sd_deg = 0.2;
   for (int i = 0; i < 400; ++i) {
-    run.segments.push_back(still(up(i % 3), static_cast<std::uint64_t>(i) * 100, 30 + 10 * i, 100));
+    run.segments.push_back(
+        at_rest(up(i % 3), static_cast<std::uint64_t>(i) * 100, 30 + 10 * i, 100));
   }
   const auto counts = run_protocol(run);
   ASSERT_OK(counts);
@@ -53,7 +50,7 @@ TEST(ProtocolRun, NoiseAndSeatingHaveTheirSize) {
 }
 
 TEST(ProtocolRun, TemperatureComesFromTheLog) {
-  ProtocolRun run = quiet({still(up(2), 0, 100, 100), still(up(2), 100, 200, 100)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 100, 100), at_rest(up(2), 100, 200, 100)});
   run.temperature = {{0, 25}, {100, 25}, {200, 45}, {300, 45}};
   run.effects = {spec("offset_tempco", {{"mg_per_c", {1, 0, 0}}}),
                  spec("sensitivity_tempco", {{"percent_per_c", {0, 0, 0.05}}})};
@@ -80,16 +77,16 @@ TEST(ProtocolRun, SameSeedSameCountsWithEverythingOn) {
 TEST(ProtocolRun, RefusesWhatMakesNoSense) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_OK(run_protocol({}));
-  ProtocolRun run = quiet({still(up(2), 0, 30), still(up(2), 500, 60)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 30), at_rest(up(2), 500, 60)});
   EXPECT_FAILS(run_protocol(run), ErrorCode::bad_data);
-  run = quiet({still(up(2), 0, nan)});
+  run = quiet({at_rest(up(2), 0, nan)});
   EXPECT_FAILS(run_protocol(run), ErrorCode::bad_data);
-  run = quiet({still(up(2), 0, 1, ~std::uint64_t{0})});
+  run = quiet({at_rest(up(2), 0, 1, ~std::uint64_t{0})});
   EXPECT_FAILS(run_protocol(run), ErrorCode::bad_data);
-  run = quiet({still(up(2), 0, 1)});
+  run = quiet({at_rest(up(2), 0, 1)});
   run.gain[1] = nan;
   EXPECT_FAILS(run_protocol(run), ErrorCode::bad_data);
-  run = quiet({still(up(2), 0, 1)});
+  run = quiet({at_rest(up(2), 0, 1)});
   run.effects.push_back({});
   EXPECT_FAILS(run_protocol(run), ErrorCode::bad_data);
 }

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include "cli/run_child.h"
 #include "device/jigs/hid_jig.h"
 #include "device/wire/protocol.h"
 #include "gap/judge/diagnosis.h"
@@ -25,66 +26,10 @@ using tests::UsbipClient;
 using Data = UsbipClient::Data;
 
 // `sixpoint virtual ARGUMENTS --json`, up to its document.
-class Served {
+class Served : public tests::Child {
  public:
-  explicit Served(std::vector<std::string> arguments) {
-    std::array<int, 2> ends{};
-    if (::pipe(ends.data()) != 0) {
-      throw std::runtime_error("no pipe");
-    }
-    child_ = ::fork();
-    if (child_ == 0) {
-      ::dup2(ends[1], STDOUT_FILENO);
-      ::close(ends[0]);
-      ::close(ends[1]);
-      arguments.insert(arguments.begin(), {SIXPOINT_PROGRAM, "virtual", "--usbip", "0", "--json"});
-      std::vector<char*> argv;
-      for (std::string& argument : arguments) {
-        argv.push_back(argument.data());
-      }
-      argv.push_back(nullptr);
-      ::execv(SIXPOINT_PROGRAM, argv.data());
-      ::_exit(127);
-    }
-    ::close(ends[1]);
-    out_ = ends[0];
-    std::string text;
-    std::array<char, 4096> part{};
-    while (document.is_null()) {
-      const auto count = ::read(out_, part.data(), part.size());
-      if (count <= 0) {
-        break;
-      }
-      text.append(part.data(), static_cast<std::size_t>(count));
-      if (Json::accept(text)) {
-        document = Json::parse(text);
-      }
-    }
-  }
-  Served(const Served&) = delete;
-  Served& operator=(const Served&) = delete;
-  ~Served() {
-    if (child_ > 0) {
-      stop(SIGTERM);
-    }
-    ::close(out_);
-  }
-  int stop(int signal) {
-    ::kill(child_, signal);
-    int status = 0;
-    ::waitpid(child_, &status, 0);
-    child_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-  // As timeout(1) and impatient people do it: again and again until it has ended.
-  int stop_repeatedly(int signal) {
-    int status = 0;
-    do {
-      ::kill(child_, signal);
-    } while (::waitpid(child_, &status, WNOHANG) == 0);
-    child_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
+  explicit Served(std::vector<std::string> arguments)
+      : Child(whole(std::move(arguments))), document(next_document()) {}
   UsbipClient connect() const {
     return UsbipClient(document["usbip"]["port"].get<std::uint16_t>());
   }
@@ -92,8 +37,10 @@ class Served {
   Json document;
 
  private:
-  pid_t child_ = -1;
-  int out_ = -1;
+  static std::vector<std::string> whole(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"virtual", "--usbip", "0", "--json"});
+    return arguments;
+  }
 };
 
 // What a diagnosis would leave behind that found these effects, at the simulator's default sizes.

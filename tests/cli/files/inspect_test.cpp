@@ -11,12 +11,7 @@
 namespace sixpoint::cli {
 namespace {
 
-using gt3x::tests::append_second;
-using gt3x::tests::kStart;
-using gt3x::tests::made_info;
-using gt3x::tests::made_log;
-using gt3x::tests::made_parameters;
-using gt3x::tests::put_recording;
+using namespace gt3x::tests;
 using testing::HasSubstr;
 using tests::run_command;
 using tests::shared_file;

@@ -6,7 +6,6 @@ namespace {
 
 using testing::HasSubstr;
 using tests::CommandTest;
-using Json = nlohmann::ordered_json;
 
 class GapTrends : public CommandTest {
  protected:
@@ -36,7 +35,7 @@ TEST_F(GapTrends, OneUnitIsTooFew) {
   measure("J2");
   const auto answer = trends({"--json"});
   EXPECT_EQ(answer.exit_code, 2);
-  const Json json = answer.json();
+  const nlohmann::ordered_json json = answer.json();
   EXPECT_EQ(json["schema"], "sixpoint/gap-trends/1");
   EXPECT_EQ(json["runs"], 3);
   ASSERT_EQ(json["jigs"].size(), 2U);

@@ -13,12 +13,12 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 
-constexpr const char* kUnit = "virtual:seed=7,true_sensitivity_lsb_per_g=237.7/251.8/242.3";
+constexpr const char* kOtherUnit = "virtual:seed=7,true_sensitivity_lsb_per_g=237.7/251.8/242.3";
 
 class OtherDevices : public tests::CommandTest {
  protected:
   tests::Answer jig(const std::string& jig) {
-    return run({"jig", "--device", kUnit, "--jig", jig, "--store", path("s.db"), "--json"});
+    return run({"jig", "--device", kOtherUnit, "--jig", jig, "--store", path("s.db"), "--json"});
   }
 };
 

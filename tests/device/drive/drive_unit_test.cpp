@@ -14,8 +14,8 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Bench {
-  Bench() {
+struct DriveBench {
+  DriveBench() {
     options.unit.truth = sim::draw_unit(7);
     EXPECT_OK(mocks::make_virtual_drive(memory.files, "usb", options));
     registry.emplace(TransportRegistry(),
@@ -28,7 +28,7 @@ struct Bench {
 };
 
 TEST(DriveUnit, SaysWhoItIsAndHandsOutItsRecording) {
-  Bench bench;
+  DriveBench bench;
   const auto unit = bench.registry->open("drive:usb/", bench.memory.env);
   ASSERT_OK(unit);
   EXPECT_EQ((*unit)->identity().serial, bench.options.unit.truth.serial);
@@ -50,7 +50,7 @@ TEST(DriveUnit, SaysWhoItIsAndHandsOutItsRecording) {
 }
 
 TEST(DriveUnit, WhatItCannotDoIsUsage) {
-  Bench bench;
+  DriveBench bench;
   const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
   EXPECT_FAILS(unit->start_stream(100), ErrorCode::usage);
   EXPECT_FAILS(unit->read_calibration(), ErrorCode::usage);
@@ -60,7 +60,7 @@ TEST(DriveUnit, WhatItCannotDoIsUsage) {
 }
 
 TEST(DriveUnit, RefusesWhatIsNoUnit) {
-  Bench bench;
+  DriveBench bench;
   const auto open = [&](const char* address) {
     return bench.registry->open(address, bench.memory.env);
   };
@@ -73,10 +73,10 @@ TEST(DriveUnit, RefusesWhatIsNoUnit) {
 }
 
 TEST(DriveUnit, AnotherUnitInItsPlaceIsNoticed) {
-  Bench bench;
+  DriveBench bench;
   const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
   const auto recordings = *unit->recordings();
-  Bench other;
+  DriveBench other;
   sim::GivenProperties given;
   given.serial = "MOS2B99990001";
   other.options.unit.truth = sim::draw_unit(8, given);

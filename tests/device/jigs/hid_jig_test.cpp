@@ -17,8 +17,8 @@ using mocks::VirtualHidJig;
 using mocks::VirtualHidJigOptions;
 using testing::HasSubstr;
 
-struct Bench {
-  explicit Bench(const VirtualHidJigOptions& options = {}) {
+struct HidJigBench {
+  explicit HidJigBench(const VirtualHidJigOptions& options = {}) {
     mocks::VirtualUnitOptions unit;
     unit.truth = sim::draw_unit(7);
     clock = std::make_shared<ManualClock>();
@@ -35,7 +35,7 @@ struct Bench {
 };
 
 TEST(HidJig, TurnsSettlesAndReports) {
-  Bench bench;
+  HidJigBench bench;
   EXPECT_EQ(bench.jig->name(), "SixJig J600001");
   EXPECT_FALSE(bench.jig->position()->pose) << "it has not been sent anywhere";
   for (const Pose pose : kPoses) {
@@ -53,7 +53,7 @@ TEST(HidJig, TurnsSettlesAndReports) {
 
 // The unit stands still within 100 ms of the call, on the jig's own clock.
 TEST(HidJig, AnEmergencyStopIsAtTheMotorWithin100Ms) {
-  Bench bench;
+  HidJigBench bench;
   ASSERT_OK(bench.jig->go_to(Pose::minus_z));
   bench.clock->sleep(std::chrono::milliseconds(500));
   ASSERT_TRUE(bench.plugged->unit.is_turning(bench.clock->elapsed()));
@@ -134,7 +134,7 @@ TEST(HidJig, FaultsHaveTheirReasons) {
   VirtualHidJigOptions options;
   options.fault = JigFault::obstructed;
   options.fault_at = 2;
-  Bench bench(options);
+  HidJigBench bench(options);
   ASSERT_OK(bench.jig->go_to(Pose::plus_x));
   bench.clock->sleep(std::chrono::seconds(3));
   ASSERT_OK(bench.jig->go_to(Pose::plus_y));

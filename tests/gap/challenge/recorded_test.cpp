@@ -193,7 +193,7 @@ TEST_F(RecordedTrial, EveryEffectOfTheListShowsAtRest) {
 }
 
 // A minute with every raw count from -800 to 999, of the unit of MadeRecording.
-tests::MadeRecording ramp() {
+tests::MadeRecording ramp_recording() {
   tests::MadeRecording made;
   for (int i = 0; i < 1800; ++i) {
     made.raw.push_back({i - 800, 999 - i, (i * 7) % 1800 - 800});
@@ -214,7 +214,7 @@ TEST(PlainTrial, TheMismatchActsOnTheRawCounts) {
        {std::pair{StoredConstants{{246, 270, 303}, {-201, -228, -192}, {61, 4, 61}}, 0.0},
         {tests::kStored, 1.0}}) {
     MemoryFiles files;
-    tests::MadeRecording made = ramp();
+    tests::MadeRecording made = ramp_recording();
     made.constants = c;
     ASSERT_OK(made.write(files, "in.gt3x"));
     ASSERT_OK(write_plain_trial(files, "in.gt3x", "out.gt3x", {mismatch()}));
@@ -234,7 +234,7 @@ TEST(PlainTrial, TheMismatchActsOnTheRawCounts) {
 // Oracle: gain and offset in the axes as they are stored; one count of rounding twice.
 TEST(PlainTrial, ARecordingWithTurnedAxesIsChangedAsStored) {
   MemoryFiles files;
-  tests::MadeRecording made = ramp();
+  tests::MadeRecording made = ramp_recording();
   made.firmware = "1.6.0";
   ASSERT_OK(made.write(files, "in.gt3x"));
   ASSERT_OK(write_plain_trial(files, "in.gt3x", "out.gt3x", {mismatch()}));
@@ -252,7 +252,7 @@ TEST(PlainTrial, ARecordingWithTurnedAxesIsChangedAsStored) {
 
 TEST(PlainTrial, EverythingButTheSamplesStays) {
   MemoryFiles files;
-  ASSERT_OK(ramp().write(files, "in.gt3x"));
+  ASSERT_OK(ramp_recording().write(files, "in.gt3x"));
   ASSERT_OK(write_plain_trial(files, "in.gt3x", "same.gt3x", {}));
   ASSERT_OK(write_plain_trial(files, "in.gt3x", "out.gt3x", {mismatch()}));
   EXPECT_EQ(tests::entry_of(files, "same.gt3x", "log.bin"),
@@ -281,7 +281,7 @@ TEST(PlainTrial, EverythingButTheSamplesStays) {
 
 TEST(PlainTrial, OneMismatchIsAllThatCanBeAdded) {
   MemoryFiles files;
-  ASSERT_OK(ramp().write(files, "in.gt3x"));
+  ASSERT_OK(ramp_recording().write(files, "in.gt3x"));
   for (const auto& effects : {std::vector<EffectSpec>{effect("tilt")},
                               {mismatch(), mismatch()},
                               {mismatch(), effect("tilt")}}) {
@@ -294,13 +294,13 @@ TEST(PlainTrial, OneMismatchIsAllThatCanBeAdded) {
 
 TEST(PlainTrial, ARecordingWithoutOneSetOfUsableConstantsIsRefused) {
   MemoryFiles files;
-  tests::MadeRecording made = ramp();
+  tests::MadeRecording made = ramp_recording();
   made.constants.negative_lsb[1] = made.constants.positive_lsb[1];
   ASSERT_OK(made.write(files, "equal.gt3x"));
-  made = ramp();
+  made = ramp_recording();
   made.raw.clear();
   ASSERT_OK(made.write(files, "empty.gt3x"));
-  made = ramp();
+  made = ramp_recording();
   tests::MadeRecording other = made;
   other.constants.zero_lsb[0] = 0;
   made.between = [&](std::size_t second) {
@@ -311,7 +311,7 @@ TEST(PlainTrial, ARecordingWithoutOneSetOfUsableConstantsIsRefused) {
     return bytes;
   };
   ASSERT_OK(made.write(files, "two.gt3x"));
-  made = ramp();
+  made = ramp_recording();
   auto writer = gt3x::RecordingWriter::create(files, "repaired.gt3x").value();
   ASSERT_OK(writer.add("log.bin", made.log()));
   ASSERT_OK(writer.add("info.txt", gt3x::tests::made_info()));

@@ -67,12 +67,12 @@ double gap_mg(const Features& recorded, const Features& simulation) {
   return std::sqrt(std::max(0.0, sum / static_cast<double>(std::max<std::size_t>(1, n))));
 }
 
-struct Case {
+struct ScenarioCase {
   const char* effect;
   const char* parameters;
 };
 
-class Resimulation : public ::testing::TestWithParam<Case> {};
+class Resimulation : public ::testing::TestWithParam<ScenarioCase> {};
 
 TEST_P(Resimulation, GapAfterIsWhatTheSimulatorLeaves) {
   Json truth = {
@@ -138,16 +138,17 @@ TEST_P(Resimulation, GapAfterIsWhatTheSimulatorLeaves) {
 
 INSTANTIATE_TEST_SUITE_P(
     Effects, Resimulation,
-    ::testing::Values(Case{"tilt", R"({"rotation_vector_deg": [0.15, -0.1, 0]})"},
-                      Case{"misalignment", R"({"rotation_vector_deg": [0.3, -0.2, 0.25]})"},
-                      Case{"non_orthogonality", R"({"yz_xz_xy": [0.004, -0.003, 0.005]})"},
-                      Case{"second_order", R"({"mg_per_g2": [0.4, -0.3, 0.2]})"},
-                      Case{"third_order", R"({"mg_per_g3": [0.08, -0.06, 0.05]})"},
-                      Case{"hysteresis", R"({"mg": [0.8, -0.6, 0.7]})"},
-                      Case{"offset_tempco", R"({"mg_per_c": [0.4, -0.3, 0.2]})"},
-                      Case{"sensitivity_tempco", R"({"percent_per_c": [0.03, 0.02, -0.025]})"},
-                      Case{"warm_up", R"({"mg": [6, -4, 5], "tau_s": [300]})"},
-                      Case{"drift", R"({"mg_per_h": [3, -2, 2.5]})"}),
+    ::testing::Values(ScenarioCase{"tilt", R"({"rotation_vector_deg": [0.15, -0.1, 0]})"},
+                      ScenarioCase{"misalignment", R"({"rotation_vector_deg": [0.3, -0.2, 0.25]})"},
+                      ScenarioCase{"non_orthogonality", R"({"yz_xz_xy": [0.004, -0.003, 0.005]})"},
+                      ScenarioCase{"second_order", R"({"mg_per_g2": [0.4, -0.3, 0.2]})"},
+                      ScenarioCase{"third_order", R"({"mg_per_g3": [0.08, -0.06, 0.05]})"},
+                      ScenarioCase{"hysteresis", R"({"mg": [0.8, -0.6, 0.7]})"},
+                      ScenarioCase{"offset_tempco", R"({"mg_per_c": [0.4, -0.3, 0.2]})"},
+                      ScenarioCase{"sensitivity_tempco",
+                                   R"({"percent_per_c": [0.03, 0.02, -0.025]})"},
+                      ScenarioCase{"warm_up", R"({"mg": [6, -4, 5], "tau_s": [300]})"},
+                      ScenarioCase{"drift", R"({"mg_per_h": [3, -2, 2.5]})"}),
     [](const auto& made) { return std::string(made.param.effect); });
 
 }  // namespace

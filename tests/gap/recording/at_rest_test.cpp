@@ -10,14 +10,14 @@
 namespace sixpoint::gap {
 namespace {
 
-struct Made {
+struct MadeSegments {
   Bundle bundle;
   CleanSamples clean;
 };
 
 // Segments of Z = 256 LSB and a little, one behind the other.
-Made made(const std::vector<Segment>& segments) {
-  Made made;
+MadeSegments made(const std::vector<Segment>& segments) {
+  MadeSegments made;
   for (Segment segment : segments) {
     segment.first_sample = made.clean.samples.size();
     for (std::size_t i = 0; i < segment.samples; ++i) {
@@ -42,10 +42,11 @@ Segment segment(Segment::Kind kind, std::size_t samples, bool starts_placement) 
 // Three seconds ring after a move; what is left must be four seconds at rest.
 TEST(AtRest, StretchesAreFourQuietSecondsAndMoreAtRest) {
   using Kind = Segment::Kind;
-  const Made made = gap::made({segment(Kind::still, 700, true), segment(Kind::still, 699, true),
-                               segment(Kind::still, 400, false), segment(Kind::still, 399, false),
-                               segment(Kind::soak, 2000, true), segment(Kind::ramp, 2000, true),
-                               segment(Kind::vibration, 2000, true)});
+  const MadeSegments made =
+      gap::made({segment(Kind::still, 700, true), segment(Kind::still, 699, true),
+                 segment(Kind::still, 400, false), segment(Kind::still, 399, false),
+                 segment(Kind::soak, 2000, true), segment(Kind::ramp, 2000, true),
+                 segment(Kind::vibration, 2000, true)});
   const auto found = stretches(made.bundle, made.clean);
   ASSERT_EQ(found.size(), 3U);
   const std::size_t samples[] = {400, 400, 1700};
@@ -59,7 +60,7 @@ TEST(AtRest, StretchesAreFourQuietSecondsAndMoreAtRest) {
 
 // One LSB is 3.90625 mg.
 TEST(AtRest, StretchesAreInMgAboutTheirMeanWithMaskedSamplesZero) {
-  Made made = gap::made({segment(Segment::Kind::still, 400, false)});
+  MadeSegments made = gap::made({segment(Segment::Kind::still, 400, false)});
   for (std::size_t i = 100; i < 110; ++i) {
     made.clean.samples[i] = {2000, 2000, 2000};
     made.clean.flags[i] = kSampleClipped;
@@ -74,7 +75,7 @@ TEST(AtRest, StretchesAreInMgAboutTheirMeanWithMaskedSamplesZero) {
 }
 
 TEST(AtRest, StretchWithMoreThanATenthMaskedIsLeftOut) {
-  Made made = gap::made({segment(Segment::Kind::still, 400, false)});
+  MadeSegments made = gap::made({segment(Segment::Kind::still, 400, false)});
   std::fill_n(made.clean.flags.begin(), 40, std::uint8_t{kSampleZero});
   EXPECT_EQ(stretches(made.bundle, made.clean).size(), 1U);
   made.clean.flags[40] = kSampleHeld;
@@ -84,8 +85,9 @@ TEST(AtRest, StretchWithMoreThanATenthMaskedIsLeftOut) {
 // By hand: 300 samples ring after the move, 1700 are left; the segment begins at sample 100.
 TEST(AtRest, PiecesFollowOneAnotherFromWhereRingingIsOver) {
   using Kind = Segment::Kind;
-  const Made made = gap::made({segment(Kind::vibration, 100, true),
-                               segment(Kind::still, 2000, true), segment(Kind::ramp, 50, false)});
+  const MadeSegments made =
+      gap::made({segment(Kind::vibration, 100, true), segment(Kind::still, 2000, true),
+                 segment(Kind::ramp, 50, false)});
   const auto pieces = rest_pieces(made.bundle, 1, 600);
   ASSERT_EQ(pieces.size(), 3U);
   const std::size_t first[] = {400, 1000, 1600};

@@ -13,8 +13,8 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 // A unit behind a plan; the test is the carrier.
-struct Bench {
-  explicit Bench(const std::string& faults)
+struct FaultyBench {
+  explicit FaultyBench(const std::string& faults)
       : injector(
             *parse_fault_plan(R"({"schema": "sixpoint/faults/1", "faults": [)" + faults + "]}"),
             nanoseconds(0)) {}
@@ -40,7 +40,7 @@ struct Bench {
 };
 
 TEST(FaultInjector, WithoutFaultsEverythingPasses) {
-  Bench bench("");
+  FaultyBench bench("");
   for (int i = 0; i < 10; ++i) {
     EXPECT_TRUE(bench.answers());
   }
@@ -51,7 +51,7 @@ TEST(FaultInjector, WithoutFaultsEverythingPasses) {
 
 // `at_report` counts from 1; `every` and `count` as docs/faults.md describes them.
 TEST(FaultInjector, CountAndEveryChooseTheReports) {
-  Bench bench(R"({"fault": "lost", "at_report": 3, "count": 2, "every": 5})");
+  FaultyBench bench(R"({"fault": "lost", "at_report": 3, "count": 2, "every": 5})");
   std::string passed;
   for (int i = 0; i < 14; ++i) {
     passed += bench.answers() ? '+' : '-';
@@ -60,37 +60,37 @@ TEST(FaultInjector, CountAndEveryChooseTheReports) {
 }
 
 TEST(FaultInjector, TransfersAreChangedAsTheKindDescribes) {
-  Bench flip(R"({"fault": "bit_flip", "at_report": 1, "byte": 10, "bit": 4})");
-  Bench clean("");
+  FaultyBench flip(R"({"fault": "bit_flip", "at_report": 1, "byte": 10, "bit": 4})");
+  FaultyBench clean("");
   Bytes changed = flip.exchange().bytes;
   const Bytes whole = clean.exchange().bytes;
   ASSERT_EQ(changed.size(), whole.size());
   changed[10] ^= 0x10;
   EXPECT_EQ(changed, whole);
 
-  Bench part(R"({"fault": "short_packet", "at_report": 1, "bytes": 7})");
+  FaultyBench part(R"({"fault": "short_packet", "at_report": 1, "bytes": 7})");
   EXPECT_EQ(part.exchange().bytes, Bytes(whole.begin(), whole.begin() + 7));
 
-  Bench twice(R"({"fault": "duplicate", "at_report": 1})");
+  FaultyBench twice(R"({"fault": "duplicate", "at_report": 1})");
   EXPECT_EQ(twice.exchange().bytes, whole);
   EXPECT_EQ(twice.read().bytes, whole);
   EXPECT_EQ(twice.read().kind, Kind::nothing);
 
-  Bench crc(R"({"fault": "bad_crc", "at_report": 1})");
+  FaultyBench crc(R"({"fault": "bad_crc", "at_report": 1})");
   EXPECT_FAILS(device::decode(crc.exchange().bytes), ErrorCode::bad_data);
 
-  Bench sequence(R"({"fault": "wrong_sequence", "at_report": 1})");
+  FaultyBench sequence(R"({"fault": "wrong_sequence", "at_report": 1})");
   const auto message = device::decode(sequence.exchange().bytes);
   ASSERT_OK(message);
   EXPECT_NE(message->sequence, 1);
 }
 
 TEST(FaultInjector, AStallKeepsTheDataAndADelayHoldsThem) {
-  Bench stall(R"({"fault": "stall", "at_report": 1})");
+  FaultyBench stall(R"({"fault": "stall", "at_report": 1})");
   EXPECT_EQ(stall.exchange().kind, Kind::stalled);
   EXPECT_EQ(stall.read().kind, Kind::data);
 
-  Bench delay(R"({"fault": "delay", "at_report": 1, "seconds": 0.5})");
+  FaultyBench delay(R"({"fault": "delay", "at_report": 1, "seconds": 0.5})");
   EXPECT_EQ(delay.exchange().kind, Kind::nothing);
   EXPECT_EQ(delay.injector.next_due(delay.unit), nanoseconds(milliseconds(500)));
   delay.now = milliseconds(499);
@@ -100,7 +100,7 @@ TEST(FaultInjector, AStallKeepsTheDataAndADelayHoldsThem) {
 }
 
 TEST(FaultInjector, AnUnpluggedUnitComesBackAsAnotherEnumeration) {
-  Bench bench(R"({"fault": "unplug", "at_s": 20, "seconds": 2})");
+  FaultyBench bench(R"({"fault": "unplug", "at_s": 20, "seconds": 2})");
   EXPECT_TRUE(bench.answers());
   EXPECT_EQ(bench.injector.next_due(bench.unit), nanoseconds(seconds(20)));
   bench.now = seconds(21);
@@ -112,7 +112,7 @@ TEST(FaultInjector, AnUnpluggedUnitComesBackAsAnotherEnumeration) {
 }
 
 TEST(FaultInjector, ASwapBringsAnotherSerial) {
-  Bench bench(R"({"fault": "swap", "at_s": 1, "serial": "MOS2B99990007"})");
+  FaultyBench bench(R"({"fault": "swap", "at_s": 1, "serial": "MOS2B99990007"})");
   bench.now = seconds(2);
   bench.injector.advance(bench.unit, bench.now);
   const auto message = device::decode(bench.exchange().bytes);
@@ -122,7 +122,7 @@ TEST(FaultInjector, ASwapBringsAnotherSerial) {
 }
 
 TEST(FaultInjector, BatteryAndFlashFaultsAreSeenInTheReplies) {
-  Bench bench(R"({"fault": "battery_low", "at_s": 1, "battery_mv": 3100},
+  FaultyBench bench(R"({"fault": "battery_low", "at_s": 1, "battery_mv": 3100},
                  {"fault": "battery_low", "at_s": 3, "battery_mv": 4000},
                  {"fault": "full_flash", "at_s": 3})");
   const auto start = [&] {

@@ -11,8 +11,8 @@ namespace {
 
 constexpr const char* kAddress = "virtual:seed=7";
 
-struct Bench {
-  Bench() { bench.register_in(links); }
+struct TestBench {
+  TestBench() { bench.register_in(links); }
   Result<std::unique_ptr<device::Unit>> open() {
     SIXPOINT_ASSIGN(device::Link link, links.open(kAddress, memory.env));
     return device::WireUnit::open(std::move(link));
@@ -46,7 +46,7 @@ PerAxis<double> mean_lsb(device::Unit& unit) {
 }
 
 TEST(VirtualBench, KeepsAUnitBetweenOpenings) {
-  Bench bench;
+  TestBench bench;
   EXPECT_FALSE(bench.bench.has(kAddress));
   EXPECT_FAILS(bench.bench.turn(kAddress, device::Pose::plus_x), ErrorCode::usage);
   auto unit = *bench.open();
@@ -59,7 +59,7 @@ TEST(VirtualBench, KeepsAUnitBetweenOpenings) {
 }
 
 TEST(VirtualBench, TurnsTheUnit) {
-  Bench bench;
+  TestBench bench;
   const auto unit = *bench.open();
   unit->clock().sleep(std::chrono::seconds(3));
   const PerAxis<double> before = mean_lsb(*unit);
@@ -71,7 +71,7 @@ TEST(VirtualBench, TurnsTheUnit) {
 }
 
 TEST(VirtualBench, UnplugsAndSwaps) {
-  Bench bench;
+  TestBench bench;
   const auto unit = *bench.open();
   const std::string serial = unit->identity().serial;
   ASSERT_OK(bench.bench.set_plugged(kAddress, false));

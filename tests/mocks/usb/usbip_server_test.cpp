@@ -30,8 +30,8 @@ constexpr std::int32_t kOverflow = -75;
 constexpr std::int32_t kConnectionReset = -104;
 constexpr std::int32_t kShutdown = -108;
 
-struct Bench {
-  explicit Bench(int count = 1, UsbipLimits limits = {}) {
+struct ServerBench {
+  explicit ServerBench(int count = 1, UsbipLimits limits = {}) {
     const auto clock = device::borrow_clock(posix_env().clock);
     std::vector<std::shared_ptr<UsbDevice>> devices;
     for (int i = 0; i < count; ++i) {
@@ -44,7 +44,7 @@ struct Bench {
     server = *UsbipServer::listen(devices, {.port = 0, .limits = limits});
     thread = std::thread([this] { status = server->run(); });
   }
-  ~Bench() {
+  ~ServerBench() {
     server->stop();
     thread.join();
     EXPECT_TRUE(status.has_value());
@@ -60,7 +60,7 @@ struct Bench {
 
 // Layout and meaning: Linux, Documentation/usb/usbip_protocol.rst.
 TEST(UsbipServer, ListsItsDevices) {
-  Bench bench(3);
+  ServerBench bench(3);
   auto client = bench.connect();
   const auto devices = client.list();
   ASSERT_EQ(devices.size(), 3U);
@@ -81,7 +81,7 @@ TEST(UsbipServer, ListsItsDevices) {
 }
 
 TEST(UsbipServer, ADeviceHasOneClientAtATime) {
-  Bench bench(2);
+  ServerBench bench(2);
   {
     auto first = bench.connect();
     ASSERT_EQ(first.import("1-1"), 0U);
@@ -110,7 +110,7 @@ TEST(UsbipServer, ADeviceHasOneClientAtATime) {
 }
 
 TEST(UsbipServer, ControlRequestsTruncateAndStall) {
-  Bench bench;
+  ServerBench bench;
   auto client = bench.connect();
   ASSERT_EQ(client.import("1-1"), 0U);
   const auto device = client.control(0x80, 6, 0x0100, 0, 18);
@@ -138,7 +138,7 @@ TEST(UsbipServer, ControlRequestsTruncateAndStall) {
 }
 
 TEST(UsbipServer, ReportsWaitUntilTheUnitHasOne) {
-  Bench bench;
+  ServerBench bench;
   auto client = bench.connect();
   ASSERT_EQ(client.import("1-1"), 0U);
   const auto waiting = client.submit(1, true, 64);
@@ -172,7 +172,7 @@ TEST(UsbipServer, ReportsWaitUntilTheUnitHasOne) {
 
 // The unit's clock is the machine's: samples come by themselves.
 TEST(UsbipServer, SamplesStreamInOrder) {
-  Bench bench;
+  ServerBench bench;
   auto client = bench.connect();
   ASSERT_EQ(client.import("1-1"), 0U);
   client.out(1, request_report(device::Command::start_stream, 1,
@@ -189,7 +189,7 @@ TEST(UsbipServer, SamplesStreamInOrder) {
 }
 
 TEST(UsbipServer, ReadsTheVolumeOverTheWire) {
-  Bench bench;
+  ServerBench bench;
   auto client = bench.connect();
   ASSERT_EQ(client.import("1-1"), 0U);
   EXPECT_EQ(client.control(0xA1, 0xFE, 0, 2, 1).data, Data{0});
@@ -213,7 +213,7 @@ TEST(UsbipServer, ReadsTheVolumeOverTheWire) {
 }
 
 TEST(UsbipServer, UnpluggedInFlightAndPluggedAgain) {
-  Bench bench;
+  ServerBench bench;
   auto client = bench.connect();
   ASSERT_EQ(client.import("1-1"), 0U);
   const auto report = client.submit(1, true, 64);
@@ -238,7 +238,7 @@ TEST(UsbipServer, UnpluggedInFlightAndPluggedAgain) {
 // ---- hostile peers ------------------------------------------------------------------------------
 
 TEST(UsbipServer, BreachesEndTheConnectionAndNothingElse) {
-  Bench bench;
+  ServerBench bench;
   for (const Data& hello : {Data{0x01, 0x10, 0x80, 0x05, 0, 0, 0, 0}, Data(64, 0xFF), Data(8, 0),
                             Data{0x01, 0x11, 0x80, 0x04, 0, 0, 0, 0}}) {
     auto client = bench.connect();
@@ -265,7 +265,7 @@ TEST(UsbipServer, BreachesEndTheConnectionAndNothingElse) {
 }
 
 TEST(UsbipServer, AFloodOfRequestsIsCutOff) {
-  Bench bench;
+  ServerBench bench;
   auto client = bench.connect();
   ASSERT_EQ(client.import("1-1"), 0U);
   for (int i = 0; i < 5000; ++i) {
@@ -276,7 +276,7 @@ TEST(UsbipServer, AFloodOfRequestsIsCutOff) {
 }
 
 TEST(UsbipServer, ATakenPortIsSaid) {
-  Bench bench;
+  ServerBench bench;
   EXPECT_FAILS(UsbipServer::listen({}, {.port = bench.server->port(), .limits = {}}),
                ErrorCode::io);
 }

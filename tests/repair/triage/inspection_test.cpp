@@ -18,12 +18,7 @@ namespace {
 
 using gt3x::GapKind;
 using gt3x::RecordType;
-using gt3x::tests::append_second;
-using gt3x::tests::kStart;
-using gt3x::tests::made_info;
-using gt3x::tests::made_log;
-using gt3x::tests::made_parameters;
-using gt3x::tests::put_recording;
+using namespace gt3x::tests;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;

@@ -7,9 +7,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::run;
+using namespace tests;
 
 // Oracle: what firmware 1.6.0 does (16CPAN03): x stored = -y, y stored = x.
 TEST(AxisRotation, TurnsWhatIsStoredAsFirmware160Does) {

@@ -11,12 +11,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::amplitude_mg;
-using tests::made_block;
-using tests::made_effect;
-using tests::quiet;
-using tests::spec;
-using tests::tone;
+using namespace tests;
 
 std::unique_ptr<Effect> low_pass(double corner_hz, int order) {
   auto effect = made_effect("bandwidth",

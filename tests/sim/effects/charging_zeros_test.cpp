@@ -7,9 +7,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::run;
+using namespace tests;
 
 TEST(ChargingZeros, ChargingStoresZeros) {
   const SimulatedBlock block =

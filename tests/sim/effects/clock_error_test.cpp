@@ -5,9 +5,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::run;
+using namespace tests;
 
 // Oracle: closed forms.
 TEST(ClockError, ClockErrorComesEarly) {

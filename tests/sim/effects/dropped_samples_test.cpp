@@ -9,15 +9,10 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::quiet;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(DroppedSamples, TheRestComesLater) {
-  ProtocolRun run = quiet({still(up(2), 0, 50, 20'000)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 50, 20'000)});
   run.noise_mg = {5, 5, 5};
   run.effects = {spec("dropped_samples", {{"rate", {0.01}}})};
   EXPECT_NEAR(record_protocol(run)->sample_time_s.back() - 50, 199.99 + 2.02, 0.7);

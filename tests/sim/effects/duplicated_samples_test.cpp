@@ -10,15 +10,10 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::quiet;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(DuplicatedSamples, TheRestComesEarlierAndTheCopyIsExact) {
-  ProtocolRun run = quiet({still(up(2), 0, 50, 20'000)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 50, 20'000)});
   run.effects = {spec("duplicated_samples", {{"rate", {0.01}}})};
   const auto twice = record_protocol(run);
   ASSERT_OK(twice);

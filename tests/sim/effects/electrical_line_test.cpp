@@ -11,7 +11,7 @@ namespace {
 using tests::made_block;
 using tests::made_effect;
 
-constexpr double kFrequency_hz = 5;  // a quarter of a period is five samples at 100 Hz
+constexpr double kLine_hz = 5;  // a quarter of a period is five samples at 100 Hz
 
 std::vector<Eigen::Vector3d> added(Effect& effect, double clock_start_s,
                                    const Eigen::Vector3d& force_g) {
@@ -26,8 +26,8 @@ std::vector<Eigen::Vector3d> added(Effect& effect, double clock_start_s,
 
 // Oracle: sin^2 + cos^2 = 1 whatever the phase, and all axes in step.
 TEST(ElectricalLine, IsASineOfItsAmplitudeAndFrequency) {
-  const auto effect = made_effect("electrical_line",
-                                  {{"vector_mg", {1, -2, 0}}, {"frequency_hz", {kFrequency_hz}}});
+  const auto effect =
+      made_effect("electrical_line", {{"vector_mg", {1, -2, 0}}, {"frequency_hz", {kLine_hz}}});
   const auto line = added(*effect, 30, {0, 0, 1});
   for (std::size_t i = 0; i + 20 < line.size(); ++i) {
     EXPECT_NEAR(std::hypot(line[i].x(), line[i + 5].x()), 0.001, 1e-12) << i;
@@ -42,7 +42,7 @@ TEST(ElectricalLine, IsASineOfItsAmplitudeAndFrequency) {
 // whole periods.
 TEST(ElectricalLine, IsTheSameInEveryPoseAndRunsOn) {
   const auto effect =
-      made_effect("electrical_line", {{"vector_mg", {1, 2, 3}}, {"frequency_hz", {kFrequency_hz}}});
+      made_effect("electrical_line", {{"vector_mg", {1, 2, 3}}, {"frequency_hz", {kLine_hz}}});
   const auto flat = added(*effect, 30, {0, 0, 1});
   const auto side = added(*effect, 60, {1, 0, 0});
   for (std::size_t i = 0; i < flat.size(); ++i) {

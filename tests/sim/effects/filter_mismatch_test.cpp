@@ -5,9 +5,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_effect;
-using tests::run;
-using tests::sensed_under;
+using namespace tests;
 
 // Oracle: a common gain and an offset per axis, by hand.
 TEST(FilterMismatch, ACommonGainAndAnOffsetOfEachAxis) {

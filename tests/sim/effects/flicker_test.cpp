@@ -10,13 +10,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::mean_mg;
-using tests::quiet;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 // Oracle: the definition. Between 0.05 and 0.5 Hz and between 0.5 and 5 Hz a 1/f law has the same
 // power; at 1 Hz its one-sided density is mg^2 per Hz.
@@ -25,7 +19,7 @@ TEST(Flicker, FlickerHasItsSpectrum) {
   run.accel_scale_lsb_per_g = 1500;
   run.noise_mg = {};
   run.seating_sd_deg = 0;
-  run.segments = {still(up(2), 0, 50, 120'000)};
+  run.segments = {at_rest(up(2), 0, 50, 120'000)};
   run.effects = {spec("flicker", {{"mg", {5}}})};
   const auto counts = run_protocol(run);
   ASSERT_OK(counts);

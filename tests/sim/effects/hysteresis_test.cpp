@@ -7,17 +7,12 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_effect;
-using tests::mean_mg;
-using tests::quiet;
-using tests::sensed_under;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(Hysteresis, HysteresisRemembersTheApproach) {
-  ProtocolRun run = quiet({still(up(2), 0, 30), still(up(0), 1000, 45), still(up(2), 2000, 60),
-                           still(up(2, true), 3000, 75), still(up(0), 4000, 90)});
+  ProtocolRun run =
+      quiet({at_rest(up(2), 0, 30), at_rest(up(0), 1000, 45), at_rest(up(2), 2000, 60),
+             at_rest(up(2, true), 3000, 75), at_rest(up(0), 4000, 90)});
   run.effects = {spec("hysteresis", {{"mg", {10, 10, 10}}})};
   const auto counts = run_protocol(run);
   ASSERT_OK(counts);

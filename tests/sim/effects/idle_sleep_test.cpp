@@ -10,9 +10,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::spec;
+using namespace tests;
 
 TEST(IdleSleep, IdleSleepHoldsAtRestOnly) {
   ProtocolRun run;

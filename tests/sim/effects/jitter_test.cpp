@@ -9,15 +9,10 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::quiet;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(Jitter, HasItsSize) {
-  ProtocolRun run = quiet({still(up(2), 0, 50, 20'000)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 50, 20'000)});
   run.noise_mg = {5, 5, 5};
   run.effects = {spec("jitter", {{"rms_ms", {1}}})};
   const auto shaken = record_protocol(run);

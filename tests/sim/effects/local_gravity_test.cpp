@@ -5,9 +5,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::run;
+using namespace tests;
 
 // Oracle: a ratio of specific forces; gravity is vertical.
 TEST(LocalGravity, ChangesTheVerticalForceOnly) {

@@ -8,9 +8,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_effect;
-using tests::run;
-using tests::sensed_under;
+using namespace tests;
 
 TEST(Misalignment, MisalignmentTurnsWhatTheSensorFeelsNotTheTruth) {
   const SimulatedBlock block = run("misalignment", {{"rotation_vector_deg", {0, 1, 0}}}, {0, 0, 1});

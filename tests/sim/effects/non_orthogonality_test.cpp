@@ -5,9 +5,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_effect;
-using tests::run;
-using tests::sensed_under;
+using namespace tests;
 
 // Oracle: the wGT3X-BT with the largest cross-axis of those that were measured (docs/constants.md).
 TEST(NonOrthogonality, TheCrossAxisOfRealUnitsIsPlausible) {

@@ -6,14 +6,10 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::integer_under;
-using tests::quiet;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(RoundingFloor, StoresTheNextLowerCount) {
-  ProtocolRun run = quiet({still(up(2), 0, 50)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 50)});
   run.accel_scale_lsb_per_g = 256;
   run.offset_g = {-0.7 / 256, 0.7 / 256, 0};
   run.effects = {spec("rounding_floor")};

@@ -10,16 +10,11 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
-using tests::made_effect;
-using tests::mean_mg;
-using tests::quiet;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(Settling, SettlingRingsAfterAMoveOnly) {
-  ProtocolRun run = quiet({still(up(2), 0, 30), still(up(0), 1000, 45), still(up(0), 2000, 60)});
+  ProtocolRun run =
+      quiet({at_rest(up(2), 0, 30), at_rest(up(0), 1000, 45), at_rest(up(0), 2000, 60)});
   run.effects = {
       spec("settling", {{"amplitude", {0.1}}, {"frequency_hz", {5}}, {"decay_s", {0.3}}})};
   const auto counts = run_protocol(run);

@@ -9,11 +9,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::amplitude_mg;
-using tests::made_effect;
-using tests::quiet;
-using tests::spec;
-using tests::tone;
+using namespace tests;
 
 TEST(SoftMount, ResonatesAtItsFrequency) {
   ProtocolRun run = quiet({tone(10, 0.1)});

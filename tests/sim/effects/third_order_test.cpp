@@ -10,12 +10,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_effect;
-using tests::quiet;
-using tests::sensed_under;
-using tests::spec;
-using tests::tone;
-using tests::up;
+using namespace tests;
 
 TEST(ThirdOrder, ThirdOrderMakesAThirdHarmonic) {
   ProtocolRun run = quiet({tone(5, 1)});

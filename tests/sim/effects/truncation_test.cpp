@@ -9,12 +9,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::integer_under;
-using tests::quiet;
-using tests::run;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(Truncation, TruncationMovesTowardZero) {
   const SimulatedBlock cut = run("truncation", {}, {0.3, -0.5, 0.8});
@@ -28,7 +23,7 @@ TEST(Truncation, TruncationMovesTowardZero) {
 }
 
 TEST(Truncation, StoresTheCountNearerToZero) {
-  ProtocolRun run = quiet({still(up(2), 0, 50)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 50)});
   run.accel_scale_lsb_per_g = 256;
   run.offset_g = {-0.7 / 256, 0.7 / 256, 0};
   run.effects = {spec("truncation")};

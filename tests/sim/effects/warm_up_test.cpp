@@ -9,16 +9,10 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_effect;
-using tests::mean_mg;
-using tests::quiet;
-using tests::sensed_under;
-using tests::spec;
-using tests::still;
-using tests::up;
+using namespace tests;
 
 TEST(WarmUp, CountsFromPowerOn) {
-  ProtocolRun run = quiet({still(up(2), 0, 100, 10), still(up(2), 10, 3600, 10)});
+  ProtocolRun run = quiet({at_rest(up(2), 0, 100, 10), at_rest(up(2), 10, 3600, 10)});
   run.effects = {spec("warm_up", {{"mg", {50, 0, 0}}, {"tau_s", {200}}}),
                  spec("drift", {{"mg_per_h", {0, 20, 0}}})};
   const auto counts = run_protocol(run);

@@ -10,10 +10,7 @@
 namespace sixpoint::sim {
 namespace {
 
-using tests::integer_under;
-using tests::quiet;
-using tests::spec;
-using tests::tone;
+using namespace tests;
 
 TEST(Wrap, CountsOverflowModulo4096) {
   ProtocolRun run = quiet({tone(20, 3)});

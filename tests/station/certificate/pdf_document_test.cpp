@@ -13,10 +13,10 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr UtcTime kMade{std::chrono::sys_days{std::chrono::year{2026} / 3 / 4}};
+constexpr UtcTime kPrinted{std::chrono::sys_days{std::chrono::year{2026} / 3 / 4}};
 
 Bytes two_pages(const std::string& title) {
-  PdfDocument pdf(title, kMade);
+  PdfDocument pdf(title, kPrinted);
   pdf.add_page();
   pdf.text(20, 30, "left", {});
   pdf.text(190, 30, "right", {PdfFont::bold, 12, 0.4}, Align::right);
@@ -58,7 +58,7 @@ TEST(PdfDocument, PopplerReadsTheTextWhereItWasPlaced) {
 }
 
 TEST(PdfDocument, LinesHoldAllWordsAndCutAWordThatIsTooWide) {
-  PdfDocument pdf("a", kMade);
+  PdfDocument pdf("a", kPrinted);
   pdf.add_page();
   EXPECT_EQ(pdf.lines("", 50, {}), std::vector<std::string>{""});
   EXPECT_EQ(pdf.lines("one line", 50, {}), std::vector<std::string>{"one line"});
@@ -72,7 +72,7 @@ TEST(PdfDocument, LinesHoldAllWordsAndCutAWordThatIsTooWide) {
 }
 
 TEST(PdfDocument, ControlCharactersAndOtherBytesAreEscaped) {
-  PdfDocument pdf("a", kMade);
+  PdfDocument pdf("a", kPrinted);
   pdf.add_page();
   EXPECT_EQ(pdf.lines("a\nb\xff"
                       "c",

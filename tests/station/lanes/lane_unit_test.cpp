@@ -4,7 +4,7 @@
 namespace sixpoint::station {
 namespace {
 
-constexpr const char* kDevice = "virtual:seed=7,serial=MOS2A45130007,pace=20";
+constexpr const char* kUnitDevice = "virtual:seed=7,serial=MOS2A45130007,pace=20";
 
 int hand(const Station& station, const Json& body) {
   return station.post("/api/lanes/1/hand", body);
@@ -28,7 +28,7 @@ bool comes_more_than(const Station& station, std::uint64_t seen) {
 
 TEST(LaneUnit, ReadingsComeWhileNothingRuns) {
   const tests::TemporaryFolder folder;
-  Station station({kDevice}, folder.path());
+  Station station({kUnitDevice}, folder.path());
   station.wait_state(1, "idle");
   EXPECT_TRUE(comes_more_than(station, 0));
   EXPECT_TRUE(comes_more_than(station, readings(station)));
@@ -37,7 +37,7 @@ TEST(LaneUnit, ReadingsComeWhileNothingRuns) {
 
 TEST(LaneUnit, AUnitThatIsPulledOutIsNoticedAndAgainWhenItIsBack) {
   const tests::TemporaryFolder folder;
-  Station station({kDevice}, folder.path());
+  Station station({kUnitDevice}, folder.path());
   station.wait_state(1, "idle");
   ASSERT_TRUE(comes_more_than(station, 0));
   ASSERT_EQ(hand(station, {{"do", "unplug"}}), 200);
@@ -53,7 +53,7 @@ TEST(LaneUnit, AUnitThatIsPulledOutIsNoticedAndAgainWhenItIsBack) {
 // with another one.
 TEST(LaneUnit, AResultStaysWithItsUnitAndGoesWithIt) {
   const tests::TemporaryFolder folder;
-  Station station({kDevice}, folder.path());
+  Station station({kUnitDevice}, folder.path());
   station.start("/api/run");
   station.wait_state(1, "running");
   ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
@@ -74,7 +74,7 @@ TEST(LaneUnit, AResultStaysWithItsUnitAndGoesWithIt) {
 // While a run waits for its unit it can be stopped; it ends as stopped, with the unit's name.
 TEST(LaneUnit, ARunThatWaitsForItsUnitCanBeStopped) {
   const tests::TemporaryFolder folder;
-  Station station({kDevice}, folder.path());
+  Station station({kUnitDevice}, folder.path());
   station.start("/api/run");
   place_unit(station, 1, 1);
   station.wait(1, [](const Json& json) { return json["run"]["taken"].size() == 1; });
@@ -91,7 +91,7 @@ TEST(LaneUnit, ARunThatWaitsForItsUnitCanBeStopped) {
 // Lanes do not disturb each other: one loses its unit, the other's readings go on.
 TEST(LaneUnit, EachLaneHasItsOwnUnit) {
   const tests::TemporaryFolder folder;
-  Station station({kDevice, "virtual:seed=8,serial=MOS2A45130008,pace=20"}, folder.path());
+  Station station({kUnitDevice, "virtual:seed=8,serial=MOS2A45130008,pace=20"}, folder.path());
   station.wait_state(1, "idle");
   station.wait_state(2, "idle");
   ASSERT_EQ(station.post("/api/lanes/2/hand", {{"do", "unplug"}}), 200);

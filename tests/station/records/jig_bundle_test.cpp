@@ -11,8 +11,6 @@
 namespace sixpoint::station {
 namespace {
 
-using Json = nlohmann::json;
-
 TEST(JigBundle, AStoredRunIsDiagnosed) {
   tests::TemporaryFolder folder;
   const std::string store = folder / "s.db";
@@ -24,10 +22,10 @@ TEST(JigBundle, AStoredRunIsDiagnosed) {
   const auto diagnosed = tests::run_command(
       posix_env(), {"gap", "diagnose", "--run", run, "--store", store, "--json"});
   EXPECT_EQ(diagnosed.exit_code, 0) << diagnosed.people;
-  const Json json = Json::parse(diagnosed.out);
+  const nlohmann::json json = nlohmann::json::parse(diagnosed.out);
   EXPECT_EQ(json["verdict"], "no_gap");
   bool mismatch = false;
-  for (const Json& hidden : json["not_observable"]) {
+  for (const nlohmann::json& hidden : json["not_observable"]) {
     mismatch = mismatch || hidden["name"] == "filter_mismatch";
   }
   EXPECT_TRUE(mismatch) << "raw counts do not show it";
@@ -38,7 +36,7 @@ TEST(JigBundle, AStoredRunIsDiagnosed) {
   const auto trends =
       tests::run_command(posix_env(), {"gap", "trends", "--store", store, "--json"});
   EXPECT_EQ(trends.exit_code, 2) << "one unit is too few";
-  EXPECT_EQ(Json::parse(trends.out)["jigs"][0]["belongs_to"], "too_few_units");
+  EXPECT_EQ(nlohmann::json::parse(trends.out)["jigs"][0]["belongs_to"], "too_few_units");
 }
 
 TEST(JigBundle, WhatDoesNotBelongTogetherIsRefused) {

@@ -10,8 +10,6 @@
 namespace sixpoint::station {
 namespace {
 
-using Json = nlohmann::json;
-
 JigReport a_report() {
   JigReport report;
   report.serial = "MOS2A45130007";
@@ -29,13 +27,13 @@ JigReport a_report() {
 TEST(RunRecords, ARunIsCompletedFromItsReport) {
   db::RunRecord run = run_record_before({}, "MOS2A45130007", "J1");
   EXPECT_EQ(run.model, "wGT3X-BT");
-  EXPECT_EQ(Json::parse(run.limits)["run"]["rate_hz"], JigRunOptions().rate_hz);
+  EXPECT_EQ(nlohmann::json::parse(run.limits)["run"]["rate_hz"], JigRunOptions().rate_hz);
   complete_run_record(run, a_report(), "spring");
   EXPECT_EQ(run.verdict, "fail");
   EXPECT_EQ(run.codes, std::vector<std::string>{"zero_high"});
   EXPECT_EQ(run.ended - run.started, std::chrono::minutes(2));
   EXPECT_DOUBLE_EQ(run.temperature_c.value_or(0), 25.5) << "mean of the faces";
-  EXPECT_EQ(Json::parse(run.document)["study"], "spring");
+  EXPECT_EQ(nlohmann::json::parse(run.document)["study"], "spring");
 }
 
 TEST(RunRecords, AFailedRunIsStoredWithItsSamplesAndWithoutConstants) {
