@@ -21,7 +21,6 @@ namespace sixpoint::cli {
 namespace {
 
 using testing::HasSubstr;
-using Json = nlohmann::json;
 using tests::UsbipClient;
 using Data = UsbipClient::Data;
 
@@ -34,7 +33,7 @@ class Served : public tests::Child {
     return UsbipClient(document["usbip"]["port"].get<std::uint16_t>());
   }
 
-  Json document;
+  nlohmann::json document;
 
  private:
   static std::vector<std::string> whole(std::vector<std::string> arguments) {

@@ -7,7 +7,6 @@ namespace sixpoint::cli {
 namespace {
 
 using tests::CommandTest;
-using Json = nlohmann::json;
 
 TEST_F(CommandTest, SimulateMakesTheSameBytes) {
   std::ofstream(path("s.json"))
@@ -17,8 +16,8 @@ TEST_F(CommandTest, SimulateMakesTheSameBytes) {
   EXPECT_EQ(first.exit_code, 0) << first.people;
   const auto second =
       run({"simulate", "--scenario", path("s.json"), "-o", path("b.gt3x"), "--json"});
-  const Json json = Json::parse(first.out);
-  EXPECT_EQ(json["sha256"], Json::parse(second.out)["sha256"]);
+  const nlohmann::json json = nlohmann::json::parse(first.out);
+  EXPECT_EQ(json["sha256"], nlohmann::json::parse(second.out)["sha256"]);
   EXPECT_EQ(json["samples"], 3600);
   EXPECT_EQ(json["filter"]["in_force"], "current");
   std::ifstream truth(path("a.csv"));

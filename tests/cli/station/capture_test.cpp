@@ -7,14 +7,13 @@ namespace {
 using testing::HasSubstr;
 using tests::CommandTest;
 using tests::kDevice;
-using Json = nlohmann::json;
 
 TEST_F(CommandTest, CaptureMakesACalibrationFile) {
   const auto answer =
       run({"capture", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"), "-o",
            path("c.gt3x"), "--constants", path("c.json"), "--json"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
-  const Json json = Json::parse(answer.out);
+  const nlohmann::json json = nlohmann::json::parse(answer.out);
   EXPECT_EQ(json["schema"], "sixpoint/capture/1");
   EXPECT_EQ(json["verified"], true);
   EXPECT_EQ(json["file"], path("c.gt3x"));
@@ -22,7 +21,7 @@ TEST_F(CommandTest, CaptureMakesACalibrationFile) {
   // The file stands on its own: `solve` gives the same constants.
   const auto solve = run({"solve", path("c.gt3x"), "--json"});
   EXPECT_EQ(solve.exit_code, 0);
-  EXPECT_EQ(Json::parse(solve.out)["constants"], json["constants"]);
+  EXPECT_EQ(nlohmann::json::parse(solve.out)["constants"], json["constants"]);
 
   const auto again = run({"capture", "--device", kDevice, "--jig", "virtual", "--store",
                           path("s.db"), "-o", path("c.gt3x")});
@@ -33,7 +32,7 @@ TEST_F(CommandTest, CaptureRefusesAFirmwareWhoseFileCannotHelp) {
   const auto answer = run({"capture", "--device", "virtual:seed=7,firmware=1.8.0,jig=auto", "-o",
                            path("c.gt3x"), "--store", path("s.db"), "--json"});
   EXPECT_EQ(answer.exit_code, 1);
-  const Json json = Json::parse(answer.out);
+  const nlohmann::json json = nlohmann::json::parse(answer.out);
   EXPECT_EQ(json["verdict"], "refused");
   EXPECT_EQ(json["filter"], "legacy");
   EXPECT_THAT(json["reasons"].dump(), HasSubstr("firmware from 1.4.0 to 1.7.0"));

@@ -21,7 +21,6 @@ namespace {
 
 using testing::HasSubstr;
 using testing::IsSupersetOf;
-using Json = nlohmann::json;
 
 constexpr const char* kUnit =
     "virtual:seed=7,serial=MOS2A45130007,true_sensitivity_lsb_per_g=237.7/251.8/242.3,"
@@ -45,11 +44,12 @@ class Faults : public testing::TestWithParam<Row> {
                                   << "]}";
     return std::string(kUnit) + ",faults=" + path("f.json");
   }
-  Json stored_constants() {
+  nlohmann::json stored_constants() {
     const auto history = tests::run_command(
         posix_env(), {"history", "MOS2A45130007", "--store", path("s.db"), "--json"});
-    const Json json = Json::parse(history.out, nullptr, false);
-    return json.is_object() && json.contains("constants") ? json["constants"] : Json::array();
+    const nlohmann::json json = nlohmann::json::parse(history.out, nullptr, false);
+    return json.is_object() && json.contains("constants") ? json["constants"]
+                                                          : nlohmann::json::array();
   }
   tests::TemporaryFolder folder_;
 };
@@ -66,7 +66,7 @@ TEST_P(JigFaults, DoesWhatTheTableSays) {
   const auto answer = tests::run_command(posix_env(), arguments);
   EXPECT_EQ(answer.exit_code, row.exit_code) << answer.people << answer.out;
   EXPECT_THAT(answer.people + answer.out, HasSubstr(row.says));
-  const Json constants = stored_constants();
+  const nlohmann::json constants = stored_constants();
   if (row.exit_code == 0) {
     // Oracle: the sensor that the device string names.
     ASSERT_EQ(constants.size(), 1U);
@@ -80,7 +80,7 @@ TEST_P(JigFaults, DoesWhatTheTableSays) {
   } else {
     EXPECT_TRUE(constants.empty()) << "nothing wrong is stored";
   }
-  if (const Json json = Json::parse(answer.out, nullptr, false);
+  if (const nlohmann::json json = nlohmann::json::parse(answer.out, nullptr, false);
       json.is_object() && json.contains("run")) {
     EXPECT_FALSE(json["run"].get<std::string>().empty()) << "the run is kept, with its samples";
   }

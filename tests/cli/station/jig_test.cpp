@@ -6,14 +6,13 @@ namespace {
 
 using tests::CommandTest;
 using tests::kDevice;
-using Json = nlohmann::json;
 
 // Oracle: the sensor that the device string names.
 TEST_F(CommandTest, JigFindsTheSensorAndStoresIt) {
   const auto answer = run({"jig", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"),
                            "--operator", "A", "--json"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
-  const Json json = Json::parse(answer.out);
+  const nlohmann::json json = nlohmann::json::parse(answer.out);
   EXPECT_EQ(json.begin().key(),
             "as_found");  // nlohmann::json sorts; the document itself is ordered
   EXPECT_EQ(answer.out.find("\"schema\": \"sixpoint/jig/1\""), 4U);
@@ -34,7 +33,7 @@ TEST_F(CommandTest, JigFindsTheSensorAndStoresIt) {
 
   const auto history = run({"history", "MOS2A45130007", "--store", path("s.db"), "--json"});
   EXPECT_EQ(history.exit_code, 0);
-  const Json constants = Json::parse(history.out)["constants"];
+  const nlohmann::json constants = nlohmann::json::parse(history.out)["constants"];
   ASSERT_EQ(constants.size(), 1U);
   EXPECT_EQ(constants[0]["id"], json["stored_id"]);
   EXPECT_EQ(constants[0]["filter"], "current");

@@ -5,8 +5,6 @@
 namespace sixpoint::gap {
 namespace {
 
-using Json = nlohmann::json;
-
 Outcome outcome(TrialKind kind, std::vector<TrialEffect> truth,
                 std::vector<std::pair<std::string, double>> named, bool unknown = false) {
   Outcome made;
@@ -72,7 +70,7 @@ TEST(Score, StrippedTrialsCountAsWithheld) {
 
 TEST(Score, AnswersOfAnotherFormAreFailures) {
   Outcome read;
-  read_answer(Json::parse(R"({"verdict": "explained", "effects": [{"name": "tilt",
+  read_answer(nlohmann::json::parse(R"({"verdict": "explained", "effects": [{"name": "tilt",
     "probability": 0.9, "confounded_with": ["misalignment", 7]}, {"name": 3}],
     "not_observable": [{"name": "wrap"}], "unknown": {"present": true}})"),
               read);
@@ -84,7 +82,7 @@ TEST(Score, AnswersOfAnotherFormAreFailures) {
   EXPECT_TRUE(read.unknown);
   for (const char* text : {"[]", "{}", R"({"verdict": 7})"}) {
     Outcome none;
-    read_answer(Json::parse(text), none);
+    read_answer(nlohmann::json::parse(text), none);
     EXPECT_NE(none.failure, "") << text;
   }
 }
