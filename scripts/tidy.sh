@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # clang-tidy over the program's sources, on every core. A clean file is not checked again until it, a file
 # that it includes, or .clang-tidy changes.
-#   scripts/tidy.sh [--within SECONDS] [FILE...]     needs a configured build/
+#   scripts/tidy.sh [--within SECONDS] [FILE...]     needs build/, built
 # --within begins with the last changes, starts no file after that time, and lists the files that are left.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -24,10 +24,10 @@ else
     awk 'NR == FNR { known[$0]; next } ($0 in known) && !seen[$0]++' \
       <(printf '%s\n' "${files[@]}") -)
 fi
-# clang does not read g++'s precompiled headers.
-mkdir -p build/tidy
-sed -E 's| -fpch-preprocess||; s| -Winvalid-pch -include [^ ]*/cmake_pch\.hxx||' \
-  build/compile_commands.json >build/tidy/compile_commands.json
+# Every file by itself, and without g++'s precompiled headers, which clang does not read.
+source scripts/build_environment.sh
+configure release -B build/tidy -DSIXPOINT_UNITY=OFF -DSIXPOINT_TESTS=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON
+cp -r build/generated build/tidy/
 left=$(mktemp)
 trap 'rm -f "$left"' EXIT
 

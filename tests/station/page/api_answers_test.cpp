@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 namespace sixpoint::station {
-namespace {
 
 using Json = nlohmann::ordered_json;
+
+namespace {
 
 // Oracle: the statuses of docs/station.md, by the meaning of RFC 9110.
 TEST(ApiAnswers, ErrorsHaveTheStatusOfTheirKind) {

@@ -10,9 +10,10 @@
 #include "temporary_folder.h"
 
 namespace sixpoint::station {
-namespace {
 
 using Json = nlohmann::ordered_json;
+
+namespace {
 
 class ApiQuality : public testing::Test {
  protected:

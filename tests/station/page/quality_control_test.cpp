@@ -10,9 +10,10 @@
 #include "temporary_folder.h"
 
 namespace sixpoint::station {
-namespace {
 
 using Json = nlohmann::ordered_json;
+
+namespace {
 
 db::StationEvent check_unit(const std::string& serial, const std::string& reason) {
   db::StationEvent event;
