@@ -54,7 +54,7 @@ if [ ! -e kernel/complete ]; then
     './lib/modules/*/kernel/block/*' './lib/modules/*/kernel/arch/*'
   rm kernel/*.deb
   # vmlinuz holds an xz stream behind its loader; the kernel inside boots in half the time.
-  offset=$(LC_ALL=C grep -abo -m 1 $'\xFD7zXZ' kernel/boot/vmlinuz-* | sed -n '1s/:.*//p')
+  offset=$(LC_ALL=C grep -abo -m 1 $'\xFD7zXZ' kernel/boot/vmlinuz-* | cut -d: -f1 | sed -n 1p)
   tail -c "+$((offset + 1))" kernel/boot/vmlinuz-* | xz -dc >kernel/vmlinux 2>/dev/null || true
   [ "$(head -c 4 kernel/vmlinux | tail -c 3)" = ELF ] || skip "no kernel was found in vmlinuz"
   touch kernel/complete
