@@ -43,7 +43,7 @@ Records judge_records(const Request& request, CleanSamples clean, NoiseSpectrum 
           std::move(timing.tones),
           timing.jitter_s,
           std::move(lines),
-          std::move(response.response),
+          response.response,
           std::move(settling),
           std::move(slow)};
 }
