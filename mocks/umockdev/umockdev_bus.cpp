@@ -99,7 +99,7 @@ void UmockdevBus::Impl::serve_ports() {
 
 std::string UmockdevBus::Impl::free_port() const {
   for (int number = 1;; ++number) {
-    const std::string port = fmt::format("{}-{}", kBusNumber, number);
+    std::string port = fmt::format("{}-{}", kBusNumber, number);
     if (!ports_.contains(port)) {
       return port;
     }
