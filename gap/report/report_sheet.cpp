@@ -193,7 +193,8 @@ class Sheet {
     std::size_t i = 0;
     for (const Chart& chart : charts_of(d_)) {
       const double x = i % 2 == 0 ? kMargin : kRight;
-      const double top = y + row_height * static_cast<double>(i / 2);
+      const std::size_t row = i / 2;
+      const double top = y + row_height * static_cast<double>(row);
       text(x, top + 11, 11, chart.title(), kBold);
       svg_.add(fmt::format(
           "<svg x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" viewBox=\"0 0 {} {}\" "

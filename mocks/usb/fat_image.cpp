@@ -13,16 +13,16 @@ namespace {
 
 using device::PayloadWriter;
 
-constexpr std::uint32_t kBlocks = (96U << 20U) / kBlockBytes;
+constexpr std::uint32_t kBlock = kBlockBytes;  // as wide as the numbers of a FAT
+constexpr std::uint32_t kBlocks = (96U << 20U) / kBlock;
 constexpr std::uint32_t kBlocksPerCluster = 4;
-constexpr std::uint32_t kClusterBytes = kBlocksPerCluster * kBlockBytes;
+constexpr std::uint32_t kClusterBytes = kBlocksPerCluster * kBlock;
 constexpr std::uint32_t kReservedBlocks = 1;
 constexpr std::uint32_t kRootEntries = 512;
 constexpr std::uint32_t kEntryBytes = 32;
-constexpr std::uint32_t kRootBlocks = kRootEntries * kEntryBytes / kBlockBytes;
+constexpr std::uint32_t kRootBlocks = kRootEntries * kEntryBytes / kBlock;
 // Two bytes per cluster, counted before the FATs themselves are taken off the volume.
-constexpr std::uint32_t kFatBlocks =
-    ((kBlocks / kBlocksPerCluster + 2) * 2 + kBlockBytes - 1) / kBlockBytes;
+constexpr std::uint32_t kFatBlocks = ((kBlocks / kBlocksPerCluster + 2) * 2 + kBlock - 1) / kBlock;
 constexpr std::uint32_t kDataStart = kReservedBlocks + 2 * kFatBlocks + kRootBlocks;
 constexpr std::uint32_t kClusters = (kBlocks - kDataStart) / kBlocksPerCluster;
 static_assert(kClusters >= 4085 && kClusters < 65525, "the number of clusters makes it FAT16");

@@ -312,10 +312,10 @@ MassStorage::Plan MassStorage::execute_on_medium(std::span<const std::uint8_t> c
     case kReadCapacity10:
       return capacity({}, medium_->blocks() - 1, kBlockBytes, 8, 8);
     case kServiceActionIn:
-      return (command[1] & 0x1FU) == kReadCapacity16
-                 ? capacity({0, 0, 0, 0}, medium_->blocks() - 1, kBlockBytes, 32,
-                            big(command, 10, 4))
-                 : refuse(kBadField);
+      if ((command[1] & 0x1FU) != kReadCapacity16) {
+        return refuse(kBadField);
+      }
+      return capacity({0, 0, 0, 0}, medium_->blocks() - 1, kBlockBytes, 32, big(command, 10, 4));
     case kRead6:
       return read(big(command, 1, 3) & 0x1FFFFFU, command[4] == 0 ? 256 : command[4]);
     case kRead10:
