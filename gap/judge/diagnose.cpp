@@ -36,15 +36,9 @@ Records judge_records(const Request& request, CleanSamples clean, NoiseSpectrum 
     }
   }
   SlowNoise slow = slow_noise(request.bundle, clean, noise);
-  return {std::move(clean),
-          std::move(noise),
-          codes,
-          timing.host,
-          std::move(timing.tones),
-          timing.jitter_s,
-          std::move(lines),
-          response.response,
-          std::move(settling),
+  return {std::move(clean), std::move(noise),        codes,
+          timing.host,      std::move(timing.tones), timing.jitter_s,
+          std::move(lines), response.response,       std::move(settling),
           std::move(slow)};
 }
 
