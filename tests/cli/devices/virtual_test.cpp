@@ -2,11 +2,9 @@
 #include <csignal>
 #include <fstream>
 #include <set>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <sys/wait.h>
 
 #include "cli/run_child.h"
 #include "device/jigs/hid_jig.h"
