@@ -9,6 +9,9 @@
 //     repaired by this program                         not_affected
 //     any other                                        as triage() says (repair/triage/triage.h)
 //
+// An .agd names no date of calibration: it is taken from the recording of the same unit and name
+// that lies beside it, where there is one.
+//
 // The samples are reported as a reason and never change the verdict. Safe to call from several
 // threads.
 #pragma once
