@@ -115,6 +115,11 @@ Json to_json(const SolveReport& report) {
     add_fit(json, *report.fit);
   }
   add_six(json, report);
+  if (report.trust) {
+    json["trust"] = {{"trusted", to_string(report.trust->trusted)},
+                     {"apart_mg", report.trust->apart_mg},
+                     {"why", report.trust->why}};
+  }
   if (report.search) {
     json["genetic"] = to_json(*report.search);
   }
@@ -140,6 +145,7 @@ Json to_json(const SixPoseSolution& solution) {
   return {{"constants", to_json(solution.calibration, solution.stored)},
           {"standard_uncertainty", to_json(solution.uncertainty)},
           {"own_rms_mg", solution.own_rms_mg},
+          {"choosing_rms_mg", number_or_null(solution.choosing_rms_mg)},
           {"held_out_rms_mg", number_or_null(solution.held_out_rms_mg)},
           {"held_out_worst_mg", number_or_null(solution.held_out_worst_mg)},
           {"rounded_rms_mg", number_or_null(solution.rounded_rms_mg)}};
@@ -167,7 +173,8 @@ Json to_json(const SixPoseReport& report) {
     poses.push_back({{"pose", pose.side},
                      {"magnitude_mg", pose.magnitude_mg},
                      {"tilt_deg", pose.tilt_deg},
-                     {"held_out", pose.held_out}});
+                     {"held_out", pose.held_out},
+                     {"chose", pose.chose}});
   }
   json.update({{"chosen", to_string(report.chosen)},
                {"better_by_mg", report.better_by_mg},
