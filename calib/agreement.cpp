@@ -9,8 +9,8 @@
 namespace sixpoint::calib {
 namespace {
 
-// 95 % of a normal distribution.
-constexpr double kCoverageFactor = 2;
+// 99.7 % of a normal distribution: nine values are compared for every file.
+constexpr double kCoverageFactor = 3;
 
 double stated(double value) { return std::isfinite(value) ? value : 0; }
 

@@ -8,7 +8,7 @@
 // Both are applied to one raw count of the sensor, on each axis at -1 g, 0 g and +1 g. They agree
 // where everywhere
 //
-//     difference <= 2 sqrt(u1^2 + u2^2) + allowance
+//     difference <= 3 sqrt(u1^2 + u2^2) + allowance
 //
 // with u the standard uncertainty of the value in g: zero and sensitivity together.
 #pragma once

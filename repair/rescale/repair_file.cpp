@@ -193,7 +193,7 @@ class Repair {
   bool may_write() {
     const GateEvidence evidence = gate_evidence(survey_, chosen_->record.calibration);
     const GateAnswer answer = gate(evidence, options_.force);
-    if (evidence.still_blocks > 0) {
+    if (evidence.directions > 0) {
       report_.still_error_after_mg = evidence.after_mg;
     }
     if (!answer.reason.empty()) {

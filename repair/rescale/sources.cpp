@@ -66,10 +66,9 @@ std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const
 }
 
 std::string digest_of(const calib::ConstantsRecord& record) {
-  const nlohmann::ordered_json content = {
-      {"serial", record.serial},
-      {"filter", calib::to_string(record.filter)},
-      {"constants", calib::to_json(record.calibration)}};
+  const nlohmann::ordered_json content = {{"serial", record.serial},
+                                          {"filter", calib::to_string(record.filter)},
+                                          {"constants", calib::to_json(record.calibration)}};
   return text_sha256(content.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace))
       .substr(0, 32);
 }
@@ -80,8 +79,7 @@ SourceUsed source_used(const std::string& kind, const std::string& id,
   if (record.made_at != UtcTime{}) {
     used.made_at = record.made_at;
   }
-  if (const double largest_mg = calib::largest_uncertainty_mg(record.uncertainty);
-      largest_mg > 0) {
+  if (const double largest_mg = calib::largest_uncertainty_mg(record.uncertainty); largest_mg > 0) {
     used.standard_uncertainty_mg = largest_mg;
   }
   return used;

@@ -27,14 +27,14 @@ TEST(AgreementOfConstants, AZeroThatMovedIsFoundWithItsAxis) {
   EXPECT_THAT(between.brief(), testing::HasSubstr("12.0 mg on y"));
 }
 
-// By hand: 2 sqrt(3^2 + 4^2) + 10 = 20 mg.
+// By hand: 3 sqrt(3^2 + 4^2) + 10 = 25 mg; without the second one 3 * 3 + 10 = 19 mg.
 TEST(AgreementOfConstants, BothUncertaintiesCount) {
   Calibration other = kOne;
-  other.zero_lsb[2] += 4.5;  // 18 mg
+  other.zero_lsb[2] += 6;  // 24 mg
   const ConstantsUncertainty first = {{}, {3, 3, 3}};
   const ConstantsUncertainty second = {{}, {4, 4, 4}};
   const Agreement between = agreement(kOne, first, other, second);
-  EXPECT_NEAR(between.allowed_mg, 20, 1e-9);
+  EXPECT_NEAR(between.allowed_mg, 25, 1e-9);
   EXPECT_TRUE(between.agree());
   EXPECT_FALSE(agreement(kOne, first, other, {}).agree());
 }

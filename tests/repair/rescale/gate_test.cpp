@@ -54,6 +54,22 @@ TEST(Gate, WhatRightConstantsCannotLeaveIsNotWritten) {
   expect_refused({9, 140.25, 32.25}, GateRow::too_much_left);
   expect_refused({9, 60.25, 40.25}, GateRow::too_much_left);
   EXPECT_EQ(gate({9, 140, 32}, false).row, GateRow::helps);
+  expect_refused({3, 140.25, 20.25}, GateRow::too_much_left);
+  EXPECT_EQ(gate({3, 140, 20}, false).row, GateRow::weak);
+}
+
+TEST(Gate, InFewDirectionsARightInputIsLeftUnlessItsCountsAreTheUnitsOwn) {
+  expect_refused({3, 31.75, 1.25, false}, GateRow::ambiguous);
+  EXPECT_EQ(gate({3, 31.75, 1.25, true}, false).row, GateRow::weak);
+  EXPECT_EQ(gate({3, 32.25, 1.25, false}, false).row, GateRow::weak);
+  EXPECT_EQ(gate({4, 31.75, 1.25, false}, false).row, GateRow::helps);
+}
+
+TEST(Gate, AWeakCheckIsSaid) {
+  const GateAnswer answer = gate({3, 112, 0.8, true}, false);
+  EXPECT_EQ(answer.row, GateRow::weak);
+  EXPECT_TRUE(answer.write);
+  EXPECT_THAT(answer.reason, HasSubstr("3 of the at least 4 directions"));
 }
 
 TEST(Gate, WhatHelpsIsWrittenAndNeedsNoForce) {
@@ -70,12 +86,13 @@ TEST(Gate, TheEvidenceIsOfTheFileAndOfWhatTheConstantsMakeOfIt) {
   ASSERT_OK(tests::six_sides().write(memory.files, "in.gt3x"));
   const Survey surveyed = survey(memory.files, "in.gt3x").value();
   const GateEvidence right = gate_evidence(surveyed, tests::kTrue);
-  EXPECT_EQ(right.still_blocks, surveyed.blocks.size());
+  EXPECT_EQ(right.directions, 6);
   EXPECT_GT(right.before_mg, 100);
   EXPECT_LT(right.after_mg, 1);
   const GateEvidence same =
       gate_evidence(surveyed, calib::calibration_from(tests::kStored).value());
   EXPECT_NEAR(same.after_mg, same.before_mg, 0.5) << "half a count of rounding on six sides";
+  EXPECT_TRUE(right.counts_are_the_units_own) << "positive - negative of z is 495, below 2 * 256";
 }
 
 }  // namespace

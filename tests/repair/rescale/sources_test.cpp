@@ -27,8 +27,7 @@ TEST(Sources, TheOrderByItsTable) {
   EXPECT_THAT(sources_in_order({no, no, no, yes, no, no}), ElementsAre(kStore));
   EXPECT_THAT(sources_in_order({no, no, no, no, no, yes}), ElementsAre(kStore, kScan));
   EXPECT_THAT(sources_in_order({}), ElementsAre(kScan));
-  EXPECT_THAT(sources_in_order({yes, yes, yes, yes, yes, yes}),
-              ElementsAre(kConstantsFile, kScan));
+  EXPECT_THAT(sources_in_order({yes, yes, yes, yes, yes, yes}), ElementsAre(kConstantsFile, kScan));
   EXPECT_THAT(sources_in_order({no, yes, no, no, yes, yes}), ElementsAre(kCalibrationFile, kScan));
   EXPECT_THAT(sources_in_order({no, no, no, yes, yes, no}), ElementsAre(kStore, kScan));
   EXPECT_THAT(sources_in_order({no, no, yes, no, yes, yes}), ElementsAre(kScan));
