@@ -17,9 +17,10 @@ namespace {
 void print(const char* about, std::uint64_t seed, const sixpoint::tests::TrialResult& result) {
   std::printf("seed %llu, %s\n", static_cast<unsigned long long>(seed), about);
   for (const auto& [kind, of] : result.kinds) {
-    std::printf("%-34s %5d files %5d written %5d refused %4d worse, most %+.1f mg, %.1f mg left\n%s",
-                kind.c_str(), of.files, of.written, of.refused, of.worse, of.worst_mg,
-                of.most_left_mg, of.examples.c_str());
+    std::printf(
+        "%-34s %5d files %5d written %5d refused %4d worse, most %+.1f mg, %.1f mg left\n%s",
+        kind.c_str(), of.files, of.written, of.refused, of.worse, of.worst_mg, of.most_left_mg,
+        of.examples.c_str());
   }
 }
 

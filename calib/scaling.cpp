@@ -20,6 +20,22 @@ double firmware_value(double twice_scale, int zero, int span, int raw) {
 
 std::size_t table_size(RecordWidth width) { return width == RecordWidth::bits12 ? 4096 : 65536; }
 
+// The raw counts whose value lies within the record's range, and one count more on either side:
+// no other can lead to a stored count, half-way cases included.
+struct RawRange {
+  int low = 0;
+  int high = 0;
+};
+RawRange raw_range(double twice_scale, int zero, int span, RecordWidth width) {
+  const double one = zero + (lowest_count(width) - 1.0) * span / twice_scale;
+  const double other = zero + (highest_count(width) + 1.0) * span / twice_scale;
+  const auto inside = [](double raw) {
+    return static_cast<int>(std::clamp(raw, double{kRawLow}, double{kRawHigh}));
+  };
+  return {inside(std::floor(std::min(one, other)) - 1),
+          inside(std::ceil(std::max(one, other)) + 1)};
+}
+
 Status check_scale(double accel_scale) {
   if (!(accel_scale >= 1 && accel_scale <= 32768)) {
     return fail(ErrorCode::bad_data,
@@ -68,8 +84,9 @@ Result<Reversal> Reversal::make(const StoredConstants& stored, double accel_scal
     const auto value_of = [&](int raw) {
       return firmware_value(twice_scale, stored.zero_lsb[a], span, raw);
     };
+    const RawRange range = raw_range(twice_scale, stored.zero_lsb[a], span, width);
     const auto slot = [&](int count) { return static_cast<std::size_t>(count - low); };
-    for (int raw = kRawLow; raw <= kRawHigh; ++raw) {
+    for (int raw = range.low; raw <= range.high; ++raw) {
       const int count = round_half_away(value_of(raw));
       if (count < low || count > high) {
         continue;
@@ -82,7 +99,7 @@ Result<Reversal> Reversal::make(const StoredConstants& stored, double accel_scal
     }
     // A firmware that computes in single precision may send an exact half to the other side. That
     // counts as an explanation only where there is no better one.
-    for (int raw = kRawLow; raw <= kRawHigh; ++raw) {
+    for (int raw = range.low; raw <= range.high; ++raw) {
       const double value = value_of(raw);
       if (std::abs(value - std::trunc(value)) != 0.5) {
         continue;

@@ -11,6 +11,9 @@
 //     carries our mark, they are beyond 64 mg          cannot_tell: wrong constants, or a defect
 //     any other                                        as triage() says (repair/triage/triage.h)
 //
+// An .agd names no date of calibration: it is taken from the recording of the same unit and name
+// that lies beside it, where there is one.
+//
 // Of a file without our mark the samples are a reason and do not change the verdict. Safe to call
 // from several threads.
 #pragma once

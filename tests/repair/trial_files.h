@@ -179,8 +179,8 @@ class Trial {
     for (int i = 0; i < 30 * seconds; ++i) {
       PerAxis<double> g{};
       for (std::size_t a = 0; a < kAxes; ++a) {
-        g[a] = up[a] + random_.uniform(0.2, 0.6) *
-                           std::sin(turns * i * 0.2 + static_cast<double>(a));
+        g[a] =
+            up[a] + random_.uniform(0.2, 0.6) * std::sin(turns * i * 0.2 + static_cast<double>(a));
       }
       motion_.push_back(g);
     }

@@ -23,10 +23,10 @@ struct TrialCount {
   int files = 0;
   int written = 0;
   int refused = 0;
-  int worse = 0;         // by more than 1 mg RMS against the true motion
+  int worse = 0;            // by more than 1 mg RMS against the true motion
   double most_left_mg = 0;  // the largest still error of a file that was written
-  double worst_mg = 0;   // the largest growth of the RMS error
-  std::string examples;  // of what is worse or was refused
+  double worst_mg = 0;      // the largest growth of the RMS error
+  std::string examples;     // of what is worse or was refused
 };
 
 struct TrialResult {

@@ -9,6 +9,7 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/made_agd.h"
 #include "repair/six_sides.h"
 #include "repair/triage/survey.h"
 #include "shared_data.h"
@@ -225,6 +226,32 @@ TEST(ScanFile, RealFiles) {
   EXPECT_EQ(epochs.facts.serial, "TAS1E31150129");
   EXPECT_EQ(epochs.verdict, "not_affected");
   EXPECT_THAT(epochs.reasons, Contains(HasSubstr("an .agd cannot be repaired")));
+}
+
+// The date of an .agd stands in the recording beside it, where that is of the same unit.
+TEST(ScanFile, AnAgdHasTheDateOfItsRecording) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  tests::MadeRecording made = at_rest(256);
+  made.serial = "MOS2A1";
+  ASSERT_OK(made.write(files, folder / "one.gt3x"));
+  made.serial = "MOS2A2";
+  ASSERT_OK(made.write(files, folder / "another60sec.gt3x"));
+  struct Case {
+    const char* name;
+    const char* verdict;
+    const char* reason;
+  };
+  for (const Case& c : std::initializer_list<Case>{{"one.agd", "affected", "one.gt3x"},
+                                                   {"one60sec.agd", "affected", "one.gt3x"},
+                                                   {"another60sec.agd", "cannot_tell", "put its"},
+                                                   {"60sec.agd", "cannot_tell", "put its"},
+                                                   {"alone.agd", "cannot_tell", "put its"}}) {
+    tests::make_agd(folder / c.name, "MOS2A1", "1.5.0");
+    const ScannedFile file = scan_file(files, folder / c.name);
+    EXPECT_EQ(file.verdict, c.verdict) << c.name;
+    EXPECT_THAT(file.reasons, Contains(HasSubstr(c.reason))) << c.name;
+  }
 }
 
 }  // namespace
