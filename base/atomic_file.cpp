@@ -124,6 +124,10 @@ Status AtomicFile::append(std::span<const std::uint8_t> bytes) {
   return {};
 }
 
+Status AtomicFile::restrict_to_owner() {
+  return temporary_.empty() ? Status{} : files_->restrict_to_owner(temporary_);
+}
+
 Status AtomicFile::append(std::string_view text) { return append(as_bytes(text)); }
 
 Status AtomicFile::commit() {
@@ -139,6 +143,7 @@ Status AtomicFile::commit() {
 Status put_in_place(FileSystem& files, const std::string& temporary, const std::string& path) {
   SIXPOINT_ASSIGN(const Placement placement, files.placement(path));
   switch (placement.how) {
+    case Placing::unruled:
     case Placing::replace:
       SIXPOINT_CHECK(files.rename(temporary, placement.path));
       break;
@@ -152,20 +157,51 @@ Status put_in_place(FileSystem& files, const std::string& temporary, const std::
   return files.sync_folder(folder_of(placement.path));
 }
 
-Status make_synced_folders(FileSystem& files, const std::string& path) {
+Status refuse_existing(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const Placement placement, files.placement(path));
+  if (placement.how == Placing::unruled && files.info(path)) {
+    return fail(ErrorCode::cannot_create, "the file exists already", path,
+                "choose another name, or remove it");
+  }
+  return {};
+}
+
+namespace {
+
+Status make_each_folder(FileSystem& files, const std::string& path, bool is_private) {
   if (files.info(path)) {
     return files.make_folders(path);  // says so where it is no folder
   }
   const std::string parent = folder_of(path);
   if (parent != path && parent != ".") {
-    SIXPOINT_CHECK(make_synced_folders(files, parent));
+    SIXPOINT_CHECK(make_each_folder(files, parent, is_private));
   }
   SIXPOINT_CHECK(files.make_folders(path));
+  if (is_private) {
+    SIXPOINT_CHECK(files.restrict_to_owner(path));
+  }
   return files.sync_folder(parent);
+}
+
+}  // namespace
+
+Status make_synced_folders(FileSystem& files, const std::string& path) {
+  return make_each_folder(files, path, /*is_private=*/false);
+}
+
+Status make_private_folders(FileSystem& files, const std::string& path) {
+  return make_each_folder(files, path, /*is_private=*/true);
 }
 
 Status write_file(FileSystem& files, const std::string& path, std::string_view text) {
   SIXPOINT_ASSIGN(auto out, AtomicFile::create(files, path));
+  SIXPOINT_CHECK(out.append(text));
+  return out.commit();
+}
+
+Status write_private_file(FileSystem& files, const std::string& path, std::string_view text) {
+  SIXPOINT_ASSIGN(auto out, AtomicFile::create(files, path));
+  SIXPOINT_CHECK(out.restrict_to_owner());
   SIXPOINT_CHECK(out.append(text));
   return out.commit();
 }

@@ -10,7 +10,8 @@
 //
 // FileSystem::placement() says what happens to a file that has the name already:
 //
-//   replace  it is replaced: every library file by default
+//   unruled  it is replaced: a disk has no rule
+//   replace  it is replaced
 //   keep     it stays, commit() gives cannot_create: outputs that a user named (cli/output.h)
 //   through  it is a device or a pipe: the bytes go into it as they come, nothing is renamed
 #pragma once
@@ -35,6 +36,7 @@ class AtomicFile {
   AtomicFile& operator=(AtomicFile&&) = delete;
   ~AtomicFile();
 
+  Status restrict_to_owner();  // before the first byte, so that nobody else reads one
   Status append(std::span<const std::uint8_t> bytes);
   Status append(std::string_view text);
   // For writers that seek; append() goes on from size(). What goes to a device or a pipe is then
@@ -61,9 +63,18 @@ class AtomicFile {
 // the name `path` as FileSystem::placement() says. cannot_create for a device or a pipe.
 Status put_in_place(FileSystem& files, const std::string& temporary, const std::string& path);
 
+// For a writer that replaces nothing by itself: cannot_create where `path` exists and the file
+// system has no rule for it.
+Status refuse_existing(FileSystem& files, const std::string& path);
+
 // As FileSystem::make_folders(), and every folder that was made is on the medium.
 Status make_synced_folders(FileSystem& files, const std::string& path);
 
+// The same; every folder that was made is its owner's alone.
+Status make_private_folders(FileSystem& files, const std::string& path);
+
 Status write_file(FileSystem& files, const std::string& path, std::string_view text);
+// The same; only the owner may read the file.
+Status write_private_file(FileSystem& files, const std::string& path, std::string_view text);
 
 }  // namespace sixpoint

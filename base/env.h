@@ -79,12 +79,13 @@ class FileLock {
 
 // How a file that was written comes to its name (base/atomic_file.h).
 enum class Placing : std::uint8_t {
+  unruled,  // the file system has no rule: its writer's own holds
   replace,  // takes the name from what is there
   keep,     // cannot_create where something is there
   through,  // no name of its own: the bytes go into the device or the pipe that is there
 };
 struct Placement {
-  Placing how = Placing::replace;
+  Placing how = Placing::unruled;
   std::string path;  // the name that the file gets: another one where a symbolic link is followed
 };
 
@@ -105,11 +106,14 @@ class FileSystem {
   // How AtomicFile puts a file at `path`. A program that writes where its user said so has rules of
   // its own (cli/output.h); an error says why nothing may be written there.
   virtual Result<Placement> placement(const std::string& path) {
-    return Placement{Placing::replace, path};
+    return Placement{Placing::unruled, path};
   }
   // A device or a pipe that is there, for bytes one after another: offsets mean nothing, and what
   // was written cannot be read. Waits for the reader of a pipe.
   virtual Result<std::unique_ptr<WritableFile>> open_through(const std::string& path);
+  // Takes every right from everybody but the owner: a file is then 0600, a folder 0700. Nothing
+  // where the file system has no rights.
+  virtual Status restrict_to_owner(const std::string& /*path*/) { return {}; }
   // As info(), of a symbolic link itself where `path` is one.
   virtual Result<FileInfo> link_info(const std::string& path) { return info(path); }
   // The path without symbolic links, "." and "..", from the root; no_input where there is none.

@@ -284,6 +284,15 @@ class PosixFileSystem final : public FileSystem {
     return done_unless(::unlink(path.c_str()), ErrorCode::io, "cannot remove", path);
   }
 
+  Status restrict_to_owner(const std::string& path) override {
+    struct stat status {};
+    int result = ::stat(path.c_str(), &status);
+    if (result == 0) {
+      result = ::chmod(path.c_str(), status.st_mode & S_IRWXU);
+    }
+    return done_unless(result, ErrorCode::permission, "cannot make private", path);
+  }
+
   Status sync_folder(const std::string& path) override {
     const Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     return done_unless(folder.get() < 0 ? -1 : ::fsync(folder.get()), ErrorCode::io,

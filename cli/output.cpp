@@ -289,6 +289,9 @@ class Outputs::Files final : public FileSystem {
     return files_.rename_new(from, to);
   }
   Status remove(const std::string& path) override { return files_.remove(path); }
+  Status restrict_to_owner(const std::string& path) override {
+    return files_.restrict_to_owner(path);
+  }
   Status sync_folder(const std::string& path) override { return files_.sync_folder(path); }
   Result<FileInfo> link_info(const std::string& path) override { return files_.link_info(path); }
   Result<std::string> real_path(const std::string& path) override {
