@@ -260,9 +260,9 @@ class PosixFileSystem final : public FileSystem {
 
   Status rename_new(const std::string& from, const std::string& to) override {
     const int error = sixpoint::rename_new(from, to);
-    return error == 0 ? Status()
-                      : Status(system_failure(error, ErrorCode::cannot_create,
-                                              "cannot put in place", to));
+    return error == 0
+               ? Status()
+               : Status(system_failure(error, ErrorCode::cannot_create, "cannot put in place", to));
   }
 
   Result<std::unique_ptr<WritableFile>> open_through(const std::string& path) override {

@@ -53,10 +53,10 @@ std::string beginning_of(FileSystem& files, const std::string& path) {
   constexpr std::size_t kEnough = 4096;
   const auto file = files.open(path);
   std::string text(kEnough, '\0');
-  const auto count = file ? (*file)->read_at(0, std::span(reinterpret_cast<std::uint8_t*>(
-                                                              text.data()),
-                                                          text.size()))
-                          : Result<std::size_t>(0);
+  const auto count =
+      file ? (*file)->read_at(0,
+                              std::span(reinterpret_cast<std::uint8_t*>(text.data()), text.size()))
+           : Result<std::size_t>(0);
   text.resize(count.value_or(0));
   return text;
 }
@@ -90,8 +90,8 @@ bool is_plan(FileSystem& files, const std::string& folder) {
 }
 
 bool belongs_to_record(FileSystem& files, const std::string& path, std::string_view beginning) {
-  constexpr std::array<std::string_view, 5> kRecords = {
-      "bundle", "archive-plan", "archive-output", "session-journal", "journal-entry"};
+  constexpr std::array<std::string_view, 5> kRecords = {"bundle", "archive-plan", "archive-output",
+                                                        "session-journal", "journal-entry"};
   constexpr std::array<std::string_view, 2> kOfBundle = {"temperature.csv", "host_clock.csv"};
   const std::string folder = folder_of(path);
   return std::any_of(kRecords.begin(), kRecords.end(),
@@ -294,9 +294,7 @@ class Outputs::Files final : public FileSystem {
   }
   Status sync_folder(const std::string& path) override { return files_.sync_folder(path); }
   Result<FileInfo> link_info(const std::string& path) override { return files_.link_info(path); }
-  Result<std::string> real_path(const std::string& path) override {
-    return files_.real_path(path);
-  }
+  Result<std::string> real_path(const std::string& path) override { return files_.real_path(path); }
   Result<std::unique_ptr<FileLock>> lock(const std::string& path) override {
     return files_.lock(path);
   }

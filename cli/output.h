@@ -1,9 +1,9 @@
 // Where a command writes: one rule for every output of every command (docs/outputs.md).
 //
-//   Outputs outputs(context, options.output, options.json);
-//   SIXPOINT_CHECK(outputs.input(options.recording));       // never written over
-//   SIXPOINT_CHECK(outputs.file("--html", options.html));   // refused before the work begins
-//   SIXPOINT_CHECK(write_file(outputs.files(), options.html, "a page"));  // and asked once more
+//   Outputs outputs(context, how, as_json);                 // how: --force
+//   SIXPOINT_CHECK(outputs.input(recording));               // never written over
+//   SIXPOINT_CHECK(outputs.file("--html", html));           // refused before the work begins
+//   SIXPOINT_CHECK(write_file(outputs.files(), html, "a page"));  // and asked once more
 //
 // What a library writes through files() obeys the rule: AtomicFile asks files().placement(). An
 // empty path is no output. One thread; files() for any number of them.
@@ -38,16 +38,16 @@ void refuse_old_output(CLI::App& command, const char* name, const char* instead)
 // .gt3x, .agdc or .agd is enough for a recording that is damaged.
 enum class Target : std::uint8_t {
   nothing,
-  plain,       // a regular file of no kind below
-  recording,   // a zip archive: .gt3x, .agdc, a session too; or named as a recording
-  database,    // an SQLite file: a store, an .agd; and the files that SQLite keeps beside it
-  record,      // a file of a bundle, of an archive's plan, of a session's or a store's journal
-  input,       // what this command reads
-  folder,      // any
-  device,      // of characters; standard output
-  pipe,        // also one without a name: /dev/fd/63
-  other,       // a disk, a socket
-  lost_link,   // a symbolic link to nothing, or in a circle
+  plain,      // a regular file of no kind below
+  recording,  // a zip archive: .gt3x, .agdc, a session too; or named as a recording
+  database,   // an SQLite file: a store, an .agd; and the files that SQLite keeps beside it
+  record,     // a file of a bundle, of an archive's plan, of a session's or a store's journal
+  input,      // what this command reads
+  folder,     // any
+  device,     // of characters; standard output
+  pipe,       // also one without a name: /dev/fd/63
+  other,      // a disk, a socket
+  lost_link,  // a symbolic link to nothing, or in a circle
 };
 
 // The rule. `link`: the name is a symbolic link to such a thing.

@@ -126,8 +126,7 @@ Status recover(const Options& options, Context& context) {
   if (context.env.files.info(journal)) {
     SIXPOINT_CHECK(outputs.file_to_keep("--output", output));
   }
-  SIXPOINT_ASSIGN(const auto recovered,
-                  device::recover_session(outputs.files(), journal, output));
+  SIXPOINT_ASSIGN(const auto recovered, device::recover_session(outputs.files(), journal, output));
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, recovered.target));
   print(context, options.json, recovered.target, session,

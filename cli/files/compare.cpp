@@ -40,8 +40,7 @@ Status run(const Options& options, Context& context) {
     }
   }
   if (!options.html.empty()) {
-    SIXPOINT_CHECK(
-        write_file(outputs.files(), options.html, repair::compare_html(traces, pairs)));
+    SIXPOINT_CHECK(write_file(outputs.files(), options.html, repair::compare_html(traces, pairs)));
   }
   Json json = document("compare");
   Json& list = json["pairs"] = Json::array();

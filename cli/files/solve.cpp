@@ -69,8 +69,8 @@ Status keep(const std::string& path, const Options& options, const std::string& 
   calib::ConstantsOrigin origin;
   SIXPOINT_ASSIGN(origin.sha256, file_sha256(context.env.files, path));
   origin.file = file_name_of(path);
-  SIXPOINT_ASSIGN(const auto record,
-                  record_constants(outputs.env(), outcome.report, origin, to_file ? options.output : ""));
+  SIXPOINT_ASSIGN(const auto record, record_constants(outputs.env(), outcome.report, origin,
+                                                      to_file ? options.output : ""));
   if (to_store) {
     SIXPOINT_ASSIGN(outcome.saved, save_constants(context, options.store, record, model));
   }

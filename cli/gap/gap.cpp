@@ -86,7 +86,7 @@ void print(const gap::Diagnosis& d, Context& context) {
   context.text() << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
   for (const gap::EffectFinding& effect : d.effects) {
     context.text() << fmt::format("  {:<20} p {:.3f}  held out {:+.1f} nats", effect.name,
-                               effect.probability, effect.held_out_gain_nats);
+                                  effect.probability, effect.held_out_gain_nats);
     for (const gap::NamedValue& p : effect.parameters) {
       context.text() << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
     }
@@ -96,8 +96,8 @@ void print(const gap::Diagnosis& d, Context& context) {
     context.text() << "  unknown: " << printable(where, 300) << '\n';
   }
   for (const gap::NextSegment& next : d.next_segments) {
-    context.text() << fmt::format("  next: {} ({:.0f} min) would show {}\n", next.name, next.minutes,
-                               fmt::join(next.separates, ", "));
+    context.text() << fmt::format("  next: {} ({:.0f} min) would show {}\n", next.name,
+                                  next.minutes, fmt::join(next.separates, ", "));
   }
   for (const std::string& loss : d.losses) {
     context.people << "sixpoint: " << printable(loss, 1000) << '\n';
@@ -126,8 +126,8 @@ Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, Fi
     SIXPOINT_CHECK(write_file(files, options.pdf, as_text(pdf)));
   }
   if (!options.scenario_out.empty()) {
-    SIXPOINT_CHECK(write_file(files, options.scenario_out,
-                              gap::augmented_scenario(diagnosis).dump(2) + "\n"));
+    SIXPOINT_CHECK(
+        write_file(files, options.scenario_out, gap::augmented_scenario(diagnosis).dump(2) + "\n"));
   }
   return {};
 }

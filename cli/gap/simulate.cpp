@@ -46,7 +46,8 @@ Result<Json> simulate_bundle(const Options& options, const sim::Scenario& scenar
   SIXPOINT_CHECK(outputs.folder("--output", options.output));
   SIXPOINT_ASSIGN(const sim::BundleReport report,
                   sim::write_bundle(outputs.files(), options.output, scenario));
-  SIXPOINT_ASSIGN(Json json, answer_of(outputs.files(), scenario, options.output + "/recording.gt3x"));
+  SIXPOINT_ASSIGN(Json json,
+                  answer_of(outputs.files(), scenario, options.output + "/recording.gt3x"));
   json["bundle"] = options.output;
   json["segments"] = report.segments;
   json["samples"] = report.samples;

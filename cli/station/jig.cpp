@@ -145,9 +145,8 @@ void make_papers(Context& context, const Options& options, Outputs& outputs,
   }
   if (!options.label.empty()) {
     const auto label = station::label_zpl(run);
-    report(
-        label ? write_file(outputs.files(), options.label, *label) : Status(fail(label.error())),
-        done.labelled);
+    report(label ? write_file(outputs.files(), options.label, *label) : Status(fail(label.error())),
+           done.labelled);
   }
 }
 
@@ -369,9 +368,10 @@ void print(Context& context, const Done& done) {
     context.text() << "     sensitivity         zero        +1 g   -1 g    0 g\n";
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       context.text() << fmt::format("  {}  {:8.3f} LSB/g {:8.3f} LSB {:6} {:6} {:6}\n",
-                                 kAxisNames[axis], 1 / best.calibration.sensitivity_g_per_lsb[axis],
-                                 best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
-                                 best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
+                                    kAxisNames[axis],
+                                    1 / best.calibration.sensitivity_g_per_lsb[axis],
+                                    best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
+                                    best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
     }
   }
   if (!done.kept) {

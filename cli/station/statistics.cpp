@@ -61,13 +61,13 @@ void print(Context& context, const Answer& answer) {
   };
   const auto line = [&](const station::GroupStatistics& group) {
     context.text() << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>9.0f} s\n",
-                               printable(group.name.empty() ? "(not stated)" : group.name, 24),
-                               group.runs, group.units, percent(group.yield),
-                               percent(group.first_pass_yield), group.seconds_per_unit_median);
+                                  printable(group.name.empty() ? "(not stated)" : group.name, 24),
+                                  group.runs, group.units, percent(group.yield),
+                                  percent(group.first_pass_yield), group.seconds_per_unit_median);
   };
   context.text() << answer.report.brief() << '\n';
   context.text() << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>11}\n", "", "runs", "units",
-                             "yield", "first pass", "per unit");
+                                "yield", "first pass", "per unit");
   for (const station::GroupStatistics& group : answer.report.groups) {
     line(group);
   }
@@ -75,11 +75,11 @@ void print(Context& context, const Answer& answer) {
   for (const auto& [code, count] : answer.report.all.failure_codes) {
     const station::FailureCode* known = station::find_failure_code(code);
     context.text() << fmt::format("  {:>5} x {}: {}\n", count, printable(code),
-                               known != nullptr ? known->meaning : "");
+                                  known != nullptr ? known->meaning : "");
   }
   for (const auto& [name, one] : answer.report.capabilities) {
     context.text() << fmt::format("  Cpk {:6.2f} ({:.2f} to {:.2f}), n = {}: {}\n", one.cpk,
-                               one.cpk_low, one.cpk_high, one.n, name);
+                                  one.cpk_low, one.cpk_high, one.n, name);
   }
   for (const station::StationState& state : answer.states) {
     context.text() << printable(state.brief(), 4000) << '\n';

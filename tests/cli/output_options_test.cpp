@@ -42,7 +42,7 @@ const std::map<std::string, Role>& common_roles() {
                                          {"--limits", Role::input},
                                          {"--calibration-file", Role::input},
                                          {"--faults", Role::input},
-                                         {"--files", Role::working_folder},
+                                         {"--files", Role::input},
                                          {"--state", Role::working_folder},
                                          {"--record", Role::output_to_keep},
                                          {"--certificate", Role::output},
@@ -69,20 +69,67 @@ const std::map<std::string, Role>& common_roles() {
                                          {"CAPTURE", Role::input},
                                          {"--scenario", Role::input},
                                          {"--constants", Role::input}};
-    for (const char* name :
-         {"--device",       "--jig",        "--gravity",   "--latitude",     "--altitude",
-          "--jobs",         "--operator",   "--reason",    "--station",      "--seed",
-          "--rate",         "--patience",   "--dwell",     "--filter",       "--jig-id",
-          "--jig-due",      "--retest-of",  "--study",     "--side-seconds", "--turn-seconds",
-          "--method",       "--prior",      "--max-lag",   "--head",         "--days",
-          "--from",         "--to",         "--by",        "--quantity",     "--axis",
-          "--tolerance",    "--without",    "--run",       "--trials",       "--protocol",
-          "--effects",      "--none",       "--pairs",     "--outside",      "--usbip",
-          "--count",        "--port",       "--bind",      "--token",        "--shards",
-          "--shard-bytes",  "--at-once",    "--shard",     "--doing",        "--replays",
-          "--bus",          "--device-number", "--for",    "--help",         "SERIAL",
-          "serial",         "RUN",          "id",          "table",          "jig",
-          "--why"}) {
+    for (const char* name : {"--device",
+                             "--jig",
+                             "--gravity",
+                             "--latitude",
+                             "--altitude",
+                             "--jobs",
+                             "--operator",
+                             "--reason",
+                             "--station",
+                             "--seed",
+                             "--rate",
+                             "--patience",
+                             "--dwell",
+                             "--filter",
+                             "--jig-id",
+                             "--jig-due",
+                             "--retest-of",
+                             "--study",
+                             "--side-seconds",
+                             "--turn-seconds",
+                             "--method",
+                             "--prior",
+                             "--max-lag",
+                             "--head",
+                             "--days",
+                             "--from",
+                             "--to",
+                             "--by",
+                             "--quantity",
+                             "--axis",
+                             "--tolerance",
+                             "--without",
+                             "--run",
+                             "--trials",
+                             "--protocol",
+                             "--effects",
+                             "--none",
+                             "--pairs",
+                             "--outside",
+                             "--usbip",
+                             "--count",
+                             "--port",
+                             "--bind",
+                             "--token",
+                             "--shards",
+                             "--shard-bytes",
+                             "--at-once",
+                             "--shard",
+                             "--doing",
+                             "--replays",
+                             "--bus",
+                             "--device-number",
+                             "--for",
+                             "--help",
+                             "SERIAL",
+                             "serial",
+                             "RUN",
+                             "id",
+                             "table",
+                             "jig",
+                             "--why"}) {
       roles.emplace(name, Role::no_path);
     }
     return roles;
@@ -124,27 +171,27 @@ void for_each_option(const std::function<void(const std::string&, std::optional<
   for (const CommandEntry& entry : commands()) {
     entry.add(app, context);
   }
-  const std::function<void(const CLI::App&, const std::string&)> walk = [&](const CLI::App& command,
-                                                                            const std::string& name) {
-    for (const CLI::Option* option : command.get_options()) {
-      if (option->get_type_size() == 0) {
-        continue;  // a flag takes no value
-      }
-      const std::string key = long_name(*option);
-      const auto own = own_roles().find(name + " " + key);
-      const auto common = common_roles().find(key);
-      std::optional<Role> role;
-      if (own != own_roles().end()) {
-        role = own->second;
-      } else if (common != common_roles().end()) {
-        role = common->second;
-      }
-      visit(name + " " + key, role);
-    }
-    for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; })) {
-      walk(*sub, name.empty() ? sub->get_name() : name + " " + sub->get_name());
-    }
-  };
+  const std::function<void(const CLI::App&, const std::string&)> walk =
+      [&](const CLI::App& command, const std::string& name) {
+        for (const CLI::Option* option : command.get_options()) {
+          if (option->get_type_size() == 0) {
+            continue;  // a flag takes no value
+          }
+          const std::string key = long_name(*option);
+          const auto own = own_roles().find(name + " " + key);
+          const auto common = common_roles().find(key);
+          std::optional<Role> role;
+          if (own != own_roles().end()) {
+            role = own->second;
+          } else if (common != common_roles().end()) {
+            role = common->second;
+          }
+          visit(name + " " + key, role);
+        }
+        for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; })) {
+          walk(*sub, name.empty() ? sub->get_name() : name + " " + sub->get_name());
+        }
+      };
   walk(app, "");
 }
 
@@ -167,14 +214,15 @@ TEST(OutputOptions, EveryOptionIsClassified) {
 class OutputOptions : public tests::CommandTest {
  protected:
   void SetUp() override {
-    write("s.json", R"({"seed": 3, "motions": [{"kind": "still", "duration_s": 30, "pose": "+z"}]})");
+    write("s.json",
+          R"({"seed": 3, "motions": [{"kind": "still", "duration_s": 30, "pose": "+z"}]})");
     write("b.json", R"({"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production"})");
     must({"simulate", "--scenario", path("s.json"), "-o", path("rec.gt3x")}, 0);
     must({"simulate", "--scenario", path("b.json"), "-o", path("bundle")}, 0);
-    const Answer jig = must({"jig", "--device", tests::kUnitInJig, "--store", path("s.db"),
-                             "--station", "A", "--write", "--record", path("session.zip"),
-                             "--json"},
-                            0);
+    const Answer jig =
+        must({"jig", "--device", tests::kUnitInJig, "--store", path("s.db"), "--station", "A",
+              "--write", "--record", path("session.zip"), "--json"},
+             0);
     run_ = jig.json().value("run", "");
     ASSERT_FALSE(run_.empty());
     std::filesystem::create_directory(path("archive"));
@@ -195,13 +243,13 @@ class OutputOptions : public tests::CommandTest {
 
   // The arguments before the output's name; --store names a store that does not matter.
   std::map<std::string, std::vector<std::string>> recipes() const {
-    const std::vector<std::string> jig = {"jig",     "--device", tests::kUnitInJig, "--store",
-                                          path("j.db"), "--station", "A", "--write"};
+    const std::vector<std::string> jig = {
+        "jig", "--device", tests::kUnitInJig, "--store", path("j.db"), "--station", "A", "--write"};
     const std::vector<std::string> capture = {
         "capture", "--device", tests::kUnitInJig, "--store", path("c.db"), "--side-seconds", "5"};
     const std::vector<std::string> diagnose = {"gap", "diagnose", path("bundle")};
-    const std::vector<std::string> challenge = {"gap",      "challenge",    "--trials",
-                                                "1",        "--protocol",   "production",
+    const std::vector<std::string> challenge = {"gap",       "challenge",     "--trials",
+                                                "1",         "--protocol",    "production",
                                                 "--program", SIXPOINT_PROGRAM};
     const std::vector<std::string> simulate = {"simulate", "--scenario", path("s.json")};
     const std::vector<std::string> certificate = {"certificate", run_, "--store", path("s.db")};
@@ -219,6 +267,7 @@ class OutputOptions : public tests::CommandTest {
          {"session", "minimise", path("session.zip"), "--doing", "identify", "--replays", "1"}},
         {"session from-pcap --output", {"session", "from-pcap", path("s.json")}},
         {"archive plan --output", {"archive", "plan", path("archive"), "--scan"}},
+        {"station --state", {"station", "--port", "0", "--device", "virtual:seed=7"}},
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
     };
     for (const char* option : {"--certificate", "--label", "--record", "--state"}) {
@@ -285,20 +334,20 @@ std::map<std::string, std::string> everything_in(const std::filesystem::path& pa
 }
 
 bool has_force(const std::string& option) {
-  return option != "repair --output" && option != "archive run --output";
+  return option != "repair --output" && option != "archive run --output" &&
+         option != "station --state";
 }
 
 TEST_F(OutputOptions, NothingThatHoldsMeasurementsIsWrittenOver) {
   std::size_t tried = 0;
   for_each_option([&](const std::string& option, std::optional<Role> role) {
-    if (!role || *role < Role::output || *role == Role::refused || option == "station --state" ||
-        option == "station --files") {
+    if (!role || *role < Role::output || *role == Role::refused) {
       return;
     }
     ASSERT_TRUE(recipes().contains(option)) << option << ": say in this test how it is run";
     ++tried;
-    for (const std::string kind : {"recording", "store", "session", "bundle", "folder", "link",
-                                   "journal"}) {
+    for (const std::string kind :
+         {"recording", "store", "session", "bundle", "folder", "link", "journal"}) {
       const bool folder_is_fine = *role == Role::working_folder && kind == "folder";
       for (const bool force : {false, true}) {
         if (folder_is_fine || (force && !has_force(option))) {
@@ -308,8 +357,8 @@ TEST_F(OutputOptions, NothingThatHoldsMeasurementsIsWrittenOver) {
         const std::string target = path("target" + ending_for(option));
         const std::string behind = kind == "link" ? path("behind") : target;
         const std::map<std::string, std::string> sources = {
-            {"recording", "rec.gt3x"}, {"store", "s.db"},   {"session", "session.zip"},
-            {"bundle", "bundle"},      {"folder", "archive"}, {"link", "rec.gt3x"},
+            {"recording", "rec.gt3x"},     {"store", "s.db"},     {"session", "session.zip"},
+            {"bundle", "bundle"},          {"folder", "archive"}, {"link", "rec.gt3x"},
             {"journal", "cut.zip.journal"}};
         std::filesystem::copy(path(sources.at(kind)), behind,
                               std::filesystem::copy_options::recursive);
@@ -400,8 +449,8 @@ std::string full_device(const std::string& path) {
 
 TEST_F(OutputOptions, DevicesAndPipesStayWhatTheyAre) {
   for_each_option([&](const std::string& option, std::optional<Role> role) {
-    if (!role || *role < Role::output || *role == Role::refused || option == "station --state" ||
-        option == "station --files" || option.starts_with("gap challenge --html")) {
+    if (!role || *role < Role::output || *role == Role::refused ||
+        option == "gap challenge --html") {
       return;
     }
     for (const bool force : {false, true}) {
@@ -437,8 +486,7 @@ TEST_F(OutputOptions, DevicesAndPipesStayWhatTheyAre) {
 }
 
 TEST_F(OutputOptions, TheOldNamesOfOutputsAreRefusedWithTheNewOnes) {
-  const Answer diagnosis =
-      run({"gap", "diagnose", path("bundle"), "--scenario", path("s.json")});
+  const Answer diagnosis = run({"gap", "diagnose", path("bundle"), "--scenario", path("s.json")});
   EXPECT_EQ(diagnosis.exit_code, 64);
   EXPECT_NE(diagnosis.people.find("--scenario-out"), std::string::npos) << diagnosis.people;
   const Answer capture =

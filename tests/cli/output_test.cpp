@@ -74,9 +74,7 @@ TEST(OutputRule, FollowsTheTableOfFolders) {
 
 class OutputLook : public tests::CommandTest {
  protected:
-  Target look(const std::string& name) const {
-    return look_at(posix_env().files, path(name), {});
-  }
+  Target look(const std::string& name) const { return look_at(posix_env().files, path(name), {}); }
   void write(const std::string& name, std::string_view text) const {
     ASSERT_OK(write_file(posix_env().files, path(name), text));
   }
