@@ -5,6 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/files/repair_answer.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/rescale/constants_finder.h"
@@ -77,6 +78,8 @@ RepairReport repair_one(const NamedFile& file, const Options& options,
 }
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, {}, options.json);
+  SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
   std::optional<db::Store> store;
   SIXPOINT_ASSIGN(auto how, finder_options(options, context, store));
   repair::ConstantsFinder finder(context.env, std::move(how));
