@@ -61,6 +61,31 @@ Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& c
   return mark;
 }
 
+// The mark as a record of the log (kRepairMarkType): who it was, by what, and when. The vendor's
+// own METADATA records begin and end with the same members.
+std::string mark_record_of(const RepairReport& report, UtcTime now) {
+  const Json record = {{"MetadataType", kRepairMarkType},
+                       {"Schema", "sixpoint/repair-mark/1"},
+                       {"RepairedAt", to_iso8601(now)},
+                       {"InputSha256", report.input_sha256},
+                       {"Serial", report.serial},
+                       {"Method", report.method},
+                       {"ConstantsId", report.constants_id},
+                       {"RotationUndone", report.rotation_undone},
+                       {"Forced", report.forced},
+                       {"Parsed", false},
+                       {"JSON", nullptr}};
+  return record.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+// Entries that a unit or its software writes beside the samples and that do not depend on them.
+bool is_independent_of_samples(const std::string& name) {
+  constexpr std::array<std::string_view, 8> kNames = {"log.bin",      "info.txt",    "lux.bin",
+                                                      "battery.bin",  "eeprom.bin",  "firmware.bin",
+                                                      "capsense.bin", "metadata.bin"};
+  return std::ranges::find(kNames, name) != kNames.end();
+}
+
 // The mark of a repaired file; nothing where there is no such file or mark.
 std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
   auto recording = gt3x::Recording::open(files, path);
@@ -98,7 +123,7 @@ class Repair {
  public:
   Repair(Env& env, const std::string& input, const std::string& output, ConstantsSource& source,
          const RepairOptions& options)
-      : env_(env), output_(output), source_(source), options_(options) {
+      : env_(env), now_(env.clock.now()), output_(output), source_(source), options_(options) {
     report_.input = input;
     report_.dry_run = options.dry_run;
   }
@@ -152,6 +177,7 @@ class Repair {
     }
     const Triage judged = triage(survey_.facts);
     report_.reasons = judged.reasons;
+    report_.reasons.insert(report_.reasons.end(), survey_.notes.begin(), survey_.notes.end());
     const bool rotation_only = judged.verdict == Verdict::not_affected && judged.axes_rotated;
     if (judged.verdict == Verdict::not_affected && !(rotation_only && options_.undo_rotation)) {
       report_.status = RepairStatus::not_affected;
@@ -247,6 +273,7 @@ class Repair {
     options.wide = options_.wide;
     options.beyond_12_bits = survey_.beyond_12_bits;
     options.affine = chosen_.has_value() && !survey_.plausibility.plausible();
+    options.mark = mark_record_of(report_, now_);
     options.size = options_.wide ? survey_.log_bytes_wide : survey_.log_bytes;
     options.still = options_.still;
     return options;
@@ -288,8 +315,30 @@ class Repair {
       SIXPOINT_CHECK(write_output(recording, log));
     }
     take(*log);
+    name_what_was_not_repaired(recording, log->tally().epoch_records);
     report_.status = RepairStatus::repaired;
     return {};
+  }
+
+  // Epochs were computed by the unit, or by software, from the samples as they were.
+  void name_what_was_not_repaired(const gt3x::Recording& recording, std::uint64_t epoch_records) {
+    std::vector<std::string> names;
+    for (const gt3x::EntryInfo& entry : recording.entries()) {
+      if (!is_independent_of_samples(entry.name)) {
+        names.push_back(printable(entry.name, 60));
+      }
+    }
+    if (!names.empty()) {
+      report_.reasons.push_back(fmt::format(
+          "carried over as they were: {}; what was computed from the samples must be made anew",
+          fmt::join(names, ", ")));
+    }
+    if (epoch_records > 0) {
+      report_.reasons.push_back(fmt::format(
+          "{} EPOCH records were computed by the unit from the wrong samples; they were carried "
+          "over and must be made anew",
+          epoch_records));
+    }
   }
 
   static Status read_through(RescaledLog& log) {
@@ -308,12 +357,12 @@ class Repair {
                          ? writer.add(entry.name, std::make_unique<SharedSource>(log))
                          : writer.copy(recording, entry.name));
     }
-    report_.repaired_at = env_.clock.now();
     SIXPOINT_CHECK(
-        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, *report_.repaired_at)
+        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, now_)
                                         .dump(2, ' ', false, Json::error_handler_t::replace) +
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());
+    report_.repaired_at = now_;
     report_.output = output_;
     SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
     return {};
@@ -349,6 +398,7 @@ class Repair {
   }
 
   Env& env_;
+  UtcTime now_;  // in both marks
   std::string output_;
   ConstantsSource& source_;
   RepairOptions options_;
