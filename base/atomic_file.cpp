@@ -1,8 +1,43 @@
 #include "base/atomic_file.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 namespace sixpoint {
+
+// A device or a pipe: bytes go through as they come, or, once somebody seeks, all of them at the
+// end.
+class AtomicFile::Held final : public WritableFile {
+ public:
+  explicit Held(std::unique_ptr<WritableFile> through) : through_(std::move(through)) {}
+  void hold() { holds_ = true; }
+  Status write_at(std::uint64_t offset, std::span<const std::uint8_t> bytes) override {
+    if (!holds_) {
+      return through_->write_at(offset, bytes);
+    }
+    bytes_.resize(std::max<std::size_t>(bytes_.size(), offset + bytes.size()));
+    std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(offset));
+    return {};
+  }
+  Result<std::size_t> read_at(std::uint64_t offset, std::span<std::uint8_t> out) override {
+    const std::size_t from = std::min<std::size_t>(offset, bytes_.size());
+    const std::size_t count = std::min(out.size(), bytes_.size() - from);
+    std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(from), count, out.begin());
+    return count;
+  }
+  Status sync() override {
+    SIXPOINT_CHECK(through_->write_at(0, bytes_));
+    bytes_.clear();
+    return through_->sync();
+  }
+  Status close() override { return through_->close(); }
+
+ private:
+  std::unique_ptr<WritableFile> through_;
+  Bytes bytes_;
+  bool holds_ = false;
+};
 
 AtomicFile::AtomicFile(FileSystem& files, std::string path, std::string temporary,
                        std::unique_ptr<WritableFile> file)
@@ -16,10 +51,11 @@ AtomicFile::AtomicFile(AtomicFile&& other) noexcept
       path_(std::move(other.path_)),
       temporary_(std::move(other.temporary_)),
       file_(std::move(other.file_)),
+      held_(other.held_),
       size_(other.size_) {}
 
 AtomicFile::~AtomicFile() {
-  if (file_ != nullptr) {
+  if (file_ != nullptr && !temporary_.empty()) {
     file_.reset();
     // Nothing can be done about a failure here: the name says that the file is temporary.
     static_cast<void>(files_->remove(temporary_));
@@ -46,6 +82,19 @@ void AtomicFile::remove_left_over(FileSystem& files, const std::string& path) {
 }
 
 Result<AtomicFile> AtomicFile::create(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const Placement placement, files.placement(path));
+  if (placement.how == Placing::through) {
+    SIXPOINT_ASSIGN(auto through, files.open_through(placement.path));
+    auto held = std::make_unique<Held>(std::move(through));
+    Held* const whole = held.get();
+    AtomicFile file(files, path, {}, std::move(held));
+    file.held_ = whole;
+    return file;
+  }
+  return create_temporary(files, placement.path);
+}
+
+Result<AtomicFile> AtomicFile::create_temporary(FileSystem& files, const std::string& path) {
   // The first free name: one that a killed process left behind must not stop the next run, and two
   // processes that write the same target must not share a temporary file.
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
@@ -62,10 +111,21 @@ Result<AtomicFile> AtomicFile::create(FileSystem& files, const std::string& path
               "remove the .tmp files in its folder");
 }
 
+WritableFile& AtomicFile::file() {
+  if (held_ != nullptr) {
+    held_->hold();
+  }
+  return *file_;
+}
+
 Status AtomicFile::append(std::span<const std::uint8_t> bytes) {
   SIXPOINT_CHECK(file_->write_at(size_, bytes));
   size_ += bytes.size();
   return {};
+}
+
+Status AtomicFile::restrict_to_owner() {
+  return temporary_.empty() ? Status{} : files_->restrict_to_owner(temporary_);
 }
 
 Status AtomicFile::append(std::string_view text) { return append(as_bytes(text)); }
@@ -73,25 +133,75 @@ Status AtomicFile::append(std::string_view text) { return append(as_bytes(text))
 Status AtomicFile::commit() {
   SIXPOINT_CHECK(file_->sync());
   SIXPOINT_CHECK(file_->close());
-  SIXPOINT_CHECK(files_->rename(temporary_, path_));
+  if (!temporary_.empty()) {
+    SIXPOINT_CHECK(put_in_place(*files_, temporary_, path_));
+  }
   file_.reset();
-  return files_->sync_folder(folder_of(path_));
+  return {};
 }
 
-Status make_synced_folders(FileSystem& files, const std::string& path) {
+Status put_in_place(FileSystem& files, const std::string& temporary, const std::string& path) {
+  SIXPOINT_ASSIGN(const Placement placement, files.placement(path));
+  switch (placement.how) {
+    case Placing::unruled:
+    case Placing::replace:
+      SIXPOINT_CHECK(files.rename(temporary, placement.path));
+      break;
+    case Placing::keep:
+      SIXPOINT_CHECK(files.rename_new(temporary, placement.path));
+      break;
+    case Placing::through:
+      return fail(ErrorCode::cannot_create, "this became a device or a pipe meanwhile", path,
+                  "name a file");
+  }
+  return files.sync_folder(folder_of(placement.path));
+}
+
+Status refuse_existing(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(const Placement placement, files.placement(path));
+  if (placement.how == Placing::unruled && files.info(path)) {
+    return fail(ErrorCode::cannot_create, "the file exists already", path,
+                "choose another name, or remove it");
+  }
+  return {};
+}
+
+namespace {
+
+Status make_each_folder(FileSystem& files, const std::string& path, bool is_private) {
   if (files.info(path)) {
     return files.make_folders(path);  // says so where it is no folder
   }
   const std::string parent = folder_of(path);
   if (parent != path && parent != ".") {
-    SIXPOINT_CHECK(make_synced_folders(files, parent));
+    SIXPOINT_CHECK(make_each_folder(files, parent, is_private));
   }
   SIXPOINT_CHECK(files.make_folders(path));
+  if (is_private) {
+    SIXPOINT_CHECK(files.restrict_to_owner(path));
+  }
   return files.sync_folder(parent);
+}
+
+}  // namespace
+
+Status make_synced_folders(FileSystem& files, const std::string& path) {
+  return make_each_folder(files, path, /*is_private=*/false);
+}
+
+Status make_private_folders(FileSystem& files, const std::string& path) {
+  return make_each_folder(files, path, /*is_private=*/true);
 }
 
 Status write_file(FileSystem& files, const std::string& path, std::string_view text) {
   SIXPOINT_ASSIGN(auto out, AtomicFile::create(files, path));
+  SIXPOINT_CHECK(out.append(text));
+  return out.commit();
+}
+
+Status write_private_file(FileSystem& files, const std::string& path, std::string_view text) {
+  SIXPOINT_ASSIGN(auto out, AtomicFile::create(files, path));
+  SIXPOINT_CHECK(out.restrict_to_owner());
   SIXPOINT_CHECK(out.append(text));
   return out.commit();
 }

@@ -8,6 +8,18 @@ Result<std::unique_ptr<FileLock>> FileSystem::lock(const std::string& path) {
   return fail(ErrorCode::io, "this file system has no locks", path, "choose another folder");
 }
 
+Status FileSystem::rename_new(const std::string& from, const std::string& to) {
+  if (link_info(to)) {
+    return fail(ErrorCode::cannot_create, "the file exists", to, "choose another name");
+  }
+  return rename(from, to);
+}
+
+Result<std::unique_ptr<WritableFile>> FileSystem::open_through(const std::string& path) {
+  return fail(ErrorCode::cannot_create, "this file system has no devices and pipes", path,
+              "name a file");
+}
+
 Result<Bytes> read_file(FileSystem& files, const std::string& path, std::uint64_t limit) {
   SIXPOINT_ASSIGN(const auto file, files.open(path));
   if (file->size() > limit) {

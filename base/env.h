@@ -51,8 +51,18 @@ class WritableFile {
   virtual Status close() = 0;  // reports what the destructor could not
 };
 
+enum class FileKind : std::uint8_t {
+  file,
+  folder,
+  device,  // of characters: a terminal, /dev/null
+  pipe,
+  disk,  // a device of blocks
+  socket,
+};
+
 struct FileInfo {
   bool is_folder = false;
+  FileKind kind = FileKind::file;
   std::uint64_t size = 0;
   bool is_link = false;          // only from link_info()
   std::int64_t modified_ns = 0;  // nanoseconds since 1970 UTC
@@ -67,6 +77,18 @@ class FileLock {
   virtual ~FileLock() = default;
 };
 
+// How a file that was written comes to its name (base/atomic_file.h).
+enum class Placing : std::uint8_t {
+  unruled,  // the file system has no rule: its writer's own holds
+  replace,  // takes the name from what is there
+  keep,     // cannot_create where something is there
+  through,  // no name of its own: the bytes go into the device or the pipe that is there
+};
+struct Placement {
+  Placing how = Placing::unruled;
+  std::string path;  // the name that the file gets: another one where a symbolic link is followed
+};
+
 class FileSystem {
  public:
   virtual ~FileSystem() = default;
@@ -77,8 +99,21 @@ class FileSystem {
   virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;  // names, sorted
   virtual Status make_folders(const std::string& path) = 0;                      // like mkdir -p
   virtual Status rename(const std::string& from, const std::string& to) = 0;     // replaces `to`
+  // cannot_create where `to` exists, which stays as it is. The default looks and then renames.
+  virtual Status rename_new(const std::string& from, const std::string& to);
   virtual Status remove(const std::string& path) = 0;
   virtual Status sync_folder(const std::string& path) = 0;  // makes renames in it durable
+  // How AtomicFile puts a file at `path`. A program that writes where its user said so has rules of
+  // its own (cli/output.h); an error says why nothing may be written there.
+  virtual Result<Placement> placement(const std::string& path) {
+    return Placement{Placing::unruled, path};
+  }
+  // A device or a pipe that is there, for bytes one after another: offsets mean nothing, and what
+  // was written cannot be read. Waits for the reader of a pipe.
+  virtual Result<std::unique_ptr<WritableFile>> open_through(const std::string& path);
+  // Takes every right from everybody but the owner: a file is then 0600, a folder 0700. Nothing
+  // where the file system has no rights.
+  virtual Status restrict_to_owner(const std::string& /*path*/) { return {}; }
   // As info(), of a symbolic link itself where `path` is one.
   virtual Result<FileInfo> link_info(const std::string& path) { return info(path); }
   // The path without symbolic links, "." and "..", from the root; no_input where there is none.

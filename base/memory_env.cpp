@@ -131,6 +131,7 @@ Result<FileInfo> MemoryFiles::info(const std::string& path) {
   if (folders_.contains(path)) {
     FileInfo info;
     info.is_folder = true;
+    info.kind = FileKind::folder;
     return info;
   }
   const auto found = seen_.find(path);
@@ -174,8 +175,19 @@ Status MemoryFiles::make_folders(const std::string& path) {
 }
 
 Status MemoryFiles::rename(const std::string& from, const std::string& to) {
+  return rename_unless(from, to, /*keep=*/false);
+}
+
+Status MemoryFiles::rename_new(const std::string& from, const std::string& to) {
+  return rename_unless(from, to, /*keep=*/true);
+}
+
+Status MemoryFiles::rename_unless(const std::string& from, const std::string& to, bool keep) {
   SIXPOINT_CHECK(may_change(to));
   const std::lock_guard lock(mutex_);
+  if (keep && (seen_.contains(to) || folders_.contains(to))) {
+    return fail(ErrorCode::cannot_create, "the file exists", to, "choose another name");
+  }
   const auto found = seen_.find(from);
   if (found == seen_.end()) {
     return fail(ErrorCode::cannot_create, "no such file to rename", from, "check the path");

@@ -46,6 +46,7 @@ class MemoryFiles final : public FileSystem {
   Result<std::vector<std::string>> list(const std::string& folder) override;
   Status make_folders(const std::string& path) override;
   Status rename(const std::string& from, const std::string& to) override;
+  Status rename_new(const std::string& from, const std::string& to) override;
   Status remove(const std::string& path) override;
   Status sync_folder(const std::string& path) override;
   Result<std::unique_ptr<FileLock>> lock(const std::string& path) override;
@@ -65,6 +66,7 @@ class MemoryFiles final : public FileSystem {
  private:
   friend class MemoryWritableFile;
   Status may_change(const std::string& path);
+  Status rename_unless(const std::string& from, const std::string& to, bool keep);
   std::int64_t next_change();
 
   mutable std::mutex mutex_;

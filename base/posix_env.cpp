@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "base/env.h"
+#include "base/rename_new.h"
 
 namespace sixpoint {
 namespace {
@@ -32,6 +33,8 @@ tl::unexpected<Error> system_failure(int error, ErrorCode otherwise, const std::
       return fail(ErrorCode::io, what, path, "free some space and run the command again");
     case ENOENT:
       return fail(otherwise, what, path, "check the path");
+    case EEXIST:
+      return fail(otherwise, what, path, "choose another name");
     default:
       return fail(otherwise, what, path, "check the path and the disk");
   }
@@ -123,6 +126,34 @@ class PosixWritableFile final : public WritableFile {
   Status sync() override {
     return done_unless(::fsync(fd_.get()), ErrorCode::io, "syncing failed", path_);
   }
+  Status close() override {
+    return done_unless(fd_.close(), ErrorCode::io, "closing failed", path_);
+  }
+
+ private:
+  Descriptor fd_;
+  std::string path_;
+};
+
+// A device or a pipe: it takes bytes in their order, and has nothing to sync.
+class PosixThroughFile final : public WritableFile {
+ public:
+  PosixThroughFile(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
+  Status write_at(std::uint64_t /*offset*/, std::span<const std::uint8_t> bytes) override {
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+      const ssize_t count = ::write(fd_.get(), bytes.data() + done, bytes.size() - done);
+      if (count < 0 && errno != EINTR) {
+        return system_failure(errno, ErrorCode::io, "writing failed", path_);
+      }
+      done += count < 0 ? 0 : static_cast<std::size_t>(count);
+    }
+    return {};
+  }
+  Result<std::size_t> read_at(std::uint64_t /*offset*/, std::span<std::uint8_t> /*out*/) override {
+    return std::size_t{0};
+  }
+  Status sync() override { return {}; }
   Status close() override {
     return done_unless(fd_.close(), ErrorCode::io, "closing failed", path_);
   }
@@ -227,8 +258,39 @@ class PosixFileSystem final : public FileSystem {
                        "cannot put in place", to);
   }
 
+  Status rename_new(const std::string& from, const std::string& to) override {
+    const int error = sixpoint::rename_new(from, to);
+    return error == 0
+               ? Status()
+               : Status(system_failure(error, ErrorCode::cannot_create, "cannot put in place", to));
+  }
+
+  Result<std::unique_ptr<WritableFile>> open_through(const std::string& path) override {
+    // Without O_CREAT and O_TRUNC: a file that came to this name meanwhile stays as it is.
+    const int fd = ::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
+    if (fd < 0) {
+      return system_failure(errno, ErrorCode::cannot_create, "cannot open", path);
+    }
+    std::unique_ptr<WritableFile> file = std::make_unique<PosixThroughFile>(fd, path);
+    struct stat status {};
+    if (::fstat(fd, &status) != 0 || !(S_ISCHR(status.st_mode) || S_ISFIFO(status.st_mode))) {
+      return fail(ErrorCode::cannot_create, "this is no device and no pipe any more", path,
+                  "run the command again");
+    }
+    return file;
+  }
+
   Status remove(const std::string& path) override {
     return done_unless(::unlink(path.c_str()), ErrorCode::io, "cannot remove", path);
+  }
+
+  Status restrict_to_owner(const std::string& path) override {
+    struct stat status {};
+    int result = ::stat(path.c_str(), &status);
+    if (result == 0) {
+      result = ::chmod(path.c_str(), status.st_mode & S_IRWXU);
+    }
+    return done_unless(result, ErrorCode::permission, "cannot make private", path);
   }
 
   Status sync_folder(const std::string& path) override {
@@ -238,6 +300,22 @@ class PosixFileSystem final : public FileSystem {
   }
 
  private:
+  static FileKind kind_of(mode_t mode) {
+    if (S_ISDIR(mode)) {
+      return FileKind::folder;
+    }
+    if (S_ISCHR(mode)) {
+      return FileKind::device;
+    }
+    if (S_ISFIFO(mode)) {
+      return FileKind::pipe;
+    }
+    if (S_ISBLK(mode)) {
+      return FileKind::disk;
+    }
+    return S_ISSOCK(mode) ? FileKind::socket : FileKind::file;
+  }
+
   static Result<FileInfo> info_by(int (*call)(const char*, struct stat*), const std::string& path) {
     struct stat status {};
     if (call(path.c_str(), &status) != 0) {
@@ -245,6 +323,7 @@ class PosixFileSystem final : public FileSystem {
     }
     FileInfo info;
     info.is_folder = S_ISDIR(status.st_mode);
+    info.kind = kind_of(status.st_mode);
     info.is_link = S_ISLNK(status.st_mode);
     info.size = static_cast<std::uint64_t>(status.st_size);
     info.modified_ns =

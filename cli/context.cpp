@@ -57,7 +57,7 @@ Status print_answer(Context& context, bool as_json, const Json& json, std::strin
   if (as_json) {
     return print_json(context, json);
   }
-  context.out << text;
+  context.text() << text;
   return {};
 }
 

@@ -49,8 +49,12 @@ struct Context {
   std::ostream& people;  // standard error: prompts, progress, warnings, errors
   std::istream& in;
   bool people_at_terminal = false;  // progress bars only when true
+  bool out_is_taken = false;       // an output was named "-": text for people goes to `people`
   int exit_code = 0;
   std::shared_ptr<spdlog::logger> logger = nullptr;  // made by log() at its first use
+
+  // Where the text of an answer goes.
+  std::ostream& text() { return out_is_taken ? people : out; }
 
   // Warnings and errors: lines "sixpoint: ..." on `people`. Prompts, summaries and bars are written
   // to `people` directly.

@@ -56,6 +56,11 @@ std::string journal_name(const std::string& location) {
 
 }  // namespace
 
+std::string store_file(const std::string& location) {
+  std::string place = place_of(location);
+  return is_on_server(place) ? std::string() : place;
+}
+
 std::string run_folder_name(const std::string& location, const std::string& who) {
   return text_sha256(place_of(location) + "\n" + who).substr(0, 12);
 }
@@ -108,12 +113,12 @@ Json kept_to_json(const db::Saved& kept) {
           {"error", kept.refusal ? error_to_json(*kept.refusal) : Json(nullptr)}};
 }
 
-Result<calib::ConstantsRecord> record_constants(Context& context, const calib::SolveReport& solved,
+Result<calib::ConstantsRecord> record_constants(const Env& env, const calib::SolveReport& solved,
                                                 const calib::ConstantsOrigin& origin,
                                                 const std::string& path) {
-  SIXPOINT_ASSIGN(auto record, calib::record_of(solved, context.env.clock.now(), origin));
+  SIXPOINT_ASSIGN(auto record, calib::record_of(solved, env.clock.now(), origin));
   if (!path.empty()) {
-    SIXPOINT_CHECK(write_file(context.env.files, path, calib::to_json(record).dump(2) + "\n"));
+    SIXPOINT_CHECK(write_file(env.files, path, calib::to_json(record).dump(2) + "\n"));
   }
   return record;
 }
@@ -131,12 +136,12 @@ Result<SavedConstants> save_constants(Context& context, const std::string& locat
   return done;
 }
 
-Result<SavedConstants> save_capture(Context& context, const std::string& location,
+Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
                                     const station::CaptureReport& report, const std::string& path) {
   calib::ConstantsOrigin origin;
   origin.sha256 = report.file_sha256;
   origin.file = file_name_of(report.file);
-  SIXPOINT_ASSIGN(const auto record, record_constants(context, *report.solved, origin, path));
+  SIXPOINT_ASSIGN(const auto record, record_constants(env, *report.solved, origin, path));
   return save_constants(context, location, record, std::string(gt3x::model_of(record.serial)));
 }
 

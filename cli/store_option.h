@@ -42,6 +42,8 @@ Result<std::string> place_of_new_store(Context& context, const std::string& loca
 std::string data_folder();
 // Of the store where none is named.
 std::string default_store();
+// The file of the store at `location`; empty for a store on a server.
+std::string store_file(const std::string& location);
 // Names the folder of a run under way: `who` (a unit, a station) and the store that it goes into.
 std::string run_folder_name(const std::string& location, const std::string& who);
 
@@ -64,7 +66,7 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
 Json kept_to_json(const db::Saved& kept);
 
 // Constants that were solved just now, as a record; also written to the file `path` (none: empty).
-Result<calib::ConstantsRecord> record_constants(Context& context, const calib::SolveReport& solved,
+Result<calib::ConstantsRecord> record_constants(const Env& env, const calib::SolveReport& solved,
                                                 const calib::ConstantsOrigin& origin,
                                                 const std::string& path);
 
@@ -76,8 +78,8 @@ struct SavedConstants {
 Result<SavedConstants> save_constants(Context& context, const std::string& location,
                                       const calib::ConstantsRecord& record,
                                       const std::string& model);
-// Those of a calibration file that was made just now; also written to the file `path`.
-Result<SavedConstants> save_capture(Context& context, const std::string& location,
+// Those of a calibration file that was made just now; also written to the file `path` of `env`.
+Result<SavedConstants> save_capture(Context& context, const Env& env, const std::string& location,
                                     const station::CaptureReport& report, const std::string& path);
 
 }  // namespace sixpoint::cli

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "db/exchange.h"
 #include "db/history.h"
 
@@ -27,11 +28,10 @@ Result<ExchangeReport> make_store_file(
     remove();
     return report;
   }
-  if (Status placed = env.files.rename(temporary, path); !placed) {
+  if (Status placed = put_in_place(env.files, temporary, path); !placed) {
     remove();
     return fail(std::move(placed).error());
   }
-  SIXPOINT_CHECK(env.files.sync_folder(folder_of(path)));
   return report;
 }
 

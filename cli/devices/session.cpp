@@ -8,6 +8,7 @@
 
 #include "cli/command.h"
 #include "cli/devices/session_minimiser.h"
+#include "cli/output.h"
 #include "device/session/pcap.h"
 #include "device/session/session_journal.h"
 #include "device/wire/protocol.h"
@@ -22,6 +23,7 @@ struct Options {
   int most_replays = 2000;
   std::optional<std::uint16_t> bus;
   std::optional<std::uint16_t> device_number;
+  OutputOptions outputs;
   bool json = false;
 };
 
@@ -76,18 +78,24 @@ Status show(const Options& options, Context& context) {
 }
 
 Status minimise(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(options.input));
+  SIXPOINT_CHECK(outputs.file("--output", options.output));
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, options.input));
   MinimiseOptions how;
   SIXPOINT_ASSIGN(how.work, parse_session_work(options.work));
   how.most_replays = options.most_replays;
   const MinimiseReport report = cli::minimise(session, how);
-  SIXPOINT_CHECK(device::write_session(context.env.files, options.output, report.session));
+  SIXPOINT_CHECK(device::write_session(outputs.files(), options.output, report.session));
   print(context, options.json, options.output, report.session, report.brief());
   return {};
 }
 
 Status from_pcap(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(options.input));
+  SIXPOINT_CHECK(outputs.file("--output", options.output));
   constexpr std::uint64_t kMostCapture_bytes = 512ULL << 20U;
   SIXPOINT_ASSIGN(const Bytes bytes,
                   read_file(context.env.files, options.input, kMostCapture_bytes));
@@ -100,7 +108,7 @@ Status from_pcap(const Options& options, Context& context) {
     error.where = options.input + ": " + error.where;
     return fail(std::move(error));
   }
-  SIXPOINT_CHECK(device::write_session(context.env.files, options.output, *session));
+  SIXPOINT_CHECK(device::write_session(outputs.files(), options.output, *session));
   print(context, options.json, options.output, *session, {});
   return {};
 }
@@ -111,9 +119,14 @@ Status recover(const Options& options, Context& context) {
   if (target.ends_with(suffix)) {
     target.resize(target.size() - suffix.size());
   }
-  SIXPOINT_ASSIGN(const auto recovered,
-                  device::recover_session(context.env.files, device::journal_of(target),
-                                          options.output.empty() ? target : options.output));
+  const std::string output = options.output.empty() ? target : options.output;
+  Outputs outputs(context, options.outputs, options.json);
+  const std::string journal = device::journal_of(target);
+  SIXPOINT_CHECK(outputs.input(journal));
+  if (context.env.files.info(journal)) {
+    SIXPOINT_CHECK(outputs.file_to_keep("--output", output));
+  }
+  SIXPOINT_ASSIGN(const auto recovered, device::recover_session(outputs.files(), journal, output));
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, recovered.target));
   print(context, options.json, recovered.target, session,
@@ -135,6 +148,7 @@ void add_session(CLI::App& app, Context& context) {
     return declared;
   };
   const auto add_output = [](Declared<Options> made, const char* about) {
+    add_output_options(made.command, made.options.outputs);
     return made.command.add_option("-o,--output", made.options.output, about);
   };
   add("show", "what a session holds", "SESSION", show);

@@ -7,6 +7,7 @@
 #include "base/sha256.h"
 #include "cli/command.h"
 #include "cli/files/repair_answer.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "repair/archive/archive_merge.h"
 #include "repair/archive/archive_plan.h"
@@ -34,6 +35,7 @@ struct Options {
   std::string plan;    // the folder of the plan
   std::string output;  // plan: its folder; run: the folder for repaired files
   RepairSources sources;
+  OutputOptions outputs;
   ArchiveDraft draft;  // as far as the options describe it
   std::size_t shard = 0;
   bool verify = false;
@@ -117,12 +119,18 @@ Status gather_constants(const RepairSources& sources, Context& context, ArchiveD
   if (!sources.constants.empty()) {
     SIXPOINT_ASSIGN(draft.repair.given, read_constants(context.env.files, sources.constants));
   }
+  draft.repair.scan = sources.scan;
+  draft.repair.or_scan = sources.or_scan;
+  draft.repair.store_named = !sources.store.empty();
   SIXPOINT_ASSIGN(auto store, store_of(context, sources));
   if (store) {
-    SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(*store));
     const std::string place = store->database().location();
     draft.store = place.find("://") == std::string::npos ? absolute(place) : place;
-    draft.snapshot = &*snapshot;
+    const auto order = order_of(sources, true);
+    if (std::ranges::find(order, repair::SourceKind::store) != order.end()) {
+      SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(*store));
+      draft.snapshot = &*snapshot;
+    }
   }
   if (!sources.calibration_file.empty()) {
     const std::string path = absolute(sources.calibration_file);
@@ -195,7 +203,17 @@ void end_json_of_plan(const PlannedArchive& planned, bool dry_run, FileStream& f
              {"plan", text_or_null(plan.id)}});
 }
 
+// The folder of a plan is new. One that a killed program left half made is gone on with.
+Status take_plan_folder(const std::string& folder, FileSystem& files, Outputs& outputs) {
+  return files.info(folder + "/plan.lock") ? outputs.working_folder("--output", folder)
+                                           : outputs.folder("--output", folder);
+}
+
 Status run_plan(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  if (!options.dry_run) {
+    SIXPOINT_CHECK(take_plan_folder(absolute(options.output), context.env.files, outputs));
+  }
   ArchiveDraft draft = options.draft;
   std::optional<repair::ConstantsSnapshot> snapshot;
   SIXPOINT_CHECK(gather_constants(options.sources, context, draft, snapshot));
@@ -233,6 +251,8 @@ Status run_plan(const Options& options, Context& context) {
 Status run_shard(const Options& options, Context& context) {
   const std::string folder = absolute(options.plan);
   SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.working_folder("--output", absolute(options.output)));
   std::optional<Progress> progress;
   repair::ShardRunOptions how;
   how.shard = options.shard;
@@ -473,6 +493,7 @@ void add_archive(CLI::App& app, Context& context) {
                 "know files by SHA-256, not by size and time of change: reads all of them");
   add_source_options(plan, options.sources);
   add_repair_options(plan, options.draft.repair.options);
+  add_output_options(plan, options.outputs);
   plan.add_flag("--dry-run", options.dry_run, "print what would be planned, write nothing");
   const auto add = [&](const char* name, const char* about,
                        Status (*work)(const Options&, Context&)) {

@@ -3,6 +3,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/output.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -11,10 +12,16 @@ struct Options {
   std::vector<std::string> paths;
   std::string html;
   double max_lag_s = repair::CompareOptions{}.max_lag_s;
+  OutputOptions outputs;
   bool json = false;
 };
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  for (const std::string& path : options.paths) {
+    SIXPOINT_CHECK(outputs.input(path));
+  }
+  SIXPOINT_CHECK(outputs.file("--html", options.html));
   std::vector<repair::Trace> traces;
   for (const std::string& path : options.paths) {
     SIXPOINT_ASSIGN(auto trace, repair::Trace::load(context.env.files, path));
@@ -33,8 +40,7 @@ Status run(const Options& options, Context& context) {
     }
   }
   if (!options.html.empty()) {
-    SIXPOINT_CHECK(
-        write_file(context.env.files, options.html, repair::compare_html(traces, pairs)));
+    SIXPOINT_CHECK(write_file(outputs.files(), options.html, repair::compare_html(traces, pairs)));
   }
   Json json = document("compare");
   Json& list = json["pairs"] = Json::array();
@@ -58,6 +64,7 @@ void add_compare(CLI::App& app, Context& context) {
       ->required()
       ->expected(2, 3);
   command.add_option("--html", options.html, "a page with the traces and the histograms");
+  add_output_options(command, options.outputs);
   command.add_option("--max-lag", options.max_lag_s, "how far the clocks may differ, seconds")
       ->check(CLI::Range(0.0, 3'600.0));
 }

@@ -5,6 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/files/repair_answer.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/rescale/constants_finder.h"
@@ -30,6 +31,10 @@ Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Co
   const RepairSources& sources = options.sources;
   repair::ConstantsFinderOptions finder;
   finder.still = options.repair.still;
+  finder.scan = sources.scan;
+  finder.or_scan = sources.or_scan;
+  finder.store_named = !sources.store.empty();
+  finder.allow_prior = options.repair.allow_prior;
   if (!sources.constants.empty()) {
     SIXPOINT_ASSIGN(finder.given, read_constants(context.env.files, sources.constants));
   }
@@ -73,6 +78,8 @@ RepairReport repair_one(const NamedFile& file, const Options& options,
 }
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, {}, options.json);
+  SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
   std::optional<db::Store> store;
   SIXPOINT_ASSIGN(auto how, finder_options(options, context, store));
   repair::ConstantsFinder finder(context.env, std::move(how));

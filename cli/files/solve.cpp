@@ -8,6 +8,7 @@
 #include "base/sha256.h"
 #include "cli/command.h"
 #include "cli/gravity_option.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/triage/survey.h"
@@ -25,6 +26,7 @@ struct Options {
   std::string output;
   std::string prior;
   GravityOptions gravity;
+  OutputOptions outputs;
   bool json = false;
 };
 
@@ -57,7 +59,7 @@ struct Outcome {
 //   rest on a prior    -o          never
 //   not verified       never       never
 Status keep(const std::string& path, const Options& options, const std::string& model,
-            Outcome& outcome, Context& context) {
+            Outcome& outcome, Context& context, Outputs& outputs) {
   const bool to_file =
       !options.output.empty() && (outcome.report.usable() || outcome.report.from_prior);
   const bool to_store = options.save && outcome.report.usable();
@@ -67,8 +69,8 @@ Status keep(const std::string& path, const Options& options, const std::string& 
   calib::ConstantsOrigin origin;
   SIXPOINT_ASSIGN(origin.sha256, file_sha256(context.env.files, path));
   origin.file = file_name_of(path);
-  SIXPOINT_ASSIGN(const auto record,
-                  record_constants(context, outcome.report, origin, to_file ? options.output : ""));
+  SIXPOINT_ASSIGN(const auto record, record_constants(outputs.env(), outcome.report, origin,
+                                                      to_file ? options.output : ""));
   if (to_store) {
     SIXPOINT_ASSIGN(outcome.saved, save_constants(context, options.store, record, model));
   }
@@ -76,7 +78,7 @@ Status keep(const std::string& path, const Options& options, const std::string& 
 }
 
 Result<Outcome> solve_one(const std::string& path, const Options& options,
-                          calib::SolveOptions solve, Context& context) {
+                          calib::SolveOptions solve, Context& context, Outputs& outputs) {
   calib::StillBlockOptions still;
   still.strict_nonzero = options.strict_nonzero;
   SIXPOINT_ASSIGN(const repair::Survey survey, repair::survey(context.env.files, path, still));
@@ -90,17 +92,17 @@ Result<Outcome> solve_one(const std::string& path, const Options& options,
   SIXPOINT_ASSIGN(outcome.report, repair::solve_survey(path, survey, solve));
   outcome.report.seconds =
       std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
-  SIXPOINT_CHECK(keep(path, options, survey.model, outcome, context));
+  SIXPOINT_CHECK(keep(path, options, survey.model, outcome, context, outputs));
   return outcome;
 }
 
 void print(const std::string& path, const Options& options, const Outcome& outcome,
            Context& context) {
   const calib::SolveReport& report = outcome.report;
-  context.out << fmt::format("{}: {}\n", printable(path), printable(report.brief(), 2000));
+  context.text() << fmt::format("{}: {}\n", printable(path), printable(report.brief(), 2000));
   if (report.calibration) {
     for (std::size_t a = 0; a < kAxes; ++a) {
-      context.out << fmt::format(
+      context.text() << fmt::format(
           "  {}  {:.3f} LSB/g (+- {:.2f} %)  zero {:.2f} LSB (+- {:.1f} mg)\n", kAxisNames[a],
           1 / report.calibration->sensitivity_g_per_lsb[a],
           100 * report.uncertainty.sensitivity_relative[a], report.calibration->zero_lsb[a],
@@ -108,13 +110,13 @@ void print(const std::string& path, const Options& options, const Outcome& outco
     }
   }
   if (!report.verification.missing_directions.empty()) {
-    context.out << fmt::format(
+    context.text() << fmt::format(
         "  missing: lay the unit still for a minute with these axes up: {}\n",
         fmt::join(report.verification.missing_directions, " "));
   }
   if (report.partial) {
     for (std::size_t a = 0; a < kAxes; ++a) {
-      context.out << fmt::format(
+      context.text() << fmt::format(
           "  {}  zero known to {:.0f} mg ({}), sensitivity to {:.1f} % ({})\n", kAxisNames[a],
           report.partial->zero_mg[a],
           report.partial->zero_determined[a] ? "determined" : "not determined",
@@ -123,10 +125,10 @@ void print(const std::string& path, const Options& options, const Outcome& outco
     }
   }
   for (const std::string& note : report.notes) {
-    context.out << "  note: " << printable(note, 1000) << '\n';
+    context.text() << "  note: " << printable(note, 1000) << '\n';
   }
   if (outcome.saved) {
-    context.out << "  stored as " << outcome.saved->id << '\n';
+    context.text() << "  stored as " << outcome.saved->id << '\n';
   } else if (options.save && !report.usable()) {
     context.log().warn("nothing stored: only verified constants are kept");
   }
@@ -150,10 +152,16 @@ Status run(const Options& options, Context& context) {
     return fail(ErrorCode::usage, "one output for several recordings", options.output,
                 "solve them one by one, or use --save");
   }
+  Outputs outputs(context, options.outputs, options.json);
+  for (const std::string& path : options.files) {
+    SIXPOINT_CHECK(outputs.input(path));
+  }
+  SIXPOINT_CHECK(outputs.input(options.save ? store_file(options.store) : ""));
+  SIXPOINT_CHECK(outputs.file("--output", options.output));
   Json json = document("solve");
   Json list = Json::array();
   for (const std::string& path : options.files) {
-    const auto outcome = solve_one(path, options, solve, context);
+    const auto outcome = solve_one(path, options, solve, context, outputs);
     if (!outcome && single) {
       return fail(outcome.error());
     }
@@ -199,6 +207,7 @@ void add_solve(CLI::App& app, Context& context) {
                      "like; the result is marked and never verified");
   command.add_option("-o,--output", options.output,
                      "write verified constants into this constants.json");
+  add_output_options(command, options.outputs);
   command.add_flag("--save", options.save, "keep verified constants in the store");
   add_store_option(command, options.store);
 }

@@ -11,6 +11,7 @@
 #include "cli/command.h"
 #include "cli/gap/gap_challenge.h"
 #include "cli/gap/gap_trends.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "gap/judge/diagnose.h"
 #include "gap/recording/bundle.h"
@@ -31,7 +32,8 @@ struct Options {
   std::string html;
   std::string png;
   std::string pdf;
-  std::string scenario;
+  std::string scenario_out;
+  OutputOptions outputs;
   std::uint64_t seed = 0;
   double rate_hz = 0;  // 0: not given
   bool json = false;
@@ -81,29 +83,37 @@ Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
 }
 
 void print(const gap::Diagnosis& d, Context& context) {
-  context.out << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
+  context.text() << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
   for (const gap::EffectFinding& effect : d.effects) {
-    context.out << fmt::format("  {:<20} p {:.3f}  held out {:+.1f} nats", effect.name,
-                               effect.probability, effect.held_out_gain_nats);
+    context.text() << fmt::format("  {:<20} p {:.3f}  held out {:+.1f} nats", effect.name,
+                                  effect.probability, effect.held_out_gain_nats);
     for (const gap::NamedValue& p : effect.parameters) {
-      context.out << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
+      context.text() << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
     }
-    context.out << (effect.outside_datasheet ? "  (outside the datasheet)\n" : "\n");
+    context.text() << (effect.outside_datasheet ? "  (outside the datasheet)\n" : "\n");
   }
   for (const std::string& where : d.unknown.where) {
-    context.out << "  unknown: " << printable(where, 300) << '\n';
+    context.text() << "  unknown: " << printable(where, 300) << '\n';
   }
   for (const gap::NextSegment& next : d.next_segments) {
-    context.out << fmt::format("  next: {} ({:.0f} min) would show {}\n", next.name, next.minutes,
-                               fmt::join(next.separates, ", "));
+    context.text() << fmt::format("  next: {} ({:.0f} min) would show {}\n", next.name,
+                                  next.minutes, fmt::join(next.separates, ", "));
   }
   for (const std::string& loss : d.losses) {
     context.people << "sixpoint: " << printable(loss, 1000) << '\n';
   }
 }
 
-Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, Context& context) {
-  FileSystem& files = context.env.files;
+Status take_outputs(const Options& options, Outputs& outputs) {
+  SIXPOINT_CHECK(outputs.input(options.bundle));
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.file("--html", options.html));
+  SIXPOINT_CHECK(outputs.file("--png", options.png));
+  SIXPOINT_CHECK(outputs.file("--pdf", options.pdf));
+  return outputs.file("--scenario-out", options.scenario_out);
+}
+
+Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, FileSystem& files) {
   if (!options.html.empty()) {
     SIXPOINT_CHECK(write_file(files, options.html, gap::report_html(diagnosis)));
   }
@@ -115,9 +125,9 @@ Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, Co
     SIXPOINT_ASSIGN(const Bytes pdf, gap::sheet_pdf(gap::report_sheet(diagnosis)));
     SIXPOINT_CHECK(write_file(files, options.pdf, as_text(pdf)));
   }
-  if (!options.scenario.empty()) {
+  if (!options.scenario_out.empty()) {
     SIXPOINT_CHECK(
-        write_file(files, options.scenario, gap::augmented_scenario(diagnosis).dump(2) + "\n"));
+        write_file(files, options.scenario_out, gap::augmented_scenario(diagnosis).dump(2) + "\n"));
   }
   return {};
 }
@@ -126,9 +136,11 @@ Status run(const Options& options, Context& context) {
   if (options.bundle.empty() && options.run.empty()) {
     return fail(ErrorCode::usage, "BUNDLE or --run is required", {}, "name one of them");
   }
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(take_outputs(options, outputs));
   SIXPOINT_ASSIGN(const gap::Diagnosis diagnosis, diagnose(options, context));
   context.worsen(exit_code_of(diagnosis));
-  SIXPOINT_CHECK(write_reports(options, diagnosis, context));
+  SIXPOINT_CHECK(write_reports(options, diagnosis, outputs.files()));
   if (!options.json) {
     print(diagnosis, context);
     return {};
@@ -161,7 +173,10 @@ void add_gap(CLI::App& app, Context& context) {
   diagnosis.add_option("--png", options.png, "write the report as one sheet, PNG");
   diagnosis.add_option("--pdf", options.pdf, "write the report as one sheet, PDF");
   diagnosis.add_option("--seed", options.seed, "seed of the augmented scenario");
-  diagnosis.add_option("--scenario", options.scenario, "write the augmented scenario to this file");
+  diagnosis.add_option("--scenario-out", options.scenario_out,
+                       "write the augmented scenario to this file");
+  refuse_old_output(diagnosis, "--scenario", "--scenario-out");
+  add_output_options(diagnosis, options.outputs);
   add_gap_challenge(group, context);
   add_gap_trends(group, context);
 }

@@ -20,6 +20,7 @@
 #include "base/atomic_file.h"
 #include "base/html.h"
 #include "cli/command.h"
+#include "cli/output.h"
 #include "cli/workers.h"
 #include "gap/challenge/outside.h"
 #include "gap/challenge/recorded.h"
@@ -53,6 +54,7 @@ struct Options {
   // What the diagnosis says of that bundle as it is.
   std::set<std::string> own_effects;
   bool own_unknown = false;
+  OutputOptions outputs;
   bool json = false;
 };
 
@@ -380,6 +382,9 @@ Status challenge(Options options, Context& context) {
   if (options.program.empty()) {
     options.program = this_program();
   }
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(options.recording));
+  SIXPOINT_CHECK(outputs.file("--html", options.html));
   std::error_code error;
   const bool temporary = options.keep.empty();
   std::string folder = options.keep;
@@ -392,10 +397,12 @@ Status challenge(Options options, Context& context) {
     }
     folder = pattern;
   } else {
+    SIXPOINT_CHECK(outputs.folder("--keep", folder));
     SIXPOINT_CHECK(context.env.files.make_folders(folder));
   }
+  Env env = outputs.env();
   if (!options.recording.empty()) {
-    SIXPOINT_CHECK(learn_own(context.env, options, folder));
+    SIXPOINT_CHECK(learn_own(env, options, folder));
     if (std::all_of(options.only.begin(), options.only.end(),
                     [&](const std::string& name) { return options.own_effects.contains(name); })) {
       return fail(ErrorCode::bad_data, "the recording has of its own all that could be added to it",
@@ -407,7 +414,7 @@ Status challenge(Options options, Context& context) {
     Progress progress(context, "trials", options.trials);
     for_each_job(
         options.trials, options.jobs,
-        [&](std::size_t i) { results[i] = run_trial(context.env, options, *protocol, folder, i); },
+        [&](std::size_t i) { results[i] = run_trial(env, options, *protocol, folder, i); },
         [&](std::size_t done) { progress.at(done); });
   }
   if (temporary) {
@@ -422,13 +429,13 @@ Status challenge(Options options, Context& context) {
   }
   const Scores scores = gap::score(outcomes, options.strip);
   if (!options.html.empty()) {
-    SIXPOINT_CHECK(write_file(context.env.files, options.html, page(options, scores, outcomes)));
+    SIXPOINT_CHECK(write_file(outputs.files(), options.html, page(options, scores, outcomes)));
   }
   if (options.json) {
     print_json(context, to_json(options, scores, outcomes));
   } else {
     for (const auto& [what, value] : lines(scores)) {
-      context.out << fmt::format("{:<42} {}\n", what, value);
+      context.text() << fmt::format("{:<42} {}\n", what, value);
     }
   }
   if (scores.failures.right > 0) {
@@ -465,6 +472,7 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
   command.add_option("--program", options.program, "the sixpoint to test (default: this one)");
   command.add_option("--keep", options.keep, "leave bundles and answers in this folder");
   command.add_option("--html", options.html, "also write the scores as a page");
+  add_output_options(command, options.outputs);
 }
 
 }  // namespace sixpoint::cli

@@ -6,6 +6,7 @@
 #include "base/atomic_file.h"
 #include "base/sha256.h"
 #include "cli/command.h"
+#include "cli/output.h"
 #include "sim/bundle_writer.h"
 #include "sim/firmware.h"
 #include "sim/recording.h"
@@ -18,29 +19,35 @@ struct Options {
   std::string scenario;
   std::string output;
   std::string truth;
+  OutputOptions outputs;
   bool json = false;
 };
 
 // The keys that the answers for a recording and for a bundle have in common.
-Result<Json> answer_of(Context& context, const sim::Scenario& scenario,
+Result<Json> answer_of(FileSystem& files, const sim::Scenario& scenario,
                        const std::string& recording) {
   Json json = document("simulate");
   json["file"] = recording;
-  SIXPOINT_ASSIGN(json["sha256"], file_sha256(context.env.files, recording));
+  json["sha256"] = nullptr;  // of bytes that went into a device or a pipe
+  if (const auto info = files.info(recording); info && info->kind == FileKind::file) {
+    SIXPOINT_ASSIGN(json["sha256"], file_sha256(files, recording));
+  }
   json["serial"] = scenario.unit.serial;
   json["firmware"] = scenario.unit.firmware;
   return json;
 }
 
-Result<Json> simulate_bundle(Context& context, const Options& options,
-                             const sim::Scenario& scenario) {
+Result<Json> simulate_bundle(const Options& options, const sim::Scenario& scenario,
+                             Outputs& outputs) {
   if (!options.truth.empty()) {
     return fail(ErrorCode::usage, "--truth cannot be used with a protocol", {},
                 "leave it out: the scenario says what acted on the unit");
   }
+  SIXPOINT_CHECK(outputs.folder("--output", options.output));
   SIXPOINT_ASSIGN(const sim::BundleReport report,
-                  sim::write_bundle(context.env.files, options.output, scenario));
-  SIXPOINT_ASSIGN(Json json, answer_of(context, scenario, options.output + "/recording.gt3x"));
+                  sim::write_bundle(outputs.files(), options.output, scenario));
+  SIXPOINT_ASSIGN(Json json,
+                  answer_of(outputs.files(), scenario, options.output + "/recording.gt3x"));
   json["bundle"] = options.output;
   json["segments"] = report.segments;
   json["samples"] = report.samples;
@@ -49,12 +56,16 @@ Result<Json> simulate_bundle(Context& context, const Options& options,
 }
 
 Result<Json> simulate(Context& context, const Options& options) {
-  FileSystem& files = context.env.files;
+  Outputs outputs(context, options.outputs, options.json);
+  FileSystem& files = outputs.files();
+  SIXPOINT_CHECK(outputs.input(options.scenario));
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.scenario));
   SIXPOINT_ASSIGN(const sim::Scenario scenario, sim::parse_scenario(as_text(text)));
   if (scenario.protocol) {
-    return simulate_bundle(context, options, scenario);
+    return simulate_bundle(options, scenario, outputs);
   }
+  SIXPOINT_CHECK(outputs.file("--output", options.output));
+  SIXPOINT_CHECK(outputs.file("--truth", options.truth));
 
   std::optional<AtomicFile> truth_file;
   sim::TruthSink truth;
@@ -79,7 +90,7 @@ Result<Json> simulate(Context& context, const Options& options) {
     SIXPOINT_CHECK(truth_file->commit());
   }
 
-  SIXPOINT_ASSIGN(Json json, answer_of(context, scenario, options.output));
+  SIXPOINT_ASSIGN(Json json, answer_of(files, scenario, options.output));
   json["filter"]["in_force"] = calib::to_string(scenario.filter_in_force());
   json["filter"]["constants_measured_under"] =
       calib::to_string(sim::filter_of_constants(scenario.unit.serial, scenario.unit.calibrated));
@@ -110,6 +121,7 @@ void add_simulate(CLI::App& app, Context& context) {
       .add_option("-o,--output", options.output, "the .gt3x file to make, or the bundle's folder")
       ->required();
   command.add_option("--truth", options.truth, "also write the true motion in g, as CSV");
+  add_output_options(command, options.outputs);
 }
 
 }  // namespace sixpoint::cli

@@ -21,6 +21,7 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
   // CLI11 takes the arguments in reverse order.
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   context.exit_code = 0;
+  context.out_is_taken = false;
   try {
     app.parse(reversed);
   } catch (const CLI::ParseError& error) {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "db/exchange.h"
 #include "db/journal.h"
@@ -21,6 +22,7 @@ struct Options {
   std::string to;
   int days = 365;
   bool csv = false;
+  OutputOptions outputs;
   bool json = false;
 };
 
@@ -41,10 +43,14 @@ Answer answer_of(const db::ExchangeReport& report, const std::string& file,
 }
 
 Result<Answer> export_store(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(options.csv ? outputs.folder("--output", options.path)
+                             : outputs.file("--output", options.path));
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto report,
-                  options.csv ? db::export_csv(store, context.env.files, options.path)
-                              : db::export_json_lines(store, context.env.files, options.path));
+                  options.csv ? db::export_csv(store, outputs.files(), options.path)
+                              : db::export_json_lines(store, outputs.files(), options.path));
   return answer_of(report, options.path, report.brief());
 }
 
@@ -64,8 +70,12 @@ Result<Answer> import_store(const Options& options, Context& context) {
 }
 
 Result<Answer> back_up(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.file_to_keep("--output", options.path));
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-  SIXPOINT_ASSIGN(const auto report, db::backup(store, context.env, options.path));
+  Env env = outputs.env();
+  SIXPOINT_ASSIGN(const auto report, db::backup(store, env, options.path));
   return answer_of(report, options.path, report.brief());
 }
 
@@ -276,13 +286,14 @@ void add_store(CLI::App& app, Context& context) {
   };
   auto out = sub("export", "write the whole store as JSON Lines or CSV", export_store);
   with(out, "-o,--output", &Options::path, "the file; with --csv the folder")->required();
+  add_output_options(out.command, out.options.outputs);
   out.command.add_flag("--csv", out.options.csv, "one CSV file per table instead of JSON Lines");
   with(sub("import", "continue a store with the rows of an export", import_store), "file",
        &Options::path, "what 'store export' wrote: JSON Lines")
       ->required();
-  with(sub("backup", "copy the store into an SQLite file while others work", back_up),
-       "-o,--output", &Options::path, "the copy")
-      ->required();
+  auto copy = sub("backup", "copy the store into an SQLite file while others work", back_up);
+  with(copy, "-o,--output", &Options::path, "the copy")->required();
+  add_output_options(copy.command, copy.options.outputs);
   with(sub("catch-up", "store what the store did not take when it was measured", catch_up),
        "--journal", &Options::journal,
        "the folder of a journal that was written elsewhere (default: this station's)");

@@ -16,7 +16,7 @@ namespace {
 
 struct Options : JigOptions {
   std::string output;
-  std::string constants_file;
+  std::string constants_out;
   int rate_hz = 30;
   double side_s = 40;
   double turn_s = 5;
@@ -63,10 +63,18 @@ station::SideAnswer ask_side(Context& context, double side_s, bool by_itself, de
                                                                       : station::SideAnswer::stop;
 }
 
-Result<Done> capture(Context& context, const Options& options, device::SessionRecorder& recorder) {
-  SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, recorder));
+Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
+                     device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.file("--constants-out", options.constants_out));
+  SIXPOINT_CHECK(outputs.file_to_keep("--output", options.output));
+  SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, outputs, recorder));
   device::Unit& unit = *opened.unit;
   SIXPOINT_ASSIGN(const auto how, capture_options(context, options, unit.identity().serial));
+  if (options.output.empty()) {
+    SIXPOINT_CHECK(outputs.file_to_keep("--output", how.output));
+  }
+  Env env = outputs.env();
   context.people << fmt::format("unit {} with firmware {}\n", printable(unit.identity().serial),
                                 printable(unit.identity().firmware));
   Done done;
@@ -75,14 +83,14 @@ Result<Done> capture(Context& context, const Options& options, device::SessionRe
     hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
       return ask_side(context, options.side_s, opened.jig->turns_by_itself(), side, number, of);
     };
-    SIXPOINT_ASSIGN(done.report, station::run_capture(opened.on_jig(), context.env, how, hooks));
+    SIXPOINT_ASSIGN(done.report, station::run_capture(opened.on_jig(), env, how, hooks));
   } else {
     context.people << "this unit offers files only: the recording that it holds is taken\n";
-    SIXPOINT_ASSIGN(done.report, station::run_file_capture(unit, context.env, how));
+    SIXPOINT_ASSIGN(done.report, station::run_file_capture(unit, env, how));
   }
   if (done.report.usable()) {
     SIXPOINT_ASSIGN(done.saved,
-                    save_capture(context, options.store, done.report, options.constants_file));
+                    save_capture(context, env, options.store, done.report, options.constants_out));
   }
   return done;
 }
@@ -119,13 +127,13 @@ void print(Context& context, const Done& done) {
     context.log().error("{}", fmt::join(report.refusal, "; "));
     return;
   }
-  context.out << fmt::format("{}: {}\n", printable(report.file), report.solved->brief());
+  context.text() << fmt::format("{}: {}\n", printable(report.file), report.solved->brief());
   const auto& missing = report.solved->verification.missing_directions;
   if (!missing.empty()) {
-    context.out << fmt::format("repeat these sides: {}\n", fmt::join(missing, " "));
+    context.text() << fmt::format("repeat these sides: {}\n", fmt::join(missing, " "));
   }
   if (done.saved) {
-    context.out << fmt::format("constants stored as {}\n", done.saved->id);
+    context.text() << fmt::format("constants stored as {}\n", done.saved->id);
   }
 }
 
@@ -143,8 +151,9 @@ int exit_code_of(const station::CaptureReport& report) {
 }
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
   device::SessionRecorder recorder;
-  const Result<Done> done = capture(context, options, recorder);
+  const Result<Done> done = capture(context, options, outputs, recorder);
   finish_session(context, recorder, options.record);
   if (!done) {
     return fail(done.error());
@@ -167,8 +176,9 @@ void add_capture(CLI::App& app, Context& context) {
   add_jig_options(command, options);
   command.add_option("-o,--output", options.output,
                      "the .gt3x to make (default: SERIAL-calibration-DAY.gt3x)");
-  command.add_option("--constants", options.constants_file,
+  command.add_option("--constants-out", options.constants_out,
                      "also write the constants into this constants.json");
+  refuse_old_output(command, "--constants", "--constants-out");
   const auto add_number = [&command = command](const char* name, auto& value, auto least, auto most,
                                                const char* about) {
     command.add_option(name, value, about)->check(CLI::Range(least, most))->capture_default_str();

@@ -5,6 +5,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 
 namespace sixpoint::cli {
@@ -16,19 +17,24 @@ struct Options {
   std::string store;
   std::string output;
   std::string label;
+  OutputOptions outputs;
   bool json = false;
 };
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.file("--output", options.output));
+  SIXPOINT_CHECK(outputs.file("--label", options.label));
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const db::RunRecord record, store.run(options.run));
   SIXPOINT_ASSIGN(const auto certificate, station::certificate_of(record));
   if (!options.output.empty()) {
-    SIXPOINT_CHECK(station::write_certificate(context.env.files, options.output, record));
+    SIXPOINT_CHECK(station::write_certificate(outputs.files(), options.output, record));
   }
   if (!options.label.empty()) {
     SIXPOINT_ASSIGN(const std::string label, station::label_zpl(record));
-    SIXPOINT_CHECK(write_file(context.env.files, options.label, label));
+    SIXPOINT_CHECK(write_file(outputs.files(), options.label, label));
   }
   return print_answer(
       context, options.json, certificate.to_json(),
@@ -44,6 +50,7 @@ void add_certificate(CLI::App& app, Context& context) {
   command.add_option("RUN", options.run, "the run's id, as 'sixpoint jig' said it")->required();
   command.add_option("-o,--output", options.output, "the .pdf or .json to make");
   command.add_option("--label", options.label, "and a label for the unit, as ZPL");
+  add_output_options(command, options.outputs);
   add_store_option(command, options.store);
 }
 

@@ -3,6 +3,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "station/records/station_records.h"
 
@@ -18,6 +19,7 @@ struct Options {
   std::string limits;
   std::string store;
   std::string html;
+  OutputOptions outputs;
   bool new_baseline = false;
   bool release = false;
   bool json = false;
@@ -41,6 +43,10 @@ Status decide(const Options& options, Context& context, const char* command,
 }
 
 Status show_state(const Options& options, Context& context, const char* command) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.input(options.limits));
+  SIXPOINT_CHECK(outputs.file("--html", options.html));
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
   SIXPOINT_ASSIGN(const auto state,
@@ -50,7 +56,7 @@ Status show_state(const Options& options, Context& context, const char* command)
     for (const station::CheckUnitChart& chart : state.charts) {
       page += station::chart_svg(chart);
     }
-    SIXPOINT_CHECK(write_file(context.env.files, options.html, page));
+    SIXPOINT_CHECK(write_file(outputs.files(), options.html, page));
   }
   context.worsen(state.locked ? kExitFailed : kExitPassed);
   Json json = document(command);
@@ -145,6 +151,7 @@ void add_check_unit(CLI::App& app, Context& context) {
   auto [chart, options] = add_state(group, context, "check-unit", "chart",
                                     "individuals and moving range charts; exit 1: locked");
   chart.add_option("--html", options.html, "the charts as a page");
+  add_output_options(chart, options.outputs);
 }
 
 void add_station_lock(CLI::App& app, Context& context) {

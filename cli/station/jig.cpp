@@ -104,7 +104,14 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
   return run;
 }
 
-Status check_outputs(const Options& options) {
+Status check_outputs(const Options& options, Outputs& outputs) {
+  SIXPOINT_CHECK(outputs.input(options.limits));
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.file("--certificate", options.certificate));
+  SIXPOINT_CHECK(outputs.file("--label", options.label));
+  if (!options.state.empty()) {
+    SIXPOINT_CHECK(outputs.working_folder("--state", options.state));
+  }
   if (!options.certificate.empty()) {
     SIXPOINT_CHECK(station::check_certificate_name(options.certificate));
   }
@@ -122,7 +129,8 @@ Status check_outputs(const Options& options) {
 
 // Certificate and label from the record as it is stored, so that they can be made again from there.
 // An error is reported, and the run goes on.
-void make_papers(Context& context, const Options& options, const db::RunRecord& run, Done& done) {
+void make_papers(Context& context, const Options& options, Outputs& outputs,
+                 const db::RunRecord& run, Done& done) {
   const auto report = [&](const Status& made, bool& flag) {
     flag = made.has_value();
     if (!made) {
@@ -133,13 +141,12 @@ void make_papers(Context& context, const Options& options, const db::RunRecord& 
     }
   };
   if (!options.certificate.empty()) {
-    report(station::write_certificate(context.env.files, options.certificate, run), done.certified);
+    report(station::write_certificate(outputs.files(), options.certificate, run), done.certified);
   }
   if (!options.label.empty()) {
     const auto label = station::label_zpl(run);
-    report(
-        label ? write_file(context.env.files, options.label, *label) : Status(fail(label.error())),
-        done.labelled);
+    report(label ? write_file(outputs.files(), options.label, *label) : Status(fail(label.error())),
+           done.labelled);
   }
 }
 
@@ -287,10 +294,11 @@ Result<station::JigReport> run_and_store(
   return report;
 }
 
-Result<Done> measure(Context& context, const Options& options, device::SessionRecorder& recorder) {
-  SIXPOINT_CHECK(check_outputs(options));
+Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
+                     device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(check_outputs(options, outputs));
   SIXPOINT_ASSIGN(auto session, session_options(context, options));
-  SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, recorder));
+  SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, outputs, recorder));
   const device::Unit& unit = *opened.unit;
   const device::Identity& identity = unit.identity();
   if (!unit.abilities().streams || !unit.abilities().holds_constants) {
@@ -325,7 +333,7 @@ Result<Done> measure(Context& context, const Options& options, device::SessionRe
   };
   SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, store_run));
   if (done.kept) {
-    make_papers(context, options, record, done);
+    make_papers(context, options, outputs, record, done);
   }
   return done;
 }
@@ -349,28 +357,29 @@ Json to_json(const Options& options, const Done& done) {
 
 void print(Context& context, const Done& done) {
   const station::JigReport& report = done.report;
-  context.out << report.brief() << '\n';
+  context.text() << report.brief() << '\n';
   if (!report.usable()) {
     for (const std::string& action : station::next_actions(report.codes)) {
-      context.out << "  what to do: " << action << '\n';
+      context.text() << "  what to do: " << action << '\n';
     }
   }
   if (report.six) {
     const calib::SixPoseSolution& best = report.six->best();
-    context.out << "     sensitivity         zero        +1 g   -1 g    0 g\n";
+    context.text() << "     sensitivity         zero        +1 g   -1 g    0 g\n";
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      context.out << fmt::format("  {}  {:8.3f} LSB/g {:8.3f} LSB {:6} {:6} {:6}\n",
-                                 kAxisNames[axis], 1 / best.calibration.sensitivity_g_per_lsb[axis],
-                                 best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
-                                 best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
+      context.text() << fmt::format("  {}  {:8.3f} LSB/g {:8.3f} LSB {:6} {:6} {:6}\n",
+                                    kAxisNames[axis],
+                                    1 / best.calibration.sensitivity_g_per_lsb[axis],
+                                    best.calibration.zero_lsb[axis], best.stored.positive_lsb[axis],
+                                    best.stored.negative_lsb[axis], best.stored.zero_lsb[axis]);
     }
   }
   if (!done.kept) {
     return;
   }
-  context.out << fmt::format("run {}\n", done.run_id);
+  context.text() << fmt::format("run {}\n", done.run_id);
   if (done.constants_id) {
-    context.out << fmt::format("constants stored as {}\n", *done.constants_id);
+    context.text() << fmt::format("constants stored as {}\n", *done.constants_id);
   }
 }
 
@@ -380,8 +389,9 @@ int exit_code_of(const Done& done) {
 }
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
   device::SessionRecorder recorder;
-  const Result<Done> done = measure(context, options, recorder);
+  const Result<Done> done = measure(context, options, outputs, recorder);
   finish_session(context, recorder, options.record);
   if (!done) {
     return fail(done.error());

@@ -16,12 +16,13 @@ void add_jig_options(CLI::App& command, JigOptions& options) {
                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
   add_store_option(command, options.store);
   add_record_option(command, options.record);
+  add_output_options(command, options.outputs);
   add_gravity_options(command, options.gravity);
 }
 
-Result<JiggedUnit> open_unit(Context& context, const JigOptions& options,
+Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Outputs& outputs,
                              device::SessionRecorder& recorder) {
-  SIXPOINT_CHECK(begin_session(context, recorder, options.record));
+  SIXPOINT_CHECK(begin_session(outputs, recorder, options.record));
   JiggedUnit opened;
   SIXPOINT_ASSIGN(opened.unit, station::known_units().open(
                                    station::with_jig(options.device, options.jig), context.env,

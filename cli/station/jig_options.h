@@ -2,8 +2,9 @@
 // name.
 //
 //   add_jig_options(command, options);
+//   Outputs outputs(context, options.outputs, options.json);
 //   device::SessionRecorder recorder;
-//   SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, recorder));
+//   SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, outputs, recorder));
 //   SIXPOINT_CHECK(station::run_jig(opened.on_jig(), context.env, session, hooks));
 #pragma once
 
@@ -12,6 +13,7 @@
 
 #include "cli/context.h"
 #include "cli/gravity_option.h"
+#include "cli/output.h"
 #include "device/session/session_recorder.h"
 #include "station/run/jig_session.h"
 
@@ -27,9 +29,10 @@ struct JigOptions {
   std::string record;
   std::string store;
   GravityOptions gravity;
+  OutputOptions outputs;
   bool json = false;
 };
-// --device, --jig, --store, --record, and those of gravity
+// --device, --jig, --store, --record, --force, and those of gravity
 void add_jig_options(CLI::App& command, JigOptions& options);
 
 struct JiggedUnit {
@@ -39,7 +42,7 @@ struct JiggedUnit {
   station::UnitOnJig on_jig() const { return {unit.get(), jig}; }
 };
 // Begins the session that `--record` names, and opens unit and jig.
-Result<JiggedUnit> open_unit(Context& context, const JigOptions& options,
+Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Outputs& outputs,
                              device::SessionRecorder& recorder);
 
 }  // namespace sixpoint::cli

@@ -9,8 +9,9 @@ void add_record_option(CLI::App& command, std::string& path) {
                      "write every transfer with the device into this session (docs/sessions.md)");
 }
 
-Status begin_session(Context& context, device::SessionRecorder& recorder, const std::string& path) {
-  return path.empty() ? Status{} : recorder.begin(context.env.files, path);
+Status begin_session(Outputs& outputs, device::SessionRecorder& recorder, const std::string& path) {
+  SIXPOINT_CHECK(outputs.file_to_keep("--record", path));
+  return path.empty() ? Status{} : recorder.begin(outputs.files(), path);
 }
 
 void finish_session(Context& context, device::SessionRecorder& recorder, const std::string& path) {

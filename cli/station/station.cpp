@@ -10,6 +10,7 @@
 #include "cli/devices/known_devices.h"
 #include "cli/devices/stop_signals.h"
 #include "cli/gravity_option.h"
+#include "cli/output.h"
 #include "cli/station/practice_bench.h"
 #include "cli/store_option.h"
 #include "station/certificate/certificate.h"
@@ -73,7 +74,7 @@ class StationStore {
   // Constants of a calibration file: beside it as FILE.constants.json, and in the store.
   Result<std::string> add_constants(const station::CaptureReport& report) {
     const std::lock_guard lock(mutex_);
-    SIXPOINT_ASSIGN(const auto saved, save_capture(context_, options_.store, report,
+    SIXPOINT_ASSIGN(const auto saved, save_capture(context_, context_.env, options_.store, report,
                                                    report.file + ".constants.json"));
     return saved.id;
   }
@@ -175,6 +176,8 @@ void serve_until_signal(station::Server& server, const sigset_t& signals) {
 }
 
 Status serve(const Options& options, Context& context) {
+  Outputs outputs(context, {}, /*json=*/false);
+  SIXPOINT_CHECK(outputs.working_folder("--state", state_folder(options)));
   SIXPOINT_ASSIGN(auto lanes_asked, lanes_options(context, options));
   // A store that cannot be used is refused before anything is measured.
   if (const auto store = open_store(context, options.store);

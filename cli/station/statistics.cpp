@@ -5,6 +5,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "station/records/station_records.h"
 
@@ -18,6 +19,7 @@ struct Options {
   std::string from;
   std::string to;
   std::string html;
+  OutputOptions outputs;
   std::string limits;
   std::string file;
   std::string study;
@@ -58,36 +60,40 @@ void print(Context& context, const Answer& answer) {
     return part.of == 0 ? std::string("-") : fmt::format("{:.1f} %", 100 * part.value());
   };
   const auto line = [&](const station::GroupStatistics& group) {
-    context.out << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>9.0f} s\n",
-                               printable(group.name.empty() ? "(not stated)" : group.name, 24),
-                               group.runs, group.units, percent(group.yield),
-                               percent(group.first_pass_yield), group.seconds_per_unit_median);
+    context.text() << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>9.0f} s\n",
+                                  printable(group.name.empty() ? "(not stated)" : group.name, 24),
+                                  group.runs, group.units, percent(group.yield),
+                                  percent(group.first_pass_yield), group.seconds_per_unit_median);
   };
-  context.out << answer.report.brief() << '\n';
-  context.out << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>11}\n", "", "runs", "units",
-                             "yield", "first pass", "per unit");
+  context.text() << answer.report.brief() << '\n';
+  context.text() << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>11}\n", "", "runs", "units",
+                                "yield", "first pass", "per unit");
   for (const station::GroupStatistics& group : answer.report.groups) {
     line(group);
   }
   line(answer.report.all);
   for (const auto& [code, count] : answer.report.all.failure_codes) {
     const station::FailureCode* known = station::find_failure_code(code);
-    context.out << fmt::format("  {:>5} x {}: {}\n", count, printable(code),
-                               known != nullptr ? known->meaning : "");
+    context.text() << fmt::format("  {:>5} x {}: {}\n", count, printable(code),
+                                  known != nullptr ? known->meaning : "");
   }
   for (const auto& [name, one] : answer.report.capabilities) {
-    context.out << fmt::format("  Cpk {:6.2f} ({:.2f} to {:.2f}), n = {}: {}\n", one.cpk,
-                               one.cpk_low, one.cpk_high, one.n, name);
+    context.text() << fmt::format("  Cpk {:6.2f} ({:.2f} to {:.2f}), n = {}: {}\n", one.cpk,
+                                  one.cpk_low, one.cpk_high, one.n, name);
   }
   for (const station::StationState& state : answer.states) {
-    context.out << printable(state.brief(), 4000) << '\n';
+    context.text() << printable(state.brief(), 4000) << '\n';
   }
 }
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.input(options.limits));
+  SIXPOINT_CHECK(outputs.file("--html", options.html));
   SIXPOINT_ASSIGN(const Answer answer, collect(context, options));
   if (!options.html.empty()) {
-    SIXPOINT_CHECK(write_file(context.env.files, options.html,
+    SIXPOINT_CHECK(write_file(outputs.files(), options.html,
                               station::statistics_html(answer.report, answer.states)));
   }
   if (!options.json) {
@@ -144,6 +150,7 @@ void add_statistics(CLI::App& app, Context& context) {
   command.add_option("--from", options.from, "runs that started then or later (2027-03-31)");
   command.add_option("--to", options.to, "runs that started before");
   command.add_option("--html", options.html, "a page with charts");
+  add_output_options(command, options.outputs);
   command.add_option("--limits", options.limits, "a limits file with a [check_unit] table");
   add_store_option(command, options.store);
 }

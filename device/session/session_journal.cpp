@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/atomic_file.h"
 #include "device/session/session_archive.h"
 
 namespace sixpoint::device {
@@ -177,10 +178,7 @@ Result<RecoveredSession> recover_session(FileSystem& files, const std::string& j
     error.hint = "a journal is there only after a recording that was broken off";
     return fail(std::move(error));
   }
-  if (files.info(target)) {
-    return fail(ErrorCode::cannot_create, "the file exists already", target,
-                "name another one with -o");
-  }
+  SIXPOINT_CHECK(refuse_existing(files, target));
   const std::shared_ptr<ReadableFile> file = *std::move(opened);
   Lines lines(*file);
   SIXPOINT_ASSIGN(const auto first, lines.next());

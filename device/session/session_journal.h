@@ -66,7 +66,8 @@ struct RecoveredSession {
 
 // Makes `target` of what a journal holds, up to the first line that is no transfer, and removes the
 // journal. The session says `truncated`. no_input where there is no journal, bad_data where it is
-// none, cannot_create where `target` exists. Not for a journal whose program still runs.
+// none, cannot_create where `target` exists (refuse_existing()). Not for a journal whose program
+// still runs.
 Result<RecoveredSession> recover_session(FileSystem& files, const std::string& journal,
                                          const std::string& target);
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "device/wire/payload.h"
 #include "device/wire/wire_unit.h"
 
@@ -71,10 +72,7 @@ Status WireUnit::download(const RecordingInfo& recording, FileSystem& files,
     return fail(ErrorCode::device_unavailable, "this device offers no download", link_.address,
                 "connect the unit by USB");
   }
-  if (files.info(path)) {
-    return fail(ErrorCode::cannot_create, "the file exists already", path,
-                "choose another name or remove it");
-  }
+  SIXPOINT_CHECK(refuse_existing(files, path));
   const std::string part = fmt::format("{}.{}.part", path, to_hex(recording.sha256).substr(0, 12));
   const std::string before = part + ".before";
 
@@ -113,8 +111,7 @@ Status WireUnit::download(const RecordingInfo& recording, FileSystem& files,
     return fail(ErrorCode::bad_data, "what came is not the recording that the unit announced",
                 link_.address, "download it again");
   }
-  SIXPOINT_CHECK(files.rename(part, path));
-  return files.sync_folder(folder_of(path));
+  return put_in_place(files, part, path);
 }
 
 }  // namespace sixpoint::device

@@ -14,6 +14,24 @@ bool at_limit(const gt3x::Counts& sample, calib::RecordWidth width) {
   });
 }
 
+// A unit that charges stores zeros on all axes: no measurement, so they stay zeros. Rescaled they
+// would look like rest in a wrong direction. A single zero may be a measurement: only three in a
+// row, or zeros up to the record's first or last sample, are taken for charging.
+void keep_charging_zeros(std::span<const gt3x::Counts> samples, std::span<gt3x::Counts> fresh) {
+  constexpr std::size_t kLeastRun = 3;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    std::size_t end = i;
+    while (end < samples.size() && samples[end] == gt3x::Counts{}) {
+      ++end;
+    }
+    if (end - i >= kLeastRun || (end > i && (i == 0 || end == samples.size()))) {
+      std::fill(fresh.begin() + static_cast<std::ptrdiff_t>(i),
+                fresh.begin() + static_cast<std::ptrdiff_t>(end), gt3x::Counts{});
+    }
+    i = std::max(i, end);
+  }
+}
+
 bool is_epoch(const gt3x::Record& record) {
   using enum gt3x::RecordType;
   return record.is(epoch) || record.is(epoch2) || record.is(epoch3) || record.is(epoch4);
@@ -80,6 +98,7 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
     calib::RescaleTally counts;
     maps_[*map_].second.apply(fresh_samples_, fresh_samples_, counts);
     tally_.affine_counts += counts.affine[0] + counts.affine[1] + counts.affine[2];
+    keep_charging_zeros(samples_, fresh_samples_);
   }
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     tally_.clipped_before += at_limit(samples_[i], limit_before) ? 1 : 0;

@@ -22,15 +22,26 @@ ScannedFile unreadable_file(const std::string& path, const Error& error) {
 namespace {
 
 void judge(ScannedFile& answer, bool repaired) {
+  const bool fits = !answer.evidence_mg || *answer.evidence_mg <= kEvidenceLimit_mg;
   if (repaired) {
-    answer.verdict = to_string(Verdict::not_affected);
-    answer.reasons.insert(answer.reasons.begin(), "already repaired by sixpoint");
+    answer.verdict = to_string(fits ? Verdict::not_affected : Verdict::cannot_tell);
+    answer.reasons.insert(
+        answer.reasons.begin(),
+        fits ? "already repaired by sixpoint"
+             : "already repaired by sixpoint, with constants that do not fit, or the unit has a "
+               "defect: repair the original again");
     return;
   }
   const Triage triage = repair::triage(answer.facts);
   answer.verdict = to_string(triage.verdict);
   answer.axes_rotated = triage.axes_rotated;
   answer.reasons.insert(answer.reasons.begin(), triage.reasons.begin(), triage.reasons.end());
+  if (triage.verdict == Verdict::affected && answer.evidence_mg && fits) {
+    answer.reasons.push_back(
+        fmt::format("its still periods are within {:.0f} mg of 1 g all the same: it may have been "
+                    "corrected by other software; repair writes it only where that improves it",
+                    kEvidenceLimit_mg));
+  }
 }
 
 // Where the recording of an .agd may lie: NAME.gt3x beside NAME.agd, and beside NAME60sec.agd,

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "base/sha256.h"
 #include "base/time.h"
 #include "gt3x/recording.h"
@@ -171,10 +172,7 @@ class CaptureRun {
       progress_ = *resume;
       SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
     } else {
-      if (env_.files.info(options_.output)) {
-        return fail(ErrorCode::cannot_create, "the file exists already", options_.output,
-                    "choose another name with -o, or remove it");
-      }
+      SIXPOINT_CHECK(refuse_existing(env_.files, options_.output));
       progress_.started = unit().clock().now();
       SIXPOINT_CHECK(begin_recording());
     }

@@ -51,7 +51,7 @@ mkdir -p "/mnt/my unit"
 mount -t vfat -o ro "$disk" "/mnt/my unit"
 sixpoint devices | tee found
 grep -q '^drive:/mnt/my unit .*file-monitor .*ready' found
-sixpoint capture --device "drive:/mnt/my unit" -o copy.gt3x --constants C.json --store bench.db
+sixpoint capture --device "drive:/mnt/my unit" -o copy.gt3x --constants-out C.json --store bench.db
 sixpoint solve copy.gt3x
 grep -q MOS2A45130008 C.json
 status=0; sixpoint jig --device "drive:/mnt/my unit" --store bench.db || status=$?

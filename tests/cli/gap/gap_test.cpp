@@ -16,7 +16,7 @@ TEST_F(CommandTest, DiagnosisOfASimulatedBundleFindsNoGap) {
       << R"({"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production"})";
   ASSERT_EQ(run({"simulate", "--scenario", path("s.json"), "-o", path("bundle")}).exit_code, 0);
   const auto answer = run({"gap", "diagnose", path("bundle"), "--html", path("r.html"),
-                           "--scenario", path("augmented.json"), "--json"});
+                           "--scenario-out", path("augmented.json"), "--json"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   const auto json = answer.json();
   EXPECT_EQ(json["schema"], "sixpoint/gap-diagnose/1");

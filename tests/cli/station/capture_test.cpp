@@ -11,7 +11,7 @@ using tests::kDevice;
 TEST_F(CommandTest, CaptureMakesACalibrationFile) {
   const auto answer =
       run({"capture", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"), "-o",
-           path("c.gt3x"), "--constants", path("c.json"), "--json"});
+           path("c.gt3x"), "--constants-out", path("c.json"), "--json"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   const nlohmann::json json = nlohmann::json::parse(answer.out);
   EXPECT_EQ(json["schema"], "sixpoint/capture/1");

@@ -74,7 +74,7 @@ TEST_F(OtherDevices, AUnitWithoutCommandsIsCalibratedByItsFile) {
   options.unit.truth = sim::draw_unit(7);
   ASSERT_OK(mocks::make_virtual_drive(posix_env().files, path("usb"), options));
   const auto answer = run({"capture", "--device", "drive:" + path("usb"), "--store", path("s.db"),
-                           "-o", path("c.gt3x"), "--constants", path("c.json"), "--json"});
+                           "-o", path("c.gt3x"), "--constants-out", path("c.json"), "--json"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   EXPECT_EQ(answer.json()["serial"], options.unit.truth.serial);
   for (std::size_t axis = 0; axis < kAxes; ++axis) {

@@ -44,7 +44,7 @@ std::size_t not_named(bool in_faces) {
                   .exit_code,
               0);
     const auto answer = tests::run_command(env, {"gap", "diagnose", folder / "bundle", "--json",
-                                                 "--scenario", folder / "augmented.json"});
+                                                 "--scenario-out", folder / "augmented.json"});
     EXPECT_LT(answer.exit_code, 64) << answer.people;
     if (answer.exit_code >= 64) {
       continue;

@@ -158,6 +158,29 @@ TEST(ScanFile, ARepairedFileIsNotAffectedAnyMore) {
   EXPECT_FALSE(file.axes_rotated) << "the repair turned them back";
 }
 
+// The mark says that it was repaired; its still periods say that this did not help.
+TEST(ScanFile, AMarkedFileWhoseStillPeriodsDoNotFitIsNotCleared) {
+  MemoryFiles files;
+  const tests::MadeRecording made = at_rest(256 + 30);
+  auto writer = gt3x::RecordingWriter::create(files, "marked.gt3x").value();
+  ASSERT_OK(writer.add("log.bin", made.log()));
+  ASSERT_OK(writer.add("info.txt", std::string_view("Serial Number: MOS2A45130450\r\n"
+                                                    "Firmware: 1.5.0\r\nSample Rate: 30\r\n")));
+  ASSERT_OK(writer.add(kRepairMark, "{}"));
+  ASSERT_OK(writer.commit());
+  const ScannedFile file = scan_file(files, "marked.gt3x");
+  ASSERT_GT(file.evidence_mg.value(), kEvidenceLimit_mg);
+  EXPECT_EQ(file.verdict, "cannot_tell");
+  EXPECT_THAT(file.reasons, Contains(HasSubstr("repair the original again")));
+}
+
+TEST(ScanFile, AnAffectedFileThatFitsAllTheSameIsSaid) {
+  const ScannedFile file = scanned(at_rest(256));
+  ASSERT_LE(file.evidence_mg.value(), kEvidenceLimit_mg);
+  EXPECT_EQ(file.verdict, "affected");
+  EXPECT_THAT(file.reasons, Contains(HasSubstr("corrected by other software")));
+}
+
 TEST(ScanFile, WhatCannotBeReadIsAnAnswerToo) {
   MemoryFiles files;
   ASSERT_OK(write_file(files, "text.gt3x", "this is no zip archive"));
