@@ -57,7 +57,7 @@ void add_fit(Json& json, const BlockFit& fit) {
   richer["cross_axis"] = more.model.cross_axis ? Json(more.cross_axis) : Json(nullptr);
   richer["zero_lsb_per_c"] = more.model.temperature ? Json(more.zero_lsb_per_c) : Json(nullptr);
   richer["reference_temperature_c"] =
-      more.model.temperature ? Json(fit.reference_temperature_c) : Json(nullptr);
+      more.model.temperature ? number_or_null(fit.reference_temperature_c) : Json(nullptr);
   richer["held_out_rms_mg"] = fit.richer->held_out_rms_mg;
 }
 
@@ -109,6 +109,9 @@ Json to_json(const SolveReport& report) {
   json["iterations"] = report.iterations;
   json["seconds"] = report.seconds;
   json["gravity_m_per_s2"] = report.gravity_g * kStandardGravity_m_per_s2;
+  // What the constants hold for.
+  json["temperature_c"] =
+      report.fit ? number_or_null(report.fit->reference_temperature_c) : Json(nullptr);
   json["from_prior"] = report.from_prior;
   json["verification"] = to_json(report.verification);
   if (report.fit) {

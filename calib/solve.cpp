@@ -60,7 +60,7 @@ std::vector<StillBlock> without_richer_terms(std::span<const StillBlock> blocks,
   std::vector<StillBlock> out(blocks.begin(), blocks.end());
   for (StillBlock& block : out) {
     const double above_c =
-        block.temperature_c ? *block.temperature_c - fit.reference_temperature_c : 0;
+        block.temperature_c ? *block.temperature_c - fit.reference_temperature_c.value_or(0) : 0;
     PerAxis<double> u{};
     for (std::size_t a = 0; a < kAxes; ++a) {
       block.mean_lsb[a] -= more.zero_lsb_per_c[a] * above_c;
@@ -230,7 +230,7 @@ void add_notes(std::vector<std::string>& notes, const BlockFit& fit, const BestS
         "the data show zeros that drift by {:+.2f} {:+.2f} {:+.2f} mg/C (X Y Z), which six "
         "constants cannot follow: they hold at {:.1f} C; unseen directions are predicted to "
         "{:.1f} mg with the drift, {:.1f} mg without",
-        mg_per_c(0), mg_per_c(1), mg_per_c(2), fit.reference_temperature_c,
+        mg_per_c(0), mg_per_c(1), mg_per_c(2), fit.reference_temperature_c.value_or(0),
         fit.richer->held_out_rms_mg, fit.held_out_rms_mg.value_or(0)));
   } else if (fit.temperature_range_c >= 10) {
     notes.push_back(
