@@ -10,6 +10,7 @@
 #include "calib/agreement.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
+#include "repair/rescale/applied_map.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/gate.h"
 #include "repair/rescale/rescaled_log.h"
@@ -37,6 +38,10 @@ Json still_error_to_json(const RepairReport& report) {
           {"after", calib::number_or_null(report.still_error_after_mg)}};
 }
 
+Json sample_uncertainty_to_json(const RepairReport& report) {
+  return report.sample_uncertainty_mg ? Json(*report.sample_uncertainty_mg) : Json(nullptr);
+}
+
 Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& chosen,
              const Survey& survey, UtcTime now) {
   Json mark;
@@ -54,6 +59,8 @@ Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& c
   mark["constants_id"] = report.constants_id.empty() ? Json(nullptr) : Json(report.constants_id);
   mark["source"] = report.source ? report.source->to_json() : Json(nullptr);
   mark["forced"] = report.forced;
+  mark["cross_axis_applied"] = report.cross_axis_applied;
+  mark["sample_uncertainty_mg"] = sample_uncertainty_to_json(report);
   mark["still_error_mg"] = still_error_to_json(report);
   if (report.forced) {
     mark["reasons"] = report.reasons;
@@ -73,6 +80,8 @@ std::string mark_record_of(const RepairReport& report, UtcTime now) {
                        {"ConstantsId", report.constants_id},
                        {"RotationUndone", report.rotation_undone},
                        {"Forced", report.forced},
+                       {"CrossAxisApplied", report.cross_axis_applied},
+                       {"SampleUncertaintyMg", sample_uncertainty_to_json(report)},
                        {"Parsed", false},
                        {"JSON", nullptr}};
   return record.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -106,6 +115,13 @@ std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
 
 std::string text_in(const Json& mark, const char* key) {
   return mark.contains(key) && mark[key].is_string() ? mark[key].get<std::string>() : "";
+}
+
+std::optional<PerAxis<double>> three_in(const Json& mark, const char* key) {
+  const auto found = mark.find(key);
+  const bool three = found != mark.end() && found->is_array() && found->size() == kAxes &&
+                     std::ranges::all_of(*found, [](const Json& one) { return one.is_number(); });
+  return three ? std::optional(found->get<PerAxis<double>>()) : std::nullopt;
 }
 
 // The writer destroys its source at commit(); the log's tally is needed after that.
@@ -217,7 +233,11 @@ class Repair {
   // Whether the constants that were chosen may be used on this file: the gate, and what its own
   // still periods say. False where the status is decided.
   bool may_write() {
-    const GateEvidence evidence = gate_evidence(survey_, chosen_->record.calibration);
+    map_ = applied_map(chosen_->record, survey_);
+    if (!map_->why.empty()) {
+      report_.reasons.push_back(map_->why);
+    }
+    const GateEvidence evidence = gate_evidence(survey_, map_->calibration, map_->cross_axis);
     const GateAnswer answer = gate(evidence, options_.force);
     if (evidence.directions > 0) {
       report_.still_error_after_mg = evidence.after_mg;
@@ -240,6 +260,8 @@ class Repair {
       report_.status = RepairStatus::not_repairable;
       return false;
     }
+    report_.cross_axis_applied = map_->has_terms();
+    report_.sample_uncertainty_mg = map_->sample_uncertainty_mg;
     return true;
   }
 
@@ -250,9 +272,12 @@ class Repair {
     if (!own || !own->usable()) {
       return std::nullopt;
     }
-    const calib::Agreement between =
-        calib::agreement(chosen_->record.calibration, chosen_->record.uncertainty,
-                         *own->calibration, own->uncertainty);
+    const calib::ConstantsRecord& record = chosen_->record;
+    const SensorsOwn theirs =
+        sensors_own(record.calibration, record.uncertainty, record.cross_axis);
+    const SensorsOwn files = sensors_own(*own->calibration, own->uncertainty, own->cross_axis);
+    const calib::Agreement between = calib::agreement(theirs.calibration, theirs.uncertainty,
+                                                      files.calibration, files.uncertainty);
     return between.agree() ? std::nullopt
                            : std::optional(fmt::format(
                                  "the constants disagree with the file's own still periods: {}",
@@ -261,8 +286,9 @@ class Repair {
 
   RescaledLogOptions log_options() const {
     RescaledLogOptions options;
-    if (chosen_.has_value()) {
-      options.fresh = chosen_->record.calibration;
+    if (map_.has_value()) {
+      options.fresh = map_->calibration;
+      options.cross_axis = map_->cross_axis;
     }
     options.accel_scale_lsb_per_g = survey_.accel_scale_lsb_per_g;
     options.rate_hz = survey_.rate_hz;
@@ -383,6 +409,8 @@ class Repair {
       report_.source = parse_source_used((*mark)["source"]);
     }
     report_.forced = mark->value("forced", Json(false)) == Json(true);
+    report_.cross_axis_applied = mark->value("cross_axis_applied", Json(false)) == Json(true);
+    report_.sample_uncertainty_mg = three_in(*mark, "sample_uncertainty_mg");
     if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
       report_.repaired_at = *then;
     }
@@ -404,6 +432,7 @@ class Repair {
   RepairOptions options_;
   Survey survey_;
   std::optional<ChosenConstants> chosen_;
+  std::optional<AppliedMap> map_;  // of chosen_
   RepairReport report_;
 };
 
@@ -450,6 +479,8 @@ Json RepairReport::to_json() const {
           {"still_error_mg", still_error_to_json(*this)},
           {"rotation_undone", rotation_undone},
           {"forced", forced},
+          {"cross_axis_applied", cross_axis_applied},
+          {"sample_uncertainty_mg", sample_uncertainty_to_json(*this)},
           {"source", source ? source->to_json() : Json(nullptr)},
           {"constants_id", optional_text(constants_id)},
           {"input_sha256", optional_text(input_sha256)},
