@@ -1,5 +1,6 @@
 #include "calib/constants.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -95,6 +96,33 @@ Status read_constants(const Json& json, ConstantsRecord& record) {
   return {};
 }
 
+Result<CrossAxisMap> read_cross_axis(const Json& json) {
+  const std::string where = "constants.json, cross_axis";
+  const auto evidence = json.find("unseen_mg");
+  const auto verified = json.find("verified");
+  if (!json.is_object() || evidence == json.end() || !evidence->is_object() ||
+      !evidence->contains("matrix") || !evidence->contains("six") ||
+      !evidence->contains("directions") || verified == json.end() || !verified->is_boolean()) {
+    return bad_record("is not whole: it needs terms, constants and the evidence for them", where);
+  }
+  CrossAxisMap map;
+  SIXPOINT_ASSIGN(map.cross_axis, read_axes<double>(json, "xy_xz_yz"));
+  SIXPOINT_ASSIGN(map.cross_axis_sd, read_axes<double>(json, "standard_uncertainty"));
+  SIXPOINT_ASSIGN(map.calibration.sensitivity_g_per_lsb,
+                  read_axes<double>(json, "sensitivity_g_per_lsb"));
+  SIXPOINT_ASSIGN(map.calibration.zero_lsb, read_axes<double>(json, "zero_lsb"));
+  SIXPOINT_ASSIGN(map.uncertainty.sensitivity_relative,
+                  read_axes<double>(json, "sensitivity_relative_uncertainty"));
+  SIXPOINT_ASSIGN(map.uncertainty.zero_mg, read_axes<double>(json, "zero_mg_uncertainty"));
+  SIXPOINT_ASSIGN(map.unseen_mg, read_number((*evidence)["matrix"], where));
+  SIXPOINT_ASSIGN(map.six_unseen_mg, read_number((*evidence)["six"], where));
+  SIXPOINT_ASSIGN(const double directions, read_number((*evidence)["directions"], where));
+  map.unseen_directions = static_cast<int>(std::clamp(directions, 0.0, 1e6));
+  map.verified = verified->get<bool>();
+  SIXPOINT_CHECK(validate(map));
+  return map;
+}
+
 }  // namespace
 
 std::string_view to_string(FilterConfiguration filter) {
@@ -142,6 +170,22 @@ Status validate(const Calibration& calibration) {
       return bad_constants(
           fmt::format("{} axis: a zero of {} LSB is impossible", kAxisNames[a], zero));
     }
+  }
+  return {};
+}
+
+Status validate(const CrossAxisMap& map) {
+  constexpr double kMostTerm = 0.2;
+  SIXPOINT_CHECK(validate(map.calibration));
+  for (const double term : map.cross_axis) {
+    // Written so that NaN fails.
+    if (!(std::abs(term) <= kMostTerm)) {
+      return bad_constants(fmt::format("a cross-axis term of {} is impossible", term));
+    }
+  }
+  if (!all_finite(map.cross_axis_sd, map.uncertainty.sensitivity_relative, map.uncertainty.zero_mg,
+                  map.unseen_mg, map.six_unseen_mg)) {
+    return bad_constants("the uncertainty of the cross-axis terms is not finite");
   }
   return {};
 }
@@ -216,6 +260,20 @@ Json to_json(const ConstantsUncertainty& uncertainty) {
           {"zero_mg", axes(uncertainty.zero_mg)}};
 }
 
+Json to_json(const CrossAxisMap& map) {
+  Json json;
+  json["xy_xz_yz"] = map.cross_axis;
+  json["standard_uncertainty"] = map.cross_axis_sd;
+  json["sensitivity_g_per_lsb"] = map.calibration.sensitivity_g_per_lsb;
+  json["zero_lsb"] = map.calibration.zero_lsb;
+  json["sensitivity_relative_uncertainty"] = map.uncertainty.sensitivity_relative;
+  json["zero_mg_uncertainty"] = map.uncertainty.zero_mg;
+  json["unseen_mg"] = {
+      {"six", map.six_unseen_mg}, {"matrix", map.unseen_mg}, {"directions", map.unseen_directions}};
+  json["verified"] = map.verified;
+  return json;
+}
+
 Json to_json(const ConstantsRecord& record) {
   Json json;
   json["serial"] = record.serial;
@@ -234,6 +292,9 @@ Json to_json(const ConstantsRecord& record) {
   json["gravity_m_per_s2"] = record.gravity_m_per_s2;
   if (record.from_prior) {
     json["from_prior"] = true;
+  }
+  if (record.cross_axis) {
+    json["cross_axis"] = to_json(*record.cross_axis);
   }
   return json;
 }
@@ -280,6 +341,9 @@ Result<ConstantsRecord> constants_record_from_json(const Json& json) {
   }
   if (const auto found = json.find("from_prior"); found != json.end() && found->is_boolean()) {
     record.from_prior = found->get<bool>();
+  }
+  if (const auto found = json.find("cross_axis"); found != json.end() && !found->is_null()) {
+    SIXPOINT_ASSIGN(record.cross_axis, read_cross_axis(*found));
   }
   return record;
 }

@@ -66,6 +66,32 @@ struct ConstantsUncertainty {
   PerAxis<double> zero_mg{};
 };
 
+// Constants with cross-axis terms: g = (I + C) u, where u is Eq. 4-6 by `calibration` and C is
+// symmetric with zeros on its diagonal. It is whole by itself: the six in it are the sensor's own,
+// which need not be the six of the record (best_six.h). Six constants cannot correct what C does.
+struct CrossAxisMap {
+  Calibration calibration;
+  PerAxis<double> cross_axis{};  // xy, xz, yz: fractions
+  ConstantsUncertainty uncertainty;
+  PerAxis<double> cross_axis_sd{};  // standard uncertainties
+  // The evidence: root mean square error in directions that the fits had not seen, over the time at
+  // rest, with this map and with the record's six constants.
+  int unseen_directions = 0;
+  double unseen_mg = 0;
+  double six_unseen_mg = 0;
+  bool verified = false;
+
+  PerAxis<double> to_g(const PerAxis<double>& raw_lsb) const {
+    const PerAxis<double> u = calibration.to_g(raw_lsb);
+    const auto& [xy, xz, yz] = cross_axis;
+    return {u[0] + xy * u[1] + xz * u[2], u[1] + xy * u[0] + yz * u[2],
+            u[2] + xz * u[0] + yz * u[1]};
+  }
+};
+
+// bad_data when a number is not finite, or a term is beyond what any working sensor has (0.2).
+Status validate(const CrossAxisMap& map);
+
 // Where constants came from. `sha256` is that of the recording or session; empty when there is none
 // (constants typed in).
 struct ConstantsOrigin {
@@ -89,6 +115,8 @@ struct ConstantsRecord {
   // The constants rest on a population prior (solve --prior population) and not on this unit's data
   // alone. `repair` refuses them unless asked for by name.
   bool from_prior = false;
+  // Present where the data show cross-axis terms. Which of the two a file gets: map_to_apply.h.
+  std::optional<CrossAxisMap> cross_axis;
 
   std::string brief() const;  // one line for people
 };
@@ -105,6 +133,7 @@ nlohmann::ordered_json to_json(const StoredConstants& stored);  // {positive_lsb
 nlohmann::ordered_json to_json(const Calibration& calibration);
 nlohmann::ordered_json to_json(const Calibration& calibration, const StoredConstants& stored);
 nlohmann::ordered_json to_json(const ConstantsUncertainty& uncertainty);
+nlohmann::ordered_json to_json(const CrossAxisMap& map);
 nlohmann::ordered_json to_json(const ConstantsRecord& record);
 
 // Reads constants.json. Strict where a wrong value would make data worse: serial, filter and

@@ -12,6 +12,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "calib/direction_cells.h"
 #include "calib/least_squares.h"
@@ -34,5 +35,18 @@ struct HeldOutCells {
 // 16. Each fit starts from `fit` and has its model.
 HeldOut hold_out(const HeldOutCells& in, const LeastSquaresFit& fit, double gravity_g,
                  const std::optional<CalibrationPrior>& prior);
+
+// One of several ways to predict that are compared on the same cells.
+struct HeldOutRival {
+  LeastSquaresFit fit;
+  std::vector<double> fit_sigma_g;
+  bool six_only = false;  // predict with the six constants of the fit, without its other terms
+};
+
+// As hold_out(), for each rival in turn; counted are the cells that the fits of all of them predict
+// to 5 mg. `in.fit_sigma_g` is not used.
+std::vector<HeldOut> hold_out_together(const HeldOutCells& in, std::span<const HeldOutRival> rivals,
+                                       double gravity_g,
+                                       const std::optional<CalibrationPrior>& prior);
 
 }  // namespace sixpoint::calib

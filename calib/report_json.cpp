@@ -61,6 +61,24 @@ void add_fit(Json& json, const BlockFit& fit) {
   richer["held_out_rms_mg"] = fit.richer->held_out_rms_mg;
 }
 
+// How the six constants were chosen, and the map with cross-axis terms.
+void add_six(Json& json, const SolveReport& report) {
+  if (report.six && report.six->unseen_mg) {
+    const BestSix& six = *report.six;
+    json["best_six"] = {{"chosen", to_string(six.from)},
+                        {"unseen_mg",
+                         {{"of_sensor", six.unseen_mg->of_sensor},
+                          {"of_directions", six.unseen_mg->of_directions},
+                          {"of_time", six.unseen_mg->of_time},
+                          {"matrix", six.unseen_mg->matrix}}},
+                        {"unseen_directions", six.unseen_mg->directions},
+                        {"elsewhere_mg", six.elsewhere_mg}};
+  }
+  if (report.cross_axis) {
+    json["cross_axis"] = to_json(*report.cross_axis);
+  }
+}
+
 Json to_json(const GeneticResult& search) {
   return {{"settled", search.settled},   {"fitness_mg", search.fitness_mg},
           {"level_mg", search.level_mg}, {"spread_mg", search.spread_mg},
@@ -96,6 +114,7 @@ Json to_json(const SolveReport& report) {
   if (report.fit) {
     add_fit(json, *report.fit);
   }
+  add_six(json, report);
   if (report.search) {
     json["genetic"] = to_json(*report.search);
   }

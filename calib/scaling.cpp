@@ -20,6 +20,22 @@ double firmware_value(double twice_scale, int zero, int span, int raw) {
 
 std::size_t table_size(RecordWidth width) { return width == RecordWidth::bits12 ? 4096 : 65536; }
 
+// The raw counts whose value lies within the record's range, and one count more on either side:
+// no other can lead to a stored count, half-way cases included.
+struct RawRange {
+  int low = 0;
+  int high = 0;
+};
+RawRange raw_range(double twice_scale, int zero, int span, RecordWidth width) {
+  const double one = zero + (lowest_count(width) - 1.0) * span / twice_scale;
+  const double other = zero + (highest_count(width) + 1.0) * span / twice_scale;
+  const auto inside = [](double raw) {
+    return static_cast<int>(std::clamp(raw, double{kRawLow}, double{kRawHigh}));
+  };
+  return {inside(std::floor(std::min(one, other)) - 1),
+          inside(std::ceil(std::max(one, other)) + 1)};
+}
+
 Status check_scale(double accel_scale) {
   if (!(accel_scale >= 1 && accel_scale <= 32768)) {
     return fail(ErrorCode::bad_data,
@@ -68,8 +84,9 @@ Result<Reversal> Reversal::make(const StoredConstants& stored, double accel_scal
     const auto value_of = [&](int raw) {
       return firmware_value(twice_scale, stored.zero_lsb[a], span, raw);
     };
+    const RawRange range = raw_range(twice_scale, stored.zero_lsb[a], span, width);
     const auto slot = [&](int count) { return static_cast<std::size_t>(count - low); };
-    for (int raw = kRawLow; raw <= kRawHigh; ++raw) {
+    for (int raw = range.low; raw <= range.high; ++raw) {
       const int count = round_half_away(value_of(raw));
       if (count < low || count > high) {
         continue;
@@ -82,7 +99,7 @@ Result<Reversal> Reversal::make(const StoredConstants& stored, double accel_scal
     }
     // A firmware that computes in single precision may send an exact half to the other side. That
     // counts as an explanation only where there is no better one.
-    for (int raw = kRawLow; raw <= kRawHigh; ++raw) {
+    for (int raw = range.low; raw <= range.high; ++raw) {
       const double value = value_of(raw);
       if (std::abs(value - std::trunc(value)) != 0.5) {
         continue;
@@ -148,7 +165,14 @@ Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh
   SIXPOINT_CHECK(validate(fresh));
   Rescale rescale;
   rescale.input_ = reversal.width();
-  rescale.identity_ = fresh == reversal.calibration();
+  rescale.output_ = options.output;
+  rescale.cross_axis_ = options.cross_axis;
+  rescale.has_terms_ = options.cross_axis != PerAxis<double>{};
+  rescale.identity_ = fresh == reversal.calibration() && !rescale.has_terms_;
+  if (!all_finite(options.cross_axis)) {
+    return fail(ErrorCode::bad_data, "a cross-axis term is not finite", "scaling",
+                "take the constants from the store or from another recording");
+  }
   const int low = lowest_count(reversal.width());
   const int high = highest_count(reversal.width());
   const int out_low = lowest_count(options.output);
@@ -165,7 +189,11 @@ Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh
       const bool affine = options.affine || candidates.number == 0;
       const double raw = affine ? reversal.affine_raw_lsb(a, count) : candidates.middle;
       const bool at_limit = count == low || count == high;
-      int fresh_count = round_half_away(scale * (raw - fresh.zero_lsb[a]));
+      const double level = scale * (raw - fresh.zero_lsb[a]);
+      int fresh_count = round_half_away(level);
+      if (rescale.has_terms_) {
+        rescale.level_[a].push_back(level);
+      }
       if (rescale.identity_) {
         fresh_count = count;
       } else if (at_limit && !widens) {
@@ -187,18 +215,56 @@ Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh
   return rescale;
 }
 
+StoredCounts Rescale::with_terms(const StoredCounts& in, PerAxis<std::uint8_t>& flags) const {
+  PerAxis<double> u{};
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const std::size_t slot = index(in[a]);
+    u[a] = level_[a][slot];
+    flags[a] = static_cast<std::uint8_t>(flags_[a][slot] & (kClippedBefore | kAffine));
+  }
+  const auto& [xy, xz, yz] = cross_axis_;
+  const PerAxis<double> q = {u[0] + xy * u[1] + xz * u[2], u[1] + xy * u[0] + yz * u[2],
+                             u[2] + xz * u[0] + yz * u[1]};
+  const int low = lowest_count(output_);
+  const int high = highest_count(output_);
+  const bool widens = high > highest_count(input_);
+  StoredCounts out{};
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const bool at_limit = (flags[a] & kClippedBefore) != 0;
+    if (at_limit && !widens) {
+      out[a] = count_[a][index(in[a])];
+      continue;
+    }
+    const int count = round_half_away(q[a]);
+    if (!at_limit && (count < low || count > high)) {
+      flags[a] |= kClippedAfter;
+    }
+    out[a] = static_cast<std::int16_t>(std::clamp(count, low, high));
+  }
+  return out;
+}
+
 void Rescale::apply(std::span<const StoredCounts> in, std::span<StoredCounts> out,
                     RescaleTally& counts) const {
   const std::size_t size = std::min(in.size(), out.size());
   for (std::size_t i = 0; i < size; ++i) {
+    PerAxis<std::uint8_t> flags{};
+    StoredCounts fresh{};
+    if (has_terms_) {
+      fresh = with_terms(in[i], flags);
+    } else {
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const std::size_t slot = index(in[i][a]);
+        flags[a] = flags_[a][slot];
+        fresh[a] = count_[a][slot];
+      }
+    }
+    out[i] = fresh;
     for (std::size_t a = 0; a < kAxes; ++a) {
-      const std::size_t slot = index(in[i][a]);
-      const std::uint8_t flag = flags_[a][slot];
-      out[i][a] = count_[a][slot];
-      if (flag != 0) {
-        counts.clipped_before[a] += (flag & kClippedBefore) != 0 ? 1U : 0U;
-        counts.clipped_after[a] += (flag & kClippedAfter) != 0 ? 1U : 0U;
-        counts.affine[a] += (flag & kAffine) != 0 ? 1U : 0U;
+      if (flags[a] != 0) {
+        counts.clipped_before[a] += (flags[a] & kClippedBefore) != 0 ? 1U : 0U;
+        counts.clipped_after[a] += (flags[a] & kClippedAfter) != 0 ? 1U : 0U;
+        counts.affine[a] += (flags[a] & kAffine) != 0 ? 1U : 0U;
       }
     }
   }

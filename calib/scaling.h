@@ -130,6 +130,8 @@ struct RescaleTally {
 //    wide as well; in a wider outgoing record it becomes what the new constants make of it (a lower
 //    bound of the true magnitude). Either way it is counted in clipped_before.
 //  - constants that are equal to the old ones change no count at all.
+//  - with cross-axis terms: first the integers, as above; then the constants, in floating point;
+//    then the terms; and then the one rounding. A count at the limit is left there as above.
 // Immutable after make(); threads may share it.
 class Rescale {
  public:
@@ -138,10 +140,13 @@ class Rescale {
     // Set where the file's counts cannot have come from its constants: no candidates, the affine
     // map for all counts.
     bool affine = false;
+    // Terms xy, xz, yz that belong to the constants (CrossAxisMap). All zero: none.
+    PerAxis<double> cross_axis{};
   };
   static Result<Rescale> make(const Reversal& reversal, const Calibration& fresh,
                               const Options& options);
 
+  // Without cross-axis terms, which need all three counts of a sample.
   std::int16_t operator()(std::size_t axis, std::int16_t stored_count) const {
     return count_[axis][index(stored_count)];
   }
@@ -159,8 +164,14 @@ class Rescale {
     return static_cast<std::size_t>(inside - low);
   }
 
+  StoredCounts with_terms(const StoredCounts& in, PerAxis<std::uint8_t>& flags) const;
+
   RecordWidth input_ = RecordWidth::bits12;
+  RecordWidth output_ = RecordWidth::bits12;
   bool identity_ = false;
+  bool has_terms_ = false;
+  PerAxis<double> cross_axis_{};
+  PerAxis<std::vector<double>> level_;  // unrounded counts by `fresh`; with cross-axis terms only
   PerAxis<std::vector<std::int16_t>> count_;
   PerAxis<std::vector<std::uint8_t>> flags_;
 };

@@ -82,6 +82,17 @@ void add_uncertainty(ConstantsUncertainty& to, const PerAxis<double>& sensitivit
   }
 }
 
+// Six constants that are not the sensor's own are that far from them.
+void add_distance(ConstantsUncertainty& to, const Calibration& own, const Calibration& six) {
+  PerAxis<double> relative{};
+  PerAxis<double> zero_mg{};
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    relative[a] = six.sensitivity_g_per_lsb[a] / own.sensitivity_g_per_lsb[a] - 1;
+    zero_mg[a] = kMgPerG * own.sensitivity_g_per_lsb[a] * (six.zero_lsb[a] - own.zero_lsb[a]);
+  }
+  add_uncertainty(to, relative, zero_mg);
+}
+
 // Uncertainty, residuals and the nine integers of report.calibration.
 Status finish_constants(SolveReport& report, const SolveOptions& options) {
   const BlockFit& fit = *report.fit;
@@ -100,12 +111,16 @@ Status finish_constants(SolveReport& report, const SolveOptions& options) {
   if (fit.drift) {
     add_uncertainty(report.statistical, fit.drift->sensitivity_relative(), fit.drift->zero_mg());
   }
+  if (report.six && options.method == SolveMethod::least_squares) {
+    add_distance(report.statistical, fit.best().calibration, report.six->calibration);
+  }
   report.uncertainty = report.statistical;
   const double gravity = options.gravity_sd_g / options.gravity_g;
   add_uncertainty(report.uncertainty, {gravity, gravity, gravity}, {});
   report.residual_after_mg = cells_rms_mg(fit.cells, *report.calibration, options.gravity_g);
-  auto rounded =
-      round_constants(*report.calibration, fit.cells, fit.cell_sigma_mg, options.gravity_g);
+  auto rounded = round_constants(*report.calibration, fit.cells,
+                                 report.six ? report.six->cell_sigma_mg : fit.cell_sigma_mg,
+                                 options.gravity_g);
   if (rounded) {
     report.stored = *rounded;
     SIXPOINT_ASSIGN(const Calibration applied, calibration_from(*rounded));
@@ -182,7 +197,7 @@ std::vector<std::string> genetic_doubts(const SolveReport& report) {
 }
 
 // What a person should know of the fit besides the verdict.
-void add_notes(std::vector<std::string>& notes, const BlockFit& fit) {
+void add_notes(std::vector<std::string>& notes, const BlockFit& fit, const BestSix& six) {
   if (!fit.left_out_reason.empty()) {
     notes.push_back(fit.left_out_reason);
   }
@@ -195,6 +210,16 @@ void add_notes(std::vector<std::string>& notes, const BlockFit& fit) {
         "mg without",
         100 * c[0], 100 * c[1], 100 * c[2], fit.richer->held_out_rms_mg,
         fit.held_out_rms_mg.value_or(0)));
+    if (six.from != SixFrom::of_sensor) {
+      notes.push_back(fmt::format(
+          "the six constants are those that suit the {} best: over the time at rest they leave "
+          "{:.1f} mg in unseen directions (the sensor's own six {:.1f} mg, the cross-axis terms "
+          "{:.1f} mg); towards directions that the unit hardly took they may be wrong by up to "
+          "{:.0f} mg",
+          six.from == SixFrom::of_time ? "time at rest" : "directions at rest",
+          six.unseen_chosen_mg(), six.unseen_mg->of_sensor, six.unseen_mg->matrix,
+          six.elsewhere_mg));
+    }
   }
   if (model.temperature) {
     const LeastSquaresFit& more = fit.richer->fit;
@@ -214,19 +239,39 @@ void add_notes(std::vector<std::string>& notes, const BlockFit& fit) {
   }
 }
 
+// The map with cross-axis terms, of the same blocks, verified when the constants are and its own
+// worst direction is within the limit.
+void add_cross_axis(SolveReport& report, const SolveOptions& options) {
+  const BlockFit& fit = *report.fit;
+  report.cross_axis = cross_axis_map(fit, *report.six, options.gravity_sd_g / options.gravity_g);
+  if (!report.cross_axis) {
+    return;
+  }
+  if (fit.drift) {
+    add_uncertainty(report.cross_axis->uncertainty, fit.drift->sensitivity_relative(),
+                    fit.drift->zero_mg());
+  }
+  report.cross_axis->verified =
+      report.verification.verified &&
+      worst_direction_with_terms_mg(fit.best()) <= VerificationLimits::worst_direction_mg;
+}
+
 // From a fit to the verdict: the genetic algorithm beside it, rounding, verification, notes.
 Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit, const Input& in) {
   const SolveOptions& options = in.options;
   const bool by_search = options.method == SolveMethod::genetic;
   report.fit = std::move(fit);
   SIXPOINT_ASSIGN(report.search, search_beside(*report.fit, in));
-  report.calibration = by_search ? report.search->calibration : report.fit->best().calibration;
+  report.six = best_six(*report.fit, options.gravity_g);
+  const Calibration sensors =
+      by_search ? report.search->calibration : report.fit->best().calibration;
+  report.calibration = by_search ? sensors : report.six->calibration;
   report.iterations =
       by_search ? static_cast<int>(report.search->fitness_mg.size()) : report.fit->fit.iterations;
   SIXPOINT_CHECK(finish_constants(report, options));
   report.residual_before_mg = cells_rms_mg(report.fit->cells, in.file_constants, options.gravity_g);
-  report.verification = verify(in.blocks, in.file_constants, *report.calibration, *report.fit,
-                               report.search, in.fit_options());
+  report.verification = verify(in.blocks, in.file_constants, sensors, *report.fit, report.search,
+                               in.fit_options(), report.calibration);
   if (by_search) {
     if (auto doubts = genetic_doubts(report); !doubts.empty()) {
       refuse(report.verification, std::move(doubts));
@@ -244,7 +289,7 @@ Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit, const Input& 
     report.notes.emplace_back(
         "the data determine the constants without the prior, which was not used");
   }
-  add_notes(report.notes, *report.fit);
+  add_notes(report.notes, *report.fit, *report.six);
   if (report.residual_rounded_mg && *report.residual_rounded_mg > VerificationLimits::applied_mg &&
       report.verification.verified) {
     refuse(report.verification,
@@ -252,6 +297,7 @@ Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit, const Input& 
                         "{:.1f} mg from 1 g (limit {:.1f} mg)",
                         *report.residual_rounded_mg, VerificationLimits::applied_mg)});
   }
+  add_cross_axis(report, options);
   return report;
 }
 
@@ -387,6 +433,7 @@ Result<ConstantsRecord> record_of(const SolveReport& report, UtcTime made_at,
   record.made_from = std::move(made_from);
   record.gravity_m_per_s2 = report.gravity_g * kStandardGravity_m_per_s2;
   record.from_prior = report.from_prior;
+  record.cross_axis = report.cross_axis;
   return record;
 }
 

@@ -21,6 +21,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "base/result.h"
+#include "calib/best_six.h"
 #include "calib/block_fit.h"
 #include "calib/constants.h"
 #include "calib/coverage.h"
@@ -80,6 +81,10 @@ struct SolveReport {
   Verification verification;
   std::vector<std::string> notes;  // what matters for people besides the verdict
   std::optional<BlockFit> fit;
+  // How `calibration` was chosen, by least squares; and the map with cross-axis terms, made from
+  // the same blocks, where the data show such terms.
+  std::optional<BestSix> six;
+  std::optional<CrossAxisMap> cross_axis;
   std::optional<GeneticResult> search;
   std::optional<PartialKnowledge> partial;
   // Filled by the caller where the recording holds temperatures and the unit was left lying while

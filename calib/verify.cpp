@@ -234,8 +234,12 @@ std::string_view to_string(Verdict verdict) {
 
 Verification verify(std::span<const StillBlock> used, const Calibration& file_constants,
                     const Calibration& chosen, const BlockFit& fit,
-                    const std::optional<GeneticResult>& search, const BlockFitOptions& options) {
+                    const std::optional<GeneticResult>& search, const BlockFitOptions& options,
+                    const std::optional<Calibration>& applied) {
   Verification out = measure(used, chosen, fit, options);
+  if (applied) {
+    out.applied_rms_mg = cells_rms_mg(fit.cells, *applied, options.gravity_g);
+  }
   if (!out.missing_directions.empty()) {
     out.verdict = Verdict::incomplete;
     out.reasons.push_back(fmt::format("no still block reaches beyond 0.3 g towards {}",

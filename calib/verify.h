@@ -103,9 +103,11 @@ struct Verification {
 nlohmann::ordered_json to_json(const Verification& verification);
 
 // `used` are the blocks that the fit was given, `chosen` the constants under judgement, `search`
-// the genetic algorithm's answer where it was run.
+// the genetic algorithm's answer where it was run. `applied`: the six constants that are applied
+// where these are not `chosen` (best_six.h); only what they leave is judged.
 Verification verify(std::span<const StillBlock> used, const Calibration& file_constants,
                     const Calibration& chosen, const BlockFit& fit,
-                    const std::optional<GeneticResult>& search, const BlockFitOptions& options);
+                    const std::optional<GeneticResult>& search, const BlockFitOptions& options,
+                    const std::optional<Calibration>& applied = std::nullopt);
 
 }  // namespace sixpoint::calib

@@ -119,12 +119,18 @@ Status gather_constants(const RepairSources& sources, Context& context, ArchiveD
   if (!sources.constants.empty()) {
     SIXPOINT_ASSIGN(draft.repair.given, read_constants(context.env.files, sources.constants));
   }
+  draft.repair.scan = sources.scan;
+  draft.repair.or_scan = sources.or_scan;
+  draft.repair.store_named = !sources.store.empty();
   SIXPOINT_ASSIGN(auto store, store_of(context, sources));
   if (store) {
-    SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(*store));
     const std::string place = store->database().location();
     draft.store = place.find("://") == std::string::npos ? absolute(place) : place;
-    draft.snapshot = &*snapshot;
+    const auto order = order_of(sources, true);
+    if (std::ranges::find(order, repair::SourceKind::store) != order.end()) {
+      SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(*store));
+      draft.snapshot = &*snapshot;
+    }
   }
   if (!sources.calibration_file.empty()) {
     const std::string path = absolute(sources.calibration_file);

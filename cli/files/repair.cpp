@@ -31,6 +31,10 @@ Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Co
   const RepairSources& sources = options.sources;
   repair::ConstantsFinderOptions finder;
   finder.still = options.repair.still;
+  finder.scan = sources.scan;
+  finder.or_scan = sources.or_scan;
+  finder.store_named = !sources.store.empty();
+  finder.allow_prior = options.repair.allow_prior;
   if (!sources.constants.empty()) {
     SIXPOINT_ASSIGN(finder.given, read_constants(context.env.files, sources.constants));
   }

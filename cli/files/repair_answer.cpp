@@ -12,12 +12,25 @@ using repair::RepairReport;
 using repair::RepairStatus;
 
 void add_source_options(CLI::App& command, RepairSources& sources) {
-  command.add_option("--constants", sources.constants, "use these constants (constants.json)");
-  add_store_option(command, sources.store);
+  command.add_option("--constants", sources.constants,
+                     "use these constants (constants.json), and no others");
   command.add_option("--calibration-file", sources.calibration_file,
-                     "a recording of the unit lying still on each of its six sides");
-  command.add_flag("--scan", sources.scan,
-                   "use the still periods of the file itself (also the last resort without it)");
+                     "use a recording of the unit lying still on each of its six sides");
+  command.add_flag("--scan", sources.scan, "use the still periods of the file itself");
+  add_store_option(command, sources.store);
+  command.add_flag("--or-scan", sources.or_scan,
+                   "the still periods of the file itself where what is named does not fit");
+}
+
+std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_store) {
+  repair::NamedSources named;
+  named.constants = !sources.constants.empty();
+  named.calibration_file = !sources.calibration_file.empty();
+  named.scan = sources.scan;
+  named.store = !sources.store.empty();
+  named.or_scan = sources.or_scan;
+  named.default_store = has_store && sources.store.empty();
+  return repair::sources_in_order(named);
 }
 
 void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
@@ -27,6 +40,8 @@ void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
                    "also turn back the axes of firmware 1.6.0 where the constants are right");
   command.add_flag("--allow-prior", options.allow_prior,
                    "also use constants that rest on a population prior");
+  command.add_flag("--force", options.force,
+                   "write a file also where its own still periods say that it does not help");
 }
 
 Result<std::optional<db::Store>> store_of(Context& context, const RepairSources& sources) {
@@ -94,10 +109,8 @@ std::string RepairTally::brief(bool dry_run) const {
 
 void print_report(Context& context, const RepairReport& report) {
   context.out << report.brief() << '\n';
-  if (report.status != RepairStatus::repaired) {
-    for (const std::string& reason : report.reasons) {
-      context.out << "                 " << printable(reason) << '\n';
-    }
+  for (const std::string& reason : report.reasons) {
+    context.out << "                 " << printable(reason) << '\n';
   }
 }
 

@@ -18,6 +18,7 @@
 #include "cli/context.h"
 #include "cli/store_option.h"
 #include "repair/rescale/repair_file.h"
+#include "repair/rescale/sources.h"
 
 namespace CLI {
 class App;
@@ -31,12 +32,15 @@ struct RepairSources {
   std::string store;             // --store
   std::string calibration_file;  // --calibration-file FILE.gt3x
   bool scan = false;             // --scan
+  bool or_scan = false;          // --or-scan
 };
 void add_source_options(CLI::App& command, RepairSources& sources);
-// --wide, --undo-rotation, --allow-prior
+// The order in which they are asked (repair/rescale/sources.h). `has_store`: store_of() gave one.
+std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_store);
+// --wide, --undo-rotation, --allow-prior, --force
 void add_repair_options(CLI::App& command, repair::RepairOptions& options);
 
-// The store that is asked for constants:
+// The store that keeps what was repaired, and is asked for constants where order_of() has it:
 //
 //   --store  --scan  --calibration-file  store
 //   given    any     any                 the one that is named; an error where it is missing

@@ -48,10 +48,13 @@ struct ArchiveCalibrationFile {
 
 // How the files are repaired, as `repair` takes it; the same for every shard.
 struct ArchiveRepair {
-  RepairOptions options;  // wide, undo_rotation, allow_prior
-  // Constants that the user named: nothing else is asked.
+  RepairOptions options;  // wide, undo_rotation, allow_prior, force
+  // What the user named, as ConstantsFinderOptions has it.
   std::optional<calib::ConstantsRecord> given;
   std::optional<ArchiveCalibrationFile> calibration_file;
+  bool scan = false;
+  bool store_named = false;
+  bool or_scan = false;
 };
 
 struct ArchivePlan {
@@ -62,8 +65,8 @@ struct ArchivePlan {
   std::vector<ArchiveShard> shards;
   std::vector<RefusedPath> refused;  // files that no shard can repair, and why
   ArchiveRepair repair;
-  std::string store;  // where the constants came from, without a password; empty: no store
-  std::string constants_sha256;  // of constants.jsonl; empty: no store
+  std::string store;  // that keeps what was repaired, without a password; empty: no store
+  std::string constants_sha256;  // of constants.jsonl; empty: no store is asked for constants
 
   std::size_t files() const;
   std::uint64_t bytes() const;

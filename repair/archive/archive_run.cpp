@@ -125,6 +125,10 @@ class ShardRun {
     SIXPOINT_ASSIGN(snapshot_, read_snapshot(files_, folder_, plan_));
     ConstantsFinderOptions finder;
     finder.given = plan_.repair.given;
+    finder.scan = plan_.repair.scan;
+    finder.store_named = plan_.repair.store_named;
+    finder.or_scan = plan_.repair.or_scan;
+    finder.allow_prior = plan_.repair.options.allow_prior;
     finder.snapshot = snapshot_ ? &*snapshot_ : nullptr;
     if (plan_.repair.calibration_file) {
       const ArchiveCalibrationFile& file = *plan_.repair.calibration_file;

@@ -17,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kSchema = "sixpoint/archive-plan/";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 constexpr std::uint64_t kLargestPlan = 256ULL << 20;
 constexpr std::uint64_t kLargestManifest = 1ULL << 30;
 
@@ -74,7 +74,10 @@ Json to_json(const ArchivePlan& plan) {
   const ArchiveRepair& repair = plan.repair;
   json["options"] = {{"wide", repair.options.wide},
                      {"undo_rotation", repair.options.undo_rotation},
-                     {"allow_prior", repair.options.allow_prior}};
+                     {"allow_prior", repair.options.allow_prior},
+                     {"force", repair.options.force}};
+  json["sources"] = {
+      {"scan", repair.scan}, {"store_named", repair.store_named}, {"or_scan", repair.or_scan}};
   json["constants"] = repair.given ? calib::to_json(*repair.given) : Json(nullptr);
   json["calibration_file"] = repair.calibration_file
                                  ? Json{{"path", encode_path(repair.calibration_file->path)},
@@ -110,6 +113,11 @@ Result<ArchivePlan> plan_of(const Json& json) {
   plan.repair.options.wide = options.at("wide");
   plan.repair.options.undo_rotation = options.at("undo_rotation");
   plan.repair.options.allow_prior = options.at("allow_prior");
+  plan.repair.options.force = options.at("force");
+  const Json& sources = json.at("sources");
+  plan.repair.scan = sources.at("scan");
+  plan.repair.store_named = sources.at("store_named");
+  plan.repair.or_scan = sources.at("or_scan");
   if (const Json& given = json.at("constants"); !given.is_null()) {
     SIXPOINT_ASSIGN(plan.repair.given, calib::constants_record_from_json(given));
   }

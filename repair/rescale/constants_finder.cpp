@@ -159,20 +159,50 @@ Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
   return {};
 }
 
+std::vector<SourceKind> ConstantsFinder::order() const {
+  const bool has_store = options_.store != nullptr || options_.snapshot != nullptr;
+  NamedSources named;
+  named.constants = options_.given.has_value();
+  named.calibration_file = options_.calibration_file.has_value();
+  named.scan = options_.scan;
+  named.store = has_store && options_.store_named;
+  named.or_scan = options_.or_scan;
+  named.default_store = has_store && !options_.store_named;
+  return sources_in_order(named);
+}
+
+Status ConstantsFinder::ask(SourceKind kind, const std::string& path, const Survey& survey,
+                            ConstantsChoice& choice) {
+  switch (kind) {
+    case SourceKind::constants:
+      choice.chosen = ChosenConstants{*options_.given, "constants", ""};
+      break;
+    case SourceKind::calibration_file:
+      ask_calibration_file(survey, choice);
+      break;
+    case SourceKind::scan:
+      SIXPOINT_CHECK(ask_scan(path, survey, choice));
+      break;
+    case SourceKind::store:
+      SIXPOINT_CHECK(ask_store(survey, choice));
+      break;
+  }
+  if (choice.chosen) {
+    if (auto why = why_unfit(choice.chosen->record, survey.facts, options_.allow_prior)) {
+      choice.reasons.push_back(*std::move(why));
+      choice.chosen.reset();
+    }
+  }
+  return {};
+}
+
 Result<ConstantsChoice> ConstantsFinder::choose(const std::string& path, const Survey& survey) {
   ConstantsChoice choice;
-  if (options_.given.has_value()) {
-    choice.chosen = ChosenConstants{*options_.given, "constants", ""};
-    return choice;
-  }
-  if (options_.store != nullptr || options_.snapshot != nullptr) {
-    SIXPOINT_CHECK(ask_store(survey, choice));
-  }
-  if (!choice.chosen && options_.calibration_file.has_value()) {
-    ask_calibration_file(survey, choice);
-  }
-  if (!choice.chosen && options_.scan) {
-    SIXPOINT_CHECK(ask_scan(path, survey, choice));
+  for (const SourceKind kind : order()) {
+    SIXPOINT_CHECK(ask(kind, path, survey, choice));
+    if (choice.chosen) {
+      break;
+    }
   }
   return choice;
 }

@@ -1,17 +1,17 @@
-// Which constants repair a file: the paper's three methods in order of trust.
+// Asks the sources of constants for a file, in the order of sources.h.
 //
 //   ConstantsFinderOptions options;
 //   options.store = &store;
 //   ConstantsFinder finder(env, options);
 //   SIXPOINT_ASSIGN(const ConstantsChoice choice, finder.choose(path, survey));
 //
-// | source, in this order                        | used when                                   |
-// |----------------------------------------------|---------------------------------------------|
-// | constants that the user named                | given: no other source is asked             |
-// | the store (method 3, the jig) or a snapshot  | it has a set of this unit under `current`   |
-// | a calibration file (method 2)                | it is of this unit, recorded under          |
-// |                                              | `current`, and is solved                    |
-// | the file's own still periods (method 1)      | they suffice                                |
+// | source                                       | has constants that fit when                  |
+// |----------------------------------------------|----------------------------------------------|
+// | constants that the user named                | why_unfit() (sources.h) says nothing         |
+// | a calibration file (method 2)                | the same, it was recorded under `current`,   |
+// |                                              | and its solution is verified                 |
+// | the file's own still periods (method 1)      | their solution is verified                   |
+// | the store (method 3, the jig) or a snapshot  | it has a set of this unit under `current`    |
 //
 // A calibration file recorded under `legacy` would make the data worse, so it is refused.
 #pragma once
@@ -24,11 +24,12 @@
 #include "db/store.h"
 #include "repair/rescale/constants_snapshot.h"
 #include "repair/rescale/repair_file.h"
+#include "repair/rescale/sources.h"
 
 namespace sixpoint::repair {
 
 struct ConstantsFinderOptions {
-  // Constants from a file that the user named: nothing else is asked.
+  // Constants from a file that the user named.
   std::optional<calib::ConstantsRecord> given;
   // Not owned; may be null.
   db::Store* store = nullptr;
@@ -36,8 +37,13 @@ struct ConstantsFinderOptions {
   // null.
   const ConstantsSnapshot* snapshot = nullptr;
   std::optional<std::string> calibration_file;
-  // The file's own still periods, where nothing better was found.
-  bool scan = true;
+  // What the user named beside the members above. A store that nobody named is the default store.
+  bool scan = false;
+  bool store_named = false;
+  // The file's own still periods, where a named source has nothing that fits.
+  bool or_scan = false;
+  // A prior over a model's constants is no measurement of this unit: used only when asked for.
+  bool allow_prior = false;
   calib::SolveOptions solve;
   calib::StillBlockOptions still;
 };
@@ -59,6 +65,9 @@ class ConstantsFinder final : public ConstantsSource {
     std::string serial;
     std::string refusal;  // why there is no record
   };
+  std::vector<SourceKind> order() const;
+  Status ask(SourceKind kind, const std::string& path, const Survey& survey,
+             ConstantsChoice& choice);
   Status ask_store(const Survey& survey, ConstantsChoice& choice);
   void ask_calibration_file(const Survey& survey, ConstantsChoice& choice);
   Status ask_scan(const std::string& path, const Survey& survey, ConstantsChoice& choice);

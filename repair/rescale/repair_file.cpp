@@ -7,8 +7,11 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
+#include "calib/agreement.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
+#include "repair/rescale/constants_finder.h"
+#include "repair/rescale/gate.h"
 #include "repair/rescale/rescaled_log.h"
 
 namespace sixpoint::repair {
@@ -29,6 +32,11 @@ constexpr const char* kMappedByLine =
     "the counts cannot have come from whole raw counts by the file's constants (averaged, mended "
     "before, or resampled): {} of them mapped by the straight line";
 
+Json still_error_to_json(const RepairReport& report) {
+  return {{"before", calib::number_or_null(report.still_error_before_mg)},
+          {"after", calib::number_or_null(report.still_error_after_mg)}};
+}
+
 Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& chosen,
              const Survey& survey, UtcTime now) {
   Json mark;
@@ -44,7 +52,38 @@ Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& c
   }
   mark["constants_after"] = chosen ? calib::to_json(chosen->record) : Json(nullptr);
   mark["constants_id"] = report.constants_id.empty() ? Json(nullptr) : Json(report.constants_id);
+  mark["source"] = report.source ? report.source->to_json() : Json(nullptr);
+  mark["forced"] = report.forced;
+  mark["still_error_mg"] = still_error_to_json(report);
+  if (report.forced) {
+    mark["reasons"] = report.reasons;
+  }
   return mark;
+}
+
+// The mark as a record of the log (kRepairMarkType): who it was, by what, and when. The vendor's
+// own METADATA records begin and end with the same members.
+std::string mark_record_of(const RepairReport& report, UtcTime now) {
+  const Json record = {{"MetadataType", kRepairMarkType},
+                       {"Schema", "sixpoint/repair-mark/1"},
+                       {"RepairedAt", to_iso8601(now)},
+                       {"InputSha256", report.input_sha256},
+                       {"Serial", report.serial},
+                       {"Method", report.method},
+                       {"ConstantsId", report.constants_id},
+                       {"RotationUndone", report.rotation_undone},
+                       {"Forced", report.forced},
+                       {"Parsed", false},
+                       {"JSON", nullptr}};
+  return record.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+// Entries that a unit or its software writes beside the samples and that do not depend on them.
+bool is_independent_of_samples(const std::string& name) {
+  constexpr std::array<std::string_view, 8> kNames = {"log.bin",      "info.txt",    "lux.bin",
+                                                      "battery.bin",  "eeprom.bin",  "firmware.bin",
+                                                      "capsense.bin", "metadata.bin"};
+  return std::ranges::find(kNames, name) != kNames.end();
 }
 
 // The mark of a repaired file; nothing where there is no such file or mark.
@@ -84,7 +123,7 @@ class Repair {
  public:
   Repair(Env& env, const std::string& input, const std::string& output, ConstantsSource& source,
          const RepairOptions& options)
-      : env_(env), output_(output), source_(source), options_(options) {
+      : env_(env), now_(env.clock.now()), output_(output), source_(source), options_(options) {
     report_.input = input;
     report_.dry_run = options.dry_run;
   }
@@ -122,6 +161,9 @@ class Repair {
         report_.status = RepairStatus::not_repairable;
         return {};
       }
+      if (!may_write()) {
+        return {};
+      }
     }
     return write();
   }
@@ -135,6 +177,7 @@ class Repair {
     }
     const Triage judged = triage(survey_.facts);
     report_.reasons = judged.reasons;
+    report_.reasons.insert(report_.reasons.end(), survey_.notes.begin(), survey_.notes.end());
     const bool rotation_only = judged.verdict == Verdict::not_affected && judged.axes_rotated;
     if (judged.verdict == Verdict::not_affected && !(rotation_only && options_.undo_rotation)) {
       report_.status = RepairStatus::not_affected;
@@ -160,28 +203,60 @@ class Repair {
     if (!choice.chosen.has_value()) {
       return {};
     }
-    const calib::ConstantsRecord& record = choice.chosen->record;
-    if (record.serial != survey_.facts.serial) {
-      report_.reasons.push_back(fmt::format("the constants belong to unit {}, not to this one",
-                                            printable(record.serial, 60)));
-      return {};
-    }
-    if (record.filter != calib::FilterConfiguration::current) {
-      report_.reasons.emplace_back(
-          "the constants were measured under the legacy filter configuration; this file was "
-          "recorded under the current one: measure the unit under 'current'");
-      return {};
-    }
-    if (record.from_prior && !options_.allow_prior) {
-      report_.reasons.emplace_back(
-          "the constants rest on a population prior, not on this unit's data; --allow-prior uses "
-          "them all the same");
+    if (auto why = why_unfit(choice.chosen->record, survey_.facts, options_.allow_prior)) {
+      report_.reasons.push_back(*std::move(why));
       return {};
     }
     chosen_ = std::move(choice.chosen);
     report_.method = chosen_->method;
     report_.constants_id = chosen_->constants_id;
+    report_.source = source_used(chosen_->method, chosen_->constants_id, chosen_->record);
     return {};
+  }
+
+  // Whether the constants that were chosen may be used on this file: the gate, and what its own
+  // still periods say. False where the status is decided.
+  bool may_write() {
+    const GateEvidence evidence = gate_evidence(survey_, chosen_->record.calibration);
+    const GateAnswer answer = gate(evidence, options_.force);
+    if (evidence.directions > 0) {
+      report_.still_error_after_mg = evidence.after_mg;
+    }
+    if (!answer.reason.empty()) {
+      report_.reasons.push_back(answer.reason);
+    }
+    report_.forced = answer.forced;
+    if (answer.write && chosen_->method != to_string(SourceKind::scan)) {
+      if (auto contradiction = own_still_periods_contradict()) {
+        report_.reasons.push_back(*std::move(contradiction));
+        report_.forced = true;
+      }
+    }
+    if (report_.forced && options_.force) {
+      report_.reasons.emplace_back("--force: repaired all the same");
+    }
+    if (!answer.write || (report_.forced && !options_.force)) {
+      report_.forced = false;
+      report_.status = RepairStatus::not_repairable;
+      return false;
+    }
+    return true;
+  }
+
+  // What is wrong with constants from elsewhere by the file's own still periods, where these have a
+  // verified solution.
+  std::optional<std::string> own_still_periods_contradict() const {
+    const auto own = solve_survey(report_.input, survey_, {});
+    if (!own || !own->usable()) {
+      return std::nullopt;
+    }
+    const calib::Agreement between =
+        calib::agreement(chosen_->record.calibration, chosen_->record.uncertainty,
+                         *own->calibration, own->uncertainty);
+    return between.agree() ? std::nullopt
+                           : std::optional(fmt::format(
+                                 "the constants disagree with the file's own still periods: {}",
+                                 between.brief()));
   }
 
   RescaledLogOptions log_options() const {
@@ -198,6 +273,7 @@ class Repair {
     options.wide = options_.wide;
     options.beyond_12_bits = survey_.beyond_12_bits;
     options.affine = chosen_.has_value() && !survey_.plausibility.plausible();
+    options.mark = mark_record_of(report_, now_);
     options.size = options_.wide ? survey_.log_bytes_wide : survey_.log_bytes;
     options.still = options_.still;
     return options;
@@ -239,8 +315,30 @@ class Repair {
       SIXPOINT_CHECK(write_output(recording, log));
     }
     take(*log);
+    name_what_was_not_repaired(recording, log->tally().epoch_records);
     report_.status = RepairStatus::repaired;
     return {};
+  }
+
+  // Epochs were computed by the unit, or by software, from the samples as they were.
+  void name_what_was_not_repaired(const gt3x::Recording& recording, std::uint64_t epoch_records) {
+    std::vector<std::string> names;
+    for (const gt3x::EntryInfo& entry : recording.entries()) {
+      if (!is_independent_of_samples(entry.name)) {
+        names.push_back(printable(entry.name, 60));
+      }
+    }
+    if (!names.empty()) {
+      report_.reasons.push_back(fmt::format(
+          "carried over as they were: {}; what was computed from the samples must be made anew",
+          fmt::join(names, ", ")));
+    }
+    if (epoch_records > 0) {
+      report_.reasons.push_back(fmt::format(
+          "{} EPOCH records were computed by the unit from the wrong samples; they were carried "
+          "over and must be made anew",
+          epoch_records));
+    }
   }
 
   static Status read_through(RescaledLog& log) {
@@ -259,12 +357,12 @@ class Repair {
                          ? writer.add(entry.name, std::make_unique<SharedSource>(log))
                          : writer.copy(recording, entry.name));
     }
-    report_.repaired_at = env_.clock.now();
     SIXPOINT_CHECK(
-        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, *report_.repaired_at)
+        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, now_)
                                         .dump(2, ' ', false, Json::error_handler_t::replace) +
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());
+    report_.repaired_at = now_;
     report_.output = output_;
     SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
     return {};
@@ -281,6 +379,10 @@ class Repair {
     report_.resumed = true;
     report_.method = text_in(*mark, "method");
     report_.constants_id = text_in(*mark, "constants_id");
+    if (mark->contains("source")) {
+      report_.source = parse_source_used((*mark)["source"]);
+    }
+    report_.forced = mark->value("forced", Json(false)) == Json(true);
     if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
       report_.repaired_at = *then;
     }
@@ -296,6 +398,7 @@ class Repair {
   }
 
   Env& env_;
+  UtcTime now_;  // in both marks
   std::string output_;
   ConstantsSource& source_;
   RepairOptions options_;
@@ -319,17 +422,18 @@ std::optional<RepairStatus> parse_repair_status(std::string_view text) {
 
 std::string RepairReport::brief() const {
   std::string text = fmt::format("{:<16} {}", to_string(status), printable(input));
-  if (status == RepairStatus::repaired && still_error_before_mg && still_error_after_mg) {
+  if (still_error_before_mg && still_error_after_mg) {
     text += fmt::format("  still error {:.1f} -> {:.1f} mg", *still_error_before_mg,
                         *still_error_after_mg);
+  }
+  if (source) {
+    text += fmt::format("  {} {}", status == RepairStatus::repaired ? "by" : "with",
+                        printable(source->brief()));
   }
   return text;
 }
 
 Json RepairReport::to_json() const {
-  const auto optional_number = [](const std::optional<double>& value) {
-    return value ? Json(*value) : Json(nullptr);
-  };
   const auto optional_text = [](const std::string& text) {
     return text.empty() ? Json(nullptr) : Json(text);
   };
@@ -343,10 +447,10 @@ Json RepairReport::to_json() const {
           {"clipped_before", clipped_before},
           {"clipped_after", clipped_after},
           {"still_blocks", still_blocks},
-          {"still_error_mg",
-           {{"before", optional_number(still_error_before_mg)},
-            {"after", optional_number(still_error_after_mg)}}},
+          {"still_error_mg", still_error_to_json(*this)},
           {"rotation_undone", rotation_undone},
+          {"forced", forced},
+          {"source", source ? source->to_json() : Json(nullptr)},
           {"constants_id", optional_text(constants_id)},
           {"input_sha256", optional_text(input_sha256)},
           {"output_sha256", optional_text(output_sha256)}};

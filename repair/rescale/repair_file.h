@@ -5,8 +5,9 @@
 //   report.brief();  // "repaired         in.gt3x  still error 112.3 -> 0.8 mg"
 //
 // The original is only ever read. The output is a .gt3x with the same entries in the same order, in
-// which the samples alone differ (rescaled_log.h), and one more entry, the mark (kRepairMark): JSON
-// with what was done, by which constants, to the file of which hash. What becomes of a file:
+// which the samples alone differ (rescaled_log.h), and two marks: one more entry (kRepairMark), JSON
+// with what was done, by which constants, to the file of which hash; and a record before the others
+// of the log (kRepairMarkType), which stays when the archive is packed anew. What becomes of a file:
 //
 // | file                                                    | status                             |
 // |---------------------------------------------------------|------------------------------------|
@@ -15,13 +16,16 @@
 // | triage: not affected, axes turned, undo_rotation on     | repaired, method `rotation`        |
 // | triage: cannot tell                                     | not_repairable                     |
 // | affected, no constants that may be used (choose() below)| not_repairable                     |
+// | ... that the file's own still periods contradict        | not_repairable, but with force     |
+// | ... that do not help by the gate (gate.h)               | not_repairable, but with force     |
 // | affected, with constants, output not there              | repaired                           |
 // | ... output there, made from this input, resume on       | repaired, `resumed`; nothing done  |
 // | ... output there, otherwise                             | failed: cannot_create              |
 // | cannot be read or written                               | failed, with the error             |
 //
-// Constants may be used when they are this unit's, were measured under the `current` filter, and do
-// not rest on a prior (allow_prior lets those pass).
+// Constants may be used when why_unfit() (sources.h) says nothing. Where they are not from the file
+// itself, and its own still periods give a verified solution, the two must agree
+// (calib/agreement.h).
 #pragma once
 
 #include <optional>
@@ -32,6 +36,7 @@
 
 #include "base/env.h"
 #include "calib/constants.h"
+#include "repair/rescale/sources.h"
 #include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
@@ -71,6 +76,8 @@ struct RepairOptions {
   bool undo_rotation = false;
   // A prior over a model's constants is no measurement of this unit: used only when asked for.
   bool allow_prior = false;
+  // Writes what the gate or the file's own still periods refuse; the mark says so.
+  bool force = false;
   // An output that is there already and was made from this very input is taken as done.
   bool resume = false;
   calib::StillBlockOptions still;
@@ -88,16 +95,21 @@ struct RepairReport {
   std::uint64_t clipped_before = 0;
   std::uint64_t clipped_after = 0;
   std::size_t still_blocks = 0;
-  std::optional<double> still_error_before_mg;  // mean of |magnitude - 1 g| over still blocks
+  // Mean of |magnitude - 1 g| over still blocks. Of a file that is not written, `after` is what the
+  // constants would have made of it.
+  std::optional<double> still_error_before_mg;
   std::optional<double> still_error_after_mg;
   bool rotation_undone = false;
   bool resumed = false;  // repaired by an earlier run; method and constants are those of its mark
   std::string constants_id;
+  std::optional<SourceUsed> source;
+  bool forced = false;  // written although the gate or the file's own still periods said no
   std::optional<UtcTime> repaired_at;  // as its mark says
   std::string input_sha256;
   std::string output_sha256;
   bool dry_run = false;
 
+  // "repaired  in.gt3x  still error 112.3 -> 0.8 mg  by store 5c0f91aa (2026-11-22, +- 1.2 mg)"
   std::string brief() const;
   bool usable() const { return status != RepairStatus::failed; }
   nlohmann::ordered_json to_json() const;

@@ -14,6 +14,29 @@ bool at_limit(const gt3x::Counts& sample, calib::RecordWidth width) {
   });
 }
 
+// A unit that charges stores zeros on all axes: no measurement, so they stay zeros. Rescaled they
+// would look like rest in a wrong direction. A single zero may be a measurement: only three in a
+// row, or zeros up to the record's first or last sample, are taken for charging.
+void keep_charging_zeros(std::span<const gt3x::Counts> samples, std::span<gt3x::Counts> fresh) {
+  constexpr std::size_t kLeastRun = 3;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    std::size_t end = i;
+    while (end < samples.size() && samples[end] == gt3x::Counts{}) {
+      ++end;
+    }
+    if (end - i >= kLeastRun || (end > i && (i == 0 || end == samples.size()))) {
+      std::fill(fresh.begin() + static_cast<std::ptrdiff_t>(i),
+                fresh.begin() + static_cast<std::ptrdiff_t>(end), gt3x::Counts{});
+    }
+    i = std::max(i, end);
+  }
+}
+
+bool is_epoch(const gt3x::Record& record) {
+  using enum gt3x::RecordType;
+  return record.is(epoch) || record.is(epoch2) || record.is(epoch3) || record.is(epoch4);
+}
+
 }  // namespace
 
 RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options, StillScan still)
@@ -34,6 +57,16 @@ Status RescaledLog::set_constants(const StoredConstants& constants) {
   if (!options_.fresh.has_value() || constants_ == constants) {
     return {};
   }
+  constants_ = constants;
+  const auto known = std::ranges::find(maps_, constants, [](const auto& map) { return map.first; });
+  map_ = static_cast<std::size_t>(known - maps_.begin());
+  if (known != maps_.end()) {
+    return {};
+  }
+  if (maps_.size() == kMaxSetsOfConstants) {
+    return fail(ErrorCode::bad_data, "the log holds more sets of constants than a recording has",
+                {}, "download the recording from the unit again");
+  }
   const auto limit =
       options_.beyond_12_bits ? calib::RecordWidth::bits16 : calib::RecordWidth::bits12;
   SIXPOINT_ASSIGN(const auto reversal,
@@ -41,8 +74,8 @@ Status RescaledLog::set_constants(const StoredConstants& constants) {
   calib::Rescale::Options rescale;
   rescale.output = options_.wide ? calib::RecordWidth::bits16 : limit;
   rescale.affine = options_.affine;
-  SIXPOINT_ASSIGN(rescale_, calib::Rescale::make(reversal, *options_.fresh, rescale));
-  constants_ = constants;
+  SIXPOINT_ASSIGN(auto map, calib::Rescale::make(reversal, *options_.fresh, rescale));
+  maps_.emplace_back(constants, std::move(map));
   return {};
 }
 
@@ -58,12 +91,13 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
   const auto limit_after = options_.wide ? calib::RecordWidth::bits16 : limit_before;
   fresh_samples_ = samples_;
   if (options_.undo_rotation) {
-    undo_rotation(fresh_samples_);
+    undo_rotation(fresh_samples_, limit_before);
   }
-  if (rescale_.has_value()) {
+  if (map_.has_value()) {
     calib::RescaleTally counts;
-    rescale_->apply(fresh_samples_, fresh_samples_, counts);
+    maps_[*map_].second.apply(fresh_samples_, fresh_samples_, counts);
     tally_.affine_counts += counts.affine[0] + counts.affine[1] + counts.affine[2];
+    keep_charging_zeros(samples_, fresh_samples_);
   }
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     tally_.clipped_before += at_limit(samples_[i], limit_before) ? 1 : 0;
@@ -74,8 +108,19 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
   ++tally_.sample_records;
   still_.push(record.unix_time, fresh_samples_);
 
+  if (packed && options_.wide) {
+    // A long record may hold more samples than one of 16 bits can: they go on in another one.
+    for (std::span<const gt3x::Counts> left = fresh_samples_; !left.empty();) {
+      const auto part = left.first(std::min(left.size(), kMaxWideSamples));
+      payload_.clear();
+      gt3x::append_activity2(payload_, part);
+      gt3x::append_record(pending_, gt3x::RecordType::activity2, record.unix_time, payload_);
+      left = left.subspan(part.size());
+    }
+    return;
+  }
   payload_.clear();
-  if (packed && !options_.wide) {
+  if (packed) {
     gt3x::append_activity(payload_, fresh_samples_);
     // The unused nibble behind an odd number of values, and bytes that make no whole sample, stay.
     if (samples_.size() % 2 == 1 && !payload_.empty()) {
@@ -85,23 +130,39 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
   } else {
     gt3x::append_activity2(payload_, fresh_samples_);
   }
-  if (!(packed && options_.wide) && payload_.size() < record.payload.size()) {
+  if (payload_.size() < record.payload.size()) {
     const auto rest = record.payload.subspan(payload_.size());
     payload_.insert(payload_.end(), rest.begin(), rest.end());
   }
-  gt3x::append_record(pending_,
-                      packed && options_.wide ? gt3x::RecordType::activity2
-                                              : static_cast<gt3x::RecordType>(record.type),
-                      record.unix_time, payload_);
+  gt3x::append_record(pending_, static_cast<gt3x::RecordType>(record.type), record.unix_time,
+                      payload_);
+}
+
+std::optional<std::uint64_t> RescaledLog::size() const {
+  if (!options_.size || options_.mark.empty()) {
+    return options_.size;
+  }
+  return *options_.size + options_.mark.size() + gt3x::kRecordOverhead;
+}
+
+void RescaledLog::put_mark(std::uint32_t unix_time) {
+  if (!options_.mark.empty()) {
+    gt3x::append_record(pending_, gt3x::RecordType::metadata, unix_time, as_bytes(options_.mark));
+  }
+  marked_ = true;
 }
 
 Result<bool> RescaledLog::pull() {
-  SIXPOINT_ASSIGN(const auto item, log_.next());
-  if (!item.has_value()) {
-    return false;
-  }
   pending_.clear();
   taken_ = 0;
+  SIXPOINT_ASSIGN(const auto item, log_.next());
+  const bool good = item && item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok;
+  if (!marked_ && (good || !item)) {
+    put_mark(good ? item->record.unix_time : 0);
+  }
+  if (!item.has_value()) {
+    return !pending_.empty();
+  }
   const gt3x::Record& record = item->record;
   if (item->kind == gt3x::LogItem::Kind::record && record.checksum_ok) {
     const bool activity =
@@ -112,6 +173,8 @@ Result<bool> RescaledLog::pull() {
     }
     if (activity || (record.is(gt3x::RecordType::event) && record.payload.size() == 1)) {
       still_.break_run();
+    } else if (is_epoch(record)) {
+      ++tally_.epoch_records;
     } else if (record.is(gt3x::RecordType::parameters)) {
       const auto parameters = gt3x::parse_parameters(record.payload);
       if (parameters && parameters->constants.has_value()) {
@@ -121,7 +184,7 @@ Result<bool> RescaledLog::pull() {
   } else if (item->kind != gt3x::LogItem::Kind::stray) {
     still_.break_run();
   }
-  pending_.assign(item->raw.begin(), item->raw.end());
+  pending_.insert(pending_.end(), item->raw.begin(), item->raw.end());
   return true;
 }
 

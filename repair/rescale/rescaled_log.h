@@ -8,14 +8,16 @@
 //   SIXPOINT_CHECK(repaired->read(bytes));  // log.bin, piece by piece
 //
 // Only ACTIVITY and ACTIVITY2 records with samples in them and a right checksum change; they are
-// packed anew and get their checksum. Every other byte comes out as it went in: other records, USB
-// records, records whose checksum fails, zero bytes and damage between records.
+// packed anew and get their checksum. One record is new: the mark, before all others. Every other
+// byte comes out as it went in: other records, USB records, records whose checksum fails, zero
+// bytes and damage between records.
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "base/constants.h"
@@ -25,6 +27,7 @@
 #include "gt3x/log/log_reader.h"
 #include "gt3x/log/samples.h"
 #include "repair/triage/still_scan.h"
+#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 
@@ -42,7 +45,11 @@ struct RescaledLogOptions {
   bool beyond_12_bits = false;
   // The counts cannot have come from the constants: one affine map instead of the integers.
   bool affine = false;
-  // Bytes that will come out, where they are known (Survey::log_bytes, log_bytes_wide).
+  // JSON text of at most gt3x::kMaxPayload bytes, put before the first good record as METADATA of
+  // that record's time. Empty: no mark.
+  std::string mark;
+  // Bytes that will come out but for the mark, where they are known (Survey::log_bytes,
+  // log_bytes_wide).
   std::optional<std::uint64_t> size;
   calib::StillBlockOptions still;
 };
@@ -54,6 +61,7 @@ struct RescaledLogTally {
   std::uint64_t clipped_before = 0;  // samples with an axis at the limit of the record they came in
   std::uint64_t clipped_after = 0;   // ... of the record they went out in
   std::uint64_t affine_counts = 0;   // counts with no integer behind them, mapped by the line
+  std::uint64_t epoch_records = 0;   // the unit's own epochs, which it computed from wrong samples
 };
 
 class RescaledLog final : public gt3x::ByteSource {
@@ -64,7 +72,7 @@ class RescaledLog final : public gt3x::ByteSource {
 
   // bad_data where PARAMETERS bring constants that Eq. 1-3 cannot be used with.
   Result<std::size_t> read(std::span<std::uint8_t> out) override;
-  std::optional<std::uint64_t> size() const override { return options_.size; }
+  std::optional<std::uint64_t> size() const override;
 
   // Complete after read() has answered 0.
   const RescaledLogTally& tally() const { return tally_; }
@@ -74,13 +82,17 @@ class RescaledLog final : public gt3x::ByteSource {
   RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options, StillScan still);
   Status set_constants(const StoredConstants& constants);
   Result<bool> pull();  // the next item into pending_; false at the end
+  void put_mark(std::uint32_t unix_time);
   void put_samples(const gt3x::Record& record);
 
   gt3x::LogReader log_;
   RescaledLogOptions options_;
   StillScan still_;
   std::optional<StoredConstants> constants_;
-  std::optional<calib::Rescale> rescale_;
+  // By the constants that are undone; the log holds a few sets, whatever their order.
+  std::vector<std::pair<StoredConstants, calib::Rescale>> maps_;
+  std::optional<std::size_t> map_;  // of maps_, in force
+  bool marked_ = false;
   std::vector<gt3x::Counts> samples_;
   std::vector<gt3x::Counts> fresh_samples_;
   Bytes payload_;

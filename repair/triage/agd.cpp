@@ -21,11 +21,29 @@ std::string uri_of(const std::string& path) {
   return uri + "?mode=ro&immutable=1";
 }
 
+// A settings table has some thirty short rows. What needs more than this is no .agd.
+constexpr int kLongestValue = 1 << 16;  // bytes
+constexpr int kStepsBetweenLooks = 10'000;
+constexpr int kMostLooks = 100;  // a million steps of SQLite's machine: some ten milliseconds
+
+// Called by SQLite now and then; another answer than 0 ends the query.
+int give_up_after(void* looks) { return ++*static_cast<int*>(looks) > kMostLooks ? 1 : 0; }
+
 }  // namespace
 
 Result<FileFacts> read_agd_facts(const std::string& path) {
   try {
     const SQLite::Database database(uri_of(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    sqlite3_limit(database.getHandle(), SQLITE_LIMIT_LENGTH, kLongestValue);
+    int looks = 0;
+    sqlite3_progress_handler(database.getHandle(), kStepsBetweenLooks, &give_up_after, &looks);
+    // Only a table: a view of that name may run on without an end.
+    SQLite::Statement table(
+        database, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'settings'");
+    if (!table.executeStep()) {
+      return fail(ErrorCode::bad_data, "the file holds no table of settings, so it is no .agd",
+                  path, "check that this is the file that ActiLife wrote");
+    }
     SQLite::Statement query(database,
                             "SELECT settingName, settingValue FROM settings WHERE settingName IN "
                             "('deviceserial', 'deviceversion')");

@@ -4,7 +4,8 @@
 //   const Triage answer = triage(facts);  // triage.h
 //
 // Such a file can be triaged but not repaired: its epochs must be made anew from repaired raw data.
-// It does not say when the unit was calibrated.
+// It does not say when the unit was calibrated; the recording that it was made from does, where it
+// lies beside it (scan_file.h).
 #pragma once
 
 #include <string>
@@ -15,7 +16,7 @@
 namespace sixpoint::repair {
 
 // Read-only, without making a journal beside the file. no_input where there is no file, bad_data
-// where it is no .agd.
+// where it is no .agd or claims more work or memory than settings need.
 Result<FileFacts> read_agd_facts(const std::string& path);
 
 }  // namespace sixpoint::repair

@@ -77,7 +77,8 @@ class StillWatch {
     }
     if (rotated) {
       turned_.assign(item.counts.begin(), item.counts.end());
-      undo_rotation(turned_);
+      undo_rotation(turned_, item.type == gt3x::RecordType::activity ? calib::RecordWidth::bits12
+                                                                     : calib::RecordWidth::bits16);
       scan_->push(item.unix_time, turned_);
     } else {
       scan_->push(item.unix_time, item.counts);

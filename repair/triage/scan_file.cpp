@@ -22,18 +22,55 @@ ScannedFile unreadable_file(const std::string& path, const Error& error) {
 namespace {
 
 void judge(ScannedFile& answer, bool repaired) {
+  const bool fits = !answer.evidence_mg || *answer.evidence_mg <= kEvidenceLimit_mg;
   if (repaired) {
-    answer.verdict = to_string(Verdict::not_affected);
-    answer.reasons.insert(answer.reasons.begin(), "already repaired by sixpoint");
+    answer.verdict = to_string(fits ? Verdict::not_affected : Verdict::cannot_tell);
+    answer.reasons.insert(
+        answer.reasons.begin(),
+        fits ? "already repaired by sixpoint"
+             : "already repaired by sixpoint, with constants that do not fit, or the unit has a "
+               "defect: repair the original again");
     return;
   }
   const Triage triage = repair::triage(answer.facts);
   answer.verdict = to_string(triage.verdict);
   answer.axes_rotated = triage.axes_rotated;
   answer.reasons.insert(answer.reasons.begin(), triage.reasons.begin(), triage.reasons.end());
+  if (triage.verdict == Verdict::affected && answer.evidence_mg && fits) {
+    answer.reasons.push_back(
+        fmt::format("its still periods are within {:.0f} mg of 1 g all the same: it may have been "
+                    "corrected by other software; repair writes it only where that improves it",
+                    kEvidenceLimit_mg));
+  }
 }
 
-ScannedFile scan_agd(const std::string& path) {
+// Where the recording of an .agd may lie: NAME.gt3x beside NAME.agd, and beside NAME60sec.agd,
+// which is what ActiLife calls its epochs of 60 seconds.
+std::vector<std::string> recordings_of_agd(const std::string& path) {
+  std::string stem = path.substr(0, path.size() - std::string_view(".agd").size());
+  std::vector<std::string> paths = {stem + ".gt3x"};
+  if (stem.ends_with("sec")) {
+    stem.resize(stem.size() - 3);
+    const auto name = stem.find_last_not_of("0123456789");
+    if (name != std::string::npos && name + 1 < stem.size()) {
+      paths.push_back(stem.substr(0, name + 1) + ".gt3x");
+    }
+  }
+  return paths;
+}
+
+void take_date_from_recording(FileSystem& files, ScannedFile& answer) {
+  for (const std::string& path : recordings_of_agd(answer.path)) {
+    const auto facts = facts_of(files, path);
+    if (facts && facts->serial == answer.facts.serial && facts->calibration_time) {
+      answer.facts.calibration_time = facts->calibration_time;
+      answer.reasons.push_back("the date of calibration is that of " + path);
+      return;
+    }
+  }
+}
+
+ScannedFile scan_agd(FileSystem& files, const std::string& path) {
   const auto facts = read_agd_facts(path);
   if (!facts) {
     return unreadable_file(path, facts.error());
@@ -41,8 +78,13 @@ ScannedFile scan_agd(const std::string& path) {
   ScannedFile answer;
   answer.path = path;
   answer.facts = *facts;
+  take_date_from_recording(files, answer);
   answer.reasons.push_back("an .agd cannot be repaired: make it again from the repaired raw data");
   judge(answer, false);
+  if (answer.verdict == to_string(Verdict::cannot_tell) && !answer.facts.calibration_time) {
+    answer.reasons.push_back(
+        "put its recording (.gt3x, the same name) beside it: that says the date");
+  }
   return answer;
 }
 
@@ -54,6 +96,7 @@ ScannedFile scan_recording(FileSystem& files, const std::string& path) {
     return unreadable_file(path, survey.error());
   }
   answer.facts = survey->facts;
+  answer.reasons = survey->notes;
   if (survey->magnitude.blocks > 0) {
     answer.evidence_mg = survey->magnitude.p95_mg;
     if (survey->magnitude.p95_mg > kEvidenceLimit_mg) {
@@ -77,7 +120,7 @@ ScannedFile scan_recording(FileSystem& files, const std::string& path) {
 }  // namespace
 
 ScannedFile scan_file(FileSystem& files, const std::string& path) {
-  return has_ending(path, ".agd") ? scan_agd(path) : scan_recording(files, path);
+  return has_ending(path, ".agd") ? scan_agd(files, path) : scan_recording(files, path);
 }
 
 }  // namespace sixpoint::repair

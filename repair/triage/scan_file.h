@@ -6,11 +6,16 @@
 //
 //     file                                             verdict
 //     cannot be read                                   unreadable, with `error`
-//     repaired by this program                         not_affected
+//     carries our mark, its still periods fit          not_affected
+//     carries our mark, has no still periods           not_affected, and the reasons say so
+//     carries our mark, they are beyond 64 mg          cannot_tell: wrong constants, or a defect
 //     any other                                        as triage() says (repair/triage/triage.h)
 //
-// The samples are reported as a reason and never change the verdict. Safe to call from several
-// threads.
+// An .agd names no date of calibration: it is taken from the recording of the same unit and name
+// that lies beside it, where there is one.
+//
+// Of a file without our mark the samples are a reason and do not change the verdict. Safe to call
+// from several threads.
 #pragma once
 
 #include <optional>

@@ -4,15 +4,19 @@
 #include <cmath>
 #include <numeric>
 
+#include <fmt/format.h>
+
 namespace sixpoint::repair {
 
-void undo_rotation(std::span<gt3x::Counts> samples) {
+void undo_rotation(std::span<gt3x::Counts> samples, calib::RecordWidth width) {
+  const int low = calib::lowest_count(width);
+  const int high = calib::highest_count(width);
   for (gt3x::Counts& sample : samples) {
-    const std::int16_t stored_x = sample[0];
+    const int stored_x = sample[0];
     sample[0] = sample[1];
-    sample[1] = stored_x <= gt3x::kMin12   ? gt3x::kMax12
-                : stored_x >= gt3x::kMax12 ? gt3x::kMin12
-                                           : static_cast<std::int16_t>(-stored_x);
+    sample[1] = static_cast<std::int16_t>(stored_x <= low    ? high
+                                          : stored_x >= high ? low
+                                                             : -stored_x);
   }
 }
 
@@ -22,27 +26,45 @@ StillScan::StillScan(double rate_hz, double accel_scale, const calib::StillBlock
 Result<StillScan> StillScan::make(double rate_hz, double accel_scale_lsb_per_g,
                                   const calib::StillBlockOptions& options) {
   StillScan scan(rate_hz, accel_scale_lsb_per_g, options);
-  SIXPOINT_CHECK(scan.start(
-      calib::Reversal::of_raw_counts(accel_scale_lsb_per_g, calib::RecordWidth::bits12)));
+  SIXPOINT_ASSIGN(auto raw_counts, calib::Reversal::of_raw_counts(accel_scale_lsb_per_g,
+                                                                  calib::RecordWidth::bits12));
+  scan.raw_counts_ = std::make_unique<const calib::Reversal>(std::move(raw_counts));
+  SIXPOINT_CHECK(scan.start(*scan.raw_counts_));
   return scan;
 }
 
-Status StillScan::start(Result<calib::Reversal> reversal) {
-  if (!reversal) {
-    return fail(std::move(reversal).error());
-  }
+Status StillScan::start(const calib::Reversal& reversal) {
   close_finder();
-  reversal_ = std::make_unique<calib::Reversal>(*std::move(reversal));
-  SIXPOINT_ASSIGN(finder_, calib::StillBlockFinder::make(*reversal_, rate_hz_, options_));
+  reversal_ = &reversal;
+  SIXPOINT_ASSIGN(finder_, calib::StillBlockFinder::make(reversal, rate_hz_, options_));
   finder_->set_temperature(temperature_c_);
   return {};
+}
+
+Result<const calib::Reversal*> StillScan::reversal_of(const StoredConstants& constants) {
+  for (const auto& [known, reversal] : reversals_) {
+    if (known == constants) {
+      return reversal.get();
+    }
+  }
+  if (reversals_.size() == kMaxSetsOfConstants) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the recording holds more than {} different sets of constants",
+                            kMaxSetsOfConstants),
+                {}, "no unit changes them so often; download the recording from the unit again");
+  }
+  SIXPOINT_ASSIGN(auto made,
+                  calib::Reversal::make(constants, accel_scale_, calib::RecordWidth::bits12));
+  reversals_.emplace_back(constants, std::make_unique<const calib::Reversal>(std::move(made)));
+  return reversals_.back().second.get();
 }
 
 Status StillScan::set_constants(const StoredConstants& constants) {
   if (constants_ == constants) {
     return {};
   }
-  SIXPOINT_CHECK(start(calib::Reversal::make(constants, accel_scale_, calib::RecordWidth::bits12)));
+  SIXPOINT_ASSIGN(const calib::Reversal* reversal, reversal_of(constants));
+  SIXPOINT_CHECK(start(*reversal));
   constants_ = constants;
   return {};
 }

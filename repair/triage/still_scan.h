@@ -16,6 +16,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/constants.h"
@@ -26,8 +27,13 @@
 namespace sixpoint::repair {
 
 // Turns stored axes back: firmware 1.6.0 stored x' = -y, y' = x; this gives x = y', y = -x'. A
-// count of -2048 stays at the limit (its mirror image would not fit).
-void undo_rotation(std::span<gt3x::Counts> samples);
+// count at a limit of `width` becomes the other limit: the mirror image of the lowest would not
+// fit.
+void undo_rotation(std::span<gt3x::Counts> samples, calib::RecordWidth width);
+
+// Different sets of constants in one recording. A unit writes one, or two where it was calibrated
+// between; each costs a table, so what claims more is no recording that can be worked on.
+inline constexpr std::size_t kMaxSetsOfConstants = 16;
 
 class StillScan {
  public:
@@ -37,7 +43,7 @@ class StillScan {
                                 const calib::StillBlockOptions& options = {});
 
   // From here on the counts come from these constants; the same ones again change nothing. bad_data
-  // for constants that Eq. 1-3 cannot be used with.
+  // for constants that Eq. 1-3 cannot be used with, and for one set more than kMaxSetsOfConstants.
   Status set_constants(const StoredConstants& constants);
 
   // One record's samples in the firmware's order of axes, right way round; X Y Z.
@@ -57,14 +63,18 @@ class StillScan {
 
  private:
   StillScan(double rate_hz, double accel_scale, const calib::StillBlockOptions& options);
-  Status start(Result<calib::Reversal> reversal);
+  Status start(const calib::Reversal& reversal);
+  Result<const calib::Reversal*> reversal_of(const StoredConstants& constants);
   void close_finder();
 
   double rate_hz_;
   double accel_scale_;
   calib::StillBlockOptions options_;
   std::optional<StoredConstants> constants_;
-  std::unique_ptr<calib::Reversal> reversal_;  // at a fixed address: the finder keeps a pointer
+  // By the constants that are undone; at fixed addresses, because the finder keeps a pointer.
+  std::vector<std::pair<StoredConstants, std::unique_ptr<const calib::Reversal>>> reversals_;
+  std::unique_ptr<const calib::Reversal> raw_counts_;  // until constants are set
+  const calib::Reversal* reversal_ = nullptr;          // of the finder
   std::optional<calib::StillBlockFinder> finder_;
   std::optional<std::uint32_t> last_time_;
   std::optional<double> temperature_c_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "gt3x/container/byte_source.h"
 #include "gt3x/forms/agdc.h"
@@ -12,6 +13,16 @@
 #include "gt3x/recording.h"
 
 namespace sixpoint::repair {
+
+bool is_repair_mark(const gt3x::Record& record) {
+  if (!record.is(gt3x::RecordType::metadata)) {
+    return false;
+  }
+  const auto json = nlohmann::json::parse(record.payload.begin(), record.payload.end(), nullptr,
+                                          /*allow_exceptions=*/false);
+  return json.is_object() && json.value("MetadataType", nlohmann::json()) == kRepairMarkType;
+}
+
 namespace {
 
 constexpr double kUsualScale_lsb_per_g = 256;
@@ -21,23 +32,36 @@ void take_parameters(const gt3x::Parameters& parameters, FileFacts& facts) {
   if (!facts.calibration_time.has_value()) {
     facts.calibration_time = parameters.calibration_time;
   }
-  if (facts.firmware.empty() && parameters.firmware.has_value()) {
-    facts.firmware = *parameters.firmware;
+  if (facts.firmware.empty()) {
+    facts.firmware = parameters.firmware.value_or("");
+  } else if (parameters.firmware &&
+             parse_firmware(*parameters.firmware) != parse_firmware(facts.firmware)) {
+    facts.other_firmware = *parameters.firmware;
   }
 }
 
-// The first PARAMETERS record of the log whose checksum holds; nothing when there is none.
-Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& recording) {
+// What a log says before its samples need it.
+struct LogHead {
+  // The first PARAMETERS record whose checksum holds; nothing when there is none.
+  std::optional<gt3x::Parameters> parameters;
+  bool marked = false;  // our mark stands before it
+};
+Result<LogHead> read_head(gt3x::Recording& recording) {
   SIXPOINT_ASSIGN(auto log, recording.open_log());
+  LogHead head;
   while (true) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item.has_value()) {
-      return std::nullopt;
+      return head;
     }
-    if (item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok &&
-        item->record.is(gt3x::RecordType::parameters)) {
+    if (item->kind != gt3x::LogItem::Kind::record || !item->record.checksum_ok) {
+      continue;
+    }
+    head.marked = head.marked || is_repair_mark(item->record);
+    if (item->record.is(gt3x::RecordType::parameters)) {
       if (auto parameters = gt3x::parse_parameters(item->record.payload)) {
-        return *std::move(parameters);
+        head.parameters = *std::move(parameters);
+        return head;
       }
     }
   }
@@ -122,16 +146,10 @@ class LogSurvey {
  private:
   // Finds out the scale, and the constants of the samples before the first PARAMETERS record.
   Status begin() {
-    SIXPOINT_ASSIGN(const auto first, first_parameters(recording_));
-    std::optional<double> scale = first ? first->accel_scale_lsb_per_g : std::nullopt;
-    if (!scale) {
-      scale = recording_.info().accel_scale_lsb_per_g();
-    }
-    if (!scale) {
-      scale = gt3x::default_accel_scale_lsb_per_g(result_.facts.serial);
-    }
-    result_.accel_scale_known = scale.has_value();
-    result_.accel_scale_lsb_per_g = scale.value_or(kUsualScale_lsb_per_g);
+    SIXPOINT_ASSIGN(const LogHead head, read_head(recording_));
+    const auto& first = head.parameters;
+    result_.already_repaired = result_.already_repaired || head.marked;
+    take_scale(first);
     if (first.has_value()) {
       take_parameters(*first, result_.facts);
     }
@@ -141,6 +159,33 @@ class LogSurvey {
       use_constants(*first);
     }
     return {};
+  }
+
+  void take_scale(const std::optional<gt3x::Parameters>& first) {
+    std::optional<double> scale = first ? first->accel_scale_lsb_per_g : std::nullopt;
+    if (!scale) {
+      scale = recording_.info().accel_scale_lsb_per_g();
+    }
+    if (!scale) {
+      scale = gt3x::default_accel_scale_lsb_per_g(result_.facts.serial);
+    }
+    result_.accel_scale_known = scale.has_value();
+    result_.accel_scale_lsb_per_g = scale.value_or(kUsualScale_lsb_per_g);
+    const auto replaced = [&](const char* where, const std::string& value) {
+      result_.notes.push_back(
+          fmt::format("{} gives an acceleration scale of {}, which no unit has: {} LSB/g was used",
+                      where, value, result_.accel_scale_lsb_per_g));
+    };
+    const auto written = recording_.info().get("Acceleration Scale");
+    if (written && !recording_.info().accel_scale_lsb_per_g()) {
+      replaced("info.txt", fmt::format("'{}'", printable(*written, 20)));
+    }
+    if (first && !first->accel_scale_lsb_per_g) {
+      const auto code = first->values.find(gt3x::kParameterAccelScale);
+      if (code != first->values.end()) {
+        replaced("PARAMETERS", fmt::format("{:g}", gt3x::decode_float(code->second)));
+      }
+    }
   }
 
   Result<StillScan> make_scan(double scale_lsb_per_g, const calib::StillBlockOptions& options) {
@@ -156,7 +201,8 @@ class LogSurvey {
       result_.constants_problem = status.error();
       result_.constants_problem->where = recording_.path();
     }
-    if (std::ranges::find(result_.constants, *parameters.constants) == result_.constants.end()) {
+    if (std::ranges::find(result_.constants, *parameters.constants) == result_.constants.end() &&
+        result_.constants.size() <= kMaxSetsOfConstants) {
       result_.constants.push_back(*parameters.constants);
     }
   }
@@ -192,7 +238,10 @@ class LogSurvey {
   void take_samples(const gt3x::Record& record) {
     if (record.is(gt3x::RecordType::activity)) {
       gt3x::unpack_activity(record.payload, samples_);
-      result_.log_bytes_wide += samples_.size() * sizeof(gt3x::Counts) - record.payload.size();
+      // Packed anew, in as many records as it takes (RescaledLog).
+      const std::size_t records = (samples_.size() + kMaxWideSamples - 1) / kMaxWideSamples;
+      result_.log_bytes_wide += samples_.size() * sizeof(gt3x::Counts) +
+                                records * gt3x::kRecordOverhead - record.raw.size();
     } else {
       gt3x::unpack_activity2(record.payload, samples_);
     }
@@ -204,7 +253,8 @@ class LogSurvey {
       result_.beyond_12_bits = result_.beyond_12_bits || low < gt3x::kMin12 || high > gt3x::kMax12;
     }
     if (rotated_) {
-      undo_rotation(samples_);
+      undo_rotation(samples_, record.is(gt3x::RecordType::activity) ? calib::RecordWidth::bits12
+                                                                    : calib::RecordWidth::bits16);
     }
     still_->push(record.unix_time, samples_);
   }
@@ -279,6 +329,18 @@ class LogSurvey {
 };
 
 }  // namespace
+
+Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+  FileFacts facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
+  if (recording.has_log()) {
+    SIXPOINT_ASSIGN(const LogHead head, read_head(recording));
+    if (head.parameters) {
+      take_parameters(*head.parameters, facts);
+    }
+  }
+  return facts;
+}
 
 Result<Survey> survey(FileSystem& files, const std::string& path,
                       const calib::StillBlockOptions& options) {

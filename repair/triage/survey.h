@@ -17,6 +17,8 @@
 #include "base/env.h"
 #include "calib/still_blocks.h"
 #include "gt3x/log/log_reader.h"
+#include "gt3x/log/record.h"
+#include "gt3x/log/samples.h"
 #include "repair/triage/still_scan.h"
 #include "repair/triage/triage.h"
 
@@ -26,6 +28,13 @@ namespace sixpoint::repair {
 // that open log.bin and info.txt by name do not see it; its presence is what makes a second repair
 // answer `already_repaired`.
 inline constexpr const char* kRepairMark = "sixpoint-repair.json";
+// The same in the log itself, before the first record, so that packing the archive anew does not
+// lose it: a METADATA record, JSON in the vendor's form, with this MetadataType.
+inline constexpr const char* kRepairMarkType = "SixpointRepair";
+bool is_repair_mark(const gt3x::Record& record);
+
+// Samples in one ACTIVITY2 record.
+inline constexpr std::size_t kMaxWideSamples = gt3x::kMaxPayload / sizeof(gt3x::Counts);
 
 struct Survey {
   FileFacts facts;
@@ -33,7 +42,9 @@ struct Survey {
   double rate_hz = 0;
   double accel_scale_lsb_per_g = 0;
   bool accel_scale_known = false;  // false: 256 was assumed
-  bool already_repaired = false;   // the mark is there
+  bool already_repaired = false;   // a mark is there: the zip entry or the record in the log
+  // What had to be assumed, a sentence each: a scale that cannot be and was replaced.
+  std::vector<std::string> notes;
   // The constants that were in force for at least one sample, in order; usually one set.
   std::vector<StoredConstants> constants;
   // An .agdc file's samples are raw counts, which nothing has to be undone for and nothing can be
@@ -49,7 +60,7 @@ struct Survey {
   std::uint64_t clipped_samples = 0;  // an axis at the limit of 12 bits
   std::uint64_t sample_records = 0;   // ACTIVITY and ACTIVITY2 with samples in them
   std::uint64_t log_bytes = 0;
-  std::uint64_t log_bytes_wide = 0;  // with every ACTIVITY record written as ACTIVITY2
+  std::uint64_t log_bytes_wide = 0;  // with every ACTIVITY record written as ACTIVITY2 records
   bool beyond_12_bits = false;       // a count outside [-2048, 2047], in ACTIVITY2 records
   gt3x::LogStatistics log;
 
@@ -62,6 +73,9 @@ struct Survey {
   MagnitudeError magnitude;  // of the file as it is, by its own scale
   double duration_s = 0;     // samples over rate
 };
+
+// Only what the header and the first PARAMETERS record say; reads no further.
+Result<FileFacts> facts_of(FileSystem& files, const std::string& path);
 
 // no_input, bad_data (no zip, damaged entry ...), as gt3x::Recording and LogReader have it;
 // bad_data also for a sample rate of 0 and for files of other forms than log.bin with ACTIVITY

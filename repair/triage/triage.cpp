@@ -48,6 +48,11 @@ UtcTime filter_change() {
   return UtcTime(sys_days(year(2014) / March / 24));
 }
 
+UtcTime first_possible_calibration() {
+  using namespace std::chrono;
+  return UtcTime(sys_days(year(2012) / January / 1));
+}
+
 std::optional<FirmwareVersion> parse_firmware(std::string_view text) {
   FirmwareVersion version;
   std::array<int*, 3> parts = {&version.major_number, &version.minor_number, &version.patch};
@@ -74,53 +79,57 @@ std::optional<FirmwareVersion> parse_firmware(std::string_view text) {
   return std::nullopt;
 }
 
-Triage triage(const FileFacts& facts) {
+namespace {
+
+// The date of the constants; nothing where the clock that it was taken from was not set.
+std::optional<UtcTime> date_of_constants(const FileFacts& facts) {
+  return facts.calibration_time && *facts.calibration_time >= first_possible_calibration()
+             ? facts.calibration_time
+             : std::nullopt;
+}
+
+// A MOS unit's file, as recorded by this firmware.
+Triage triage_by(const std::string& version, const FileFacts& facts) {
   Triage result;
   const auto decide = [&](Verdict verdict, std::string reason) {
     result.verdict = verdict;
     result.reasons.push_back(std::move(reason));
   };
-  if (facts.serial.empty()) {
-    decide(Verdict::cannot_tell, "the file does not say its unit's serial number");
-    return result;
-  }
-  if (!is_mos(facts.serial)) {
-    decide(Verdict::not_affected,
-           fmt::format("serial number {}: only units whose number begins with MOS are affected",
-                       printable(facts.serial, 60)));
-    return result;
-  }
-  const auto firmware = parse_firmware(facts.firmware);
+  const auto firmware = parse_firmware(version);
   const FilterRule rule = filter_rule(firmware);
+  const auto calibrated = date_of_constants(facts);
   result.axes_rotated = firmware == kRotatingFirmware;
-  const bool calibrated_late =
-      facts.calibration_time.has_value() && *facts.calibration_time >= filter_change();
 
   if (rule == FilterRule::by_calibration_date) {
     decide(Verdict::not_affected,
            fmt::format("firmware {} chooses the filter configuration that the constants need",
-                       printable(facts.firmware, 40)));
+                       printable(version, 40)));
   }
-  if (calibrated_late) {
+  if (calibrated && *calibrated >= filter_change()) {
     decide(Verdict::not_affected,
            fmt::format("calibrated on {}, under the configuration that all later firmware sets",
-                       to_iso8601(*facts.calibration_time)));
+                       to_iso8601(*calibrated)));
   }
   if (result.reasons.empty()) {
-    if (rule == FilterRule::always_current && facts.calibration_time.has_value()) {
+    if (rule == FilterRule::always_current && calibrated) {
       decide(Verdict::affected,
              fmt::format("calibrated on {}, before 2014-03-24, and recorded by firmware {}, which "
                          "set the other filter configuration",
-                         to_iso8601(*facts.calibration_time), printable(facts.firmware, 40)));
+                         to_iso8601(*calibrated), printable(version, 40)));
     }
     if (!facts.calibration_time.has_value()) {
       decide(Verdict::cannot_tell, "the file does not say when the unit was calibrated");
+    } else if (!calibrated) {
+      decide(Verdict::cannot_tell,
+             fmt::format("the file says that the unit was calibrated on {}, before such units were "
+                         "made: a clock had not been set",
+                         to_iso8601(*facts.calibration_time)));
     }
-    if (facts.firmware.empty()) {
+    if (version.empty()) {
       decide(Verdict::cannot_tell, "the file does not say which firmware recorded it");
     } else if (rule == FilterRule::unknown) {
-      decide(Verdict::cannot_tell, fmt::format("firmware '{}' is none whose behaviour is known",
-                                               printable(facts.firmware, 40)));
+      decide(Verdict::cannot_tell,
+             fmt::format("firmware '{}' is none whose behaviour is known", printable(version, 40)));
     }
   }
   if (result.axes_rotated) {
@@ -129,19 +138,45 @@ Triage triage(const FileFacts& facts) {
   return result;
 }
 
-std::optional<FilterConfiguration> filter_of_constants(const FileFacts& facts) {
-  if (!is_mos(facts.serial) || !facts.calibration_time) {
-    return std::nullopt;
+}  // namespace
+
+Triage triage(const FileFacts& facts) {
+  if (facts.serial.empty()) {
+    return {Verdict::cannot_tell, {"the file does not say its unit's serial number"}};
   }
-  return *facts.calibration_time < filter_change() ? FilterConfiguration::legacy
-                                                   : FilterConfiguration::current;
+  if (!is_mos(facts.serial)) {
+    return {Verdict::not_affected,
+            {fmt::format("serial number {}: only units whose number begins with MOS are affected",
+                         printable(facts.serial, 60))}};
+  }
+  Triage result = triage_by(facts.firmware, facts);
+  if (facts.other_firmware.empty()) {
+    return result;
+  }
+  std::string two = fmt::format("info.txt names firmware {}, the PARAMETERS record {}",
+                                printable(facts.firmware, 40), printable(facts.other_firmware, 40));
+  const Triage other = triage_by(facts.other_firmware, facts);
+  if (other.verdict == result.verdict && other.axes_rotated == result.axes_rotated) {
+    result.reasons.push_back(std::move(two));
+    return result;
+  }
+  return {Verdict::cannot_tell,
+          {two + ": they lead to different answers, and one of them is wrong"}};
 }
 
-std::optional<FilterConfiguration> filter_in_force(const FileFacts& facts) {
-  if (!is_mos(facts.serial)) {
+std::optional<FilterConfiguration> filter_of_constants(const FileFacts& facts) {
+  const auto calibrated = date_of_constants(facts);
+  if (!is_mos(facts.serial) || !calibrated) {
     return std::nullopt;
   }
-  switch (filter_rule(parse_firmware(facts.firmware))) {
+  return *calibrated < filter_change() ? FilterConfiguration::legacy : FilterConfiguration::current;
+}
+
+namespace {
+
+std::optional<FilterConfiguration> filter_set_by(const std::string& firmware,
+                                                 const FileFacts& facts) {
+  switch (filter_rule(parse_firmware(firmware))) {
     case FilterRule::always_current:
       return FilterConfiguration::current;
     case FilterRule::by_calibration_date:
@@ -153,6 +188,18 @@ std::optional<FilterConfiguration> filter_in_force(const FileFacts& facts) {
                  : std::nullopt;
   }
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<FilterConfiguration> filter_in_force(const FileFacts& facts) {
+  if (!is_mos(facts.serial)) {
+    return std::nullopt;
+  }
+  const auto filter = filter_set_by(facts.firmware, facts);
+  return facts.other_firmware.empty() || filter_set_by(facts.other_firmware, facts) == filter
+             ? filter
+             : std::nullopt;
 }
 
 }  // namespace sixpoint::repair

@@ -18,6 +18,10 @@
 // | MOS...        | before or not said | not said, or 1.4.0 to 1.7.x but | cannot_tell  |
 // |               |                    | not one of the five             |              |
 // | MOS...        | not said           | one of the five                 | cannot_tell  |
+// | MOS...        | any                | two, which lead to two answers  | cannot_tell  |
+//
+// A date before 2012 is none: the family was not made then, so a clock had not been set. Two
+// firmware versions: info.txt names one and the PARAMETERS record another.
 #pragma once
 
 #include <optional>
@@ -35,6 +39,7 @@ struct FileFacts {
   std::string serial;
   std::string firmware;
   std::optional<UtcTime> calibration_time;
+  std::string other_firmware = {};  // of the PARAMETERS record, where info.txt names another
 };
 
 enum class Verdict { affected, not_affected, cannot_tell };
@@ -56,6 +61,9 @@ std::optional<calib::FilterConfiguration> filter_of_constants(const FileFacts& f
 
 // Firmware 1.1.0's release, before which every unit was calibrated under `legacy`.
 UtcTime filter_change();  // 2014-03-24T00:00:00Z
+// The first affected units were shipped on 2013-11-07 (paper, "16CPAN03 Issue Description"); nearly
+// two years more are allowed for, so that only clocks that were never set lie before it.
+UtcTime first_possible_calibration();  // 2012-01-01T00:00:00Z
 
 // "1.10.2" compared number by number; nothing where the text is no version.
 struct FirmwareVersion {

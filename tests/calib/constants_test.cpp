@@ -48,6 +48,63 @@ TEST(Constants, RecordSurvivesTheFile) {
   EXPECT_NE(record.brief().find("MOS2A45130450"), std::string::npos);
 }
 
+CrossAxisMap example_map() {
+  CrossAxisMap map;
+  map.calibration = {{0.00421, 0.00396, 0.00414}, {49.1, 95.2, 61.3}};
+  map.cross_axis = {-0.019, 0.0004, 0.0079};
+  map.cross_axis_sd = {0.0003, 0.0002, 0.0004};
+  map.uncertainty = {{0.0011, 0.0012, 0.0013}, {0.4, 0.5, 0.6}};
+  map.unseen_directions = 60;
+  map.unseen_mg = 3.6;
+  map.six_unseen_mg = 7.1;
+  map.verified = true;
+  return map;
+}
+
+TEST(Constants, CrossAxisTermsSurviveTheFile) {
+  ConstantsRecord record = example();
+  record.cross_axis = example_map();
+  const auto back = parse_constants_record(to_json(record).dump());
+  ASSERT_OK(back);
+  ASSERT_TRUE(back->cross_axis);
+  EXPECT_EQ(back->cross_axis->calibration, record.cross_axis->calibration);
+  EXPECT_EQ(to_json(*back->cross_axis), to_json(*record.cross_axis));
+  // A reader of six constants finds the six where they always were.
+  EXPECT_EQ(back->calibration, record.calibration);
+  nlohmann::ordered_json without = to_json(record);
+  without.erase("cross_axis");
+  EXPECT_EQ(without, to_json(example()));
+}
+
+// Oracle: the three rows of the matrix, written out.
+TEST(Constants, TheMatrixIsSymmetric) {
+  CrossAxisMap map = example_map();
+  map.calibration = {{0.004, 0.004, 0.004}, {10, 20, 30}};
+  const PerAxis<double> g = map.to_g({260, 20, 30});  // u = 1, 0, 0
+  EXPECT_NEAR(g[0], 1, 1e-12);
+  EXPECT_NEAR(g[1], -0.019, 1e-12);
+  EXPECT_NEAR(g[2], 0.0004, 1e-12);
+  EXPECT_NEAR(map.to_g({10, 20, 280})[1], 0.0079, 1e-12);
+}
+
+TEST(Constants, HalfACrossAxisMapIsRefused) {
+  ConstantsRecord record = example();
+  record.cross_axis = example_map();
+  const nlohmann::ordered_json whole = to_json(record);
+  for (const auto& [key, value] : whole["cross_axis"].items()) {
+    auto less = whole;
+    less["cross_axis"].erase(key);
+    SCOPED_TRACE(key);
+    EXPECT_FAILS(constants_record_from_json(less), ErrorCode::bad_data);
+    auto wrong = whole;
+    wrong["cross_axis"][key] = "no";
+    EXPECT_FAILS(constants_record_from_json(wrong), ErrorCode::bad_data);
+  }
+  auto absurd = whole;
+  absurd["cross_axis"]["xy_xz_yz"][1] = 0.5;
+  EXPECT_FAILS(constants_record_from_json(absurd), ErrorCode::bad_data);
+}
+
 TEST(Constants, TheNineIntegersAloneAreEnough) {
   const auto record = parse_constants_record(
       R"({"serial":"MOS2A45130450","filter":"legacy","constants":)"

@@ -349,7 +349,8 @@ TEST(PublishedOracle, FreeLivingIsVerifiedByThePapersBlocks) {
     std::printf("  %s\n", note.c_str());
   }
   EXPECT_TRUE(report->verification.verified);
-  EXPECT_LT(*report->residual_after_mg, 0.6 * report->residual_before_mg);
+  // Over directions, every one equal; the six are the best for the time at rest (best_six_test).
+  EXPECT_LT(*report->residual_after_mg, 0.7 * report->residual_before_mg);
   // By GGIR's measure, which counts blocks and not directions.
   std::printf("  mean error over blocks %.2f mg (GGIR's windows: 3.94 mg)\n",
               report->fit->mean_error_mg);

@@ -1,5 +1,9 @@
 #include "calib/scaling.h"
 
+#include <cmath>
+#include <limits>
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "calib/constants.h"
@@ -168,6 +172,78 @@ TEST(Rescale, EqualsWhatTheFirmwareWouldHaveStored) {
     }
   }
   EXPECT_GT(exact, 8000);
+}
+
+// Oracle: Eq. 4-6 and the three rows of the matrix, written out; the rounding is within half a
+// count.
+TEST(Rescale, CrossAxisTermsAreAppliedToTheIntegersInOneRounding) {
+  const StoredConstants old = affected();
+  const Calibration fresh = {{1 / 240.0, 1 / 251.0, 1 / 246.0}, {50.3, 95.6, 61.4}};
+  const PerAxis<double> terms = {-0.0190, -0.0003, 0.0079};
+  const auto reversal = Reversal::make(old, 256, RecordWidth::bits12);
+  Rescale::Options options;
+  options.cross_axis = terms;
+  const auto rescale = Rescale::make(*reversal, fresh, options);
+  ASSERT_OK(rescale);
+  EXPECT_FALSE(rescale->changes_nothing());
+  std::mt19937_64 random(5);
+  std::uniform_int_distribution<int> anywhere(-700, 700);
+  int exact = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const PerAxis<int> raw = {anywhere(random), anywhere(random), anywhere(random)};
+    StoredCounts in{};
+    bool sure = true;
+    PerAxis<double> u{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      in[a] = firmware_count(old, 256, a, raw[a], RecordWidth::bits12);
+      sure = sure && reversal->candidates(a, in[a]).number == 1;
+      u[a] = (raw[a] - fresh.zero_lsb[a]) * fresh.sensitivity_g_per_lsb[a];
+    }
+    const PerAxis<double> wanted_g = {u[0] + terms[0] * u[1] + terms[1] * u[2],
+                                      terms[0] * u[0] + u[1] + terms[2] * u[2],
+                                      terms[1] * u[0] + terms[2] * u[1] + u[2]};
+    StoredCounts out{};
+    RescaleTally counts;
+    rescale->apply(std::span(&in, 1), std::span(&out, 1), counts);
+    for (std::size_t a = 0; a < kAxes && sure; ++a) {
+      ASSERT_LE(std::abs(out[a] - 256 * wanted_g[a]), 0.5 + 1e-9) << i;
+      ++exact;
+    }
+  }
+  EXPECT_GT(exact, 20'000);
+  // No terms: the table of the six constants.
+  options.cross_axis = {};
+  const StoredCounts in = {100, -200, 250};
+  StoredCounts out{};
+  RescaleTally counts;
+  Rescale::make(*reversal, fresh, options)->apply(std::span(&in, 1), std::span(&out, 1), counts);
+  StoredCounts plain{};
+  Rescale::make(*reversal, fresh, {})->apply(std::span(&in, 1), std::span(&plain, 1), counts);
+  EXPECT_EQ(out, plain);
+  options.cross_axis[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FAILS(Rescale::make(*reversal, fresh, options), ErrorCode::bad_data);
+}
+
+TEST(Rescale, WithCrossAxisTermsAClippedCountStaysAndOthersAreClippedOnTheirOwn) {
+  const auto reversal = Reversal::make(affected(), 256, RecordWidth::bits12);
+  const Calibration same = *calibration_from(affected());
+  Rescale::Options options;
+  options.cross_axis = {0.1, 0, 0};
+  const std::vector<StoredCounts> in = {{2047, 100, 0}, {2000, 1500, 0}, {-2048, -2048, -2048}};
+  std::vector<StoredCounts> out(in.size());
+  RescaleTally counts;
+  Rescale::make(*reversal, same, options)->apply(in, out, counts);
+  EXPECT_EQ(out[0][0], 2047);
+  EXPECT_NEAR(out[0][1], 100 + 0.1 * 2047, 1.5);
+  EXPECT_EQ(out[1][0], 2047);  // 2000 + 150
+  EXPECT_EQ(out[2], in[2]);
+  EXPECT_EQ(counts.clipped_before, (PerAxis<std::uint64_t>{2, 1, 1}));
+  EXPECT_EQ(counts.clipped_after, (PerAxis<std::uint64_t>{1, 0, 0}));
+  options.output = RecordWidth::bits16;
+  RescaleTally wide;
+  Rescale::make(*reversal, same, options)->apply(in, out, wide);
+  EXPECT_NEAR(out[1][0], 2150, 2);
+  EXPECT_EQ(wide.clipped_after, (PerAxis<std::uint64_t>{0, 0, 0}));
 }
 
 TEST(Rescale, ClippedStaysAtTheLimitAndIsCounted) {

@@ -50,8 +50,7 @@ class RefusingStore : public StoreTest {
   RefusingStore() { ::setenv("XDG_DATA_HOME", (folder_ / "data").c_str(), 1); }
   ~RefusingStore() override { ::unsetenv("XDG_DATA_HOME"); }
   tests::Answer jig(const std::string& store) {
-    return run(
-        {"jig", "--device", tests::kUnitInJig, "--jig", "virtual", "--store", store, "--json"});
+    return run({"jig", "--device", tests::kDevice, "--jig", "virtual", "--store", store, "--json"});
   }
   void expect_in_journal(const std::string& store, const tests::Answer& answer) {
     const auto json = answer.json();
@@ -116,7 +115,11 @@ TEST_F(RefusingStore, ARepairThatTheStoreDoesNotTakeIsJournalledAndResumedOnce) 
   for (const char* name : {"a", "b"}) {
     std::ofstream(path("s.json")) << R"({"schema": "sixpoint/scenario/1", "seed": )"
                                   << (name[0] - 'a') << R"(, "unit": {
-        "serial": "MOS2A45130007", "firmware": "1.5.0", "calibrated": "2013-11-12T14:32:13Z"},
+        "serial": "MOS2A45130007", "firmware": "1.5.0", "calibrated": "2013-11-12T14:32:13Z",
+        "constants": {"positive_lsb": [311, 310, 287], "negative_lsb": [-204, -216, -234],
+                      "zero_lsb": [54, 47, 26]},
+        "sensor": {"current": {"sensitivity_lsb_per_g": [237.7, 251.8, 242.3],
+                               "zero_lsb": [49.9, 95.8, 60.8]}}},
         "motions": [{"kind": "free_living", "duration_s": 900}]})";
     ASSERT_EQ(run({"simulate", "--scenario", path("s.json"), "-o",
                    path(std::string("archive/") + name + ".gt3x")})

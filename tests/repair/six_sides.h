@@ -43,6 +43,24 @@ inline MadeRecording six_sides() {
   return made;
 }
 
+// The same unit at rest for ten seconds in each of thirty directions: its still periods suffice.
+inline MadeRecording many_sides(std::uint64_t seed = 5) {
+  MadeRecording made;
+  Random random(seed);
+  for (int pose = 0; pose < 30; ++pose) {
+    PerAxis<double> up = {random.normal(), random.normal(), random.normal()};
+    const double length = std::hypot(up[0], up[1], up[2]);
+    for (int i = 0; i < 300; ++i) {
+      PerAxis<double> g{};
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        g[a] = up[a] / length + 0.004 * random.normal();
+      }
+      made.raw.push_back(sense(g));
+    }
+  }
+  return made;
+}
+
 // What that unit stores on each of its sides when nothing moves and nothing is noisy.
 inline std::array<gt3x::Counts, 6> stored_sides() {
   std::array<gt3x::Counts, 6> sides{};

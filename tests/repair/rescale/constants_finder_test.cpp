@@ -16,7 +16,7 @@ using testing::HasSubstr;
 class Finder : public testing::Test {
  protected:
   Finder() {
-    EXPECT_OK(tests::six_sides().write(memory_.files, "in.gt3x"));
+    EXPECT_OK(tests::many_sides().write(memory_.files, "in.gt3x"));
     survey_ = survey(memory_.files, "in.gt3x").value();
     id_ = store_.add_constants(tests::jig_constants(), "").value();
   }
@@ -26,7 +26,6 @@ class Finder : public testing::Test {
   }
   // No constants, and one reason that holds `text`.
   void expect_none(ConstantsFinderOptions options, const char* text) {
-    options.scan = false;
     const auto choice = choose(options);
     EXPECT_FALSE(choice.chosen);
     EXPECT_THAT(choice.reasons, testing::ElementsAre(HasSubstr(text)));
@@ -60,9 +59,40 @@ TEST_F(Finder, TheStoreComesBeforeTheFile) {
   EXPECT_EQ(choose(options).chosen->constants_id, id_) << "a snapshot answers as the store does";
 }
 
+TEST_F(Finder, WhatIsNamedWinsOverTheStore) {
+  ConstantsFinderOptions options;
+  options.store = &store_;
+  options.scan = true;
+  EXPECT_EQ(choose(options).chosen->method, "scan");
+  options.store_named = true;
+  EXPECT_EQ(choose(options).chosen->method, "scan") << "also over one that is named";
+  options.calibration_file = "in.gt3x";
+  EXPECT_EQ(choose(options).chosen->method, "calibration_file");
+}
+
+TEST_F(Finder, ANamedSourceThatDoesNotFitStopsUnlessOrScan) {
+  ConstantsFinderOptions options;
+  options.given = calib::parse_constants_record(tests::kConstants).value();
+  options.given->serial = "MOS2A45130999";
+  options.store = &store_;
+  expect_none(options, "MOS2A45130999");
+  options.or_scan = true;
+  const auto choice = choose(options);
+  EXPECT_EQ(choice.chosen->method, "scan");
+  EXPECT_THAT(choice.reasons, testing::ElementsAre(HasSubstr("MOS2A45130999")))
+      << "why the named one was not used is said all the same";
+}
+
+TEST_F(Finder, TheDefaultStoreGoesOnToTheFileWhereItHasNothing) {
+  ConstantsFinderOptions options;
+  options.store = &empty_;
+  EXPECT_EQ(choose(options).chosen->method, "scan");
+}
+
 TEST_F(Finder, SaysWhyThereIsNothing) {
   ConstantsFinderOptions options;
   options.store = &empty_;
+  options.store_named = true;
   expect_none(options, "MOS2A45130450");
 }
 

@@ -20,6 +20,9 @@ using tests::samples_of;
 using tests::sense;
 using tests::six_sides;
 
+// The raw counts that the unit stores as zero.
+constexpr PerAxis<int> kStoredZero = tests::kStored.zero_lsb;
+
 class FixedConstants final : public ConstantsSource {
  public:
   explicit FixedConstants(const calib::Calibration& calibration = kTrue) {
@@ -140,9 +143,108 @@ TEST_F(RepairFile, UnchangedConstantsChangeNothingAtAll) {
   const MadeRecording made = six_sides();
   ASSERT_OK(made.write(memory_.files, "in.gt3x"));
   FixedConstants same(calib::calibration_from(made.constants).value());
-  const auto report = repair_file(memory_.env, "in.gt3x", "out.gt3x", same, {});
+  RepairOptions force;  // the gate refuses a repair that changes nothing
+  force.force = true;
+  const auto report = repair_file(memory_.env, "in.gt3x", "out.gt3x", same, force);
   ASSERT_EQ(report.status, RepairStatus::repaired);
+  EXPECT_TRUE(report.forced);
   EXPECT_EQ(entry_of(memory_.files, "out.gt3x", "log.bin"), made.log());
+}
+
+// A file that other software corrected: the same header, right samples.
+TEST_F(RepairFile, WhatIsRightAlreadyIsNotWritten) {
+  MadeRecording made = six_sides();
+  made.constants = {{328, 300, 333}, {-148, -204, -152}, {95, 52, 91}};  // those of kTrue
+  MadeRecording header = made;
+  header.constants = tests::kStored;
+  Bytes log = made.log();
+  const Bytes parameters = header.parameters();
+  Bytes head;
+  gt3x::append_record(head, gt3x::RecordType::parameters, made.start - 1, parameters);
+  std::copy(head.begin(), head.end(), log.begin());
+  ASSERT_OK(made.write(memory_.files, "in.gt3x", log));
+  const RepairReport report = repair();
+  EXPECT_EQ(report.status, RepairStatus::not_repairable) << report.to_json().dump(1);
+  EXPECT_LT(report.still_error_before_mg.value(), 5);
+  EXPECT_GT(report.still_error_after_mg.value(), 50);
+  EXPECT_FALSE(exists("out.gt3x"));
+}
+
+TEST_F(RepairFile, ConstantsOfAnotherUnitAreRefusedByTheGateAndForcedWithAMark) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  calib::Calibration other = kTrue;
+  other.zero_lsb = {110, 20, 60};
+  source_ = FixedConstants(other);
+  EXPECT_EQ(repair().status, RepairStatus::not_repairable);
+  EXPECT_FALSE(exists("out.gt3x"));
+  RepairOptions force;
+  force.force = true;
+  const RepairReport report = repair(force);
+  ASSERT_EQ(report.status, RepairStatus::repaired);
+  EXPECT_TRUE(report.forced);
+  const Bytes bytes = entry_of(memory_.files, "out.gt3x", kRepairMark);
+  const auto mark = nlohmann::json::parse(bytes.begin(), bytes.end());
+  EXPECT_EQ(mark["forced"], true);
+  EXPECT_GT(mark["still_error_mg"]["before"].get<double>(), 32);
+  EXPECT_GT(mark["still_error_mg"]["after"].get<double>(), 32);
+}
+
+// 20 mg on one axis pass the gate; the file's own still periods know better.
+TEST_F(RepairFile, ConstantsThatTheFileContradictsAreNotApplied) {
+  ASSERT_OK(tests::many_sides().write(memory_.files, "in.gt3x"));
+  calib::Calibration old = kTrue;
+  old.zero_lsb[2] += 5;
+  source_ = FixedConstants(old);
+  const RepairReport report = repair();
+  EXPECT_EQ(report.status, RepairStatus::not_repairable);
+  EXPECT_NE(report.reasons.back().find("on z"), std::string::npos) << report.reasons.back();
+  RepairOptions force;
+  force.force = true;
+  EXPECT_TRUE(repair(force).forced);
+}
+
+TEST_F(RepairFile, WithoutStillPeriodsItIsWrittenAndSaid) {
+  MadeRecording made = six_sides();
+  made.raw.erase(made.raw.begin(), made.raw.begin() + 1800);
+  ASSERT_OK(made.write(memory_.files, "in.gt3x"));
+  const RepairReport report = repair();
+  EXPECT_EQ(report.status, RepairStatus::repaired);
+  EXPECT_EQ(report.still_blocks, 0U);
+  EXPECT_NE(report.to_json()["reasons"].dump().find("could not be checked"), std::string::npos);
+}
+
+// A unit on its charger stores zeros: they stay, and count neither before nor after.
+TEST_F(RepairFile, ChargingZerosStayZero) {
+  const MadeRecording made = six_sides();
+  ASSERT_OK(made.write(memory_.files, "plain.gt3x"));
+  const auto plain = repair_file(memory_.env, "plain.gt3x", "plain-out.gt3x", source_, {});
+  Bytes log = made.log();
+  const std::vector<Counts> zeros(made.rate_hz);
+  for (std::uint32_t second = 0; second < 600; ++second) {
+    Bytes payload;
+    gt3x::append_activity(payload, zeros);
+    gt3x::append_record(log, gt3x::RecordType::activity, made.start + 70 + second, payload);
+  }
+  ASSERT_OK(made.write(memory_.files, "in.gt3x", log));
+  const RepairReport report = repair();
+  ASSERT_EQ(report.status, RepairStatus::repaired) << report.to_json().dump(1);
+  EXPECT_EQ(report.still_error_before_mg, plain.still_error_before_mg);
+  EXPECT_EQ(report.still_error_after_mg, plain.still_error_after_mg);
+  const auto repaired = samples_of(memory_.files, "out.gt3x");
+  ASSERT_EQ(repaired.size(), 670U * made.rate_hz);
+  for (std::size_t i = 70UL * made.rate_hz; i < repaired.size(); ++i) {
+    ASSERT_EQ(repaired[i], Counts{}) << i;
+  }
+}
+
+TEST_F(RepairFile, ASingleZeroIsAMeasurement) {
+  MadeRecording made = six_sides();
+  const std::size_t at = 1815;  // moving, and inside a record
+  made.raw[at] = {kStoredZero[0], kStoredZero[1], kStoredZero[2]};
+  ASSERT_EQ(made.stored()[at], Counts{});
+  ASSERT_OK(made.write(memory_.files, "in.gt3x"));
+  ASSERT_EQ(repair().status, RepairStatus::repaired);
+  EXPECT_NE(samples_of(memory_.files, "out.gt3x")[at], Counts{});
 }
 
 TEST_F(RepairFile, IsDoneOnce) {
@@ -332,6 +434,7 @@ TEST_F(RepairFile, RealUnitRoundTrip) {
   same.choice.chosen->record.serial = "MOS2A45130451";
   RepairOptions dry;
   dry.dry_run = true;
+  dry.force = true;
   const auto report = repair_file(posix_env(), path, "/nowhere/out.gt3x", same, dry);
   EXPECT_EQ(report.status, RepairStatus::repaired) << report.to_json().dump(1);
   EXPECT_NEAR(report.still_error_before_mg.value(), report.still_error_after_mg.value(), 1e-9);

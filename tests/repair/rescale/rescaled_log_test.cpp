@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/memory_env.h"
 #include "expect_result.h"
 #include "repair/six_sides.h"
 
@@ -54,6 +55,101 @@ TEST(RescaledLog, SmallPiecesGiveTheSameBytes) {
   }
   EXPECT_EQ(got, expected);
   EXPECT_LT(pieces->still_error().mean_mg, 5) << "at rest the right constants give 1 g";
+}
+
+TEST(RescaledLog, TheMarkStandsBeforeTheFirstRecordAndTheRestIsAsItWas) {
+  const Bytes log = with_noise().log();
+  RescaledLogOptions options;
+  options.mark = R"({"MetadataType":"SixpointRepair","Parsed":false,"JSON":null})";
+  options.size = log.size();
+  auto rescaled = RescaledLog::make(reader_of(log), options).value();
+  const Bytes marked = gt3x::read_all(*rescaled, 1U << 20).value();
+  EXPECT_EQ(rescaled->size(), marked.size());
+  Bytes expected;
+  gt3x::append_record(expected, gt3x::RecordType::metadata, 1'428'588'239, as_bytes(options.mark));
+  expected.insert(expected.end(), log.begin(), log.end());
+  EXPECT_EQ(marked, expected);
+  // Survey knows it, packed anew or not.
+  MemoryFiles files;
+  ASSERT_OK(with_noise().write(files, "again.gt3x", marked));
+  const auto found = survey(files, "again.gt3x");
+  ASSERT_OK(found);
+  EXPECT_TRUE(found->already_repaired);
+}
+
+TEST(RescaledLog, ALogWithoutAGoodRecordHasItsMarkToo) {
+  RescaledLogOptions options;
+  options.mark = "{}";
+  options.size = 1;
+  auto rescaled = RescaledLog::make(reader_of({0x55}), options).value();
+  EXPECT_EQ(gt3x::read_all(*rescaled, 100).value().size(), rescaled->size());
+}
+
+TEST(RescaledLog, ARecordTooLongForSixteenBitsGoesOnInAnother) {
+  tests::MadeRecording made = tests::six_sides();
+  made.raw.resize(2000);
+  std::vector<gt3x::Counts> samples;
+  for (int i = 0; i < 14'000; ++i) {
+    samples.push_back({static_cast<std::int16_t>(i % 2000), -3, 256});
+  }
+  Bytes log;
+  gt3x::append_record(log, gt3x::RecordType::parameters, 7, made.parameters());
+  Bytes payload;
+  gt3x::append_activity(payload, samples);
+  gt3x::append_record(log, gt3x::RecordType::activity, 8, payload);
+  MemoryFiles files;
+  ASSERT_OK(made.write(files, "long.gt3x", log));
+  const auto found = survey(files, "long.gt3x");
+  ASSERT_OK(found);
+  RescaledLogOptions options;
+  options.wide = true;
+  options.size = found->log_bytes_wide;
+  auto rescaled = RescaledLog::make(reader_of(log), options).value();
+  const Bytes wide = gt3x::read_all(*rescaled, 1U << 20).value();
+  EXPECT_EQ(rescaled->size(), wide.size());
+  ASSERT_OK(made.write(files, "wide.gt3x", wide));
+  EXPECT_EQ(tests::samples_of(files, "wide.gt3x"), samples);
+}
+
+// Two sets of constants, from one record to the next: each sample has the constants before it.
+TEST(RescaledLog, ConstantsThatAlternateAreEachUndone) {
+  const StoredConstants other = {{310, 300, 300}, {-210, -260, -200}, {50, 10, 50}};
+  Bytes log;
+  tests::MadeRecording made;
+  std::vector<gt3x::Counts> expected;
+  for (std::uint32_t second = 0; second < 40; ++second) {
+    made.constants = second % 2 == 0 ? tests::kStored : other;
+    gt3x::append_record(log, gt3x::RecordType::parameters, second, made.parameters());
+    Bytes payload;
+    const gt3x::Counts sample =
+        tests::MadeRecording::store(made.constants, {static_cast<int>(second), 50, 250}, false);
+    gt3x::append_activity(payload, std::vector<gt3x::Counts>(30, sample));
+    gt3x::append_record(log, gt3x::RecordType::activity, second, payload);
+    // The same raw counts under constants that read them as they are: 256 LSB/g, zero at 0.
+    expected.insert(expected.end(), 30, {static_cast<std::int16_t>(second), 50, 250});
+  }
+  MemoryFiles files;
+  RescaledLogOptions options;
+  options.fresh = calib::Calibration{};
+  options.fresh->sensitivity_g_per_lsb = {1.0 / 256, 1.0 / 256, 1.0 / 256};
+  auto rescaled = RescaledLog::make(reader_of(log), options).value();
+  ASSERT_OK(made.write(files, "out.gt3x", gt3x::read_all(*rescaled, 1U << 20).value()));
+  const auto got = tests::samples_of(files, "out.gt3x");
+  ASSERT_EQ(got.size(), expected.size());
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      ASSERT_NEAR(got[i][a], expected[i][a], 1) << i;  // two raw counts may share a stored one
+    }
+  }
+}
+
+TEST(RescaledLog, TheUnitsOwnEpochsAreCounted) {
+  Bytes log = tests::six_sides().log();
+  gt3x::append_record(log, gt3x::RecordType::epoch, 9, Bytes{1});
+  gt3x::append_record(log, gt3x::RecordType::epoch4, 9, Bytes{1});
+  auto rescaled = RescaledLog::make(reader_of(log), {}).value();
+  EXPECT_EQ(gt3x::read_all(*rescaled, 1U << 20).value(), log);
+  EXPECT_EQ(rescaled->tally().epoch_records, 2U);
 }
 
 TEST(RescaledLog, RefusesConstantsThatDivideByZero) {

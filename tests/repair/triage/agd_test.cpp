@@ -3,30 +3,22 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include "expect_result.h"
+#include "repair/made_agd.h"
 #include "temporary_folder.h"
 
 namespace sixpoint::repair {
 namespace {
 
-void make(const std::string& path, const std::string& sql) {
-  sqlite3* database = nullptr;
-  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
-  sqlite3_close(database);
-}
-
-constexpr const char* kTable = "CREATE TABLE settings (settingName TEXT, settingValue TEXT);";
+using tests::kSettingsTable;
+using tests::make_database;
 
 TEST(Agd, ReadsSerialAndFirmware) {
   const tests::TemporaryFolder folder;
   // Characters that would end an SQLite URI.
   const std::string path = folder / "a?b#c%41.agd";
-  make(path, std::string(kTable) +
-                 "INSERT INTO settings VALUES ('deviceserial', 'MOS2A1'), ('deviceversion', "
-                 "'1.5.0'), ('other', 'x');");
+  tests::make_agd(path, "MOS2A1", "1.5.0");
   const auto facts = read_agd_facts(path);
   ASSERT_OK(facts);
   EXPECT_EQ(facts->serial, "MOS2A1");
@@ -39,10 +31,29 @@ TEST(Agd, RefusesOtherFiles) {
   EXPECT_FAILS(read_agd_facts(folder / "none.agd"), ErrorCode::no_input);
   std::ofstream(folder / "text.agd") << "this is no database, and it is long enough to say so";
   EXPECT_FAILS(read_agd_facts(folder / "text.agd"), ErrorCode::bad_data);
-  make(folder / "empty.agd", kTable);
+  make_database(folder / "empty.agd", kSettingsTable);
   EXPECT_FAILS(read_agd_facts(folder / "empty.agd"), ErrorCode::bad_data);
-  make(folder / "other.agd", "CREATE TABLE mine (a);");
+  make_database(folder / "other.agd", "CREATE TABLE mine (a);");
   EXPECT_FAILS(read_agd_facts(folder / "other.agd"), ErrorCode::bad_data);
+}
+
+// Neither may take longer or more memory than a table of settings.
+TEST(Agd, RefusesAHostileDatabaseAtOnce) {
+  const tests::TemporaryFolder folder;
+  make_database(
+      folder / "view.agd",
+      "CREATE VIEW settings AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+      "SELECT 'deviceserial' AS settingName, i AS settingValue FROM n WHERE i < 0;");
+  EXPECT_FAILS(read_agd_facts(folder / "view.agd"), ErrorCode::bad_data);
+  make_database(folder / "long.agd",
+                std::string(kSettingsTable) +
+                    "INSERT INTO settings VALUES ('deviceserial', zeroblob(10000000));");
+  EXPECT_FAILS(read_agd_facts(folder / "long.agd"), ErrorCode::bad_data);
+  make_database(folder / "rows.agd",
+                std::string(kSettingsTable) +
+                    "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 300000) "
+                    "INSERT INTO settings SELECT 'other', i FROM n;");
+  EXPECT_FAILS(read_agd_facts(folder / "rows.agd"), ErrorCode::bad_data);
 }
 
 }  // namespace

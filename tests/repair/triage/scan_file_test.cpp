@@ -9,6 +9,7 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/made_agd.h"
 #include "repair/six_sides.h"
 #include "repair/triage/survey.h"
 #include "shared_data.h"
@@ -157,6 +158,29 @@ TEST(ScanFile, ARepairedFileIsNotAffectedAnyMore) {
   EXPECT_FALSE(file.axes_rotated) << "the repair turned them back";
 }
 
+// The mark says that it was repaired; its still periods say that this did not help.
+TEST(ScanFile, AMarkedFileWhoseStillPeriodsDoNotFitIsNotCleared) {
+  MemoryFiles files;
+  const tests::MadeRecording made = at_rest(256 + 30);
+  auto writer = gt3x::RecordingWriter::create(files, "marked.gt3x").value();
+  ASSERT_OK(writer.add("log.bin", made.log()));
+  ASSERT_OK(writer.add("info.txt", std::string_view("Serial Number: MOS2A45130450\r\n"
+                                                    "Firmware: 1.5.0\r\nSample Rate: 30\r\n")));
+  ASSERT_OK(writer.add(kRepairMark, "{}"));
+  ASSERT_OK(writer.commit());
+  const ScannedFile file = scan_file(files, "marked.gt3x");
+  ASSERT_GT(file.evidence_mg.value(), kEvidenceLimit_mg);
+  EXPECT_EQ(file.verdict, "cannot_tell");
+  EXPECT_THAT(file.reasons, Contains(HasSubstr("repair the original again")));
+}
+
+TEST(ScanFile, AnAffectedFileThatFitsAllTheSameIsSaid) {
+  const ScannedFile file = scanned(at_rest(256));
+  ASSERT_LE(file.evidence_mg.value(), kEvidenceLimit_mg);
+  EXPECT_EQ(file.verdict, "affected");
+  EXPECT_THAT(file.reasons, Contains(HasSubstr("corrected by other software")));
+}
+
 TEST(ScanFile, WhatCannotBeReadIsAnAnswerToo) {
   MemoryFiles files;
   ASSERT_OK(write_file(files, "text.gt3x", "this is no zip archive"));
@@ -202,6 +226,32 @@ TEST(ScanFile, RealFiles) {
   EXPECT_EQ(epochs.facts.serial, "TAS1E31150129");
   EXPECT_EQ(epochs.verdict, "not_affected");
   EXPECT_THAT(epochs.reasons, Contains(HasSubstr("an .agd cannot be repaired")));
+}
+
+// The date of an .agd stands in the recording beside it, where that is of the same unit.
+TEST(ScanFile, AnAgdHasTheDateOfItsRecording) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  tests::MadeRecording made = at_rest(256);
+  made.serial = "MOS2A1";
+  ASSERT_OK(made.write(files, folder / "one.gt3x"));
+  made.serial = "MOS2A2";
+  ASSERT_OK(made.write(files, folder / "another60sec.gt3x"));
+  struct Case {
+    const char* name;
+    const char* verdict;
+    const char* reason;
+  };
+  for (const Case& c : std::initializer_list<Case>{{"one.agd", "affected", "one.gt3x"},
+                                                   {"one60sec.agd", "affected", "one.gt3x"},
+                                                   {"another60sec.agd", "cannot_tell", "put its"},
+                                                   {"60sec.agd", "cannot_tell", "put its"},
+                                                   {"alone.agd", "cannot_tell", "put its"}}) {
+    tests::make_agd(folder / c.name, "MOS2A1", "1.5.0");
+    const ScannedFile file = scan_file(files, folder / c.name);
+    EXPECT_EQ(file.verdict, c.verdict) << c.name;
+    EXPECT_THAT(file.reasons, Contains(HasSubstr(c.reason))) << c.name;
+  }
 }
 
 }  // namespace

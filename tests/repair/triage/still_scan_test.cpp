@@ -12,10 +12,17 @@ using gt3x::Counts;
 // Firmware 1.6.0 stored x' = -y, y' = x.
 TEST(StillScan, UndoesTheRotation) {
   std::vector<Counts> samples = {{-20, 10, 30}, {2047, 5, 0}, {-2048, 5, 0}};
-  undo_rotation(samples);
+  undo_rotation(samples, calib::RecordWidth::bits12);
   EXPECT_EQ(samples[0], (Counts{10, 20, 30}));
   EXPECT_EQ(samples[1], (Counts{5, -2048, 0})) << "at the limit it stays at the limit";
   EXPECT_EQ(samples[2], (Counts{5, 2047, 0}));
+}
+
+TEST(StillScan, RotationKeepsCountsOfSixteenBits) {
+  std::vector<Counts> samples = {{2047, 5, 0}, {-2048, 5, 0}, {-3000, 9, 1}, {-32768, 0, 0}};
+  undo_rotation(samples, calib::RecordWidth::bits16);
+  EXPECT_EQ(samples,
+            (std::vector<Counts>{{5, -2047, 0}, {5, 2048, 0}, {9, 3000, 1}, {0, 32767, 0}}));
 }
 
 TEST(StillScan, MagnitudeErrorsByHand) {
@@ -37,6 +44,20 @@ TEST(StillScan, RefusesWhatCannotBe) {
   auto scan = StillScan::make(30, 256);
   ASSERT_OK(scan);
   EXPECT_FALSE(scan->set_constants({{10, 300, 300}, {10, -300, -300}, {0, 0, 0}}));
+}
+
+TEST(StillScan, MoreSetsOfConstantsThanARecordingHasAreRefused) {
+  auto scan = StillScan::make(30, 256);
+  ASSERT_OK(scan);
+  StoredConstants constants = {{326, 287, 303}, {-201, -268, -192}, {61, 4, 61}};
+  for (int round = 0; round < 2; ++round) {  // the second time they are known
+    for (std::size_t i = 0; i < kMaxSetsOfConstants; ++i) {
+      constants.zero_lsb[0] = static_cast<int>(i);
+      EXPECT_OK(scan->set_constants(constants)) << i;
+    }
+  }
+  constants.zero_lsb[0] = -1;
+  EXPECT_FAILS(scan->set_constants(constants), ErrorCode::bad_data);
 }
 
 // Twenty seconds at rest, in one run and with two seconds missing in the middle.

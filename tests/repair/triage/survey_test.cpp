@@ -1,5 +1,6 @@
 #include "repair/triage/survey.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "base/memory_env.h"
@@ -65,6 +66,73 @@ TEST(Survey, NamesWhatIsMissing) {
   made.raw.clear();
   ASSERT_OK(made.write(files, "no-rate.gt3x", Bytes{}));
   EXPECT_FAILS(survey(files, "no-rate.gt3x"), ErrorCode::bad_data);
+}
+
+TEST(Survey, ThousandsOfSetsOfConstantsAreOneProblem) {
+  tests::MadeRecording made = tests::six_sides();
+  made.between = [set = made](std::size_t second) mutable {
+    Bytes bytes;
+    for (int i = 0; i < 100; ++i) {
+      set.constants.zero_lsb = {static_cast<int>(second), i, 0};
+      gt3x::append_record(bytes, gt3x::RecordType::parameters, 7, set.parameters());
+    }
+    return bytes;
+  };
+  MemoryFiles files;
+  ASSERT_OK(made.write(files, "hostile.gt3x"));
+  const auto found = survey(files, "hostile.gt3x");
+  ASSERT_OK(found);
+  ASSERT_TRUE(found->constants_problem);
+  EXPECT_NE(found->constants_problem->what.find("sets of constants"), std::string::npos);
+  EXPECT_LE(found->constants.size(), kMaxSetsOfConstants + 1);
+}
+
+TEST(Survey, TwoFirmwareVersionsAreBothKept) {
+  tests::MadeRecording made = tests::six_sides();
+  gt3x::ParameterValues values = gt3x::parse_parameters(made.parameters())->values;
+  values[gt3x::kParameterFirmwareVersion] = *gt3x::encode_firmware("1.8.0");
+  Bytes log;
+  gt3x::append_record(log, gt3x::RecordType::parameters, 7, gt3x::encode_parameters(values));
+  const Bytes rest = made.log();
+  log.insert(log.end(), rest.begin(), rest.end());
+  MemoryFiles files;
+  ASSERT_OK(made.write(files, "two.gt3x", log));
+  auto found = survey(files, "two.gt3x");
+  ASSERT_OK(found);
+  EXPECT_EQ(found->facts.firmware, "1.5.0");
+  EXPECT_EQ(found->facts.other_firmware, "1.8.0");
+  made.firmware = "1.8";  // the same, in other words
+  ASSERT_OK(made.write(files, "one.gt3x", log));
+  found = survey(files, "one.gt3x");
+  ASSERT_OK(found);
+  EXPECT_EQ(found->facts.other_firmware, "");
+}
+
+TEST(Survey, AScaleThatCannotBeIsSaid) {
+  MemoryFiles files;
+  const tests::MadeRecording made = tests::six_sides();
+  gt3x::ParameterValues values = gt3x::parse_parameters(made.parameters())->values;
+  for (const double scale : {256.0, 0.0}) {
+    for (const char* line : {"256.0", "256,0", "0", "NaN"}) {
+      values[gt3x::kParameterAccelScale] = gt3x::encode_float(scale);
+      Bytes log;
+      gt3x::append_record(log, gt3x::RecordType::parameters, 7, gt3x::encode_parameters(values));
+      const std::string path = fmt::format("{}-{}.gt3x", scale, line);
+      auto writer = gt3x::RecordingWriter::create(files, path).value();
+      ASSERT_OK(writer.add("log.bin", log));
+      ASSERT_OK(writer.add("info.txt",
+                           fmt::format("Serial Number: MOS2A1\r\nFirmware: 1.5.0\r\nSample Rate: "
+                                       "30\r\nAcceleration Scale: {}\r\n",
+                                       line)));
+      ASSERT_OK(writer.commit());
+      const auto found = survey(files, path);
+      ASSERT_OK(found);
+      EXPECT_EQ(found->accel_scale_lsb_per_g, 256) << path;
+      const std::size_t wrong =
+          (scale == 0 ? 1 : 0) + (std::string_view(line).starts_with("256") ? 0 : 1);
+      EXPECT_EQ(found->notes.size(), wrong) << path;
+    }
+  }
 }
 
 TEST(Survey, KnowsTheMarkAndWideRecords) {

@@ -48,11 +48,40 @@ TEST(Triage, FollowsTheTable) {
            {"MOS2A45130450", "abc", "2013-11-12", kUnknown},
            {"MOS2A45130450", "", "2015-11-12", kNo},
            {"MOS2A45130450", "1.9.2", nullptr, kNo},
+           {"MOS2A45130450", "1.5.0", "2011-12-31T23:59:59", kUnknown},
+           {"MOS2A45130450", "1.5.0", "2012-01-01", kYes},
+           {"MOS2A45130450", "1.9.2", "2000-01-01", kNo},
        }) {
     const Triage result = triage(facts(c.serial, c.firmware, c.calibrated));
     EXPECT_EQ(result.verdict, c.verdict) << c.serial << " " << c.firmware;
     EXPECT_FALSE(result.reasons.empty());
     EXPECT_EQ(result.axes_rotated, std::string_view(c.firmware) == "1.6.0");
+  }
+}
+
+TEST(Triage, TwoFirmwareVersionsAreTwoAnswersUnlessBothSayTheSame) {
+  struct Row {
+    const char* firmware;
+    const char* other;
+    const char* calibrated;
+    Verdict verdict;
+    bool rotated;
+    bool filter_known;
+  };
+  for (const Row& row : std::initializer_list<Row>{
+           {"1.5.0", "1.8.0", "2013-11-12", Verdict::cannot_tell, false, false},
+           {"1.9.2", "1.5.0", "2013-11-12", Verdict::cannot_tell, false, false},
+           {"1.5.0", "1.6.0", "2013-11-12", Verdict::cannot_tell, false, true},
+           {"1.5.0", "1.4.1", "2013-11-12", Verdict::affected, false, true},
+           {"1.5.0", "1.9.2", "2015-11-12", Verdict::not_affected, false, true},
+       }) {
+    FileFacts two = facts("MOS2A45130450", row.firmware, row.calibrated);
+    two.other_firmware = row.other;
+    const Triage result = triage(two);
+    EXPECT_EQ(result.verdict, row.verdict) << row.firmware << " " << row.other;
+    EXPECT_EQ(result.axes_rotated, row.rotated) << row.firmware << " " << row.other;
+    EXPECT_EQ(filter_in_force(two).has_value(), row.filter_known) << row.firmware << row.other;
+    EXPECT_NE(result.reasons.back().find(row.other), std::string::npos) << result.reasons.back();
   }
 }
 
@@ -67,6 +96,7 @@ TEST(Triage, KnowsTheConfigurations) {
   EXPECT_EQ(filter_in_force(facts("MOS2A1", "1.5.0", "2014-03-24")), current);
   EXPECT_EQ(filter_in_force(facts("MOS2A1", "", "2015-03-24")), current);
   EXPECT_EQ(filter_in_force(facts("MOS2A1", "1.8.0", nullptr)), std::nullopt);
+  EXPECT_EQ(filter_of_constants(facts("MOS2A1", "1.8.0", "2000-01-01")), std::nullopt);
   EXPECT_EQ(filter_in_force(facts("TAS1", "1.5.0", "2015-03-24")), std::nullopt);
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kConstants =
     R"({"serial":"MOS2A45130450","filter":"current","constants":)"
-    R"({"sensitivity_g_per_lsb":[0.004,0.004,0.004],"zero_lsb":[60,5,60]},)"
+    R"({"sensitivity_g_per_lsb":[0.004,0.004,0.004],"zero_lsb":[60,5,90]},)"
     R"("method":"jig","made_at":"2014-05-01T00:00:00Z","gravity_m_per_s2":9.81})";
 
 // One machine: an archive with an affected recording, and a store with its unit's constants.
@@ -28,7 +28,7 @@ class Machine {
   Machine() {
     tests::MadeRecording made;
     for (int i = 0; i < 3000; ++i) {
-      made.raw.push_back({61 + i % 2, 4, 308});
+      made.raw.push_back({61 + i % 2, 4, 340});
     }
     EXPECT_OK(memory.files.make_folders("archive"));
     EXPECT_OK(made.write(memory.files, "archive/a.gt3x"));

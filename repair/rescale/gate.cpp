@@ -1,0 +1,120 @@
+#include "repair/rescale/gate.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "calib/direction_cells.h"
+#include "repair/triage/scan_file.h"
+
+namespace sixpoint::repair {
+namespace {
+
+double most_left_mg(const GateEvidence& evidence) {
+  return evidence.directions < kLeastDirections ? kMostLeftInFewDirections_mg : kMostLeft_mg;
+}
+
+GateRow row_of(const GateEvidence& evidence) {
+  if (evidence.directions == 0) {
+    return GateRow::not_checked;
+  }
+  if (evidence.after_mg > evidence.before_mg) {
+    return GateRow::worse;
+  }
+  if (evidence.before_mg <= kEvidenceLimit_mg &&
+      evidence.after_mg > evidence.before_mg - kLeastGain_mg) {
+    return GateRow::no_better;
+  }
+  if (evidence.after_mg > most_left_mg(evidence)) {
+    return GateRow::too_much_left;
+  }
+  if (evidence.directions >= kLeastDirections) {
+    return GateRow::helps;
+  }
+  return evidence.before_mg <= kMostLeft_mg && !evidence.counts_are_the_units_own
+             ? GateRow::ambiguous
+             : GateRow::weak;
+}
+
+bool is_refused(GateRow row) {
+  return row == GateRow::worse || row == GateRow::no_better || row == GateRow::too_much_left ||
+         row == GateRow::ambiguous;
+}
+
+// By constants with a slope above 1 some stored counts have no raw count behind them; a hundredth
+// of them shows another origin for certain (PlausibilityTally).
+bool counts_are_the_units_own(const Survey& survey) {
+  constexpr double kLeastSlope = 1.01;
+  const auto shows = [&](const StoredConstants& constants) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const int span_lsb = constants.positive_lsb[a] - constants.negative_lsb[a];
+      if (2 * survey.accel_scale_lsb_per_g > kLeastSlope * span_lsb) {
+        return true;
+      }
+    }
+    return false;
+  };
+  return survey.plausibility.plausible() && std::ranges::all_of(survey.constants, shows);
+}
+
+std::string reason_of(GateRow row, const GateEvidence& evidence) {
+  const auto both = [&](std::string_view text) {
+    return fmt::format(fmt::runtime(text), fmt::arg("before", evidence.before_mg),
+                       fmt::arg("after", evidence.after_mg));
+  };
+  switch (row) {
+    case GateRow::not_checked:
+      return "the file has no still periods: whether the repair helps could not be checked";
+    case GateRow::worse:
+      return both(
+          "the repair would make it worse: still error {before:.1f} mg before, {after:.1f} mg "
+          "after");
+    case GateRow::no_better:
+      return both(
+          "the file is within 64 mg as it is, perhaps corrected before, and the repair does not "
+          "improve it: still error {before:.1f} mg before, {after:.1f} mg after");
+    case GateRow::too_much_left:
+      return both(
+                 "the constants do not fit the file: still error {before:.1f} mg before, "
+                 "{after:.1f} mg after") +
+             fmt::format(", more than the {:.0f} mg that right constants can leave",
+                         most_left_mg(evidence));
+    case GateRow::ambiguous:
+      return both(
+          "the still periods lie in few directions and look right as they are: still error "
+          "{before:.1f} mg before, {after:.1f} mg after; other software may have corrected the "
+          "file");
+    case GateRow::weak:
+      return fmt::format(
+          "the still periods lie in {} of the at least {} directions that show every constant: the "
+          "check is weak",
+          evidence.directions, kLeastDirections);
+    case GateRow::helps:
+      break;
+  }
+  return {};
+}
+
+}  // namespace
+
+GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh) {
+  std::vector<calib::StillBlock> after = survey.blocks;
+  for (calib::StillBlock& block : after) {
+    block.mean_g = fresh.to_g(block.mean_lsb);
+  }
+  std::vector<calib::DirectionCell> cells = calib::cells_of(after);
+  return {calib::number_neighbourhoods(cells, fresh), survey.magnitude.mean_mg,
+          magnitude_error(after).mean_mg, counts_are_the_units_own(survey)};
+}
+
+GateAnswer gate(const GateEvidence& evidence, bool force) {
+  GateAnswer answer;
+  answer.row = row_of(evidence);
+  answer.reason = reason_of(answer.row, evidence);
+  const bool refused = is_refused(answer.row);
+  answer.write = !refused || force;
+  answer.forced = refused && force;
+  return answer;
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,67 @@
+// Does a repair help? The last question before a file is written.
+//
+//   const GateEvidence evidence = gate_evidence(survey, constants);
+//   const GateAnswer answer = gate(evidence, /*force=*/false);
+//   answer.write;   // false
+//   answer.reason;  // "the repair would make it worse: still error 12.3 mg before, ..."
+//
+// The still error is the mean of |magnitude - 1 g| over the still blocks: of the file as it is, and
+// of what the constants would make of the same blocks. Charging zeros are in no still block. The
+// first row that fits decides:
+//
+// | directions | before -> after                              | row           | written      |
+// |------------|----------------------------------------------|---------------|--------------|
+// | 0          | -                                            | not_checked   | yes          |
+// | 1 or more  | after > before                               | worse         | with `force` |
+// | 1 or more  | before <= 64 mg, and after > before - 1 mg   | no_better     | with `force` |
+// | 1 to 3     | after > 20 mg                                | too_much_left | with `force` |
+// | 4 or more  | after > 32 mg                                | too_much_left | with `force` |
+// | 1 to 3     | before <= 32 mg, the counts may come from    | ambiguous     | with `force` |
+// |            | other software                               |               |              |
+// | 1 to 3     | otherwise                                    | weak          | yes          |
+// | 4 or more  | otherwise                                    | helps         | yes          |
+//
+// 64 mg is the paper's limit of a file that needs no repair (Step 2). A file within it may have
+// been corrected before by other software, which leaves serial number, date and firmware as they
+// were. 32 mg are left only by constants of another unit or another filter: uncertainty,
+// temperature and gravity together stay below 20 mg. In one to three directions wrong constants
+// look right by chance more often, so the limit is 20 mg there.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "calib/constants.h"
+#include "calib/still_blocks.h"
+#include "repair/triage/survey.h"
+
+namespace sixpoint::repair {
+
+inline constexpr double kLeastGain_mg = 1;
+inline constexpr double kMostLeft_mg = 32;
+inline constexpr double kMostLeftInFewDirections_mg = 20;
+
+// Fewer directions than this do not see every constant.
+inline constexpr int kLeastDirections = 4;
+
+struct GateEvidence {
+  int directions = 0;  // in which the file has still blocks (calib/direction_cells.h)
+  double before_mg = 0;
+  double after_mg = 0;
+  // Only the unit's own constants make such counts: other software leaves counts that no integer
+  // leads to. False where that cannot be told (calib/scaling.h, PlausibilityTally).
+  bool counts_are_the_units_own = false;
+};
+GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh);
+
+enum class GateRow { not_checked, worse, no_better, too_much_left, ambiguous, weak, helps };
+struct GateAnswer {
+  GateRow row = GateRow::not_checked;
+  bool write = true;
+  bool forced = false;  // written although the row says no
+  std::string reason;   // for people; with both numbers where they decide; empty where it helps
+};
+GateAnswer gate(const GateEvidence& evidence, bool force);
+
+}  // namespace sixpoint::repair

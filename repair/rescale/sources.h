@@ -1,0 +1,81 @@
+// Which source of constants is asked, and which constants do not fit a file.
+//
+//   NamedSources named;
+//   named.calibration_file = true;
+//   sources_in_order(named);  // {SourceKind::calibration_file}
+//
+// What the user names wins and stands alone. The first row that fits decides:
+//
+// | named                      | order                                                      |
+// |----------------------------|------------------------------------------------------------|
+// | --constants                | constants                                                  |
+// | --calibration-file         | calibration_file                                           |
+// | --scan                     | scan                                                       |
+// | --store                    | store                                                      |
+// | nothing, a default store   | store, scan                                                |
+// | nothing, no default store  | scan                                                       |
+// | any of them, and --or-scan | as above, then scan                                        |
+//
+// The next source of the order is asked only where the one before has no constants that fit.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "base/time.h"
+#include "calib/constants.h"
+#include "repair/triage/triage.h"
+
+namespace sixpoint::repair {
+
+enum class SourceKind { constants, calibration_file, scan, store };
+std::string_view to_string(SourceKind kind);  // as `method` and `source.kind` have it
+std::optional<SourceKind> parse_source_kind(std::string_view text);
+
+struct NamedSources {
+  bool constants = false;
+  bool calibration_file = false;
+  bool scan = false;
+  bool store = false;
+  bool or_scan = false;
+  bool default_store = false;  // nobody named it, and it is there
+};
+std::vector<SourceKind> sources_in_order(const NamedSources& named);
+
+// Why constants must not be applied to a file of these facts; nothing where they may. The first row
+// that fits decides:
+//
+// | constants                                           | fit |
+// |-----------------------------------------------------|-----|
+// | of another serial number                            | no  |
+// | measured under `legacy`                             | no  |
+// | resting on a population prior, without `allow_prior`| no  |
+// | otherwise                                           | yes |
+std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const FileFacts& file,
+                                     bool allow_prior);
+
+// Two sets have one digest when they do the same to a file: serial number, filter and constants.
+// 32 hex digits.
+std::string digest_of(const calib::ConstantsRecord& record);
+
+// Where the constants of a repair came from, for people.
+struct SourceUsed {
+  std::string kind;  // to_string(SourceKind)
+  std::string id;    // in the store; else digest_of() the constants
+  std::optional<UtcTime> made_at;
+  std::optional<double> standard_uncertainty_mg;  // of a value of 1 g, the largest of the axes
+
+  std::string brief() const;  // "store 5c0f91aa (2026-11-22, +- 1.2 mg)"
+  nlohmann::ordered_json to_json() const;
+};
+// `id`: in the store, or empty.
+SourceUsed source_used(const std::string& kind, const std::string& id,
+                       const calib::ConstantsRecord& record);
+// null and what to_json() does not write give nothing.
+std::optional<SourceUsed> parse_source_used(const nlohmann::ordered_json& json);
+
+}  // namespace sixpoint::repair
