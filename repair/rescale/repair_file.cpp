@@ -11,6 +11,7 @@
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
 #include "repair/rescale/constants_finder.h"
+#include "repair/rescale/earlier_output.h"
 #include "repair/rescale/gate.h"
 #include "repair/rescale/rescaled_log.h"
 
@@ -20,14 +21,17 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // In the order of RepairStatus.
-constexpr std::array<std::string_view, 5> kStatusNames = {
-    "repaired", "not_affected", "not_repairable", "already_repaired", "failed"};
+constexpr std::array<std::string_view, 6> kStatusNames = {
+    "repaired", "not_affected", "not_repairable", "already_repaired", "outdated", "failed"};
 
 constexpr std::uint64_t kLargestMark = 1U << 20;
 // Reasons are JSON values that other programs may read, so their words stay as they are.
 constexpr const char* kNotDecided =
     "what cannot be told affected is not mended: find out what is missing first";
 constexpr const char* kDoneBefore = "mended by an earlier run";
+constexpr const char* kMadeOtherwise =
+    "the output that is there was made with other constants, options or rules than would be used "
+    "now; --redo-outdated replaces it";
 constexpr const char* kMappedByLine =
     "the counts cannot have come from whole raw counts by the file's constants (averaged, mended "
     "before, or resampled): {} of them mapped by the straight line";
@@ -38,11 +42,12 @@ Json still_error_to_json(const RepairReport& report) {
 }
 
 Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& chosen,
-             const Survey& survey, UtcTime now) {
+             const Survey& survey, const std::string& recipe, UtcTime now) {
   Json mark;
   mark["schema"] = "sixpoint/repair-mark/1";
   mark["repaired_at"] = to_iso8601(now);
   mark["input_sha256"] = report.input_sha256;
+  mark["recipe"] = recipe;
   mark["serial"] = report.serial;
   mark["method"] = report.method;
   mark["rotation_undone"] = report.rotation_undone;
@@ -157,12 +162,9 @@ class Repair {
         return fail(*survey_.constants_problem);
       }
       SIXPOINT_CHECK(choose());
-      if (!chosen_.has_value()) {
+      if (!chosen_.has_value() || !may_write()) {
         report_.status = RepairStatus::not_repairable;
-        return {};
-      }
-      if (!may_write()) {
-        return {};
+        return look_for_earlier_output();
       }
     }
     return write();
@@ -215,7 +217,7 @@ class Repair {
   }
 
   // Whether the constants that were chosen may be used on this file: the gate, and what its own
-  // still periods say. False where the status is decided.
+  // still periods say.
   bool may_write() {
     const GateEvidence evidence = gate_evidence(survey_, chosen_->record.calibration);
     const GateAnswer answer = gate(evidence, options_.force);
@@ -237,7 +239,6 @@ class Repair {
     }
     if (!answer.write || (report_.forced && !options_.force)) {
       report_.forced = false;
-      report_.status = RepairStatus::not_repairable;
       return false;
     }
     return true;
@@ -309,9 +310,14 @@ class Repair {
     const std::shared_ptr<RescaledLog> log = std::move(made);
     if (options_.dry_run) {
       SIXPOINT_CHECK(read_through(*log));
-    } else if (env_.files.info(output_)) {
-      return take_earlier_output();
     } else {
+      const auto mark = mark_in(env_.files, output_);
+      const EarlierOutput earlier =
+          judge_earlier_output(found_output(mark), report_.input_sha256, recipe());
+      if (earlier != EarlierOutput::none &&
+          !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
+        return take_earlier_output(earlier, mark.value_or(Json()));
+      }
       SIXPOINT_CHECK(write_output(recording, log));
     }
     take(*log);
@@ -358,7 +364,7 @@ class Repair {
                          : writer.copy(recording, entry.name));
     }
     SIXPOINT_CHECK(
-        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, now_)
+        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, recipe(), now_)
                                         .dump(2, ' ', false, Json::error_handler_t::replace) +
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());
@@ -368,22 +374,60 @@ class Repair {
     return {};
   }
 
+  std::string recipe() const {
+    Recipe recipe;
+    if (chosen_) {
+      recipe.constants = chosen_->record;
+    }
+    recipe.rotation_undone = report_.rotation_undone;
+    recipe.wide = options_.wide;
+    return recipe_digest(recipe);
+  }
+
+  // What lies where the output goes; nothing where nothing does.
+  std::optional<FoundOutput> found_output(const std::optional<Json>& mark) {
+    if (!env_.files.info(output_)) {
+      return std::nullopt;
+    }
+    return mark ? FoundOutput{text_in(*mark, "input_sha256"), text_in(*mark, "recipe")}
+                : FoundOutput{};
+  }
+
+  // A file that would not be written now: does the output of an earlier run lie there?
+  Status look_for_earlier_output() {
+    const auto mark = options_.dry_run ? std::nullopt : mark_in(env_.files, output_);
+    if (!mark) {
+      return {};
+    }
+    SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
+    if (text_in(*mark, "input_sha256") == report_.input_sha256) {
+      report_.status = RepairStatus::outdated;
+      report_.reasons.push_back(
+          fmt::format("an earlier run wrote {}, which would not be written now: look at the two, "
+                      "and remove it",
+                      printable(output_)));
+    }
+    return {};
+  }
+
   // What an earlier run made of this very input, with the constants that were used then.
-  Status take_earlier_output() {
-    const auto mark = options_.resume ? mark_in(env_.files, output_) : std::nullopt;
-    if (!mark || text_in(*mark, "input_sha256") != report_.input_sha256) {
+  Status take_earlier_output(EarlierOutput earlier, const Json& mark) {
+    if (earlier == EarlierOutput::outdated) {
+      report_.status = RepairStatus::outdated;
+      report_.reasons.emplace_back(kMadeOtherwise);
+      return {};
+    }
+    if (earlier == EarlierOutput::foreign || !options_.resume) {
       return fail(ErrorCode::cannot_create, "a file of that name is there already", output_,
                   "choose another folder, or --resume to go on with an earlier run");
     }
     report_.reasons.emplace_back(kDoneBefore);
     report_.resumed = true;
-    report_.method = text_in(*mark, "method");
-    report_.constants_id = text_in(*mark, "constants_id");
-    if (mark->contains("source")) {
-      report_.source = parse_source_used((*mark)["source"]);
-    }
-    report_.forced = mark->value("forced", Json(false)) == Json(true);
-    if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
+    report_.method = text_in(mark, "method");
+    report_.constants_id = text_in(mark, "constants_id");
+    report_.source = parse_source_used(mark.value("source", Json(nullptr)));
+    report_.forced = mark.value("forced", Json(false)) == Json(true);
+    if (const auto then = parse_iso8601(text_in(mark, "repaired_at")); then) {
       report_.repaired_at = *then;
     }
     report_.output = output_;
