@@ -140,7 +140,7 @@ class BlockFitter {
  private:
   GravityPoint point_of_block(const StillBlock& block) const {
     const double above_c =
-        block.temperature_c ? *block.temperature_c - out_.reference_temperature_c : 0;
+        block.temperature_c ? *block.temperature_c - out_.reference_temperature_c.value_or(0) : 0;
     return {block.mean_lsb, block.ramp_variance_lsb2, 1, above_c};
   }
 

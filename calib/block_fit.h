@@ -67,9 +67,10 @@ struct BlockFit {
   double block_sd_mg = 0;       // scatter of blocks within one direction
   double noise_sd_mg = 0;       // what the samples' own noise explains of it
   double structural_mg = 0;
-  int directions = 0;                  // more than 12 degrees apart
-  int redundancy = 0;                  // directions - 6: what is left to test the fit with
-  double reference_temperature_c = 0;  // mean of the blocks
+  int directions = 0;  // more than 12 degrees apart
+  int redundancy = 0;  // directions - 6: what is left to test the fit with
+  // Mean of the blocks, which the constants hold for; absent where no temperature was measured.
+  std::optional<double> reference_temperature_c;
   double temperature_range_c = 0;
   double rms_mg = 0;         // of the blocks used
   double mean_error_mg = 0;  // mean absolute error of the blocks used

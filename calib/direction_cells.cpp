@@ -101,7 +101,7 @@ std::vector<GravityPoint> points_of(std::span<const DirectionCell> cells,
   return points;
 }
 
-double mean_temperature_c(std::span<const StillBlock> blocks) {
+std::optional<double> mean_temperature_c(std::span<const StillBlock> blocks) {
   double sum = 0;
   double count = 0;
   for (const StillBlock& block : blocks) {
@@ -110,7 +110,7 @@ double mean_temperature_c(std::span<const StillBlock> blocks) {
       count += 1;
     }
   }
-  return count > 0 ? sum / count : 0;
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
 }
 
 std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::span<const char> used,
@@ -118,7 +118,7 @@ std::vector<DirectionCell> cells_of(std::span<const StillBlock> blocks, std::spa
   if (cell_of_block != nullptr) {
     cell_of_block->assign(blocks.size(), -1);
   }
-  const double reference_c = mean_temperature_c(blocks);
+  const double reference_c = mean_temperature_c(blocks).value_or(0);
   const auto temperature_of = [&](const StillBlock& block) {
     return block.temperature_c ? *block.temperature_c - reference_c : 0.0;
   };

@@ -9,6 +9,7 @@
 // standard g, times in seconds as the blocks have them. Pure functions: any thread may call them.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,9 +35,9 @@ GravityPoint point_of(const DirectionCell& cell, double sigma_g);
 std::vector<GravityPoint> points_of(std::span<const DirectionCell> cells,
                                     std::span<const double> sigma_g);
 
-// Over the blocks that have a temperature; 0 if none has. Constants without temperature terms hold
-// for it.
-double mean_temperature_c(std::span<const StillBlock> blocks);
+// Over the blocks that have a temperature; nothing if none has. Constants without temperature terms
+// hold for it.
+std::optional<double> mean_temperature_c(std::span<const StillBlock> blocks);
 
 // `used` may be empty (all blocks) or hold a flag for each block. `cell_of_block` receives the
 // number of each block's cell, -1 for a block that is not used.

@@ -57,7 +57,7 @@ void add_fit(Json& json, const BlockFit& fit) {
   richer["cross_axis"] = more.model.cross_axis ? Json(more.cross_axis) : Json(nullptr);
   richer["zero_lsb_per_c"] = more.model.temperature ? Json(more.zero_lsb_per_c) : Json(nullptr);
   richer["reference_temperature_c"] =
-      more.model.temperature ? Json(fit.reference_temperature_c) : Json(nullptr);
+      more.model.temperature ? number_or_null(fit.reference_temperature_c) : Json(nullptr);
   richer["held_out_rms_mg"] = fit.richer->held_out_rms_mg;
 }
 
@@ -109,12 +109,20 @@ Json to_json(const SolveReport& report) {
   json["iterations"] = report.iterations;
   json["seconds"] = report.seconds;
   json["gravity_m_per_s2"] = report.gravity_g * kStandardGravity_m_per_s2;
+  // What the constants hold for.
+  json["temperature_c"] =
+      report.fit ? number_or_null(report.fit->reference_temperature_c) : Json(nullptr);
   json["from_prior"] = report.from_prior;
   json["verification"] = to_json(report.verification);
   if (report.fit) {
     add_fit(json, *report.fit);
   }
   add_six(json, report);
+  if (report.trust) {
+    json["trust"] = {{"trusted", to_string(report.trust->trusted)},
+                     {"apart_mg", report.trust->apart_mg},
+                     {"why", report.trust->why}};
+  }
   if (report.search) {
     json["genetic"] = to_json(*report.search);
   }
@@ -140,6 +148,7 @@ Json to_json(const SixPoseSolution& solution) {
   return {{"constants", to_json(solution.calibration, solution.stored)},
           {"standard_uncertainty", to_json(solution.uncertainty)},
           {"own_rms_mg", solution.own_rms_mg},
+          {"choosing_rms_mg", number_or_null(solution.choosing_rms_mg)},
           {"held_out_rms_mg", number_or_null(solution.held_out_rms_mg)},
           {"held_out_worst_mg", number_or_null(solution.held_out_worst_mg)},
           {"rounded_rms_mg", number_or_null(solution.rounded_rms_mg)}};
@@ -167,7 +176,8 @@ Json to_json(const SixPoseReport& report) {
     poses.push_back({{"pose", pose.side},
                      {"magnitude_mg", pose.magnitude_mg},
                      {"tilt_deg", pose.tilt_deg},
-                     {"held_out", pose.held_out}});
+                     {"held_out", pose.held_out},
+                     {"chose", pose.chose}});
   }
   json.update({{"chosen", to_string(report.chosen)},
                {"better_by_mg", report.better_by_mg},

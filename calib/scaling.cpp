@@ -147,16 +147,24 @@ RawCandidates Reversal::candidates(std::size_t axis, int stored_count) const {
   return {first_[axis][i], number_[axis][i], tie_[axis][i] != 0, raw_[axis][i]};
 }
 
+// Runs over every count of every recording, so without a branch: clipped counts are those at the
+// ends of the table.
 void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
            PlausibilityTally& counts) {
-  for (const StoredCounts& sample : samples) {
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      if (reversal.clipped(sample[a])) {
-        continue;
-      }
-      ++counts.counts;
-      counts.impossible += reversal.candidates(a, sample[a]).number == 0 ? 1 : 0;
+  const int low = lowest_count(reversal.width());
+  const int high = highest_count(reversal.width());
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const std::uint16_t* const number = reversal.number_[a].data();
+    std::size_t clipped = 0;
+    std::size_t impossible = 0;
+    for (const StoredCounts& sample : samples) {
+      const int count = std::clamp<int>(sample[a], low, high);
+      const bool at_limit = count == low || count == high;
+      clipped += at_limit ? 1U : 0U;
+      impossible += !at_limit && number[count - low] == 0 ? 1U : 0U;
     }
+    counts.counts += samples.size() - clipped;
+    counts.impossible += impossible;
   }
 }
 

@@ -96,6 +96,9 @@ class Reversal {
   PerAxis<std::vector<std::int16_t>> first_;
   PerAxis<std::vector<std::uint16_t>> number_;
   PerAxis<std::vector<std::uint8_t>> tie_;
+
+  friend void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
+                    struct PlausibilityTally& counts);
 };
 
 // Whether a file's counts can have come from its constants. Where positive - negative is below

@@ -98,6 +98,7 @@ class Jig {
           fmt::format("no reading with {} up", fmt::join(report_.missing_directions, ", ")));
       return std::move(report_);
     }
+    split_held_out();
     SIXPOINT_CHECK(solve_letter());
     SIXPOINT_CHECK(solve_pair());
     SIXPOINT_CHECK(solve_vector());
@@ -123,6 +124,26 @@ class Jig {
     for (std::size_t side = 0; side < kSides; ++side) {
       if (count[side] == 0) {
         report_.missing_directions.emplace_back(kSideNames[side]);
+      }
+    }
+  }
+
+  // Choice and verification by different readings. What is wrong with a solution is wrong on both
+  // sides of an axis, so each of the two has a reading of every axis where there are enough.
+  void split_held_out() {
+    PerAxis<int> readings{};
+    for (const PoseMean& reading : held_out_) {
+      ++readings[nearest_side(reading.up).side / 2];
+    }
+    PerAxis<bool> has_chosen{};
+    for (std::size_t i = 0; i < held_out_.size(); ++i) {
+      const std::size_t axis = nearest_side(held_out_[i].up).side / 2;
+      if (readings[axis] > 1 && !has_chosen[axis]) {
+        has_chosen[axis] = true;
+        report_.choosing.push_back(i);
+        choosing_.push_back(held_out_[i]);
+      } else {
+        verifying_.push_back(held_out_[i]);
       }
     }
   }
@@ -265,11 +286,13 @@ class Jig {
       }
     }
     SIXPOINT_ASSIGN(const Calibration applied, calibration_from(solution.stored));
-    const auto tested = held_out_.empty() ? used_ : held_out_;
-    solution.rounded_rms_mg = rms_mg(tested, applied);
-    if (!held_out_.empty()) {
+    solution.rounded_rms_mg = rms_mg(verifying_.empty() ? used_ : verifying_, applied);
+    if (!choosing_.empty()) {
+      solution.choosing_rms_mg = rms_mg(choosing_, solution.calibration);
+    }
+    if (!verifying_.empty()) {
       double worst = 0;
-      solution.held_out_rms_mg = rms_mg(held_out_, solution.calibration, &worst);
+      solution.held_out_rms_mg = rms_mg(verifying_, solution.calibration, &worst);
       solution.held_out_worst_mg = worst;
     }
     for (double& relative : solution.uncertainty.sensitivity_relative) {
@@ -280,9 +303,9 @@ class Jig {
 
   void choose() {
     const auto error = [](const SixPoseSolution& solution) {
-      return solution.held_out_rms_mg.value_or(solution.own_rms_mg);
+      return solution.choosing_rms_mg.value_or(0);
     };
-    // The pair is left only for a gain that chance does not give: the RMS over three unused poses,
+    // The pair is left only for a gain that chance does not give: the RMS over three poses,
     // each the mean of six seconds, scatters by a tenth of a milligravity.
     constexpr double kMatters_mg = 0.3;
     report_.chosen = SixPoseMethod::per_axis;
@@ -292,25 +315,26 @@ class Jig {
     if (error(report_.all_axes.six) < error(report_.best()) - kMatters_mg) {
       report_.chosen = SixPoseMethod::all_axes;
     }
-    report_.better_by_mg = error(report_.as_published) - error(report_.best());
+    report_.better_by_mg = report_.as_published.held_out_rms_mg.value_or(0) -
+                           report_.best().held_out_rms_mg.value_or(0);
   }
 
   void describe_poses() {
     const Calibration& calibration = report_.best().calibration;
-    const auto add = [&](const PoseMean& reading, bool held_out) {
+    const auto add = [&](const PoseMean& reading, bool held_out, bool chose) {
       const PerAxis<double> g = calibration.to_g(reading.mean_lsb);
       const double length = length_of(g);
       const double along =
           (g[0] * reading.up[0] + g[1] * reading.up[1] + g[2] * reading.up[2]) / length;
       report_.poses.push_back({std::string(kSideNames[nearest_side(reading.up).side]),
                                kMgPerG * (length - gravity_g_),
-                               std::acos(std::clamp(along, -1.0, 1.0)) / kRadian, held_out});
+                               std::acos(std::clamp(along, -1.0, 1.0)) / kRadian, held_out, chose});
     };
     for (const PoseMean& reading : used_) {
-      add(reading, false);
+      add(reading, false, false);
     }
-    for (const PoseMean& reading : held_out_) {
-      add(reading, true);
+    for (std::size_t i = 0; i < held_out_.size(); ++i) {
+      add(held_out_[i], true, std::ranges::find(report_.choosing, i) != report_.choosing.end());
     }
   }
 
@@ -394,6 +418,8 @@ class Jig {
 
   std::span<const PoseMean> used_;
   std::span<const PoseMean> held_out_;
+  std::vector<PoseMean> choosing_;
+  std::vector<PoseMean> verifying_;
   const SixPoseOptions& options_;
   double gravity_g_;
   SixPoseReport report_;

@@ -7,7 +7,8 @@
 //   }
 //
 // Three solutions of the same readings are computed and reported. The one that does best on
-// readings that were not used is chosen:
+// readings that were not used is chosen, and verified by other readings that were not used (of
+// every axis the first unused reading chooses, all others verify):
 //  - as_published: Eq. 1-3 as the paper has them. positive and negative are the readings at +1 g
 //    and -1 g, zero is the mean reading of the four poses in which the axis lies level. Level
 //    readings carry the tilt of jig and case in full (0.5 degrees are 9 mg). That is why zero is
@@ -87,7 +88,8 @@ struct SixPoseSolution {
   StoredConstants stored;                 // the integers for the unit's memory
   ConstantsUncertainty uncertainty;       // noise, tilt and gravity
   double own_rms_mg = 0;                  // magnitude error on the readings that were used
-  std::optional<double> held_out_rms_mg;  // and on those that were not
+  std::optional<double> choosing_rms_mg;  // on the unused ones that choose between the solutions
+  std::optional<double> held_out_rms_mg;  // and on the unused ones that verify
   std::optional<double> held_out_worst_mg;
   std::optional<double> rounded_rms_mg;  // the same with the nine integers
 };
@@ -106,6 +108,7 @@ struct PoseResidual {
   double magnitude_mg = 0;  // by the chosen constants, minus local gravity
   double tilt_deg = 0;      // of the chosen constants' vector from the pose's direction
   bool held_out = false;
+  bool chose = false;  // held out, and used to choose between the solutions
 };
 
 enum class SixPoseMethod { as_published, per_axis, all_axes };
@@ -116,7 +119,10 @@ struct SixPoseReport {
   SixPoseSolution per_axis;
   AllAxesSolution all_axes;
   SixPoseMethod chosen = SixPoseMethod::per_axis;
-  double better_by_mg = 0;  // than `as_published`, on held-out readings
+  double better_by_mg = 0;  // than `as_published`, on the readings that verify
+  // Of the held-out readings, in their order, those that chose. Empty: none was left for it, and
+  // `per_axis` is taken.
+  std::vector<std::size_t> choosing;
   std::vector<PoseResidual> poses;
   PerAxis<double> midpoint_minus_zero_lsb{};  // what the level readings disagree by
   bool verified = false;

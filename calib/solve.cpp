@@ -60,7 +60,7 @@ std::vector<StillBlock> without_richer_terms(std::span<const StillBlock> blocks,
   std::vector<StillBlock> out(blocks.begin(), blocks.end());
   for (StillBlock& block : out) {
     const double above_c =
-        block.temperature_c ? *block.temperature_c - fit.reference_temperature_c : 0;
+        block.temperature_c ? *block.temperature_c - fit.reference_temperature_c.value_or(0) : 0;
     PerAxis<double> u{};
     for (std::size_t a = 0; a < kAxes; ++a) {
       block.mean_lsb[a] -= more.zero_lsb_per_c[a] * above_c;
@@ -230,12 +230,39 @@ void add_notes(std::vector<std::string>& notes, const BlockFit& fit, const BestS
         "the data show zeros that drift by {:+.2f} {:+.2f} {:+.2f} mg/C (X Y Z), which six "
         "constants cannot follow: they hold at {:.1f} C; unseen directions are predicted to "
         "{:.1f} mg with the drift, {:.1f} mg without",
-        mg_per_c(0), mg_per_c(1), mg_per_c(2), fit.reference_temperature_c,
+        mg_per_c(0), mg_per_c(1), mg_per_c(2), fit.reference_temperature_c.value_or(0),
         fit.richer->held_out_rms_mg, fit.held_out_rms_mg.value_or(0)));
   } else if (fit.temperature_range_c >= 10) {
     notes.push_back(
         fmt::format("the temperature changed by {:.0f} C; the constants hold for its mean",
                     fit.temperature_range_c));
+  }
+}
+
+// The still blocks by constants of either method, with the terms that were admitted.
+double error_with_terms_mg(const BlockFit& fit, const Calibration& constants, double gravity_g) {
+  LeastSquaresFit terms = fit.best();
+  terms.calibration = constants;
+  const auto sizes = neighbourhood_sizes(fit.cells, fit.directions);
+  double square = 0;
+  double weights = 0;
+  for (std::size_t k = 0; k < fit.cells.size(); ++k) {
+    const double off = magnitude_g(terms, point_of(fit.cells[k], 1)) - gravity_g;
+    square += off * off / sizes[k];
+    weights += 1 / sizes[k];
+  }
+  return kMgPerG * std::sqrt(square / weights);
+}
+
+void compare_methods(SolveReport& report, double gravity_g) {
+  const BlockFit& fit = *report.fit;
+  const Calibration& least = fit.best().calibration;
+  const Calibration& genetic = report.search->calibration;
+  report.trust = whom_to_trust(
+      {fit.best().converged, report.search->settled, difference_over_sphere(least, genetic).rms_mg,
+       error_with_terms_mg(fit, least, gravity_g), error_with_terms_mg(fit, genetic, gravity_g)});
+  if (report.trust->trusted != Trusted::both) {
+    report.notes.push_back(report.trust->why);
   }
 }
 
@@ -290,6 +317,7 @@ Result<SolveReport> solve_fitted(SolveReport report, BlockFit fit, const Input& 
         "the data determine the constants without the prior, which was not used");
   }
   add_notes(report.notes, *report.fit, *report.six);
+  compare_methods(report, options.gravity_g);
   if (report.residual_rounded_mg && *report.residual_rounded_mg > VerificationLimits::applied_mg &&
       report.verification.verified) {
     refuse(report.verification,
@@ -382,8 +410,8 @@ Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
                   "the recording is damaged");
     }
   }
-  // The paper's criteria first. Where they leave too few blocks, also those that fail only by
-  // sensor noise.
+  // The paper's criteria first. Where they leave too few blocks or directions, also those that fail
+  // only by sensor noise. Where the data contradict the constants, or drift, more are no remedy.
   std::vector<StillBlock> paper;
   for (const StillBlock& block : blocks) {
     if (!block.noisy) {
@@ -391,7 +419,7 @@ Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
     }
   }
   SIXPOINT_ASSIGN(SolveReport report, solve_input({paper, file_constants, options}));
-  if (!report.usable() && paper.size() < blocks.size()) {
+  if (!report.usable() && !report.verification.contradicted && paper.size() < blocks.size()) {
     SIXPOINT_ASSIGN(report, solve_input({blocks, file_constants, options}));
     report.noisy_points = blocks.size() - paper.size();
     report.notes.push_back(fmt::format(

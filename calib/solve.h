@@ -28,6 +28,7 @@
 #include "calib/genetic.h"
 #include "calib/still_blocks.h"
 #include "calib/temperature_drift.h"
+#include "calib/trust.h"
 #include "calib/verify.h"
 
 namespace sixpoint::calib {
@@ -85,6 +86,7 @@ struct SolveReport {
   // the same blocks, where the data show such terms.
   std::optional<BestSix> six;
   std::optional<CrossAxisMap> cross_axis;
+  std::optional<Trust> trust;  // of least squares and the genetic algorithm, where both ran
   std::optional<GeneticResult> search;
   std::optional<PartialKnowledge> partial;
   // Filled by the caller where the recording holds temperatures and the unit was left lying while

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -33,6 +34,34 @@ Line fit_line(const std::int16_t* values, int size, double sum_square_index) {
     moment += 2 * static_cast<std::int64_t>(chunk_moment) + (2LL * begin - (size - 1)) * chunk_sum;
   }
   return {static_cast<double>(sum) / size, 0.5 * static_cast<double>(moment) / sum_square_index};
+}
+
+// Cells are of any length; chunks keep the inner loops in 32 bits, as above.
+template <class Cell>
+Cell cell_of(const std::int16_t* values, int size) {
+  Cell cell;
+  cell.low = values[0];
+  cell.high = values[0];
+  constexpr int kChunk = 32;
+  for (int begin = 0; begin < size; begin += kChunk) {
+    const int end = std::min(size, begin + kChunk);
+    std::int32_t sum = 0;
+    std::int32_t moment = 0;
+    std::int16_t low = values[begin];
+    std::int16_t high = values[begin];
+    for (int i = begin; i < end; ++i) {
+      const std::int16_t value = values[i];
+      sum += value;
+      moment += value * static_cast<std::int16_t>(i - begin);
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    cell.sum += sum;
+    cell.moment += moment + static_cast<std::int64_t>(begin) * sum;
+    cell.low = std::min(cell.low, low);
+    cell.high = std::max(cell.high, high);
+  }
+  return cell;
 }
 
 float largest_residual(const std::int16_t* values, const float* centred, int size, float mean,
@@ -71,6 +100,7 @@ StillBlockFinder::StillBlockFinder(const Reversal& reversal, double rate_hz,
       step_samples_(std::max(1, static_cast<int>(std::lround(options.step_s * rate_hz)))),
       // Stored counts are calibrated: g is the count over accel_scale, whatever the constants.
       g_per_count_(1.0 / reversal.accel_scale_lsb_per_g()) {
+  in_cells_ = block_samples_ % step_samples_ == 0;
   for (int i = 0; i < block_samples_; ++i) {
     const double centred = i - 0.5 * (block_samples_ - 1);
     centred_.push_back(static_cast<float>(centred));
@@ -114,16 +144,30 @@ std::vector<StillBlock> StillBlockFinder::finish() {
 }
 
 void StillBlockFinder::break_run() {
-  for (auto& axis : run_) {
-    axis.clear();
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    run_[a].clear();
+    cells_[a].clear();
   }
   marks_.clear();
   next_ = 0;
   in_run_ = false;
 }
 
+void StillBlockFinder::make_cells() {
+  const auto size = static_cast<std::size_t>(step_samples_);
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    for (std::size_t begin = cells_[a].size() * size; begin + size <= run_[a].size();
+         begin += size) {
+      cells_[a].push_back(cell_of<Cell>(run_[a].data() + begin, step_samples_));
+    }
+  }
+}
+
 void StillBlockFinder::search() {
   const auto block = static_cast<std::size_t>(block_samples_);
+  if (in_cells_) {
+    make_cells();
+  }
   while (next_ + block <= run_[0].size()) {
     next_ += take_block(next_) ? block : static_cast<std::size_t>(step_samples_);
   }
@@ -131,8 +175,13 @@ void StillBlockFinder::search() {
   constexpr std::size_t kBehind = 1U << 13;
   if (next_ > kBehind) {
     const std::size_t gone = std::min(next_, run_[0].size());
-    for (auto& axis : run_) {
-      axis.erase(axis.begin(), axis.begin() + static_cast<std::ptrdiff_t>(gone));
+    const std::size_t cells_gone = gone / static_cast<std::size_t>(step_samples_);
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      run_[a].erase(run_[a].begin(), run_[a].begin() + static_cast<std::ptrdiff_t>(gone));
+      if (in_cells_) {
+        cells_[a].erase(cells_[a].begin(),
+                        cells_[a].begin() + static_cast<std::ptrdiff_t>(cells_gone));
+      }
     }
     next_ -= gone;
     while (marks_.size() > 1 && marks_[1].index <= gone) {
@@ -154,7 +203,7 @@ bool StillBlockFinder::take_block(std::size_t begin) {
   for (std::size_t a = 0; a < kAxes; ++a) {
     window.values[a] = run_[a].data() + begin;
   }
-  if (!fit_lines(window)) {
+  if (!fit_lines(begin, window)) {
     return false;
   }
   StillBlock block = measure(window);
@@ -184,15 +233,61 @@ bool StillBlockFinder::take_block(std::size_t begin) {
   return true;
 }
 
+Line StillBlockFinder::line_of_cells(std::size_t axis, std::size_t first, Window& window) const {
+  const int count = block_samples_ / step_samples_;
+  std::int64_t sum = 0;
+  std::int64_t moment = 0;  // of value times sample number within the window
+  std::int16_t low = std::numeric_limits<std::int16_t>::max();
+  std::int16_t high = std::numeric_limits<std::int16_t>::min();
+  for (int i = 0; i < count; ++i) {
+    const Cell& cell = cells_[axis][first + static_cast<std::size_t>(i)];
+    sum += cell.sum;
+    moment += cell.moment + static_cast<std::int64_t>(i) * step_samples_ * cell.sum;
+    low = std::min(low, cell.low);
+    high = std::max(high, cell.high);
+  }
+  window.low[axis] = low;
+  window.high[axis] = high;
+  return {static_cast<double>(sum) / block_samples_,
+          0.5 * static_cast<double>(2 * moment - (block_samples_ - 1) * sum) / sum_square_index_};
+}
+
+Line StillBlockFinder::line_of(std::size_t axis, std::size_t begin, Window& window) const {
+  if (in_cells_) {
+    return line_of_cells(axis, begin / static_cast<std::size_t>(step_samples_), window);
+  }
+  const auto [low, high] =
+      std::minmax_element(window.values[axis], window.values[axis] + block_samples_);
+  window.low[axis] = *low;
+  window.high[axis] = *high;
+  return fit_line(window.values[axis], block_samples_, sum_square_index_);
+}
+
+// Values that spread this far have a residual of `widest_g` whatever line they lie about: half of
+// the spread that the line's own rise does not explain. A count more, for the rounding of the
+// residuals themselves (single precision).
+bool StillBlockFinder::cannot_be_still(const Window& window, std::size_t axis,
+                                       double widest_g) const {
+  const double spread = static_cast<double>(window.high[axis]) - window.low[axis];
+  const double rise = std::abs(window.lines[axis].slope) * (block_samples_ - 1);
+  return g_per_count_ * ((spread - rise) / 2 - 1) >= widest_g;
+}
+
 // Criteria 1 and 2. False where the window cannot be a block, noisy or not.
-bool StillBlockFinder::fit_lines(Window& window) const {
+bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
   for (std::size_t a = 0; a < kAxes; ++a) {
-    window.lines[a] = fit_line(window.values[a], block_samples_, sum_square_index_);
+    window.lines[a] = line_of(a, begin, window);
     if (std::abs(window.lines[a].slope) * g_per_count_ >= options_.max_slope_g_per_sample) {
       return false;
     }
   }
   const double widest = std::max(options_.max_residual_g, kNoiseSigmas * options_.noisy_sd_g);
+  const double limit_g = options_.noisy_sd_g > 0 ? widest : options_.max_residual_g;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    if (cannot_be_still(window, a, limit_g)) {
+      return false;
+    }
+  }
   for (std::size_t a = 0; a < kAxes; ++a) {
     const double largest_g = g_per_count_ * static_cast<double>(largest_residual(
                                                 window.values[a], centred_.data(), block_samples_,
@@ -245,6 +340,11 @@ bool StillBlockFinder::is_noise(const Window& window) const {
 
 // Criterion 3.
 bool StillBlockFinder::has_zeros(const Window& window) const {
+  const auto may_be_zero = [&](std::size_t a) { return window.low[a] <= 0 && window.high[a] >= 0; };
+  if (options_.strict_nonzero ? !may_be_zero(0) && !may_be_zero(1) && !may_be_zero(2)
+                              : !may_be_zero(0) || !may_be_zero(1) || !may_be_zero(2)) {
+    return false;
+  }
   const auto& [x, y, z] = window.values;
   for (std::size_t i = 0; i < centred_.size(); ++i) {
     if (options_.strict_nonzero ? x[i] == 0 || y[i] == 0 || z[i] == 0
@@ -256,10 +356,12 @@ bool StillBlockFinder::has_zeros(const Window& window) const {
 }
 
 bool StillBlockFinder::has_clipped(const Window& window) const {
-  return std::ranges::any_of(window.values, [&](const std::int16_t* values) {
-    return std::any_of(values, values + block_samples_,
-                       [&](std::int16_t value) { return reversal_->clipped(value); });
-  });
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    if (reversal_->clipped(window.low[a]) || reversal_->clipped(window.high[a])) {
+      return true;
+    }
+  }
+  return false;
 }
 
 void StillBlockFinder::keep(StillBlock block) {

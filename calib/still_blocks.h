@@ -114,15 +114,30 @@ class StillBlockFinder {
   // A candidate for a block, and what is found out about it.
   struct Window {
     PerAxis<const std::int16_t*> values{};
+    // The smallest and the largest of the values.
+    PerAxis<std::int16_t> low{};
+    PerAxis<std::int16_t> high{};
     PerAxis<Line> lines;
     PerAxis<double> largest_g{};  // residual
     PerAxis<double> sd_g{};
     bool within_paper = true;
   };
+  // One step's samples of one axis, from which the windows that overlap them are put together.
+  // Sums are exact, so a window has the same line whatever way it is made.
+  struct Cell {
+    std::int64_t sum = 0;
+    std::int64_t moment = 0;  // of value times sample number within the cell
+    std::int16_t low = 0;
+    std::int16_t high = 0;
+  };
   StillBlockFinder(const Reversal& reversal, double rate_hz, const StillBlockOptions& options);
+  void make_cells();
+  Line line_of_cells(std::size_t axis, std::size_t first, Window& window) const;
+  Line line_of(std::size_t axis, std::size_t begin, Window& window) const;
+  bool cannot_be_still(const Window& window, std::size_t axis, double widest_g) const;
   void search();
   bool take_block(std::size_t begin);
-  bool fit_lines(Window& window) const;
+  bool fit_lines(std::size_t begin, Window& window) const;
   StillBlock measure(Window& window) const;
   bool is_noise(const Window& window) const;
   bool has_zeros(const Window& window) const;
@@ -137,6 +152,9 @@ class StillBlockFinder {
   double g_per_count_;
   PerAxis<std::vector<std::int16_t>> run_;  // the samples of the run that are not yet behind us
   std::size_t next_ = 0;                    // where the next window starts in run_
+  // Cells of run_, where a block is a whole number of steps: then every window begins with a cell.
+  bool in_cells_ = false;
+  PerAxis<std::vector<Cell>> cells_;
   struct Mark {
     std::size_t index;  // into run_
     double time_s;

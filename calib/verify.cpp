@@ -123,6 +123,7 @@ Verification measure(std::span<const StillBlock> used, const Calibration& chosen
 void check_uncertainty(const BlockFit& fit, Verification& out) {
   const bool drifts = out.drift_mg && !(*out.drift_mg <= Limits::drift_mg);
   if (drifts) {
+    out.contradicted = true;
     out.reasons.push_back(fmt::format(
         "the zeros drift while the unit lies still, by up to {:.1f} mg to either end of the file "
         "(limit {:.1f} mg), as when it warms up; let it take the room's temperature for half an "
@@ -208,6 +209,7 @@ void check_repeatability(std::span<const StillBlock> used, const BlockFit& fit,
     // increases itself.
     const double limit = std::max(Limits::halves_mg, 4 * fit.noise_sd_mg);
     if (!out.halves_mg || !(*out.halves_mg <= limit)) {
+      out.contradicted = true;
       out.reasons.push_back(fmt::format(
           "the earlier and the later half of the data give constants {:.1f} mg apart (limit {:.1f} "
           "mg)",
@@ -249,12 +251,14 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
   if (!fit.fit.converged) {
     out.reasons.emplace_back("least squares did not converge");
   }
-  check_range(file_constants, chosen, out.reasons);
   check_uncertainty(fit, out);
+  const std::size_t not_against = out.reasons.size();
+  check_range(file_constants, chosen, out.reasons);
   check_scatter(fit, used.size(), out);
   if (search) {
     check_agreement(fit, *search, out);
   }
+  out.contradicted = out.contradicted || out.reasons.size() > not_against;
   const bool tested = out.held_out_rms_mg.has_value() &&
                       out.held_out_directions >= Limits::held_out_directions &&
                       out.redundancy >= Limits::held_out_directions;
@@ -263,6 +267,7 @@ Verification verify(std::span<const StillBlock> used, const Calibration& file_co
     return out;
   }
   if (!(*out.held_out_rms_mg <= Limits::held_out_mg)) {
+    out.contradicted = true;
     out.reasons.push_back(
         fmt::format("directions that the fit had not seen are predicted to {:.1f} mg only (limit "
                     "{:.1f} mg)",

@@ -82,6 +82,9 @@ struct Verification {
   bool verified = false;
   Verdict verdict = Verdict::not_verified;
   std::vector<std::string> reasons;  // why not; and for the weaker verdicts what they rest on
+  // The data speak against the constants, or the zeros drift: more blocks are no remedy. False
+  // where the data only do not suffice.
+  bool contradicted = false;
   std::vector<std::string> missing_directions;
   std::optional<double> held_out_rms_mg;
   int held_out_directions = 0;

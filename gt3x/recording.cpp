@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/container/inflating_source.h"
+#include "gt3x/container/read_ahead.h"
 #include "gt3x/container/zip_bridge.h"
 #include "gt3x/recording_archive.h"
 
@@ -29,62 +31,43 @@ bool plain_name(std::string_view name) {
   });
 }
 
-// One entry being read.
-class EntrySource final : public ByteSource {
- public:
-  EntrySource(std::shared_ptr<Recording> recording, std::string where,
-              std::optional<Error>* failure, zip_file_t* file, std::uint64_t size)
-      : recording_(std::move(recording)),
-        where_(std::move(where)),
-        failure_(failure),
-        file_(file),
-        size_(size) {}
-  EntrySource(const EntrySource&) = delete;
-  EntrySource& operator=(const EntrySource&) = delete;
-  ~EntrySource() override { zip_fclose(file_); }
+// From this size on an entry is unpacked on a thread of its own; below, the thread costs more.
+constexpr std::uint64_t kReadAheadFrom = std::uint64_t{4} << 20;
 
-  std::optional<std::uint64_t> size() const override { return size_; }
+}  // namespace
+
+// The packed bytes of one entry.
+class Recording::PackedEntry final : public ByteSource {
+ public:
+  PackedEntry(std::shared_ptr<Archive> archive, zip_file_t* file, std::string where)
+      : archive_(std::move(archive)), file_(file), where_(std::move(where)) {}
+  PackedEntry(const PackedEntry&) = delete;
+  PackedEntry& operator=(const PackedEntry&) = delete;
+  ~PackedEntry() override {
+    const std::lock_guard lock(archive_->mutex);
+    zip_fclose(file_);
+  }
 
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
-    if (broken_) {
-      return fail(*broken_);
-    }
+    const std::lock_guard lock(archive_->mutex);
     const zip_int64_t count = zip_fread(file_, out.data(), out.size());
-    if (count < 0) {
-      if (*failure_) {
-        broken_ = **failure_;
-      } else {
-        zip_error_t* error = zip_file_get_error(file_);
-        broken_ = Error{ErrorCode::bad_data,
-                        zip_error_code_zip(error) == ZIP_ER_CRC
-                            ? "the entry is damaged: its CRC does not hold"
-                            : fmt::format("the entry is damaged: {}", zip_error_strerror(error)),
-                        where_, std::string(kDownloadAgain)};
-      }
-      return fail(*broken_);
+    if (count >= 0) {
+      return static_cast<std::size_t>(count);
     }
-    done_ += static_cast<std::uint64_t>(count);
-    // libzip compares sizes too; said here once more because samples hang on it.
-    if (done_ > size_ || (count == 0 && done_ != size_)) {
-      broken_ = Error{ErrorCode::bad_data,
-                      fmt::format("the entry is damaged: it should have {} bytes", size_), where_,
-                      std::string(kDownloadAgain)};
-      return fail(*broken_);
+    if (archive_->failure) {
+      return fail(*archive_->failure);
     }
-    return static_cast<std::size_t>(count);
+    return fail(
+        ErrorCode::bad_data,
+        std::string("the entry is damaged: ") + zip_error_strerror(zip_file_get_error(file_)),
+        where_, std::string(kDownloadAgain));
   }
 
  private:
-  std::shared_ptr<Recording> recording_;  // keeps the archive open
-  std::string where_;
-  std::optional<Error>* failure_;
+  std::shared_ptr<Archive> archive_;  // stays open
   zip_file_t* file_;
-  std::uint64_t size_;
-  std::uint64_t done_ = 0;
-  std::optional<Error> broken_;
+  std::string where_;
 };
-
-}  // namespace
 
 zip_int64_t Recording::Archive::origin(void* user, void* data, zip_uint64_t length,
                                        zip_source_cmd_t command) {
@@ -255,7 +238,12 @@ Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& nam
   if (!index) {
     return archive_->bad(fmt::format("the archive holds no {}", printable(name, 60)));
   }
-  zip_file_t* file = zip_fopen_index(archive_->zip, *index, 0);
+  const std::lock_guard lock(archive_->mutex);
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  zip_file_t* file = zip_stat_index(archive_->zip, *index, 0, &stat) == 0
+                         ? zip_fopen_index(archive_->zip, *index, ZIP_FL_COMPRESSED)
+                         : nullptr;
   if (file == nullptr) {
     if (archive_->failure) {
       return fail(*archive_->failure);
@@ -263,9 +251,17 @@ Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& nam
     return archive_->bad(fmt::format("entry {} cannot be opened: {}", printable(name, 60),
                                      zip_strerror(archive_->zip)));
   }
-  return std::make_unique<EntrySource>(std::make_shared<Recording>(Recording(archive_)),
-                                       archive_->path + ":" + name, &archive_->failure, file,
-                                       archive_->entries[*index].size);
+  EntryFacts facts;
+  facts.packing = stat.comp_method == ZIP_CM_DEFLATE ? EntryFacts::Packing::deflate
+                                                     : EntryFacts::Packing::store;
+  facts.size = archive_->entries[*index].size;
+  facts.crc32 = stat.crc;
+  facts.where = archive_->path + ":" + name;
+  auto unpacked = unpack_entry(std::make_unique<PackedEntry>(archive_, file, facts.where), facts);
+  if (facts.size < kReadAheadFrom) {
+    return unpacked;
+  }
+  return std::make_unique<ReadAhead>(std::move(unpacked));
 }
 
 Result<LogReader> Recording::open_log() {

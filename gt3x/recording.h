@@ -8,8 +8,10 @@
 // The file is read through the FileSystem that was given, piece by piece; nothing is unpacked to
 // disk and no entry is held in memory whole, but info.txt.
 //
-// One object, and everything opened from it, belongs to one thread; the file stays open as long as
-// any of them lives. The original is never changed: there is no way to write through this.
+// One object, and everything opened from it, belongs to one thread; large entries are unpacked on
+// threads of their own, which end with what open_entry() and open_log() gave. The file stays open
+// as long as any of them lives. The original is never changed: there is no way to write through
+// this.
 #pragma once
 
 #include <cstdint>
@@ -60,6 +62,7 @@ class Recording {
  private:
   friend class RecordingWriter;
   struct Archive;
+  class PackedEntry;
   explicit Recording(std::shared_ptr<Archive> archive);
   std::shared_ptr<Archive> archive_;
 };

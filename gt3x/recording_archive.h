@@ -1,6 +1,8 @@
 // What Recording holds, and RecordingWriter::copy() reaches into (private to this room).
 #pragma once
 
+#include <mutex>
+
 #include <zip.h>
 
 #include "gt3x/recording.h"
@@ -26,6 +28,9 @@ struct Recording::Archive {
   std::optional<std::size_t> index_of(const std::string& name) const;
   tl::unexpected<Error> bad(std::string what, std::string hint = {}) const;
 
+  // Every call of libzip that touches the file: entries are read by threads of their own
+  // (read_ahead.h). Recursive, because libzip calls back.
+  std::recursive_mutex mutex;
   std::unique_ptr<ReadableFile> file;
   std::string path;
   std::uint64_t at = 0;

@@ -1,6 +1,11 @@
 #include "gt3x/log/samples.h"
 
 #include <algorithm>
+#include <array>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 namespace sixpoint::gt3x {
 namespace {
@@ -31,10 +36,9 @@ std::int16_t extend12(unsigned bits) {
   return static_cast<std::int16_t>(static_cast<int>(bits ^ 0x800U) - 0x800);
 }
 
-void unpack12(std::span<const std::uint8_t> payload, std::vector<Counts>& samples,
-              const PerAxis<std::size_t>& order) {
-  const std::size_t count = payload.size() * 2 / 9;  // nine nibbles to a sample
-  samples.resize(count);
+// One value after the other, from nibble `nibble` on: what every other way is tested against.
+void unpack12_plain(const std::uint8_t* payload, std::span<Counts> samples,
+                    const PerAxis<std::size_t>& order) {
   std::size_t nibble = 0;
   for (Counts& sample : samples) {
     for (const std::size_t axis : order) {
@@ -47,6 +51,75 @@ void unpack12(std::span<const std::uint8_t> payload, std::vector<Counts>& sample
       nibble += 3;
     }
   }
+}
+
+#if defined(__x86_64__)
+
+// Eight samples are 24 values in 36 bytes. Each of three shuffles makes eight values: value v of
+// the disk's order lies in bytes 3v / 2 and the one behind, which become one big-endian word; an
+// even value is its upper 12 bits, an odd one its lower 12.
+constexpr std::size_t kGroup = 8;
+constexpr std::size_t kGroupBytes = 36;
+constexpr std::array<std::size_t, 3> kLoadAt = {0, 12, 20};  // 16 bytes from there hold all eight
+
+struct Shuffles {
+  alignas(16) std::array<std::array<std::uint8_t, 16>, 3> bytes;
+  alignas(16) std::array<std::array<std::int16_t, 8>, 3> shift_left;  // as a factor: 1 or 16
+};
+
+constexpr Shuffles shuffles_of(const PerAxis<std::size_t>& order) {
+  Shuffles made{};
+  PerAxis<std::size_t> place{};  // of an axis on disk
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    place[order[i]] = i;
+  }
+  for (std::size_t out = 0; out < kGroup * kAxes; ++out) {
+    const std::size_t value = out / kAxes * kAxes + place[out % kAxes];
+    const std::size_t part = out / 8;
+    const std::size_t byte = value * 3 / 2 - kLoadAt[part];
+    // Little-endian lanes: the word's upper byte is the second one.
+    made.bytes[part][out % 8 * 2] = static_cast<std::uint8_t>(byte + 1);
+    made.bytes[part][out % 8 * 2 + 1] = static_cast<std::uint8_t>(byte);
+    made.shift_left[part][out % 8] = value % 2 == 0 ? 1 : 16;
+  }
+  return made;
+}
+constexpr Shuffles kActivityShuffles = shuffles_of(kActivityOrder);
+constexpr Shuffles kActivity3Shuffles = shuffles_of(kActivity3Order);
+
+// Whole groups, as many as the bytes allow; returns how many samples.
+[[gnu::target("ssse3")]] std::size_t unpack12_ssse3(std::span<const std::uint8_t> payload,
+                                                    std::span<Counts> samples,
+                                                    const Shuffles& shuffles) {
+  const auto load = [](const void* at) { return _mm_loadu_si128(static_cast<const __m128i*>(at)); };
+  std::size_t done = 0;
+  const std::uint8_t* from = payload.data();
+  for (; done + kGroup <= samples.size(); done += kGroup, from += kGroupBytes) {
+    for (std::size_t part = 0; part < 3; ++part) {
+      const __m128i words =
+          _mm_shuffle_epi8(load(from + kLoadAt[part]), load(shuffles.bytes[part].data()));
+      const __m128i values =
+          _mm_srai_epi16(_mm_mullo_epi16(words, load(shuffles.shift_left[part].data())), 4);
+      _mm_storeu_si128(reinterpret_cast<__m128i*>(samples[done].data() + part * 8), values);
+    }
+  }
+  return done;
+}
+
+#endif
+
+void unpack12(std::span<const std::uint8_t> payload, std::vector<Counts>& samples,
+              const PerAxis<std::size_t>& order) {
+  samples.resize(payload.size() * 2 / 9);  // nine nibbles to a sample
+  std::size_t done = 0;
+#if defined(__x86_64__)
+  static const bool has_ssse3 = __builtin_cpu_supports("ssse3") != 0;
+  if (has_ssse3) {
+    done = unpack12_ssse3(payload, samples,
+                          order == kActivityOrder ? kActivityShuffles : kActivity3Shuffles);
+  }
+#endif
+  unpack12_plain(payload.data() + done * 9 / 2, std::span(samples).subspan(done), order);
 }
 
 }  // namespace
@@ -67,6 +140,16 @@ void append_activity2(Bytes& payload, std::span<const Counts> samples) {
       payload.push_back(static_cast<std::uint8_t>(bits >> 8));
     }
   }
+}
+
+CountRange range_of(std::span<const Counts> samples) {
+  CountRange range;
+  const std::int16_t* const values = samples.empty() ? nullptr : samples.front().data();
+  for (std::size_t i = 0; i < samples.size() * kAxes; ++i) {
+    range.low = std::min(range.low, values[i]);
+    range.high = std::max(range.high, values[i]);
+  }
+  return range;
 }
 
 void unpack_activity(std::span<const std::uint8_t> payload, std::vector<Counts>& samples) {

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -37,5 +38,13 @@ void append_activity3(Bytes& payload, std::span<const Counts> samples);
 void unpack_activity(std::span<const std::uint8_t> payload, std::vector<Counts>& samples);
 void unpack_activity2(std::span<const std::uint8_t> payload, std::vector<Counts>& samples);
 void unpack_activity3(std::span<const std::uint8_t> payload, std::vector<Counts>& samples);
+
+// The smallest and the largest count of all axes: whether any sample can have been clipped is seen
+// from these. Without samples low is above high.
+struct CountRange {
+  std::int16_t low = std::numeric_limits<std::int16_t>::max();
+  std::int16_t high = std::numeric_limits<std::int16_t>::min();
+};
+CountRange range_of(std::span<const Counts> samples);
 
 }  // namespace sixpoint::gt3x

@@ -54,6 +54,8 @@ Result<RepairReport> report_of(const Json& json) {
   report.still_error_after_mg = optional_of<double>(from.at("still_error_mg").at("after"));
   report.rotation_undone = from.at("rotation_undone");
   report.forced = from.at("forced");
+  report.cross_axis_applied = from.at("cross_axis_applied");
+  report.sample_uncertainty_mg = optional_of<PerAxis<double>>(from.at("sample_uncertainty_mg"));
   report.source = parse_source_used(from.at("source"));
   report.constants_id = optional_of<std::string>(from.at("constants_id")).value_or("");
   report.input_sha256 = optional_of<std::string>(from.at("input_sha256")).value_or("");

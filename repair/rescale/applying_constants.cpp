@@ -60,9 +60,8 @@ std::string why_of(const Candidate& best, const std::vector<Candidate>& all,
   if (same_method.size() == 1) {
     return fmt::format("applies: {} comes first", best.method());
   }
-  const bool newest = std::ranges::none_of(same_method, [&](const Candidate& other) {
-    return other.row->made_at > best.row->made_at;
-  });
+  const bool newest = std::ranges::none_of(
+      same_method, [&](const Candidate& other) { return other.row->made_at > best.row->made_at; });
   return newest ? fmt::format("applies: the latest by {}", best.method())
                 : fmt::format("applies: the smallest uncertainty by {} ({:.1f} mg)", best.method(),
                               best.uncertainty_mg);
@@ -75,9 +74,8 @@ std::optional<std::string> conflict_with(const Candidate& best, const std::vecto
         !best.record) {
       continue;
     }
-    const auto between =
-        calib::agreement(best.record->calibration, best.record->uncertainty,
-                         other.record->calibration, other.record->uncertainty);
+    const auto between = calib::agreement(best.record->calibration, best.record->uncertainty,
+                                          other.record->calibration, other.record->uncertainty);
     if (!between.agree()) {
       return fmt::format(
           "the set {} by {} is older than the set {} by {} and disagrees with it ({}): decide with "

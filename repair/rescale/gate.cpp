@@ -97,10 +97,14 @@ std::string reason_of(GateRow row, const GateEvidence& evidence) {
 
 }  // namespace
 
-GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh) {
+GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh,
+                           const PerAxis<double>& cross_axis) {
+  calib::CrossAxisMap map;
+  map.calibration = fresh;
+  map.cross_axis = cross_axis;
   std::vector<calib::StillBlock> after = survey.blocks;
   for (calib::StillBlock& block : after) {
-    block.mean_g = fresh.to_g(block.mean_lsb);
+    block.mean_g = map.to_g(block.mean_lsb);
   }
   std::vector<calib::DirectionCell> cells = calib::cells_of(after);
   return {calib::number_neighbourhoods(cells, fresh), survey.magnitude.mean_mg,

@@ -53,7 +53,9 @@ struct GateEvidence {
   // leads to. False where that cannot be told (calib/scaling.h, PlausibilityTally).
   bool counts_are_the_units_own = false;
 };
-GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh);
+// `cross_axis`: the terms xy, xz, yz that are applied with the constants; all zero for none.
+GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh,
+                           const PerAxis<double>& cross_axis = {});
 
 enum class GateRow { not_checked, worse, no_better, too_much_left, ambiguous, weak, helps };
 struct GateAnswer {

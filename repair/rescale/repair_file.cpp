@@ -10,9 +10,11 @@
 #include "calib/agreement.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
+#include "repair/rescale/applied_map.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/earlier_output.h"
 #include "repair/rescale/gate.h"
+#include "repair/rescale/repair_mark.h"
 #include "repair/rescale/rescaled_log.h"
 
 namespace sixpoint::repair {
@@ -24,7 +26,6 @@ using Json = nlohmann::ordered_json;
 constexpr std::array<std::string_view, 6> kStatusNames = {
     "repaired", "not_affected", "not_repairable", "already_repaired", "outdated", "failed"};
 
-constexpr std::uint64_t kLargestMark = 1U << 20;
 // Reasons are JSON values that other programs may read, so their words stay as they are.
 constexpr const char* kNotDecided =
     "what cannot be told affected is not mended: find out what is missing first";
@@ -36,81 +37,12 @@ constexpr const char* kMappedByLine =
     "the counts cannot have come from whole raw counts by the file's constants (averaged, mended "
     "before, or resampled): {} of them mapped by the straight line";
 
-Json still_error_to_json(const RepairReport& report) {
-  return {{"before", calib::number_or_null(report.still_error_before_mg)},
-          {"after", calib::number_or_null(report.still_error_after_mg)}};
-}
-
-Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& chosen,
-             const Survey& survey, const std::string& recipe, UtcTime now) {
-  Json mark;
-  mark["schema"] = "sixpoint/repair-mark/1";
-  mark["repaired_at"] = to_iso8601(now);
-  mark["input_sha256"] = report.input_sha256;
-  mark["recipe"] = recipe;
-  mark["serial"] = report.serial;
-  mark["method"] = report.method;
-  mark["rotation_undone"] = report.rotation_undone;
-  mark["constants_before"] = Json::array();
-  for (const StoredConstants& constants : survey.constants) {
-    mark["constants_before"].push_back(calib::to_json(constants));
-  }
-  mark["constants_after"] = chosen ? calib::to_json(chosen->record) : Json(nullptr);
-  mark["constants_id"] = report.constants_id.empty() ? Json(nullptr) : Json(report.constants_id);
-  mark["source"] = report.source ? report.source->to_json() : Json(nullptr);
-  mark["forced"] = report.forced;
-  mark["still_error_mg"] = still_error_to_json(report);
-  if (report.forced) {
-    mark["reasons"] = report.reasons;
-  }
-  return mark;
-}
-
-// The mark as a record of the log (kRepairMarkType): who it was, by what, and when. The vendor's
-// own METADATA records begin and end with the same members.
-std::string mark_record_of(const RepairReport& report, UtcTime now) {
-  const Json record = {{"MetadataType", kRepairMarkType},
-                       {"Schema", "sixpoint/repair-mark/1"},
-                       {"RepairedAt", to_iso8601(now)},
-                       {"InputSha256", report.input_sha256},
-                       {"Serial", report.serial},
-                       {"Method", report.method},
-                       {"ConstantsId", report.constants_id},
-                       {"RotationUndone", report.rotation_undone},
-                       {"Forced", report.forced},
-                       {"Parsed", false},
-                       {"JSON", nullptr}};
-  return record.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 // Entries that a unit or its software writes beside the samples and that do not depend on them.
 bool is_independent_of_samples(const std::string& name) {
   constexpr std::array<std::string_view, 8> kNames = {"log.bin",      "info.txt",    "lux.bin",
                                                       "battery.bin",  "eeprom.bin",  "firmware.bin",
                                                       "capsense.bin", "metadata.bin"};
   return std::ranges::find(kNames, name) != kNames.end();
-}
-
-// The mark of a repaired file; nothing where there is no such file or mark.
-std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
-  auto recording = gt3x::Recording::open(files, path);
-  if (!recording || !recording->has_entry(kRepairMark)) {
-    return std::nullopt;
-  }
-  auto source = recording->open_entry(kRepairMark);
-  if (!source) {
-    return std::nullopt;
-  }
-  const auto bytes = gt3x::read_all(**source, kLargestMark);
-  if (!bytes) {
-    return std::nullopt;
-  }
-  auto mark = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
-  return mark.is_object() ? std::optional(std::move(mark)) : std::nullopt;
-}
-
-std::string text_in(const Json& mark, const char* key) {
-  return mark.contains(key) && mark[key].is_string() ? mark[key].get<std::string>() : "";
 }
 
 // The writer destroys its source at commit(); the log's tally is needed after that.
@@ -219,7 +151,11 @@ class Repair {
   // Whether the constants that were chosen may be used on this file: the gate, and what its own
   // still periods say.
   bool may_write() {
-    const GateEvidence evidence = gate_evidence(survey_, chosen_->record.calibration);
+    map_ = applied_map(chosen_->record, survey_);
+    if (!map_->why.empty()) {
+      report_.reasons.push_back(map_->why);
+    }
+    const GateEvidence evidence = gate_evidence(survey_, map_->calibration, map_->cross_axis);
     const GateAnswer answer = gate(evidence, options_.force);
     if (evidence.directions > 0) {
       report_.still_error_after_mg = evidence.after_mg;
@@ -241,6 +177,8 @@ class Repair {
       report_.forced = false;
       return false;
     }
+    report_.cross_axis_applied = map_->has_terms();
+    report_.sample_uncertainty_mg = map_->sample_uncertainty_mg;
     return true;
   }
 
@@ -251,9 +189,12 @@ class Repair {
     if (!own || !own->usable()) {
       return std::nullopt;
     }
-    const calib::Agreement between =
-        calib::agreement(chosen_->record.calibration, chosen_->record.uncertainty,
-                         *own->calibration, own->uncertainty);
+    const calib::ConstantsRecord& record = chosen_->record;
+    const SensorsOwn theirs =
+        sensors_own(record.calibration, record.uncertainty, record.cross_axis);
+    const SensorsOwn files = sensors_own(*own->calibration, own->uncertainty, own->cross_axis);
+    const calib::Agreement between = calib::agreement(theirs.calibration, theirs.uncertainty,
+                                                      files.calibration, files.uncertainty);
     return between.agree() ? std::nullopt
                            : std::optional(fmt::format(
                                  "the constants disagree with the file's own still periods: {}",
@@ -262,8 +203,9 @@ class Repair {
 
   RescaledLogOptions log_options() const {
     RescaledLogOptions options;
-    if (chosen_.has_value()) {
-      options.fresh = chosen_->record.calibration;
+    if (map_.has_value()) {
+      options.fresh = map_->calibration;
+      options.cross_axis = map_->cross_axis;
     }
     options.accel_scale_lsb_per_g = survey_.accel_scale_lsb_per_g;
     options.rate_hz = survey_.rate_hz;
@@ -422,11 +364,15 @@ class Repair {
                   "choose another folder, or --resume to go on with an earlier run");
     }
     report_.reasons.emplace_back(kDoneBefore);
+    SIXPOINT_ASSIGN(const auto recording, gt3x::Recording::open(env_.files, report_.input));
+    name_what_was_not_repaired(recording, 0);
     report_.resumed = true;
     report_.method = text_in(mark, "method");
     report_.constants_id = text_in(mark, "constants_id");
     report_.source = parse_source_used(mark.value("source", Json(nullptr)));
     report_.forced = mark.value("forced", Json(false)) == Json(true);
+    report_.cross_axis_applied = mark.value("cross_axis_applied", Json(false)) == Json(true);
+    report_.sample_uncertainty_mg = three_in(mark, "sample_uncertainty_mg");
     if (const auto then = parse_iso8601(text_in(mark, "repaired_at")); then) {
       report_.repaired_at = *then;
     }
@@ -448,6 +394,7 @@ class Repair {
   RepairOptions options_;
   Survey survey_;
   std::optional<ChosenConstants> chosen_;
+  std::optional<AppliedMap> map_;  // of chosen_
   RepairReport report_;
 };
 
@@ -494,6 +441,8 @@ Json RepairReport::to_json() const {
           {"still_error_mg", still_error_to_json(*this)},
           {"rotation_undone", rotation_undone},
           {"forced", forced},
+          {"cross_axis_applied", cross_axis_applied},
+          {"sample_uncertainty_mg", sample_uncertainty_to_json(*this)},
           {"source", source ? source->to_json() : Json(nullptr)},
           {"constants_id", optional_text(constants_id)},
           {"input_sha256", optional_text(input_sha256)},

@@ -119,6 +119,9 @@ struct RepairReport {
   std::string constants_id;
   std::optional<SourceUsed> source;
   bool forced = false;  // written although the gate or the file's own still periods said no
+  bool cross_axis_applied = false;  // not only six constants (applied_map.h)
+  // Standard uncertainty of a sample, X Y Z; absent where the constants state none.
+  std::optional<PerAxis<double>> sample_uncertainty_mg;
   std::optional<UtcTime> repaired_at;  // as its mark says
   std::string input_sha256;
   std::string output_sha256;

@@ -74,6 +74,7 @@ Status RescaledLog::set_constants(const StoredConstants& constants) {
   calib::Rescale::Options rescale;
   rescale.output = options_.wide ? calib::RecordWidth::bits16 : limit;
   rescale.affine = options_.affine;
+  rescale.cross_axis = options_.cross_axis;
   SIXPOINT_ASSIGN(auto map, calib::Rescale::make(reversal, *options_.fresh, rescale));
   maps_.emplace_back(constants, std::move(map));
   return {};

@@ -34,6 +34,8 @@ namespace sixpoint::repair {
 struct RescaledLogOptions {
   // The constants to apply. Without them only the rotation is undone.
   std::optional<calib::Calibration> fresh;
+  // The cross-axis terms that belong to them: xy, xz, yz. All zero: none.
+  PerAxis<double> cross_axis{};
   double accel_scale_lsb_per_g = 256;
   double rate_hz = 30;
   // Scales the samples that stand before the first PARAMETERS record.

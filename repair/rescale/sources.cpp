@@ -66,12 +66,12 @@ std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const
 }
 
 std::string digest_of(const calib::ConstantsRecord& record) {
-  const nlohmann::ordered_json content = {
-      {"serial", record.serial},
-      {"filter", calib::to_string(record.filter)},
-      {"constants", calib::to_json(record.calibration)},
-      {"cross_axis",
-       record.cross_axis ? calib::to_json(*record.cross_axis) : nlohmann::ordered_json(nullptr)}};
+  nlohmann::ordered_json content = {{"serial", record.serial},
+                                    {"filter", calib::to_string(record.filter)},
+                                    {"constants", calib::to_json(record.calibration)}};
+  if (record.cross_axis) {
+    content["cross_axis"] = calib::to_json(*record.cross_axis);
+  }
   return text_sha256(content.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace))
       .substr(0, 32);
 }

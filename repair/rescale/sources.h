@@ -58,8 +58,8 @@ std::vector<SourceKind> sources_in_order(const NamedSources& named);
 std::optional<std::string> why_unfit(const calib::ConstantsRecord& record, const FileFacts& file,
                                      bool allow_prior);
 
-// Two sets have one digest when they do the same to a file: serial number, filter and constants.
-// 32 hex digits.
+// Two sets have one digest when they do the same to a file: serial number, filter, constants and
+// cross-axis terms.// 32 hex digits.
 std::string digest_of(const calib::ConstantsRecord& record);
 
 // Where the constants of a repair came from, for people.

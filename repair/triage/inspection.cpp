@@ -125,8 +125,11 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
     }
   }
   found.samples += item.counts.size();
-  found.clipped_samples += static_cast<std::uint64_t>(std::ranges::count_if(
-      item.counts, [&](const gt3x::Counts& sample) { return item.clipped(sample); }));
+  if (const auto all = gt3x::range_of(item.counts);
+      all.low <= item.limit_min || all.high >= item.limit_max) {
+    found.clipped_samples += static_cast<std::uint64_t>(std::ranges::count_if(
+        item.counts, [&](const gt3x::Counts& sample) { return item.clipped(sample); }));
+  }
   if (found.rate_hz.value_or(0) > 0) {
     found.end_s = std::max(
         found.end_s, item.unix_time + static_cast<double>(item.counts.size()) / *found.rate_hz);

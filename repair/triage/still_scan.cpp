@@ -74,7 +74,6 @@ void StillScan::push(std::uint32_t unix_time, std::span<const gt3x::Counts> samp
     break_run();
   }
   last_time_ = unix_time;
-  calib::tally(*reversal_, samples, plausibility_);
   finder_->push(unix_time, samples);
 }
 
@@ -103,6 +102,8 @@ void StillScan::close_finder() {
     affine_lsb_.push_back(affine_lsb);
   }
   const calib::StillBlockTally& tally = finder_->tally();
+  plausibility_.counts += tally.plausibility.counts;
+  plausibility_.impossible += tally.plausibility.impossible;
   tally_.samples += tally.samples;
   tally_.runs += tally.runs;
   tally_.blocks += tally.blocks;

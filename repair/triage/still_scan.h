@@ -58,6 +58,7 @@ class StillScan {
   // straight line's inverse of the mean.
   std::vector<calib::StillBlock> finish();
 
+  // Complete after finish().
   const calib::PlausibilityTally& plausibility() const { return plausibility_; }
   const calib::StillBlockTally& tally() const { return tally_; }
 

@@ -247,10 +247,15 @@ class LogSurvey {
     }
     ++result_.sample_records;
     result_.samples += samples_.size();
-    for (const gt3x::Counts& sample : samples_) {
-      const auto [low, high] = std::ranges::minmax(sample);
-      result_.clipped_samples += low <= gt3x::kMin12 || high >= gt3x::kMax12 ? 1 : 0;
-      result_.beyond_12_bits = result_.beyond_12_bits || low < gt3x::kMin12 || high > gt3x::kMax12;
+    if (const auto all = gt3x::range_of(samples_);
+        all.low <= gt3x::kMin12 || all.high >= gt3x::kMax12) {
+      result_.beyond_12_bits =
+          result_.beyond_12_bits || all.low < gt3x::kMin12 || all.high > gt3x::kMax12;
+      result_.clipped_samples += static_cast<std::uint64_t>(
+          std::ranges::count_if(samples_, [](const gt3x::Counts& sample) {
+            const auto [low, high] = std::ranges::minmax(sample);
+            return low <= gt3x::kMin12 || high >= gt3x::kMax12;
+          }));
     }
     if (rotated_) {
       undo_rotation(samples_, record.is(gt3x::RecordType::activity) ? calib::RecordWidth::bits12

@@ -96,7 +96,7 @@ std::vector<Certificate::Pose> read_poses(const Json* list) {
     from.three("mean_lsb", pose.mean_lsb);
     from.three("sd_lsb", pose.sd_lsb);
     pose.samples = static_cast<int>(from.number("samples").value_or(0));
-    pose.temperature_c = from.number("temperature_c").value_or(0);
+    pose.temperature_c = from.number("temperature_c");
     pose.tilt_deg = from.number("tilt_deg").value_or(0);
     pose.error_mg = from.number("error_mg");
     poses.push_back(std::move(pose));
@@ -134,7 +134,7 @@ Json poses_to_json(const std::vector<Certificate::Pose>& poses) {
                  {"mean_lsb", pose.mean_lsb},
                  {"sd_lsb", pose.sd_lsb},
                  {"samples", pose.samples},
-                 {"temperature_c", pose.temperature_c},
+                 {"temperature_c", pose.temperature_c ? Json(*pose.temperature_c) : Json(nullptr)},
                  {"tilt_deg", pose.tilt_deg}};
     if (pose.error_mg) {
       item["error_mg"] = *pose.error_mg;

@@ -69,7 +69,7 @@ struct Certificate {
     PerAxis<double> mean_lsb{};
     PerAxis<double> sd_lsb{};
     int samples = 0;
-    double temperature_c = 0;
+    std::optional<double> temperature_c;
     double tilt_deg = 0;
     std::optional<double> error_mg;  // of verification poses
   };

@@ -321,7 +321,8 @@ class Sheet : PageFlow {
                         list == &certificate_.poses ? "result" : "verification",
                         fixed(pose.mean_lsb[0], 2), fixed(pose.mean_lsb[1], 2),
                         fixed(pose.mean_lsb[2], 2), fmt::format("{}", pose.samples),
-                        fixed(pose.temperature_c, 1), fixed(pose.tilt_deg, 2),
+                        pose.temperature_c ? fixed(*pose.temperature_c, 1) : std::string(kDash),
+                        fixed(pose.tilt_deg, 2),
                         pose.error_mg ? fixed(*pose.error_mg, 2) : std::string(kDash)});
       }
     }

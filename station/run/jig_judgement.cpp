@@ -43,9 +43,11 @@ Result<bool> judge_readings(JigReport& report, const JigRun& run) {
                   solve_faces(run.faces(), run.verification(), report.gravity, report.limits));
   const calib::SixPoseSolution& best = report.six->best();
   report.method = fmt::format("six_pose_{}", calib::to_string(report.six->chosen));
-  report.verification = judge(run.verification(), best.calibration, report.gravity.g());
+  const std::vector<std::size_t>& choosing = report.six->choosing;
+  report.verification = judge(run.verification(), best.calibration, report.gravity.g(), choosing);
   if (const auto rounded = calib::calibration_from(best.stored)) {
-    report.rounded_residual_mg = judge(run.verification(), *rounded, report.gravity.g()).worst_mg;
+    report.rounded_residual_mg =
+        judge(run.verification(), *rounded, report.gravity.g(), choosing).worst_mg;
   }
   for (PoseReading& face : report.faces) {
     for (const calib::PoseResidual& residual : report.six->poses) {

@@ -26,6 +26,7 @@ nlohmann::ordered_json json_of(const JudgedPoses& judged) {
     nlohmann::ordered_json item = station::to_json(pose.reading);
     item["magnitude_g"] = pose.magnitude_g;
     item["error_mg"] = pose.error_mg;
+    item["chose_solution"] = pose.chose;
     json["poses"].push_back(std::move(item));
   }
   return json;
@@ -61,19 +62,24 @@ nlohmann::ordered_json page_to_json(const std::optional<device::CalibrationPage>
 }
 
 JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& calibration,
-                  double gravity_g) {
+                  double gravity_g, const std::vector<std::size_t>& choosing) {
   JudgedPoses judged;
-  for (const PoseReading& reading : readings) {
-    const PerAxis<double> force_g = calibration.to_g(reading.mean_lsb);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const PerAxis<double> force_g = calibration.to_g(readings[i].mean_lsb);
     JudgedPose pose;
-    pose.reading = reading;
+    pose.reading = readings[i];
     pose.magnitude_g = std::hypot(force_g[0], force_g[1], force_g[2]);
     pose.error_mg = (pose.magnitude_g - gravity_g) * kMgPerG;
-    judged.worst_mg = std::max(judged.worst_mg, std::abs(pose.error_mg));
-    judged.rms_mg += pose.error_mg * pose.error_mg / static_cast<double>(readings.size());
+    pose.chose = std::ranges::find(choosing, i) != choosing.end();
+    if (!pose.chose) {
+      ++judged.judging;
+      judged.worst_mg = std::max(judged.worst_mg, std::abs(pose.error_mg));
+      judged.rms_mg += pose.error_mg * pose.error_mg;
+    }
     judged.poses.push_back(pose);
   }
-  judged.rms_mg = std::sqrt(judged.rms_mg);
+  judged.rms_mg =
+      std::sqrt(judged.rms_mg / static_cast<double>(std::max<std::size_t>(1, judged.judging)));
   return judged;
 }
 
@@ -82,7 +88,7 @@ std::string JigReport::brief() const {
                                  to_string(verdict));
   if (!verification.poses.empty()) {
     text += fmt::format("; {:.1f} mg off on {} poses that were not fitted", verification.worst_mg,
-                        verification.poses.size());
+                        verification.judging);
   }
   for (const std::string& reason : reasons) {
     text += "; " + reason;

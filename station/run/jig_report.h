@@ -31,14 +31,17 @@ struct JudgedPose {
   PoseReading reading;
   double magnitude_g = 0;
   double error_mg = 0;
+  bool chose = false;  // it chose between the solutions, so it does not judge
 };
 struct JudgedPoses {
   std::vector<JudgedPose> poses;
+  std::size_t judging = 0;  // poses that the two numbers are made of: those that did not choose
   double worst_mg = 0;
   double rms_mg = 0;
 };
+// `choosing`: which of the readings chose between the solutions (SixPoseReport::choosing).
 JudgedPoses judge(const std::vector<PoseReading>& readings, const calib::Calibration& calibration,
-                  double gravity_g);
+                  double gravity_g, const std::vector<std::size_t>& choosing = {});
 
 // null where there is none.
 nlohmann::ordered_json page_to_json(const std::optional<device::CalibrationPage>& page);

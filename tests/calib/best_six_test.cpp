@@ -187,10 +187,10 @@ TEST(BestSix, OnARealDayAsGoodAsGgirAndTheMatrixBetter) {
   std::printf(
       "real day, %zu GGIR windows, mean error: GGIR %.2f mg, six %.2f mg, matrix %.2f mg; unseen "
       "directions over the time at rest: six %.2f mg, sensor's own six %.2f mg, matrix %.2f mg; "
-      "every unseen direction equal: matrix %.2f mg\n",
+      "every unseen direction equal: matrix %.2f mg; elsewhere %.0f mg\n",
       windows.size(), ggir_mg, six_mg, matrix_mg, report->six->unseen_chosen_mg(),
       report->six->unseen_mg->of_sensor, report->six->unseen_mg->matrix,
-      *report->verification.held_out_rms_mg);
+      *report->verification.held_out_rms_mg, report->six->elsewhere_mg);
   EXPECT_NEAR(ggir_mg, 3.94, 0.1);
   EXPECT_LE(six_mg, 4.0);
   EXPECT_LE(matrix_mg, 3.4);

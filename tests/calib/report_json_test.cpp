@@ -266,8 +266,11 @@ TEST(ReportJson, TheJigsThreeSolutionsStandSideBySide) {
   EXPECT_EQ(json["midpoint_minus_zero_lsb"], Json({2, 4, 7}));
   EXPECT_EQ(json["gravity_m_per_s2"], 9.81);
   ASSERT_EQ(json["poses"].size(), 2U);
-  EXPECT_EQ(json["poses"][1],
-            Json({{"pose", "-z"}, {"magnitude_mg", -1.5}, {"tilt_deg", 0.75}, {"held_out", true}}));
+  EXPECT_EQ(json["poses"][1], Json({{"pose", "-z"},
+                                    {"magnitude_mg", -1.5},
+                                    {"tilt_deg", 0.75},
+                                    {"held_out", true},
+                                    {"chose", false}}));
 }
 
 // Without all six sides there are no constants to show.

@@ -1,5 +1,7 @@
 #include "calib/six_pose.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -118,6 +120,37 @@ TEST(SixPose, TiltHurtsTheLetterAndNotThePair) {
   }
   EXPECT_GT(std::sqrt(letter_square / 50), 5);
   EXPECT_LT(std::sqrt(pair_square / 50), 2);
+}
+
+// A reading that chooses between the solutions has no part in the verdict, and the other way round.
+TEST(SixPose, ChoiceAndVerificationUseDifferentReadings) {
+  std::mt19937_64 random(9);
+  const SyntheticUnit unit;
+  const auto used = all_sides(unit, {}, random);
+  const auto held_out = all_sides(unit, {}, random);
+  const auto untouched = solve_six_poses(used, held_out);
+  ASSERT_OK(untouched);
+  EXPECT_THAT(untouched->choosing, testing::ElementsAre(0, 2, 4));  // one of every axis
+  EXPECT_EQ(std::ranges::count_if(untouched->poses, &PoseResidual::chose), 3);
+  for (std::size_t i = 0; i < held_out.size(); ++i) {
+    auto other = held_out;
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      other[i].mean_lsb[a] *= 1.01;
+    }
+    const auto report = solve_six_poses(used, other);
+    ASSERT_OK(report);
+    const bool chooses = i % 2 == 0;
+    EXPECT_EQ(report->per_axis.held_out_rms_mg == untouched->per_axis.held_out_rms_mg, chooses);
+    EXPECT_EQ(report->per_axis.choosing_rms_mg == untouched->per_axis.choosing_rms_mg, !chooses);
+  }
+  // One reading of an axis verifies; where none is left to choose with, the pair is taken.
+  const std::vector<PoseMean> three = {held_out[0], held_out[2], held_out[4]};
+  const auto few = solve_six_poses(used, three);
+  ASSERT_OK(few);
+  EXPECT_THAT(few->choosing, testing::IsEmpty());
+  EXPECT_FALSE(few->per_axis.choosing_rms_mg);
+  EXPECT_EQ(few->chosen, SixPoseMethod::per_axis);
+  EXPECT_TRUE(few->verified) << few->brief();
 }
 
 TEST(SixPose, UncertaintyOfThePairIsHonest) {

@@ -149,6 +149,101 @@ TEST(StillBlocks, NeverSpanAGapAndDoNotDependOnHowTheyArrive) {
   }
 }
 
+// The paper's criteria to the letter, sample by sample, for every window that the search looks at:
+// where it finds a block. Shares no code with the finder.
+std::vector<std::size_t> starts_by_the_letter(const std::vector<Sample>& samples, int block,
+                                              int step) {
+  std::vector<std::size_t> starts;
+  const auto size = static_cast<std::size_t>(block);
+  for (std::size_t begin = 0; begin + size <= samples.size();) {
+    bool still = true;
+    bool all_zero = false;
+    bool clipped = false;
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      long double sum_t = 0, sum_v = 0, sum_tt = 0, sum_tv = 0;
+      for (std::size_t i = 0; i < size; ++i) {
+        const long double value = samples[begin + i][a];
+        const auto time = static_cast<long double>(i);
+        sum_t += time, sum_v += value, sum_tt += time * time, sum_tv += time * value;
+      }
+      const long double slope = (block * sum_tv - sum_t * sum_v) / (block * sum_tt - sum_t * sum_t);
+      const long double start = (sum_v - slope * sum_t) / block;
+      still = still && std::abs(slope) / 256 < 0.0005L;
+      for (std::size_t i = 0; i < size; ++i) {
+        const long double value = samples[begin + i][a];
+        still =
+            still && std::abs(value - start - slope * static_cast<long double>(i)) / 256 < 0.015L;
+        clipped = clipped || value <= -2048 || value >= 2047;
+      }
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      all_zero = all_zero || samples[begin + i] == Sample{0, 0, 0};
+    }
+    still = still && !all_zero && !clipped;
+    if (still) {
+      starts.push_back(begin);
+    }
+    begin += still ? size : static_cast<std::size_t>(step);
+  }
+  return starts;
+}
+
+// Rest, slow turns, steps, zeros, the sensor's limit and movement, in stretches of random length.
+std::vector<Sample> mixed_recording(unsigned seed, double rate_hz) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> noise(0, 1);
+  std::vector<Sample> samples;
+  while (samples.size() < static_cast<std::size_t>(600 * rate_hz)) {
+    const int kind = static_cast<int>(unit(random) * 8);
+    const auto count = static_cast<std::size_t>((1 + 20 * unit(random)) * rate_hz);
+    std::array<double, 3> level{};
+    std::array<double, 3> turn{};
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      level[a] = kind == 6 ? 0 : 500 * (unit(random) - 0.5) + (kind == 7 && a == 0 ? 2040 : 0);
+      turn[a] = kind == 1 ? 0.3 * (unit(random) - 0.5) : 0;
+    }
+    const double sd = kind == 2 ? 30 : kind == 3 ? 2 : kind == 6 ? 0.2 : 0.7;
+    for (std::size_t i = 0; i < count; ++i) {
+      Sample sample{};
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const double step = kind == 4 && i > count / 2 ? 5 : 0;
+        const double value =
+            level[a] + turn[a] * static_cast<double>(i) + step + sd * noise(random);
+        sample[a] = static_cast<std::int16_t>(std::lround(std::clamp(value, -2048.0, 2047.0)));
+      }
+      samples.push_back(sample);
+    }
+  }
+  return samples;
+}
+
+TEST(StillBlocks, AreThoseOfThePapersLetter) {
+  const Reversal reversal = reversal_of({});
+  std::size_t found = 0;
+  for (const double rate_hz :
+       {25.0, 30.0, 100.0}) {  // at 25 Hz a block is no whole number of steps
+    const int block = static_cast<int>(4 * rate_hz);
+    const int step = static_cast<int>(std::lround(0.5 * rate_hz));
+    for (unsigned seed = 1; seed <= 6; ++seed) {
+      const auto samples = mixed_recording(seed, rate_hz);
+      const auto starts = starts_by_the_letter(samples, block, step);
+      auto finder = *StillBlockFinder::make(reversal, rate_hz, {.noisy_sd_g = 0});
+      for (std::size_t i = 0; i < samples.size(); i += 37) {
+        finder.push(static_cast<double>(i) / rate_hz,
+                    std::span(samples).subspan(i, std::min<std::size_t>(37, samples.size() - i)));
+      }
+      ASSERT_EQ(finder.blocks().size(), starts.size()) << rate_hz << " Hz, seed " << seed;
+      for (std::size_t i = 0; i < starts.size(); ++i) {
+        EXPECT_NEAR(finder.blocks()[i].start_time_s * rate_hz, static_cast<double>(starts[i]),
+                    1e-6);
+      }
+      found += starts.size();
+    }
+  }
+  EXPECT_GT(found, 200U);
+}
+
 TEST(StillBlocks, NoiseAloneIsKeptApartAndMarked) {
   const auto [unit, samples, reversal] = rest_of(5.5, 60, 100, 4);
   auto paper = *StillBlockFinder::make(reversal, 100, {.noisy_sd_g = 0});

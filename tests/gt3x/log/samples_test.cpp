@@ -50,6 +50,53 @@ TEST(Samples, RoundTripsAtEveryLengthAndLimit) {
   }
 }
 
+// Every count at every place of a group, whatever way the machine unpacks groups. Oracle: the bits
+// one by one, most significant first, as the vendor describes them.
+TEST(Samples, EveryCountOnEveryAxisIsUnpackedAsItsBits) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    std::vector<Counts> samples;
+    for (int count = kMin12; count <= kMax12; ++count) {
+      Counts sample = {-1, 5, 1234};
+      sample[axis] = static_cast<std::int16_t>(count);
+      samples.push_back(sample);
+      samples.push_back({0, -2048, 2047});
+      samples.push_back({-2048, 2047, 0});
+    }
+    for (const PerAxis<std::size_t>& order : {PerAxis<std::size_t>{1, 0, 2}, {0, 1, 2}}) {
+      std::vector<bool> bits;
+      for (const Counts& sample : samples) {
+        for (const std::size_t a : order) {
+          for (int bit = 11; bit >= 0; --bit) {
+            bits.push_back((static_cast<unsigned>(sample[a]) >> bit & 1U) != 0);
+          }
+        }
+      }
+      Bytes payload((bits.size() + 7) / 8);
+      for (std::size_t i = 0; i < bits.size(); ++i) {
+        payload[i / 8] =
+            static_cast<std::uint8_t>(payload[i / 8] | (bits[i] ? 0x80U >> (i % 8) : 0));
+      }
+      std::vector<Counts> back;
+      if (order[0] == 1) {
+        unpack_activity(payload, back);
+      } else {
+        unpack_activity3(payload, back);
+      }
+      ASSERT_EQ(back, samples);
+    }
+  }
+}
+
+TEST(Samples, RangeIsThatOfAllAxes) {
+  const CountRange none = range_of({});
+  EXPECT_GT(none.low, none.high);
+  const std::vector<Counts> samples = {{3, -7, 0}, {4, 1, 2047}, {-2048, 0, 0}};
+  EXPECT_EQ(range_of(samples).low, -2048);
+  EXPECT_EQ(range_of(samples).high, 2047);
+  EXPECT_EQ(range_of(std::span(samples).first(1)).low, -7);
+  EXPECT_EQ(range_of(std::span(samples).first(1)).high, 3);
+}
+
 TEST(Samples, WideValuesSurviveOnlyInSixteenBits) {
   const std::vector<Counts> samples = {{32767, -32768, 300}};
   std::vector<Counts> back;

@@ -49,16 +49,12 @@ class Sets {
     }
     return answer.conflict ? "conflict" : "none";
   }
-  std::string why() const {
-    return applying_constants(history, FilterConfiguration::current).why;
-  }
+  std::string why() const { return applying_constants(history, FilterConfiguration::current).why; }
 
   db::UnitHistory history;
 };
 
-TEST(ApplyingConstants, WithoutSetsNothingApplies) {
-  EXPECT_EQ(Sets().applying(), "none");
-}
+TEST(ApplyingConstants, WithoutSetsNothingApplies) { EXPECT_EQ(Sets().applying(), "none"); }
 
 TEST(ApplyingConstants, WithdrawnAndOtherFiltersNever) {
   Sets sets;

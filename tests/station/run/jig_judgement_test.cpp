@@ -69,7 +69,7 @@ TEST(JigVerdict, AColdUnitAndANoisyOne) {
 TEST(JigVerdict, TooUncertainIsInconclusive) {
   VirtualBench bench(3);
   JigSessionOptions options;
-  options.limits = *parse_limits("[sensitivity_uncertainty_percent]\nhigh = 0.1\n", "t.toml");
+  options.limits = *parse_limits("[sensitivity_uncertainty_percent]\nhigh = 0.15\n", "t.toml");
   const auto report = bench.run(options);
   ASSERT_OK(report);
   EXPECT_EQ(report->verdict, JigVerdict::inconclusive);

@@ -1,0 +1,136 @@
+#include "gt3x/container/inflating_source.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "base/random.h"
+#include "expect_result.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+// Oracle: zlib, another implementation, packs and computes the CRC.
+Bytes deflated(const Bytes& bytes, int level, int strategy) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, level, Z_DEFLATED, -15, 9, strategy), Z_OK);
+  Bytes packed(deflateBound(&stream, bytes.size()) + 100);
+  stream.next_in = const_cast<Bytef*>(bytes.data());  // NOLINT: zlib's interface
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = packed.data();
+  stream.avail_out = static_cast<uInt>(packed.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+EntryFacts facts_of(const Bytes& bytes) {
+  EntryFacts facts;
+  facts.packing = EntryFacts::Packing::deflate;
+  facts.size = bytes.size();
+  facts.crc32 = static_cast<std::uint32_t>(crc32(0, bytes.data(), static_cast<uInt>(bytes.size())));
+  facts.where = "f:log.bin";
+  return facts;
+}
+
+Result<Bytes> unpacked(const Bytes& packed, const EntryFacts& facts, std::size_t piece_size) {
+  const auto source = unpack_entry(std::make_unique<MemorySource>(packed), facts);
+  EXPECT_EQ(source->size(), facts.size);
+  Bytes all;
+  Bytes piece(piece_size);
+  for (;;) {
+    SIXPOINT_ASSIGN(const std::size_t count, source->read(piece));
+    if (count == 0) {
+      return all;
+    }
+    all.insert(all.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+}
+
+Bytes some_bytes(std::size_t size, int kinds) {
+  Random random(size);
+  Bytes bytes(size);
+  for (auto& byte : bytes) {
+    byte = static_cast<std::uint8_t>(random.below(static_cast<std::uint64_t>(kinds)));
+  }
+  return bytes;
+}
+
+TEST(InflatingSource, ReadsWhatZlibPackedInPiecesOfEverySize) {
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{1}, std::size_t{70'000}, std::size_t{1'000'000}}) {
+    for (const int kinds : {1, 5, 256}) {
+      const Bytes bytes = some_bytes(size, kinds);
+      for (const int strategy : {Z_DEFAULT_STRATEGY, Z_FIXED, Z_HUFFMAN_ONLY}) {
+        for (const int level : {0, 1, 6, 9}) {
+          const Bytes packed = deflated(bytes, level, strategy);
+          const auto whole = unpacked(packed, facts_of(bytes), 1U << 20);
+          ASSERT_OK(whole);
+          ASSERT_EQ(*whole, bytes) << size << " " << kinds << " " << strategy << " " << level;
+        }
+      }
+      for (const std::size_t piece : {std::size_t{7}, std::size_t{4096}}) {
+        if (size <= 70'000) {
+          EXPECT_EQ(
+              unpacked(deflated(bytes, 6, Z_DEFAULT_STRATEGY), facts_of(bytes), piece).value(),
+              bytes);
+        }
+      }
+    }
+  }
+}
+
+TEST(InflatingSource, StoredBytesPass) {
+  const Bytes bytes = some_bytes(5000, 256);
+  EntryFacts facts = facts_of(bytes);
+  facts.packing = EntryFacts::Packing::store;
+  EXPECT_EQ(unpacked(bytes, facts, 100).value(), bytes);
+}
+
+// Whatever happens to the packed bytes: the right bytes, or an error; never other bytes.
+TEST(InflatingSource, EveryTruncationAndEveryFlippedBitIsAnError) {
+  const Bytes bytes = some_bytes(600, 40);
+  const Bytes packed = deflated(bytes, 6, Z_DEFAULT_STRATEGY);
+  const EntryFacts facts = facts_of(bytes);
+  for (std::size_t size = 0; size < packed.size(); ++size) {
+    SCOPED_TRACE(size);
+    EXPECT_FAILS(unpacked(Bytes(packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(size)),
+                          facts, 256),
+                 ErrorCode::bad_data);
+  }
+  std::size_t errors = 0;
+  for (std::size_t bit = 0; bit < packed.size() * 8; ++bit) {
+    Bytes damaged = packed;
+    damaged[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
+    const auto result = unpacked(damaged, facts, 256);
+    errors += result ? 0 : 1;
+    // The last byte has bits behind the end of the stream, which mean nothing.
+    EXPECT_TRUE(!result || (*result == bytes && bit / 8 + 1 == packed.size())) << bit;
+  }
+  EXPECT_GT(errors, packed.size() * 8 - 8);
+}
+
+TEST(InflatingSource, WrongSizeAndWrongCrcAreSaidAndStaySaid) {
+  const Bytes bytes = some_bytes(600, 40);
+  const Bytes packed = deflated(bytes, 6, Z_DEFAULT_STRATEGY);
+  EntryFacts facts = facts_of(bytes);
+  facts.crc32 ^= 1U;
+  const auto source = unpack_entry(std::make_unique<MemorySource>(packed), facts);
+  Bytes piece(1000);
+  ASSERT_EQ(source->read(piece).value(), 600U);
+  for (int i = 0; i < 2; ++i) {
+    const auto end = source->read(piece);
+    ASSERT_FALSE(end);
+    EXPECT_EQ(end.error().where, "f:log.bin");
+    EXPECT_NE(end.error().what.find("CRC"), std::string::npos);
+  }
+  facts = facts_of(bytes);
+  for (const std::uint64_t size : {599, 601}) {
+    SCOPED_TRACE(size);
+    facts.size = size;
+    EXPECT_FAILS(unpacked(packed, facts, 256), ErrorCode::bad_data);
+  }
+}
+
+}  // namespace
+}  // namespace sixpoint::gt3x
