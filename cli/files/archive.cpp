@@ -493,7 +493,6 @@ void add_archive(CLI::App& app, Context& context) {
                 "know files by SHA-256, not by size and time of change: reads all of them");
   add_source_options(plan, options.sources);
   add_repair_options(plan, options.draft.repair.options);
-  add_output_options(plan, options.outputs);
   plan.add_flag("--dry-run", options.dry_run, "print what would be planned, write nothing");
   const auto add = [&](const char* name, const char* about,
                        Status (*work)(const Options&, Context&)) {

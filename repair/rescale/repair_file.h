@@ -5,9 +5,10 @@
 //   report.brief();  // "repaired         in.gt3x  still error 112.3 -> 0.8 mg"
 //
 // The original is only ever read. The output is a .gt3x with the same entries in the same order, in
-// which the samples alone differ (rescaled_log.h), and two marks: one more entry (kRepairMark), JSON
-// with what was done, by which constants, to the file of which hash; and a record before the others
-// of the log (kRepairMarkType), which stays when the archive is packed anew. What becomes of a file:
+// which the samples alone differ (rescaled_log.h), and two marks: one more entry (kRepairMark),
+// JSON with what was done, by which constants, to the file of which hash; and a record before the
+// others of the log (kRepairMarkType), which stays when the archive is packed anew. What becomes of
+// a file:
 //
 // | file                                                    | status                             |
 // |---------------------------------------------------------|------------------------------------|
