@@ -161,7 +161,7 @@ bool store_exists(Context& context, const std::string& location) {
 Result<std::string> place_of_new_store(Context& context, const std::string& location) {
   const std::string path = place_of(location);
   if (location.empty() && !is_on_server(path)) {
-    SIXPOINT_CHECK(context.env.files.make_folders(folder_of(path)));
+    SIXPOINT_CHECK(make_private_folders(context.env.files, folder_of(path)));
   }
   return path;
 }
@@ -178,7 +178,12 @@ Result<db::Store> open_existing_store(Context& context, const std::string& locat
         ErrorCode::no_input, "there is no store", path,
         "name one with --store, or make one with 'sixpoint jig' or 'sixpoint solve --save'");
   }
-  return db::Store::open(context.env, path);
+  auto store = db::Store::open(context.env, path);
+  if (store || store.error().code != ErrorCode::permission) {
+    return store;
+  }
+  // It may not be written: what only reads it goes on, and a write says so.
+  auto to_read = db::Store::open_to_read(context.env, path);
+  return to_read ? std::move(to_read) : std::move(store);
 }
-
 }  // namespace sixpoint::cli

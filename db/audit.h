@@ -11,6 +11,15 @@
 
 namespace sixpoint::db {
 
+// The end of the chain, to be written down elsewhere: whoever has it can ask later whether the
+// history up to there is still the same.
+struct StoreHead {
+  std::int64_t rows = 0;
+  std::string head;  // hex SHA-256 of the last row
+
+  nlohmann::ordered_json to_json() const;  // rows, head
+};
+
 struct AuditReport {
   bool ok = false;
   std::int64_t rows = 0;

@@ -121,7 +121,7 @@ Result<NewRows> rows_from(const std::string& record) {
 }  // namespace
 
 Result<Journal> Journal::open(FileSystem& files, const std::string& folder) {
-  SIXPOINT_CHECK(files.make_folders(folder));
+  SIXPOINT_CHECK(make_private_folders(files, folder));
   return Journal(files, folder);
 }
 
@@ -147,8 +147,8 @@ Result<std::string> Journal::add(NewRows rows) {
   }
   const std::string record = to_json(rows).dump();
   const Json line = {{"schema", kFormat}, {"sha256", text_sha256(record)}, {"record", record}};
-  SIXPOINT_CHECK(write_file(*files_, fmt::format("{}/{:010}-{}.json", folder_, last + 1, rows.id),
-                            line.dump() + "\n"));
+  SIXPOINT_CHECK(write_private_file(
+      *files_, fmt::format("{}/{:010}-{}.json", folder_, last + 1, rows.id), line.dump() + "\n"));
   return std::move(rows.id);
 }
 

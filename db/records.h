@@ -61,6 +61,8 @@ struct RunRecord {
   std::optional<double> gravity_m_per_s2 = {};  // local gravity
   std::optional<double> temperature_c = {};     // of the unit during the run
   std::vector<std::string> codes = {};          // the verdict's reasons
+  // Hex, of its row in the chain: Store::run() fills it. It is a head that 'audit verify' knows.
+  std::string head = {};
 };
 
 // Raw data of a run, byte for byte.

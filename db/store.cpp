@@ -22,13 +22,30 @@ NewRows single_row(std::string_view table_name, Row row) {
   return rows;
 }
 
+bool is_postgres(const std::string& location) {
+  return location.starts_with("postgresql://") || location.starts_with("postgres://");
+}
+
 }  // namespace
 
 Result<Store> Store::open(Env& env, const std::string& location) {
-  const bool postgres =
-      location.starts_with("postgresql://") || location.starts_with("postgres://");
-  SIXPOINT_ASSIGN(auto database, postgres ? open_postgres(location) : open_sqlite(location));
+  SIXPOINT_ASSIGN(auto database,
+                  is_postgres(location) ? open_postgres(location) : open_sqlite(location));
   SIXPOINT_CHECK(migrate(*database));
+  return Store(env, std::move(database));
+}
+
+Result<Store> Store::open_to_read(Env& env, const std::string& location) {
+  SIXPOINT_ASSIGN(auto database, is_postgres(location) ? open_postgres(location)
+                                                       : open_sqlite(location, Access::read));
+  SIXPOINT_ASSIGN(const std::int64_t version, database->schema_version());
+  if (version != kSchemaVersion) {
+    return fail(ErrorCode::configuration,
+                fmt::format("the store has version {}, this program reads version {}", version,
+                            kSchemaVersion),
+                database->location(),
+                "somebody who may write it has to open it once, with this program");
+  }
   return Store(env, std::move(database));
 }
 
@@ -165,7 +182,19 @@ Result<RunRecord> Store::run(const std::string& id) {
     return fail(ErrorCode::no_input, fmt::format("no run '{}'", printable(id, 60)),
                 database_->location(), "'sixpoint history SERIAL' lists the runs of a unit");
   }
+  SIXPOINT_ASSIGN(found[0].head, head_of_run(id));
   return std::move(found[0]);
+}
+
+Result<std::string> Store::head_of_run(const std::string& id) {
+  SIXPOINT_ASSIGN(const auto found,
+                  database_->query("SELECT hash FROM runs WHERE id = $1", std::vector<Value>{id}));
+  const auto* hash = found.empty() ? nullptr : std::get_if<Bytes>(&found[0][0]);
+  if (hash == nullptr) {
+    return fail(ErrorCode::no_input, fmt::format("no run '{}'", printable(id, 60)),
+                database_->location(), "'sixpoint history SERIAL' lists the runs of a unit");
+  }
+  return to_hex(*hash);
 }
 
 Result<std::optional<RepairRecord>> Store::repair_of_output(const std::string& output_sha256) {

@@ -34,6 +34,9 @@ class Store final : public RecordWriter {
   // `location`: a path of an SQLite file, which is made when it is not there, or postgresql://...
   // Errors as open_sqlite(), open_postgres() and migrate().
   static Result<Store> open(Env& env, const std::string& location);
+  // Only to read, also where nothing may be written: a store of an earlier version is refused
+  // (configuration), and so is a place where there is none (no_input).
+  static Result<Store> open_to_read(Env& env, const std::string& location);
 
   // The tables themselves, for exchange.h and for tests. Only this class adds rows to them.
   Database& database() { return *database_; }
@@ -83,6 +86,11 @@ class Store final : public RecordWriter {
   Result<std::vector<DueUnit>> units_due(UtcTime older_than);
   Result<std::vector<TrendPoint>> trend(const std::string& serial);
 
+  // As it is written in the store; audit() says whether the rows agree.
+  Result<StoreHead> head();
+  // The hash of the row of a run: a head that stays in the chain, for what is handed out about that
+  // run. no_input where there is none.
+  Result<std::string> head_of_run(const std::string& id);
   // Reads everything, as it is at this moment, while others go on writing. With the hex hash of an
   // earlier head, also whether that is still a row of the chain: this alone shows a history that
   // was written anew from its beginning.

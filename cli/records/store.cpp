@@ -81,13 +81,19 @@ Result<Answer> back_up(const Options& options, Context& context) {
   return answer_of(report, options.path, report.brief());
 }
 
+// A store that is there, for a command that adds to it: one that may not be written is refused.
+Result<db::Store> open_to_add(const Options& options, Context& context) {
+  return store_exists(context, options.store) ? open_store(context, options.store)
+                                              : open_existing_store(context, options.store);
+}
+
 Result<Answer> catch_up(const Options& options, Context& context) {
   const std::string folder =
       options.journal.empty() ? journal_folder(options.store) : options.journal;
   if (!options.journal.empty()) {
     SIXPOINT_CHECK(context.env.files.info(folder));
   }
-  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   std::size_t taken = 0;
   if (context.env.files.info(folder)) {
     SIXPOINT_ASSIGN(auto journal, db::Journal::open(context.env.files, folder));
@@ -120,7 +126,7 @@ Result<Answer> correct(db::Store& store, const Options& options, const std::stri
 }
 
 Result<Answer> withdraw(const Options& options, Context& context) {
-  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "withdraw"));
   SIXPOINT_ASSIGN(const auto recall, store.recall_list(options.id));
   answer.json["withdrawn"] = options.id;
@@ -131,7 +137,7 @@ Result<Answer> withdraw(const Options& options, Context& context) {
 }
 
 Result<Answer> reinstate(const Options& options, Context& context) {
-  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "reinstate"));
   answer.note = "these constants apply again";
   return answer;
@@ -146,7 +152,7 @@ Result<Answer> prefer(const Options& options, Context& context) {
 }
 
 Result<Answer> note(const Options& options, Context& context) {
-  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "note"));
   answer.note = fmt::format("noted about {} {}", options.table, printable(options.id));
   return answer;

@@ -333,6 +333,9 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
   };
   SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, store_run));
   if (done.kept) {
+    if (done.kept->in_store() && store) {
+      SIXPOINT_ASSIGN(record.head, store->head_of_run(record.id));
+    }
     make_papers(context, options, outputs, record, done);
   }
   return done;

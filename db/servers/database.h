@@ -75,6 +75,11 @@ class Database {
   virtual std::string table_options() const = 0;    // " STRICT" where the server knows it
   virtual const std::string& location() const = 0;  // for error messages; without a password
 
+  // What is wrong with the server's own files: pages, and indexes that do not say what the tables
+  // say, so that a question would get another answer than the rows give. One sentence each, the
+  // first 20; empty where nothing is, or nothing known. Its own connection: beside another call.
+  virtual Result<std::vector<std::string>> check_indexes() = 0;
+
   // Makes `path`, a file that is not there yet, a copy of the whole store as it is now, while
   // others go on working; false where the server has no such means (and nothing was made).
   virtual Result<bool> copy_to_file(const std::string& path) = 0;
@@ -95,10 +100,24 @@ class Transaction {
   Database* database_;
 };
 
-// An SQLite file; made when it is not there. WAL mode, every commit synced, foreign keys on; a
-// writer waits up to 30 s for another. Errors: no_input or cannot_create for the path, permission
-// for a read-only place, bad_data for a file that is no store or is damaged, io for a full disk.
-Result<std::unique_ptr<Database>> open_sqlite(const std::string& path);
+enum class Access : std::uint8_t { write, read };
+
+// An SQLite file. WAL mode, every commit synced, foreign keys on; a writer waits up to 30 s for
+// another.
+//
+//   what is at `path`                    to write                       to read
+//   nothing                              made, its owner's alone        no_input
+//   an empty file or database            becomes a store                bad_data
+//   a store                              opened                         opened
+//   a store that may not be written      permission                     opened
+//   a database of another program        bad_data, nothing is touched   bad_data, nothing is
+//   touched another file, a folder, a device     bad_data, nothing is touched   bad_data, nothing
+//   is touched a link that leads nowhere            cannot_create                  no_input
+//
+// Besides: cannot_create without its folder, permission for a place where nothing can be read, io
+// for a full disk, bad_data for damage.
+Result<std::unique_ptr<Database>> open_sqlite(const std::string& path,
+                                              Access access = Access::write);
 
 // A PostgreSQL database (postgresql://user:password@host:port/name, as libpq takes it; a password
 // may also come from PGPASSWORD or ~/.pgpass, which other users cannot see in the process list).

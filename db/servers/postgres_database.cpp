@@ -244,6 +244,8 @@ class PostgresDatabase final : public Database {
   std::string integer_type() const override { return "BIGINT"; }
   std::string table_options() const override { return ""; }
   const std::string& location() const override { return address_.shown; }
+  // The server checks its own files (pg_amcheck, data checksums).
+  Result<std::vector<std::string>> check_indexes() override { return std::vector<std::string>(); }
   Result<bool> copy_to_file(const std::string& /*path*/) override { return false; }
 
  private:

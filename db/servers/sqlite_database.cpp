@@ -1,11 +1,18 @@
+#include <array>
+#include <cerrno>
+#include <cstring>
 #include <map>
 
 #include <SQLiteCpp/Backup.h>
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "db/servers/database.h"
+#include "db/servers/sqlite_indexes.h"
 
 namespace sixpoint::db {
 namespace {
@@ -110,6 +117,11 @@ class Reset {
   SQLite::Statement& statement_;
 };
 
+Error not_ours(const std::string& path) {
+  return {ErrorCode::bad_data, "the file is an SQLite database, but not a store of sixpoint", path,
+          "name another file with --store"};
+}
+
 class SqliteRows final : public RowStream {
  public:
   SqliteRows(SQLite::Database& database, const std::string& sql, std::span<const Value> parameters,
@@ -134,11 +146,27 @@ class SqliteRows final : public RowStream {
   std::string path_;
 };
 
+// `path` as SQLite reads it in an address, whatever bytes it has.
+std::string address_of(const std::string& path, std::string_view setting) {
+  std::string address = "file:";
+  for (const char c : path) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '/' || c == '.' || c == '-' || c == '_';
+    address += plain ? std::string(1, c) : fmt::format("%{:02x}", static_cast<unsigned char>(c));
+  }
+  return address + "?" + std::string(setting);
+}
+
 class SqliteDatabase final : public Database {
  public:
   explicit SqliteDatabase(const std::string& path)
-      : database_(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout_ms),
-        path_(path) {}
+      : database_(path, SQLite::OPEN_READWRITE, kBusyTimeout_ms), path_(path) {}
+  // Only to read; `setting`: how SQLite reads the file.
+  SqliteDatabase(const std::string& path, const char* setting)
+      : database_(address_of(path, setting), SQLite::OPEN_READONLY | SQLite::OPEN_URI,
+                  kBusyTimeout_ms),
+        path_(path),
+        setting_to_read_(setting) {}
 
   Status prepare() {
     const auto read_only = [&](const std::string& what) {
@@ -150,11 +178,10 @@ class SqliteDatabase final : public Database {
       return read_only("the store may only be read here");
     }
     try {
+      SIXPOINT_CHECK(take_if_empty());
       database_.exec("PRAGMA journal_mode=WAL");
       database_.exec("PRAGMA synchronous=FULL");
-      database_.exec("PRAGMA foreign_keys=ON");
-      // Views and triggers of a file from elsewhere must not run functions of ours.
-      database_.exec("PRAGMA trusted_schema=OFF");
+      set_up_connection();
     } catch (const SQLite::Exception& exception) {
       // The file itself was opened: it is the files beside it that cannot be made.
       if (exception.getErrorCode() == SQLITE_CANTOPEN) {
@@ -162,22 +189,32 @@ class SqliteDatabase final : public Database {
       }
       return fail(to_error(exception, path_));
     }
-    return check_owner();
+    return {};
   }
 
-  // Ours, empty, or another program's file that must not be changed.
-  Status check_owner() {
+  // For a connection that only reads; the first read shows whether it can.
+  void prepare_to_read() {
+    set_up_connection();
+    static_cast<void>(database_.execAndGet("SELECT count(*) FROM sqlite_schema").getInt64());
+  }
+
+  void set_up_connection() {
+    database_.exec("PRAGMA foreign_keys=ON");
+    // Views and triggers of a file from elsewhere must not run functions of ours.
+    database_.exec("PRAGMA trusted_schema=OFF");
+  }
+
+  // An empty file gets our mark before anything else, and before WAL mode: then the mark stands in
+  // the file itself, where look_at() finds it whatever happens next.
+  Status take_if_empty() {
     const std::int64_t id = database_.execAndGet("PRAGMA application_id").getInt64();
     if (id == kApplicationId) {
       return {};
     }
-    const bool empty =
-        database_.execAndGet("SELECT count(*) FROM sqlite_schema").getInt() == 0 && id == 0;
-    if (!empty) {
-      return fail(ErrorCode::bad_data,
-                  "the file is an SQLite database, but not a store of sixpoint", path_,
-                  "name another file with --store");
+    if (id != 0 || database_.execAndGet("SELECT count(*) FROM sqlite_schema").getInt() != 0) {
+      return fail(not_ours(path_));
     }
+    database_.exec("PRAGMA synchronous=FULL");
     database_.exec(fmt::format("PRAGMA application_id={}", kApplicationId));
     return {};
   }
@@ -221,6 +258,17 @@ class SqliteDatabase final : public Database {
         read_row(statement, rows.emplace_back());
       }
       return rows;
+    } catch (const SQLite::Exception& exception) {
+      return fail(to_error(exception, path_));
+    }
+  }
+
+  Result<std::vector<std::string>> check_indexes() override {
+    try {
+      SQLite::Database own(address_of(path_, setting_to_read_),
+                           SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout_ms);
+      own.exec("BEGIN");
+      return check_sqlite_indexes(*own.getHandle());
     } catch (const SQLite::Exception& exception) {
       return fail(to_error(exception, path_));
     }
@@ -289,12 +337,136 @@ class SqliteDatabase final : public Database {
   SQLite::Database database_;
   std::map<std::string, std::unique_ptr<SQLite::Statement>> prepared_;
   std::string path_;
+  const char* setting_to_read_ = "mode=ro";  // of a second connection
 };
+
+enum class Found { nothing, empty, ours };
+
+bool has_bytes(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 && status.st_size > 0;
+}
+
+// Our mark in the file's first bytes. SQLite does not answer for a file that a full disk left half
+// copied from its log; with the log it is whole.
+bool has_our_mark(SQLite::Database& database) {
+  constexpr std::size_t kMarkAt = 68;
+  std::array<std::uint8_t, 100> header{};
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_FILE_POINTER, &file);
+  if (file == nullptr || file->pMethods == nullptr ||
+      file->pMethods->xRead(file, header.data(), static_cast<int>(header.size()), 0) != SQLITE_OK) {
+    return false;
+  }
+  std::int64_t mark = 0;
+  for (std::size_t i = kMarkAt; i < kMarkAt + 4; ++i) {
+    mark = mark * 256 + header[i];
+  }
+  return std::memcmp(header.data(), "SQLite format 3", 16) == 0 && mark == kApplicationId;
+}
+
+// What SQLite sees in the file alone, without a lock and without a file beside it. Opening the file
+// by other means would, at its close, end the locks of this process's other connections.
+Result<Found> look_at_database(const std::string& path) {
+  try {
+    SQLite::Database looked(address_of(path, "immutable=1"),
+                            SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    if (has_our_mark(looked)) {
+      return Found::ours;
+    }
+    const std::int64_t id = looked.execAndGet("PRAGMA application_id").getInt64();
+    const bool empty = looked.execAndGet("SELECT count(*) FROM sqlite_schema").getInt64() == 0;
+    if (id != 0 || !empty) {
+      return fail(not_ours(path));
+    }
+    if (!has_bytes(path + "-wal")) {
+      return Found::empty;
+    }
+    // All that was written so far is in a log; a reader beside its writers changes neither.
+    if (::access((path + "-shm").c_str(), F_OK) == 0) {
+      SQLite::Database with_log(address_of(path, "mode=ro"),
+                                SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+      if (with_log.execAndGet("PRAGMA application_id").getInt64() == kApplicationId) {
+        return Found::ours;
+      }
+    }
+    return fail(not_ours(path));
+  } catch (const SQLite::Exception& exception) {
+    if (exception.getErrorCode() == SQLITE_CANTOPEN && ::access(path.c_str(), R_OK) != 0) {
+      return fail(ErrorCode::permission, "the store may not be read by this user", path,
+                  "ask its owner: a store is its owner's alone (mode 0600)");
+    }
+    return fail(to_error(exception, path));
+  }
+}
+
+Result<Found> look_at(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) {
+    if (errno == ELOOP) {
+      return fail(ErrorCode::cannot_create, "the store is a symbolic link in a circle", path,
+                  "name another file with --store");
+    }
+    return Found::nothing;
+  }
+  if (!S_ISREG(status.st_mode)) {
+    return fail(ErrorCode::bad_data,
+                S_ISDIR(status.st_mode) ? "the store is a folder" : "the store is no regular file",
+                path, "name a file with --store");
+  }
+  return status.st_size == 0 ? Found::empty : look_at_database(path);
+}
+
+Status make_private_file(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  // Another process may have made it meanwhile.
+  if (file >= 0) {
+    ::close(file);
+    return {};
+  }
+  return errno == EEXIST && ::access(path.c_str(), F_OK) == 0
+             ? Status()
+             : Status(fail(errno == EACCES || errno == EROFS ? ErrorCode::permission
+                                                             : ErrorCode::cannot_create,
+                           fmt::format("the store cannot be made: {}", std::strerror(errno)), path,
+                           "check that the folder exists and is writable"));
+}
+
+// A store that nobody has open stands whole in its file, and is read as it stands: SQLite would
+// make files beside it that its owner could not use. Where there is a log, SQLite reads both.
+Result<std::unique_ptr<Database>> open_to_read(const std::string& path) {
+  const bool has_log = ::access((path + "-wal").c_str(), F_OK) == 0;
+  try {
+    auto database = std::make_unique<SqliteDatabase>(path, has_log ? "mode=ro" : "immutable=1");
+    database->prepare_to_read();
+    return database;
+  } catch (const SQLite::Exception& exception) {
+    if (exception.getErrorCode() != SQLITE_CANTOPEN || !has_log) {
+      return fail(to_error(exception, path));
+    }
+  }
+  return fail(ErrorCode::permission,
+              "what was written last is in a file beside the store that may not be used here", path,
+              "ask its owner to open it once, for example with 'sixpoint units'");
+}
 
 }  // namespace
 
-Result<std::unique_ptr<Database>> open_sqlite(const std::string& path) {
+Result<std::unique_ptr<Database>> open_sqlite(const std::string& path, Access access) {
+  SIXPOINT_ASSIGN(const Found found, look_at(path));
+  if (access == Access::read && found != Found::ours) {
+    return found == Found::nothing
+               ? fail(ErrorCode::no_input, "there is no store", path, "check the path")
+               : fail(ErrorCode::bad_data, "this file is empty and no store", path,
+                      "name another file with --store");
+  }
+  if (found == Found::nothing) {
+    SIXPOINT_CHECK(make_private_file(path));
+  }
   try {
+    if (access == Access::read) {
+      return open_to_read(path);
+    }
     auto database = std::make_unique<SqliteDatabase>(path);
     SIXPOINT_CHECK(database->prepare());
     return database;

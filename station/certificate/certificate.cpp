@@ -181,6 +181,7 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
   out.station = run.station;
   out.software = run.build.empty() ? run.software : fmt::format("{} ({})", run.software, run.build);
   out.raw_sha256 = document.text("raw_sha256");
+  out.head = run.head;
   out.jig = run.jig;
   out.jig_due = run.jig_due;
   out.verdict = *verdict;
@@ -258,6 +259,7 @@ Json Certificate::to_json() const {
   json["poses"] = poses_to_json(poses);
   json["verification"] = poses_to_json(verification);
   json["raw_sha256"] = raw_sha256;
+  json["head"] = head.empty() ? Json(nullptr) : Json(head);
   json["accredited"] = false;
   return json;
 }

@@ -36,6 +36,7 @@ struct Certificate {
   std::string station;
   std::string software;    // name and version, and the build where it is known
   std::string raw_sha256;  // of the samples that the store keeps
+  std::string head;        // of the store's chain, at this run; empty where no store has it yet
 
   std::string jig;  // its number, or its kind where that was not given
   std::optional<UtcTime> jig_due;

@@ -339,6 +339,10 @@ class Sheet : PageFlow {
     paragraph(
         fmt::format("All samples are kept; SHA-256 {}.", or_not_stated(certificate_.raw_sha256)),
         kNote);
+    if (!certificate_.head.empty()) {
+      paragraph(fmt::format("Head of the store's history at this run: {}.", certificate_.head),
+                kNote);
+    }
   }
 
   void statements() {

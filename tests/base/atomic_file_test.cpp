@@ -7,6 +7,8 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "forwarding_files.h"
+#include "temporary_folder.h"
 #include "text_of.h"
 
 namespace sixpoint {
@@ -52,6 +54,87 @@ TEST(AtomicFile, StepsAsideForALeftoverTemporaryFile) {
   ASSERT_OK(memory.files.create("./.f.0.tmp"));
   ASSERT_OK(write_file(memory.files, "f", "text"));
   EXPECT_EQ(text_of(memory.files, "f"), "text");
+}
+
+// A disk whose rule is `how` for every file, with a pipe that takes everything.
+class RuledFiles final : public tests::ForwardingFiles {
+ public:
+  RuledFiles(FileSystem& files, Placing how) : ForwardingFiles(files), how_(how) {}
+  Result<Placement> placement(const std::string& path) override { return Placement{how_, path}; }
+  Result<std::unique_ptr<WritableFile>> open_through(const std::string& /*path*/) override {
+    class Pipe final : public WritableFile {
+     public:
+      explicit Pipe(std::string& text) : text_(text) {}
+      Status write_at(std::uint64_t /*offset*/, std::span<const std::uint8_t> bytes) override {
+        text_ += as_text(bytes);
+        return {};
+      }
+      Result<std::size_t> read_at(std::uint64_t /*offset*/,
+                                  std::span<std::uint8_t> /*out*/) override {
+        return std::size_t{0};
+      }
+      Status sync() override { return {}; }
+      Status close() override { return {}; }
+
+     private:
+      std::string& text_;
+    };
+    return std::make_unique<Pipe>(went_through);
+  }
+  std::string went_through;
+
+ private:
+  Placing how_;
+};
+
+TEST(AtomicFile, KeepsWhatIsThereWhereTheRuleSaysSo) {
+  MemoryEnv memory;
+  RuledFiles files(memory.files, Placing::keep);
+  ASSERT_OK(write_file(files, "f", "first"));
+  EXPECT_FAILS(write_file(files, "f", "second"), ErrorCode::cannot_create);
+  EXPECT_EQ(text_of(memory.files, "f"), "first");
+  EXPECT_EQ(memory.files.list(".")->size(), 1U) << "no temporary file stays";
+  RuledFiles replacing(memory.files, Placing::replace);
+  EXPECT_FAILS(refuse_existing(memory.files, "f"), ErrorCode::cannot_create);
+  EXPECT_OK(refuse_existing(replacing, "f"));
+  EXPECT_OK(refuse_existing(memory.files, "none"));
+}
+
+TEST(AtomicFile, BytesThatGoThroughMakeNoFile) {
+  MemoryEnv memory;
+  RuledFiles files(memory.files, Placing::through);
+  {
+    auto out = AtomicFile::create(files, "pipe");
+    ASSERT_OK(out);
+    ASSERT_OK(out->append("as "));
+    EXPECT_EQ(files.went_through, "as ") << "at once";
+    ASSERT_OK(out->append("they come"));
+    ASSERT_OK(out->commit());
+  }
+  EXPECT_EQ(files.went_through, "as they come");
+  files.went_through.clear();
+  // A writer that goes back: the whole comes at the end.
+  auto seeking = AtomicFile::create(files, "pipe");
+  ASSERT_OK(seeking);
+  ASSERT_OK(seeking->file().write_at(2, as_bytes("cd")));
+  ASSERT_OK(seeking->file().write_at(0, as_bytes("ab")));
+  EXPECT_EQ(files.went_through, "");
+  ASSERT_OK(seeking->commit());
+  EXPECT_EQ(files.went_through, "abcd");
+  EXPECT_EQ(memory.files.changing_operations(), 0U);
+}
+
+TEST(PrivateFiles, AreTheirOwnersAlone) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  ASSERT_OK(make_private_folders(files, folder / "a/b"));
+  ASSERT_OK(write_private_file(files, folder / "a/b/f", "text"));
+  using std::filesystem::perms;
+  EXPECT_EQ(std::filesystem::status(folder / "a").permissions(), perms::owner_all);
+  EXPECT_EQ(std::filesystem::status(folder / "a/b").permissions(), perms::owner_all);
+  EXPECT_EQ(std::filesystem::status(folder / "a/b/f").permissions(),
+            perms::owner_read | perms::owner_write);
+  EXPECT_EQ(text_of(files, folder / "a/b/f"), "text");
 }
 
 }  // namespace

@@ -64,6 +64,30 @@ TEST_F(StoreTest, AuditFindsWhatWasTouched) {
   }
 }
 
+TEST_F(StoreTest, TheHeadIsPublishedAndFoundAgain) {
+  Store store = open();
+  EXPECT_EQ(store.head()->rows, 0);
+  EXPECT_EQ(store.head()->head, std::string(64, '0'));
+  RunRecord run;
+  run.serial = "MOS2A1";
+  run.kind = "jig";
+  run.filter = "current";
+  run.document = "{}";
+  const auto id = store.add_run(run, {});
+  ASSERT_OK(id);
+  const std::string of_run = store.run(*id)->head;
+  ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 100, "1"), "w"));
+  const auto head = store.head();
+  ASSERT_OK(head);
+  EXPECT_EQ(head->head, store.audit()->head);
+  EXPECT_EQ(head->rows, store.audit()->rows);
+  EXPECT_NE(of_run, head->head);
+  EXPECT_EQ(of_run, store.head_of_run(*id).value());
+  EXPECT_TRUE(store.audit(of_run)->ok);
+  EXPECT_TRUE(store.audit(head->head)->ok);
+  EXPECT_FAILS(store.head_of_run("none"), ErrorCode::no_input);
+}
+
 TEST_F(StoreTest, AnAuditSeesOneMomentWhileOthersWrite) {
   Store store = open();
   std::atomic<bool> stop = false;

@@ -45,5 +45,43 @@ TEST_F(StoreTest, AuditVerifyAnswersWithRowsAndHead) {
   EXPECT_EQ(run({"audit", "verify", "--store", path("none.db")}).exit_code, 66);
 }
 
+// A head from any of them is one that verify finds again.
+TEST_F(StoreTest, TheHeadIsInEveryPlaceThatIsHandedOut) {
+  const auto jig = run({"jig", "--device", tests::kUnitInJig, "--store", path("a.db"),
+                        "--certificate", path("c.json"), "--json"});
+  ASSERT_EQ(jig.exit_code, 0) << jig.people;
+  const auto head = run({"audit", "head", "--store", path("a.db"), "--json"});
+  EXPECT_EQ(head.exit_code, 0);
+  EXPECT_EQ(head.json()["schema"], "sixpoint/audit/1");
+  const std::string hex = head.json()["head"];
+  EXPECT_EQ(run({"audit", "head", "--store", path("a.db")}).out, hex + "\n");
+  EXPECT_EQ(head.json()["rows"],
+            run({"audit", "verify", "--store", path("a.db"), "--json"}).json()["rows"]);
+  std::vector<std::string> heads = {hex};
+  heads.push_back(run({"store", "backup", "--store", path("a.db"), "-o", path("b.db"), "--json"})
+                      .json()["head"]);
+  heads.push_back(run({"store", "export", "--store", path("a.db"), "-o", path("a.jsonl"), "--json"})
+                      .json()["head"]);
+  std::ifstream exported(path("a.jsonl"));
+  std::string line;
+  std::getline(exported, line);
+  heads.push_back(nlohmann::json::parse(line)["head"]);
+  EXPECT_EQ(heads[1], hex);
+  EXPECT_EQ(heads[2], hex);
+  EXPECT_EQ(heads[3], hex);
+  std::ifstream certificate(path("c.json"));
+  heads.push_back(nlohmann::json::parse(certificate)["head"]);
+  EXPECT_NE(heads[4], hex) << "the run's own row is not the last one";
+  // The store goes on; what was handed out holds.
+  ASSERT_EQ(run({"station-lock", "sign", "--operator", "Ada", "--reason", "checked", "--store",
+                 path("a.db")})
+                .exit_code,
+            0);
+  for (const std::string& old : heads) {
+    EXPECT_EQ(run({"audit", "verify", "--store", path("a.db"), "--head", old}).exit_code, 0) << old;
+  }
+  EXPECT_EQ(run({"audit", "head", "--store", path("none.db")}).exit_code, 66);
+}
+
 }  // namespace
 }  // namespace sixpoint

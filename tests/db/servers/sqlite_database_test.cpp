@@ -1,5 +1,6 @@
 // What only a store in a file can meet: other files, no rights, full disks, damage, early versions.
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 
 #include <gmock/gmock.h>
@@ -58,6 +59,137 @@ TEST_F(SqliteStoreTest, OpensOnlyStores) {
   EXPECT_FAILS(Store::open(memory_.env, other), ErrorCode::bad_data);
   ASSERT_OK(open_sqlite(folder_ / "newer.db").value()->set_schema_version(99));
   EXPECT_FAILS(Store::open(memory_.env, folder_ / "newer.db"), ErrorCode::configuration);
+}
+
+std::string all_bytes(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<std::string> names_in(const std::string& folder) {
+  return posix_env().files.list(folder).value();
+}
+
+unsigned mode_of(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 ? status.st_mode & 07777U : 0U;
+}
+
+// The rows of open_sqlite()'s table that refuse a file: bytes and neighbours stay.
+TEST_F(SqliteStoreTest, LeavesAStrangersFileAsItIs) {
+  const std::string other = folder_ / "other.db";
+  for (const char* mode : {"DELETE", "WAL"}) {
+    std::filesystem::remove(other);
+    sqlite3* handle = nullptr;
+    ASSERT_EQ(sqlite3_open(other.c_str(), &handle), SQLITE_OK);
+    const std::string sql = std::string("PRAGMA journal_mode=") + mode +
+                            "; CREATE TABLE mine (a); INSERT INTO mine VALUES (1)";
+    ASSERT_EQ(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+    const auto refuse = [&] {
+      const std::string before = all_bytes(other);
+      const auto names = names_in(folder_.path());
+      EXPECT_FAILS(Store::open(memory_.env, other), ErrorCode::bad_data);
+      EXPECT_FAILS(Store::open_to_read(memory_.env, other), ErrorCode::bad_data);
+      EXPECT_EQ(all_bytes(other), before) << mode;
+      EXPECT_EQ(names_in(folder_.path()), names) << mode;
+    };
+    refuse();  // while the other program has it open: in WAL mode the file itself is still empty
+    ASSERT_EQ(sqlite3_exec(handle, "INSERT INTO mine VALUES (2)", nullptr, nullptr, nullptr),
+              SQLITE_OK)
+        << "the other program works on";
+    sqlite3_close(handle);
+    refuse();
+  }
+}
+
+// As earlier programs made a store: their mark stands in the log until it is copied.
+TEST_F(SqliteStoreTest, KnowsAStoreWhoseMarkIsInItsLog) {
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open(path().c_str(), &handle), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(handle, "PRAGMA journal_mode=WAL; PRAGMA application_id=0x73697870",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  EXPECT_OK(open());
+  sqlite3_close(handle);
+  EXPECT_OK(open());
+}
+
+TEST_F(SqliteStoreTest, AFolderALoopAndAPipeAreNoStores) {
+  std::filesystem::create_directory(folder_ / "folder");
+  std::filesystem::create_symlink("loop", folder_ / "loop");
+  std::filesystem::create_symlink("none", folder_ / "lost");
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  EXPECT_FAILS(Store::open(memory_.env, folder_ / "folder"), ErrorCode::bad_data);
+  EXPECT_FAILS(Store::open(memory_.env, folder_ / "loop"), ErrorCode::cannot_create);
+  EXPECT_FAILS(Store::open(memory_.env, folder_ / "lost"), ErrorCode::cannot_create);
+  EXPECT_FAILS(Store::open(memory_.env, folder_ / "pipe"), ErrorCode::bad_data);
+  EXPECT_FAILS(Store::open_to_read(memory_.env, folder_ / "none.db"), ErrorCode::no_input);
+  std::ofstream(folder_ / "empty.db").flush();
+  EXPECT_FAILS(Store::open_to_read(memory_.env, folder_ / "empty.db"), ErrorCode::bad_data);
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "empty.db"), 0U);
+  ASSERT_OK(Store::open(memory_.env, folder_ / "empty.db"));
+  EXPECT_EQ(names_in(folder_.path()),
+            (std::vector<std::string>{"empty.db", "folder", "loop", "lost", "pipe"}));
+}
+
+TEST_F(SqliteStoreTest, AStoreIsItsOwnersAlone) {
+  auto store = open();
+  ASSERT_OK(store);
+  ASSERT_OK(store->add_constants(constants(1), "w"));
+  for (const char* name : {"store.db", "store.db-wal", "store.db-shm"}) {
+    EXPECT_EQ(mode_of(folder_ / name), 0600U) << name;
+  }
+}
+
+TEST_F(SqliteStoreTest, TakesNamesInAnyEncoding) {
+  for (const std::string name : {"caf\xe9.db", "\xff\xfe?#%20&.db", "a b\n.db"}) {
+    const std::string place = folder_ / name;
+    {
+      auto store = Store::open(memory_.env, place);
+      ASSERT_OK(store);
+      ASSERT_OK(store->add_constants(constants(1), "w"));
+    }
+    ASSERT_TRUE(std::filesystem::exists(place));
+    auto again = Store::open_to_read(memory_.env, place);
+    ASSERT_OK(again);
+    EXPECT_EQ(again->history("MOS2A1")->size(), 1U);
+  }
+  EXPECT_EQ(names_in(folder_.path()).size(), 3U);
+}
+
+// The index of constants loses its entry for the newest set, behind SQLite's back: the chain of the
+// rows holds, and the question "which constants apply" would be answered wrongly.
+TEST_F(SqliteStoreTest, AuditFindsAnIndexThatDoesNotSayWhatItsTableSays) {
+  {
+    auto store = open();
+    for (int i = 1; i <= 5; ++i) {
+      ASSERT_OK(store->add_constants(constants(i), "w"));
+    }
+    EXPECT_TRUE(store->audit()->ok);
+  }
+  run_sql(
+      "DROP TRIGGER constants_no_update; PRAGMA foreign_keys=OFF;"
+      "UPDATE constants SET serial='X' WHERE made_at_ns=5000000000");
+  run_sql(
+      "CREATE TABLE aside AS SELECT * FROM sqlite_schema WHERE name='constants_by_1';"
+      "PRAGMA writable_schema=ON; DELETE FROM sqlite_schema WHERE name='constants_by_1'");
+  run_sql("UPDATE constants SET serial='MOS2A1' WHERE made_at_ns=5000000000");
+  run_sql("PRAGMA writable_schema=ON; INSERT INTO sqlite_schema SELECT * FROM aside");
+  run_sql("DROP TABLE aside");
+  auto store = open();
+  ASSERT_OK(store);
+  EXPECT_EQ(store->constants_for("MOS2A1", "current").value()->made_at, from_unix_seconds(4))
+      << "the wrong answer that the audit has to find";
+  const auto audit = store->audit();
+  ASSERT_OK(audit);
+  EXPECT_FALSE(audit->ok);
+  std::string all;
+  for (const std::string& finding : audit->findings) {
+    all += finding + "\n";
+  }
+  EXPECT_NE(all.find("constants_by_1 of constants does not say"), std::string::npos) << all;
+  EXPECT_EQ(audit->findings.size(), 1U) << all;
+  EXPECT_EQ(all.find("does not fit the chain"), std::string::npos) << all;
 }
 
 // The text of version 1, as the first program wrote it, with three rows and their hashes. The
@@ -196,6 +328,20 @@ TEST_F(SqliteStoreTest, AFileThatMayNotBeWrittenIsReadOnlyWithAClearError) {
   int status = 0;
   ::waitpid(child, &status, 0);
   EXPECT_EQ(WEXITSTATUS(status), static_cast<int>(ErrorCode::permission));
+  // To read it is open all the same, in a folder that may not be written either.
+  const pid_t reader = ::fork();
+  if (reader == 0) {
+    if (::geteuid() == 0 && (::chmod(folder_.path().c_str(), 0555) != 0 || ::setuid(65534) != 0)) {
+      ::_exit(100);
+    }
+    auto store = Store::open_to_read(memory_.env, path());
+    const bool reads = store && store->history("MOS2A1")->size() == 1 && store->audit()->ok;
+    const auto id = reads ? store->add_constants(constants(2), "w")
+                          : Result<std::string>(fail(ErrorCode::internal, "cannot be read"));
+    ::_exit(id ? 0 : static_cast<int>(id.error().code));
+  }
+  ::waitpid(reader, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), static_cast<int>(ErrorCode::permission)) << "reads, never writes";
   ::chmod(folder_.path().c_str(), 0755);
   EXPECT_EQ(open()->history("MOS2A1")->size(), 1U);
 }
