@@ -49,7 +49,7 @@ struct Context {
   std::ostream& people;  // standard error: prompts, progress, warnings, errors
   std::istream& in;
   bool people_at_terminal = false;  // progress bars only when true
-  bool out_is_taken = false;       // an output was named "-": text for people goes to `people`
+  bool out_is_taken = false;        // an output was named "-": text for people goes to `people`
   int exit_code = 0;
   std::shared_ptr<spdlog::logger> logger = nullptr;  // made by log() at its first use
 

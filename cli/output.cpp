@@ -101,8 +101,9 @@ bool belongs_to_record(FileSystem& files, const std::string& path, std::string_v
          is_plan(files, folder) || is_plan(files, folder + "/..");
 }
 
-// Of a regular file that is no input.
-Target look_at_content(FileSystem& files, const std::string& path) {
+// Of a regular file that is no input; `named` may be a link to it.
+Target look_at_content(FileSystem& files, const std::string& named) {
+  const std::string path = files.real_path(named).value_or(named);
   // The files beside a database first: opening and closing one would end SQLite's locks on it.
   if (belongs_to_database(files, path)) {
     return Target::database;

@@ -174,7 +174,7 @@ void for_each_option(const std::function<void(const std::string&, std::optional<
   const std::function<void(const CLI::App&, const std::string&)> walk =
       [&](const CLI::App& command, const std::string& name) {
         for (const CLI::Option* option : command.get_options()) {
-          if (option->get_type_size() == 0) {
+          if (option->get_items_expected_max() == 0) {
             continue;  // a flag takes no value
           }
           const std::string key = long_name(*option);
@@ -195,7 +195,7 @@ void for_each_option(const std::function<void(const std::string&, std::optional<
   walk(app, "");
 }
 
-TEST(OutputOptions, EveryOptionIsClassified) {
+TEST(OptionList, EveryOptionIsClassified) {
   std::size_t seen = 0;
   std::set<std::string> own;
   for_each_option([&](const std::string& name, std::optional<Role> role) {
@@ -211,7 +211,7 @@ TEST(OutputOptions, EveryOptionIsClassified) {
 
 // A command that would write `output` through each of the options; everything else is as it has to
 // be.
-class OutputOptions : public tests::CommandTest {
+class EveryOutput : public tests::CommandTest {
  protected:
   void SetUp() override {
     write("s.json",
@@ -338,7 +338,7 @@ bool has_force(const std::string& option) {
          option != "station --state";
 }
 
-TEST_F(OutputOptions, NothingThatHoldsMeasurementsIsWrittenOver) {
+TEST_F(EveryOutput, NothingThatHoldsMeasurementsIsWrittenOver) {
   std::size_t tried = 0;
   for_each_option([&](const std::string& option, std::optional<Role> role) {
     if (!role || *role < Role::output || *role == Role::refused) {
@@ -385,7 +385,7 @@ TEST_F(OutputOptions, NothingThatHoldsMeasurementsIsWrittenOver) {
   EXPECT_GE(tried, 28U);
 }
 
-TEST_F(OutputOptions, AFileOfNobodyIsReplacedWithForceAlone) {
+TEST_F(EveryOutput, AFileOfNobodyIsReplacedWithForceAlone) {
   for_each_option([&](const std::string& option, std::optional<Role> role) {
     if (!role || *role < Role::output || *role >= Role::folder) {
       return;
@@ -447,7 +447,7 @@ std::string full_device(const std::string& path) {
              : "/dev/full";
 }
 
-TEST_F(OutputOptions, DevicesAndPipesStayWhatTheyAre) {
+TEST_F(EveryOutput, DevicesAndPipesStayWhatTheyAre) {
   for_each_option([&](const std::string& option, std::optional<Role> role) {
     if (!role || *role < Role::output || *role == Role::refused ||
         option == "gap challenge --html") {
@@ -485,7 +485,7 @@ TEST_F(OutputOptions, DevicesAndPipesStayWhatTheyAre) {
   });
 }
 
-TEST_F(OutputOptions, TheOldNamesOfOutputsAreRefusedWithTheNewOnes) {
+TEST_F(EveryOutput, TheOldNamesOfOutputsAreRefusedWithTheNewOnes) {
   const Answer diagnosis = run({"gap", "diagnose", path("bundle"), "--scenario", path("s.json")});
   EXPECT_EQ(diagnosis.exit_code, 64);
   EXPECT_NE(diagnosis.people.find("--scenario-out"), std::string::npos) << diagnosis.people;

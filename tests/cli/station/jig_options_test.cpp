@@ -52,12 +52,13 @@ struct Opening {
     options.device = device;
     options.jig = jig;
     options.record = record;
-    return open_unit(context, options, recorder);
+    return open_unit(context, options, outputs, recorder);
   }
   MemoryEnv memory;
   std::ostringstream out;
   std::istringstream in;
   Context context{memory.env, out, out, in};
+  Outputs outputs{context, {}, /*json=*/false};
   device::SessionRecorder recorder;
 };
 

@@ -27,6 +27,7 @@ struct Recorded {
   std::ostringstream people;
   std::istringstream in;
   Context context{memory.env, out, people, in};
+  Outputs outputs{context, {}, /*json=*/false};
   device::SessionRecorder recorder;
 };
 
@@ -34,7 +35,7 @@ struct Recorded {
 // one reply.
 TEST(RecordOption, TheSessionHasWhatPassed) {
   Recorded recorded;
-  ASSERT_OK(begin_session(recorded.context, recorded.recorder, "s.zip"));
+  ASSERT_OK(begin_session(recorded.outputs, recorded.recorder, "s.zip"));
   recorded.open_a_unit();
   finish_session(recorded.context, recorded.recorder, "s.zip");
   EXPECT_EQ(recorded.context.exit_code, 0) << recorded.people.str();
@@ -49,9 +50,18 @@ TEST(RecordOption, TheSessionHasWhatPassed) {
   EXPECT_EQ(session->transfers[1].kind, device::SessionTransfer::Kind::from_device);
 }
 
+// Before anything is opened, and not when the work is done.
+TEST(RecordOption, AFileThatIsThereIsRefusedBeforeTheWork) {
+  Recorded recorded;
+  ASSERT_OK(recorded.memory.files.create("s.zip"));
+  EXPECT_FAILS(begin_session(recorded.outputs, recorded.recorder, "s.zip"),
+               ErrorCode::cannot_create);
+  EXPECT_FALSE(recorded.memory.files.info("s.zip.journal"));
+}
+
 TEST(RecordOption, WithoutANameNothingIsWritten) {
   Recorded recorded;
-  ASSERT_OK(begin_session(recorded.context, recorded.recorder, ""));
+  ASSERT_OK(begin_session(recorded.outputs, recorded.recorder, ""));
   recorded.open_a_unit();
   finish_session(recorded.context, recorded.recorder, "");
   EXPECT_EQ(recorded.memory.files.changing_operations(), 0U);
@@ -62,7 +72,7 @@ TEST(RecordOption, WithoutANameNothingIsWritten) {
 // The exit code of the contract for a disk that fails is 74.
 TEST(RecordOption, ASessionThatCannotBeMadeIsReported) {
   Recorded recorded;
-  ASSERT_OK(begin_session(recorded.context, recorded.recorder, "s.zip"));
+  ASSERT_OK(begin_session(recorded.outputs, recorded.recorder, "s.zip"));
   recorded.open_a_unit();
   recorded.memory.files.fail_after(0);
   finish_session(recorded.context, recorded.recorder, "s.zip");
@@ -77,7 +87,7 @@ TEST(RecordOption, ASessionThatCannotBeMadeIsReported) {
 TEST(RecordOption, ASessionThatIsTooLongSaysSo) {
   Recorded recorded;
   device::SessionRecorder brief(150);
-  ASSERT_OK(begin_session(recorded.context, brief, "s.zip"));
+  ASSERT_OK(begin_session(recorded.outputs, brief, "s.zip"));
   ASSERT_OK(station::known_units().open("virtual:seed=7", recorded.memory.env,
                                         [&](device::Link& link) { brief.attach(link); }));
   finish_session(recorded.context, brief, "s.zip");
