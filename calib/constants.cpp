@@ -289,6 +289,9 @@ Json to_json(const ConstantsRecord& record) {
   if (!record.made_from.station.empty()) {
     json["made_from"]["station"] = record.made_from.station;
   }
+  if (!record.made_from.kind.empty()) {
+    json["made_from"]["kind"] = record.made_from.kind;
+  }
   json["gravity_m_per_s2"] = record.gravity_m_per_s2;
   if (record.from_prior) {
     json["from_prior"] = true;
@@ -330,7 +333,7 @@ Result<ConstantsRecord> constants_record_from_json(const Json& json) {
   }
   if (const auto found = json.find("made_from"); found != json.end() && found->is_object()) {
     record.made_from = {read_text(*found, "sha256"), read_text(*found, "file"),
-                        read_text(*found, "station")};
+                        read_text(*found, "station"), read_text(*found, "kind")};
   }
   if (const auto found = json.find("gravity_m_per_s2"); found != json.end()) {
     const std::string where = "constants.json, gravity_m_per_s2";

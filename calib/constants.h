@@ -92,12 +92,14 @@ struct CrossAxisMap {
 // bad_data when a number is not finite, or a term is beyond what any working sensor has (0.2).
 Status validate(const CrossAxisMap& map);
 
-// Where constants came from. `sha256` is that of the recording or session; empty when there is none
-// (constants typed in).
+// Where constants came from. `kind`: "jig", "calibration_file" (the unit at rest on its sides) or
+// "file_scan" (a file that was worn); empty where it is not known. `sha256` is that of the
+// recording or session; empty when there is none (constants typed in).
 struct ConstantsOrigin {
   std::string sha256;
   std::string file;     // name of the recording, for people
   std::string station;  // who measured, for people
+  std::string kind = {};
 };
 
 // One set of constants with everything needed to trust it: the content of constants.json and a row

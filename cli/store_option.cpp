@@ -141,6 +141,7 @@ Result<SavedConstants> save_capture(Context& context, const Env& env, const std:
   calib::ConstantsOrigin origin;
   origin.sha256 = report.file_sha256;
   origin.file = file_name_of(report.file);
+  origin.kind = "calibration_file";
   SIXPOINT_ASSIGN(const auto record, record_constants(env, *report.solved, origin, path));
   return save_constants(context, location, record, std::string(gt3x::model_of(record.serial)));
 }

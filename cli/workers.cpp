@@ -38,23 +38,26 @@ void add_jobs_option(CLI::App& command, unsigned& jobs) {
 }
 
 void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& work,
-                  const std::function<void(std::size_t)>& watch) {
+                  const std::function<void(std::size_t)>& watch, const std::atomic<bool>* stop) {
   if (jobs == 0) {
     jobs = std::max(1U, std::thread::hardware_concurrency());
   }
   std::atomic<std::size_t> next{0};
   std::atomic<std::size_t> done{0};
+  std::atomic<std::size_t> ended{0};  // threads
+  const auto stopped = [stop] { return stop != nullptr && *stop; };
   const auto run = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
+    for (std::size_t i = next++; i < count && !stopped(); i = next++) {
       work(i);
       ++done;
     }
+    ++ended;
   };
   std::vector<std::jthread> threads;
   for (unsigned i = 0; i < jobs && i < count; ++i) {
     threads.emplace_back(run);
   }
-  while (done < count) {
+  while (ended < threads.size()) {
     watch(done);
     std::this_thread::sleep_for(std::chrono::milliseconds(count - done < jobs ? 2 : 20));
   }

@@ -38,9 +38,10 @@ void add_jobs_option(CLI::App& command, unsigned& jobs);
 
 // Calls work(i) for every i below `count`, on up to `jobs` threads (0: one per core). Meanwhile
 // `watch(done)` is called on the calling thread. `work` must be safe to call from several threads
-// for different i.
+// for different i. Once `stop` is set no further i is begun.
 void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& work,
-                  const std::function<void(std::size_t)>& watch);
+                  const std::function<void(std::size_t)>& watch,
+                  const std::atomic<bool>* stop = nullptr);
 
 // The answers of `work(file)`, which runs on up to `jobs` threads; `doing` names the progress bar.
 template <class Answer, class Work>

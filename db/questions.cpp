@@ -47,11 +47,24 @@ bool UnitHistory::is_withdrawn(const std::string& constants_id) const {
   bool withdrawn = false;
   for (const Correction& correction : corrections) {
     if (correction.table == "constants" && correction.row_id == constants_id &&
-        correction.action != "note") {
+        (correction.action == "withdraw" || correction.action == "reinstate")) {
       withdrawn = correction.action == "withdraw";
     }
   }
   return withdrawn;
+}
+
+const Correction* UnitHistory::preference(const std::string& filter) const {
+  const Correction* last = nullptr;
+  for (const Correction& correction : corrections) {
+    const bool applies = correction.table == "constants" && correction.action == "prefer" &&
+                         !is_withdrawn(correction.row_id) &&
+                         std::ranges::any_of(constants, [&](const ConstantsRecord& set) {
+                           return set.id == correction.row_id && set.filter == filter;
+                         });
+    last = applies ? &correction : last;
+  }
+  return last;
 }
 
 double YieldReport::yield() const { return share(passed, units); }

@@ -27,12 +27,15 @@ struct UnitHistory {
   bool empty() const;
   // Do these constants apply no more? The last correction decides:
   //
-  // | corrections of the set, oldest first (notes do not count) | withdrawn |
+  // | corrections of the set, oldest first (others do not count)| withdrawn |
   // |------------------------------------------------------------|-----------|
   // | none                                                       | no        |
   // | ..., withdraw                                              | yes       |
   // | ..., withdraw, reinstate                                   | no        |
   bool is_withdrawn(const std::string& constants_id) const;
+  // The last word of a person about which set of a filter configuration applies: the newest
+  // correction "prefer" about a set of it that is not withdrawn; null where there is none.
+  const Correction* preference(const std::string& filter) const;
 };
 
 // A file that was repaired with constants that are withdrawn: repair it again.

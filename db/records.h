@@ -100,8 +100,8 @@ struct Correction {
   UtcTime made_at{};
   std::string table;   // the row's table ...
   std::string row_id;  // ... and its key
-  // "withdraw": constants apply no more. "reinstate": they apply again. "note": what is wrong or
-  // missing in the row, in a sentence.
+  // "withdraw": constants apply no more. "reinstate": they apply again. "prefer": of the sets of
+  // their unit and filter, they apply. "note": what is wrong or missing in the row, in a sentence.
   std::string action;
   std::string operator_name;
   std::string reason;

@@ -104,7 +104,7 @@ const std::vector<Table>& tables() {
         time("made_at_ns"),
         {.name = "about_table"},
         {.name = "about_id"},
-        {.name = "action"},  // withdraw, reinstate, note
+        {.name = "action"},  // withdraw, reinstate, prefer, note
         {.name = "operator"},
         reason()},
        {"about_table, about_id"}},

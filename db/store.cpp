@@ -63,12 +63,13 @@ Result<std::string> Store::correct(const Correction& correction) {
     return fail(ErrorCode::usage, fmt::format("no table '{}'", printable(correction.table, 60)), {},
                 "there are:" + names);
   }
-  const bool of_constants = correction.action == "withdraw" || correction.action == "reinstate";
+  const bool of_constants = correction.action == "withdraw" || correction.action == "reinstate" ||
+                            correction.action == "prefer";
   if (of_constants ? correction.table != "constants" : correction.action != "note") {
     return fail(
         ErrorCode::usage,
         fmt::format("no correction '{}' of {}", printable(correction.action, 60), correction.table),
-        {}, "constants are withdrawn and reinstated; any row can have a note");
+        {}, "constants are withdrawn, reinstated and preferred; any row can have a note");
   }
   if (correction.reason.empty()) {
     return fail(ErrorCode::usage, "a correction needs a reason", {}, "say why");
@@ -142,13 +143,16 @@ Status Store::for_each_run(const RunFilter& filter,
   return for_each_row(*rows, [&](const Row& row) { return visit(record_of<RunRecord>(row)); });
 }
 
-Result<std::optional<ConstantsRecord>> Store::constants_for(const std::string& serial,
-                                                            const std::string& filter) {
-  SIXPOINT_ASSIGN(const auto found, select<ConstantsRecord>(
-                                        "WHERE serial = $1 AND filter = $2 AND " + not_withdrawn() +
-                                            " ORDER BY made_at_ns DESC, seq DESC LIMIT 1",
-                                        std::vector<Value>{serial, filter}));
-  return found.empty() ? std::nullopt : std::optional(found[0]);
+Result<UnitHistory> Store::constants_history(const std::string& serial) {
+  SIXPOINT_ASSIGN(const auto transaction, Transaction::reading(*database_));
+  const std::vector<Value> unit = {serial};
+  UnitHistory all;
+  SIXPOINT_ASSIGN(all.constants, select<ConstantsRecord>("WHERE serial = $1 ORDER BY seq", unit));
+  SIXPOINT_ASSIGN(all.corrections,
+                  select<Correction>("WHERE about_table = 'constants' AND about_id IN (SELECT id "
+                                     "FROM constants WHERE serial = $1) ORDER BY seq",
+                                     unit));
+  return all;
 }
 
 Result<std::vector<ConstantsRecord>> Store::history(const std::string& serial) {

@@ -3,10 +3,11 @@
 //
 //   SIXPOINT_ASSIGN(auto store, Store::open(env, "plant.db"));
 //   SIXPOINT_ASSIGN(const auto id, store.add_constants(record, "wGT3XBT"));
-//   SIXPOINT_ASSIGN(const auto newest, store.constants_for("MOS2A1", "current"));
+//   SIXPOINT_ASSIGN(const auto sets, store.constants_history("MOS2A1"));
 //
 // Rows are only ever added. Constants belong to (serial number, filter configuration); new ones
-// stand beside the old ones, and constants_for() answers with the newest set that is not withdrawn.
+// stand beside the old ones. Which of them apply is the question of
+// repair/rescale/applying_constants.h.
 // A mistake is corrected by a new row with a reason (withdraw_constants()). Every row is chained to
 // the one before by SHA-256 (chain.h), and audit() finds any that was changed, removed or moved.
 //
@@ -46,9 +47,10 @@ class Store final : public RecordWriter {
   // | action              | of which rows      |
   // |---------------------|--------------------|
   // | withdraw, reinstate | constants          |
+  // | prefer              | constants          |
   // | note                | any of any table   |
   Result<std::string> correct(const Correction& correction);
-  // From now on constants_for() passes over them. They stay in the history.
+  // From now on they do not apply. They stay in the history.
   Status withdraw_constants(const std::string& id, const std::string& operator_name,
                             const std::string& reason);
 
@@ -61,18 +63,9 @@ class Store final : public RecordWriter {
   Status for_each_run(const RunFilter& filter,
                       const std::function<Status(const RunRecord&)>& visit);
 
-  // Which constants apply to a file of `serial` recorded under `filter`. Nothing where there are
-  // none.
-  //
-  // | sets of this unit and this configuration        | answer                        |
-  // |-------------------------------------------------|-------------------------------|
-  // | several, none withdrawn                         | the newest by made_at         |
-  // | two of the same made_at                         | of them, the last one stored  |
-  // | the newest is withdrawn                         | the newest that is not        |
-  // | withdrawn and reinstated                        | counts like any other         |
-  // | none, or all withdrawn, or only other `filter`s | nothing                       |
-  Result<std::optional<ConstantsRecord>> constants_for(const std::string& serial,
-                                                       const std::string& filter);
+  // The sets of constants of a unit and the corrections about them, without the rest of its
+  // history.
+  Result<UnitHistory> constants_history(const std::string& serial);
   // The whole history, oldest first, withdrawn sets included.
   Result<std::vector<ConstantsRecord>> history(const std::string& serial);
   Result<UnitHistory> unit_history(const std::string& serial);

@@ -6,8 +6,10 @@
 
 #include "base/sha256.h"
 #include "cli/command.h"
+#include "cli/files/file_stream.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
+#include "cli/stop_request.h"
 #include "cli/store_option.h"
 #include "repair/archive/archive_merge.h"
 #include "repair/archive/archive_plan.h"
@@ -35,10 +37,10 @@ struct Options {
   std::string plan;    // the folder of the plan
   std::string output;  // plan: its folder; run: the folder for repaired files
   RepairSources sources;
-  OutputOptions outputs;
   ArchiveDraft draft;  // as far as the options describe it
   std::size_t shard = 0;
   bool verify = false;
+  bool redo_outdated = false;
   bool dry_run = false;
   bool json = false;
 };
@@ -68,49 +70,6 @@ std::function<void(std::size_t, std::size_t)> show_in(std::optional<Progress>& p
     progress->at(done);
   };
 }
-
-// The answer with its list of files, which may be longer than memory: each file is written as it
-// comes, as JSON or as lines for people.
-class FileStream {
- public:
-  FileStream(Context& context, bool json) : context_(context), json_(json) {
-    if (json_) {
-      context_.out << "{\n\"schema\": \"sixpoint/archive/1\",\n\"files\": [";
-    }
-  }
-  void add(const Json& file) {
-    if (json_) {
-      context_.out << (first_ ? "\n" : ",\n") << text_of(file);
-      first_ = false;
-    }
-  }
-  void add(const RepairReport& report) {
-    if (json_) {
-      add(report.to_json());
-    } else {
-      print_report(context_, report);
-    }
-  }
-  // The other keys of the document.
-  void end(const Json& rest) {
-    if (!json_) {
-      return;
-    }
-    context_.out << "\n]";
-    for (const auto& [key, value] : rest.items()) {
-      context_.out << ",\n\"" << key << "\": " << text_of(value);
-    }
-    context_.out << "\n}\n";
-  }
-
- private:
-  static std::string text_of(const Json& json) {
-    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  }
-  Context& context_;
-  bool json_;
-  bool first_ = true;
-};
 
 // --- plan
 
@@ -210,7 +169,8 @@ Status take_plan_folder(const std::string& folder, FileSystem& files, Outputs& o
 }
 
 Status run_plan(const Options& options, Context& context) {
-  Outputs outputs(context, options.outputs, options.json);
+  // --force is about files that repair refuses; a plan's folder is new in any case.
+  Outputs outputs(context, {}, options.json);
   if (!options.dry_run) {
     SIXPOINT_CHECK(take_plan_folder(absolute(options.output), context.env.files, outputs));
   }
@@ -248,16 +208,26 @@ Status run_plan(const Options& options, Context& context) {
 
 // --- run
 
+repair::ShardState state_of(const Options& options, const ShardResult& result) {
+  if (options.dry_run) {
+    return repair::ShardState::missing;
+  }
+  return result.stopped ? repair::ShardState::partly : repair::ShardState::done;
+}
+
 Status run_shard(const Options& options, Context& context) {
   const std::string folder = absolute(options.plan);
   SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
-  Outputs outputs(context, options.outputs, options.json);
+  Outputs outputs(context, {}, options.json);
   SIXPOINT_CHECK(outputs.working_folder("--output", absolute(options.output)));
   std::optional<Progress> progress;
   repair::ShardRunOptions how;
   how.shard = options.shard;
   how.output_folder = absolute(options.output);
   how.dry_run = options.dry_run;
+  how.redo_outdated = options.redo_outdated;
+  StopRequest stop;
+  how.stop = [&stop] { return stop.requested(); };
   how.software = station::software_and_build();
   how.progress = show_in(progress, context, fmt::format("shard {}", options.shard));
   const auto result = repair::run_shard(context.env, folder, plan, how);
@@ -273,8 +243,7 @@ Status run_shard(const Options& options, Context& context) {
   }
   files.end({{"shards",
               {{{"shard", options.shard},
-                {"state", repair::to_string(options.dry_run ? repair::ShardState::missing
-                                                            : repair::ShardState::done)},
+                {"state", repair::to_string(state_of(options, *result))},
                 {"files", result->files.size()},
                 {"done_before", result->done_before}}}},
              {"summary", tally.to_json(options.dry_run)}});
@@ -284,6 +253,14 @@ Status run_shard(const Options& options, Context& context) {
                                     result->done_before);
     }
     context.people << fmt::format("shard {}: ", options.shard) << tally.brief(options.dry_run);
+  }
+  if (result->stopped) {
+    context.worsen(kExitStopped);
+    context.people << fmt::format(
+        "stopped: {} files of the shard are done; to go on:\n  sixpoint archive run {} --shard {} "
+        "-o {}{}\n",
+        result->files.size(), repair::shell_word(options.plan), options.shard,
+        repair::shell_word(options.output), options.redo_outdated ? " --redo-outdated" : "");
   }
   return {};
 }
@@ -493,7 +470,6 @@ void add_archive(CLI::App& app, Context& context) {
                 "know files by SHA-256, not by size and time of change: reads all of them");
   add_source_options(plan, options.sources);
   add_repair_options(plan, options.draft.repair.options);
-  add_output_options(plan, options.outputs);
   plan.add_flag("--dry-run", options.dry_run, "print what would be planned, write nothing");
   const auto add = [&](const char* name, const char* about,
                        Status (*work)(const Options&, Context&)) {
@@ -505,6 +481,7 @@ void add_archive(CLI::App& app, Context& context) {
   auto [run, of_run] = add("run", "repair one shard; may be repeated", run_shard);
   run.add_option("--shard", of_run.shard, "which one, counted from 0")->required();
   run.add_option("-o,--output", of_run.output, "the folder for repaired files")->required();
+  add_redo_option(run, of_run.redo_outdated);
   run.add_flag("--dry-run", of_run.dry_run, "compute everything, write nothing");
   auto [merge, of_merge] =
       add("merge", "the answers of all shards as one; adds them to the store", run_merge);

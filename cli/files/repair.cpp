@@ -1,13 +1,17 @@
 // sixpoint repair PATH... -o OUTDIR: repairs affected files; the originals stay as they are.
+#include <atomic>
 #include <map>
 
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
+#include "cli/stop_request.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
+#include "repair/archive/archive_scripts.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/triage/file_tree.h"
@@ -74,21 +78,92 @@ RepairReport repair_one(const NamedFile& file, const Options& options,
       return failed_report(file.path, made.error());
     }
   }
-  return repair::repair_file(env, file.path, output, finder, options.repair);
+  repair::RepairOptions how = options.repair;
+  how.resume = how.resume || how.redo_outdated;
+  return repair::repair_file(env, file.path, output, finder, how);
+}
+
+// Every file's report, but for those that were not begun when the operator stopped the run.
+std::vector<RepairReport> repair_files(const std::vector<NamedFile>& files, const Options& options,
+                                       repair::ConstantsFinder& finder, Context& context) {
+  std::vector<std::optional<RepairReport>> answers(files.size());
+  StopRequest stop;
+  std::atomic<bool> stopping{false};
+  {
+    Progress progress(context, "repairing", files.size());
+    for_each_job(
+        files.size(), options.jobs,
+        [&](std::size_t i) { answers[i] = repair_one(files[i], options, finder, context.env); },
+        [&](std::size_t done) {
+          progress.at(done);
+          stopping = stop.requested();
+        },
+        &stopping);
+  }
+  std::vector<RepairReport> reports;
+  for (std::optional<RepairReport>& answer : answers) {
+    if (answer) {
+      reports.push_back(*std::move(answer));
+    }
+  }
+  return reports;
+}
+
+// The command line that goes on with this run.
+std::string line_that_goes_on(const Options& options) {
+  std::string line = "sixpoint repair";
+  const auto add = [&](const char* name, const std::string& value) {
+    if (!value.empty()) {
+      line += fmt::format(" {} {}", name, repair::shell_word(value));
+    }
+  };
+  const auto flag = [&](const char* name, bool given) { line += given ? name : ""; };
+  for (const std::string& path : options.paths) {
+    line += fmt::format(" {}", repair::shell_word(path));
+  }
+  add("-o", options.folder);
+  add("--constants", options.sources.constants);
+  add("--calibration-file", options.sources.calibration_file);
+  add("--store", options.sources.store);
+  flag(" --scan", options.sources.scan);
+  flag(" --or-scan", options.sources.or_scan);
+  flag(" --wide", options.repair.wide);
+  flag(" --undo-rotation", options.repair.undo_rotation);
+  flag(" --allow-prior", options.repair.allow_prior);
+  flag(" --force", options.repair.force);
+  flag(" --redo-outdated", options.repair.redo_outdated);
+  return line + " --resume";
+}
+
+// What the run leaves in its folder, and how it goes on where it was stopped.
+Status conclude(const Options& options, const std::vector<RepairReport>& reports, std::size_t files,
+                Context& context) {
+  const bool stopped = reports.size() < files;
+  if (stopped) {
+    context.worsen(kExitStopped);
+  }
+  if (!options.repair.dry_run && context.env.files.info(options.folder)) {
+    SIXPOINT_CHECK(
+        write_manifest(context.env.files, options.folder, reports, context.env.clock.now()));
+  }
+  if (stopped) {
+    context.people << fmt::format("stopped: {} of {} files are done; to go on:\n  {}\n",
+                                  reports.size(), files, line_that_goes_on(options));
+  }
+  return {};
 }
 
 Status run(const Options& options, Context& context) {
   Outputs outputs(context, {}, options.json);
   SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
+  SIXPOINT_CHECK(check_manifest(context.env.files, options.folder));
   std::optional<db::Store> store;
   SIXPOINT_ASSIGN(auto how, finder_options(options, context, store));
   repair::ConstantsFinder finder(context.env, std::move(how));
 
   auto files = named_files(context, options.paths, {".gt3x"});
   refuse_same_outputs(files, options.folder);
-  const auto reports = for_each_file<RepairReport>(
-      context, "repairing", files, options.jobs,
-      [&](const NamedFile& file) { return repair_one(file, options, finder, context.env); });
+  const auto reports = repair_files(files, options, finder, context);
   RepairTally tally;
   Json json = document("repair");
   Json& list = json["files"] = Json::array();
@@ -104,13 +179,14 @@ Status run(const Options& options, Context& context) {
         keep_repairs(context, options.sources.store, opened, reports, "run it again with --resume");
   }
   if (options.json) {
-    return print_json(context, json);
+    SIXPOINT_CHECK(print_json(context, json));
+  } else {
+    for (const RepairReport& report : reports) {
+      print_report(context, report);
+    }
+    context.people << tally.brief(options.repair.dry_run);
   }
-  for (const RepairReport& report : reports) {
-    print_report(context, report);
-  }
-  context.people << tally.brief(options.repair.dry_run);
-  return {};
+  return conclude(options, reports, files.size(), context);
 }
 
 }  // namespace
@@ -125,6 +201,7 @@ void add_repair(CLI::App& app, Context& context) {
   command.add_flag("--dry-run", options.repair.dry_run, "compute everything, write nothing");
   command.add_flag("--resume", options.repair.resume,
                    "go on with an earlier run: what it finished is left as it is");
+  add_redo_option(command, options.repair.redo_outdated);
   add_jobs_option(command, options.jobs);
 }
 

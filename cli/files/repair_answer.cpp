@@ -44,6 +44,11 @@ void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
                    "write a file also where its own still periods say that it does not help");
 }
 
+void add_redo_option(CLI::App& command, bool& redo_outdated) {
+  command.add_flag("--redo-outdated", redo_outdated,
+                   "replace outputs that were made otherwise than they would be made now");
+}
+
 Result<std::optional<db::Store>> store_of(Context& context, const RepairSources& sources) {
   const bool only_scan = sources.scan && sources.calibration_file.empty();
   if (sources.store.empty() && (only_scan || !store_exists(context, ""))) {
@@ -77,7 +82,8 @@ void RepairTally::add(Context& context, const RepairReport& report) {
   ++counts_[report.status];
   if (report.status == RepairStatus::failed) {
     context.worsen(report.error ? report.error->code : ErrorCode::internal);
-  } else if (report.status == RepairStatus::not_repairable) {
+  } else if (report.status == RepairStatus::not_repairable ||
+             report.status == RepairStatus::outdated) {
     context.worsen(kExitFailed);
   }
 }
@@ -91,7 +97,7 @@ Json RepairTally::to_json(bool dry_run) const {
   Json summary = {{"files", files_}};
   for (const RepairStatus status :
        {RepairStatus::repaired, RepairStatus::not_affected, RepairStatus::not_repairable,
-        RepairStatus::already_repaired, RepairStatus::failed}) {
+        RepairStatus::already_repaired, RepairStatus::outdated, RepairStatus::failed}) {
     summary[std::string(repair::to_string(status))] = of(status);
   }
   summary["dry_run"] = dry_run;
@@ -101,10 +107,10 @@ Json RepairTally::to_json(bool dry_run) const {
 std::string RepairTally::brief(bool dry_run) const {
   return fmt::format(
       "{} files: {} repaired{}, {} not affected, {} already repaired, {} not repairable, {} "
-      "failed\n",
+      "outdated, {} failed\n",
       files_, of(RepairStatus::repaired), dry_run ? " (dry run: nothing was written)" : "",
       of(RepairStatus::not_affected), of(RepairStatus::already_repaired),
-      of(RepairStatus::not_repairable), of(RepairStatus::failed));
+      of(RepairStatus::not_repairable), of(RepairStatus::outdated), of(RepairStatus::failed));
 }
 
 void print_report(Context& context, const RepairReport& report) {

@@ -40,6 +40,9 @@ std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_
 // --wide, --undo-rotation, --allow-prior, --force
 void add_repair_options(CLI::App& command, repair::RepairOptions& options);
 
+// --redo-outdated
+void add_redo_option(CLI::App& command, bool& redo_outdated);
+
 // The store that keeps what was repaired, and is asked for constants where order_of() has it:
 //
 //   --store  --scan  --calibration-file  store
@@ -59,10 +62,11 @@ class RepairTally {
   // Counts the report, and keeps the worst exit code:
   //
   //   repaired, not_affected, already_repaired   0
-  //   not_repairable                             1
+  //   not_repairable, outdated                   1
   //   failed                                     the error's
   void add(Context& context, const repair::RepairReport& report);
-  // {files, repaired, not_affected, not_repairable, already_repaired, failed, dry_run}
+  // {files, repaired, not_affected, not_repairable, already_repaired, outdated, failed,
+  // dry_run}
   Json to_json(bool dry_run) const;
   std::string brief(bool dry_run) const;  // one line, with its line end
 
@@ -72,7 +76,7 @@ class RepairTally {
   std::map<repair::RepairStatus, std::size_t> counts_;
 };
 
-// One line on stdout, and the reasons where the file was not repaired.
+// A line on stdout with source and still error, and the reasons below it.
 void print_report(Context& context, const repair::RepairReport& report);
 
 // Adds the files that were repaired to the store, each once. `store` is the result of open_store().

@@ -58,7 +58,7 @@ struct Outcome {
 //   verified           -o          --save
 //   rest on a prior    -o          never
 //   not verified       never       never
-Status keep(const std::string& path, const Options& options, const std::string& model,
+Status keep(const std::string& path, const Options& options, const repair::Survey& survey,
             Outcome& outcome, Context& context, Outputs& outputs) {
   const bool to_file =
       !options.output.empty() && (outcome.report.usable() || outcome.report.from_prior);
@@ -69,10 +69,11 @@ Status keep(const std::string& path, const Options& options, const std::string& 
   calib::ConstantsOrigin origin;
   SIXPOINT_ASSIGN(origin.sha256, file_sha256(context.env.files, path));
   origin.file = file_name_of(path);
+  origin.kind = repair::recording_kind(survey);
   SIXPOINT_ASSIGN(const auto record, record_constants(outputs.env(), outcome.report, origin,
                                                       to_file ? options.output : ""));
   if (to_store) {
-    SIXPOINT_ASSIGN(outcome.saved, save_constants(context, options.store, record, model));
+    SIXPOINT_ASSIGN(outcome.saved, save_constants(context, options.store, record, survey.model));
   }
   return {};
 }
@@ -92,7 +93,7 @@ Result<Outcome> solve_one(const std::string& path, const Options& options,
   SIXPOINT_ASSIGN(outcome.report, repair::solve_survey(path, survey, solve));
   outcome.report.seconds =
       std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
-  SIXPOINT_CHECK(keep(path, options, survey.model, outcome, context, outputs));
+  SIXPOINT_CHECK(keep(path, options, survey, outcome, context, outputs));
   return outcome;
 }
 

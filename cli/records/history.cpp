@@ -5,8 +5,10 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
+#include "calib/constants.h"
 #include "cli/command.h"
 #include "cli/store_option.h"
+#include "repair/rescale/applying_constants.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -23,7 +25,21 @@ Json json_in(const std::string& text) {
   return json.is_discarded() ? Json(nullptr) : json;
 }
 
-Json to_json(const db::ConstantsRecord& record, bool withdrawn) {
+// Of every set, by its own filter configuration: why it applies or does not.
+std::vector<std::string> about_constants(const db::UnitHistory& history) {
+  using calib::FilterConfiguration;
+  const auto current = repair::applying_constants(history, FilterConfiguration::current);
+  const auto legacy = repair::applying_constants(history, FilterConfiguration::legacy);
+  std::vector<std::string> about;
+  for (std::size_t i = 0; i < history.constants.size(); ++i) {
+    const bool of_current =
+        history.constants[i].filter == calib::to_string(FilterConfiguration::current);
+    about.push_back(of_current ? current.about[i] : legacy.about[i]);
+  }
+  return about;
+}
+
+Json to_json(const db::ConstantsRecord& record, bool withdrawn, const std::string& about) {
   Json json;
   json["id"] = record.id;
   json["serial"] = record.serial;
@@ -37,6 +53,8 @@ Json to_json(const db::ConstantsRecord& record, bool withdrawn) {
   json["run"] = text_or_null(record.run_id);
   json["origin"] = json_in(record.origin);
   json["withdrawn"] = withdrawn;
+  json["applies"] = about.starts_with("applies");
+  json["why"] = about;
   return json;
 }
 
@@ -112,10 +130,11 @@ Json array_of(const Records& records) {
 }
 
 void print(const db::UnitHistory& history, Context& context) {
-  for (const auto& record : history.constants) {
-    context.out << fmt::format("{}  {:<8} {:<14} {}{}\n", to_iso8601(record.made_at), record.filter,
-                               record.method, record.id,
-                               history.is_withdrawn(record.id) ? "  withdrawn" : "");
+  const auto about = about_constants(history);
+  for (std::size_t i = 0; i < history.constants.size(); ++i) {
+    const db::ConstantsRecord& record = history.constants[i];
+    context.out << fmt::format("{}  {:<8} {:<14} {}  {}\n", to_iso8601(record.made_at),
+                               record.filter, record.method, record.id, printable(about[i]));
   }
   for (const auto& run : history.runs) {
     context.out << fmt::format("{}  run {:<4} {:<14} {}  {}{}\n", to_iso8601(run.started), run.kind,
@@ -151,8 +170,10 @@ Status run(const Options& options, Context& context) {
   Json json = document("history");
   json["serial"] = options.serial;
   Json& constants = json["constants"] = Json::array();
-  for (const auto& record : history.constants) {
-    constants.push_back(to_json(record, history.is_withdrawn(record.id)));
+  const auto about = about_constants(history);
+  for (std::size_t i = 0; i < history.constants.size(); ++i) {
+    const db::ConstantsRecord& record = history.constants[i];
+    constants.push_back(to_json(record, history.is_withdrawn(record.id), about[i]));
   }
   json["runs"] = array_of(history.runs);
   json["writes"] = array_of(history.writes);

@@ -1,4 +1,6 @@
 // sixpoint store: moving, saving and asking the whole store.
+#include <cstdlib>
+
 #include <fmt/format.h>
 
 #include "cli/command.h"
@@ -97,13 +99,19 @@ Result<Answer> catch_up(const Options& options, Context& context) {
   return answer;
 }
 
-// Adds a row about an old one: withdraw, reinstate, note.
+std::string login_name() {
+  const char* user = std::getenv("USER");
+  return user != nullptr && *user != '\0' ? user : "unknown";
+}
+
+// Adds a row about an old one: withdraw, reinstate, prefer, note.
 Result<Answer> correct(db::Store& store, const Options& options, const std::string& action) {
-  const db::Correction correction{.table = options.table,
-                                  .row_id = options.id,
-                                  .action = action,
-                                  .operator_name = options.operator_name,
-                                  .reason = options.reason};
+  const db::Correction correction{
+      .table = options.table,
+      .row_id = options.id,
+      .action = action,
+      .operator_name = options.operator_name.empty() ? login_name() : options.operator_name,
+      .reason = options.reason};
   Answer answer;
   SIXPOINT_ASSIGN(answer.json["correction"], store.correct(correction));
   answer.json["action"] = action;
@@ -126,6 +134,14 @@ Result<Answer> reinstate(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "reinstate"));
   answer.note = "these constants apply again";
+  return answer;
+}
+
+Result<Answer> prefer(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
+  SIXPOINT_ASSIGN(Answer answer, correct(store, options, "prefer"));
+  answer.json["preferred"] = options.id;
+  answer.note = "of the sets of this unit and filter, these constants apply now";
   return answer;
 }
 
@@ -264,11 +280,12 @@ Declared<Options> add(CLI::App& parent, Context& context, const char* name, cons
   return declared;
 }
 
-// --reason and --operator, for rows about other rows.
+// --why and --operator, for rows about other rows.
 void add_correction_options(const Declared<Options>& correction) {
   auto [command, options] = correction;
-  command.add_option("--reason", options.reason, "why, or what")->required();
-  command.add_option("--operator", options.operator_name, "who decides")->required();
+  command.add_option("--why,--reason", options.reason, "why, or what")->required();
+  command.add_option("--operator", options.operator_name,
+                     "who decides (default: the name under which you are logged in)");
 }
 
 }  // namespace
@@ -299,7 +316,8 @@ void add_store(CLI::App& app, Context& context) {
        "the folder of a journal that was written elsewhere (default: this station's)");
   for (const auto& correction :
        {sub("withdraw", "constants apply no more; they stay in the history", withdraw),
-        sub("reinstate", "withdrawn constants apply again", reinstate)}) {
+        sub("reinstate", "withdrawn constants apply again", reinstate),
+        sub("prefer", "of a unit's sets, these constants apply", prefer)}) {
     with(correction, "id", &Options::id, "the constants' id ('sixpoint history')")->required();
     add_correction_options(correction);
   }

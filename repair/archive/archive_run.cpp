@@ -145,7 +145,8 @@ class ShardRun {
   }
 
   bool still_holds(const std::optional<RepairReport>& report) {
-    if (!report || report->status == RepairStatus::failed) {
+    if (!report || report->status == RepairStatus::failed ||
+        report->status == RepairStatus::outdated) {
       return false;
     }
     return report->status != RepairStatus::repaired || files_.info(report->output).has_value();
@@ -178,27 +179,44 @@ class ShardRun {
         continue;
       }
       options_.progress(done, reports.size());
+      if (options_.stop()) {
+        result.stopped = true;
+        break;
+      }
       reports[i] = repair_one(shard, i);
       ++done;
       fresh.reports.emplace_back(i, *reports[i]);
       if (!options_.dry_run && done < reports.size() &&
           (fresh.reports.size() >= options_.checkpoint_files ||
            env_.clock.elapsed() - since >= options_.checkpoint_after)) {
-        SIXPOINT_CHECK(make_folder(shard.parts_folder()));
-        SIXPOINT_CHECK(
-            shard.write(fmt::format("{}/{:06}.jsonl", shard.parts_folder(), next_part++), fresh));
-        fresh.reports.clear();
+        SIXPOINT_CHECK(write_part(shard, next_part++, fresh));
         since = env_.clock.elapsed();
       }
     }
     options_.progress(done, reports.size());
     ShardReports all{options_.output_folder, options_.software, {}};
     for (std::size_t i = 0; i < reports.size(); ++i) {
+      if (!reports[i]) {
+        continue;  // stopped before it
+      }
       result.files.push_back(*reports[i]);
       all.reports.emplace_back(i, *std::move(reports[i]));
     }
     const bool nothing_to_do = result.done_before == reports.size();
-    return options_.dry_run ? Status() : conclude(shard, all, nothing_to_do);
+    if (options_.dry_run) {
+      return {};
+    }
+    if (result.stopped) {
+      return fresh.reports.empty() ? Status() : write_part(shard, next_part, fresh);
+    }
+    return conclude(shard, all, nothing_to_do);
+  }
+
+  Status write_part(const ShardFolder& shard, std::size_t number, ShardReports& fresh) {
+    SIXPOINT_CHECK(make_folder(shard.parts_folder()));
+    SIXPOINT_CHECK(shard.write(fmt::format("{}/{:06}.jsonl", shard.parts_folder(), number), fresh));
+    fresh.reports.clear();
+    return {};
   }
 
   // Writes the result, then removes the parts, which it contains.
@@ -249,6 +267,7 @@ class ShardRun {
     RepairOptions options = plan_.repair.options;
     options.dry_run = options_.dry_run;
     options.resume = true;
+    options.redo_outdated = options_.redo_outdated;
     RepairReport report = repair_file(env_, input, output, *finder_, options);
     const auto after = files_.info(input);
     const bool same = after && after->size == before->size &&

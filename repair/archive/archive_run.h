@@ -27,6 +27,10 @@ struct ShardRunOptions {
   std::string output_folder;  // write an absolute path; made where it is not there
   // Reads and computes; writes neither outputs nor results.
   bool dry_run = false;
+  // Replaces outputs that were made otherwise than the plan makes them (earlier_output.h).
+  bool redo_outdated = false;
+  // Asked before every file: true ends the run there. What is done is written down.
+  std::function<bool()> stop = [] { return false; };
   // What was done is written down after so many files or seconds, whichever comes first: what a
   // kill costs is at most this.
   std::size_t checkpoint_files = 128;

@@ -10,6 +10,7 @@
 #include "base/sha256.h"
 #include "repair/archive/archive_json.h"
 #include "repair/archive/archive_scripts.h"
+#include "repair/rescale/earlier_output.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -76,6 +77,7 @@ Json to_json(const ArchivePlan& plan) {
                      {"undo_rotation", repair.options.undo_rotation},
                      {"allow_prior", repair.options.allow_prior},
                      {"force", repair.options.force}};
+  json["rules"] = kRepairRules;
   json["sources"] = {
       {"scan", repair.scan}, {"store_named", repair.store_named}, {"or_scan", repair.or_scan}};
   json["constants"] = repair.given ? calib::to_json(*repair.given) : Json(nullptr);
@@ -105,6 +107,7 @@ Result<ArchivePlan> plan_of(const Json& json) {
   ArchivePlan plan;
   SIXPOINT_ASSIGN(plan.made_at, parse_iso8601(json.at("made_at").get<std::string>()));
   plan.software = json.at("software");
+  static_cast<void>(json.at("rules"));  // read_plan() compared them
   for (const Json& root : json.at("roots")) {
     SIXPOINT_ASSIGN(std::string path, decode_path(root.at("path").get<std::string>()));
     plan.roots.push_back({std::move(path), root.at("whole").get<bool>()});
@@ -252,6 +255,11 @@ Result<ArchivePlan> read_plan(FileSystem& files, const std::string& folder) {
   if (text_sha256(text_of(json)) != id) {
     return fail(ErrorCode::configuration, "the plan was changed after it was made", path,
                 "a plan is never changed: make another one");
+  }
+  if (json.contains("rules") && json["rules"] != kRepairRules) {
+    return fail(ErrorCode::configuration,
+                "the plan was made for other rules of repair than this program has", path,
+                "make another plan");
   }
   try {
     auto plan = plan_of(json);

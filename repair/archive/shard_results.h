@@ -26,6 +26,7 @@ struct ShardResult {
   std::string software;             // of the run that ended it
   std::vector<RepairReport> files;  // in the order of the manifest
   std::size_t done_before = 0;      // how many of them earlier runs did
+  bool stopped = false;             // the rest of the shard is not done yet
 };
 
 // The result of a whole shard; no_input where there is none yet, bad_data for one that is damaged

@@ -57,6 +57,16 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
   return report;
 }
 
+std::string recording_kind(const Survey& survey) {
+  constexpr double kLongest_s = 2 * 3600;
+  double still_s = 0;
+  for (const calib::StillBlock& block : survey.blocks) {
+    still_s += block.samples / survey.rate_hz;
+  }
+  return survey.duration_s <= kLongest_s && still_s >= survey.duration_s / 2 ? "calibration_file"
+                                                                             : "file_scan";
+}
+
 ConstantsFinder::ConstantsFinder(Env& env, ConstantsFinderOptions options)
     : env_(env), options_(std::move(options)) {}
 
@@ -68,17 +78,16 @@ Status ConstantsFinder::ask_store(const Survey& survey, ConstantsChoice& choice)
       found = *entry;
     }
   } else {
-    SIXPOINT_ASSIGN(
-        const auto record,
-        options_.store->constants_for(survey.facts.serial,
-                                      std::string(calib::to_string(FilterConfiguration::current))));
-    if (record) {
-      found = {record->id, record->document};
-    }
+    SIXPOINT_ASSIGN(found, ConstantsSnapshot::of_unit(*options_.store, survey.facts.serial));
   }
   if (!found.has_value()) {
     choice.reasons.push_back(fmt::format(
         "the store holds no constants of {} under the current configuration", survey.facts.serial));
+    return {};
+  }
+  if (!found->conflict.empty()) {
+    choice.reasons.push_back(found->conflict);
+    choice.for_a_person = true;
     return {};
   }
   SIXPOINT_ASSIGN(auto record, calib::parse_constants_record(found->document));
@@ -116,6 +125,7 @@ ConstantsFinder::CalibrationFile ConstantsFinder::read_calibration_file(const st
   }
   calib::ConstantsOrigin origin;
   origin.file = path;
+  origin.kind = "calibration_file";
   auto record = calib::record_of(*report, env_.clock.now(), origin);
   if (!record) {
     result.refusal = record.error().brief();
@@ -154,6 +164,7 @@ Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
   }
   calib::ConstantsOrigin origin;
   origin.file = path;
+  origin.kind = "file_scan";
   SIXPOINT_ASSIGN(auto record, calib::record_of(report, env_.clock.now(), origin));
   choice.chosen = ChosenConstants{std::move(record), "scan", ""};
   return {};
@@ -200,7 +211,7 @@ Result<ConstantsChoice> ConstantsFinder::choose(const std::string& path, const S
   ConstantsChoice choice;
   for (const SourceKind kind : order()) {
     SIXPOINT_CHECK(ask(kind, path, survey, choice));
-    if (choice.chosen) {
+    if (choice.chosen || (choice.for_a_person && !options_.or_scan)) {
       break;
     }
   }

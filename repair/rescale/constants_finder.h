@@ -53,6 +53,14 @@ struct ConstantsFinderOptions {
 Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,
                                         const calib::SolveOptions& options);
 
+// What a recording is that constants are solved from, as ConstantsOrigin::kind has it:
+//
+// | at rest             | length        | kind             |
+// |---------------------|---------------|------------------|
+// | at least half of it | up to 2 hours | calibration_file |
+// | otherwise           |               | file_scan        |
+std::string recording_kind(const Survey& survey);
+
 // Safe to call from several threads: store and calibration file are read by one at a time.
 class ConstantsFinder final : public ConstantsSource {
  public:

@@ -3,21 +3,33 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/constants.h"
+#include "repair/rescale/applying_constants.h"
 
 namespace sixpoint::repair {
 
 using Json = nlohmann::ordered_json;
 
+Result<std::optional<ConstantsSnapshot::Entry>> ConstantsSnapshot::of_unit(
+    db::Store& store, const std::string& serial) {
+  SIXPOINT_ASSIGN(const auto history, store.constants_history(serial));
+  const Applying applying = applying_constants(history, calib::FilterConfiguration::current);
+  if (applying.conflict) {
+    return std::optional(Entry{"", "", applying.why});
+  }
+  if (!applying.index) {
+    return std::optional<Entry>();
+  }
+  const db::ConstantsRecord& set = history.constants[*applying.index];
+  return std::optional(Entry{set.id, set.document, ""});
+}
+
 Result<ConstantsSnapshot> ConstantsSnapshot::of_store(db::Store& store) {
   ConstantsSnapshot snapshot;
   SIXPOINT_ASSIGN(const auto units, store.units());
   for (const db::UnitRecord& unit : units) {
-    SIXPOINT_ASSIGN(
-        const auto found,
-        store.constants_for(unit.serial,
-                            std::string(calib::to_string(calib::FilterConfiguration::current))));
-    if (found) {
-      snapshot.entries_[unit.serial] = {found->id, found->document};
+    SIXPOINT_ASSIGN(auto entry, of_unit(store, unit.serial));
+    if (entry) {
+      snapshot.entries_[unit.serial] = *std::move(entry);
     }
   }
   return snapshot;
@@ -26,8 +38,11 @@ Result<ConstantsSnapshot> ConstantsSnapshot::of_store(db::Store& store) {
 std::string ConstantsSnapshot::to_json_lines() const {
   std::string text;
   for (const auto& [serial, entry] : entries_) {
-    text += Json{{"serial", serial}, {"id", entry.id}, {"document", entry.document}}.dump(
-        -1, ' ', false, Json::error_handler_t::replace);
+    text += Json{{"serial", serial},
+                 {"id", entry.id},
+                 {"document", entry.document},
+                 {"conflict", entry.conflict}}
+                .dump(-1, ' ', false, Json::error_handler_t::replace);
     text += '\n';
   }
   return text;
@@ -40,12 +55,13 @@ Result<ConstantsSnapshot> ConstantsSnapshot::parse(std::string_view text) {
     const auto is_text = [&](const char* key) {
       return json.is_object() && json.contains(key) && json[key].is_string();
     };
-    if (!is_text("serial") || !is_text("id") || !is_text("document")) {
+    if (!is_text("serial") || !is_text("id") || !is_text("document") || !is_text("conflict")) {
       return fail(ErrorCode::bad_data, "a line of the constants is damaged", {},
                   "make the plan anew");
     }
     snapshot.entries_[json["serial"].get<std::string>()] = {json["id"].get<std::string>(),
-                                                            json["document"].get<std::string>()};
+                                                            json["document"].get<std::string>(),
+                                                            json["conflict"].get<std::string>()};
   }
   return snapshot;
 }

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -19,10 +20,13 @@ class ConstantsSnapshot {
   struct Entry {
     std::string id;        // in the store
     std::string document;  // JSON in the form of constants.json
+    std::string conflict;  // instead of both: why a person must decide (applying_constants.h)
   };
 
-  // The newest constants under `current` that are not withdrawn, of every unit of the store.
+  // The constants under `current` that apply, of every unit of the store.
   static Result<ConstantsSnapshot> of_store(db::Store& store);
+  // Of one unit; nothing where no constants apply.
+  static Result<std::optional<Entry>> of_unit(db::Store& store, const std::string& serial);
   // What to_json_lines() wrote; bad_data otherwise.
   static Result<ConstantsSnapshot> parse(std::string_view text);
   std::string to_json_lines() const;

@@ -12,7 +12,9 @@
 #include "gt3x/recording_writer.h"
 #include "repair/rescale/applied_map.h"
 #include "repair/rescale/constants_finder.h"
+#include "repair/rescale/earlier_output.h"
 #include "repair/rescale/gate.h"
+#include "repair/rescale/repair_mark.h"
 #include "repair/rescale/rescaled_log.h"
 
 namespace sixpoint::repair {
@@ -21,71 +23,19 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // In the order of RepairStatus.
-constexpr std::array<std::string_view, 5> kStatusNames = {
-    "repaired", "not_affected", "not_repairable", "already_repaired", "failed"};
+constexpr std::array<std::string_view, 6> kStatusNames = {
+    "repaired", "not_affected", "not_repairable", "already_repaired", "outdated", "failed"};
 
-constexpr std::uint64_t kLargestMark = 1U << 20;
 // Reasons are JSON values that other programs may read, so their words stay as they are.
 constexpr const char* kNotDecided =
     "what cannot be told affected is not mended: find out what is missing first";
 constexpr const char* kDoneBefore = "mended by an earlier run";
+constexpr const char* kMadeOtherwise =
+    "the output that is there was made with other constants, options or rules than would be used "
+    "now; --redo-outdated replaces it";
 constexpr const char* kMappedByLine =
     "the counts cannot have come from whole raw counts by the file's constants (averaged, mended "
     "before, or resampled): {} of them mapped by the straight line";
-
-Json still_error_to_json(const RepairReport& report) {
-  return {{"before", calib::number_or_null(report.still_error_before_mg)},
-          {"after", calib::number_or_null(report.still_error_after_mg)}};
-}
-
-Json sample_uncertainty_to_json(const RepairReport& report) {
-  return report.sample_uncertainty_mg ? Json(*report.sample_uncertainty_mg) : Json(nullptr);
-}
-
-Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& chosen,
-             const Survey& survey, UtcTime now) {
-  Json mark;
-  mark["schema"] = "sixpoint/repair-mark/1";
-  mark["repaired_at"] = to_iso8601(now);
-  mark["input_sha256"] = report.input_sha256;
-  mark["serial"] = report.serial;
-  mark["method"] = report.method;
-  mark["rotation_undone"] = report.rotation_undone;
-  mark["constants_before"] = Json::array();
-  for (const StoredConstants& constants : survey.constants) {
-    mark["constants_before"].push_back(calib::to_json(constants));
-  }
-  mark["constants_after"] = chosen ? calib::to_json(chosen->record) : Json(nullptr);
-  mark["constants_id"] = report.constants_id.empty() ? Json(nullptr) : Json(report.constants_id);
-  mark["source"] = report.source ? report.source->to_json() : Json(nullptr);
-  mark["forced"] = report.forced;
-  mark["cross_axis_applied"] = report.cross_axis_applied;
-  mark["sample_uncertainty_mg"] = sample_uncertainty_to_json(report);
-  mark["still_error_mg"] = still_error_to_json(report);
-  if (report.forced) {
-    mark["reasons"] = report.reasons;
-  }
-  return mark;
-}
-
-// The mark as a record of the log (kRepairMarkType): who it was, by what, and when. The vendor's
-// own METADATA records begin and end with the same members.
-std::string mark_record_of(const RepairReport& report, UtcTime now) {
-  const Json record = {{"MetadataType", kRepairMarkType},
-                       {"Schema", "sixpoint/repair-mark/1"},
-                       {"RepairedAt", to_iso8601(now)},
-                       {"InputSha256", report.input_sha256},
-                       {"Serial", report.serial},
-                       {"Method", report.method},
-                       {"ConstantsId", report.constants_id},
-                       {"RotationUndone", report.rotation_undone},
-                       {"Forced", report.forced},
-                       {"CrossAxisApplied", report.cross_axis_applied},
-                       {"SampleUncertaintyMg", sample_uncertainty_to_json(report)},
-                       {"Parsed", false},
-                       {"JSON", nullptr}};
-  return record.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
 
 // Entries that a unit or its software writes beside the samples and that do not depend on them.
 bool is_independent_of_samples(const std::string& name) {
@@ -93,35 +43,6 @@ bool is_independent_of_samples(const std::string& name) {
                                                       "battery.bin",  "eeprom.bin",  "firmware.bin",
                                                       "capsense.bin", "metadata.bin"};
   return std::ranges::find(kNames, name) != kNames.end();
-}
-
-// The mark of a repaired file; nothing where there is no such file or mark.
-std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
-  auto recording = gt3x::Recording::open(files, path);
-  if (!recording || !recording->has_entry(kRepairMark)) {
-    return std::nullopt;
-  }
-  auto source = recording->open_entry(kRepairMark);
-  if (!source) {
-    return std::nullopt;
-  }
-  const auto bytes = gt3x::read_all(**source, kLargestMark);
-  if (!bytes) {
-    return std::nullopt;
-  }
-  auto mark = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
-  return mark.is_object() ? std::optional(std::move(mark)) : std::nullopt;
-}
-
-std::string text_in(const Json& mark, const char* key) {
-  return mark.contains(key) && mark[key].is_string() ? mark[key].get<std::string>() : "";
-}
-
-std::optional<PerAxis<double>> three_in(const Json& mark, const char* key) {
-  const auto found = mark.find(key);
-  const bool three = found != mark.end() && found->is_array() && found->size() == kAxes &&
-                     std::ranges::all_of(*found, [](const Json& one) { return one.is_number(); });
-  return three ? std::optional(found->get<PerAxis<double>>()) : std::nullopt;
 }
 
 // The writer destroys its source at commit(); the log's tally is needed after that.
@@ -173,12 +94,9 @@ class Repair {
         return fail(*survey_.constants_problem);
       }
       SIXPOINT_CHECK(choose());
-      if (!chosen_.has_value()) {
+      if (!chosen_.has_value() || !may_write()) {
         report_.status = RepairStatus::not_repairable;
-        return {};
-      }
-      if (!may_write()) {
-        return {};
+        return look_for_earlier_output();
       }
     }
     return write();
@@ -231,7 +149,7 @@ class Repair {
   }
 
   // Whether the constants that were chosen may be used on this file: the gate, and what its own
-  // still periods say. False where the status is decided.
+  // still periods say.
   bool may_write() {
     map_ = applied_map(chosen_->record, survey_);
     if (!map_->why.empty()) {
@@ -257,7 +175,6 @@ class Repair {
     }
     if (!answer.write || (report_.forced && !options_.force)) {
       report_.forced = false;
-      report_.status = RepairStatus::not_repairable;
       return false;
     }
     report_.cross_axis_applied = map_->has_terms();
@@ -335,9 +252,14 @@ class Repair {
     const std::shared_ptr<RescaledLog> log = std::move(made);
     if (options_.dry_run) {
       SIXPOINT_CHECK(read_through(*log));
-    } else if (env_.files.info(output_)) {
-      return take_earlier_output();
     } else {
+      const auto mark = mark_in(env_.files, output_);
+      const EarlierOutput earlier =
+          judge_earlier_output(found_output(mark), report_.input_sha256, recipe());
+      if (earlier != EarlierOutput::none &&
+          !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
+        return take_earlier_output(earlier, mark.value_or(Json()));
+      }
       SIXPOINT_CHECK(write_output(recording, log));
     }
     take(*log);
@@ -384,7 +306,7 @@ class Repair {
                          : writer.copy(recording, entry.name));
     }
     SIXPOINT_CHECK(
-        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, now_)
+        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, recipe(), now_)
                                         .dump(2, ' ', false, Json::error_handler_t::replace) +
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());
@@ -394,24 +316,64 @@ class Repair {
     return {};
   }
 
+  std::string recipe() const {
+    Recipe recipe;
+    if (chosen_) {
+      recipe.constants = chosen_->record;
+    }
+    recipe.rotation_undone = report_.rotation_undone;
+    recipe.wide = options_.wide;
+    return recipe_digest(recipe);
+  }
+
+  // What lies where the output goes; nothing where nothing does.
+  std::optional<FoundOutput> found_output(const std::optional<Json>& mark) {
+    if (!env_.files.info(output_)) {
+      return std::nullopt;
+    }
+    return mark ? FoundOutput{text_in(*mark, "input_sha256"), text_in(*mark, "recipe")}
+                : FoundOutput{};
+  }
+
+  // A file that would not be written now: does the output of an earlier run lie there?
+  Status look_for_earlier_output() {
+    const auto mark = options_.dry_run ? std::nullopt : mark_in(env_.files, output_);
+    if (!mark) {
+      return {};
+    }
+    SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
+    if (text_in(*mark, "input_sha256") == report_.input_sha256) {
+      report_.status = RepairStatus::outdated;
+      report_.reasons.push_back(
+          fmt::format("an earlier run wrote {}, which would not be written now: look at the two, "
+                      "and remove it",
+                      printable(output_)));
+    }
+    return {};
+  }
+
   // What an earlier run made of this very input, with the constants that were used then.
-  Status take_earlier_output() {
-    const auto mark = options_.resume ? mark_in(env_.files, output_) : std::nullopt;
-    if (!mark || text_in(*mark, "input_sha256") != report_.input_sha256) {
+  Status take_earlier_output(EarlierOutput earlier, const Json& mark) {
+    if (earlier == EarlierOutput::outdated) {
+      report_.status = RepairStatus::outdated;
+      report_.reasons.emplace_back(kMadeOtherwise);
+      return {};
+    }
+    if (earlier == EarlierOutput::foreign || !options_.resume) {
       return fail(ErrorCode::cannot_create, "a file of that name is there already", output_,
                   "choose another folder, or --resume to go on with an earlier run");
     }
     report_.reasons.emplace_back(kDoneBefore);
+    SIXPOINT_ASSIGN(const auto recording, gt3x::Recording::open(env_.files, report_.input));
+    name_what_was_not_repaired(recording, 0);
     report_.resumed = true;
-    report_.method = text_in(*mark, "method");
-    report_.constants_id = text_in(*mark, "constants_id");
-    if (mark->contains("source")) {
-      report_.source = parse_source_used((*mark)["source"]);
-    }
-    report_.forced = mark->value("forced", Json(false)) == Json(true);
-    report_.cross_axis_applied = mark->value("cross_axis_applied", Json(false)) == Json(true);
-    report_.sample_uncertainty_mg = three_in(*mark, "sample_uncertainty_mg");
-    if (const auto then = parse_iso8601(text_in(*mark, "repaired_at")); then) {
+    report_.method = text_in(mark, "method");
+    report_.constants_id = text_in(mark, "constants_id");
+    report_.source = parse_source_used(mark.value("source", Json(nullptr)));
+    report_.forced = mark.value("forced", Json(false)) == Json(true);
+    report_.cross_axis_applied = mark.value("cross_axis_applied", Json(false)) == Json(true);
+    report_.sample_uncertainty_mg = three_in(mark, "sample_uncertainty_mg");
+    if (const auto then = parse_iso8601(text_in(mark, "repaired_at")); then) {
       report_.repaired_at = *then;
     }
     report_.output = output_;

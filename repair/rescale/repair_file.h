@@ -20,8 +20,11 @@
 // | ... that the file's own still periods contradict        | not_repairable, but with force     |
 // | ... that do not help by the gate (gate.h)               | not_repairable, but with force     |
 // | affected, with constants, output not there              | repaired                           |
-// | ... output there, made from this input, resume on       | repaired, `resumed`; nothing done  |
+// | ... output there, done (earlier_output.h), resume on    | repaired, `resumed`; nothing done  |
+// | ... output there, outdated                              | outdated; with redo_outdated       |
+// |                                                         | replaced: repaired                 |
 // | ... output there, otherwise                             | failed: cannot_create              |
+// | not_repairable by now, an output of this input is there | outdated: it is never replaced     |
 // | cannot be read or written                               | failed, with the error             |
 //
 // Constants may be used when why_unfit() (sources.h) says nothing. Where they are not from the file
@@ -42,7 +45,14 @@
 
 namespace sixpoint::repair {
 
-enum class RepairStatus { repaired, not_affected, not_repairable, already_repaired, failed };
+enum class RepairStatus {
+  repaired,
+  not_affected,
+  not_repairable,
+  already_repaired,
+  outdated,
+  failed
+};
 std::string_view to_string(RepairStatus status);
 std::optional<RepairStatus> parse_repair_status(std::string_view text);
 
@@ -57,6 +67,7 @@ struct ChosenConstants {
 struct ConstantsChoice {
   std::optional<ChosenConstants> chosen;
   std::vector<std::string> reasons;
+  bool for_a_person = false;  // sets of the store contradict each other: none of them is chosen
 };
 
 // Finds constants for a surveyed file of `path`; called only for files that need them. Must be safe
@@ -79,8 +90,11 @@ struct RepairOptions {
   bool allow_prior = false;
   // Writes what the gate or the file's own still periods refuse; the mark says so.
   bool force = false;
-  // An output that is there already and was made from this very input is taken as done.
+  // An output that is there already and was made from this very input, as it would be made now, is
+  // taken as done.
   bool resume = false;
+  // An output that was made otherwise than it would be made now is replaced.
+  bool redo_outdated = false;
   calib::StillBlockOptions still;
 };
 

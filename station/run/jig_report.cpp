@@ -161,6 +161,7 @@ calib::ConstantsRecord JigReport::record() const {
   record.method = method;
   record.made_at = ended;
   record.made_from.sha256 = raw_sha256();
+  record.made_from.kind = "jig";
   record.gravity_m_per_s2 = gravity.m_per_s2;
   return record;
 }

@@ -15,13 +15,14 @@ TEST_F(StoreTest, KeepsConstantsPerSerialAndFilterWithTheirHistory) {
     ASSERT_OK(store.add_constants(constants("MOS2A2", "current", 400, R"({"n":4})"), "w"));
   }
   Store store = open();
-  const auto found = store.constants_for("MOS2A1", "current");
-  ASSERT_OK(found);
-  ASSERT_TRUE(found->has_value());
-  EXPECT_EQ((*found)->document, R"({"n":3})");
-  EXPECT_EQ((*found)->made_at, from_unix_seconds(300));
-  EXPECT_EQ(store.constants_for("MOS2A1", "legacy").value()->document, R"({"n":2})");
-  EXPECT_FALSE(store.constants_for("MOS2A2", "legacy")->has_value());
+  const auto sets = store.constants_history("MOS2A1");
+  ASSERT_OK(sets);
+  ASSERT_EQ(sets->constants.size(), 3U);
+  EXPECT_EQ(sets->constants[2].document, R"({"n":3})");
+  EXPECT_EQ(sets->constants[2].made_at, from_unix_seconds(300));
+  EXPECT_EQ(sets->constants[1].filter, "legacy");
+  EXPECT_EQ(store.constants_history("MOS2A2")->constants.size(), 1U);
+  EXPECT_TRUE(store.constants_history("MOS2A3")->constants.empty());
   const auto history = store.history("MOS2A1");
   ASSERT_OK(history);
   ASSERT_EQ(history->size(), 3U);
@@ -45,7 +46,9 @@ TEST_F(StoreTest, WithdrawnConstantsAreHistoryButApplyNoMore) {
   ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 100, "1"), "w"));
   const auto id = store.add_constants(constants("MOS2A1", "current", 200, "2"), "w");
   ASSERT_OK(store.withdraw_constants(id.value(), "Ada", "jig was out of level"));
-  EXPECT_EQ(store.constants_for("MOS2A1", "current").value()->document, "1");
+  const auto sets = store.constants_history("MOS2A1");
+  EXPECT_FALSE(sets->is_withdrawn(sets->constants[0].id));
+  EXPECT_TRUE(sets->is_withdrawn(id.value()));
   EXPECT_EQ(store.history("MOS2A1")->size(), 2U);
   EXPECT_FAILS(store.withdraw_constants("nonsense", "Ada", "x"), ErrorCode::no_input);
 }
@@ -73,18 +76,18 @@ TEST_F(StoreTest, ACorrectionIsANewRowWithAReason) {
     return correction;
   };
   ASSERT_OK(store.correct(word("constants", id, "withdraw", "wrong unit")));
-  EXPECT_FALSE(store.constants_for("MOS2A1", "current")->has_value());
+  EXPECT_TRUE(store.constants_history("MOS2A1")->is_withdrawn(id));
   EXPECT_EQ(store.recall_list()->size(), 1U);
   EXPECT_TRUE(store.unit_history("MOS2A1")->is_withdrawn(id));
   memory_.clock.sleep(std::chrono::seconds(1));
   ASSERT_OK(store.correct(word("constants", id, "reinstate", "it was the right one")));
-  EXPECT_TRUE(store.constants_for("MOS2A1", "current")->has_value());
+  EXPECT_FALSE(store.constants_history("MOS2A1")->is_withdrawn(id));
   EXPECT_TRUE(store.recall_list()->empty());
   EXPECT_FALSE(store.trend("MOS2A1")->front().withdrawn);
   EXPECT_FALSE(store.unit_history("MOS2A1")->is_withdrawn(id));
   memory_.clock.sleep(std::chrono::seconds(1));
   ASSERT_OK(store.correct(word("constants", id, "withdraw", "no, the wrong one")));
-  EXPECT_FALSE(store.constants_for("MOS2A1", "current")->has_value());
+  EXPECT_TRUE(store.constants_history("MOS2A1")->is_withdrawn(id));
   ASSERT_EQ(store.recall_list()->size(), 1U);
   EXPECT_EQ(store.recall_list()->front().reason, "no, the wrong one");
   ASSERT_OK(store.correct(word("runs", run_id, "note", "the operator was Zoë")));
@@ -105,6 +108,26 @@ TEST_F(StoreTest, ACorrectionIsANewRowWithAReason) {
   EXPECT_FAILS(store.correct(word("runs", run_id, "erase", "x")), ErrorCode::usage);
   EXPECT_FAILS(store.correct(word("runs", run_id, "note", "")), ErrorCode::usage);
   EXPECT_FAILS(store.correct(word("head; DROP TABLE runs", "1", "note", "x")), ErrorCode::usage);
+  EXPECT_TRUE(store.audit()->ok);
+}
+
+TEST_F(StoreTest, TheLastPreferenceOfASetThatIsNotWithdrawnHolds) {
+  Store store = open();
+  const auto one = store.add_constants(constants("MOS2A1", "current", 100, "1"), "w").value();
+  const auto two = store.add_constants(constants("MOS2A1", "current", 200, "2"), "w").value();
+  const auto prefer = [&](const std::string& id, const std::string& why) {
+    memory_.clock.sleep(std::chrono::seconds(1));
+    return store.correct({"", {}, "constants", id, "prefer", "Ada", why});
+  };
+  EXPECT_EQ(store.constants_history("MOS2A1")->preference("current"), nullptr);
+  ASSERT_OK(prefer(two, "warmed up"));
+  ASSERT_OK(prefer(one, "the better jig"));
+  EXPECT_EQ(store.constants_history("MOS2A1")->preference("current")->reason, "the better jig");
+  EXPECT_EQ(store.constants_history("MOS2A1")->preference("legacy"), nullptr);
+  ASSERT_OK(store.withdraw_constants(one, "Ada", "it was not"));
+  EXPECT_EQ(store.constants_history("MOS2A1")->preference("current")->reason, "warmed up");
+  EXPECT_FAILS(prefer("none", "x"), ErrorCode::no_input);
+  EXPECT_FAILS(prefer(one, ""), ErrorCode::usage);
   EXPECT_TRUE(store.audit()->ok);
 }
 

@@ -46,15 +46,16 @@ TEST_F(RepairAnswer, TheTallyKeepsTheWorstExitCode) {
   EXPECT_EQ(add(RepairStatus::not_affected), 0);
   EXPECT_EQ(add(RepairStatus::already_repaired), 0);
   EXPECT_EQ(add(RepairStatus::not_repairable), 1);
+  EXPECT_EQ(add(RepairStatus::outdated), 1);
   tally.add(context_,
             failed_report("a.gt3x", {ErrorCode::io, "cannot be read", "a.gt3x", "retry"}));
   EXPECT_EQ(context_.exit_code, 74);
   EXPECT_EQ(add(RepairStatus::repaired), 74);
-  EXPECT_EQ(tally.to_json(true), Json::parse(R"({"files": 6, "repaired": 2, "not_affected": 1,
-      "not_repairable": 1, "already_repaired": 1, "failed": 1, "dry_run": true})"));
+  EXPECT_EQ(tally.to_json(true), Json::parse(R"({"files": 7, "repaired": 2, "not_affected": 1,
+      "not_repairable": 1, "already_repaired": 1, "outdated": 1, "failed": 1, "dry_run": true})"));
   EXPECT_EQ(tally.brief(true),
-            "6 files: 2 repaired (dry run: nothing was written), 1 not affected, 1 already "
-            "repaired, 1 not repairable, 1 failed\n");
+            "7 files: 2 repaired (dry run: nothing was written), 1 not affected, 1 already "
+            "repaired, 1 not repairable, 1 outdated, 1 failed\n");
 }
 
 TEST_F(RepairAnswer, ConstantsThatCannotBeReadNameTheirFile) {

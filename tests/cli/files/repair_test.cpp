@@ -1,10 +1,14 @@
 // sixpoint repair and scan by their contract, on the real disk.
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "base/random.h"
 #include "cli/command_fixture.h"
@@ -180,6 +184,101 @@ TEST_F(RepairCommand, DryRunWritesNothing) {
   EXPECT_EQ(answer.exit_code, 0);
   EXPECT_EQ(answer.json()["files"][0]["status"], "repaired");
   EXPECT_FALSE(std::filesystem::exists(out_));
+}
+
+TEST_F(RepairCommand, WhatWasMadeOtherwiseIsOutdatedAndReplacedWhenAsked) {
+  const auto repair = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"repair", archive_ + "/affected.gt3x", "-o", out_, "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  };
+  const std::string constants = folder_ / "constants.json";
+  ASSERT_EQ(repair({"--constants", constants}).exit_code, 0);
+  const Bytes first = read_file(files_, out_ + "/affected.gt3x").value();
+  const auto outdated = repair({"--scan", "--resume"});
+  EXPECT_EQ(outdated.exit_code, 1);
+  EXPECT_EQ(outdated.json()["files"][0]["status"], "outdated");
+  EXPECT_EQ(outdated.json()["summary"]["outdated"], 1);
+  EXPECT_EQ(repair({"--constants", constants, "--wide", "--resume"}).exit_code, 1);
+  EXPECT_EQ(repair({"--constants", constants, "--resume"}).exit_code, 0);
+  EXPECT_EQ(read_file(files_, out_ + "/affected.gt3x").value(), first) << "nothing was touched";
+  const auto redone = repair({"--scan", "--redo-outdated"});
+  EXPECT_EQ(redone.exit_code, 0) << redone.out;
+  EXPECT_EQ(redone.json()["files"][0]["method"], "scan");
+  EXPECT_NE(read_file(files_, out_ + "/affected.gt3x").value(), first);
+  EXPECT_EQ(repair({"--scan", "--resume"}).exit_code, 0);
+}
+
+// A file that would not be written now, and an earlier run's output of it: both are said.
+TEST_F(RepairCommand, AnOutputThatWouldNotBeWrittenNowIsOutdated) {
+  std::string wrong = kConstants;
+  wrong.replace(wrong.find("90.5"), 4, "20.5");
+  std::ofstream(folder_ / "wrong.json") << wrong;
+  const auto repair = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"repair",      archive_ + "/affected.gt3x", "-o",    out_,
+                                      "--constants", folder_ / "wrong.json",      "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words).json()["files"][0];
+  };
+  EXPECT_EQ(repair({})["status"], "not_repairable");
+  const Json forced = repair({"--force"});
+  EXPECT_EQ(forced["status"], "repaired");
+  EXPECT_EQ(forced["forced"], true);
+  EXPECT_EQ(repair({})["status"], "outdated");
+  EXPECT_EQ(repair({"--redo-outdated"})["status"], "outdated") << "there is nothing to put there";
+}
+
+TEST_F(RepairCommand, PeopleSeeTheSourceTheErrorsAndTheReasons) {
+  const auto answer =
+      run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json"});
+  EXPECT_THAT(answer.out, HasSubstr(" -> "));
+  EXPECT_THAT(answer.out, HasSubstr("by constants "));
+  EXPECT_THAT(answer.out, HasSubstr("calibrated on 2013-11-12"));
+  const Json manifest = Json::parse(std::ifstream(out_ + "/manifest.json"));
+  ASSERT_EQ(manifest["files"].size(), 2U);
+  EXPECT_EQ(manifest["files"][0]["status"], "repaired");
+  EXPECT_EQ(manifest["files"][0]["source"]["kind"], "constants");
+  EXPECT_TRUE(std::filesystem::exists(out_ + "/manifest.csv"));
+  EXPECT_EQ(run({"scan", out_}).exit_code, 0);
+}
+
+// The program as people start it, stopped by Ctrl-C: exit 3, what is done stays, and the line that
+// it prints goes on.
+TEST_F(RepairCommand, CtrlCEndsInOrderAndTheLineGoesOn) {
+  for (int i = 0; i < 60; ++i) {
+    std::filesystem::copy_file(archive_ + "/affected.gt3x",
+                               archive_ + "/more" + std::to_string(i) + ".gt3x");
+  }
+  const std::string line = std::string(SIXPOINT_PROGRAM) + " repair " + archive_ + " -o " + out_ +
+                           " --jobs 1 --constants " + (folder_ / "constants.json");
+  // The shell's own process becomes the program, so that the signal finds it.
+  const std::string script = "exec " + line + " >/dev/null 2>" + (folder_ / "people");
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    ::execl("/bin/sh", "sh", "-c", script.c_str(), nullptr);
+    ::_exit(127);
+  }
+  while (!std::filesystem::exists(out_ + "/affected.gt3x")) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ASSERT_EQ(::kill(child, SIGINT), 0);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 3);
+  std::ifstream people(folder_ / "people");
+  const std::string said{std::istreambuf_iterator<char>(people), {}};
+  EXPECT_THAT(said, HasSubstr("to go on:\n  sixpoint repair " + archive_ + " -o " + out_));
+  EXPECT_THAT(said, HasSubstr("--resume"));
+  const Json manifest = Json::parse(std::ifstream(out_ + "/manifest.json"));
+  EXPECT_GE(manifest["files"].size(), 1U);
+  EXPECT_LT(manifest["files"].size(), 62U);
+  const auto on = run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json",
+                       "--resume", "--json"});
+  EXPECT_EQ(on.exit_code, 0) << on.people;
+  EXPECT_EQ(on.json()["summary"]["repaired"], 61);
+  EXPECT_EQ(Json::parse(std::ifstream(out_ + "/manifest.json"))["files"].size(), 62U);
 }
 
 TEST_F(RepairCommand, StoreCommandsAnswerByContract) {

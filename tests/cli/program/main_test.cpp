@@ -1,7 +1,11 @@
 // The program as a process: arguments, both streams, exit code. Oracle: the contract's exit codes
 // (sysexits.h, and 0 to 3), and the version that CMake was given.
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include <gmock/gmock.h>
 
@@ -49,6 +53,29 @@ TEST_F(Main, ArgumentsOfTheProgramAreNotItsName) {
 TEST_F(Main, AnOutputThatTakesNothingIsAnError) {
   EXPECT_EQ(run("limits print >/dev/full 2>" + (folder_ / "e")), 74);
   EXPECT_THAT(text("e"), HasSubstr("standard output"));
+}
+
+// Ctrl-C in a command that has nothing to end in order: here one that would work for a long time.
+TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) {
+  std::ofstream(folder_ / "s.json") << R"({"schema": "sixpoint/scenario/1", "seed": 1, "unit": {},
+    "motions": [{"kind": "free_living", "duration_s": 8640000}]})";
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string script = "exec " + std::string(SIXPOINT_PROGRAM) + " simulate --scenario " +
+                               (folder_ / "s.json") + " -o " + (folder_ / "out.gt3x") +
+                               to("o", "e");
+    ::execl("/bin/sh", "sh", "-c", script.c_str(), nullptr);
+    ::_exit(127);
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  ASSERT_EQ(::kill(child, SIGINT), 0);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 3) << text("e");
+  EXPECT_THAT(text("e"), HasSubstr("sixpoint simulate --scenario"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out.gt3x"));
 }
 
 // A bar is for a terminal, and a file is none.

@@ -75,7 +75,7 @@ TEST_F(SqliteStoreTest, BringsAStoreOfVersion1UpToDateAndItsHashesHold) {
   EXPECT_TRUE(audit->ok) << audit->brief();
   EXPECT_EQ(audit->rows, 3);
   EXPECT_EQ(audit->head, before);
-  EXPECT_EQ(store->constants_for("MOS2A1", "legacy").value()->document, R"({"n":1})");
+  EXPECT_EQ(store->constants_history("MOS2A1")->constants.front().document, R"({"n":1})");
   ASSERT_OK(store->add_constants(constants(7), "w"));
   audit = store->audit();
   EXPECT_TRUE(audit->ok) << audit->brief();

@@ -1,0 +1,126 @@
+#include "cli/files/manifest.h"
+
+#include <set>
+
+#include <fmt/format.h>
+
+#include "base/atomic_file.h"
+#include "cli/context.h"
+#include "db/records.h"
+#include "station/records/software.h"
+
+namespace sixpoint::cli {
+namespace {
+
+constexpr std::string_view kSchema = "sixpoint/repair-manifest/1";
+constexpr std::string_view kColumns =
+    "input,output,status,source,source_id,still_error_before_mg,still_error_after_mg,input_sha256,"
+    "output_sha256\r\n";
+constexpr std::uint64_t kLargestManifest = 1ULL << 30;
+
+std::string json_of(const std::string& folder) { return folder + "/manifest.json"; }
+std::string csv_of(const std::string& folder) { return folder + "/manifest.csv"; }
+
+// The manifest that is there; an empty object where there is none or it is not ours.
+Json manifest_in(FileSystem& files, const std::string& folder) {
+  const auto bytes = read_file(files, json_of(folder), kLargestManifest);
+  if (bytes) {
+    Json json = Json::parse(bytes->begin(), bytes->end(), nullptr, false);
+    if (json.is_object() && json.value("schema", Json()) == kSchema && json.contains("files") &&
+        json["files"].is_array()) {
+      return json;
+    }
+  }
+  return Json::object();
+}
+
+Json entry_of(const repair::RepairReport& report) {
+  const Json all = report.to_json();
+  Json entry = {{"input", db::storable_path(report.input)},
+                {"output", text_or_null(db::storable_path(report.output))}};
+  for (const char* key : {"status", "source", "still_error_mg", "input_sha256", "output_sha256"}) {
+    entry[key] = all[key];
+  }
+  return entry;
+}
+
+// A field as RFC 4180 has it.
+std::string field(const Json& value) {
+  if (value.is_number()) {
+    return fmt::format("{:.3f}", value.get<double>());
+  }
+  if (!value.is_string()) {
+    return "";
+  }
+  const auto& text = value.get_ref<const std::string&>();
+  if (text.find_first_of(",\"\r\n") == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return quoted + "\"";
+}
+
+std::string line_of(const Json& entry) {
+  const auto at = [](const Json& json, const char* key) {
+    return json.is_object() ? json.value(key, Json()) : Json();
+  };
+  const Json source = at(entry, "source");
+  const Json error = at(entry, "still_error_mg");
+  std::string line;
+  for (const Json& value :
+       {at(entry, "input"), at(entry, "output"), at(entry, "status"), at(source, "kind"),
+        at(source, "id"), at(error, "before"), at(error, "after"), at(entry, "input_sha256"),
+        at(entry, "output_sha256")}) {
+    line += field(value) + ",";
+  }
+  line.back() = '\r';
+  return line + "\n";
+}
+
+}  // namespace
+
+Status check_manifest(FileSystem& files, const std::string& folder) {
+  const bool ours = !manifest_in(files, folder).empty();
+  for (const std::string& path : {json_of(folder), csv_of(folder)}) {
+    if (!ours && files.info(path)) {
+      return fail(ErrorCode::cannot_create, "this is no manifest of an earlier repair", path,
+                  "choose another output folder, or move the file away");
+    }
+  }
+  return {};
+}
+
+Status write_manifest(FileSystem& files, const std::string& folder,
+                      const std::vector<repair::RepairReport>& reports, UtcTime now) {
+  Json entries = Json::array();
+  std::set<std::string> of_this_run;
+  for (const repair::RepairReport& report : reports) {
+    of_this_run.insert(db::storable_path(report.input));
+  }
+  const Json earlier = manifest_in(files, folder);
+  for (const Json& entry : earlier.value("files", Json::array())) {
+    const Json input = entry.is_object() ? entry.value("input", Json()) : Json();
+    if (input.is_string() && !of_this_run.contains(input.get<std::string>())) {
+      entries.push_back(entry);
+    }
+  }
+  for (const repair::RepairReport& report : reports) {
+    entries.push_back(entry_of(report));
+  }
+  std::string csv(kColumns);
+  for (const Json& entry : entries) {
+    csv += line_of(entry);
+  }
+  const Json json = {{"schema", kSchema},
+                     {"made_at", to_iso8601(now)},
+                     {"software", station::software_and_build()},
+                     {"files", std::move(entries)}};
+  SIXPOINT_CHECK(write_file(files, json_of(folder),
+                            json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"));
+  return write_file(files, csv_of(folder), csv);
+}
+
+}  // namespace sixpoint::cli

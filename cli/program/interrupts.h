@@ -1,0 +1,17 @@
+// Ctrl-C in a command that does not take it itself (cli/stop_request.h): exit 3.
+//
+//   take_interrupts({"scan", "archive"});  // prints "sixpoint scan archive" when it comes
+//
+// Results appear whole or not at all, so what is done stays, and the same line goes on. In the
+// background of a script, where the signal is ignored, it stays so.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace sixpoint::cli {
+
+// Once, before threads are started.
+void take_interrupts(const std::vector<std::string>& arguments);
+
+}  // namespace sixpoint::cli

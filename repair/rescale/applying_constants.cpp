@@ -1,0 +1,145 @@
+#include "repair/rescale/applying_constants.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "calib/agreement.h"
+
+namespace sixpoint::repair {
+namespace {
+
+// Uncertainties are estimates themselves: two that differ by less are equal.
+constexpr double kEqualShare = 1.1;
+
+// In the order of ConstantsKind.
+constexpr std::array<std::string_view, 3> kKindNames = {"jig", "calibration file", "file scan"};
+
+// A set that can apply.
+struct Candidate {
+  std::size_t index = 0;
+  const db::ConstantsRecord* row = nullptr;
+  ConstantsKind kind = ConstantsKind::file_scan;
+  std::optional<calib::ConstantsRecord> record;  // nothing where the document cannot be read
+  double uncertainty_mg = std::numeric_limits<double>::infinity();
+
+  std::string_view method() const { return kKindNames[static_cast<std::size_t>(kind)]; }
+};
+
+Candidate candidate_of(std::size_t index, const db::ConstantsRecord& row) {
+  Candidate candidate{index, &row, kind_of(row), std::nullopt};
+  if (auto record = calib::parse_constants_record(row.document)) {
+    if (const double mg = calib::largest_uncertainty_mg(record->uncertainty); mg > 0) {
+      candidate.uncertainty_mg = mg;
+    }
+    candidate.record = *std::move(record);
+  }
+  return candidate;
+}
+
+// Of one method: the smallest uncertainty, then the latest.
+const Candidate& best_of(const std::vector<Candidate>& candidates) {
+  const auto& surest = *std::ranges::min_element(candidates, {}, &Candidate::uncertainty_mg);
+  const Candidate* best = nullptr;
+  for (const Candidate& one : candidates) {
+    const bool equal = one.uncertainty_mg <= kEqualShare * surest.uncertainty_mg;
+    if (equal && (best == nullptr || one.row->made_at >= best->row->made_at)) {
+      best = &one;
+    }
+  }
+  return *best;
+}
+
+std::string why_of(const Candidate& best, const std::vector<Candidate>& all,
+                   const std::vector<Candidate>& same_method) {
+  if (all.size() == 1) {
+    return "applies: the only set";
+  }
+  if (same_method.size() == 1) {
+    return fmt::format("applies: {} comes first", best.method());
+  }
+  const bool newest = std::ranges::none_of(
+      same_method, [&](const Candidate& other) { return other.row->made_at > best.row->made_at; });
+  return newest ? fmt::format("applies: the latest by {}", best.method())
+                : fmt::format("applies: the smallest uncertainty by {} ({:.1f} mg)", best.method(),
+                              best.uncertainty_mg);
+}
+
+// The first newer set of a method behind that disagrees; what is wrong, in one sentence.
+std::optional<std::string> conflict_with(const Candidate& best, const std::vector<Candidate>& all) {
+  for (const Candidate& other : all) {
+    if (other.kind <= best.kind || other.row->made_at <= best.row->made_at || !other.record ||
+        !best.record) {
+      continue;
+    }
+    const auto between = calib::agreement(best.record->calibration, best.record->uncertainty,
+                                          other.record->calibration, other.record->uncertainty);
+    if (!between.agree()) {
+      return fmt::format(
+          "the set {} by {} is older than the set {} by {} and disagrees with it ({}): decide with "
+          "'sixpoint store prefer ID --why TEXT'",
+          best.row->id, best.method(), other.row->id, other.method(), between.brief());
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+ConstantsKind kind_of(const db::ConstantsRecord& record) {
+  std::string kind;
+  if (const auto parsed = calib::parse_constants_record(record.document)) {
+    kind = parsed->made_from.kind;
+  }
+  if (kind == "jig" || (kind.empty() && (record.method == "jig" || record.method == "six_pose"))) {
+    return ConstantsKind::jig;
+  }
+  return kind == "calibration_file" ? ConstantsKind::calibration_file : ConstantsKind::file_scan;
+}
+
+Applying applying_constants(const db::UnitHistory& history, calib::FilterConfiguration filter) {
+  const std::string wanted(calib::to_string(filter));
+  Applying answer;
+  std::vector<Candidate> all;
+  for (std::size_t i = 0; i < history.constants.size(); ++i) {
+    const db::ConstantsRecord& row = history.constants[i];
+    const bool withdrawn = history.is_withdrawn(row.id);
+    answer.about.push_back(withdrawn              ? "does not apply: withdrawn"
+                           : row.filter != wanted ? "does not apply: another filter configuration"
+                                                  : "does not apply: another set comes first");
+    if (!withdrawn && row.filter == wanted) {
+      all.push_back(candidate_of(i, row));
+    }
+  }
+  if (all.empty()) {
+    answer.why = "the store holds no constants of this unit that apply";
+    return answer;
+  }
+  const db::Correction* preference = history.preference(wanted);
+  if (preference != nullptr) {
+    const auto preferred = std::ranges::find_if(
+        all, [&](const Candidate& one) { return one.row->id == preference->row_id; });
+    answer.index = preferred->index;
+    answer.why = fmt::format("applies: preferred ({})", printable(preference->reason, 200));
+  } else {
+    const ConstantsKind first = std::ranges::min_element(all, {}, &Candidate::kind)->kind;
+    std::vector<Candidate> same_method;
+    std::ranges::copy_if(all, std::back_inserter(same_method),
+                         [&](const Candidate& one) { return one.kind == first; });
+    const Candidate& best = best_of(same_method);
+    if (auto conflict = conflict_with(best, all)) {
+      answer.conflict = true;
+      answer.why = *std::move(conflict);
+      answer.about[best.index] = "does not apply: a person must decide: " + answer.why;
+      return answer;
+    }
+    answer.index = best.index;
+    answer.why = why_of(best, all, same_method);
+  }
+  answer.about[*answer.index] = answer.why;
+  return answer;
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,90 @@
+#include "cli/files/manifest.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.h"
+#include "base/memory_env.h"
+#include "expect_result.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::HasSubstr;
+
+repair::RepairReport repaired(const std::string& input) {
+  repair::RepairReport report;
+  report.input = input;
+  report.output = "out/" + input;
+  report.status = repair::RepairStatus::repaired;
+  report.still_error_before_mg = 112.34567;
+  report.still_error_after_mg = 0.8;
+  report.source = repair::SourceUsed{"store", "0123", std::nullopt, 1.5};
+  report.input_sha256 = "aa";
+  report.output_sha256 = "bb";
+  return report;
+}
+
+class Manifest : public testing::Test {
+ protected:
+  Manifest() { EXPECT_OK(memory_.files.make_folders("out")); }
+  std::string text(const std::string& path) {
+    const Bytes bytes = read_file(memory_.files, path).value();
+    return {bytes.begin(), bytes.end()};
+  }
+  void write(const std::vector<repair::RepairReport>& reports) {
+    ASSERT_OK(check_manifest(memory_.files, "out"));
+    ASSERT_OK(write_manifest(memory_.files, "out", reports, from_unix_seconds(0)));
+  }
+  MemoryEnv memory_;
+};
+
+TEST_F(Manifest, HasALinePerFile) {
+  repair::RepairReport refused;
+  refused.input = "b.gt3x";
+  refused.status = repair::RepairStatus::not_repairable;
+  write({repaired("a.gt3x"), refused});
+  EXPECT_EQ(text("out/manifest.csv"),
+            "input,output,status,source,source_id,still_error_before_mg,still_error_after_mg,"
+            "input_sha256,output_sha256\r\n"
+            "a.gt3x,out/a.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+            "b.gt3x,,not_repairable,,,,,,\r\n");
+  const auto json = nlohmann::json::parse(text("out/manifest.json"));
+  EXPECT_EQ(json["schema"], "sixpoint/repair-manifest/1");
+  ASSERT_EQ(json["files"].size(), 2U);
+  EXPECT_EQ(json["files"][0]["source"]["standard_uncertainty_mg"], 1.5);
+  EXPECT_EQ(json["files"][0]["still_error_mg"]["before"], 112.34567);
+  EXPECT_TRUE(json["files"][1]["output"].is_null());
+}
+
+TEST_F(Manifest, QuotesAndEscapesNames) {
+  write({repaired("a,\"b\".gt3x"), repaired("\xff\xfe.gt3x")});
+  const std::string csv = text("out/manifest.csv");
+  EXPECT_THAT(csv, HasSubstr("\"a,\"\"b\"\".gt3x\",\"out/a,\"\"b\"\".gt3x\",repaired"));
+  EXPECT_THAT(csv, HasSubstr("\\xff\\xfe.gt3x,out/\\xff\\xfe.gt3x,repaired"));
+  EXPECT_TRUE(nlohmann::json::accept(text("out/manifest.json")));
+}
+
+TEST_F(Manifest, KeepsTheFilesOfEarlierRuns) {
+  write({repaired("a.gt3x"), repaired("b.gt3x")});
+  repair::RepairReport again = repaired("b.gt3x");
+  again.status = repair::RepairStatus::outdated;
+  write({again, repaired("c.gt3x")});
+  const auto json = nlohmann::json::parse(text("out/manifest.json"));
+  ASSERT_EQ(json["files"].size(), 3U);
+  EXPECT_EQ(json["files"][0]["input"], "a.gt3x");
+  EXPECT_EQ(json["files"][1]["status"], "outdated");
+  EXPECT_EQ(json["files"][2]["input"], "c.gt3x");
+}
+
+TEST_F(Manifest, LeavesAFileOfThatNameThatIsNotOursAlone) {
+  ASSERT_OK(write_file(memory_.files, "out/manifest.csv", "mine"));
+  EXPECT_FAILS(check_manifest(memory_.files, "out"), ErrorCode::cannot_create);
+  ASSERT_OK(memory_.files.remove("out/manifest.csv"));
+  ASSERT_OK(write_file(memory_.files, "out/manifest.json", R"({"files": []})"));
+  EXPECT_FAILS(check_manifest(memory_.files, "out"), ErrorCode::cannot_create);
+}
+
+}  // namespace
+}  // namespace sixpoint::cli
