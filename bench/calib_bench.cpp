@@ -346,7 +346,7 @@ std::vector<Vector> directions_of(const Unit& unit, std::span<const StillBlock> 
 template <class Wear>
 void accuracy(const char* name, int units, unsigned seed, double rate_hz, double drift_mg,
               double wanted_mean, double wanted_worst, const Wear& wear) {
-  Statistics mean, worst, baseline, plain, time, bound_mean, bound_worst;
+  Statistics mean, worst, baseline, plain, deployed, time, bound_mean, bound_worst;
   std::size_t blocks_seen = 0;
   constexpr int kJudged = 200;  // the genetic algorithm takes seven times as long as the rest
   int judged = 0, refused = 0, incomplete = 0, failed = 0, cross = 0;
@@ -387,6 +387,9 @@ void accuracy(const char* name, int units, unsigned seed, double rate_hz, double
       const auto report = solve_from_still_blocks(blocks, stored_of(unit));
       ++judged;
       refused += report && report->usable() ? 0 : 1;
+      if (report && report->calibration) {
+        deployed.add(sphere_error(unit, *report->calibration).mean_mg);
+      }
       // The paper's rule reads the file's own constants, and these are wrong by up to 0.2 g.
       incomplete += report && report->verification.verdict == Verdict::incomplete ? 1 : 0;
     }
@@ -396,7 +399,8 @@ void accuracy(const char* name, int units, unsigned seed, double rate_hz, double
   }
   std::printf(
       "%-34s mean %.4f mg (wanted %.3f), worst direction %.4f mg on average, %.4f at most%s; "
-      "cross-axis admitted %d (six parameters alone: %.4f mg); failed %d; refused %d of %d (%d by "
+      "cross-axis admitted %d (six parameters alone: %.4f mg); the six of the answer: %.4f mg; "
+      "failed %d; refused %d of %d (%d by "
       "the 0.3 g rule); "
       "closest-point baseline "
       "%.4f mg, ratio "
@@ -404,7 +408,7 @@ void accuracy(const char* name, int units, unsigned seed, double rate_hz, double
       "(%zu blocks), at most %.1f ms\n",
       name, mean.mean(), wanted_mean, worst.mean(), worst.worst,
       wanted_worst > 0 ? (" (wanted " + std::to_string(wanted_worst) + ")").c_str() : "", cross,
-      plain.mean(), failed, refused, judged, incomplete, baseline.mean(),
+      plain.mean(), deployed.mean(), failed, refused, judged, incomplete, baseline.mean(),
       baseline.mean() / mean.mean(), time.mean(), blocks_seen / static_cast<std::size_t>(units),
       time.worst);
   if (bound_mean.count > 0) {

@@ -3,7 +3,7 @@
 //
 //   const BestSix six = best_six(fit, 1.0);  // 1 g
 //   const Calibration& constants = six.calibration;
-//   six.unseen_mg.matrix;  // what the cross-axis terms would leave
+//   six.elsewhere_mg;  // how wrong they may be in directions that the unit hardly took
 //
 // The sensitivities and zeros of a sensor with cross-axis terms are right in every direction when
 // the terms are applied too. Without the terms they are not the best six: over a day of one person

@@ -6,7 +6,7 @@
 //   by.before = file_constants;
 //   by.accel_scale_lsb_per_g = 256;
 //   const SampleUncertainty sample = sample_uncertainty(by);
-//   sample.mg[0];  // axis X
+//   const double x_mg = sample.mg[0];
 //
 // The law of propagation of uncertainty (GUM, JCGM 100:2008, 5.1.2) for a sample of
 // q_a = s_a (m_a - z_a) + sum_b C_ab u_b, each term of its own origin:

@@ -8,6 +8,7 @@
 
 #include "base/sha256.h"
 #include "calib/agreement.h"
+#include "calib/map_to_apply.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -82,7 +83,10 @@ SourceUsed source_used(const std::string& kind, const std::string& id,
   if (record.made_at != UtcTime{}) {
     used.made_at = record.made_at;
   }
-  if (const double largest_mg = calib::largest_uncertainty_mg(record.uncertainty); largest_mg > 0) {
+  const bool has_terms = calib::map_to_apply(record, calib::MapTarget::file).cross_axis;
+  const calib::ConstantsUncertainty& applied =
+      has_terms ? record.cross_axis->uncertainty : record.uncertainty;
+  if (const double largest_mg = calib::largest_uncertainty_mg(applied); largest_mg > 0) {
     used.standard_uncertainty_mg = largest_mg;
   }
   return used;

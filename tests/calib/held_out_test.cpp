@@ -36,6 +36,33 @@ TEST(HeldOut, WhatTheModelLacksIsMeasured) {
   EXPECT_LT(test.rms_mg, 30);
 }
 
+// Rivals are tested on the same cells, each by its own fits.
+TEST(HeldOut, RivalsStandSideBySide) {
+  SyntheticUnit unit;
+  unit.cross_axis = {0.02, 0, 0};
+  auto cells = cells_of(tests::exact_blocks(unit, tests::cube_directions()));
+  const int number = number_neighbourhoods(cells, tests::truth(unit));
+  const std::vector<double> sigma_g(cells.size(), 1e-3);
+  const auto six = least_squares(points_of(cells, sigma_g), tests::truth(unit));
+  LeastSquaresOptions options;
+  options.model.cross_axis = true;
+  const auto terms = least_squares(points_of(cells, sigma_g), tests::truth(unit), options);
+  ASSERT_OK(six);
+  ASSERT_OK(terms);
+  const HeldOutRival rivals[] = {
+      {*six, sigma_g, false}, {*terms, sigma_g, false}, {*terms, sigma_g, true}};
+  const HeldOutCells in = {cells, number, {}, sigma_g};
+  const auto tested = hold_out_together(in, rivals, 1, {});
+  ASSERT_EQ(tested.size(), 3U);
+  EXPECT_LT(tested[1].rms_mg, 0.5);
+  EXPECT_GT(tested[0].rms_mg, 5);
+  EXPECT_GT(tested[2].rms_mg, 5) << "without the terms the sensor's own six are no better";
+  for (const HeldOut& one : tested) {
+    EXPECT_EQ(one.directions, tested.front().directions);
+    EXPECT_GT(one.directions, 20);
+  }
+}
+
 // Five sides do not determine six constants, so nothing can be predicted.
 TEST(HeldOut, SixSidesCannotPredictEachOther) {
   EXPECT_EQ(hold_out_of({}, tests::kSixSides).directions, 0);

@@ -195,6 +195,37 @@ TEST(ReportJson, TheFitAndItsRicherModel) {
   EXPECT_EQ(json["richer_model"]["reference_temperature_c"], 24.5);
 }
 
+TEST(ReportJson, TheBestSixTheTermsAndWhomToTrust) {
+  SolveReport report = made_report();
+  report.six.emplace();
+  EXPECT_FALSE(to_json(report).contains("best_six")) << "no cross-axis terms, no choice";
+  report.six->from = SixFrom::of_time;
+  report.six->unseen_mg = BestSix::Unseen{11.5, 10.25, 7.125, 4.75, 60};
+  report.six->elsewhere_mg = 55.5;
+  report.cross_axis.emplace();
+  report.cross_axis->cross_axis = {-0.019, 0.0, 0.008};
+  report.cross_axis->unseen_mg = 4.75;
+  report.cross_axis->six_unseen_mg = 7.125;
+  report.trust = Trust{Trusted::least_squares, 1.5, "because"};
+  const Json json = to_json(report);
+  EXPECT_EQ(json["best_six"]["chosen"], "of_time");
+  EXPECT_EQ(
+      json["best_six"]["unseen_mg"],
+      Json({{"of_sensor", 11.5}, {"of_directions", 10.25}, {"of_time", 7.125}, {"matrix", 4.75}}));
+  EXPECT_EQ(json["best_six"]["unseen_directions"], 60);
+  EXPECT_EQ(json["best_six"]["elsewhere_mg"], 55.5);
+  EXPECT_EQ(json["cross_axis"]["xy_xz_yz"], Json({-0.019, 0.0, 0.008}));
+  EXPECT_EQ(json["cross_axis"]["unseen_mg"]["six"], 7.125);
+  EXPECT_EQ(json["cross_axis"]["verified"], false);
+  EXPECT_EQ(json["trust"],
+            Json({{"trusted", "least_squares"}, {"apart_mg", 1.5}, {"why", "because"}}));
+  EXPECT_TRUE(json["temperature_c"].is_null()) << "no temperature was measured";
+  report.fit.emplace();
+  EXPECT_TRUE(to_json(report)["temperature_c"].is_null());
+  report.fit->reference_temperature_c = 0.0;
+  EXPECT_EQ(to_json(report)["temperature_c"], 0.0);
+}
+
 TEST(ReportJson, SearchTemperatureAndPartialKnowledge) {
   SolveReport report = made_report();
   report.search.emplace();

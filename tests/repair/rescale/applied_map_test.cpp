@@ -137,6 +137,9 @@ TEST(AppliedMap, AFileOfASensorWithCrossAxisIsRepairedWithTheTerms) {
     }
   }
   EXPECT_NEAR(mark["constants_after"]["cross_axis"]["xy_xz_yz"][0].get<double>(), -0.02, 0.002);
+  // Of the terms that are applied; the six constants are far from the sensor's own.
+  ASSERT_TRUE(report.source);
+  EXPECT_LT(*report.source->standard_uncertainty_mg, 4);
   // A later run that finds the output answers the same.
   RepairOptions resume;
   resume.resume = true;
@@ -166,6 +169,9 @@ TEST(AppliedMap, TermsComeBackFromTheStore) {
   ASSERT_TRUE(choice.chosen->record.cross_axis);
   EXPECT_EQ(calib::to_json(*choice.chosen->record.cross_axis),
             calib::to_json(*crossed_record().cross_axis));
+  EXPECT_NEAR(*source_used("store", "x", crossed_record()).standard_uncertainty_mg,
+              std::hypot(0.6, 1.3), 1e-9)
+      << "of the terms: zero and sensitivity of z at 1 g";
   // Terms make another set of constants.
   auto other = crossed_record();
   other.cross_axis->cross_axis[0] = 0.01;
