@@ -93,7 +93,8 @@ ConstantsKind kind_of(const db::ConstantsRecord& record) {
   if (const auto parsed = calib::parse_constants_record(record.document)) {
     kind = parsed->made_from.kind;
   }
-  if (kind == "jig" || (kind.empty() && (record.method == "jig" || record.method == "six_pose"))) {
+  if (kind == "jig" ||
+      (kind.empty() && (record.method == "jig" || record.method.starts_with("six_pose")))) {
     return ConstantsKind::jig;
   }
   return kind == "calibration_file" ? ConstantsKind::calibration_file : ConstantsKind::file_scan;

@@ -185,7 +185,13 @@ class Repair {
   // What is wrong with constants from elsewhere by the file's own still periods, where these have a
   // verified solution.
   std::optional<std::string> own_still_periods_contradict() const {
-    const auto own = solve_survey(report_.input, survey_, {});
+    // A thousand blocks, evenly taken, say the same as ten thousand and cost a tenth.
+    constexpr std::size_t kEnoughBlocks = 1000;
+    const std::size_t stride = 1 + survey_.blocks.size() / kEnoughBlocks;
+    Survey thinned = survey_;
+    std::erase_if(thinned.blocks,
+                  [&, at = std::size_t{0}](const auto&) mutable { return at++ % stride != 0; });
+    const auto own = solve_survey(report_.input, thinned, {});
     if (!own || !own->usable()) {
       return std::nullopt;
     }

@@ -134,7 +134,7 @@ TEST(ApplyingConstants, SetsOfEarlierVersionsAreToldByTheirMethod) {
   Sets sets;
   sets.add("", 1, 1);
   EXPECT_EQ(kind_of(sets.history.constants[0]), ConstantsKind::file_scan);
-  sets.history.constants[0].method = "six_pose";
+  sets.history.constants[0].method = "six_pose_pair";
   EXPECT_EQ(kind_of(sets.history.constants[0]), ConstantsKind::jig);
   sets.history.constants[0].document = "no JSON";
   EXPECT_EQ(sets.applying(), "set 0") << "what cannot be read is not compared";
