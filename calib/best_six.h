@@ -11,15 +11,13 @@
 // seen, and six constants fitted to the time at rest 7.3 mg. So several sixes are tried on
 // directions that are left out of their fits:
 //
-// | cross-axis terms admitted (BlockFit::richer) | unseen directions, over the time   | six       |
-// |                                              | at rest                            |           |
-// |----------------------------------------------|------------------------------------|-----------|
-// | no                                           | -                                  | of_fit    |
-// | yes                                          | fewer than 30 can be predicted     | of_sensor |
-// | yes                                          | no other is better by a tenth      | of_sensor |
-// | yes                                          | every direction equal is better    |
-// of_directions  | | yes                                          | every minute at rest equal is
-// best | of_time   |
+// | cross-axis terms (BlockFit::richer) | unseen directions, over the time at rest | six           |
+// |-------------------------------------|------------------------------------------|---------------|
+// | not admitted                        | -                                        | of_fit        |
+// | admitted                            | fewer than 30 can be predicted           | of_sensor     |
+// | admitted                            | no other is better by a tenth            | of_sensor     |
+// | admitted                            | every direction equal is best            | of_directions |
+// | admitted                            | every minute at rest equal is best       | of_time       |
 //
 // Fewer than 30 directions are those of a calibration file: what leads the hand from side to side
 // says nothing about how the unit is worn. A six that leaves more than

@@ -105,14 +105,15 @@ enum class Access : std::uint8_t { write, read };
 // An SQLite file. WAL mode, every commit synced, foreign keys on; a writer waits up to 30 s for
 // another.
 //
-//   what is at `path`                    to write                       to read
-//   nothing                              made, its owner's alone        no_input
-//   an empty file or database            becomes a store                bad_data
-//   a store                              opened                         opened
-//   a store that may not be written      permission                     opened
-//   a database of another program        bad_data, nothing is touched   bad_data, nothing is
-//   touched another file, a folder, a device     bad_data, nothing is touched   bad_data, nothing
-//   is touched a link that leads nowhere            cannot_create                  no_input
+// | what is at `path`                 | to write                 | to read                  |
+// |-----------------------------------|--------------------------|--------------------------|
+// | nothing                           | made, its owner's alone  | no_input                 |
+// | an empty file or database         | becomes a store          | bad_data                 |
+// | a store                           | opened                   | opened                   |
+// | a store that may not be written   | permission               | opened                   |
+// | a database of another program     | bad_data, left untouched | bad_data, left untouched |
+// | another file, a folder, a device  | bad_data, left untouched | bad_data, left untouched |
+// | a link that leads nowhere         | cannot_create            | no_input                 |
 //
 // Besides: cannot_create without its folder, permission for a place where nothing can be read, io
 // for a full disk, bad_data for damage.
