@@ -11,14 +11,15 @@
 // seen, and six constants fitted to the time at rest 7.3 mg. So several sixes are tried on
 // directions that are left out of their fits:
 //
-// | cross-axis terms (BlockFit::richer) | unseen directions, over the time at rest | six           |
-// |-------------------------------------|------------------------------------------|---------------|
-// | not admitted                        | -                                        | of_fit        |
-// | admitted                            | fewer than 30 can be predicted           | of_sensor     |
-// | admitted                            | no other is better by a tenth            | of_sensor     |
-// | admitted                            | every direction equal is best            | of_directions |
-// | admitted                            | every minute at rest equal is best       | of_time       |
+// | cross-axis terms | unseen directions, over the time at rest | six           |
+// |------------------|------------------------------------------|---------------|
+// | not admitted     | -                                        | of_fit        |
+// | admitted         | fewer than 30 can be predicted           | of_sensor     |
+// | admitted         | no other is better by a tenth            | of_sensor     |
+// | admitted         | every direction equal is best            | of_directions |
+// | admitted         | every minute at rest equal is best       | of_time       |
 //
+// Terms are admitted where BlockFit::richer is there.
 // Fewer than 30 directions are those of a calibration file: what leads the hand from side to side
 // says nothing about how the unit is worn. A six that leaves more than
 // VerificationLimits::applied_mg over all directions is not tried. Where the unit has no cross-axis
