@@ -22,13 +22,13 @@
 // constants drop out, because the mean of n_x, and of n_x n_y, is zero. An even distribution over
 // an interval has the variance of its square / 12 (GUM, 4.3.7). v_a is in counts:
 //
-// | the file was rescaled by              | v_a                                                     |
-// |---------------------------------------|---------------------------------------------------------|
-// | whole counts, each count of the file  | 0                                                       |
-// | has one                               |                                                         |
-// | whole counts, slope k < 1 of the      | the variance of n equal counts, (n^2 - 1) / 12, over    |
-// | firmware: some have two or more       | the n = 1/k rounded down and up that occur              |
-// | the affine map                        | 1 / (12 k^2): the firmware's rounding stays in it       |
+// | the file was rescaled by              | v_a                                                   |
+// |---------------------------------------|-------------------------------------------------------|
+// | whole counts, each count of the file  | 0                                                     |
+// | has one                               |                                                       |
+// | whole counts, slope k < 1 of the      | the variance of n equal counts, (n^2 - 1) / 12, over  |
+// | firmware: some have two or more       | the n = 1/k rounded down and up that occur            |
+// | the affine map                        | 1 / (12 k^2): the firmware's rounding stays in it     |
 //
 // k = file counts per raw count by the constants before (old sensitivity times scale). Records of
 // 12 and 16 bits have the same scale, so the same uncertainty. Not in it: noise and bandwidth of
