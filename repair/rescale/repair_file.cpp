@@ -60,7 +60,7 @@ class Repair {
  public:
   Repair(Env& env, const std::string& input, const std::string& output, ConstantsSource& source,
          const RepairOptions& options)
-      : env_(env), now_(env.clock.now()), output_(output), source_(source), options_(options) {
+      : env_(env), output_(output), source_(source), options_(options) {
     report_.input = input;
     report_.dry_run = options.dry_run;
   }
@@ -222,7 +222,7 @@ class Repair {
     options.wide = options_.wide;
     options.beyond_12_bits = survey_.beyond_12_bits;
     options.affine = chosen_.has_value() && !survey_.plausibility.plausible();
-    options.mark = mark_record_of(report_, now_);
+    options.mark = mark_record_of(report_);
     options.size = options_.wide ? survey_.log_bytes_wide : survey_.log_bytes;
     options.still = options_.still;
     return options;
@@ -311,12 +311,12 @@ class Repair {
                          ? writer.add(entry.name, std::make_unique<SharedSource>(log))
                          : writer.copy(recording, entry.name));
     }
+    report_.repaired_at = env_.clock.now();
     SIXPOINT_CHECK(
-        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, recipe(), now_)
+        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, recipe(), *report_.repaired_at)
                                         .dump(2, ' ', false, Json::error_handler_t::replace) +
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());
-    report_.repaired_at = now_;
     report_.output = output_;
     SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
     return {};
@@ -394,7 +394,6 @@ class Repair {
   }
 
   Env& env_;
-  UtcTime now_;  // in both marks
   std::string output_;
   ConstantsSource& source_;
   RepairOptions options_;

@@ -53,10 +53,9 @@ Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& c
 }
 
 // The vendor's own METADATA records begin and end with the same members.
-std::string mark_record_of(const RepairReport& report, UtcTime now) {
+std::string mark_record_of(const RepairReport& report) {
   const Json record = {{"MetadataType", kRepairMarkType},
                        {"Schema", "sixpoint/repair-mark/1"},
-                       {"RepairedAt", to_iso8601(now)},
                        {"InputSha256", report.input_sha256},
                        {"Serial", report.serial},
                        {"Method", report.method},

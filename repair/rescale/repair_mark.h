@@ -25,8 +25,9 @@ nlohmann::ordered_json sample_uncertainty_to_json(const RepairReport& report);
 nlohmann::ordered_json mark_of(const RepairReport& report,
                                const std::optional<ChosenConstants>& chosen, const Survey& survey,
                                const std::string& recipe, UtcTime now);
-// The record (kRepairMarkType): who it was, by what, and when.
-std::string mark_record_of(const RepairReport& report, UtcTime now);
+// The record (kRepairMarkType): who it was, and by what. Without the time, so that the same repair
+// gives the same log.
+std::string mark_record_of(const RepairReport& report);
 
 // The entry of a repaired file; nothing where there is no such file or mark.
 std::optional<nlohmann::ordered_json> mark_in(FileSystem& files, const std::string& path);

@@ -178,7 +178,8 @@ TEST_F(SqliteStoreTest, AuditFindsAnIndexThatDoesNotSayWhatItsTableSays) {
   run_sql("DROP TABLE aside");
   auto store = open();
   ASSERT_OK(store);
-  EXPECT_EQ(store->constants_for("MOS2A1", "current").value()->made_at, from_unix_seconds(4))
+  EXPECT_EQ(store->constants_history("MOS2A1").value().constants.back().made_at,
+            from_unix_seconds(4))
       << "the wrong answer that the audit has to find";
   const auto audit = store->audit();
   ASSERT_OK(audit);
