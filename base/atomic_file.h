@@ -10,10 +10,10 @@
 //
 // FileSystem::placement() says what happens to a file that has the name already:
 //
-//   unruled  it is replaced: a disk has no rule
-//   replace  it is replaced
-//   keep     it stays, commit() gives cannot_create: outputs that a user named (cli/output.h)
-//   through  it is a device or a pipe: the bytes go into it as they come, nothing is renamed
+//     unruled  it is replaced: a disk has no rule
+//     replace  it is replaced
+//     keep     it stays, commit() gives cannot_create: outputs that a user named (cli/output.h)
+//     through  it is a device or a pipe: the bytes go into it as they come, nothing is renamed
 #pragma once
 
 #include <memory>
