@@ -56,12 +56,18 @@ std::string usage_of(const CLI::Option& option) {
   return option.get_expected_max() > 1 ? text + " ..." : text;
 }
 
+// Without those that --help does not list: old names that are refused.
+std::vector<const CLI::Option*> listed_options(const CLI::App& command) {
+  return command.get_options(
+      [](const CLI::Option* option) { return !option->get_group().empty(); });
+}
+
 std::string man_page(const CLI::App& app) {
   std::string text;
   for_each_command(app, "", [&](const CLI::App& command, const std::string& path) {
     text +=
         fmt::format(".SS sixpoint {}\n{}\n", roff(path, false), roff(command.get_description()));
-    for (const CLI::Option* option : command.get_options()) {
+    for (const CLI::Option* option : listed_options(command)) {
       if (option == command.get_help_ptr()) {
         continue;
       }
@@ -81,7 +87,7 @@ std::string completion(const CLI::App& app) {
       words += fmt::format("{}{}", words.empty() ? "" : " ", sub->get_name());
     }
     std::string options;
-    for (const CLI::Option* option : command.get_options()) {
+    for (const CLI::Option* option : listed_options(command)) {
       for (const std::string& name : option->get_lnames()) {
         options += fmt::format("{}--{}", options.empty() ? "" : " ", name);
       }

@@ -64,8 +64,10 @@ TEST_F(Reference, AnOptionIsATaggedParagraphOfItsCommand) {
   EXPECT_THAT(page, HasSubstr(".SS sixpoint audit\n"));
   EXPECT_THAT(page, HasSubstr(".SS sixpoint audit verify\nfind rows that were changed, removed or "
                               "moved\n"));
-  EXPECT_THAT(page, HasSubstr(".TP\n\\fB\\-\\-head\\fR \\fIVALUE\\fR\na head that was written down "
-                              "earlier: is it still a part of the history?\n"));
+  EXPECT_THAT(
+      page,
+      HasSubstr(".TP\n\\fB\\-\\-head\\fR \\fIVALUE\\fR\na head that 'audit head', a backup, an "
+                "export or a certificate gave: is it still a part of the history?\n"));
   // A flag has no value; an argument without dashes that may be repeated ends in "...".
   EXPECT_THAT(page, HasSubstr(".TP\n\\fB\\-\\-verify\\fR\nalso read every repaired file again\n"));
   EXPECT_THAT(page, HasSubstr("\\fBpath\\fR ...\nrecordings (.gt3x) or folders of them\n"));
@@ -93,9 +95,10 @@ TEST_F(Reference, NoWordOfACommandBecomesARequest) {
 // option has no place in the manual's sections, but is offered.
 TEST_F(Reference, TheCompletionHasOneCaseForEachCommand) {
   const std::string text = filled("completion");
-  EXPECT_THAT(text, HasSubstr("    'audit') commands='verify' options='--help"));
+  EXPECT_THAT(text, HasSubstr("    'audit') commands='head verify' options='--help"));
   EXPECT_THAT(text, HasSubstr("    'archive') commands='plan run merge status' options='--help"));
   EXPECT_THAT(text, HasSubstr("    'audit verify') commands='' options='"));
+  EXPECT_THAT(text, Not(HasSubstr("--constants-out --constants "))) << "an old name is not offered";
   EXPECT_TRUE(text.starts_with("    '') commands='inspect scan repair ")) << text.substr(0, 80);
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {

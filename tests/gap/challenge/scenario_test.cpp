@@ -33,25 +33,26 @@ std::size_t not_named(bool in_faces) {
       continue;
     }
     SCOPED_TRACE(kind.name);
+    const std::string prefix = folder / std::string(kind.name);
     const Json given = {{"schema", "sixpoint/scenario/1"},
                         {"seed", 11},
                         {"protocol", in_faces ? "production" : "engineering"},
                         {"effects", {{{"name", kind.name}}}}};
-    std::ofstream(folder / "given.json") << given.dump();
+    std::ofstream(prefix + "-given.json") << given.dump();
     Env env = posix_env();
     EXPECT_EQ(tests::run_command(
-                  env, {"simulate", "--scenario", folder / "given.json", "-o", folder / "bundle"})
+                  env, {"simulate", "--scenario", prefix + "-given.json", "-o", prefix + "-bundle"})
                   .exit_code,
               0);
-    const auto answer = tests::run_command(env, {"gap", "diagnose", folder / "bundle", "--json",
-                                                 "--scenario-out", folder / "augmented.json"});
+    const auto answer = tests::run_command(env, {"gap", "diagnose", prefix + "-bundle", "--json",
+                                                 "--scenario-out", prefix + "-augmented.json"});
     EXPECT_LT(answer.exit_code, 64) << answer.people;
     if (answer.exit_code >= 64) {
       continue;
     }
     missed += answer.json()["effects"].empty() || answer.json()["effects"][0]["name"] != kind.name;
     const auto again = tests::run_command(
-        env, {"simulate", "--scenario", folder / "augmented.json", "-o", folder / "again"});
+        env, {"simulate", "--scenario", prefix + "-augmented.json", "-o", prefix + "-again"});
     EXPECT_EQ(again.exit_code, 0) << again.people;
   }
   return missed;
