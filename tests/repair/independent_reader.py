@@ -6,6 +6,7 @@ description of log.bin, read as the common readers do it: entries by name, recor
 
 Makes a recording, repairs it, and checks the repaired file against the original.
 """
+import hashlib
 import json
 import math
 import struct
@@ -81,6 +82,13 @@ def main():
     assert json.loads(after["sixpoint-repair.json"])["schema"] == "sixpoint/repair-mark/1"
     for name in before:
         assert name == "log.bin" or before[name] == after[name], f"{name} changed"
+    # The mark is the first record: METADATA as the vendor writes it, which readers take for text.
+    mark, log_after = log_after[0], log_after[1:]
+    assert mark[0] == 6 and mark[1] == log_before[0][1]
+    metadata = json.loads(mark[2])
+    assert metadata["MetadataType"] == "SixpointRepair" and metadata["Parsed"] is False
+    with open(original, "rb") as file:
+        assert metadata["InputSha256"] == hashlib.sha256(file.read()).hexdigest()
     assert len(log_before) == len(log_after)
     changed = 0
     for was, now in zip(log_before, log_after):
