@@ -106,6 +106,7 @@ std::vector<HeldOut> hold_out_together(const HeldOutCells& in, std::span<const H
   }
   const auto directions = static_cast<int>(std::count(tested.begin(), tested.end(), 1));
   std::vector<HeldOut> out;
+  out.reserve(square.size());
   for (const double sum : square) {
     out.push_back({weights > 0 ? kMgPerG * std::sqrt(sum / weights) : 0, directions});
   }
