@@ -34,13 +34,11 @@ std::vector<SourceKind> sources_in_order(const NamedSources& named) {
     order = {SourceKind::constants};
   } else if (named.calibration_file) {
     order = {SourceKind::calibration_file};
-  } else if (named.scan) {
-    order = {SourceKind::scan};
-  } else if (named.store) {
+  } else if (named.store && !named.scan) {
     order = {SourceKind::store};
-  } else if (named.default_store) {
+  } else if (named.default_store && !named.scan) {
     order = {SourceKind::store, SourceKind::scan};
-  } else {
+  } else {  // --scan, or nothing at all
     order = {SourceKind::scan};
   }
   if (named.or_scan && order.back() != SourceKind::scan) {
