@@ -125,7 +125,7 @@ TEST(InflatingSource, WrongSizeAndWrongCrcAreSaidAndStaySaid) {
     EXPECT_NE(end.error().what.find("CRC"), std::string::npos);
   }
   facts = facts_of(bytes);
-  for (const std::uint64_t size : {599, 601}) {
+  for (const std::uint64_t size : {std::uint64_t{599}, std::uint64_t{601}}) {
     SCOPED_TRACE(size);
     facts.size = size;
     EXPECT_FAILS(unpacked(packed, facts, 256), ErrorCode::bad_data);
