@@ -144,7 +144,10 @@ void append_activity2(Bytes& payload, std::span<const Counts> samples) {
 
 CountRange range_of(std::span<const Counts> samples) {
   CountRange range;
-  const std::int16_t* const values = samples.empty() ? nullptr : samples.front().data();
+  if (samples.empty()) {
+    return range;
+  }
+  const std::int16_t* const values = samples.front().data();
   for (std::size_t i = 0; i < samples.size() * kAxes; ++i) {
     range.low = std::min(range.low, values[i]);
     range.high = std::max(range.high, values[i]);
