@@ -7,7 +7,7 @@
 
 #include <optional>
 
-#include "calib/gravity.h"
+#include "calib/poses/gravity.h"
 
 namespace CLI {
 class App;
@@ -25,7 +25,7 @@ void add_gravity_options(CLI::App& command, GravityOptions& options);
 
 //   --gravity  --latitude  answer
 //   given      any         the value of --gravity
-//   -          given       computed from latitude and altitude (calib/gravity.h)
+//   -          given       computed from latitude and altitude (calib/poses/gravity.h)
 //   -          -           none: gravity is unknown
 // usage where a value is impossible.
 Result<std::optional<calib::LocalGravity>> local_gravity(const GravityOptions& options);

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "calib/map_to_apply.h"
-#include "calib/sample_uncertainty.h"
+#include "calib/application/map_to_apply.h"
+#include "calib/application/sample_uncertainty.h"
 
 namespace sixpoint::repair {
 namespace {

@@ -7,9 +7,9 @@
 //   options.cross_axis = map.cross_axis;
 //   map.sample_uncertainty_mg;  // X Y Z, in the report and in the mark
 //
-// calib/map_to_apply.h decides between the six constants and the cross-axis terms,
-// calib/sample_uncertainty.h has the formula. Where the constants state no uncertainty, none is
-// stated for the samples. Where a file holds several sets of constants, the largest holds.
+// calib/application/map_to_apply.h decides between the six constants and the cross-axis terms,
+// calib/application/sample_uncertainty.h has the formula. Where the constants state no uncertainty,
+// none is stated for the samples. Where a file holds several sets of constants, the largest holds.
 #pragma once
 
 #include <optional>

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "calib/agreement.h"
+#include "calib/application/agreement.h"
 
 namespace sixpoint::repair {
 namespace {

@@ -21,8 +21,8 @@
 // | of one method, equally certain                         | the latest `made_at`, of equals    |
 // |                                                        | the last one stored                |
 //
-// Two sets disagree as calib/agreement.h has it. Sets of an earlier version, which do not say where
-// they were made, count as file scans unless their method is the jig's.
+// Two sets disagree as calib/application/agreement.h has it. Sets of an earlier version, which do
+// not say where they were made, count as file scans unless their method is the jig's.
 #pragma once
 
 #include <cstddef>

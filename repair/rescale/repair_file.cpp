@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
-#include "calib/agreement.h"
+#include "calib/application/agreement.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
 #include "repair/rescale/applied_map.h"

@@ -29,7 +29,7 @@
 //
 // Constants may be used when why_unfit() (sources.h) says nothing. Where they are not from the file
 // itself, and its own still periods give a verified solution, the two must agree
-// (calib/agreement.h).
+// (calib/application/agreement.h).
 #pragma once
 
 #include <optional>

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
-#include "calib/agreement.h"
-#include "calib/map_to_apply.h"
+#include "calib/application/agreement.h"
+#include "calib/application/map_to_apply.h"
 
 namespace sixpoint::repair {
 namespace {

@@ -67,7 +67,7 @@ struct SourceUsed {
   std::string kind;  // to_string(SourceKind)
   std::string id;    // in the store; else digest_of() the constants
   std::optional<UtcTime> made_at;
-  // Of a value of 1 g by what is applied (calib/map_to_apply.h), the largest of the axes.
+  // Of a value of 1 g by what is applied (map_to_apply.h), the largest of the axes.
   std::optional<double> standard_uncertainty_mg;
 
   std::string brief() const;  // "store 5c0f91aa (2026-11-22, +- 1.2 mg)"

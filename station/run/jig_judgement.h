@@ -5,7 +5,7 @@
 //   ending.write = may_write;
 //   conclude_report(report, run, ending);  // verdict, codes, reasons
 //
-// Uncertainties: calib/six_pose.h and budget.h. The functions change the caller's report only; any
+// Uncertainties: six_pose.h and budget.h. The functions change the caller's report only; any
 // thread.
 #pragma once
 
@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "base/result.h"
-#include "calib/gravity.h"
-#include "calib/six_pose.h"
+#include "calib/poses/gravity.h"
+#include "calib/poses/six_pose.h"
 #include "station/limits/limits.h"
 #include "station/limits/verdict.h"
 #include "station/run/jig_report.h"

@@ -17,8 +17,8 @@
 
 #include "base/measure.h"
 #include "calib/constants.h"
-#include "calib/gravity.h"
-#include "calib/six_pose.h"
+#include "calib/poses/gravity.h"
+#include "calib/poses/six_pose.h"
 #include "device/unit.h"
 #include "station/limits/limits.h"
 #include "station/limits/verdict.h"

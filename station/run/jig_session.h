@@ -18,7 +18,7 @@
 
 #include "base/env.h"
 #include "calib/constants.h"
-#include "calib/gravity.h"
+#include "calib/poses/gravity.h"
 #include "device/unit.h"
 #include "station/limits/limits.h"
 #include "station/limits/verdict.h"

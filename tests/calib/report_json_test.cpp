@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/made_blocks.h"
-#include "calib/six_pose.h"
+#include "calib/poses/six_pose.h"
 #include "calib/solve.h"
 #include "exact_blocks.h"
 #include "expect_result.h"

@@ -1,4 +1,4 @@
-#include "calib/gravity.h"
+#include "calib/poses/gravity.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "calib/sample_uncertainty.h"
+#include "calib/application/sample_uncertainty.h"
 
 #include <cmath>
 #include <cstdio>
@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "calib/scaling.h"
+#include "calib/synthetic_unit.h"
 #include "expect_result.h"
-#include "synthetic_unit.h"
 
 namespace sixpoint::calib {
 namespace {

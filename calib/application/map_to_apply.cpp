@@ -1,4 +1,4 @@
-#include "calib/map_to_apply.h"
+#include "calib/application/map_to_apply.h"
 
 #include <fmt/format.h>
 

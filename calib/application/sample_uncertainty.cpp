@@ -1,4 +1,4 @@
-#include "calib/sample_uncertainty.h"
+#include "calib/application/sample_uncertainty.h"
 
 #include <array>
 #include <cmath>

@@ -35,7 +35,7 @@
 #include "base/measure.h"
 #include "base/result.h"
 #include "calib/constants.h"
-#include "calib/gravity.h"
+#include "calib/poses/gravity.h"
 
 namespace sixpoint::calib {
 

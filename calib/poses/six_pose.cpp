@@ -1,4 +1,4 @@
-#include "calib/six_pose.h"
+#include "calib/poses/six_pose.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

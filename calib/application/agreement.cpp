@@ -1,4 +1,4 @@
-#include "calib/agreement.h"
+#include "calib/application/agreement.h"
 
 #include <algorithm>
 #include <array>

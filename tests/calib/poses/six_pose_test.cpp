@@ -1,4 +1,4 @@
-#include "calib/six_pose.h"
+#include "calib/poses/six_pose.h"
 
 #include <algorithm>
 
@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "calib/exact_blocks.h"
 #include "calib/least_squares.h"
-#include "exact_blocks.h"
 #include "expect_result.h"
 
 namespace sixpoint::calib {
