@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 
 namespace sixpoint::cli {
 
@@ -247,21 +248,21 @@ class StandardOutput final : public WritableFile {
 }  // namespace
 
 // The disk, with the rule on top.
-class Outputs::Files final : public FileSystem {
+class Outputs::Files final : public ForwardingFiles {
  public:
   Files(Context& context, bool force)
-      : files_(context.env.files), out_(context.out), force_(force) {}
+      : ForwardingFiles(context.env.files), out_(context.out), force_(force) {}
 
+  using ForwardingFiles::disk;
   void add_input(const FileInfo& input) { inputs_.push_back(input); }
-  FileSystem& disk() { return files_; }
   bool force() const { return force_; }
 
   Result<Placement> placement(const std::string& path) override {
-    SIXPOINT_ASSIGN(const Placing how, placing_of(look_at(files_, path, inputs_), force_, path));
+    SIXPOINT_ASSIGN(const Placing how, placing_of(look_at(disk(), path, inputs_), force_, path));
     Placement placement{how, path};
-    if (const auto link = files_.link_info(path);
+    if (const auto link = disk().link_info(path);
         how == Placing::replace && link && link->is_link) {
-      SIXPOINT_ASSIGN(placement.path, files_.real_path(path));
+      SIXPOINT_ASSIGN(placement.path, disk().real_path(path));
     }
     return placement;
   }
@@ -269,39 +270,10 @@ class Outputs::Files final : public FileSystem {
     if (is_standard_output(path)) {
       return std::make_unique<StandardOutput>(out_);
     }
-    return files_.open_through(path);
-  }
-
-  Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
-    return files_.open(path);
-  }
-  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
-    return files_.create(path);
-  }
-  Result<FileInfo> info(const std::string& path) override { return files_.info(path); }
-  Result<std::vector<std::string>> list(const std::string& folder) override {
-    return files_.list(folder);
-  }
-  Status make_folders(const std::string& path) override { return files_.make_folders(path); }
-  Status rename(const std::string& from, const std::string& to) override {
-    return files_.rename(from, to);
-  }
-  Status rename_new(const std::string& from, const std::string& to) override {
-    return files_.rename_new(from, to);
-  }
-  Status remove(const std::string& path) override { return files_.remove(path); }
-  Status restrict_to_owner(const std::string& path) override {
-    return files_.restrict_to_owner(path);
-  }
-  Status sync_folder(const std::string& path) override { return files_.sync_folder(path); }
-  Result<FileInfo> link_info(const std::string& path) override { return files_.link_info(path); }
-  Result<std::string> real_path(const std::string& path) override { return files_.real_path(path); }
-  Result<std::unique_ptr<FileLock>> lock(const std::string& path) override {
-    return files_.lock(path);
+    return disk().open_through(path);
   }
 
  private:
-  FileSystem& files_;
   std::ostream& out_;
   bool force_;
   std::vector<FileInfo> inputs_;

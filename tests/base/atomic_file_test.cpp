@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "forwarding_files.h"
 #include "temporary_folder.h"
 #include "text_of.h"
 
@@ -57,7 +57,7 @@ TEST(AtomicFile, StepsAsideForALeftoverTemporaryFile) {
 }
 
 // A disk whose rule is `how` for every file, with a pipe that takes everything.
-class RuledFiles final : public tests::ForwardingFiles {
+class RuledFiles final : public ForwardingFiles {
  public:
   RuledFiles(FileSystem& files, Placing how) : ForwardingFiles(files), how_(how) {}
   Result<Placement> placement(const std::string& path) override { return Placement{how_, path}; }

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "db/journal.h"
 #include "expect_result.h"
-#include "forwarding_files.h"
 #include "place.h"
 
 namespace sixpoint::db {
@@ -138,7 +138,7 @@ TEST_F(SaveTest, ADamagedEarlierEntryBlocksTheStoreButLosesNoRun) {
 }
 
 // A disk on which one folder cannot be written.
-class OneBadFolder final : public sixpoint::tests::ForwardingFiles {
+class OneBadFolder final : public sixpoint::ForwardingFiles {
  public:
   OneBadFolder(FileSystem& files, std::string bad) : ForwardingFiles(files), bad_(std::move(bad)) {}
   Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {

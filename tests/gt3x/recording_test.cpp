@@ -5,9 +5,9 @@
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "forwarding_files.h"
 #include "gt3x/recording_writer.h"
 #include "gt3x_made_log.h"
 #include "shared_data.h"
@@ -184,7 +184,7 @@ class FailingFile final : public ReadableFile {
   std::uint64_t limit_;
 };
 
-class FailingFiles final : public sixpoint::tests::ForwardingFiles {
+class FailingFiles final : public sixpoint::ForwardingFiles {
  public:
   FailingFiles(FileSystem& inner, std::uint64_t limit) : ForwardingFiles(inner), limit_(limit) {}
   Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
