@@ -57,10 +57,10 @@ Status RescaledLog::set_constants(const StoredConstants& constants) {
   if (!options_.fresh.has_value() || constants_ == constants) {
     return {};
   }
-  constants_ = constants;
   const auto known = std::ranges::find(maps_, constants, [](const auto& map) { return map.first; });
-  map_ = static_cast<std::size_t>(known - maps_.begin());
   if (known != maps_.end()) {
+    map_ = static_cast<std::size_t>(known - maps_.begin());
+    constants_ = constants;
     return {};
   }
   if (maps_.size() == kMaxSetsOfConstants) {
@@ -76,7 +76,9 @@ Status RescaledLog::set_constants(const StoredConstants& constants) {
   rescale.affine = options_.affine;
   rescale.cross_axis = options_.cross_axis;
   SIXPOINT_ASSIGN(auto map, calib::Rescale::make(reversal, *options_.fresh, rescale));
+  map_ = maps_.size();
   maps_.emplace_back(constants, std::move(map));
+  constants_ = constants;
   return {};
 }
 

@@ -198,7 +198,7 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path)
   found.device_type = info.device_type();
   found.rate_hz = info.sample_rate_hz();
   found.entries = recording.entries();
-  found.already_repaired = recording.has_entry(kRepairMark);
+  SIXPOINT_ASSIGN(found.already_repaired, carries_repair_mark(recording));
   found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, nullptr);
   if (found.rate_hz.value_or(0) <= 0 && !recording.has_log()) {
     return fail(without_rate(path));

@@ -23,6 +23,22 @@ bool is_repair_mark(const gt3x::Record& record) {
   return json.is_object() && json.value("MetadataType", nlohmann::json()) == kRepairMarkType;
 }
 
+Result<bool> carries_repair_mark(gt3x::Recording& recording) {
+  if (recording.has_entry(kRepairMark) || !recording.has_log()) {
+    return recording.has_entry(kRepairMark);
+  }
+  SIXPOINT_ASSIGN(auto log, recording.open_log());
+  while (true) {
+    SIXPOINT_ASSIGN(const auto item, log.next());
+    if (!item.has_value()) {
+      return false;
+    }
+    if (item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok) {
+      return is_repair_mark(item->record);
+    }
+  }
+}
+
 namespace {
 
 constexpr double kUsualScale_lsb_per_g = 256;
@@ -40,28 +56,18 @@ void take_parameters(const gt3x::Parameters& parameters, FileFacts& facts) {
   }
 }
 
-// What a log says before its samples need it.
-struct LogHead {
-  // The first PARAMETERS record whose checksum holds; nothing when there is none.
-  std::optional<gt3x::Parameters> parameters;
-  bool marked = false;  // our mark stands before it
-};
-Result<LogHead> read_head(gt3x::Recording& recording) {
+// The first PARAMETERS record of the log whose checksum holds; nothing when there is none.
+Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& recording) {
   SIXPOINT_ASSIGN(auto log, recording.open_log());
-  LogHead head;
   while (true) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item.has_value()) {
-      return head;
+      return std::nullopt;
     }
-    if (item->kind != gt3x::LogItem::Kind::record || !item->record.checksum_ok) {
-      continue;
-    }
-    head.marked = head.marked || is_repair_mark(item->record);
-    if (item->record.is(gt3x::RecordType::parameters)) {
+    if (item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok &&
+        item->record.is(gt3x::RecordType::parameters)) {
       if (auto parameters = gt3x::parse_parameters(item->record.payload)) {
-        head.parameters = *std::move(parameters);
-        return head;
+        return *std::move(parameters);
       }
     }
   }
@@ -146,9 +152,7 @@ class LogSurvey {
  private:
   // Finds out the scale, and the constants of the samples before the first PARAMETERS record.
   Status begin() {
-    SIXPOINT_ASSIGN(const LogHead head, read_head(recording_));
-    const auto& first = head.parameters;
-    result_.already_repaired = result_.already_repaired || head.marked;
+    SIXPOINT_ASSIGN(const auto first, first_parameters(recording_));
     take_scale(first);
     if (first.has_value()) {
       take_parameters(*first, result_.facts);
@@ -339,9 +343,9 @@ Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
   FileFacts facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
   if (recording.has_log()) {
-    SIXPOINT_ASSIGN(const LogHead head, read_head(recording));
-    if (head.parameters) {
-      take_parameters(*head.parameters, facts);
+    SIXPOINT_ASSIGN(const auto first, first_parameters(recording));
+    if (first) {
+      take_parameters(*first, facts);
     }
   }
   return facts;
@@ -353,7 +357,7 @@ Result<Survey> survey(FileSystem& files, const std::string& path,
   Survey result;
   result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
   result.model = gt3x::model_of(result.facts.serial);
-  result.already_repaired = recording.has_entry(kRepairMark);
+  SIXPOINT_ASSIGN(result.already_repaired, carries_repair_mark(recording));
   result.rate_hz = recording.info().sample_rate_hz().value_or(0);
   if (!recording.has_log()) {
     result.constants_problem =

@@ -19,6 +19,7 @@
 #include "gt3x/log/log_reader.h"
 #include "gt3x/log/record.h"
 #include "gt3x/log/samples.h"
+#include "gt3x/recording.h"
 #include "repair/triage/still_scan.h"
 #include "repair/triage/triage.h"
 
@@ -32,6 +33,8 @@ inline constexpr const char* kRepairMark = "sixpoint-repair.json";
 // lose it: a METADATA record, JSON in the vendor's form, with this MetadataType.
 inline constexpr const char* kRepairMarkType = "SixpointRepair";
 bool is_repair_mark(const gt3x::Record& record);
+// Either of the two; reads the log up to its first good record.
+Result<bool> carries_repair_mark(gt3x::Recording& recording);
 
 // Samples in one ACTIVITY2 record.
 inline constexpr std::size_t kMaxWideSamples = gt3x::kMaxPayload / sizeof(gt3x::Counts);

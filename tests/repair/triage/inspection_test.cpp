@@ -205,6 +205,25 @@ TEST(Inspection, ARepairedFileIsJudgedByItsCountsAlone) {
   }
 }
 
+// Packed anew without sixpoint-repair.json: the record in the log is still there.
+TEST(Inspection, KnowsAMarkThatOutlivedItsEntry) {
+  const Bytes log = tests::six_sides().log();
+  Bytes marked;
+  gt3x::append_record(marked, RecordType::metadata, 7,
+                      as_bytes(R"({"MetadataType":"SixpointRepair","Parsed":false,"JSON":null})"));
+  marked.insert(marked.end(), log.begin(), log.end());
+  EXPECT_TRUE(inspected(marked).already_repaired);
+  EXPECT_FALSE(inspected(log).already_repaired);
+  // Other METADATA, and our words in a record that is not the first, are no mark.
+  Bytes later = log;
+  later.insert(later.end(), marked.begin(), marked.end() - static_cast<std::ptrdiff_t>(log.size()));
+  EXPECT_FALSE(inspected(later).already_repaired);
+  Bytes other;
+  gt3x::append_record(other, RecordType::metadata, 7, as_bytes(R"({"MetadataType":"Bio"})"));
+  other.insert(other.end(), log.begin(), log.end());
+  EXPECT_FALSE(inspected(other).already_repaired);
+}
+
 TEST(Inspection, WarnsOfParametersThatDoNotSuffice) {
   Bytes none;
   append_second(none, 0);
