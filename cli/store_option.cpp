@@ -6,6 +6,7 @@
 #include "base/atomic_file.h"
 #include "base/sha256.h"
 #include "cli/command.h"
+#include "db/records.h"
 #include "gt3x/forms/model.h"
 #include "station/records/run_records.h"
 
@@ -140,7 +141,7 @@ Result<SavedConstants> save_capture(Context& context, const Env& env, const std:
                                     const station::CaptureReport& report, const std::string& path) {
   calib::ConstantsOrigin origin;
   origin.sha256 = report.file_sha256;
-  origin.file = file_name_of(report.file);
+  origin.file = db::storable_path(file_name_of(report.file));
   origin.kind = "calibration_file";
   SIXPOINT_ASSIGN(const auto record, record_constants(env, *report.solved, origin, path));
   return save_constants(context, location, record, std::string(gt3x::model_of(record.serial)));

@@ -22,8 +22,9 @@ inline std::string shared_file(const std::string& relative) {
 
 }  // namespace sixpoint::tests
 
-// First line of a test that needs a real recording. Without the recordings the test cannot say
-// anything, and says so; scripts/test.sh counts and prints these skips.
+// First line of a test that needs a real recording. The recordings belong to others and may not be
+// copied into the project, so a checkout alone has none. Without them the test cannot say anything,
+// and says so; scripts/test.sh counts and prints these skips.
 #define SIXPOINT_NEED_SHARED(relative)                                                 \
   if (!std::filesystem::exists(::sixpoint::tests::shared_file(relative)))              \
   GTEST_SKIP() << "SKIPPED, NOT PASSED: the recording " << (relative) << " is not in " \

@@ -10,6 +10,7 @@
 #include "cli/gravity_option.h"
 #include "cli/output.h"
 #include "cli/store_option.h"
+#include "db/records.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/triage/survey.h"
 
@@ -68,7 +69,7 @@ Status keep(const std::string& path, const Options& options, const repair::Surve
   }
   calib::ConstantsOrigin origin;
   SIXPOINT_ASSIGN(origin.sha256, file_sha256(context.env.files, path));
-  origin.file = file_name_of(path);
+  origin.file = db::storable_path(file_name_of(path));
   origin.kind = repair::recording_kind(survey);
   SIXPOINT_ASSIGN(const auto record, record_constants(outputs.env(), outcome.report, origin,
                                                       to_file ? options.output : ""));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "db/records.h"
+
 namespace sixpoint::repair {
 namespace {
 
@@ -124,7 +126,7 @@ ConstantsFinder::CalibrationFile ConstantsFinder::read_calibration_file(const st
     return result;
   }
   calib::ConstantsOrigin origin;
-  origin.file = path;
+  origin.file = db::storable_path(path);
   origin.kind = "calibration_file";
   auto record = calib::record_of(*report, env_.clock.now(), origin);
   if (!record) {
@@ -163,7 +165,7 @@ Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
     return {};
   }
   calib::ConstantsOrigin origin;
-  origin.file = path;
+  origin.file = db::storable_path(path);
   origin.kind = "file_scan";
   SIXPOINT_ASSIGN(auto record, calib::record_of(report, env_.clock.now(), origin));
   choice.chosen = ChosenConstants{std::move(record), "scan", ""};

@@ -53,6 +53,19 @@ class SolveCommand : public tests::CommandTest {
   }
 };
 
+// The name of a file may be any bytes; what is written and stored is UTF-8.
+TEST_F(SolveCommand, ANameThatIsNoUtf8IsEscaped) {
+  const std::string path = write(sides_recording({0, 1, 2, 3, 4, 5}), "s\xff x.gt3x");
+  const std::string output = folder_ / "constants.json";
+  const auto answer =
+      run({"solve", path, "--json", "--save", "--store", folder_ / "s.db", "-o", output});
+  ASSERT_EQ(answer.exit_code, 0) << answer.people;
+  EXPECT_TRUE(answer.json().is_object());
+  std::ifstream file(output);
+  const auto written = nlohmann::json::parse(file);
+  EXPECT_EQ(written["made_from"]["file"], "s\\xff x.gt3x");
+}
+
 TEST_F(SolveCommand, SixSidesAreSolvedStoredAndWritten) {
   for (const unsigned rate : {30U, 60U, 100U}) {
     const std::string path =
