@@ -23,6 +23,10 @@
 
 namespace sixpoint::db {
 
+// The part of an id that people are shown: 12 digits, which Store::whole_key() takes as well. JSON
+// has whole ids.
+inline std::string shown_id(const std::string& id) { return id.substr(0, 12); }
+
 // Constants of one unit under one filter configuration, as they were determined.
 struct ConstantsRecord {
   static constexpr std::string_view kTable = "constants";

@@ -16,6 +16,11 @@ Result<bool> has_row(Database& database, const Table& table, const Value& key) {
   return !rows.empty();
 }
 
+bool may_be_beginning_of_id(const std::string& text) {
+  constexpr std::size_t kFewest = 8;
+  return text.size() >= kFewest && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
 NewRows single_row(std::string_view table_name, Row row) {
   NewRows rows{text_of(row[0])};
   rows.rows.emplace_back(&table(table_name), std::move(row));
@@ -46,6 +51,12 @@ Result<Store> Store::open_to_read(Env& env, const std::string& location) {
                 database->location(),
                 "somebody who may write it has to open it once, with this program");
   }
+  return Store(env, std::move(database));
+}
+
+Result<Store> Store::in_memory(Env& env) {
+  SIXPOINT_ASSIGN(auto database, open_sqlite_in_memory());
+  SIXPOINT_CHECK(migrate(*database));
   return Store(env, std::move(database));
 }
 
@@ -93,14 +104,35 @@ Result<std::string> Store::correct(const Correction& correction) {
   }
   Correction now = correction;
   now.made_at = env_->clock.now();
+  SIXPOINT_ASSIGN(now.row_id, whole_key(correction.table, correction.row_id));
   SIXPOINT_ASSIGN(Row row, new_row(now));
-  SIXPOINT_ASSIGN(const bool known, has_row(*database_, *about, correction.row_id));
-  if (!known) {
-    return fail(ErrorCode::no_input,
-                fmt::format("no {} '{}'", correction.table, printable(correction.row_id, 60)),
-                database_->location(), "'sixpoint history SERIAL' lists them");
-  }
   return add(single_row("corrections", std::move(row)));
+}
+
+Result<std::string> Store::whole_key(std::string_view table_name, const std::string& given) {
+  const Table& table = db::table(table_name);
+  SIXPOINT_ASSIGN(const bool known, has_row(*database_, table, given));
+  if (known) {
+    return given;
+  }
+  std::vector<Row> rows;
+  // A serial number is no id: the beginning of one may be another unit's.
+  if (table.columns[0].name == "id" && may_be_beginning_of_id(given)) {
+    // 'g' stands after every digit.
+    SIXPOINT_ASSIGN(rows, database_->query(
+                              fmt::format("SELECT {0} FROM {1} WHERE {0} > $1 AND {0} < $2 LIMIT 2",
+                                          table.columns[0].name, table.name),
+                              std::vector<Value>{given, given + "g"}));
+  }
+  if (rows.size() == 1) {
+    return text_of(rows[0][0]);
+  }
+  const std::string name = fmt::format("'{}'", printable(given, 60));
+  return rows.empty()
+             ? fail(ErrorCode::no_input, fmt::format("no {} {}", table.name, name),
+                    database_->location(), "'sixpoint history SERIAL' lists them")
+             : fail(ErrorCode::usage, fmt::format("several {} begin with {}", table.name, name),
+                    database_->location(), "give more of its digits");
 }
 
 Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,
@@ -176,13 +208,10 @@ Result<std::vector<ConstantsRecord>> Store::history(const std::string& serial) {
   return select<ConstantsRecord>("WHERE serial = $1 ORDER BY seq", std::vector<Value>{serial});
 }
 
-Result<RunRecord> Store::run(const std::string& id) {
+Result<RunRecord> Store::run(const std::string& given) {
+  SIXPOINT_ASSIGN(const std::string id, whole_key("runs", given));
   SIXPOINT_ASSIGN(auto found, select<RunRecord>("WHERE id = $1", std::vector<Value>{id}));
-  if (found.empty()) {
-    return fail(ErrorCode::no_input, fmt::format("no run '{}'", printable(id, 60)),
-                database_->location(), "'sixpoint history SERIAL' lists the runs of a unit");
-  }
-  SIXPOINT_ASSIGN(found[0].head, head_of_run(id));
+  SIXPOINT_ASSIGN(found.at(0).head, head_of_run(id));
   return std::move(found[0]);
 }
 

@@ -37,6 +37,8 @@ class Store final : public RecordWriter {
   // Only to read, also where nothing may be written: a store of an earlier version is refused
   // (configuration), and so is a place where there is none (no_input).
   static Result<Store> open_to_read(Env& env, const std::string& location);
+  // Ends with its object: for tests.
+  static Result<Store> in_memory(Env& env);
 
   // The tables themselves, for exchange.h and for tests. Only this class adds rows to them.
   Database& database() { return *database_; }
@@ -44,8 +46,20 @@ class Store final : public RecordWriter {
   // Adds the rows that the store does not have yet, in one transaction.
   Result<std::string> add(NewRows rows) override;
 
-  // Adds a correction, made now. no_input where there is no such row; usage for another action, or
-  // without a reason.
+  // The key of the row of `table` (a name in schema.h) that a person names by `given`:
+  //
+  // | `given`                              | rows whose key begins so | answer                   |
+  // |--------------------------------------|--------------------------|--------------------------|
+  // | a whole key                          | any number               | it                       |
+  // | 8 hexadecimal digits or more         | one                      | its key                  |
+  // | 8 hexadecimal digits or more         | several                  | usage: more digits       |
+  // | 8 hexadecimal digits or more         | none                     | no_input                 |
+  // | fewer digits, or anything else       | any number               | no_input                 |
+  // | the beginning of a serial number     | any number               | no_input                 |
+  Result<std::string> whole_key(std::string_view table, const std::string& given);
+
+  // Adds a correction, made now; `row_id` as whole_key() takes it. no_input where there is no such
+  // row; usage for another action, or without a reason.
   //
   // | action              | of which rows      |
   // |---------------------|--------------------|
@@ -72,7 +86,7 @@ class Store final : public RecordWriter {
   // The whole history, oldest first, withdrawn sets included.
   Result<std::vector<ConstantsRecord>> history(const std::string& serial);
   Result<UnitHistory> unit_history(const std::string& serial);
-  // no_input where there is none.
+  // `id`: as whole_key() takes it.
   Result<RunRecord> run(const std::string& id);
   Result<std::vector<UnitRecord>> units();
   // The repair that made a file of this hash, if one did.

@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static MemoryEnv clock_only;
   static std::optional<db::Store> store;
   if (!store) {
-    store.emplace(db::Store::open(clock_only.env, ":memory:").value());
+    store.emplace(db::Store::in_memory(clock_only.env).value());
   }
   MemoryFiles files;
   {
@@ -27,7 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (report) {
     // What came in goes out and in again.
     MemoryFiles out;
-    auto again = db::Store::open(clock_only.env, ":memory:").value();
+    auto again = db::Store::in_memory(clock_only.env).value();
     if (!db::export_json_lines(*store, out, "out.jsonl") ||
         db::import_json_lines(again, out, "out.jsonl").value().head != report->head) {
       std::abort();

@@ -14,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   static MemoryEnv clock_only;
-  static auto store = db::Store::open(clock_only.env, ":memory:").value();
+  static auto store = db::Store::in_memory(clock_only.env).value();
   static int stored = 0;
   std::string text(reinterpret_cast<const char*>(data) + 1, size - 1);
   if (data[0] % 2 == 0) {
@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     // So that an audit stays quick.
     if (++stored % 200 == 0) {
-      store = db::Store::open(clock_only.env, ":memory:").value();
+      store = db::Store::in_memory(clock_only.env).value();
     }
   }
   return 0;

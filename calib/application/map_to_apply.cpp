@@ -6,16 +6,11 @@
 
 namespace sixpoint::calib {
 
-MapChoice map_to_apply(const ConstantsRecord& record, MapTarget target) {
+MapChoice map_to_apply(const ConstantsRecord& record) {
   if (!record.cross_axis) {
     return {};
   }
   const CrossAxisMap& map = *record.cross_axis;
-  if (target == MapTarget::unit_memory) {
-    return {false,
-            "a unit's memory has no place for cross-axis terms: the best six constants without "
-            "them are used"};
-  }
   if (!map.verified) {
     return {false, "the cross-axis terms are not verified: the six constants are used"};
   }

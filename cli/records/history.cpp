@@ -134,25 +134,29 @@ void print(const db::UnitHistory& history, Context& context) {
   for (std::size_t i = 0; i < history.constants.size(); ++i) {
     const db::ConstantsRecord& record = history.constants[i];
     context.out << fmt::format("{}  {:<8} {:<14} {}  {}\n", to_iso8601(record.made_at),
-                               record.filter, record.method, record.id, printable(about[i]));
+                               record.filter, record.method, db::shown_id(record.id),
+                               printable(about[i]));
   }
   for (const auto& run : history.runs) {
-    context.out << fmt::format("{}  run {:<4} {:<14} {}  {}{}\n", to_iso8601(run.started), run.kind,
-                               run.verdict, run.id, printable(run.jig),
-                               run.retest_of.empty() ? "" : "  repeats " + run.retest_of);
+    context.out << fmt::format(
+        "{}  run {:<4} {:<14} {}  {}{}\n", to_iso8601(run.started), run.kind, run.verdict,
+        db::shown_id(run.id), printable(run.jig),
+        run.retest_of.empty() ? "" : "  repeats " + db::shown_id(run.retest_of));
   }
   for (const auto& write : history.writes) {
     context.out << fmt::format("{}  written into the unit by run {}\n", to_iso8601(write.written),
-                               write.run_id);
+                               db::shown_id(write.run_id));
   }
   for (const auto& repair : history.repairs) {
     context.out << fmt::format("{}  repaired {:<14} {}\n", to_iso8601(repair.made_at),
                                repair.method, printable(repair.input));
   }
   for (const auto& correction : history.corrections) {
-    context.out << fmt::format("{}  {:<8} of {} {}: {} ({})\n", to_iso8601(correction.made_at),
-                               correction.action, correction.table, correction.row_id,
-                               printable(correction.reason), printable(correction.operator_name));
+    context.out << fmt::format(
+        "{}  {:<8} of {} {}: {} ({})\n", to_iso8601(correction.made_at), correction.action,
+        correction.table,
+        correction.table == "units" ? correction.row_id : db::shown_id(correction.row_id),
+        printable(correction.reason), printable(correction.operator_name));
   }
 }
 

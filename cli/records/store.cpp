@@ -121,15 +121,17 @@ Result<Answer> correct(db::Store& store, const Options& options, const std::stri
   Answer answer;
   SIXPOINT_ASSIGN(answer.json["correction"], store.correct(correction));
   answer.json["action"] = action;
-  answer.json["about"] = {{"table", options.table}, {"id", options.id}};
+  SIXPOINT_ASSIGN(const std::string id, store.whole_key(options.table, options.id));
+  answer.json["about"] = {{"table", options.table}, {"id", id}};
   return answer;
 }
 
 Result<Answer> withdraw(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "withdraw"));
-  SIXPOINT_ASSIGN(const auto recall, store.recall_list(options.id));
-  answer.json["withdrawn"] = options.id;
+  const auto id = answer.json["about"]["id"].get<std::string>();
+  SIXPOINT_ASSIGN(const auto recall, store.recall_list(id));
+  answer.json["withdrawn"] = id;
   answer.json["recall"] = recall.size();
   answer.note =
       fmt::format("withdrawn; {} files were repaired with these constants", recall.size());
@@ -146,7 +148,7 @@ Result<Answer> reinstate(const Options& options, Context& context) {
 Result<Answer> prefer(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "prefer"));
-  answer.json["preferred"] = options.id;
+  answer.json["preferred"] = answer.json["about"]["id"];
   answer.note = "of the sets of this unit and filter, these constants apply now";
   return answer;
 }
@@ -160,7 +162,11 @@ Result<Answer> note(const Options& options, Context& context) {
 
 Result<Answer> recall(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
-  SIXPOINT_ASSIGN(const auto entries, store.recall_list(options.id));
+  std::string id;
+  if (!options.id.empty()) {
+    SIXPOINT_ASSIGN(id, store.whole_key("constants", options.id));
+  }
+  SIXPOINT_ASSIGN(const auto entries, store.recall_list(id));
   Answer answer;
   Json& files = answer.json["files"] = Json::array();
   for (const auto& entry : entries) {
@@ -265,8 +271,8 @@ Result<Answer> trend(const Options& options, Context& context) {
                                       : Json(nullptr)}});
     answer.text +=
         fmt::format("{}  {:<8} {:<10} {:<12} {}{}\n", to_iso8601(point.constants.made_at),
-                    point.constants.filter, point.constants.method, point.jig, point.constants.id,
-                    point.withdrawn ? "  withdrawn" : "");
+                    point.constants.filter, point.constants.method, point.jig,
+                    db::shown_id(point.constants.id), point.withdrawn ? "  withdrawn" : "");
   }
   return answer;
 }

@@ -133,7 +133,7 @@ void print(Context& context, const Done& done) {
     context.text() << fmt::format("repeat these sides: {}\n", fmt::join(missing, " "));
   }
   if (done.saved) {
-    context.text() << fmt::format("constants stored as {}\n", done.saved->id);
+    context.text() << fmt::format("constants stored as {}\n", db::shown_id(done.saved->id));
   }
 }
 

@@ -58,11 +58,15 @@ Result<std::string> retested_run(const Options& options, const std::string& seri
   if (!store) {
     return fail(store.error());
   }
+  const bool last = options.retest_of == "last";
   SIXPOINT_ASSIGN(const auto history, store->unit_history(serial));
+  const auto named = last ? Result<std::string>() : store->whole_key("runs", options.retest_of);
+  if (!named && named.error().code != ErrorCode::no_input) {
+    return fail(named.error());
+  }
   const auto earlier =
       std::find_if(history.runs.rbegin(), history.runs.rend(), [&](const db::RunRecord& candidate) {
-        return candidate.kind == "jig" &&
-               (options.retest_of == "last" || options.retest_of == candidate.id);
+        return candidate.kind == "jig" && (last || (named && *named == candidate.id));
       });
   if (earlier == history.runs.rend()) {
     return fail(ErrorCode::no_input,
@@ -380,9 +384,9 @@ void print(Context& context, const Done& done) {
   if (!done.kept) {
     return;
   }
-  context.text() << fmt::format("run {}\n", done.run_id);
+  context.text() << fmt::format("run {}\n", db::shown_id(done.run_id));
   if (done.constants_id) {
-    context.text() << fmt::format("constants stored as {}\n", *done.constants_id);
+    context.text() << fmt::format("constants stored as {}\n", db::shown_id(*done.constants_id));
   }
 }
 

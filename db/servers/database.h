@@ -119,6 +119,8 @@ enum class Access : std::uint8_t { write, read };
 // for a full disk, bad_data for damage.
 Result<std::unique_ptr<Database>> open_sqlite(const std::string& path,
                                               Access access = Access::write);
+// A store that ends with its object: for tests.
+Result<std::unique_ptr<Database>> open_sqlite_in_memory();
 
 // A PostgreSQL database (postgresql://user:password@host:port/name, as libpq takes it; a password
 // may also come from PGPASSWORD or ~/.pgpass, which other users cannot see in the process list).

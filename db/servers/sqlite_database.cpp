@@ -146,9 +146,10 @@ class SqliteRows final : public RowStream {
   std::string path_;
 };
 
-// `path` as SQLite reads it in an address, whatever bytes it has.
+// `path` as SQLite reads it in an address, whatever bytes it has; a file also where it is
+// ":memory:".
 std::string address_of(const std::string& path, std::string_view setting) {
-  std::string address = "file:";
+  std::string address = path.starts_with('/') ? "file:" : "file:./";
   for (const char c : path) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
                        c == '/' || c == '.' || c == '-' || c == '_';
@@ -159,8 +160,13 @@ std::string address_of(const std::string& path, std::string_view setting) {
 
 class SqliteDatabase final : public Database {
  public:
+  // A file, whatever its name is.
   explicit SqliteDatabase(const std::string& path)
-      : database_(path, SQLite::OPEN_READWRITE, kBusyTimeout_ms), path_(path) {}
+      : database_(address_of(path, "mode=rw"), SQLite::OPEN_READWRITE | SQLite::OPEN_URI,
+                  kBusyTimeout_ms),
+        path_(path) {}
+  // No file.
+  SqliteDatabase() : database_(":memory:", SQLite::OPEN_READWRITE), path_(":memory:") {}
   // Only to read; `setting`: how SQLite reads the file.
   SqliteDatabase(const std::string& path, const char* setting)
       : database_(address_of(path, setting), SQLite::OPEN_READONLY | SQLite::OPEN_URI,
@@ -264,6 +270,10 @@ class SqliteDatabase final : public Database {
   }
 
   Result<std::vector<std::string>> check_indexes() override {
+    const char* file = sqlite3_db_filename(database_.getHandle(), "main");
+    if (file == nullptr || *file == '\0') {
+      return std::vector<std::string>();  // in memory: nothing that a second connection could read
+    }
     try {
       SQLite::Database own(address_of(path_, setting_to_read_),
                            SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout_ms);
@@ -276,7 +286,9 @@ class SqliteDatabase final : public Database {
 
   Result<bool> copy_to_file(const std::string& path) override {
     try {
-      SQLite::Database copy(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout_ms);
+      SQLite::Database copy(address_of(path, "mode=rwc"),
+                            SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_URI,
+                            kBusyTimeout_ms);
       copy.exec("PRAGMA synchronous=FULL");
       SQLite::Backup backup(copy, database_);
       // In one step: a copy in many steps begins again whenever another process writes.
@@ -451,6 +463,16 @@ Result<std::unique_ptr<Database>> open_to_read(const std::string& path) {
 }
 
 }  // namespace
+
+Result<std::unique_ptr<Database>> open_sqlite_in_memory() {
+  try {
+    auto database = std::make_unique<SqliteDatabase>();
+    SIXPOINT_CHECK(database->prepare());
+    return database;
+  } catch (const SQLite::Exception& exception) {
+    return fail(to_error(exception, "memory"));
+  }
+}
 
 Result<std::unique_ptr<Database>> open_sqlite(const std::string& path, Access access) {
   SIXPOINT_ASSIGN(const Found found, look_at(path));

@@ -16,7 +16,7 @@ bool states_uncertainty(const calib::ConstantsUncertainty& uncertainty) {
 }  // namespace
 
 AppliedMap applied_map(const calib::ConstantsRecord& record, const Survey& survey) {
-  const calib::MapChoice choice = calib::map_to_apply(record, calib::MapTarget::file);
+  const calib::MapChoice choice = calib::map_to_apply(record);
   AppliedMap out{record.calibration, {}, choice.why, std::nullopt};
   calib::RepairedBy by;
   by.constants = record.uncertainty;

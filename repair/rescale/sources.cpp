@@ -9,6 +9,7 @@
 #include "base/sha256.h"
 #include "calib/application/agreement.h"
 #include "calib/application/map_to_apply.h"
+#include "db/records.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -81,7 +82,7 @@ SourceUsed source_used(const std::string& kind, const std::string& id,
   if (record.made_at != UtcTime{}) {
     used.made_at = record.made_at;
   }
-  const bool has_terms = calib::map_to_apply(record, calib::MapTarget::file).cross_axis;
+  const bool has_terms = calib::map_to_apply(record).cross_axis;
   const calib::ConstantsUncertainty& applied =
       has_terms ? record.cross_axis->uncertainty : record.uncertainty;
   if (const double largest_mg = calib::largest_uncertainty_mg(applied); largest_mg > 0) {
@@ -91,9 +92,8 @@ SourceUsed source_used(const std::string& kind, const std::string& id,
 }
 
 std::string SourceUsed::brief() const {
-  constexpr std::size_t kShownDigits = 12;
   constexpr std::size_t kDate = 10;
-  return fmt::format("{} {} ({}, {})", kind, id.substr(0, kShownDigits),
+  return fmt::format("{} {} ({}, {})", kind, db::shown_id(id),
                      made_at ? to_iso8601(*made_at).substr(0, kDate) : "no date",
                      standard_uncertainty_mg ? fmt::format("+- {:.1f} mg", *standard_uncertainty_mg)
                                              : "no uncertainty stated");

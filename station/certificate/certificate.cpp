@@ -316,7 +316,7 @@ Result<std::string> label_zpl(const db::RunRecord& run) {
                                         : 10,
       zpl_text(certificate.serial), date,
       certificate.verdict == JigVerdict::pass ? "PASS" : "CONDITIONAL PASS", certificate.filter,
-      certificate.run.substr(0, 16), zpl_text(qr));
+      db::shown_id(certificate.run), zpl_text(qr));
 }
 
 }  // namespace sixpoint::station

@@ -53,6 +53,37 @@ TEST_F(StoreTest, WithdrawnConstantsAreHistoryButApplyNoMore) {
   EXPECT_FAILS(store.withdraw_constants("nonsense", "Ada", "x"), ErrorCode::no_input);
 }
 
+TEST_F(StoreTest, ARowIsNamedByTheFirstDigitsOfItsId) {
+  Store store = open();
+  const auto id = store.add_constants(constants("0123456789ab", "current", 100, "1"), "w").value();
+  ASSERT_EQ(id.size(), 32U);
+  EXPECT_EQ(store.whole_key("constants", id).value(), id);
+  EXPECT_EQ(store.whole_key("constants", shown_id(id)).value(), id);
+  EXPECT_EQ(store.whole_key("constants", id.substr(0, 8)).value(), id);
+  EXPECT_FAILS(store.whole_key("constants", id.substr(0, 7)), ErrorCode::no_input);
+  EXPECT_FAILS(store.whole_key("constants", id + "0"), ErrorCode::no_input);
+  EXPECT_FAILS(store.whole_key("runs", id), ErrorCode::no_input);
+  EXPECT_FAILS(store.whole_key("constants", "00000000"), ErrorCode::no_input);
+  EXPECT_FAILS(store.whole_key("constants", "%"), ErrorCode::no_input);
+  EXPECT_FAILS(store.whole_key("constants", ""), ErrorCode::no_input);
+  EXPECT_EQ(store.whole_key("units", "0123456789ab").value(), "0123456789ab");
+  EXPECT_FAILS(store.whole_key("units", "0123456789a"), ErrorCode::no_input);
+
+  // No two contents are known whose ids begin alike: rows by hand.
+  const auto add_by_hand = [&](const std::string& key, std::int64_t seq) {
+    return store.database().execute(
+        "INSERT INTO corrections (seq, id, made_at_ns, about_table, about_id, action, operator, "
+        "reason, hash) VALUES ($1, $2, 0, 'units', 'a', 'note', 'a', 'a', $3)",
+        std::vector<Value>{seq, key, Bytes(32, static_cast<std::uint8_t>(seq))});
+  };
+  ASSERT_OK(add_by_hand("0123456789abcdef0123456789abcdef", 1001));
+  EXPECT_EQ(store.whole_key("corrections", "01234567").value(), "0123456789abcdef0123456789abcdef");
+  ASSERT_OK(add_by_hand("01234567ffffffffffffffffffffffff", 1002));
+  EXPECT_FAILS(store.whole_key("corrections", "01234567"), ErrorCode::usage);
+  EXPECT_EQ(store.whole_key("corrections", "012345678").value(),
+            "0123456789abcdef0123456789abcdef");
+}
+
 TEST_F(StoreTest, ACorrectionIsANewRowWithAReason) {
   Store store = open();
   const auto id = store.add_constants(constants("MOS2A1", "current", 100, "1"), "w").value();

@@ -94,7 +94,7 @@ inline void run_trial(std::uint64_t seed, std::uint64_t number, bool few, TrialR
     ++result.kinds["not made"].worse;
     return;
   }
-  auto store = db::Store::open(memory.env, ":memory:").value();
+  auto store = db::Store::in_memory(memory.env).value();
   const auto good = store.add_constants(stored(trial.right(), 0), "").value();
   repair::ConstantsFinderOptions by_store;
   by_store.store = &store;

@@ -19,21 +19,18 @@ ConstantsRecord with_map(bool verified, int directions, double matrix_mg, double
 TEST(MapToApply, FollowsTheTable) {
   struct Row {
     ConstantsRecord record;
-    MapTarget target;
     bool cross_axis;
     const char* said;
   };
   const Row rows[] = {
-      {ConstantsRecord(), MapTarget::file, false, ""},
-      {ConstantsRecord(), MapTarget::unit_memory, false, ""},
-      {with_map(true, 60, 4, 8), MapTarget::unit_memory, false, "memory"},
-      {with_map(false, 60, 4, 8), MapTarget::file, false, "not verified"},
-      {with_map(true, 2, 4, 8), MapTarget::file, false, "not tested"},
-      {with_map(true, 60, 7.5, 8), MapTarget::file, false, "not applied"},
-      {with_map(true, 60, 4, 8), MapTarget::file, true, "4.0 mg with them, 8.0 mg with six"},
+      {ConstantsRecord(), false, ""},
+      {with_map(false, 60, 4, 8), false, "not verified"},
+      {with_map(true, 2, 4, 8), false, "not tested"},
+      {with_map(true, 60, 7.5, 8), false, "not applied"},
+      {with_map(true, 60, 4, 8), true, "4.0 mg with them, 8.0 mg with six"},
   };
   for (const Row& row : rows) {
-    const MapChoice choice = map_to_apply(row.record, row.target);
+    const MapChoice choice = map_to_apply(row.record);
     EXPECT_EQ(choice.cross_axis, row.cross_axis) << row.said;
     EXPECT_THAT(choice.why, testing::HasSubstr(row.said));
     EXPECT_EQ(choice.why.empty(), !row.record.cross_axis) << row.said;

@@ -157,6 +157,21 @@ TEST_F(SqliteStoreTest, TakesNamesInAnyEncoding) {
   EXPECT_EQ(names_in(folder_.path()).size(), 3U);
 }
 
+// SQLite would keep a database of this name in memory, and lose it.
+TEST_F(SqliteStoreTest, TheNameOfAStoreIsAlwaysThatOfAFile) {
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_.path());
+  auto store = Store::open(memory_.env, ":memory:");
+  EXPECT_OK(store);
+  if (store) {
+    EXPECT_OK(store->add_constants(constants(1), "w"));
+    store = Store::open(memory_.env, ":memory:");
+  }
+  std::filesystem::current_path(before);
+  ASSERT_OK(store);
+  EXPECT_EQ(store->history("MOS2A1")->size(), 1U);
+}
+
 // The index of constants loses its entry for the newest set, behind SQLite's back: the chain of the
 // rows holds, and the question "which constants apply" would be answered wrongly.
 TEST_F(SqliteStoreTest, AuditFindsAnIndexThatDoesNotSayWhatItsTableSays) {

@@ -153,7 +153,7 @@ TEST(AppliedMap, AFileOfASensorWithCrossAxisIsRepairedWithTheTerms) {
 TEST(AppliedMap, TermsComeBackFromTheStore) {
   MemoryEnv memory;
   ASSERT_OK(crossed_rests().write(memory.files, "in.gt3x"));
-  auto store = db::Store::open(memory.env, ":memory:").value();
+  auto store = db::Store::in_memory(memory.env).value();
   db::ConstantsRecord row;
   row.made_at = from_unix_seconds(1'700'000'000);
   row.serial = "MOS2A45130450";

@@ -32,8 +32,8 @@ class Finder : public testing::Test {
   }
 
   MemoryEnv memory_;
-  db::Store store_ = db::Store::open(memory_.env, ":memory:").value();
-  db::Store empty_ = db::Store::open(memory_.env, ":memory:").value();
+  db::Store store_ = db::Store::in_memory(memory_.env).value();
+  db::Store empty_ = db::Store::in_memory(memory_.env).value();
   Survey survey_;
   std::string id_;
 };

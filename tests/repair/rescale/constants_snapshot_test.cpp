@@ -7,7 +7,7 @@ namespace {
 
 TEST_F(Archive, TheSnapshotGivesWhatTheStoreGives) {
   MemoryEnv memory;
-  auto store = db::Store::open(memory.env, ":memory:");
+  auto store = db::Store::in_memory(memory.env);
   ASSERT_OK(store);
   db::ConstantsRecord record = tests::jig_constants();
   const auto first = store->add_constants(record, "");

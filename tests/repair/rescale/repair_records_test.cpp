@@ -31,7 +31,7 @@ class Records : public testing::Test {
   }
 
   MemoryEnv memory_;
-  db::Store store_ = db::Store::open(memory_.env, ":memory:").value();
+  db::Store store_ = db::Store::in_memory(memory_.env).value();
   std::string constants_;
 };
 
