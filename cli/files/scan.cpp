@@ -1,8 +1,12 @@
 // sixpoint scan PATH...: which files are affected by 16CPAN03, and whether their samples show it.
+#include <mutex>
+
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "cli/store_option.h"
 #include "cli/workers.h"
+#include "repair/rescale/known_calibration.h"
 #include "repair/triage/scan_file.h"
 
 namespace sixpoint::cli {
@@ -10,6 +14,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> paths;
+  std::string store;
   unsigned jobs = 0;
   bool json = false;
 };
@@ -43,6 +48,46 @@ Json to_json(const ScannedFile& answer) {
   return json;
 }
 
+// The dates of calibration that the store knows. It is opened for the first file that needs one:
+// who never named a store shall not hear of it.
+class DatesInStore {
+ public:
+  DatesInStore(Context& context, const std::string& location)
+      : context_(context), location_(location) {}
+
+  // A store that was named must be there.
+  Status check() {
+    if (!location_.empty()) {
+      SIXPOINT_ASSIGN(store_, open_existing_store(context_, location_));
+    }
+    return {};
+  }
+
+  // From any thread.
+  repair::KnownDate of(const std::string& serial) {
+    const std::scoped_lock lock(mutex_);
+    if (!store_ && !store_exists(context_, location_)) {
+      return {};
+    }
+    if (!store_) {
+      auto opened = open_existing_store(context_, location_);
+      if (!opened) {
+        return {std::nullopt, opened.error().brief()};
+      }
+      store_ = *std::move(opened);
+    }
+    const auto history = store_->unit_history(serial);
+    return history ? repair::calibration_date(*history)
+                   : repair::KnownDate{std::nullopt, history.error().brief()};
+  }
+
+ private:
+  Context& context_;
+  std::string location_;
+  std::mutex mutex_;
+  std::optional<db::Store> store_;
+};
+
 Json summary_of(const std::vector<ScannedFile>& answers) {
   Json summary = {{"files", answers.size()}, {"affected", 0},   {"not_affected", 0},
                   {"cannot_tell", 0},        {"unreadable", 0}, {"axes_rotated", 0}};
@@ -55,10 +100,13 @@ Json summary_of(const std::vector<ScannedFile>& answers) {
 
 Status run(const Options& options, Context& context) {
   const auto files = named_files(context, options.paths, {".gt3x", ".agdc", ".agd"});
+  DatesInStore dates(context, options.store);
+  SIXPOINT_CHECK(dates.check());
+  const auto lookup = [&](const std::string& serial) { return dates.of(serial); };
   const auto answers = for_each_file<ScannedFile>(
-      context, "scanning", files, options.jobs, [&context](const NamedFile& file) {
+      context, "scanning", files, options.jobs, [&](const NamedFile& file) {
         return file.error ? repair::unreadable_file(file.path, *file.error)
-                          : repair::scan_file(context.env.files, file.path);
+                          : repair::scan_file(context.env.files, file.path, lookup);
       });
   Json json = document("scan");
   Json& list = json["files"] = Json::array();
@@ -91,6 +139,7 @@ void add_scan(CLI::App& app, Context& context) {
   command.add_option("path", options.paths, "recordings (.gt3x, .agdc, .agd) or folders of them")
       ->required();
   add_jobs_option(command, options.jobs);
+  add_store_option(command, options.store);
 }
 
 }  // namespace sixpoint::cli

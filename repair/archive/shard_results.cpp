@@ -46,6 +46,10 @@ Result<RepairReport> report_of(const Json& json) {
   report.method = optional_of<std::string>(from.at("method")).value_or("");
   report.reasons = from.at("reasons").get<std::vector<std::string>>();
   report.serial = from.at("serial");
+  // Absent from results of earlier versions.
+  if (const auto time = optional_of<std::string>(from.value("calibration_time", Json()))) {
+    SIXPOINT_ASSIGN(report.calibration_time, parse_iso8601(*time));
+  }
   report.samples = integer_of<std::uint64_t>(from.at("samples"));
   report.clipped_before = integer_of<std::uint64_t>(from.at("clipped_before"));
   report.clipped_after = integer_of<std::uint64_t>(from.at("clipped_after"));

@@ -79,6 +79,7 @@ class Repair {
   Status work() {
     SIXPOINT_ASSIGN(survey_, survey(env_.files, report_.input, options_.still));
     report_.serial = survey_.facts.serial;
+    report_.calibration_time = survey_.facts.calibration_time;
     report_.samples = survey_.samples;
     report_.clipped_before = survey_.clipped_samples;
     report_.clipped_after = survey_.clipped_samples;
@@ -433,25 +434,27 @@ Json RepairReport::to_json() const {
   const auto optional_text = [](const std::string& text) {
     return text.empty() ? Json(nullptr) : Json(text);
   };
-  return {{"input", input},
-          {"output", optional_text(output)},
-          {"status", sixpoint::repair::to_string(status)},
-          {"method", optional_text(method)},
-          {"reasons", reasons},
-          {"serial", serial},
-          {"samples", samples},
-          {"clipped_before", clipped_before},
-          {"clipped_after", clipped_after},
-          {"still_blocks", still_blocks},
-          {"still_error_mg", still_error_to_json(*this)},
-          {"rotation_undone", rotation_undone},
-          {"forced", forced},
-          {"cross_axis_applied", cross_axis_applied},
-          {"sample_uncertainty_mg", sample_uncertainty_to_json(*this)},
-          {"source", source ? source->to_json() : Json(nullptr)},
-          {"constants_id", optional_text(constants_id)},
-          {"input_sha256", optional_text(input_sha256)},
-          {"output_sha256", optional_text(output_sha256)}};
+  return {
+      {"input", input},
+      {"output", optional_text(output)},
+      {"status", sixpoint::repair::to_string(status)},
+      {"method", optional_text(method)},
+      {"reasons", reasons},
+      {"serial", serial},
+      {"calibration_time", calibration_time ? Json(to_iso8601(*calibration_time)) : Json(nullptr)},
+      {"samples", samples},
+      {"clipped_before", clipped_before},
+      {"clipped_after", clipped_after},
+      {"still_blocks", still_blocks},
+      {"still_error_mg", still_error_to_json(*this)},
+      {"rotation_undone", rotation_undone},
+      {"forced", forced},
+      {"cross_axis_applied", cross_axis_applied},
+      {"sample_uncertainty_mg", sample_uncertainty_to_json(*this)},
+      {"source", source ? source->to_json() : Json(nullptr)},
+      {"constants_id", optional_text(constants_id)},
+      {"input_sha256", optional_text(input_sha256)},
+      {"output_sha256", optional_text(output_sha256)}};
 }
 
 RepairReport repair_file(Env& env, const std::string& input, const std::string& output,

@@ -106,6 +106,7 @@ struct RepairReport {
   std::vector<std::string> reasons;
   std::optional<Error> error;  // with `failed`
   std::string serial;
+  std::optional<UtcTime> calibration_time;  // of the stored constants, as the file states it
   std::uint64_t samples = 0;
   std::uint64_t clipped_before = 0;
   std::uint64_t clipped_after = 0;

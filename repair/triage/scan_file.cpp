@@ -70,7 +70,7 @@ void take_date_from_recording(FileSystem& files, ScannedFile& answer) {
   }
 }
 
-ScannedFile scan_agd(FileSystem& files, const std::string& path) {
+ScannedFile scan_agd(FileSystem& files, const std::string& path, const CalibrationLookup& lookup) {
   const auto facts = read_agd_facts(path);
   if (!facts) {
     return unreadable_file(path, facts.error());
@@ -79,11 +79,18 @@ ScannedFile scan_agd(FileSystem& files, const std::string& path) {
   answer.path = path;
   answer.facts = *facts;
   take_date_from_recording(files, answer);
+  if (!answer.facts.calibration_time && lookup) {
+    if (KnownDate known = lookup(answer.facts.serial); !known.why.empty()) {
+      answer.facts.calibration_time = known.time;
+      answer.reasons.push_back(std::move(known.why));
+    }
+  }
   answer.reasons.push_back("an .agd cannot be repaired: make it again from the repaired raw data");
   judge(answer, false);
   if (answer.verdict == to_string(Verdict::cannot_tell) && !answer.facts.calibration_time) {
     answer.reasons.push_back(
-        "put its recording (.gt3x, the same name) beside it: that says the date");
+        "put its recording (.gt3x, the same name) beside it, or name a store that knows the unit "
+        "(--store): they say the date");
   }
   return answer;
 }
@@ -119,8 +126,8 @@ ScannedFile scan_recording(FileSystem& files, const std::string& path) {
 
 }  // namespace
 
-ScannedFile scan_file(FileSystem& files, const std::string& path) {
-  return has_ending(path, ".agd") ? scan_agd(files, path) : scan_recording(files, path);
+ScannedFile scan_file(FileSystem& files, const std::string& path, const CalibrationLookup& lookup) {
+  return has_ending(path, ".agd") ? scan_agd(files, path, lookup) : scan_recording(files, path);
 }
 
 }  // namespace sixpoint::repair

@@ -12,12 +12,13 @@
 //     any other                                        as triage() says (repair/triage/triage.h)
 //
 // An .agd names no date of calibration: it is taken from the recording of the same unit and name
-// that lies beside it, where there is one.
+// that lies beside it, and where there is none, from who asks (a store, known_calibration.h).
 //
 // Of a file without our mark the samples are a reason and do not change the verdict. Safe to call
 // from several threads.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,8 +42,17 @@ struct ScannedFile {
   std::optional<Error> error;
 };
 
+// A unit's date of calibration as something else than the file knows it.
+struct KnownDate {
+  std::optional<UtcTime> time;
+  std::string why;  // one sentence for the reasons; empty where nothing is known
+};
+// Asked for a serial number. Must be safe to call from several threads.
+using CalibrationLookup = std::function<KnownDate(const std::string& serial)>;
+
 // Never fails as a function: what went wrong is in the answer.
-ScannedFile scan_file(FileSystem& files, const std::string& path);
+ScannedFile scan_file(FileSystem& files, const std::string& path,
+                      const CalibrationLookup& lookup = {});
 ScannedFile unreadable_file(const std::string& path, const Error& error);
 
 }  // namespace sixpoint::repair

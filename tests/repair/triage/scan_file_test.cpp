@@ -254,5 +254,33 @@ TEST(ScanFile, AnAgdHasTheDateOfItsRecording) {
   }
 }
 
+// Who asks is asked in turn, but for a file whose recording says the date.
+TEST(ScanFile, AnAgdWithoutItsRecordingHasTheDateThatIsKnownElsewhere) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  tests::MadeRecording made = at_rest(256);
+  made.serial = "MOS2A1";
+  ASSERT_OK(made.write(files, folder / "one.gt3x"));
+  tests::make_agd(folder / "one.agd", "MOS2A1", "1.5.0");
+  tests::make_agd(folder / "alone.agd", "MOS2A1", "1.5.0");
+  const auto in_2015 = [](const std::string& serial) -> KnownDate {
+    return {from_unix_seconds(1'420'070'400), "known for " + serial};
+  };
+  EXPECT_EQ(scan_file(files, folder / "one.agd", in_2015).verdict, "affected");
+  const ScannedFile known = scan_file(files, folder / "alone.agd", in_2015);
+  EXPECT_EQ(known.verdict, "not_affected");
+  EXPECT_THAT(known.reasons, Contains(HasSubstr("known for MOS2A1")));
+  const ScannedFile several =
+      scan_file(files, folder / "alone.agd", [](const std::string&) -> KnownDate {
+        return {std::nullopt, "several dates"};
+      });
+  EXPECT_EQ(several.verdict, "cannot_tell");
+  EXPECT_THAT(several.reasons, Contains(HasSubstr("several dates")));
+  const ScannedFile unknown =
+      scan_file(files, folder / "alone.agd", [](const std::string&) -> KnownDate { return {}; });
+  EXPECT_EQ(unknown.verdict, "cannot_tell");
+  EXPECT_THAT(unknown.reasons, Contains(HasSubstr("--store")));
+}
+
 }  // namespace
 }  // namespace sixpoint::repair
