@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/csv_header.h"
 #include "gt3x/forms/agdc.h"
 #include "gt3x/sample_reader.h"
 
@@ -17,19 +18,6 @@ namespace {
 
 constexpr std::uint64_t kLongestFill_s = 400ULL * 86'400;
 constexpr std::size_t kPiece = std::size_t{64} * 1024;
-
-std::string clock_text(UtcTime time) {
-  const auto day = std::chrono::floor<std::chrono::days>(time);
-  const std::chrono::hh_mm_ss clock(std::chrono::floor<std::chrono::seconds>(time - day));
-  return fmt::format("{:02}:{:02}:{:02}", clock.hours().count(), clock.minutes().count(),
-                     clock.seconds().count());
-}
-
-std::string date_text(UtcTime time) {
-  const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(time));
-  return fmt::format("{}/{}/{}", static_cast<unsigned>(date.month()),
-                     static_cast<unsigned>(date.day()), static_cast<int>(date.year()));
-}
 
 // 1008 -> "1.008", 20 -> "0.02", -1000 -> "-1", 0 -> "0"; returns the length.
 std::size_t print_mg(std::int64_t mg, char* out) {
@@ -54,22 +42,12 @@ class Writer {
       : info_(recording.info()), options_(options), sink_(sink) {}
 
   Status header(std::uint32_t start_time, double rate_hz) {
-    const UtcTime start = from_unix_seconds(start_time);
-    const UtcTime download = info_.download().value_or(start);
-    std::string battery(info_.get("Battery Voltage").value_or("0"));
-    for (char& c : battery) {
-      c = c == ',' ? '.' : c;
-    }
-    text_ = fmt::format(
-        "------------ Data File Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v{} date "
-        "format M/d/yyyy at {} Hz  Filter Normal -----------\r\n"
-        "Serial Number: {}\r\nStart Time {}\r\nStart Date {}\r\n"
-        "Epoch Period (hh:mm:ss) 00:00:00\r\nDownload Time {}\r\nDownload Date {}\r\n"
-        "Current Memory Address: 0\r\nCurrent Battery Voltage: {}     Mode = 12\r\n"
-        "--------------------------------------------------\r\n"
-        "Accelerometer X,Accelerometer Y,Accelerometer Z\r\n",
-        printable(info_.firmware(), 40), rate_hz, printable(info_.serial(), 40), clock_text(start),
-        date_text(start), clock_text(download), date_text(download), printable(battery, 40));
+    text_ = csv_header(info_,
+                       fmt::format("Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v{} date "
+                                   "format M/d/yyyy at {} Hz  Filter Normal ",
+                                   printable(info_.firmware(), 40), rate_hz),
+                       start_time) +
+            "Accelerometer X,Accelerometer Y,Accelerometer Z\r\n";
     return {};
   }
 

@@ -1,6 +1,7 @@
 #include "gt3x/log/record.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include <fmt/format.h>
@@ -8,49 +9,39 @@
 namespace sixpoint::gt3x {
 
 std::string record_type_name(std::uint8_t type) {
-  switch (static_cast<RecordType>(type)) {
-    case RecordType::activity:
-      return "ACTIVITY";
-    case RecordType::battery:
-      return "BATTERY";
-    case RecordType::event:
-      return "EVENT";
-    case RecordType::heart_rate_bpm:
-      return "HEART_RATE_BPM";
-    case RecordType::lux:
-      return "LUX";
-    case RecordType::metadata:
-      return "METADATA";
-    case RecordType::tag:
-      return "TAG";
-    case RecordType::epoch:
-      return "EPOCH";
-    case RecordType::heart_rate_ant:
-      return "HEART_RATE_ANT";
-    case RecordType::epoch2:
-      return "EPOCH2";
-    case RecordType::capsense:
-      return "CAPSENSE";
-    case RecordType::heart_rate_ble:
-      return "HEART_RATE_BLE";
-    case RecordType::epoch3:
-      return "EPOCH3";
-    case RecordType::epoch4:
-      return "EPOCH4";
-    case RecordType::parameters:
-      return "PARAMETERS";
-    case RecordType::sensor_schema:
-      return "SENSOR_SCHEMA";
-    case RecordType::sensor_data:
-      return "SENSOR_DATA";
-    case RecordType::activity2:
-      return "ACTIVITY2";
-    case RecordType::activity3:
-      return "ACTIVITY3";
-    case RecordType::temperature:
-      return "TEMPERATURE";
-  }
-  return fmt::format("TYPE_{}", type);
+  constexpr std::array<std::string_view, 31> kNames = {"ACTIVITY",
+                                                       "ANT_PLUS",
+                                                       "BATTERY",
+                                                       "EVENT",
+                                                       "HEART_RATE_BPM",
+                                                       "LUX",
+                                                       "METADATA",
+                                                       "TAG",
+                                                       "TEMPERATURE_OLD",
+                                                       "EPOCH",
+                                                       "DAILY_SUMMARY",
+                                                       "HEART_RATE_ANT",
+                                                       "EPOCH2",
+                                                       "CAPSENSE",
+                                                       "HEART_RATE_BLE",
+                                                       "EPOCH3",
+                                                       "EPOCH4",
+                                                       "IMU_9DOF",
+                                                       "MAGNETOMETER",
+                                                       "FIFO_ERROR",
+                                                       "FIFO_DUMP",
+                                                       "PARAMETERS",
+                                                       "IMU_ACCELEROMETER",
+                                                       "DEBUG",
+                                                       "SENSOR_SCHEMA",
+                                                       "SENSOR_DATA",
+                                                       "ACTIVITY2",
+                                                       "ACTIVITY3",
+                                                       "",
+                                                       "",
+                                                       "TEMPERATURE"};
+  return type < kNames.size() && !kNames[type].empty() ? std::string(kNames[type])
+                                                       : fmt::format("TYPE_{}", type);
 }
 
 std::uint8_t record_checksum(std::span<const std::uint8_t> header_and_payload) {

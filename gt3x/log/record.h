@@ -21,28 +21,37 @@ namespace sixpoint::gt3x {
 
 enum class RecordType : std::uint8_t {
   activity = 0,  // one second of 12-bit samples, Y X Z
-  battery = 2,   // millivolts, 2 bytes
-  event = 3,     // one byte 0x08 enters idle sleep, 0x09 leaves it; others are diagnostics
+  ant_plus = 1,
+  battery = 2,  // millivolts, 2 bytes
+  event = 3,    // one byte 0x08 enters idle sleep, 0x09 leaves it; others are diagnostics
   heart_rate_bpm = 4,
   lux = 5,
   metadata = 6,  // JSON text
   tag = 7,
+  temperature_old = 8,  // named by the vendor, its content is not described
   epoch = 9,
+  daily_summary = 10,
   heart_rate_ant = 11,
   epoch2 = 12,
   capsense = 13,
   heart_rate_ble = 14,
   epoch3 = 15,
   epoch4 = 16,
+  imu_9dof = 17,
+  magnetometer = 18,
+  fifo_error = 19,
+  fifo_dump = 20,
   parameters = 21,  // parameters.h
-  sensor_schema = 24,
+  imu_accelerometer = 22,
+  debug = 23,
+  sensor_schema = 24,  // forms/sensor_schema.h
   sensor_data = 25,
   activity2 = 26,    // one second of 16-bit samples, X Y Z
   activity3 = 27,    // .agdc: one second of 12-bit raw sensor counts, X Y Z
-  temperature = 30,  // .agdc: temperature.h
+  temperature = 30,  // .agdc: forms/agdc.h
 };
 
-// "ACTIVITY", "PARAMETERS" ...; "TYPE_19" for one that has no name here.
+// "ACTIVITY", "PARAMETERS" ...; "TYPE_29" for one that has no name here.
 std::string record_type_name(std::uint8_t type);
 
 inline constexpr std::uint8_t kSeparator = 0x1E;

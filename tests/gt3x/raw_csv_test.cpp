@@ -1,16 +1,15 @@
 #include "gt3x/raw_csv.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <fstream>
 #include <sstream>
 
 #include <gmock/gmock.h>
-#include <zlib.h>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "gt3x/recording_writer.h"
+#include "gt3x_csv_lines.h"
 #include "gt3x_made_log.h"
 #include "shared_data.h"
 
@@ -18,6 +17,8 @@ namespace sixpoint::gt3x {
 namespace {
 
 using sixpoint::tests::shared_file;
+using tests::gunzipped;
+using tests::lines_of;
 
 Result<std::string> csv_of(Recording& recording, const RawCsvOptions& options = {},
                            RawCsvTally* tally = nullptr) {
@@ -41,29 +42,6 @@ Result<std::string> csv_of(const Bytes& log, const std::string& info,
   SIXPOINT_CHECK(tests::put_recording(memory.files, "f", log, info));
   SIXPOINT_ASSIGN(auto recording, Recording::open(memory.files, "f"));
   return csv_of(recording, options, tally);
-}
-
-std::string gunzipped(const std::string& path) {
-  std::string text;
-  gzFile file = gzopen(path.c_str(), "rb");
-  std::vector<char> piece(1 << 16);
-  for (int count = 0; (count = gzread(file, piece.data(), 1 << 16)) > 0;) {
-    text.append(piece.data(), static_cast<std::size_t>(count));
-  }
-  gzclose(file);
-  return text;
-}
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) {
-    while (!line.empty() && line.back() == '\r') {
-      line.pop_back();
-    }
-    lines.push_back(line);
-  }
-  return lines;
 }
 
 // The lines below header and column names.

@@ -31,5 +31,35 @@ TEST(Export, WritesWholeFilesAndNeverOverARecording) {
   EXPECT_FALSE(memory.files.info("late.csv"));
 }
 
+TEST(Export, WritesTheRecordsOfOneType) {
+  MemoryEnv memory;
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(2)));
+  const auto lux = run_command(memory.env, {"export", "f.gt3x", "--records", "LUX", "--csv", "-"});
+  EXPECT_EQ(lux.exit_code, 0);
+  EXPECT_EQ(
+      lux.out,
+      "time,unix_s,lux\n2015-04-09T14:04:00,1428588240,7\n2015-04-09T14:04:01,1428588241,7\n");
+  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--records", "5", "--csv", "-"}).out,
+            lux.out);
+  const auto unknown =
+      run_command(memory.env, {"export", "f.gt3x", "--records", "LIGHT", "--csv", "a.csv"});
+  EXPECT_EQ(unknown.exit_code, 64);
+  EXPECT_THAT(unknown.err, testing::HasSubstr("BATTERY"));
+  EXPECT_FALSE(memory.files.info("a.csv"));
+  EXPECT_EQ(
+      run_command(memory.env, {"export", "f.gt3x", "--records", "LUX", "--imu", "--csv", "a.csv"})
+          .exit_code,
+      64);
+}
+
+TEST(Export, ARecordingWithoutTheInertialSensorIsRefused) {
+  MemoryEnv memory;
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(2)));
+  const auto imu = run_command(memory.env, {"export", "f.gt3x", "--imu", "--csv", "a.csv"});
+  EXPECT_EQ(imu.exit_code, 65);
+  EXPECT_THAT(imu.err, testing::HasSubstr("SENSOR_SCHEMA"));
+  EXPECT_FALSE(memory.files.info("a.csv"));
+}
+
 }  // namespace
 }  // namespace sixpoint::cli

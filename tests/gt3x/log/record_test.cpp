@@ -33,7 +33,11 @@ TEST(Record, ChecksumIsTheComplementOfTheXorForEveryLength) {
 TEST(Record, Names) {
   EXPECT_EQ(record_type_name(0), "ACTIVITY");
   EXPECT_EQ(record_type_name(26), "ACTIVITY2");
-  EXPECT_EQ(record_type_name(19), "TYPE_19");
+  EXPECT_EQ(record_type_name(static_cast<std::uint8_t>(RecordType::sensor_data)), "SENSOR_DATA");
+  EXPECT_EQ(record_type_name(static_cast<std::uint8_t>(RecordType::temperature)), "TEMPERATURE");
+  EXPECT_EQ(record_type_name(19), "FIFO_ERROR");
+  EXPECT_EQ(record_type_name(29), "TYPE_29");
+  EXPECT_EQ(record_type_name(200), "TYPE_200");
 }
 
 }  // namespace

@@ -1,0 +1,109 @@
+#include "gt3x/records_csv.h"
+
+#include <fmt/format.h>
+
+#include "gt3x/forms/small_records.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+// The rows of one record as lines.
+std::string lines_of(std::int64_t unix_s, const std::vector<std::vector<std::string>>& rows) {
+  std::string time = to_iso8601(from_unix_seconds(unix_s));
+  time.pop_back();  // Z: the clock is the recording's own
+  std::string text;
+  for (const auto& row : rows) {
+    text += fmt::format("{},{}", time, unix_s);
+    for (const std::string& value : row) {
+      text.append(",").append(value);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+Result<std::optional<TemperatureCalibration>> temperature_calibration(Recording& recording) {
+  constexpr const char* kEntry = "temperature_calibration.json";
+  if (!recording.has_entry(kEntry)) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry(kEntry));
+  SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1U << 20));
+  SIXPOINT_ASSIGN(const auto calibration, parse_temperature_calibration(as_text(bytes)));
+  return calibration;
+}
+
+Result<RecordsCsvTally> write_old_lux(Recording& recording, const TextSink& sink) {
+  const auto start = recording.info().start();
+  if (!start) {
+    return fail(ErrorCode::bad_data, "info.txt names no start", recording.path(),
+                "download the recording from the unit again");
+  }
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry("lux.bin"));
+  RecordsCsvTally tally;
+  Bytes bytes(std::size_t{64} * 1024);
+  std::size_t held = 0;
+  for (;;) {
+    SIXPOINT_ASSIGN(const std::size_t count, source->read(std::span(bytes).subspan(held)));
+    held += count;
+    std::string text;
+    std::size_t used = 0;
+    for (; used + 2 <= held; used += 2) {
+      SIXPOINT_ASSIGN(const auto rows,
+                      small_record_rows(static_cast<std::uint8_t>(RecordType::lux),
+                                        std::span(bytes).subspan(used, 2), std::nullopt));
+      text += lines_of(to_unix_seconds(*start) + static_cast<std::int64_t>(tally.records), rows);
+      ++tally.records;
+    }
+    SIXPOINT_CHECK(sink(text));
+    if (count == 0) {
+      tally.unreadable_records = held - used;
+      return tally;
+    }
+    if (used < held) {
+      bytes[0] = bytes[used];
+    }
+    held -= used;
+  }
+}
+
+}  // namespace
+
+Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t type,
+                                          const TextSink& sink) {
+  std::string header = "time,unix_s";
+  for (const std::string& column : small_record_columns(type)) {
+    header += "," + column;
+  }
+  const bool old_lux =
+      !recording.has_log() && type == static_cast<std::uint8_t>(RecordType::lux) &&
+      recording.has_entry("lux.bin");
+  if (old_lux) {
+    SIXPOINT_CHECK(sink(header + "\n"));
+    return write_old_lux(recording, sink);
+  }
+  SIXPOINT_ASSIGN(LogReader log, recording.open_log());
+  SIXPOINT_ASSIGN(const auto temperature, temperature_calibration(recording));
+  SIXPOINT_CHECK(sink(header + "\n"));
+  RecordsCsvTally tally;
+  for (;;) {
+    SIXPOINT_ASSIGN(const auto item, log.next());
+    if (!item) {
+      return tally;
+    }
+    if (item->kind != LogItem::Kind::record || item->record.type != type) {
+      continue;
+    }
+    const Record& record = item->record;
+    const auto rows = record.checksum_ok ? small_record_rows(type, record.payload, temperature)
+                                         : fail(ErrorCode::bad_data, "");
+    if (!rows) {
+      ++tally.unreadable_records;
+      continue;
+    }
+    ++tally.records;
+    SIXPOINT_CHECK(sink(lines_of(record.unix_time, *rows)));
+  }
+}
+
+}  // namespace sixpoint::gt3x

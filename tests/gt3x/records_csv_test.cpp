@@ -1,0 +1,121 @@
+#include "gt3x/records_csv.h"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "gt3x/recording_writer.h"
+#include "gt3x_csv_lines.h"
+#include "gt3x_made_log.h"
+#include "shared_data.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+using sixpoint::tests::shared_file;
+using tests::lines_of;
+
+struct Records {
+  std::vector<std::string> lines;
+  RecordsCsvTally tally;
+};
+
+Result<Records> records_of(FileSystem& files, const std::string& path, RecordType type) {
+  SIXPOINT_ASSIGN(auto recording, Recording::open(files, path));
+  std::string text;
+  SIXPOINT_ASSIGN(const auto tally,
+                  write_records_csv(recording, static_cast<std::uint8_t>(type),
+                                    [&](std::string_view piece) {
+                                      text += piece;
+                                      return Status();
+                                    }));
+  return Records{lines_of(text), tally};
+}
+
+TEST(RecordsCsv, ALinePerRecordOfTheType) {
+  MemoryEnv memory;
+  Bytes log = tests::made_log(3);
+  append_record(log, RecordType::lux, tests::kStart + 3, Bytes{1});  // too short
+  append_record(log, RecordType::lux, tests::kStart + 3, Bytes{1, 0});
+  log.back() ^= 1;  // its checksum
+  ASSERT_OK(tests::put_recording(memory.files, "a.gt3x", log));
+  const auto lux = records_of(memory.files, "a.gt3x", RecordType::lux);
+  ASSERT_OK(lux);
+  EXPECT_EQ(lux->lines, (std::vector<std::string>{"time,unix_s,lux", "2015-04-09T14:04:00,1428588240,7",
+                                                  "2015-04-09T14:04:01,1428588241,7",
+                                                  "2015-04-09T14:04:02,1428588242,7"}));
+  EXPECT_EQ(lux->tally.records, 3U);
+  EXPECT_EQ(lux->tally.unreadable_records, 2U);
+  EXPECT_EQ(records_of(memory.files, "a.gt3x", RecordType::battery)->lines,
+            (std::vector<std::string>{"time,unix_s,battery_v"}));
+}
+
+// Oracle: the vendor's CSV of both sensors, in degrees and as read, of 3.5 hours in a chamber.
+TEST(RecordsCsv, TemperaturesAreTheVendors) {
+  SIXPOINT_NEED_SHARED("data/agdc/CPW1C48210013_baseline.agdc");
+  const auto ours = records_of(posix_env().files,
+                               shared_file("data/agdc/CPW1C48210013_baseline.agdc"),
+                               RecordType::temperature);
+  ASSERT_OK(ours);
+  struct Theirs {
+    const char* file;
+    std::size_t column;
+  };
+  for (const Theirs& theirs : {Theirs{"Csv_ADC/CPW1C48210013_baseline_temperature_MCU_ADC.csv", 2},
+                               Theirs{"Csv_ADC/CPW1C48210013_baseline_temperature_ADXL_ADC.csv", 3},
+                               Theirs{"Csv_Calibrated/CPW1C48210013_baseline_temperature_MCU_calibrated.csv", 4},
+                               Theirs{"Csv_Calibrated/CPW1C48210013_baseline_temperature_ADXL_calibrated.csv", 5}}) {
+    std::ifstream file(shared_file(std::string("data/agdc/") + theirs.file));
+    const auto wanted = lines_of(std::string(std::istreambuf_iterator<char>(file), {}));
+    ASSERT_EQ(wanted.size(), ours->lines.size()) << theirs.file;
+    for (std::size_t i = 1; i < wanted.size(); ++i) {
+      const std::size_t comma = wanted[i].find(',');
+      std::vector<std::string> values;
+      std::istringstream row(ours->lines[i]);
+      for (std::string value; std::getline(row, value, ',');) {
+        values.push_back(value);
+      }
+      ASSERT_EQ(values.size(), 6U);
+      ASSERT_EQ(std::stod(wanted[i].substr(0, comma)), std::stod(values[1]));
+      ASSERT_NEAR(std::stod(wanted[i].substr(comma + 1)), std::stod(values[theirs.column]), 1e-12)
+          << theirs.file << " line " << i;
+    }
+  }
+}
+
+TEST(RecordsCsv, TheOldFormHasItsLuxInAFileOfItsOwn) {
+  MemoryEnv memory;
+  {
+    auto out = RecordingWriter::create(memory.files, "old.gt3x").value();
+    ASSERT_OK(out.add("activity.bin", Bytes(9)));
+    ASSERT_OK(out.add("lux.bin", Bytes{0x00, 0x00, 0x13, 0x00, 0xFF, 0xFF, 0x98, 0x08, 0x4C}));
+    ASSERT_OK(out.add("info.txt", std::string_view(tests::made_info())));
+    ASSERT_OK(out.commit());
+  }
+  const auto lux = records_of(memory.files, "old.gt3x", RecordType::lux);
+  ASSERT_OK(lux);
+  ASSERT_EQ(lux->lines.size(), 5U);
+  EXPECT_EQ(lux->lines[1].substr(lux->lines[1].rfind(',')), ",0");
+  EXPECT_EQ(lux->lines[2].substr(lux->lines[2].rfind(',')), ",19");
+  EXPECT_EQ(lux->lines[3].substr(lux->lines[3].rfind(',')), ",");
+  EXPECT_EQ(lux->lines[4].substr(lux->lines[4].rfind(',')), ",2200");
+  EXPECT_EQ(lux->tally.unreadable_records, 1U);
+  EXPECT_FAILS(records_of(memory.files, "old.gt3x", RecordType::battery), ErrorCode::bad_data);
+}
+
+// Oracle: the file's own count of seconds, 10,467 samples at 80 Hz.
+TEST(RecordsCsv, LightOfARealOldRecording) {
+  SIXPOINT_NEED_SHARED("data/nhanes/NEO1B34100019.gt3x");
+  const auto lux = records_of(posix_env().files, shared_file("data/nhanes/NEO1B34100019.gt3x"),
+                              RecordType::lux);
+  ASSERT_OK(lux);
+  EXPECT_GT(lux->tally.records, 100U);
+  EXPECT_EQ(lux->tally.unreadable_records, 0U);
+}
+
+}  // namespace
+}  // namespace sixpoint::gt3x
