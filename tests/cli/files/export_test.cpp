@@ -44,7 +44,7 @@ TEST(Export, WritesTheRecordsOfOneType) {
   const auto unknown =
       run_command(memory.env, {"export", "f.gt3x", "--records", "LIGHT", "--csv", "a.csv"});
   EXPECT_EQ(unknown.exit_code, 64);
-  EXPECT_THAT(unknown.err, testing::HasSubstr("BATTERY"));
+  EXPECT_THAT(unknown.people, testing::HasSubstr("BATTERY"));
   EXPECT_FALSE(memory.files.info("a.csv"));
   EXPECT_EQ(
       run_command(memory.env, {"export", "f.gt3x", "--records", "LUX", "--imu", "--csv", "a.csv"})
@@ -57,7 +57,7 @@ TEST(Export, ARecordingWithoutTheInertialSensorIsRefused) {
   ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(2)));
   const auto imu = run_command(memory.env, {"export", "f.gt3x", "--imu", "--csv", "a.csv"});
   EXPECT_EQ(imu.exit_code, 65);
-  EXPECT_THAT(imu.err, testing::HasSubstr("SENSOR_SCHEMA"));
+  EXPECT_THAT(imu.people, testing::HasSubstr("SENSOR_SCHEMA"));
   EXPECT_FALSE(memory.files.info("a.csv"));
 }
 
