@@ -37,11 +37,13 @@ void add_jobs_option(CLI::App& command, unsigned& jobs) {
   command.add_option("--jobs", jobs, "files at a time (default: one per core)");
 }
 
+unsigned threads_of(unsigned jobs) {
+  return jobs > 0 ? jobs : std::max(1U, std::thread::hardware_concurrency());
+}
+
 void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& work,
                   const std::function<void(std::size_t)>& watch, const std::atomic<bool>* stop) {
-  if (jobs == 0) {
-    jobs = std::max(1U, std::thread::hardware_concurrency());
-  }
+  jobs = threads_of(jobs);
   std::atomic<std::size_t> next{0};
   std::atomic<std::size_t> done{0};
   std::atomic<std::size_t> ended{0};  // threads

@@ -35,6 +35,8 @@ std::vector<NamedFile> named_files(Context& context, const std::vector<std::stri
 
 // --jobs N
 void add_jobs_option(CLI::App& command, unsigned& jobs);
+// Threads that --jobs asks for; 0: one per core.
+unsigned threads_of(unsigned jobs);
 
 // Calls work(i) for every i below `count`, on up to `jobs` threads (0: one per core). Meanwhile
 // `watch(done)` is called on the calling thread. `work` must be safe to call from several threads

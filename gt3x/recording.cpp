@@ -6,9 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "gt3x/container/inflating_source.h"
 #include "gt3x/container/read_ahead.h"
-#include "gt3x/container/zip_bridge.h"
 #include "gt3x/recording_archive.h"
 
 namespace sixpoint::gt3x {
@@ -33,6 +31,13 @@ bool plain_name(std::string_view name) {
 
 // From this size on an entry is unpacked on a thread of its own; below, the thread costs more.
 constexpr std::uint64_t kReadAheadFrom = std::uint64_t{4} << 20;
+
+// What libzip says about an error.
+std::string describe(zip_error_t* error) {
+  std::string text = zip_error_strerror(error);
+  zip_error_fini(error);
+  return text;
+}
 
 }  // namespace
 
@@ -83,13 +88,25 @@ zip_int64_t Recording::Archive::origin(void* user, void* data, zip_uint64_t leng
       auto count =
           self->file->read_at(self->at, std::span(static_cast<std::uint8_t*>(data), length));
       if (!count) {
-        return refuse(std::move(count).error(), self->failure, ZIP_ER_READ, self->error);
+        // The first of our own errors says more than what libzip makes of it.
+        if (!self->failure) {
+          self->failure = std::move(count).error();
+        }
+        zip_error_set(&self->error, ZIP_ER_READ, EIO);
+        return -1;
       }
       self->at += *count;
       return static_cast<zip_int64_t>(*count);
     }
-    case ZIP_SOURCE_SEEK:
-      return seek(self->at, self->file->size(), data, length, self->error);
+    case ZIP_SOURCE_SEEK: {
+      const zip_int64_t target =
+          zip_source_seek_compute_offset(self->at, self->file->size(), data, length, &self->error);
+      if (target < 0) {
+        return -1;
+      }
+      self->at = static_cast<std::uint64_t>(target);
+      return 0;
+    }
     case ZIP_SOURCE_TELL:
       return static_cast<zip_int64_t>(self->at);
     case ZIP_SOURCE_STAT: {
@@ -233,31 +250,52 @@ Result<Recording> Recording::open(FileSystem& files, const std::string& path) {
   return recording;
 }
 
+Result<EntryFacts> Recording::Archive::facts_of(std::size_t index) const {
+  const std::lock_guard lock(mutex);
+  zip_stat_t stat;
+  zip_stat_init(&stat);
+  if (zip_stat_index(zip, index, 0, &stat) != 0) {
+    return bad("the archive's list of entries is damaged");
+  }
+  EntryFacts facts;
+  facts.packing = stat.comp_method == ZIP_CM_DEFLATE ? Packing::deflate : Packing::store;
+  facts.size = stat.size;
+  facts.packed_size = stat.comp_size;
+  facts.crc32 = stat.crc;
+  facts.where = path + ":" + entries[index].name;
+  zip_uint16_t length = 0;
+  const zip_uint8_t* field =
+      zip_file_extra_field_get_by_id(zip, index, kSyncPointsId, 0, &length, ZIP_FL_CENTRAL);
+  if (field != nullptr && facts.packing == Packing::deflate) {
+    facts.points =
+        parse_sync_points({field, length}, {facts.size, facts.packed_size}).value_or(SyncPoints{});
+  }
+  return facts;
+}
+
+Result<std::unique_ptr<ByteSource>> Recording::Archive::open_packed(
+    const std::shared_ptr<Archive>& archive, std::size_t index) {
+  const std::lock_guard lock(archive->mutex);
+  zip_file_t* file = zip_fopen_index(archive->zip, index, ZIP_FL_COMPRESSED);
+  const std::string& name = archive->entries[index].name;
+  if (file != nullptr) {
+    return std::make_unique<PackedEntry>(archive, file, archive->path + ":" + name);
+  }
+  if (archive->failure) {
+    return fail(*archive->failure);
+  }
+  return archive->bad(fmt::format("entry {} cannot be opened: {}", printable(name, 60),
+                                  zip_strerror(archive->zip)));
+}
+
 Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& name) {
   const auto index = archive_->index_of(name);
   if (!index) {
     return archive_->bad(fmt::format("the archive holds no {}", printable(name, 60)));
   }
-  const std::lock_guard lock(archive_->mutex);
-  zip_stat_t stat;
-  zip_stat_init(&stat);
-  zip_file_t* file = zip_stat_index(archive_->zip, *index, 0, &stat) == 0
-                         ? zip_fopen_index(archive_->zip, *index, ZIP_FL_COMPRESSED)
-                         : nullptr;
-  if (file == nullptr) {
-    if (archive_->failure) {
-      return fail(*archive_->failure);
-    }
-    return archive_->bad(fmt::format("entry {} cannot be opened: {}", printable(name, 60),
-                                     zip_strerror(archive_->zip)));
-  }
-  EntryFacts facts;
-  facts.packing = stat.comp_method == ZIP_CM_DEFLATE ? EntryFacts::Packing::deflate
-                                                     : EntryFacts::Packing::store;
-  facts.size = archive_->entries[*index].size;
-  facts.crc32 = stat.crc;
-  facts.where = archive_->path + ":" + name;
-  auto unpacked = unpack_entry(std::make_unique<PackedEntry>(archive_, file, facts.where), facts);
+  SIXPOINT_ASSIGN(const EntryFacts facts, archive_->facts_of(*index));
+  SIXPOINT_ASSIGN(auto packed, Archive::open_packed(archive_, *index));
+  auto unpacked = unpack_entry(std::move(packed), facts);
   if (facts.size < kReadAheadFrom) {
     return unpacked;
   }

@@ -5,6 +5,7 @@
 
 #include <zip.h>
 
+#include "gt3x/container/inflating_source.h"
 #include "gt3x/recording.h"
 
 namespace sixpoint::gt3x {
@@ -20,17 +21,22 @@ struct Recording::Archive {
     }
   }
 
+  // The packed bytes of one entry. They keep `archive` open.
+  static Result<std::unique_ptr<ByteSource>> open_packed(const std::shared_ptr<Archive>& archive,
+                                                         std::size_t index);
+
   static zip_int64_t origin(void* user, void* data, zip_uint64_t length, zip_source_cmd_t command);
 
   Status open_zip();
   Status read_entries();
   Result<EntryInfo> read_entry(zip_uint64_t index) const;
   std::optional<std::size_t> index_of(const std::string& name) const;
+  Result<EntryFacts> facts_of(std::size_t index) const;
   tl::unexpected<Error> bad(std::string what, std::string hint = {}) const;
 
   // Every call of libzip that touches the file: entries are read by threads of their own
   // (read_ahead.h). Recursive, because libzip calls back.
-  std::recursive_mutex mutex;
+  mutable std::recursive_mutex mutex;
   std::unique_ptr<ReadableFile> file;
   std::string path;
   std::uint64_t at = 0;

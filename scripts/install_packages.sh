@@ -9,7 +9,7 @@ build_packages=(
   libcli11-dev libcpp-httplib-dev libeigen3-dev libexpected-dev libfmt-dev libpq-dev libpqxx-dev
   libspdlog-dev libsqlite3-dev libhidapi-dev libudev-dev libusb-1.0-0-dev
   libcairo2-dev libpango1.0-dev librsvg2-dev fonts-dejavu-core
-  libisal-dev libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
+  libdeflate-dev libisal-dev libsqlitecpp-dev libssl-dev libzip-dev nlohmann-json3-dev zlib1g-dev
   libboost-dev libqrencode-dev libtomlplusplus-dev
 )
 test_packages=(

@@ -182,8 +182,8 @@ Result<RecordingReport> write_recording(FileSystem& files, const std::string& pa
   RecordingReport report;
   report.duration_s = static_cast<double>(seconds);
   SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
-  SIXPOINT_CHECK(
-      writer.add("log.bin", std::make_unique<ScenarioLog>(scenario, seconds, report, truth)));
+  ScenarioLog log(scenario, seconds, report, truth);
+  SIXPOINT_CHECK(writer.add("log.bin", log));
   SIXPOINT_CHECK(writer.add(
       "info.txt", recording_info(scenario.unit, scenario.start,
                                  scenario.start + std::chrono::seconds(seconds), scenario.rate_hz)

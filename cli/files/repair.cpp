@@ -68,7 +68,8 @@ void refuse_same_outputs(std::vector<NamedFile>& files, const std::string& folde
 }
 
 RepairReport repair_one(const NamedFile& file, const Options& options,
-                        repair::ConstantsFinder& finder, Env& env) {
+                        const repair::RepairOptions& how, repair::ConstantsFinder& finder,
+                        Env& env) {
   if (file.error) {
     return failed_report(file.path, *file.error);
   }
@@ -78,22 +79,32 @@ RepairReport repair_one(const NamedFile& file, const Options& options,
       return failed_report(file.path, made.error());
     }
   }
+  return repair::repair_file(env, file.path, output, finder, how);
+}
+
+// How one of `files` files is repaired. With fewer files than --jobs a file gets several threads.
+repair::RepairOptions options_of_file(const Options& options, std::size_t files) {
   repair::RepairOptions how = options.repair;
   how.resume = how.resume || how.redo_outdated;
-  return repair::repair_file(env, file.path, output, finder, how);
+  const unsigned jobs = threads_of(options.jobs);
+  how.jobs = std::max(1U, jobs / static_cast<unsigned>(std::clamp<std::size_t>(files, 1, jobs)));
+  return how;
 }
 
 // Every file's report, but for those that were not begun when the operator stopped the run.
 std::vector<RepairReport> repair_files(const std::vector<NamedFile>& files, const Options& options,
                                        repair::ConstantsFinder& finder, Context& context) {
   std::vector<std::optional<RepairReport>> answers(files.size());
+  const repair::RepairOptions how = options_of_file(options, files.size());
   StopRequest stop;
   std::atomic<bool> stopping{false};
   {
     Progress progress(context, "repairing", files.size());
     for_each_job(
         files.size(), options.jobs,
-        [&](std::size_t i) { answers[i] = repair_one(files[i], options, finder, context.env); },
+        [&](std::size_t i) {
+          answers[i] = repair_one(files[i], options, how, finder, context.env);
+        },
         [&](std::size_t done) {
           progress.at(done);
           stopping = stop.requested();
@@ -128,6 +139,7 @@ std::string line_that_goes_on(const Options& options) {
   flag(" --scan", options.sources.scan);
   flag(" --or-scan", options.sources.or_scan);
   flag(" --wide", options.repair.wide);
+  flag(" --store-only", options.repair.store_only);
   flag(" --undo-rotation", options.repair.undo_rotation);
   flag(" --allow-prior", options.repair.allow_prior);
   flag(" --force", options.repair.force);

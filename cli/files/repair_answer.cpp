@@ -36,6 +36,8 @@ std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_
 void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
   command.add_flag("--wide", options.wide,
                    "write 16-bit records (ACTIVITY2), in which nothing needs clipping");
+  command.add_flag("--store-only", options.store_only,
+                   "store the entries of repaired files instead of deflating them");
   command.add_flag("--undo-rotation", options.undo_rotation,
                    "also turn back the axes of firmware 1.6.0 where the constants are right");
   command.add_flag("--allow-prior", options.allow_prior,

@@ -37,7 +37,7 @@ struct RepairSources {
 void add_source_options(CLI::App& command, RepairSources& sources);
 // The order in which they are asked (repair/rescale/sources.h). `has_store`: store_of() gave one.
 std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_store);
-// --wide, --undo-rotation, --allow-prior, --force
+// --wide, --store-only, --undo-rotation, --allow-prior, --force
 void add_repair_options(CLI::App& command, repair::RepairOptions& options);
 
 // --redo-outdated

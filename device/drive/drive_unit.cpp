@@ -21,12 +21,12 @@ constexpr std::uint64_t kMostInfo_bytes = 1U << 20U;
 // log.bin, piece by piece, and its hash on the way.
 class LogSource final : public gt3x::ByteSource {
  public:
-  LogSource(std::unique_ptr<ReadableFile> file, std::shared_ptr<Sha256> hash,
-            std::function<void(std::uint64_t)> progress)
-      : file_(std::move(file)), hash_(std::move(hash)), progress_(std::move(progress)) {}
+  LogSource(std::unique_ptr<ReadableFile> file, Sha256& hash,
+            const std::function<void(std::uint64_t)>& progress)
+      : file_(std::move(file)), hash_(hash), progress_(progress) {}
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
     SIXPOINT_ASSIGN(const std::size_t count, file_->read_at(offset_, out));
-    hash_->update(std::span<const std::uint8_t>(out.first(count)));
+    hash_.update(std::span<const std::uint8_t>(out.first(count)));
     offset_ += count;
     if (progress_) {
       progress_(offset_);
@@ -37,8 +37,8 @@ class LogSource final : public gt3x::ByteSource {
 
  private:
   std::unique_ptr<ReadableFile> file_;
-  std::shared_ptr<Sha256> hash_;
-  std::function<void(std::uint64_t)> progress_;
+  Sha256& hash_;
+  const std::function<void(std::uint64_t)>& progress_;
   std::uint64_t offset_ = 0;
 };
 
@@ -136,14 +136,15 @@ Status DriveUnit::download(const RecordingInfo& recording, FileSystem& files,
   }
   SIXPOINT_ASSIGN(Bytes info, read_file(env_.files, path_of(kInfoName), kMostInfo_bytes));
   SIXPOINT_ASSIGN(auto log, env_.files.open(path_of(kLogName)));
-  const auto hash = std::make_shared<Sha256>();
+  Sha256 hash;
+  LogSource source(std::move(log), hash, progress);
   SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
-  SIXPOINT_CHECK(writer.add(kLogName, std::make_unique<LogSource>(std::move(log), hash, progress)));
+  SIXPOINT_CHECK(writer.add(kLogName, source));
   SIXPOINT_CHECK(writer.add(kInfoName, std::move(info)));
   SIXPOINT_CHECK(writer.commit());
   Status same = [&]() -> Status {
     SIXPOINT_CHECK(identify());
-    if (hash->finish() != recording.sha256) {
+    if (hash.finish() != recording.sha256) {
       return fail(ErrorCode::bad_data, "log.bin changed while it was read", address_,
                   "stop the unit's recording, then copy it again");
     }

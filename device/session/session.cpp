@@ -178,8 +178,8 @@ Status write_archive(FileSystem& files, const std::string& path, const SessionHe
   json["sha256"] = to_hex(hash);
   // The writer of recordings: one fixed time, so that the same session gives the same bytes.
   SIXPOINT_ASSIGN(auto zip, gt3x::RecordingWriter::create(files, path));
-  SIXPOINT_CHECK(zip.add(kHeadName, json.dump(2) + "\n", gt3x::Compression::deflate));
-  SIXPOINT_CHECK(zip.add(kTransfersName, std::move(lines), gt3x::Compression::deflate));
+  SIXPOINT_CHECK(zip.add(kHeadName, json.dump(2) + "\n"));
+  SIXPOINT_CHECK(zip.add(kTransfersName, *lines));
   return zip.commit();
 }
 

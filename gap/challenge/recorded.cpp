@@ -179,7 +179,7 @@ Status write_plain_trial(FileSystem& files, const std::string& from, const std::
       SIXPOINT_CHECK(writer.copy(recording, entry.name));
     }
   }
-  SIXPOINT_CHECK(writer.add("log.bin", std::move(log)));
+  SIXPOINT_CHECK(writer.add("log.bin", *log));
   return writer.commit();
 }
 

@@ -7,6 +7,8 @@
 #include <isa-l/crc.h>
 #include <isa-l/igzip_lib.h>
 
+#include "gt3x/container/piecewise_source.h"
+
 namespace sixpoint::gt3x {
 namespace {
 
@@ -106,8 +108,12 @@ class CheckedEntry final : public ByteSource {
 
 std::unique_ptr<ByteSource> unpack_entry(std::unique_ptr<ByteSource> packed,
                                          const EntryFacts& facts) {
-  if (facts.packing == EntryFacts::Packing::deflate) {
-    packed = std::make_unique<Inflate>(std::move(packed));
+  if (facts.packing == Packing::deflate) {
+    if (facts.points.packed_sizes.empty()) {
+      packed = std::make_unique<Inflate>(std::move(packed));
+    } else {
+      packed = unpack_pieces(std::move(packed), facts.points, facts.size);
+    }
   }
   return std::make_unique<CheckedEntry>(std::move(packed), facts);
 }

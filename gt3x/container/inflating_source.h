@@ -1,11 +1,15 @@
 // The bytes of one zip entry from the packed bytes that the archive holds, with their check.
 //
-//   EntryFacts facts = {EntryFacts::Packing::deflate, size, crc32, "in.gt3x:log.bin"};
+//   EntryFacts facts;
+//   facts.packing = Packing::deflate;
+//   facts.size = size;
+//   facts.crc32 = crc32;
 //   const auto bytes = unpack_entry(std::move(packed), facts);
 //   SIXPOINT_ASSIGN(const std::size_t count, bytes->read(piece));
 //
 // Intel's isa-l inflates: on a week at 100 Hz it takes 0.4 of the time of zlib, and unlike
-// libdeflate it needs no buffer for the whole entry.
+// libdeflate it needs no buffer for the whole entry. An entry with an index (sync_points.h) is
+// unpacked piece by piece, on several threads.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +17,18 @@
 #include <string>
 
 #include "gt3x/container/byte_source.h"
+#include "gt3x/container/sync_points.h"
 
 namespace sixpoint::gt3x {
 
+enum class Packing { store, deflate };
+
 struct EntryFacts {
-  enum class Packing { store, deflate };
   Packing packing = Packing::store;
-  std::uint64_t size = 0;   // unpacked
+  std::uint64_t size = 0;  // unpacked
+  std::uint64_t packed_size = 0;
   std::uint32_t crc32 = 0;  // of the unpacked bytes, as in the archive's list of entries
+  SyncPoints points;        // empty: unpacked from its beginning
   std::string where;        // for errors
 };
 

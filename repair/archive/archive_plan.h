@@ -48,7 +48,7 @@ struct ArchiveCalibrationFile {
 
 // How the files are repaired, as `repair` takes it; the same for every shard.
 struct ArchiveRepair {
-  RepairOptions options;  // wide, undo_rotation, allow_prior, force
+  RepairOptions options;  // wide, store_only, undo_rotation, allow_prior, force
   // What the user named, as ConstantsFinderOptions has it.
   std::optional<calib::ConstantsRecord> given;
   std::optional<ArchiveCalibrationFile> calibration_file;

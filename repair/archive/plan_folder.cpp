@@ -74,6 +74,7 @@ Json to_json(const ArchivePlan& plan) {
   }
   const ArchiveRepair& repair = plan.repair;
   json["options"] = {{"wide", repair.options.wide},
+                     {"store_only", repair.options.store_only},
                      {"undo_rotation", repair.options.undo_rotation},
                      {"allow_prior", repair.options.allow_prior},
                      {"force", repair.options.force}};
@@ -114,6 +115,7 @@ Result<ArchivePlan> plan_of(const Json& json) {
   }
   const Json& options = json.at("options");
   plan.repair.options.wide = options.at("wide");
+  plan.repair.options.store_only = options.at("store_only");
   plan.repair.options.undo_rotation = options.at("undo_rotation");
   plan.repair.options.allow_prior = options.at("allow_prior");
   plan.repair.options.force = options.at("force");

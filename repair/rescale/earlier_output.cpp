@@ -12,7 +12,8 @@ std::string recipe_digest(const Recipe& recipe) {
       {"rules", recipe.rules},
       {"constants", recipe.constants ? digest_of(*recipe.constants) : std::string()},
       {"rotation_undone", recipe.rotation_undone},
-      {"wide", recipe.wide}};
+      {"wide", recipe.wide},
+      {"store_only", recipe.store_only}};
   return text_sha256(content.dump());
 }
 

@@ -21,13 +21,14 @@
 namespace sixpoint::repair {
 
 // Raised whenever this program makes other bytes of the same file, constants and options.
-inline constexpr int kRepairRules = 2;
+inline constexpr int kRepairRules = 3;
 
-// All that decides the samples of a repaired file, beside the file itself.
+// All that decides the bytes of a repaired file, beside the file itself.
 struct Recipe {
   std::optional<calib::ConstantsRecord> constants;
   bool rotation_undone = false;
   bool wide = false;
+  bool store_only = false;
   int rules = kRepairRules;
 };
 // 64 hex digits; the mark carries it.

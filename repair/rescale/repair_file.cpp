@@ -45,17 +45,6 @@ bool is_independent_of_samples(const std::string& name) {
   return std::ranges::find(kNames, name) != kNames.end();
 }
 
-// The writer destroys its source at commit(); the log's tally is needed after that.
-class SharedSource final : public gt3x::ByteSource {
- public:
-  explicit SharedSource(std::shared_ptr<gt3x::ByteSource> source) : source_(std::move(source)) {}
-  Result<std::size_t> read(std::span<std::uint8_t> out) override { return source_->read(out); }
-  std::optional<std::uint64_t> size() const override { return source_->size(); }
-
- private:
-  std::shared_ptr<gt3x::ByteSource> source_;
-};
-
 class Repair {
  public:
   Repair(Env& env, const std::string& input, const std::string& output, ConstantsSource& source,
@@ -255,8 +244,7 @@ class Repair {
     SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
     SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(env_.files, report_.input));
     SIXPOINT_ASSIGN(auto reader, recording.open_log());
-    SIXPOINT_ASSIGN(auto made, RescaledLog::make(std::move(reader), log_options()));
-    const std::shared_ptr<RescaledLog> log = std::move(made);
+    SIXPOINT_ASSIGN(const auto log, RescaledLog::make(std::move(reader), log_options()));
     if (options_.dry_run) {
       SIXPOINT_CHECK(read_through(*log));
     } else {
@@ -267,7 +255,7 @@ class Repair {
           !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
         return take_earlier_output(earlier, mark.value_or(Json()));
       }
-      SIXPOINT_CHECK(write_output(recording, log));
+      SIXPOINT_CHECK(write_output(recording, *log));
     }
     take(*log);
     name_what_was_not_repaired(recording, log->tally().epoch_records);
@@ -305,12 +293,14 @@ class Repair {
     return {};
   }
 
-  Status write_output(gt3x::Recording& recording, const std::shared_ptr<RescaledLog>& log) {
-    SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(env_.files, output_));
+  Status write_output(gt3x::Recording& recording, RescaledLog& log) {
+    gt3x::WriterOptions how;
+    how.packing = options_.store_only ? gt3x::Packing::store : gt3x::Packing::deflate;
+    how.jobs = options_.jobs;
+    SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(env_.files, output_, how));
     for (const gt3x::EntryInfo& entry : recording.entries()) {
-      SIXPOINT_CHECK(entry.name == "log.bin"
-                         ? writer.add(entry.name, std::make_unique<SharedSource>(log))
-                         : writer.copy(recording, entry.name));
+      SIXPOINT_CHECK(entry.name == "log.bin" ? writer.add(entry.name, log)
+                                             : writer.copy(recording, entry.name));
     }
     report_.repaired_at = env_.clock.now();
     SIXPOINT_CHECK(
@@ -319,7 +309,7 @@ class Repair {
                                     "\n"));
     SIXPOINT_CHECK(writer.commit());
     report_.output = output_;
-    SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
+    report_.output_sha256 = writer.sha256();
     return {};
   }
 
@@ -330,6 +320,7 @@ class Repair {
     }
     recipe.rotation_undone = report_.rotation_undone;
     recipe.wide = options_.wide;
+    recipe.store_only = options_.store_only;
     return recipe_digest(recipe);
   }
 

@@ -81,6 +81,10 @@ class ConstantsSource {
 struct RepairOptions {
   // 16-bit records on request only: every reader knows the 12-bit form.
   bool wide = false;
+  // Entries stored instead of deflated: larger, and written faster.
+  bool store_only = false;
+  // Threads that pack one file's output.
+  unsigned jobs = 1;
   // Reads, chooses and computes, but writes nothing.
   bool dry_run = false;
   // Also turn back the axes of files whose constants are right. Off: a file that 16CPAN03 does not

@@ -70,7 +70,8 @@ Status join_recordings(FileSystem& files, const std::vector<std::string>& pieces
     return fail(ErrorCode::internal, "no pieces to join", output);
   }
   SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, output));
-  SIXPOINT_CHECK(writer.add("log.bin", std::make_unique<Chain>(std::move(logs))));
+  Chain log(std::move(logs));
+  SIXPOINT_CHECK(writer.add("log.bin", log));
   SIXPOINT_CHECK(writer.add("info.txt", info->serialise()));
   return writer.commit();
 }

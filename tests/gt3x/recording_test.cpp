@@ -23,11 +23,11 @@ Status put(FileSystem& files, const std::string& path, const Bytes& bytes) {
                     std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
-Bytes made_archive(Compression compression = Compression::store) {
+Bytes made_archive(Packing packing = Packing::store) {
   MemoryEnv memory;
-  auto out = RecordingWriter::create(memory.files, "f");
-  EXPECT_OK(out->add("log.bin", made_log(3), compression));
-  EXPECT_OK(out->add("info.txt", std::string_view(made_info()), compression));
+  auto out = RecordingWriter::create(memory.files, "f", {packing, 1});
+  EXPECT_OK(out->add("log.bin", made_log(3)));
+  EXPECT_OK(out->add("info.txt", std::string_view(made_info())));
   EXPECT_OK(out->add("calibration.json", std::string_view("{}")));
   EXPECT_OK(out->commit());
   return *read_file(memory.files, "f");
@@ -40,9 +40,9 @@ Result<Bytes> log_of(FileSystem& files, const std::string& path) {
 }
 
 TEST(Recording, ReadsWhatTheWriterWrote) {
-  for (const auto compression : {Compression::store, Compression::deflate}) {
+  for (const auto packing : {Packing::store, Packing::deflate}) {
     MemoryEnv memory;
-    ASSERT_OK(put(memory.files, "f", made_archive(compression)));
+    ASSERT_OK(put(memory.files, "f", made_archive(packing)));
     auto recording = Recording::open(memory.files, "f");
     ASSERT_OK(recording);
     EXPECT_EQ(recording->info().serial(), "MOS2A45130450");
@@ -129,8 +129,8 @@ TEST(Recording, TruncatedAtEveryByteIsAnError) {
 // or not at all. Never other bytes.
 TEST(Recording, ADamagedArchiveNeverDeliversOtherBytes) {
   const Bytes wanted = made_log(3);
-  for (const auto compression : {Compression::store, Compression::deflate}) {
-    const Bytes archive = made_archive(compression);
+  for (const auto packing : {Packing::store, Packing::deflate}) {
+    const Bytes archive = made_archive(packing);
     std::size_t refused = 0;
     for (std::size_t at = 0; at < archive.size(); ++at) {
       for (const unsigned flip : {0x01U, 0xFFU}) {
@@ -154,7 +154,7 @@ TEST(Recording, ADamagedArchiveNeverDeliversOtherBytes) {
 TEST(Recording, RefusesABomb) {
   // Two gigabytes claimed by an entry of a few bytes: the size field of the central directory.
   MemoryEnv memory;
-  Bytes archive = made_archive(Compression::deflate);
+  Bytes archive = made_archive(Packing::deflate);
   const std::string signature = "PK\x01\x02";
   const auto central =
       std::search(archive.begin(), archive.end(), signature.begin(), signature.end());
@@ -207,7 +207,7 @@ TEST(Recording, ADiskThatFailsIsNoDamage) {
 
 TEST(RecordingWriter, CopiesEntriesUntouched) {
   MemoryEnv memory;
-  ASSERT_OK(put(memory.files, "f", made_archive(Compression::deflate)));
+  ASSERT_OK(put(memory.files, "f", made_archive(Packing::deflate)));
   auto from = Recording::open(memory.files, "f");
   ASSERT_OK(from);
   auto out = RecordingWriter::create(memory.files, "g");
@@ -235,7 +235,8 @@ TEST(RecordingWriter, UnknownSizesMakeReadableEntries) {
   };
   MemoryEnv memory;
   auto out = RecordingWriter::create(memory.files, "f");
-  ASSERT_OK(out->add("log.bin", std::make_unique<Unsized>()));
+  Unsized source;
+  ASSERT_OK(out->add("log.bin", source));
   ASSERT_OK(out->add("info.txt", std::string_view(made_info())));
   ASSERT_OK(out->commit());
   EXPECT_EQ(log_of(memory.files, "f").value(), made_log(3));

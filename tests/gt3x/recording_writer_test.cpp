@@ -47,7 +47,10 @@ TEST(RecordingWriter, ASourceThatFailsLeavesNoFile) {
   {
     auto out = RecordingWriter::create(memory.files, "a.gt3x");
     ASSERT_OK(out);
-    ASSERT_OK(out->add("log.bin", std::make_unique<FailingSource>()));
+    FailingSource source;
+    const auto added = out->add("log.bin", source);
+    ASSERT_FALSE(added);
+    EXPECT_EQ(added.error().what, "the source broke");
     const auto status = out->commit();
     ASSERT_FALSE(status);
     EXPECT_EQ(status.error().what, "the source broke");
@@ -55,7 +58,7 @@ TEST(RecordingWriter, ASourceThatFailsLeavesNoFile) {
   EXPECT_TRUE(memory.files.list(".")->empty());
 }
 
-// Oracle: the promise of AtomicFile, now through libzip: at every operation of the disk in turn the
+// Oracle: the promise of AtomicFile, through the writer: at every operation of the disk in turn the
 // power goes, and the old file or the whole new one is there.
 TEST(RecordingWriter, SurvivesAPowerCutAtEveryOperation) {
   MemoryEnv whole;

@@ -26,7 +26,7 @@ Bytes deflated(const Bytes& bytes, int level, int strategy) {
 
 EntryFacts facts_of(const Bytes& bytes) {
   EntryFacts facts;
-  facts.packing = EntryFacts::Packing::deflate;
+  facts.packing = Packing::deflate;
   facts.size = bytes.size();
   facts.crc32 = static_cast<std::uint32_t>(crc32(0, bytes.data(), static_cast<uInt>(bytes.size())));
   facts.where = "f:log.bin";
@@ -83,7 +83,7 @@ TEST(InflatingSource, ReadsWhatZlibPackedInPiecesOfEverySize) {
 TEST(InflatingSource, StoredBytesPass) {
   const Bytes bytes = some_bytes(5000, 256);
   EntryFacts facts = facts_of(bytes);
-  facts.packing = EntryFacts::Packing::store;
+  facts.packing = Packing::store;
   EXPECT_EQ(unpacked(bytes, facts, 100).value(), bytes);
 }
 

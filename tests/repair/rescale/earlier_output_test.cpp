@@ -32,6 +32,9 @@ TEST(EarlierOutputs, ARecipeIsConstantsOptionsAndRules) {
   other.wide = true;
   EXPECT_NE(recipe_digest(other), now);
   other = recipe;
+  other.store_only = true;
+  EXPECT_NE(recipe_digest(other), now);
+  other = recipe;
   other.rotation_undone = true;
   EXPECT_NE(recipe_digest(other), now);
   other = recipe;

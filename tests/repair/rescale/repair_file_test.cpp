@@ -5,6 +5,7 @@
 
 #include "base/memory_env.h"
 #include "base/random.h"
+#include "base/sha256.h"
 #include "expect_result.h"
 #include "repair/six_sides.h"
 #include "shared_data.h"
@@ -318,6 +319,37 @@ TEST_F(RepairFile, CountsClippedSamplesAndKeepsThemAtTheLimit) {
   ASSERT_EQ(wide.status, RepairStatus::repaired);
   EXPECT_EQ(wide.clipped_after, 0U);
   EXPECT_EQ(samples_of(memory_.files, "wide.gt3x")[5][0], std::lround(256 * kTrue.to_g(0, 2047)));
+}
+
+// The hash in the answer is that of the file, though nobody read it again.
+TEST_F(RepairFile, AnyNumberOfThreadsGivesTheSameBytesAndPackingTheSameSamples) {
+  MadeRecording made = six_sides();
+  const auto sides = made.raw;
+  while (made.raw.size() < 800'000) {  // more than three pieces of 1 MiB
+    made.raw.insert(made.raw.end(), sides.begin(), sides.end());
+  }
+  ASSERT_OK(made.write(memory_.files, "in.gt3x"));
+  RepairOptions options;
+  const auto one = repair_file(memory_.env, "in.gt3x", "one.gt3x", source_, options);
+  ASSERT_EQ(one.status, RepairStatus::repaired) << one.to_json().dump(1);
+  options.jobs = 3;
+  const auto three = repair_file(memory_.env, "in.gt3x", "three.gt3x", source_, options);
+  const Bytes bytes = read_file(memory_.files, "one.gt3x").value();
+  EXPECT_TRUE(read_file(memory_.files, "three.gt3x").value() == bytes);
+  EXPECT_EQ(one.output_sha256, to_hex(sha256(bytes)));
+  EXPECT_EQ(three.output_sha256, one.output_sha256);
+
+  options.store_only = true;
+  const auto stored = repair_file(memory_.env, "in.gt3x", "stored.gt3x", source_, options);
+  ASSERT_EQ(stored.status, RepairStatus::repaired);
+  EXPECT_GT(memory_.files.info("stored.gt3x")->size, bytes.size());
+  EXPECT_EQ(stored.output_sha256, file_sha256(memory_.files, "stored.gt3x").value());
+  EXPECT_TRUE(samples_of(memory_.files, "stored.gt3x") == samples_of(memory_.files, "one.gt3x"));
+  options.resume = true;
+  EXPECT_TRUE(repair_file(memory_.env, "in.gt3x", "stored.gt3x", source_, options).resumed);
+  options.store_only = false;
+  EXPECT_EQ(repair_file(memory_.env, "in.gt3x", "stored.gt3x", source_, options).status,
+            RepairStatus::outdated);
 }
 
 TEST_F(RepairFile, RefusesConstantsThatAreNotForThisFile) {
