@@ -53,6 +53,10 @@ LaneAnswer<void> Lanes::Lane::start(const StartOrder& order, bool capture) {
     return lane_conflict(fmt::format("this lane is at work for {}", printable(operator_name_, 60)),
                          "wait for its end, or take the lane over");
   }
+  if (!jig_fault_.empty()) {
+    return lane_conflict(fmt::format("the jig stopped: {}", jig_fault_),
+                         "look at the jig; when no hand is in it, say that it is free");
+  }
   const std::string scanned = order.serial.empty() ? scanned_ : order.serial;
   if (auto checked = check_scanned(scanned); !checked) {
     scanned_ = scanned;
@@ -91,6 +95,20 @@ LaneAnswer<void> Lanes::Lane::confirm_side(const std::string& client) {
     return lane_conflict("no side is asked for in this lane", "start a capture first");
   }
   capture_->placed = true;
+  wake_.notify_all();
+  return {};
+}
+
+LaneAnswer<void> Lanes::Lane::release_jig(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  if (auto checked = check_client(client); !checked) {
+    return checked;
+  }
+  if (is_busy() || jig_fault_.empty()) {
+    return lane_conflict(is_busy() ? "a run is under way in this lane" : "the jig is free",
+                         "a jig is released after it was stopped, when no run is under way");
+  }
+  release_jig_ = true;
   wake_.notify_all();
   return {};
 }

@@ -54,6 +54,7 @@ class Lanes::Lane {
   LaneAnswer<void> command(const std::string& client, OperatorCommand command);
   LaneAnswer<void> confirm_side(const std::string& client);
   LaneAnswer<void> scan(const std::string& serial);
+  LaneAnswer<void> release_jig(const std::string& client);
   LaneAnswer<void> take_over(const std::string& client, const std::string& operator_name);
 
   bool holds(const std::string& serial) const {
@@ -117,9 +118,12 @@ class Lanes::Lane {
   UnitOnJig on_jig();
   // Answers with the unit of this serial number, opened anew, and `working` as the lane's state.
   // device_unavailable after the time-out or a stop by the operator; `internal` when the program
-  // ends.
+  // ends. `look` as in JigHooks::reopen; may be empty.
   Result<UnitOnJig> wait_for_unit(const std::stop_token& stop, const std::string& serial,
-                                  const std::string& why, LaneState working);
+                                  const std::string& why, LaneState working,
+                                  const JigHooks::Look& look);
+  // What the jig says, and what the operator said about it.
+  void look_at_jig();
 
   Result<UnitOnJig> wait_to_continue(const std::stop_token& stop, const StartOrder& order,
                                      const char* what, LaneState working);
@@ -198,6 +202,8 @@ class Lanes::Lane {
   device::Identity identity_;
   calib::Calibration approximation_;
   bool turns_by_itself_ = false;
+  std::string jig_fault_;     // why the jig holds still; empty where it is free
+  bool release_jig_ = false;  // the operator says that it is free
   LaneState state_ = LaneState::absent;
   std::string message_;
   std::string scanned_;

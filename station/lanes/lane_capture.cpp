@@ -106,7 +106,7 @@ CaptureHooks Lanes::Lane::capture_hooks(const std::stop_token& stop, UnfinishedC
       capture_->side.reset();
       changed();
     }
-    return wait_for_unit(stop, state.serial, error.what, LaneState::capturing);
+    return wait_for_unit(stop, state.serial, error.what, LaneState::capturing, {});
   };
   return hooks;
 }

@@ -83,6 +83,9 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
     static_cast<void>(folder_.close());  // the next program continues it
     return;
   }
+  if (unit_) {
+    look_at_jig();  // before the next run can be asked for
+  }
   if (!report) {
     return end_without_report(state.serial, report.error());
   }
@@ -149,8 +152,8 @@ JigHooks Lanes::Lane::run_hooks(const std::stop_token& stop, RunSaver& saver) {
     changed();
   };
   hooks.next_command = [this] { return next_command(); };
-  hooks.reopen = [this, &stop, &saver](const Error& error) {
-    return wait_for_unit(stop, saver.state().serial, error.what, LaneState::running);
+  hooks.reopen = [this, &stop, &saver](const Error& error, const JigHooks::Look& look) {
+    return wait_for_unit(stop, saver.state().serial, error.what, LaneState::running, look);
   };
   return hooks;
 }

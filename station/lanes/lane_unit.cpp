@@ -26,6 +26,7 @@ void Lanes::Lane::work(const std::stop_token& stop) {
       pause(stop, shared_.options.retry_s);
       continue;
     }
+    look_at_jig();
     const std::optional<Order> order = next_order();
     if (!order) {
       preview(stop);
@@ -86,6 +87,31 @@ void Lanes::Lane::pause(const std::stop_token& stop, double time_s) {
   const std::size_t commands = commands_.size();
   wake_.wait_for(lock, stop, from_seconds(time_s),
                  [&] { return commands_.size() != commands || order_.has_value(); });
+}
+
+void Lanes::Lane::look_at_jig() {
+  device::Jig* const jig = unit_->jig();
+  if (jig == nullptr || !jig->turns_by_itself()) {
+    return;
+  }
+  bool release = false;
+  {
+    const std::lock_guard lock(mutex_);
+    release = std::exchange(release_jig_, false);
+  }
+  const Status released = release ? jig->release() : Status{};
+  const auto position = jig->position();
+  const std::string fault = position ? position->fault : position.error().brief();
+  const std::lock_guard lock(mutex_);
+  if (release) {
+    add_log(released ? "jig" : "problem",
+            released ? fmt::format("{} says that the jig is free", printable(operator_name_, 60))
+                     : released.error().brief());
+  }
+  if (fault != jig_fault_) {
+    jig_fault_ = fault;
+    changed();
+  }
 }
 
 UnitOnJig Lanes::Lane::on_jig() {
@@ -218,11 +244,18 @@ Result<UnitOnJig> Lanes::Lane::wait_to_continue(const std::stop_token& stop,
                                                printable(order.serial, 40), what));
   }
   return wait_for_unit(stop, order.serial,
-                       fmt::format("the program was started again; the {} goes on", what), working);
+                       fmt::format("the program was started again; the {} goes on", what), working,
+                       {});
 }
 
 Result<UnitOnJig> Lanes::Lane::wait_for_unit(const std::stop_token& stop, const std::string& serial,
-                                             const std::string& why, LaneState working) {
+                                             const std::string& why, LaneState working,
+                                             const JigHooks::Look& look) {
+  // A jig that is part of its unit stays open: it can be stopped while the unit is away.
+  std::unique_ptr<device::Unit> with_jig;
+  if (const std::lock_guard lock(mutex_); unit_ && unit_->jig() != nullptr) {
+    with_jig = std::move(unit_);
+  }
   close_unit();
   const auto deadline = env_.clock.elapsed() + from_seconds(shared_.options.unit_wait_s);
   const std::string asked = fmt::format("plug unit {} in again", printable(serial, 40));
@@ -233,6 +266,9 @@ Result<UnitOnJig> Lanes::Lane::wait_for_unit(const std::stop_token& stop, const 
     add_log("away", why);
   }
   while (!stop.stop_requested()) {
+    if (look) {
+      SIXPOINT_CHECK(look());
+    }
     if (stop_requested()) {
       return fail(ErrorCode::device_unavailable, "stopped by the operator");
     }

@@ -64,6 +64,10 @@ LaneAnswer<void> Lanes::confirm_side(std::size_t number, const std::string& clie
   return lane(number).and_then([&](Lane* chosen) { return chosen->confirm_side(client); });
 }
 
+LaneAnswer<void> Lanes::release_jig(std::size_t number, const std::string& client) {
+  return lane(number).and_then([&](Lane* chosen) { return chosen->release_jig(client); });
+}
+
 LaneAnswer<std::size_t> Lanes::scan(std::size_t number, const std::string& serial) {
   if (number == 0) {
     const auto found = std::find_if(lanes_.begin(), lanes_.end(),

@@ -62,7 +62,12 @@ class Session {
  private:
   Status prepare(const std::optional<JigResume>& resume);
   Status come_back(JigRun& run, const Error& error);
+  Status end_away(JigRun& run, const Error& error);
   Status ask_jig(double now_s);
+  Status look_while_away();
+  Status obey(JigRun& run, OperatorCommand command);
+  // Turns the jig, where a look at it permits that.
+  Status place(Pose pose);
   // The jig's own position against a placement that the unit's readings have judged.
   Status compare_with_jig(const JigAction& action);
   void settle_as_left();
@@ -90,6 +95,9 @@ class Session {
   std::string last_text_;       // text of the machine's last action
   std::optional<double> jig_asked_s_;
   int jig_disagreements_ = 0;
+  // While the unit is away: what the operator said, and what the jig said.
+  std::vector<OperatorCommand> said_while_away_;
+  std::optional<Error> jig_while_away_;
   // Of this stream, already reported to the machine.
   std::uint64_t lost_ = 0;
   std::uint64_t clock_jumps_ = 0;
@@ -169,18 +177,12 @@ Status Session::come_back(JigRun& run, const Error& error) {
   const device::StreamStatistics until_now = unit_->stream_statistics();
   add_losses(before_, until_now);
   for (;;) {
-    const Result<UnitOnJig> again = hooks_.reopen(error);
+    const Result<UnitOnJig> again = hooks_.reopen(error, [this] { return look_while_away(); });
     if (!again) {
       report_.stream = until_now;
       unit_ = nullptr;  // not valid any more
       jig_ = nullptr;
-      if (again.error().code != ErrorCode::device_unavailable) {
-        return fail(again.error());  // the driver ends the run
-      }
-      gone_ = again.error();
-      const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt;
-      return handle(
-          run, command == OperatorCommand::stop ? run.on_operator(*command) : run.on_unit_gone());
+      return end_away(run, again.error());
     }
     unit_ = again->unit;
     jig_ = again->jig;
@@ -199,8 +201,65 @@ Status Session::come_back(JigRun& run, const Error& error) {
     }
   }
   SIXPOINT_CHECK(handle(run, run.on_unit_back(seconds(unit_->clock().elapsed()))));
+  for (const OperatorCommand command : std::exchange(said_while_away_, {})) {
+    SIXPOINT_CHECK(obey(run, command));
+  }
   // After a power cut the jig does not know where the unit lies.
-  return run.open_poses().empty() ? Status{} : jig_->go_to(run.open_poses().front());
+  return run.open_poses().empty() ? Status{} : place(run.open_poses().front());
+}
+
+// The unit did not come back, or the wait was ended.
+Status Session::end_away(JigRun& run, const Error& error) {
+  if (jig_while_away_) {
+    return fail(*jig_while_away_);
+  }
+  if (error.code != ErrorCode::device_unavailable) {
+    return fail(error);  // the driver ends the run
+  }
+  gone_ = error;
+  // A driver that saw the operator's stop itself leaves it in the queue, behind other commands.
+  while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
+    said_while_away_.push_back(*command);
+  }
+  const bool stopped =
+      std::ranges::find(said_while_away_, OperatorCommand::stop) != said_while_away_.end();
+  return handle(run, stopped ? run.on_operator(OperatorCommand::stop) : run.on_unit_gone());
+}
+
+// The motor stops before all else.
+Status Session::obey(JigRun& run, OperatorCommand command) {
+  if (command == OperatorCommand::stop && jig_->turns_by_itself()) {
+    // One that does not answer now is held all the same, and the run ends.
+    static_cast<void>(jig_->stop());
+  }
+  return handle(run, run.on_operator(command));
+}
+
+Status Session::look_while_away() {
+  while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
+    said_while_away_.push_back(*command);
+    if (*command == OperatorCommand::stop) {
+      if (jig_->turns_by_itself()) {
+        static_cast<void>(jig_->stop());
+      }
+      return fail(ErrorCode::device_unavailable, "stopped by the operator");
+    }
+  }
+  if (jig_->turns_by_itself()) {
+    if (const Status free = device::check_jig(*jig_); !free) {
+      jig_while_away_ = free.error();
+      static_cast<void>(jig_->stop());
+      return free;
+    }
+  }
+  return {};
+}
+
+Status Session::place(Pose pose) {
+  if (jig_->turns_by_itself()) {
+    SIXPOINT_CHECK(device::check_jig(*jig_));
+  }
+  return jig_->go_to(pose);
 }
 
 // A fault of the jig ends the run: no placement after it is certain.
@@ -210,19 +269,14 @@ Status Session::ask_jig(double now_s) {
     return {};
   }
   jig_asked_s_ = now_s;
-  SIXPOINT_ASSIGN(const device::JigPosition jig, jig_->position());
-  if (!jig.fault.empty()) {
-    return fail(ErrorCode::device_unavailable,
-                fmt::format("the jig stopped: {}", printable(jig.fault, 120)), jig_->name(),
-                "repair the fault, then begin the run again");
-  }
-  return {};
+  return device::check_jig(*jig_);
 }
 
 Status Session::compare_with_jig(const JigAction& action) {
   if (jig_ == nullptr || !jig_->turns_by_itself()) {
     return {};
   }
+  SIXPOINT_CHECK(device::check_jig(*jig_));  // a stop or a fault spoils this placement
   const bool tilted = action.kind == JigAction::Kind::refused && action.text.starts_with("tilted");
   if (action.kind != JigAction::Kind::accepted && !tilted) {
     return {};
@@ -329,7 +383,7 @@ Status Session::stream(JigRun& run) {
       SIXPOINT_CHECK(take_block(run, **block, now_s));
     }
     while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
-      SIXPOINT_CHECK(handle(run, run.on_operator(*command)));
+      SIXPOINT_CHECK(obey(run, *command));
     }
     SIXPOINT_CHECK(ask_jig(now_s));
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
@@ -350,14 +404,14 @@ Status Session::end_stream(const JigRun& run) {
 
 Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
   // Where the machine asks for two poses at once, the last one counts.
-  std::optional<Pose> place;
+  std::optional<Pose> wanted;
   for (const JigAction& action : actions) {
     if (hooks_.on_action) {
       hooks_.on_action(action);
     }
     switch (action.kind) {
       case JigAction::Kind::place:
-        place = action.pose;
+        wanted = action.pose;
         break;
       case JigAction::Kind::fit: {
         SIXPOINT_ASSIGN(const calib::SixPoseReport first,
@@ -387,7 +441,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
   if (hooks_.progress && !actions.empty()) {
     hooks_.progress(report_, run);
   }
-  return place ? jig_->go_to(*place) : Status{};
+  return wanted ? place(*wanted) : Status{};
 }
 
 Status Session::write_constants(JigRun& run) {

@@ -9,6 +9,11 @@
 // Sets and checks the filter configuration, streams, asks for the poses, computes the constants
 // from six faces and judges them on readings that the fit did not use. On request it writes them
 // into the unit, reads them back and measures two poses again with the constants of the unit.
+//
+// A motorised jig is looked at before and after every placement, four times a second, and while
+// the unit is away; a stop or a fault ends the run. The operator's stop stops the motor before all
+// else. The run never releases a jig (device/jig.h): the operator does, before the next one.
+//
 // Stores nothing: the report has all there is to store. Blocking; one thread a run.
 #pragma once
 
@@ -70,7 +75,11 @@ struct JigHooks {
   std::function<std::optional<OperatorCommand>()> next_command;
   // The unit was unplugged. Waits until it is back and returns it, opened anew, or an error.
   // Where this is empty, the run ends with the error; otherwise with an inconclusive report.
-  std::function<Result<UnitOnJig>(const Error&)> reopen;
+  // `look`: to be called several times a second while it waits, with the jig still open: the
+  // operator may stop the run, and the jig may stop or fail. Where it fails, the wait ends with
+  // its error.
+  using Look = std::function<Status()>;
+  std::function<Result<UnitOnJig>(const Error&, const Look& look)> reopen;
 };
 
 // usage where constants of this filter do not help this unit; device_unavailable when it is

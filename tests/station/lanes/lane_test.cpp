@@ -79,6 +79,38 @@ TEST(Lane, OneRunAtATimeAndNoOtherLabelDuringIt) {
   EXPECT_FALSE(lanes.confirm_side(1, "page-a").has_value()) << "a jig run asks for no side";
 }
 
+// A stop of a motorised jig holds over a replug and over the next start, until a person says that
+// the jig is free.
+TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,jig=auto,pace=20";
+  const auto bench = std::make_shared<mocks::VirtualBench>();
+  Station station({device}, folder.path(), {}, 24, bench);
+  station.start("/api/run");
+  station.wait(1, [&](const Json&) { return bench->motor(device)->movements > 1; });
+  EXPECT_FALSE(station.lanes->release_jig(1, "me").has_value()) << "not while it works";
+  ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+  const Json done = station.wait_state(1, "done");
+  EXPECT_EQ(done["result"]["verdict"], "stopped");
+  EXPECT_EQ(done["jig_fault"], "emergency stop");
+  EXPECT_EQ(station.post("/api/run", Json::object()), 409);
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
+  station.wait_state(1, "absent");
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "plug"}}), 200);
+  station.wait_state(1, "idle");
+  station.wait(1, [](const Json& json) { return json["jig_fault"] == "emergency stop"; });
+  EXPECT_EQ(station.post("/api/run", Json::object()), 409) << "a replug is no word";
+  EXPECT_EQ(bench->motor(device)->movements_after_stop, 0);
+  ASSERT_OK(bench->hands_out(device));
+  ASSERT_EQ(station.post("/api/lanes/1/jig-free", Json::object()), 200);
+  station.wait(1, [](const Json& json) { return json["jig_fault"].is_null(); });
+  ASSERT_EQ(station.post("/api/run", Json::object()), 202);
+  const Json passed = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["verdict"] == "pass";
+  });
+  EXPECT_EQ(bench->motor(device)->movements_after_stop, 0) << passed.dump(1);
+}
+
 // An order names the unit that was scanned: another one is not measured.
 TEST(Lane, AnOrderForAnotherUnitIsRefusedUntilTheRightOneIsScanned) {
   const tests::TemporaryFolder folder;

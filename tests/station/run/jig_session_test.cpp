@@ -180,6 +180,115 @@ TEST(JigSession, AnUnreadablePageIsNoObstacle) {
   EXPECT_FAILS(report, ErrorCode::io);
 }
 
+// The motor of the virtual jig counts movements with hands in it. The hands come with a stop and
+// nobody takes them out here, so after it nothing may move.
+TEST(JigSession, TheOperatorsStopStopsTheMotorFirst) {
+  VirtualBench bench;
+  bool asked = false;
+  bool moved_after = false;
+  JigHooks hooks;
+  hooks.next_command = [&]() -> std::optional<OperatorCommand> {
+    const bool turns = bench.plugged->unit.is_turning(bench.clock->elapsed());
+    if (asked || bench.plugged->motor.movements < 3 || !turns) {
+      return std::nullopt;
+    }
+    asked = true;
+    return OperatorCommand::stop;
+  };
+  hooks.on_action = [&](const JigAction& action) {
+    moved_after = moved_after || (action.kind == JigAction::Kind::finished &&
+                                  bench.plugged->unit.is_turning(bench.clock->elapsed()));
+  };
+  const auto report = run_jig(bench.on_jig(), bench.env.env, {}, hooks);
+  ASSERT_OK(report);
+  EXPECT_TRUE(asked);
+  EXPECT_EQ(report->verdict, JigVerdict::stopped);
+  EXPECT_FALSE(moved_after) << "it stands before the run says so";
+  // The next run finds it held, and does not release it.
+  JigSessionOptions options;
+  options.keep_interrupted = true;
+  const auto next = bench.run(options);
+  ASSERT_OK(next);
+  EXPECT_EQ(next->verdict, JigVerdict::inconclusive);
+  ASSERT_TRUE(next->ended_by);
+  EXPECT_THAT(next->ended_by->what, HasSubstr("emergency stop"));
+  EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0);
+  bench.plugged->motor.hands_out();
+  ASSERT_OK(bench.jig->release());
+  EXPECT_EQ(bench.run()->verdict, JigVerdict::pass);
+}
+
+struct AwayRow {
+  const char* name;
+  bool by_operator;  // else the jig's own button
+  JigVerdict verdict;
+};
+
+// The technician stops the jig, reaches in, reseats the cable: the motor stands still.
+TEST(JigSession, AStopWhileTheUnitIsAwayHoldsWhenItIsBack) {
+  for (const AwayRow& row : {AwayRow{"operator", true, JigVerdict::stopped},
+                             AwayRow{"button", false, JigVerdict::inconclusive}}) {
+    VirtualBench bench;
+    bench.on_action = [&](const JigAction& action) {
+      if (action.kind == JigAction::Kind::accepted) {
+        bench.plugged->unplugged = true;
+      }
+    };
+    JigHooks hooks;
+    hooks.on_action = bench.on_action;
+    std::vector<OperatorCommand> said;
+    hooks.next_command = [&]() -> std::optional<OperatorCommand> {
+      if (said.empty()) {
+        return std::nullopt;
+      }
+      const OperatorCommand first = said.front();
+      said.erase(said.begin());
+      return first;
+    };
+    int looks = 0;
+    hooks.reopen = [&](const Error&, const JigHooks::Look& look) -> Result<UnitOnJig> {
+      EXPECT_OK(look());
+      if (row.by_operator) {
+        said = {OperatorCommand::undo, OperatorCommand::stop};
+      } else {
+        EXPECT_OK(bench.jig->stop());
+      }
+      bench.plugged->unplugged = false;
+      const Status again = look();
+      ++looks;
+      EXPECT_FALSE(again);
+      return fail(again.error());
+    };
+    JigSessionOptions options;
+    options.keep_interrupted = true;
+    const auto report = run_jig(bench.on_jig(), bench.env.env, options, hooks);
+    ASSERT_OK(report);
+    EXPECT_EQ(looks, 1) << row.name;
+    EXPECT_EQ(report->verdict, row.verdict) << row.name << report->brief();
+    EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0) << row.name;
+    EXPECT_TRUE(bench.plugged->motor.stopped) << row.name;
+  }
+}
+
+// A driver that does not look, or a stop between its look and the return of the unit.
+TEST(JigSession, AStoppedJigIsNotMovedWhenTheUnitIsBack) {
+  VirtualBench bench;
+  JigHooks hooks;
+  hooks.on_action = [&](const JigAction& action) {
+    if (action.kind == JigAction::Kind::accepted) {
+      bench.plugged->unplugged = true;
+    }
+  };
+  hooks.reopen = [&](const Error&, const JigHooks::Look&) -> Result<UnitOnJig> {
+    EXPECT_OK(bench.jig->stop());
+    bench.plugged->unplugged = false;
+    bench.unit = *device::WireUnit::open(mocks::link_to(bench.plugged, false));
+    return bench.on_jig();
+  };
+  EXPECT_FAILS(run_jig(bench.on_jig(), bench.env.env, {}, hooks), ErrorCode::device_unavailable);
+  EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0);
+}
+
 // As a program that was killed leaves it.
 TEST(JigSession, AUnitThatWasLeftStreamingIsMeasuredAllTheSame) {
   VirtualBench bench;
