@@ -45,6 +45,7 @@ class Lanes::Lane {
  public:
   Lane(Shared& shared, std::size_t number, std::string device);
   ~Lane();
+  void request_stop();  // waits for nothing
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
@@ -82,6 +83,8 @@ class Lanes::Lane {
   struct Order {
     StartOrder start;
     bool capture = false;
+    std::string serial;  // of the unit that it is for
+    std::chrono::nanoseconds given{0};
   };
   struct LogLine {
     std::uint64_t id;
@@ -108,6 +111,7 @@ class Lanes::Lane {
   // The thread's loop (lane_unit.cpp).
   void work(const std::stop_token& stop);
   void continue_unfinished(const std::stop_token& stop);
+  // The order that waits, where it still holds (order_rule.h).
   std::optional<Order> next_order();
   void pause(const std::stop_token& stop, double time_s);
   bool open_unit();
@@ -132,7 +136,7 @@ class Lanes::Lane {
   void run(const std::stop_token& stop, const StartOrder& order,
            const std::optional<UnfinishedRun>& left);
   UnfinishedRun new_run(const StartOrder& order, calib::FilterConfiguration filter);
-  bool check_start(const std::string& serial, bool is_continued, RetestState& retest);
+  Result<RetestState> check_start(const std::string& serial, bool is_continued);
   JigHooks run_hooks(const std::stop_token& stop, RunSaver& saver);
   void on_action(const JigAction& action);
   void end_without_report(const std::string& serial, const Error& error);
@@ -174,6 +178,8 @@ class Lanes::Lane {
   // Nothing runs, or this client may command it.
   LaneAnswer<void> check_client(const std::string& client) const;
   LaneAnswer<void> check_scanned(const std::string& serial) const;
+  // The unit leaves: an order that waits is dropped.
+  void drop_order(const std::optional<std::string>& present);
   void add_log(std::string kind, std::string text);
   void set_state(LaneState state, std::string message);
   void set_done(nlohmann::ordered_json result, std::string message);
@@ -199,6 +205,8 @@ class Lanes::Lane {
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;
   std::unique_ptr<device::Unit> unit_;  // made and ended by the thread; others may cancel()
+  device::Unit* opening_ = nullptr;     // the same, before it is unit_
+  bool is_unstored_ = false;            // the store did not take the last run yet
   device::Identity identity_;
   calib::Calibration approximation_;
   bool turns_by_itself_ = false;

@@ -32,10 +32,6 @@ void Lanes::Lane::work(const std::stop_token& stop) {
       preview(stop);
       continue;
     }
-    if (is_streaming_) {
-      static_cast<void>(unit_->stop_stream());
-      is_streaming_ = false;
-    }
     if (order->capture) {
       capture(stop, order->start, {});
     } else {
@@ -47,26 +43,48 @@ void Lanes::Lane::work(const std::stop_token& stop) {
 
 // What an earlier program left on the disk.
 void Lanes::Lane::continue_unfinished(const std::stop_token& stop) {
-  const auto set_aside = [this](const Error& error) {
+  const auto say = [this](const Error& error, const Status& moved) {
     const std::lock_guard lock(mutex_);
-    add_log("problem", error.brief());
-    static_cast<void>(folder_.set_aside());
+    add_log("problem", error.brief() + (moved ? "; it is set aside" : ""));
   };
   if (const auto left = folder_.load(); !left) {
-    set_aside(left.error());
+    say(left.error(), folder_.set_aside_run());
   } else if (*left) {
     continue_run(stop, **left);
   }
   if (const auto left = folder_.load_capture(); !left) {
-    set_aside(left.error());
+    say(left.error(), folder_.set_aside_capture());
   } else if (*left && !stop.stop_requested()) {
     continue_capture(stop, **left);
   }
 }
 
-// Takes the order that waits, and prepares what clients are shown for it.
+// Takes the order that waits, and prepares what clients are shown for it. The unit is asked who it
+// is: it may have been exchanged since.
 std::optional<Lanes::Lane::Order> Lanes::Lane::next_order() {
+  bool waits = false;
+  {
+    const std::lock_guard lock(mutex_);
+    waits = order_.has_value();
+  }
+  std::optional<std::string> present;
+  if (waits) {
+    if (is_streaming_) {
+      static_cast<void>(unit_->stop_stream());
+      is_streaming_ = false;
+    }
+    if (const auto identity = unit_->identify()) {
+      present = identity->serial;
+    }
+  }
   const std::lock_guard lock(mutex_);
+  if (waits) {
+    drop_order(present);
+  }
+  if (order_ && is_unstored_) {
+    order_.reset();
+    add_log("problem", "not started: the last run is not stored yet");
+  }
   if (state_ == LaneState::absent) {
     set_state(LaneState::idle, "");
   }
@@ -129,21 +147,28 @@ bool Lanes::Lane::open_unit() {
     if (!is_busy()) {
       set_state(LaneState::absent, opened.error().brief());
     }
+    drop_order({});
     return false;
   }
   std::unique_ptr<device::Unit> unit = *std::move(opened);
+  const auto set_opening = [this](device::Unit* now) {
+    const std::lock_guard lock(mutex_);
+    opening_ = now;
+  };
+  set_opening(unit.get());
   std::optional<StoredConstants> stored;
   if (const auto page = unit->read_calibration()) {
     stored = page->constants;
   }
   const std::lock_guard lock(mutex_);
+  opening_ = nullptr;
   is_streaming_ = false;
   if (unit->identity().serial != identity_.serial) {
-    // Another unit: nothing of the one before stays on the lane.
+    // Another unit: nothing of the one before stays on the lane but what went wrong.
     if (!is_busy()) {
       result_ = nullptr;
       run_.reset();
-      log_.clear();
+      std::erase_if(log_, [](const LogLine& line) { return line.kind != "problem"; });
     }
     readings_.clear();
   }
@@ -161,6 +186,7 @@ void Lanes::Lane::close_unit() {
   const std::lock_guard lock(mutex_);
   unit_.reset();
   live_ = {};
+  drop_order({});
 }
 
 void Lanes::Lane::add_readings(const device::SampleBlock& block, const JigLive* live) {

@@ -11,7 +11,12 @@ namespace sixpoint::station {
 using Json = nlohmann::ordered_json;
 
 Lanes::Lanes() = default;
-Lanes::~Lanes() = default;
+// All lanes at once: sixteen ends one after the other would add up.
+Lanes::~Lanes() {
+  for (const auto& lane : lanes_) {
+    lane->request_stop();
+  }
+}
 
 Result<std::unique_ptr<Lanes>> Lanes::open(Env& env, const device::TransportRegistry& devices,
                                            LanesOptions options, StoreRun store_run,

@@ -48,8 +48,8 @@ struct RunLabels {
 };
 // Puts a run into the store.
 using StoreRun = std::function<Result<RunIds>(const JigReport&, const RunLabels&)>;
-// Before a run: may this unit be measured now, and what do its earlier runs demand? On an error
-// nothing is measured, and the operator reads why. May be empty.
+// Before a run or a capture: may this unit be measured now, and what do its earlier runs demand? On
+// an error nothing is measured, and the operator reads why. May be empty.
 using StartCheck = std::function<Result<RetestState>(const std::string& serial)>;
 // Stores the constants of a calibration file; answers with their id in the store.
 using StoreConstants = std::function<Result<std::string>(const CaptureReport&)>;

@@ -23,10 +23,16 @@ double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
-void add_losses(device::StreamStatistics& to, const device::StreamStatistics& of) {
-  to.lost_samples += of.lost_samples;
-  to.clock_jumps += of.clock_jumps;
-  to.clock_jumped_s += of.clock_jumped_s;
+device::StreamStatistics sum_of(device::StreamStatistics sum, const device::StreamStatistics& of) {
+  sum.samples += of.samples;
+  sum.lost_samples += of.lost_samples;
+  sum.duplicate_reports += of.duplicate_reports;
+  sum.damaged_reports += of.damaged_reports;
+  sum.overflowed_blocks += of.overflowed_blocks;
+  sum.failed_transfers += of.failed_transfers;
+  sum.clock_jumps += of.clock_jumps;
+  sum.clock_jumped_s += of.clock_jumped_s;
+  return sum;
 }
 
 // A returned unit of 2013-14: the firmware knows two configurations for it.
@@ -70,7 +76,9 @@ class Session {
   Status place(Pose pose);
   // The jig's own position against a placement that the unit's readings have judged.
   Status compare_with_jig(const JigAction& action);
-  void settle_as_left();
+  void count_stream();
+  Status begin_stream();
+  device::StreamStatistics whole_stream() const;
   void keep_interrupted(const JigRun& run, const Error& error);
   void keep_rows(std::string_view rows);
   Status stream(JigRun& run);
@@ -90,18 +98,18 @@ class Session {
   JigReport report_;
   Calibration approximation_ = first_approximation(std::nullopt).calibration;
   bool ended_ = false;
-  bool write_unknown_ = false;  // a write was begun, and the page was not read since
-  std::optional<Error> gone_;   // why the unit did not come back
-  std::string last_text_;       // text of the machine's last action
+  std::optional<Error> gone_;  // why the unit did not come back
+  std::string last_text_;      // text of the machine's last action
   std::optional<double> jig_asked_s_;
   int jig_disagreements_ = 0;
   // While the unit is away: what the operator said, and what the jig said.
   std::vector<OperatorCommand> said_while_away_;
   std::optional<Error> jig_while_away_;
+  bool is_streaming_ = false;
   // Of this stream, already reported to the machine.
   std::uint64_t lost_ = 0;
   std::uint64_t clock_jumps_ = 0;
-  device::StreamStatistics before_;  // of the streams before the unit was unplugged
+  device::StreamStatistics before_;  // of the run's earlier streams
 };
 
 Status Session::prepare(const std::optional<JigResume>& resume) {
@@ -134,7 +142,12 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
     if (resume->written && now && now->constants == resume->written->constants) {
       report_.as_left = now;
       report_.written = true;
+    } else if (resume->write_begun || resume->written) {
+      // Read just now: it is known again what the unit holds.
+      report_.as_left = now;
+      report_.write_begun = !now;
     }
+    before_ = resume->stream;
   }
   if (options_.filter == FilterConfiguration::legacy &&
       has_two_filters(report_.serial, report_.as_found)) {
@@ -174,12 +187,10 @@ void Session::keep_raw(const device::SampleBlock& block) {
 // Waits for the unit and goes on with it. Ends the run when it does not come back.
 Status Session::come_back(JigRun& run, const Error& error) {
   // Read now: reopen() may close the unit.
-  const device::StreamStatistics until_now = unit_->stream_statistics();
-  add_losses(before_, until_now);
+  count_stream();
   for (;;) {
     const Result<UnitOnJig> again = hooks_.reopen(error, [this] { return look_while_away(); });
     if (!again) {
-      report_.stream = until_now;
       unit_ = nullptr;  // not valid any more
       jig_ = nullptr;
       return end_away(run, again.error());
@@ -191,7 +202,7 @@ Status Session::come_back(JigRun& run, const Error& error) {
     }
     Status ready = choose_filter(*unit_, options_.filter);
     if (ready) {
-      ready = unit_->start_stream(options_.run.rate_hz);
+      ready = begin_stream();
     }
     if (ready) {
       break;
@@ -303,15 +314,25 @@ Status Session::compare_with_jig(const JigAction& action) {
   return {};
 }
 
-void Session::settle_as_left() {
-  if (write_unknown_) {
-    report_.as_left.reset();
-    report_.reasons.emplace_back(
-        "the unit went away while its constants were written: it holds the old ones or the new "
-        "ones, whole; measure it again to know which");
-  } else if (!report_.as_left) {
-    report_.as_left = report_.as_found;
+// Where a stream ends, its numbers go to the run's.
+void Session::count_stream() {
+  if (is_streaming_) {
+    is_streaming_ = false;
+    before_ = sum_of(before_, unit_->stream_statistics());
   }
+}
+
+Status Session::begin_stream() {
+  count_stream();
+  SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
+  is_streaming_ = true;
+  lost_ = 0;  // a new stream counts from 0
+  clock_jumps_ = 0;
+  return {};
+}
+
+device::StreamStatistics Session::whole_stream() const {
+  return is_streaming_ ? sum_of(before_, unit_->stream_statistics()) : before_;
 }
 
 // The report of what was measured until the error; no verdict on the unit.
@@ -319,10 +340,8 @@ void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
   report_.faces = run.faces();
-  if (unit_ != nullptr) {
-    report_.stream = unit_->stream_statistics();
-  }
-  settle_as_left();
+  report_.stream = whole_stream();
+  report_.settle_as_left();
   report_.verdict = JigVerdict::inconclusive;
   report_.codes = {error.code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted"};
   report_.reasons.push_back(error.what);
@@ -337,7 +356,7 @@ Status Session::take_block(JigRun& run, const device::SampleBlock& block, double
                 report_.serial, "begin the run again");
   }
   const device::StreamStatistics now = unit_->stream_statistics();
-  // A reading does not go across lost samples or a jump of the clock. A new stream counts from 0.
+  // A reading does not go across lost samples or a jump of the clock.
   if (now.lost_samples > std::exchange(lost_, now.lost_samples)) {
     SIXPOINT_CHECK(handle(run, run.on_loss()));
   }
@@ -355,7 +374,7 @@ Status Session::take_block(JigRun& run, const device::SampleBlock& block, double
 }
 
 Status Session::stream(JigRun& run) {
-  SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
+  SIXPOINT_CHECK(begin_stream());
   SIXPOINT_CHECK(handle(run, run.start(seconds(unit_->clock().elapsed()))));
   double last_block_s = seconds(unit_->clock().elapsed());
   while (run.phase() != JigPhase::finished && !ended_) {
@@ -375,7 +394,6 @@ Status Session::stream(JigRun& run) {
         break;
       }
       last_block_s = seconds(unit_->clock().elapsed());
-      lost_ = 0;
       continue;
     }
     if (*block) {
@@ -385,15 +403,17 @@ Status Session::stream(JigRun& run) {
     while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
       SIXPOINT_CHECK(obey(run, *command));
     }
-    SIXPOINT_CHECK(ask_jig(now_s));
+    if (run.phase() !=
+        JigPhase::finished) {  // else the operator's stop would be a fault of the jig
+      SIXPOINT_CHECK(ask_jig(now_s));
+    }
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
   return unit_ == nullptr ? Status{} : end_stream(run);
 }
 
 Status Session::end_stream(const JigRun& run) {
-  report_.stream = unit_->stream_statistics();
-  add_losses(report_.stream, before_);
+  count_stream();
   const Status stopped = unit_->stop_stream();
   // The readings are complete: a unit that is unplugged now is no error.
   const bool may_fail = run.outcome() == JigOutcome::unit_gone ||
@@ -420,6 +440,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
         break;
       }
       case JigAction::Kind::write: {
+        report_.stream = whole_stream();  // judged with the rest
         SIXPOINT_ASSIGN(const bool verified, judge_readings(report_, run));
         if (!verified) {
           ended_ = true;  // constants that failed are not written
@@ -439,17 +460,29 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
     }
   }
   if (hooks_.progress && !actions.empty()) {
+    report_.stream = whole_stream();
     hooks_.progress(report_, run);
   }
   return wanted ? place(*wanted) : Status{};
 }
 
 Status Session::write_constants(JigRun& run) {
+  count_stream();
   static_cast<void>(unit_->stop_stream());  // an unplugged unit gives an error below
   // Today's date: the firmware concludes from it that the constants belong to `current`.
   const device::CalibrationPage page{
       report_.six->best().stored, std::chrono::floor<std::chrono::seconds>(unit_->clock().now())};
-  write_unknown_ = true;
+  report_.write_begun = true;
+  if (hooks_.write_begins) {
+    report_.stream = before_;
+    if (const Status noted = hooks_.write_begins(report_, run); !noted) {
+      report_.write_begun = false;
+      report_.reasons.push_back("not written: that a write begins could not be noted down: " +
+                                noted.error().brief());
+      ended_ = true;
+      return {};
+    }
+  }
   Status written_status = unit_->write_calibration(page);
   // The unit holds the old page or the new one, whole: the write is repeated, once.
   if (!written_status) {
@@ -458,6 +491,7 @@ Status Session::write_constants(JigRun& run) {
       if (run.phase() == JigPhase::finished) {
         return {};
       }
+      count_stream();
       SIXPOINT_CHECK(unit_->stop_stream());
     }
     if (written_status.error().code != ErrorCode::device_unavailable || hooks_.reopen) {
@@ -465,7 +499,7 @@ Status Session::write_constants(JigRun& run) {
     }
   }
   SIXPOINT_ASSIGN(report_.as_left, unit_->read_calibration());
-  write_unknown_ = false;
+  report_.write_begun = false;
   if (!written_status) {
     ended_ = true;
     report_.reasons.push_back(written_status.error().what);
@@ -475,15 +509,16 @@ Status Session::write_constants(JigRun& run) {
   SIXPOINT_ASSIGN(const Calibration written, calib::calibration_from(report_.as_left->constants));
   run.set_approximation(written);
   SIXPOINT_CHECK(choose_filter(*unit_, options_.filter));
-  SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
+  SIXPOINT_CHECK(begin_stream());
   return handle(run, run.on_written(seconds(unit_->clock().elapsed())));
 }
 
 Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
+  report_.stream = whole_stream();
   SIXPOINT_CHECK(judge_readings(report_, run));
-  settle_as_left();
+  report_.settle_as_left();
   if (report_.as_found) {
     if (const auto found = calib::calibration_from(report_.as_found->constants)) {
       report_.as_found_residual_mg = judge(report_.faces, *found, gravity_g_).worst_mg;

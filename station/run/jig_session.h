@@ -59,7 +59,10 @@ struct JigResume {
   UtcTime started{};
   std::optional<device::CalibrationPage> as_found;
   std::optional<device::CalibrationPage> written;  // what the run wrote into the unit, if it did
-  std::string raw_csv;                             // with its headline
+  // A write was begun, and what the unit held after it was not read.
+  bool write_begun = false;
+  device::StreamStatistics stream = {};  // of the run until then
+  std::string raw_csv;                   // with its headline
 };
 
 // Calls of a run to its driver, on the run's own thread; all may be empty.
@@ -71,6 +74,9 @@ struct JigHooks {
   std::function<void(std::string_view rows)> raw;
   // After every action: for a disk, so that the run can be resumed.
   std::function<void(const JigReport&, const JigRun&)> progress;
+  // Before the first byte of a write into the unit: for a disk, so that a later program knows of
+  // the write. Where it fails nothing is written.
+  std::function<Status(const JigReport&, const JigRun&)> write_begins;
   // The operator's next command since the last call; asked after every block.
   std::function<std::optional<OperatorCommand>()> next_command;
   // The unit was unplugged. Waits until it is back and returns it, opened anew, or an error.
