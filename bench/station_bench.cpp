@@ -223,8 +223,9 @@ int run(int units, std::uint64_t first_seed, double askew_deg) {
         last_accepted = std::chrono::steady_clock::now();
       }
     };
-    hooks.reopen = [&](const Error& /*why*/) -> Result<UnitOnJig> {
+    hooks.reopen = [&](const Error& /*why*/, const JigHooks::Look& look) -> Result<UnitOnJig> {
       clock->sleep(std::chrono::seconds(3));
+      SIXPOINT_CHECK(look());
       {
         const std::lock_guard lock(plugged->mutex);
         plugged->unit.cut_power(clock->elapsed());

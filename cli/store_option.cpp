@@ -66,6 +66,10 @@ std::string run_folder_name(const std::string& location, const std::string& who)
   return text_sha256(place_of(location) + "\n" + who).substr(0, 12);
 }
 
+std::string guard_folder(const std::string& location) {
+  return data_folder() + "/station/memory-" + run_folder_name(location, {});
+}
+
 std::string journal_folder(const std::string& location) {
   return data_folder() + "/journal/" + journal_name(location);
 }

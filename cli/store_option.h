@@ -47,6 +47,9 @@ std::string store_file(const std::string& location);
 // Names the folder of a run under way: `who` (a unit, a station) and the store that it goes into.
 std::string run_folder_name(const std::string& location, const std::string& who);
 
+// The folder of the station's own memory (station/records/station_guard.h), one for each store.
+std::string guard_folder(const std::string& location);
+
 // The folder of the journal: it keeps what the store at `location` did not take. One folder per
 // store, in journal/ of data_folder().
 std::string journal_folder(const std::string& location);

@@ -37,5 +37,16 @@ PerAxis<double> direction_of(Pose pose) {
 Status ManualJig::go_to(Pose /*pose*/) { return {}; }
 Result<JigPosition> ManualJig::position() { return JigPosition{std::nullopt, 0, 0.5, {}}; }
 Status ManualJig::stop() { return {}; }
+Status ManualJig::release() { return {}; }
+
+Status check_jig(Jig& jig) {
+  SIXPOINT_ASSIGN(const JigPosition position, jig.position());
+  if (!position.fault.empty()) {
+    return fail(ErrorCode::device_unavailable,
+                fmt::format("the jig stopped: {}", printable(position.fault, 120)), jig.name(),
+                "look at the jig, repair a fault, and say that the jig is free (--jig-is-free)");
+  }
+  return {};
+}
 
 }  // namespace sixpoint::device

@@ -1,11 +1,20 @@
 // A jig turns a unit into its six poses: a person, a motor, or a program.
 //
 //   Status turn_up(Jig& jig) {
-//     SIXPOINT_CHECK(jig.go_to(Pose::plus_z));
-//     SIXPOINT_ASSIGN(const JigPosition position, jig.position());
-//     if (!position.fault.empty()) return fail(ErrorCode::io, position.fault, jig.name());
-//     return {};
+//     SIXPOINT_CHECK(check_jig(jig));  // neither stopped nor faulty
+//     return jig.go_to(Pose::plus_z);
 //   }
+//
+// A stop is a latch. The order in which a jig may move again:
+//
+//     what happened                    go_to() answers                     until
+//     stop(), or the jig's own button  device_unavailable, nothing moves   release()
+//     a fault of the jig               device_unavailable, nothing moves   the fault is gone, and
+//                                                                          release()
+//     the unit or the jig was unplugged and is back: as before; that is no word of the operator
+//
+// No program calls release() by itself: it is the operator's word that he saw the jig and that no
+// hand is in it.
 //
 // A pose is named by the axis that points up and reads +1 g, or that points down and reads -1 g.
 // Angles are in degrees. Errors: device_unavailable when the jig is gone or faulty.
@@ -51,8 +60,13 @@ class Jig {
   // Begins to turn. The unit is in its pose some time later: watch the unit's own readings.
   virtual Status go_to(Pose pose) = 0;
   virtual Result<JigPosition> position() = 0;
-  virtual Status stop() = 0;  // emergency stop: no movement until the next go_to()
+  virtual Status stop() = 0;  // emergency stop: no movement until release()
+  // The operator saw the jig and says that it is free. device_unavailable while its fault stays.
+  virtual Status release() = 0;
 };
+
+// device_unavailable, with the reason, where the jig is stopped, faulty or silent.
+Status check_jig(Jig& jig);
 
 // A person turns the unit. go_to() does nothing: the station shows the prompt.
 class ManualJig final : public Jig {
@@ -62,6 +76,7 @@ class ManualJig final : public Jig {
   Status go_to(Pose pose) override;
   Result<JigPosition> position() override;
   Status stop() override;
+  Status release() override;
 };
 
 }  // namespace sixpoint::device

@@ -48,8 +48,11 @@ class Unit {
   virtual Result<Identity> identify() = 0;
   // After device_unavailable: waits for the same unit at the same address and opens it again. The
   // content of its RAM (stream, filter) may be lost. device_unavailable when it did not come within
-  // `patience`, or another unit came.
-  virtual Status reconnect(std::chrono::nanoseconds patience) = 0;
+  // `patience`, or another unit came. `look` is called between two attempts, where it is not empty;
+  // its error ends the wait.
+  virtual Status reconnect(std::chrono::nanoseconds patience,
+                           const std::function<Status()>& look) = 0;
+  Status reconnect(std::chrono::nanoseconds patience) { return reconnect(patience, {}); }
 
   // The functions below fail with `usage` where a unit does not have them (abilities()).
   virtual Result<CalibrationPage> read_calibration();

@@ -43,19 +43,19 @@ Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& 
   return own.get();
 }
 
-std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
-    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> report,
-    std::chrono::seconds patience) {
+UnitWait wait_for_unit(device::Unit& unit, device::Jig& jig,
+                       std::function<void(const std::string&)> report,
+                       std::chrono::seconds patience) {
   static constexpr int kMostReturns = 5;
-  return [&unit, &jig, report = std::move(report), patience,
-          returns = 0](const Error& gone) mutable -> Result<UnitOnJig> {
+  return [&unit, &jig, report = std::move(report), patience, returns = 0](
+             const Error& gone, const JigHooks::Look& look) mutable -> Result<UnitOnJig> {
     if (++returns > kMostReturns) {
       return fail(ErrorCode::device_unavailable,
                   fmt::format("the unit went away {} times", returns), gone.where,
                   "check its cable and battery, then begin again");
     }
     report(fmt::format("{}: waiting {} s for it to come back", gone.what, patience.count()));
-    SIXPOINT_CHECK(unit.reconnect(patience));
+    SIXPOINT_CHECK(unit.reconnect(patience, look));
     report("it is back; the run goes on");
     return UnitOnJig{&unit, &jig};
   };

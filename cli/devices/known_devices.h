@@ -39,9 +39,10 @@ Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& 
 // `report`. Gives up after `patience`, when another unit is plugged in, and at the sixth time.
 // `unit` and `jig` must live longer than the result.
 inline constexpr std::chrono::seconds kReturnPatience{30};  // time to plug a cable in again
-std::function<Result<UnitOnJig>(const Error&)> wait_for_unit(
-    device::Unit& unit, device::Jig& jig, std::function<void(const std::string&)> report,
-    std::chrono::seconds patience = kReturnPatience);
+using UnitWait = std::function<Result<UnitOnJig>(const Error&, const JigHooks::Look&)>;
+UnitWait wait_for_unit(device::Unit& unit, device::Jig& jig,
+                       std::function<void(const std::string&)> report,
+                       std::chrono::seconds patience = kReturnPatience);
 
 // The address of a virtual unit with the jig that was named:
 //

@@ -9,6 +9,7 @@
 #include "cli/station/record_option.h"
 #include "cli/store_option.h"
 #include "station/capture/capture_run.h"
+#include "station/records/station_guard.h"
 
 namespace sixpoint::cli {
 
@@ -17,6 +18,8 @@ namespace {
 struct Options : JigOptions {
   std::string output;
   std::string constants_out;
+  std::string station;
+  std::string limits;
   int rate_hz = 30;
   double side_s = 40;
   double turn_s = 5;
@@ -66,6 +69,7 @@ station::SideAnswer ask_side(Context& context, double side_s, bool by_itself, de
 Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
                      device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.input(options.limits));
   SIXPOINT_CHECK(outputs.file("--constants-out", options.constants_out));
   SIXPOINT_CHECK(outputs.file_to_keep("--output", options.output));
   SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, outputs, recorder));
@@ -77,6 +81,11 @@ Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
   Env env = outputs.env();
   context.people << fmt::format("unit {} with firmware {}\n", printable(unit.identity().serial),
                                 printable(unit.identity().firmware));
+  // The lock of the station and the limit on failures hold for every way to constants.
+  auto store = open_store(context, options.store);
+  SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
+  SIXPOINT_CHECK(station::StationGuard(context.env, guard_folder(options.store), limits)
+                     .may_start(store, unit.identity().serial, options.station));
   Done done;
   if (unit.abilities().records_on_command) {
     station::CaptureHooks hooks;
@@ -178,6 +187,8 @@ void add_capture(CLI::App& app, Context& context) {
                      "the .gt3x to make (default: SERIAL-calibration-DAY.gt3x)");
   command.add_option("--constants-out", options.constants_out,
                      "also write the constants into this constants.json");
+  command.add_option("--station", options.station, "where it is recorded: its lock holds here too");
+  command.add_option("--limits", options.limits, "limits with the rules of check units (TOML)");
   refuse_old_output(command, "--constants", "--constants-out");
   const auto add_number = [&command = command](const char* name, auto& value, auto least, auto most,
                                                const char* about) {

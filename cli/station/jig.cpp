@@ -18,6 +18,7 @@
 #include "station/certificate/certificate.h"
 #include "station/lanes/run_folder.h"
 #include "station/records/run_records.h"
+#include "station/records/station_guard.h"
 #include "station/records/station_records.h"
 #include "station/run/jig_session.h"
 
@@ -210,23 +211,20 @@ Result<station::JigSessionOptions> session_options(Context& context, const Optio
   return session;
 }
 
-// What the unit's earlier runs demand of this one. A store that does not answer stops no run.
+// What the unit's earlier runs demand of this one. Where the store does not answer, the station
+// remembers what it said last.
 Result<station::RetestState> retest_state(Context& context, const Options& options,
-                                          const std::string& serial, const station::Limits& limits,
+                                          const std::string& serial, station::StationGuard& guard,
                                           Result<db::Store>& store) {
-  if (store && !options.study.empty()) {
+  if (!options.study.empty()) {
     return station::RetestState{};
   }
-  if (store) {
-    auto allowed = station::may_start(*store, serial, options.station, limits);
-    if (allowed || allowed.error().code == ErrorCode::configuration) {
-      return allowed;
-    }
+  if (!store) {
+    context.log().warn(
+        "the store does not answer: whether the station is locked and how often the unit failed "
+        "is taken from this station's memory");
   }
-  context.log().warn(
-      "the store does not answer: whether the station is locked and how often the "
-      "unit failed is not known");
-  return station::RetestState{};
+  return guard.may_start(store, serial, options.station);
 }
 
 void show(Context& context, const station::JigAction& action) {
@@ -280,6 +278,9 @@ Result<station::JigReport> run_and_store(
     hooks.progress = [&saver](const station::JigReport& report, const station::JigRun& run) {
       saver.save(report, run);
     };
+    hooks.write_begins = [&saver](const station::JigReport& report, const station::JigRun& run) {
+      return saver.save_now(report, run);
+    };
   }
   if (left) {
     const station::JigProgress& had = left->progress;
@@ -317,8 +318,8 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
   if (!store && store.error().code == ErrorCode::usage) {
     return fail(store.error());
   }
-  SIXPOINT_ASSIGN(session.retest,
-                  retest_state(context, options, identity.serial, session.limits, store));
+  station::StationGuard guard(context.env, guard_folder(options.store), session.limits);
+  SIXPOINT_ASSIGN(session.retest, retest_state(context, options, identity.serial, guard, store));
   SIXPOINT_ASSIGN(auto record, record_before(context, options, session, identity.serial,
                                              opened.jig->name(), store));
   Done done;
@@ -336,6 +337,11 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
     return done.kept ? Status{} : fail(done.kept.error());
   };
   SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, store_run));
+  if (options.study.empty()) {
+    if (const Status noted = guard.note_verdict(identity.serial, done.report.verdict); !noted) {
+      context.log().warn("{}", noted.error().brief());
+    }
+  }
   if (done.kept) {
     if (done.kept->in_store() && store) {
       SIXPOINT_ASSIGN(record.head, store->head_of_run(record.id));

@@ -14,6 +14,8 @@ void add_jig_options(CLI::App& command, JigOptions& options) {
       ->required();
   command.add_option("--jig", options.jig,
                      "manual (a person turns the unit), virtual, or hid:SERIAL (a motorised jig)");
+  command.add_flag("--jig-is-free", options.jig_is_free,
+                   "a motorised jig was stopped: I looked, no hand is in it, it may turn again");
   add_store_option(command, options.store);
   add_record_option(command, options.record);
   add_output_options(command, options.outputs);
@@ -29,6 +31,12 @@ Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Output
                                    [&recorder](device::Link& link) { recorder.attach(link); }));
   SIXPOINT_ASSIGN(opened.jig,
                   station::choose_jig(options.jig, *opened.unit, context.env, opened.own_jig));
+  if (opened.jig->turns_by_itself()) {
+    if (options.jig_is_free) {
+      SIXPOINT_CHECK(opened.jig->release());
+    }
+    SIXPOINT_CHECK(device::check_jig(*opened.jig));
+  }
   return opened;
 }
 

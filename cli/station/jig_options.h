@@ -30,9 +30,10 @@ struct JigOptions {
   std::string store;
   GravityOptions gravity;
   OutputOptions outputs;
+  bool jig_is_free = false;
   bool json = false;
 };
-// --device, --jig, --store, --record, --force, and those of gravity
+// --device, --jig, --jig-is-free, --store, --record, --force, and those of gravity
 void add_jig_options(CLI::App& command, JigOptions& options);
 
 struct JiggedUnit {
@@ -41,7 +42,8 @@ struct JiggedUnit {
   device::Jig* jig = nullptr;
   station::UnitOnJig on_jig() const { return {unit.get(), jig}; }
 };
-// Begins the session that `--record` names, and opens unit and jig.
+// Begins the session that `--record` names, and opens unit and jig. device_unavailable where a
+// motorised jig is stopped or faulty; with --jig-is-free, the operator's word, it is released.
 Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Outputs& outputs,
                              device::SessionRecorder& recorder);
 

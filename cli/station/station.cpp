@@ -20,6 +20,7 @@
 #include "station/page/server.h"
 #include "station/records/run_records.h"
 #include "station/records/software.h"
+#include "station/records/station_guard.h"
 #include "station/records/station_records.h"
 
 namespace sixpoint::cli {
@@ -56,7 +57,10 @@ std::string state_folder(const Options& options) {
 class StationStore {
  public:
   StationStore(Context& context, const Options& options, const station::JigSessionOptions& session)
-      : context_(context), options_(options), session_(session) {}
+      : context_(context),
+        options_(options),
+        session_(session),
+        guard_(context.env, guard_folder(options.store), session.limits) {}
 
   Result<db::Store> open() {
     const std::lock_guard lock(mutex_);
@@ -64,10 +68,10 @@ class StationStore {
   }
   Result<station::RetestState> may_start(const std::string& serial) {
     const std::lock_guard lock(mutex_);
+    // A store that does not answer is no reason not to measure: keep_records() has a journal, and
+    // the station remembers its lock.
     auto store = open_store(context_, options_.store);
-    // A store that does not answer is no reason not to measure: keep_records() has a journal.
-    return store ? station::may_start(*store, serial, options_.station, session_.limits)
-                 : Result<station::RetestState>(station::RetestState{});
+    return guard_.may_start(store, serial, options_.station);
   }
   Result<station::RunIds> add_run(const station::JigReport& report,
                                   const station::RunLabels& labels);
@@ -84,6 +88,7 @@ class StationStore {
   Context& context_;
   const Options& options_;
   const station::JigSessionOptions session_;
+  station::StationGuard guard_;
   std::mutex mutex_;
 };
 
@@ -102,6 +107,9 @@ Result<station::RunIds> StationStore::add_run(const station::JigReport& report,
         SIXPOINT_ASSIGN(stored, station::add_run_records(writer, report, run));
         return {};
       }));
+  if (const Status noted = guard_.note_verdict(report.serial, report.verdict); !noted) {
+    context_.log().warn("{}", noted.error().brief());
+  }
   return stored;
 }
 

@@ -103,7 +103,8 @@ Result<Identity> DriveUnit::identify() {
   return identity;
 }
 
-Status DriveUnit::reconnect(std::chrono::nanoseconds patience) {
+Status DriveUnit::reconnect(std::chrono::nanoseconds patience,
+                            const std::function<Status()>& look) {
   const auto deadline = env_.clock.elapsed() + patience;
   for (;;) {
     const auto identity = identify();
@@ -113,6 +114,9 @@ Status DriveUnit::reconnect(std::chrono::nanoseconds patience) {
     if (env_.clock.elapsed() >= deadline) {
       return fail(ErrorCode::device_unavailable, "the unit's folder did not come back", address_,
                   "mount it again");
+    }
+    if (look) {
+      SIXPOINT_CHECK(look());
     }
     env_.clock.sleep(std::chrono::milliseconds(200));
   }

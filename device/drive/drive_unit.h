@@ -21,7 +21,8 @@ class DriveUnit final : public Unit {
   Clock& clock() override { return env_.clock; }
   const std::string& address() const override { return address_; }
   Result<Identity> identify() override;
-  Status reconnect(std::chrono::nanoseconds patience) override;
+  using Unit::reconnect;
+  Status reconnect(std::chrono::nanoseconds patience, const std::function<Status()>& look) override;
 
   // The one recording; bytes and hash are those of its log.bin.
   Result<std::vector<RecordingInfo>> recordings() override;

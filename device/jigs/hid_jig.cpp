@@ -146,35 +146,65 @@ Result<Bytes> HidJig::ask_locked(JigCommand command, Bytes payload, bool urgent)
 
 Status HidJig::go_to(Pose pose) {
   const std::lock_guard lock(mutex_);
-  // Ends an emergency stop; a fault stays until a person has seen to it.
-  SIXPOINT_CHECK(ask_locked(JigCommand::clear, {}, false));
+  SIXPOINT_CHECK(look_locked());
+  if (held_) {
+    return fail(ErrorCode::device_unavailable, fmt::format("the jig stopped: {}", held_by_),
+                link_.address, "look at the jig; when no hand is in it, say that it is free");
+  }
   SIXPOINT_CHECK(ask_locked(JigCommand::go_to, payload_of(static_cast<std::uint8_t>(pose)), false));
   return {};
 }
 
-Result<JigPosition> HidJig::position() {
-  SIXPOINT_ASSIGN(const Bytes payload, ask(JigCommand::state));
+Result<JigState> HidJig::look_locked() {
+  SIXPOINT_ASSIGN(const Bytes payload, ask_locked(JigCommand::state, {}, false));
   SIXPOINT_ASSIGN(const JigState state, decode_jig_state(payload));
+  if (state.motion == JigMotion::fault) {
+    held_by_ = to_string(state.fault);
+    held_ = true;
+  } else if (state.motion == JigMotion::stopped) {
+    held_by_ = "emergency stop";
+    held_ = true;
+  }
+  return state;
+}
+
+Result<JigPosition> HidJig::position() {
+  const std::lock_guard lock(mutex_);
+  SIXPOINT_ASSIGN(const JigState state, look_locked());
   JigPosition position;
   if (state.motion == JigMotion::standing) {
     position.pose = state.pose;
   }
   position.angle_off_deg = state.angle_off_deg;
   position.angle_uncertainty_deg = state.uncertainty_deg;
-  if (state.motion == JigMotion::fault) {
-    position.fault = to_string(state.fault);
-  } else if (state.motion == JigMotion::stopped) {
-    position.fault = "emergency stop";
+  if (held_) {
+    position.fault = held_by_;
   }
   return position;
 }
 
 Status HidJig::stop() {
   ++stopping_;
+  held_ = true;  // also where the jig does not answer
   const std::lock_guard lock(mutex_);
   const auto answer = ask_locked(JigCommand::stop, {}, true);
+  held_ = true;
   --stopping_;
   SIXPOINT_CHECK(answer);
+  return {};
+}
+
+Status HidJig::release() {
+  const std::lock_guard lock(mutex_);
+  SIXPOINT_CHECK(ask_locked(JigCommand::clear, {}, false));
+  SIXPOINT_ASSIGN(const JigState state, look_locked());
+  if (state.motion == JigMotion::fault || state.motion == JigMotion::stopped) {
+    return fail(ErrorCode::device_unavailable, fmt::format("the jig is not free yet: {}", held_by_),
+                link_.address,
+                "repair the fault, switch the jig off and on, then say again that it is free");
+  }
+  held_ = false;
+  held_by_ = "emergency stop";
   return {};
 }
 

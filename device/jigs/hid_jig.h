@@ -69,6 +69,8 @@ class HidJig final : public Jig {
   Result<JigPosition> position() override;
   // From any thread; a request that is under way in another ends with device_unavailable.
   Status stop() override;
+  // Clears the jig's stop, then looks whether it is free.
+  Status release() override;
 
  private:
   HidJig(Link link, HidJigOptions options) : link_(std::move(link)), options_(options) {}
@@ -76,12 +78,17 @@ class HidJig final : public Jig {
   Result<Bytes> ask(JigCommand command, Bytes payload = {});
   // The caller holds the mutex. An urgent request does not end by stop().
   Result<Bytes> ask_locked(JigCommand command, Bytes payload, bool urgent);
+  // Its state; a stop or a fault that it shows is held until release(). The caller holds the mutex.
+  Result<JigState> look_locked();
 
   Link link_;
   HidJigOptions options_;
   JigIdentity identity_;
   std::mutex mutex_;
   std::atomic<int> stopping_ = 0;
+  // Stopped or faulty, and not released since: also where the jig itself forgot it, without power.
+  std::atomic<bool> held_ = false;
+  std::string held_by_ = "emergency stop";
   std::uint16_t sequence_ = 0;
 };
 

@@ -234,9 +234,10 @@ class Collector {
     }
     start_ = start_.value_or(packet.time);
     // Completions of several processors may stand a little out of order.
-    transfer->time =
-        std::max(packet.time - *start_,
-                 session_.transfers.empty() ? nanoseconds::zero() : session_.transfers.back().time);
+    transfer->time = std::clamp(
+        packet.time - *start_,
+        session_.transfers.empty() ? nanoseconds::zero() : session_.transfers.back().time,
+        kLongestSession);
     session_.transfers.push_back(std::move(*transfer));
   }
 

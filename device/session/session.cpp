@@ -84,6 +84,9 @@ Result<SessionTransfer> parse_line(std::string_view line, const std::string& whe
     return broken("a transfer without its time", where);
   }
   transfer.time = std::chrono::nanoseconds(time->get<std::int64_t>());
+  if (transfer.time > kLongestSession) {
+    return broken("a transfer more than 30 days after the start", where);
+  }
   const std::string kind = text("kind");
   if (kind == "out") {
     transfer.kind = SessionTransfer::Kind::to_device;

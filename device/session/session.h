@@ -24,6 +24,9 @@ namespace sixpoint::device {
 
 enum class SessionChannel : std::uint8_t { reports, bulk };
 
+// A transfer's time is at most this: sums of two such times cannot overflow.
+inline constexpr std::chrono::nanoseconds kLongestSession = std::chrono::hours(24 * 30);
+
 struct SessionTransfer {
   enum class Kind : std::uint8_t {
     to_device,    // a write

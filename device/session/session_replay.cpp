@@ -326,6 +326,7 @@ class ReplayedJig final : public Jig {
   Status go_to(Pose /*pose*/) override { return {}; }
   Result<JigPosition> position() override { return JigPosition{}; }
   Status stop() override { return {}; }
+  Status release() override { return {}; }
 };
 
 Link link_to(const std::shared_ptr<Player>& player, bool with_bulk) {

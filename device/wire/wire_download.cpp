@@ -77,8 +77,14 @@ Status WireUnit::download(const RecordingInfo& recording, FileSystem& files,
   const std::string before = part + ".before";
 
   // The part of an earlier call is renamed and copied, so that a loss of power now loses nothing.
-  if (files.info(part)) {
-    SIXPOINT_CHECK(files.rename(part, before));
+  // Where that happened in mid-copy both are there, and the longer one is the one to go on from.
+  if (const auto kept = files.info(part); kept) {
+    const auto older = files.info(before);
+    if (older && older->size > kept->size) {
+      SIXPOINT_CHECK(files.remove(part));
+    } else {
+      SIXPOINT_CHECK(files.rename(part, before));
+    }
   }
   SIXPOINT_ASSIGN(auto file, files.create(part));
   Sha256 hash;

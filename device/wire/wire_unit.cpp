@@ -69,7 +69,7 @@ Status WireUnit::introduce(const std::string& expected) {
   return {};
 }
 
-Status WireUnit::reconnect(nanoseconds patience) {
+Status WireUnit::reconnect(nanoseconds patience, const std::function<Status()>& look) {
   const nanoseconds deadline = link_.clock->elapsed() + patience;
   const std::string serial = identity_.serial;
   streaming_ = false;
@@ -82,6 +82,9 @@ Status WireUnit::reconnect(nanoseconds patience) {
                   fmt::format("the unit {} went away and did not come back within {:.0f} s", serial,
                               std::chrono::duration<double>(patience).count()),
                   link_.address, hint);
+    }
+    if (look) {
+      SIXPOINT_CHECK(look());
     }
     link_.clock->sleep(options_.reopen_interval);
     Result<Link> again = link_.reopen();

@@ -47,7 +47,8 @@ class WireUnit final : public Unit {
   Jig* jig() override { return link_.jig.get(); }
   const std::string& address() const override { return link_.address; }
   Result<Identity> identify() override;
-  Status reconnect(std::chrono::nanoseconds patience) override;
+  using Unit::reconnect;
+  Status reconnect(std::chrono::nanoseconds patience, const std::function<Status()>& look) override;
 
   Result<CalibrationPage> read_calibration() override;
   Status write_calibration(const CalibrationPage& page) override;

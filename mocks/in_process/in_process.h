@@ -16,6 +16,23 @@
 
 namespace sixpoint::mocks {
 
+// The motor of the jig that turns a virtual unit. It outlives every link to the jig.
+struct JigMotor {
+  bool stopped = false;  // until released
+  int movements = 0;
+  // After a stop there are hands in the jig, until the test that stands for the operator calls
+  // hands_out(). No message to the jig does that.
+  bool hands_in = false;
+  int movements_after_stop = 0;  // with hands in the jig: must stay 0
+
+  void begin_movement() {
+    ++movements;
+    movements_after_stop += hands_in ? 1 : 0;
+  }
+  void stop() { stopped = hands_in = true; }
+  void hands_out() { hands_in = false; }
+};
+
 // A virtual unit that is plugged in: shared by its two channels and its jig.
 struct PluggedUnit {
   PluggedUnit(VirtualUnitOptions options, std::shared_ptr<Clock> link_clock)
@@ -29,6 +46,7 @@ struct PluggedUnit {
   std::mutex mutex;  // guards what follows
   VirtualUnit unit;
   FaultInjector faults;
+  JigMotor motor;
   bool unplugged = false;  // every transfer answers device_unavailable
   bool cancelled = false;
 };

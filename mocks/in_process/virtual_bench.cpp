@@ -130,6 +130,19 @@ Status VirtualBench::set_plugged(const std::string& device, bool plugged_in) {
   return {};
 }
 
+Result<JigMotor> VirtualBench::motor(const std::string& device) const {
+  SIXPOINT_ASSIGN(const auto plugged, unit_of(device));
+  const std::lock_guard lock(plugged->mutex);
+  return plugged->motor;
+}
+
+Status VirtualBench::hands_out(const std::string& device) {
+  SIXPOINT_ASSIGN(const auto plugged, unit_of(device));
+  const std::lock_guard lock(plugged->mutex);
+  plugged->motor.hands_out();
+  return {};
+}
+
 Status VirtualBench::swap(const std::string& device, std::uint64_t seed,
                           const std::string& serial) {
   SIXPOINT_ASSIGN(const auto old, unit_of(device));

@@ -37,6 +37,9 @@ class VirtualBench {
   // Pulls it out and plugs another in, which has this seed and serial number.
   Status swap(const std::string& device, std::uint64_t seed, const std::string& serial);
   bool has(const std::string& device) const;
+  // The motor of its jig, and the operator who takes his hands out of it after a stop.
+  Result<JigMotor> motor(const std::string& device) const;
+  Status hands_out(const std::string& device);
 
  private:
   struct Place;

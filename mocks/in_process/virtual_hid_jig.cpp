@@ -52,6 +52,8 @@ bool read_setting(std::string_view key, std::string_view value, VirtualHidJigOpt
   return (key == "fault" && read_fault(value, options.fault)) ||
          (key == "fault_at" && read_number(value, 1, 1000, options.fault_at)) ||
          (key == "wrong_pose_at" && read_number(value, 1, 1000, options.wrong_pose_at)) ||
+         (key == "stop_at" && read_number(value, 1, 1000, options.stop_at)) ||
+         (key == "stopped" && (options.stopped = value == "1")) ||
          (key == "lie_deg" && read_number(value, 0.0, 90.0, options.lie_deg)) ||
          (key == "uncertainty_deg" && read_number(value, 0.0, 60.0, options.uncertainty_deg));
 }
@@ -104,7 +106,19 @@ Result<VirtualHidJigOptions> parse_virtual_hid_jig(std::string_view text) {
 }
 
 VirtualHidJig::VirtualHidJig(VirtualHidJigOptions options, VirtualJig* physics)
-    : options_(std::move(options)), physics_(physics) {}
+    : options_(std::move(options)), physics_(physics) {
+  if (options_.stopped) {
+    press_stop();
+  }
+}
+
+void VirtualHidJig::press_stop() {
+  if (physics_ != nullptr) {
+    static_cast<void>(physics_->stop());
+  }
+  motion_ = motion_ == JigMotion::fault ? JigMotion::fault : JigMotion::stopped;
+  pose_.reset();
+}
 
 device::JigState VirtualHidJig::state(nanoseconds now) {
   if (motion_ == JigMotion::turning) {
@@ -142,6 +156,9 @@ ReplyCode VirtualHidJig::turn_to(device::Pose pose, nanoseconds now) {
     physics_->tilt_next(options_.lie_deg);
     static_cast<void>(physics_->go_to(really));
   }
+  if (turns_ == options_.stop_at) {
+    press_stop();
+  }
   return ReplyCode::ok;
 }
 
@@ -169,13 +186,12 @@ device::Message VirtualHidJig::answer(const device::Message& request, nanosecond
       reply.payload = device::encode_jig_state(state(now));
       return reply;
     case JigCommand::stop:
-      if (physics_ != nullptr) {
-        static_cast<void>(physics_->stop());
-      }
-      motion_ = motion_ == JigMotion::fault ? JigMotion::fault : JigMotion::stopped;
-      pose_.reset();
+      press_stop();
       return reply;
     case JigCommand::clear:
+      if (physics_ != nullptr && motion_ == JigMotion::stopped) {
+        static_cast<void>(physics_->release());
+      }
       motion_ = motion_ == JigMotion::stopped ? JigMotion::unknown : motion_;
       return reply;
   }

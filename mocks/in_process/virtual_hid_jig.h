@@ -9,7 +9,8 @@
 // "virtual:SETTING,...":
 //   serial, fault (a code of the page, such as obstructed), fault_at (the turn at which it comes,
 //   from 1; 3), lie_deg (it ends so far off and does not report it), wrong_pose_at (at this turn it
-//   goes to another pose and reports the one that was asked for), uncertainty_deg.
+//   goes to another pose and reports the one that was asked for), uncertainty_deg, stop_at (at this
+//   turn somebody presses its red button), stopped (1: the button was pressed before).
 #pragma once
 
 #include <memory>
@@ -28,6 +29,8 @@ struct VirtualHidJigOptions {
   double lie_deg = 0;
   int wrong_pose_at = 0;
   double uncertainty_deg = 0.05;
+  int stop_at = 0;
+  bool stopped = false;
 };
 Result<VirtualHidJigOptions> parse_virtual_hid_jig(std::string_view text);  // usage
 
@@ -39,6 +42,7 @@ class VirtualHidJig {
   void take_report(std::span<const std::uint8_t> report, std::chrono::nanoseconds now);
   std::optional<device::Report> next_report();
   device::JigState state(std::chrono::nanoseconds now);
+  void press_stop();  // its red button
 
  private:
   device::Message answer(const device::Message& request, std::chrono::nanoseconds now);

@@ -13,6 +13,11 @@ constexpr double kTurn_s = 1.5;
 Status VirtualJig::go_to(device::Pose pose) {
   const auto up = device::direction_of(pose);
   const std::lock_guard lock(plugged_->mutex);
+  if (plugged_->motor.stopped) {
+    return fail(ErrorCode::device_unavailable, "the jig stopped: emergency stop", name(),
+                "look at the jig; when no hand is in it, say that it is free");
+  }
+  plugged_->motor.begin_movement();
   plugged_->unit.turn_to({up[0], up[1], up[2]}, plugged_->clock->elapsed(), kTurn_s,
                          std::exchange(tilt_next_deg_, 0.0));
   pose_ = pose;
@@ -26,6 +31,9 @@ Result<device::JigPosition> VirtualJig::position() {
   if (!plugged_->unit.is_turning(plugged_->clock->elapsed())) {
     position.pose = pose_;
   }
+  if (plugged_->motor.stopped) {
+    position.fault = "emergency stop";
+  }
   return position;
 }
 
@@ -36,6 +44,13 @@ Status VirtualJig::stop() {
     plugged_->unit.stop_turning(now);
     pose_.reset();  // somewhere in between
   }
+  plugged_->motor.stop();
+  return {};
+}
+
+Status VirtualJig::release() {
+  const std::lock_guard lock(plugged_->mutex);
+  plugged_->motor.stopped = false;
   return {};
 }
 

@@ -21,6 +21,7 @@ class VirtualJig final : public device::Jig {
   Status go_to(device::Pose pose) override;
   Result<device::JigPosition> position() override;
   Status stop() override;
+  Status release() override;
 
   // The next placement ends this far off, in a random direction.
   void tilt_next(double tilt_deg) { tilt_next_deg_ = tilt_deg; }

@@ -37,6 +37,11 @@ Status InertJig::stop() {
   return {};
 }
 
+Status InertJig::release() {
+  ++releases;
+  return {};
+}
+
 Status TamperingTransport::write(std::span<const std::uint8_t> bytes,
                                  std::chrono::nanoseconds time_out) {
   Bytes copy(bytes.begin(), bytes.end());

@@ -40,12 +40,14 @@ class InertJig final : public device::Jig {
   Status go_to(device::Pose pose) override;
   Result<device::JigPosition> position() override { return next_position; }
   Status stop() override;
+  Status release() override;
 
   bool by_itself = true;
   Result<device::JigPosition> next_position = device::JigPosition{};
   Status next_status;
   std::vector<device::Pose> poses;
   int stops = 0;
+  int releases = 0;
 };
 
 // Passes everything through two functions. They may change the bytes, and return how many times

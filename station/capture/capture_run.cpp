@@ -323,14 +323,16 @@ class CaptureRun {
     if (placed != Step::done) {
       return placed;
     }
-    if (const Status turned = on_jig_.jig->go_to(side); !turned) {
-      if (!hooks_.reopen || turned.error().code != ErrorCode::device_unavailable) {
-        return fail(turned.error());
-      }
-      away_ = turned.error();
-      return Step::away;
-    }
-    return rest();
+    SIXPOINT_CHECK(look_at_jig());
+    SIXPOINT_CHECK(on_jig_.jig->go_to(side));
+    const auto rested = rest();
+    SIXPOINT_CHECK(look_at_jig());
+    return rested;
+  }
+
+  // A stop or a fault of a motorised jig ends the capture.
+  Status look_at_jig() const {
+    return on_jig_.jig->turns_by_itself() ? device::check_jig(*on_jig_.jig) : Status{};
   }
 
   bool is_done(device::Pose side) const {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/sha256.h"
+#include "station/lanes/order_rule.h"
 
 namespace sixpoint::station {
 
@@ -32,26 +33,40 @@ Lanes::Lane::Lane(Shared& shared, std::size_t number, std::string device)
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
-Lanes::Lane::~Lane() {
+void Lanes::Lane::request_stop() {
   thread_.request_stop();
   {
     const std::lock_guard lock(mutex_);
-    if (unit_) {
-      unit_->cancel();
+    for (device::Unit* const unit : {unit_.get(), opening_}) {
+      if (unit != nullptr) {
+        unit->cancel();
+      }
     }
   }
   wake_.notify_all();
+}
+
+Lanes::Lane::~Lane() {
+  request_stop();
   thread_.join();
 }
 
 LaneAnswer<void> Lanes::Lane::start(const StartOrder& order, bool capture) {
   const std::lock_guard lock(mutex_);
-  if (state_ == LaneState::absent) {
+  if (state_ == LaneState::absent || (!is_busy() && !unit_)) {
     return lane_conflict("no unit is plugged in here", "plug one in");
   }
   if (is_busy() || order_) {
     return lane_conflict(fmt::format("this lane is at work for {}", printable(operator_name_, 60)),
                          "wait for its end, or take the lane over");
+  }
+  if (is_unstored_) {
+    return lane_conflict("the last run is not stored yet, and a second one could take its place",
+                         "see to the store or to the disk; the station tries again by itself");
+  }
+  if (!jig_fault_.empty()) {
+    return lane_conflict(fmt::format("the jig stopped: {}", jig_fault_),
+                         "look at the jig; when no hand is in it, say that it is free");
   }
   const std::string scanned = order.serial.empty() ? scanned_ : order.serial;
   if (auto checked = check_scanned(scanned); !checked) {
@@ -59,7 +74,7 @@ LaneAnswer<void> Lanes::Lane::start(const StartOrder& order, bool capture) {
     changed();
     return checked;
   }
-  order_ = Order{order, capture};
+  order_ = Order{order, capture, identity_.serial, env_.clock.elapsed()};
   operator_name_ = order.operator_name;
   client_ = order.client;
   changed();
@@ -75,7 +90,7 @@ LaneAnswer<void> Lanes::Lane::command(const std::string& client, OperatorCommand
   if (!is_busy()) {
     return nothing_runs();
   }
-  if (commands_.size() < kMostCommands) {
+  if (commands_.size() < kMostCommands || command == OperatorCommand::stop) {
     commands_.push_back(command);
   }
   wake_.notify_all();
@@ -91,6 +106,20 @@ LaneAnswer<void> Lanes::Lane::confirm_side(const std::string& client) {
     return lane_conflict("no side is asked for in this lane", "start a capture first");
   }
   capture_->placed = true;
+  wake_.notify_all();
+  return {};
+}
+
+LaneAnswer<void> Lanes::Lane::release_jig(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  if (auto checked = check_client(client); !checked) {
+    return checked;
+  }
+  if (is_busy() || jig_fault_.empty()) {
+    return lane_conflict(is_busy() ? "a run is under way in this lane" : "the jig is free",
+                         "a jig is released after it was stopped, when no run is under way");
+  }
+  release_jig_ = true;
   wake_.notify_all();
   return {};
 }
@@ -149,6 +178,17 @@ LaneAnswer<void> Lanes::Lane::check_scanned(const std::string& serial) const {
                          "put the right unit in, or scan the label of this one");
   }
   return {};
+}
+
+void Lanes::Lane::drop_order(const std::optional<std::string>& present) {
+  if (!order_) {
+    return;
+  }
+  const double age_s = std::chrono::duration<double>(env_.clock.elapsed() - order_->given).count();
+  if (const auto dead = why_order_is_dead({order_->serial, age_s, present})) {
+    order_.reset();
+    add_log("problem", *dead);
+  }
 }
 
 void Lanes::Lane::add_log(std::string kind, std::string text) {

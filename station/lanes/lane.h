@@ -45,6 +45,7 @@ class Lanes::Lane {
  public:
   Lane(Shared& shared, std::size_t number, std::string device);
   ~Lane();
+  void request_stop();  // waits for nothing
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
@@ -54,6 +55,7 @@ class Lanes::Lane {
   LaneAnswer<void> command(const std::string& client, OperatorCommand command);
   LaneAnswer<void> confirm_side(const std::string& client);
   LaneAnswer<void> scan(const std::string& serial);
+  LaneAnswer<void> release_jig(const std::string& client);
   LaneAnswer<void> take_over(const std::string& client, const std::string& operator_name);
 
   bool holds(const std::string& serial) const {
@@ -81,6 +83,8 @@ class Lanes::Lane {
   struct Order {
     StartOrder start;
     bool capture = false;
+    std::string serial;  // of the unit that it is for
+    std::chrono::nanoseconds given{0};
   };
   struct LogLine {
     std::uint64_t id;
@@ -107,6 +111,7 @@ class Lanes::Lane {
   // The thread's loop (lane_unit.cpp).
   void work(const std::stop_token& stop);
   void continue_unfinished(const std::stop_token& stop);
+  // The order that waits, where it still holds (order_rule.h).
   std::optional<Order> next_order();
   void pause(const std::stop_token& stop, double time_s);
   bool open_unit();
@@ -117,9 +122,12 @@ class Lanes::Lane {
   UnitOnJig on_jig();
   // Answers with the unit of this serial number, opened anew, and `working` as the lane's state.
   // device_unavailable after the time-out or a stop by the operator; `internal` when the program
-  // ends.
+  // ends. `look` as in JigHooks::reopen; may be empty.
   Result<UnitOnJig> wait_for_unit(const std::stop_token& stop, const std::string& serial,
-                                  const std::string& why, LaneState working);
+                                  const std::string& why, LaneState working,
+                                  const JigHooks::Look& look);
+  // What the jig says, and what the operator said about it.
+  void look_at_jig();
 
   Result<UnitOnJig> wait_to_continue(const std::stop_token& stop, const StartOrder& order,
                                      const char* what, LaneState working);
@@ -128,7 +136,7 @@ class Lanes::Lane {
   void run(const std::stop_token& stop, const StartOrder& order,
            const std::optional<UnfinishedRun>& left);
   UnfinishedRun new_run(const StartOrder& order, calib::FilterConfiguration filter);
-  bool check_start(const std::string& serial, bool is_continued, RetestState& retest);
+  Result<RetestState> check_start(const std::string& serial, bool is_continued);
   JigHooks run_hooks(const std::stop_token& stop, RunSaver& saver);
   void on_action(const JigAction& action);
   void end_without_report(const std::string& serial, const Error& error);
@@ -170,6 +178,8 @@ class Lanes::Lane {
   // Nothing runs, or this client may command it.
   LaneAnswer<void> check_client(const std::string& client) const;
   LaneAnswer<void> check_scanned(const std::string& serial) const;
+  // The unit leaves: an order that waits is dropped.
+  void drop_order(const std::optional<std::string>& present);
   void add_log(std::string kind, std::string text);
   void set_state(LaneState state, std::string message);
   void set_done(nlohmann::ordered_json result, std::string message);
@@ -195,9 +205,13 @@ class Lanes::Lane {
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;
   std::unique_ptr<device::Unit> unit_;  // made and ended by the thread; others may cancel()
+  device::Unit* opening_ = nullptr;     // the same, before it is unit_
+  bool is_unstored_ = false;            // the store did not take the last run yet
   device::Identity identity_;
   calib::Calibration approximation_;
   bool turns_by_itself_ = false;
+  std::string jig_fault_;     // why the jig holds still; empty where it is free
+  bool release_jig_ = false;  // the operator says that it is free
   LaneState state_ = LaneState::absent;
   std::string message_;
   std::string scanned_;

@@ -106,7 +106,7 @@ CaptureHooks Lanes::Lane::capture_hooks(const std::stop_token& stop, UnfinishedC
       capture_->side.reset();
       changed();
     }
-    return wait_for_unit(stop, state.serial, error.what, LaneState::capturing);
+    return wait_for_unit(stop, state.serial, error.what, LaneState::capturing, {});
   };
   return hooks;
 }
@@ -120,6 +120,10 @@ void Lanes::Lane::capture(const std::stop_token& stop, const StartOrder& order,
     const std::lock_guard lock(mutex_);
     capture_ = CaptureView{};
     changed();
+  }
+  if (const auto allowed = check_start(state.serial, left.has_value()); !allowed) {
+    return end_capture(
+        result_of(state.serial, "refused", {allowed.error().what, allowed.error().hint}));
   }
   const auto report = run_capture(on_jig(), env_, options, capture_hooks(stop, state),
                                   left ? std::optional(left->resume) : std::nullopt);

@@ -88,6 +88,7 @@ Json Lanes::Lane::to_json() const {
   json["state"] = station::to_string(state_);
   json["message"] = message_;
   json["turns_by_itself"] = turns_by_itself_;
+  json["jig_fault"] = jig_fault_.empty() ? Json(nullptr) : Json(printable(jig_fault_, 120));
   json["unit"] = nullptr;
   if (state_ != LaneState::absent && !identity_.serial.empty()) {
     json["unit"] = {{"serial", identity_.serial},

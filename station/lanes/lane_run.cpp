@@ -48,8 +48,11 @@ JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions&
   report.limits = options.limits;
   report.faces = resume.progress.faces;
   report.as_found = resume.as_found;
-  report.as_left = resume.written ? resume.written : resume.as_found;
+  report.as_left = resume.written;
   report.written = resume.written.has_value();
+  report.write_begun = resume.write_begun;
+  report.stream = resume.stream;
+  report.settle_as_left();
   report.refusals = resume.progress.refusals;
   report.raw_csv = resume.raw_csv;
   return report;
@@ -70,9 +73,12 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
                  });
   const UnfinishedRun& state = saver.state();
   session.filter = state.filter;
-  if (!check_start(state.serial, left.has_value(), session.retest)) {
-    return;
+  const auto allowed = check_start(state.serial, left.has_value());
+  if (!allowed) {
+    return end_unmeasured(state.serial, "refused", {allowed.error().what, allowed.error().hint},
+                          allowed.error().brief());
   }
+  session.retest = *allowed;
   last_accepted_ = env_.clock.elapsed();
   if (const std::lock_guard lock(mutex_); !run_) {
     run_.emplace();
@@ -82,6 +88,9 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   if (stop.stop_requested()) {
     static_cast<void>(folder_.close());  // the next program continues it
     return;
+  }
+  if (unit_) {
+    look_at_jig();  // before the next run can be asked for
   }
   if (!report) {
     return end_without_report(state.serial, report.error());
@@ -109,22 +118,15 @@ UnfinishedRun Lanes::Lane::new_run(const StartOrder& order, calib::FilterConfigu
   return run;
 }
 
-// False where the station is locked or the unit failed too often: an engineer decides. A run that
-// is continued was checked when it started.
-bool Lanes::Lane::check_start(const std::string& serial, bool is_continued, RetestState& retest) {
+// An error where the station is locked or the unit failed too often: an engineer decides. A run
+// that is continued was checked when it started.
+Result<RetestState> Lanes::Lane::check_start(const std::string& serial, bool is_continued) {
   if (!shared_.options.may_start) {
-    return true;
+    return RetestState{};
   }
   const std::lock_guard lock(shared_.store_mutex);
   auto found = shared_.options.may_start(serial);
-  if (found) {
-    retest = *std::move(found);
-  } else if (!is_continued) {
-    end_unmeasured(serial, "refused", {found.error().what, found.error().hint},
-                   found.error().brief());
-    return false;
-  }
-  return true;
+  return found || !is_continued ? std::move(found) : RetestState{};
 }
 
 JigHooks Lanes::Lane::run_hooks(const std::stop_token& stop, RunSaver& saver) {
@@ -148,9 +150,12 @@ JigHooks Lanes::Lane::run_hooks(const std::stop_token& stop, RunSaver& saver) {
     run_->open = machine.open_poses();
     changed();
   };
+  hooks.write_begins = [&saver](const JigReport& report, const JigRun& machine) {
+    return saver.save_now(report, machine);
+  };
   hooks.next_command = [this] { return next_command(); };
-  hooks.reopen = [this, &stop, &saver](const Error& error) {
-    return wait_for_unit(stop, saver.state().serial, error.what, LaneState::running);
+  hooks.reopen = [this, &stop, &saver](const Error& error, const JigHooks::Look& look) {
+    return wait_for_unit(stop, saver.state().serial, error.what, LaneState::running, look);
   };
   return hooks;
 }
@@ -232,6 +237,7 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
     const std::lock_guard lock(mutex_);
     const bool is_shown = result_.is_object() && result_["serial"] == unstored_->report.serial;
     if (!stored) {
+      is_unstored_ = true;
       const std::string problem = "not stored yet: " + stored.error().brief();
       if (is_shown) {
         result_["problem"] = problem;
@@ -249,6 +255,7 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
         result_.erase("problem");
       }
       unstored_.reset();
+      is_unstored_ = false;
       changed();
     }
   }
@@ -275,8 +282,12 @@ void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun&
 }
 
 void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& reason) {
-  show_result(interrupted_report(left, shared_.options.session, env_.clock.now(), reason),
-              {left.operator_name, left.station, {}});
+  JigReport report = interrupted_report(left, shared_.options.session, env_.clock.now(), reason);
+  if (stop_requested()) {
+    report.verdict = JigVerdict::stopped;
+    report.codes = {"stopped"};
+  }
+  show_result(report, {left.operator_name, left.station, {}});
 }
 
 }  // namespace sixpoint::station

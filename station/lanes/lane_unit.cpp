@@ -26,14 +26,11 @@ void Lanes::Lane::work(const std::stop_token& stop) {
       pause(stop, shared_.options.retry_s);
       continue;
     }
+    look_at_jig();
     const std::optional<Order> order = next_order();
     if (!order) {
       preview(stop);
       continue;
-    }
-    if (is_streaming_) {
-      static_cast<void>(unit_->stop_stream());
-      is_streaming_ = false;
     }
     if (order->capture) {
       capture(stop, order->start, {});
@@ -46,26 +43,48 @@ void Lanes::Lane::work(const std::stop_token& stop) {
 
 // What an earlier program left on the disk.
 void Lanes::Lane::continue_unfinished(const std::stop_token& stop) {
-  const auto set_aside = [this](const Error& error) {
+  const auto say = [this](const Error& error, const Status& moved) {
     const std::lock_guard lock(mutex_);
-    add_log("problem", error.brief());
-    static_cast<void>(folder_.set_aside());
+    add_log("problem", error.brief() + (moved ? "; it is set aside" : ""));
   };
   if (const auto left = folder_.load(); !left) {
-    set_aside(left.error());
+    say(left.error(), folder_.set_aside_run());
   } else if (*left) {
     continue_run(stop, **left);
   }
   if (const auto left = folder_.load_capture(); !left) {
-    set_aside(left.error());
+    say(left.error(), folder_.set_aside_capture());
   } else if (*left && !stop.stop_requested()) {
     continue_capture(stop, **left);
   }
 }
 
-// Takes the order that waits, and prepares what clients are shown for it.
+// Takes the order that waits, and prepares what clients are shown for it. The unit is asked who it
+// is: it may have been exchanged since.
 std::optional<Lanes::Lane::Order> Lanes::Lane::next_order() {
+  bool waits = false;
+  {
+    const std::lock_guard lock(mutex_);
+    waits = order_.has_value();
+  }
+  std::optional<std::string> present;
+  if (waits) {
+    if (is_streaming_) {
+      static_cast<void>(unit_->stop_stream());
+      is_streaming_ = false;
+    }
+    if (const auto identity = unit_->identify()) {
+      present = identity->serial;
+    }
+  }
   const std::lock_guard lock(mutex_);
+  if (waits) {
+    drop_order(present);
+  }
+  if (order_ && is_unstored_) {
+    order_.reset();
+    add_log("problem", "not started: the last run is not stored yet");
+  }
   if (state_ == LaneState::absent) {
     set_state(LaneState::idle, "");
   }
@@ -88,6 +107,31 @@ void Lanes::Lane::pause(const std::stop_token& stop, double time_s) {
                  [&] { return commands_.size() != commands || order_.has_value(); });
 }
 
+void Lanes::Lane::look_at_jig() {
+  device::Jig* const jig = unit_->jig();
+  if (jig == nullptr || !jig->turns_by_itself()) {
+    return;
+  }
+  bool release = false;
+  {
+    const std::lock_guard lock(mutex_);
+    release = std::exchange(release_jig_, false);
+  }
+  const Status released = release ? jig->release() : Status{};
+  const auto position = jig->position();
+  const std::string fault = position ? position->fault : position.error().brief();
+  const std::lock_guard lock(mutex_);
+  if (release) {
+    add_log(released ? "jig" : "problem",
+            released ? fmt::format("{} says that the jig is free", printable(operator_name_, 60))
+                     : released.error().brief());
+  }
+  if (fault != jig_fault_) {
+    jig_fault_ = fault;
+    changed();
+  }
+}
+
 UnitOnJig Lanes::Lane::on_jig() {
   return {unit_.get(), unit_->jig() != nullptr ? unit_->jig() : &manual_jig_};
 }
@@ -103,21 +147,28 @@ bool Lanes::Lane::open_unit() {
     if (!is_busy()) {
       set_state(LaneState::absent, opened.error().brief());
     }
+    drop_order({});
     return false;
   }
   std::unique_ptr<device::Unit> unit = *std::move(opened);
+  const auto set_opening = [this](device::Unit* now) {
+    const std::lock_guard lock(mutex_);
+    opening_ = now;
+  };
+  set_opening(unit.get());
   std::optional<StoredConstants> stored;
   if (const auto page = unit->read_calibration()) {
     stored = page->constants;
   }
   const std::lock_guard lock(mutex_);
+  opening_ = nullptr;
   is_streaming_ = false;
   if (unit->identity().serial != identity_.serial) {
-    // Another unit: nothing of the one before stays on the lane.
+    // Another unit: nothing of the one before stays on the lane but what went wrong.
     if (!is_busy()) {
       result_ = nullptr;
       run_.reset();
-      log_.clear();
+      std::erase_if(log_, [](const LogLine& line) { return line.kind != "problem"; });
     }
     readings_.clear();
   }
@@ -135,6 +186,7 @@ void Lanes::Lane::close_unit() {
   const std::lock_guard lock(mutex_);
   unit_.reset();
   live_ = {};
+  drop_order({});
 }
 
 void Lanes::Lane::add_readings(const device::SampleBlock& block, const JigLive* live) {
@@ -218,11 +270,18 @@ Result<UnitOnJig> Lanes::Lane::wait_to_continue(const std::stop_token& stop,
                                                printable(order.serial, 40), what));
   }
   return wait_for_unit(stop, order.serial,
-                       fmt::format("the program was started again; the {} goes on", what), working);
+                       fmt::format("the program was started again; the {} goes on", what), working,
+                       {});
 }
 
 Result<UnitOnJig> Lanes::Lane::wait_for_unit(const std::stop_token& stop, const std::string& serial,
-                                             const std::string& why, LaneState working) {
+                                             const std::string& why, LaneState working,
+                                             const JigHooks::Look& look) {
+  // A jig that is part of its unit stays open: it can be stopped while the unit is away.
+  std::unique_ptr<device::Unit> with_jig;
+  if (const std::lock_guard lock(mutex_); unit_ && unit_->jig() != nullptr) {
+    with_jig = std::move(unit_);
+  }
   close_unit();
   const auto deadline = env_.clock.elapsed() + from_seconds(shared_.options.unit_wait_s);
   const std::string asked = fmt::format("plug unit {} in again", printable(serial, 40));
@@ -233,6 +292,9 @@ Result<UnitOnJig> Lanes::Lane::wait_for_unit(const std::stop_token& stop, const 
     add_log("away", why);
   }
   while (!stop.stop_requested()) {
+    if (look) {
+      SIXPOINT_CHECK(look());
+    }
     if (stop_requested()) {
       return fail(ErrorCode::device_unavailable, "stopped by the operator");
     }

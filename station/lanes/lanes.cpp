@@ -11,7 +11,12 @@ namespace sixpoint::station {
 using Json = nlohmann::ordered_json;
 
 Lanes::Lanes() = default;
-Lanes::~Lanes() = default;
+// All lanes at once: sixteen ends one after the other would add up.
+Lanes::~Lanes() {
+  for (const auto& lane : lanes_) {
+    lane->request_stop();
+  }
+}
 
 Result<std::unique_ptr<Lanes>> Lanes::open(Env& env, const device::TransportRegistry& devices,
                                            LanesOptions options, StoreRun store_run,
@@ -62,6 +67,10 @@ LaneAnswer<void> Lanes::command(std::size_t number, const std::string& client,
 
 LaneAnswer<void> Lanes::confirm_side(std::size_t number, const std::string& client) {
   return lane(number).and_then([&](Lane* chosen) { return chosen->confirm_side(client); });
+}
+
+LaneAnswer<void> Lanes::release_jig(std::size_t number, const std::string& client) {
+  return lane(number).and_then([&](Lane* chosen) { return chosen->release_jig(client); });
 }
 
 LaneAnswer<std::size_t> Lanes::scan(std::size_t number, const std::string& serial) {

@@ -48,8 +48,8 @@ struct RunLabels {
 };
 // Puts a run into the store.
 using StoreRun = std::function<Result<RunIds>(const JigReport&, const RunLabels&)>;
-// Before a run: may this unit be measured now, and what do its earlier runs demand? On an error
-// nothing is measured, and the operator reads why. May be empty.
+// Before a run or a capture: may this unit be measured now, and what do its earlier runs demand? On
+// an error nothing is measured, and the operator reads why. May be empty.
 using StartCheck = std::function<Result<RetestState>(const std::string& serial)>;
 // Stores the constants of a calibration file; answers with their id in the store.
 using StoreConstants = std::function<Result<std::string>(const CaptureReport&)>;
@@ -122,6 +122,9 @@ class Lanes {
   LaneAnswer<void> command(std::size_t number, const std::string& client, OperatorCommand command);
   // The unit lies on the side that the capture asked for.
   LaneAnswer<void> confirm_side(std::size_t number, const std::string& client);
+  // The operator saw the lane's motorised jig, which was stopped or had a fault, and says that it
+  // is free. Only when no run is under way.
+  LaneAnswer<void> release_jig(std::size_t number, const std::string& client);
   // A scanned serial number for this lane, or (number 0) for the lane that holds this unit. Answers
   // with the lane. A serial of another unit is `conflict`, until the right one is scanned.
   LaneAnswer<std::size_t> scan(std::size_t number, const std::string& serial);

@@ -46,6 +46,30 @@ Status parse_common(const Json& json, Unfinished& work) {
   return {};
 }
 
+Json stream_to_json(const device::StreamStatistics& stream) {
+  return {{"samples", stream.samples},
+          {"lost_samples", stream.lost_samples},
+          {"duplicate_reports", stream.duplicate_reports},
+          {"damaged_reports", stream.damaged_reports},
+          {"overflowed_blocks", stream.overflowed_blocks},
+          {"failed_transfers", stream.failed_transfers},
+          {"clock_jumps", stream.clock_jumps},
+          {"clock_jumped_s", stream.clock_jumped_s}};
+}
+
+device::StreamStatistics parse_stream(const Json& json) {
+  device::StreamStatistics stream;
+  json.at("samples").get_to(stream.samples);
+  json.at("lost_samples").get_to(stream.lost_samples);
+  json.at("duplicate_reports").get_to(stream.duplicate_reports);
+  json.at("damaged_reports").get_to(stream.damaged_reports);
+  json.at("overflowed_blocks").get_to(stream.overflowed_blocks);
+  json.at("failed_transfers").get_to(stream.failed_transfers);
+  json.at("clock_jumps").get_to(stream.clock_jumps);
+  json.at("clock_jumped_s").get_to(stream.clock_jumped_s);
+  return stream;
+}
+
 Result<UnfinishedRun> parse_run(const Json& json) {
   UnfinishedRun run;
   SIXPOINT_CHECK(parse_common(json, run));
@@ -57,6 +81,11 @@ Result<UnfinishedRun> parse_run(const Json& json) {
                   calib::parse_filter_configuration(json.at("filter").get<std::string>()));
   SIXPOINT_ASSIGN(run.resume.as_found, parse_page(json.at("as_found")));
   SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
+  // Folders of earlier versions do not have these.
+  run.resume.write_begun = json.value("write_begun", false);
+  if (json.contains("stream")) {
+    run.resume.stream = parse_stream(json["stream"]);
+  }
   SIXPOINT_ASSIGN(run.resume.progress, parse_jig_progress(json.at("progress")));
   return run;
 }
@@ -154,6 +183,8 @@ Status RunFolder::save(const UnfinishedRun& run) {
                      {"started", to_iso8601(run.resume.started)},
                      {"as_found", page_to_json(run.resume.as_found)},
                      {"written", page_to_json(run.resume.written)},
+                     {"write_begun", run.resume.write_begun},
+                     {"stream", stream_to_json(run.resume.stream)},
                      {"progress", to_json(run.resume.progress)}};
   return write_state(env_.files, folder_, kRun, json);
 }
@@ -227,10 +258,15 @@ Status RunFolder::clear_capture() {
   return env_.files.sync_folder(folder_);
 }
 
-Status RunFolder::set_aside() {
+Status RunFolder::set_aside_run() {
   SIXPOINT_ASSIGN(auto names, sample_files());
   names.emplace_back(kRun + 1);
-  names.emplace_back(kCapture + 1);
+  return set_aside(names);
+}
+
+Status RunFolder::set_aside_capture() { return set_aside({kCapture + 1}); }
+
+Status RunFolder::set_aside(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const std::string path = folder_ + "/" + name;
     if (env_.files.info(path)) {
@@ -251,7 +287,7 @@ std::optional<JigResume> RunSaver::take_left_over(bool begin_again) {
   auto left = folder_.load();
   if (!left) {
     warn_(left.error().brief() + "; it is set aside");
-    check(folder_.set_aside());
+    check(folder_.set_aside_run());
     return std::nullopt;
   }
   if (!*left) {
@@ -264,13 +300,19 @@ std::optional<JigResume> RunSaver::take_left_over(bool begin_again) {
   return std::move((*left)->resume);
 }
 
-void RunSaver::save(const JigReport& report, const JigRun& run) {
+Status RunSaver::save_now(const JigReport& report, const JigRun& run) {
   state_.resume.started = report.started;
   state_.resume.as_found = report.as_found;
   state_.resume.written = report.written ? report.as_left : std::nullopt;
+  state_.resume.write_begun = report.write_begun;
+  state_.resume.stream = report.stream;
   state_.resume.progress = run.progress();
+  return folder_.save(state_);
+}
+
+void RunSaver::save(const JigReport& report, const JigRun& run) {
   if (run.phase() != JigPhase::finished) {
-    check(folder_.save(state_));
+    check(save_now(report, run));
   }
 }
 

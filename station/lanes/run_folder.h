@@ -59,11 +59,14 @@ class RunFolder {
   Result<std::optional<UnfinishedCapture>> load_capture();  // as load()
   Status save_capture(const UnfinishedCapture& capture);
   Status clear_capture();
-  // Renames files that load() cannot read to names that end in `.bad`.
-  Status set_aside();
+  // Renames what load() cannot read, the state and its samples, or what load_capture() cannot read,
+  // to names that end in `.bad`. Nothing else is touched.
+  Status set_aside_run();
+  Status set_aside_capture();
 
  private:
   Result<std::vector<std::string>> sample_files() const;  // names, oldest first
+  Status set_aside(const std::vector<std::string>& names);
 
   Env& env_;
   std::string folder_;
@@ -85,7 +88,8 @@ class RunSaver {
   std::optional<JigResume> take_left_over(bool begin_again);
   void add_rows(std::string_view rows) { check(folder_.append(rows)); }  // for JigHooks::raw
   void save(const JigReport& report, const JigRun& run);                 // for JigHooks::progress
-  void end() { check(folder_.clear()); }                                 // the run is stored
+  Status save_now(const JigReport& report, const JigRun& run);  // for JigHooks::write_begins
+  void end() { check(folder_.clear()); }                        // the run is stored
 
  private:
   void check(const Status& status);

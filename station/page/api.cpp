@@ -328,6 +328,8 @@ ApiAnswer Api::command_lane(std::size_t lane, const std::string& command, const 
                                 command == "undo" ? OperatorCommand::undo : OperatorCommand::stop);
   } else if (command == "placed") {
     done = parts_.lanes.confirm_side(lane, client);
+  } else if (command == "jig-free") {
+    done = parts_.lanes.release_jig(lane, client);
   } else if (command == "take") {
     const auto operator_name = text_of(body, "operator");
     if (!operator_name) {

@@ -37,6 +37,24 @@ std::set<std::string> check_units_of(const std::vector<db::StationEvent>& events
   return units;
 }
 
+// The units whose charts count at a station, each with the time at which it ceased to be a check
+// unit. One that was removed counts until an engineer has signed: its removal lifts no lock.
+std::map<std::string, std::optional<UtcTime>> watching(const std::vector<db::StationEvent>& events,
+                                                       const StationState& state) {
+  std::map<std::string, std::optional<UtcTime>> units;
+  for (const db::StationEvent& event : events) {
+    if (event.action == "check_unit") {
+      units[event.serial] = std::nullopt;
+    } else if (event.action == "check_unit_end" && units.contains(event.serial)) {
+      units[event.serial] = event.made_at;
+    }
+  }
+  std::erase_if(units, [&](const auto& unit) {
+    return unit.second && state.signature && *unit.second <= state.signature->made_at;
+  });
+  return units;
+}
+
 std::optional<double> value_in(const RunSummary& run, std::string_view name,
                                std::string_view axis) {
   for (const JudgedQuantity& quantity : run.quantities) {
@@ -174,11 +192,11 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
   state.check_units.assign(units.begin(), units.end());
   db::RunFilter filter;
   filter.from = read_signatures(events, state);
-  for (const std::string& serial : state.check_units) {
+  for (const auto& [serial, until] : watching(events, state)) {
     filter.serial = serial;
     std::vector<RunSummary> runs;
     SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-      if (run.station == station) {
+      if (run.station == station && (!until || run.started <= *until)) {
         runs.push_back(summary_of(run));
       }
       return {};
@@ -259,6 +277,22 @@ Result<RetestState> unit_retest_state(db::Store& store, const std::string& seria
   return retest_state(earlier, policy);
 }
 
+Error station_is_locked(const std::string& why, const std::string& station) {
+  return {ErrorCode::configuration,
+          why,
+          {},
+          fmt::format("measure a check unit again; then an engineer signs, on the page or by: "
+                      "sixpoint station-lock sign --station '{}' --operator NAME --reason WHY",
+                      printable(station, 60))};
+}
+
+Error unit_needs_release(const RetestState& state, const std::string& serial) {
+  return {ErrorCode::configuration, state.reason, printable(serial, 60),
+          fmt::format("an engineer checks it; then: sixpoint retest {} --release --operator NAME "
+                      "--reason WHY",
+                      printable(serial, 60))};
+}
+
 Result<RetestState> may_start(db::Store& store, const std::string& serial,
                               const std::string& station, const Limits& limits) {
   SIXPOINT_ASSIGN(const auto events, store.station_events());
@@ -266,23 +300,13 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
   if (check_units.contains(serial)) {
     return RetestState{};  // it is measured to check the station
   }
-  if (!check_units.empty()) {
-    SIXPOINT_ASSIGN(const StationState state, station_state(store, station, limits.check_unit));
-    if (state.locked) {
-      return fail(
-          ErrorCode::configuration, state.brief(), {},
-          fmt::format(
-              "measure a check unit again; then an engineer signs, on the page or by: sixpoint "
-              "station-lock sign --station '{}' --operator NAME --reason WHY",
-              station));
-    }
+  SIXPOINT_ASSIGN(const StationState here, station_state(store, station, limits.check_unit));
+  if (here.locked) {
+    return fail(station_is_locked(here.brief(), station));
   }
   SIXPOINT_ASSIGN(RetestState state, unit_retest_state(store, serial, limits.retest));
   if (!state.may_start) {
-    return fail(ErrorCode::configuration, state.reason, printable(serial, 60),
-                fmt::format("an engineer checks it; then: sixpoint retest {} --release "
-                            "--operator NAME --reason WHY",
-                            printable(serial, 60)));
+    return fail(unit_needs_release(state, serial));
   }
   return state;
 }

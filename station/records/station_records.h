@@ -8,7 +8,8 @@
 //
 // A check unit is a unit that stays at the station and is measured regularly. Its sensitivities and
 // zeros are charted; when a chart is out of control (a locking rule of the limits, statistics.h),
-// the station measures nothing but check units until an engineer has signed.
+// the station measures nothing but check units until an engineer has signed. A check unit that is
+// removed counts until that signature: taking it away lifts no lock.
 #pragma once
 
 #include <optional>
@@ -68,6 +69,10 @@ Result<RetestState> unit_retest_state(db::Store& store, const std::string& seria
 //   any other                   open      yes, with what its earlier runs demand of this one
 Result<RetestState> may_start(db::Store& store, const std::string& serial,
                               const std::string& station, const Limits& limits);
+
+// The two configuration errors, with what lifts them.
+Error station_is_locked(const std::string& why, const std::string& station);
+Error unit_needs_release(const RetestState& state, const std::string& serial);
 
 // Runs of a gage study are stored under this kind, with the study's name as `study` in the
 // document: they count neither for yields nor as retests, and make no constants.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "station/run/jig_report.h"
@@ -95,10 +96,11 @@ double seating_scatter_rad(const JigReport& report, const PerAxis<double>& g_per
   return std::sqrt(square_g2);
 }
 
+// Of a run without any sample there is no such number: the verdict says so.
 double lost_samples_percent(const device::StreamStatistics& stream) {
   const auto lost = static_cast<double>(stream.lost_samples);
   const double sent = static_cast<double>(stream.samples) + lost;
-  return sent > 0 ? 100 * lost / sent : 0;
+  return sent > 0 ? 100 * lost / sent : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace

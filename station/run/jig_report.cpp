@@ -83,6 +83,17 @@ JudgedPoses judge(const std::vector<PoseReading>& readings, const Calibration& c
   return judged;
 }
 
+void JigReport::settle_as_left() {
+  if (write_begun) {
+    as_left.reset();
+    reasons.emplace_back(
+        "a write of the constants was begun and what the unit holds now was not read: the old ones "
+        "or the new ones, whole; measure it again to know which");
+  } else if (!as_left) {
+    as_left = as_found;
+  }
+}
+
 std::string JigReport::brief() const {
   std::string text = fmt::format("{} under '{}': {}", printable(serial), calib::to_string(filter),
                                  to_string(verdict));

@@ -74,15 +74,23 @@ struct JigReport {
 
   std::optional<device::CalibrationPage> as_found;
   double as_found_residual_mg = 0;  // of the page's constants, on the faces
-  std::optional<device::CalibrationPage>
-      as_left;  // as read back; as_found where nothing was written
+  // As read back from the unit; as_found where no write was begun; none where nobody knows.
+  std::optional<device::CalibrationPage> as_left;
+  bool write_begun = false;  // and what the unit held after it was not read
   bool written = false;
   JudgedPoses recheck;  // with the constants that were read back
   int refusals = 0;
-  device::StreamStatistics stream;
-  std::string raw_csv;  // every sample of the run: device_time_us,x,y,z,temperature_c
+  device::StreamStatistics stream;  // of the whole run: over replugs, a write, and restarts
+  std::string raw_csv;              // every sample of the run: device_time_us,x,y,z,temperature_c
 
   bool usable() const { return is_passed(verdict); }
+  // Sets as_left where nothing was read back, by this table:
+  //
+  //     write_begun   as_left before   as_left after
+  //     no            none             as_found: the unit was not touched
+  //     no            read back        as it is
+  //     yes           any              none, with a reason: old or new constants, nobody knows
+  void settle_as_left();
   std::string brief() const;
   // The contract's keys but `run`, `stored_id` and `certificate`.
   nlohmann::ordered_json to_json() const;

@@ -23,10 +23,16 @@ double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
-void add_losses(device::StreamStatistics& to, const device::StreamStatistics& of) {
-  to.lost_samples += of.lost_samples;
-  to.clock_jumps += of.clock_jumps;
-  to.clock_jumped_s += of.clock_jumped_s;
+device::StreamStatistics sum_of(device::StreamStatistics sum, const device::StreamStatistics& of) {
+  sum.samples += of.samples;
+  sum.lost_samples += of.lost_samples;
+  sum.duplicate_reports += of.duplicate_reports;
+  sum.damaged_reports += of.damaged_reports;
+  sum.overflowed_blocks += of.overflowed_blocks;
+  sum.failed_transfers += of.failed_transfers;
+  sum.clock_jumps += of.clock_jumps;
+  sum.clock_jumped_s += of.clock_jumped_s;
+  return sum;
 }
 
 // A returned unit of 2013-14: the firmware knows two configurations for it.
@@ -62,10 +68,17 @@ class Session {
  private:
   Status prepare(const std::optional<JigResume>& resume);
   Status come_back(JigRun& run, const Error& error);
+  Status end_away(JigRun& run, const Error& error);
   Status ask_jig(double now_s);
+  Status look_while_away();
+  Status obey(JigRun& run, OperatorCommand command);
+  // Turns the jig, where a look at it permits that.
+  Status place(Pose pose);
   // The jig's own position against a placement that the unit's readings have judged.
   Status compare_with_jig(const JigAction& action);
-  void settle_as_left();
+  void count_stream();
+  Status begin_stream();
+  device::StreamStatistics whole_stream() const;
   void keep_interrupted(const JigRun& run, const Error& error);
   void keep_rows(std::string_view rows);
   Status stream(JigRun& run);
@@ -85,15 +98,18 @@ class Session {
   JigReport report_;
   Calibration approximation_ = first_approximation(std::nullopt).calibration;
   bool ended_ = false;
-  bool write_unknown_ = false;  // a write was begun, and the page was not read since
-  std::optional<Error> gone_;   // why the unit did not come back
-  std::string last_text_;       // text of the machine's last action
+  std::optional<Error> gone_;  // why the unit did not come back
+  std::string last_text_;      // text of the machine's last action
   std::optional<double> jig_asked_s_;
   int jig_disagreements_ = 0;
+  // While the unit is away: what the operator said, and what the jig said.
+  std::vector<OperatorCommand> said_while_away_;
+  std::optional<Error> jig_while_away_;
+  bool is_streaming_ = false;
   // Of this stream, already reported to the machine.
   std::uint64_t lost_ = 0;
   std::uint64_t clock_jumps_ = 0;
-  device::StreamStatistics before_;  // of the streams before the unit was unplugged
+  device::StreamStatistics before_;  // of the run's earlier streams
 };
 
 Status Session::prepare(const std::optional<JigResume>& resume) {
@@ -126,7 +142,12 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
     if (resume->written && now && now->constants == resume->written->constants) {
       report_.as_left = now;
       report_.written = true;
+    } else if (resume->write_begun || resume->written) {
+      // Read just now: it is known again what the unit holds.
+      report_.as_left = now;
+      report_.write_begun = !now;
     }
+    before_ = resume->stream;
   }
   if (options_.filter == FilterConfiguration::legacy &&
       has_two_filters(report_.serial, report_.as_found)) {
@@ -166,21 +187,13 @@ void Session::keep_raw(const device::SampleBlock& block) {
 // Waits for the unit and goes on with it. Ends the run when it does not come back.
 Status Session::come_back(JigRun& run, const Error& error) {
   // Read now: reopen() may close the unit.
-  const device::StreamStatistics until_now = unit_->stream_statistics();
-  add_losses(before_, until_now);
+  count_stream();
   for (;;) {
-    const Result<UnitOnJig> again = hooks_.reopen(error);
+    const Result<UnitOnJig> again = hooks_.reopen(error, [this] { return look_while_away(); });
     if (!again) {
-      report_.stream = until_now;
       unit_ = nullptr;  // not valid any more
       jig_ = nullptr;
-      if (again.error().code != ErrorCode::device_unavailable) {
-        return fail(again.error());  // the driver ends the run
-      }
-      gone_ = again.error();
-      const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt;
-      return handle(
-          run, command == OperatorCommand::stop ? run.on_operator(*command) : run.on_unit_gone());
+      return end_away(run, again.error());
     }
     unit_ = again->unit;
     jig_ = again->jig;
@@ -189,7 +202,7 @@ Status Session::come_back(JigRun& run, const Error& error) {
     }
     Status ready = choose_filter(*unit_, options_.filter);
     if (ready) {
-      ready = unit_->start_stream(options_.run.rate_hz);
+      ready = begin_stream();
     }
     if (ready) {
       break;
@@ -199,8 +212,65 @@ Status Session::come_back(JigRun& run, const Error& error) {
     }
   }
   SIXPOINT_CHECK(handle(run, run.on_unit_back(seconds(unit_->clock().elapsed()))));
+  for (const OperatorCommand command : std::exchange(said_while_away_, {})) {
+    SIXPOINT_CHECK(obey(run, command));
+  }
   // After a power cut the jig does not know where the unit lies.
-  return run.open_poses().empty() ? Status{} : jig_->go_to(run.open_poses().front());
+  return run.open_poses().empty() ? Status{} : place(run.open_poses().front());
+}
+
+// The unit did not come back, or the wait was ended.
+Status Session::end_away(JigRun& run, const Error& error) {
+  if (jig_while_away_) {
+    return fail(*jig_while_away_);
+  }
+  if (error.code != ErrorCode::device_unavailable) {
+    return fail(error);  // the driver ends the run
+  }
+  gone_ = error;
+  // A driver that saw the operator's stop itself leaves it in the queue, behind other commands.
+  while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
+    said_while_away_.push_back(*command);
+  }
+  const bool stopped =
+      std::ranges::find(said_while_away_, OperatorCommand::stop) != said_while_away_.end();
+  return handle(run, stopped ? run.on_operator(OperatorCommand::stop) : run.on_unit_gone());
+}
+
+// The motor stops before all else.
+Status Session::obey(JigRun& run, OperatorCommand command) {
+  if (command == OperatorCommand::stop && jig_->turns_by_itself()) {
+    // One that does not answer now is held all the same, and the run ends.
+    static_cast<void>(jig_->stop());
+  }
+  return handle(run, run.on_operator(command));
+}
+
+Status Session::look_while_away() {
+  while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
+    said_while_away_.push_back(*command);
+    if (*command == OperatorCommand::stop) {
+      if (jig_->turns_by_itself()) {
+        static_cast<void>(jig_->stop());
+      }
+      return fail(ErrorCode::device_unavailable, "stopped by the operator");
+    }
+  }
+  if (jig_->turns_by_itself()) {
+    if (const Status free = device::check_jig(*jig_); !free) {
+      jig_while_away_ = free.error();
+      static_cast<void>(jig_->stop());
+      return free;
+    }
+  }
+  return {};
+}
+
+Status Session::place(Pose pose) {
+  if (jig_->turns_by_itself()) {
+    SIXPOINT_CHECK(device::check_jig(*jig_));
+  }
+  return jig_->go_to(pose);
 }
 
 // A fault of the jig ends the run: no placement after it is certain.
@@ -210,19 +280,14 @@ Status Session::ask_jig(double now_s) {
     return {};
   }
   jig_asked_s_ = now_s;
-  SIXPOINT_ASSIGN(const device::JigPosition jig, jig_->position());
-  if (!jig.fault.empty()) {
-    return fail(ErrorCode::device_unavailable,
-                fmt::format("the jig stopped: {}", printable(jig.fault, 120)), jig_->name(),
-                "repair the fault, then begin the run again");
-  }
-  return {};
+  return device::check_jig(*jig_);
 }
 
 Status Session::compare_with_jig(const JigAction& action) {
   if (jig_ == nullptr || !jig_->turns_by_itself()) {
     return {};
   }
+  SIXPOINT_CHECK(device::check_jig(*jig_));  // a stop or a fault spoils this placement
   const bool tilted = action.kind == JigAction::Kind::refused && action.text.starts_with("tilted");
   if (action.kind != JigAction::Kind::accepted && !tilted) {
     return {};
@@ -249,15 +314,25 @@ Status Session::compare_with_jig(const JigAction& action) {
   return {};
 }
 
-void Session::settle_as_left() {
-  if (write_unknown_) {
-    report_.as_left.reset();
-    report_.reasons.emplace_back(
-        "the unit went away while its constants were written: it holds the old ones or the new "
-        "ones, whole; measure it again to know which");
-  } else if (!report_.as_left) {
-    report_.as_left = report_.as_found;
+// Where a stream ends, its numbers go to the run's.
+void Session::count_stream() {
+  if (is_streaming_) {
+    is_streaming_ = false;
+    before_ = sum_of(before_, unit_->stream_statistics());
   }
+}
+
+Status Session::begin_stream() {
+  count_stream();
+  SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
+  is_streaming_ = true;
+  lost_ = 0;  // a new stream counts from 0
+  clock_jumps_ = 0;
+  return {};
+}
+
+device::StreamStatistics Session::whole_stream() const {
+  return is_streaming_ ? sum_of(before_, unit_->stream_statistics()) : before_;
 }
 
 // The report of what was measured until the error; no verdict on the unit.
@@ -265,10 +340,8 @@ void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
   report_.faces = run.faces();
-  if (unit_ != nullptr) {
-    report_.stream = unit_->stream_statistics();
-  }
-  settle_as_left();
+  report_.stream = whole_stream();
+  report_.settle_as_left();
   report_.verdict = JigVerdict::inconclusive;
   report_.codes = {error.code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted"};
   report_.reasons.push_back(error.what);
@@ -283,7 +356,7 @@ Status Session::take_block(JigRun& run, const device::SampleBlock& block, double
                 report_.serial, "begin the run again");
   }
   const device::StreamStatistics now = unit_->stream_statistics();
-  // A reading does not go across lost samples or a jump of the clock. A new stream counts from 0.
+  // A reading does not go across lost samples or a jump of the clock.
   if (now.lost_samples > std::exchange(lost_, now.lost_samples)) {
     SIXPOINT_CHECK(handle(run, run.on_loss()));
   }
@@ -301,7 +374,7 @@ Status Session::take_block(JigRun& run, const device::SampleBlock& block, double
 }
 
 Status Session::stream(JigRun& run) {
-  SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
+  SIXPOINT_CHECK(begin_stream());
   SIXPOINT_CHECK(handle(run, run.start(seconds(unit_->clock().elapsed()))));
   double last_block_s = seconds(unit_->clock().elapsed());
   while (run.phase() != JigPhase::finished && !ended_) {
@@ -321,7 +394,6 @@ Status Session::stream(JigRun& run) {
         break;
       }
       last_block_s = seconds(unit_->clock().elapsed());
-      lost_ = 0;
       continue;
     }
     if (*block) {
@@ -329,17 +401,19 @@ Status Session::stream(JigRun& run) {
       SIXPOINT_CHECK(take_block(run, **block, now_s));
     }
     while (const auto command = hooks_.next_command ? hooks_.next_command() : std::nullopt) {
-      SIXPOINT_CHECK(handle(run, run.on_operator(*command)));
+      SIXPOINT_CHECK(obey(run, *command));
     }
-    SIXPOINT_CHECK(ask_jig(now_s));
+    if (run.phase() !=
+        JigPhase::finished) {  // else the operator's stop would be a fault of the jig
+      SIXPOINT_CHECK(ask_jig(now_s));
+    }
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
   return unit_ == nullptr ? Status{} : end_stream(run);
 }
 
 Status Session::end_stream(const JigRun& run) {
-  report_.stream = unit_->stream_statistics();
-  add_losses(report_.stream, before_);
+  count_stream();
   const Status stopped = unit_->stop_stream();
   // The readings are complete: a unit that is unplugged now is no error.
   const bool may_fail = run.outcome() == JigOutcome::unit_gone ||
@@ -350,14 +424,14 @@ Status Session::end_stream(const JigRun& run) {
 
 Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
   // Where the machine asks for two poses at once, the last one counts.
-  std::optional<Pose> place;
+  std::optional<Pose> wanted;
   for (const JigAction& action : actions) {
     if (hooks_.on_action) {
       hooks_.on_action(action);
     }
     switch (action.kind) {
       case JigAction::Kind::place:
-        place = action.pose;
+        wanted = action.pose;
         break;
       case JigAction::Kind::fit: {
         SIXPOINT_ASSIGN(const calib::SixPoseReport first,
@@ -366,6 +440,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
         break;
       }
       case JigAction::Kind::write: {
+        report_.stream = whole_stream();  // judged with the rest
         SIXPOINT_ASSIGN(const bool verified, judge_readings(report_, run));
         if (!verified) {
           ended_ = true;  // constants that failed are not written
@@ -385,17 +460,29 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
     }
   }
   if (hooks_.progress && !actions.empty()) {
+    report_.stream = whole_stream();
     hooks_.progress(report_, run);
   }
-  return place ? jig_->go_to(*place) : Status{};
+  return wanted ? place(*wanted) : Status{};
 }
 
 Status Session::write_constants(JigRun& run) {
+  count_stream();
   static_cast<void>(unit_->stop_stream());  // an unplugged unit gives an error below
   // Today's date: the firmware concludes from it that the constants belong to `current`.
   const device::CalibrationPage page{
       report_.six->best().stored, std::chrono::floor<std::chrono::seconds>(unit_->clock().now())};
-  write_unknown_ = true;
+  report_.write_begun = true;
+  if (hooks_.write_begins) {
+    report_.stream = before_;
+    if (const Status noted = hooks_.write_begins(report_, run); !noted) {
+      report_.write_begun = false;
+      report_.reasons.push_back("not written: that a write begins could not be noted down: " +
+                                noted.error().brief());
+      ended_ = true;
+      return {};
+    }
+  }
   Status written_status = unit_->write_calibration(page);
   // The unit holds the old page or the new one, whole: the write is repeated, once.
   if (!written_status) {
@@ -404,6 +491,7 @@ Status Session::write_constants(JigRun& run) {
       if (run.phase() == JigPhase::finished) {
         return {};
       }
+      count_stream();
       SIXPOINT_CHECK(unit_->stop_stream());
     }
     if (written_status.error().code != ErrorCode::device_unavailable || hooks_.reopen) {
@@ -411,7 +499,7 @@ Status Session::write_constants(JigRun& run) {
     }
   }
   SIXPOINT_ASSIGN(report_.as_left, unit_->read_calibration());
-  write_unknown_ = false;
+  report_.write_begun = false;
   if (!written_status) {
     ended_ = true;
     report_.reasons.push_back(written_status.error().what);
@@ -421,15 +509,16 @@ Status Session::write_constants(JigRun& run) {
   SIXPOINT_ASSIGN(const Calibration written, calib::calibration_from(report_.as_left->constants));
   run.set_approximation(written);
   SIXPOINT_CHECK(choose_filter(*unit_, options_.filter));
-  SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
+  SIXPOINT_CHECK(begin_stream());
   return handle(run, run.on_written(seconds(unit_->clock().elapsed())));
 }
 
 Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
+  report_.stream = whole_stream();
   SIXPOINT_CHECK(judge_readings(report_, run));
-  settle_as_left();
+  report_.settle_as_left();
   if (report_.as_found) {
     if (const auto found = calib::calibration_from(report_.as_found->constants)) {
       report_.as_found_residual_mg = judge(report_.faces, *found, gravity_g_).worst_mg;

@@ -9,6 +9,11 @@
 // Sets and checks the filter configuration, streams, asks for the poses, computes the constants
 // from six faces and judges them on readings that the fit did not use. On request it writes them
 // into the unit, reads them back and measures two poses again with the constants of the unit.
+//
+// A motorised jig is looked at before and after every placement, four times a second, and while
+// the unit is away; a stop or a fault ends the run. The operator's stop stops the motor before all
+// else. The run never releases a jig (device/jig.h): the operator does, before the next one.
+//
 // Stores nothing: the report has all there is to store. Blocking; one thread a run.
 #pragma once
 
@@ -54,7 +59,10 @@ struct JigResume {
   UtcTime started{};
   std::optional<device::CalibrationPage> as_found;
   std::optional<device::CalibrationPage> written;  // what the run wrote into the unit, if it did
-  std::string raw_csv;                             // with its headline
+  // A write was begun, and what the unit held after it was not read.
+  bool write_begun = false;
+  device::StreamStatistics stream = {};  // of the run until then
+  std::string raw_csv;                   // with its headline
 };
 
 // Calls of a run to its driver, on the run's own thread; all may be empty.
@@ -66,11 +74,18 @@ struct JigHooks {
   std::function<void(std::string_view rows)> raw;
   // After every action: for a disk, so that the run can be resumed.
   std::function<void(const JigReport&, const JigRun&)> progress;
+  // Before the first byte of a write into the unit: for a disk, so that a later program knows of
+  // the write. Where it fails nothing is written.
+  std::function<Status(const JigReport&, const JigRun&)> write_begins;
   // The operator's next command since the last call; asked after every block.
   std::function<std::optional<OperatorCommand>()> next_command;
   // The unit was unplugged. Waits until it is back and returns it, opened anew, or an error.
   // Where this is empty, the run ends with the error; otherwise with an inconclusive report.
-  std::function<Result<UnitOnJig>(const Error&)> reopen;
+  // `look`: to be called several times a second while it waits, with the jig still open: the
+  // operator may stop the run, and the jig may stop or fail. Where it fails, the wait ends with
+  // its error.
+  using Look = std::function<Status()>;
+  std::function<Result<UnitOnJig>(const Error&, const Look& look)> reopen;
 };
 
 // usage where constants of this filter do not help this unit; device_unavailable when it is

@@ -22,7 +22,7 @@ class NameOnly final : public Unit {
   Clock& clock() override { return memory_.clock; }
   const std::string& address() const override { return address_; }
   Result<Identity> identify() override { return identity_; }
-  Status reconnect(std::chrono::nanoseconds) override { return {}; }
+  Status reconnect(std::chrono::nanoseconds, const std::function<Status()>&) override { return {}; }
   void cancel() override {}
 
  private:

@@ -135,6 +135,11 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
       <h2 id="lane-title">{S.lane(lane.lane)} <small>{lane.unit ? S.unit(lane.unit.serial, lane.unit.firmware) : lane.device}</small>{watches && <b class="tag">{S.lock.checkUnit}</b>}</h2>
       <p class="prompt" role="status" aria-live="polite">{locked && (lane.state === 'idle' || lane.state === 'done') ? S.lock.prompt : S.prompt(lane)}</p>
       {(lane.state === 'wrong_unit' || lane.state === 'unit_away') && <p class="notice bad"><b aria-hidden="true">⚠ </b>{lane.message}</p>}
+      {lane.jig_fault && (
+        <p class="notice bad" role="alert"><b aria-hidden="true">⚠ </b>{S.jigStopped(lane.jig_fault)}
+          {!busy && <>{' '}<button type="button" class="danger" onClick={() => say('jig-free')}>{S.jigFree}</button></>}
+        </p>
+      )}
       {lane.scan && <p class={lane.scan.matches ? 'notice good' : 'notice bad'}><b aria-hidden="true">{lane.scan.matches ? '✔ ' : '✖ '}</b>{S.scanned(lane.scan.serial, lane.scan.matches)}</p>}
       <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal)}</p>
 
@@ -159,7 +164,7 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
       <div class="buttons">
         {(lane.state === 'idle' || lane.state === 'done') && (
           <>
-            <button type="button" class="primary" disabled={locked} onClick={start}>{lane.result?.kind === 'jig' && lane.result.verdict !== 'refused' ? S.again : S.start}</button>
+            <button type="button" class="primary" disabled={locked || !!lane.jig_fault} onClick={start}>{lane.result?.kind === 'jig' && lane.result.verdict !== 'refused' ? S.again : S.start}</button>
             <label class="check"><input type="checkbox" checked={write} onChange={(event) => setWrite(event.currentTarget.checked)} /> {S.write}</label>
           </>
         )}

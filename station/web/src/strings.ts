@@ -80,6 +80,8 @@ export const S = {
   stopSure: 'Really stop? What was measured is stored.',
   stopYes: 'Yes, stop',
   stopNo: 'No, go on',
+  jigStopped: (why: string) => `The jig stopped: ${why}. Look at it: is the unit seated, is no hand in it?`,
+  jigFree: 'The jig is free. Go on',
   held: (who: string) => `${who || 'Someone else'} is at work on this lane.`,
   takeOver: 'Take this lane over',
   scanned: (serial: string, ok: boolean) => ok ? `Label ${serial}: matches` : `Label ${serial}: does not match this unit`,

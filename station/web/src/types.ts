@@ -13,7 +13,7 @@ export interface Result {
   problem?: string; file?: string; repeat_sides?: string[]; written?: boolean; next_actions?: string[];
 }
 export interface Lane {
-  lane: number; device: string; message: string; turns_by_itself: boolean;
+  lane: number; device: string; message: string; turns_by_itself: boolean; jig_fault: string | null;
   state: 'absent' | 'idle' | 'resuming' | 'running' | 'unit_away' | 'wrong_unit' | 'capturing' | 'done';
   unit: { serial: string; firmware: string; model: string; battery_mv: number } | null;
   scan: { serial: string; matches: boolean } | null;

@@ -30,6 +30,11 @@ TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
             0);
   const auto refused = measure("seed=9", limits);
   EXPECT_EQ(refused.exit_code, 78);
+  std::vector<std::string> nameless = {"jig", "--device", "virtual:seed=9,jig=auto"};
+  nameless.insert(nameless.end(), limits.begin(), limits.end());
+  EXPECT_EQ(run(nameless).exit_code, 78) << "left out";
+  nameless.insert(nameless.end(), {"--station", "a"});
+  EXPECT_EQ(run(nameless).exit_code, 78) << "spelt otherwise";
   EXPECT_THAT(refused.people, HasSubstr("station A is locked"));
   EXPECT_THAT(refused.people, HasSubstr("station-lock sign"));
   EXPECT_EQ(refused.json()["error"]["code"], "configuration");
@@ -64,6 +69,10 @@ TEST_F(StationCommands, AUnitThatFailedIsMeasuredTwiceAndNotForever) {
     EXPECT_EQ(measure(unit, tight).exit_code, 1);
   }
   EXPECT_EQ(measure(unit).exit_code, 78);
+  const auto file =
+      run({"capture", "--device", "virtual:jig=auto," + unit, "-o", folder_ / "c.gt3x", "--json"});
+  EXPECT_EQ(file.exit_code, 78) << "another way to constants is no way around it";
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "c.gt3x"));
   const auto state = run({"retest", "MOS2A00000009", "--json"});
   EXPECT_EQ(state.exit_code, 1);
   EXPECT_EQ(state.json()["failures_in_row"], 3);

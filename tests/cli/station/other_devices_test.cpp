@@ -51,6 +51,19 @@ TEST_F(OtherDevices, AJigsFaultEndsTheRunWithItsReason) {
   }
 }
 
+TEST_F(OtherDevices, AStoppedJigTurnsAfterTheOperatorsWordOnly) {
+  const auto pressed = jig("virtual:stop_at=3");
+  EXPECT_EQ(pressed.exit_code, 69);
+  EXPECT_THAT(pressed.people, HasSubstr("emergency stop"));
+  EXPECT_EQ(pressed.json()["poses"].size(), 2U) << "what was measured is kept";
+  const auto held = jig("virtual:stopped=1");
+  EXPECT_EQ(held.exit_code, 69);
+  EXPECT_THAT(held.people, HasSubstr("--jig-is-free"));
+  const auto freed = run({"jig", "--device", kOtherUnit, "--jig", "virtual:stopped=1",
+                          "--jig-is-free", "--store", path("s.db"), "--json"});
+  EXPECT_EQ(freed.exit_code, 0) << freed.people;
+}
+
 TEST_F(OtherDevices, AJigThatLiesIsNoticed) {
   const auto elsewhere = jig("virtual:wrong_pose_at=3");
   EXPECT_EQ(elsewhere.exit_code, 65);

@@ -62,9 +62,56 @@ TEST(HidJig, AnEmergencyStopIsAtTheMotorWithin100Ms) {
   EXPECT_LE(bench.clock->elapsed() - called, std::chrono::milliseconds(100));
   EXPECT_FALSE(bench.plugged->unit.is_turning(bench.clock->elapsed()));
   EXPECT_EQ(bench.jig->position()->fault, "emergency stop");
-  // No movement until the next go_to().
+}
+
+// The table of device/jig.h. `hands_out`: the operator took his hands out of the jig; the jig's
+// messages know nothing of that, so the count of movements is an oracle of its own.
+TEST(HidJig, AStopHoldsUntilTheOperatorReleasesIt) {
+  HidJigBench bench;
+  const auto expect_held = [&](const char* when) {
+    SCOPED_TRACE(when);
+    EXPECT_FAILS(bench.jig->go_to(Pose::plus_x), ErrorCode::device_unavailable);
+    EXPECT_EQ(bench.jig->position()->fault, "emergency stop");
+    EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0);
+  };
+  ASSERT_OK(bench.jig->go_to(Pose::minus_z));
+  ASSERT_OK(bench.jig->stop());
+  expect_held("after a stop by the program");
+  bench.clock->sleep(std::chrono::seconds(60));
+  expect_held("a minute later");
+  bench.jig = *HidJig::open(mocks::link_to_jig(bench.twin, bench.clock));
+  expect_held("opened anew");
+  bench.plugged->motor.hands_out();
+  ASSERT_OK(bench.jig->release());
   ASSERT_OK(bench.jig->go_to(Pose::plus_x));
-  EXPECT_TRUE(bench.plugged->unit.is_turning(bench.clock->elapsed()));
+  EXPECT_EQ(bench.plugged->motor.movements, 2);
+  bench.twin->press_stop();
+  expect_held("after its own button");
+  // Without power the firmware forgets the stop; the station does not.
+  const auto restarted = std::make_shared<VirtualHidJig>(VirtualHidJigOptions{}, nullptr);
+  const auto jig = *HidJig::open(mocks::link_to_jig(restarted, bench.clock));
+  ASSERT_OK(jig->stop());
+  *restarted = VirtualHidJig({}, nullptr);
+  EXPECT_FAILS(jig->go_to(Pose::plus_x), ErrorCode::device_unavailable);
+  EXPECT_EQ(jig->position()->fault, "emergency stop");
+  ASSERT_OK(jig->release());
+  EXPECT_OK(jig->go_to(Pose::plus_x));
+}
+
+TEST(HidJig, AFaultIsReleasedOnlyWhenItIsGone) {
+  VirtualHidJigOptions options;
+  options.fault = JigFault::door_open;
+  options.fault_at = 1;
+  HidJigBench bench(options);
+  ASSERT_OK(bench.jig->go_to(Pose::plus_x));
+  EXPECT_EQ(bench.jig->position()->fault, "the door is open");
+  EXPECT_FAILS(bench.jig->release(), ErrorCode::device_unavailable);
+  // Switched off and on, the door closed.
+  *bench.twin = VirtualHidJig({}, bench.physics.get());
+  EXPECT_EQ(bench.jig->position()->fault, "the door is open") << "nobody said that it is free";
+  EXPECT_FAILS(bench.jig->go_to(Pose::plus_x), ErrorCode::device_unavailable);
+  ASSERT_OK(bench.jig->release());
+  EXPECT_OK(bench.jig->go_to(Pose::plus_x));
 }
 
 // A silent jig does not delay a stop: reads are cut into slices, and a request that waits ends.
@@ -88,6 +135,8 @@ class SilentTransport final : public Transport {
                     static_cast<Command>(commands.back()), ReplyCode::ok,
                     commands.back() == static_cast<std::uint8_t>(JigCommand::identify)
                         ? encode_jig_identity({{"J1", "1.0", "SixJig"}, 1})
+                    : commands.back() == static_cast<std::uint8_t>(JigCommand::state)
+                        ? encode_jig_state({})
                         : Bytes{}});
         std::copy(reply.begin(), reply.end(), out.begin());
         return reply.size();

@@ -52,6 +52,9 @@ TEST(Session, AChangedFileIsNoticed) {
 TEST(Session, LinesThatAreNoTransfersAreRefused) {
   for (const char* line :
        {"x", "{}", R"({"t_ns":-1,"kind":"out","channel":"bulk"})",
+        R"({"t_ns":9223372036854775807,"kind":"out","channel":"bulk"})",
+        R"({"t_ns":18446744073709551615,"kind":"out","channel":"bulk"})",
+        R"({"t_ns":2592000000000001,"kind":"out","channel":"bulk"})",
         R"({"t_ns":1,"kind":"up","channel":"bulk"})", R"({"t_ns":1,"kind":"in","channel":"x"})",
         R"({"t_ns":1,"kind":"in","channel":"bulk","hex":"0g"})",
         R"({"t_ns":1,"kind":"in","channel":"bulk","hex":"012"})",

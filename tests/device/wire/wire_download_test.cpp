@@ -130,6 +130,28 @@ TEST(WireDownload, APartOfAnyLengthIsContinued) {
   }
 }
 
+// A loss of power while the part was copied leaves two files: the longer is continued.
+TEST(WireDownload, OfTwoPartsTheLongerIsContinued) {
+  Bench bench;
+  auto unit = *WireUnit::open(bench.link());
+  const RecordingInfo info = record(bench, *unit, 300);
+  const Bytes whole = bench.plugged->unit.recordings()[0];
+  const std::string part = "x.gt3x." + to_hex(info.sha256).substr(0, 12) + ".part";
+  const std::size_t half = whole.size() / 2;
+  for (const auto& [in_part, in_before] :
+       {std::pair{std::size_t{100}, half}, std::pair{half, std::size_t{100}}}) {
+    MemoryEnv env;
+    ASSERT_OK(write_file(env.files, part, text_of(whole).substr(0, in_part)));
+    ASSERT_OK(write_file(env.files, part + ".before", text_of(whole).substr(0, in_before)));
+    std::uint64_t first = 0;
+    ASSERT_OK(unit->download(info, env.files, "x.gt3x",
+                             [&](std::uint64_t at) { first = first == 0 ? at : first; }));
+    EXPECT_EQ(*read_file(env.files, "x.gt3x"), whole);
+    EXPECT_GT(first, half);
+    EXPECT_EQ(env.files.list(".")->size(), 1U) << "neither part is left";
+  }
+}
+
 // Nothing that is wrong stays: a part with other bytes makes the hash fail, and the next call
 // begins anew.
 TEST(WireDownload, ADamagedPartIsThrownAwayAndTheNextCallBeginsAnew) {

@@ -15,7 +15,8 @@ using std::chrono::seconds;
 // The settings of docs/devices/motorised-jig.md.
 TEST(VirtualHidJig, SettingsAreRead) {
   const auto options = parse_virtual_hid_jig(
-      "serial=J7,fault=obstructed,fault_at=2,lie_deg=3,wrong_pose_at=4,uncertainty_deg=0.2");
+      "serial=J7,fault=obstructed,fault_at=2,lie_deg=3,wrong_pose_at=4,uncertainty_deg=0.2,"
+      "stop_at=5,stopped=1");
   ASSERT_OK(options);
   EXPECT_EQ(options->serial, "J7");
   EXPECT_EQ(options->fault, JigFault::obstructed);
@@ -23,6 +24,8 @@ TEST(VirtualHidJig, SettingsAreRead) {
   EXPECT_EQ(options->lie_deg, 3);
   EXPECT_EQ(options->wrong_pose_at, 4);
   EXPECT_EQ(options->uncertainty_deg, 0.2);
+  EXPECT_EQ(options->stop_at, 5);
+  EXPECT_TRUE(options->stopped);
   EXPECT_EQ(parse_virtual_hid_jig("fault=overcurrent")->fault, JigFault::overcurrent);
   EXPECT_EQ(parse_virtual_hid_jig("fault=supply_low")->fault, JigFault::supply_low);
   EXPECT_EQ(parse_virtual_hid_jig("")->serial, "J600001");
@@ -50,6 +53,17 @@ TEST(VirtualHidJig, TurnsByTimeAlone) {
   EXPECT_EQ(jig->position()->pose, device::Pose::minus_y);
   ASSERT_OK(jig->stop());
   EXPECT_EQ(virtual_jig->state(clock->elapsed()).motion, JigMotion::stopped);
+}
+
+TEST(VirtualHidJig, ItsButtonIsPressedBeforeOrAtATurn) {
+  const auto clock = std::make_shared<ManualClock>();
+  const auto jig =
+      open(std::make_shared<VirtualHidJig>(*parse_virtual_hid_jig("stop_at=1"), nullptr), clock);
+  EXPECT_EQ(jig->position()->fault, "");
+  ASSERT_OK(jig->go_to(device::Pose::plus_x));
+  EXPECT_EQ(jig->position()->fault, "emergency stop");
+  VirtualHidJig stopped(*parse_virtual_hid_jig("stopped=1"), nullptr);
+  EXPECT_EQ(stopped.state(clock->elapsed()).motion, JigMotion::stopped);
 }
 
 TEST(VirtualHidJig, AFaultComesAtItsTurn) {

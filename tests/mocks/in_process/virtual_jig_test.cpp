@@ -41,7 +41,7 @@ PerAxis<double> reading_g(Bench& bench) {
   return g;
 }
 
-// device/jig.h: after stop() nothing moves until the next go_to(). Oracle: gravity is 1 g in any
+// device/jig.h: after stop() nothing moves until release(). Oracle: gravity is 1 g in any
 // pose, and half-way from +z to +x it lies between the two.
 TEST(VirtualJig, StoppedInMidTurnItStaysThere) {
   Bench bench;
@@ -62,6 +62,9 @@ TEST(VirtualJig, StoppedInMidTurnItStaysThere) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     EXPECT_NEAR(later[axis], first[axis], 0.01);  // noise of 300 samples, 0.3 mg
   }
+  EXPECT_FAILS(bench.jig->go_to(Pose::plus_x), ErrorCode::device_unavailable);
+  EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0);
+  ASSERT_OK(bench.jig->release());
   ASSERT_OK(bench.jig->go_to(Pose::plus_x));
   bench.clock->sleep(std::chrono::seconds(5));
   EXPECT_EQ(bench.jig->position()->pose, Pose::plus_x);

@@ -1,6 +1,8 @@
 // Jig runs in a lane: they survive a replug and a restart of the program, and are stored.
 #include <algorithm>
 
+#include "base/sha256.h"
+#include "station/lanes/run_folder.h"
 #include "station/page/station_in_process.h"
 
 namespace sixpoint::station {
@@ -127,6 +129,34 @@ TEST(LaneRun, AnInterruptedRunWithoutItsUnitEndsWithItsData) {
   EXPECT_GT(station.reports.front().raw_csv.size(), 20'000U);
 }
 
+// The program was killed in mid-write, and the unit never comes back: nobody knows what it holds.
+TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
+  for (const bool begun : {false, true}) {
+    const tests::TemporaryFolder folder;
+    const std::string device = "virtual:seed=7,serial=MOS2A45130007,pace=50";
+    UnfinishedRun left;
+    left.device = device;
+    left.serial = "MOS2A45139999";  // another unit than the one in the lane now
+    left.client = "me";
+    left.write = true;
+    left.resume.started = *parse_iso8601("2026-01-02T03:04:05");
+    left.resume.as_found = device::CalibrationPage{};
+    left.resume.write_begun = begun;
+    ASSERT_OK(
+        RunFolder(posix_env(), folder.path() + "/state/lane-1-" + text_sha256(device).substr(0, 8))
+            .save(left));
+    Station station({device}, folder.path());
+    station.wait_state(1, "wrong_unit");
+    EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+    station.wait(1, [](const Json& json) {
+      return json["result"].is_object() && json["result"]["stored"] == true;
+    });
+    ASSERT_EQ(station.reports.size(), 1U);
+    EXPECT_EQ(station.reports.front().as_left.has_value(), !begun);
+    EXPECT_EQ(station.reports.front().verdict, JigVerdict::stopped);
+  }
+}
+
 TEST(LaneRun, AStoreThatFailsIsTriedAgain) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7,jig=auto"}, folder.path());
@@ -137,6 +167,8 @@ TEST(LaneRun, AStoreThatFailsIsTriedAgain) {
   });
   EXPECT_EQ(lane["result"]["verdict"], "pass");
   EXPECT_EQ(lane["result"]["stored"], false);
+  EXPECT_EQ(station.post("/api/run", Json::object()), 409)
+      << "it would take the place of the first";
   {
     const std::lock_guard lock(station.mutex);
     station.store_is_away = false;

@@ -79,6 +79,37 @@ TEST(Lane, OneRunAtATimeAndNoOtherLabelDuringIt) {
   EXPECT_FALSE(lanes.confirm_side(1, "page-a").has_value()) << "a jig run asks for no side";
 }
 
+// A stop of a motorised jig holds over a replug and over the next start, until a person says that
+// the jig is free.
+TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,jig=auto,pace=4";
+  const auto bench = std::make_shared<mocks::VirtualBench>();
+  Station station({device}, folder.path(), {}, 24, bench);
+  station.start("/api/run");
+  station.wait(1, [&](const Json&) { return bench->motor(device)->movements > 1; });
+  EXPECT_FALSE(station.lanes->release_jig(1, "me").has_value()) << "not while it works";
+  ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+  const Json done = station.wait_state(1, "done");
+  EXPECT_EQ(done["result"]["verdict"], "stopped") << done.dump(1);
+  EXPECT_EQ(done["jig_fault"], "emergency stop");
+  EXPECT_EQ(station.post("/api/run", Json::object()), 409);
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
+  station.wait_state(1, "absent");
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "plug"}}), 200);
+  station.wait_state(1, "idle");
+  station.wait(1, [](const Json& json) { return json["jig_fault"] == "emergency stop"; });
+  EXPECT_EQ(station.post("/api/run", Json::object()), 409) << "a replug is no word";
+  EXPECT_EQ(bench->motor(device)->movements_after_stop, 0);
+  ASSERT_OK(bench->hands_out(device));
+  ASSERT_EQ(station.post("/api/lanes/1/jig-free", Json::object()), 200);
+  station.wait(1, [](const Json& json) { return json["jig_fault"].is_null(); });
+  const int before = bench->motor(device)->movements;
+  ASSERT_EQ(station.post("/api/run", Json::object()), 202);
+  station.wait(1, [&](const Json&) { return bench->motor(device)->movements > before; });
+  EXPECT_EQ(bench->motor(device)->movements_after_stop, 0);
+}
+
 // An order names the unit that was scanned: another one is not measured.
 TEST(Lane, AnOrderForAnotherUnitIsRefusedUntilTheRightOneIsScanned) {
   const tests::TemporaryFolder folder;
@@ -94,6 +125,31 @@ TEST(Lane, AnOrderForAnotherUnitIsRefusedUntilTheRightOneIsScanned) {
   EXPECT_FALSE(station.lanes->start(1, order).has_value()) << "the wrong label still counts";
   EXPECT_TRUE(station.lanes->scan(1, "MOS2A45130007").has_value());
   EXPECT_TRUE(station.lanes->start(1, order).has_value());
+}
+
+// The lane's thread is held in the store while the order is given and the unit is exchanged.
+TEST(Lane, AStartDiesWithItsUnit) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,serial=MOS2A45130007,jig=auto";
+  const auto bench = std::make_shared<mocks::VirtualBench>();
+  Station station({device}, folder.path(), {}, 24, bench);
+  {
+    const std::unique_lock held(station.mutex);
+    station.start("/api/run");
+    station.wait_state(1, "done");
+    StartOrder order = order_of("me");
+    order.write = true;
+    ASSERT_TRUE(station.lanes->start(1, order).has_value());
+    ASSERT_OK(bench->swap(device, 8, "MOS2A45130008"));
+  }
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["unit"].is_object() && json["unit"]["serial"] == "MOS2A45130008";
+  });
+  EXPECT_TRUE(lane["run"].is_null()) << lane.dump(1);
+  EXPECT_THAT(lane["log"].dump(), testing::HasSubstr("not started"));
+  EXPECT_EQ(bench->motor(device)->movements, 0) << "of the new unit's jig";
+  const std::lock_guard lock(station.mutex);
+  EXPECT_EQ(station.reports.size(), 1U);
 }
 
 // The client that takes a run over commands it from then on; without a name the operator stays.

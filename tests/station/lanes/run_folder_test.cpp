@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "expect_result.h"
 #include "temporary_folder.h"
@@ -25,6 +26,9 @@ UnfinishedRun a_run() {
   run.resume.as_found = device::CalibrationPage{};
   run.resume.as_found->constants.zero_lsb = {1, -2, 3};
   run.resume.progress.refusals = 4;
+  run.resume.write_begun = true;
+  run.resume.stream.samples = 1000;
+  run.resume.stream.lost_samples = 12;
   return run;
 }
 
@@ -32,6 +36,47 @@ std::string text_of_file(const std::string& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
   return text.str();
+}
+
+// One damaged file takes nothing else with it.
+TEST(RunFolder, ABadRunSetsAsideItselfAndItsSamplesAlone) {
+  const tests::TemporaryFolder folder;
+  RunFolder lane(posix_env(), folder / "lane");
+  UnfinishedCapture capture;
+  capture.serial = "MOS2A45130007";
+  capture.resume.started = *parse_iso8601("2026-01-02T03:04:05");
+  ASSERT_OK(lane.save_capture(capture));
+  ASSERT_OK(lane.append("t,x,y,z,c\n"));
+  ASSERT_OK(lane.close());
+  std::ofstream(folder / "lane/run.json") << "{}";
+  EXPECT_FAILS(lane.load(), ErrorCode::bad_data);
+  ASSERT_OK(lane.set_aside_run());
+  EXPECT_FALSE(posix_env().files.info(folder / "lane/samples-1.csv"));
+  const auto left = lane.load_capture();
+  ASSERT_OK(left);
+  ASSERT_TRUE(left->has_value());
+  EXPECT_EQ((*left)->serial, "MOS2A45130007");
+  ASSERT_OK(lane.save(a_run()));
+  std::ofstream(folder / "lane/capture.json") << "{}";
+  EXPECT_FAILS(lane.load_capture(), ErrorCode::bad_data);
+  ASSERT_OK(lane.set_aside_capture());
+  EXPECT_TRUE((*lane.load()).has_value());
+  EXPECT_FALSE((*lane.load_capture()).has_value());
+}
+
+// A folder of the version before has no `stream` and no `write_begun`.
+TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
+  const tests::TemporaryFolder folder;
+  RunFolder lane(posix_env(), folder / "lane");
+  ASSERT_OK(lane.save(a_run()));
+  auto json = nlohmann::ordered_json::parse(text_of_file(folder / "lane/run.json"));
+  json.erase("stream");
+  json.erase("write_begun");
+  std::ofstream(folder / "lane/run.json") << json.dump();
+  const auto left = lane.load();
+  ASSERT_OK(left);
+  EXPECT_FALSE((*left)->resume.write_begun);
+  EXPECT_EQ((*left)->resume.stream.samples, 0U);
 }
 
 TEST(RunFolder, AnotherProgramFindsTheRunWithItsSamples) {
@@ -56,6 +101,9 @@ TEST(RunFolder, AnotherProgramFindsTheRunWithItsSamples) {
   EXPECT_EQ(run.operator_name, "Łukasz");
   EXPECT_EQ(run.filter, calib::FilterConfiguration::legacy);
   EXPECT_TRUE(run.write);
+  EXPECT_TRUE(run.resume.write_begun);
+  EXPECT_EQ(run.resume.stream.samples, 1000U);
+  EXPECT_EQ(run.resume.stream.lost_samples, 12U);
   EXPECT_EQ(to_iso8601(run.resume.started), "2026-01-02T03:04:05Z");
   ASSERT_TRUE(run.resume.as_found);
   EXPECT_EQ(run.resume.as_found->constants.zero_lsb, (PerAxis<int>{1, -2, 3}));
@@ -81,7 +129,7 @@ TEST(RunFolder, ADamagedStateIsRefusedAndSetAside) {
   ASSERT_OK(lane.save(a_run()));
   std::ofstream(folder / "lane/run.json") << R"({"device": "virtual:seed=7", "serial": 7})";
   EXPECT_FAILS(lane.load(), ErrorCode::bad_data);
-  ASSERT_OK(lane.set_aside());
+  ASSERT_OK(lane.set_aside_run());
   const auto left = lane.load();
   ASSERT_OK(left);
   EXPECT_FALSE(left->has_value());

@@ -52,12 +52,17 @@ TEST_F(StationRecords, ANewBaselineForgetsTheOldOne) {
   EXPECT_EQ(state->charts[0].chart.baseline, 0U);
 }
 
-TEST_F(StationRecords, AUnitThatIsNoCheckUnitAnyMoreLocksNothing) {
+TEST_F(StationRecords, TheRemovalOfACheckUnitLiftsNoLock) {
   decide("check_unit", "CHECK1");
   baseline();
   add_run("CHECK1", JigVerdict::pass, 200);
   decide("check_unit_end", "CHECK1");
+  EXPECT_FAILS(start("MOS2A1"), ErrorCode::configuration);
+  EXPECT_FAILS(start("CHECK1"), ErrorCode::configuration);  // it is a unit as any other now
+  decide("sign");
   EXPECT_OK(start("MOS2A1"));
+  add_run("CHECK1", JigVerdict::pass, 300);
+  EXPECT_OK(start("MOS2A1")) << "it watches nothing any more";
 }
 
 TEST_F(StationRecords, TheRetestPolicyHoldsOverTheStoresRuns) {

@@ -17,7 +17,7 @@ struct Standing {
 };
 
 // A sensor of 250 LSB per g without noise in its six poses, not rounded to whole counts.
-std::vector<Measured> midpoints(const Standing& standing) {
+JigReport six_poses_of(const Standing& standing) {
   constexpr double kLsbPerG = 250;
   JigReport report;
   std::vector<calib::PoseMean> used;
@@ -47,13 +47,30 @@ std::vector<Measured> midpoints(const Standing& standing) {
   calib::SixPoseOptions options;
   options.gravity = calib::LocalGravity{kStandardGravity_m_per_s2, 1e-6};
   report.six = *calib::solve_six_poses(used, {}, options);
+  return report;
+}
+
+std::vector<Measured> measured_as(const JigReport& report, std::string_view name) {
   std::vector<Measured> found;
   for (const Measured& measured : measured_quantities(report)) {
-    if (measured.name == "midpoint_minus_zero_mg") {
+    if (measured.name == name) {
       found.push_back(measured);
     }
   }
   return found;
+}
+
+std::vector<Measured> midpoints(const Standing& standing) {
+  return measured_as(six_poses_of(standing), "midpoint_minus_zero_mg");
+}
+
+// 0 / 0 is no rate of 0 %; 30 of 1000 are 3 %.
+TEST(Budget, ARunWithoutSamplesHasNoRateOfLosses) {
+  JigReport report = six_poses_of({});
+  EXPECT_TRUE(std::isnan(measured_as(report, "lost_samples_percent").at(0).value));
+  report.stream.samples = 970;
+  report.stream.lost_samples = 30;
+  EXPECT_DOUBLE_EQ(measured_as(report, "lost_samples_percent").at(0).value, 3);
 }
 
 // Oracle: closed form. At +1 g and -1 g a second order adds K2 to both readings and nothing to the

@@ -30,6 +30,27 @@ TEST(JigReport, ReadingsAreJudgedByTheirLength) {
   EXPECT_NEAR(judged.rms_mg, std::sqrt((20.0 * 20 + 40 * 40) / 2), 1e-9);
 }
 
+// The table of settle_as_left(), row by row.
+TEST(JigReport, AsLeftFollowsTheTable) {
+  device::CalibrationPage found;
+  found.constants.zero_lsb = {1, 2, 3};
+  device::CalibrationPage read;
+  read.constants.zero_lsb = {4, 5, 6};
+  const auto settled = [&](bool begun, const std::optional<device::CalibrationPage>& before) {
+    JigReport report;
+    report.as_found = found;
+    report.as_left = before;
+    report.write_begun = begun;
+    report.settle_as_left();
+    EXPECT_EQ(report.reasons.size(), begun ? 1U : 0U);
+    return report.as_left;
+  };
+  EXPECT_EQ(settled(false, std::nullopt)->constants, found.constants);
+  EXPECT_EQ(settled(false, read)->constants, read.constants);
+  EXPECT_FALSE(settled(true, std::nullopt));
+  EXPECT_FALSE(settled(true, read));
+}
+
 // Oracle: FIPS 180-4, SHA-256 of "abc".
 TEST(JigReport, NamesItsSamplesByTheirHash) {
   JigReport report;

@@ -1,6 +1,8 @@
 #include "station/run/jig_session.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -178,6 +180,277 @@ TEST(JigSession, AnUnreadablePageIsNoObstacle) {
   const auto report = bench.run();
   // The virtual unit refuses to read a worn page at all.
   EXPECT_FAILS(report, ErrorCode::io);
+}
+
+// The motor of the virtual jig counts movements with hands in it. The hands come with a stop and
+// nobody takes them out here, so after it nothing may move.
+TEST(JigSession, TheOperatorsStopStopsTheMotorFirst) {
+  VirtualBench bench;
+  bool asked = false;
+  bool moved_after = false;
+  JigHooks hooks;
+  hooks.next_command = [&]() -> std::optional<OperatorCommand> {
+    const bool turns = bench.plugged->unit.is_turning(bench.clock->elapsed());
+    if (asked || bench.plugged->motor.movements < 3 || !turns) {
+      return std::nullopt;
+    }
+    asked = true;
+    return OperatorCommand::stop;
+  };
+  hooks.on_action = [&](const JigAction& action) {
+    moved_after = moved_after || (action.kind == JigAction::Kind::finished &&
+                                  bench.plugged->unit.is_turning(bench.clock->elapsed()));
+  };
+  const auto report = run_jig(bench.on_jig(), bench.env.env, {}, hooks);
+  ASSERT_OK(report);
+  EXPECT_TRUE(asked);
+  EXPECT_EQ(report->verdict, JigVerdict::stopped);
+  EXPECT_FALSE(moved_after) << "it stands before the run says so";
+  // The next run finds it held, and does not release it.
+  JigSessionOptions options;
+  options.keep_interrupted = true;
+  const auto next = bench.run(options);
+  ASSERT_OK(next);
+  EXPECT_EQ(next->verdict, JigVerdict::inconclusive);
+  ASSERT_TRUE(next->ended_by);
+  EXPECT_THAT(next->ended_by->what, HasSubstr("emergency stop"));
+  EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0);
+  bench.plugged->motor.hands_out();
+  ASSERT_OK(bench.jig->release());
+  EXPECT_EQ(bench.run()->verdict, JigVerdict::pass);
+}
+
+struct AwayRow {
+  const char* name;
+  bool by_operator;  // else the jig's own button
+  JigVerdict verdict;
+};
+
+// The technician stops the jig, reaches in, reseats the cable: the motor stands still.
+TEST(JigSession, AStopWhileTheUnitIsAwayHoldsWhenItIsBack) {
+  for (const AwayRow& row : {AwayRow{"operator", true, JigVerdict::stopped},
+                             AwayRow{"button", false, JigVerdict::inconclusive}}) {
+    VirtualBench bench;
+    bench.on_action = [&](const JigAction& action) {
+      if (action.kind == JigAction::Kind::accepted) {
+        bench.plugged->unplugged = true;
+      }
+    };
+    JigHooks hooks;
+    hooks.on_action = bench.on_action;
+    std::vector<OperatorCommand> said;
+    hooks.next_command = [&]() -> std::optional<OperatorCommand> {
+      if (said.empty()) {
+        return std::nullopt;
+      }
+      const OperatorCommand first = said.front();
+      said.erase(said.begin());
+      return first;
+    };
+    int looks = 0;
+    hooks.reopen = [&](const Error&, const JigHooks::Look& look) -> Result<UnitOnJig> {
+      EXPECT_OK(look());
+      if (row.by_operator) {
+        said = {OperatorCommand::undo, OperatorCommand::stop};
+      } else {
+        EXPECT_OK(bench.jig->stop());
+      }
+      bench.plugged->unplugged = false;
+      const Status again = look();
+      ++looks;
+      EXPECT_FALSE(again);
+      return fail(again.error());
+    };
+    JigSessionOptions options;
+    options.keep_interrupted = true;
+    const auto report = run_jig(bench.on_jig(), bench.env.env, options, hooks);
+    ASSERT_OK(report);
+    EXPECT_EQ(looks, 1) << row.name;
+    EXPECT_EQ(report->verdict, row.verdict) << row.name << report->brief();
+    EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0) << row.name;
+    EXPECT_TRUE(bench.plugged->motor.stopped) << row.name;
+  }
+}
+
+// A driver that does not look, or a stop between its look and the return of the unit.
+TEST(JigSession, AStoppedJigIsNotMovedWhenTheUnitIsBack) {
+  VirtualBench bench;
+  JigHooks hooks;
+  hooks.on_action = [&](const JigAction& action) {
+    if (action.kind == JigAction::Kind::accepted) {
+      bench.plugged->unplugged = true;
+    }
+  };
+  hooks.reopen = [&](const Error&, const JigHooks::Look&) -> Result<UnitOnJig> {
+    EXPECT_OK(bench.jig->stop());
+    bench.plugged->unplugged = false;
+    bench.unit = *device::WireUnit::open(mocks::link_to(bench.plugged, false));
+    return bench.on_jig();
+  };
+  EXPECT_FAILS(run_jig(bench.on_jig(), bench.env.env, {}, hooks), ErrorCode::device_unavailable);
+  EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0);
+}
+
+// Oracle: the samples in the reports that the cable loses, counted where they are lost: before and
+// after a write, and before and after the unit was unplugged.
+TEST(JigSession, LossesCountOverTheWholeRun) {
+  VirtualBench bench;
+  std::uint64_t lost = 0;
+  std::uint64_t came = 0;
+  std::uint64_t pending = 0;  // lost, and not yet followed by a report that shows it
+  int reports = 0;
+  const auto open = [&] {
+    device::Link link = mocks::link_to(bench.plugged, false);
+    pending = 0;
+    link.reports = std::make_unique<mocks::TamperingTransport>(
+        std::move(link.reports), nullptr, [&](Bytes& bytes) {
+          const auto message = device::decode(bytes);
+          if (!message || message->kind != device::ReportKind::samples) {
+            return 1;
+          }
+          const std::size_t count = device::decode_samples(*message)->counts.size();
+          if (++reports % 700 == 7) {
+            pending += count;
+            return 0;
+          }
+          lost += std::exchange(pending, 0);
+          came += count;
+          return 1;
+        });
+    return *device::WireUnit::open(std::move(link));
+  };
+  bench.unit = open();
+  int accepted = 0;
+  JigHooks hooks;
+  hooks.on_action = [&](const JigAction& action) {
+    accepted += action.kind == JigAction::Kind::accepted ? 1 : 0;
+    if (accepted == 8 && action.kind == JigAction::Kind::accepted) {
+      bench.plugged->unplugged = true;
+    }
+  };
+  hooks.reopen = [&](const Error&, const JigHooks::Look&) -> Result<UnitOnJig> {
+    bench.plugged->unplugged = false;
+    bench.unit = open();
+    return bench.on_jig();
+  };
+  JigSessionOptions options;
+  options.run.write = true;
+  const auto report = run_jig(bench.on_jig(), bench.env.env, options, hooks);
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->written) << report->brief();
+  ASSERT_GT(lost, 20U);
+  EXPECT_EQ(report->stream.lost_samples, lost);
+  // The blocks that wait when a stream ends were counted by the unit's link and not read.
+  EXPECT_NEAR(static_cast<double>(report->stream.samples), static_cast<double>(came),
+              0.001 * static_cast<double>(came));
+  const auto quantity = std::ranges::find_if(report->quantities, [](const JudgedQuantity& each) {
+    return each.name == "lost_samples_percent";
+  });
+  ASSERT_NE(quantity, report->quantities.end());
+  EXPECT_NEAR(quantity->value, 100.0 * static_cast<double>(lost) / static_cast<double>(lost + came),
+              0.001);
+}
+
+// The unit goes away at every single request of the write and of the reading that follows, and is
+// back or not, and goes away a second time or not. Oracle: the page in the unit's memory.
+TEST(JigSession, AsLeftIsWhatTheUnitHoldsOrUnknown) {
+  struct Row {
+    int first;   // request since the write began, at which the unit goes away
+    int second;  // and again, counted from its return; 0: it stays. -1: it does not come back
+  };
+  std::vector<Row> rows;
+  for (int first = 1; first < 60; first += 4) {
+    rows.push_back({first, 0});
+    rows.push_back({first, -1});
+    rows.push_back({first, 1 + first % 9});
+    rows.push_back({first, 20 + first});
+  }
+  int unknown = 0;
+  int known = 0;
+  for (const Row& row : rows) {
+    VirtualBench bench;
+    bool writing = false;
+    bool noted = false;
+    int requests = 0;
+    int returns = 0;
+    int away_at = row.first;
+    const auto open = [&] {
+      device::Link link = mocks::link_to(bench.plugged, false);
+      link.reports = std::make_unique<mocks::TamperingTransport>(
+          std::move(link.reports),
+          [&](Bytes& bytes) {
+            const auto message = device::decode(bytes);
+            if (writing && message && message->command == device::Command::write_staged) {
+              EXPECT_TRUE(noted) << "the first byte goes out after the note";
+            }
+            if (writing && away_at > 0 && ++requests == away_at) {
+              bench.plugged->unplugged = true;
+              bench.plugged->unit.cut_power(bench.clock->elapsed());
+            }
+            return 1;
+          },
+          nullptr);
+      return device::WireUnit::open(std::move(link));
+    };
+    bench.unit = *open();
+    JigHooks hooks;
+    hooks.on_action = [&](const JigAction& action) {
+      writing = writing || action.kind == JigAction::Kind::write;
+    };
+    hooks.write_begins = [&](const JigReport& report, const JigRun&) -> Status {
+      noted = report.write_begun;
+      return {};
+    };
+    hooks.reopen = [&](const Error& gone, const JigHooks::Look&) -> Result<UnitOnJig> {
+      ++returns;
+      if (row.second < 0 || returns > 2 || (returns > 1 && row.second > 0)) {
+        return fail(ErrorCode::device_unavailable, "it does not come back", gone.where);
+      }
+      bench.plugged->unplugged = false;
+      bench.plugged->unit.restore_power(bench.clock->elapsed());
+      requests = 0;
+      away_at = row.second;
+      SIXPOINT_ASSIGN(bench.unit, open());
+      return bench.on_jig();
+    };
+    JigSessionOptions options;
+    options.run.write = true;
+    options.keep_interrupted = true;
+    const auto report = run_jig(bench.on_jig(), bench.env.env, options, hooks);
+    ASSERT_OK(report);
+    if (!report->as_left) {
+      ++unknown;
+      EXPECT_FALSE(report->usable());
+      EXPECT_THAT(report->reasons, Contains(HasSubstr("a write of the constants was begun")));
+      continue;
+    }
+    ++known;
+    bench.plugged->unplugged = false;
+    bench.plugged->unit.restore_power(bench.clock->elapsed());
+    const auto holds =
+        (*device::WireUnit::open(mocks::link_to(bench.plugged, false)))->read_calibration();
+    ASSERT_OK(holds);
+    EXPECT_EQ(report->as_left->constants, holds->constants)
+        << row.first << ' ' << row.second << ' ' << report->brief();
+  }
+  EXPECT_GT(unknown, 10);
+  EXPECT_GT(known, 10);
+}
+
+TEST(JigSession, AWriteThatCannotBeNotedDownIsNotBegun) {
+  VirtualBench bench;
+  JigHooks hooks;
+  hooks.write_begins = [](const JigReport&, const JigRun&) -> Status {
+    return fail(ErrorCode::io, "the disk is full");
+  };
+  JigSessionOptions options;
+  options.run.write = true;
+  const auto report = run_jig(bench.on_jig(), bench.env.env, options, hooks);
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->usable());
+  EXPECT_THAT(report->reasons, Contains(HasSubstr("the disk is full")));
+  EXPECT_EQ(report->as_left->constants, report->as_found->constants);
+  EXPECT_EQ(bench.unit->read_calibration()->constants, report->as_found->constants);
 }
 
 // As a program that was killed leaves it.

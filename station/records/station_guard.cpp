@@ -1,0 +1,199 @@
+#include "station/records/station_guard.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.h"
+#include "base/sha256.h"
+#include "station/records/station_records.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kName = "/memory.json";
+constexpr std::uint64_t kMostMemory_bytes = 16U << 20U;
+constexpr std::size_t kMostNames = 64;
+
+bool contains(const std::vector<std::string>& list, const std::string& text) {
+  return std::ranges::find(list, text) != list.end();
+}
+
+bool demands_something(const RetestState& state) {
+  return state.failures_in_row > 0 || state.passes_needed > 1 || !state.retest_of.empty();
+}
+
+Json to_json(const StationMemory& memory) {
+  Json json = {{"schema", "sixpoint/station-memory/1"},
+               {"id", memory.id},
+               {"names", memory.names},
+               {"locked", memory.locked},
+               {"locked_as", memory.locked_as},
+               {"why", memory.why},
+               {"check_units", memory.check_units},
+               {"units", Json::object()}};
+  for (const auto& [serial, state] : memory.units) {
+    json["units"][serial] = {{"failures_in_row", state.failures_in_row},
+                             {"passes_needed", state.passes_needed},
+                             {"may_start", state.may_start},
+                             {"retest_of", state.retest_of},
+                             {"reason", state.reason}};
+  }
+  return json;
+}
+
+StationMemory parse_memory(const Json& json) {
+  StationMemory memory;
+  json.at("id").get_to(memory.id);
+  json.at("names").get_to(memory.names);
+  json.at("locked").get_to(memory.locked);
+  json.at("locked_as").get_to(memory.locked_as);
+  json.at("why").get_to(memory.why);
+  json.at("check_units").get_to(memory.check_units);
+  for (const auto& [serial, item] : json.at("units").items()) {
+    RetestState state;
+    item.at("failures_in_row").get_to(state.failures_in_row);
+    item.at("passes_needed").get_to(state.passes_needed);
+    item.at("may_start").get_to(state.may_start);
+    item.at("retest_of").get_to(state.retest_of);
+    item.at("reason").get_to(state.reason);
+    memory.units[serial] = state;
+  }
+  return memory;
+}
+
+}  // namespace
+
+Result<StationMemory> StationGuard::memory() const {
+  const std::string path = folder_ + kName;
+  if (!env_.files.info(path)) {
+    return StationMemory{};
+  }
+  const auto damaged = [&path] {
+    return fail(ErrorCode::configuration,
+                "the station's memory of its lock and of units that failed cannot be read", path,
+                "an engineer looks at the station, then removes this file");
+  };
+  const auto bytes = read_file(env_.files, path, kMostMemory_bytes);
+  if (!bytes) {
+    return damaged();
+  }
+  try {
+    return parse_memory(Json::parse(*bytes, nullptr, false));
+  } catch (const std::exception&) {  // of nlohmann
+    return damaged();
+  }
+}
+
+Status StationGuard::remember(StationMemory memory) const {
+  const bool known = env_.files.info(folder_ + kName).has_value();
+  if (!known && !memory.locked && memory.check_units.empty() && memory.units.empty()) {
+    return {};
+  }
+  if (memory.id.empty()) {
+    memory.id = text_sha256(folder_ + to_iso8601(env_.clock.now())).substr(0, 16);
+  }
+  SIXPOINT_CHECK(env_.files.make_folders(folder_));
+  return write_file(env_.files, folder_ + kName,
+                    to_json(memory).dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Result<RetestState> StationGuard::may_start(Result<db::Store>& store, const std::string& serial,
+                                            const std::string& name) {
+  if (store) {
+    auto allowed = ask_store(*store, serial, name);
+    // A store that fails in mid-question is away.
+    if (allowed || allowed.error().code == ErrorCode::configuration) {
+      return allowed;
+    }
+  }
+  return ask_memory(serial);
+}
+
+Result<RetestState> StationGuard::ask_store(db::Store& store, const std::string& serial,
+                                            const std::string& name) {
+  SIXPOINT_ASSIGN(StationMemory known, memory());
+  if (!contains(known.names, name) && known.names.size() < kMostNames) {
+    known.names.push_back(name);
+  }
+  known.locked = false;
+  known.why.clear();
+  known.locked_as.clear();
+  for (const std::string& each : known.names) {
+    SIXPOINT_ASSIGN(const StationState state, station_state(store, each, limits_.check_unit));
+    known.check_units = state.check_units;
+    if (state.locked && !known.locked) {
+      known.locked = true;
+      known.why = state.brief();
+      known.locked_as = each;
+    }
+  }
+  SIXPOINT_ASSIGN(const RetestState unit, unit_retest_state(store, serial, limits_.retest));
+  known.units.erase(serial);
+  if (demands_something(unit)) {
+    known.units[serial] = unit;
+  }
+  SIXPOINT_CHECK(remember(known));
+  if (contains(known.check_units, serial)) {
+    return RetestState{};  // it is measured to check the station
+  }
+  if (known.locked) {
+    return fail(station_is_locked(known.why, known.locked_as));
+  }
+  if (!unit.may_start) {
+    return fail(unit_needs_release(unit, serial));
+  }
+  return unit;
+}
+
+Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
+  SIXPOINT_ASSIGN(const StationMemory known, memory());
+  if (contains(known.check_units, serial)) {
+    return RetestState{};
+  }
+  if (known.locked) {
+    return fail(station_is_locked(
+        known.why + " (the store does not answer now; this is what it said last)",
+        known.locked_as));
+  }
+  const auto unit = known.units.find(serial);
+  if (unit == known.units.end()) {
+    return RetestState{};
+  }
+  if (!unit->second.may_start) {
+    return fail(unit_needs_release(unit->second, serial));
+  }
+  return unit->second;
+}
+
+Status StationGuard::note_verdict(const std::string& serial, JigVerdict verdict) {
+  SIXPOINT_ASSIGN(StationMemory known, memory());
+  const auto found = known.units.find(serial);
+  RetestState state = found == known.units.end() ? RetestState{} : found->second;
+  if (verdict == JigVerdict::fail || verdict == JigVerdict::conditional_fail) {
+    ++state.failures_in_row;
+    state.passes_needed = limits_.retest.passes_after_failure;
+    if (state.failures_in_row >= limits_.retest.most_failures) {
+      state.may_start = false;
+      state.reason = fmt::format("the unit failed {} times in a row, as often as the limits allow",
+                                 state.failures_in_row);
+    }
+    known.units[serial] = state;
+  } else if (is_passed(verdict) && found != known.units.end()) {
+    state.failures_in_row = 0;
+    if (--state.passes_needed > 0) {
+      known.units[serial] = state;
+    } else {
+      known.units.erase(found);
+    }
+  } else {
+    return {};
+  }
+  return remember(std::move(known));
+}
+
+}  // namespace sixpoint::station

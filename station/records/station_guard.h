@@ -1,0 +1,76 @@
+// May this station measure a unit now? Also where the store does not answer, and whatever name the
+// station goes by.
+//
+//   StationGuard guard(env, "data/station/3f2a", limits);
+//   SIXPOINT_ASSIGN(const RetestState state, guard.may_start(store, "MOS2A45130007", "bench-1"));
+//   guard.note_verdict("MOS2A45130007", JigVerdict::fail);  // after the run
+//
+// The station has an identity of its own: the folder beside its state, one for each store. Its file
+// memory.json holds an identifier that is made once, the names that the station went by, and what
+// the store said last: whether it is locked and why, its check units, and the units that have
+// failed. The rule:
+//
+// | store   | the station, under any of its names | unit                    | answer              |
+// |---------|-------------------------------------|-------------------------|---------------------|
+// | answers | open or locked                      | any                     | as may_start() of   |
+// |         |                                     |                         | station_records.h   |
+// | away    | locked when the store said it last  | a check unit            | yes                 |
+// | away    | locked when the store said it last  | any other               | configuration error |
+// | away    | open                                | failed too often        | configuration error |
+// | away    | open                                | any other               | yes, with what its  |
+// |         |                                     |                         | runs here demand    |
+// | any     | its memory cannot be read           | any                     | configuration error |
+//
+// A station that is called without a name, or by another spelling, is locked where it is locked
+// under one of the names that it went by. Errors: configuration, and those of the disk. One thread
+// at a time.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/env.h"
+#include "db/store.h"
+#include "station/limits/limits.h"
+#include "station/limits/verdict.h"
+
+namespace sixpoint::station {
+
+struct StationMemory {
+  std::string id;                  // hexadecimal, made once
+  std::vector<std::string> names;  // empty text: called without a name
+  bool locked = false;
+  std::string locked_as;  // the name that it is locked under
+  std::string why;  // for people
+  std::vector<std::string> check_units;
+  std::map<std::string, RetestState> units;  // those whose earlier runs demand something
+};
+
+class StationGuard {
+ public:
+  // `folder` is made when there is something to remember.
+  StationGuard(Env& env, std::string folder, Limits limits)
+      : env_(env), folder_(std::move(folder)), limits_(std::move(limits)) {}
+
+  // `store`: the store, or why it does not answer.
+  Result<RetestState> may_start(Result<db::Store>& store, const std::string& serial,
+                                const std::string& name);
+  // After a run, whether it was stored or not.
+  Status note_verdict(const std::string& serial, JigVerdict verdict);
+
+  Result<StationMemory> memory() const;  // empty where nothing was remembered
+
+ private:
+  Result<RetestState> ask_store(db::Store& store, const std::string& serial,
+                                const std::string& name);
+  Result<RetestState> ask_memory(const std::string& serial) const;
+  Status remember(StationMemory memory) const;
+
+  Env& env_;
+  std::string folder_;
+  Limits limits_;
+};
+
+}  // namespace sixpoint::station
