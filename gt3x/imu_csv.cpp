@@ -77,8 +77,8 @@ Result<ImuCsvTally> write_imu_csv(Recording& recording, const TextSink& sink) {
       break;
     }
     const Record& record = item->record;
-    if (item->kind != LogItem::Kind::record || !(record.is(RecordType::sensor_schema) ||
-                                                 record.is(RecordType::sensor_data))) {
+    if (item->kind != LogItem::Kind::record ||
+        !(record.is(RecordType::sensor_schema) || record.is(RecordType::sensor_data))) {
       continue;
     }
     if (!record.checksum_ok) {

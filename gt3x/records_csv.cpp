@@ -75,9 +75,8 @@ Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t typ
   for (const std::string& column : small_record_columns(type)) {
     header += "," + column;
   }
-  const bool old_lux =
-      !recording.has_log() && type == static_cast<std::uint8_t>(RecordType::lux) &&
-      recording.has_entry("lux.bin");
+  const bool old_lux = !recording.has_log() && type == static_cast<std::uint8_t>(RecordType::lux) &&
+                       recording.has_entry("lux.bin");
   if (old_lux) {
     SIXPOINT_CHECK(sink(header + "\n"));
     return write_old_lux(recording, sink);

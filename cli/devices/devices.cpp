@@ -113,7 +113,8 @@ Status watch(const Options& options, Context& context) {
   constexpr std::chrono::milliseconds kSlice{200};  // how long Ctrl-C takes at most
   const timespec at_once{};
   Status status;
-  while (::sigtimedwait(&signals, nullptr, &at_once) < 0 &&
+  int signal = -1;
+  while ((signal = ::sigtimedwait(&signals, nullptr, &at_once)) < 0 &&
          (!options.for_s ||
           context.env.clock.elapsed() - start < std::chrono::duration<double>(*options.for_s))) {
     const auto event = hotplug->next(kSlice);
@@ -145,6 +146,7 @@ Status watch(const Options& options, Context& context) {
     context.out << std::flush;
   }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  take_stop(context, signal);
   return status;
 }
 

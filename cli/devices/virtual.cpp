@@ -237,6 +237,7 @@ Status serve(const Options& options, Context& context) {
   sigwait(&signals, &signal);
   server->stop();
   serving.join();
+  take_stop(context, signal);
   return status;
 }
 

@@ -173,14 +173,20 @@ void raise_descriptor_limit() {
   }
 }
 
-void serve_until_signal(station::Server& server, const sigset_t& signals) {
+// Answers with the signal; -1 where the server ended by itself.
+int serve_until_signal(station::Server& server, const sigset_t& signals) {
+  int signal = -1;
   std::jthread waiter([&](const std::stop_token& stop) {
     const timespec between_checks{0, 200'000'000};
-    while (!stop.stop_requested() && sigtimedwait(&signals, nullptr, &between_checks) < 0) {
+    while (!stop.stop_requested() &&
+           (signal = sigtimedwait(&signals, nullptr, &between_checks)) < 0) {
     }
     server.stop();
   });
   server.serve();
+  waiter.request_stop();
+  waiter.join();
+  return signal;
 }
 
 Status serve(const Options& options, Context& context) {
@@ -238,7 +244,7 @@ Status serve(const Options& options, Context& context) {
                         "{} lane{}; Ctrl-C ends the station, runs go on at the next start\n",
                         lanes->size(), lanes->size() == 1 ? "" : "s")
                  << std::flush;
-  serve_until_signal(*server, signals);
+  take_stop(context, serve_until_signal(*server, signals));
   return {};
 }
 

@@ -1,7 +1,8 @@
 // Where the last block of a deflate stream begins, so that streams can be joined into one.
 //
 //   const auto last = find_last_block(stream);
-//   if (last) stream[last->begin_bit / 8] ^= 1U << (last->begin_bit % 8);  // no longer the last one
+//   if (last) stream[last->begin_bit / 8] ^= 1U << (last->begin_bit % 8);  // no longer the last
+//   one
 //
 // The first bit of a block says whether it is the last of its stream (RFC 1951, 3.2.3). libdeflate
 // makes whole streams only and does not tell where its blocks begin, so the symbols of the stream

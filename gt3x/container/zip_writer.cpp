@@ -58,9 +58,7 @@ class Header {
   Bytes out_;
 };
 
-std::uint16_t method_of(Packing packing) {
-  return packing == Packing::store ? kStored : kDeflated;
-}
+std::uint16_t method_of(Packing packing) { return packing == Packing::store ? kStored : kDeflated; }
 
 std::uint16_t flags_of(const std::string& name, bool described_behind) {
   const bool ascii = std::ranges::all_of(name, [](char c) { return (c & 0x80) == 0; });
@@ -138,9 +136,9 @@ Status ZipWriter::add(const std::string& name, ByteSource& source, Packing packi
   Bytes second;
   SIXPOINT_CHECK(fill(source, nullptr, first));
   SIXPOINT_CHECK(fill(source, &first, second));
-  return second.empty() ? add_whole(std::move(entry), first)
-                        : add_in_pieces(std::move(entry), source, std::move(first),
-                                        std::move(second));
+  return second.empty()
+             ? add_whole(std::move(entry), first)
+             : add_in_pieces(std::move(entry), source, std::move(first), std::move(second));
 }
 
 Status ZipWriter::add_whole(Entry entry, std::span<const std::uint8_t> bytes) {

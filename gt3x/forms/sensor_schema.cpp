@@ -85,8 +85,8 @@ Result<SensorSchema> parse_sensor_schema(std::span<const std::uint8_t> payload) 
   const std::size_t columns = two_bytes(payload.subspan(2));
   if (columns == 0 || columns > kMostColumns ||
       payload.size() != kSchemaHeader + columns * kColumnSize) {
-    return bad(fmt::format("a SENSOR_SCHEMA record of {} bytes for {} columns", payload.size(),
-                           columns));
+    return bad(
+        fmt::format("a SENSOR_SCHEMA record of {} bytes for {} columns", payload.size(), columns));
   }
   for (std::size_t i = 0; i < columns; ++i) {
     SIXPOINT_ASSIGN(SensorColumn column,

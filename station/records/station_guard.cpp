@@ -156,9 +156,9 @@ Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
     return RetestState{};
   }
   if (known.locked) {
-    return fail(station_is_locked(
-        known.why + " (the store does not answer now; this is what it said last)",
-        known.locked_as));
+    return fail(
+        station_is_locked(known.why + " (the store does not answer now; this is what it said last)",
+                          known.locked_as));
   }
   const auto unit = known.units.find(serial);
   if (unit == known.units.end()) {

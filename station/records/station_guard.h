@@ -43,7 +43,7 @@ struct StationMemory {
   std::vector<std::string> names;  // empty text: called without a name
   bool locked = false;
   std::string locked_as;  // the name that it is locked under
-  std::string why;  // for people
+  std::string why;        // for people
   std::vector<std::string> check_units;
   std::map<std::string, RetestState> units;  // those whose earlier runs demand something
 };

@@ -68,7 +68,8 @@ Bytes made_imu_log(const std::vector<std::size_t>& samples_per_second) {
 // Closed form: with counts 0, 1, 2 ... the j-th line of a second of n samples is j * n / 100, and
 // never beyond the last sample.
 TEST(ImuCsv, ASecondOfAnotherLengthIsInterpolated) {
-  for (const std::size_t n : {std::size_t{1}, std::size_t{99}, std::size_t{100}, std::size_t{101}}) {
+  for (const std::size_t n :
+       {std::size_t{1}, std::size_t{99}, std::size_t{100}, std::size_t{101}}) {
     MemoryEnv memory;
     ASSERT_OK(tests::put_recording(memory.files, "a.gt3x", made_imu_log({n})));
     const auto csv = imu_of(memory.files, "a.gt3x");
@@ -77,7 +78,8 @@ TEST(ImuCsv, ASecondOfAnotherLengthIsInterpolated) {
     ASSERT_EQ(lines.size(), 111U);
     EXPECT_EQ(lines[10], "Timestamp,Count");
     for (std::size_t j = 0; j < 100; ++j) {
-      const double expected = std::min(static_cast<double>(j * n) / 100, static_cast<double>(n - 1));
+      const double expected =
+          std::min(static_cast<double>(j * n) / 100, static_cast<double>(n - 1));
       const std::string value = lines[11 + j].substr(lines[11 + j].find(',') + 1);
       EXPECT_NEAR(std::stod(value), expected, 1e-6) << n << " " << j;
     }

@@ -27,12 +27,11 @@ struct Records {
 Result<Records> records_of(FileSystem& files, const std::string& path, RecordType type) {
   SIXPOINT_ASSIGN(auto recording, Recording::open(files, path));
   std::string text;
-  SIXPOINT_ASSIGN(const auto tally,
-                  write_records_csv(recording, static_cast<std::uint8_t>(type),
-                                    [&](std::string_view piece) {
-                                      text += piece;
-                                      return Status();
-                                    }));
+  SIXPOINT_ASSIGN(const auto tally, write_records_csv(recording, static_cast<std::uint8_t>(type),
+                                                      [&](std::string_view piece) {
+                                                        text += piece;
+                                                        return Status();
+                                                      }));
   return Records{lines_of(text), tally};
 }
 
@@ -45,9 +44,10 @@ TEST(RecordsCsv, ALinePerRecordOfTheType) {
   ASSERT_OK(tests::put_recording(memory.files, "a.gt3x", log));
   const auto lux = records_of(memory.files, "a.gt3x", RecordType::lux);
   ASSERT_OK(lux);
-  EXPECT_EQ(lux->lines, (std::vector<std::string>{"time,unix_s,lux", "2015-04-09T14:04:00,1428588240,7",
-                                                  "2015-04-09T14:04:01,1428588241,7",
-                                                  "2015-04-09T14:04:02,1428588242,7"}));
+  EXPECT_EQ(lux->lines,
+            (std::vector<std::string>{"time,unix_s,lux", "2015-04-09T14:04:00,1428588240,7",
+                                      "2015-04-09T14:04:01,1428588241,7",
+                                      "2015-04-09T14:04:02,1428588242,7"}));
   EXPECT_EQ(lux->tally.records, 3U);
   EXPECT_EQ(lux->tally.unreadable_records, 2U);
   EXPECT_EQ(records_of(memory.files, "a.gt3x", RecordType::battery)->lines,
@@ -57,18 +57,19 @@ TEST(RecordsCsv, ALinePerRecordOfTheType) {
 // Oracle: the vendor's CSV of both sensors, in degrees and as read, of 3.5 hours in a chamber.
 TEST(RecordsCsv, TemperaturesAreTheVendors) {
   SIXPOINT_NEED_SHARED("data/agdc/CPW1C48210013_baseline.agdc");
-  const auto ours = records_of(posix_env().files,
-                               shared_file("data/agdc/CPW1C48210013_baseline.agdc"),
-                               RecordType::temperature);
+  const auto ours =
+      records_of(posix_env().files, shared_file("data/agdc/CPW1C48210013_baseline.agdc"),
+                 RecordType::temperature);
   ASSERT_OK(ours);
   struct Theirs {
     const char* file;
     std::size_t column;
   };
-  for (const Theirs& theirs : {Theirs{"Csv_ADC/CPW1C48210013_baseline_temperature_MCU_ADC.csv", 2},
-                               Theirs{"Csv_ADC/CPW1C48210013_baseline_temperature_ADXL_ADC.csv", 3},
-                               Theirs{"Csv_Calibrated/CPW1C48210013_baseline_temperature_MCU_calibrated.csv", 4},
-                               Theirs{"Csv_Calibrated/CPW1C48210013_baseline_temperature_ADXL_calibrated.csv", 5}}) {
+  for (const Theirs& theirs :
+       {Theirs{"Csv_ADC/CPW1C48210013_baseline_temperature_MCU_ADC.csv", 2},
+        Theirs{"Csv_ADC/CPW1C48210013_baseline_temperature_ADXL_ADC.csv", 3},
+        Theirs{"Csv_Calibrated/CPW1C48210013_baseline_temperature_MCU_calibrated.csv", 4},
+        Theirs{"Csv_Calibrated/CPW1C48210013_baseline_temperature_ADXL_calibrated.csv", 5}}) {
     std::ifstream file(shared_file(std::string("data/agdc/") + theirs.file));
     const auto wanted = lines_of(std::string(std::istreambuf_iterator<char>(file), {}));
     ASSERT_EQ(wanted.size(), ours->lines.size()) << theirs.file;
@@ -110,8 +111,8 @@ TEST(RecordsCsv, TheOldFormHasItsLuxInAFileOfItsOwn) {
 // Oracle: the file's own count of seconds, 10,467 samples at 80 Hz.
 TEST(RecordsCsv, LightOfARealOldRecording) {
   SIXPOINT_NEED_SHARED("data/nhanes/NEO1B34100019.gt3x");
-  const auto lux = records_of(posix_env().files, shared_file("data/nhanes/NEO1B34100019.gt3x"),
-                              RecordType::lux);
+  const auto lux =
+      records_of(posix_env().files, shared_file("data/nhanes/NEO1B34100019.gt3x"), RecordType::lux);
   ASSERT_OK(lux);
   EXPECT_GT(lux->tally.records, 100U);
   EXPECT_EQ(lux->tally.unreadable_records, 0U);

@@ -31,7 +31,7 @@ for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1/serial ] && break; sleep 0
 [ "$(cat /sys/bus/usb/devices/1-1/serial)" = MOS2A45130007 ]
 
 echo "== the program ends and takes its units along"
-kill -INT $server
+kill -TERM $server
 wait $server
 for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
 ! ls /sys/bus/usb/devices | grep '^1-[1-9]'
@@ -62,7 +62,7 @@ for i in $(seq 100); do [ -e /sys/bus/usb/devices/1-1 ] || break; sleep 0.1; don
 status=0; sixpoint capture --device "drive:/mnt/my unit" -o gone.gt3x --store bench.db || status=$?
 [ $status -ne 0 ]
 [ ! -e gone.gt3x ]
-kill -INT $server
+kill -TERM $server
 wait $server
 
 echo "== the installed program, a unit and a motorised jig, through fault plans (docs/faults.md)"
@@ -93,7 +93,7 @@ with_faults() {
   cat said
   [ $status -eq "$expected" ] || { echo "FAILED: ended with $status, not with $expected"; cat answer; return 1; }
   cat said answer | grep -q "$words" || { echo "FAILED: no word of: $words"; cat answer; return 1; }
-  kill -INT $server
+  kill -TERM $server
   wait $server
   for i in $(seq 100); do ls /sys/bus/usb/devices | grep -q '^1-[1-9]' || break; sleep 0.1; done
 }

@@ -187,7 +187,7 @@ TEST_F(Program, SaysWhatComesAndGoes) {
           ::kill(child, SIGINT);
         }
       });
-  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  EXPECT_EQ(answer.exit_code, 3) << answer.people;
   std::vector<std::string> events;
   std::istringstream lines(answer.out);
   for (std::string line; std::getline(lines, line);) {

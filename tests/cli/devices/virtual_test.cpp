@@ -102,14 +102,14 @@ TEST(VirtualCommand, SaysWhatItServesAndServesIt) {
       EXPECT_EQ(serial, served.document["devices"][i]["serial"]);
     }
     EXPECT_EQ(serials.size(), 3U);
-    EXPECT_EQ(served.stop(signal), 0);
+    EXPECT_EQ(served.stop(signal), signal == SIGINT ? 3 : 0);
   }
 }
 
 TEST(VirtualCommand, ASecondCtrlCDoesNotEndTheOrderlyEnd) {
   Served served({"--count", "2"});
   ASSERT_TRUE(served.document.is_object());
-  EXPECT_EQ(served.stop_repeatedly(SIGINT), 0);
+  EXPECT_EQ(served.stop_repeatedly(SIGINT), 3);
 }
 
 TEST(VirtualCommand, TheSameSeedIsTheSameBench) {
@@ -227,7 +227,7 @@ TEST(VirtualCommand, AUnitOfFilesAloneIsOffered) {
   EXPECT_EQ(served.document["devices"][0]["product_id"], "0003");
   EXPECT_EQ(served.document["devices"][0]["serial"], "MOS2A45139074");
   EXPECT_EQ(served.document["devices"][1]["product_id"], "0001");
-  EXPECT_EQ(served.stop(SIGINT), 0);
+  EXPECT_EQ(served.stop(SIGTERM), 0);
 }
 
 TEST(VirtualCommand, RefusesWhatItCannotDo) {

@@ -32,10 +32,11 @@ Bytes made_schema(const std::vector<MadeColumn>& columns) {
 }
 
 const std::vector<MadeColumn> kColumns = {
-    {"A", 3, 0, 16, 2048},         // big-endian, signed
-    {"B", 2, 16, 16, 0},           // little-endian, signed, as stored
-    {"C", 0, 32, 8, 2},            // unsigned
-    {"Temperature", 3, 40, 16, 1}, {"", 0, 56, 8, 0},
+    {"A", 3, 0, 16, 2048},  // big-endian, signed
+    {"B", 2, 16, 16, 0},    // little-endian, signed, as stored
+    {"C", 0, 32, 8, 2},     // unsigned
+    {"Temperature", 3, 40, 16, 1},
+    {"", 0, 56, 8, 0},
     {"D", 2, 64, 32, 0},
 };
 

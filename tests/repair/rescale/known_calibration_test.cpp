@@ -19,9 +19,8 @@ db::RunRecord run_of(const std::string& document) {
 
 constexpr const char* kIn2013 = R"({"calibration_time":"2013-11-12T14:32:13Z"})";
 constexpr const char* kFoundIn2013 = R"({"as_found":{"calibrated":"2013-11-12T14:32:13Z"}})";
-constexpr const char* kWrittenIn2026 =
-    R"({"as_found":{"calibrated":"2013-11-12T14:32:13Z"},)"
-    R"("as_left":{"calibrated":"2026-01-01T00:00:00Z"}})";
+constexpr const char* kWrittenIn2026 = R"({"as_found":{"calibrated":"2013-11-12T14:32:13Z"},)"
+                                       R"("as_left":{"calibrated":"2026-01-01T00:00:00Z"}})";
 
 // The rows of the table in the header.
 TEST(KnownCalibration, RecordsThatSayNothingGiveNothing) {
