@@ -58,7 +58,11 @@ class Writer {
       return {};
     }
     const auto scale = accel_scale_lsb_per_g(info_, item.parameters);
-    if (!scale || *scale < 1 || *scale > 65536) {
+    // 12 bits at 16 LSB/g would be 128 g: what an .agdc says of raw counts (1) is no scale.
+    constexpr double kLeastOfCalibrated_lsb_per_g = 16;
+    const bool no_scale =
+        item.type == RecordType::activity3 && scale && *scale < kLeastOfCalibrated_lsb_per_g;
+    if (!scale || *scale < 1 || *scale > 65536 || no_scale) {
       return fail(ErrorCode::bad_data, "the recording does not say how many LSB make one g", {},
                   "export the stored counts with --raw");
     }

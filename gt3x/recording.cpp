@@ -231,6 +231,9 @@ Status Recording::Archive::read_entries() {
 
 Result<Recording> Recording::open(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto file, files.open(path));
+  if (file->size() == 0) {
+    return fail(ErrorCode::bad_data, "the file is empty", path, std::string(kDownloadAgain));
+  }
   auto archive = std::make_shared<Archive>(std::move(file), path);
   SIXPOINT_CHECK(archive->open_zip());
   SIXPOINT_CHECK(archive->read_entries());

@@ -140,8 +140,10 @@ void print(std::ostream& out, const repair::Inspection& found, const std::string
        fmt::format("{} ({}), firmware {}", found.facts.serial, gt3x::model_of(found.facts.serial),
                    found.facts.firmware.empty() ? "?" : found.facts.firmware));
   if (found.form != "agd") {
-    line("samples", fmt::format("{} at {} Hz, {} LSB/g", found.samples, found.rate_hz.value_or(0),
-                                found.accel_scale_lsb_per_g.value_or(0)));
+    line("samples", fmt::format("{} at {} Hz, {}", found.samples, found.rate_hz.value_or(0),
+                                found.accel_scale_lsb_per_g
+                                    ? fmt::format("{} LSB/g", *found.accel_scale_lsb_per_g)
+                                    : std::string("raw counts")));
     line("start", time_or_dash(found.start));
     line("duration",
          fmt::format("{:.1f} s, of which {} s are gaps", found.duration_s(), found.gap_seconds));

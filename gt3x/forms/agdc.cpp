@@ -97,6 +97,11 @@ Result<TemperatureCalibration> parse_temperature_calibration(std::string_view te
 }
 
 PerAxis<double> AgdcCalibration::apply(const Counts& raw_lsb) const {
+  return apply(PerAxis<double>{static_cast<double>(raw_lsb[0]), static_cast<double>(raw_lsb[1]),
+                               static_cast<double>(raw_lsb[2])});
+}
+
+PerAxis<double> AgdcCalibration::apply(const PerAxis<double>& raw_lsb) const {
   PerAxis<double> g{};
   for (std::size_t row = 0; row < kAxes; ++row) {
     for (std::size_t column = 0; column < kAxes; ++column) {
@@ -117,6 +122,13 @@ Result<AgdcCalibration> parse_agdc_calibration(std::string_view text, int rate_h
       json.contains("calibrationMethod") && json["calibrationMethod"].is_number_integer()
           ? json["calibrationMethod"].get<int>()
           : 0;
+  constexpr int kMatrix = 2;
+  if (!calibration.already_applied && calibration.method != kMatrix) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("a calibration by method {}, which is not public",
+                            json.value("calibrationMethod", Json(nullptr)).dump()),
+                {}, "export the raw counts with --raw");
+  }
   constexpr std::string_view kAxis = "XYZ";
   StoredConstants constants;
   bool six_point = true;

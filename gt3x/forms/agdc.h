@@ -53,10 +53,12 @@ struct AgdcCalibration {
   PerAxis<PerAxis<double>> sensitivity_g_per_lsb{};
   std::optional<StoredConstants> constants;  // the six-point form, where it is there
 
+  PerAxis<double> apply(const PerAxis<double>& raw_lsb) const;
   PerAxis<double> apply(const Counts& raw_lsb) const;
 };
-// For one of the rates that the file knows (32, 64, 128, 256 Hz); bad_data otherwise, and for what
-// is no such JSON.
+// For one of the rates that the file knows (32, 64, 128, 256 Hz); bad_data otherwise, for what is
+// no such JSON, and for raw counts of a method other than 2: nothing public says how those become
+// g.
 Result<AgdcCalibration> parse_agdc_calibration(std::string_view json, int rate_hz);
 
 }  // namespace sixpoint::gt3x

@@ -1,5 +1,6 @@
 #include "gt3x/forms/model.h"
 
+#include <algorithm>
 #include <array>
 
 namespace sixpoint::gt3x {
@@ -15,7 +16,7 @@ struct Family {
 constexpr std::array<Family, 9> kFamilies = {{
     {"NEO", "GT3X+", 341},
     {"CLE", "wGT3X+", 341},
-    {"MRA", "ActiSleep+", std::nullopt},
+    {"MRA", "ActiSleep+", 341},
     {"MOS0", "wGT3X-BT", 256},
     {"MOS2", "wGT3X-BT", 256},
     {"MOS3", "wActiSleep+", 256},
@@ -24,9 +25,16 @@ constexpr std::array<Family, 9> kFamilies = {{
     {"TAS", "GT9X Link", 256},
 }};
 
+// Some files have the serial number in lower case.
+bool begins_with(std::string_view serial, std::string_view prefix) {
+  return serial.size() >= prefix.size() &&
+         std::equal(prefix.begin(), prefix.end(), serial.begin(),
+                    [](char a, char b) { return a == b || (b >= 'a' && a == b - 'a' + 'A'); });
+}
+
 const Family* family_of(std::string_view serial) {
   for (const Family& family : kFamilies) {
-    if (serial.starts_with(family.prefix)) {
+    if (begins_with(serial, family.prefix)) {
       return &family;
     }
   }
@@ -36,7 +44,7 @@ const Family* family_of(std::string_view serial) {
 }  // namespace
 
 std::string_view model_of(std::string_view serial) {
-  if (serial.starts_with("CPW")) {
+  if (begins_with(serial, "CPW")) {
     return "CentrePoint Insight Watch";
   }
   const Family* family = family_of(serial);

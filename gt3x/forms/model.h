@@ -14,8 +14,9 @@ namespace sixpoint::gt3x {
 // Watch. "unknown" for every other; other MOS prefixes are "wGT3X-BT family".
 std::string_view model_of(std::string_view serial);
 
-// The scale of the stored counts where the file does not say: 341 LSB/g for NEO and CLE, 256 for
-// MOS and TAS; nothing for the rest (MRA is described nowhere, CPW stores raw counts).
+// The scale of the stored counts where the file does not say: 341 LSB/g for NEO, CLE and MRA (the
+// vendor's public library divides by it), 256 for MOS and TAS; nothing for the rest (CPW stores raw
+// counts). Capitals or not: files with either are known.
 std::optional<double> default_accel_scale_lsb_per_g(std::string_view serial);
 
 }  // namespace sixpoint::gt3x

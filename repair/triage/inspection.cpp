@@ -33,18 +33,11 @@ void add_gap(Inspection& found, const gt3x::SampleItem& item) {
   }
 }
 
-// The constants that an .agdc file carries beside its raw counts.
-std::optional<StoredConstants> agdc_constants(gt3x::Recording& recording, double rate_hz) {
-  auto source = recording.open_entry("calibration.json");
-  if (!source) {
-    return std::nullopt;
-  }
-  const auto bytes = gt3x::read_all(**source, 1 << 20);
-  if (!bytes) {
-    return std::nullopt;
-  }
-  const auto calibration = gt3x::parse_agdc_calibration(as_text(*bytes), static_cast<int>(rate_hz));
-  return calibration ? calibration->constants : std::nullopt;
+// What an .agdc file carries beside its raw counts.
+Result<gt3x::AgdcCalibration> agdc_calibration(gt3x::Recording& recording, double rate_hz) {
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
+  SIXPOINT_ASSIGN(const Bytes bytes, gt3x::read_all(*source, 1U << 20U));
+  return gt3x::parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz));
 }
 
 // Finds still blocks while the samples are read, so that no recording must fit into memory.
@@ -53,10 +46,10 @@ class StillWatch {
   StillWatch(bool use_constants, std::vector<std::string>& warnings)
       : use_constants_(use_constants), warnings_(warnings) {}
 
-  void start(double rate_hz, double scale) {
-    if (auto made = StillScan::make(rate_hz, scale)) {
-      scan_.emplace(*std::move(made));
-    }
+  Status start(double rate_hz, double scale) {
+    SIXPOINT_ASSIGN(auto made, StillScan::make(rate_hz, scale));
+    scan_.emplace(std::move(made));
+    return {};
   }
 
   void push(const gt3x::SampleItem& item, bool rotated) {
@@ -91,11 +84,17 @@ class StillWatch {
     }
   }
 
-  std::optional<InspectedStill> finish() {
+  // `agdc`: how the raw counts of such a file become g; null where counts have a scale.
+  std::optional<InspectedStill> finish(const gt3x::AgdcCalibration* agdc) {
     if (!scan_) {
       return std::nullopt;
     }
-    const auto blocks = scan_->finish();
+    auto blocks = scan_->finish();
+    if (agdc != nullptr) {
+      for (calib::StillBlock& block : blocks) {
+        block.mean_g = agdc->apply(block.mean_lsb);
+      }
+    }
     return InspectedStill{calib::coverage_of(blocks), magnitude_error(blocks)};
   }
 
@@ -108,7 +107,7 @@ class StillWatch {
 };
 
 void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& item,
-                  const gt3x::Info& info) {
+                  const gt3x::Info& info, bool raw_counts) {
   if (found.samples == 0) {  // the first sample decides
     found.start = item.unix_time;
     found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, item.parameters);
@@ -119,9 +118,16 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
         found.facts.firmware = item.parameters->firmware.value_or("");
       }
     }
-    if (found.rate_hz.value_or(0) > 0 && found.accel_scale_lsb_per_g &&
-        item.type != gt3x::RecordType::activity3) {
-      still.start(*found.rate_hz, *found.accel_scale_lsb_per_g);
+    if (raw_counts) {
+      found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
+    }
+    if (found.rate_hz.value_or(0) > 0 && (found.accel_scale_lsb_per_g || raw_counts)) {
+      constexpr double kUsualScale_lsb_per_g = 256;
+      if (const Status started = still.start(
+              *found.rate_hz, found.accel_scale_lsb_per_g.value_or(kUsualScale_lsb_per_g));
+          !started) {
+        found.problem = started.error();
+      }
     }
   }
   found.samples += item.counts.size();
@@ -204,6 +210,16 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path)
     return fail(without_rate(path));
   }
 
+  std::optional<gt3x::AgdcCalibration> agdc;
+  if (recording.has_entry("calibration.json")) {
+    auto calibration = agdc_calibration(recording, found.rate_hz.value_or(0));
+    if (calibration) {
+      agdc = *std::move(calibration);
+    } else {
+      found.warnings.push_back("calibration.json: " + calibration.error().what);
+    }
+  }
+
   // A repaired file keeps its PARAMETERS, but its counts come from other constants.
   StillWatch still(!found.already_repaired, found.warnings);
   gt3x::SampleReader reader(recording);
@@ -221,18 +237,24 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path)
     if (item->type == gt3x::RecordType::activity3) {
       found.form = "agdc";
     }
+    const bool raw_counts = found.form == "agdc" && !(agdc && agdc->already_applied);
     steps_back += item->broke_order ? 1 : 0;
-    take_samples(found, still, *item, info);
+    take_samples(found, still, *item, info, raw_counts);
   }
   found.log = reader.statistics();
-  found.still = still.finish();
+  if (found.form != "agdc" || agdc) {
+    found.still = still.finish(agdc && !agdc->already_applied ? &*agdc : nullptr);
+  }
   if (found.samples == 0 && !reader.parameter_sets().empty()) {
     const gt3x::Parameters& last = reader.parameter_sets().back()->parameters;
     found.constants = last.constants;
     found.facts.calibration_time = last.calibration_time;
   }
   if (found.form == "agdc") {
-    found.constants = agdc_constants(recording, found.rate_hz.value_or(0));
+    found.constants = agdc ? agdc->constants : std::nullopt;
+  }
+  if (found.problem) {
+    found.problem->where = path;
   }
   add_warnings(found, reader, steps_back);
   if (found.rate_hz.value_or(0) <= 0) {

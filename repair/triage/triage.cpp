@@ -17,7 +17,13 @@ constexpr FirmwareVersion kCheckRemoved = {1, 4, 0};
 constexpr FirmwareVersion kCheckRestored = {1, 8, 0};
 constexpr FirmwareVersion kRotatingFirmware = {1, 6, 0};
 
-bool is_mos(const std::string& serial) { return serial.starts_with("MOS"); }
+// In capitals or not: files with either are known.
+bool is_mos(std::string_view serial) {
+  constexpr std::string_view kPrefix = "MOS";
+  return serial.size() >= kPrefix.size() &&
+         std::equal(kPrefix.begin(), kPrefix.end(), serial.begin(),
+                    [](char a, char b) { return a == b || b == a - 'A' + 'a'; });
+}
 
 // How firmware sets the filter configuration.
 enum class FilterRule { by_calibration_date, always_current, unknown };

@@ -190,6 +190,40 @@ TEST(RawCsv, RawCountsOfAnAgdcBecomeG) {
   }
 }
 
+// Of raw counts an .agdc says 1 LSB/g: as a scale of calibrated ones it would make 342 g of 1.34 g.
+TEST(RawCsv, CalibratedSamplesOfAnAgdcNeedAScale) {
+  for (const bool has_scale : {false, true}) {
+    MemoryEnv memory;
+    Bytes payload;
+    append_activity3(payload, std::vector<Counts>(32, Counts{342, 0, 0}));
+    Bytes log;
+    append_record(log, RecordType::activity3, tests::kStart, payload);
+    std::string calibration = R"({"isCalibrated":true,"calibrationMethod":2)";
+    for (const char* key : {"offsetX", "offsetY", "offsetZ", "sensitivityXX", "sensitivityYY",
+                            "sensitivityZZ", "sensitivityXY", "sensitivityXZ", "sensitivityYZ"}) {
+      calibration += std::string(",\"") + key + "_32\":25000";
+    }
+    auto out = RecordingWriter::create(memory.files, "a.agdc").value();
+    ASSERT_OK(out.add("log.bin", log));
+    ASSERT_OK(out.add("calibration.json", std::string_view(calibration + "}")));
+    ASSERT_OK(out.add("info.txt",
+                      std::string_view(has_scale ? "Serial Number: CPW1\r\nSample Rate: 32\r\n"
+                                                   "Acceleration Scale: 256\r\n"
+                                                 : "Serial Number: CPW1\r\nSample Rate: 32\r\n"
+                                                   "Acceleration Scale: 1\r\n")));
+    ASSERT_OK(out.commit());
+    auto recording = Recording::open(memory.files, "a.agdc");
+    ASSERT_OK(recording);
+    const auto text = csv_of(*recording);
+    if (has_scale) {
+      ASSERT_OK(text);
+      EXPECT_EQ(rows_of(*text).front(), "1.336,0,0");
+    } else {
+      EXPECT_FAILS(text, ErrorCode::bad_data);
+    }
+  }
+}
+
 // Every recording of the current form that we have can be exported; the oracle for the count is the
 // file's own record headers, 30 to 100 samples a second.
 TEST(RawCsv, EveryRealRecording) {

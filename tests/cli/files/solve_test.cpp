@@ -190,7 +190,7 @@ std::string write_agdc(FileSystem& files, const std::string& path, const PerAxis
   info.set("Serial Number", "CPW1C48210099");
   info.set("Firmware", "2.1.9");
   info.set("Sample Rate", "32");
-  Json calibration = {{"calibrationMethod", 1}, {"isCalibrated", false}, {"calibrationTime", 1}};
+  Json calibration = {{"calibrationMethod", 2}, {"isCalibrated", false}, {"calibrationTime", 1}};
   const PerAxis<const char*> names = {"X", "Y", "Z"};
   for (std::size_t a = 0; a < kAxes; ++a) {
     const auto zero = static_cast<int>(kZeroAt20[a]);

@@ -131,6 +131,17 @@ TEST(Agdc, Refuses) {
                                     R"("adxlTempLow":1,"adxlTempHigh":2})"),
       ErrorCode::bad_data);
   EXPECT_FAILS(parse_temperature({}), ErrorCode::bad_data);
+  // Whatever else it holds: the vendor's public reader knows method 2 alone.
+  for (const char* method : {"1", "3", "null", "\"2\"", "2.0e300"}) {
+    std::string json = R"({"isCalibrated":false,"calibrationMethod":)" + std::string(method);
+    for (const char* key : {"offsetX", "offsetY", "offsetZ", "sensitivityXX", "sensitivityYY",
+                            "sensitivityZZ", "sensitivityXY", "sensitivityXZ", "sensitivityYZ"}) {
+      json += std::string(",\"") + key + "_32\":25000";
+    }
+    EXPECT_FAILS(parse_agdc_calibration(json + "}", 32), ErrorCode::bad_data);
+    const std::size_t at = json.find("false");
+    EXPECT_OK(parse_agdc_calibration(json.replace(at, 5, "true") + "}", 32));
+  }
   EXPECT_FAILS(parse_temperature(Bytes(4, 0)), ErrorCode::bad_data);
 }
 

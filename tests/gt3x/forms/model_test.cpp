@@ -14,7 +14,8 @@ TEST(Model, FollowsThePrefix) {
        {Row{"NEO1F12345678", "GT3X+"}, Row{"MOS2A45130450", "wGT3X-BT"},
         Row{"MOS3A1", "wActiSleep+"}, Row{"MOS4A1", "wActiSleep-BT"},
         Row{"MOS9", "wGT3X-BT family"}, Row{"CLE2A1", "wGT3X+"}, Row{"TAS1", "GT9X Link"},
-        Row{"CPW1", "CentrePoint Insight Watch"}, Row{"", "unknown"}}) {
+        Row{"CPW1", "CentrePoint Insight Watch"}, Row{"neo1f12345678", "GT3X+"},
+        Row{"Mos2", "wGT3X-BT"}, Row{"", "unknown"}, Row{"NE", "unknown"}}) {
     EXPECT_EQ(model_of(serial), model);
   }
 }
@@ -23,7 +24,8 @@ TEST(Model, ScaleOnlyWhereItIsKnown) {
   EXPECT_EQ(default_accel_scale_lsb_per_g("NEO1"), 341);
   EXPECT_EQ(default_accel_scale_lsb_per_g("MOS0"), 256);
   EXPECT_EQ(default_accel_scale_lsb_per_g("MOS2A1"), 256);
-  EXPECT_EQ(default_accel_scale_lsb_per_g("MRA1"), std::nullopt);
+  EXPECT_EQ(default_accel_scale_lsb_per_g("MRA1"), 341);
+  EXPECT_EQ(default_accel_scale_lsb_per_g("neo1"), 341);
   EXPECT_EQ(default_accel_scale_lsb_per_g("CPW1"), std::nullopt);
 }
 

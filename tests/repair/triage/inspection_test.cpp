@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
@@ -279,6 +280,7 @@ TEST(Inspection, WhatCanBeReadAndNotUsedIsAProblem) {
   for (const auto& [found, what] :
        {std::pair{inspected(made_log(0)), "no samples"},
         {inspected(made_log(2), made_info("0")), "sample rate"},
+        {inspected(made_log(2), made_info("0.5")), "rate"},
         {inspected(made_log(2), "Serial Number: MOS2A45130450\r\n"), "sample rate"}}) {
     ASSERT_TRUE(found.problem) << what;
     EXPECT_EQ(found.problem->code, ErrorCode::bad_data);
@@ -313,8 +315,50 @@ TEST(Inspection, TheOldFormNeedsASampleRate) {
   EXPECT_EQ(bad.error().where, "0");
 }
 
+// Closed form: two sides at rest, one right, one 20 mg too short.
+TEST(Inspection, StillPeriodsOfAnAgdcAreJudgedByItsCalibration) {
+  MemoryFiles files;
+  const PerAxis<double> offset = {30, -12, 7};
+  Bytes log;
+  for (std::uint32_t second = 0; second < 40; ++second) {
+    const bool up = second < 20;
+    const auto z = static_cast<std::int16_t>(offset[2] + (up ? 250 : -245));
+    const gt3x::Counts sample = {30, -12, z};
+    Bytes payload;
+    gt3x::append_activity3(payload, std::vector<gt3x::Counts>(32, sample));
+    append_record(log, RecordType::activity3, kStart + second, payload);
+  }
+  std::string calibration = R"({"isCalibrated":false,"calibrationMethod":2)";
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    for (std::size_t b = a; b < kAxes; ++b) {
+      calibration +=
+          fmt::format(",\"sensitivity{}{}_32\":{}", "XYZ"[a], "XYZ"[b], a == b ? 25'000 : 0);
+    }
+    calibration += fmt::format(",\"offset{}_32\":{}", "XYZ"[a], offset[a]);
+  }
+  auto writer = gt3x::RecordingWriter::create(files, "a.agdc").value();
+  ASSERT_OK(writer.add("log.bin", log));
+  ASSERT_OK(writer.add("calibration.json", std::string_view(calibration + "}")));
+  ASSERT_OK(writer.add("info.txt", std::string_view("Serial Number: CPW1\r\nSample Rate: 32\r\n"
+                                                    "Acceleration Scale: 1\r\n")));
+  ASSERT_OK(writer.commit());
+  const auto found = inspect(files, "a.agdc");
+  ASSERT_OK(found);
+  EXPECT_EQ(found->form, "agdc");
+  EXPECT_FALSE(found->accel_scale_lsb_per_g);
+  ASSERT_TRUE(found->still);
+  EXPECT_GE(found->still->magnitude.blocks, 2U);
+  EXPECT_NEAR(found->still->coverage.max_g[2], 1, 1e-9);
+  EXPECT_NEAR(found->still->coverage.min_g[2], -0.98, 1e-9);
+  EXPECT_NEAR(found->still->magnitude.worst_mg, 20, 1e-6);
+}
+
 TEST(Inspection, FilesThatCannotBeOpenedAreErrors) {
   MemoryFiles files;
+  ASSERT_OK(write_file(files, "empty.gt3x", ""));
+  const auto empty = inspect(files, "empty.gt3x");
+  EXPECT_FAILS(empty, ErrorCode::bad_data);
+  EXPECT_THAT(empty.error().what, HasSubstr("empty"));
   ASSERT_OK(write_file(files, "text.gt3x", "this is no zip archive"));
   EXPECT_FAILS(inspect(files, "none.gt3x"), ErrorCode::no_input);
   EXPECT_FAILS(inspect(files, "text.gt3x"), ErrorCode::bad_data);
@@ -336,7 +380,7 @@ TEST(Inspection, RealFiles) {
 
   const Inspection chamber = of("agdc/CPW1C48210013_baseline.agdc");
   EXPECT_EQ(chamber.form, "agdc");
-  EXPECT_FALSE(chamber.still) << "raw counts are not judged by a scale";
+  EXPECT_FALSE(chamber.accel_scale_lsb_per_g) << "raw counts have no scale";
   EXPECT_NEAR(chamber.duration_s() / 3600, 3.5, 0.1);
 
   const Inspection epochs = of("agd/example1sec.agd");
