@@ -105,6 +105,9 @@ Result<std::string> Store::correct(const Correction& correction) {
   Correction now = correction;
   now.made_at = env_->clock.now();
   SIXPOINT_ASSIGN(now.row_id, whole_key(correction.table, correction.row_id));
+  if (correction.action == "prefer") {
+    SIXPOINT_CHECK(refuse_withdrawn(now.row_id));
+  }
   SIXPOINT_ASSIGN(Row row, new_row(now));
   return add(single_row("corrections", std::move(row)));
 }
@@ -133,6 +136,16 @@ Result<std::string> Store::whole_key(std::string_view table_name, const std::str
                     database_->location(), "'sixpoint history SERIAL' lists them")
              : fail(ErrorCode::usage, fmt::format("several {} begin with {}", table.name, name),
                     database_->location(), "give more of its digits");
+}
+
+Status Store::refuse_withdrawn(const std::string& constants_id) {
+  SIXPOINT_ASSIGN(const auto sets,
+                  select<ConstantsRecord>("WHERE id = $1", std::vector<Value>{constants_id}));
+  SIXPOINT_ASSIGN(const UnitHistory history, constants_history(sets.at(0).serial));
+  return history.is_withdrawn(constants_id)
+             ? Status(fail(ErrorCode::usage, "constants that are withdrawn apply to nothing",
+                           constants_id, "reinstate them first, or prefer another set"))
+             : Status();
 }
 
 Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,

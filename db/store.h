@@ -61,11 +61,11 @@ class Store final : public RecordWriter {
   // Adds a correction, made now; `row_id` as whole_key() takes it. no_input where there is no such
   // row; usage for another action, or without a reason.
   //
-  // | action              | of which rows      |
-  // |---------------------|--------------------|
-  // | withdraw, reinstate | constants          |
-  // | prefer              | constants          |
-  // | note                | any of any table   |
+  // | action              | of which rows                               |
+  // |---------------------|---------------------------------------------|
+  // | withdraw, reinstate | constants                                   |
+  // | prefer              | constants; usage where they are withdrawn   |
+  // | note                | any of any table                            |
   Result<std::string> correct(const Correction& correction);
   // From now on they do not apply. They stay in the history.
   Status withdraw_constants(const std::string& id, const std::string& operator_name,
@@ -111,6 +111,7 @@ class Store final : public RecordWriter {
   Result<AuditReport> audit(const std::string& earlier_head = {});
 
  private:
+  Status refuse_withdrawn(const std::string& constants_id);
   Store(Env& env, std::unique_ptr<Database> database)
       : env_(&env), database_(std::move(database)) {}
   // The records of a table for which `clauses` hold ("WHERE ... ORDER BY ...").

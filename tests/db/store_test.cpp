@@ -158,7 +158,11 @@ TEST_F(StoreTest, TheLastPreferenceOfASetThatIsNotWithdrawnHolds) {
   ASSERT_OK(store.withdraw_constants(one, "Ada", "it was not"));
   EXPECT_EQ(store.constants_history("MOS2A1")->preference("current")->reason, "warmed up");
   EXPECT_FAILS(prefer("none", "x"), ErrorCode::no_input);
-  EXPECT_FAILS(prefer(one, ""), ErrorCode::usage);
+  EXPECT_FAILS(prefer(two, ""), ErrorCode::usage);
+  EXPECT_FAILS(prefer(one, "it was right after all"), ErrorCode::usage);
+  memory_.clock.sleep(std::chrono::seconds(1));
+  ASSERT_OK(store.correct({"", {}, "constants", one, "reinstate", "Ada", "it was right"}));
+  ASSERT_OK(prefer(one, "it was right after all"));
   EXPECT_TRUE(store.audit()->ok);
 }
 
