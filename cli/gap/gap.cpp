@@ -29,6 +29,7 @@ struct Options {
   std::string run;
   std::string store;
   std::vector<std::string> without;
+  double matters_mg = gap::DiagnoseOptions{}.matters_mg;
   std::string html;
   std::string png;
   std::string pdf;
@@ -76,6 +77,7 @@ Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
   const auto start = context.env.clock.elapsed();
   gap::DiagnoseOptions how;
   how.without = std::set<std::string>(options.without.begin(), options.without.end());
+  how.matters_mg = options.matters_mg;
   how.seed = options.seed;
   SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, diagnose_input(options, std::move(how), context));
   diagnosis.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
@@ -169,6 +171,10 @@ void add_gap(CLI::App& app, Context& context) {
   add_store_option(diagnosis, options.store);
   diagnosis.add_option("--without", options.without, "effects taken out of the catalogue")
       ->delimiter(',');
+  diagnosis
+      .add_option("--matters-mg", options.matters_mg,
+                  "an effect matters from this root mean square on (probability_it_matters)")
+      ->check(CLI::Range(0.0, 1000.0));
   diagnosis.add_option("--html", options.html, "write the report as one page to this file");
   diagnosis.add_option("--png", options.png, "write the report as one sheet, PNG");
   diagnosis.add_option("--pdf", options.pdf, "write the report as one sheet, PDF");

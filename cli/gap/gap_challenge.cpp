@@ -216,6 +216,7 @@ Json to_json(const Outcome& outcome, std::size_t index) {
     entry["named"].push_back({{"name", name}, {"probability", number(probability)}});
   }
   entry["unknown"] = outcome.unknown;
+  entry["unknown_probability"] = number(outcome.unknown_probability);
   entry["honest"] = outcome.honest();
   entry["confidently_wrong"] = outcome.confidently_wrong();
   entry["seconds"] = outcome.seconds;
@@ -244,9 +245,15 @@ Json to_json(const Options& options, const Scores& scores, const std::vector<Out
   result["single_family_right"] = to_json(scores.family);
   result["none_alarms"] = to_json(scores.alarms);
   result["pair_f1"] = number(scores.f1());
+  result["realistic_dominant_first"] = to_json(scores.dominant);
+  result["realistic_recall"] = to_json(scores.recall);
+  result["realistic_precision"] = to_json(scores.precise);
+  result["realistic_exact_set"] = to_json(scores.exact_set);
+  result["realistic_needless_unknown"] = to_json(scores.needless);
   result["withheld_honest"] = to_json(scores.withheld_honest);
   result["withheld_confidently_wrong"] = to_json(scores.withheld_wrong);
   result["expected_calibration_error"] = number(scores.calibration_error());
+  result["unknown_calibration_error"] = number(scores.unknown_calibration_error());
   result["failures"] = to_json(scores.failures);
   json["calibration"] = Json::array();
   for (const Scores::Bin& bin : scores.bins) {
@@ -281,9 +288,15 @@ std::vector<std::pair<std::string, std::string>> lines(const Scores& scores) {
           {"  ... right family", text_of(scores.family)},
           {"two effects: F1 of the set", fmt::format("{:.3f}", scores.f1())},
           {"nothing missing: alarms", text_of(scores.alarms)},
+          {"realistic: dominant effect first", text_of(scores.dominant)},
+          {"  ... effects named (recall)", text_of(scores.recall)},
+          {"  ... names that are right (precision)", text_of(scores.precise)},
+          {"  ... exactly the effects that are there", text_of(scores.exact_set)},
+          {"  ... needless unknown", text_of(scores.needless)},
           {"withheld: unknown, or right family", text_of(scores.withheld_honest)},
           {"withheld: confidently wrong", text_of(scores.withheld_wrong)},
           {"expected calibration error", fmt::format("{:.3f}", scores.calibration_error())},
+          {"  ... of unknown", fmt::format("{:.3f}", scores.unknown_calibration_error())},
           {"failures of the program", text_of(scores.failures)}};
 }
 
@@ -468,6 +481,11 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
       .add_option("--outside", options.shares.outside,
                   "share of trials with an effect that is not in the catalogue")
       ->check(CLI::Range(0.0, 1.0));
+  command
+      .add_option("--realistic", options.shares.realistic,
+                  "share of trials with many small effects and one that dominates")
+      ->check(CLI::Range(0.0, 1.0));
+  command.add_flag("--rates", options.shares.any_rate, "draw sample rates from 20 to 100 Hz");
   command.add_option("--jobs", options.jobs, "diagnoses at a time (0 = one per core)");
   command.add_option("--program", options.program, "the sixpoint to test (default: this one)");
   command.add_option("--keep", options.keep, "leave bundles and answers in this folder");

@@ -53,6 +53,45 @@ void score_pair(const Outcome& outcome, Scores& scores) {
   }
 }
 
+void score_realistic(const Outcome& outcome, Scores& scores) {
+  const TrialEffect& dominant = outcome.truth.front();
+  if (!outcome.not_observable.contains(dominant.name)) {
+    scores.dominant.count(!outcome.named.empty() && outcome.named.front().first == dominant.name);
+  }
+  bool all = true;
+  for (const TrialEffect& effect : outcome.truth) {
+    const bool named = std::any_of(outcome.named.begin(), outcome.named.end(),
+                                   [&](const auto& n) { return n.first == effect.name; });
+    if (!outcome.not_observable.contains(effect.name)) {
+      scores.recall.count(named);
+      auto& own = scores.by_effect[effect.name];
+      own.first.count(named);
+      own.missed += named ? 0 : 1;
+      all = all && named;
+    }
+  }
+  for (const auto& [name, probability] : outcome.named) {
+    scores.precise.count(outcome.has(name));
+    all = all && outcome.has(name);
+  }
+  scores.exact_set.count(all && !outcome.unknown);
+  scores.needless.count(outcome.unknown);
+}
+
+Scores::Bin& bin_of(std::array<Scores::Bin, 10>& bins, double probability) {
+  return bins[static_cast<std::size_t>(std::clamp(probability * 10, 0.0, 9.0))];
+}
+
+double expected_error(const std::array<Scores::Bin, 10>& bins) {
+  double error = 0;
+  double all = 0;
+  for (const Scores::Bin& bin : bins) {
+    error += std::abs(bin.sum_p - bin.right);
+    all += bin.of;
+  }
+  return all == 0 ? 0 : error / all;
+}
+
 }  // namespace
 
 bool Outcome::has(std::string_view name) const {
@@ -113,6 +152,9 @@ void read_answer(const Json& json, Outcome& outcome) {
   }
   if (const auto unknown = json.find("unknown"); unknown != json.end() && unknown->is_object()) {
     const auto present = unknown->find("present");
+    const auto probability = unknown->find("probability");
+    outcome.unknown_probability =
+        probability != unknown->end() && probability->is_number() ? probability->get<double>() : 0;
     outcome.unknown = present != unknown->end() && present->is_boolean() && present->get<bool>();
   }
 }
@@ -133,15 +175,8 @@ double Scores::f1() const {
   return pair_named + pair_truth == 0 ? 0 : 2 * pair_hits / (pair_named + pair_truth);
 }
 
-double Scores::calibration_error() const {
-  double error = 0;
-  double all = 0;
-  for (const Bin& bin : bins) {
-    error += std::abs(bin.sum_p - bin.right);
-    all += bin.of;
-  }
-  return all == 0 ? 0 : error / all;
-}
+double Scores::calibration_error() const { return expected_error(bins); }
+double Scores::unknown_calibration_error() const { return expected_error(unknown_bins); }
 
 Scores score(const std::vector<Outcome>& outcomes, bool strip) {
   Scores scores;
@@ -152,21 +187,29 @@ Scores score(const std::vector<Outcome>& outcomes, bool strip) {
     }
     scores.seconds_sum += outcome.seconds;
     scores.seconds_max = std::max(scores.seconds_max, outcome.seconds);
-    if (outcome.kind == TrialKind::outside || (strip && outcome.kind != TrialKind::none)) {
+    const bool withheld =
+        outcome.kind == TrialKind::outside || (strip && outcome.kind != TrialKind::none);
+    Scores::Bin& unknown = bin_of(scores.unknown_bins, outcome.unknown_probability);
+    unknown.sum_p += outcome.unknown_probability;
+    unknown.right += withheld ? 1 : 0;
+    unknown.of += 1;
+    if (withheld) {
       scores.withheld_honest.count(outcome.honest());
       scores.withheld_wrong.count(outcome.confidently_wrong());
       continue;
     }
     for (const auto& [name, probability] : outcome.candidates) {
-      const auto bin = static_cast<std::size_t>(std::clamp(probability * 10, 0.0, 9.0));
-      scores.bins[bin].sum_p += probability;
-      scores.bins[bin].right += outcome.has(name) ? 1 : 0;
-      scores.bins[bin].of += 1;
+      Scores::Bin& bin = bin_of(scores.bins, probability);
+      bin.sum_p += probability;
+      bin.right += outcome.has(name) ? 1 : 0;
+      bin.of += 1;
     }
     if (outcome.kind == TrialKind::none) {
       scores.alarms.count(!outcome.named.empty() || outcome.unknown);
     } else if (outcome.kind == TrialKind::single) {
       score_single(outcome, scores);
+    } else if (outcome.kind == TrialKind::realistic) {
+      score_realistic(outcome, scores);
     } else {
       score_pair(outcome, scores);
     }

@@ -38,6 +38,7 @@ struct Outcome {
   std::set<std::string> confounded;                        // with the first one named
   std::set<std::string> not_observable;
   bool unknown = false;
+  double unknown_probability = 0;
   double seconds = 0;
 
   bool has(std::string_view name) const;  // the truth has this effect
@@ -70,8 +71,14 @@ struct Scores {
   Share first_large;       // ... and the severity is at least 1
   Share family;            // single: the family is right, where observable
   Share alarms;            // none: something was named or called unknown
-  Share withheld_honest;   // outside or stripped: unknown, or the right family
-  Share withheld_wrong;    // outside or stripped: confidently something else
+  // realistic units, of the effects that the diagnosis does not list as not observable:
+  Share dominant;         // the dominant effect is named first
+  Share recall;           // effects that are named
+  Share precise;          // named effects that are there
+  Share exact_set;        // all of them are named, and nothing else
+  Share needless;         // something is called unknown although the catalogue holds everything
+  Share withheld_honest;  // outside or stripped: unknown, or the right family
+  Share withheld_wrong;   // outside or stripped: confidently something else
   double pair_hits = 0, pair_named = 0, pair_truth = 0;
   Share failures;
   struct Bin {
@@ -83,10 +90,13 @@ struct Scores {
     double blind = 0, missed = 0;
   };
   std::map<std::string, PerEffect> by_effect;
+  // Of `unknown.probability`: whether the trial holds something outside the catalogue.
+  std::array<Bin, 10> unknown_bins;
   double seconds_sum = 0, seconds_max = 0;
 
   double f1() const;
   double calibration_error() const;  // expected, over the bins
+  double unknown_calibration_error() const;
 };
 
 // `strip`: the true effects were taken out of the catalogue.

@@ -28,7 +28,45 @@ class Drawing {
 
   Random& random() { return random_; }
 
-  double severity() { return std::exp(random_.uniform(std::log(0.3), std::log(3.0))); }
+  double severity() { return log_uniform(0.3, 3); }
+
+  double log_uniform(double low, double high) {
+    return std::exp(random_.uniform(std::log(low), std::log(high)));
+  }
+
+  // Names and severities of a realistic unit, the dominant one first. `gradual`: those that a unit
+  // may have a little of; of them the first ten are what every unit has.
+  std::vector<TrialEffect> realistic(const std::vector<std::string>& gradual) {
+    constexpr std::size_t kEveryUnit = 10;
+    std::vector<std::string> names = gradual;
+    const auto shuffle = [&](std::size_t count) {
+      for (std::size_t i = count; i > 1; --i) {
+        std::swap(names[i - 1], names[static_cast<std::size_t>(random_.below(i))]);
+      }
+    };
+    if (random_.uniform() < 0.5) {
+      names.resize(std::min(names.size(), kEveryUnit));
+      shuffle(names.size());
+    } else {
+      shuffle(names.size());
+      names.resize(std::min<std::size_t>(names.size(), 4 + random_.below(5)));
+    }
+    // The one that dominates the recording: others move too little even when they are large.
+    const auto dominant = std::find_if(names.begin(), names.end(), [](const std::string& name) {
+      constexpr std::array kCan = {"non_orthogonality", "misalignment", "offset_tempco",
+                                   "warm_up",           "settling",     "floor_vibration",
+                                   "electrical_line",   "seating",      "tilt"};
+      return std::find(kCan.begin(), kCan.end(), name) != kCan.end();
+    });
+    if (dominant != names.end()) {
+      std::rotate(names.begin(), dominant, dominant + 1);
+    }
+    std::vector<TrialEffect> drawn;
+    for (const std::string& name : names) {
+      drawn.push_back({name, drawn.empty() ? log_uniform(3, 6) : log_uniform(0.05, 0.5)});
+    }
+    return drawn;
+  }
 
   double sign() { return random_.uniform() < 0.5 ? -1 : 1; }
 
@@ -206,8 +244,28 @@ class Drawing {
 
 }  // namespace
 
+const std::vector<std::string>& gradual_effects() {
+  static const std::vector<std::string> kNames = {"non_orthogonality",
+                                                  "misalignment",
+                                                  "offset_tempco",
+                                                  "sensitivity_tempco",
+                                                  "second_order",
+                                                  "third_order",
+                                                  "seating",
+                                                  "clock_error",
+                                                  "drift",
+                                                  "floor_vibration",
+                                                  "warm_up",
+                                                  "settling",
+                                                  "electrical_line",
+                                                  "tilt",
+                                                  "hysteresis"};
+  return kNames;
+}
+
 std::string_view to_string(TrialKind kind) {
-  constexpr std::array<std::string_view, 4> kNames = {"none", "single", "pair", "outside"};
+  constexpr std::array<std::string_view, 5> kNames = {"none", "single", "pair", "outside",
+                                                      "realistic"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -267,9 +325,13 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
       R"({{"serial": "MOS2{}{:08}", "firmware": "{}", "calibrated": "201{}-0{}-15T12:00:00Z"}})",
       static_cast<char>('A' + random.below(5)), random.below(100'000'000),
       kFirmware[random.below(kFirmware.size())], 4 + random.below(5), 5 + random.below(5));
-  SIXPOINT_ASSIGN(trial.scenario, sim::parse_scenario(fmt::format(
-                                      R"({{"seed": {}, "protocol": "{}", "unit": {}}})",
-                                      random.bits() >> 12U, to_string(protocol), unit)));
+  const std::uint64_t seed_of_unit = random.bits() >> 12U;
+  constexpr std::array kRates_hz = {20, 25, 30, 40, 50, 60, 70, 80, 90, 100};
+  const int rate_hz = shares.any_rate ? kRates_hz[random.below(kRates_hz.size())] : 100;
+  SIXPOINT_ASSIGN(trial.scenario,
+                  sim::parse_scenario(
+                      fmt::format(R"({{"seed": {}, "protocol": "{}", "rate_hz": {}, "unit": {}}})",
+                                  seed_of_unit, to_string(protocol), rate_hz, unit)));
 
   std::vector<std::string> names;
   for (const EffectKind& kind : sim::effect_catalogue()) {
@@ -300,9 +362,19 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
     trial.effects.push_back({kind.effect.name, severity});
     return trial;
   }
-  trial.kind = dice < shares.none + shares.outside + shares.pair && names.size() > 1
-                   ? TrialKind::pair
-                   : TrialKind::single;
+  if (dice < shares.none + shares.outside + shares.realistic) {
+    trial.kind = TrialKind::realistic;
+    trial.effects = drawing.realistic(gradual_effects());
+    for (const TrialEffect& drawn : trial.effects) {
+      SIXPOINT_ASSIGN(std::vector<EffectSpec> parts, drawing.effect(drawn.name, drawn.severity));
+      effects.insert(effects.end(), parts.begin(), parts.end());
+    }
+    return trial;
+  }
+  trial.kind =
+      dice < shares.none + shares.outside + shares.realistic + shares.pair && names.size() > 1
+          ? TrialKind::pair
+          : TrialKind::single;
   while (trial.effects.size() < (trial.kind == TrialKind::pair ? 2U : 1U)) {
     const std::string& name = names[static_cast<std::size_t>(random.below(names.size()))];
     if (std::any_of(trial.effects.begin(), trial.effects.end(),

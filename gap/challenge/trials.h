@@ -10,6 +10,11 @@
 // two modes, lines have harmonics, drifts bend, low-passes have several orders, warm-ups two time
 // constants. Trials outside the catalogue hold effects that no diagnosis knows by name
 // (outside.h).
+//
+// A realistic unit has everything at once: half of them all ten small effects, half four to eight
+// effects of the gradual ones. Each is 0.05 to 0.5 times typical, but for one that dominates with 3
+// to 6 times; the clock is off by 5 to 40 ppm. The dominant effect comes first in
+// GapTrial::effects.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +28,7 @@
 
 namespace sixpoint::gap {
 
-enum class TrialKind { none, single, pair, outside };
+enum class TrialKind { none, single, pair, outside, realistic };
 std::string_view to_string(TrialKind kind);
 
 struct TrialEffect {
@@ -41,12 +46,17 @@ struct TrialShares {
   double none = 0.15;
   double pair = 0.2;
   double outside = 0.15;  // the rest is single
+  double realistic = 0;
+  bool any_rate = false;  // sample rates of 20 to 100 Hz instead of 100
 };
 
 // The same seed and index give the same trial. `only` restricts the effects drawn, of the catalogue
 // or outside it; empty: all that the protocol can show.
 Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::StandardProtocol protocol,
                             const TrialShares& shares, const std::vector<std::string>& only = {});
+
+// What a realistic unit is drawn from; every unit has the first ten.
+const std::vector<std::string>& gradual_effects();
 
 // Effects that one recording rarely tells apart answer to one family name.
 std::string_view family_of(std::string_view effect);

@@ -12,6 +12,9 @@ namespace sixpoint::gap {
 
 // Prior log odds of one effect: the catalogue has thirty, and one of them is present.
 inline constexpr double kLogPriorEffect = -3.5;
+// One unit in ten is a real one that shows a little of everything: each effect is there with even
+// odds. The others have at most a fault or two.
+inline constexpr double kShareOfRealUnits = 0.1;
 // Prior log odds of one kind of cause that the catalogue lacks: a third of the above.
 inline constexpr double kLogPriorUnknown = -4.5;
 // An effect is accepted from nine to one on: log 9.
@@ -20,6 +23,10 @@ inline constexpr double kAccept_nats = 2.2;
 inline constexpr double kUnknownWins_nats = 3;
 // Log odds of something that was not asked for.
 inline constexpr double kExcluded_nats = -1e3;
+
+// Real effects bend from the catalogue's plain laws by up to a tenth: the standard uncertainty of a
+// size that was estimated by the plain law.
+inline constexpr double kFormShare = 0.05;
 
 // A test of the residuals alarms at this many standard deviations. About forty tests of normal
 // variables would alarm in less than one bundle in a million; the real tails (chi-square with few

@@ -13,9 +13,15 @@ EvidenceModel::EvidenceModel(const std::vector<Block>& blocks, EvidenceOptions o
     : blocks_(blocks), options_(std::move(options)) {
   for (const ParameterGroup& group : parameter_groups()) {
     if (group.effect == "gain" || group.effect == "offset" || allowed(group.effect)) {
+      // Groups that differ in their prior size only share their columns.
+      const auto same = std::find_if(groups_.begin(), groups_.end(), [&](const ParameterGroup& g) {
+        return g.first == group.first && g.tau_s == group.tau_s && g.shape == group.shape;
+      });
+      first_column_.push_back(same == groups_.end()
+                                  ? columns_
+                                  : first_column(static_cast<int>(same - groups_.begin())));
+      columns_ += same == groups_.end() ? group.count : 0;
       groups_.push_back(group);
-      first_column_.push_back(columns_);
-      columns_ += group.count;
     }
   }
   for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -32,6 +38,14 @@ std::vector<int> EvidenceModel::groups_of(const std::string& effect) const {
     }
   }
   return found;
+}
+
+void EvidenceModel::set_time_constant(int g, double tau_s) {
+  for (int other = 0; other < group_count(); ++other) {
+    if (first_column(other) == first_column(g)) {
+      groups_[static_cast<std::size_t>(other)].tau_s = tau_s;
+    }
+  }
 }
 
 int EvidenceModel::feature_of_row(int row) const {

@@ -95,9 +95,8 @@ class EvidenceModel {
   const ParameterGroup& group(int g) const { return groups_[static_cast<std::size_t>(g)]; }
   int first_column(int g) const { return first_column_[static_cast<std::size_t>(g)]; }
   std::vector<int> groups_of(const std::string& effect) const;
-  void set_time_constant(int g, double tau_s) {
-    groups_[static_cast<std::size_t>(g)].tau_s = tau_s;
-  }
+  // Of this group and of those that share its columns.
+  void set_time_constant(int g, double tau_s);
   int columns() const { return columns_; }
   int rows() const { return static_cast<int>(row_block_.size()); }
   const std::vector<int>& row_block() const { return row_block_; }
@@ -124,12 +123,18 @@ class EvidenceModel {
   // The same with it; an estimate far beyond an effect's largest size has none.
   double evidence(const Whitened& w, const std::vector<int>& groups,
                   Posterior* posterior = nullptr) const;
-  double log_prior(const std::vector<int>& groups) const;
-  // The likeliest subset; every subset that was tried is added to `tried`.
-  Subset search(const Whitened& w, std::vector<Subset>& tried) const;
+  // Of these groups beside this scatter, over none: see log_prior_of_count().
+  double log_prior(const std::vector<int>& groups, Scatter scatter = Scatter::nominal) const;
+  // The likeliest subset; every subset that was tried is added to `tried`. `swap`: also tries each
+  // other effect in the place of each one found (some hundred subsets more).
+  Subset search(const Whitened& w, std::vector<Subset>& tried, bool swap = false) const;
   Fit make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const;
 
  private:
+  Subset climb(const Whitened& w, Subset from, bool generous, bool swap,
+               std::vector<Subset>& tried) const;
+  Subset attempt(const Whitened& w, std::vector<int> groups, std::vector<Subset>& tried) const;
+  bool fits(const std::vector<int>& groups, int g) const;
   Eigen::Index whiten_blocks(std::size_t first, std::size_t last, Scatter scatter, double size,
                              Eigen::Index first_row, double& half_log_det,
                              Eigen::MatrixXd& rows) const;
@@ -143,6 +148,21 @@ class EvidenceModel {
   int columns_ = 0;
   std::vector<int> row_block_;
 };
+
+// Log prior odds of `count` given effects over none. Units are of two sorts: a few have one fault
+// or two, each effect with the odds of kLogPriorEffect; kShareOfRealUnits of them have a little of
+// everything, each effect with even odds. So the third effect that is found makes others likelier
+// (a prior over the number of effects: Scott and Berger 2010).
+//
+// | count | nats  |
+// |-------|-------|
+// | 0     | 0     |
+// | 1     | -3.5  |
+// | 2     | -7.0  |
+// | 3     | -10.4 |
+// | 4     | -12.5 |
+// | 10    | -12.8 |
+double log_prior_of_count(std::size_t count);
 
 // Nuisances and the subset's groups.
 std::vector<int> with_nuisances(const std::vector<int>& groups);

@@ -5,6 +5,28 @@
 #include "gap/explain/explanation.h"
 
 namespace sixpoint::gap {
+namespace {
+
+// Mean square about their mean that scatter adds to the blocks' means.
+double scatter_mg2(const std::vector<Block>& blocks, const Fit& fit) {
+  const double n = static_cast<double>(blocks.size());
+  const double size2 = fit.scatter_size * fit.scatter_size;
+  double own = 0, shared = 0;
+  for (const Block& a : blocks) {
+    if (fit.scatter == Scatter::seating) {
+      own += size2 * seating_lever(a).topRows<3>().squaredNorm() / 3;
+      continue;
+    }
+    const double start_s = blocks.front().middle_s - blocks.front().seconds / 2;
+    own += size2 * scatter_kernel(fit.scatter, a, a, start_s);
+    for (const Block& b : blocks) {
+      shared += size2 * scatter_kernel(fit.scatter, a, b, start_s);
+    }
+  }
+  return std::max(0.0, own / n - shared / (n * n));
+}
+
+}  // namespace
 
 double Explanation::gain_nats(const std::string& effect, bool known_only) const {
   const std::vector<int> own = model_.groups_of(effect);
@@ -75,32 +97,54 @@ double Explanation::undetermined(const std::string& effect) const {
   return least.value_or(1);
 }
 
-double Explanation::expected_nats(const std::string& effect) const {
+// What the data alone say of one group beside `others`.
+Explanation::Information Explanation::information(int g, std::vector<int> others) const {
   // One axis has the size, the others a uniform share of it: mean square a third.
   constexpr double kOthers = 1.0 / 3;
+  const ParameterGroup& group = model_.group(g);
+  Posterior posterior;
+  model_.evidence(data_, with_group(std::move(others), g), &posterior);
+  const auto at = std::find(posterior.columns.begin() + kNuisanceParameters,
+                            posterior.columns.end(), model_.first_column(g)) -
+                  posterior.columns.begin();
+  Information sum;
+  for (Eigen::Index i = 0; i < std::min(3, group.count); ++i) {
+    const double prior2 = group.prior_sd * group.prior_sd;
+    const double left = std::min(posterior.covariance(at + i, at + i), prior2 * (1 - 1e-9));
+    // Posterior less prior precision.
+    sum.per_size2 += (1 / left - 1 / prior2) * (i == 0 ? 1 : kOthers);
+    sum.occam_nats += 0.5 * std::log(prior2 / left);
+  }
+  return sum;
+}
+
+double Explanation::expected_nats(const std::string& effect) const {
   double best = kNoEvidence_nats;
   for (const int g : model_.groups_of(effect)) {
-    const ParameterGroup& group = model_.group(g);
-    if (group.smallest == 0) {
-      continue;
+    const double smallest = model_.group(g).smallest;
+    if (smallest > 0) {
+      const Information known = information(g, {});
+      best = std::max(best, 0.5 * smallest * smallest * known.per_size2 - known.occam_nats +
+                                model_.log_prior({g}));
     }
-    Posterior posterior;
-    model_.evidence(data_, {g}, &posterior);
-    double square = 0;
-    double occam = 0;
-    for (Eigen::Index i = 0; i < std::min(3, group.count); ++i) {
-      const double variance =
-          posterior.covariance(kNuisanceParameters + i, kNuisanceParameters + i);
-      const double prior2 = group.prior_sd * group.prior_sd;
-      const double left = std::min(variance, prior2 * (1 - 1e-9));
-      // What the data alone say: posterior less prior precision.
-      const double information = 1 / left - 1 / prior2;
-      square += group.smallest * group.smallest * information * (i == 0 ? 1 : kOthers);
-      occam += 0.5 * std::log(prior2 / left);
-    }
-    best = std::max(best, 0.5 * square - occam + model_.log_prior({g}));
   }
   return best == kNoEvidence_nats ? -kNoEvidence_nats : best;
+}
+
+std::optional<double> Explanation::bound(const std::string& effect) const {
+  std::vector<int> others = best().subset.groups;
+  const std::vector<int> own = model_.groups_of(effect);
+  std::erase_if(others, [&](int g) { return std::find(own.begin(), own.end(), g) != own.end(); });
+  std::optional<double> least;
+  for (const int g : own) {
+    const Information known = information(g, others);
+    const double prior = model_.log_prior(with_group(others, g), best().scatter) -
+                         model_.log_prior(others, best().scatter);
+    const double needed = kAccept_nats + known.occam_nats - prior;
+    const double size = std::sqrt(2 * std::max(0.0, needed) / std::max(1e-12, known.per_size2));
+    least = std::min(least.value_or(size), size);
+  }
+  return least;
 }
 
 std::vector<double> Explanation::row_freedom() const {
@@ -112,6 +156,45 @@ std::vector<double> Explanation::row_freedom() const {
     freedom.push_back(std::clamp(1 - h, 0.0, 1.0));
   }
   return freedom;
+}
+
+std::map<std::string, double> Explanation::gap_mg2() const {
+  std::map<std::string, double> found;
+  const Posterior& posterior = best().posterior;
+  const Whitened w = model_.whiten(linear_, Scatter::nominal, 0);
+  Posterior nuisances;
+  model_.evidence_of(w.sums, {}, &nuisances);
+  // What gains and offsets take over, by least squares of the whitened rows.
+  const Eigen::MatrixXd own = used_columns(w.x, nuisances);
+  const Eigen::MatrixXd own_mg = used_columns(linear_, nuisances);
+  std::vector<std::string> names;
+  Eigen::MatrixXd adds_mg = Eigen::MatrixXd::Zero(model_.rows(), 0);
+  Eigen::Index at = kNuisanceParameters;
+  for (const int g : best().subset.groups) {
+    const int count = model_.group(g).count;
+    const Eigen::VectorXd value = posterior.mean.segment(at, count);
+    const auto adds = w.x.middleCols(model_.first_column(g), count) * value;
+    const Eigen::VectorXd taken = nuisances.covariance * (own.transpose() * adds);
+    adds_mg.conservativeResize(Eigen::NoChange, adds_mg.cols() + 1);
+    adds_mg.rightCols<1>() =
+        linear_.middleCols(model_.first_column(g), count) * value - own_mg * taken;
+    names.push_back(model_.group(g).effect);
+    at += count;
+  }
+  double n = 0;
+  Eigen::VectorXd in_mg(model_.rows());
+  for (int row = 0; row < model_.rows(); ++row) {
+    in_mg[row] = model_.feature_of_row(row) < kSecondHarmonic ? 1 : 0;  // as in held_out()
+    n += in_mg[row];
+  }
+  const Eigen::VectorXd all_mg = in_mg.cwiseProduct(adds_mg.rowwise().sum());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    found[names[i]] = adds_mg.col(static_cast<Eigen::Index>(i)).dot(all_mg) / std::max(1.0, n);
+  }
+  if (best().scatter != Scatter::nominal && in_catalogue(best().scatter)) {
+    found[std::string(to_string(best().scatter))] = scatter_mg2(model_.blocks(), best());
+  }
+  return found;
 }
 
 double Explanation::changing_nats(const std::string& effect) const {

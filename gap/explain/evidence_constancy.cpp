@@ -19,7 +19,7 @@ constexpr std::array<double, 3> kAngleSizes_deg = {0.02, 0.1, 0.4};
 constexpr std::array<double, 2> kEffectShares = {0.15, 0.6};
 // Real effects bend from their plain equations by this share, and slow ones by the second over
 // time (gap.md: forms are bent by up to a tenth).
-constexpr double kFormShare = 0.03;
+constexpr double kFormShare = 0.1;
 constexpr double kFormShareInTime = 0.1;
 // A change begins at this many times what the form may be bent.
 constexpr double kBeyondForm = 2;
@@ -160,7 +160,7 @@ Refit refit(const EvidenceModel& model, const Fit& fit, const Regressors& all) {
   Refit again;
   again.left = value - x * estimate;
   again.nats = 0.5 * pull.dot(estimate) - 0.5 * value.squaredNorm() - all.half_log_det -
-               half_log_determinant(normal) + model.log_prior(fit.subset.groups);
+               half_log_determinant(normal) + model.log_prior(fit.subset.groups, fit.scatter);
   again.taken = x.transpose() * all.rows.rightCols(all.rows.cols() - used - 1);
   normal.matrixL().solveInPlace(again.taken);
   return again;
@@ -252,7 +252,8 @@ std::vector<Inconstancy> Explanation::inconstancies() const {
   if (best_known_.scatter != Scatter::nominal) {
     // Without scatter, but against what is accepted as if it were certain: a probability of e^-x is
     // to be just that.
-    const double certain_nats = best_known_.nats - model_.log_prior(best_known_.subset.groups) -
+    const double certain_nats = best_known_.nats -
+                                model_.log_prior(best_known_.subset.groups, best_known_.scatter) -
                                 scatter_log_prior(best_known_.scatter);
     add_changes(model_, best_nominal_, linear_of(best_nominal_), factors, certain_nats, by_factor);
   }

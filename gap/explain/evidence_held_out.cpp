@@ -78,8 +78,15 @@ double Explanation::held_out_nats(const std::string& effect) const {
   return gain;
 }
 
-Explanation::HeldOut Explanation::held_out() const {
+Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) const {
   HeldOut out;
+  // Per column of the explanation: whether a simulation has it.
+  std::vector<bool> counts(kNuisanceParameters, true);
+  for (const int g : best().subset.groups) {
+    for (int i = 0; i < model_.group(g).count; ++i) {
+      counts.push_back(i < 3 && named.count(model_.group(g).effect) != 0);
+    }
+  }
   if (model_.rows() == 0) {
     return out;
   }
@@ -95,6 +102,9 @@ Explanation::HeldOut Explanation::held_out() const {
     Posterior accepted;
     model_.evidence_of(left.others, {}, &nothing);
     model_.evidence_of(left.others, best().subset.groups, &accepted);
+    for (std::size_t c = 0; c < counts.size(); ++c) {
+      accepted.mean[static_cast<Eigen::Index>(c)] *= counts[c] ? 1 : 0;
+    }
     for (const int row : left.rows) {
       const int feature = model_.feature_of_row(row);
       const double r0 = residual_of_row(w, row, nothing);

@@ -10,10 +10,12 @@ namespace {
 
 // Conventions of the search. With them `gap challenge` (seeds 2031 and 2032) finds pairs of effects
 // with an F1 of 0.98 to 0.99.
-constexpr std::size_t kMostEffects = 5;
+constexpr std::size_t kMostEffects = 12;
+constexpr std::size_t kMostInBeam = 5;
 constexpr std::size_t kBeamOfPairs = 6;  // subsets that grow to three effects
 constexpr std::size_t kBeam = 4;         // and further
 constexpr double kLeastGain_nats = 0.5;  // of one more effect, for the search to go on
+constexpr double kClimb_nats = 1e-6;     // of one step: less is rounding
 
 // An estimate is another thing where it lies beyond the effect's largest size by this factor, by
 // more than three standard deviations.
@@ -23,9 +25,8 @@ constexpr double kBeyond_sd = 3;
 constexpr double kImpossible_nats = 1e6;
 
 double most_of(const ParameterGroup& group, int i) {
-  return i >= 3 && group.curve_sd > 0
-             ? kBeyondCurve * group.curve_sd
-             : (group.effect == "truncation" ? 1 : kBeyondLargest) * group.largest;
+  return i >= 3 ? kBeyondCurve * group.sd_of(i)
+                : (group.effect == "truncation" ? 1 : kBeyondLargest) * group.largest;
 }
 
 }  // namespace
@@ -91,33 +92,93 @@ double EvidenceModel::evidence(const Whitened& w, const std::vector<int>& groups
   return nats;
 }
 
-double EvidenceModel::log_prior(const std::vector<int>& groups) const {
-  double sum = 0;
+double log_prior_of_count(std::size_t count) {
+  // Of the sixteen effects of the means and kinds of scatter, per unit of either sort.
+  constexpr double kEffects = 16;
+  static const double kEven = std::log(kShareOfRealUnits) - kEffects * std::log(2.0);
+  static const double kFew =
+      std::log(1 - kShareOfRealUnits) - kEffects * std::log1p(std::exp(kLogPriorEffect));
+  const auto log_sum = [](double few, double real) {
+    return std::max(few, real) + std::log1p(std::exp(-std::abs(few - real)));
+  };
+  return log_sum(kFew + static_cast<double>(count) * kLogPriorEffect, kEven) - log_sum(kFew, kEven);
+}
+
+double EvidenceModel::log_prior(const std::vector<int>& groups, Scatter scatter) const {
+  const bool counts = scatter != Scatter::nominal && in_catalogue(scatter);
+  // The scatter's own prior is in Whitened::outside_nats already.
+  double sum =
+      log_prior_of_count(groups.size() + (counts ? 1 : 0)) - (counts ? kLogPriorEffect : 0);
   for (const int g : groups) {
     // The shapes of an effect share its prior.
-    sum += kLogPriorEffect - std::log(static_cast<double>(groups_of(group(g).effect).size()));
+    sum -= std::log(static_cast<double>(groups_of(group(g).effect).size()));
   }
   return sum;
 }
 
-Subset EvidenceModel::search(const Whitened& w, std::vector<Subset>& tried) const {
-  const auto attempt = [&](std::vector<int> groups) {
-    const double nats = evidence(w, groups) + log_prior(groups);
-    tried.push_back({std::move(groups), nats});
-    return tried.back();
+Subset EvidenceModel::attempt(const Whitened& w, std::vector<int> groups,
+                              std::vector<Subset>& tried) const {
+  const double nats = evidence(w, groups) + log_prior(groups, w.scatter);
+  tried.push_back({std::move(groups), nats});
+  return tried.back();
+}
+
+// One group of an effect at most.
+bool EvidenceModel::fits(const std::vector<int>& groups, int g) const {
+  return std::none_of(groups.begin(), groups.end(),
+                      [&](int have) { return group(have).effect == group(g).effect; });
+}
+
+// From one subset to the likeliest neighbour until none is likelier: one group more, one less, or
+// another shape of the same effect; with `swap`, another effect in the place of one. `generous`: as
+// if the unit were known to have a little of everything, so that many small effects, each too small
+// to begin with, are found together.
+Subset EvidenceModel::climb(const Whitened& w, Subset from, bool generous, bool swap,
+                            std::vector<Subset>& tried) const {
+  const std::size_t scatters = w.scatter != Scatter::nominal && in_catalogue(w.scatter) ? 1 : 0;
+  const auto height = [&](const Subset& s) {
+    return s.nats - (generous ? log_prior_of_count(s.groups.size() + scatters) : 0);
   };
-  const auto fits = [&](const std::vector<int>& groups, int g) {
-    return std::none_of(groups.begin(), groups.end(),
-                        [&](int have) { return group(have).effect == group(g).effect; });
-  };
+  for (;;) {
+    Subset best = from;
+    const auto consider = [&](std::vector<int> groups) {
+      const Subset tested = attempt(w, std::move(groups), tried);
+      if (height(tested) > height(best) + kClimb_nats) {
+        best = tested;
+      }
+    };
+    for (int g = kNuisances; g < group_count(); ++g) {
+      if (from.groups.size() < kMostEffects && fits(from.groups, g)) {
+        consider(with_group(from.groups, g));
+      }
+    }
+    for (std::size_t i = 0; i < from.groups.size(); ++i) {
+      std::vector<int> less = from.groups;
+      less.erase(less.begin() + static_cast<std::ptrdiff_t>(i));
+      consider(less);
+      for (int g = kNuisances; g < group_count(); ++g) {
+        const bool shape = group(g).effect == group(from.groups[i]).effect;
+        if (g != from.groups[i] && (swap || shape) && fits(less, g)) {
+          consider(with_group(less, g));
+        }
+      }
+    }
+    if (best.groups == from.groups) {
+      return from;
+    }
+    from = best;
+  }
+}
+
+Subset EvidenceModel::search(const Whitened& w, std::vector<Subset>& tried, bool swap) const {
   const auto better = [](const Subset& a, const Subset& b) { return a.nats > b.nats; };
   // All singles and pairs; larger subsets grow from the best few.
-  std::vector<Subset> beam = {attempt({})};
+  std::vector<Subset> beam = {attempt(w, {}, tried)};
   for (int g = kNuisances; g < group_count(); ++g) {
-    beam.push_back(attempt({g}));
+    beam.push_back(attempt(w, {g}, tried));
     for (int h = g + 1; h < group_count(); ++h) {
       if (fits({g}, h)) {
-        beam.push_back(attempt({g, h}));
+        beam.push_back(attempt(w, {g, h}, tried));
       }
     }
   }
@@ -125,14 +186,14 @@ Subset EvidenceModel::search(const Whitened& w, std::vector<Subset>& tried) cons
   Subset best = beam.front();
   beam.resize(std::min(beam.size(), kBeamOfPairs));
   std::set<std::vector<int>> seen;
-  for (std::size_t size = 3; size <= kMostEffects; ++size) {
+  for (std::size_t size = 3; size <= kMostInBeam; ++size) {
     std::vector<Subset> next;
     for (const Subset& from : beam) {
-      for (int g = kNuisances; g < group_count() && from.groups.size() < kMostEffects; ++g) {
+      for (int g = kNuisances; g < group_count() && from.groups.size() < kMostInBeam; ++g) {
         if (fits(from.groups, g)) {
           std::vector<int> grown = with_group(from.groups, g);
           if (seen.insert(grown).second) {
-            next.push_back(attempt(std::move(grown)));
+            next.push_back(attempt(w, std::move(grown), tried));
           }
         }
       }
@@ -148,7 +209,9 @@ Subset EvidenceModel::search(const Whitened& w, std::vector<Subset>& tried) cons
     next.resize(std::min(next.size(), kBeam));
     beam = std::move(next);
   }
-  return best;
+  const Subset few = climb(w, best, false, swap, tried);
+  const Subset many = climb(w, climb(w, few, true, false, tried), false, swap, tried);
+  return many.nats > few.nats ? many : few;
 }
 
 Fit EvidenceModel::make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const {

@@ -14,6 +14,7 @@ constexpr double kDerivativeStep = 0.02;
 constexpr double kRegular = 1e-9;
 // A rotation by one degree moves 1 g by this many mg (1000 pi / 180).
 constexpr double kMgPerDegree = 17.45;
+constexpr double kRadPerDeg = M_PI / 180;
 
 // Placements are independent of each other under these kinds of scatter.
 bool by_placement_only(Scatter scatter) {
@@ -36,6 +37,9 @@ Eigen::MatrixXd covariance_of(const Block& a, const Block& b, Scatter scatter, d
     const double turn_deg = one_pose ? size / kMgPerDegree : 0;
     const double sd_deg = one_placement ? std::hypot(seat_deg, turn_deg) : turn_deg;
     v += sd_deg * sd_deg * seating_lever(a) * seating_lever(b).transpose();
+    // To second order a turn by (x, y) takes x^2 + y^2 off: its mean square is 8 sd^4.
+    const double loss = 8 * std::pow(sd_deg * kRadPerDeg, 4);
+    v += loss * seating_loss(a) * seating_loss(b).transpose();
   }
   if (scatter != Scatter::nominal && scatter != Scatter::seating) {
     const double c = size * size * scatter_kernel(scatter, a, b, start_s);
@@ -90,8 +94,12 @@ Eigen::MatrixXd EvidenceModel::linearise(const ForwardState& at) const {
   for (const Block& block : blocks_) {
     const Eigen::VectorXd base = predict(at, block, options_.lsb_mg);
     y.segment(row, block.size()) = block.value_mg - base;
+    int next_column = 0;
     for (int g = 0; g < group_count(); ++g) {
-      add_columns(at, block, base, g, row, x, theta);
+      if (first_column(g) == next_column) {  // the others share columns
+        add_columns(at, block, base, g, row, x, theta);
+        next_column += group(g).count;
+      }
     }
     row += block.size();
   }

@@ -88,7 +88,7 @@ ForwardState Explanation::explain_nominal() {
   for (int round = 1; round <= kMostRounds; ++round) {
     data_ = model_.whiten(model_.linearise(at), Scatter::nominal, 0);
     tried.clear();
-    const Fit next = model_.make_fit(data_, model_.search(data_, tried), at);
+    const Fit next = model_.make_fit(data_, model_.search(data_, tried, round > 1), at);
     const bool settled = round > 1 && next.subset.groups == fit.subset.groups;
     fit = next;
     if (settled && round >= kLeastRounds) {
@@ -171,7 +171,8 @@ void Explanation::compete(Scatter scatter, Trial trial, Whitened& unknown_data) 
     const ForwardState& at = trial.fit->state;
     data_ = model_.whiten(model_.linearise(at), scatter, trial.fit->scatter_size);
     std::vector<Subset> tried;
-    best_known_ = model_.make_fit(data_, model_.search(data_, tried), at);
+    best_known_ = model_.make_fit(data_, model_.search(data_, tried, true), at);
+    remember(scatter, tried);
   }
 }
 

@@ -15,7 +15,9 @@
 // The object refers to `blocks`, which must outlive it. It is constant after construction.
 #pragma once
 
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -66,6 +68,11 @@ class Explanation {
   // Log evidence to be expected of this effect at its smallest realistic size, prior included.
   // Below kAccept_nats this recording can't show it at that size.
   double expected_nats(const std::string& effect) const;
+  // The size, in the unit of the effect's first parameter, at which this recording shows it half of
+  // the time: its expected evidence beside everything else of the best explanation just reaches
+  // kAccept_nats. Of one axis, the others a uniform share of it. None for effects that the means do
+  // not show.
+  std::optional<double> bound(const std::string& effect) const;
   // Log evidence that an effect of the best explanation (or "gain") changes in proportion to time,
   // over the best explanation, in which it is constant.
   double changing_nats(const std::string& effect) const;
@@ -78,6 +85,12 @@ class Explanation {
   // Log predictive likelihood of held-out conditions with the effect less without it.
   double held_out_nats(const std::string& effect) const;
 
+  // Mean square, mg^2 per mean and tone amplitude, that each effect of the best explanation adds
+  // beyond what gains and offsets take over: its Shapley value in the mean square of all together
+  // (for a sum of vectors that is the product of the vector with the sum). Of a scatter: what it
+  // is expected to add.
+  std::map<std::string, double> gap_mg2() const;
+
   // Root mean squares of what was predicted from the other conditions, before (nuisances only) and
   // after (best explanation); sigma: in standard deviations of noise and nominal seating.
   struct HeldOut {
@@ -88,13 +101,20 @@ class Explanation {
     double mean_before_sigma = 0, mean_after_sigma = 0;
     int rows = 0;
   };
-  HeldOut held_out() const;
+  // `named`: effects that count as explained; of others, and of what bends an effect from its plain
+  // law, the estimates are taken out, as a simulation with the named effects would leave them out.
+  HeldOut held_out(const std::set<std::string>& named) const;
 
  private:
   struct Tried {
     Scatter scatter;
     Subset subset;
   };
+  struct Information {
+    double per_size2 = 0;   // nats times two, for a size of one
+    double occam_nats = 0;  // what the free numbers cost
+  };
+  Information information(int g, std::vector<int> others) const;
   // What one kind of scatter explains.
   struct Trial {
     std::optional<Fit> fit;

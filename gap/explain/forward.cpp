@@ -77,6 +77,22 @@ double quick_erf(double x) {
   return std::copysign(value, x);
 }
 
+// Size of an effect that a unit has a little of, as a share of the typical (convention: from the
+// datasheet's typical values to what the best units have).
+constexpr double kSmallShare = 0.2;
+// Of one that is far beyond the catalogue's sizes.
+constexpr double kLargeShare = 4;
+
+// Real effects bend from their plain laws by up to a tenth over this range of temperature.
+constexpr double kBend = 0.1;
+constexpr double kBend_c = 20;
+
+// Gains and offsets are free, truncation is there or not, and gravity is known within one range.
+bool varies_in_size(const ParameterGroup& group) {
+  return group.effect != "gain" && group.effect != "offset" && group.effect != "truncation" &&
+         group.effect != "local_gravity";
+}
+
 // Steps below kLeastStep_g are none.
 double sign_of_step(double step_g) {
   return std::abs(step_g) < kLeastStep_g ? 0 : std::copysign(1.0, step_g);
@@ -87,11 +103,17 @@ Eigen::Vector3d slow_zero_mg(const ForwardState& s, const Block& block) {
   const double warm = block.temperature_c - kReference_c;
   const double hours = block.middle_s / 3600;
   // Mean of exp(-t/tau) over the block.
-  const double half = block.seconds / (2 * s.warm_up_tau_s);
-  const double decay =
-      std::exp(-block.middle_s / s.warm_up_tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
+  const auto decay = [&](double tau_s) {
+    const double half = block.seconds / (2 * tau_s);
+    return std::exp(-block.middle_s / tau_s) * (half > 1e-6 ? std::sinh(half) / half : 1);
+  };
   Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
-                            hours * s.drift_mg_per_h + decay * s.warm_up_mg;
+                            warm * warm * warm * s.tempco_cubic_mg_per_c3 +
+                            hours * s.drift_mg_per_h + decay(s.warm_up_tau_s) * s.warm_up_mg;
+  // Zero in most calls, and an exponential costs.
+  if (!s.quick_warm_up_mg.isZero(0)) {
+    slow_mg += decay(s.warm_up_tau_s / 4) * s.quick_warm_up_mg;
+  }
   for (Eigen::Index a = 0; a < 3; ++a) {
     slow_mg[a] +=
         s.hysteresis_mg[a] * (s.hysteresis_shape == 0   ? 0.5 * block.approach_g[a]
@@ -113,7 +135,9 @@ double& parameter(ForwardState& s, int position) {
   for (const std::span<double> values :
        spans_of(s.gain, s.offset_mg, s.tilt_deg, s.misalignment_deg, s.cross, s.second_mg_per_g2,
                 s.third_mg_per_g3, s.hysteresis_mg, s.tempco_mg_per_c, s.tempco_curve_mg_per_c2,
-                s.sensitivity_percent_per_c, s.warm_up_mg, s.drift_mg_per_h)) {
+                s.tempco_cubic_mg_per_c3, s.sensitivity_percent_per_c,
+                s.sensitivity_curve_percent_per_c2, s.warm_up_mg, s.quick_warm_up_mg,
+                s.drift_mg_per_h)) {
     if (at < values.size()) {
       return values[at];
     }
@@ -131,7 +155,8 @@ std::vector<ParameterGroup> parameter_groups() {
   // Nuisances are free here (sd of 0.3): their own priors, 2 % and 35 mg, are judged afterwards.
   // Effects: prior sd about the middle of the catalogue's realistic sizes, `largest` their upper
   // end, `smallest` their lower (where the catalogue names none: a third of the typical).
-  // A zero bends over temperature by some hundredths of its slope per degree.
+  // A zero bends over temperature by some hundredths of its slope per degree, and by a tenth of its
+  // slope over 20 C as a cubic; a sensitivity bends by a tenth over 20 C.
   std::vector<ParameterGroup> groups = {
       {"gain", 0, 3, 0.3, 1, 0, 10},
       {"offset", 3, 3, 300, 0, 0, 1e4},
@@ -140,17 +165,30 @@ std::vector<ParameterGroup> parameter_groups() {
       {"non_orthogonality", 11, 3, 0.006, 0, 0, 0.015, 0.0015},
       {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0.12},
       {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0.012},
-      {"offset_tempco", 23, 6, 0.5, 0, 0.004, 1, 0.2},
-      {"sensitivity_tempco", 29, 3, 0.03, 0, 0, 0.05, 0.01},
-      {"drift", 35, 3, 2.5, 0, 0, 5, 1},
-      {"local_gravity", 38, 1, 0.0015, 0, 0, 0.0027, 0.0005},
-      {"truncation", 39, 1, 0.05, 1, 0, 0.35},
+      {"offset_tempco", 23, 9, 0.5, 0, 0.004, 1, 0.2, 0, 1, kBend * 0.5 / (kBend_c * kBend_c)},
+      {"sensitivity_tempco", 32, 6, 0.03, 0, kBend * 0.03 / kBend_c, 0.05, 0.01},
+      {"drift", 44, 3, 2.5, 0, 0, 5, 1},
+      {"local_gravity", 47, 1, 0.0015, 0, 0, 0.0027, 0.0005},
+      {"truncation", 48, 1, 0.05, 1, 0, 0.35},
   };
   for (const int shape : {1, 0, 2}) {
     groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0.2, 0, shape});
   }
   for (const double tau_s : {75.0, 120.0, 180.0, 270.0, 400.0, 600.0}) {
-    groups.push_back({"warm_up", 32, 3, 4, 0, 0, 10, 1, tau_s, 1});
+    groups.push_back({"warm_up", 38, 6, 4, 0, kBend * 4, 10, 1, tau_s, 1});
+  }
+  // A prior of one width would count a small size as unlikely: 1.6 nats for each number of it. How
+  // much an effect bends goes with its size.
+  const std::size_t full = groups.size();
+  for (const double share : {kSmallShare, kLargeShare}) {
+    for (std::size_t i = 0; i < full; ++i) {
+      if (varies_in_size(groups[i]) && (share < 1 || groups[i].curve_sd > 0)) {
+        groups.push_back(groups[i]);
+        groups.back().prior_sd *= share;
+        groups.back().curve_sd *= share;
+        groups.back().cubic_sd *= share;
+      }
+    }
   }
   return groups;
 }
@@ -163,9 +201,10 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   const Eigen::Vector3d rest = chain * (block.gravity_lab_g * (1 + s.gravity_ratio));
   const Eigen::Vector3d swing = chain * block.vibration_lab_g;
   const Eigen::Vector3d slow_mg = slow_zero_mg(s, block);
-  const Eigen::Vector3d sensitivity =
-      Eigen::Vector3d::Ones() +
-      0.01 * (block.temperature_c - kReference_c) * s.sensitivity_percent_per_c;
+  const double warm = block.temperature_c - kReference_c;
+  const Eigen::Vector3d sensitivity = Eigen::Vector3d::Ones() +
+                                      0.01 * warm * s.sensitivity_percent_per_c +
+                                      0.01 * warm * warm * s.sensitivity_curve_percent_per_c2;
   // What axis a shows at the specific force v, in a noise of sigma.
   const auto stored_mg = [&](Eigen::Index a, double v, double sigma) {
     double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
@@ -221,6 +260,16 @@ Eigen::MatrixXd seating_lever(const Block& block) {
     }
   }
   return lever;
+}
+
+Eigen::VectorXd seating_loss(const Block& block) {
+  Eigen::VectorXd loss = Eigen::VectorXd::Zero(block.size());
+  loss.head<3>() = 500 * block.rotation * block.gravity_lab_g;
+  if (block.tone) {
+    const Eigen::Vector3d swing = block.rotation * block.vibration_lab_g;
+    loss.segment<3>(kToneAmplitude) = std::copysign(500.0, swing[block.axis]) * swing;
+  }
+  return loss;
 }
 
 }  // namespace sixpoint::gap

@@ -32,8 +32,12 @@ struct ForwardState {
   Eigen::Vector3d hysteresis_mg = Eigen::Vector3d::Zero();
   Eigen::Vector3d tempco_mg_per_c = Eigen::Vector3d::Zero();
   Eigen::Vector3d tempco_curve_mg_per_c2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d tempco_cubic_mg_per_c3 = Eigen::Vector3d::Zero();
   Eigen::Vector3d sensitivity_percent_per_c = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sensitivity_curve_percent_per_c2 = Eigen::Vector3d::Zero();
   Eigen::Vector3d warm_up_mg = Eigen::Vector3d::Zero();
+  Eigen::Vector3d quick_warm_up_mg =
+      Eigen::Vector3d::Zero();  // with a quarter of the time constant
   Eigen::Vector3d drift_mg_per_h = Eigen::Vector3d::Zero();
   double gravity_ratio = 0;
   double truncation = 0;  // 1: toward zero instead of nearest
@@ -49,17 +53,20 @@ struct ParameterGroup {
   int count = 0;
   double prior_sd = 1;  // of each, from the realistic sizes of the catalogue
   double prior_mean = 0;
-  double curve_sd = 0;  // of the fourth number on: what bends the effect's main law
+  double curve_sd = 0;  // of the fourth to the sixth number: what bends the effect's main law
   double largest = 0;   // largest realistic size
   double smallest = 0;  // smallest realistic size; 0: not used
   double tau_s = 0;     // shape of warm_up
   int shape = 1;        // shape of hysteresis
+  double cubic_sd = 0;  // of the seventh number on
 
   // Prior standard deviation of the group's i-th number.
-  double sd_of(int i) const { return i >= 3 && curve_sd > 0 ? curve_sd : prior_sd; }
+  double sd_of(int i) const { return i < 3 ? prior_sd : i < 6 ? curve_sd : cubic_sd; }
 };
-inline constexpr int kForwardParameters = 40;
-// Every group, with each shape of warm_up and hysteresis as a group of its own.
+inline constexpr int kForwardParameters = 49;
+// Every group, with each shape of warm_up and hysteresis as a group of its own, and each effect
+// that every unit has a little of twice: at its typical size, and at a fifth of it; those that bend
+// also at four times of it.
 std::vector<ParameterGroup> parameter_groups();
 inline constexpr double kReference_c = 25;
 
@@ -99,5 +106,9 @@ Eigen::VectorXd predict(const ForwardState& state, const Block& block, double ls
 
 // d(features)/d(small rotation of the unit in its seat, sensor's frame), mg per degree: size x 3.
 Eigen::MatrixXd seating_lever(const Block& block);
+
+// What a small turn takes off the features to second order, mg per rad^2 of each angle: half of the
+// vectors themselves.
+Eigen::VectorXd seating_loss(const Block& block);
 
 }  // namespace sixpoint::gap

@@ -337,19 +337,29 @@ class LineFinder {
 
 std::vector<SpectralLine> find_lines(const Bundle& bundle, const CleanSamples& clean,
                                      const NoiseSpectrum& noise) {
-  constexpr std::size_t kMost = 4;
+  constexpr std::size_t kMost = 8;
+  constexpr int kMostTried = 16;
   std::vector<SpectralLine> lines;
   auto all = noise.usable() ? stretches(bundle, clean) : std::vector<Stretch>{};
   if (all.empty()) {
     return lines;
   }
   LineFinder finder(bundle.rate_hz, noise, std::move(all));
-  while (lines.size() < kMost) {
+  // Strongest first: a dwell of some seconds spreads a line over its neighbourhood.
+  const auto spread_of = [](const SpectralLine& strong, const SpectralLine& line) {
+    constexpr double kReach_hz = 3, kShare = 0.03;
+    return std::abs(strong.frequency_hz - line.frequency_hz) < kReach_hz &&
+           line.vector_mg.norm() < kShare * strong.vector_mg.norm();
+  };
+  for (int tried = 0; tried < kMostTried && lines.size() < kMost; ++tried) {
     const auto line = finder.next();
     if (!line) {
       break;
     }
-    lines.push_back(*line);
+    if (std::none_of(lines.begin(), lines.end(),
+                     [&](const SpectralLine& strong) { return spread_of(strong, *line); })) {
+      lines.push_back(*line);
+    }
   }
   std::sort(lines.begin(), lines.end(),
             [](const SpectralLine& a, const SpectralLine& b) { return a.gain_nats > b.gain_nats; });

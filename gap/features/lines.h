@@ -32,7 +32,7 @@ struct SpectralLine {
   double held_out_nats = 0;
 };
 
-// Strongest first, at most four.
+// Strongest first, at most eight. What a strong line spreads about itself is none.
 std::vector<SpectralLine> find_lines(const Bundle& bundle, const CleanSamples& clean,
                                      const NoiseSpectrum& noise);
 

@@ -105,8 +105,11 @@ class ToneAnalysis {
     }
     w_ = 2 * M_PI * segment_.vibration->frequency_hz / bundle_.rate_hz /
          (1 + 1e-6 * options_.clock_ppm);
-    if (std::sin(w_) == 0 || w_ >= M_PI) {
-      return fit_;  // beyond half the sample rate nothing of this holds
+    // About half of the sample rate sine and cosine look alike, and beyond it nothing of this
+    // holds.
+    constexpr double kHighest = 0.95 * M_PI;
+    if (std::sin(w_) == 0 || w_ >= kHighest) {
+      return fit_;
     }
     find_slips();
     fit_all();

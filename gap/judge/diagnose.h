@@ -44,6 +44,9 @@ struct DiagnoseOptions {
   std::set<std::string> without = {};  // effects taken out of the catalogue
   // Raw counts of a unit that is not calibrated yet: its gains and offsets are not judged.
   bool uncalibrated = false;
+  // An effect matters from this root mean square per axis on: twice what noise and seating leave of
+  // the mean of a ten-second dwell.
+  double matters_mg = 0.4;
   std::uint64_t seed = 0;  // goes into the augmented scenario
 };
 

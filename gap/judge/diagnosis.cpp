@@ -1,5 +1,6 @@
 #include "gap/judge/diagnosis.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -47,6 +48,9 @@ Json finding_json(const EffectFinding& finding) {
     }
   }
   json["held_out_gain_nats"] = finite(finding.held_out_gain_nats);
+  json["share_of_gap"] = finite(finding.share_of_gap);
+  json["probability_it_matters"] = finite(finding.probability_it_matters);
+  json["bound"] = finding.bound ? finite(*finding.bound) : Json(nullptr);
   json["outside_datasheet"] = finding.outside_datasheet;
   json["confounded_with"] = finding.confounded_with;
   return json;
@@ -153,10 +157,16 @@ Json Diagnosis::to_json() const {
                {"unknown",
                 {{"present", unknown.present},
                  {"probability", finite(unknown.probability)},
+                 {"size_mg", finite(unknown.size_mg)},
                  {"where", unknown.where}}}};
   json["not_observable"] = Json::array();
   for (const auto& [name, segment] : not_observable) {
-    json["not_observable"].push_back({{"name", name}, {"needs_segment", segment}});
+    const auto judged = std::find_if(candidates.begin(), candidates.end(),
+                                     [&](const EffectFinding& f) { return f.name == name; });
+    const bool known = judged != candidates.end() && judged->bound;
+    json["not_observable"].push_back({{"name", name},
+                                      {"needs_segment", segment},
+                                      {"bound", known ? finite(*judged->bound) : Json(nullptr)}});
   }
   json["gap"]["before"] = {{"rms_mg", finite(gap.before_mg)}, {"sigma", finite(gap.before_sigma)}};
   json["gap"]["after"] = {

@@ -32,12 +32,20 @@ struct EffectFinding {
   std::vector<std::string> confounded_with = {};
   // Log odds of a cause that the catalogue lacks in its place: they lower the probability.
   double other_nats = -1e3;
+  // Mean square per axis that it adds to the recording, mg^2, and its share of the whole gap.
+  double gap_mg2 = 0;
+  double share_of_gap = 0;
+  // That it is there and adds more than DiagnoseOptions::matters_mg.
+  double probability_it_matters = 0;
+  // The size, in the unit of the first parameter, that this recording shows half of the time.
+  std::optional<double> bound = {};
 };
 
 struct UnknownFinding {
   bool present = false;
   double probability = 0;
   std::vector<std::string> where;  // strongest first, in words
+  double size_mg = 0;              // rms per axis that nothing named explains, above the floor
 };
 
 struct GapSize {

@@ -42,6 +42,27 @@ void complete(const Request& request, Findings& found) {
   }
 }
 
+// Relative uncertainty of a size: that of its first parameter, taken together over the axes.
+double relative_sd(const EffectFinding& f) {
+  constexpr double kUnknown = 0.3;  // convention, where none is given
+  double value2 = 0, sd2 = 0;
+  if (!f.parameters.empty()) {
+    for (const double v : f.parameters.front().value) {
+      value2 += v * v;
+    }
+    for (const double sd : f.parameters.front().sd) {
+      sd2 += sd * sd;
+    }
+  }
+  return value2 > 0 && sd2 > 0 ? std::sqrt(sd2 / value2) : kUnknown;
+}
+
+double probability_it_matters(const EffectFinding& f, double matters_mg) {
+  const double rms_mg = std::sqrt(std::max(0.0, f.gap_mg2));
+  const double z = rms_mg > 0 ? (rms_mg - matters_mg) / (rms_mg * relative_sd(f)) : -10;
+  return f.probability * 0.5 * std::erfc(-z / M_SQRT2);
+}
+
 // Of something unknown, by convention.
 double unknown_probability(const Findings& found) {
   if (!found.alarms.empty()) {
@@ -132,6 +153,26 @@ void finish(const Request& request, Findings found, Diagnosis& out) {
   }
   out.unknown.present = !found.alarms.empty();
   out.unknown.probability = unknown_probability(found);
+  out.unknown.size_mg =
+      out.unknown.present
+          ? std::sqrt(std::max(0.0, std::pow(out.gap.after_mg, 2) - std::pow(out.gap.floor_mg, 2)))
+          : 0;
+  // Strongest first: by what they close of the gap; evidence says only how sure they are.
+  std::stable_sort(
+      found.effects.begin(), found.effects.end(),
+      [](const EffectFinding& a, const EffectFinding& b) { return a.gap_mg2 > b.gap_mg2; });
+  const double above_floor =
+      out.gap.before_mg * out.gap.before_mg - out.gap.floor_mg * out.gap.floor_mg;
+  for (auto* list : {&found.effects, &found.candidates}) {
+    double whole = above_floor;
+    for (const EffectFinding& f : *list) {
+      whole = std::max(whole, f.gap_mg2);
+    }
+    for (EffectFinding& f : *list) {
+      f.share_of_gap = whole > 0 ? std::clamp(f.gap_mg2 / whole, 0.0, 1.0) : 0;
+      f.probability_it_matters = probability_it_matters(f, request.options.matters_mg);
+    }
+  }
   out.verdict = out.unknown.present
                     ? (found.effects.empty() ? Verdict::unexplained : Verdict::partly_explained)
                     : (found.effects.empty() ? Verdict::no_gap : Verdict::explained);

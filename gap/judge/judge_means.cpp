@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include <fmt/format.h>
@@ -24,8 +25,6 @@ constexpr double kCertain_nats = 20;
 constexpr double kPaysForChange = 0.1;
 // What a free spectrum costs, against the best slow noise.
 constexpr double kFreeSpectrumCost_nats = 4;
-// Real effects keep to the catalogue's straight lines within this share.
-constexpr double kFormShare = 0.03;
 constexpr double kTauShare = 0.2;           // relative uncertainty of a time constant
 constexpr double kScatterSizeShare = 0.12;  // and of a scatter's size
 // Effects whose evidence is at most so much below zero could stand in for one that has at most so
@@ -50,7 +49,7 @@ bool zero_bends(const Fit& fit) {
   Eigen::Index at = kNuisanceParameters;
   for (const ParameterGroup& group : fit.groups) {
     for (int i = 0; i < group.count; ++i, ++at) {
-      if (group.effect == "offset_tempco" && i >= 3 &&
+      if (group.effect == "offset_tempco" && i >= 3 && i < 6 &&
           std::abs(fit.posterior.mean[at]) -
                   kSurely_sd * std::sqrt(fit.posterior.covariance(at, at)) >
               kBeyond * std::min(group.curve_sd, std::max(kLeast_mg_per_c2, kShare * slope))) {
@@ -138,10 +137,8 @@ std::vector<NamedValue> parameters_of(const std::string& name,
   std::vector<NamedValue> parameters;
   if (name != "truncation") {
     std::vector<double> sd = estimate.sd;
-    if (name == "drift" || name == "warm_up" || name == "offset_tempco") {
-      for (std::size_t i = 0; i < sd.size(); ++i) {
-        sd[i] = std::hypot(sd[i], kFormShare * estimate.value[i]);
-      }
+    for (std::size_t i = 0; i < sd.size(); ++i) {
+      sd[i] = std::hypot(sd[i], kFormShare * estimate.value[i]);
     }
     parameters.push_back({parameter_name(name), estimate.value, std::move(sd)});
   }
@@ -203,7 +200,8 @@ void judge_effect(const Request& request, const Explanation& explanation, const 
   EffectFinding f{.name = name,
                   .nats = in ? std::max(kPresent_nats, gain) : std::min(kAbsent_nats, gain),
                   .parameters = parameters_of(name, *estimate),
-                  .held_out_gain_nats = explanation.held_out_nats(name)};
+                  .held_out_gain_nats = explanation.held_out_nats(name),
+                  .bound = explanation.bound(name)};
   if (in) {
     f.confounded_with = confounded(request, explanation, name, found, before);
     // It must stand out beside unknown scatter, and help where it was not fitted.
@@ -303,6 +301,13 @@ Findings judge_means(const Request& request, const Explanation& explanation, con
   // Nothing separates it from an offset of half an LSB: what is known is the prior.
   found.add(request,
             {.name = "rounding_floor", .nats = kLogPriorEffect, .confounded_with = {"offset"}});
+  const std::map<std::string, double> gap_mg2 = explanation.gap_mg2();
+  for (auto* list : {&found.effects, &found.candidates}) {
+    for (EffectFinding& f : *list) {
+      const auto own = gap_mg2.find(f.name);
+      f.gap_mg2 = own == gap_mg2.end() ? 0 : own->second;
+    }
+  }
   // What explains much, but so do others, is a gap all the same.
   const bool named =
       std::any_of(found.effects.begin(), found.effects.end(), [&](const EffectFinding& e) {

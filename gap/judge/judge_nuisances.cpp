@@ -147,6 +147,7 @@ Nuisances judge_nuisances(const Request& request, const ForwardState& s, bool ju
   const bool mismatch = request.allowed(f.name) && f.nats > kAccept_nats;
   if (mismatch) {
     undo_mode(s, mode.common, out);
+    f.gap_mg2 = out.found.outside_means_mg2.back();
   } else if (chi > kFarOut_chi) {
     out.found.alarm(z, "nuisance: gains or offsets of the unit lie far outside their priors");
   }

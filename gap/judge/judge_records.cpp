@@ -44,18 +44,21 @@ void judge_low_pass(const Request& request, const Response& response,
                .parameters = {{"corner_hz", {l.corner_hz}, {}}}});
     return;
   }
+  double gap_mg2 = 0;
+  for (const ToneFit& tone : tones) {
+    const Segment& s = request.bundle.segments[tone.segment];
+    const double h = l.tone_gain(s.vibration->frequency_hz, request.bundle.rate_hz);
+    gap_mg2 += tone_gap_mg2(request, s, h);
+  }
+  found.outside_means_mg2.push_back(gap_mg2);
   found.add(request, {.name = "bandwidth",
                       .nats = gain_nats - kResponseCost_nats + kLogPriorEffect,
                       .parameters = {{"corner_hz",
                                       {l.corner_hz},
                                       {std::max(l.corner_sd_hz, kCorner * l.corner_hz)}},
                                      {"order", {static_cast<double>(l.order)}, {}}},
-                      .held_out_gain_nats = l.held_out_nats});
-  for (const ToneFit& tone : tones) {
-    const Segment& s = request.bundle.segments[tone.segment];
-    const double h = l.tone_gain(s.vibration->frequency_hz, request.bundle.rate_hz);
-    found.outside_means_mg2.push_back(tone_gap_mg2(request, s, h));
-  }
+                      .held_out_gain_nats = l.held_out_nats,
+                      .gap_mg2 = gap_mg2});
 }
 
 void judge_resonance(const Request& request, const Response& response,
@@ -63,20 +66,20 @@ void judge_resonance(const Request& request, const Response& response,
   const Resonance& r = response.resonance;
   const bool there = response.resonance_significant;
   const double nats = r.tone_nats - kResponseCost_nats + kLogPriorEffect;
+  double gap_mg2 = 0;
+  for (const ToneFit& tone : tones) {
+    const Segment& s = request.bundle.segments[tone.segment];
+    gap_mg2 += there ? tone_gap_mg2(request, s, resonance_gain(s.vibration->frequency_hz, r)) : 0;
+  }
+  found.outside_means_mg2.push_back(gap_mg2);
   found.add(
       request,
       {.name = "soft_mount",
        .nats = there ? nats : std::min(kLogPriorEffect, nats),
        .parameters = {{"frequency_hz", {r.frequency_hz}, {kResonanceFrequency * r.frequency_hz}},
                       {"q", {r.q}, {kResonanceQ * r.q}}},
-       .held_out_gain_nats = there ? r.held_out_nats : 0.0});
-  for (const ToneFit& tone : tones) {
-    const Segment& s = request.bundle.segments[tone.segment];
-    if (there) {
-      found.outside_means_mg2.push_back(
-          tone_gap_mg2(request, s, resonance_gain(s.vibration->frequency_hz, r)));
-    }
-  }
+       .held_out_gain_nats = there ? r.held_out_nats : 0.0,
+       .gap_mg2 = gap_mg2});
 }
 
 }  // namespace
@@ -114,18 +117,23 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
       }
     }
     const bool own = request.allowed(name);
+    const auto size_sd = [&](Eigen::Index a) {
+      return std::hypot(line.sd_mg, kFormShare * line.vector_mg[a]);
+    };
     EffectFinding f{
         .name = own ? name : other,
         .nats = std::max(line.gain_nats - kLineCost_nats + kLogPriorEffect, kFoundLine_nats),
         .held_out_gain_nats = line.held_out_nats};
     f.parameters = {{"vector_mg",
                      {line.vector_mg[0], line.vector_mg[1], line.vector_mg[2]},
-                     {line.sd_mg, line.sd_mg, line.sd_mg}},
+                     {size_sd(0), size_sd(1), size_sd(2)}},
                     {"frequency_hz", {line.frequency_hz}, {kLineFrequencySd_hz}}};
     if (!line.decidable) {
       f.confounded_with.push_back(other);
     }
-    by_name.emplace(f.name, f);
+    f.gap_mg2 = line.vector_mg.squaredNorm() / 6;
+    EffectFinding& strongest = by_name.emplace(f.name, f).first->second;
+    strongest.gap_mg2 += strongest.nats == f.nats ? 0 : f.gap_mg2;
   }
   for (auto& [name, f] : by_name) {
     lines.found.add(request, std::move(f));
@@ -158,6 +166,8 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   // how near a line is.
   constexpr double kAmplitudePrior = 0.03, kPairs = 60, kRings_nats = 3;
   constexpr double kSurelyRings_sd = 4.5, kNearLine_hz = 2.5;
+  // A mount rings in several modes: how far frequency and decay of one mode stand for all.
+  constexpr double kModeShare = 0.03, kDecayShare = 0.15;
   // Mean square of a decaying sine over a dwell; share of the dwells that ring: a convention.
   constexpr double kDwell_s = 10, kRingingShare = 0.6;
   Settling settling;
@@ -177,9 +187,12 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
     f.held_out_gain_nats = held_out_step_nats(request.bundle, clean, noise, lines.power_mg2);
   }
   f.parameters = {
-      {"amplitude", {step.amplitude}, {sd}},
-      {"frequency_hz", {mode.frequency_hz}, {relative / (2 * M_PI * std::max(0.03, mode.decay_s))}},
-      {"decay_s", {mode.decay_s}, {2 * relative * mode.decay_s}}};
+      {"amplitude", {step.amplitude}, {std::hypot(sd, kFormShare * step.amplitude)}},
+      {"frequency_hz",
+       {mode.frequency_hz},
+       {std::hypot(relative / (2 * M_PI * std::max(0.03, mode.decay_s)),
+                   kModeShare * mode.frequency_hz)}},
+      {"decay_s", {mode.decay_s}, {std::hypot(2 * relative, kDecayShare) * mode.decay_s}}};
   // A line has a phase of its own in every dwell; the rest of it in their mean looks like ringing
   // at its frequency.
   const bool is_line =
@@ -191,12 +204,12 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   const bool rings = step.gain_nats > step.plain_nats + kRings_nats;
   const bool named = there && rings && request.allowed("settling");
   settling.unexplained = there && !named;
+  if (named) {
+    f.gap_mg2 = std::pow(1000 * step.amplitude, 2) * mode.decay_s / 4 / kDwell_s * kRingingShare;
+    settling.found.outside_means_mg2.push_back(f.gap_mg2);
+  }
   if (named || !there) {
     settling.found.add(request, std::move(f));
-  }
-  if (named) {
-    settling.found.outside_means_mg2.push_back(std::pow(1000 * step.amplitude, 2) * mode.decay_s /
-                                               4 / kDwell_s * kRingingShare);
   }
   return settling;
 }

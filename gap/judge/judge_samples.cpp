@@ -37,12 +37,14 @@ void judge_turned_axes(const Request& request, const CleanSamples& clean, Findin
     }
   }
   const double nats = kPerTurn_nats * clean.axes_gain_g;
-  found.outside_means_mg2.push_back(std::pow(1000 * clean.axes_gain_g, 2));
+  const double gap_mg2 = std::pow(1000 * clean.axes_gain_g, 2);
+  found.outside_means_mg2.push_back(gap_mg2);
   if (request.allowed("axis_rotation")) {
     found.add(request, {.name = "axis_rotation",
                         .nats = nats,
                         .parameters = {std::move(matrix)},
-                        .held_out_gain_nats = nats});
+                        .held_out_gain_nats = nats,
+                        .gap_mg2 = gap_mg2});
   } else {
     found.alarm(kTurnedAlarm_sd, "pose: axes are permuted or reversed against the protocol");
   }
@@ -78,7 +80,8 @@ Findings judge_marks(const Request& request, const CleanSamples& clean) {
                         double cost_nats, double per_share_mg2, const std::string& words) {
     effect.nats = per_sample_nats * static_cast<double>(samples) + kLogPriorEffect;
     effect.held_out_gain_nats = effect.nats - cost_nats;
-    found.outside_means_mg2.push_back(share_of(samples, all) * per_share_mg2);
+    effect.gap_mg2 = share_of(samples, all) * per_share_mg2;
+    found.outside_means_mg2.push_back(effect.gap_mg2);
     if (request.allowed(effect.name)) {
       found.add(request, std::move(effect));
     } else {

@@ -11,8 +11,10 @@ namespace {
 // Uncertainties beside the statistical ones (conventions): of a tone's frequency, and of the host's
 // clock or the shaker's oscillator, which are known to a few ppm.
 constexpr double kToneFloor_ppm = 0.5;
-constexpr double kClockFloor_ppm = 1.5;
-constexpr double kClockRange_ppm = 1500;  // prior range of a clock's error
+constexpr double kClockFloor_ppm = 1;
+// Prior ranges of a clock's error: of every crystal, and of one that is wrong. Even odds.
+constexpr double kCrystal_ppm = 40;
+constexpr double kClockRange_ppm = 1500;
 constexpr double kPossibleClock_ppm = 20'000;
 constexpr double kDatasheetClock_ppm = 200;  // also in the catalogue
 constexpr double kNoClock_ppm = 1e9;         // uncertainty where nothing shows it
@@ -124,11 +126,16 @@ void judge_clock(const Request& request, const HostTiming& host, const std::vect
   }
   const double known_ppm = std::hypot(sd, kClockFloor_ppm);
   const double z = ppm / known_ppm;
-  const double nats =
-      0.5 * z * z - std::log(std::max(2.0, kClockRange_ppm / known_ppm)) + kLogPriorEffect;
-  if (nats > kAccept_nats) {
-    found.outside_means_mg2.push_back(clock_gap_mg2(request, tones, ppm));
-  }
+  const auto range_nats = [&](double range_ppm) {
+    const double wide2 = 1 + std::pow(range_ppm / known_ppm, 2);
+    return 0.5 * z * z * (1 - 1 / wide2) - 0.5 * std::log(wide2);
+  };
+  const double crystal = range_nats(kCrystal_ppm);
+  const double wrong = range_nats(kClockRange_ppm);
+  const double nats = std::max(crystal, wrong) + std::log1p(std::exp(-std::abs(crystal - wrong))) -
+                      std::log(2.0) + kLogPriorEffect;
+  const double gap_mg2 = nats > kAccept_nats ? clock_gap_mg2(request, tones, ppm) : 0;
+  found.outside_means_mg2.push_back(gap_mg2);
   if (!request.allowed("clock_error") && nats > kAccept_nats) {
     found.alarm(std::abs(z), fmt::format("timing: the sample clock is off by {:.0f} ppm", ppm));
   } else if (std::abs(ppm) < kPossibleClock_ppm) {
@@ -137,7 +144,9 @@ void judge_clock(const Request& request, const HostTiming& host, const std::vect
                         .parameters = {{"ppm", {ppm}, {known_ppm}}},
                         .held_out_gain_nats =
                             host.usable ? host.clock_held_out_nats : nats - kLogPriorEffect - 1,
-                        .outside_datasheet = std::abs(ppm) > kDatasheetClock_ppm});
+                        .outside_datasheet = std::abs(ppm) > kDatasheetClock_ppm,
+                        .gap_mg2 = gap_mg2,
+                        .bound = known_ppm * std::sqrt(2 * (kAccept_nats + 0.5 * z * z - nats))});
   }
 }
 
@@ -152,9 +161,8 @@ void judge_slips(const Request& request, const HostTiming& host, const ToneClock
     const double rate = share_of(count, samples);
     const double nats = count == 0 ? (by_host ? kNoSlip_nats : kLogPriorEffect - 1)
                                    : kPerSlip_nats * static_cast<double>(count) + kLogPriorEffect;
-    if (count > 0) {
-      found.outside_means_mg2.push_back(rate * 1e6);  // 1 g rms for each sample out of place
-    }
+    const double gap_mg2 = rate * 1e6;  // 1 g rms for each sample out of place
+    found.outside_means_mg2.push_back(gap_mg2);
     if (count > 0 && !request.allowed(name)) {
       found.alarm(kSlipAlarm_sd, fmt::format("timing: {} samples {}", count, words));
     } else if (samples > 0) {
@@ -163,7 +171,8 @@ void judge_slips(const Request& request, const HostTiming& host, const ToneClock
       found.add(request, {.name = name,
                           .nats = nats,
                           .parameters = {{"rate", {rate}, {sd}}},
-                          .held_out_gain_nats = nats});
+                          .held_out_gain_nats = nats,
+                          .gap_mg2 = gap_mg2});
     }
   };
   judge("dropped_samples", lost, "are missing");
@@ -226,23 +235,24 @@ void judge_jitter(const Request& request, const NoiseSpectrum& noise, Timing& ti
     timing.found.alarm(z, "timing: scatter on the slopes of the tones");
     return;
   }
+  if (there) {
+    timing.jitter_s = jitter_ms / 1e3;
+  }
+  double gap_mg2 = 0;
+  for (ToneFit& tone : timing.tones) {
+    const double f =
+        2 * M_PI * request.bundle.segments[tone.segment].vibration->frequency_hz * timing.jitter_s;
+    tone.in_phase_mg *= std::exp(f * f / 2);
+    gap_mg2 += std::pow(f * tone.in_phase_mg[tone.axis], 2) / 2 / 3 / request.segments();
+  }
+  timing.found.outside_means_mg2.push_back(gap_mg2);
   timing.found.add(
       request,
       {.name = "jitter",
        .nats = nats,
        .parameters = {{"rms_ms", {jitter_ms}, {there ? std::min(sd_ms, jitter_ms) : sd_ms}}},
-       .held_out_gain_nats = nats - kLogPriorEffect});
-  if (!there) {
-    return;
-  }
-  timing.jitter_s = jitter_ms / 1e3;
-  for (ToneFit& tone : timing.tones) {
-    const double f =
-        2 * M_PI * request.bundle.segments[tone.segment].vibration->frequency_hz * timing.jitter_s;
-    tone.in_phase_mg *= std::exp(f * f / 2);
-    timing.found.outside_means_mg2.push_back(std::pow(f * tone.in_phase_mg[tone.axis], 2) / 2 / 3 /
-                                             request.segments());
-  }
+       .held_out_gain_nats = nats - kLogPriorEffect,
+       .gap_mg2 = gap_mg2});
 }
 
 }  // namespace

@@ -79,7 +79,11 @@ BeforeAfter timing_feature(const HostTiming& host, const Findings& found) {
 }  // namespace
 
 GapSize measure_gap(const Records& records, const Explanation& explanation, const Findings& found) {
-  const Explanation::HeldOut held = explanation.held_out();
+  std::set<std::string> named;
+  for (const EffectFinding& e : found.effects) {
+    named.insert(e.name);
+  }
+  const Explanation::HeldOut held = explanation.held_out(named);
   double outside_mg2 = 0;
   for (const double mg2 : found.outside_means_mg2) {
     outside_mg2 += mg2;

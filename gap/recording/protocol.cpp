@@ -188,10 +188,6 @@ Status check_segment(const Bundle& bundle, const Segment& segment, const std::st
       return bad(where, "it starts earlier than the segment before");
     }
   }
-  if (segment.vibration && segment.vibration->frequency_hz >= bundle.rate_hz / 2) {
-    return bad(where, fmt::format("a tone of {} Hz can't be recorded at {} Hz",
-                                  segment.vibration->frequency_hz, bundle.rate_hz));
-  }
   return {};
 }
 
@@ -277,6 +273,16 @@ Status read_protocol(FileSystem& files, const std::string& path, Bundle& bundle)
     SIXPOINT_ASSIGN(Segment segment, read_segment((*segments)[i], where));
     SIXPOINT_CHECK(check_segment(bundle, segment, where));
     bundle.segments.push_back(std::move(segment));
+  }
+  // A shaker runs through its tones whatever the unit's sample rate is.
+  if (const auto folded = std::count_if(
+          bundle.segments.begin(), bundle.segments.end(),
+          [&](const Segment& segment) {
+            return segment.vibration && segment.vibration->frequency_hz >= bundle.rate_hz / 2;
+          });
+      folded > 0) {
+    bundle.losses.push_back(
+        fmt::format("{} tones of half of the sample rate and more say nothing", folded));
   }
   number_placements(bundle);
   return {};

@@ -87,5 +87,25 @@ TEST(Score, AnswersOfAnotherFormAreFailures) {
   }
 }
 
+// By hand: of three effects two can be seen, one of them is named first; a second name is wrong.
+TEST(Score, RealisticUnits) {
+  Outcome outcome;
+  outcome.kind = TrialKind::realistic;
+  outcome.truth = {{"tilt", 4}, {"drift", 0.1}, {"third_order", 0.1}};
+  outcome.named = {{"tilt", 0.99}, {"flicker", 0.95}};
+  outcome.not_observable = {"third_order"};
+  outcome.unknown = true;
+  outcome.unknown_probability = 0.8;
+  const Scores scores = score({outcome}, false);
+  EXPECT_EQ(scores.dominant.right, 1);
+  EXPECT_EQ(scores.recall.right, 1);
+  EXPECT_EQ(scores.recall.of, 2);
+  EXPECT_EQ(scores.precise.right, 1);
+  EXPECT_EQ(scores.precise.of, 2);
+  EXPECT_EQ(scores.exact_set.right, 0);
+  EXPECT_EQ(scores.needless.right, 1);
+  EXPECT_NEAR(scores.unknown_calibration_error(), 0.8, 1e-12);
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

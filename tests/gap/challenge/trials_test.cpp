@@ -153,6 +153,31 @@ TEST(Trials, KindsHaveNames) {
   EXPECT_EQ(gap::to_string(TrialKind::single), "single");
   EXPECT_EQ(gap::to_string(TrialKind::pair), "pair");
   EXPECT_EQ(gap::to_string(TrialKind::outside), "outside");
+  EXPECT_EQ(gap::to_string(TrialKind::realistic), "realistic");
+}
+
+TEST(Trials, RealisticUnitsHaveManyEffectsAndOneThatDominates) {
+  const gap::TrialShares shares{
+      .none = 0, .pair = 0, .outside = 0, .realistic = 1, .any_rate = true};
+  std::set<int> rates;
+  bool all_ten = false;
+  for (std::uint64_t i = 0; i < 60; ++i) {
+    const auto trial = gap::draw_trial(77, i, kProduction, shares);
+    ASSERT_OK(trial);
+    EXPECT_EQ(trial->kind, TrialKind::realistic);
+    ASSERT_GE(trial->effects.size(), 4U);
+    EXPECT_LE(trial->effects.size(), 10U);
+    std::set<std::string> names;
+    for (std::size_t k = 0; k < trial->effects.size(); ++k) {
+      EXPECT_TRUE(names.insert(trial->effects[k].name).second) << trial->effects[k].name;
+      EXPECT_GE(trial->effects[k].severity, k == 0 ? 3 : 0.05);
+      EXPECT_LE(trial->effects[k].severity, k == 0 ? 6 : 0.5);
+    }
+    all_ten = all_ten || trial->effects.size() == 10;
+    rates.insert(static_cast<int>(trial->scenario.protocol->rate_hz));
+  }
+  EXPECT_TRUE(all_ten);
+  EXPECT_GT(rates.size(), 7U);
 }
 
 }  // namespace

@@ -82,10 +82,10 @@ TEST(EvidenceAnswers, GainIsTheEvidenceOverTheBestWithout) {
       5, 120);
   const Explanation explanation(blocks, only({"drift"}));
   const EvidenceModel& model = explanation.model();
-  const std::vector<int> drift = model.groups_of("drift");
+  const std::vector<int> drift = explanation.best().subset.groups;
   const Whitened data =
       model.whiten(model.linearise(explanation.best().state), Scatter::nominal, 0);
-  const double with = model.evidence(data, drift) + kLogPriorEffect;
+  const double with = model.evidence(data, drift) + model.log_prior(drift);
   EXPECT_NEAR(explanation.best().nats, with, 0.1);
   // The best without it is one with scatter: no better than the evidence without scatter allows.
   EXPECT_GT(explanation.gain_nats("drift"), 10);
@@ -120,6 +120,50 @@ TEST(EvidenceAnswers, ChangeOfTheGainIsABayesFactor) {
   const double nats = changing.nats() - constant.nats();
   EXPECT_NEAR(explanation.changing_nats("gain"), nats, 1e-3 + 1e-3 * std::abs(nats));
   EXPECT_EQ(explanation.changing_nats("tilt"), 0) << "not in the explanation";
+}
+
+// Drifts of the size that is said to show half of the time do so in about half of the recordings.
+TEST(EvidenceAnswers, BoundShowsHalfOfTheTime) {
+  const auto still = tests::made_dwells({}, 1, 120);
+  const std::optional<double> bound = Explanation(still, only({"drift"})).bound("drift");
+  ASSERT_TRUE(bound);
+  EXPECT_FALSE(Explanation(still, only({"drift"})).bound("clock_error"));
+  const auto shown = [&](double size) {
+    int count = 0;
+    for (unsigned seed = 1; seed <= 30; ++seed) {
+      const double u = (seed % 11) / 5.0 - 1;
+      const double v = (seed % 7) / 3.0 - 1;
+      const auto blocks = tests::made_dwells(
+          [&](const Block& b) -> Eigen::Vector3d {
+            return b.middle_s / 3600 * size * Eigen::Vector3d(1, u, v);
+          },
+          seed, 120);
+      count += Explanation(blocks, only({"drift"})).gain_nats("drift") > kAccept_nats ? 1 : 0;
+    }
+    return count;
+  };
+  EXPECT_GT(shown(*bound), 6);
+  EXPECT_LT(shown(*bound), 25);
+  EXPECT_GT(shown(2.5 * *bound), 25);
+  EXPECT_LT(shown(0.3 * *bound), 4);
+}
+
+// By hand: a drift of d over hours h, less what the offset takes over (the mean).
+TEST(EvidenceAnswers, GapOfAnEffectIsItsMeanSquareWithoutTheOffset) {
+  const Eigen::Vector3d drift(9, -6, 7);
+  const auto blocks = tests::made_dwells(
+      [&](const Block& b) -> Eigen::Vector3d { return b.middle_s / 3600 * drift; }, 5, 120);
+  const Explanation explanation(blocks, only({"drift"}));
+  double h = 0, hh = 0;
+  for (const Block& b : blocks) {
+    h += b.middle_s / 3600 / 18;
+    hh += std::pow(b.middle_s / 3600, 2) / 18;
+  }
+  const double expected = (hh - h * h) * drift.squaredNorm() / 3;
+  const auto found = explanation.gap_mg2();
+  ASSERT_EQ(found.count("drift"), 1U);
+  // Gains take a little over where early and late dwells do not have the same poses.
+  EXPECT_NEAR(found.at("drift"), expected, 0.2 * expected);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ using tests::only;
 TEST(EvidenceHeldOut, HeldOutFloorInClosedForm) {
   const auto blocks = tests::made_dwells({}, 4);
   const Explanation explanation(blocks, only({}));
-  const Explanation::HeldOut held = explanation.held_out();
+  const Explanation::HeldOut held = explanation.held_out({});
   EXPECT_EQ(held.rows, 54);
   EXPECT_NEAR(held.floor_mg, std::sqrt(0.13 * 0.13 + 2.0 / 3 * 0.1745 * 0.1745), 1e-4);
   EXPECT_NEAR(held.before_sigma, 1, 0.35);
@@ -58,7 +58,7 @@ TEST(EvidenceHeldOut, PredictsEachConditionFromTheOthers) {
   ASSERT_EQ(explanation.best().scatter, Scatter::nominal);
   const EvidenceModel& model = explanation.model();
   const Eigen::MatrixXd linear = model.linearise(explanation.best().state);
-  const tests::Marginal with = tests::marginal(model, linear, model.groups_of("drift"));
+  const tests::Marginal with = tests::marginal(model, linear, explanation.best().subset.groups);
   const tests::Marginal without = tests::marginal(model, linear, {});
   double nats = 0;
   double before2_mg2 = 0;
@@ -75,11 +75,13 @@ TEST(EvidenceHeldOut, PredictsEachConditionFromTheOthers) {
   EXPECT_GT(nats, 20);
   EXPECT_NEAR(explanation.held_out_nats("drift"), nats, 1e-3 * nats);
   // Each face is up along an axis: rows are independent, and whitening is a division by their sd.
-  const Explanation::HeldOut held = explanation.held_out();
+  const Explanation::HeldOut held = explanation.held_out({"drift"});
   EXPECT_NEAR(held.before_mg, std::sqrt(before2_mg2 / 54), 1e-3 * held.before_mg);
   EXPECT_NEAR(held.after_mg, std::sqrt(after2_mg2 / 54), 1e-3 * held.after_mg);
   EXPECT_GT(held.before_sigma, 2 * held.after_sigma);
   EXPECT_EQ(held.mean_after_sigma, held.after_sigma) << "dwells have means alone";
+  // What is not named closes nothing.
+  EXPECT_GT(explanation.held_out({}).after_mg, 2 * held.after_mg);
 }
 
 TEST(EvidenceHeldOut, EffectThatIsNotOfTheMeansPredictsNothing) {

@@ -46,7 +46,7 @@ TEST(EvidenceWhiten, WhiteningGivesUnitVariance) {
 }
 
 // A matrix L with V = L L' takes the unit matrix to its inverse: R V R' is the unit matrix, and
-// half the logarithm of det V is known from V itself. V by hand: noise, nominal seating of the
+// half the logarithm of det V is known from V itself. V by hand: noise, seating of the
 // placement, and the kernel of the scatter on each axis, which scatter_test.cpp checks.
 TEST(EvidenceWhiten, RowsAreDividedByTheRootOfTheCovariance) {
   const auto blocks = tests::made_dwells();
@@ -64,7 +64,11 @@ TEST(EvidenceWhiten, RowsAreDividedByTheRootOfTheCovariance) {
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       const auto ri = static_cast<Eigen::Index>(3 * i);
       const Eigen::MatrixXd lever = seat_deg * seating_lever(blocks[i]);
-      v.block<3, 3>(ri, ri) = blocks[i].white_mg2 + lever * lever.transpose();
+      // Cosines of the turns about the two axes across gravity, to second order.
+      const Eigen::Vector3d off_mg =
+          500 * std::pow(seat_deg * M_PI / 180, 2) * std::sqrt(8.0) * blocks[i].rotation.col(2);
+      v.block<3, 3>(ri, ri) =
+          blocks[i].white_mg2 + lever * lever.transpose() + off_mg * off_mg.transpose();
       for (std::size_t j = 0; j < blocks.size() && zeros; ++j) {
         const auto rj = static_cast<Eigen::Index>(3 * j);
         v.block<3, 3>(ri, rj).diagonal().array() +=

@@ -93,6 +93,28 @@ TEST(Forward, SeatingLeverIsTheDerivativeOfASmallTurn) {
   }
 }
 
+// A tilt of 1 deg about X takes 1 - cos 1 deg off the axis along gravity.
+TEST(Forward, SeatingLossIsTheSecondOrderOfATurn) {
+  const Block block = dwell(Eigen::Matrix3d::Identity());
+  const double turn = M_PI / 180;
+  EXPECT_NEAR((turn * turn * seating_loss(block))[2], 1000 * (1 - std::cos(turn)), 1e-4);
+  EXPECT_NEAR((turn * turn * seating_loss(tone(6)))[5], 6000 * (1 - std::cos(turn)), 1e-3);
+}
+
+TEST(Forward, TempcosAndWarmUpBend) {
+  ForwardState s;
+  s.tempco_cubic_mg_per_c3 = {1e-3, 0, 0};
+  s.sensitivity_curve_percent_per_c2 = {0, 0, 1e-3};
+  s.quick_warm_up_mg = {0, 4, 0};
+  Block block = dwell(Eigen::Matrix3d::Identity());
+  block.temperature_c = 35;
+  block.middle_s = s.warm_up_tau_s / 4;
+  const Eigen::VectorXd y = predict(s, block, kLsb_mg);
+  EXPECT_NEAR(y[0], 1, 1e-9);                  // 10^3 of it
+  EXPECT_NEAR(y[1], 4 * std::exp(-1), 2e-3);   // the block has a length
+  EXPECT_NEAR(y[2], 1000 * (1 + 1e-3), 1e-9);  // 10^2 of it, in per cent
+}
+
 TEST(Forward, EveryParameterHasItsPlace) {
   ForwardState s;
   for (int p = 0; p < kForwardParameters; ++p) {

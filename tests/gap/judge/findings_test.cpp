@@ -24,6 +24,31 @@ TEST(Findings, ProbabilityFromNats) {
   EXPECT_NEAR(probability_of(1000), 1 / (1 + std::exp(-9)), 1e-15) << "never quite certain";
 }
 
+// What closes most of the gap comes first, however sure the others are.
+TEST(Findings, EffectsAreOrderedByTheirShareOfTheGap) {
+  Asked asked;
+  asked.options.matters_mg = 1;
+  Findings found;
+  found.add(asked.request, {.name = "drift",
+                            .nats = 500,
+                            .parameters = {{"mg_per_h", {1, 0, 0}, {0.1, 0, 0}}},
+                            .gap_mg2 = 0.25});
+  found.add(asked.request, {.name = "tilt",
+                            .nats = 9,
+                            .parameters = {{"rotation_vector_deg", {1, 0, 0}, {0.1, 0, 0}}},
+                            .gap_mg2 = 9});
+  Diagnosis out;
+  out.gap.before_mg = 4;
+  out.gap.floor_mg = std::sqrt(6.0);
+  finish(asked.request, found, out);
+  ASSERT_EQ(out.effects.size(), 2U);
+  EXPECT_EQ(out.effects[0].name, "tilt");
+  EXPECT_NEAR(out.effects[0].share_of_gap, 0.9, 1e-12) << "9 of 16 - 6 mg^2";
+  EXPECT_NEAR(out.effects[1].share_of_gap, 0.025, 1e-12);
+  EXPECT_GT(out.effects[0].probability_it_matters, 0.99) << "3 +- 0.3 mg";
+  EXPECT_LT(out.effects[1].probability_it_matters, 1e-6) << "0.5 +- 0.05 mg";
+}
+
 TEST(Findings, NineToOneIsAccepted) {
   const Asked asked{{.without = {"flicker"}}};
   Findings found;

@@ -102,7 +102,7 @@ TEST_F(BundleTest, ContradictionsAreBadData) {
   fails("/segments/1/host_start_s", nullptr);
   fails("/segments/1/rotation/0/0", 1e308);
   for (const char* tone :
-       {R"({"direction_lab": [0, 0, 1], "frequency_hz": 9999, "amplitude_g": 1})",
+       {R"({"direction_lab": [0, 0, 1], "frequency_hz": 99999, "amplitude_g": 1})",
         R"({"direction_lab": [0, 0, 1], "frequency_hz": 9, "amplitude_g": 900})",
         R"({"direction_lab": [0, 1, 1], "frequency_hz": 9, "amplitude_g": 1})"}) {
     protocol_ = good;

@@ -190,7 +190,9 @@ TEST(Protocol, LimitsAreWhereTheyAreSaidToBe) {
     return read(json);
   };
   EXPECT_OK(with("/segments/1/vibration/frequency_hz", 49.9));
-  EXPECT_FAILS(with("/segments/1/vibration/frequency_hz", 50), ErrorCode::bad_data);
+  const auto folded = with("/segments/1/vibration/frequency_hz", 50);
+  ASSERT_OK(folded) << "a shaker runs through its tones whatever the unit's rate is";
+  EXPECT_EQ(folded->losses.size(), 1U);
   EXPECT_OK(with("/gravity_g", 0.9956));  // the least and the most on Earth
   EXPECT_OK(with("/gravity_g", 1.0028));
   EXPECT_FAILS(with("/gravity_g", 0.98), ErrorCode::bad_data);
