@@ -65,9 +65,8 @@ class PiecewiseInflate final : public ByteSource {
     const std::uint64_t before = std::uint64_t{points_.piece_size} * begun_;
     slot.piece.resize(last ? size_ - before : points_.piece_size);
     const auto place = last ? PiecePacker::Place::last : PiecePacker::Place::inner;
-    slot.done = std::async(std::launch::async, [&slot, place] {
-      return unpack_piece(slot.packed, place, slot.piece);
-    });
+    slot.done = std::async(std::launch::async,
+                           [&slot, place] { return unpack_piece(slot.packed, place, slot.piece); });
     ++begun_;
     return {};
   }
@@ -75,10 +74,10 @@ class PiecewiseInflate final : public ByteSource {
   std::unique_ptr<ByteSource> packed_;
   SyncPoints points_;
   std::uint64_t size_;
-  std::vector<Slot> slots_;   // in turn
-  std::size_t begun_ = 0;     // pieces
-  std::size_t current_ = 0;   // piece that read() is in
-  std::size_t taken_ = 0;     // bytes of it
+  std::vector<Slot> slots_;  // in turn
+  std::size_t begun_ = 0;    // pieces
+  std::size_t current_ = 0;  // piece that read() is in
+  std::size_t taken_ = 0;    // bytes of it
 };
 
 }  // namespace

@@ -60,8 +60,8 @@ std::optional<SyncPoints> parse_sync_points(std::span<const std::uint8_t> field,
       return std::nullopt;
     }
   }
-  const std::uint64_t sum = std::accumulate(points.packed_sizes.begin(), points.packed_sizes.end(),
-                                            std::uint64_t{0});
+  const std::uint64_t sum =
+      std::accumulate(points.packed_sizes.begin(), points.packed_sizes.end(), std::uint64_t{0});
   return sum == entry.packed ? std::optional(std::move(points)) : std::nullopt;
 }
 

@@ -123,8 +123,9 @@ TEST(ZipWriter, ErrorsOfSourceAndSinkComeBack) {
       ZipWriter full(
           [&](std::span<const std::uint8_t> bytes) -> Status {
             written += bytes.size();
-            return written > kPackedPieceSize / 2 ? fail(ErrorCode::io, "the disk is full", "f", "make room")
-                                                  : Status{};
+            return written > kPackedPieceSize / 2
+                       ? fail(ErrorCode::io, "the disk is full", "f", "make room")
+                       : Status{};
           },
           jobs);
       MemorySource long_one(entries_to_write().front().second);
