@@ -1,33 +1,47 @@
-// How fast recordings are read, on a made recording of a day at 100 Hz, in memory.
+// How fast recordings are read, written and repaired.
 //
-// Baseline of every ratio: pulling the same entry's bytes out of the archive and looking at none of
-// them (what libzip alone costs, CRC included).
+//     gt3x_bench                       a made day at 100 Hz, in memory, without repair
+//     gt3x_bench FILE CONSTANTS.json   a recording, and repair by these constants
+//
+// Every line has its ratio against what libraries alone need for the same bytes in the same run:
+// libdeflate inflates log.bin, libdeflate packs it at the level that is written, memcpy copies it.
+// Seconds of processor are those of all threads.
 #include <chrono>
 #include <cstdio>
+#include <cstring>
+
+#include <libdeflate.h>
+#include <sys/resource.h>
 
 #include "base/memory_env.h"
 #include "base/random.h"
+#include "calib/constants.h"
+#include "gt3x/container/piece_packer.h"
 #include "gt3x/raw_csv.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
 #include "gt3x/sample_reader.h"
+#include "repair/rescale/constants_finder.h"
+#include "repair/rescale/repair_file.h"
+#include "repair/triage/survey.h"
 
 namespace {
 
 using namespace sixpoint;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint32_t kSeconds = 86'400;
-constexpr std::size_t kRate = 100;
+constexpr int kPackLevel = 6;
 
 Bytes made_log() {
+  constexpr std::uint32_t kSeconds = 86'400;
+  constexpr std::size_t kRate = 100;
   Random random(1);
   Bytes log;
   std::vector<gt3x::Counts> samples(kRate);
   for (std::uint32_t second = 0; second < kSeconds; ++second) {
     for (auto& sample : samples) {
       for (auto& value : sample) {
-        value = static_cast<std::int16_t>(static_cast<int>(random.below(600)) - 300);
+        value = static_cast<std::int16_t>(static_cast<int>(random.below(12)) - 6);
       }
     }
     Bytes payload;
@@ -37,23 +51,103 @@ Bytes made_log() {
   return log;
 }
 
+struct Taken {
+  double seconds = 1e9;
+  double processor_s = 1e9;
+};
+
+double processor_s() {
+  rusage used{};
+  getrusage(RUSAGE_SELF, &used);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(used.ru_utime) + seconds(used.ru_stime);
+}
+
+// The best of three, of each.
 template <class Work>
-double seconds_of(Work work) {
-  double best = 1e9;
+Taken taken_by(Work work) {
+  Taken best;
   for (int round = 0; round < 3; ++round) {
     const auto start = Clock::now();
+    const double before = processor_s();
     work();
-    best = std::min(best, std::chrono::duration<double>(Clock::now() - start).count());
+    best.seconds =
+        std::min(best.seconds, std::chrono::duration<double>(Clock::now() - start).count());
+    best.processor_s = std::min(best.processor_s, processor_s() - before);
   }
   return best;
 }
 
+Bytes log_of(FileSystem& files, const std::string& path) {
+  auto recording = gt3x::Recording::open(files, path);
+  auto source = recording ? recording->open_entry("log.bin")
+                          : Result<std::unique_ptr<gt3x::ByteSource>>(fail(recording.error()));
+  return source ? gt3x::read_all(**source, 16ULL << 30).value_or(Bytes{}) : Bytes{};
+}
+
+class Table {
+ public:
+  void baseline(const Taken& inflate, const Taken& deflate, const Taken& copy) {
+    inflate_ = inflate;
+    deflate_ = deflate;
+    std::printf("%-34s %8s %10s %8s\n", "", "seconds", "processor", "ratio");
+    print("memcpy", copy, copy);
+    print("libdeflate inflates", inflate, inflate);
+    print("libdeflate packs at level 6", deflate, deflate);
+  }
+  // Against inflating alone.
+  void reads(const char* name, const Taken& taken) const { print(name, taken, inflate_); }
+  // Against inflating and packing.
+  void packs(const char* name, const Taken& taken) const {
+    print(name, taken,
+          {inflate_.seconds + deflate_.seconds, inflate_.processor_s + deflate_.processor_s});
+  }
+
+ private:
+  static void print(const char* name, const Taken& taken, const Taken& against) {
+    std::printf("%-34s %8.3f %10.3f %8.2f\n", name, taken.seconds, taken.processor_s,
+                taken.processor_s / against.processor_s);
+  }
+  Taken inflate_;
+  Taken deflate_;
+};
+
+void measure_repair(Env& env, const std::string& path, const calib::ConstantsRecord& constants,
+                    const Table& table) {
+  repair::ConstantsFinderOptions how;
+  how.given = constants;
+  repair::ConstantsFinder finder(env, how);
+  const std::string output = path + ".bench.gt3x";
+  for (const unsigned jobs : {0U, 1U, 2U}) {
+    repair::RepairOptions options;
+    options.store_only = jobs == 0;
+    options.jobs = std::max(1U, jobs);
+    repair::RepairReport report;
+    const Taken taken = taken_by([&] {
+      static_cast<void>(env.files.remove(output));
+      report = repair::repair_file(env, path, output, finder, options);
+    });
+    if (report.status != repair::RepairStatus::repaired) {
+      std::puts(report.brief().c_str());
+    } else if (jobs == 0) {
+      table.reads("repair, stored", taken);
+    } else {
+      table.packs(jobs == 1 ? "repair, deflated, --jobs 1" : "repair, deflated, --jobs 2", taken);
+    }
+  }
+  static_cast<void>(env.files.remove(output));
+}
+
 }  // namespace
 
-int main() {
+int main(int count, char** arguments) {
   MemoryEnv memory;
-  {
-    auto out = gt3x::RecordingWriter::create(memory.files, "f");
+  Env& env = count > 1 ? posix_env() : memory.env;
+  const std::string path = count > 1 ? arguments[1] : "f";
+  if (count == 1) {
+    auto out = gt3x::RecordingWriter::create(memory.files, path);
     if (!out || !out->add("log.bin", made_log()) ||
         !out->add("info.txt", std::string_view("Serial Number: MOS2A1\r\nSample Rate: 100\r\n")) ||
         !out->commit()) {
@@ -61,39 +155,78 @@ int main() {
       return 1;
     }
   }
-  auto recording = gt3x::Recording::open(memory.files, "f");
+  Table table;
+  {
+    const Bytes log = log_of(env.files, path);
+    if (log.empty()) {
+      std::puts("there is no log.bin to read");
+      return 1;
+    }
+    libdeflate_compressor* packer = libdeflate_alloc_compressor(kPackLevel);
+    libdeflate_decompressor* unpacker = libdeflate_alloc_decompressor();
+    Bytes whole(libdeflate_deflate_compress_bound(packer, log.size()));
+    whole.resize(
+        libdeflate_deflate_compress(packer, log.data(), log.size(), whole.data(), whole.size()));
+    Bytes out(log.size());
+    const Taken copy = taken_by([&] { std::memcpy(out.data(), log.data(), log.size()); });
+    const Taken inflate = taken_by([&] {
+      libdeflate_deflate_decompress(unpacker, whole.data(), whole.size(), out.data(), out.size(),
+                                    nullptr);
+    });
+    const Taken deflate = taken_by([&] {
+      for (std::size_t at = 0; at < log.size(); at += gt3x::kPackedPieceSize) {
+        libdeflate_deflate_compress(packer, log.data() + at,
+                                    std::min(gt3x::kPackedPieceSize, log.size() - at), out.data(),
+                                    out.size());
+      }
+    });
+    libdeflate_free_compressor(packer);
+    libdeflate_free_decompressor(unpacker);
+    std::printf("log.bin: %.1f MB, packed %.1f MB\n", 1e-6 * static_cast<double>(log.size()),
+                1e-6 * static_cast<double>(whole.size()));
+    table.baseline(inflate, deflate, copy);
+  }
+  auto recording = gt3x::Recording::open(env.files, path);
   if (!recording) {
     std::puts(recording.error().brief().c_str());
     return 1;
   }
-  const double bytes_s = seconds_of([&] {
-    auto source = recording->open_entry("log.bin");
-    Bytes piece(1 << 16);
-    while (source && (*source)->read(piece).value_or(0) > 0) {
+  table.reads("bytes", taken_by([&] {
+                auto source = recording->open_entry("log.bin");
+                Bytes piece(1 << 16);
+                while (source && (*source)->read(piece).value_or(0) > 0) {
+                }
+              }));
+  table.reads("records", taken_by([&] {
+                auto log = recording->open_log();
+                for (auto item = log->next(); item && *item; item = log->next()) {
+                }
+              }));
+  table.reads("samples", taken_by([&] {
+                gt3x::SampleReader samples(*recording);
+                for (auto item = samples.next(); item && *item; item = samples.next()) {
+                }
+              }));
+  table.reads("survey (scan)",
+              taken_by([&] { static_cast<void>(repair::survey(env.files, path)); }));
+  for (const auto time : {gt3x::RawCsvOptions::Time::none, gt3x::RawCsvOptions::Time::iso}) {
+    gt3x::RawCsvOptions how;
+    how.time = time;
+    const bool timed = time != gt3x::RawCsvOptions::Time::none;
+    table.reads(timed ? "CSV with times" : "CSV", taken_by([&] {
+                  static_cast<void>(gt3x::write_raw_csv(
+                      *recording, how, [](std::string_view) -> Status { return {}; }));
+                }));
+  }
+  if (count > 2) {
+    const auto text = read_file(env.files, arguments[2]);
+    const auto constants = text ? calib::parse_constants_record(as_text(*text))
+                                : Result<calib::ConstantsRecord>(fail(text.error()));
+    if (!constants) {
+      std::puts(constants.error().brief().c_str());
+      return 1;
     }
-  });
-  const double records_s = seconds_of([&] {
-    auto log = recording->open_log();
-    for (auto item = log->next(); item && *item; item = log->next()) {
-    }
-  });
-  const double samples_s = seconds_of([&] {
-    gt3x::SampleReader samples(*recording);
-    for (auto item = samples.next(); item && *item; item = samples.next()) {
-    }
-  });
-  const double csv_s = seconds_of([&] {
-    static_cast<void>(
-        gt3x::write_raw_csv(*recording, {}, [](std::string_view) -> Status { return {}; }));
-  });
-  const double millions = static_cast<double>(kSeconds) * kRate / 1e6;
-  std::printf("%-28s %8s %18s %8s\n", "a day at 100 Hz", "seconds", "million samples/s", "ratio");
-  const auto line = [&](const char* name, double seconds) {
-    std::printf("%-28s %8.3f %18.1f %8.2f\n", name, seconds, millions / seconds, seconds / bytes_s);
-  };
-  line("bytes alone (baseline)", bytes_s);
-  line("records", records_s);
-  line("samples", samples_s);
-  line("raw CSV", csv_s);
+    measure_repair(env, path, *constants, table);
+  }
   return 0;
 }

@@ -378,6 +378,10 @@ void StillBlockFinder::keep(StillBlock block) {
     blocks_.resize(out);
     tally_.thinned *= 2;
   }
+  if (blocks_.empty()) {
+    // At once: a vector that grows holds its blocks twice. Memory is only used where blocks are.
+    blocks_.reserve(options_.max_blocks);
+  }
   blocks_.push_back(block);
 }
 

@@ -17,6 +17,7 @@
 #include <deque>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/measure.h"
@@ -45,8 +46,9 @@ struct StillBlockOptions {
   // worst axis (920 ug/sqrt(Hz)) in 50 Hz.
   double noisy_sd_g = 0.007;
   // Upper bound of memory: beyond it every second block is dropped and from then on only every
-  // second one is taken (and so on). 250,000 blocks are eleven days of uninterrupted stillness.
-  std::size_t max_blocks = 250'000;
+  // second one is taken (and so on). 40,000 blocks are 44 hours of stillness and 5.4 MB; between
+  // 20,000 and 40,000 evenly taken ones say the same as all.
+  std::size_t max_blocks = 40'000;
 };
 
 // A jump of more than this on any axis from one block to the next: the unit was moved. Under a
@@ -101,6 +103,8 @@ class StillBlockFinder {
 
   // Valid at any time; complete after break_run().
   const std::vector<StillBlock>& blocks() const { return blocks_; }
+  // The same, handed over; the finder has none then.
+  std::vector<StillBlock> take_blocks() { return std::exchange(blocks_, {}); }
   const StillBlockTally& tally() const { return tally_; }
   int samples_per_block() const { return block_samples_; }
 

@@ -26,7 +26,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return {};
   };
   static_cast<void>(gt3x::write_raw_csv(*recording, {}, sink));
-  static_cast<void>(gt3x::write_raw_csv(*recording, {true, false}, sink));
+  gt3x::RawCsvOptions raw;
+  raw.raw_lsb = true;
+  raw.fill = false;
+  raw.time = gt3x::RawCsvOptions::Time::iso;
+  static_cast<void>(gt3x::write_raw_csv(*recording, raw, sink));
   auto out = gt3x::RecordingWriter::create(memory.files, "g");
   if (out) {
     for (const gt3x::EntryInfo& entry : recording->entries()) {

@@ -36,19 +36,108 @@ std::size_t print_mg(std::int64_t mg, char* out) {
   return static_cast<std::size_t>(at - out);
 }
 
+// The times of lines.
+class TimeColumn {
+ public:
+  // Room that one time takes, at most.
+  static constexpr std::size_t kLongest = 40;
+
+  TimeColumn(RawCsvOptions::Time form, double rate_hz) : form_(form), rate_hz_(rate_hz) {}
+
+  const char* name() const {
+    switch (form_) {
+      case RawCsvOptions::Time::none:
+        return "";
+      case RawCsvOptions::Time::iso:
+        return "Timestamp,";
+      case RawCsvOptions::Time::seconds:
+        return "Seconds,";
+      case RawCsvOptions::Time::unix_seconds:
+        return "Unix Timestamp,";
+    }
+    return "";
+  }
+
+  void begin(std::uint32_t first) { first_ = first; }
+
+  // The next lines belong to this second, counted from `line`.
+  void at(std::uint32_t unix_time, std::uint64_t line) {
+    second_ = unix_time;
+    line_ = line;
+    shown_.clear();
+  }
+
+  // Writes the next line's time and comma to `out`; returns behind it.
+  char* put(char* out) {
+    if (form_ == RawCsvOptions::Time::none) {
+      return out;
+    }
+    const double after_s = static_cast<double>(line_++) / rate_hz_;
+    const auto whole_s = static_cast<std::uint64_t>(after_s);
+    if (shown_.empty() || whole_s != shown_s_) {
+      shown_s_ = whole_s;
+      shown_ = text_of(second_ + static_cast<std::int64_t>(whole_s));
+    }
+    std::memcpy(out, shown_.data(), shown_.size());
+    out += shown_.size();
+    // A thousandth that is one but for the division's rounding is one.
+    constexpr double kRounding = 1e-6;
+    auto thousandths =
+        static_cast<unsigned>((after_s - static_cast<double>(whole_s)) * 1000 + kRounding);
+    thousandths = std::min(thousandths, 999U);
+    *out++ = '.';
+    *out++ = static_cast<char>('0' + thousandths / 100);
+    *out++ = static_cast<char>('0' + thousandths / 10 % 10);
+    *out++ = static_cast<char>('0' + thousandths % 10);
+    *out++ = ',';
+    return out;
+  }
+
+ private:
+  std::string text_of(std::int64_t unix_time) const {
+    switch (form_) {
+      case RawCsvOptions::Time::iso: {
+        std::string text = to_iso8601(from_unix_seconds(unix_time));
+        text.resize(19);  // the file's clock may show local time: no Z
+        return text;
+      }
+      case RawCsvOptions::Time::seconds:
+        return std::to_string(unix_time - static_cast<std::int64_t>(first_));
+      default:
+        return std::to_string(unix_time);
+    }
+  }
+
+  RawCsvOptions::Time form_;
+  double rate_hz_;
+  std::uint32_t first_ = 0;
+  std::int64_t second_ = 0;
+  std::uint64_t line_ = 0;
+  std::string shown_;  // of second_ + shown_s_
+  std::uint64_t shown_s_ = 0;
+};
+
 class Writer {
  public:
-  Writer(const Recording& recording, const RawCsvOptions& options, const TextSink& sink)
-      : info_(recording.info()), options_(options), sink_(sink) {}
+  Writer(const Recording& recording, const RawCsvOptions& options, const TextSink& sink,
+         double rate_hz)
+      : info_(recording.info()),
+        options_(options),
+        sink_(sink),
+        time_(options.time, rate_hz),
+        text_(kPiece + kLongestLine) {}
 
   Status header(std::uint32_t start_time, double rate_hz) {
-    text_ = csv_header(info_,
-                       fmt::format("Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v{} date "
-                                   "format M/d/yyyy at {} Hz  Filter Normal ",
-                                   printable(info_.firmware(), 40), rate_hz),
-                       start_time) +
-            "Accelerometer X,Accelerometer Y,Accelerometer Z\r\n";
-    return {};
+    time_.begin(start_time);
+    const std::string created_by = options_.created_by.empty()
+                                       ? std::string("ActiGraph GT3X+ ActiLife v6.13.3")
+                                       : printable(options_.created_by, 60);
+    return sink_(csv_header(info_,
+                            fmt::format("Created By {} Firmware v{} date format M/d/yyyy at {} Hz  "
+                                        "Filter Normal ",
+                                        created_by, printable(info_.firmware(), 40), rate_hz),
+                            start_time) +
+                 time_.name() + "Accelerometer X,Accelerometer Y,Accelerometer Z\r\n");
   }
 
   // What the counts of these samples mean.
@@ -75,41 +164,23 @@ class Writer {
       scale_ = *scale;
       for (std::size_t i = 0; i < cells_.size(); ++i) {
         Cell& cell = cells_[i];
-        cell.size = static_cast<std::uint8_t>(
-            print_mg(round_to_mg(static_cast<int>(i) + kMin12, scale_), cell.text.data()));
+        std::size_t size =
+            print_mg(round_to_mg(static_cast<int>(i) + kMin12, scale_), cell.text.data());
+        cell.text[size++] = ',';
+        cell.size = static_cast<std::uint8_t>(size);
       }
     }
     return {};
   }
 
-  Status line(const Counts& sample) {
-    std::array<char, 96> row{};
-    char* at = row.data();
-    PerAxis<double> agdc_g{};
-    if (agdc_ != nullptr && !options_.raw_lsb) {
-      agdc_g = agdc_->apply(sample);
+  // The lines that come next are those of this second, from its line number `line` on.
+  void at(std::uint32_t unix_time, std::uint64_t line) { time_.at(unix_time, line); }
+
+  Status lines(std::span<const Counts> samples) {
+    for (const Counts& sample : samples) {
+      SIXPOINT_CHECK(line(sample));
     }
-    for (std::size_t axis = 0; axis < kAxes; ++axis) {
-      if (axis > 0) {
-        *at++ = ',';
-      }
-      const int count = sample[axis];
-      if (options_.raw_lsb) {
-        at = std::to_chars(at, at + 8, count).ptr;
-      } else if (agdc_ != nullptr) {
-        // Real numbers: no half-way case is exact here.
-        at += print_mg(std::llround(std::clamp(agdc_g[axis], -1e6, 1e6) * kMgPerG), at);
-      } else if (count >= kMin12 && count <= kMax12) {
-        const Cell& cell = cells_[static_cast<std::size_t>(count - kMin12)];
-        std::memcpy(at, cell.text.data(), cell.text.size());
-        at += cell.size;
-      } else {
-        at += print_mg(round_to_mg(count, scale_), at);
-      }
-    }
-    *at++ = '\r';
-    *at++ = '\n';
-    return put(std::string_view(row.data(), static_cast<std::size_t>(at - row.data())), 1);
+    return {};
   }
 
   // The same line many times: what a repeated sample or a second without data becomes.
@@ -120,35 +191,75 @@ class Writer {
     return {};
   }
 
-  Status zeros(std::uint64_t times) { return put("0,0,0\r\n", times); }
-  Status finish() { return flush(); }
-
- private:
-  struct Cell {
-    std::array<char, 23> text{};
-    std::uint8_t size = 0;
-  };
-
-  Status put(std::string_view text, std::uint64_t times) {
+  Status zeros(std::uint64_t times) {
+    constexpr std::string_view kZeros = "0,0,0\r\n";
     for (std::uint64_t i = 0; i < times; ++i) {
-      text_ += text;
-      if (text_.size() >= kPiece) {
-        SIXPOINT_CHECK(flush());
-      }
+      char* out = time_.put(text_.data() + size_);
+      std::memcpy(out, kZeros.data(), kZeros.size());
+      SIXPOINT_CHECK(end_line(out + kZeros.size()));
     }
     return {};
   }
+  Status finish() { return flush(); }
+
+ private:
+  // A value and its comma: "-1365.333," is the longest.
+  struct Cell {
+    std::array<char, 15> text{};
+    std::uint8_t size = 0;
+  };
+  static_assert(sizeof(Cell) == 16);
+  static constexpr std::size_t kLongestLine = TimeColumn::kLongest + 96;
+
+  Status line(const Counts& sample) {
+    char* out = time_.put(text_.data() + size_);
+    if (!options_.raw_lsb && agdc_ == nullptr) {
+      for (const int count : sample) {
+        if (count >= kMin12 && count <= kMax12) [[likely]] {
+          const Cell& cell = cells_[static_cast<std::size_t>(count - kMin12)];
+          std::memcpy(out, &cell, sizeof cell);
+          out += cell.size;
+        } else {
+          out += print_mg(round_to_mg(count, scale_), out);
+          *out++ = ',';
+        }
+      }
+    } else {
+      PerAxis<double> agdc_g{};
+      if (!options_.raw_lsb) {
+        agdc_g = agdc_->apply(sample);
+      }
+      for (std::size_t axis = 0; axis < kAxes; ++axis) {
+        if (options_.raw_lsb) {
+          out = std::to_chars(out, out + 8, sample[axis]).ptr;
+        } else {
+          // Real numbers: no half-way case is exact here.
+          out += print_mg(std::llround(std::clamp(agdc_g[axis], -1e6, 1e6) * kMgPerG), out);
+        }
+        *out++ = ',';
+      }
+    }
+    out[-1] = '\r';
+    *out++ = '\n';
+    return end_line(out);
+  }
+
+  Status end_line(const char* end) {
+    size_ = static_cast<std::size_t>(end - text_.data());
+    return size_ < kPiece ? Status{} : flush();
+  }
 
   Status flush() {
-    SIXPOINT_CHECK(sink_(text_));
-    text_.clear();
-    return {};
+    const std::string_view text(text_.data(), std::exchange(size_, 0));
+    return sink_(text);
   }
 
   const Info& info_;
   const RawCsvOptions& options_;
   const TextSink& sink_;
-  std::string text_;
+  TimeColumn time_;
+  std::vector<char> text_;  // a line more than kPiece
+  std::size_t size_ = 0;    // of it, filled
   const AgdcCalibration* agdc_ = nullptr;
   double scale_ = 0;
   std::vector<Cell> cells_ = std::vector<Cell>(kMax12 - kMin12 + 1);
@@ -174,7 +285,7 @@ class Export {
         rate_hz_(rate_hz),
         rate_(static_cast<std::uint64_t>(std::llround(rate_hz))),
         agdc_(agdc),
-        out_(recording, options, sink) {}
+        out_(recording, options, sink, rate_hz) {}
 
   Status take(const SampleItem& item) {
     if (!started_) {
@@ -182,8 +293,9 @@ class Export {
       started_ = true;
     }
     if (options_.fill && short_by_ > 0) {
-      SIXPOINT_CHECK(fill(std::exchange(short_by_, 0)));
+      SIXPOINT_CHECK(fill(std::exchange(short_by_, 0)));  // goes on in the second before
     }
+    out_.at(item.unix_time, 0);
     return item.kind == SampleItem::Kind::recorded ? take_samples(item) : take_gap(item);
   }
 
@@ -199,9 +311,7 @@ class Export {
  private:
   Status take_samples(const SampleItem& item) {
     SIXPOINT_CHECK(out_.set_scale(item, agdc_));
-    for (const Counts& sample : item.counts) {
-      SIXPOINT_CHECK(out_.line(sample));
-    }
+    SIXPOINT_CHECK(out_.lines(item.counts));
     last_ = item.counts.back();
     zeros_ = false;
     tally_.samples += item.counts.size();

@@ -8,8 +8,17 @@
 //   };
 //   SIXPOINT_ASSIGN(const RawCsvTally tally, write_raw_csv(recording, {}, sink));
 //
-// Ten header lines, one line of column names, then a line per sample, X Y Z, without time stamps:
-// the n-th line belongs to start + n / rate. Lines end in CR LF.
+// Ten header lines, one line of column names, then a line per sample, X Y Z. Without a time column,
+// as the vendor writes it, the n-th line belongs to start + n / rate. Lines end in CR LF.
+//
+// A time column stands first. The k-th line of a second has the second's time in the file plus
+// k / rate, in thousandths of a second, rounded down; the clock is the file's own:
+//
+//     time     column             example
+//     none     -                  -0.02,0.996,0.086
+//     iso      Timestamp          2015-04-09T14:04:00.033,-0.02,0.996,0.086
+//     seconds  Seconds            0.033,-0.02,0.996,0.086      since the first sample
+//     unix     Unix Timestamp     1428588240.033,-0.02,0.996,0.086
 //
 // Rounding: g to three decimals, half-way cases away from zero, then without trailing zeros
 // ("0.02", "1", "0"). It is computed in integers (round_to_mg), because half-way cases are common
@@ -24,6 +33,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <string_view>
 
 #include "base/result.h"
@@ -36,6 +46,11 @@ struct RawCsvOptions {
   bool raw_lsb = false;
   // Missing seconds filled in, so that the line number is the time. Without: what was recorded.
   bool fill = true;
+  enum class Time { none, iso, seconds, unix_seconds };
+  Time time = Time::none;
+  // Who stands in the first line for who made the data. Empty: the vendor's own words, which are
+  // true of samples as the unit stored them, and not of repaired ones.
+  std::string created_by;
 };
 
 struct RawCsvTally {

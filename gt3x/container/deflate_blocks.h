@@ -1,13 +1,14 @@
 // Where the last block of a deflate stream begins, so that streams can be joined into one.
 //
 //   const auto last = find_last_block(stream);
-//   if (last) stream[last->begin_bit / 8] ^= 1U << (last->begin_bit % 8);  // no longer the last
-//   one
+//   if (last) {  // no longer the last one
+//     stream[last->begin_bit / 8] ^= static_cast<std::uint8_t>(1U << (last->begin_bit % 8));
+//   }
 //
 // The first bit of a block says whether it is the last of its stream (RFC 1951, 3.2.3). libdeflate
 // makes whole streams only and does not tell where its blocks begin, so the symbols of the stream
-// are walked through: their lengths alone, no byte is unpacked. That takes about a twentieth of the
-// time of packing at level 6.
+// are walked through: their lengths alone, no byte is unpacked. That takes a tenth to a sixth of
+// the time of packing at level 6; stopping at every block with zlib would take twice as long.
 #pragma once
 
 #include <cstdint>

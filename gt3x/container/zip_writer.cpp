@@ -1,11 +1,12 @@
 #include "gt3x/container/zip_writer.h"
 
 #include <algorithm>
-#include <future>
 #include <limits>
 #include <utility>
 
 #include <isa-l/crc.h>
+
+#include "gt3x/container/pack_line.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -89,14 +90,6 @@ Status fill(ByteSource& source, const Bytes* before, Bytes& piece) {
   piece.resize(filled);
   return {};
 }
-
-// A piece on its way.
-struct Slot {
-  PiecePacker packer;
-  Bytes piece;
-  Bytes packed;
-  std::future<void> done;  // its end waits for the thread that uses the above
-};
 
 }  // namespace
 
@@ -219,46 +212,21 @@ Status ZipWriter::put_pieces_stored(Entry& entry, ByteSource& source, Bytes firs
   return {};
 }
 
-Status ZipWriter::put_packed_piece(Entry& entry, std::span<const std::uint8_t> packed) {
-  entry.packed_size += packed.size();
-  entry.points.packed_sizes.push_back(static_cast<std::uint32_t>(packed.size()));
-  return put(packed);
-}
-
 Status ZipWriter::put_pieces_packed(Entry& entry, ByteSource& source, Bytes piece, Bytes next) {
-  // One piece more than threads, so that none of them waits for this thread.
-  std::vector<Slot> slots(jobs_ > 1 ? jobs_ + 1 : 1);
-  std::size_t begun = 0;
-  std::size_t written = 0;
-  const auto write_oldest = [&]() -> Status {
-    Slot& slot = slots[written++ % slots.size()];
-    if (slot.done.valid()) {
-      slot.done.get();
-    }
-    return put_packed_piece(entry, slot.packed);
-  };
+  PackLine line(jobs_, [&](std::span<const std::uint8_t> packed) {
+    entry.packed_size += packed.size();
+    entry.points.packed_sizes.push_back(static_cast<std::uint32_t>(packed.size()));
+    return put(packed);
+  });
   while (!piece.empty()) {
-    if (begun - written == slots.size()) {
-      SIXPOINT_CHECK(write_oldest());
-    }
     entry.crc32 = crc32_of(piece, entry.crc32);
     entry.size += piece.size();
-    Slot& slot = slots[begun++ % slots.size()];
-    slot.piece.swap(piece);
+    SIXPOINT_CHECK(
+        line.put(piece, next.empty() ? PiecePacker::Place::last : PiecePacker::Place::inner));
     piece.swap(next);
-    const auto place = piece.empty() ? PiecePacker::Place::last : PiecePacker::Place::inner;
-    const auto pack = [&slot, place] { slot.packer.pack(slot.piece, place, slot.packed); };
-    if (jobs_ > 1) {
-      slot.done = std::async(std::launch::async, pack);
-    } else {
-      pack();
-    }
     SIXPOINT_CHECK(fill(source, &piece, next));
   }
-  while (written < begun) {
-    SIXPOINT_CHECK(write_oldest());
-  }
-  return {};
+  return line.finish();
 }
 
 Status ZipWriter::finish() {

@@ -64,7 +64,6 @@ class ZipWriter {
   Status add_in_pieces(Entry entry, ByteSource& source, Bytes first, Bytes second);
   Status put_pieces_packed(Entry& entry, ByteSource& source, Bytes first, Bytes second);
   Status put_pieces_stored(Entry& entry, ByteSource& source, Bytes first, Bytes second);
-  Status put_packed_piece(Entry& entry, std::span<const std::uint8_t> packed);
 
   Sink sink_;
   unsigned jobs_;

@@ -230,7 +230,9 @@ void VirtualUnit::finish_recording(nanoseconds now) {
   // The archive is made on a disk in memory: the model has none of its own.
   MemoryFiles files;
   const std::string name = "recording.gt3x";
-  auto writer = gt3x::RecordingWriter::create(files, name);
+  gt3x::WriterOptions how;
+  how.packing = gt3x::Packing::store;  // a unit's flash holds records as they come
+  auto writer = gt3x::RecordingWriter::create(files, name, how);
   Bytes image;
   if (writer && writer->add("log.bin", std::move(log)) &&
       writer->add(

@@ -8,11 +8,34 @@
 namespace sixpoint::repair {
 namespace {
 
-bool at_limit(const gt3x::Counts& sample, calib::RecordWidth width) {
-  return std::any_of(sample.begin(), sample.end(), [&](std::int16_t count) {
-    return count <= calib::lowest_count(width) || count >= calib::highest_count(width);
-  });
+// Samples with an axis at the limit of their record.
+std::uint64_t count_at_limit(std::span<const gt3x::Counts> samples, calib::RecordWidth width) {
+  const int low = calib::lowest_count(width);
+  const int high = calib::highest_count(width);
+  // Nearly no record holds one, and the range of a whole record is found quickly.
+  const gt3x::CountRange all = gt3x::range_of(samples);
+  if (all.low > low && all.high < high) {
+    return 0;
+  }
+  return static_cast<std::uint64_t>(std::ranges::count_if(samples, [&](const auto& sample) {
+    return std::ranges::any_of(sample,
+                               [&](std::int16_t count) { return count <= low || count >= high; });
+  }));
 }
+
+// Compared number by number: as arrays they would be compared by a call of memcmp each.
+std::uint64_t count_changed(std::span<const gt3x::Counts> before,
+                            std::span<const gt3x::Counts> after) {
+  std::uint64_t changed = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const int difference =
+        (before[i][0] ^ after[i][0]) | (before[i][1] ^ after[i][1]) | (before[i][2] ^ after[i][2]);
+    changed += difference != 0 ? 1U : 0U;
+  }
+  return changed;
+}
+
+bool is_zero(const gt3x::Counts& sample) { return (sample[0] | sample[1] | sample[2]) == 0; }
 
 // A unit that charges stores zeros on all axes: no measurement, so they stay zeros. Rescaled they
 // would look like rest in a wrong direction. A single zero may be a measurement: only three in a
@@ -21,7 +44,7 @@ void keep_charging_zeros(std::span<const gt3x::Counts> samples, std::span<gt3x::
   constexpr std::size_t kLeastRun = 3;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     std::size_t end = i;
-    while (end < samples.size() && samples[end] == gt3x::Counts{}) {
+    while (end < samples.size() && is_zero(samples[end])) {
       ++end;
     }
     if (end - i >= kLeastRun || (end > i && (i == 0 || end == samples.size()))) {
@@ -102,11 +125,9 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
     tally_.affine_counts += counts.affine[0] + counts.affine[1] + counts.affine[2];
     keep_charging_zeros(samples_, fresh_samples_);
   }
-  for (std::size_t i = 0; i < samples_.size(); ++i) {
-    tally_.clipped_before += at_limit(samples_[i], limit_before) ? 1 : 0;
-    tally_.clipped_after += at_limit(fresh_samples_[i], limit_after) ? 1 : 0;
-    tally_.changed_samples += samples_[i] != fresh_samples_[i] ? 1 : 0;
-  }
+  tally_.clipped_before += count_at_limit(samples_, limit_before);
+  tally_.clipped_after += count_at_limit(fresh_samples_, limit_after);
+  tally_.changed_samples += count_changed(samples_, fresh_samples_);
   tally_.samples += samples_.size();
   ++tally_.sample_records;
   still_.push(record.unix_time, fresh_samples_);

@@ -20,8 +20,18 @@ void undo_rotation(std::span<gt3x::Counts> samples, calib::RecordWidth width) {
   }
 }
 
+namespace {
+
+// A repair looks at a copy of the blocks for a moment, and its memory has to stay below 48 MB with
+// everything else. 20,000 blocks are 22 hours of stillness.
+constexpr std::size_t kMostBlocks = 20'000;
+
+}  // namespace
+
 StillScan::StillScan(double rate_hz, double accel_scale, const calib::StillBlockOptions& options)
-    : rate_hz_(rate_hz), accel_scale_(accel_scale), options_(options) {}
+    : rate_hz_(rate_hz), accel_scale_(accel_scale), options_(options) {
+  options_.max_blocks = std::min(options_.max_blocks, kMostBlocks);
+}
 
 Result<StillScan> StillScan::make(double rate_hz, double accel_scale_lsb_per_g,
                                   const calib::StillBlockOptions& options) {
@@ -92,15 +102,7 @@ void StillScan::close_finder() {
     return;
   }
   break_run();
-  const calib::Calibration& undone = reversal_->calibration();
-  for (const calib::StillBlock& block : finder_->blocks()) {
-    blocks_.push_back(block);
-    PerAxis<double> affine_lsb{};
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      affine_lsb[a] = undone.zero_lsb[a] + block.mean_g[a] / undone.sensitivity_g_per_lsb[a];
-    }
-    affine_lsb_.push_back(affine_lsb);
-  }
+  append(finder_->take_blocks());
   const calib::StillBlockTally& tally = finder_->tally();
   plausibility_.counts += tally.plausibility.counts;
   plausibility_.impossible += tally.plausibility.impossible;
@@ -114,11 +116,51 @@ void StillScan::close_finder() {
   finder_.reset();
 }
 
+void StillScan::append(std::vector<calib::StillBlock> blocks) {
+  if (blocks.empty()) {
+    return;
+  }
+  if (blocks_.empty()) {
+    blocks_ = std::move(blocks);
+  } else {
+    blocks_.insert(blocks_.end(), blocks.begin(), blocks.end());
+  }
+  if (stretches_.empty() || stretches_.back().reversal != reversal_) {
+    stretches_.push_back({0, reversal_});
+  }
+  stretches_.back().end = blocks_.size();
+  while (blocks_.size() > options_.max_blocks) {
+    thin();
+  }
+}
+
+// Every second block goes, as in the finder.
+void StillScan::thin() {
+  std::erase_if(blocks_,
+                [at = std::size_t{0}](const calib::StillBlock&) mutable { return at++ % 2 == 1; });
+  for (Stretch& stretch : stretches_) {
+    stretch.end = (stretch.end + 1) / 2;
+  }
+  // Sets that take turns leave many stretches without a block.
+  std::size_t begin = 0;
+  std::erase_if(stretches_, [&](const Stretch& stretch) {
+    return std::exchange(begin, stretch.end) == stretch.end;
+  });
+  tally_.thinned *= 2;
+}
+
 std::vector<calib::StillBlock> StillScan::finish() {
   close_finder();
   if (!plausibility_.plausible()) {
-    for (std::size_t i = 0; i < blocks_.size(); ++i) {
-      blocks_[i].mean_lsb = affine_lsb_[i];
+    std::size_t begin = 0;
+    for (const Stretch& stretch : stretches_) {
+      const calib::Calibration& undone = stretch.reversal->calibration();
+      for (; begin < stretch.end; ++begin) {
+        for (std::size_t a = 0; a < kAxes; ++a) {
+          blocks_[begin].mean_lsb[a] =
+              undone.zero_lsb[a] + blocks_[begin].mean_g[a] / undone.sensitivity_g_per_lsb[a];
+        }
+      }
     }
   }
   return std::move(blocks_);

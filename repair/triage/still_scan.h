@@ -67,6 +67,8 @@ class StillScan {
   Status start(const calib::Reversal& reversal);
   Result<const calib::Reversal*> reversal_of(const StoredConstants& constants);
   void close_finder();
+  void append(std::vector<calib::StillBlock> blocks);
+  void thin();
 
   double rate_hz_;
   double accel_scale_;
@@ -80,7 +82,13 @@ class StillScan {
   std::optional<std::uint32_t> last_time_;
   std::optional<double> temperature_c_;
   std::vector<calib::StillBlock> blocks_;
-  std::vector<PerAxis<double>> affine_lsb_;  // of each block, what the straight line makes of it
+  // Which constants each block came by: those up to `end`, behind the ones before. Neighbours that
+  // came by the same are one.
+  struct Stretch {
+    std::size_t end = 0;
+    const calib::Reversal* reversal = nullptr;
+  };
+  std::vector<Stretch> stretches_;
   calib::PlausibilityTally plausibility_;
   calib::StillBlockTally tally_;
 };

@@ -307,6 +307,10 @@ class LogSurvey {
         block.mean_g = result_.raw_calibration->to_g(block.mean_lsb);
       }
     }
+    if (result_.still_tally.thinned > 1) {
+      result_.notes.push_back(fmt::format("of {} still periods, {} evenly taken ones were used",
+                                          result_.still_tally.blocks, result_.blocks.size()));
+    }
     result_.magnitude = magnitude_error(result_.blocks);
     result_.duration_s = static_cast<double>(result_.samples) / result_.rate_hz;
     if (result_.samples == 0) {

@@ -129,6 +129,7 @@ const std::map<std::string, Role>& common_roles() {
                              "id",
                              "table",
                              "jig",
+                             "--time",
                              "--why"}) {
       roles.emplace(name, Role::no_path);
     }
@@ -141,6 +142,7 @@ const std::map<std::string, Role>& common_roles() {
 const std::map<std::string, Role>& own_roles() {
   static const std::map<std::string, Role> kRoles = {
       {"repair --output", Role::working_folder},
+      {"export --output", Role::folder},
       {"solve --output", Role::output},
       {"capture --output", Role::output_to_keep},
       {"capture --constants", Role::refused},
@@ -255,6 +257,7 @@ class EveryOutput : public tests::CommandTest {
     const std::vector<std::string> certificate = {"certificate", run_, "--store", path("s.db")};
     std::map<std::string, std::vector<std::string>> all = {
         {"export --csv", {"export", path("rec.gt3x")}},
+        {"export --output", {"export", path("rec.gt3x")}},
         {"compare --html", {"compare", path("rec.gt3x"), path("archive/rec.gt3x")}},
         {"solve --output", {"solve", path("rec.gt3x")}},
         {"repair --output", {"repair", path("archive"), "--scan"}},

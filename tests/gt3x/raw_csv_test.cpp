@@ -44,6 +44,13 @@ Result<std::string> csv_of(const Bytes& log, const std::string& info,
   return csv_of(recording, options, tally);
 }
 
+RawCsvOptions with(bool raw_lsb, bool fill) {
+  RawCsvOptions options;
+  options.raw_lsb = raw_lsb;
+  options.fill = fill;
+  return options;
+}
+
 // The lines below header and column names.
 std::vector<std::string> rows_of(const std::string& text) {
   auto lines = lines_of(text);
@@ -129,7 +136,7 @@ TEST(RawCsv, FillsAsTheRuleSays) {
                                       "1,0,-0.063", "-1,0.063,7.996",         //
                                       "-1,0.063,7.996", "-1,0.063,7.996"}));  // to the last time
   EXPECT_EQ(tally.filled, 8U);
-  const auto plain = csv_of(log, info, {true, false});
+  const auto plain = csv_of(log, info, with(true, false));
   ASSERT_OK(plain);
   EXPECT_EQ(rows_of(*plain),
             (std::vector<std::string>{"256,0,-16", "-256,16,2047", "256,0,-16", "-256,16,2047"}));
@@ -159,11 +166,11 @@ TEST(RawCsv, Refuses) {
   const auto leap = csv_of(far, tests::made_info());
   EXPECT_FAILS(leap, ErrorCode::bad_data);
   EXPECT_THAT(leap.error().hint, testing::HasSubstr("--no-fill"));
-  EXPECT_OK(csv_of(far, tests::made_info(), {false, false}));
+  EXPECT_OK(csv_of(far, tests::made_info(), with(false, false)));
   Bytes nameless;
   tests::append_second(nameless, 0);
   EXPECT_FAILS(csv_of(nameless, "Serial Number: X\r\nSample Rate: 30\r\n"), ErrorCode::bad_data);
-  EXPECT_OK(csv_of(nameless, "Serial Number: X\r\nSample Rate: 30\r\n", {true, true}));
+  EXPECT_OK(csv_of(nameless, "Serial Number: X\r\nSample Rate: 30\r\n", with(true, true)));
 }
 
 // Oracle: the vendor's calibrated CSV of the same .agdc, to the three decimals that we print.

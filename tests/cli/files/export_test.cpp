@@ -1,8 +1,11 @@
 // sixpoint export by its contract: the CSV, and what it never writes over.
 #include <gmock/gmock.h>
+#include <zlib.h>
 
+#include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "gt3x/recording_writer.h"
 #include "gt3x_made_log.h"
 #include "run_command.h"
 
@@ -59,6 +62,103 @@ TEST(Export, ARecordingWithoutTheInertialSensorIsRefused) {
   EXPECT_EQ(imu.exit_code, 65);
   EXPECT_THAT(imu.people, testing::HasSubstr("SENSOR_SCHEMA"));
   EXPECT_FALSE(memory.files.info("a.csv"));
+}
+
+std::vector<std::string> lines_of_csv(const std::string& text) {
+  std::vector<std::string> lines;
+  for (const std::string_view line : lines_of(text)) {
+    lines.emplace_back(line);
+    while (!lines.back().empty() && lines.back().back() == '\r') {
+      lines.back().pop_back();
+    }
+  }
+  return lines;
+}
+
+// made_log: seconds of samples from gt3x::tests::kStart on.
+TEST(Export, TimesStandInTheFirstColumn) {
+  MemoryEnv memory;
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(2)));
+  const auto lines = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"export", "f.gt3x", "--csv", "-"});
+    return lines_of_csv(run_command(memory.env, more).out);
+  };
+  const auto plain = lines({});
+  const auto iso = lines({"--time"});
+  const auto seconds = lines({"--time=seconds"});
+  const auto unix_time = lines({"--unix"});
+  ASSERT_EQ(iso.size(), plain.size());
+  EXPECT_EQ(iso[10], "Timestamp," + plain[10]);
+  EXPECT_EQ(seconds[10], "Seconds," + plain[10]);
+  EXPECT_EQ(unix_time[10], "Unix Timestamp," + plain[10]);
+  const std::string start = std::to_string(gt3x::tests::kStart);
+  EXPECT_EQ(unix_time[11], start + ".000," + plain[11]);
+  EXPECT_EQ(unix_time[12], start + ".033," + plain[12]) << "30 Hz";
+  EXPECT_EQ(unix_time[11 + 3], start + ".100," + plain[11 + 3]);
+  EXPECT_EQ(unix_time[11 + 29], start + ".966," + plain[11 + 29]);
+  EXPECT_EQ(seconds[11 + 30], "1.000," + plain[11 + 30]);
+  const std::string first = to_iso8601(from_unix_seconds(gt3x::tests::kStart));
+  EXPECT_EQ(iso[11 + 3], first.substr(0, 19) + ".100," + plain[11 + 3]);
+  EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "-", "--time=day"}).exit_code,
+            64);
+}
+
+TEST(Export, SeveralRecordingsGoIntoAFolder) {
+  MemoryEnv memory;
+  ASSERT_OK(memory.files.make_folders("in/deep"));
+  ASSERT_OK(put_recording(memory.files, "in/a.gt3x", made_log(1)));
+  ASSERT_OK(put_recording(memory.files, "in/deep/b.gt3x", made_log(2)));
+  ASSERT_OK(write_file(memory.files, "in/broken.gt3x", "no zip"));
+  const auto answer = run_command(memory.env, {"export", "in", "-o", "out"});
+  EXPECT_EQ(answer.exit_code, 65) << "one of them cannot be read";
+  EXPECT_THAT(answer.people, testing::HasSubstr("broken.gt3x"));
+  const auto one = run_command(memory.env, {"export", "in/deep/b.gt3x", "--csv", "-"});
+  const Bytes b = read_file(memory.files, "out/deep/b.csv").value();
+  EXPECT_EQ(std::string(b.begin(), b.end()), one.out);
+  EXPECT_TRUE(memory.files.info("out/a.csv"));
+  EXPECT_FALSE(memory.files.info("out/broken.csv"));
+  EXPECT_EQ(run_command(memory.env, {"export", "in/a.gt3x", "-o", "out"}).exit_code, 73);
+  EXPECT_EQ(run_command(memory.env, {"export", "in/a.gt3x"}).exit_code, 64);
+  EXPECT_EQ(run_command(memory.env, {"export", "in", "in/a.gt3x", "--csv", "x.csv"}).exit_code, 64);
+  const auto same = run_command(memory.env, {"export", "in/a.gt3x", "in/a.gt3x", "-o", "twice"});
+  EXPECT_EQ(same.exit_code, 73);
+  EXPECT_TRUE(memory.files.info("twice/a.csv"));
+}
+
+// Oracle: zlib.
+TEST(Export, GzipHoldsTheSameText) {
+  MemoryEnv memory;
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(5)));
+  ASSERT_EQ(run_command(memory.env, {"export", "f.gt3x", "-o", "out", "--gzip"}).exit_code, 0);
+  const auto plain = run_command(memory.env, {"export", "f.gt3x", "--csv", "-"});
+  Bytes packed = read_file(memory.files, "out/f.csv.gz").value();
+  z_stream state{};
+  ASSERT_EQ(inflateInit2(&state, 15 + 16), Z_OK);
+  std::string text(plain.out.size() + 1, ' ');
+  state.next_in = packed.data();
+  state.avail_in = static_cast<uInt>(packed.size());
+  state.next_out = reinterpret_cast<Bytef*>(text.data());
+  state.avail_out = static_cast<uInt>(text.size());
+  EXPECT_EQ(inflate(&state, Z_FINISH), Z_STREAM_END);
+  text.resize(state.total_out);
+  inflateEnd(&state);
+  EXPECT_TRUE(text == plain.out);
+}
+
+TEST(Export, ARepairedRecordingIsNotCalledTheVendors) {
+  MemoryEnv memory;
+  auto writer = gt3x::RecordingWriter::create(memory.files, "marked.gt3x").value();
+  ASSERT_OK(writer.add("log.bin", made_log(1)));
+  ASSERT_OK(writer.add("info.txt", std::string_view(gt3x::tests::made_info())));
+  ASSERT_OK(writer.add("sixpoint-repair.json", std::string_view("{}")));
+  ASSERT_OK(writer.commit());
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(1)));
+  const auto first_line = [&](const char* path) {
+    return lines_of_csv(run_command(memory.env, {"export", path, "--csv", "-"}).out).front();
+  };
+  EXPECT_THAT(first_line("f.gt3x"), testing::HasSubstr("Created By ActiGraph GT3X+ ActiLife"));
+  EXPECT_THAT(first_line("marked.gt3x"), testing::HasSubstr("Created By sixpoint "));
+  EXPECT_THAT(first_line("marked.gt3x"), testing::HasSubstr("repaired recording Firmware v"));
 }
 
 }  // namespace

@@ -60,6 +60,38 @@ TEST(StillScan, MoreSetsOfConstantsThanARecordingHasAreRefused) {
   EXPECT_FAILS(scan->set_constants(constants), ErrorCode::bad_data);
 }
 
+// Two sets of constants that take turns: as many blocks as are allowed, evenly taken, and each by
+// the constants that it came by. Oracle: both sets by hand. By the narrow one every stored count is
+// 1.7 raw ones, so that many have none behind them and the straight line is taken.
+TEST(StillScan, MemoryIsBoundedWhateverTheConstantsDo) {
+  const StoredConstants wide = {{300, 300, 300}, {-300, -300, -300}, {0, 0, 0}};
+  const StoredConstants narrow = {{150, 150, 150}, {-150, -150, -150}, {0, 0, 0}};
+  calib::StillBlockOptions options;
+  options.max_blocks = 16;
+  StillScan scan = StillScan::make(30, 256, options).value();
+  std::vector<Counts> second(30, Counts{0, 0, 256});
+  for (std::size_t i = 0; i < second.size(); i += 2) {
+    second[i][2] = 257;
+  }
+  std::uint32_t time = 1000;
+  for (int stretch = 0; stretch < 101; ++stretch) {
+    EXPECT_OK(scan.set_constants(stretch % 2 == 0 ? wide : narrow));
+    for (int i = 0; i < 5; ++i) {
+      scan.push(time++, second);
+    }
+  }
+  const auto blocks = scan.finish();
+  EXPECT_LE(blocks.size(), 16U);
+  EXPECT_GE(blocks.size(), 8U);
+  EXPECT_EQ(scan.tally().blocks, 101U);
+  EXPECT_GE(scan.tally().thinned, 4U);
+  EXPECT_FALSE(scan.plausibility().plausible());
+  for (const calib::StillBlock& block : blocks) {
+    const bool in_wide = static_cast<int>((block.start_time_s - 1000) / 5) % 2 == 0;
+    EXPECT_NEAR(block.mean_lsb[2], 256.5 / 256 * (in_wide ? 300 : 150), 1e-9) << block.start_time_s;
+  }
+}
+
 // Twenty seconds at rest, in one run and with two seconds missing in the middle.
 TEST(StillScan, AGapEndsARun) {
   const std::vector<Counts> second(30, Counts{0, 0, 256});

@@ -1,0 +1,52 @@
+// Packs pieces on several threads; what comes out is in the order in which the pieces went in.
+//
+//   PackLine line(2, [&](std::span<const std::uint8_t> packed) {
+//     stream.insert(stream.end(), packed.begin(), packed.end());
+//     return Status{};
+//   });
+//   SIXPOINT_CHECK(line.put(first, PiecePacker::Place::inner));
+//   SIXPOINT_CHECK(line.put(second, PiecePacker::Place::last));
+//   SIXPOINT_CHECK(line.finish());
+//
+// The sink is called on the calling thread. Memory: for every thread a piece, its packed bytes
+// and libdeflate's tables, 3 MB together. One object belongs to one thread.
+#pragma once
+
+#include <functional>
+#include <future>
+#include <span>
+#include <vector>
+
+#include "base/result.h"
+#include "gt3x/container/piece_packer.h"
+
+namespace sixpoint::gt3x {
+
+class PackLine {
+ public:
+  using Sink = std::function<Status(std::span<const std::uint8_t>)>;
+
+  // Threads beside the calling one; 1: the calling one packs.
+  PackLine(unsigned jobs, Sink sink);
+
+  // Takes the bytes of `piece` along, and leaves others there, whose memory is used again.
+  Status put(Bytes& piece, PiecePacker::Place place);
+  Status finish();
+
+ private:
+  struct Slot {
+    PiecePacker packer;
+    Bytes piece;
+    Bytes packed;
+    std::future<void> done;  // its end waits for the thread that uses the above
+  };
+  Status write_oldest();
+
+  bool on_threads_;
+  Sink sink_;
+  std::vector<Slot> slots_;  // in turn
+  std::size_t begun_ = 0;    // pieces
+  std::size_t written_ = 0;
+};
+
+}  // namespace sixpoint::gt3x
