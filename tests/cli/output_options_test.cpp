@@ -130,6 +130,7 @@ const std::map<std::string, Role>& common_roles() {
                              "table",
                              "jig",
                              "--time",
+                             "--records",
                              "--why"}) {
       roles.emplace(name, Role::no_path);
     }
