@@ -63,7 +63,11 @@ class Drawing {
     }
     std::vector<TrialEffect> drawn;
     for (const std::string& name : names) {
-      drawn.push_back({name, drawn.empty() ? log_uniform(3, 6) : log_uniform(0.05, 0.5)});
+      // 5 to 40 ppm of 500
+      const bool clock = name == "clock_error";
+      drawn.push_back({name, drawn.empty() ? log_uniform(3, 6)
+                             : clock       ? log_uniform(0.01, 0.08)
+                                           : log_uniform(0.05, 0.5)});
     }
     return drawn;
   }

@@ -92,14 +92,16 @@ ToneOptions tone_options(const NoiseSpectrum& noise, const HostTiming& host) {
   return options;
 }
 
-// Mean square that a clock error adds to the tones: it turns their phase by at most a full swing.
+// Mean square that a clock error adds to the tones within a packet of one second, whose time the
+// host knows: it turns their phase by at most a full swing.
 double clock_gap_mg2(const Request& request, const std::vector<ToneFit>& tones, double ppm) {
   constexpr double kMostTurn = 1.4;  // of the swing: two sines without a common phase
   double mismatch = 0;
   for (const ToneFit& tone : tones) {
     const Segment& s = request.bundle.segments[tone.segment];
-    const double turn = 2 * M_PI * s.vibration->frequency_hz * ppm * 1e-6 *
-                        static_cast<double>(s.samples) / request.bundle.rate_hz / std::sqrt(12.0);
+    const double seconds = std::min(1.0, static_cast<double>(s.samples) / request.bundle.rate_hz);
+    const double turn =
+        2 * M_PI * s.vibration->frequency_hz * ppm * 1e-6 * seconds / std::sqrt(12.0);
     mismatch +=
         std::pow(kRmsPerG_mg * s.vibration->amplitude_g * std::min(kMostTurn, std::abs(turn)), 2);
   }
