@@ -5,9 +5,7 @@
 namespace sixpoint::gt3x {
 
 PackLine::PackLine(unsigned jobs, Sink sink)
-    : on_threads_(jobs > 1),
-      sink_(std::move(sink)),
-      slots_(on_threads_ ? jobs : 1U) {}
+    : on_threads_(jobs > 1), sink_(std::move(sink)), slots_(on_threads_ ? jobs : 1U) {}
 
 Status PackLine::write_oldest() {
   Slot& slot = slots_[written_++ % slots_.size()];

@@ -45,8 +45,8 @@ TEST(GzipWriter, ZlibReadsItAndTheBytesDependOnTheTextAlone) {
   while (text.size() < 2 * kPackedPieceSize + 100) {
     text += std::to_string(text.size() * 7919 % 1000) + ",0.02\r\n";
   }
-  for (const std::size_t size : {std::size_t{0}, std::size_t{5}, kPackedPieceSize,
-                                 kPackedPieceSize + 1, text.size()}) {
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{5}, kPackedPieceSize, kPackedPieceSize + 1, text.size()}) {
     const std::string_view part = std::string_view(text).substr(0, size);
     const Bytes one = gzipped(part, 1U << 16, 1);
     EXPECT_TRUE(ungzipped(one, size) == part) << size;
