@@ -46,9 +46,10 @@ struct StillBlockOptions {
   // worst axis (920 ug/sqrt(Hz)) in 50 Hz.
   double noisy_sd_g = 0.007;
   // Upper bound of memory: beyond it every second block is dropped and from then on only every
-  // second one is taken (and so on). 40,000 blocks are 44 hours of stillness and 5.4 MB; between
-  // 20,000 and 40,000 evenly taken ones say the same as all.
-  std::size_t max_blocks = 40'000;
+  // second one is taken (and so on). 20,000 blocks are 22 hours of stillness and 2.7 MB; between
+  // 10,000 and 20,000 evenly taken ones say the same as all. A repair looks at a copy of them for a
+  // moment, and its memory has to stay below 48 MB with everything else.
+  std::size_t max_blocks = 20'000;
 };
 
 // A jump of more than this on any axis from one block to the next: the unit was moved. Under a

@@ -67,7 +67,7 @@ std::string run_folder_name(const std::string& location, const std::string& who)
 }
 
 std::string guard_folder(const std::string& location) {
-  return data_folder() + "/station/memory-" + run_folder_name(location, {});
+  return data_folder() + "/station/memory-" + journal_name(location);
 }
 
 std::string journal_folder(const std::string& location) {

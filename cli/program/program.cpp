@@ -14,6 +14,11 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
                "sixpoint");
   app.set_version_flag("--version", station::software_name());
   app.require_subcommand(1);
+  app.footer(
+      "First steps, without any device:\n"
+      "  sixpoint jig --device virtual:seed=7,jig=auto --store bench.db\n"
+      "  sixpoint station --device virtual:seed=7,pace=real --store bench.db\n"
+      "'sixpoint COMMAND --help' lists the options of a command.");
   app.failure_message(CLI::FailureMessage::simple);
   for (const CommandEntry& entry : commands()) {
     entry.add(app, context);

@@ -16,6 +16,7 @@ struct Options {
   std::string station;
   std::string operator_name;
   std::string reason;
+  std::string expect;
   std::string limits;
   std::string store;
   std::string html;
@@ -29,11 +30,15 @@ struct Options {
 Status decide(const Options& options, Context& context, const char* command,
               const std::string& action, const std::string& done) {
   SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
+  std::string reason = options.reason;
+  if (!options.expect.empty()) {
+    SIXPOINT_ASSIGN(reason, station::reason_with_codes(options.expect, options.reason));
+  }
   const db::StationEvent event{.station = options.station,
                                .serial = options.serial,
                                .action = action,
                                .operator_name = options.operator_name,
-                               .reason = options.reason};
+                               .reason = reason};
   Json json = document(command);
   SIXPOINT_ASSIGN(json["stored_id"], store.add_station_event(event));
   json["action"] = action;
@@ -49,8 +54,9 @@ Status show_state(const Options& options, Context& context, const char* command)
   SIXPOINT_CHECK(outputs.file("--html", options.html));
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
-  SIXPOINT_ASSIGN(const auto state,
-                  station::station_state(store, options.station, limits.check_unit));
+  SIXPOINT_ASSIGN(
+      const auto state,
+      station::station_state(store, options.station, limits.check_unit, context.env.clock.now()));
   if (!options.html.empty()) {
     std::string page = "<!doctype html>\n<meta charset=utf-8><title>Check units</title>\n";
     for (const station::CheckUnitChart& chart : state.charts) {
@@ -143,6 +149,11 @@ void add_check_unit(CLI::App& app, Context& context) {
     command.add_option("SERIAL", options.serial)->required();
     add_decision_options(command, options);
     add_place_options(command, options);
+    if (std::string_view(action) == "check_unit") {
+      command.add_option(
+          "--expect", options.expect,
+          "a known-bad unit: the codes that it must fail with at each shift's start");
+    }
   };
   add_action("add", "from now on this unit checks the station", "check_unit",
              " is a check unit now");

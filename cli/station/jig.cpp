@@ -13,10 +13,12 @@
 #include "cli/devices/known_devices.h"
 #include "cli/station/jig_options.h"
 #include "cli/station/record_option.h"
+#include "cli/stop_request.h"
 #include "cli/store_option.h"
 #include "device/unit.h"
 #include "station/certificate/certificate.h"
 #include "station/lanes/run_folder.h"
+#include "station/records/jig_due.h"
 #include "station/records/run_records.h"
 #include "station/records/station_guard.h"
 #include "station/records/station_records.h"
@@ -29,6 +31,8 @@ namespace {
 struct Options : JigOptions {
   std::string jig_id;
   std::string jig_due;
+  std::string jig_exception;
+  std::string jig_exception_by;
   std::string retest_of;
   std::string operator_name;
   std::string station;
@@ -78,8 +82,20 @@ Result<std::string> retested_run(const Options& options, const std::string& seri
   return earlier->id;
 }
 
+Result<station::JigDue> due_of(const Options& options) {
+  station::JigDue jig{{}, options.jig_exception, options.jig_exception_by};
+  if (!options.jig_due.empty()) {
+    const auto due = parse_iso8601(options.jig_due);
+    if (!due) {
+      return fail(ErrorCode::usage, due.error().what, "--jig-due", "write it as 2027-03-31");
+    }
+    jig.due = *due;
+  }
+  return jig;
+}
+
 // What is known before the unit is measured. What can be refused is refused here, before the work.
-Result<db::RunRecord> record_before(Context& context, const Options& options,
+Result<db::RunRecord> record_before(const Options& options,
                                     const station::JigSessionOptions& session,
                                     const std::string& serial, const std::string& jig,
                                     Result<db::Store>& store) {
@@ -90,16 +106,8 @@ Result<db::RunRecord> record_before(Context& context, const Options& options,
   }
   run.operator_name = options.operator_name;
   run.station = options.station;
-  if (!options.jig_due.empty()) {
-    const auto due = parse_iso8601(options.jig_due);
-    if (!due) {
-      return fail(ErrorCode::usage, due.error().what, "--jig-due", "write it as 2027-03-31");
-    }
-    run.jig_due = *due;
-    if (*due < context.env.clock.now()) {
-      context.log().warn("the jig was due for its own calibration on {}", to_iso8601(*due));
-    }
-  }
+  SIXPOINT_ASSIGN(const station::JigDue jig_due, due_of(options));
+  run.jig_due = jig_due.due;
   if (options.retest_of.empty()) {
     run.retest_of = session.retest.retest_of;
   } else {
@@ -155,25 +163,29 @@ void make_papers(Context& context, const Options& options, Outputs& outputs,
   }
 }
 
-// The operator's line since the last call, without waiting: u undoes, s or q stops.
-std::optional<station::OperatorCommand> operator_at_terminal() {
+// The operator's line since the last call, without waiting: u undoes, s or q stops; with a virtual
+// unit, words for the hands (mocks/in_process/virtual_hands.h).
+std::optional<station::OperatorCommand> operator_at_terminal(Context& context,
+                                                             mocks::VirtualHands* hands) {
   pollfd keyboard{STDIN_FILENO, POLLIN, 0};
   if (poll(&keyboard, 1, 0) <= 0 || (keyboard.revents & POLLIN) == 0) {
     return std::nullopt;
   }
   std::array<char, 80> line{};
-  if (read(STDIN_FILENO, line.data(), line.size()) <= 0) {
-    return std::nullopt;
+  const ssize_t count = read(STDIN_FILENO, line.data(), line.size());
+  std::string word(line.data(), count > 0 ? static_cast<std::size_t>(count) : 0);
+  word.erase(std::min(word.find_first_of("\r\n"), word.size()));
+  if (word == "u" || word == "undo") {
+    return station::OperatorCommand::undo;
   }
-  switch (line[0]) {
-    case 'u':
-      return station::OperatorCommand::undo;
-    case 's':
-    case 'q':
-      return station::OperatorCommand::stop;
-    default:
-      return std::nullopt;
+  if (word == "s" || word == "q" || word == "stop") {
+    return station::OperatorCommand::stop;
   }
+  if (hands != nullptr && !word.empty()) {
+    const auto done = hands->obey(word);
+    context.people << (done ? "  " + *done : done.error().brief()) << '\n' << std::flush;
+  }
+  return std::nullopt;
 }
 
 // The folder of the run on disk; empty where the run is not saved: a jig that turns by itself
@@ -208,6 +220,12 @@ Result<station::JigSessionOptions> session_options(Context& context, const Optio
   session.run.write = options.write;
   session.run.dwell_s = options.dwell_s;
   session.keep_interrupted = true;
+  SIXPOINT_ASSIGN(const station::JigDue jig_due, due_of(options));
+  SIXPOINT_CHECK(station::check_jig_due(jig_due, context.env.clock.now()));
+  if (std::string note = station::jig_due_note(jig_due, context.env.clock.now()); !note.empty()) {
+    context.log().warn("{}", note);
+    session.notes.push_back(std::move(note));
+  }
   return session;
 }
 
@@ -242,8 +260,8 @@ void show(Context& context, const station::JigAction& action) {
   context.people << std::flush;
 }
 
-station::JigHooks terminal_hooks(Context& context, const Options& options,
-                                 const JiggedUnit& opened) {
+station::JigHooks terminal_hooks(Context& context, const Options& options, const JiggedUnit& opened,
+                                 std::optional<StopRequest>& stop) {
   station::JigHooks hooks;
   hooks.on_action = [&context](const station::JigAction& action) { show(context, action); };
   hooks.reopen = station::wait_for_unit(
@@ -253,8 +271,23 @@ station::JigHooks terminal_hooks(Context& context, const Options& options,
       std::chrono::seconds(options.patience_s));
   if (context.people_at_terminal && isatty(STDIN_FILENO) == 1) {
     context.people << "u and Enter: undo the last pose; s and Enter: stop\n" << std::flush;
-    hooks.next_command = operator_at_terminal;
+    if (opened.hands) {
+      context.people
+          << "you turn the virtual unit: +z and Enter lays it with its z axis up, -x with "
+             "x down ...; knock; swap\n"
+          << std::flush;
+    }
   }
+  hooks.next_command = [&context, &opened, &stop,
+                        asked = false]() mutable -> std::optional<station::OperatorCommand> {
+    if (!asked && stop && stop->requested()) {
+      asked = true;
+      return station::OperatorCommand::stop;
+    }
+    return context.people_at_terminal && isatty(STDIN_FILENO) == 1
+               ? operator_at_terminal(context, opened.hands.get())
+               : std::nullopt;
+  };
   return hooks;
 }
 
@@ -262,9 +295,9 @@ station::JigHooks terminal_hooks(Context& context, const Options& options,
 // with it, until `store_run` has stored the report.
 Result<station::JigReport> run_and_store(
     Context& context, const Options& options, const JiggedUnit& opened,
-    const station::JigSessionOptions& session,
+    const station::JigSessionOptions& session, std::optional<StopRequest>& stop,
     const std::function<Status(const station::JigReport&)>& store_run) {
-  station::JigHooks hooks = terminal_hooks(context, options, opened);
+  station::JigHooks hooks = terminal_hooks(context, options, opened, stop);
   const device::Identity& identity = opened.unit->identity();
   const std::string path = run_folder(context, options, *opened.jig, identity.serial);
   station::RunFolder folder(context.env, path);
@@ -303,7 +336,13 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
                      device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(check_outputs(options, outputs));
   SIXPOINT_ASSIGN(auto session, session_options(context, options));
+  // Ctrl-C stops a motor and the run, which is stored. A run by hand goes on with the next program:
+  // there Ctrl-C ends this one at once. Made before the threads of the device are.
+  std::optional<StopRequest> stop(std::in_place);
   SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, outputs, recorder));
+  if (!opened.jig->turns_by_itself()) {
+    stop.reset();
+  }
   const device::Unit& unit = *opened.unit;
   const device::Identity& identity = unit.identity();
   if (!unit.abilities().streams || !unit.abilities().holds_constants) {
@@ -320,8 +359,8 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
   }
   station::StationGuard guard(context.env, guard_folder(options.store), session.limits);
   SIXPOINT_ASSIGN(session.retest, retest_state(context, options, identity.serial, guard, store));
-  SIXPOINT_ASSIGN(auto record, record_before(context, options, session, identity.serial,
-                                             opened.jig->name(), store));
+  SIXPOINT_ASSIGN(auto record,
+                  record_before(options, session, identity.serial, opened.jig->name(), store));
   Done done;
   const auto store_run = [&](const station::JigReport& report) -> Status {
     station::complete_run_record(record, report, options.study);
@@ -336,7 +375,7 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
     record.id = done.run_id;
     return done.kept ? Status{} : fail(done.kept.error());
   };
-  SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, store_run));
+  SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, stop, store_run));
   if (options.study.empty()) {
     if (const Status noted = guard.note_verdict(identity.serial, done.report.verdict); !noted) {
       context.log().warn("{}", noted.error().brief());
@@ -430,11 +469,13 @@ struct TextOption {
   std::string Options::*text;
   const char* about;
 };
-constexpr std::array<TextOption, 10> kTextOptions = {{
+constexpr std::array<TextOption, 12> kTextOptions = {{
     {"--jig-id", &Options::jig_id,
      "the jig's own number, for the record (which units were on it?)"},
     {"--jig-due", &Options::jig_due,
-     "when the jig itself is due for calibration (2027-03-31), for the record"},
+     "when the jig itself is due for calibration (2027-03-31); after that day nothing is measured"},
+    {"--jig-exception", &Options::jig_exception, "why it is measured all the same, for the record"},
+    {"--jig-exception-by", &Options::jig_exception_by, "the engineer who signs for that"},
     {"--retest-of", &Options::retest_of,
      "the run that this one repeats: its id, or 'last' for the unit's last one"},
     {"--operator", &Options::operator_name, "who runs it, for the record"},

@@ -1,11 +1,30 @@
 #include "cli/station/jig_options.h"
 
+#include <unistd.h>
+
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
 #include "cli/station/record_option.h"
 #include "cli/store_option.h"
+#include "mocks/in_process/virtual_jig.h"
 
 namespace sixpoint::cli {
+
+namespace {
+
+// Nobody else can turn such a unit.
+bool is_turned_by_words(const Context& context, const JigOptions& options) {
+  return context.people_at_terminal && isatty(STDIN_FILENO) == 1 && options.jig.empty() &&
+         options.device.starts_with("virtual:") && options.device.find("jig=") == std::string::npos;
+}
+
+// On the machine's clock, because words take their time.
+std::string for_words(const std::string& device) {
+  const std::string turned = station::with_jig(device, "virtual");
+  return turned.find("pace=") == std::string::npos ? turned + ",pace=real" : turned;
+}
+
+}  // namespace
 
 void add_jig_options(CLI::App& command, JigOptions& options) {
   command
@@ -26,9 +45,22 @@ Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Output
                              device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(begin_session(outputs, recorder, options.record));
   JiggedUnit opened;
-  SIXPOINT_ASSIGN(opened.unit, station::known_units().open(
-                                   station::with_jig(options.device, options.jig), context.env,
-                                   [&recorder](device::Link& link) { recorder.attach(link); }));
+  const bool by_words = is_turned_by_words(context, options);
+  SIXPOINT_ASSIGN(
+      opened.unit,
+      station::known_units().open(
+          by_words ? for_words(options.device) : station::with_jig(options.device, options.jig),
+          context.env, [&recorder](device::Link& link) { recorder.attach(link); }));
+  if (by_words) {
+    // The jig in it is the hands; for the run, a person turns the unit.
+    auto* const turned = dynamic_cast<mocks::VirtualJig*>(opened.unit->jig());
+    opened.own_jig = std::make_unique<device::ManualJig>();
+    opened.jig = opened.own_jig.get();
+    if (turned != nullptr) {
+      opened.hands = std::make_unique<mocks::VirtualHands>(turned->plugged());
+    }
+    return opened;
+  }
   SIXPOINT_ASSIGN(opened.jig,
                   station::choose_jig(options.jig, *opened.unit, context.env, opened.own_jig));
   if (opened.jig->turns_by_itself()) {

@@ -15,6 +15,7 @@
 #include "cli/gravity_option.h"
 #include "cli/output.h"
 #include "device/session/session_recorder.h"
+#include "mocks/in_process/virtual_hands.h"
 #include "station/run/jig_session.h"
 
 namespace CLI {
@@ -38,6 +39,8 @@ void add_jig_options(CLI::App& command, JigOptions& options);
 
 struct JiggedUnit {
   std::unique_ptr<device::Unit> unit;
+  // A virtual unit at a terminal, without a jig: the person turns it by words.
+  std::unique_ptr<mocks::VirtualHands> hands;
   std::unique_ptr<device::Jig> own_jig;  // where the jig is not part of the unit
   device::Jig* jig = nullptr;
   station::UnitOnJig on_jig() const { return {unit.get(), jig}; }

@@ -1,10 +1,14 @@
 // sixpoint station: serves the technician's page.
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
 #include <mutex>
 #include <thread>
 
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
@@ -173,14 +177,40 @@ void raise_descriptor_limit() {
   }
 }
 
+// Ends the program where its orderly end takes longer than two seconds: a lane may wait for its
+// unit, for the store or for a solution. All that was measured is on the disk at every moment, and
+// the next program goes on with it.
+class EndInTime {
+ public:
+  ~EndInTime() { end_ = std::jthread(); }
+  // Once, when the end begins.
+  void begin(int exit_code) {
+    end_ = std::jthread([exit_code](const std::stop_token& stop) {
+      std::mutex mutex;
+      std::unique_lock lock(mutex);
+      std::condition_variable_any ended;
+      if (!ended.wait_for(lock, stop, kLongestEnd, [&] { return stop.stop_requested(); })) {
+        constexpr std::string_view kText = "sixpoint: ended while a lane was at work; it goes on\n";
+        static_cast<void>(!::write(STDERR_FILENO, kText.data(), kText.size()));
+        std::_Exit(exit_code);
+      }
+    });
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kLongestEnd{1800};
+  std::jthread end_;
+};
+
 // Answers with the signal; -1 where the server ended by itself.
-int serve_until_signal(station::Server& server, const sigset_t& signals) {
+int serve_until_signal(station::Server& server, const sigset_t& signals, EndInTime& end) {
   int signal = -1;
   std::jthread waiter([&](const std::stop_token& stop) {
-    const timespec between_checks{0, 200'000'000};
+    const timespec between_checks{0, 100'000'000};
     while (!stop.stop_requested() &&
            (signal = sigtimedwait(&signals, nullptr, &between_checks)) < 0) {
     }
+    end.begin(signal == SIGINT ? kExitStopped : 0);
     server.stop();
   });
   server.serve();
@@ -199,6 +229,7 @@ Status serve(const Options& options, Context& context) {
     return fail(store.error());
   }
   const sigset_t signals = block_stop_signals();
+  EndInTime end;  // after all that ends
   raise_descriptor_limit();
 
   mocks::VirtualBench bench;
@@ -244,7 +275,7 @@ Status serve(const Options& options, Context& context) {
                         "{} lane{}; Ctrl-C ends the station, runs go on at the next start\n",
                         lanes->size(), lanes->size() == 1 ? "" : "s")
                  << std::flush;
-  take_stop(context, serve_until_signal(*server, signals));
+  take_stop(context, serve_until_signal(*server, signals, end));
   return {};
 }
 

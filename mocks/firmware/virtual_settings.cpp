@@ -68,6 +68,7 @@ struct Draft {
   VirtualSettings settings;
   sim::GivenProperties given;
   std::uint64_t seed = 0;
+  std::optional<std::uint64_t> noise;
 };
 
 bool read_lsb(std::string_view value, std::optional<PerAxis<int>>& wish) {
@@ -101,6 +102,22 @@ bool read_switch(std::string_view value, std::string_view on, std::string_view o
   return value == on || value == off;
 }
 
+// A unit that must fail, with the code of its name (docs/verdicts.md): well beyond the built-in
+// limits in one quantity, and within them in all others.
+bool read_defect(std::string_view value, sim::GivenProperties& given) {
+  given.current_sensitivity_lsb_per_g = PerAxis<double>{250, 250, 250};
+  given.current_zero_lsb = PerAxis<double>{20, 20, 20};
+  if (value == "zero_high") {
+    (*given.current_zero_lsb)[0] = 225;
+    return true;
+  }
+  if (value == "sensitivity_low" || value == "sensitivity_high") {
+    (*given.current_sensitivity_lsb_per_g)[0] = value == "sensitivity_low" ? 350 : 150;
+    return true;
+  }
+  return false;
+}
+
 struct Setting {
   std::string_view key;
   bool (*read)(std::string_view value, Draft& draft);  // false: refused
@@ -109,9 +126,16 @@ struct Setting {
 
 constexpr std::string_view kThreeCounts = "three whole counts such as 54/47/26";
 
-constexpr std::array<Setting, 15> kSettings = {{
+constexpr std::array<Setting, 17> kSettings = {{
+    {"bad", [](auto value, auto& d) { return read_defect(value, d.given); },
+     "zero_high, sensitivity_low or sensitivity_high"},
     {"seed",
      [](auto value, auto& d) { return read_number(value, std::uint64_t{0}, UINT64_MAX, d.seed); },
+     "a whole number that is not negative"},
+    {"noise",
+     [](auto value, auto& d) {
+       return read_number(value, std::uint64_t{0}, UINT64_MAX, d.noise.emplace());
+     },
      "a whole number that is not negative"},
     {"serial",
      [](auto value, auto& d) {
@@ -203,7 +227,7 @@ Result<VirtualSettings> parse_virtual_settings(std::string_view text, std::uint6
     SIXPOINT_CHECK(read_setting(text.substr(0, comma), seen, draft));
     text.remove_prefix(std::min(comma + 1, text.size()));
   }
-  draft.settings.unit.seed = draft.seed;
+  draft.settings.unit.seed = draft.noise.value_or(draft.seed);
   draft.settings.unit.truth = sim::draw_unit(draft.seed, draft.given);
   if (!calib::validate(draft.settings.unit.truth.constants)) {
     return wrong("positive_lsb and negative_lsb", "...", "a pair with positive above negative");

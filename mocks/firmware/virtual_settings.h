@@ -3,12 +3,15 @@
 //   Result<VirtualSettings> settings = parse_virtual_settings("seed=7,jig=auto", 1);
 //
 //     serial, firmware, calibrated (2013-11-12), seed
+//     noise: the seed of noise and seating alone: the same unit, measured another time
 //     positive_lsb, negative_lsb, zero_lsb: what the memory holds, a/b/c
 //     true_sensitivity_lsb_per_g, true_zero_lsb: what the sensor is under `current`, a/b/c
 //     jig: auto (a virtual jig turns the unit), none
 //     pace: fast (time passes as it is waited for), real (the machine's clock), 2 to 100 (so many
 //       times the machine's clock)
 //     interfaces: all, storage (mass storage alone, over USB/IP)
+//     bad: zero_high, sensitivity_low, sensitivity_high: a unit that must fail with that
+//       code
 //     battery_mv, temperature_c
 //     faults: a fault plan's file, whose name holds no comma
 //

@@ -118,10 +118,15 @@ device::Link link_to(std::shared_ptr<PluggedUnit> plugged, bool with_jig) {
   return link;
 }
 
+std::uint64_t fresh_seed(Env& env) {
+  return env.seed ^ static_cast<std::uint64_t>(env.clock.now().time_since_epoch().count());
+}
+
 void register_virtual(device::TransportRegistry& registry) {
   registry.add("virtual", "virtual:seed=7,jig=auto",
                [](std::string_view rest, Env& env) -> Result<device::Link> {
-                 SIXPOINT_ASSIGN(VirtualSettings settings, parse_openable_settings(rest, env.seed));
+                 SIXPOINT_ASSIGN(VirtualSettings settings,
+                                 parse_openable_settings(rest, fresh_seed(env)));
                  std::shared_ptr<Clock> clock = clock_of(settings, env.clock);
                  FaultPlan plan;
                  if (!settings.faults_file.empty()) {

@@ -54,6 +54,10 @@ struct PluggedUnit {
 // Channels (and, with `with_jig`, the jig) of a unit. The unit lives as long as any of them.
 device::Link link_to(std::shared_ptr<PluggedUnit> plugged, bool with_jig);
 
+// For what a device string leaves to chance: another one each time, so that a unit without a seed
+// is another unit in every run of a program.
+std::uint64_t fresh_seed(Env& env);
+
 // Registers "virtual:".
 void register_virtual(device::TransportRegistry& registry);
 

@@ -42,7 +42,7 @@ void VirtualBench::register_in(device::TransportRegistry& registry) {
                  }
                  if (!place) {
                    SIXPOINT_ASSIGN(VirtualSettings settings,
-                                   parse_openable_settings(rest, env.seed));
+                                   parse_openable_settings(rest, fresh_seed(env)));
                    place = std::make_shared<Place>();
                    place->with_jig = settings.with_jig;
                    place->plugged = std::make_shared<PluggedUnit>(std::move(settings.unit),

@@ -23,6 +23,8 @@ class VirtualJig final : public device::Jig {
   Status stop() override;
   Status release() override;
 
+  // What it turns.
+  const std::shared_ptr<PluggedUnit>& plugged() const { return plugged_; }
   // The next placement ends this far off, in a random direction.
   void tilt_next(double tilt_deg) { tilt_next_deg_ = tilt_deg; }
 

@@ -20,18 +20,8 @@ void undo_rotation(std::span<gt3x::Counts> samples, calib::RecordWidth width) {
   }
 }
 
-namespace {
-
-// A repair looks at a copy of the blocks for a moment, and its memory has to stay below 48 MB with
-// everything else. 20,000 blocks are 22 hours of stillness.
-constexpr std::size_t kMostBlocks = 20'000;
-
-}  // namespace
-
 StillScan::StillScan(double rate_hz, double accel_scale, const calib::StillBlockOptions& options)
-    : rate_hz_(rate_hz), accel_scale_(accel_scale), options_(options) {
-  options_.max_blocks = std::min(options_.max_blocks, kMostBlocks);
-}
+    : rate_hz_(rate_hz), accel_scale_(accel_scale), options_(options) {}
 
 Result<StillScan> StillScan::make(double rate_hz, double accel_scale_lsb_per_g,
                                   const calib::StillBlockOptions& options) {

@@ -124,7 +124,8 @@ Result<RetestState> StationGuard::ask_store(db::Store& store, const std::string&
   known.why.clear();
   known.locked_as.clear();
   for (const std::string& each : known.names) {
-    SIXPOINT_ASSIGN(const StationState state, station_state(store, each, limits_.check_unit));
+    SIXPOINT_ASSIGN(const StationState state,
+                    station_state(store, each, limits_.check_unit, env_.clock.now()));
     known.check_units = state.check_units;
     if (state.locked && !known.locked) {
       known.locked = true;
@@ -138,16 +139,10 @@ Result<RetestState> StationGuard::ask_store(db::Store& store, const std::string&
     known.units[serial] = unit;
   }
   SIXPOINT_CHECK(remember(known));
-  if (contains(known.check_units, serial)) {
-    return RetestState{};  // it is measured to check the station
-  }
-  if (known.locked) {
+  if (known.locked && !contains(known.check_units, serial)) {
     return fail(station_is_locked(known.why, known.locked_as));
   }
-  if (!unit.may_start) {
-    return fail(unit_needs_release(unit, serial));
-  }
-  return unit;
+  return station::may_start(store, serial, name, limits_);
 }
 
 Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {

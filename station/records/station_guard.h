@@ -2,8 +2,8 @@
 // station goes by.
 //
 //   StationGuard guard(env, "data/station/3f2a", limits);
-//   SIXPOINT_ASSIGN(const RetestState state, guard.may_start(store, "MOS2A45130007", "bench-1"));
-//   guard.note_verdict("MOS2A45130007", JigVerdict::fail);  // after the run
+//   SIXPOINT_ASSIGN(const RetestState state, guard.may_start(opened, "MOS2A45130007", "bench-1"));
+//   SIXPOINT_CHECK(guard.note_verdict("MOS2A45130007", JigVerdict::fail));  // after the run
 //
 // The station has an identity of its own: the folder beside its state, one for each store. Its file
 // memory.json holds an identifier that is made once, the names that the station went by, and what

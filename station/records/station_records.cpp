@@ -7,6 +7,7 @@
 #include <set>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 namespace sixpoint::station {
@@ -183,8 +184,93 @@ std::optional<std::string> lock_reason(const CheckUnitChart& one, std::string_vi
 
 }  // namespace
 
+constexpr std::string_view kExpects = "expects ";
+
+Result<std::string> reason_with_codes(const std::string& codes, const std::string& reason) {
+  std::string text(kExpects);
+  std::size_t begin = 0;
+  while (begin <= codes.size()) {
+    const std::size_t end = std::min(codes.find(',', begin), codes.size());
+    const std::string code = codes.substr(begin, end - begin);
+    if (find_failure_code(code) == nullptr) {
+      return fail(ErrorCode::usage, fmt::format("'{}' is no code of a run", printable(code, 60)),
+                  "--expect", "docs/verdicts.md lists the codes; give them as CODE,CODE");
+    }
+    begin = end + 1;
+  }
+  return fmt::format("{}{}: {}", kExpects, codes, reason);
+}
+
+std::vector<std::string> codes_in_reason(const std::string& reason) {
+  std::vector<std::string> codes;
+  const std::size_t colon = reason.find(": ");
+  if (!reason.starts_with(kExpects) || colon == std::string::npos) {
+    return codes;
+  }
+  std::string_view rest = std::string_view(reason).substr(0, colon).substr(kExpects.size());
+  while (!rest.empty()) {
+    const std::size_t comma = std::min(rest.find(','), rest.size());
+    codes.emplace_back(rest.substr(0, comma));
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
+  }
+  // What a person wrote by chance is no list of codes.
+  if (std::ranges::any_of(codes, [](const auto& code) { return !find_failure_code(code); })) {
+    return {};
+  }
+  std::ranges::sort(codes);
+  return codes;
+}
+
+namespace {
+
+std::vector<KnownBad> known_bad_of(const std::vector<db::StationEvent>& events,
+                                   const std::string& station) {
+  std::map<std::string, std::vector<std::string>> units;
+  for (const db::StationEvent& event : events) {
+    if (event.action == "check_unit_end") {
+      units.erase(event.serial);
+    } else if (event.action == "check_unit" && event.station == station) {
+      units[event.serial] = codes_in_reason(event.reason);
+    }
+  }
+  std::vector<KnownBad> known;
+  for (const auto& [serial, codes] : units) {
+    if (!codes.empty()) {
+      known.push_back({serial, codes});
+    }
+  }
+  return known;
+}
+
+// Why this known-bad unit locks the station; nothing where it failed as it must.
+std::optional<std::string> why_not_as_bad_as_known(const KnownBad& unit,
+                                                   const std::optional<RunSummary>& last,
+                                                   const StationState& state,
+                                                   const std::optional<UtcTime>& now) {
+  const std::string must = fmt::format("{}", fmt::join(unit.codes, ", "));
+  if (now && (!last || last->started < *now - kShift)) {
+    return fmt::format("known-bad unit {} was not measured in this shift; it must fail with {}",
+                       unit.serial, must);
+  }
+  if (!last || (state.signature && last->started <= state.signature->made_at)) {
+    return std::nullopt;
+  }
+  std::vector<std::string> codes = last->codes;
+  std::ranges::sort(codes);
+  const bool failed =
+      last->verdict == JigVerdict::fail || last->verdict == JigVerdict::conditional_fail;
+  if (failed && codes == unit.codes) {
+    return std::nullopt;
+  }
+  return fmt::format("known-bad unit {} must fail with {}, and its last run says {} {}",
+                     unit.serial, must, to_string(last->verdict), fmt::join(codes, ", "));
+}
+
+}  // namespace
+
 Result<StationState> station_state(db::Store& store, const std::string& station,
-                                   const CheckUnitPolicy& policy) {
+                                   const CheckUnitPolicy& policy,
+                                   const std::optional<UtcTime>& now) {
   SIXPOINT_ASSIGN(const auto events, store.station_events());
   StationState state;
   state.station = station;
@@ -213,6 +299,22 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
       state.charts.push_back(std::move(chart));
     }
   }
+  state.known_bad = known_bad_of(events, station);
+  for (const KnownBad& unit : state.known_bad) {
+    db::RunFilter of_unit;
+    of_unit.serial = unit.serial;
+    std::optional<RunSummary> last;
+    SIXPOINT_CHECK(store.for_each_run(of_unit, [&](const db::RunRecord& run) -> Status {
+      if (run.station == station) {
+        last = summary_of(run);
+      }
+      return {};
+    }));
+    if (auto reason = why_not_as_bad_as_known(unit, last, state, now)) {
+      state.locked = true;
+      state.reasons.push_back(*std::move(reason));
+    }
+  }
   return state;
 }
 
@@ -229,11 +331,12 @@ std::string StationState::brief() const {
 }
 
 Json StationState::to_json() const {
-  Json json = {{"station", station},
-               {"locked", locked},
-               {"reasons", reasons},
-               {"check_units", check_units},
-               {"signature", nullptr}};
+  Json json = {{"station", station},          {"locked", locked},
+               {"reasons", reasons},          {"check_units", check_units},
+               {"known_bad", Json::object()}, {"signature", nullptr}};
+  for (const KnownBad& unit : known_bad) {
+    json["known_bad"][unit.serial] = unit.codes;
+  }
   if (signature) {
     json["signature"] = {{"made_at", to_iso8601(signature->made_at)},
                          {"operator", signature->operator_name},

@@ -12,6 +12,7 @@
 // removed counts until that signature: taking it away lifts no lock.
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,9 +42,29 @@ struct CheckUnitChart {
   ControlChart chart;          // "zero_offset_mg x" ...
 };
 
+// A known-bad check unit: it must fail, with just its codes, at the start of each shift. It shows
+// that the station still finds what is wrong. The rule, for each such unit that was named for this
+// station:
+//
+// | its last run here since the signature   | the station                                         |
+// |-----------------------------------------|-----------------------------------------------------|
+// | none in the last kShift                 | locked: measure it first (known where `now` is)     |
+// | failed with just its codes              | open                                                |
+// | passed, or other codes, or no verdict   | locked until it fails as it must, or a signature    |
+inline constexpr std::chrono::hours kShift{12};
+struct KnownBad {
+  std::string serial;
+  std::vector<std::string> codes;  // sorted
+};
+// The decision's reason with the codes in front, and back; none where it names no codes. usage for
+// a code that is not in the catalogue (verdict.h).
+Result<std::string> reason_with_codes(const std::string& codes, const std::string& reason);
+std::vector<std::string> codes_in_reason(const std::string& reason);
+
 struct StationState {
   std::string station;
   std::vector<std::string> check_units;  // of all stations: a check unit may be moved
+  std::vector<KnownBad> known_bad;       // of this station
   std::vector<CheckUnitChart> charts;    // six for each check unit that was measured here
   bool locked = false;
   std::vector<std::string> reasons;           // why, for people
@@ -53,8 +74,10 @@ struct StationState {
   std::string brief() const;
   nlohmann::ordered_json to_json() const;
 };
+// `now`: to know whether a known-bad unit was measured in this shift; without it that is not asked.
 Result<StationState> station_state(db::Store& store, const std::string& station,
-                                   const CheckUnitPolicy& policy);
+                                   const CheckUnitPolicy& policy,
+                                   const std::optional<UtcTime>& now = {});
 
 // What a unit's earlier jig runs and releases demand of the next one.
 Result<RetestState> unit_retest_state(db::Store& store, const std::string& serial,

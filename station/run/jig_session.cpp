@@ -120,6 +120,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
   report_.filter = options_.filter;
   report_.gravity = options_.gravity;
   report_.limits = options_.limits;
+  report_.reasons = options_.notes;
   const auto page = unit_->read_calibration();
   if (page) {
     report_.as_found = *page;

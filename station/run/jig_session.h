@@ -20,6 +20,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/env.h"
 #include "calib/constants.h"
@@ -37,7 +38,9 @@ struct JigSessionOptions {
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   calib::LocalGravity gravity = calib::gravity_unknown();  // where the jig stands
   Limits limits = default_limits();
-  RetestState retest;    // of the unit's earlier runs (verdict.h)
+  RetestState retest;  // of the unit's earlier runs (verdict.h)
+  std::vector<std::string>
+      notes;             // reasons that the report begins with, such as a signed exception
   double silence_s = 3;  // of a streaming unit, then it counts as unplugged
   // An error in mid-run gives a report with `ended_by`, so that the readings can be stored. Without
   // it, run_jig() returns the error alone.

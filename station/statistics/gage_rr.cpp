@@ -74,6 +74,20 @@ Result<Balanced> balance(const std::vector<GageReading>& readings) {
   return out;
 }
 
+// No measurement does: scatter of 0.00 % and a million categories would come out.
+bool repeats_itself(const Balanced& study) {
+  for (std::size_t i = 0; i < study.parts.size(); ++i) {
+    for (std::size_t j = 0; j < study.operators.size(); ++j) {
+      for (std::size_t k = 1; k < study.trials; ++k) {
+        if (study.at(i, j, k) != study.at(i, j, 0)) {
+          return false;
+        }
+      }
+    }
+  }
+  return true;
+}
+
 AnovaRow row_of(std::string source, double degrees_of_freedom, double sum_of_squares) {
   return {std::move(source), degrees_of_freedom,
           sum_of_squares,    sum_of_squares / degrees_of_freedom,
@@ -163,6 +177,12 @@ Result<GageReport> gage_rr(const std::vector<GageReading>& readings, const GageO
   const auto p = static_cast<double>(study.parts.size());
   const auto o = static_cast<double>(study.operators.size());
   const auto t = static_cast<double>(study.trials);
+  if (!all_equal && repeats_itself(study)) {
+    return fail(ErrorCode::bad_data, "every repeat is the same to the last digit: a copy, no study",
+                "gage study",
+                "measure each part anew each time; a virtual unit with a seed repeats itself, and "
+                "needs another noise=N each time");
+  }
   const SumsOfSquares sums = sums_of_squares(study);
 
   GageReport report;

@@ -95,7 +95,7 @@ struct OnBench {
   std::unique_ptr<device::Unit> unit;
   device::ManualJig jig;
   std::vector<std::string> said;
-  std::function<Result<UnitOnJig>(const Error&)> hook;
+  UnitWait hook;
 };
 
 const Error kGone{ErrorCode::device_unavailable, "the unit was unplugged", "virtual unit", ""};
@@ -104,7 +104,7 @@ const Error kGone{ErrorCode::device_unavailable, "the unit was unplugged", "virt
 TEST(KnownDevices, AUnitMayComeBackFiveTimes) {
   OnBench on;
   for (int i = 0; i < 5; ++i) {
-    const auto back = on.hook(kGone);
+    const auto back = on.hook(kGone, {});
     ASSERT_OK(back) << i;
     EXPECT_EQ(back->unit, on.unit.get());
     EXPECT_EQ(back->jig, &on.jig);
@@ -112,7 +112,7 @@ TEST(KnownDevices, AUnitMayComeBackFiveTimes) {
     EXPECT_THAT(on.said[on.said.size() - 2],
                 testing::AllOf(StartsWith("the unit was unplugged"), HasSubstr("30 s")));
   }
-  const auto sixth = on.hook(kGone);
+  const auto sixth = on.hook(kGone, {});
   EXPECT_FAILS(sixth, ErrorCode::device_unavailable);
   EXPECT_THAT(sixth.error().what, HasSubstr("6 times"));
 }
@@ -124,12 +124,12 @@ TEST(KnownDevices, AUnitThatStaysAwayIsGivenUpAfterThePatience) {
   ASSERT_OK(on.bench.set_plugged(OnBench::kAddress, false));
   Clock& clock = on.unit->clock();
   const auto before = clock.elapsed();
-  EXPECT_FAILS(on.hook(kGone), ErrorCode::device_unavailable);
+  EXPECT_FAILS(on.hook(kGone, {}), ErrorCode::device_unavailable);
   const double waited_s = std::chrono::duration<double>(clock.elapsed() - before).count();
   EXPECT_GE(waited_s, 30);
   EXPECT_LE(waited_s, 30.5);
   ASSERT_OK(on.bench.set_plugged(OnBench::kAddress, true));
-  EXPECT_OK(on.hook(kGone)) << "it is one of the five";
+  EXPECT_OK(on.hook(kGone, {})) << "it is one of the five";
 }
 
 }  // namespace

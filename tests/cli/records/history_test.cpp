@@ -21,7 +21,8 @@ TEST_F(StoreTest, AJigRunIsStoredWithWhatItWasJudgedBy) {
   const auto first = jig({"--jig-due", "2027-03-31"});
   EXPECT_EQ(first.exit_code, 0) << first.people;
   EXPECT_EQ(first.json()["kept"]["in"], "store");
-  const auto second = jig({"--jig-due", "2001-01-01", "--retest-of", "last", "--write"});
+  const auto second = jig({"--jig-due", "2001-01-01", "--jig-exception", "no other jig",
+                           "--jig-exception-by", "Eve", "--retest-of", "last", "--write"});
   EXPECT_EQ(second.exit_code, 0) << second.people;
   EXPECT_THAT(second.people, HasSubstr("2001-01-01"));
   EXPECT_EQ(jig({"--jig-due", "soon"}).exit_code, 64);

@@ -1,6 +1,8 @@
 // check-unit, station-lock and retest by their contract; tests/station/records has the rules.
 #include <filesystem>
 
+#include <fmt/format.h>
+
 #include "cli/station/station_fixture.h"
 
 namespace sixpoint::station {
@@ -53,6 +55,31 @@ TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
   EXPECT_EQ(chart.exit_code, 0);
   EXPECT_EQ(chart.json()["charts"].size(), 6U);
   EXPECT_GT(std::filesystem::file_size(folder_ / "c.html"), 1000U);
+}
+
+// Oracle: the code in the name of the defect, and no other.
+TEST_F(StationCommands, AKnownBadUnitOpensTheStationByFailing) {
+  int seed = 100;
+  for (const char* defect : {"zero_high", "sensitivity_low", "sensitivity_high"}) {
+    const auto failed = measure(fmt::format("seed={},bad={}", ++seed, defect));
+    EXPECT_EQ(failed.exit_code, 1) << defect;
+    EXPECT_EQ(failed.json()["codes"], nlohmann::json({defect}));
+  }
+  ASSERT_EQ(run({"check-unit", "add", "MOS2A0BAD", "--expect", "zero_high", "--station", "A",
+                 "--operator", "Eve", "--reason", "dropped"})
+                .exit_code,
+            0);
+  EXPECT_EQ(run({"check-unit", "add", "MOS2A0BAD", "--expect", "zero_hihg", "--station", "A",
+                 "--operator", "Eve", "--reason", "dropped"})
+                .exit_code,
+            64);
+  const auto locked = measure("seed=9");
+  EXPECT_EQ(locked.exit_code, 78);
+  EXPECT_THAT(locked.people, HasSubstr("it must fail with zero_high"));
+  EXPECT_EQ(measure("seed=5,serial=MOS2A0BAD,bad=zero_high").exit_code, 1);
+  EXPECT_EQ(measure("seed=9").exit_code, 0);
+  EXPECT_EQ(measure("seed=5,serial=MOS2A0BAD").exit_code, 0) << "it does not fail";
+  EXPECT_EQ(measure("seed=9").exit_code, 78);
 }
 
 TEST_F(StationCommands, AUnitThatFailedIsMeasuredTwiceAndNotForever) {

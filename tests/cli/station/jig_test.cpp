@@ -1,11 +1,26 @@
 // sixpoint jig by its contract, on the real disk.
+#include <csignal>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include "cli/command_fixture.h"
 
 namespace sixpoint::cli {
 namespace {
 
+using testing::HasSubstr;
 using tests::CommandTest;
 using tests::kDevice;
+
+std::string said_in(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
 
 // Oracle: the sensor that the device string names.
 TEST_F(CommandTest, JigFindsTheSensorAndStoresIt) {
@@ -54,6 +69,62 @@ TEST_F(CommandTest, JigRefusesByTheContractsCodes) {
   EXPECT_EQ(code_of({"--device", kDevice, "--jig", "manual"}), 2)
       << "the unit is never turned: inconclusive";
   EXPECT_EQ(code_of({}), 64);
+}
+
+// Ctrl-C in a run by a jig: the motor stops, the run is stored as stopped, exit 3.
+TEST_F(CommandTest, CtrlCInAnAutomaticRunStoresItAsStopped) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string script = "exec " + std::string(SIXPOINT_PROGRAM) +
+                               " jig --device virtual:seed=7,jig=auto,pace=real --store " +
+                               path("s.db") + " --json > " + path("o") + " 2> " + path("e");
+    ::execl("/bin/sh", "sh", "-c", script.c_str(), nullptr);
+    ::_exit(127);
+  }
+  for (int i = 0; i < 500 && said_in(path("e")).find("turn the unit") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  ASSERT_EQ(::kill(child, SIGINT), 0);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 3) << said_in(path("e"));
+  const auto json = nlohmann::json::parse(said_in(path("o")), nullptr, false);
+  ASSERT_TRUE(json.is_object()) << said_in(path("o"));
+  EXPECT_EQ(json["verdict"], "stopped");
+  const auto history =
+      run({"history", json["serial"].get<std::string>(), "--store", path("s.db"), "--json"});
+  EXPECT_THAT(history.out, HasSubstr("stopped"));
+}
+
+// The first command that --help shows ends in a pass.
+TEST_F(CommandTest, TheFirstCommandOfHelpEndsInAPass) {
+  const std::string help = run({"--help"}).out;
+  const std::string first = "  sixpoint jig ";
+  const std::size_t begin = help.find(first);
+  ASSERT_NE(begin, std::string::npos) << help;
+  std::istringstream line(help.substr(begin, help.find('\n', begin) - begin));
+  std::vector<std::string> words;
+  for (std::string word; line >> word;) {
+    words.push_back(word == "bench.db" ? path("s.db") : word);
+  }
+  words.erase(words.begin());
+  EXPECT_EQ(run(words).exit_code, 0);
+}
+
+TEST_F(CommandTest, AnOverdueJigMeasuresNothingWithoutASignedException) {
+  std::vector<std::string> words = {"jig",     "--device",   kDevice,  "--jig",     "virtual",
+                                    "--store", path("s.db"), "--json", "--jig-due", "2001-01-01"};
+  const auto refused = run(words);
+  EXPECT_EQ(refused.exit_code, 78);
+  EXPECT_THAT(refused.people, HasSubstr("due for its own calibration on 2001-01-01"));
+  words.insert(words.end(), {"--jig-exception", "no other jig"});
+  EXPECT_EQ(run(words).exit_code, 64) << "who signs?";
+  words.insert(words.end(), {"--jig-exception-by", "Eve"});
+  const auto measured = run(words);
+  EXPECT_EQ(measured.exit_code, 0) << measured.people;
+  EXPECT_THAT(measured.out, HasSubstr("Eve signed: no other jig"));
 }
 
 }  // namespace

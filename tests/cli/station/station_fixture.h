@@ -1,6 +1,7 @@
 // The commands of the station, on the real disk with virtual units.
 #pragma once
 
+#include <cstdlib>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -15,6 +16,9 @@ namespace sixpoint::station {
 
 class StationCommands : public testing::Test {
  protected:
+  // The station's memory is in the user's data folder.
+  StationCommands() { ::setenv("XDG_DATA_HOME", (folder_ / "data").c_str(), 1); }
+  ~StationCommands() override { ::unsetenv("XDG_DATA_HOME"); }
   tests::Answer run(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--store", folder_ / "s.db"});
     return tests::run_command(posix_env(), arguments);

@@ -33,15 +33,14 @@ TEST_F(CommandTest, StatisticsCountsTheRunsOfTheStore) {
   EXPECT_EQ(run({"statistics", "--store", path("none.db")}).exit_code, 66);
 }
 
-// Two parts, two operators, two readings each. All readings of a part are equal, so repeatability
-// and reproducibility are zero.
+// Two parts, two operators, two readings each, 0.01 apart, on parts that are 1 apart.
 TEST_F(CommandTest, GageRrReadsItsTable) {
   std::ofstream csv(path("g.csv"));
   csv << "part,operator,value\n";
   for (const char* part : {"A,", "B,"}) {
     for (const char* who : {"ada,", "max,"}) {
       for (int repeat = 0; repeat < 2; ++repeat) {
-        csv << part << who << (part[0] == 'A' ? "1.0" : "2.0") << '\n';
+        csv << part << who << (part[0] == 'A' ? "1.0" : "2.0") << repeat << '\n';
       }
     }
   }
@@ -57,8 +56,10 @@ TEST_F(StationCommands, StatisticsAndTheGageStudy) {
   for (int part = 1; part <= 3; ++part) {
     for (const char* person : {"Ada", "Bo"}) {
       for (int trial = 0; trial < 2; ++trial) {
-        const auto answer = run({"jig", "--device", "virtual:seed=" + std::to_string(part), "--jig",
-                                 "virtual", "--operator", person, "--study", "spring"});
+        const auto answer = run({"jig", "--device",
+                                 "virtual:seed=" + std::to_string(part) + ",noise=" +
+                                     std::to_string(100 * part + 10 * trial + person[0] % 2),
+                                 "--jig", "virtual", "--operator", person, "--study", "spring"});
         EXPECT_EQ(answer.exit_code, 0) << answer.people;
       }
     }

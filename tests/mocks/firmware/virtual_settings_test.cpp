@@ -15,6 +15,19 @@ constexpr const char* kContract =
     "negative_lsb=-204/-216/-234,zero_lsb=54/47/26,true_sensitivity_lsb_per_g=237.7/251.8/242.3,"
     "true_zero_lsb=49.9/95.8/60.8,jig=auto";
 
+// The same unit measured another time; without a noise of its own, the same to the last digit.
+TEST(VirtualSettings, NoiseHasASeedOfItsOwn) {
+  const auto plain = parse_virtual_settings("seed=7", 1);
+  const auto again = parse_virtual_settings("seed=7,noise=3", 1);
+  ASSERT_OK(plain);
+  ASSERT_OK(again);
+  EXPECT_EQ(plain->unit.seed, 7U);
+  EXPECT_EQ(again->unit.seed, 3U);
+  EXPECT_EQ(plain->unit.truth.serial, again->unit.truth.serial);
+  EXPECT_EQ(plain->unit.truth.current.zero_lsb, again->unit.truth.current.zero_lsb);
+  EXPECT_FAILS(parse_virtual_settings("noise=x", 1), ErrorCode::usage);
+}
+
 TEST(VirtualSettings, ReadsTheContractsExample) {
   const auto settings = parse_virtual_settings(kContract, 1);
   ASSERT_OK(settings);

@@ -39,6 +39,42 @@ TEST_F(StationRecords, ACheckUnitOutOfControlLocksItsStationUntilAnEngineerSigns
   EXPECT_FAILS(start("MOS2A1"), ErrorCode::configuration);
 }
 
+// The table of the header, row by row.
+TEST_F(StationRecords, AKnownBadUnitMustFailAsItIsKnownTo) {
+  const auto locked = [&](const std::string& station = "A") {
+    return station_state(store_, station, default_limits().check_unit, env_.clock.now())->locked;
+  };
+  db::StationEvent event;
+  event.station = "A";
+  event.serial = "BAD1";
+  event.action = "check_unit";
+  event.operator_name = "Eve";
+  event.reason = *reason_with_codes("zero_high", "dropped");
+  env_.clock.set(env_.clock.now() + std::chrono::minutes(10));
+  ASSERT_OK(store_.add_station_event(event));
+  EXPECT_TRUE(locked()) << "not measured in this shift";
+  EXPECT_FALSE(locked("B")) << "it was named for A";
+  add_run("BAD1", JigVerdict::fail);  // with zero_high
+  EXPECT_FALSE(locked());
+  env_.clock.set(env_.clock.now() + kShift + std::chrono::hours(1));
+  EXPECT_TRUE(locked()) << "the next shift";
+  add_run("BAD1", JigVerdict::pass);
+  EXPECT_TRUE(locked()) << "the station does not find what is wrong";
+  add_run("BAD1", JigVerdict::inconclusive);
+  EXPECT_TRUE(locked());
+  add_run("BAD1", JigVerdict::fail);
+  EXPECT_FALSE(locked());
+  add_run("BAD1", JigVerdict::pass);
+  EXPECT_TRUE(locked());
+  decide("sign");
+  EXPECT_FALSE(locked()) << "an engineer has looked";
+  EXPECT_FAILS(reason_with_codes("zero_hihg", "x"), ErrorCode::usage);
+  EXPECT_FAILS(reason_with_codes("", "x"), ErrorCode::usage);
+  EXPECT_TRUE(codes_in_reason("expects nothing: really").empty());
+  const std::vector<std::string> two = {"noise_high", "zero_high"};
+  EXPECT_EQ(codes_in_reason(*reason_with_codes("zero_high,noise_high", "x")), two);
+}
+
 TEST_F(StationRecords, ANewBaselineForgetsTheOldOne) {
   decide("check_unit", "CHECK1");
   baseline();

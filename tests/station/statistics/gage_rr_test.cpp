@@ -96,6 +96,20 @@ TEST(GageRr, WhatIsNoStudyIsRefused) {
   EXPECT_FAILS(gage_rr(alike), ErrorCode::bad_data);
 }
 
+TEST(GageRr, RepeatsWithoutAnyScatterAreACopyAndNoStudy) {
+  std::vector<GageReading> readings;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    for (const auto& [part, value] : {std::pair{"1", 10.1}, {"2", 20.2}, {"3", 30.3}}) {
+      readings.push_back({part, "Ada", value});
+      readings.push_back({part, "Bo", value + 0.1});
+    }
+  }
+  const auto refused = gage_rr(readings);
+  EXPECT_FAILS(refused, ErrorCode::bad_data);
+  readings.back().value += 0.1;
+  EXPECT_OK(gage_rr(readings));
+}
+
 TEST(GageCsv, ColumnsInAnyOrder) {
   const auto readings = parse_gage_csv("value,part,operator\r\n1.5,7,Ada\r\n\r\n-2e-1,8,Bo\n", "f");
   ASSERT_OK(readings);

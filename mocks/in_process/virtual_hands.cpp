@@ -1,0 +1,46 @@
+#include "mocks/in_process/virtual_hands.h"
+
+#include <fmt/format.h>
+
+#include "device/jig.h"
+
+namespace sixpoint::mocks {
+
+namespace {
+
+constexpr double kTurn_s = 1.5;
+constexpr double kKnock_s = 0.15;
+constexpr double kKnock_deg = 12;
+
+Eigen::Vector3d up_of(device::Pose pose) {
+  const auto up = device::direction_of(pose);
+  return {up[0], up[1], up[2]};
+}
+
+}  // namespace
+
+Result<std::string> VirtualHands::obey(std::string_view word) {
+  const std::lock_guard lock(plugged_->mutex);
+  const nanoseconds now = plugged_->clock->elapsed();
+  if (word == "knock") {
+    plugged_->unit.turn_to(up_of(pose_), now, kKnock_s, kKnock_deg);
+    plugged_->unit.turn_to(up_of(pose_), now + from_seconds(kKnock_s), kKnock_s);
+    return std::string("the unit was knocked");
+  }
+  if (word == "swap") {
+    SIXPOINT_ASSIGN(FaultPlan plan, parse_fault_plan(R"({"schema": "sixpoint/faults/1",
+                      "faults": [{"fault": "swap", "at_s": 0, "seconds": 5}]})"));
+    plugged_->faults = FaultInjector(std::move(plan), now);
+    return std::string("another unit is plugged in; in five seconds the first one is back");
+  }
+  const auto pose = device::parse_pose(word);
+  if (!pose) {
+    return fail(ErrorCode::usage, fmt::format("'{}' is no word for the hands", printable(word, 40)),
+                {}, "+x -x +y -y +z -z turn the unit; knock; swap");
+  }
+  pose_ = *pose;
+  plugged_->unit.turn_to(up_of(pose_), now, kTurn_s, 0);
+  return fmt::format("the unit is turned to {}", device::to_string(pose_));
+}
+
+}  // namespace sixpoint::mocks

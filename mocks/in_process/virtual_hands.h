@@ -1,0 +1,35 @@
+// A person's hands on a virtual unit, by words that are typed at a terminal.
+//
+//   VirtualHands hands(plugged);
+//   const Result<std::string> done = hands.obey("+z");  // "it lies on ..."
+//
+// | word              | what the hands do                                                        |
+// |-------------------|--------------------------------------------------------------------------|
+// | +x -x +y -y +z -z | turn the unit, that axis up (+) or down (-)                              |
+// | knock             | move it a little, and back                                               |
+// | swap              | pull it out, plug another one in for five seconds, then the first again  |
+//
+// Any thread.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "mocks/in_process/in_process.h"
+
+namespace sixpoint::mocks {
+
+class VirtualHands {
+ public:
+  explicit VirtualHands(std::shared_ptr<PluggedUnit> plugged) : plugged_(std::move(plugged)) {}
+
+  // One sentence about what was done; usage for another word.
+  Result<std::string> obey(std::string_view word);
+
+ private:
+  std::shared_ptr<PluggedUnit> plugged_;
+  device::Pose pose_ = device::Pose::plus_z;
+};
+
+}  // namespace sixpoint::mocks

@@ -1,0 +1,40 @@
+#include "station/records/jig_due.h"
+
+#include <fmt/format.h>
+
+namespace sixpoint::station {
+
+namespace {
+
+bool is_over(const JigDue& jig, UtcTime now) { return jig.due && *jig.due < now; }
+
+}  // namespace
+
+Status check_jig_due(const JigDue& jig, UtcTime now) {
+  if (!is_over(jig, now)) {
+    return {};
+  }
+  if (jig.exception.empty()) {
+    return fail(ErrorCode::configuration,
+                fmt::format("the jig was due for its own calibration on {}",
+                            to_iso8601(*jig.due).substr(0, 10)),
+                {},
+                "have it calibrated; or an engineer signs: --jig-exception WHY "
+                "--jig-exception-by NAME");
+  }
+  if (jig.signed_by.empty()) {
+    return fail(ErrorCode::usage, "an exception for the jig has a name", "--jig-exception",
+                "say who signs for it with --jig-exception-by NAME");
+  }
+  return {};
+}
+
+std::string jig_due_note(const JigDue& jig, UtcTime now) {
+  return is_over(jig, now)
+             ? fmt::format("the jig was due for its own calibration on {}; {} signed: {}",
+                           to_iso8601(*jig.due).substr(0, 10), printable(jig.signed_by, 60),
+                           printable(jig.exception, 200))
+             : std::string();
+}
+
+}  // namespace sixpoint::station

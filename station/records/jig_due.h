@@ -1,0 +1,35 @@
+// The jig is calibrated too: after its due date no run passes, unless an engineer signed for it.
+//
+//   SIXPOINT_CHECK(check_jig_due({due, "the laboratory is closed", "Eve"}, env.clock.now()));
+//
+// | due date         | exception | signed by | answer                                           |
+// |------------------|-----------|-----------|--------------------------------------------------|
+// | not known        | any       | any       | the unit may be measured                         |
+// | not over         | any       | any       | the unit may be measured                         |
+// | over             | none      | any       | configuration error: nothing is measured         |
+// | over             | a reason  | nobody    | usage error: an exception has a name             |
+// | over             | a reason  | a name    | the unit may be measured; jig_due_note() goes    |
+// |                  |           |           | into the run's record                            |
+//
+// Pure functions.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "base/result.h"
+#include "base/time.h"
+
+namespace sixpoint::station {
+
+struct JigDue {
+  std::optional<UtcTime> due;
+  std::string exception;  // why it may be used all the same; empty: it may not
+  std::string signed_by;  // the engineer's name
+};
+
+Status check_jig_due(const JigDue& jig, UtcTime now);
+// The signed exception in one sentence, for the run's record; empty where none is needed.
+std::string jig_due_note(const JigDue& jig, UtcTime now);
+
+}  // namespace sixpoint::station
