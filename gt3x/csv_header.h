@@ -1,8 +1,8 @@
 // The ten lines before the column names in the CSV files of the vendor's software (private to this
 // room).
 //
-//   const std::string text = csv_header(recording.info(), "Created By ... at 30 Hz ",
-//   1'400'000'000);
+//   Info info;
+//   const std::string text = csv_header(info, "Created By ... at 30 Hz ", 1'400'000'000);
 //
 // Times are by the recording's own clock. Lines end in CR LF.
 #pragma once

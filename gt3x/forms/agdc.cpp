@@ -97,15 +97,15 @@ Result<TemperatureCalibration> parse_temperature_calibration(std::string_view te
 }
 
 PerAxis<double> AgdcCalibration::apply(const Counts& raw_lsb) const {
-  return apply(PerAxis<double>{static_cast<double>(raw_lsb[0]), static_cast<double>(raw_lsb[1]),
-                               static_cast<double>(raw_lsb[2])});
+  return apply_to_mean({static_cast<double>(raw_lsb[0]), static_cast<double>(raw_lsb[1]),
+                        static_cast<double>(raw_lsb[2])});
 }
 
-PerAxis<double> AgdcCalibration::apply(const PerAxis<double>& raw_lsb) const {
+PerAxis<double> AgdcCalibration::apply_to_mean(const PerAxis<double>& mean_lsb) const {
   PerAxis<double> g{};
   for (std::size_t row = 0; row < kAxes; ++row) {
     for (std::size_t column = 0; column < kAxes; ++column) {
-      g[row] += sensitivity_g_per_lsb[row][column] * (raw_lsb[column] - offset_lsb[column]);
+      g[row] += sensitivity_g_per_lsb[row][column] * (mean_lsb[column] - offset_lsb[column]);
     }
   }
   return g;

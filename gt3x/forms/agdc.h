@@ -53,8 +53,8 @@ struct AgdcCalibration {
   PerAxis<PerAxis<double>> sensitivity_g_per_lsb{};
   std::optional<StoredConstants> constants;  // the six-point form, where it is there
 
-  PerAxis<double> apply(const PerAxis<double>& raw_lsb) const;
   PerAxis<double> apply(const Counts& raw_lsb) const;
+  PerAxis<double> apply_to_mean(const PerAxis<double>& mean_lsb) const;  // of raw counts
 };
 // For one of the rates that the file knows (32, 64, 128, 256 Hz); bad_data otherwise, for what is
 // no such JSON, and for raw counts of a method other than 2: nothing public says how those become

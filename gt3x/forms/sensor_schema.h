@@ -1,8 +1,9 @@
 // The inertial sensor of a GT9X Link: SENSOR_SCHEMA says how the samples of SENSOR_DATA lie.
 //
-//   SIXPOINT_ASSIGN(const SensorSchema schema, parse_sensor_schema(schema_record.payload));
-//   SIXPOINT_ASSIGN(const auto samples, parse_sensor_data(schema, data_record.payload));
-//   samples[0][0];  // the first column of the first sample, in its unit
+//   Bytes schema_payload, data_payload;  // of the two records
+//   SIXPOINT_ASSIGN(const SensorSchema schema, parse_sensor_schema(schema_payload));
+//   SIXPOINT_ASSIGN(const auto samples, parse_sensor_data(schema, data_payload));
+//   const double first = samples[0][0];  // the first column of the first sample, in its unit
 //
 // Layout (the vendor's public description, confirmed on a real recording and its CSV), all numbers
 // little-endian: the schema's number (2 bytes), columns (2), samples of a record or 0 (2); then 23
@@ -16,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "base/bytes.h"
 #include "base/result.h"
 
 namespace sixpoint::gt3x {

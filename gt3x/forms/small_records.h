@@ -4,7 +4,7 @@
 //   small_record_columns(type);                    // {"battery_v"}
 //   const Bytes payload = {0x68, 0x10};
 //   SIXPOINT_ASSIGN(const auto rows, small_record_rows(type, payload, {}));
-//   rows[0][0];                                    // "4.2"
+//   const std::string battery_v = rows[0][0];      // "4.2"
 //
 // By the vendor's public description of the .gt3x format:
 //

@@ -92,7 +92,7 @@ class StillWatch {
     auto blocks = scan_->finish();
     if (agdc != nullptr) {
       for (calib::StillBlock& block : blocks) {
-        block.mean_g = agdc->apply(block.mean_lsb);
+        block.mean_g = agdc->apply_to_mean(block.mean_lsb);
       }
     }
     return InspectedStill{calib::coverage_of(blocks), magnitude_error(blocks)};
