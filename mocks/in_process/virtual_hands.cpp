@@ -29,9 +29,9 @@ Result<std::string> VirtualHands::obey(std::string_view word) {
   }
   if (word == "swap") {
     SIXPOINT_ASSIGN(FaultPlan plan, parse_fault_plan(R"({"schema": "sixpoint/faults/1",
-                      "faults": [{"fault": "swap", "at_s": 0, "seconds": 5}]})"));
+                      "faults": [{"fault": "swap", "at_s": 0, "seconds": 1}]})"));
     plugged_->faults = FaultInjector(std::move(plan), now);
-    return std::string("another unit is plugged in; in five seconds the first one is back");
+    return std::string("the unit is pulled out; in a second another one is plugged in");
   }
   const auto pose = device::parse_pose(word);
   if (!pose) {

@@ -7,7 +7,7 @@
 // |-------------------|--------------------------------------------------------------------------|
 // | +x -x +y -y +z -z | turn the unit, that axis up (+) or down (-)                              |
 // | knock             | move it a little, and back                                               |
-// | swap              | pull it out, plug another one in for five seconds, then the first again  |
+// | swap              | pull it out, and plug another one in after a second                      |
 //
 // Any thread.
 #pragma once

@@ -134,6 +134,8 @@ const std::map<std::string, Role>& common_roles() {
                              "jig",
                              "--time",
                              "--records",
+                             "--matters-mg",
+                             "--realistic",
                              "--why"}) {
       roles.emplace(name, Role::no_path);
     }
