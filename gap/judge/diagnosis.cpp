@@ -161,8 +161,9 @@ Json Diagnosis::to_json() const {
                  {"where", unknown.where}}}};
   json["not_observable"] = Json::array();
   for (const auto& [name, segment] : not_observable) {
-    const auto judged = std::find_if(candidates.begin(), candidates.end(),
-                                     [&](const EffectFinding& f) { return f.name == name; });
+    const auto judged =
+        std::find_if(candidates.begin(), candidates.end(),
+                     [&wanted = name](const EffectFinding& f) { return f.name == wanted; });
     const bool known = judged != candidates.end() && judged->bound;
     json["not_observable"].push_back({{"name", name},
                                       {"needs_segment", segment},

@@ -281,12 +281,13 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
   for (const auto& [serial, until] : watching(events, state)) {
     filter.serial = serial;
     std::vector<RunSummary> runs;
-    SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-      if (run.station == station && (!until || run.started <= *until)) {
-        runs.push_back(summary_of(run));
-      }
-      return {};
-    }));
+    SIXPOINT_CHECK(
+        store.for_each_run(filter, [&, &last = until](const db::RunRecord& run) -> Status {
+          if (run.station == station && (!last || run.started <= *last)) {
+            runs.push_back(summary_of(run));
+          }
+          return {};
+        }));
     for (const auto& [name, axis] : kCharted) {
       CheckUnitChart chart = chart_of(runs, name, axis, state, policy);
       if (chart.times.empty()) {
