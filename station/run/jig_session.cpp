@@ -261,7 +261,7 @@ Status Session::look_while_away() {
     if (const Status free = device::check_jig(*jig_); !free) {
       jig_while_away_ = free.error();
       static_cast<void>(jig_->stop());
-      return free;
+      return fail(free.error());
     }
   }
   return {};
