@@ -63,7 +63,7 @@ TEST_F(StationCommands, AKnownBadUnitOpensTheStationByFailing) {
   for (const char* defect : {"zero_high", "sensitivity_low", "sensitivity_high"}) {
     const auto failed = measure(fmt::format("seed={},bad={}", ++seed, defect));
     EXPECT_EQ(failed.exit_code, 1) << defect;
-    EXPECT_EQ(failed.json()["codes"], Json::array({defect}));
+    EXPECT_EQ(failed.json()["codes"], cli::Json::array({defect}));
   }
   ASSERT_EQ(run({"check-unit", "add", "MOS2A0BAD", "--expect", "zero_high", "--station", "A",
                  "--operator", "Eve", "--reason", "dropped"})
