@@ -187,7 +187,10 @@ std::map<std::string, double> Explanation::gap_mg2() const {
     in_mg[row] = model_.feature_of_row(row) < kSecondHarmonic ? 1 : 0;  // as in held_out()
     n += in_mg[row];
   }
-  const Eigen::VectorXd all_mg = in_mg.cwiseProduct(adds_mg.rowwise().sum());
+  Eigen::VectorXd all_mg = Eigen::VectorXd::Zero(model_.rows());
+  for (Eigen::Index i = 0; i < adds_mg.cols(); ++i) {  // there may be none
+    all_mg += in_mg.cwiseProduct(adds_mg.col(i));
+  }
   for (std::size_t i = 0; i < names.size(); ++i) {
     found[names[i]] = adds_mg.col(static_cast<Eigen::Index>(i)).dot(all_mg) / std::max(1.0, n);
   }
