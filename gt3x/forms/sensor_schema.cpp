@@ -53,11 +53,12 @@ double value_of(const SensorColumn& column, std::span<const std::uint8_t> sample
     const std::size_t at = column.big_endian ? i : column.bytes - 1 - i;
     stored = (stored << 8) | sample[column.first_byte + at];
   }
-  double value = stored;
-  if (column.is_signed) {
-    const auto unused = static_cast<unsigned>(32 - 8 * column.bytes);
-    value = static_cast<double>(static_cast<std::int32_t>(stored << unused) >> unused);
+  auto whole = static_cast<std::int64_t>(stored);
+  if (const std::int64_t range = std::int64_t{1} << (8 * column.bytes);
+      column.is_signed && whole >= range / 2) {
+    whole -= range;
   }
+  auto value = static_cast<double>(whole);
   if (column.scale != 0) {
     value /= column.scale;
   }
