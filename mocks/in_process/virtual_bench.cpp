@@ -6,22 +6,9 @@
 
 #include "mocks/firmware/virtual_settings.h"
 #include "mocks/in_process/scaled_clock.h"
+#include "mocks/in_process/virtual_hands.h"
 
 namespace sixpoint::mocks {
-
-namespace {
-
-// A turn by a person; a knock is quicker.
-constexpr double kTurn_s = 1.5;
-constexpr double kKnock_s = 0.15;
-constexpr double kKnock_deg = 12;
-
-Eigen::Vector3d up_of(device::Pose pose) {
-  const auto up = device::direction_of(pose);
-  return {up[0], up[1], up[2]};
-}
-
-}  // namespace
 
 struct VirtualBench::Place {
   std::shared_ptr<PluggedUnit> plugged;
@@ -84,7 +71,7 @@ Status VirtualBench::turn_up(const std::string& device, const Eigen::Vector3d& u
                              double tilt_deg) const {
   SIXPOINT_ASSIGN(const auto plugged, unit_of(device));
   const std::lock_guard lock(plugged->mutex);
-  plugged->unit.turn_to(up, plugged->clock->elapsed(), kTurn_s, tilt_deg);
+  turn_by_hand(*plugged, up, tilt_deg);
   return {};
 }
 
@@ -107,11 +94,7 @@ Status VirtualBench::knock(const std::string& device) {
     up = up_of(places_.at(device)->pose);
   }
   const std::lock_guard lock(plugged->mutex);
-  const nanoseconds now = plugged->clock->elapsed();
-  plugged->unit.turn_to(up, now, kKnock_s, kKnock_deg);
-  plugged->unit.turn_to(
-      up, now + std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>(kKnock_s)),
-      kKnock_s);
+  knock_by_hand(*plugged, up);
   return {};
 }
 

@@ -2,35 +2,42 @@
 
 #include <fmt/format.h>
 
-#include "device/jig.h"
-
 namespace sixpoint::mocks {
 
 namespace {
 
+// A turn by a person; a knock is quicker.
 constexpr double kTurn_s = 1.5;
 constexpr double kKnock_s = 0.15;
 constexpr double kKnock_deg = 12;
+
+}  // namespace
 
 Eigen::Vector3d up_of(device::Pose pose) {
   const auto up = device::direction_of(pose);
   return {up[0], up[1], up[2]};
 }
 
-}  // namespace
+void turn_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, double tilt_deg) {
+  plugged.unit.turn_to(up, plugged.clock->elapsed(), kTurn_s, tilt_deg);
+}
+
+void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up) {
+  const nanoseconds now = plugged.clock->elapsed();
+  plugged.unit.turn_to(up, now, kKnock_s, kKnock_deg);
+  plugged.unit.turn_to(up, now + from_seconds(kKnock_s), kKnock_s);
+}
 
 Result<std::string> VirtualHands::obey(std::string_view word) {
   const std::lock_guard lock(plugged_->mutex);
-  const nanoseconds now = plugged_->clock->elapsed();
   if (word == "knock") {
-    plugged_->unit.turn_to(up_of(pose_), now, kKnock_s, kKnock_deg);
-    plugged_->unit.turn_to(up_of(pose_), now + from_seconds(kKnock_s), kKnock_s);
+    knock_by_hand(*plugged_, up_of(pose_));
     return std::string("the unit was knocked");
   }
   if (word == "swap") {
     SIXPOINT_ASSIGN(FaultPlan plan, parse_fault_plan(R"({"schema": "sixpoint/faults/1",
                       "faults": [{"fault": "swap", "at_s": 0, "seconds": 1}]})"));
-    plugged_->faults = FaultInjector(std::move(plan), now);
+    plugged_->faults = FaultInjector(std::move(plan), plugged_->clock->elapsed());
     return std::string("the unit is pulled out; in a second another one is plugged in");
   }
   const auto pose = device::parse_pose(word);
@@ -39,7 +46,7 @@ Result<std::string> VirtualHands::obey(std::string_view word) {
                 {}, "+x -x +y -y +z -z turn the unit; knock; swap");
   }
   pose_ = *pose;
-  plugged_->unit.turn_to(up_of(pose_), now, kTurn_s, 0);
+  turn_by_hand(*plugged_, up_of(pose_));
   return fmt::format("the unit is turned to {}", device::to_string(pose_));
 }
 

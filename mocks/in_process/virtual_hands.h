@@ -12,13 +12,20 @@
 // Any thread.
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
 #include <string>
 #include <string_view>
 
+#include "device/jig.h"
 #include "mocks/in_process/in_process.h"
 
 namespace sixpoint::mocks {
+
+// What hands do to a unit whose mutex the caller holds; `up`: the direction that points up then.
+Eigen::Vector3d up_of(device::Pose pose);
+void turn_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, double tilt_deg = 0);
+void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up);
 
 class VirtualHands {
  public:
