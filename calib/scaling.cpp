@@ -120,6 +120,7 @@ Result<Reversal> Reversal::make(const StoredConstants& stored, double accel_scal
           number[i] > 0 ? first[i] + 0.5 * (number[i] - 1) : reversal.affine_raw_lsb(a, count);
     }
   }
+  reversal.sort_counts();
   return reversal;
 }
 
@@ -139,6 +140,7 @@ Result<Reversal> Reversal::of_raw_counts(double accel_scale_lsb_per_g, RecordWid
       reversal.raw_[a].push_back(count);
     }
   }
+  reversal.sort_counts();
   return reversal;
 }
 
@@ -147,24 +149,32 @@ RawCandidates Reversal::candidates(std::size_t axis, int stored_count) const {
   return {first_[axis][i], number_[axis][i], tie_[axis][i] != 0, raw_[axis][i]};
 }
 
-// Runs over every count of every recording, so without a branch: clipped counts are those at the
-// ends of the table.
+// Runs over every count of every recording, so without a branch.
 void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
            PlausibilityTally& counts) {
-  const int low = lowest_count(reversal.width());
-  const int high = highest_count(reversal.width());
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    const std::uint16_t* const number = reversal.number_[a].data();
-    std::size_t clipped = 0;
-    std::size_t impossible = 0;
-    for (const StoredCounts& sample : samples) {
-      const int count = std::clamp<int>(sample[a], low, high);
-      const bool at_limit = count == low || count == high;
-      clipped += at_limit ? 1U : 0U;
-      impossible += !at_limit && number[count - low] == 0 ? 1U : 0U;
+  const PerAxis<const std::uint8_t*> kind = {reversal.kind_[0].data(), reversal.kind_[1].data(),
+                                             reversal.kind_[2].data()};
+  std::size_t clipped = 0;
+  std::size_t impossible = 0;
+  for (const StoredCounts& sample : samples) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const unsigned here = kind[a][reversal.index(sample[a])];
+      clipped += here & Reversal::kClipped;
+      impossible += here / Reversal::kImpossible;
     }
-    counts.counts += samples.size() - clipped;
-    counts.impossible += impossible;
+  }
+  counts.counts += kAxes * samples.size() - clipped;
+  counts.impossible += impossible;
+}
+
+void Reversal::sort_counts() {
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    kind_[a].assign(table_size(width_), 0);
+    std::ranges::transform(number_[a], kind_[a].begin(), [](std::uint16_t number) {
+      return number == 0 ? kImpossible : std::uint8_t{0};
+    });
+    kind_[a].front() = kClipped;
+    kind_[a].back() = kClipped;
   }
 }
 

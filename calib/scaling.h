@@ -96,6 +96,11 @@ class Reversal {
   PerAxis<std::vector<std::int16_t>> first_;
   PerAxis<std::vector<std::uint16_t>> number_;
   PerAxis<std::vector<std::uint8_t>> tie_;
+  // What tally() counts.
+  static constexpr std::uint8_t kClipped = 1;
+  static constexpr std::uint8_t kImpossible = 2;
+  PerAxis<std::vector<std::uint8_t>> kind_;
+  void sort_counts();
 
   friend void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
                     struct PlausibilityTally& counts);

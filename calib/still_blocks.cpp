@@ -12,68 +12,6 @@ namespace {
 
 constexpr double kNoiseSigmas = 5;  // see StillBlockOptions::noisy_sd_g
 
-using Line = StillBlockFinder::Line;
-
-// Sums of values and of values times the centred sample number. Both are exact: doubled centred
-// numbers and counts are integers below 2^53. Chunks keep the inner loops in 32 bits, where the
-// compiler vectorises them.
-Line fit_line(const std::int16_t* values, int size, double sum_square_index) {
-  std::int64_t sum = 0;
-  std::int64_t moment = 0;
-  constexpr int kChunk = 32;
-  for (int begin = 0; begin < size; begin += kChunk) {
-    const int end = std::min(size, begin + kChunk);
-    std::int32_t chunk_sum = 0;
-    std::int32_t chunk_moment = 0;
-    for (int i = begin; i < end; ++i) {
-      const std::int32_t value = values[i];
-      chunk_sum += value;
-      chunk_moment += value * static_cast<std::int16_t>(i - begin);
-    }
-    sum += chunk_sum;
-    moment += 2 * static_cast<std::int64_t>(chunk_moment) + (2LL * begin - (size - 1)) * chunk_sum;
-  }
-  return {static_cast<double>(sum) / size, 0.5 * static_cast<double>(moment) / sum_square_index};
-}
-
-// Cells are of any length; chunks keep the inner loops in 32 bits, as above.
-template <class Cell>
-Cell cell_of(const std::int16_t* values, int size) {
-  Cell cell;
-  cell.low = values[0];
-  cell.high = values[0];
-  constexpr int kChunk = 32;
-  for (int begin = 0; begin < size; begin += kChunk) {
-    const int end = std::min(size, begin + kChunk);
-    std::int32_t sum = 0;
-    std::int32_t moment = 0;
-    std::int16_t low = values[begin];
-    std::int16_t high = values[begin];
-    for (int i = begin; i < end; ++i) {
-      const std::int16_t value = values[i];
-      sum += value;
-      moment += value * static_cast<std::int16_t>(i - begin);
-      low = std::min(low, value);
-      high = std::max(high, value);
-    }
-    cell.sum += sum;
-    cell.moment += moment + static_cast<std::int64_t>(begin) * sum;
-    cell.low = std::min(cell.low, low);
-    cell.high = std::max(cell.high, high);
-  }
-  return cell;
-}
-
-float largest_residual(const std::int16_t* values, const float* centred, int size, float mean,
-                       float slope) {
-  float largest = 0;
-  for (int i = 0; i < size; ++i) {
-    const float residual = std::abs(static_cast<float>(values[i]) - (mean + slope * centred[i]));
-    largest = residual > largest ? residual : largest;
-  }
-  return largest;
-}
-
 }  // namespace
 
 Result<StillBlockFinder> StillBlockFinder::make(const Reversal& reversal, double rate_hz,
@@ -116,7 +54,6 @@ void StillBlockFinder::push(double start_time_s, std::span<const StoredCounts> s
     in_run_ = true;
     ++tally_.runs;
   }
-  tally_.samples += stored.size();
   // Slices, so that one huge push needs no second copy of itself.
   constexpr std::size_t kSlice = 1U << 16;
   for (std::size_t begin = 0; begin < stored.size(); begin += kSlice) {
@@ -130,6 +67,7 @@ void StillBlockFinder::push(double start_time_s, std::span<const StoredCounts> s
         out[i] = slice[i][a];
       }
     }
+    tally_.samples += slice.size();
     calib::tally(*reversal_, slice, tally_.plausibility);
     search();
   }
@@ -158,7 +96,7 @@ void StillBlockFinder::make_cells() {
   for (std::size_t a = 0; a < kAxes; ++a) {
     for (std::size_t begin = cells_[a].size() * size; begin + size <= run_[a].size();
          begin += size) {
-      cells_[a].push_back(cell_of<Cell>(run_[a].data() + begin, step_samples_));
+      cells_[a].push_back(count_sums(std::span(run_[a]).subspan(begin, size)));
     }
   }
 }
@@ -201,17 +139,14 @@ void StillBlockFinder::search() {
 bool StillBlockFinder::take_block(std::size_t begin) {
   Window window;
   for (std::size_t a = 0; a < kAxes; ++a) {
-    window.values[a] = run_[a].data() + begin;
+    window.values[a] = std::span(run_[a]).subspan(begin, static_cast<std::size_t>(block_samples_));
   }
   if (!fit_lines(begin, window)) {
     return false;
   }
-  StillBlock block = measure(window);
-  if (!window.within_paper) {
-    if (!is_noise(window)) {
-      return false;
-    }
-    block.noisy = true;
+  find_noise(window);
+  if (!window.within_paper && !is_noise(window)) {
+    return false;
   }
   if (has_zeros(window)) {
     ++tally_.rejected_zero;
@@ -221,46 +156,44 @@ bool StillBlockFinder::take_block(std::size_t begin) {
     ++tally_.rejected_clipped;
     return false;
   }
+  ++tally_.blocks;
+  tally_.noisy_blocks += window.within_paper ? 0 : 1;
+  if (since_kept_++ % tally_.thinned != 0) {
+    return true;
+  }
+  StillBlock block = measure(window);
+  block.noisy = !window.within_paper;
   const auto after =
       std::upper_bound(marks_.begin(), marks_.end(), begin,
                        [](std::size_t index, const Mark& mark) { return index < mark.index; });
   const Mark& mark = after == marks_.begin() ? *after : *std::prev(after);
   block.start_time_s =
       mark.time_s + (static_cast<double>(begin) - static_cast<double>(mark.index)) / rate_hz_;
+  block.first_sample = tally_.samples - run_[0].size() + begin;
   block.samples = block_samples_;
   block.temperature_c = temperature_c_;
   keep(block);
   return true;
 }
 
-Line StillBlockFinder::line_of_cells(std::size_t axis, std::size_t first, Window& window) const {
-  const int count = block_samples_ / step_samples_;
-  std::int64_t sum = 0;
-  std::int64_t moment = 0;  // of value times sample number within the window
-  std::int16_t low = std::numeric_limits<std::int16_t>::max();
-  std::int16_t high = std::numeric_limits<std::int16_t>::min();
-  for (int i = 0; i < count; ++i) {
-    const Cell& cell = cells_[axis][first + static_cast<std::size_t>(i)];
-    sum += cell.sum;
-    moment += cell.moment + static_cast<std::int64_t>(i) * step_samples_ * cell.sum;
-    low = std::min(low, cell.low);
-    high = std::max(high, cell.high);
-  }
-  window.low[axis] = low;
-  window.high[axis] = high;
-  return {static_cast<double>(sum) / block_samples_,
-          0.5 * static_cast<double>(2 * moment - (block_samples_ - 1) * sum) / sum_square_index_};
+StillBlockFinder::Line StillBlockFinder::line_by(const CountSums& sums) const {
+  // Doubled, the centred sample numbers are whole.
+  const std::int64_t doubled = 2 * sums.moment - (block_samples_ - 1) * sums.sum;
+  return {static_cast<double>(sums.sum) / block_samples_,
+          0.5 * static_cast<double>(doubled) / sum_square_index_};
 }
 
-Line StillBlockFinder::line_of(std::size_t axis, std::size_t begin, Window& window) const {
-  if (in_cells_) {
-    return line_of_cells(axis, begin / static_cast<std::size_t>(step_samples_), window);
+CountSums StillBlockFinder::sums_of_cells(std::size_t axis, std::size_t first) const {
+  CountSums all = cells_[axis][first];
+  const int count = block_samples_ / step_samples_;
+  for (int i = 1; i < count; ++i) {
+    const CountSums& cell = cells_[axis][first + static_cast<std::size_t>(i)];
+    all.sum += cell.sum;
+    all.moment += cell.moment + static_cast<std::int64_t>(i) * step_samples_ * cell.sum;
+    all.low = std::min(all.low, cell.low);
+    all.high = std::max(all.high, cell.high);
   }
-  const auto [low, high] =
-      std::minmax_element(window.values[axis], window.values[axis] + block_samples_);
-  window.low[axis] = *low;
-  window.high[axis] = *high;
-  return fit_line(window.values[axis], block_samples_, sum_square_index_);
+  return all;
 }
 
 // Values that spread this far have a residual of `widest_g` whatever line they lie about: half of
@@ -276,7 +209,13 @@ bool StillBlockFinder::cannot_be_still(const Window& window, std::size_t axis,
 // Criteria 1 and 2. False where the window cannot be a block, noisy or not.
 bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
   for (std::size_t a = 0; a < kAxes; ++a) {
-    window.lines[a] = line_of(a, begin, window);
+    const CountSums sums = in_cells_
+                               ? sums_of_cells(a, begin / static_cast<std::size_t>(step_samples_))
+                               : count_sums(window.values[a]);
+    window.lines[a] = line_by(sums);
+    window.sums[a] = sums.sum;
+    window.low[a] = sums.low;
+    window.high[a] = sums.high;
     if (std::abs(window.lines[a].slope) * g_per_count_ >= options_.max_slope_g_per_sample) {
       return false;
     }
@@ -289,10 +228,10 @@ bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
     }
   }
   for (std::size_t a = 0; a < kAxes; ++a) {
-    const double largest_g = g_per_count_ * static_cast<double>(largest_residual(
-                                                window.values[a], centred_.data(), block_samples_,
-                                                static_cast<float>(window.lines[a].mean),
-                                                static_cast<float>(window.lines[a].slope)));
+    const double largest_g =
+        g_per_count_ * static_cast<double>(largest_residual(
+                           window.values[a], centred_, static_cast<float>(window.lines[a].mean),
+                           static_cast<float>(window.lines[a].slope)));
     window.largest_g[a] = largest_g;
     window.within_paper = window.within_paper && largest_g < options_.max_residual_g;
     if (!window.within_paper && (options_.noisy_sd_g <= 0 || largest_g >= widest)) {
@@ -302,25 +241,30 @@ bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
   return true;
 }
 
-StillBlock StillBlockFinder::measure(Window& window) const {
+// The spread about the lines, from sums that are exact up to the last subtraction.
+void StillBlockFinder::find_noise(Window& window) const {
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const std::int64_t spread =
+        block_samples_ * sum_of_squares(window.values[a]) - window.sums[a] * window.sums[a];
+    const double slope = window.lines[a].slope;
+    const double about_line =
+        static_cast<double>(spread) / block_samples_ - slope * slope * sum_square_index_;
+    window.sd[a] = std::sqrt(std::max(0.0, about_line) / (block_samples_ - 2));
+  }
+}
+
+StillBlock StillBlockFinder::measure(const Window& window) const {
   StillBlock block;
   for (std::size_t a = 0; a < kAxes; ++a) {
-    const Line& line = window.lines[a];
     double sum_raw = 0;
-    double square = 0;
-    for (std::size_t i = 0; i < centred_.size(); ++i) {
-      sum_raw += reversal_->raw_lsb(a, window.values[a][i]);
-      const double residual =
-          window.values[a][i] - (line.mean + line.slope * static_cast<double>(centred_[i]));
-      square += residual * residual;
+    for (const std::int16_t count : window.values[a]) {
+      sum_raw += reversal_->raw_lsb(a, count);
     }
-    const double sd = std::sqrt(square / (block_samples_ - 2));
-    window.sd_g[a] = sd * g_per_count_;
     const double raw_per_count = g_per_count_ / reversal_->calibration().sensitivity_g_per_lsb[a];
-    block.mean_g[a] = line.mean * g_per_count_;
+    block.mean_g[a] = window.lines[a].mean * g_per_count_;
     block.mean_lsb[a] = sum_raw / block_samples_;
-    block.sd_lsb[a] = sd * raw_per_count;
-    const double slope_lsb = line.slope * raw_per_count;
+    block.sd_lsb[a] = window.sd[a] * raw_per_count;
+    const double slope_lsb = window.lines[a].slope * raw_per_count;
     block.ramp_variance_lsb2[a] = slope_lsb * slope_lsb * sum_square_index_ / block_samples_;
   }
   return block;
@@ -329,9 +273,9 @@ StillBlock StillBlockFinder::measure(Window& window) const {
 // Noise and nothing else: as small as a sensor's, and no sample far out of it.
 bool StillBlockFinder::is_noise(const Window& window) const {
   for (std::size_t a = 0; a < kAxes; ++a) {
-    if (window.sd_g[a] >= options_.noisy_sd_g ||
-        (window.largest_g[a] >= options_.max_residual_g &&
-         window.largest_g[a] >= kNoiseSigmas * window.sd_g[a])) {
+    const double sd_g = window.sd[a] * g_per_count_;
+    if (sd_g >= options_.noisy_sd_g || (window.largest_g[a] >= options_.max_residual_g &&
+                                        window.largest_g[a] >= kNoiseSigmas * sd_g)) {
       return false;
     }
   }
@@ -364,12 +308,7 @@ bool StillBlockFinder::has_clipped(const Window& window) const {
   return false;
 }
 
-void StillBlockFinder::keep(StillBlock block) {
-  ++tally_.blocks;
-  tally_.noisy_blocks += block.noisy ? 1 : 0;
-  if (since_kept_++ % tally_.thinned != 0) {
-    return;
-  }
+void StillBlockFinder::keep(const StillBlock& block) {
   if (blocks_.size() >= options_.max_blocks) {
     std::size_t out = 0;
     for (std::size_t i = 0; i < blocks_.size(); i += 2) {

@@ -23,6 +23,7 @@
 #include "base/measure.h"
 #include "base/result.h"
 #include "calib/scaling.h"
+#include "calib/sums/count_sums.h"
 
 namespace sixpoint::calib {
 
@@ -58,6 +59,7 @@ inline constexpr double kMoved_g = 0.015;
 
 struct StillBlock {
   double start_time_s = 0;
+  std::uint64_t first_sample = 0;  // of all that were pushed, gaps not counted
   int samples = 0;
   PerAxis<double> mean_g{};    // by the constants in the file
   PerAxis<double> mean_lsb{};  // of the recovered raw counts, which is what solvers work on
@@ -118,36 +120,30 @@ class StillBlockFinder {
  private:
   // A candidate for a block, and what is found out about it.
   struct Window {
-    PerAxis<const std::int16_t*> values{};
+    PerAxis<std::span<const std::int16_t>> values{};
+    PerAxis<std::int64_t> sums{};
     // The smallest and the largest of the values.
     PerAxis<std::int16_t> low{};
     PerAxis<std::int16_t> high{};
     PerAxis<Line> lines;
     PerAxis<double> largest_g{};  // residual
-    PerAxis<double> sd_g{};
+    PerAxis<double> sd{};         // about the line, counts; by find_noise()
     bool within_paper = true;
-  };
-  // One step's samples of one axis, from which the windows that overlap them are put together.
-  // Sums are exact, so a window has the same line whatever way it is made.
-  struct Cell {
-    std::int64_t sum = 0;
-    std::int64_t moment = 0;  // of value times sample number within the cell
-    std::int16_t low = 0;
-    std::int16_t high = 0;
   };
   StillBlockFinder(const Reversal& reversal, double rate_hz, const StillBlockOptions& options);
   void make_cells();
-  Line line_of_cells(std::size_t axis, std::size_t first, Window& window) const;
-  Line line_of(std::size_t axis, std::size_t begin, Window& window) const;
+  CountSums sums_of_cells(std::size_t axis, std::size_t first) const;
+  Line line_by(const CountSums& sums) const;
   bool cannot_be_still(const Window& window, std::size_t axis, double widest_g) const;
   void search();
   bool take_block(std::size_t begin);
   bool fit_lines(std::size_t begin, Window& window) const;
-  StillBlock measure(Window& window) const;
+  void find_noise(Window& window) const;
   bool is_noise(const Window& window) const;
+  StillBlock measure(const Window& window) const;
   bool has_zeros(const Window& window) const;
   bool has_clipped(const Window& window) const;
-  void keep(StillBlock block);
+  void keep(const StillBlock& block);
 
   const Reversal* reversal_;
   StillBlockOptions options_;
@@ -157,9 +153,11 @@ class StillBlockFinder {
   double g_per_count_;
   PerAxis<std::vector<std::int16_t>> run_;  // the samples of the run that are not yet behind us
   std::size_t next_ = 0;                    // where the next window starts in run_
-  // Cells of run_, where a block is a whole number of steps: then every window begins with a cell.
+  // The sums of each step's samples, from which the windows that overlap them are put together,
+  // where a block is a whole number of steps. Sums are exact, so a window has the same line
+  // whatever way it is made.
   bool in_cells_ = false;
-  PerAxis<std::vector<Cell>> cells_;
+  PerAxis<std::vector<CountSums>> cells_;
   struct Mark {
     std::size_t index;  // into run_
     double time_s;

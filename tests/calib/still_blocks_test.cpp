@@ -135,6 +135,7 @@ TEST(StillBlocks, NeverSpanAGapAndDoNotDependOnHowTheyArrive) {
   ASSERT_EQ(whole.blocks().size(), pieces.blocks().size());
   for (std::size_t i = 0; i < whole.blocks().size(); ++i) {
     EXPECT_NEAR(whole.blocks()[i].start_time_s, pieces.blocks()[i].start_time_s, 1e-6);
+    EXPECT_EQ(whole.blocks()[i].first_sample, pieces.blocks()[i].first_sample);
     EXPECT_EQ(whole.blocks()[i].mean_lsb, pieces.blocks()[i].mean_lsb);
   }
   // Runs of 3.9 s never hold a block; runs of 4 s hold one each.
