@@ -1,4 +1,4 @@
-// PARAMETERS, EVENT-sized payloads, samples and the JSON of .agdc files.
+// PARAMETERS, EVENT-sized payloads and samples.
 #include <cstdlib>
 
 #include "gt3x/forms/agdc.h"
@@ -30,8 +30,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   gt3x::unpack_activity2(payload, samples);
   static_cast<void>(gt3x::parse_temperature(payload));
-  const std::string_view text(reinterpret_cast<const char*>(data), size);
-  static_cast<void>(gt3x::parse_agdc_calibration(text, 32));
-  static_cast<void>(gt3x::parse_temperature_calibration(text));
   return 0;
 }

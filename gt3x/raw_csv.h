@@ -12,7 +12,8 @@
 // as the vendor writes it, the n-th line belongs to start + n / rate. Lines end in CR LF.
 //
 // A time column stands first. The k-th line of a second has the second's time in the file plus
-// k / rate, in thousandths of a second, rounded down; the clock is the file's own:
+// k / rate, in thousandths of a second, rounded down; the clock is the file's own (clock.h), as in
+// the header lines. Where that is known to be UTC, ISO times end in Z:
 //
 //     time     column             example
 //     none     -                  -0.02,0.996,0.086
@@ -26,26 +27,34 @@
 // and a binary fraction must not decide them. Tested sample for sample against two exports of the
 // vendor.
 //
+// Which seconds are written is second_order.h's to say: each once, by the recording's own clock,
+// and as many lines as the rate has samples. A second with more samples ends at the rate.
+//
 // Missing seconds: the last sample is repeated, as the vendor does for idle sleep. From a one-byte
 // record (USB) on it is zeros instead, until the next sample or the file's Last Sample Time. A
-// second with too few samples is filled up in the same way, but for the last of all.
+// second with too few samples is filled up in the same way, but for the last of all. Gaps that
+// fills_gap() does not fill are left out: behind them a line's number no longer tells its time.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/result.h"
 #include "gt3x/recording.h"
+#include "gt3x/second_order.h"
 
 namespace sixpoint::gt3x {
 
 struct RawCsvOptions {
   // Stored counts instead of g (of .agdc files: the sensor's raw counts).
   bool raw_lsb = false;
-  // Missing seconds filled in, so that the line number is the time. Without: what was recorded.
+  // Missing seconds filled in, so that the line number is the time. Without: what was recorded, in
+  // the order of the file, and nothing else.
   bool fill = true;
+  std::uint64_t fill_limit_s = kUsualFillLimit_s;  // fills_gap()
   enum class Time { none, iso, seconds, unix_seconds };
   Time time = Time::none;
   // Who stands in the first line for who made the data. Empty: the vendor's own words, which are
@@ -58,9 +67,15 @@ struct RawCsvTally {
   std::uint64_t filled = 0;   // lines that repeat a sample or are zeros
   std::uint64_t checksum_failures = 0;
   std::uint64_t damaged_stretches = 0;
-  // Seconds that are not later than the one before, and seconds with more samples than the rate:
-  // behind them a line's number no longer tells its time.
-  std::uint64_t out_of_step_seconds = 0;
+  std::uint64_t surplus_samples = 0;  // of seconds with more than the rate; not written
+  struct Leap {
+    std::uint32_t unix_time = 0;  // of the first second behind it
+    std::int64_t seconds = 0;     // that are left out; below 0: so far back the time goes
+  };
+  static constexpr std::size_t kMostLeaps = 100;
+  std::vector<Leap> leaps;  // where a line's number no longer tells its time; the first ones
+  std::uint64_t leap_count = 0;
+  Irregular irregular;  // empty without filling
 };
 
 // Text for the file, in pieces of some ten thousand characters, in order.

@@ -22,6 +22,8 @@
 
 #include "base/env.h"
 #include "gt3x/container/byte_source.h"
+#include "gt3x/container/delivery.h"
+#include "gt3x/container/entry_rule.h"
 #include "gt3x/forms/info.h"
 #include "gt3x/log/log_reader.h"
 
@@ -38,12 +40,30 @@ enum class RecordingForm {
   activity  // old form (GT3X+ and ActiSleep+ with firmware 2.5.0 or earlier): activity.bin
 };
 
+struct RecordingOptions {
+  // Delivers what is left of a damaged file (container/delivery.h) and lists the damage. Off: a
+  // damaged file is refused.
+  bool salvage = false;
+  ArchiveLimits limits;
+};
+
+// A damage that was met and passed, with the option salvage.
+struct RecordingDamage {
+  Damage kind = Damage::none;
+  std::string entry;  // empty: the archive
+  std::string why;
+};
+
 class Recording {
  public:
   // no_input where there is no such file; bad_data where it is no zip, is cut short, holds neither
-  // log.bin nor activity.bin, no info.txt, two entries of one name, entries named with a path,
-  // encrypted ones, or sizes that no recording has.
-  static Result<Recording> open(FileSystem& files, const std::string& path);
+  // log.bin nor activity.bin, no info.txt, two entries of one name, or one that why_refused()
+  // (container/entry_rule.h) refuses. Folders are no entries.
+  //
+  // With salvage: without a list of entries they are found by their own headers. Where info.txt is
+  // lost or damaged, info() holds what is left of it, and what the log says (salvaged_info.h).
+  static Result<Recording> open(FileSystem& files, const std::string& path,
+                                const RecordingOptions& options = {});
 
   const std::string& path() const;
   const Info& info() const;
@@ -52,8 +72,17 @@ class Recording {
   bool has_log() const { return form() == RecordingForm::log; }
   bool has_entry(const std::string& name) const;
 
+  // Bytes of the file behind the archive's end; they are not read.
+  std::uint64_t bytes_behind() const;
+
+  // Empty without the option salvage, and where nothing was found yet: an entry's damage shows when
+  // it is read, and is complete when it was read to its end. Each is listed once.
+  const std::vector<RecordingDamage>& damage() const;
+  bool is_damaged(const std::string& entry) const;
+
   // The bytes of one entry, decompressed. A damaged stream and a wrong CRC come as bad_data from
-  // read(), the latter only at the end: what is written from it must not be kept before.
+  // read(), the latter only at the end: what is written from it must not be kept before. With
+  // salvage they end there instead.
   Result<std::unique_ptr<ByteSource>> open_entry(const std::string& name);
 
   // bad_data for a file of the old form.

@@ -26,10 +26,9 @@ struct RecordingWriter::Archive {
   }
 
   Status take_name(const std::string& name) {
-    if (name.empty() || name.size() > 255 || name.find_first_of("/\\:") != std::string::npos ||
-        name.starts_with('.')) {
+    if (!stays_inside(name)) {
       return fail(ErrorCode::usage, "an entry cannot be named '" + printable(name, 60) + "'", path,
-                  "use a plain file name");
+                  "use a name inside the archive");
     }
     if (!names.insert(name).second) {
       return fail(ErrorCode::usage, "an entry named " + printable(name, 60) + " was added already",

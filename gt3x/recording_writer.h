@@ -44,8 +44,8 @@ class RecordingWriter {
   RecordingWriter& operator=(RecordingWriter&&) noexcept;
   ~RecordingWriter();
 
-  // A name may be added once and must be a plain file name; `usage` otherwise. Errors of a source
-  // come back as they are.
+  // A name may be added once and must stay inside (entry_rule.h); `usage` otherwise. Errors of a
+  // source come back as they are.
   Status add(const std::string& name, ByteSource& source);
   Status add(const std::string& name, Bytes bytes);
   Status add(const std::string& name, std::string_view text);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/forms/eeprom.h"
 #include "gt3x/forms/small_records.h"
 
 namespace sixpoint::gt3x {
@@ -67,6 +68,19 @@ Result<RecordsCsvTally> write_old_lux(Recording& recording, const TextSink& sink
   }
 }
 
+Result<RecordsCsvTally> write_old_battery(Recording& recording, const TextSink& sink) {
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry("battery.bin"));
+  SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1U << 24));
+  RecordsCsvTally tally;
+  for (const OldBatteryReading& reading : parse_old_battery(bytes)) {
+    SIXPOINT_CHECK(
+        sink(lines_of(to_unix_seconds(reading.time), {{fmt::format("{}", reading.battery_v)}})));
+    ++tally.records;
+  }
+  tally.unreadable_records = bytes.size() / kOldBatteryEntry - tally.records;
+  return tally;
+}
+
 }  // namespace
 
 Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t type,
@@ -74,6 +88,11 @@ Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t typ
   std::string header = "time,unix_s";
   for (const std::string& column : small_record_columns(type)) {
     header += "," + column;
+  }
+  if (!recording.has_log() && type == static_cast<std::uint8_t>(RecordType::battery) &&
+      recording.has_entry("battery.bin")) {
+    SIXPOINT_CHECK(sink(header + "\n"));
+    return write_old_battery(recording, sink);
   }
   const bool old_lux = !recording.has_log() && type == static_cast<std::uint8_t>(RecordType::lux) &&
                        recording.has_entry("lux.bin");

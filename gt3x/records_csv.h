@@ -10,7 +10,8 @@
 //
 // The first line names the columns: time (ISO 8601, by the recording's own clock), unix_s, and
 // those of gt3x/forms/small_records.h. Records come in the order of the file. Of the old form (no
-// records) LUX is read from lux.bin, one value a second from the start on.
+// records) LUX is read from lux.bin, one value a second from the start on, and BATTERY from
+// battery.bin.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +26,8 @@ struct RecordsCsvTally {
   std::uint64_t unreadable_records = 0;  // wrong checksum, or another length than the type's
 };
 
-// bad_data for a type other than LUX of the old form. A recording without such records gives the
-// first line alone.
+// bad_data for a type other than LUX and BATTERY of the old form. A recording without such records
+// gives the first line alone.
 Result<RecordsCsvTally> write_records_csv(Recording& recording, std::uint8_t type,
                                           const TextSink& sink);
 

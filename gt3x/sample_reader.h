@@ -7,12 +7,14 @@
 //     if (item->kind == SampleItem::Kind::recorded) seconds.push_back(item->counts.front());
 //   }
 //
-// Items come in the order of the file. A record whose checksum fails gives no samples: its second
-// is missing (kind gap, `damaged`). Memory is bounded.
+// Items come in the order of the recording's clock, each second once, by the rule of
+// second_order.h; irregular() says what did not fit. As ReadOrder::of_the_file they come as they
+// were recorded, and no gaps between them. A record whose checksum fails gives no samples: its
+// second is missing (kind gap, `damaged`). Memory is bounded.
 //
-// Where the second is not contiguous with the one before, a gap stands between them; so who wants
-// runs of unbroken data starts a new run at everything that is not `recorded`, and where
-// `broke_order` is set.
+// Where the second is not contiguous with the one before, a gap stands between them, or broke_order
+// is set; so who wants runs of unbroken data starts a new run at everything that is not `recorded`,
+// and where `broke_order` is set.
 #pragma once
 
 #include <cstdint>
@@ -22,20 +24,13 @@
 #include <string_view>
 #include <vector>
 
+#include "gt3x/forms/clock.h"
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
+#include "gt3x/second_order.h"
 
 namespace sixpoint::gt3x {
-
-// Why seconds are missing.
-enum class GapKind {
-  idle_sleep,   // an EVENT says that the unit went to sleep
-  usb,          // a one-byte record came before: the unit hung on USB, charging
-  damaged,      // the records of these seconds are damaged
-  unexplained,  // nothing in the file says why; seen in real recordings
-};
-std::string_view to_string(GapKind kind);
 
 struct SampleItem {
   enum class Kind {
@@ -47,16 +42,16 @@ struct SampleItem {
   std::uint32_t unix_time = 0;
   std::uint32_t seconds = 1;
   GapKind gap = GapKind::unexplained;
+  bool filled = true;  // of gaps: fills_gap()
 
-  // Of `recorded` only. The counts stay until the next call of next(), the parameters as long as
-  // the reader. Counts are in the units of the record: LSB at the file's scale, or raw sensor
-  // counts for ACTIVITY3.
+  // Of `recorded` only. Counts and parameters stay until the next call of next(). Counts are in the
+  // units of the record: LSB at the file's scale, or raw sensor counts for ACTIVITY3.
   std::span<const Counts> counts;
   RecordType type = RecordType::activity;
   std::int16_t limit_min = kMin12;  // a value at one of these was clipped, or may have been
   std::int16_t limit_max = kMax12;
   const Parameters* parameters = nullptr;  // in force; nullptr where none came before
-  bool broke_order = false;                // the time is not later than that of the second before
+  bool broke_order = false;                // the time is not later than that of the item before
 
   // Whether any axis of a sample is at a limit of its record.
   bool clipped(const Counts& sample) const {
@@ -69,10 +64,13 @@ struct SampleItem {
   }
 };
 
+enum class ReadOrder { of_the_clock, of_the_file };
+
 class SampleReader {
  public:
   // The reader keeps open what it needs: `recording` may end before it.
-  explicit SampleReader(Recording& recording);
+  explicit SampleReader(Recording& recording, ReadOrder order = ReadOrder::of_the_clock,
+                        std::uint64_t fill_limit_s = kUsualFillLimit_s);
   SampleReader(SampleReader&&) noexcept;
   SampleReader& operator=(SampleReader&&) noexcept;
   ~SampleReader();
@@ -83,15 +81,14 @@ class SampleReader {
 
   // Of the records read so far (empty for the old form).
   const LogStatistics& statistics() const;
+  const Irregular& irregular() const;
+  // By what was read so far; complete at the first sample of a file as units write it.
+  Clock clock() const;
 
-  struct ParameterSet {
-    std::uint32_t unix_time = 0;
-    Parameters parameters;
-  };
   // Every PARAMETERS record met so far, but one that repeats the set before it; of more than
   // kMaxParameterSets the later ones are in force all the same, and the last is kept.
   static constexpr std::size_t kMaxParameterSets = 100;
-  const std::vector<std::unique_ptr<ParameterSet>>& parameter_sets() const;
+  const std::vector<std::shared_ptr<const ParameterSet>>& parameter_sets() const;
   // True once samples were recorded under different constants: a file that says two things.
   bool constants_changed() const;
   std::uint64_t unreadable_parameters() const;  // PARAMETERS records that make no sense

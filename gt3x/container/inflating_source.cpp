@@ -25,6 +25,9 @@ class Inflate final : public ByteSource {
   }
 
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
+    if (broken_ != nullptr) {
+      return fail(ErrorCode::bad_data, broken_, {}, {});
+    }
     const std::size_t wanted = std::min(out.size(), kLargestPiece);
     state_->next_out = out.data();
     state_->avail_out = static_cast<std::uint32_t>(wanted);
@@ -37,25 +40,29 @@ class Inflate final : public ByteSource {
       }
       const bool had_input = state_->avail_in > 0;
       if (isal_inflate(state_.get()) != ISAL_DECOMP_OK) {
-        return damaged("the packed data make no sense");
+        return broken("the packed data make no sense", wanted);
       }
       if (!had_input && packed_ended_ && state_->avail_out == wanted &&
           state_->block_state != ISAL_BLOCK_FINISH) {
-        return damaged("the packed data end too early");
+        return broken("the packed data end too early", wanted);
       }
     }
     return wanted - state_->avail_out;
   }
 
  private:
-  static tl::unexpected<Error> damaged(const char* how) {
-    return fail(ErrorCode::bad_data, how, {}, {});
+  // What was unpacked before the break comes out first.
+  Result<std::size_t> broken(const char* how, std::size_t wanted) {
+    broken_ = how;
+    const std::size_t before = wanted - state_->avail_out;
+    return before > 0 ? Result<std::size_t>(before) : fail(ErrorCode::bad_data, how, {}, {});
   }
 
   std::unique_ptr<ByteSource> packed_;
   Bytes piece_;
   std::unique_ptr<inflate_state> state_;
   bool packed_ended_ = false;
+  const char* broken_ = nullptr;
 };
 
 // Counts and checks what passes.
@@ -64,11 +71,22 @@ class CheckedEntry final : public ByteSource {
   CheckedEntry(std::unique_ptr<ByteSource> bytes, const EntryFacts& facts)
       : bytes_(std::move(bytes)), facts_(facts) {}
 
-  std::optional<std::uint64_t> size() const override { return facts_.size; }
+  std::optional<std::uint64_t> size() const override {
+    return facts_.size_known ? std::optional(facts_.size) : std::nullopt;
+  }
+
+  // From now on what is left is delivered, and its damage told.
+  void salvage(const ArchiveLimits& limits, std::function<void(const EntryDamage&)> note) {
+    limits_ = limits;
+    note_ = std::move(note);
+  }
 
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
     if (broken_) {
       return fail(*broken_);
+    }
+    if (ended_) {
+      return std::size_t{0};
     }
     auto count = bytes_->read(out.first(std::min(out.size(), kLargestPiece)));
     if (!count) {
@@ -77,30 +95,57 @@ class CheckedEntry final : public ByteSource {
         broken_ = count.error();
         return fail(*broken_);
       }
-      return damaged(count.error().what);
+      return damaged(Damage::broken_stream, count.error().what);
+    }
+    if (facts_.size_known && *count > facts_.size - done_) {
+      const auto too_long = static_cast<std::size_t>(facts_.size - done_);
+      done_ = facts_.size;
+      return damaged(Damage::wrong_length, size_text(), too_long);
     }
     crc32_ = crc32_gzip_refl(crc32_, out.data(), *count);
     done_ += *count;
-    if (done_ > facts_.size || (*count == 0 && done_ != facts_.size)) {
-      return damaged(fmt::format("it should have {} bytes", facts_.size));
+    if (!facts_.size_known && !limits_.allow(done_, facts_.packed_size)) {
+      return damaged(Damage::refused, "it has more bytes than a recording can have");
     }
-    if (*count == 0 && crc32_ != facts_.crc32) {
-      return damaged("its CRC does not hold");
-    }
-    return *count;
+    return *count > 0 ? *count : end();
   }
 
  private:
-  Result<std::size_t> damaged(const std::string& how) {
-    broken_ = Error{ErrorCode::bad_data, "the entry is damaged: " + how, facts_.where,
-                    "download the recording from the unit again, or fetch an undamaged copy"};
-    return fail(*broken_);
+  std::string size_text() const { return fmt::format("it should have {} bytes", facts_.size); }
+
+  Result<std::size_t> end() {
+    if (facts_.size_known && done_ != facts_.size) {
+      return damaged(Damage::wrong_length, size_text());
+    }
+    if (!facts_.crc_known) {
+      return damaged(Damage::no_crc, "nothing says which CRC it should have");
+    }
+    if (crc32_ != facts_.crc32) {
+      return damaged(Damage::wrong_crc, "its CRC does not hold");
+    }
+    ended_ = true;
+    return std::size_t{0};
+  }
+
+  // The error, or the end: `last` bytes more, and what was wrong told.
+  Result<std::size_t> damaged(Damage kind, const std::string& how, std::size_t last = 0) {
+    if (what_may_be_delivered(kind, note_ != nullptr) == Delivery::nothing) {
+      broken_ = Error{ErrorCode::bad_data, "the entry is damaged: " + how, facts_.where,
+                      hint_about(kind)};
+      return fail(*broken_);
+    }
+    ended_ = true;
+    note_({kind, done_, how});
+    return last;
   }
 
   std::unique_ptr<ByteSource> bytes_;
   EntryFacts facts_;
+  ArchiveLimits limits_;
+  std::function<void(const EntryDamage&)> note_;
   std::uint64_t done_ = 0;
   std::uint32_t crc32_ = 0;
+  bool ended_ = false;
   std::optional<Error> broken_;
 };
 
@@ -116,6 +161,17 @@ std::unique_ptr<ByteSource> unpack_entry(std::unique_ptr<ByteSource> packed,
     }
   }
   return std::make_unique<CheckedEntry>(std::move(packed), facts);
+}
+
+std::unique_ptr<ByteSource> salvage_entry(std::unique_ptr<ByteSource> packed,
+                                          const EntryFacts& facts, const ArchiveLimits& limits,
+                                          std::function<void(const EntryDamage&)> note) {
+  if (facts.packing == Packing::deflate) {
+    packed = std::make_unique<Inflate>(std::move(packed));
+  }
+  auto entry = std::make_unique<CheckedEntry>(std::move(packed), facts);
+  entry->salvage(limits, std::move(note));
+  return entry;
 }
 
 }  // namespace sixpoint::gt3x

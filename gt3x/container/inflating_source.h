@@ -13,10 +13,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "gt3x/container/byte_source.h"
+#include "gt3x/container/delivery.h"
+#include "gt3x/container/entry_rule.h"
 #include "gt3x/container/sync_points.h"
 
 namespace sixpoint::gt3x {
@@ -28,13 +31,30 @@ struct EntryFacts {
   std::uint64_t size = 0;  // unpacked
   std::uint64_t packed_size = 0;
   std::uint32_t crc32 = 0;  // of the unpacked bytes, as in the archive's list of entries
-  SyncPoints points;        // empty: unpacked from its beginning
-  std::string where;        // for errors
+  // False where neither the list nor the entry's own header says it (local_headers.h).
+  bool size_known = true;
+  bool crc_known = true;
+  SyncPoints points;  // empty: unpacked from its beginning
+  std::string where;  // for errors
 };
 
 // read() answers bad_data for a damaged stream, for one byte more or less than `size`, and, with
 // the answer that is the end, for a wrong CRC. After an error it answers the same error.
 std::unique_ptr<ByteSource> unpack_entry(std::unique_ptr<ByteSource> packed,
                                          const EntryFacts& facts);
+
+// What was wrong with an entry that was read all the same.
+struct EntryDamage {
+  Damage kind = Damage::none;
+  std::uint64_t bytes = 0;  // that were delivered
+  std::string why;
+};
+
+// The same for who takes what is left (delivery.h): what unpack_entry() refuses ends the bytes here
+// and is told to `note`, on the thread that reads, once. Errors are those of the disk, and bad_data
+// for more bytes than `limits` allow.
+std::unique_ptr<ByteSource> salvage_entry(std::unique_ptr<ByteSource> packed,
+                                          const EntryFacts& facts, const ArchiveLimits& limits,
+                                          std::function<void(const EntryDamage&)> note);
 
 }  // namespace sixpoint::gt3x

@@ -132,7 +132,7 @@ std::optional<double> Info::sample_rate_hz() const {
 
 std::optional<double> Info::accel_scale_lsb_per_g() const {
   const auto scale = number_of("Acceleration Scale");
-  return scale && *scale > 0 && *scale <= 65536 ? scale : std::nullopt;
+  return scale && *scale > 0 && *scale <= 32768 ? scale : std::nullopt;
 }
 
 std::optional<UtcTime> Info::time_of(std::string_view key) const {

@@ -78,7 +78,7 @@ Result<Parameters> parse_parameters(std::span<const std::uint8_t> payload) {
   if (const auto scale = value(kParameterAccelScale)) {
     const double decoded = decode_float(*scale);
     // A scale outside this range belongs to no accelerometer; it would turn samples to nonsense.
-    if (decoded >= 1 && decoded <= 65536) {
+    if (decoded >= 1 && decoded <= 32768) {
       parameters.accel_scale_lsb_per_g = decoded;
     }
   }

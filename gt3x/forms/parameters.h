@@ -34,7 +34,8 @@ inline constexpr std::uint16_t kParameterUnitSpace = 1;
 inline constexpr std::uint16_t kParameterNegative = 4;  // 4, 5, 6 for X, Y, Z
 inline constexpr std::uint16_t kParameterPositive = 7;  // 7, 8, 9
 inline constexpr ParameterKey kParameterSampleRate = {1, 10};
-inline constexpr std::uint16_t kParameterZero = 15;  // 15, 16, 17
+inline constexpr std::uint16_t kParameterZero = 15;           // 15, 16, 17
+inline constexpr ParameterKey kParameterUtcOffset = {1, 40};  // seconds
 
 struct Parameters {
   // Only when all nine are there and each lies in [-2048, 2047]. positive = negative is possible

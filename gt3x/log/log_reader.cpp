@@ -219,6 +219,10 @@ class LogReader::Window {
     if (record.checksum_ok) {
       close_loss(record.unix_time);
       last_time_ = record.unix_time;
+      statistics_.last_time = record.unix_time;
+      if (!statistics_.first_time) {
+        statistics_.first_time = record.unix_time;
+      }
     } else {
       ++statistics_.checksum_failures;
       if (statistics_.failures.size() < LogStatistics::kMaxListed) {

@@ -67,6 +67,9 @@ struct LogStatistics {
   std::uint64_t stray_bytes = 0;
   std::uint64_t damaged_bytes = 0;
   std::uint64_t damaged_stretches = 0;
+  // Unix time of the first and of the last record whose checksum holds.
+  std::optional<std::uint32_t> first_time;
+  std::optional<std::uint32_t> last_time;
   // The first kMaxListed of each; the counts above are of all.
   static constexpr std::size_t kMaxListed = 1000;
   std::vector<Loss> losses;

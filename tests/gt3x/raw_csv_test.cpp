@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <fstream>
+#include <numeric>
 #include <sstream>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "base/memory_env.h"
@@ -156,12 +158,151 @@ TEST(RawCsv, AShortSecondIsFilledUp) {
   EXPECT_EQ(rows_of(*csv_of(ends_short, tests::made_info())).size(), 58U);
 }
 
+// A minute at 30 Hz, one record per element of `seconds`; 1,800 lines when each is written once.
+Bytes log_of(const std::vector<std::uint32_t>& seconds) {
+  Bytes log = tests::made_log(0);
+  for (const std::uint32_t second : seconds) {
+    tests::append_second(log, second);
+  }
+  return log;
+}
+
+std::vector<std::uint32_t> a_minute() {
+  std::vector<std::uint32_t> seconds(60);
+  std::iota(seconds.begin(), seconds.end(), 0);
+  return seconds;
+}
+
+struct Lines {
+  std::vector<std::string> rows;
+  RawCsvTally tally;
+};
+
+Lines lines_of_log(const Bytes& log, const RawCsvOptions& options = {},
+                   const std::string& info = tests::made_info()) {
+  Lines lines;
+  const auto text = csv_of(log, info, options, &lines.tally);
+  EXPECT_OK(text);
+  lines.rows = rows_of(text.value_or(""));
+  return lines;
+}
+
+TEST(RawCsv, ARepeatedRecordAddsNoLine) {
+  const auto whole = lines_of_log(log_of(a_minute()));
+  ASSERT_EQ(whole.rows.size(), 1800U);
+  auto seconds = a_minute();
+  seconds.insert(seconds.begin() + 20, 19);
+  const auto lines = lines_of_log(log_of(seconds));
+  EXPECT_EQ(lines.rows, whole.rows);
+  EXPECT_EQ(lines.tally.irregular.repeated_seconds(), 1U);
+  const auto plain = lines_of_log(log_of(seconds), with(false, false));
+  EXPECT_EQ(plain.rows.size(), 1830U) << "without filling: what was recorded";
+}
+
+TEST(RawCsv, RecordsThatChangedPlacesAndLateOnesComeInTheirPlace) {
+  const auto whole = lines_of_log(log_of(a_minute()));
+  auto swapped = a_minute();
+  std::swap(swapped[20], swapped[21]);
+  const auto two = lines_of_log(log_of(swapped));
+  EXPECT_EQ(two.rows, whole.rows);
+  EXPECT_EQ(two.tally.irregular.records_out_of_order(), 1U);
+  auto late = a_minute();
+  late.erase(late.begin() + 29);
+  late.push_back(29);
+  const auto one = lines_of_log(log_of(late));
+  EXPECT_EQ(one.rows, whole.rows);
+  EXPECT_EQ(one.tally.irregular.records_out_of_order(), 1U);
+  EXPECT_EQ(one.tally.filled, 0U);
+}
+
+TEST(RawCsv, ARecordThatIsDatedThreeDaysAheadMakesNoMillionsOfLines) {
+  auto seconds = a_minute();
+  seconds[30] += 3 * 86'400;
+  const auto lines = lines_of_log(log_of(seconds));
+  EXPECT_EQ(lines.rows.size(), 1800U) << "it stands where it was recorded";
+  EXPECT_EQ(lines.tally.irregular.count(IrregularKind::jump), 2U);
+  ASSERT_EQ(lines.tally.leap_count, 2U);
+  EXPECT_EQ(lines.tally.leaps[0].unix_time, tests::kStart + 30 + 3 * 86'400);
+  EXPECT_EQ(lines.tally.leaps[0].seconds, 3 * 86'400);
+  EXPECT_EQ(lines.tally.leaps[1].seconds, 1 - 3 * 86'400);
+}
+
+TEST(RawCsv, TheFillLimitMovesWhatIsFilled) {
+  RawCsvOptions options;
+  const Bytes two_hours = log_of({0, 1, 7202});
+  EXPECT_EQ(lines_of_log(two_hours).rows.size(), 90U);
+  options.fill_limit_s = 7200;
+  EXPECT_EQ(lines_of_log(two_hours, options).rows.size(), 7203U * 30);
+  const Bytes half_an_hour = log_of({0, 1, 1802});
+  EXPECT_EQ(lines_of_log(half_an_hour).rows.size(), 1803U * 30);
+  options.fill_limit_s = 1799;
+  const auto lowered = lines_of_log(half_an_hour, options);
+  EXPECT_EQ(lowered.rows.size(), 90U);
+  EXPECT_EQ(lowered.tally.leap_count, 1U);
+}
+
+TEST(RawCsv, SleepOfHoursIsFilled) {
+  Bytes log = log_of({0, 1});
+  append_record(log, RecordType::event, tests::kStart + 2, Bytes{kEventEnterIdleSleep});
+  tests::append_second(log, 9000);
+  EXPECT_EQ(lines_of_log(log).rows.size(), 9001U * 30);
+}
+
+// The form of a real GT3X+ recording of 6,891 seconds at 80 Hz, in which a one-byte record and
+// samples share a second: 551,280 lines, one per sample period, and not 80 more.
+TEST(RawCsv, ASecondWithAOneByteRecordAndSamplesIsWrittenOnce) {
+  constexpr std::uint32_t kSeconds = 6891;
+  constexpr std::size_t kRate = 80;
+  for (const bool usb_first : {true, false}) {
+    Bytes log = tests::made_log(0);
+    for (std::uint32_t second = 0; second < kSeconds; ++second) {
+      if (usb_first && second == 5000) {
+        append_record(log, RecordType::activity, tests::kStart + second, Bytes{0x5A});
+      }
+      tests::append_second(log, second, kRate);
+      if (!usb_first && second == 5000) {
+        append_record(log, RecordType::activity, tests::kStart + second, Bytes{0x5A});
+      }
+    }
+    const auto lines = lines_of_log(log, with(true, true), tests::made_info("80"));
+    ASSERT_EQ(lines.rows.size(), 551'280U);
+    EXPECT_EQ(lines.tally.filled, 0U);
+    EXPECT_EQ(lines.tally.irregular.count(IrregularKind::usb_and_samples), 1U);
+    const auto expected = tests::samples_of(5000, kRate);
+    EXPECT_EQ(lines.rows[5000 * kRate],
+              fmt::format("{},{},{}", expected[0][0], expected[0][1], expected[0][2]));
+  }
+}
+
+// After samples and a one-byte record in one second the unit hangs on USB: zeros.
+TEST(RawCsv, BehindSamplesAndAOneByteRecordTheGapIsZeros) {
+  Bytes log = log_of({0});
+  append_record(log, RecordType::activity, tests::kStart, Bytes{0x5A});
+  tests::append_second(log, 2);
+  const auto lines = lines_of_log(log);
+  ASSERT_EQ(lines.rows.size(), 90U);
+  EXPECT_EQ(lines.rows[30], "0,0,0");
+  EXPECT_EQ(lines.rows[59], "0,0,0");
+}
+
+TEST(RawCsv, ASecondWithMoreSamplesEndsAtTheRate) {
+  Bytes log = log_of({0});
+  tests::append_second(log, 1, 31);
+  tests::append_second(log, 2);
+  const auto lines = lines_of_log(log);
+  EXPECT_EQ(lines.rows.size(), 90U);
+  EXPECT_EQ(lines.tally.surplus_samples, 1U);
+  EXPECT_EQ(lines.tally.irregular.count(IrregularKind::odd_size), 1U);
+  EXPECT_EQ(lines_of_log(log, with(false, false)).rows.size(), 91U);
+}
+
 TEST(RawCsv, Refuses) {
   const auto no_samples = csv_of(tests::made_log(0), tests::made_info());
   EXPECT_FAILS(no_samples, ErrorCode::bad_data);
   EXPECT_THAT(no_samples.error().what, testing::HasSubstr("no samples"));
   EXPECT_FAILS(csv_of(tests::made_log(1), tests::made_info("0")), ErrorCode::bad_data);
   Bytes far = tests::made_log(1);
+  append_record(far, RecordType::event, tests::kStart + 1, Bytes{kEventEnterIdleSleep});
   tests::append_second(far, 2'000'000'000);
   const auto leap = csv_of(far, tests::made_info());
   EXPECT_FAILS(leap, ErrorCode::bad_data);

@@ -109,6 +109,17 @@ TEST(RecordsCsv, TheOldFormHasItsLuxInAFileOfItsOwn) {
 }
 
 // Oracle: the file's own count of seconds, 10,467 samples at 80 Hz.
+// Readings of the same file by hand: 84 10 is 4.228 V.
+TEST(RecordsCsv, BatteryOfARealOldRecording) {
+  SIXPOINT_NEED_SHARED("data/nhanes/NEO1B34100019.gt3x");
+  const auto battery = records_of(posix_env().files, shared_file("data/nhanes/NEO1B34100019.gt3x"),
+                                  RecordType::battery);
+  ASSERT_OK(battery);
+  EXPECT_EQ(battery->tally.records, 4U);
+  EXPECT_EQ(battery->tally.unreadable_records, 0U);
+  EXPECT_EQ(battery->lines[1], "2010-10-26T13:31:00,1288099860,4.228");
+}
+
 TEST(RecordsCsv, LightOfARealOldRecording) {
   SIXPOINT_NEED_SHARED("data/nhanes/NEO1B34100019.gt3x");
   const auto lux =

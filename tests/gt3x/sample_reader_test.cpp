@@ -132,14 +132,24 @@ TEST(SampleReader, TheLastParametersBeforeASampleHold) {
   EXPECT_EQ(result->parameter_sets, 2U) << "a repetition is no new set";
 }
 
-TEST(SampleReader, TimeThatStepsBackIsMarked) {
+TEST(SampleReader, OfTheFileComesWhatWasRecordedAndTimeThatStepsBackIsMarked) {
   Bytes log = made_log(3);
   append_second(log, 1);
-  const auto result = run(log);
-  ASSERT_OK(result);
-  ASSERT_EQ(result->items.size(), 4U);
-  EXPECT_FALSE(result->items[2].broke_order);
-  EXPECT_TRUE(result->items[3].broke_order);
+  append_second(log, 9);
+  MemoryEnv memory;
+  ASSERT_OK(tests::put_recording(memory.files, "f", log));
+  auto recording = Recording::open(memory.files, "f");
+  ASSERT_OK(recording);
+  SampleReader reader(*recording, ReadOrder::of_the_file);
+  std::vector<std::pair<std::uint32_t, bool>> seen;
+  for (auto item = reader.next(); item && *item; item = reader.next()) {
+    seen.emplace_back((*item)->unix_time - kStart, (*item)->broke_order);
+  }
+  EXPECT_EQ(seen, (std::vector<std::pair<std::uint32_t, bool>>{
+                      {0, false}, {1, false}, {2, false}, {1, true}, {9, false}}));
+  const auto by_clock = run(log);
+  ASSERT_OK(by_clock);
+  EXPECT_EQ(by_clock->items.size(), 5U) << "0, 1, 2, a gap, 9";
 }
 
 TEST(SampleReader, NoSamplesNoParameters) {

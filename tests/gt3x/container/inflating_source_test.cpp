@@ -132,5 +132,48 @@ TEST(InflatingSource, WrongSizeAndWrongCrcAreSaidAndStaySaid) {
   }
 }
 
+// What is left of an entry is its beginning, whatever its packed bytes lost; the damage is told
+// once.
+TEST(InflatingSource, SalvageGivesTheBeginningAndTellsTheDamageOnce) {
+  const Bytes bytes = some_bytes(600, 40);
+  const Bytes packed = deflated(bytes, 6, Z_DEFAULT_STRATEGY);
+  std::size_t most = 0;
+  for (std::size_t size = 0; size <= packed.size(); ++size) {
+    std::vector<EntryDamage> told;
+    const auto source = salvage_entry(
+        std::make_unique<MemorySource>(
+            Bytes(packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(size))),
+        facts_of(bytes), ArchiveLimits{}, [&](const EntryDamage& one) { told.push_back(one); });
+    const auto left = read_all(*source, 1000);
+    ASSERT_OK(left);
+    ASSERT_LE(left->size(), bytes.size());
+    EXPECT_TRUE(std::equal(left->begin(), left->end(), bytes.begin())) << size;
+    EXPECT_GE(left->size(), most) << size;
+    most = left->size();
+    Bytes more(10);
+    EXPECT_EQ(source->read(more).value(), 0U);
+    if (size == packed.size()) {
+      EXPECT_TRUE(told.empty());
+      EXPECT_EQ(*left, bytes);
+    } else {
+      ASSERT_EQ(told.size(), 1U) << size;
+      EXPECT_EQ(told[0].kind, Damage::broken_stream);
+      EXPECT_EQ(told[0].bytes, left->size());
+    }
+  }
+}
+
+TEST(InflatingSource, SalvageOfMoreBytesThanSaidIsCutOff) {
+  const Bytes bytes = some_bytes(600, 40);
+  EntryFacts facts = facts_of(bytes);
+  facts.size = 500;
+  Damage told = Damage::none;
+  const auto source =
+      salvage_entry(std::make_unique<MemorySource>(deflated(bytes, 6, Z_DEFAULT_STRATEGY)), facts,
+                    ArchiveLimits{}, [&](const EntryDamage& one) { told = one.kind; });
+  EXPECT_EQ(read_all(*source, 1000).value().size(), 500U);
+  EXPECT_EQ(told, Damage::wrong_length);
+}
+
 }  // namespace
 }  // namespace sixpoint::gt3x

@@ -50,9 +50,9 @@ TEST(Samples, RoundTripsAtEveryLengthAndLimit) {
   }
 }
 
-// Every count at every place of a group, whatever way the machine unpacks groups. Oracle: the bits
+// Every count at every place of a group, whatever way the machine works on groups. Oracle: the bits
 // one by one, most significant first, as the vendor describes them.
-TEST(Samples, EveryCountOnEveryAxisIsUnpackedAsItsBits) {
+TEST(Samples, EveryCountOnEveryAxisIsItsBits) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     std::vector<Counts> samples;
     for (int count = kMin12; count <= kMax12; ++count) {
@@ -77,12 +77,18 @@ TEST(Samples, EveryCountOnEveryAxisIsUnpackedAsItsBits) {
             static_cast<std::uint8_t>(payload[i / 8] | (bits[i] ? 0x80U >> (i % 8) : 0));
       }
       std::vector<Counts> back;
+      Bytes packed = {0xA5};
       if (order[0] == 1) {
         unpack_activity(payload, back);
+        append_activity(packed, samples);
       } else {
         unpack_activity3(payload, back);
+        append_activity3(packed, samples);
       }
       ASSERT_EQ(back, samples);
+      ASSERT_EQ(packed.front(), 0xA5) << "appended, not replaced";
+      packed.erase(packed.begin());
+      ASSERT_EQ(packed, payload);
     }
   }
 }
@@ -109,6 +115,10 @@ TEST(Samples, WideValuesSurviveOnlyInSixteenBits) {
   append_activity(packed, samples);
   unpack_activity(packed, back);
   EXPECT_EQ(back, (std::vector<Counts>{{kMax12, kMin12, 300}}));
+  packed.clear();
+  append_activity(packed, std::vector<Counts>(50, samples[0]));
+  unpack_activity(packed, back);
+  EXPECT_EQ(back, std::vector<Counts>(50, {kMax12, kMin12, 300}));
 }
 
 TEST(Samples, ShortPayloadsGiveWholeSamplesOnly) {

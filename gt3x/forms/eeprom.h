@@ -1,0 +1,45 @@
+// eeprom.bin of the old form: a unit's permanent memory, with the constants that it scales with.
+//
+//   SIXPOINT_ASSIGN(const UnitMemory memory, parse_eeprom(bytes));
+//   memory.constants.zero_lsb;  // what the unit subtracted
+//
+// The layout is public (the vendor's description of the NHANES release): serial number at 0; from
+// 256 on "TUNE", int16 zero, positive and negative (X Y Z each), six bytes of date, and at 349 the
+// firmware; at 510 the CRC-CCITT of bytes 256 to 509. Little-endian but for the CRC; the date is
+// year - 2000, day, month, hour, minute, second. Both were confirmed on a real image, whose counts
+// fit the constants by Eq. 1-6.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/constants.h"
+#include "base/result.h"
+#include "base/time.h"
+
+namespace sixpoint::gt3x {
+
+struct UnitMemory {
+  std::string serial;
+  StoredConstants constants;
+  std::optional<UtcTime> calibration_time;  // by the unit's clock; absent where it is no date
+  std::string firmware;                     // "1.4.0"
+};
+// bad_data for what is too short, has no calibration section, a CRC that fails, or constants that
+// no unit has.
+Result<UnitMemory> parse_eeprom(std::span<const std::uint8_t> bytes);
+
+inline constexpr std::size_t kOldBatteryEntry = 8;  // bytes
+// One entry of battery.bin: six bytes of date, then millivolts, two bytes little-endian.
+struct OldBatteryReading {
+  UtcTime time;
+  double battery_v = 0;
+};
+// Entries without a date (an erased or damaged part) are left out.
+std::vector<OldBatteryReading> parse_old_battery(std::span<const std::uint8_t> bytes);
+
+}  // namespace sixpoint::gt3x

@@ -1,0 +1,186 @@
+#include "gt3x/sample_rows.h"
+
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "gt3x/sample_reader.h"
+
+namespace sixpoint::gt3x {
+namespace {
+
+constexpr std::uint64_t kLongestFill_s = 400ULL * 86'400;
+
+Result<std::optional<AgdcCalibration>> agdc_calibration_of(Recording& recording, double rate_hz) {
+  if (!recording.has_entry("calibration.json")) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
+  SIXPOINT_ASSIGN(const Bytes bytes, read_all(*source, 1 << 20));
+  const auto parsed = parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz));
+  // Not every calibration.json is one of these; who needs it will say that it is missing.
+  return parsed ? std::optional(*parsed) : std::nullopt;
+}
+
+// Rows for the seconds of a recording, one after the other.
+class Export {
+ public:
+  Export(const Info& info, const RawCsvOptions& options, RowWriter& out, double rate_hz,
+         const std::optional<AgdcCalibration>& agdc)
+      : info_(info),
+        options_(options),
+        rate_(static_cast<std::uint64_t>(std::llround(rate_hz))),
+        agdc_(agdc),
+        out_(out) {}
+
+  Status take(const SampleItem& item, const SampleReader& reader) {
+    if (!started_) {
+      SIXPOINT_CHECK(out_.begin(item.unix_time, reader.clock().kind == ClockKind::utc));
+      started_ = true;
+    }
+    if (options_.fill && short_by_ > 0) {
+      SIXPOINT_CHECK(fill(std::exchange(short_by_, 0)));  // goes on in the second before
+    }
+    out_.at(item.unix_time);
+    return item.kind == SampleItem::Kind::recorded ? take_samples(item) : take_gap(item);
+  }
+
+  Result<RawCsvTally> finish(const std::string& path) {
+    if (tally_.samples == 0) {
+      return fail(ErrorCode::bad_data, "the recording holds no samples", path,
+                  "check that the unit was started; download the recording again");
+    }
+    SIXPOINT_CHECK(out_.end());
+    return tally_;
+  }
+
+ private:
+  Status take_samples(const SampleItem& item) {
+    SIXPOINT_CHECK(set_meaning(item));
+    std::span<const Counts> counts = item.counts;
+    if (options_.fill && counts.size() > rate_) {
+      tally_.surplus_samples += counts.size() - rate_;
+      counts = counts.first(static_cast<std::size_t>(rate_));
+    }
+    if (options_.fill && item.broke_order) {
+      note_leap(item.unix_time, std::int64_t{item.unix_time} - std::int64_t{last_second_});
+    }
+    last_second_ = item.unix_time;
+    SIXPOINT_CHECK(out_.rows(counts));
+    last_ = counts.back();
+    zeros_ = false;
+    tally_.samples += counts.size();
+    short_by_ = counts.size() < rate_ ? rate_ - counts.size() : 0;
+    return {};
+  }
+
+  // What the counts of these samples mean.
+  Status set_meaning(const SampleItem& item) {
+    if (options_.raw_lsb) {
+      return {};
+    }
+    if (item.type == RecordType::activity3 && agdc_ && !agdc_->already_applied) {
+      out_.set_meaning(&*agdc_, 0);
+      return {};
+    }
+    const auto scale = accel_scale_lsb_per_g(info_, item.parameters);
+    // 12 bits at 16 LSB/g would be 128 g: what an .agdc says of raw counts (1) is no scale.
+    constexpr double kLeastOfCalibrated_lsb_per_g = 16;
+    const bool no_scale =
+        item.type == RecordType::activity3 && scale && *scale < kLeastOfCalibrated_lsb_per_g;
+    if (!scale || *scale < 1 || *scale > 65536 || no_scale) {
+      return fail(ErrorCode::bad_data, "the recording does not say how many LSB make one g", {},
+                  "export the stored counts with --raw");
+    }
+    if (item.type == RecordType::activity3 && !agdc_) {
+      return fail(ErrorCode::bad_data,
+                  "the recording holds raw counts and no calibration.json that turns them into g",
+                  {}, "export the raw counts with --raw");
+    }
+    out_.set_meaning(nullptr, *scale);
+    return {};
+  }
+
+  void note_leap(std::uint32_t unix_time, std::int64_t seconds) {
+    ++tally_.leap_count;
+    if (tally_.leaps.size() < RawCsvTally::kMostLeaps) {
+      tally_.leaps.push_back({unix_time, seconds});
+    }
+  }
+
+  Status take_gap(const SampleItem& item) {
+    zeros_ = zeros_ || item.kind == SampleItem::Kind::usb || item.gap == GapKind::usb;
+    if (!options_.fill) {
+      return {};
+    }
+    last_second_ = item.unix_time + (item.seconds - 1);
+    if (!item.filled) {
+      note_leap(item.unix_time + item.seconds, item.seconds);
+      return {};
+    }
+    filled_s_ += item.seconds;
+    if (filled_s_ > kLongestFill_s) {
+      return fail(
+          ErrorCode::bad_data,
+          fmt::format("more than {} days are missing at {}; a time stamp must be wrong",
+                      kLongestFill_s / 86'400, to_iso8601(from_unix_seconds(item.unix_time))),
+          {}, "export what was recorded with --no-fill");
+    }
+    return fill(item.seconds * rate_);
+  }
+
+  Status fill(std::uint64_t lines) {
+    tally_.filled += lines;
+    return out_.repeat(last_, lines, zeros_);
+  }
+
+  const Info& info_;
+  const RawCsvOptions& options_;
+  std::uint64_t rate_;
+  const std::optional<AgdcCalibration>& agdc_;
+  RowWriter& out_;
+  RawCsvTally tally_;
+  Counts last_{};
+  bool zeros_ = false;  // since a USB record
+  std::uint32_t last_second_ = 0;
+  std::uint64_t filled_s_ = 0;
+  std::uint64_t short_by_ = 0;  // lines that the second before lacks; the last of all may be short
+  bool started_ = false;
+};
+
+}  // namespace
+
+Result<RawCsvTally> write_rows(Recording& recording, const RawCsvOptions& options, RowWriter& out) {
+  const double rate_hz = recording.info().sample_rate_hz().value_or(0);
+  if (!(rate_hz >= 1)) {
+    return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all",
+                recording.path(), "download the recording from the unit again");
+  }
+  SIXPOINT_ASSIGN(const auto agdc, agdc_calibration_of(recording, rate_hz));
+  Export rows(recording.info(), options, out, rate_hz, agdc);
+  SampleReader reader(recording, options.fill ? ReadOrder::of_the_clock : ReadOrder::of_the_file,
+                      options.fill_limit_s);
+  for (;;) {
+    auto next = reader.next();
+    Status status = next ? Status() : Status(fail(next.error()));
+    if (next && *next) {
+      status = rows.take(**next, reader);
+    }
+    if (!status) {
+      Error error = std::move(status).error();
+      error.where = error.where.empty() ? recording.path() : error.where;
+      return fail(std::move(error));
+    }
+    if (!*next) {
+      break;
+    }
+  }
+  SIXPOINT_ASSIGN(RawCsvTally tally, rows.finish(recording.path()));
+  tally.checksum_failures = reader.statistics().checksum_failures;
+  tally.damaged_stretches = reader.statistics().damaged_stretches;
+  tally.irregular = reader.irregular();
+  return tally;
+}
+
+}  // namespace sixpoint::gt3x
