@@ -45,6 +45,9 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
       start = item->unix_time;
       trace.start_s_ = item->unix_time;
     }
+    if (item->unix_time < *start) {
+      continue;  // a clock that was set back
+    }
     const std::uint64_t first = (item->unix_time - *start) * rate;
     const std::uint64_t count = std::min<std::uint64_t>(item->counts.size(), rate);
     if (first + count > kMaxTraceSamples) {

@@ -8,12 +8,15 @@
 namespace sixpoint::repair {
 
 std::string recipe_digest(const Recipe& recipe) {
-  const nlohmann::ordered_json content = {
+  nlohmann::ordered_json content = {
       {"rules", recipe.rules},
       {"constants", recipe.constants ? digest_of(*recipe.constants) : std::string()},
       {"rotation_undone", recipe.rotation_undone},
       {"wide", recipe.wide},
       {"store_only", recipe.store_only}};
+  if (recipe.salvaged) {
+    content["salvaged"] = true;
+  }
   return text_sha256(content.dump());
 }
 

@@ -29,6 +29,7 @@ struct Recipe {
   bool rotation_undone = false;
   bool wide = false;
   bool store_only = false;
+  bool salvaged = false;  // something was lost
   int rules = kRepairRules;
 };
 // 64 hex digits; the mark carries it.

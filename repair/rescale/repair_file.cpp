@@ -39,9 +39,9 @@ constexpr const char* kMappedByLine =
 
 // Entries that a unit or its software writes beside the samples and that do not depend on them.
 bool is_independent_of_samples(const std::string& name) {
-  constexpr std::array<std::string_view, 8> kNames = {"log.bin",      "info.txt",    "lux.bin",
-                                                      "battery.bin",  "eeprom.bin",  "firmware.bin",
-                                                      "capsense.bin", "metadata.bin"};
+  constexpr std::array<std::string_view, 9> kNames = {
+      "log.bin",      "info.txt",     "lux.bin",      "battery.bin", "eeprom.bin",
+      "firmware.bin", "capsense.bin", "metadata.bin", kSalvageMark};
   return std::ranges::find(kNames, name) != kNames.end();
 }
 
@@ -66,7 +66,9 @@ class Repair {
 
  private:
   Status work() {
-    SIXPOINT_ASSIGN(survey_, survey(env_.files, report_.input, options_.still));
+    SIXPOINT_ASSIGN(survey_,
+                    survey(env_.files, report_.input, options_.still, {options_.salvage, {}}));
+    report_.losses = survey_.losses;
     report_.serial = survey_.facts.serial;
     report_.calibration_time = survey_.facts.calibration_time;
     report_.samples = survey_.samples;
@@ -109,16 +111,35 @@ class Repair {
         report_.reasons.emplace_back(
             "its constants are right, its axes are not: --undo-rotation turns them back");
       }
-      return false;
+      return write_whole();
     }
     if (judged.verdict == Verdict::cannot_tell) {
       report_.status = RepairStatus::not_repairable;
       report_.reasons.emplace_back(kNotDecided);
-      return false;
+      return write_whole();
     }
     report_.rotation_undone = judged.axes_rotated;
     report_.method = rotation_only ? "rotation" : "";
     return true;
+  }
+
+  // A damaged file whose samples stay as they are is written whole all the same; its status says
+  // nothing else than without that.
+  bool write_whole() {
+    if (report_.losses.empty() || survey_.samples == 0) {
+      return false;
+    }
+    report_.method = kSalvageMethod;
+    report_.reasons.emplace_back(
+        "--salvage: written without what was lost; its samples are as they were");
+    return true;
+  }
+
+  // Of a file that was written, now or by an earlier run.
+  void take_status_of_written() {
+    if (report_.method != kSalvageMethod) {
+      report_.status = RepairStatus::repaired;
+    }
   }
 
   Status choose() {
@@ -202,8 +223,7 @@ class Repair {
       options.fresh = map_->calibration;
       options.cross_axis = map_->cross_axis;
     }
-    options.accel_scale_lsb_per_g = survey_.accel_scale_lsb_per_g;
-    options.rate_hz = survey_.rate_hz;
+    options.accel_scale_lsb_per_g = survey_.header_scale_lsb_per_g;
     if (!survey_.constants.empty()) {
       options.first_constants = survey_.constants.front();
     }
@@ -211,23 +231,28 @@ class Repair {
     options.wide = options_.wide;
     options.beyond_12_bits = survey_.beyond_12_bits;
     options.affine = chosen_.has_value() && !survey_.plausibility.plausible();
+    options.leave_out_damage = options_.salvage;
     options.mark = mark_record_of(report_);
     options.size = options_.wide ? survey_.log_bytes_wide : survey_.log_bytes;
-    options.still = options_.still;
+    for (const calib::StillBlock& block : survey_.blocks) {
+      options.still.push_back({block.first_sample, block.samples});
+    }
     return options;
   }
 
   void take(RescaledLog& log) {
     report_.clipped_before = log.tally().clipped_before;
     report_.clipped_after = log.tally().clipped_after;
-    const MagnitudeError after = log.still_error();
-    if (after.blocks > 0) {
-      report_.still_error_after_mg = after.mean_mg;
+    if (const auto after_mg = log.still_error_mg()) {
+      report_.still_error_after_mg = after_mg;
     }
     if (log.tally().affine_counts > 0) {
       report_.reasons.push_back(fmt::format(kMappedByLine, log.tally().affine_counts));
     }
-    if (survey_.log.checksum_failures + survey_.log.damaged_stretches > 0) {
+    if (!report_.losses.empty()) {
+      report_.reasons.push_back(
+          fmt::format("--salvage: {} losses, which its marks state", report_.losses.size()));
+    } else if (survey_.log.checksum_failures + survey_.log.damaged_stretches > 0) {
       report_.reasons.push_back(fmt::format(
           "{} records with a wrong checksum and {} damaged stretches were carried over unchanged",
           survey_.log.checksum_failures, survey_.log.damaged_stretches));
@@ -240,12 +265,13 @@ class Repair {
   }
 
   Status write() {
-    // All that they had to say was said by now; writing finds others.
-    survey_.blocks = {};
     SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
-    SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(env_.files, report_.input));
+    const RescaledLogOptions how = log_options();  // with the mark, which holds the hash
+    survey_.blocks = {};                           // all that they had to say was said by now
+    SIXPOINT_ASSIGN(auto recording,
+                    gt3x::Recording::open(env_.files, report_.input, {options_.salvage, {}}));
     SIXPOINT_ASSIGN(auto reader, recording.open_log());
-    SIXPOINT_ASSIGN(const auto log, RescaledLog::make(std::move(reader), log_options()));
+    SIXPOINT_ASSIGN(const auto log, RescaledLog::make(std::move(reader), how));
     if (options_.dry_run) {
       SIXPOINT_CHECK(read_through(*log));
     } else {
@@ -260,12 +286,15 @@ class Repair {
     }
     take(*log);
     name_what_was_not_repaired(recording, log->tally().epoch_records);
-    report_.status = RepairStatus::repaired;
+    take_status_of_written();
     return {};
   }
 
   // Epochs were computed by the unit, or by software, from the samples as they were.
   void name_what_was_not_repaired(const gt3x::Recording& recording, std::uint64_t epoch_records) {
+    if (report_.method == kSalvageMethod) {
+      return;  // nothing was
+    }
     std::vector<std::string> names;
     for (const gt3x::EntryInfo& entry : recording.entries()) {
       if (!is_independent_of_samples(entry.name)) {
@@ -300,18 +329,39 @@ class Repair {
     how.jobs = options_.jobs;
     SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(env_.files, output_, how));
     for (const gt3x::EntryInfo& entry : recording.entries()) {
+      if (entry.name == mark_name(report_)) {
+        continue;  // a file that was salvaged before; its record in the log stays
+      }
       SIXPOINT_CHECK(entry.name == "log.bin" ? writer.add(entry.name, log)
-                                             : writer.copy(recording, entry.name));
+                                             : carry_over(recording, entry.name, writer));
+    }
+    if (!recording.has_entry("info.txt")) {
+      SIXPOINT_CHECK(writer.add("info.txt", recording.info().serialise()));
     }
     report_.repaired_at = env_.clock.now();
-    SIXPOINT_CHECK(
-        writer.add(kRepairMark, mark_of(report_, chosen_, survey_, recipe(), *report_.repaired_at)
-                                        .dump(2, ' ', false, Json::error_handler_t::replace) +
-                                    "\n"));
+    SIXPOINT_CHECK(writer.add(mark_name(report_),
+                              mark_of(report_, chosen_, survey_, recipe(), *report_.repaired_at)
+                                      .dump(2, ' ', false, Json::error_handler_t::replace) +
+                                  "\n"));
     SIXPOINT_CHECK(writer.commit());
     report_.output = output_;
     report_.output_sha256 = writer.sha256();
     return {};
+  }
+
+  // An entry as it is; of a damaged one, what is left of it.
+  Status carry_over(gt3x::Recording& recording, const std::string& name,
+                    gt3x::RecordingWriter& writer) const {
+    const bool damaged =
+        std::ranges::find(report_.losses, name, &gt3x::SalvageLoss::entry) != report_.losses.end();
+    if (!damaged) {
+      return writer.copy(recording, name);
+    }
+    if (name == "info.txt") {
+      return writer.add(name, recording.info().serialise());
+    }
+    SIXPOINT_ASSIGN(const auto source, recording.open_entry(name));
+    return writer.add(name, *source);
   }
 
   std::string recipe() const {
@@ -322,6 +372,7 @@ class Repair {
     recipe.rotation_undone = report_.rotation_undone;
     recipe.wide = options_.wide;
     recipe.store_only = options_.store_only;
+    recipe.salvaged = !report_.losses.empty();
     return recipe_digest(recipe);
   }
 
@@ -363,7 +414,8 @@ class Repair {
                   "choose another folder, or --resume to go on with an earlier run");
     }
     report_.reasons.emplace_back(kDoneBefore);
-    SIXPOINT_ASSIGN(const auto recording, gt3x::Recording::open(env_.files, report_.input));
+    SIXPOINT_ASSIGN(const auto recording,
+                    gt3x::Recording::open(env_.files, report_.input, {options_.salvage, {}}));
     name_what_was_not_repaired(recording, 0);
     report_.resumed = true;
     report_.method = text_in(mark, "method");
@@ -382,7 +434,7 @@ class Repair {
     }
     report_.clipped_after = repaired.clipped_samples;
     SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
-    report_.status = RepairStatus::repaired;
+    take_status_of_written();
     return {};
   }
 
@@ -444,6 +496,7 @@ Json RepairReport::to_json() const {
       {"cross_axis_applied", cross_axis_applied},
       {"sample_uncertainty_mg", sample_uncertainty_to_json(*this)},
       {"source", source ? source->to_json() : Json(nullptr)},
+      {"losses", losses_to_json(losses)},
       {"constants_id", optional_text(constants_id)},
       {"input_sha256", optional_text(input_sha256)},
       {"output_sha256", optional_text(output_sha256)}};

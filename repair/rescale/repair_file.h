@@ -16,6 +16,8 @@
 // | triage: not affected, axes right or undo_rotation off   | not_affected                       |
 // | triage: not affected, axes turned, undo_rotation on     | repaired, method `rotation`        |
 // | triage: cannot tell                                     | not_repairable                     |
+// | ... either of the two, with losses (salvage on)         | the same, method `salvage`: written|
+// |                                                         | whole, samples as they were        |
 // | affected, no constants that may be used (choose() below)| not_repairable                     |
 // | ... that the file's own still periods contradict        | not_repairable, but with force     |
 // | ... that do not help by the gate (gate.h)               | not_repairable, but with force     |
@@ -92,6 +94,9 @@ struct RepairOptions {
   bool undo_rotation = false;
   // A prior over a model's constants is no measurement of this unit: used only when asked for.
   bool allow_prior = false;
+  // Reads what is left of a damaged file (gt3x/container/delivery.h), leaves out of the log what is
+  // no good record, and lists what was lost in the report and in both marks.
+  bool salvage = false;
   // Writes what the gate or the file's own still periods refuse; the mark says so.
   bool force = false;
   // An output that is there already and was made from this very input, as it would be made now, is
@@ -127,7 +132,8 @@ struct RepairReport {
   bool cross_axis_applied = false;  // not only six constants (applied_map.h)
   // Standard uncertainty of a sample, X Y Z; absent where the constants state none.
   std::optional<PerAxis<double>> sample_uncertainty_mg;
-  std::optional<UtcTime> repaired_at;  // as its mark says
+  std::vector<gt3x::SalvageLoss> losses;  // with RepairOptions::salvage
+  std::optional<UtcTime> repaired_at;     // as its mark says
   std::string input_sha256;
   std::string output_sha256;
   bool dry_run = false;

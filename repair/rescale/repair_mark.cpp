@@ -13,8 +13,13 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr std::uint64_t kLargestMark = 1U << 20;
+constexpr std::size_t kLossesInRecord = 20;
 
 }  // namespace
+
+std::string mark_name(const RepairReport& report) {
+  return report.method == kSalvageMethod ? kSalvageMark : kRepairMark;
+}
 
 Json still_error_to_json(const RepairReport& report) {
   return {{"before", calib::number_or_null(report.still_error_before_mg)},
@@ -49,32 +54,44 @@ Json mark_of(const RepairReport& report, const std::optional<ChosenConstants>& c
   if (report.forced) {
     mark["reasons"] = report.reasons;
   }
+  if (!report.losses.empty()) {
+    mark["losses"] = losses_to_json(report.losses);
+  }
   return mark;
 }
 
 // The vendor's own METADATA records begin and end with the same members.
 std::string mark_record_of(const RepairReport& report) {
-  const Json record = {{"MetadataType", kRepairMarkType},
-                       {"Schema", "sixpoint/repair-mark/1"},
-                       {"InputSha256", report.input_sha256},
-                       {"Serial", report.serial},
-                       {"Method", report.method},
-                       {"ConstantsId", report.constants_id},
-                       {"RotationUndone", report.rotation_undone},
-                       {"Forced", report.forced},
-                       {"CrossAxisApplied", report.cross_axis_applied},
-                       {"SampleUncertaintyMg", sample_uncertainty_to_json(report)},
-                       {"Parsed", false},
-                       {"JSON", nullptr}};
+  Json record = {
+      {"MetadataType", report.method == kSalvageMethod ? kSalvageMarkType : kRepairMarkType},
+      {"Schema", "sixpoint/repair-mark/1"},
+      {"InputSha256", report.input_sha256},
+      {"Serial", report.serial},
+      {"Method", report.method},
+      {"ConstantsId", report.constants_id},
+      {"RotationUndone", report.rotation_undone},
+      {"Forced", report.forced},
+      {"CrossAxisApplied", report.cross_axis_applied},
+      {"SampleUncertaintyMg", sample_uncertainty_to_json(report)},
+      {"Parsed", false},
+      {"JSON", nullptr}};
+  if (!report.losses.empty()) {
+    // A record has room for 64 KB; the entry lists them all.
+    const std::size_t listed = std::min<std::size_t>(report.losses.size(), kLossesInRecord);
+    record["Losses"] = losses_to_json(
+        {report.losses.begin(), report.losses.begin() + static_cast<std::ptrdiff_t>(listed)});
+    record["LossCount"] = report.losses.size();
+  }
   return record.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::optional<Json> mark_in(FileSystem& files, const std::string& path) {
   auto recording = gt3x::Recording::open(files, path);
-  if (!recording || !recording->has_entry(kRepairMark)) {
+  if (!recording) {
     return std::nullopt;
   }
-  auto source = recording->open_entry(kRepairMark);
+  auto source =
+      recording->open_entry(recording->has_entry(kRepairMark) ? kRepairMark : kSalvageMark);
   if (!source) {
     return std::nullopt;
   }

@@ -17,15 +17,23 @@
 
 namespace sixpoint::repair {
 
+// The same two marks of a file that --salvage wrote whole and whose samples stay as they were. They
+// do not make it `already_repaired`.
+inline constexpr const char* kSalvageMark = "sixpoint-salvage.json";
+inline constexpr const char* kSalvageMarkType = "SixpointSalvage";
+inline constexpr const char* kSalvageMethod = "salvage";
+// The name of the entry that belongs to this report.
+std::string mark_name(const RepairReport& report);
+
 // {before, after}, and three numbers; null for what is not known.
 nlohmann::ordered_json still_error_to_json(const RepairReport& report);
 nlohmann::ordered_json sample_uncertainty_to_json(const RepairReport& report);
 
-// The entry (kRepairMark). `recipe`: recipe_digest() in earlier_output.h.
+// The entry. `recipe`: recipe_digest() in earlier_output.h.
 nlohmann::ordered_json mark_of(const RepairReport& report,
                                const std::optional<ChosenConstants>& chosen, const Survey& survey,
                                const std::string& recipe, UtcTime now);
-// The record (kRepairMarkType): who it was, and by what. Without the time, so that the same repair
+// The record: who it was, and by what. Without the time, so that the same repair
 // gives the same log.
 std::string mark_record_of(const RepairReport& report);
 

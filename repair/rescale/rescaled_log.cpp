@@ -4,6 +4,8 @@
 
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/record.h"
+#include "repair/triage/still_scan.h"
+#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -62,28 +64,38 @@ bool is_epoch(const gt3x::Record& record) {
 
 }  // namespace
 
-RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options, StillScan still)
-    : log_(std::move(log)), options_(options), still_(std::move(still)) {}
+RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options)
+    : log_(std::move(log)),
+      options_(options),
+      still_(options.still, options.accel_scale_lsb_per_g),
+      accel_scale_lsb_per_g_(options.accel_scale_lsb_per_g) {}
 
 Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
                                                        const RescaledLogOptions& options) {
-  SIXPOINT_ASSIGN(auto still,
-                  StillScan::make(options.rate_hz, options.accel_scale_lsb_per_g, options.still));
-  std::unique_ptr<RescaledLog> source(new RescaledLog(std::move(log), options, std::move(still)));
+  std::unique_ptr<RescaledLog> source(new RescaledLog(std::move(log), options));
   if (options.first_constants.has_value()) {
-    SIXPOINT_CHECK(source->set_constants(*options.first_constants));
+    SIXPOINT_CHECK(source->set_source(options.first_constants, options.accel_scale_lsb_per_g));
   }
   return source;
 }
 
-Status RescaledLog::set_constants(const StoredConstants& constants) {
-  if (!options_.fresh.has_value() || constants_ == constants) {
+Status RescaledLog::set_source(const std::optional<StoredConstants>& constants,
+                               double accel_scale_lsb_per_g) {
+  still_.set_scale(accel_scale_lsb_per_g);
+  if (!options_.fresh.has_value() || !constants ||
+      (map_ && constants_ == constants && accel_scale_lsb_per_g_ == accel_scale_lsb_per_g)) {
     return {};
   }
-  const auto known = std::ranges::find(maps_, constants, [](const auto& map) { return map.first; });
-  if (known != maps_.end()) {
-    map_ = static_cast<std::size_t>(known - maps_.begin());
+  const auto known = std::ranges::find_if(maps_, [&](const Map& map) {
+    return map.undone == *constants && map.accel_scale_lsb_per_g == accel_scale_lsb_per_g;
+  });
+  const auto take = [&](std::size_t map) {
+    map_ = map;
     constants_ = constants;
+    accel_scale_lsb_per_g_ = accel_scale_lsb_per_g;
+  };
+  if (known != maps_.end()) {
+    take(static_cast<std::size_t>(known - maps_.begin()));
     return {};
   }
   if (maps_.size() == kMaxSetsOfConstants) {
@@ -93,15 +105,14 @@ Status RescaledLog::set_constants(const StoredConstants& constants) {
   const auto limit =
       options_.beyond_12_bits ? calib::RecordWidth::bits16 : calib::RecordWidth::bits12;
   SIXPOINT_ASSIGN(const auto reversal,
-                  calib::Reversal::make(constants, options_.accel_scale_lsb_per_g, limit));
+                  calib::Reversal::make(*constants, accel_scale_lsb_per_g, limit));
   calib::Rescale::Options rescale;
   rescale.output = options_.wide ? calib::RecordWidth::bits16 : limit;
   rescale.affine = options_.affine;
   rescale.cross_axis = options_.cross_axis;
   SIXPOINT_ASSIGN(auto map, calib::Rescale::make(reversal, *options_.fresh, rescale));
-  map_ = maps_.size();
-  maps_.emplace_back(constants, std::move(map));
-  constants_ = constants;
+  maps_.push_back({*constants, accel_scale_lsb_per_g, std::move(map)});
+  take(maps_.size() - 1);
   return {};
 }
 
@@ -121,7 +132,7 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
   }
   if (map_.has_value()) {
     calib::RescaleTally counts;
-    maps_[*map_].second.apply(fresh_samples_, fresh_samples_, counts);
+    maps_[*map_].rescale.apply(fresh_samples_, fresh_samples_, counts);
     tally_.affine_counts += counts.affine[0] + counts.affine[1] + counts.affine[2];
     keep_charging_zeros(samples_, fresh_samples_);
   }
@@ -130,7 +141,7 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
   tally_.changed_samples += count_changed(samples_, fresh_samples_);
   tally_.samples += samples_.size();
   ++tally_.sample_records;
-  still_.push(record.unix_time, fresh_samples_);
+  still_.push(fresh_samples_);
 
   if (packed && options_.wide) {
     // A long record may hold more samples than one of 16 bits can: they go on in another one.
@@ -195,18 +206,18 @@ Result<bool> RescaledLog::pull() {
       put_samples(record);
       return true;
     }
-    if (activity || (record.is(gt3x::RecordType::event) && record.payload.size() == 1)) {
-      still_.break_run();
-    } else if (is_epoch(record)) {
+    if (is_epoch(record)) {
       ++tally_.epoch_records;
     } else if (record.is(gt3x::RecordType::parameters)) {
       const auto parameters = gt3x::parse_parameters(record.payload);
-      if (parameters && parameters->constants.has_value()) {
-        SIXPOINT_CHECK(set_constants(*parameters->constants));
+      if (parameters) {
+        SIXPOINT_CHECK(
+            set_source(parameters->constants ? parameters->constants : constants_,
+                       parameters->accel_scale_lsb_per_g.value_or(options_.accel_scale_lsb_per_g)));
       }
     }
-  } else if (item->kind != gt3x::LogItem::Kind::stray) {
-    still_.break_run();
+  } else if (options_.leave_out_damage && item->kind != gt3x::LogItem::Kind::stray) {
+    return true;
   }
   pending_.insert(pending_.end(), item->raw.begin(), item->raw.end());
   return true;
@@ -230,7 +241,5 @@ Result<std::size_t> RescaledLog::read(std::span<std::uint8_t> out) {
   }
   return done;
 }
-
-MagnitudeError RescaledLog::still_error() { return magnitude_error(still_.finish()); }
 
 }  // namespace sixpoint::repair

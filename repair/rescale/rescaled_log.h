@@ -26,8 +26,7 @@
 #include "gt3x/container/byte_source.h"
 #include "gt3x/log/log_reader.h"
 #include "gt3x/log/samples.h"
-#include "repair/triage/still_scan.h"
-#include "repair/triage/survey.h"
+#include "repair/rescale/still_windows.h"
 
 namespace sixpoint::repair {
 
@@ -36,8 +35,8 @@ struct RescaledLogOptions {
   std::optional<calib::Calibration> fresh;
   // The cross-axis terms that belong to them: xy, xz, yz. All zero: none.
   PerAxis<double> cross_axis{};
+  // Of the samples for which no PARAMETERS say it.
   double accel_scale_lsb_per_g = 256;
-  double rate_hz = 30;
   // Scales the samples that stand before the first PARAMETERS record.
   std::optional<StoredConstants> first_constants;
   bool undo_rotation = false;
@@ -45,15 +44,18 @@ struct RescaledLogOptions {
   bool wide = false;
   // The file holds counts beyond 12 bits: its own limit is that of ACTIVITY2.
   bool beyond_12_bits = false;
+  // Leaves out what is no good record: damage between records, and records whose checksum fails.
+  bool leave_out_damage = false;
   // The counts cannot have come from the constants: one affine map instead of the integers.
   bool affine = false;
   // JSON text of at most gt3x::kMaxPayload bytes, put before the first good record as METADATA of
   // that record's time. Empty: no mark.
   std::string mark;
-  // Bytes that will come out but for the mark, where they are known (Survey::log_bytes,
+  // Bytes that will come out at most, but for the mark, where they are known (Survey::log_bytes,
   // log_bytes_wide).
   std::optional<std::uint64_t> size;
-  calib::StillBlockOptions still;
+  // Where the input was still (Survey::blocks): still_error_mg() judges what came out there.
+  std::vector<StillWindow> still;
 };
 
 struct RescaledLogTally {
@@ -68,7 +70,7 @@ struct RescaledLogTally {
 
 class RescaledLog final : public gt3x::ByteSource {
  public:
-  // bad_data for a rate or a scale that cannot be.
+  // bad_data where the first constants are such that Eq. 1-3 cannot be used with them.
   static Result<std::unique_ptr<RescaledLog>> make(gt3x::LogReader log,
                                                    const RescaledLogOptions& options);
 
@@ -78,21 +80,30 @@ class RescaledLog final : public gt3x::ByteSource {
 
   // Complete after read() has answered 0.
   const RescaledLogTally& tally() const { return tally_; }
-  MagnitudeError still_error();  // of what came out, by its own scale; once
+  // Mean of |magnitude - 1 g| of what came out in the still windows, by its own scale; nothing
+  // without a window.
+  std::optional<double> still_error_mg() const { return still_.mean_mg(); }
 
  private:
-  RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options, StillScan still);
-  Status set_constants(const StoredConstants& constants);
+  RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options);
+  // What the samples from here on were made with.
+  Status set_source(const std::optional<StoredConstants>& constants, double accel_scale_lsb_per_g);
   Result<bool> pull();  // the next item into pending_; false at the end
   void put_mark(std::uint32_t unix_time);
   void put_samples(const gt3x::Record& record);
 
   gt3x::LogReader log_;
   RescaledLogOptions options_;
-  StillScan still_;
+  WindowError still_;
   std::optional<StoredConstants> constants_;
+  double accel_scale_lsb_per_g_;
   // By the constants that are undone; the log holds a few sets, whatever their order.
-  std::vector<std::pair<StoredConstants, calib::Rescale>> maps_;
+  struct Map {
+    StoredConstants undone;
+    double accel_scale_lsb_per_g = 0;
+    calib::Rescale rescale;
+  };
+  std::vector<Map> maps_;
   std::optional<std::size_t> map_;  // of maps_, in force
   bool marked_ = false;
   std::vector<gt3x::Counts> samples_;

@@ -46,19 +46,24 @@ class StillWatch {
   StillWatch(bool use_constants, std::vector<std::string>& warnings)
       : use_constants_(use_constants), warnings_(warnings) {}
 
-  Status start(double rate_hz, double scale) {
+  // `constants`: of the samples before any PARAMETERS (the old form).
+  Status start(double rate_hz, double scale, const std::optional<StoredConstants>& constants) {
     SIXPOINT_ASSIGN(auto made, StillScan::make(rate_hz, scale));
     scan_.emplace(std::move(made));
-    return {};
+    return constants && use_constants_ ? scan_->set_constants(*constants) : Status();
   }
 
-  void push(const gt3x::SampleItem& item, bool rotated) {
+  // `scale_lsb_per_g`: in force for these samples.
+  void push(const gt3x::SampleItem& item, double scale_lsb_per_g, bool rotated) {
     if (!scan_) {
       return;
     }
-    if (item.parameters != parameters_ && item.parameters != nullptr &&
-        item.parameters->constants && use_constants_) {
-      if (auto status = scan_->set_constants(*item.parameters->constants); !status) {
+    if (item.parameters != parameters_ && item.parameters != nullptr) {
+      Status status = scan_->set_scale(scale_lsb_per_g);
+      if (status && item.parameters->constants && use_constants_) {
+        status = scan_->set_constants(*item.parameters->constants);
+      }
+      if (!status) {
         warnings_.push_back("still periods cannot be judged: " + status.error().what);
         scan_.reset();
         return;
@@ -106,6 +111,8 @@ class StillWatch {
   std::vector<gt3x::Counts> turned_;
 };
 
+constexpr double kUsualScale_lsb_per_g = 256;
+
 void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& item,
                   const gt3x::Info& info, bool raw_counts) {
   if (found.samples == 0) {  // the first sample decides
@@ -122,9 +129,9 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
       found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
     }
     if (found.rate_hz.value_or(0) > 0 && (found.accel_scale_lsb_per_g || raw_counts)) {
-      constexpr double kUsualScale_lsb_per_g = 256;
       if (const Status started = still.start(
-              *found.rate_hz, found.accel_scale_lsb_per_g.value_or(kUsualScale_lsb_per_g));
+              *found.rate_hz, found.accel_scale_lsb_per_g.value_or(kUsualScale_lsb_per_g),
+              found.form == "gt3x_old" ? found.constants : std::nullopt);
           !started) {
         found.problem = started.error();
       }
@@ -141,14 +148,88 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
         found.end_s, item.unix_time + static_cast<double>(item.counts.size()) / *found.rate_hz);
   }
   const bool rotated = triage(found.facts).axes_rotated && !found.already_repaired;
-  still.push(item, rotated);
+  const auto scale_lsb_per_g =
+      raw_counts ? std::nullopt : gt3x::accel_scale_lsb_per_g(info, item.parameters);
+  still.push(item, scale_lsb_per_g.value_or(kUsualScale_lsb_per_g), rotated);
 }
 
-std::string time_or_dash(std::optional<std::uint32_t> unix_time) {
-  return unix_time ? to_iso8601(from_unix_seconds(*unix_time)) : "-";
+// What is irregular about the times, a line for each kind that was met.
+void add_time_warnings(Inspection& found) {
+  using enum gt3x::IrregularKind;
+  const auto warn = [&](gt3x::IrregularKind kind, const char* what) {
+    const auto& places = found.irregular.places;
+    const auto first = std::ranges::find(places, kind, &gt3x::Irregular::Place::kind);
+    if (first != places.end()) {
+      found.warnings.push_back(fmt::format("{} {}; the first at {}", found.irregular.count(kind),
+                                           what, gt3x::clock_time(found.clock, first->unix_time)));
+    }
+  };
+  warn(repeated, "records repeat a second");
+  warn(repeated_otherwise, "records repeat a second with other samples");
+  warn(out_of_order, "records stand behind later ones");
+  warn(late, "records come so late that their place is taken");
+  warn(odd_size, "records hold more or fewer samples than the rate");
+  warn(jump, "times leap by more than an hour, and nothing in the file says why");
 }
 
-void add_warnings(Inspection& found, const gt3x::SampleReader& reader, std::uint64_t steps_back) {
+// Where PARAMETERS and info.txt, or two PARAMETERS, say two things.
+class HeaderCheck {
+ public:
+  explicit HeaderCheck(Inspection& found) : found_(found) {}
+
+  void run(const gt3x::Info& info, const gt3x::SampleReader& reader) {
+    std::optional<double> rate_hz = info.sample_rate_hz();
+    std::optional<double> scale_lsb_per_g = info.accel_scale_lsb_per_g();
+    std::string firmware = info.firmware();
+    std::string before = "info.txt";
+    for (const auto& set : reader.parameter_sets()) {
+      const auto rate = set->parameters.values.find(gt3x::kParameterSampleRate);
+      if (rate != set->parameters.values.end()) {
+        compare("a sample rate of", "Hz", rate_hz, static_cast<double>(rate->second), before, *set,
+                "info.txt holds");
+      }
+      if (set->parameters.accel_scale_lsb_per_g) {
+        compare("an acceleration scale of", "LSB/g", scale_lsb_per_g,
+                *set->parameters.accel_scale_lsb_per_g, before, *set,
+                "PARAMETERS hold, from there on");
+      }
+      if (set->parameters.firmware) {
+        if (!firmware.empty() &&
+            parse_firmware(firmware) != parse_firmware(*set->parameters.firmware)) {
+          say(fmt::format("firmware {}", firmware), *set->parameters.firmware, before, *set,
+              "what the samples were made by is not known");
+        }
+        firmware = *set->parameters.firmware;
+      }
+      before = "the PARAMETERS record before";
+    }
+  }
+
+ private:
+  void compare(const char* what, const char* unit, std::optional<double>& known, double value,
+               const std::string& before, const gt3x::ParameterSet& set, const char* holds) {
+    if (known && *known != value) {
+      say(fmt::format("{} {} {}", what, *known, unit), fmt::format("{}", value), before, set,
+          holds);
+    }
+    known = value;
+  }
+
+  void say(const std::string& what, const std::string& other, const std::string& before,
+           const gt3x::ParameterSet& set, const char* holds) {
+    constexpr int kMostSaid = 10;
+    if (++said_ <= kMostSaid) {
+      found_.warnings.push_back(fmt::format("{} says {}, PARAMETERS of {} say {}; {}", before, what,
+                                            gt3x::clock_time(found_.clock, set.unix_time), other,
+                                            holds));
+    }
+  }
+
+  Inspection& found_;
+  int said_ = 0;
+};
+
+void add_warnings(Inspection& found, const gt3x::SampleReader& reader) {
   const auto warn = [&](std::string text) { found.warnings.push_back(std::move(text)); };
   const gt3x::LogStatistics& log = reader.statistics();
   if (log.checksum_failures > 0) {
@@ -160,6 +241,9 @@ void add_warnings(Inspection& found, const gt3x::SampleReader& reader, std::uint
       warn(fmt::format("... {} damaged stretches in all", log.damaged_stretches));
       break;
     }
+    const auto time_or_dash = [&](std::optional<std::uint32_t> unix_time) {
+      return unix_time ? gt3x::clock_time(found.clock, *unix_time) : "-";
+    };
     warn(fmt::format("{} bytes at {} are damaged, between {} and {}", loss.bytes, loss.offset,
                      time_or_dash(loss.time_before), time_or_dash(loss.time_after)));
   }
@@ -180,9 +264,7 @@ void add_warnings(Inspection& found, const gt3x::SampleReader& reader, std::uint
       break;
     }
   }
-  if (steps_back > 0) {
-    warn(fmt::format("the time does not go forward at {} records", steps_back));
-  }
+  add_time_warnings(found);
 }
 
 Error bad_recording(const std::string& path, const char* what, const char* hint) {
@@ -194,8 +276,9 @@ Error without_rate(const std::string& path) {
                        "download the recording from the unit again");
 }
 
-Result<Inspection> inspect_recording(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
+                                     const gt3x::RecordingOptions& how) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path, how));
   const gt3x::Info& info = recording.info();
   Inspection found;
   found.form = recording.has_log() ? "gt3x" : "gt3x_old";
@@ -220,10 +303,18 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path)
     }
   }
 
+  if (!recording.has_log()) {
+    if (const auto memory = unit_memory(recording)) {
+      found.constants = memory->constants;
+      found.facts.calibration_time = memory->calibration_time;
+    } else {
+      found.warnings.push_back("there are no constants: " + memory.error().what);
+    }
+  }
+
   // A repaired file keeps its PARAMETERS, but its counts come from other constants.
   StillWatch still(!found.already_repaired, found.warnings);
   gt3x::SampleReader reader(recording);
-  std::uint64_t steps_back = 0;
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
     if (!item) {
@@ -238,10 +329,14 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path)
       found.form = "agdc";
     }
     const bool raw_counts = found.form == "agdc" && !(agdc && agdc->already_applied);
-    steps_back += item->broke_order ? 1 : 0;
     take_samples(found, still, *item, info, raw_counts);
   }
   found.log = reader.statistics();
+  found.irregular = reader.irregular();
+  found.clock = reader.clock();
+  if (const auto start = info.start(); start && found.start) {
+    found.first_after_start_s = std::int64_t{*found.start} - to_unix_seconds(*start);
+  }
   if (found.form != "agdc" || agdc) {
     found.still = still.finish(agdc && !agdc->already_applied ? &*agdc : nullptr);
   }
@@ -256,7 +351,16 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path)
   if (found.problem) {
     found.problem->where = path;
   }
-  add_warnings(found, reader, steps_back);
+  add_warnings(found, reader);
+  if (recording.bytes_behind() > 0) {
+    found.warnings.push_back(
+        fmt::format("{} bytes stand behind the end of the archive; they are ignored",
+                    recording.bytes_behind()));
+  }
+  HeaderCheck(found).run(info, reader);
+  if (how.salvage) {
+    SIXPOINT_ASSIGN(found.losses, gt3x::salvage_losses(recording, found.log));
+  }
   if (found.rate_hz.value_or(0) <= 0) {
     found.problem = without_rate(path);
   } else if (found.samples == 0) {
@@ -280,8 +384,9 @@ Result<Inspection> inspect_agd(const std::string& path) {
 
 double Inspection::duration_s() const { return start ? std::max(0.0, end_s - *start) : 0; }
 
-Result<Inspection> inspect(FileSystem& files, const std::string& path) {
-  return has_ending(path, ".agd") ? inspect_agd(path) : inspect_recording(files, path);
+Result<Inspection> inspect(FileSystem& files, const std::string& path,
+                           const gt3x::RecordingOptions& how) {
+  return has_ending(path, ".agd") ? inspect_agd(path) : inspect_recording(files, path, how);
 }
 
 }  // namespace sixpoint::repair

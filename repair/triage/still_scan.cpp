@@ -26,11 +26,26 @@ StillScan::StillScan(double rate_hz, double accel_scale, const calib::StillBlock
 Result<StillScan> StillScan::make(double rate_hz, double accel_scale_lsb_per_g,
                                   const calib::StillBlockOptions& options) {
   StillScan scan(rate_hz, accel_scale_lsb_per_g, options);
-  SIXPOINT_ASSIGN(auto raw_counts, calib::Reversal::of_raw_counts(accel_scale_lsb_per_g,
-                                                                  calib::RecordWidth::bits12));
-  scan.raw_counts_ = std::make_unique<const calib::Reversal>(std::move(raw_counts));
-  SIXPOINT_CHECK(scan.start(*scan.raw_counts_));
+  SIXPOINT_CHECK(scan.start_raw_counts());
   return scan;
+}
+
+Status StillScan::start_raw_counts() {
+  for (const auto& known : raw_counts_) {
+    if (known->accel_scale_lsb_per_g() == accel_scale_) {
+      return start(*known);
+    }
+  }
+  if (raw_counts_.size() == kMaxSetsOfConstants) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the recording holds more than {} different acceleration scales",
+                            kMaxSetsOfConstants),
+                {}, "no unit changes them so often; download the recording from the unit again");
+  }
+  SIXPOINT_ASSIGN(auto made,
+                  calib::Reversal::of_raw_counts(accel_scale_, calib::RecordWidth::bits12));
+  raw_counts_.push_back(std::make_unique<const calib::Reversal>(std::move(made)));
+  return start(*raw_counts_.back());
 }
 
 Status StillScan::start(const calib::Reversal& reversal) {
@@ -43,7 +58,7 @@ Status StillScan::start(const calib::Reversal& reversal) {
 
 Result<const calib::Reversal*> StillScan::reversal_of(const StoredConstants& constants) {
   for (const auto& [known, reversal] : reversals_) {
-    if (known == constants) {
+    if (known == constants && reversal->accel_scale_lsb_per_g() == accel_scale_) {
       return reversal.get();
     }
   }
@@ -67,6 +82,17 @@ Status StillScan::set_constants(const StoredConstants& constants) {
   SIXPOINT_CHECK(start(*reversal));
   constants_ = constants;
   return {};
+}
+
+Status StillScan::set_scale(double accel_scale_lsb_per_g) {
+  if (accel_scale_ == accel_scale_lsb_per_g) {
+    return {};
+  }
+  accel_scale_ = accel_scale_lsb_per_g;
+  if (!constants_) {
+    return start_raw_counts();
+  }
+  return set_constants(*std::exchange(constants_, std::nullopt));
 }
 
 void StillScan::push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples) {
@@ -109,6 +135,9 @@ void StillScan::close_finder() {
 void StillScan::append(std::vector<calib::StillBlock> blocks) {
   if (blocks.empty()) {
     return;
+  }
+  for (calib::StillBlock& block : blocks) {
+    block.first_sample += tally_.samples;  // of the finders before
   }
   if (blocks_.empty()) {
     blocks_ = std::move(blocks);

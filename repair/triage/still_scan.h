@@ -46,6 +46,10 @@ class StillScan {
   // for constants that Eq. 1-3 cannot be used with, and for one set more than kMaxSetsOfConstants.
   Status set_constants(const StoredConstants& constants);
 
+  // From here on so many LSB make one g; the same again changes nothing. bad_data for a scale that
+  // cannot be, and as set_constants().
+  Status set_scale(double accel_scale_lsb_per_g);
+
   // One record's samples in the firmware's order of axes, right way round; X Y Z.
   void push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples);
   void break_run();
@@ -65,6 +69,7 @@ class StillScan {
  private:
   StillScan(double rate_hz, double accel_scale, const calib::StillBlockOptions& options);
   Status start(const calib::Reversal& reversal);
+  Status start_raw_counts();
   Result<const calib::Reversal*> reversal_of(const StoredConstants& constants);
   void close_finder();
   void append(std::vector<calib::StillBlock> blocks);
@@ -76,8 +81,9 @@ class StillScan {
   std::optional<StoredConstants> constants_;
   // By the constants that are undone; at fixed addresses, because the finder keeps a pointer.
   std::vector<std::pair<StoredConstants, std::unique_ptr<const calib::Reversal>>> reversals_;
-  std::unique_ptr<const calib::Reversal> raw_counts_;  // until constants are set
-  const calib::Reversal* reversal_ = nullptr;          // of the finder
+  // Until constants are set: one for each scale.
+  std::vector<std::unique_ptr<const calib::Reversal>> raw_counts_;
+  const calib::Reversal* reversal_ = nullptr;  // of the finder
   std::optional<calib::StillBlockFinder> finder_;
   std::optional<std::uint32_t> last_time_;
   std::optional<double> temperature_c_;

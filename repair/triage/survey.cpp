@@ -7,10 +7,12 @@
 
 #include "gt3x/container/byte_source.h"
 #include "gt3x/forms/agdc.h"
+#include "gt3x/forms/clock.h"
 #include "gt3x/forms/model.h"
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
+#include "gt3x/sample_reader.h"
 
 namespace sixpoint::repair {
 
@@ -37,6 +39,20 @@ Result<bool> carries_repair_mark(gt3x::Recording& recording) {
       return is_repair_mark(item->record);
     }
   }
+}
+
+Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording) {
+  SIXPOINT_ASSIGN(const auto source, recording.open_entry("eeprom.bin"));
+  SIXPOINT_ASSIGN(const Bytes bytes, gt3x::read_all(*source, 1U << 20U));
+  SIXPOINT_ASSIGN(auto memory, gt3x::parse_eeprom(bytes));
+  const std::string serial = recording.info().serial();
+  if (!memory.serial.empty() && memory.serial != serial) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("eeprom.bin is of {}, the recording of {}",
+                            printable(memory.serial, 16), printable(serial, 16)),
+                recording.path(), "download the recording from the unit again");
+  }
+  return memory;
 }
 
 namespace {
@@ -120,6 +136,61 @@ Error no_constants(std::string what, const std::string& path, std::string hint) 
   return {ErrorCode::bad_data, std::move(what), path, std::move(hint)};
 }
 
+// activity.bin: samples without records, and constants in the image of the unit's memory.
+Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOptions& options,
+                       Survey& result) {
+  const auto scale = gt3x::accel_scale_lsb_per_g(recording.info(), nullptr);
+  result.accel_scale_known = scale.has_value();
+  result.accel_scale_lsb_per_g = scale.value_or(kUsualScale_lsb_per_g);
+  result.header_scale_lsb_per_g = result.accel_scale_lsb_per_g;
+  SIXPOINT_ASSIGN(auto still,
+                  StillScan::make(result.rate_hz, result.accel_scale_lsb_per_g, options));
+  if (const auto memory = unit_memory(recording)) {
+    result.facts.calibration_time = memory->calibration_time;
+    if (result.facts.firmware.empty()) {
+      result.facts.firmware = memory->firmware;
+    } else if (!memory->firmware.empty() &&
+               parse_firmware(memory->firmware) != parse_firmware(result.facts.firmware)) {
+      result.facts.other_firmware = memory->firmware;
+    }
+    if (auto status = still.set_constants(memory->constants); status) {
+      result.constants.push_back(memory->constants);
+    } else {
+      result.constants_problem = status.error();
+    }
+  } else {
+    result.constants_problem = memory.error();
+  }
+  gt3x::SampleReader reader(recording);
+  while (true) {
+    SIXPOINT_ASSIGN(const auto item, reader.next());
+    if (!item) {
+      break;
+    }
+    if (item->kind != gt3x::SampleItem::Kind::recorded) {
+      still.break_run();
+      continue;
+    }
+    result.samples += item->counts.size();
+    result.clipped_samples += static_cast<std::uint64_t>(std::ranges::count_if(
+        item->counts, [&](const gt3x::Counts& sample) { return item->clipped(sample); }));
+    still.push(item->unix_time, item->counts);
+  }
+  result.blocks = still.finish();
+  result.plausibility = still.plausibility();
+  result.still_tally = still.tally();
+  result.magnitude = magnitude_error(result.blocks);
+  result.duration_s = static_cast<double>(result.samples) / result.rate_hz;
+  if (result.samples == 0) {
+    result.constants_problem =
+        no_constants("the recording holds no samples", recording.path(),
+                     "it can be neither solved nor repaired; download it from the unit again");
+  } else if (result.constants_problem) {
+    result.constants_problem->where = recording.path();
+  }
+  return {};
+}
+
 // One pass over the log of a recording.
 class LogSurvey {
  public:
@@ -157,8 +228,9 @@ class LogSurvey {
     if (first.has_value()) {
       take_parameters(*first, result_.facts);
     }
+    scale_lsb_per_g_ = result_.header_scale_lsb_per_g;
     rotated_ = triage(result_.facts).axes_rotated && !result_.already_repaired;
-    SIXPOINT_ASSIGN(still_, make_scan(result_.accel_scale_lsb_per_g, options_));
+    SIXPOINT_ASSIGN(still_, make_scan(result_.header_scale_lsb_per_g, options_));
     if (first.has_value()) {
       use_constants(*first);
     }
@@ -175,6 +247,8 @@ class LogSurvey {
     }
     result_.accel_scale_known = scale.has_value();
     result_.accel_scale_lsb_per_g = scale.value_or(kUsualScale_lsb_per_g);
+    result_.header_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(recording_.info(), nullptr)
+                                         .value_or(result_.accel_scale_lsb_per_g);
     const auto replaced = [&](const char* where, const std::string& value) {
       result_.notes.push_back(
           fmt::format("{} gives an acceleration scale of {}, which no unit has: {} LSB/g was used",
@@ -211,11 +285,29 @@ class LogSurvey {
     }
   }
 
+  void use_scale(const gt3x::Parameters& parameters) {
+    const double scale_lsb_per_g =
+        parameters.accel_scale_lsb_per_g.value_or(result_.header_scale_lsb_per_g);
+    if (auto status = still_->set_scale(scale_lsb_per_g); !status) {
+      result_.constants_problem = status.error();
+      result_.constants_problem->where = recording_.path();
+    }
+    constexpr std::size_t kMostNotes = 20;
+    if (result_.samples > 0 && scale_lsb_per_g != scale_lsb_per_g_ &&
+        result_.notes.size() < kMostNotes) {
+      result_.notes.push_back(
+          fmt::format("the acceleration scale changes within the recording, from {} to {} LSB/g",
+                      scale_lsb_per_g_, scale_lsb_per_g));
+    }
+    scale_lsb_per_g_ = scale_lsb_per_g;
+  }
+
   Status take(const gt3x::Record& record) {
     // A one-byte payload in place of samples is a USB event.
     const bool has_samples = record.payload.size() > 1;
     if (record.is(gt3x::RecordType::parameters)) {
       if (const auto parameters = gt3x::parse_parameters(record.payload)) {
+        use_scale(*parameters);
         use_constants(*parameters);
       }
     } else if (record.is(gt3x::RecordType::activity) || record.is(gt3x::RecordType::activity2)) {
@@ -334,6 +426,7 @@ class LogSurvey {
   const calib::StillBlockOptions& options_;
   Survey& result_;
   bool rotated_ = false;
+  double scale_lsb_per_g_ = 0;  // in force
   std::optional<StillScan> still_;
   std::optional<StillScan> raw_still_;  // of raw counts (.agdc)
   std::optional<StillScan> raw_resting_;
@@ -346,7 +439,11 @@ class LogSurvey {
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
   FileFacts facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
-  if (recording.has_log()) {
+  if (!recording.has_log()) {
+    if (const auto memory = unit_memory(recording)) {
+      facts.calibration_time = memory->calibration_time;
+    }
+  } else {
     SIXPOINT_ASSIGN(const auto first, first_parameters(recording));
     if (first) {
       take_parameters(*first, facts);
@@ -356,25 +453,42 @@ Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
 }
 
 Result<Survey> survey(FileSystem& files, const std::string& path,
-                      const calib::StillBlockOptions& options) {
-  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+                      const calib::StillBlockOptions& options, const gt3x::RecordingOptions& how) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path, how));
   Survey result;
   result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
   result.model = gt3x::model_of(result.facts.serial);
   SIXPOINT_ASSIGN(result.already_repaired, carries_repair_mark(recording));
   result.rate_hz = recording.info().sample_rate_hz().value_or(0);
-  if (!recording.has_log()) {
-    result.constants_problem =
-        no_constants("the recording has the old form (activity.bin), which holds no constants",
-                     path, "only recordings with a log.bin can be worked on");
-    return result;
-  }
   if (result.rate_hz <= 0) {
     return fail(ErrorCode::bad_data, "info.txt gives no sample rate above 0", path,
                 "download the recording from the unit again");
   }
-  SIXPOINT_CHECK(LogSurvey(recording, options, result).run());
+  if (recording.has_log()) {
+    SIXPOINT_CHECK(LogSurvey(recording, options, result).run());
+  } else {
+    SIXPOINT_CHECK(survey_old_form(recording, options, result));
+  }
+  if (how.salvage) {
+    SIXPOINT_ASSIGN(result.losses, gt3x::salvage_losses(recording, result.log));
+  }
   return result;
+}
+
+nlohmann::ordered_json losses_to_json(const std::vector<gt3x::SalvageLoss>& losses) {
+  using Json = nlohmann::ordered_json;
+  const auto time = [](std::optional<std::uint32_t> unix_time) {
+    return unix_time ? Json(gt3x::clock_time({}, *unix_time)) : Json(nullptr);
+  };
+  Json list = Json::array();
+  for (const gt3x::SalvageLoss& loss : losses) {
+    list.push_back({{"kind", gt3x::to_string(loss.kind)},
+                    {"entry", loss.entry.empty() ? Json(nullptr) : Json(loss.entry)},
+                    {"from", time(loss.from)},
+                    {"to", time(loss.to)},
+                    {"why", loss.why}});
+  }
+  return list;
 }
 
 }  // namespace sixpoint::repair

@@ -13,13 +13,17 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "base/constants.h"
 #include "base/env.h"
 #include "calib/still_blocks.h"
+#include "gt3x/forms/eeprom.h"
 #include "gt3x/log/log_reader.h"
 #include "gt3x/log/record.h"
 #include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
+#include "gt3x/salvage_losses.h"
 #include "repair/triage/still_scan.h"
 #include "repair/triage/triage.h"
 
@@ -43,9 +47,13 @@ struct Survey {
   FileFacts facts;
   std::string model;
   double rate_hz = 0;
+  // Of the first PARAMETERS, else as below. Where others come later, each holds for the samples
+  // behind it (gt3x::accel_scale_lsb_per_g, which `export` follows too).
   double accel_scale_lsb_per_g = 0;
   bool accel_scale_known = false;  // false: 256 was assumed
-  bool already_repaired = false;   // a mark is there: the zip entry or the record in the log
+  // Where no PARAMETERS say it: info.txt, else the model, else the one above.
+  double header_scale_lsb_per_g = 0;
+  bool already_repaired = false;  // a mark is there: the zip entry or the record in the log
   // What had to be assumed, a sentence each: a scale that cannot be and was replaced.
   std::vector<std::string> notes;
   // The constants that were in force for at least one sample, in order; usually one set.
@@ -66,6 +74,7 @@ struct Survey {
   std::uint64_t log_bytes_wide = 0;  // with every ACTIVITY record written as ACTIVITY2 records
   bool beyond_12_bits = false;       // a count outside [-2048, 2047], in ACTIVITY2 records
   gt3x::LogStatistics log;
+  std::vector<gt3x::SalvageLoss> losses;  // with the option salvage
 
   std::vector<calib::StillBlock> blocks;
   // Of a recording with temperatures: also the blocks at rest while something hums (a climate
@@ -77,13 +86,21 @@ struct Survey {
   double duration_s = 0;     // samples over rate
 };
 
+// What eeprom.bin of a recording of the old form says; bad_data where there is none, or another
+// unit's.
+Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording);
+
 // Only what the header and the first PARAMETERS record say; reads no further.
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path);
 
 // no_input, bad_data (no zip, damaged entry ...), as gt3x::Recording and LogReader have it;
-// bad_data also for a sample rate of 0 and for files of other forms than log.bin with ACTIVITY
-// records.
+// bad_data also for a sample rate of 0. Of the old form (activity.bin) the constants are those in
+// eeprom.bin; without them its still periods are found all the same.
 Result<Survey> survey(FileSystem& files, const std::string& path,
-                      const calib::StillBlockOptions& options = {});
+                      const calib::StillBlockOptions& options = {},
+                      const gt3x::RecordingOptions& how = {});
+
+// [{kind, entry, from, to, why}], times by the file's clock, no zone; null for what is not known.
+nlohmann::ordered_json losses_to_json(const std::vector<gt3x::SalvageLoss>& losses);
 
 }  // namespace sixpoint::repair

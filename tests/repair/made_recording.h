@@ -111,6 +111,41 @@ struct MadeRecording {
   }
 };
 
+// The log of `made` (12 bits, no noise between the records), whose second half comes at twice the
+// acceleration scale, which PARAMETERS before it say.
+inline Bytes log_of_two_scales(const MadeRecording& made) {
+  Bytes bytes;
+  const std::size_t half = made.raw.size() / made.rate_hz / 2 * made.rate_hz;
+  for (const double scale : {256.0, 512.0}) {
+    gt3x::ParameterValues values;
+    gt3x::set_constants(values, made.constants);
+    values[gt3x::kParameterCalibrationTime] = static_cast<std::uint32_t>(made.calibrated);
+    values[gt3x::kParameterAccelScale] = gt3x::encode_float(scale);
+    const std::size_t begin = scale < 512 ? 0 : half;
+    const std::size_t end = scale < 512 ? half : made.raw.size();
+    const auto time = made.start + static_cast<std::uint32_t>(begin / made.rate_hz);
+    gt3x::append_record(bytes, gt3x::RecordType::parameters, time, gt3x::encode_parameters(values));
+    for (std::size_t i = begin; i < end; i += made.rate_hz) {
+      std::vector<gt3x::Counts> second;
+      for (std::size_t k = i; k < std::min<std::size_t>(i + made.rate_hz, end); ++k) {
+        gt3x::Counts counts{};
+        for (std::size_t a = 0; a < 3; ++a) {
+          const double g = 2.0 * (made.raw[k][a] - made.constants.zero_lsb[a]) /
+                           (made.constants.positive_lsb[a] - made.constants.negative_lsb[a]);
+          counts[a] =
+              static_cast<std::int16_t>(std::fmax(-2048, std::fmin(2047, std::round(g * scale))));
+        }
+        second.push_back(counts);
+      }
+      Bytes payload;
+      gt3x::append_activity(payload, second);
+      gt3x::append_record(bytes, gt3x::RecordType::activity,
+                          made.start + static_cast<std::uint32_t>(i / made.rate_hz), payload);
+    }
+  }
+  return bytes;
+}
+
 inline Bytes entry_of(FileSystem& files, const std::string& path, const std::string& name) {
   auto recording = gt3x::Recording::open(files, path);
   if (!recording) {

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "base/sha256.h"
 #include "expect_result.h"
+#include "gt3x/made_archive.h"
+#include "repair/rescale/repair_mark.h"
 #include "repair/six_sides.h"
 #include "shared_data.h"
 
@@ -479,6 +482,76 @@ TEST_F(RepairFile, RealUnitRoundTrip) {
   EXPECT_EQ(report.status, RepairStatus::repaired) << report.to_json().dump(1);
   EXPECT_NEAR(report.still_error_before_mg.value(), report.still_error_after_mg.value(), 1e-9);
   EXPECT_GT(report.still_error_before_mg.value(), 64) << "the paper's limit";
+}
+
+// A recording of two entries and one damaged record in the middle of its log, cut before its list.
+Bytes damaged_recording(const Bytes& log, const std::string& info) {
+  const gt3x::tests::MadeArchive made({{"notes/extra.bin", Bytes{1, 2, 3}},
+                                       {"info.txt", Bytes(info.begin(), info.end())},
+                                       {"log.bin", log}});
+  Bytes bytes(made.bytes.begin(),
+              made.bytes.begin() + static_cast<std::ptrdiff_t>(made.list_offset));
+  bytes[made.data_offsets[2] + log.size() / 2] ^= 0x40U;
+  return bytes;
+}
+
+TEST_F(RepairFile, SalvageWritesAWholeFileAndBothMarksStateTheLoss) {
+  const MadeRecording made = six_sides();
+  ASSERT_OK(made.write(memory_.files, "whole.gt3x"));
+  const Bytes info = entry_of(memory_.files, "whole.gt3x", "info.txt");
+  const Bytes damaged = damaged_recording(made.log(), std::string(as_text(info)));
+  ASSERT_OK(write_file(memory_.files, "in.gt3x", as_text(damaged)));
+  EXPECT_NE(expect_bad_data(), "");
+  RepairOptions options;
+  options.salvage = true;
+  const RepairReport report = repair(options);
+  ASSERT_EQ(report.status, RepairStatus::repaired) << report.to_json().dump(1);
+  EXPECT_EQ(read_file(memory_.files, "in.gt3x").value(), damaged) << "the original was touched";
+  EXPECT_GE(report.losses.size(), 3U);  // the list, the CRC, the record
+  // The output is whole: it is read without the option, and what is missing is one second.
+  const auto repaired = survey(memory_.files, "out.gt3x");
+  ASSERT_OK(repaired);
+  EXPECT_EQ(repaired->samples, made.raw.size() - made.rate_hz);
+  EXPECT_EQ(repaired->log.checksum_failures + repaired->log.damaged_stretches, 0U);
+  EXPECT_LT(repaired->magnitude.mean_mg, 2);
+  EXPECT_EQ(entry_of(memory_.files, "out.gt3x", "notes/extra.bin"), (Bytes{1, 2, 3}));
+  const auto mark = mark_in(memory_.files, "out.gt3x").value();
+  ASSERT_EQ(mark["losses"].size(), report.losses.size());
+  EXPECT_NE(mark["losses"].back()["from"], nullptr);
+  const Bytes log = entry_of(memory_.files, "out.gt3x", "log.bin");
+  gt3x::LogReader reader(std::make_unique<gt3x::MemorySource>(log));
+  const auto record = nlohmann::ordered_json::parse(as_text(reader.next().value()->record.payload));
+  EXPECT_EQ(record["MetadataType"], kRepairMarkType);
+  EXPECT_EQ(record["InputSha256"], to_hex(sha256(damaged)));
+  EXPECT_EQ(record["LossCount"], report.losses.size());
+  EXPECT_EQ(record["Losses"].back()["why"], mark["losses"].back()["why"]);
+  options.resume = true;
+  EXPECT_TRUE(repair(options).resumed);
+}
+
+TEST_F(RepairFile, SalvageWritesAFileThatNeedsNoRepairAndDoesNotCallItRepaired) {
+  MadeRecording made = six_sides();
+  made.firmware = "1.8.0";
+  ASSERT_OK(made.write(memory_.files, "whole.gt3x"));
+  const Bytes info = entry_of(memory_.files, "whole.gt3x", "info.txt");
+  ASSERT_OK(write_file(memory_.files, "in.gt3x",
+                       as_text(damaged_recording(made.log(), std::string(as_text(info))))));
+  RepairOptions options;
+  options.salvage = true;
+  const RepairReport report = repair(options);
+  ASSERT_EQ(report.status, RepairStatus::not_affected) << report.to_json().dump(1);
+  EXPECT_EQ(report.method, "salvage");
+  EXPECT_EQ(report.output, "out.gt3x");
+  const auto written = survey(memory_.files, "out.gt3x");
+  ASSERT_OK(written);
+  EXPECT_FALSE(written->already_repaired);
+  EXPECT_EQ(written->samples, made.raw.size() - made.rate_hz);
+  EXPECT_FALSE(entry_of(memory_.files, "out.gt3x", kSalvageMark).empty());
+  EXPECT_EQ(mark_in(memory_.files, "out.gt3x").value()["losses"].size(), report.losses.size());
+  options.resume = true;
+  const RepairReport again = repair(options);
+  EXPECT_TRUE(again.resumed);
+  EXPECT_EQ(again.status, RepairStatus::not_affected);
 }
 
 }  // namespace

@@ -47,6 +47,7 @@ TEST(RescaledLog, SmallPiecesGiveTheSameBytes) {
   const Bytes expected = gt3x::read_all(*whole, 1U << 20).value();
   EXPECT_EQ(expected.size(), log.size());
   EXPECT_NE(expected, log);
+  options.still = {{0, 120}};
   auto pieces = RescaledLog::make(reader_of(log), options).value();
   Bytes got;
   Bytes piece(7);
@@ -54,7 +55,8 @@ TEST(RescaledLog, SmallPiecesGiveTheSameBytes) {
     got.insert(got.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(count));
   }
   EXPECT_EQ(got, expected);
-  EXPECT_LT(pieces->still_error().mean_mg, 5) << "at rest the right constants give 1 g";
+  ASSERT_TRUE(pieces->still_error_mg());
+  EXPECT_LT(*pieces->still_error_mg(), 5) << "at rest the right constants give 1 g";
 }
 
 TEST(RescaledLog, TheMarkStandsBeforeTheFirstRecordAndTheRestIsAsItWas) {
@@ -157,6 +159,41 @@ TEST(RescaledLog, RefusesConstantsThatDivideByZero) {
   options.fresh = tests::kTrue;
   options.first_constants = StoredConstants{{1, 1, 1}, {1, 1, 1}, {0, 0, 0}};
   EXPECT_FALSE(RescaledLog::make(reader_of(Bytes{}), options));
+}
+
+// Where PARAMETERS change the scale, counts go out at the scale at which they came in.
+TEST(RescaledLog, FollowsTheAccelerationScaleInForce) {
+  const tests::MadeRecording made = tests::six_sides();
+  RescaledLogOptions options;
+  options.fresh = tests::kTrue;
+  options.first_constants = tests::kStored;
+  for (const int side : {0, 1, 2, 4, 5}) {  // the scale changes while it lies on the fourth
+    options.still.push_back({static_cast<std::uint64_t>(side) * 300 + 90, 120});
+  }
+  auto rescaled = RescaledLog::make(reader_of(tests::log_of_two_scales(made)), options).value();
+  const Bytes out = gt3x::read_all(*rescaled, 1U << 20).value();
+  ASSERT_TRUE(rescaled->still_error_mg());
+  EXPECT_LT(*rescaled->still_error_mg(), 5);
+  // The last second of the second half, sample by sample, by the formula.
+  auto log = reader_of(out);
+  std::vector<gt3x::Counts> last;
+  for (auto item = log.next(); item && *item; item = log.next()) {
+    if ((*item)->record.is(gt3x::RecordType::activity)) {
+      gt3x::unpack_activity((*item)->record.payload, last);
+    }
+  }
+  ASSERT_EQ(last.size(), 30U);
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    const PerAxis<int>& raw = made.raw[made.raw.size() - 30 + i];
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const double g = tests::kTrue.sensitivity_g_per_lsb[a] * (raw[a] - tests::kTrue.zero_lsb[a]);
+      const double stored_g = 2.0 * (raw[a] - tests::kStored.zero_lsb[a]) /
+                              (tests::kStored.positive_lsb[a] - tests::kStored.negative_lsb[a]);
+      if (std::abs(g * 512) < 2040 && std::abs(stored_g * 512) < 2040) {
+        EXPECT_NEAR(last[i][a], g * 512, 1.6) << i << " axis " << a;
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -251,12 +251,58 @@ TEST(Inspection, WarnsOfParametersThatDoNotSuffice) {
               ElementsAre(HasSubstr("1 PARAMETERS records cannot be read")));
 }
 
-TEST(Inspection, WarnsOfTimeThatGoesBack) {
+TEST(Inspection, SaysWhatIsIrregularAboutTheTimes) {
   Bytes log = made_log(3);
+  append_second(log, 1);  // repeated
+  append_second(log, 4);
+  append_second(log, 3);        // out of order
+  append_second(log, 5, 31);    // one sample too many
+  append_second(log, 300'000);  // a leap
+  append_usb(log, 300'001);
+  append_second(log, 300'001);  // a one-byte record and samples
+  const Inspection found = inspected(log);
+  EXPECT_EQ(found.irregular.repeated_seconds(), 1U);
+  EXPECT_EQ(found.irregular.records_out_of_order(), 1U);
+  EXPECT_EQ(found.irregular.count(gt3x::IrregularKind::odd_size), 1U);
+  EXPECT_EQ(found.irregular.count(gt3x::IrregularKind::jump), 1U);
+  EXPECT_EQ(found.irregular.count(gt3x::IrregularKind::usb_and_samples), 1U);
+  EXPECT_EQ(found.samples, 8U * 30 + 1) << "each second once";
+  EXPECT_THAT(gaps_of(found), ElementsAre("unexplained 6+299994"));
+  EXPECT_THAT(found.warnings,
+              ElementsAre("1 records repeat a second; the first at 2015-04-09T14:04:01",
+                          "1 records stand behind later ones; the first at 2015-04-09T14:04:03",
+                          HasSubstr("more or fewer samples than the rate"),
+                          HasSubstr("leap by more than an hour")));
+}
+
+TEST(Inspection, SaysHowFarTheFirstSampleIsFromTheStart) {
+  EXPECT_EQ(inspected(made_log(2)).first_after_start_s, 0);
+  Bytes shifted;
+  append_second(shifted, 1);
+  EXPECT_EQ(inspected(shifted).first_after_start_s, 1);
+  EXPECT_FALSE(inspected(shifted, "Sample Rate: 30\r\n").first_after_start_s);
+}
+
+// What info.txt and PARAMETERS say, and two PARAMETERS.
+TEST(Inspection, SaysWhereTheHeadersDisagree) {
+  auto values = made_parameters();
+  values[gt3x::kParameterSampleRate] = 100;
+  values[gt3x::kParameterAccelScale] = gt3x::encode_float(341);
+  values[gt3x::kParameterFirmwareVersion] = 0x01060000;
+  Bytes log;
+  append_record(log, RecordType::parameters, kStart - 1, gt3x::encode_parameters(values));
+  append_second(log, 0);
+  EXPECT_THAT(inspected(log).warnings,
+              ElementsAre(HasSubstr("info.txt says a sample rate of 30 Hz, PARAMETERS of "
+                                    "2015-04-09T14:03:59 say 100; info.txt holds"),
+                          HasSubstr("an acceleration scale of 256 LSB/g, PARAMETERS of"),
+                          HasSubstr("firmware 1.5.0")));
+  values[gt3x::kParameterAccelScale] = gt3x::encode_float(256);
+  append_record(log, RecordType::parameters, kStart + 1, gt3x::encode_parameters(values));
   append_second(log, 1);
-  append_second(log, 2);
-  append_second(log, 2);
-  EXPECT_THAT(inspected(log).warnings, ElementsAre("the time does not go forward at 2 records"));
+  EXPECT_THAT(
+      inspected(log).warnings,
+      Contains(HasSubstr("the PARAMETERS record before says an acceleration scale of 341")));
 }
 
 TEST(Inspection, DamageIsToldWithPlaceAndTimeAndNotForEver) {
@@ -272,7 +318,7 @@ TEST(Inspection, DamageIsToldWithPlaceAndTimeAndNotForEver) {
   ASSERT_THAT(found.warnings, SizeIs(22));
   EXPECT_EQ(found.warnings[0],
             "50 bytes at " + std::to_string(place) +
-                " are damaged, between 2015-04-09T14:04:00Z and 2015-04-09T14:04:01Z");
+                " are damaged, between 2015-04-09T14:04:00 and 2015-04-09T14:04:01");
   EXPECT_EQ(found.warnings.back(), "... 30 damaged stretches in all");
 }
 
@@ -391,6 +437,15 @@ TEST(Inspection, RealFiles) {
   const Inspection clipped = of("gt9x/TAS1H30182785_2019-09-17.gt3x");
   EXPECT_EQ(clipped.clipped_samples, 203U) << "rows of the vendor's own CSV export";
   EXPECT_EQ(clipped.rate_hz, 100);
+
+  // Who set the clocks is in METADATA; the vendor's temperatures of the chamber are labelled UTC.
+  EXPECT_EQ(clipped.clock.kind, gt3x::ClockKind::local);
+  EXPECT_EQ(clipped.clock.offset_minutes, -240);
+  EXPECT_EQ(chamber.clock.kind, gt3x::ClockKind::utc);
+  EXPECT_EQ(chamber.clock.offset_minutes, -300);
+  EXPECT_EQ(old_form.clock.kind, gt3x::ClockKind::local);
+  EXPECT_FALSE(old_form.clock.offset_minutes);
+  EXPECT_FALSE(clipped.irregular.any());
 
   std::uint64_t unexplained_seconds = 0;
   for (const InspectedGap& gap : of("wgt3x-bt-affected/MOS2A45130451.gt3x").gaps) {

@@ -89,6 +89,7 @@ TEST(StillScan, MemoryIsBoundedWhateverTheConstantsDo) {
   for (const calib::StillBlock& block : blocks) {
     const bool in_wide = static_cast<int>((block.start_time_s - 1000) / 5) % 2 == 0;
     EXPECT_NEAR(block.mean_lsb[2], 256.5 / 256 * (in_wide ? 300 : 150), 1e-9) << block.start_time_s;
+    EXPECT_NEAR(static_cast<double>(block.first_sample), 30 * (block.start_time_s - 1000), 1e-6);
   }
 }
 
@@ -108,6 +109,11 @@ TEST(StillScan, AGapEndsARun) {
   EXPECT_NEAR(whole[0].mean_lsb[2], 256, 1e-9);
   const auto split = blocks_with(2);
   EXPECT_GE(split.size(), whole.size() == 1 ? 2U : 1U);
+  for (const calib::StillBlock& block : split) {
+    const double gap_s = block.start_time_s < 1010 ? 0 : 2;
+    EXPECT_NEAR(static_cast<double>(block.first_sample), 30 * (block.start_time_s - 1000 - gap_s),
+                1e-6);
+  }
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "repair/old_form.h"
 #include "repair/six_sides.h"
+#include "shared_data.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -152,6 +154,85 @@ TEST(Survey, KnowsTheMarkAndWideRecords) {
   EXPECT_TRUE(found->already_repaired);
   EXPECT_TRUE(found->constants.empty()) << "its counts no longer come from its PARAMETERS";
   EXPECT_EQ(found->log_bytes_wide, found->log_bytes) << "wide already";
+}
+
+// PARAMETERS with another acceleration scale in the middle: each scale holds for what follows it.
+TEST(Survey, FollowsTheAccelerationScaleInForce) {
+  MemoryFiles files;
+  const tests::MadeRecording made = tests::six_sides();
+  ASSERT_OK(made.write(files, "one.gt3x"));
+  ASSERT_OK(made.write(files, "two.gt3x", tests::log_of_two_scales(made)));
+  const auto one = survey(files, "one.gt3x");
+  const auto two = survey(files, "two.gt3x");
+  ASSERT_OK(one);
+  ASSERT_OK(two);
+  EXPECT_EQ(two->samples, one->samples);
+  EXPECT_EQ(two->magnitude.blocks, one->magnitude.blocks);
+  EXPECT_NEAR(two->magnitude.mean_mg, one->magnitude.mean_mg, 2);
+  EXPECT_EQ(two->constants.size(), 1U);
+  ASSERT_EQ(two->notes.size(), 1U);
+  EXPECT_NE(two->notes[0].find("from 256 to 512 LSB/g"), std::string::npos) << two->notes[0];
+}
+
+TEST(Survey, TheOldFormHasConstantsAndStillPeriods) {
+  MemoryFiles files;
+  tests::OldRecording made;
+  made.raw = tests::many_sides().raw;
+  ASSERT_OK(made.write(files, "old.gt3x"));
+  const auto found = survey(files, "old.gt3x");
+  ASSERT_OK(found);
+  EXPECT_FALSE(found->constants_problem);
+  EXPECT_EQ(found->samples, made.raw.size());
+  EXPECT_EQ(found->accel_scale_lsb_per_g, 341);
+  EXPECT_EQ(found->constants, std::vector{tests::kStored});
+  EXPECT_EQ(found->facts.calibration_time, parse_iso8601("2010-10-21T11:23:47").value());
+  EXPECT_GE(found->magnitude.blocks, 30U);
+  EXPECT_GT(found->magnitude.mean_mg, 50) << "the constants do not fit";
+  EXPECT_TRUE(found->plausibility.plausible());
+
+  // A unit that charges stores zeros on all axes: no still periods.
+  made.zeros = 3000;
+  ASSERT_OK(made.write(files, "charged.gt3x"));
+  const auto charged = survey(files, "charged.gt3x");
+  ASSERT_OK(charged);
+  EXPECT_EQ(charged->samples, made.raw.size() + 3000);
+  EXPECT_EQ(charged->magnitude.blocks, found->magnitude.blocks);
+}
+
+TEST(Survey, OldConstantsThatCannotBeUsedAreAProblem) {
+  MemoryFiles files;
+  tests::OldRecording made;
+  made.raw = tests::six_sides().raw;
+  const auto problem_of = [&](const Bytes& eeprom) {
+    EXPECT_OK(made.write(files, "old.gt3x", eeprom));
+    const auto found = survey(files, "old.gt3x");
+    EXPECT_OK(found);
+    EXPECT_GE(found->magnitude.blocks, 6U) << "evidence all the same";
+    const std::string text = found->constants_problem ? found->constants_problem->what : "";
+    EXPECT_OK(files.remove("old.gt3x"));
+    return text;
+  };
+  Bytes bad = made.eeprom();
+  bad[300] ^= 1;
+  EXPECT_NE(problem_of(bad).find("CRC"), std::string::npos);
+  EXPECT_NE(problem_of(Bytes{}).find("no eeprom.bin"), std::string::npos);
+  Bytes others = made.eeprom();
+  others[12] = 'X';
+  EXPECT_NE(problem_of(others).find("eeprom.bin is of"), std::string::npos);
+}
+
+// Oracle: a real unit (PROVENANCE: not affected), whose counts fit the constants in its memory.
+TEST(Survey, ARealRecordingOfTheOldForm) {
+  SIXPOINT_NEED_SHARED("data/nhanes/NEO1B34100019.gt3x");
+  const auto found =
+      survey(posix_env().files, tests::shared_file("data/nhanes/NEO1B34100019.gt3x"));
+  ASSERT_OK(found);
+  EXPECT_FALSE(found->constants_problem);
+  EXPECT_EQ(found->samples, 10'467U);
+  EXPECT_GT(found->magnitude.blocks, 0U);
+  EXPECT_LT(found->magnitude.mean_mg, 64);
+  EXPECT_EQ(found->facts.calibration_time, parse_iso8601("2010-10-21T11:23:47").value());
+  EXPECT_EQ(triage(found->facts).verdict, Verdict::not_affected);
 }
 
 }  // namespace
