@@ -7,6 +7,7 @@
 
 #include "base/atomic_file.h"
 #include "gt3x/forms/model.h"
+#include "station/certificate/dcc.h"
 #include "station/run/jig_report.h"
 
 namespace sixpoint::station {
@@ -162,7 +163,7 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
   const Json json = Json::parse(run.document, nullptr, false);
   const Document document(json);
   const auto verdict = parse_jig_verdict(run.verdict);
-  if (run.kind != "jig" || !verdict || *verdict == JigVerdict::stopped ||
+  if ((run.kind != "jig" && run.kind != "write") || !verdict || *verdict == JigVerdict::stopped ||
       *verdict == JigVerdict::inconclusive || !document.in("constants").has("zero_lsb")) {
     return fail(ErrorCode::bad_data,
                 fmt::format("run {} ended as '{}' and has no result to certify",
@@ -178,6 +179,7 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
   out.started = run.started;
   out.ended = run.ended;
   out.operator_name = run.operator_name;
+  out.operator_authenticated = document.flag("operator_authenticated");
   out.station = run.station;
   out.software = run.build.empty() ? run.software : fmt::format("{} ({})", run.software, run.build);
   out.raw_sha256 = document.text("raw_sha256");
@@ -223,6 +225,7 @@ Json Certificate::to_json() const {
   json["started"] = to_iso8601(started);
   json["issued"] = to_iso8601(ended);
   json["operator"] = operator_name;
+  json["operator_authenticated"] = operator_authenticated;
   json["station"] = station;
   json["software"] = software;
   json["method"] = method;
@@ -264,9 +267,20 @@ Json Certificate::to_json() const {
   return json;
 }
 
+std::vector<std::string> documents_of(const db::RunRecord& run) {
+  std::vector<std::string> names = {"report.json"};
+  if (certificate_of(run)) {
+    names.insert(names.end(), {"certificate.pdf", "certificate.json", "certificate.dcc.xml"});
+  }
+  if (label_zpl(run)) {
+    names.emplace_back("label.zpl");
+  }
+  return names;
+}
+
 Status check_certificate_name(const std::string& path) {
-  if (!path.ends_with(".pdf") && !path.ends_with(".json")) {
-    return fail(ErrorCode::usage, "a certificate is a .pdf or a .json", path,
+  if (!path.ends_with(".pdf") && !path.ends_with(".json") && !path.ends_with(".dcc.xml")) {
+    return fail(ErrorCode::usage, "a certificate is a .pdf, a .json or a .dcc.xml", path,
                 "end the file's name with one of them");
   }
   return {};
@@ -279,6 +293,9 @@ Status write_certificate(FileSystem& files, const std::string& path, const db::R
     return write_file(
         files, path,
         certificate.to_json().dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  }
+  if (path.ends_with(".dcc.xml")) {
+    return write_file(files, path, certificate_dcc(certificate));
   }
   SIXPOINT_ASSIGN(const Bytes bytes, certificate_pdf(certificate));
   return write_file(files, path, as_text(bytes));
@@ -315,8 +332,8 @@ Result<std::string> label_zpl(const db::RunRecord& run) {
       : certificate.serial.size() <= 24 ? 17
                                         : 10,
       zpl_text(certificate.serial), date,
-      certificate.verdict == JigVerdict::pass ? "PASS" : "CONDITIONAL PASS", certificate.filter,
-      db::shown_id(certificate.run), zpl_text(qr));
+      certificate.verdict == JigVerdict::pass ? "PASS - WRITTEN" : "CONDITIONAL PASS - WRITTEN",
+      certificate.filter, db::shown_id(certificate.run), zpl_text(qr));
 }
 
 }  // namespace sixpoint::station

@@ -33,6 +33,7 @@ struct Certificate {
   UtcTime started{};
   UtcTime ended{};
   std::string operator_name;
+  bool operator_authenticated = false;  // by a PIN
   std::string station;
   std::string software;    // name and version, and the build where it is known
   std::string raw_sha256;  // of the samples that the store keeps
@@ -88,8 +89,11 @@ struct Certificate {
 Result<Certificate> certificate_of(const db::RunRecord& run);
 // A PDF of A4 pages: text that can be searched, a QR code "sixpoint:SERIAL:RUN".
 Result<Bytes> certificate_pdf(const Certificate& certificate);
-// usage where the file's name ends in neither .pdf nor .json.
+// usage where the file's name ends in neither .pdf nor .json nor .dcc.xml.
 Status check_certificate_name(const std::string& path);
+// What can be asked for about a stored run: report.json always; certificate.pdf, certificate.json
+// and certificate.dcc.xml where certificate_of() makes one, label.zpl where label_zpl() does.
+std::vector<std::string> documents_of(const db::RunRecord& run);
 // By the ending of `path`.
 Status write_certificate(FileSystem& files, const std::string& path, const db::RunRecord& run);
 

@@ -50,6 +50,13 @@ std::string upper(std::string_view text) {
 std::string date_of(UtcTime time) { return to_iso8601(time).substr(0, 10); }
 std::string or_not_stated(const std::string& text) { return text.empty() ? "not stated" : text; }
 
+// A name that somebody typed is no proof of who it was.
+std::string operator_of(const Certificate& c) {
+  return c.operator_name.empty() || c.operator_authenticated
+             ? or_not_stated(c.operator_name)
+             : c.operator_name + " (not authenticated)";
+}
+
 std::string_view meaning_of(JigVerdict verdict) {
   switch (verdict) {
     case JigVerdict::pass:
@@ -135,7 +142,7 @@ class Sheet : PageFlow {
           {{{"Model", or_not_stated(c.model)}, {"Date of issue", date_of(c.ended)}}},
           {{{"Firmware", or_not_stated(c.firmware)}, {"Measured", measured}}},
           {{{"Filter setting", c.filter}, {"Station", or_not_stated(c.station)}}},
-          {{{"Jig", or_not_stated(c.jig)}, {"Operator", or_not_stated(c.operator_name)}}},
+          {{{"Jig", or_not_stated(c.jig)}, {"Operator", operator_of(c)}}},
           {{{"Jig calibrated until", due}, {"Software", or_not_stated(c.software)}}}});
   }
 
@@ -145,8 +152,14 @@ class Sheet : PageFlow {
     const double height_mm = std::max(12.0, 4.5 + kLine_mm * static_cast<double>(meaning.size()));
     pdf_.box(kLeft_mm, y_mm_ - 3, kWidth_mm, height_mm, 0.92);
     pdf_.box(kLeft_mm, y_mm_ - 3, 1.6, height_mm, is_passed(certificate_.verdict) ? 0.35 : 0);
-    pdf_.text(kLeft_mm + 5, y_mm_ + 4.4, upper(to_string(certificate_.verdict)),
+    const bool passed = is_passed(certificate_.verdict);
+    pdf_.text(kLeft_mm + 5, y_mm_ + (passed ? 2.6 : 4.4), upper(to_string(certificate_.verdict)),
               {PdfFont::bold, 12});
+    if (passed) {
+      pdf_.text(kLeft_mm + 5, y_mm_ + 7.2,
+                certificate_.written ? "WRITTEN INTO THE UNIT" : "NOT WRITTEN INTO THE UNIT",
+                {PdfFont::bold, 8});
+    }
     double at_mm = y_mm_ + (meaning.size() == 1 ? 4.2 : 2);
     for (const std::string& line : meaning) {
       pdf_.text(kLeft_mm + 62, at_mm, line, kBody);

@@ -68,6 +68,10 @@ LaneAnswer<void> Lanes::Lane::start(const StartOrder& order, bool capture) {
     return lane_conflict(fmt::format("the jig stopped: {}", jig_fault_),
                          "look at the jig; when no hand is in it, say that it is free");
   }
+  if (order.last_run && unwritten_serial_ != identity_.serial) {
+    return lane_conflict("the last run of this unit has no constants that wait to be written",
+                         "measure the unit with 'write'");
+  }
   const std::string scanned = order.serial.empty() ? scanned_ : order.serial;
   if (auto checked = check_scanned(scanned); !checked) {
     scanned_ = scanned;

@@ -135,6 +135,8 @@ class Lanes::Lane {
   // A jig run (lane_run.cpp).
   void run(const std::stop_token& stop, const StartOrder& order,
            const std::optional<UnfinishedRun>& left);
+  // "Write now": the last run goes on with its write (StartOrder::last_run).
+  void write_last(const std::stop_token& stop, const StartOrder& order);
   UnfinishedRun new_run(const StartOrder& order, calib::FilterConfiguration filter);
   Result<RetestState> check_start(const std::string& serial, bool is_continued);
   JigHooks run_hooks(const std::stop_token& stop, RunSaver& saver);
@@ -201,12 +203,15 @@ class Lanes::Lane {
     RunLabels labels;
   };
   std::optional<Unstored> unstored_;
+  // The last run, where it passed and nothing was written, for write_last().
+  std::optional<UnfinishedRun> unwritten_;
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;
   std::unique_ptr<device::Unit> unit_;  // made and ended by the thread; others may cancel()
   device::Unit* opening_ = nullptr;     // the same, before it is unit_
   bool is_unstored_ = false;            // the store did not take the last run yet
+  std::string unwritten_serial_;        // whose constants may be written now; empty: nobody's
   device::Identity identity_;
   calib::Calibration approximation_;
   bool turns_by_itself_ = false;

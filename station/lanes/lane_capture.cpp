@@ -159,7 +159,7 @@ void Lanes::Lane::end_capture(Json result) {
 
 // Its unit recorded on, or holds what it recorded until then.
 void Lanes::Lane::continue_capture(const std::stop_token& stop, const UnfinishedCapture& left) {
-  const StartOrder order = {left.operator_name, left.client, left.serial, false};
+  const StartOrder order = {left.operator_name, false, left.client, left.serial};
   {
     const std::lock_guard lock(mutex_);
     capture_ = CaptureView{};

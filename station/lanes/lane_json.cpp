@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/sha256.h"
 #include "gt3x/forms/model.h"
 #include "station/lanes/lane.h"
 
@@ -25,6 +26,10 @@ std::string_view to_string(LaneState state) {
   static constexpr std::array<std::string_view, 8> kNames = {
       "absent", "idle", "resuming", "running", "unit_away", "wrong_unit", "capturing", "done"};
   return kNames.at(static_cast<std::size_t>(state));
+}
+
+std::string public_name(const std::string& client) {
+  return client.empty() ? std::string() : text_sha256("sixpoint client " + client).substr(0, 16);
 }
 
 LaneTrace Lanes::Lane::trace(std::uint64_t first) const {
@@ -102,7 +107,7 @@ Json Lanes::Lane::to_json() const {
                     {"matches", state_ != LaneState::absent && scanned_ == identity_.serial}};
   }
   json["operator"] = printable(operator_name_, 100);
-  json["client"] = client_;
+  json["client"] = public_name(client_);
   json["write"] = write_;
   json["run"] = run_ ? run_json() : Json(nullptr);
   json["capture"] = nullptr;

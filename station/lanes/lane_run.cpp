@@ -28,6 +28,13 @@ Json json_of(const JigReport& report) {
       report.as_found ? Json(report.as_found_residual_mg) : Json(nullptr);
   json["written"] = report.written;
   json["refusals"] = report.refusals;
+  json["quantities"] = Json::array();
+  for (const JudgedQuantity& quantity : report.quantities) {
+    json["quantities"].push_back(to_json(quantity));
+    const QuantityInfo* const info = find_quantity(quantity.name);
+    json["quantities"].back()["title"] = info != nullptr ? info->title : quantity.name;
+    json["quantities"].back()["unit"] = info != nullptr ? info->unit : "";
+  }
   json["stored"] = false;
   return json;
 }
@@ -73,12 +80,16 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
                  });
   const UnfinishedRun& state = saver.state();
   session.filter = state.filter;
-  const auto allowed = check_start(state.serial, left.has_value());
+  const auto allowed = check_start(state.serial, left.has_value() && !order.last_run);
   if (!allowed) {
     return end_unmeasured(state.serial, "refused", {allowed.error().what, allowed.error().hint},
                           allowed.error().brief());
   }
   session.retest = *allowed;
+  if (order.last_run) {
+    session.notes.emplace_back(
+        "written after the run: the readings that judge the constants are those of the run");
+  }
   last_accepted_ = env_.clock.elapsed();
   if (const std::lock_guard lock(mutex_); !run_) {
     run_.emplace();
@@ -95,8 +106,16 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   if (!report) {
     return end_without_report(state.serial, report.error());
   }
-  show_result(*report, {state.operator_name, state.station, session.retest.retest_of});
+  show_result(*report, {state.operator_name, state.is_authenticated, state.station,
+                        session.retest.retest_of, order.last_run ? kWriteKind : "jig"});
   const std::lock_guard lock(mutex_);
+  if (report->usable() && !report->written && !report->write_begun && run_) {
+    UnfinishedRun& last = unwritten_.emplace(state);
+    last.resume = {run_->progress, report->started, report->as_found, {},
+                   false,          report->stream,  report->raw_csv};
+    unwritten_serial_ = state.serial;
+    result_["can_write"] = true;
+  }
   result_["verdict_ms"] =
       std::chrono::duration<double, std::milli>(env_.clock.elapsed() - last_accepted_).count();
   if (report->six && report->usable()) {
@@ -105,12 +124,31 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   changed();
 }
 
+void Lanes::Lane::write_last(const std::stop_token& stop, const StartOrder& order) {
+  UnfinishedRun left = *std::exchange(unwritten_, std::nullopt);
+  left.operator_name = order.operator_name;
+  left.is_authenticated = order.is_authenticated;
+  left.client = order.client;
+  left.write = true;
+  StartOrder writing = order;
+  writing.write = true;
+  {
+    const std::lock_guard lock(mutex_);
+    write_ = true;
+    run_.emplace().progress = left.resume.progress;
+  }
+  // For a program that goes on with it: the store has this run's samples, and their file is gone.
+  static_cast<void>(folder_.append(left.resume.raw_csv));
+  run(stop, writing, left);
+}
+
 UnfinishedRun Lanes::Lane::new_run(const StartOrder& order, calib::FilterConfiguration filter) {
   UnfinishedRun run;
   run.device = device_;
   run.serial = identity_.serial;
   run.firmware = identity_.firmware;
   run.operator_name = order.operator_name;
+  run.is_authenticated = order.is_authenticated;
   run.station = shared_.options.station;
   run.client = order.client;
   run.write = order.write;
@@ -248,10 +286,12 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
         add_log("problem", cleared.error().brief());
       }
       if (is_shown) {
-        result_["stored"] = true;
-        result_["run"] = stored->run_id;
+        result_["stored"] = !stored->is_kept_here;
+        result_["kept_here"] = stored->is_kept_here;
+        result_["run"] = stored->ids.run_id;
+        result_["documents"] = stored->documents;
         result_["constants_id"] =
-            stored->constants_id ? Json(*stored->constants_id) : Json(nullptr);
+            stored->ids.constants_id ? Json(*stored->ids.constants_id) : Json(nullptr);
         result_.erase("problem");
       }
       unstored_.reset();
@@ -265,7 +305,8 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
 }
 
 void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun& left) {
-  const StartOrder order = {left.operator_name, left.client, left.serial, left.write};
+  const StartOrder order = {left.operator_name, left.is_authenticated, left.client, left.serial,
+                            left.write};
   {
     const std::lock_guard lock(mutex_);
     run_.emplace().progress = left.resume.progress;
@@ -287,7 +328,7 @@ void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& 
     report.verdict = JigVerdict::stopped;
     report.codes = {"stopped"};
   }
-  show_result(report, {left.operator_name, left.station, {}});
+  show_result(report, {left.operator_name, left.is_authenticated, left.station, {}});
 }
 
 }  // namespace sixpoint::station

@@ -32,7 +32,9 @@ void Lanes::Lane::work(const std::stop_token& stop) {
       preview(stop);
       continue;
     }
-    if (order->capture) {
+    if (order->start.last_run) {
+      write_last(stop, order->start);
+    } else if (order->capture) {
       capture(stop, order->start, {});
     } else {
       run(stop, order->start, {});
@@ -92,6 +94,7 @@ std::optional<Lanes::Lane::Order> Lanes::Lane::next_order() {
   commands_.clear();
   if (order) {
     write_ = order->start.write;
+    unwritten_serial_.clear();
     result_ = nullptr;
     run_.reset();
     log_.clear();
@@ -166,8 +169,10 @@ bool Lanes::Lane::open_unit() {
   if (unit->identity().serial != identity_.serial) {
     // Another unit: nothing of the one before stays on the lane but what went wrong.
     if (!is_busy()) {
-      result_ = nullptr;
+      // What came out of the one before stays to be read until the next start; its constants are
+      // for its own unit alone.
       run_.reset();
+      unwritten_serial_.clear();
       std::erase_if(log_, [](const LogLine& line) { return line.kind != "problem"; });
     }
     readings_.clear();

@@ -10,6 +10,12 @@ namespace sixpoint::station {
 
 using Json = nlohmann::ordered_json;
 
+namespace {
+
+constexpr std::size_t kMostUnmatched = 256;  // clients with a scan that no lane matched
+
+}  // namespace
+
 Lanes::Lanes() = default;
 // All lanes at once: sixteen ends one after the other would add up.
 Lanes::~Lanes() {
@@ -52,12 +58,30 @@ LaneAnswer<Lanes::Lane*> Lanes::lane(std::size_t number) const {
   return lanes_[number - 1].get();
 }
 
+LaneAnswer<Lanes::Lane*> Lanes::lane_to_start(std::size_t number, const std::string& client) {
+  return lane(number).and_then([&](Lane* chosen) -> LaneAnswer<Lane*> {
+    const std::lock_guard lock(mutex_);
+    const auto unmatched = unmatched_.find(client);
+    if (unmatched != unmatched_.end() && !chosen->holds(unmatched->second)) {
+      return lane_conflict(fmt::format("the label of {} was scanned, and this is another unit",
+                                       printable(unmatched->second, 40)),
+                           "plug in the unit that was scanned, or scan the label of this one");
+    }
+    unmatched_.erase(client);
+    return chosen;
+  });
+}
+
 LaneAnswer<void> Lanes::start(std::size_t number, const StartOrder& order) {
-  return lane(number).and_then([&](Lane* chosen) { return chosen->start(order, false); });
+  return lane_to_start(number, order.client).and_then([&](Lane* chosen) {
+    return chosen->start(order, false);
+  });
 }
 
 LaneAnswer<void> Lanes::start_capture(std::size_t number, const StartOrder& order) {
-  return lane(number).and_then([&](Lane* chosen) { return chosen->start(order, true); });
+  return lane_to_start(number, order.client).and_then([&](Lane* chosen) {
+    return chosen->start(order, true);
+  });
 }
 
 LaneAnswer<void> Lanes::command(std::size_t number, const std::string& client,
@@ -73,11 +97,22 @@ LaneAnswer<void> Lanes::release_jig(std::size_t number, const std::string& clien
   return lane(number).and_then([&](Lane* chosen) { return chosen->release_jig(client); });
 }
 
-LaneAnswer<std::size_t> Lanes::scan(std::size_t number, const std::string& serial) {
+void Lanes::dismiss_scan(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  unmatched_.erase(client);
+}
+
+LaneAnswer<std::size_t> Lanes::scan(std::size_t number, const std::string& serial,
+                                    const std::string& client) {
+  dismiss_scan(client);
   if (number == 0) {
     const auto found = std::find_if(lanes_.begin(), lanes_.end(),
                                     [&](const auto& each) { return each->holds(serial); });
     if (found == lanes_.end()) {
+      const std::lock_guard lock(mutex_);
+      if (unmatched_.size() < kMostUnmatched) {
+        unmatched_[client] = serial;
+      }
       return lane_conflict(fmt::format("no lane holds a unit {}", printable(serial, 40)),
                            "plug the unit in, or check that its label is its own");
     }

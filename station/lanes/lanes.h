@@ -23,7 +23,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,11 +45,19 @@ inline constexpr std::size_t kMostLanes = 16;
 // Operator and place of a run, for its record.
 struct RunLabels {
   std::string operator_name;
+  bool is_authenticated = false;  // by a PIN
   std::string station;
-  std::string retest_of;  // the run that this one repeats, or empty
+  std::string retest_of;     // the run that this one repeats, or empty
+  std::string kind = "jig";  // or kWriteKind
+};
+// What became of a run that was to be stored.
+struct RunInStore {
+  RunIds ids;
+  bool is_kept_here = false;           // the store did not take it; it is sent when it answers
+  std::vector<std::string> documents;  // that can be asked for: "certificate.pdf" ...
 };
 // Puts a run into the store.
-using StoreRun = std::function<Result<RunIds>(const JigReport&, const RunLabels&)>;
+using StoreRun = std::function<Result<RunInStore>(const JigReport&, const RunLabels&)>;
 // Before a run or a capture: may this unit be measured now, and what do its earlier runs demand? On
 // an error nothing is measured, and the operator reads why. May be empty.
 using StartCheck = std::function<Result<RetestState>(const std::string& serial)>;
@@ -89,11 +99,19 @@ struct LaneRefusal {
 template <class T>
 using LaneAnswer = tl::expected<T, LaneRefusal>;
 
+// What others are shown of a client: its identifier is a secret, because it commands a run. Empty
+// for none.
+std::string public_name(const std::string& client);
+
 struct StartOrder {
   std::string operator_name;
-  std::string client;  // that may command the run
-  std::string serial;  // as scanned; the unit must have it. Empty: not scanned.
+  bool is_authenticated = false;  // by a PIN
+  std::string client;             // that may command the run; a secret of this client
+  std::string serial;             // as scanned; the unit must have it. Empty: not scanned.
   bool write = false;
+  // No new run: the constants of the lane's last one, which passed, are written into the same unit,
+  // read back, and two placements are measured with them.
+  bool last_run = false;
 };
 
 // Calibrated readings, newest last.
@@ -126,8 +144,11 @@ class Lanes {
   // is free. Only when no run is under way.
   LaneAnswer<void> release_jig(std::size_t number, const std::string& client);
   // A scanned serial number for this lane, or (number 0) for the lane that holds this unit. Answers
-  // with the lane. A serial of another unit is `conflict`, until the right one is scanned.
-  LaneAnswer<std::size_t> scan(std::size_t number, const std::string& serial);
+  // with the lane. A serial of another unit is `conflict`, until the right one is scanned. Where no
+  // lane holds the unit, this client's next start is refused, until one does or dismiss_scan().
+  LaneAnswer<std::size_t> scan(std::size_t number, const std::string& serial,
+                               const std::string& client);
+  void dismiss_scan(const std::string& client);
   // From now on the run takes commands from this client.
   LaneAnswer<void> take_over(std::size_t number, const std::string& client,
                              const std::string& operator_name);
@@ -151,8 +172,13 @@ class Lanes {
   Lanes();
   LaneAnswer<Lane*> lane(std::size_t number) const;
 
+  // Refuses while this client's last scan was of a unit that is not in this lane.
+  LaneAnswer<Lane*> lane_to_start(std::size_t number, const std::string& client);
+
   std::unique_ptr<Shared> shared_;
   std::vector<std::unique_ptr<Lane>> lanes_;
+  std::mutex mutex_;                              // guards what follows
+  std::map<std::string, std::string> unmatched_;  // client -> the serial that no lane held
 };
 
 }  // namespace sixpoint::station

@@ -77,6 +77,7 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   json.at("firmware").get_to(run.firmware);
   json.at("station").get_to(run.station);
   json.at("write").get_to(run.write);
+  run.is_authenticated = json.value("operator_authenticated", false);
   SIXPOINT_ASSIGN(run.filter,
                   calib::parse_filter_configuration(json.at("filter").get<std::string>()));
   SIXPOINT_ASSIGN(run.resume.as_found, parse_page(json.at("as_found")));
@@ -176,6 +177,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
                      {"serial", run.serial},
                      {"firmware", run.firmware},
                      {"operator", run.operator_name},
+                     {"operator_authenticated", run.is_authenticated},
                      {"station", run.station},
                      {"client", run.client},
                      {"write", run.write},

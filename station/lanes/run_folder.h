@@ -29,6 +29,7 @@ struct UnfinishedRun {
   std::string serial;
   std::string firmware;
   std::string operator_name;
+  bool is_authenticated = false;
   std::string station;
   std::string client = {};
   bool write = false;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "station/lanes/scan_rule.h"
 #include "station/page/api_answers.h"
 #include "station/page/quality_control.h"
 
@@ -21,14 +22,11 @@ ApiAnswer lane_refusal(const LaneRefusal& why) {
              : refusal(409, "conflict", why.what, why.hint);
 }
 
-// Compares in a time that does not depend on where two texts differ.
-bool same_secret(std::string_view a, std::string_view b) {
-  unsigned differ = a.size() == b.size() ? 0U : 1U;
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    differ |=
-        static_cast<unsigned char>(i < a.size() ? a[i] : 0) ^ static_cast<unsigned char>(b[i]);
-  }
-  return differ == 0;
+std::string client_of(const ApiRequest& request) { return request.client.substr(0, kMostText); }
+
+// Of the clock that nobody sets.
+std::int64_t clock_ms(Clock& clock) {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(clock.elapsed()).count();
 }
 
 // The value of a cookie in a Cookie header.
@@ -43,10 +41,6 @@ std::string_view cookie_value(std::string_view header, std::string_view name) {
     }
   }
   return {};
-}
-
-bool is_loopback(std::string_view name) {
-  return name == "127.0.0.1" || name == "localhost" || name == "[::1]" || name == "::1";
 }
 
 // A numeric address. A name that was made to point here (DNS rebinding) is not one.
@@ -110,28 +104,35 @@ std::string ApiRequest::parameter(const std::string& name) const {
   return found == parameters.end() ? std::string() : found->second;
 }
 
-// The first call of the page brings the token in its address; later ones in a cookie.
-std::optional<ApiAnswer> Api::check_token(const ApiRequest& request) const {
+// Cookies know no port: without it, two stations of one machine would take each other's.
+std::string Api::cookie_name() const { return fmt::format("sixpoint_session_{}", port_.load()); }
+
+// The page itself has no secrets, and it is what asks a person to sign in.
+std::optional<ApiAnswer> Api::check_session(const ApiRequest& request) const {
   constexpr std::string_view kBearer = "Bearer ";
   const std::string_view sent = request.authorization;
-  const bool by_header =
-      sent.starts_with(kBearer) && same_secret(sent.substr(kBearer.size()), options_.token);
-  if (options_.token.empty() || by_header ||
-      same_secret(cookie_value(request.cookie, "sixpoint_token"), options_.token)) {
+  if ((sent.starts_with(kBearer) && parts_.sign_in.is_token(sent.substr(kBearer.size()))) ||
+      parts_.sign_in.session_holds(cookie_value(request.cookie, cookie_name())) ||
+      page_asset(request.path) || (request.method == "POST" && request.path == "/api/session")) {
     return std::nullopt;
   }
-  if (request.method == "GET" && request.path == "/" &&
-      same_secret(request.parameter("token"), options_.token)) {
-    return ApiAnswer{
-        303,
-        "text/plain",
-        "",
-        {{"Location", "/"},
-         {"Set-Cookie",
-          fmt::format("sixpoint_token={}; HttpOnly; SameSite=Strict; Path=/", options_.token)}}};
+  return refusal(401, "sign_in", "this browser is not signed in",
+                 "open the address that the station printed, or type its code");
+}
+
+ApiAnswer Api::open_session(const Json& body) const {
+  const auto code = text_of(body, "code");
+  const auto session = code ? parts_.sign_in.session_for(*code) : std::nullopt;
+  if (!session) {
+    return refusal(401, "wrong_code", "this code was used, is too old, or never was one",
+                   "ask a page that is signed in for a new code, or type the station's token");
   }
-  return refusal(401, "token_needed", "this station wants its token",
-                 "open it as http://ADDRESS:PORT/?token=TOKEN");
+  ApiAnswer opened = answer(200, {{"signed_in", true}});
+  const auto life_s = std::chrono::duration_cast<std::chrono::seconds>(kSessionLife).count();
+  opened.headers.emplace_back(
+      "Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}{}",
+                                cookie_name(), *session, life_s, options_.tls ? "; Secure" : ""));
+  return opened;
 }
 
 std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
@@ -151,14 +152,67 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
   }
   // Origin and Sec-Fetch-Site: another page in the same browser sent this (CSRF).
   const bool other_origin =
-      !request.origin.empty() && request.origin != fmt::format("http://{}", request.host);
+      !request.origin.empty() &&
+      request.origin != fmt::format("{}://{}", options_.tls ? "https" : "http", request.host);
   const bool other_site = request.path.starts_with("/api/") && !request.fetch_site.empty() &&
                           request.fetch_site != "same-origin" && request.fetch_site != "none";
   if (other_origin || other_site) {
     return with_headers(refusal(403, "wrong_origin", "another page may not command this station"));
   }
-  auto refused = check_token(request);
+  auto refused = check_session(request);
   return refused ? std::optional(with_headers(*std::move(refused))) : std::nullopt;
+}
+
+std::string Api::place_of(const ApiRequest& request) const {
+  const std::string_view session = cookie_value(request.cookie, cookie_name());
+  return session.empty() ? "the token" : std::string(session);
+}
+
+tl::expected<SignedName, ApiAnswer> Api::signer(const ApiRequest& request, const std::string& typed,
+                                                OperatorRole needed) const {
+  if (parts_.operators == nullptr) {
+    return SignedName{typed, false};
+  }
+  auto who = parts_.operators->who(place_of(request), typed, needed);
+  if (!who) {
+    const Error& why = who.error();
+    return tl::unexpected<ApiAnswer>(why.code == ErrorCode::permission
+                                         ? refusal(403, "operator_needed", why.what, why.hint)
+                                         : refusal(why));
+  }
+  return *std::move(who);
+}
+
+Json Api::me(const ApiRequest& request) const {
+  Json json;
+  json["clock_ms"] = clock_ms(parts_.env.clock);
+  json["client"] = public_name(client_of(request));
+  json["operators"] = Json::array();
+  json["operator"] = nullptr;
+  if (parts_.operators != nullptr) {
+    for (const Operator& each : parts_.operators->list().value_or(std::vector<Operator>())) {
+      json["operators"].push_back(each.name);
+    }
+    if (const auto here = parts_.operators->at(place_of(request))) {
+      json["operator"] = {{"name", here->name}, {"role", to_string(here->role)}};
+    }
+  }
+  return json;
+}
+
+// {name, pin}; an empty name signs out.
+ApiAnswer Api::sign_in_operator(const ApiRequest& request, const Json& body) const {
+  const auto name = text_of(body, "name");
+  const auto pin = text_of(body, "pin");
+  if (parts_.operators == nullptr || !name || !pin) {
+    return bad_field(name ? "pin" : "name", "a text of at most 200 bytes");
+  }
+  if (name->empty()) {
+    parts_.operators->sign_out(place_of(request));
+    return answer(200, me(request));
+  }
+  const auto who = parts_.operators->sign_in(place_of(request), *name, *pin);
+  return who ? answer(200, me(request)) : refusal(who.error());
 }
 
 Json Api::state() const {
@@ -166,6 +220,8 @@ Json Api::state() const {
   json["schema"] = "sixpoint/station/1";
   json["station"] = options_.station;
   json["version"] = options_.version;
+  json["jig_due"] = options_.jig_due ? Json(to_iso8601(*options_.jig_due)) : Json(nullptr);
+  json["write_default"] = options_.write_default;
   json["time_ms"] =
       std::chrono::duration<double, std::milli>(parts_.env.clock.now().time_since_epoch()).count();
   json["virtual_hands"] = Json::array();
@@ -207,6 +263,9 @@ ApiAnswer Api::get(const ApiRequest& request) {
   const auto parts = parts_of(request.path);
   if (parts.size() == 1 && parts[0] == "state") {
     return answer(200, state());
+  }
+  if (parts.size() == 1 && parts[0] == "me") {
+    return answer(200, me(request));
   }
   if (parts.size() == 1 && parts[0] == "files") {
     return list_files(request.parameter("path"));
@@ -252,6 +311,16 @@ ApiAnswer Api::post(const ApiRequest& request) {
     return unknown_route();
   }
   const auto parts = parts_of(request.path);
+  if (!request.before.empty()) {
+    const auto before_ms = number_of(request.before);
+    if (!before_ms) {
+      return refusal(400, "bad_request", "X-Sixpoint-Before is a time in milliseconds");
+    }
+    if (clock_ms(parts_.env.clock) > static_cast<std::int64_t>(*before_ms)) {
+      return refusal(408, "too_late", "this command came too late, and nothing was done",
+                     "give it again");
+    }
+  }
   Json body = Json::object();
   if (!request.body.empty()) {
     body = Json::parse(request.body, nullptr, false);
@@ -259,15 +328,28 @@ ApiAnswer Api::post(const ApiRequest& request) {
       return refusal(400, "bad_json", "the body is no JSON object");
     }
   }
+  if (parts.size() == 1 && parts[0] == "session") {
+    return open_session(body);
+  }
+  if (parts.size() == 1 && parts[0] == "operator") {
+    return sign_in_operator(request, body);
+  }
+  if (parts.size() == 1 && parts[0] == "code") {
+    return answer(200, {{"code", parts_.sign_in.new_code()}});
+  }
   if (parts.size() == 1 && (parts[0] == "run" || parts[0] == "capture")) {
     return start_run(request, body);
   }
   if (parts.size() == 1 && parts[0] == "scan") {
-    const auto serial = text_of(body, "serial");
-    if (!serial || serial->empty()) {
-      return bad_field("serial", "a serial number");
+    if (body.value("dismiss", Json(false)) == Json(true)) {
+      parts_.lanes.dismiss_scan(client_of(request));
+      return answer(200, Json::object());
     }
-    const auto lane = parts_.lanes.scan(0, *serial);
+    const auto serial = serial_of_label(text_of(body, "serial").value_or(""));
+    if (!serial) {
+      return bad_field("serial", "a serial number, or what a label of ours says");
+    }
+    const auto lane = parts_.lanes.scan(0, *serial, client_of(request));
     return lane ? answer(200, {{"lane", *lane}}) : lane_refusal(lane.error());
   }
   if (parts.size() == 1 && parts[0] == "check") {
@@ -307,13 +389,21 @@ ApiAnswer Api::start_run(const ApiRequest& request, const Json& body) {
   if (!operator_name || !serial) {
     return bad_field(operator_name ? "serial" : "operator", "a text of at most 200 bytes");
   }
-  if (body.contains("write") && !body["write"].is_boolean()) {
-    return bad_field("write", "true or false");
+  for (const char* key : {"write", "last_run"}) {
+    if (body.contains(key) && !body[key].is_boolean()) {
+      return bad_field(key, "true or false");
+    }
   }
-  order.operator_name = *operator_name;
+  const auto who = signer(request, *operator_name, OperatorRole::technician);
+  if (!who) {
+    return who.error();
+  }
+  order.operator_name = who->name;
+  order.is_authenticated = who->is_authenticated;
   order.serial = *serial;
-  order.client = request.client.substr(0, kMostText);
+  order.client = client_of(request);
   order.write = body.value("write", false);
+  order.last_run = body.value("last_run", false);
   const auto started = request.path == "/api/capture" ? parts_.lanes.start_capture(lane, order)
                                                       : parts_.lanes.start(lane, order);
   return started ? answer(202, {{"lane", lane}, {"started", true}}) : lane_refusal(started.error());
@@ -321,7 +411,7 @@ ApiAnswer Api::start_run(const ApiRequest& request, const Json& body) {
 
 ApiAnswer Api::command_lane(std::size_t lane, const std::string& command, const ApiRequest& request,
                             const Json& body) {
-  const std::string client = request.client.substr(0, kMostText);
+  const std::string client = client_of(request);
   LaneAnswer<void> done;
   if (command == "undo" || command == "stop") {
     done = parts_.lanes.command(lane, client,
@@ -329,19 +419,26 @@ ApiAnswer Api::command_lane(std::size_t lane, const std::string& command, const 
   } else if (command == "placed") {
     done = parts_.lanes.confirm_side(lane, client);
   } else if (command == "jig-free") {
+    if (const auto who = signer(request, {}, OperatorRole::technician); !who) {
+      return who.error();
+    }
     done = parts_.lanes.release_jig(lane, client);
   } else if (command == "take") {
     const auto operator_name = text_of(body, "operator");
     if (!operator_name) {
       return bad_field("operator", "a text of at most 200 bytes");
     }
-    done = parts_.lanes.take_over(lane, client, *operator_name);
-  } else if (command == "scan") {
-    const auto serial = text_of(body, "serial");
-    if (!serial || serial->empty() || lane == 0) {
-      return bad_field("serial", "a text of at most 200 bytes");
+    const auto who = signer(request, *operator_name, OperatorRole::technician);
+    if (!who) {
+      return who.error();
     }
-    done = parts_.lanes.scan(lane, *serial).map([](std::size_t) {});
+    done = parts_.lanes.take_over(lane, client, who->name);
+  } else if (command == "scan") {
+    const auto serial = serial_of_label(text_of(body, "serial").value_or(""));
+    if (!serial || lane == 0) {
+      return bad_field("serial", "a serial number, or what a label of ours says");
+    }
+    done = parts_.lanes.scan(lane, *serial, client).map([](std::size_t) {});
   } else if (command == "hand") {
     return move_virtual_unit(lane, body);
   } else {

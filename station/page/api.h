@@ -2,7 +2,7 @@
 //
 //   ApiOptions options;
 //   options.station = "bench-1";
-//   Api api(options, {env, lanes, repairs});
+//   Api api(options, {env, lanes, repairs, sign_in});
 //   api.set_port(6020);
 //   ApiRequest request;
 //   request.method = "GET";
@@ -24,6 +24,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "station/access/operators.h"
+#include "station/access/sign_in.h"
 #include "station/lanes/lanes.h"
 #include "station/page/practice_bench.h"
 #include "station/page/repair_job.h"
@@ -41,6 +43,9 @@ struct ApiRequest {
   std::string authorization;  // Authorization
   std::string cookie;
   std::string client;  // X-Sixpoint-Client: the page that may command a run
+  // X-Sixpoint-Before: milliseconds of the station's own clock (clock_ms of GET /api/me). A command
+  // that comes later is refused: nobody waits for it any more.
+  std::string before;
   std::map<std::string, std::string> parameters;  // of the query, the first of each name
 
   std::string parameter(const std::string& name) const;  // empty where it was not sent
@@ -57,10 +62,12 @@ struct ApiOptions {
   std::string station;
   std::string version;
   std::string bind = "127.0.0.1";
-  std::string token;  // empty: none is needed, on the loopback address only
+  bool tls = false;  // the address of the page begins with https
   // Files are listed, checked and repaired below this folder, and nowhere else.
   std::string files_folder = ".";
   int most_streams = 24;
+  std::optional<UtcTime> jig_due;  // when the jig itself is due
+  bool write_default = false;      // the page's runs write, unless a person says no
 };
 
 // A document of a stored run: kind is report.json, certificate.pdf, certificate.json or label.zpl.
@@ -78,10 +85,12 @@ struct ApiParts {
   Env& env;
   Lanes& lanes;
   RepairJob& repairs;
+  SignIn& sign_in;
   PracticeBench* bench = nullptr;       // null: no virtual units
   StoreConstants store_constants = {};  // of a file that was checked
   RunDocuments run_document = {};
   QualityControl* quality = nullptr;  // null: no check units, no statistics
+  Operators* operators = nullptr;     // null: names are as they are typed
 };
 
 class EventStream;
@@ -107,7 +116,16 @@ class Api {
 
  private:
   friend class EventStream;
-  std::optional<ApiAnswer> check_token(const ApiRequest& request) const;
+  std::optional<ApiAnswer> check_session(const ApiRequest& request) const;
+  std::string cookie_name() const;
+  // Where a request comes from: the session of its browser.
+  std::string place_of(const ApiRequest& request) const;
+  // Whose name stands in the record of what is asked for; the answer says why nobody's.
+  tl::expected<SignedName, ApiAnswer> signer(const ApiRequest& request, const std::string& typed,
+                                             OperatorRole needed) const;
+  nlohmann::ordered_json me(const ApiRequest& request) const;
+  ApiAnswer sign_in_operator(const ApiRequest& request, const nlohmann::ordered_json& body) const;
+  ApiAnswer open_session(const nlohmann::ordered_json& body) const;
   nlohmann::ordered_json state() const;
   ApiAnswer get(const ApiRequest& request);
   ApiAnswer post(const ApiRequest& request);

@@ -2,6 +2,7 @@
 #include <charconv>
 
 #include "base/serial.h"
+#include "station/lanes/scan_rule.h"
 #include "station/page/api_answers.h"
 #include "station/page/quality_control.h"
 
@@ -27,6 +28,12 @@ std::optional<ApiAnswer> Api::get_quality(const ApiRequest& request, const std::
   }
   if (what == "check-units") {
     return answer_of(parts_.quality->check_units());
+  }
+  if (what == "runs") {
+    // What was scanned or typed; a text that is no serial number is looked for all the same.
+    const std::string serial = parameter(request, "serial");
+    return answer_of(
+        parts_.quality->runs(parameter(request, "from"), serial_of_label(serial).value_or(serial)));
   }
   if (what == "statistics") {
     return answer_of(parts_.quality->statistics(
@@ -70,7 +77,11 @@ std::optional<ApiAnswer> Api::post_decision(const ApiRequest& request, const std
     return bad_field(operator_name ? "reason" : "operator", "a text of at most 200 bytes");
   }
   db::StationEvent decision;
-  decision.operator_name = *operator_name;
+  const auto who = signer(request, *operator_name, OperatorRole::engineer);
+  if (!who) {
+    return who.error();
+  }
+  decision.operator_name = who->name;
   decision.reason = *reason;
   if (what == "station-lock") {
     if (body.contains("new_baseline") && !body["new_baseline"].is_boolean()) {

@@ -1,7 +1,12 @@
 #include "station/page/quality_control.h"
 
+#include <algorithm>
+#include <deque>
 #include <map>
 #include <set>
+
+#include "station/certificate/certificate.h"
+#include "station/records/run_records.h"
 
 namespace sixpoint::station {
 
@@ -31,10 +36,12 @@ Json titles_for(const std::vector<std::string>& names) {
 
 }  // namespace
 
-QualityControl::QualityControl(StoreOpener open_store, std::string station, Limits limits)
+QualityControl::QualityControl(StoreOpener open_store, std::string station, Limits limits,
+                               Clock& clock)
     : open_store_(std::move(open_store)),
       station_(std::move(station)),
       limits_(std::move(limits)),
+      clock_(clock),
       lock_({{"locked", false},
              {"reasons", Json::array()},
              {"check_units", Json::array()},
@@ -45,7 +52,7 @@ QualityControl::QualityControl(StoreOpener open_store, std::string station, Limi
 
 Result<StationState> QualityControl::read_state() {
   SIXPOINT_ASSIGN(auto store, open_store_());
-  return station_state(store, station_, limits_.check_unit);
+  return station_state(store, station_, limits_.check_unit, clock_.now());
 }
 
 void QualityControl::watch(const std::stop_token& stop) {
@@ -139,6 +146,40 @@ Result<Json> QualityControl::statistics(const StatisticsQuery& query) {
   }
   json["titles"] = titles_for(names);
   return json;
+}
+
+Result<Json> QualityControl::runs(const std::string& from, const std::string& serial) {
+  constexpr std::size_t kMostRuns = 200;
+  db::RunFilter filter;
+  filter.serial = serial;
+  if (serial.empty()) {
+    filter.station = station_;
+    SIXPOINT_ASSIGN(filter.from, parse_iso8601(from));
+  }
+  SIXPOINT_ASSIGN(auto store, open_store_());
+  std::deque<Json> newest;
+  for (const char* kind : {"jig", kWriteKind}) {
+    filter.kind = kind;
+    SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
+      const Json document = Json::parse(run.document, nullptr, false);
+      const bool written = document.is_object() &&
+                           document.value("/as_left/written"_json_pointer, Json(false)) == true;
+      newest.push_front({{"run", run.id},
+                         {"serial", run.serial},
+                         {"started", to_iso8601(run.started)},
+                         {"ended", to_iso8601(run.ended)},
+                         {"verdict", run.verdict},
+                         {"operator", run.operator_name},
+                         {"written", written},
+                         {"documents", documents_of(run)}});
+      return {};
+    }));
+  }
+  std::stable_sort(newest.begin(), newest.end(), [](const Json& a, const Json& b) {
+    return a["ended"].get_ref<const std::string&>() > b["ended"].get_ref<const std::string&>();
+  });
+  newest.resize(std::min(newest.size(), kMostRuns));
+  return Json{{"runs", newest}};
 }
 
 Result<Json> QualityControl::studies() {

@@ -1,7 +1,7 @@
 // Quality control of the station, for the page: check units and the lock, statistics, gage studies
 // (docs/statistics.md), and the decisions of engineers about them.
 //
-//   QualityControl quality(open_store, "bench-1", default_limits());
+//   QualityControl quality(open_store, "bench-1", default_limits(), env.clock);
 //   const bool locked = quality.lock()["locked"] == true;
 //   StatisticsQuery query;
 //   query.by = "operator";
@@ -45,7 +45,7 @@ class QualityControl {
  public:
   // `open_store` is called from any thread. Reads the store every 15 s: another station, or the
   // command line, may have signed.
-  QualityControl(StoreOpener open_store, std::string station, Limits limits);
+  QualityControl(StoreOpener open_store, std::string station, Limits limits, Clock& clock);
   QualityControl(const QualityControl&) = delete;
   QualityControl& operator=(const QualityControl&) = delete;
 
@@ -62,6 +62,9 @@ class QualityControl {
   // As `sixpoint statistics --json`, with the meaning of the codes and the titles of the
   // quantities.
   Result<nlohmann::ordered_json> statistics(const StatisticsQuery& query);
+  // {runs[{run, serial, started, verdict, operator, written, documents[]}]}, newest first, 200 at
+  // most: this station's runs that started at `from` or later (ISO 8601), or all runs of a unit.
+  Result<nlohmann::ordered_json> runs(const std::string& from, const std::string& serial);
   Result<nlohmann::ordered_json> studies();  // {studies[], quantities[{name, title, unit, axes[]}]}
   Result<nlohmann::ordered_json> gage_study(const GageQuery& query);
 
@@ -73,6 +76,7 @@ class QualityControl {
   const StoreOpener open_store_;
   const std::string station_;
   const Limits limits_;
+  Clock& clock_;
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;

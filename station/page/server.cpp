@@ -1,4 +1,4 @@
-// The one file that uses Boost.Asio and Boost.Beast.
+// The one file that uses Boost.Asio, Boost.Beast and TLS.
 #include "station/page/server.h"
 
 #include <array>
@@ -10,10 +10,12 @@
 #include <vector>
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/strand.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/ssl.hpp>
 #include <fmt/format.h>
 
 namespace sixpoint::station {
@@ -24,6 +26,8 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = boost::beast::http;
 using asio::ip::tcp;
+using PlainStream = beast::tcp_stream;
+using TlsStream = beast::ssl_stream<beast::tcp_stream>;
 using NetworkError = boost::system::error_code;
 
 constexpr std::chrono::milliseconds kBetweenEvents{33};
@@ -57,6 +61,7 @@ ApiRequest request_of(const http::request_header<>& head) {
   request.authorization = text(head[http::field::authorization]);
   request.cookie = text(head[http::field::cookie]);
   request.client = text(head["X-Sixpoint-Client"]);
+  request.before = text(head["X-Sixpoint-Before"]);
   const std::string target = text(head.target());
   const std::size_t path_end = std::min(target.find('?'), target.size());
   request.path = decoded(std::string_view(target).substr(0, path_end), false);
@@ -86,56 +91,74 @@ bool is_malformed(const NetworkError& error) {
 }  // namespace
 
 struct Server::Impl {
+  class Idle {
+   public:
+    virtual ~Idle() = default;
+    virtual void close_oldest() = 0;
+  };
+  template <class Stream>
   class Connection;
 
   Impl(Env& its_env, Api& its_api, const ServerOptions& its_options)
       : env(its_env), api(its_api), options(its_options) {}
   Status listen();
+  Status use_tls();
   void accept();
+  template <class Stream, class... TlsContext>
+  void begin(tcp::socket socket, TlsContext&... tls_context);
 
   Env& env;
   Api& api;
   const ServerOptions options;
   std::mutex mutex;  // guards `idle`
   // By order of arrival: connections whose request is not complete, or whose answer was sent.
-  std::map<std::uint64_t, std::weak_ptr<Connection>> idle;
+  std::map<std::uint64_t, std::weak_ptr<Idle>> idle;
   std::uint64_t arrivals = 0;
+  std::optional<asio::ssl::context> tls;  // where it serves https
   asio::io_context io;  // its destructor ends the connections, which use the members above
   tcp::acceptor acceptor{io};
 };
 
 // One request and its answer, or one event stream. Everything runs on the connection's strand, and
 // every pending operation holds a shared_ptr to the connection.
-class Server::Impl::Connection : public std::enable_shared_from_this<Connection> {
+template <class Stream>
+class Server::Impl::Connection : public Idle,
+                                 public std::enable_shared_from_this<Connection<Stream>> {
  public:
-  Connection(Impl& server, std::uint64_t number, tcp::socket socket)
+  template <class... TlsContext>
+  Connection(Impl& server, std::uint64_t number, tcp::socket socket, TlsContext&... tls_context)
       : server_(server),
         number_(number),
-        stream_(std::move(socket)),
+        stream_(std::move(socket), tls_context...),
         timer_(stream_.get_executor()) {
     NetworkError ignored;  // neither is needed for a right answer
-    stream_.socket().set_option(tcp::no_delay(true), ignored);
-    stream_.socket().set_option(tcp::socket::send_buffer_size(server_.options.most_unread_bytes),
+    plain().socket().set_option(tcp::no_delay(true), ignored);
+    plain().socket().set_option(tcp::socket::send_buffer_size(server_.options.most_unread_bytes),
                                 ignored);
     parser_.header_limit(kMostHead_bytes);
     parser_.body_limit(std::numeric_limits<std::uint64_t>::max());  // on_head() has the limit
   }
-  ~Connection() { set_idle(false); }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+  ~Connection() override { set_idle(false); }
 
   void start() {
-    asio::dispatch(stream_.get_executor(), [self = shared_from_this()] {
+    asio::dispatch(stream_.get_executor(), [self = this->shared_from_this()] {
       self->limit_time();
-      http::async_read_header(
-          self->stream_, self->buffer_, self->parser_,
-          [self](const NetworkError& error, std::size_t /*bytes*/) { self->on_head(error); });
+      if constexpr (std::is_same_v<Stream, TlsStream>) {
+        self->stream_.async_handshake(asio::ssl::stream_base::server,
+                                      self->then(&Connection::read_head));
+      } else {
+        self->read_head();
+      }
     });
   }
 
   // There are too many idle connections, and this is the oldest.
-  void close_oldest() {
-    asio::post(stream_.get_executor(), [self = shared_from_this()] {
+  void close_oldest() override {
+    asio::post(stream_.get_executor(), [self = this->shared_from_this()] {
       if (!self->busy_) {
-        self->stream_.close();
+        self->plain().close();
       }
     });
   }
@@ -143,7 +166,7 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
   void set_idle(bool is_idle) {
     const std::lock_guard lock(server_.mutex);
     if (is_idle) {
-      server_.idle.emplace(number_, weak_from_this());
+      server_.idle.emplace(number_, this->weak_from_this());
     } else {
       server_.idle.erase(number_);
     }
@@ -152,20 +175,30 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
  private:
   // Handler of an operation: goes on with `next`; closes the connection on an error.
   auto then(void (Connection::*next)()) {
-    return [self = shared_from_this(), next](const NetworkError& error, std::size_t /*bytes*/ = 0) {
-      error ? self->stream_.close() : (self.get()->*next)();
+    return [self = this->shared_from_this(), next](const NetworkError& error,
+                                                   std::size_t /*bytes*/ = 0) {
+      error ? self->plain().close() : (self.get()->*next)();
     };
   }
+  // The TCP stream, below TLS where there is any.
+  PlainStream& plain() { return beast::get_lowest_layer(stream_); }
   void limit_time() {
-    stream_.expires_after(std::chrono::seconds(server_.options.request_time_out_s));
+    plain().expires_after(std::chrono::seconds(server_.options.request_time_out_s));
   }
 
+  void read_head() {
+    http::async_read_header(
+        stream_, buffer_, parser_,
+        [self = this->shared_from_this()](const NetworkError& error, std::size_t /*bytes*/) {
+          self->on_head(error);
+        });
+  }
   void on_head(const NetworkError& error) {
     if (is_malformed(error)) {
       return respond(refused(400, "bad_request", "the request makes no sense"));
     }
     if (error) {
-      return stream_.close();
+      return plain().close();
     }
     const auto& head = parser_.get();
     request_ = request_of(head);
@@ -223,14 +256,15 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
   // the client would lose the answer.
   void finish() {
     NetworkError ignored;
-    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    plain().socket().shutdown(tcp::socket::shutdown_send, ignored);
     busy_ = false;
     set_idle(true);
     limit_time();
     discard_input();
   }
+  // Below TLS: what comes is read by nobody.
   void discard_input() {
-    stream_.async_read_some(asio::buffer(discarded_), then(&Connection::discard_input));
+    plain().async_read_some(asio::buffer(discarded_), then(&Connection::discard_input));
   }
 
   void stream_events() {
@@ -240,7 +274,7 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
       refusal.headers.emplace_back("Retry-After", "5");
       return respond(refusal);
     }
-    stream_.expires_never();
+    plain().expires_never();
     discard_input();  // ends the connection when the client closes it
     write_events(
         "HTTP/1.1 200 OK\r\nCache-Control: no-store\r\nConnection: close\r\n"
@@ -257,7 +291,7 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
     timer_.async_wait(then(&Connection::send_events));
   }
   void send_events() {
-    if (!stream_.socket().is_open()) {
+    if (!plain().socket().is_open()) {
       return;
     }
     const std::string text = events_->next();
@@ -267,7 +301,7 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
 
   Impl& server_;
   const std::uint64_t number_;
-  beast::tcp_stream stream_;
+  Stream stream_;
   asio::steady_timer timer_;
   beast::flat_buffer buffer_;
   http::request_parser<http::string_body> parser_;
@@ -302,23 +336,47 @@ void Server::Impl::accept() {
         if (error) {
           env.clock.sleep(std::chrono::milliseconds(1));  // no descriptor is free
         } else {
-          auto connection = std::make_shared<Connection>(*this, ++arrivals, std::move(socket));
-          connection->set_idle(true);
-          connection->start();
-          std::shared_ptr<Connection> oldest;
-          {
-            const std::lock_guard lock(mutex);
-            if (idle.size() > options.most_idle) {
-              oldest = idle.begin()->second.lock();
-              idle.erase(idle.begin());
-            }
-          }
-          if (oldest) {
-            oldest->close_oldest();
-          }
+          tls ? begin<TlsStream>(std::move(socket), *tls) : begin<PlainStream>(std::move(socket));
         }
         accept();
       });
+}
+
+template <class Stream, class... TlsContext>
+void Server::Impl::begin(tcp::socket socket, TlsContext&... tls_context) {
+  auto connection =
+      std::make_shared<Connection<Stream>>(*this, ++arrivals, std::move(socket), tls_context...);
+  connection->set_idle(true);
+  connection->start();
+  std::shared_ptr<Idle> oldest;
+  {
+    const std::lock_guard lock(mutex);
+    if (idle.size() > options.most_idle) {
+      oldest = idle.begin()->second.lock();
+      idle.erase(idle.begin());
+    }
+  }
+  if (oldest) {
+    oldest->close_oldest();
+  }
+}
+
+Status Server::Impl::use_tls() {
+  if (options.tls_certificate.empty() && options.tls_key.empty()) {
+    return {};
+  }
+  tls.emplace(asio::ssl::context::tls_server);
+  SSL_CTX_set_min_proto_version(tls->native_handle(), TLS1_2_VERSION);
+  NetworkError error;
+  tls->use_certificate_chain(asio::buffer(options.tls_certificate), error);
+  if (!error) {
+    tls->use_private_key(asio::buffer(options.tls_key), asio::ssl::context::pem, error);
+  }
+  if (error || SSL_CTX_check_private_key(tls->native_handle()) != 1) {
+    return fail(ErrorCode::bad_data, "this certificate and this key do not go together", {},
+                "give PEM files: the certificate with its chain, and its key without a password");
+  }
+  return {};
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -326,6 +384,7 @@ Server::~Server() { stop(); }
 
 Result<std::unique_ptr<Server>> Server::open(Env& env, Api& api, const ServerOptions& options) {
   auto impl = std::make_unique<Impl>(env, api, options);
+  SIXPOINT_CHECK(impl->use_tls());
   SIXPOINT_CHECK(impl->listen());
   std::unique_ptr<Server> server(new Server(std::move(impl)));
   api.set_port(server->port());

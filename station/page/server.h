@@ -10,7 +10,7 @@
 //   server->serve();
 //
 // One request per connection. A connection that sends nothing, or sends slowly, costs a descriptor
-// and no thread. Boost.Beast is used in server.cpp alone.
+// and no thread. Boost.Beast and OpenSSL's TLS are used in server.cpp alone.
 #pragma once
 
 #include <memory>
@@ -37,11 +37,15 @@ struct ServerOptions {
   // Events that wait for a page that does not read them. The time-out above begins when they are
   // more; a page that reads has a few KiB waiting.
   int most_unread_bytes = 128 << 10;
+  // PEM; both empty: plain HTTP.
+  std::string tls_certificate = {};
+  std::string tls_key = {};
 };
 
 class Server {
  public:
-  // Listens; answers once serve() runs. device_unavailable when the address or port is taken.
+  // Listens; answers once serve() runs. device_unavailable when the address or port is taken,
+  // bad_data for a certificate and key that do not go together.
   // `env` and `api` outlive the server.
   static Result<std::unique_ptr<Server>> open(Env& env, Api& api, const ServerOptions& options);
   ~Server();

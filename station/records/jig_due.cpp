@@ -10,6 +10,19 @@ bool is_over(const JigDue& jig, UtcTime now) { return jig.due && *jig.due < now;
 
 }  // namespace
 
+Result<JigDue> parse_jig_due(const std::string& due, const std::string& exception,
+                             const std::string& signed_by) {
+  JigDue jig{{}, exception, signed_by};
+  if (!due.empty()) {
+    const auto date = parse_iso8601(due);
+    if (!date) {
+      return fail(ErrorCode::usage, date.error().what, "--jig-due", "write it as 2027-03-31");
+    }
+    jig.due = *date;
+  }
+  return jig;
+}
+
 Status check_jig_due(const JigDue& jig, UtcTime now) {
   if (!is_over(jig, now)) {
     return {};

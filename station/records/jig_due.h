@@ -28,6 +28,9 @@ struct JigDue {
   std::string signed_by;  // the engineer's name
 };
 
+// `due` as a person writes it ("2027-03-31"), or empty; usage where it is no date.
+Result<JigDue> parse_jig_due(const std::string& due, const std::string& exception,
+                             const std::string& signed_by);
 Status check_jig_due(const JigDue& jig, UtcTime now);
 // The signed exception in one sentence, for the run's record; empty where none is needed.
 std::string jig_due_note(const JigDue& jig, UtcTime now);

@@ -43,7 +43,8 @@ db::RunRecord run_record_before(const JigSessionOptions& session, const std::str
   return run;
 }
 
-void complete_run_record(db::RunRecord& run, const JigReport& report, const std::string& study) {
+void complete_run_record(db::RunRecord& run, const JigReport& report, const std::string& study,
+                         bool is_authenticated) {
   run.started = report.started;
   run.ended = report.ended;
   run.verdict = to_string(report.verdict);
@@ -51,6 +52,9 @@ void complete_run_record(db::RunRecord& run, const JigReport& report, const std:
   Json document = report.to_json();
   if (!study.empty()) {
     document["study"] = study;
+  }
+  if (is_authenticated) {
+    document["operator_authenticated"] = true;
   }
   run.document = document.dump(-1, ' ', false, Json::error_handler_t::replace);
   run.codes = report.codes;

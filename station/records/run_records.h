@@ -16,12 +16,17 @@
 
 namespace sixpoint::station {
 
+// The kind of a record that only wrote the constants of a run before it, with that run's readings:
+// no statistics and no rule about repeated runs counts it a second time.
+inline constexpr const char* kWriteKind = "write";
+
 // What is known before the unit is measured; the document is still empty.
 db::RunRecord run_record_before(const JigSessionOptions& session, const std::string& serial,
                                 const std::string& jig);
-// What the report adds; `study` names the gage study that a run of kStudyKind belongs to.
-void complete_run_record(db::RunRecord& run, const JigReport& report,
-                         const std::string& study = {});
+// What the report adds; `study` names the gage study that a run of kStudyKind belongs to. The
+// operator's name is noted as authenticated where it was, by a PIN.
+void complete_run_record(db::RunRecord& run, const JigReport& report, const std::string& study = {},
+                         bool is_authenticated = false);
 
 // A row for the store; the run's id is still empty.
 db::ConstantsRecord constants_row(const calib::ConstantsRecord& record);

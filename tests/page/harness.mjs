@@ -28,16 +28,24 @@ export function folder() {
   return path;
 }
 
+// The token of a station, from the file that its user alone may read; by the station's address.
+const homes = new Map();
+const token = (url) => readFileSync(join(homes.get(new URL(url).origin), 'state', 'token'), 'utf8').trim();
+function ask(url, path, body, headers = {}) {
+  const sent = { headers: { Authorization: `Bearer ${token(url)}`, ...headers } };
+  return fetch(new URL(path, url), body === undefined ? sent : { ...sent, method: 'POST', body: JSON.stringify(body) });
+}
+
 // Starts `sixpoint station` on a free port; answers with its address and a way to end it.
-export async function station(devices, { home = folder(), port = 0 } = {}) {
+export async function station(devices, { home = folder(), port = 0, more = [] } = {}) {
   const child = spawn(program, [
     'station', '--port', String(port), '--store', join(home, 'store.db'), '--state', join(home, 'state'), '--files', home,
-    '--station', 'Bench 1', ...devices.flatMap((device) => ['--device', device]),
+    '--station', 'Bench 1', ...devices.flatMap((device) => ['--device', device]), ...more,
   ], { stdio: ['ignore', 'pipe', 'pipe'], env: { ...process.env, HOME: home, XDG_DATA_HOME: home } });
   let said = '';
   child.stderr.on('data', (data) => { said += data; });
   const ended = new Promise((resolve) => child.once('exit', (code, signal) => resolve(code ?? signal)));
-  const url = await new Promise((resolve, reject) => {
+  const printed = await new Promise((resolve, reject) => {
     let text = '';
     child.stdout.on('data', (data) => {
       text += data;
@@ -45,16 +53,18 @@ export async function station(devices, { home = folder(), port = 0 } = {}) {
     });
     child.once('exit', () => reject(new Error(`the station ended: ${said}`)));
   });
+  const url = `${new URL(printed).origin}/`;
+  homes.set(new URL(url).origin, home);
   const end = async (signal = 'SIGTERM') => {
     child.kill(signal);
     return ended;
   };
   cleanups.push(() => end('SIGKILL'));
-  const api = async (path, body) => {
-    const answer = await fetch(new URL(path, url), body === undefined ? {} : { method: 'POST', body: JSON.stringify(body) });
+  const api = async (path, body, headers) => {
+    const answer = await ask(url, path, body, headers);
     return { status: answer.status, json: await answer.json().catch(() => null) };
   };
-  return { url, home, end, api, pid: child.pid };
+  return { url, printed, home, end, api, pid: child.pid };
 }
 
 // The same with a unit on emulated USB, which outlives the station (usb_station.cpp): `tell` does what a hand does.
@@ -80,12 +90,13 @@ export async function stationOnUsb(words = []) {
     return at >= 0 && lines.splice(at, 1)[0];
   });
   const serial = (await line((text) => text.startsWith('serial '))).slice(7);
-  const url = await line((text) => text.startsWith('http'));
+  const url = `${new URL(await line((text) => text.startsWith('http'))).origin}/`;
+  homes.set(new URL(url).origin, home);
   const tell = async (word) => {
     child.stdin.write(`${word}\n`);
     check((await line((text) => text === 'ok' || text === 'failed')) === 'ok', `${word} is done`);
   };
-  const api = async (path) => (await fetch(new URL(path, url))).json();
+  const api = async (path) => (await ask(url, path)).json();
   const again = () => line((text) => text.startsWith('http'));
   return { serial, url, tell, api, again, home };
 }
@@ -117,9 +128,10 @@ export async function bare(url) {
   return page;
 }
 
+// A new browser, signed in by a code of its own, unless `url` has one.
 export async function open(url, { width = 1500, height = 1000 } = {}) {
   await launch();
-  const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true });
+  const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, ignoreHTTPSErrors: true });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
   const problems = [];
@@ -129,7 +141,7 @@ export async function open(url, { width = 1500, height = 1000 } = {}) {
     if (message.type() === 'error' && !/status of (4|5)\d\d|ERR_CONNECTION|ERR_INCOMPLETE/.test(message.text())) problems.push(message.text());
   });
   page.problems = problems;
-  await page.goto(url);
+  await page.goto(new URL(url).hash ? url : `${url}#code=${(await (await ask(url, '/api/code', {})).json()).code}`);
   await page.getByText('Bench 1').first().waitFor();
   return page;
 }

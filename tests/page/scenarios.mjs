@@ -29,7 +29,7 @@ const scenarios = {
     await h.axe(page);
     await h.place(page, 14);
     await page.locator('.result').waitFor();
-    check((await page.locator('.result .verdict').textContent()).includes('Pass'), 'the verdict is a pass');
+    check((await page.locator('.result .verdict').textContent()).includes('PASS - NOT WRITTEN'), 'the verdict is a pass, and nothing is in the unit');
     await page.getByText(/Stored as run [0-9a-f]{12}/).waitFor();
     await h.shot(page, 'whole-3-verdict');
     await h.axe(page);
@@ -39,6 +39,103 @@ const scenarios = {
     check(lane.result.residual_mg < 3, `the constants fit unseen placements: ${lane.result.residual_mg} mg`);
     const report = (await station.api(`/api/runs/${lane.result.run}/report.json`)).json;
     check(report.serial === lane.unit.serial && report.verification.poses.length === 8, 'the store has the whole report');
+    // "Write now": the same readings, two more placements, and the unit holds it.
+    await button(page, 'Write now').click();
+    await h.place(page, 16);
+    await page.locator('.result .verdict', { hasText: 'PASS - WRITTEN' }).waitFor();
+    await page.getByRole('link', { name: 'Label (ZPL)' }).waitFor();
+    await h.shot(page, 'whole-4-written');
+    await h.axe(page);
+    await page.locator('.hand').getByRole('button', { name: 'Unplug', exact: true }).click();
+    await page.getByText('Plug a unit in').waitFor();
+    check(await page.locator('.result .verdict').isVisible(), 'the verdict stays when the unit is out');
+    await page.locator('.hand').getByRole('button', { name: 'Swap for another', exact: true }).click();
+    await page.getByText(`Last unit: ${lane.unit.serial}, PASS - WRITTEN`).waitFor();
+    check((await page.locator('.result').count()) === 0, 'and is not taken for the next one\'s');
+    await button(page, 'Today').click();
+    await page.getByText('1 unit today, 1 passed').waitFor();
+    check((await page.locator('tbody tr').count()) === 2, 'the run and its write');
+    check((await page.locator('tbody tr').first().textContent()).includes('PASS - WRITTEN'), 'the newest first');
+    await h.shot(page, 'whole-5-today');
+    await h.axe(page);
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // The printed address opens one browser; the code does not stay in the address, another browser needs another one, and
+  // the session outlives the program.
+  async sign_in() {
+    const home = h.folder();
+    const devices = ['virtual:seed=7,pace=10'];
+    const station = await h.station(devices, { home });
+    const first = await h.open(station.printed);
+    await button(first, 'Start the measurement').waitFor();
+    check(first.url() === station.url, `the address has no code any more: ${first.url()}`);
+    check((await first.evaluate(() => history.length)) <= 2, 'nor has the history');
+    check((await first.evaluate(() => document.cookie)) === '', 'no script reads the session');
+    const second = await h.bare(station.printed);  // the same code again
+    await second.getByRole('heading', { name: 'Sign this browser in' }).waitFor();
+    check((await second.getByText('MOS2').count()) === 0, 'nothing of the bench is shown');
+    await h.axe(second);
+    await h.shot(second, 'sign-in-1-asked');
+    await second.getByLabel('Code').fill('AAAA-AAAA-AAAA');
+    await button(second, 'Sign in').click();
+    await second.getByText('this code was used, is too old, or never was one').waitFor();
+    await button(first, 'Let another browser in').click();
+    const address = await first.locator('.code').textContent();
+    await h.shot(first, 'sign-in-2-code');
+    await second.getByLabel('Code').fill(address.match(/code=(.*)/)[1].toLowerCase());
+    await second.keyboard.press('Enter');
+    await button(second, 'Start the measurement').waitFor();
+    await station.end();
+    await h.station(devices, { home, port: new URL(station.url).port });
+    await first.reload();
+    await button(first, 'Start the measurement').waitFor();
+    check(first.problems.length === 0, `no errors on the page: ${first.problems}`);
+  },
+
+  // Operators with PINs: the page asks who works, the record has the name that signed in.
+  async pins() {
+    const home = h.folder();
+    const env = { ...process.env, HOME: home, XDG_DATA_HOME: home };
+    execFileSync(h.program, ['operator', 'add', 'Ada'], { input: '471100\n', env, stdio: ['pipe', 'ignore', 'ignore'] });
+    const station = await h.station(['virtual:seed=7,jig=auto'], { home });
+    const page = await h.open(station.url);
+    await start(page);
+    await page.getByText('nobody is signed in here').waitFor();
+    await h.axe(page);
+    await h.shot(page, 'pins-1-asked');
+    await page.getByLabel('PIN').fill('0000');
+    await button(page, 'Begin').click();
+    await page.getByText('do not belong together').waitFor();
+    await page.getByLabel('PIN').fill('471100');
+    await page.keyboard.press('Enter');
+    await page.getByText('Ada (technician)').waitFor();
+    await start(page);
+    await page.locator('.result .verdict', { hasText: 'PASS' }).waitFor();
+    await page.getByText(/Stored as run/).waitFor();
+    const lane = (await station.api('/api/lanes/1')).json;
+    const certificate = (await station.api(`/api/runs/${lane.result.run}/certificate.json`)).json;
+    check(certificate.operator === 'Ada' && certificate.operator_authenticated === true, JSON.stringify([certificate.operator, certificate.operator_authenticated]));
+    await h.shot(page, 'pins-2-signed-in');
+    await h.axe(page);
+    await button(page, 'Sign out').click();
+    await page.getByLabel('PIN').waitFor();
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+  },
+
+  // The same over TLS, as on another address.
+  async tls() {
+    const home = h.folder();
+    const [cert, key] = ['cert.pem', 'key.pem'].map((name) => join(home, name));
+    execFileSync('openssl', ['req', '-x509', '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes', '-days', '2',
+      '-subj', '/CN=bench', '-addext', 'subjectAltName=IP:127.0.0.1', '-keyout', key, '-out', cert], { stdio: 'ignore' });
+    const station = await h.station(['virtual:seed=7,pace=10'], { home, more: ['--tls-cert', cert, '--tls-key', key] });
+    check(station.printed.startsWith('https://'), station.printed);
+    const page = await h.open(station.printed);
+    await start(page);
+    await h.place(page, 2);
+    const cookies = await page.context().cookies();
+    check(cookies.length === 1 && cookies[0].secure && cookies[0].httpOnly && cookies[0].sameSite === 'Strict', JSON.stringify(cookies));
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 
@@ -157,7 +254,8 @@ const scenarios = {
     await h.shot(page, 'replug-2-another');
     await button(page, 'Stop this run').click();
     await button(page, 'Yes, stop').click();
-    await page.locator('.result .verdict', { hasText: 'Stopped' }).waitFor();
+    // Another unit lies there: what came of the first one is one line with its serial number.
+    await page.locator('.last', { hasText: 'MOS2A45130012' }).filter({ hasText: /stopped/i }).waitFor();
     const lane = (await station.api('/api/lanes/1')).json;
     check(lane.result.serial === 'MOS2A45130012', 'the run is the first unit\'s');
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
@@ -366,7 +464,7 @@ const scenarios = {
     await h.shot(page, 'lock-3-jig');
     await h.axe(page);
     // A signature without a name is none.
-    check((await fetch(new URL('/api/station-lock', station.url), { method: 'POST', headers: { 'X-Sixpoint-Client': 'x' }, body: '{"operator": " ", "reason": "x"}' })).status === 400, 'a name is needed');
+    check((await station.api('/api/station-lock', { operator: ' ', reason: 'x' }, { 'X-Sixpoint-Client': 'x' })).status === 400, 'a name is needed');
     check((await station.api('/api/station-lock', { operator: 'Mallory', reason: 'x' })).status === 403, 'and the page\'s own header');
     // By keyboard alone.
     const reach = async (test) => {
@@ -529,6 +627,51 @@ const scenarios = {
     }
   },
 
+  // Four screens, one to sixteen lanes: nothing is scrolled sideways, and what a hand needs next is on the first screen.
+  async layout() {
+    const screens = [['bench', 1280, 800], ['wall', 1920, 1080], ['tablet', 820, 1180], ['phone', 390, 844]];
+    for (const lanes of [1, 4, 16]) {
+      const station = await h.station(Array.from({ length: lanes }, (_, i) => `virtual:seed=${50 + i},pace=10`));
+      const seen = async (page, name, selector) => {
+        const box = await page.locator(selector).first().boundingBox();
+        const { width, height } = page.viewportSize();
+        check(box && box.y >= 0 && box.y + box.height <= height && box.x >= 0 && box.x + box.width <= width,
+          `${lanes} lanes, ${name}: ${selector} is on the first screen (${JSON.stringify(box)})`);
+        return box;
+      };
+      const look = async (page, name, selectors) => {
+        await page.evaluate(() => scrollTo(0, 0));
+        for (const selector of selectors) await seen(page, name, selector);
+        const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+        check(over <= 0, `${lanes} lanes, ${name}: ${over} px to scroll sideways`);
+        await page.screenshot({ path: join(h.shots, `layout-${lanes}-${name}.png`) });
+      };
+      let first = true;
+      for (const [name, width, height] of screens) {
+        const page = await h.open(station.url, { width, height });
+        if (first) {
+          await until('ready', async () => (await station.api('/api/lanes/1')).json.state === 'idle');
+          if (lanes > 1) await page.locator('.card').first().click();
+          await look(page, `${name}-ready`, ['.prompt', 'button.primary']);
+          await start(page);
+        }
+        first = false;
+        await page.locator('.still').waitFor();
+        await look(page, `${name}-running`, ['.prompt', '.still', '.still progress', '.lane > .buttons button']);
+        const bar = await page.locator('.still progress').boundingBox();
+        check(bar.width > 0.5 * Math.min(width, 700), `${name}: the bar is ${bar.width} px wide`);
+        if (width >= 1280) {
+          const header = await page.locator('header').boundingBox();
+          check(header.height < 100, `${lanes} lanes, ${name}: the header is one row (${header.height} px)`);
+          const pane = await page.locator('.lane').boundingBox();
+          check(lanes === 1 || pane.width >= 0.58 * width, `${name}: the work has ${pane.width} of ${width} px`);
+        }
+        await page.close();
+      }
+      await station.end();
+    }
+  },
+
   // A calibration file whose unit is pulled out, and whose page is loaded anew, in the middle.
   async capture() {
     const station = await h.station(['virtual:seed=7,serial=MOS2A45130007,pace=20']);
@@ -581,7 +724,8 @@ const scenarios = {
     await until('ready', async () => (await station.api('/api/lanes/1')).json.state === 'idle');
     const port = new URL(station.url).port;
     const evil = await h.serve((request) => (request.url === '/frame' ? `<iframe src="${station.url}"></iframe>` : '<form method=post enctype=text/plain><input name=x></form>'));
-    const page = await h.bare(evil);
+    const page = await h.open(station.url);  // this browser is signed in
+    await page.goto(evil);
     const before = (await station.api('/api/state')).json;
     const commands = [['/api/run', { lane: 1 }], ['/api/capture', { lane: 1 }], ['/api/lanes/1/scan', { serial: 'MOS2A00000000' }],
       ['/api/check-units', { serial: 'MOS2A45130007', action: 'add', operator: 'E', reason: 'x' }],

@@ -92,7 +92,7 @@ function Designate({ units, setProblem, done }: { units: string[]; setProblem: S
   return (
     <form class="sign" aria-labelledby="designate-title" onSubmit={(event) => { event.preventDefault(); if (ready) void decide('add'); }}>
       <h3 id="designate-title">{C.change}</h3>
-      <label>{C.serial} <input value={serial} maxLength={16} list="plugged-in" spellcheck={false} autocomplete="off" onInput={(event) => setSerial(event.currentTarget.value)} /></label>
+      <label>{C.serial} <input data-serial value={serial} maxLength={16} list="plugged-in" spellcheck={false} autocomplete="off" onInput={(event) => setSerial(event.currentTarget.value)} /></label>
       <datalist id="plugged-in">{units.map((each) => <option value={each} />)}</datalist>
       <label>{C.name} <input value={name} maxLength={60} autocomplete="off" onInput={(event) => setName(event.currentTarget.value)} /></label>
       <label class="wide">{C.reason} <input value={reason} maxLength={190} autocomplete="off" onInput={(event) => setReason(event.currentTarget.value)} /></label>
@@ -123,6 +123,7 @@ export function CheckUnits({ state, setProblem }: { state: State; setProblem: Se
         <p>{C.text(view.baseline_runs)}</p>
         {!view.locked && <p class="notice good"><b aria-hidden="true">✔ </b>{C.open}</p>}
         <p class="chips">{view.check_units.length ? view.check_units.map((unit) => <b>{unit}</b>) : C.none}</p>
+        {Object.entries(view.known_bad ?? {}).map(([unit, codes]) => <p>{S.lock.knownBad(unit, codes)}</p>)}
         {view.signature && <p>{C.signed(view.signature)}</p>}
         <Designate units={units} setProblem={setProblem} done={load} />
         {!view.locked && view.charts.length > 0 && <details><summary>{S.lock.signTitle}</summary><SignForm setProblem={setProblem} done={load} /></details>}

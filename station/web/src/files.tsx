@@ -1,7 +1,8 @@
 // At home: a calibration file, and "repair my files".
 import { useEffect, useState } from 'preact/hooks';
 import { LiveBox, PosePicture } from './box';
-import { CaptureSteps, ResultBox, VirtualHand } from './lane';
+import { CaptureSteps, VirtualHand } from './lane';
+import { ResultBox } from './result';
 import { S } from './strings';
 import { ask, client, type Refusal } from './station';
 import { POSES, type State } from './types';

@@ -1,37 +1,13 @@
 // One lane in front, and all lanes as cards.
 import { useEffect, useState } from 'preact/hooks';
 import { LiveBox, PosePicture } from './box';
+import { ResultBox, tone } from './result';
 import { S } from './strings';
 import { ask, client, type Refusal } from './station';
 import { Spark, TraceChart } from './traces';
-import { POSES, type Lane, type Live, type Lock, type Pose, type Result, type State } from './types';
+import { POSES, type Lane, type Live, type Lock, type Pose, type State } from './types';
 
 const BUSY = ['running', 'unit_away', 'wrong_unit', 'resuming', 'capturing'];
-
-export function ResultBox({ result }: { result: Result }) {
-  const name = S.verdict(result);
-  const good = result.verdict === 'pass' || result.verdict === 'conditional_pass';
-  return (
-    <section class={good ? 'result good' : 'result bad'} aria-label={name}>
-      <p class="verdict"><b aria-hidden="true">{S.verdictSigns[result.verdict] ?? '?'}</b> {name}</p>
-      <p>{result.serial}</p>
-      {typeof result.residual_mg === 'number' && <p>{S.residual(result.residual_mg, result.as_found_residual_mg ?? null)}</p>}
-      {result.reasons.map((reason) => <p>{reason}</p>)}
-      {result.next_actions && result.next_actions.length > 0 && <p class="todo"><b>{S.todo}:</b> {result.next_actions.join(' ')}</p>}
-      {result.repeat_sides && result.repeat_sides.length > 0 && <p>{S.files.repeat(result.repeat_sides)}</p>}
-      {result.kind === 'jig' && result.verdict !== 'refused' && <p>{S.stored(result)}</p>}
-      {result.kind === 'capture' && result.stored && <p>{S.files.saved(`${result.file}.constants.json`)}</p>}
-      {result.run && result.stored && (
-        <p class="links">
-          <a href={`/api/runs/${result.run}/certificate.pdf`} download>{S.documents.certificate}</a>
-          <a href={`/api/runs/${result.run}/certificate.json`} download>{S.documents.json}</a>
-          {result.written && good && <a href={`/api/runs/${result.run}/label.zpl`} download>{S.documents.label}</a>}
-          <a href={`/api/runs/${result.run}/report.json`} download>{S.documents.report}</a>
-        </p>
-      )}
-    </section>
-  );
-}
 
 // For practice without hardware: buttons turn and unplug a virtual unit.
 export function VirtualHand({ lane, setProblem }: { lane: number; setProblem: (problem: Refusal | null) => void }) {
@@ -98,12 +74,12 @@ export function CaptureSteps({ lane, say }: { lane: Lane; say: (word: string, bo
   );
 }
 
-export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
-  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; lock: Lock | null; setProblem: (problem: Refusal | null) => void;
+export function LaneView({ lane, live, operator, virtual, lock, writeDefault, setProblem }: {
+  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; lock: Lock | null; writeDefault: boolean; setProblem: (problem: Refusal | null) => void;
 }) {
   const watches = !!lock && !!lane.unit && lock.check_units.includes(lane.unit.serial);
   const locked = !!lock?.locked && !watches;
-  const [write, setWrite] = useState(false);
+  const [write, setWrite] = useState(writeDefault);
   const [sure, setSure] = useState(false);
   const busy = BUSY.includes(lane.state);
   const mine = !busy || lane.client === client || lane.client === '';
@@ -113,6 +89,10 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
   };
   const start = async () => {
     const answer = await ask('/api/run', { lane: lane.lane, operator, write });
+    setProblem(answer.ok ? null : answer.error);
+  };
+  const writeNow = async () => {
+    const answer = await ask('/api/run', { lane: lane.lane, operator, write: true, last_run: true });
     setProblem(answer.ok ? null : answer.error);
   };
   useEffect(() => {
@@ -127,6 +107,9 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
   }, [lane.state, mine]);
   useEffect(() => setSure(false), [lane.state]);
 
+  // What came out stays until the next start, also when the unit is out; of another unit it is one line.
+  const result = busy ? null : lane.result;
+  const others = !!result && !!lane.unit && lane.unit.serial !== result.serial;
   const wanted: Pose | null = lane.state === 'running' ? lane.run?.wanted ?? null : lane.capture?.side ?? null;
   const shown = lane.state === 'running' ? live?.stillness : undefined;
   const refusal = lane.state === 'running' ? lane.run?.last_refusal : '';
@@ -140,27 +123,18 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
           {!busy && <>{' '}<button type="button" class="danger" onClick={() => say('jig-free')}>{S.jigFree}</button></>}
         </p>
       )}
+      {lane.log.length > 0 && lane.log[lane.log.length - 1].kind === 'problem' && <p class="notice bad" role="alert"><b aria-hidden="true">⚠ </b>{S.problemLog(lane.log[lane.log.length - 1].text)}</p>}
       {lane.scan && <p class={lane.scan.matches ? 'notice good' : 'notice bad'}><b aria-hidden="true">{lane.scan.matches ? '✔ ' : '✖ '}</b>{S.scanned(lane.scan.serial, lane.scan.matches)}</p>}
       <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal)}</p>
 
-      {(lane.state === 'done' || lane.state === 'idle') && lane.result && <ResultBox result={lane.result} />}
+      {result && (others ? <p class={`last word-${tone(result.verdict)}`}>{S.lastUnit(result)}</p> : <ResultBox result={result} writeNow={writeNow} />)}
       {lane.state === 'running' && lane.run && (
         <div class={`still still-${shown}`}>
           <span>{shown ? S.stillness[shown === 'leaving' && refusal ? 'refused' : shown] : ''}</span>
           <progress max={1} value={shown === 'dwelling' ? live?.dwell ?? 0 : 0} aria-label={S.stillness.dwelling} />
         </div>
       )}
-      <div class="pictures">
-        {wanted && (
-          <figure><figcaption>{S.wantedTitle}: <b>{S.poseText(wanted)}</b></figcaption><PosePicture pose={wanted} /></figure>
-        )}
-        {lane.state !== 'absent' && lane.state !== 'unit_away' && (
-          <figure><figcaption>{S.nowTitle} <b>{nowText(live)}</b></figcaption><LiveBox lane={lane.lane} text={nowText(live)} /></figure>
-        )}
-      </div>
-      {lane.state === 'running' && lane.run && <Placements lane={lane} />}
       {lane.state === 'capturing' && <CaptureSteps lane={lane} say={say} />}
-
       <div class="buttons">
         {(lane.state === 'idle' || lane.state === 'done') && (
           <>
@@ -182,6 +156,15 @@ export function LaneView({ lane, live, operator, virtual, lock, setProblem }: {
           <span>{S.held(lane.operator)} <button type="button" onClick={() => say('take', { operator })}>{S.takeOver}</button></span>
         )}
       </div>
+      <div class="pictures">
+        {wanted && (
+          <figure><figcaption>{S.wantedTitle}: <b>{S.poseText(wanted)}</b></figcaption><PosePicture pose={wanted} /></figure>
+        )}
+        {lane.state !== 'absent' && lane.state !== 'unit_away' && (
+          <figure><figcaption>{S.nowTitle} <b>{nowText(live)}</b></figcaption><LiveBox lane={lane.lane} text={nowText(live)} /></figure>
+        )}
+      </div>
+      {lane.state === 'running' && lane.run && <Placements lane={lane} />}
       {lane.state !== 'absent' && lane.state !== 'capturing' && <TraceChart lane={lane.lane} />}
       {virtual && <VirtualHand lane={lane.lane} setProblem={setProblem} />}
     </section>

@@ -39,6 +39,7 @@ export function LockBanner({ lock, setProblem }: { lock: Lock; setProblem: SetPr
         <p><b>{L.text}</b></p>
         <ul>{lock.reasons.map((reason) => <li>{reason}</li>)}</ul>
         <p>{L.next(lock.check_units)}</p>
+        {Object.entries(lock.known_bad ?? {}).map(([unit, codes]) => <p>{L.knownBad(unit, codes)}</p>)}
       </div>
       {open
         ? <SignForm setProblem={setProblem} done={() => setOpen(false)} cancel={() => setOpen(false)} />

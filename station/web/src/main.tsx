@@ -1,52 +1,40 @@
 import { render } from 'preact';
-import { useEffect, useReducer, useRef, useState } from 'preact/hooks';
+import { useEffect, useReducer, useState } from 'preact/hooks';
 import './page.css';
 import { CheckUnits } from './check';
+import { AnotherBrowser, SignIn, WhoWorks } from './entry';
 import { Files } from './files';
 import { LaneCards, LaneView } from './lane';
 import { LockBanner } from './lock';
 import { Statistics } from './statistics';
+import { Today } from './today';
 import { S } from './strings';
+import { serialOf, useScanner } from './scanner';
 import { ask, current, subscribe, type Refusal } from './station';
-
-// A label scanner is a keyboard that types a serial number and Enter faster than a person.
-function useScanner(found: (serial: string) => void) {
-  const text = useRef('');
-  const last = useRef(0);
-  useEffect(() => {
-    const press = (event: KeyboardEvent) => {
-      const inField = event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement;
-      if (inField || event.ctrlKey || event.altKey || event.metaKey) return;
-      if (event.timeStamp - last.current > 80) text.current = '';
-      if (event.key.length === 1 && /[A-Za-z0-9]/.test(event.key)) {
-        text.current += event.key;
-        last.current = event.timeStamp;
-      } else if (event.key === 'Enter' && text.current.length >= 6) {
-        event.preventDefault();
-        found(text.current.toUpperCase());
-        text.current = '';
-      }
-    };
-    window.addEventListener('keydown', press, true);
-    return () => window.removeEventListener('keydown', press, true);
-  });
-}
 
 function Page() {
   const [, again] = useReducer((n: number) => n + 1, 0);
   useEffect(() => subscribe(() => again(0)), []);
-  const { state, connected, live } = current();
+  const { state, connected, crowded, entry, me, live } = current();
   const [tab, setTab] = useState(() => (location.hash.slice(1) in S.tabs ? location.hash.slice(1) : 'jig'));
   const [chosen, setChosen] = useState(1);
   const [follow, setFollow] = useState(true);
   const [operator, setOperator] = useState(localStorage.getItem('sixpoint-operator') ?? '');
   const [scanned, setScanned] = useState('');
+  const [looked, setLooked] = useState('');  // whose runs the tab "Today" shows
   const [problem, setProblem] = useState<Refusal | null>(null);
 
-  const scan = async (serial: string) => {
-    const answer = await ask<{ lane: number }>('/api/scan', { serial });
-    if (answer.ok) { setChosen(answer.data.lane); setFollow(false); setProblem(null); setScanned(''); }
+  const go = (name: string) => { setTab(name); location.hash = name; };
+  const scan = async (label: string) => {
+    if (tab === 'today') return setLooked(serialOf(label));
+    const answer = await ask<{ lane: number }>('/api/scan', { serial: label });
+    setScanned('');
+    if (answer.ok) { setChosen(answer.data.lane); setFollow(false); setProblem(null); go('jig'); }
     else setProblem(answer.error);
+  };
+  const dismiss = () => {
+    setProblem(null);
+    void ask('/api/scan', { dismiss: true });  // a label that no lane holds blocks the start until then
   };
   useScanner(scan);
 
@@ -66,9 +54,9 @@ function Page() {
     window.addEventListener('keydown', press);
     return () => window.removeEventListener('keydown', press);
   }, [tab, state?.lanes.length]);
-  const go = (name: string) => { setTab(name); location.hash = name; };
-
   const lane = state?.lanes[chosen - 1];
+  // In the tab's title: what a person in another window must know.
+  useEffect(() => { document.title = `${lane ? S.prompt(lane) : S.title} - ${state?.station || S.title}`; }, [lane && S.prompt(lane), state?.station]);
   return (
     <>
       <header>
@@ -78,28 +66,29 @@ function Page() {
             <button type="button" aria-current={tab === name ? 'page' : undefined} onClick={() => go(name)}>{text}</button>
           ))}
         </nav>
-        <label>{S.operator} <input value={operator} maxLength={60} autocomplete="name" onInput={(event) => {
-          setOperator(event.currentTarget.value);
-          localStorage.setItem('sixpoint-operator', event.currentTarget.value);
-        }} /></label>
-        <form onSubmit={(event) => { event.preventDefault(); if (scanned) void scan(scanned.trim()); }}>
-          <label>{S.scan} <input value={scanned} maxLength={40} spellcheck={false} autocomplete="off" onInput={(event) => setScanned(event.currentTarget.value)} /></label>
+        {entry === 'open' && <WhoWorks me={me} typed={operator} setProblem={setProblem} setTyped={(name) => {
+          setOperator(name);
+          localStorage.setItem('sixpoint-operator', name);
+        }} />}
+        <form class="scan" onSubmit={(event) => { event.preventDefault(); if (scanned) void scan(scanned.trim()); }}>
+          <label>{S.scan} <input data-serial value={scanned} maxLength={80} spellcheck={false} autocomplete="off" onInput={(event) => setScanned(event.currentTarget.value)} /></label>
           <button type="submit">{S.scanGo}</button>
         </form>
       </header>
       <main>
         <div role="alert">
-          {!connected && state && <p class="notice bad"><b aria-hidden="true">⚠ </b>{S.connection.lost}</p>}
+          {!connected && state && <p class="notice bad"><b aria-hidden="true">⚠ </b>{crowded ? S.connection.crowded : S.connection.lost}</p>}
           {problem && <p class="notice bad"><b aria-hidden="true">✖ </b>{problem.what}. {problem.hint}{' '}
-            <button type="button" onClick={() => setProblem(null)}>OK</button></p>}
+            <button type="button" onClick={dismiss}>OK</button></p>}
         </div>
-        {state?.lock?.locked && <LockBanner lock={state.lock} setProblem={setProblem} />}
-        {!state ? <p>…</p> : tab === 'files' ? <Files state={state} setProblem={setProblem} />
+        {entry !== 'sign_in' && state?.lock?.locked && <LockBanner lock={state.lock} setProblem={setProblem} />}
+        {entry === 'sign_in' ? <SignIn /> : !state ? <p>…</p> : tab === 'files' ? <Files state={state} setProblem={setProblem} />
+          : tab === 'today' ? <Today state={state} serial={looked} setSerial={setLooked} setProblem={setProblem} />
           : tab === 'check' ? <CheckUnits state={state} setProblem={setProblem} />
           : tab === 'statistics' ? <Statistics setProblem={setProblem} /> : (
           <div class={state.lanes.length > 1 ? 'bench' : 'bench single'}>
             {lane && <LaneView key={chosen} lane={lane} live={live[chosen]} operator={operator}
-              virtual={state.virtual_hands.includes(chosen)} lock={state.lock} setProblem={setProblem} />}
+              virtual={state.virtual_hands.includes(chosen)} lock={state.lock} writeDefault={state.write_default} setProblem={setProblem} />}
             {state.lanes.length > 1 && (
               <LaneCards state={state} chosen={chosen} follow={follow} setFollow={setFollow}
                 choose={(n) => { setChosen(n); setFollow(false); }} />
@@ -107,7 +96,7 @@ function Page() {
           </div>
         )}
       </main>
-      <footer>{state?.version}</footer>
+      <footer>{entry === 'open' && <AnotherBrowser setProblem={setProblem} />} <span>{state?.version}</span>{state?.jig_due && <b>{S.jigDue(state.jig_due.slice(0, 10), Date.parse(state.jig_due) < Date.now())}</b>}</footer>
     </>
   );
 }

@@ -1,5 +1,5 @@
 // The connection to the station: state by server-sent events, commands by POST.
-import type { Job, Lane, Live, Lock, State } from './types';
+import type { Job, Lane, Live, Lock, Me, State } from './types';
 
 // Readings of one lane, the newest at `end`. Kept outside the page's state: they are drawn, not rendered.
 export const KEPT = 600;
@@ -29,9 +29,11 @@ export class Trace {
   }
 }
 
-export interface Snapshot { state: State | null; connected: boolean; live: Record<number, Live> }
+// `entry`: may this browser use the station? Not known until it was asked.
+// `me`: who works on this page, where the machine has operators with PINs.
+export interface Snapshot { state: State | null; connected: boolean; crowded: boolean; entry: 'unknown' | 'open' | 'sign_in'; me: Me; live: Record<number, Live> }
 export const traces = new Map<number, Trace>();
-let snapshot: Snapshot = { state: null, connected: false, live: {} };
+let snapshot: Snapshot = { state: null, connected: false, crowded: false, entry: 'unknown', me: { operators: [], operator: null }, live: {} };
 const listeners = new Set<() => void>();
 export const current = () => snapshot;
 export function subscribe(listener: () => void) {
@@ -43,12 +45,22 @@ function change(part: Partial<Snapshot>) {
   listeners.forEach((listener) => listener());
 }
 
+let stream: EventSource | null = null;
+// A page that nobody sees needs no stream: the browser has few connections for one address.
+let leaving: ReturnType<typeof setTimeout> | undefined;
+document.addEventListener('visibilitychange', () => {
+  clearTimeout(leaving);
+  if (!document.hidden) {
+    if (!stream && snapshot.entry === 'open') void enter();
+  } else leaving = setTimeout(() => { stream?.close(); stream = null; }, 10000);
+});
 function connect() {
-  const events = new EventSource('/api/events');
+  stream?.close();
+  const events = stream = new EventSource('/api/events');
   let lastEventMs = Date.now();
   const on = <T>(name: string, use: (data: T) => void) =>
     events.addEventListener(name, (event) => { lastEventMs = Date.now(); use(JSON.parse((event as MessageEvent<string>).data)); });
-  on<State>('state', (state) => change({ state, connected: true }));
+  on<State>('state', (state) => change({ state, connected: true, crowded: false }));
   on<Lane>('lane', (lane) => {
     if (!snapshot.state) return;
     const lanes = snapshot.state.lanes.map((each) => (each.lane === lane.lane ? lane : each));
@@ -79,13 +91,53 @@ function connect() {
   // The browser tries again by itself, except after an answer that is no stream.
   events.onerror = () => change({ connected: false });
   const watch = setInterval(() => {
+    if (stream !== events) return clearInterval(watch);  // a newer one took its place
+    if (events.readyState === EventSource.CLOSED) void showWithoutStream();
     if (events.readyState === EventSource.CLOSED || Date.now() - lastEventMs > 15000) {
       clearInterval(watch);
       events.close();
       change({ connected: false });
-      setTimeout(connect, 1000);
+      setTimeout(() => { void enter(); }, 1000);
     }
   }, 1000);
+}
+
+// Too many pages have a stream: this one shows the state as it is now, and tries again.
+async function showWithoutStream() {
+  const answer = await ask<State>('/api/state');
+  if (answer.ok) change({ state: answer.data, crowded: true });
+}
+
+// Connects where this browser is signed in; else the page asks for a code.
+async function enter() {
+  try {
+    const answer = await fetch('/api/me', { headers: { 'X-Sixpoint-Client': secret } });
+    if (answer.status === 401) return change({ entry: 'sign_in' });
+    if (answer.ok) {
+      const me: Me & { client: string; clock_ms: number } = await answer.json();
+      client = me.client;
+      clockAhead = me.clock_ms - performance.now();
+      change({ entry: 'open', me });
+      return connect();
+    }
+  } catch { /* the station is not there: it is asked again */ }
+  change({ connected: false });
+  setTimeout(() => { void enter(); }, 1000);
+}
+
+// A code of the station, or its token, for a session of this browser.
+export async function signIn(code: string): Promise<Refusal | null> {
+  const answer = await ask('/api/session', { code });
+  if (!answer.ok) return answer.error;
+  void enter();
+  return null;
+}
+
+// An empty name signs out.
+export async function operatorIs(name: string, pin: string): Promise<Refusal | null> {
+  const answer = await ask<Me>('/api/operator', { name, pin });
+  if (answer.ok) change({ me: answer.data });
+  return answer.ok ? null : answer.error;
 }
 
 // The same person after a reload of the page, another one in another window.
@@ -98,21 +150,40 @@ function clientId(): string {
   }
   return id;
 }
-export const client = clientId();
+const secret = clientId();
+// What the station calls this window before others (a lane's `client`).
+export let client = '';
+
+// A command is for now: after this time nobody waits for it any more, and the station refuses it by its own clock.
+const COMMAND_MS = 5000;
+const READ_MS = 20000;
+let clockAhead: number | null = null;  // not known before the first answer
+const before = (): Record<string, string> =>
+  (clockAhead === null ? {} : { 'X-Sixpoint-Before': String(Math.round(performance.now() + clockAhead + COMMAND_MS)) });
 
 export interface Refusal { what: string; hint: string }
 export async function ask<T>(path: string, body?: unknown): Promise<{ ok: true; data: T } | { ok: false; error: Refusal }> {
   try {
-    const answer = await fetch(path, body === undefined ? {} : {
+    const answer = await fetch(path, body === undefined ? { signal: AbortSignal.timeout(READ_MS) } : {
       method: 'POST',
-      headers: { 'Content-Type': 'application/json', 'X-Sixpoint-Client': client },
+      headers: { 'Content-Type': 'application/json', 'X-Sixpoint-Client': secret, ...before() },
       body: JSON.stringify(body),
+      signal: AbortSignal.timeout(COMMAND_MS),
     });
     const data = await answer.json();
+    if (answer.status === 401 && path !== '/api/session') change({ entry: 'sign_in' });
+    // Idle for too long, or signed out in another window: the page asks for the PIN again.
+    if (data.error?.code === 'operator_needed') change({ me: { ...snapshot.me, operator: null } });
     return answer.ok ? { ok: true, data } : { ok: false, error: data.error };
   } catch {
     return { ok: false, error: { what: 'the station does not answer', hint: '' } };
   }
 }
 
-connect();
+// The printed address has its code behind #, which no server sees; it does not stay in the history.
+const code = location.hash.match(/^#code=([\w-]+)$/)?.[1];
+if (code) {
+  history.replaceState(null, '', '/');
+  // A code that was used leads to a browser that is signed in already, or to the form.
+  void signIn(code).then((refused) => { if (refused) void enter(); });
+} else void enter();

@@ -7,12 +7,27 @@ export const faceName = (pose: Pose) =>
 
 export const S = {
   title: 'Sixpoint station',
-  tabs: { jig: 'Jig', files: 'My files', check: 'Check units', statistics: 'Statistics' } as Record<string, string>,
+  tabs: { jig: 'Jig', today: 'Today', files: 'My files', check: 'Check units', statistics: 'Statistics' } as Record<string, string>,
   connection: {
     live: 'Connected',
+    crowded: 'Too many pages of this station are open: this one shows how it was a moment ago, without readings. Close others.',
     lost: 'The station does not answer. Is the program still running? Trying again …',
   },
+  entry: {
+    title: 'Sign this browser in',
+    text: 'Open the address that the station printed when it started, or type the code at its end. A page that is signed in gives new codes.',
+    code: 'Code',
+    submit: 'Sign in',
+    another: 'Let another browser in',
+    next: 'Good for one browser, for ten minutes:',
+  },
   operator: 'Your name',
+  pin: {
+    title: 'Who works here?',
+    name: 'Name', pin: 'PIN', submit: 'Begin',
+    here: (name: string, role: string) => `${name} (${role})`,
+    out: 'Sign out',
+  },
   scan: 'Scan a label',
   scanGo: 'Find',
   lanes: 'Lanes',
@@ -51,7 +66,7 @@ export const S = {
       case 'capturing': return lane.capture?.side
         ? (lane.capture.placed ? `Let it rest on ${faceName(lane.capture.side)} side up` : `Lay it down: ${faceName(lane.capture.side)} side up`)
         : 'Recording';
-      case 'done': return lane.result?.kind === 'capture' ? 'The calibration file is done' : 'Take the unit out. The next one, please.';
+      case 'done': return lane.result?.kind === 'capture' ? 'The calibration file is done' : 'This unit is done';
       case 'running':
         if (lane.run?.phase === 'writing') return 'Writing the constants: do not unplug';
         if (!lane.run?.wanted) return 'Working …';
@@ -98,18 +113,53 @@ export const S = {
   verdictSigns: {
     pass: '✔', conditional_pass: '✔?', conditional_fail: '✖?', fail: '✖', inconclusive: '?', stopped: '■', refused: '✖',
   } as Record<string, string>,
+  // The biggest words of the page: what came out, and what the hands do next.
+  pane: (r: Result): { word: string; act: string } => {
+    switch (r.verdict) {
+      case 'pass':
+      case 'conditional_pass': {
+        const word = `${r.verdict === 'pass' ? 'PASS' : 'CONDITIONAL PASS'} - ${r.written ? 'WRITTEN' : 'NOT WRITTEN'}`;
+        return { word, act: r.written ? 'Take it out. Next unit.' : 'The unit still holds its old constants.' };
+      }
+      case 'conditional_fail': return { word: 'CONDITIONAL FAIL', act: 'Aside: red tray.' };
+      case 'fail': return { word: 'FAIL', act: 'Aside: red tray.' };
+      case 'inconclusive': return { word: 'NO VERDICT', act: 'Again, after ten minutes.' };
+      case 'stopped': return { word: 'STOPPED', act: 'It was not measured to its end.' };
+      default: return { word: 'NOT MEASURED', act: 'Read why, below.' };
+    }
+  },
+  writeNow: 'Write now',
+  writeNowText: 'Writes these constants into the unit, reads them back, and measures two sides again.',
+  lastUnit: (r: Result) => `Last unit: ${r.serial}, ${S.pane(r).word}`,
+  table: {
+    title: 'Measured values and limits',
+    quantity: 'Quantity', axis: 'Axis', value: 'Value', limits: 'Limits', uncertainty: 'U (k = 2)', margin: 'Margin',
+    limit: (low: string, high: string) => (low && high ? `${low} to ${high}` : low ? `from ${low}` : high ? `up to ${high}` : 'none'),
+  },
   residual: (after: number, before: number | null) =>
     before === null ? `${after.toFixed(1)} mg off on sides that were not fitted`
       : `${after.toFixed(1)} mg off on sides that were not fitted (as found: ${before.toFixed(0)} mg)`,
-  stored: (r: Result) => r.stored ? `Stored as run ${(r.run ?? '').slice(0, 12)}` : r.problem ?? 'Storing …',
+  stored: (r: Result) => r.stored ? `Stored as run ${(r.run ?? '').slice(0, 12)}`
+    : r.kept_here ? `Kept here as run ${(r.run ?? '').slice(0, 12)}; it will be sent when the store answers` : r.problem ?? 'Storing …',
   todo: 'What to do',
-  documents: { certificate: 'Certificate (PDF)', json: 'Certificate (JSON)', label: 'Label (ZPL)', report: 'Report (JSON)' },
+  documents: { certificate: 'Certificate (PDF)', json: 'Certificate (JSON)', dcc: 'Certificate (DCC)', label: 'Label (ZPL)', report: 'Report (JSON)' },
   unit: (serial: string, firmware: string) => `${serial}, firmware ${firmware}`,
   low: (mv: number) => `Battery ${(mv / 1000).toFixed(2)} V`,
 
+  today: {
+    title: 'Runs of this station today',
+    search: 'Serial number, or scan a label',
+    found: (serial: string) => `All runs of ${serial}`,
+    none: 'No run yet.',
+    list: 'List of runs',
+    units: (n: number, passed: number) => `${n} ${n === 1 ? 'unit' : 'units'} today, ${passed} passed`,
+    table: { time: 'Time', serial: 'Unit', verdict: 'Verdict', operator: 'Operator', papers: 'Papers' },
+  },
+  jigDue: (date: string, over: boolean) => (over ? `The jig was due on ${date}: an engineer signed for it` : `Jig due ${date}`),
   lock: {
     title: 'Station locked',
     text: 'A check unit is out of control. Until an engineer signs, only check units are measured here.',
+    knownBad: (unit: string, codes: string[]) => `In each shift ${unit} must fail with ${codes.join(', ')}.`,
     next: (units: string[]) => `Measure a check unit again (${units.join(', ')}) and look at its charts.`,
     sign: 'Sign as engineer',
     signTitle: 'Engineer\'s signature',
@@ -184,6 +234,7 @@ export const S = {
     } as Record<string, string>,
   },
 
+  problemLog: (text: string) => `Problem: ${text}`,
   hand: {
     title: 'Practice: this unit is virtual. Turn it here.',
     tilt: 'next one tilted 7.2°', lean: 'Lean on an edge', knock: 'Knock', unplug: 'Unplug', plug: 'Plug in', swap: 'Swap for another',

@@ -10,7 +10,16 @@ export interface Run {
 export interface Result {
   kind: 'jig' | 'capture'; serial: string; verdict: string; reasons: string[]; stored: boolean;
   residual_mg?: number | null; as_found_residual_mg?: number | null; run?: string; constants_id?: string | null;
+  kept_here?: boolean; documents?: string[]; can_write?: boolean; quantities?: Quantity[];
   problem?: string; file?: string; repeat_sides?: string[]; written?: boolean; next_actions?: string[];
+}
+export interface Me { operators: string[]; operator: { name: string; role: string } | null }
+export interface Quantity {
+  name: string; title: string; unit: string; axis: string; value: number; expanded_uncertainty: number;
+  low: number | null; high: number | null; verdict: string;
+}
+export interface TodayRun {
+  run: string; serial: string; started: string; verdict: string; operator: string; written: boolean; documents: string[];
 }
 export interface Lane {
   lane: number; device: string; message: string; turns_by_itself: boolean; jig_fault: string | null;
@@ -27,9 +36,9 @@ export interface Job {
   files: { input: string; status: string; reasons: string[]; still_error_mg: { before: number | null; after: number | null } }[];
 }
 export interface Signature { made_at: string; operator: string; reason: string; new_baseline: boolean }
-export interface Lock { locked: boolean; reasons: string[]; check_units: string[]; signature: Signature | null; problem: string }
+export interface Lock { locked: boolean; reasons: string[]; check_units: string[]; known_bad?: Record<string, string[]>; signature: Signature | null; problem: string }
 export interface State {
-  station: string; version: string; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job; lock: Lock | null;
+  station: string; version: string; write_default: boolean; jig_due: string | null; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job; lock: Lock | null;
 }
 
 export interface Title { name: string; title: string; unit: string; axis?: string }

@@ -36,14 +36,26 @@ TEST_F(CertificatePdf, SaysWhatACalibrationCertificateSays) {
   const auto certificate = certificate_of(run);
   ASSERT_OK(certificate);
   const std::string text = text_of(*certificate);
-  for (const std::string& said :
-       {run.serial, run.id, std::string("Ada Lovelace"), std::string("Bench 3"),
-        std::string("J-0042"), std::string("2027-03-31"), std::string("sixpoint 9.9.9"),
-        std::string("Date of calibration"), std::string("Date of issue"), std::string("As found"),
-        std::string("As left"), std::string("coverage factor k = 2"), std::string("Local gravity"),
-        std::string("ILAC-G8"), std::string("This is not an accredited calibration"),
-        std::string("Page 1 of 2"), std::string("Page 2 of 2"), std::string("PASS"),
-        default_limits().sha256}) {
+  for (const std::string& said : {run.serial,
+                                  run.id,
+                                  std::string("Ada Lovelace"),
+                                  std::string("Bench 3"),
+                                  std::string("J-0042"),
+                                  std::string("2027-03-31"),
+                                  std::string("sixpoint 9.9.9"),
+                                  std::string("Date of calibration"),
+                                  std::string("Date of issue"),
+                                  std::string("As found"),
+                                  std::string("As left"),
+                                  std::string("coverage factor k = 2"),
+                                  std::string("Local gravity"),
+                                  std::string("ILAC-G8"),
+                                  std::string("This is not an accredited calibration"),
+                                  std::string("Page 1 of 2"),
+                                  std::string("Page 2 of 2"),
+                                  std::string("PASS"),
+                                  std::string("WRITTEN INTO THE UNIT"),
+                                  default_limits().sha256}) {
     EXPECT_THAT(text, HasSubstr(said));
   }
   // The results as numbers, to the place that the uncertainty gives.

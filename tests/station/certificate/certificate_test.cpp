@@ -50,6 +50,35 @@ TEST(Certificate, ADocumentThatIsNoneIsRefused) {
 
 // --- the label ---
 
+// A name that somebody typed is no proof.
+TEST(Certificate, SaysWhetherTheOperatorWasAuthenticated) {
+  db::RunRecord run = record_of(7, writing());
+  EXPECT_EQ(certificate_of(run)->to_json()["operator_authenticated"], false);
+  auto document = nlohmann::ordered_json::parse(run.document);
+  document["operator_authenticated"] = true;
+  run.document = document.dump();
+  EXPECT_EQ(certificate_of(run)->to_json()["operator_authenticated"], true);
+}
+
+// Nobody is offered a paper that is not there.
+TEST(Certificate, DocumentsAreThoseThatCanBeMade) {
+  const std::vector<std::string> certificate = {"report.json", "certificate.pdf",
+                                                "certificate.json", "certificate.dcc.xml"};
+  auto with_label = certificate;
+  with_label.emplace_back("label.zpl");
+  const db::RunRecord written = record_of(7, writing());
+  EXPECT_EQ(documents_of(written), with_label);
+  auto later = written;
+  later.kind = "write";
+  EXPECT_EQ(documents_of(later), with_label);
+  auto measured = writing();
+  measured.run.write = false;
+  EXPECT_EQ(documents_of(record_of(7, measured)), certificate);
+  auto stopped = written;
+  stopped.verdict = "stopped";
+  EXPECT_EQ(documents_of(stopped), std::vector<std::string>{"report.json"});
+}
+
 TEST(Label, AfterAReadBackOnly) {
   const db::RunRecord run = record_of(7, writing());
   const auto label = label_zpl(run);

@@ -79,12 +79,12 @@ TEST(LaneCapture, ACaptureSurvivesTheProgram) {
   const tests::TemporaryFolder folder;
   const auto bench = std::make_shared<mocks::VirtualBench>();  // the units go on without it
   {
-    Station station({kCaptured}, folder.path(), "", 24, bench);
+    Station station({kCaptured}, folder.path(), 24, bench);
     station.start("/api/capture", {{"operator", "Ada"}});
     EXPECT_EQ(place_sides(station, 3).size(), 3U);
   }
   {
-    Station station({kCaptured}, folder.path(), "", 24, bench);
+    Station station({kCaptured}, folder.path(), 24, bench);
     station.wait(1, [](const Json& json) {
       return json["state"] == "capturing" && json["capture"]["number"] == 4;
     });
@@ -94,7 +94,7 @@ TEST(LaneCapture, ACaptureSurvivesTheProgram) {
     EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
     EXPECT_EQ(lane["result"]["stored"], true);
   }
-  Station station({kCaptured}, folder.path(), "", 24, bench);
+  Station station({kCaptured}, folder.path(), 24, bench);
   station.wait_state(1, "idle");  // nothing is left to go on with
 }
 

@@ -67,7 +67,7 @@ TEST(LaneJson, ARunShowsWhatIsTakenAndWhatIsOpen) {
   });
   const Json& run = lane["run"];
   EXPECT_EQ(lane["operator"], "Ada");
-  EXPECT_EQ(lane["client"], "me");
+  EXPECT_EQ(lane["client"], public_name("me"));
   EXPECT_EQ(run["of"], 14);
   EXPECT_EQ(run["open"].size(), 3U);
   std::set<std::string> faces(run["open"].begin(), run["open"].end());

@@ -19,11 +19,78 @@ TEST(LaneRun, MeasuresAUnitAndStoresTheRunWithItsSamples) {
   });
   EXPECT_EQ(lane["result"]["verdict"], "pass") << lane.dump(1);
   EXPECT_EQ(lane["result"]["run"], "abc123");
+  EXPECT_EQ(lane["result"]["documents"], Json({"report.json"}));
+  const Json quantities = lane["result"]["quantities"];
+  ASSERT_GT(quantities.size(), 10U);
+  EXPECT_EQ(quantities[0]["title"], find_quantity(quantities[0]["name"].get<std::string>())->title);
   EXPECT_EQ(lane["run"]["taken"].size(), 14U);
   ASSERT_EQ(station.reports.size(), 1U);
   EXPECT_EQ(station.operators.front(), "Ada");
   EXPECT_THAT(station.reports.front().raw_csv, testing::StartsWith("device_time_us,"));
   EXPECT_EQ(station.reports.front().verification.poses.size(), 8U);
+}
+
+// The constants of a run that passed go into the unit later, without fourteen new placements; no
+// statistics count it as a second run.
+TEST(LaneRun, ARunThatPassedIsWrittenAfterwards) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  station.wait_state(1, "idle");
+  const Json now = {{"last_run", true}};
+  EXPECT_EQ(station.post("/api/run", now), 409) << "nothing was measured";
+  station.start("/api/run", {{"operator", "Ada"}});
+  const auto stored = [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  };
+  const Json measured = station.wait(1, stored);
+  EXPECT_EQ(measured["result"]["written"], false);
+  EXPECT_EQ(measured["result"]["can_write"], true);
+  EXPECT_EQ(station.post("/api/run", {{"last_run", true}, {"operator", "Bo"}}), 202);
+  const Json written = station.wait(
+      1, [&](const Json& json) { return stored(json) && json["result"]["written"] == true; });
+  EXPECT_EQ(written["result"]["verdict"], "pass") << written.dump(1);
+  EXPECT_FALSE(written["result"].contains("can_write"));
+  ASSERT_EQ(station.reports.size(), 2U);
+  EXPECT_EQ(station.kinds, (std::vector<std::string>{"jig", kWriteKind}));
+  EXPECT_EQ(station.operators.back(), "Bo");
+  const JigReport& first = station.reports.front();
+  const JigReport& second = station.reports.back();
+  EXPECT_EQ(second.recheck.poses.size(), 2U) << "measured again with what the unit holds";
+  ASSERT_TRUE(second.as_left);
+  EXPECT_EQ(second.as_left->constants, first.six->best().stored);
+  EXPECT_EQ(second.started, first.started);
+  EXPECT_GT(second.raw_csv.size(), first.raw_csv.size()) << "the samples of both";
+  EXPECT_TRUE(second.raw_csv.starts_with(first.raw_csv));
+  EXPECT_EQ(station.post("/api/run", now), 409) << "once";
+}
+
+// What was measured on one unit is never written into another one.
+TEST(LaneRun, ConstantsOfTheLastRunAreForItsOwnUnitAlone) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  station.start("/api/run");
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "swap"}, {"serial", "MOS2A45139999"}}), 200);
+  station.wait(1, [](const Json& json) {
+    return json["unit"].is_object() && json["unit"]["serial"] == "MOS2A45139999";
+  });
+  EXPECT_EQ(station.post("/api/run", {{"last_run", true}}), 409);
+  EXPECT_EQ(station.reports.size(), 1U);
+}
+
+// "Stored" is said only when it is.
+TEST(LaneRun, ARunThatTheJournalKeepsIsNotCalledStored) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.is_kept_here = true;
+  station.start("/api/run");
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("run");
+  });
+  EXPECT_EQ(lane["result"]["stored"], false);
+  EXPECT_EQ(lane["result"]["kept_here"], true);
 }
 
 TEST(LaneRun, AsksForEachPlacementAndRefusesWrongOnesWithTheReason) {

@@ -75,7 +75,7 @@ TEST(Lane, OneRunAtATimeAndNoOtherLabelDuringIt) {
   EXPECT_THAT(second.error().what, testing::HasSubstr("Ada"));
   station.wait_state(1, "running");
   EXPECT_FALSE(lanes.start_capture(1, order_of("page-a")).has_value());
-  EXPECT_FALSE(lanes.scan(1, "MOS2A45130007").has_value());
+  EXPECT_FALSE(lanes.scan(1, "MOS2A45130007", "me").has_value());
   EXPECT_FALSE(lanes.confirm_side(1, "page-a").has_value()) << "a jig run asks for no side";
 }
 
@@ -85,7 +85,7 @@ TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
   const tests::TemporaryFolder folder;
   const std::string device = "virtual:seed=7,jig=auto,pace=4";
   const auto bench = std::make_shared<mocks::VirtualBench>();
-  Station station({device}, folder.path(), {}, 24, bench);
+  Station station({device}, folder.path(), 24, bench);
   station.start("/api/run");
   station.wait(1, [&](const Json&) { return bench->motor(device)->movements > 1; });
   EXPECT_FALSE(station.lanes->release_jig(1, "me").has_value()) << "not while it works";
@@ -123,7 +123,7 @@ TEST(Lane, AnOrderForAnotherUnitIsRefusedUntilTheRightOneIsScanned) {
   EXPECT_THAT(refused.error().what, testing::HasSubstr("MOS2A45130007"));
   order.serial.clear();
   EXPECT_FALSE(station.lanes->start(1, order).has_value()) << "the wrong label still counts";
-  EXPECT_TRUE(station.lanes->scan(1, "MOS2A45130007").has_value());
+  EXPECT_TRUE(station.lanes->scan(1, "MOS2A45130007", "me").has_value());
   EXPECT_TRUE(station.lanes->start(1, order).has_value());
 }
 
@@ -132,7 +132,7 @@ TEST(Lane, AStartDiesWithItsUnit) {
   const tests::TemporaryFolder folder;
   const std::string device = "virtual:seed=7,serial=MOS2A45130007,jig=auto";
   const auto bench = std::make_shared<mocks::VirtualBench>();
-  Station station({device}, folder.path(), {}, 24, bench);
+  Station station({device}, folder.path(), 24, bench);
   {
     const std::unique_lock held(station.mutex);
     station.start("/api/run");
@@ -160,7 +160,7 @@ TEST(Lane, TakingOverChangesTheClientAndTheOperatorWhereOneIsNamed) {
   ASSERT_TRUE(station.lanes->start(1, order_of("page-a")).has_value());
   station.wait_state(1, "running");
   ASSERT_TRUE(station.lanes->take_over(1, "page-b", "").has_value());
-  EXPECT_EQ(station.lane(1)["client"], "page-b");
+  EXPECT_EQ(station.lane(1)["client"], public_name("page-b"));
   EXPECT_EQ(station.lane(1)["operator"], "Ada");
   EXPECT_FALSE(station.lanes->command(1, "page-a", OperatorCommand::stop).has_value());
   EXPECT_TRUE(station.lanes->command(1, "page-b", OperatorCommand::stop).has_value());

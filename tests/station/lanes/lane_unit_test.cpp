@@ -49,9 +49,9 @@ TEST(LaneUnit, AUnitThatIsPulledOutIsNoticedAndAgainWhenItIsBack) {
   EXPECT_TRUE(comes_more_than(station, seen));
 }
 
-// What was measured belongs to the unit: it stays while that unit comes and goes, and is not shown
-// with another one.
-TEST(LaneUnit, AResultStaysWithItsUnitAndGoesWithIt) {
+// What was measured is shown until the next start, with the serial number of its unit: the unit is
+// out, or another one is in, when a person reads it.
+TEST(LaneUnit, AResultStaysUntilTheNextStart) {
   const tests::TemporaryFolder folder;
   Station station({kUnitDevice}, folder.path());
   station.start("/api/run");
@@ -66,9 +66,11 @@ TEST(LaneUnit, AResultStaysWithItsUnitAndGoesWithIt) {
   const Json other = station.wait(1, [](const Json& json) {
     return json["unit"].is_object() && json["unit"]["serial"] == "MOS2A45139999";
   });
-  EXPECT_TRUE(other["result"].is_null());
+  EXPECT_EQ(other["result"]["serial"], "MOS2A45130007");
   EXPECT_TRUE(other["run"].is_null());
   EXPECT_EQ(other["log"], Json::array());
+  EXPECT_EQ(station.post("/api/run", Json::object()), 202);
+  EXPECT_TRUE(station.wait_state(1, "running")["result"].is_null());
 }
 
 // While a run waits for its unit it can be stopped; it ends as stopped, with the unit's name.

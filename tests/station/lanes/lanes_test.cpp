@@ -18,5 +18,39 @@ TEST(Lanes, TheScannedSerialMustBeTheUnitsOwn) {
   EXPECT_EQ(station.post("/api/lanes/1/scan", {{"serial", "MOS2A45130007"}}), 200);
 }
 
+// A label that no lane holds: whoever scanned it starts nothing, until the right unit is there, its
+// label is scanned, or the scan is dismissed. Others are not held up.
+TEST(Lanes, ALabelThatNoLaneHoldsBlocksTheStartOfWhoScannedIt) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,pace=20",
+                   "virtual:seed=8,serial=MOS2A45130008,pace=20"},
+                  folder.path());
+  station.wait_state(1, "idle");
+  station.wait_state(2, "idle");
+  const auto scan = [&](const std::string& label) {
+    return station.post("/api/scan", {{"serial", label}});
+  };
+  EXPECT_EQ(scan("sixpoint:MOS2A45139999:0f"), 409);
+  for (const char* path : {"/api/run", "/api/capture"}) {
+    EXPECT_EQ(station.post(path, {{"lane", 1}}), 409) << path;
+    EXPECT_EQ(station.post(path, {{"lane", 2}}), 409) << path;
+  }
+  EXPECT_EQ(station.post("/api/run", {{"lane", 2}}, "another"), 202);
+  EXPECT_EQ(station.post("/api/scan", {{"dismiss", true}}), 200);
+  EXPECT_EQ(station.post("/api/run", {{"lane", 1}}), 202);
+  station.wait_state(1, "running");
+  EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+  station.wait_state(1, "done");
+  // The unit that was scanned comes.
+  EXPECT_EQ(scan("MOS2A45130001"), 409);
+  EXPECT_EQ(station.post("/api/run", {{"lane", 1}}), 409);
+  EXPECT_EQ(station.post("/api/lanes/1/hand", {{"do", "swap"}, {"serial", "MOS2A45130001"}}), 200);
+  station.wait(1, [](const Json& json) {
+    return json["unit"].is_object() && json["unit"]["serial"] == "MOS2A45130001";
+  });
+  EXPECT_EQ(station.post("/api/run", {{"lane", 1}}), 202);
+  EXPECT_EQ(scan("no label of ours"), 400);
+}
+
 }  // namespace
 }  // namespace sixpoint::station

@@ -24,12 +24,13 @@ class ApiQuality : public testing::Test {
     options.state_folder = folder_ / "state";
     auto lanes = Lanes::open(
         posix_env(), devices_, options,
-        [](const JigReport&, const RunLabels&) -> Result<RunIds> { return RunIds{}; },
+        [](const JigReport&, const RunLabels&) -> Result<RunInStore> { return RunInStore{}; },
         [](const CaptureReport&) -> Result<std::string> { return std::string(); });
     EXPECT_OK(lanes);
     lanes_ = *std::move(lanes);
     api_ = std::make_unique<Api>(
-        ApiOptions{}, ApiParts{posix_env(), *lanes_, repairs_, nullptr, {}, {}, &quality_});
+        ApiOptions{},
+        ApiParts{posix_env(), *lanes_, repairs_, sign_in_, nullptr, {}, {}, &quality_});
     api_->set_port(6020);
   }
 
@@ -42,6 +43,7 @@ class ApiQuality : public testing::Test {
     request.path = path;
     request.host = "127.0.0.1:6020";
     request.client = "page-a";
+    request.authorization = "Bearer 0123456789abcdef";
     return request;
   }
   ApiAnswer get(const std::string& path, const std::map<std::string, std::string>& query = {}) {
@@ -95,7 +97,9 @@ class ApiQuality : public testing::Test {
   device::TransportRegistry devices_;
   std::unique_ptr<Lanes> lanes_;
   RepairJob repairs_{posix_env(), [this] { return open(); }};
-  QualityControl quality_{[this] { return open(); }, "bench-1", default_limits()};
+  QualityControl quality_{[this] { return open(); }, "bench-1", default_limits(),
+                          posix_env().clock};
+  SignIn sign_in_{posix_env().clock, "0123456789abcdef"};
   std::unique_ptr<Api> api_;
 };
 
@@ -175,6 +179,28 @@ TEST_F(ApiQuality, WrongDecisionsAreRefusedAndNothingIsStored) {
   EXPECT_TRUE(events().empty());
 }
 
+// Where the machine has operators, the name of a decision is the engineer's who signed in.
+TEST_F(ApiQuality, OnlyAnEngineerSigns) {
+  Operators operators(posix_env(), folder_ / "operators.json");
+  EXPECT_OK(operators.add("Ada", OperatorRole::technician, "471100"));
+  EXPECT_OK(operators.add("Eve", OperatorRole::engineer, "081500"));
+  Api api(
+      ApiOptions{},
+      ApiParts{posix_env(), *lanes_, repairs_, sign_in_, nullptr, {}, {}, &quality_, &operators});
+  api.set_port(6020);
+  ApiRequest sign = request("POST", "/api/station-lock");
+  sign.body = R"({"operator": "Eve", "reason": "seat cleaned"})";
+  EXPECT_EQ(api.handle(sign).status, 403) << "nobody";
+  EXPECT_OK(operators.sign_in("the token", "Ada", "471100"));
+  EXPECT_EQ(api.handle(sign).status, 403) << "a technician";
+  EXPECT_TRUE(events().empty());
+  EXPECT_OK(operators.sign_in("the token", "Eve", "081500"));
+  sign.body = R"({"operator": "Mallory", "reason": "seat cleaned"})";
+  EXPECT_EQ(api.handle(sign).status, 200);
+  ASSERT_EQ(events().size(), 1U);
+  EXPECT_EQ(events().front().operator_name, "Eve");
+}
+
 // Oracle: five runs by hand: Ada's two units pass at once; of Bo's two, one fails and passes the
 // second time.
 TEST_F(ApiQuality, StatisticsCountTheRunsOfTheStore) {
@@ -203,6 +229,26 @@ TEST_F(ApiQuality, StatisticsCountTheRunsOfTheStore) {
 }
 
 // Oracle: by hand: three parts, two operators, two trials; a tolerance halved doubles its share.
+// The list "Today", and all runs of a unit whose label is scanned. Oracle: the rows of the store.
+TEST_F(ApiQuality, TheRunsOfADayAndOfAUnitAreListed) {
+  add_run("MOS2A45130001", "Ada", true);
+  add_run("MOS2A45130002", "Bo", false);
+  add_run("MOS2A45130001", "Bo", true);
+  const Json today = json(get("/api/runs", {{"from", "2026-03-01T09:00:00Z"}}));
+  ASSERT_EQ(today["runs"].size(), 2U);
+  EXPECT_EQ(today["runs"][0]["operator"], "Bo") << "newest first";
+  EXPECT_EQ(today["runs"][1]["serial"], "MOS2A45130002");
+  EXPECT_EQ(today["runs"][1]["verdict"], "fail");
+  EXPECT_EQ(today["runs"][1]["written"], false);
+  EXPECT_EQ(today["runs"][1]["documents"], Json({"report.json"})) << "too little for a certificate";
+  const Json unit = json(get("/api/runs", {{"serial", "sixpoint:mos2a45130001:0f"}}));
+  ASSERT_EQ(unit["runs"].size(), 2U);
+  EXPECT_EQ(unit["runs"][1]["operator"], "Ada");
+  EXPECT_EQ(json(get("/api/runs", {{"serial", "nobody"}}))["runs"].size(), 0U);
+  EXPECT_EQ(get("/api/runs", {{"from", "yesterday"}}).status, 400);
+  EXPECT_EQ(get("/api/runs").status, 400);
+}
+
 TEST_F(ApiQuality, AGageStudyIsAnsweredByItsName) {
   for (const double trial_mg : {-0.5, 0.5}) {
     for (const char* who : {"Ada", "Bo"}) {
@@ -243,7 +289,7 @@ TEST_F(ApiQuality, AGageStudyIsAnsweredByItsName) {
 
 // A station without a store of its own has none of these routes.
 TEST_F(ApiQuality, WithoutQualityControlTheRoutesAreUnknown) {
-  Api plain(ApiOptions{}, ApiParts{posix_env(), *lanes_, repairs_});
+  Api plain(ApiOptions{}, ApiParts{posix_env(), *lanes_, repairs_, sign_in_});
   plain.set_port(6020);
   for (const char* path : {"/api/check-units", "/api/statistics", "/api/gage-rr"}) {
     EXPECT_EQ(plain.handle(request("GET", path)).status, 404) << path;

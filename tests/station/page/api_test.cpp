@@ -70,23 +70,122 @@ TEST(Api, OtherPagesInTheBrowserMayNotCommandIt) {
   EXPECT_EQ(ask({{"Origin", "http://" + own}, {"Sec-Fetch-Site", "same-origin"}}), 202);
 }
 
-TEST(Api, EveryRequestNeedsTheToken) {
+// The page itself is given to everybody: it asks for the code. Nothing else is.
+TEST(Api, EveryRequestNeedsTheTokenOrASession) {
   const tests::TemporaryFolder folder;
-  Station station({"virtual:seed=7"}, folder.path(), "correct-horse");
+  Station station({"virtual:seed=7"}, folder.path());
   auto client = station.client();
-  EXPECT_EQ(client.Get("/")->status, 401);
-  EXPECT_EQ(client.Get("/api/state")->status, 401);
-  EXPECT_EQ(client.Get("/api/events")->status, 401);
-  EXPECT_EQ(client.Get("/?token=wrong")->status, 401);
-  EXPECT_EQ(client.Get("/api/state?token=correct-horse")->status, 401) << "only for the first page";
-  EXPECT_EQ(client.Get("/api/state", {{"Authorization", "Bearer correct-horse"}})->status, 200);
-  EXPECT_EQ(client.Get("/api/state", {{"Authorization", "Bearer correct-hors"}})->status, 401);
-  const auto first = client.Get("/?token=correct-horse");
-  EXPECT_EQ(first->status, 303);
-  const std::string cookie = first->get_header_value("Set-Cookie");
-  EXPECT_THAT(cookie, HasSubstr("HttpOnly; SameSite=Strict"));
-  EXPECT_EQ(client.Get("/", {{"Cookie", cookie.substr(0, cookie.find(';'))}})->status, 200);
-  EXPECT_EQ(client.Get("/", {{"Cookie", "a=b; sixpoint_token=x"}})->status, 401);
+  client.set_default_headers({});
+  for (const char* path : {"/", "/page.js", "/page.css", "/icon.svg"}) {
+    EXPECT_EQ(client.Get(path)->status, 200) << path;
+  }
+  for (const char* path : {"/api/state", "/api/events", "/api/lanes/1", "/api/files", "/api/job",
+                           "/api/me", "/api/runs/abc123/report.json", "/api/nothing", "/x",
+                           "/api/state?token=0123456789abcdef", "/api/session"}) {
+    EXPECT_EQ(client.Get(path)->status, 401) << path;
+  }
+  for (const char* path : {"/api/run", "/api/code", "/api/lanes/1/stop", "/api/repair"}) {
+    EXPECT_EQ(client.Post(path, "{}", "application/json")->status, 401) << path;
+  }
+  EXPECT_EQ(client.Get("/api/state", {{"Authorization", "Bearer 0123456789abcdef"}})->status, 200);
+  EXPECT_EQ(client.Get("/api/state", {{"Authorization", "Bearer 0123456789abcde"}})->status, 401);
+  EXPECT_EQ(client.Get("/api/state", {{"Authorization", "0123456789abcdef"}})->status, 401);
+  EXPECT_EQ(station.lane(1)["result"], Json(nullptr)) << "none of them did anything";
+}
+
+// A code opens one browser, by a cookie that holds neither the code nor the token.
+TEST(Api, ACodeGivesOneBrowserASession) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  auto client = station.client();
+  client.set_default_headers({});
+  const auto sign_in = [&](const std::string& code) {
+    return client.Post("/api/session", Json({{"code", code}}).dump(), "application/json");
+  };
+  const std::string code = station.sign_in.first_code();
+  EXPECT_EQ(sign_in("AAAA-AAAA-AAAA")->status, 401);
+  EXPECT_EQ(client.Post("/api/session", R"({"code": 7})", "application/json")->status, 401);
+  const auto opened = sign_in(code);
+  ASSERT_EQ(opened->status, 200);
+  EXPECT_EQ(sign_in(code)->status, 401) << "used up";
+  const std::string cookie = opened->get_header_value("Set-Cookie");
+  EXPECT_THAT(cookie, HasSubstr("; HttpOnly; SameSite=Strict; Path=/"));
+  EXPECT_THAT(cookie, testing::Not(HasSubstr("Secure"))) << "a browser drops it on plain http";
+  EXPECT_THAT(cookie, testing::Not(HasSubstr(Station::kToken)));
+  EXPECT_THAT(opened->body, testing::Not(HasSubstr(Station::kToken)));
+  const std::string sent = cookie.substr(0, cookie.find(';'));
+  EXPECT_EQ(client.Get("/api/state", {{"Cookie", "a=b; " + sent}})->status, 200);
+  std::string changed = sent;
+  changed.back() = changed.back() == '0' ? '1' : '0';
+  EXPECT_EQ(client.Get("/api/state", {{"Cookie", changed}})->status, 401);
+  EXPECT_EQ(client.Get("/api/state", {{"Cookie", "x" + sent}})->status, 401);
+  // A page that is signed in lets the next one in.
+  const auto next = client.Post("/api/code", {{"Cookie", sent}}, "{}", "application/json");
+  ASSERT_EQ(next->status, 200);
+  EXPECT_EQ(sign_in(Json::parse(next->body)["code"])->status, 200);
+  EXPECT_NE(sign_in(Station::kToken)->get_header_value("Set-Cookie"), cookie) << "each its own";
+}
+
+// Whoever knows a client's identifier may stop its run: what others are shown is another name.
+TEST(Api, IdentifiersOfClientsStaySecret) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  station.wait_state(1, "idle");
+  EXPECT_EQ(station.post("/api/run", {{"lane", 1}}, "secret-of-ada"), 202);
+  station.wait_state(1, "running");
+  const std::string state = station.client().Get("/api/state")->body;
+  EXPECT_THAT(state, testing::Not(HasSubstr("secret-of-ada")));
+  const auto me = station.client().Get("/api/me", {{"X-Sixpoint-Client", "secret-of-ada"}});
+  const std::string name = Json::parse(me->body)["client"];
+  EXPECT_EQ(station.lane(1)["client"], name) << "by which a page knows its own run";
+  EXPECT_EQ(station.post("/api/lanes/1/stop", Json::object(), name), 409) << "and no more";
+}
+
+// Where the machine has operators, a name comes from a PIN and not from the request.
+TEST(Api, TheNameInARecordIsTheOneThatSignedIn) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  Operators operators(posix_env(), folder / "operators.json");
+  EXPECT_OK(operators.add("Ada", OperatorRole::technician, "471100"));
+  station.wait_state(1, "idle");
+  const Json mallory = {{"operator", "Mallory"}};
+  for (const char* path :
+       {"/api/run", "/api/capture", "/api/lanes/1/take", "/api/lanes/1/jig-free"}) {
+    EXPECT_EQ(station.post(path, mallory), 403) << path;
+  }
+  EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}, {"pin", "0000"}}), 403);
+  EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}}), 403);
+  EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}, {"pin", 471100}}), 400);
+  EXPECT_EQ(station.get("/api/me")["operator"], Json(nullptr));
+  EXPECT_EQ(station.post("/api/operator", {{"name", "Ada"}, {"pin", "471100"}}), 200);
+  EXPECT_EQ(station.get("/api/me")["operator"]["role"], "technician");
+  EXPECT_EQ(station.get("/api/me")["operators"], Json({"Ada"}));
+  EXPECT_EQ(station.post("/api/run", mallory), 202);
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  EXPECT_EQ(station.operators.back(), "Ada");
+  EXPECT_TRUE(station.authenticated.back());
+  EXPECT_EQ(station.post("/api/operator", {{"name", ""}}), 200) << "signs out";
+  EXPECT_EQ(station.post("/api/run", mallory), 403);
+}
+
+// A command that hung in the network for a while does not start a motor when nobody expects it.
+TEST(Api, ACommandThatComesTooLateIsNotCarriedOut) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  station.wait_state(1, "idle");
+  const auto now_ms = station.get("/api/me")["clock_ms"].get<std::int64_t>();
+  const auto start = [&](const std::string& before) {
+    return station.client().Post("/api/run", {{"X-Sixpoint-Before", before}}, "{}",
+                                 "application/json");
+  };
+  EXPECT_EQ(start(std::to_string(now_ms - 1))->status, 408);
+  EXPECT_EQ(start("0")->status, 408);
+  EXPECT_EQ(start("soon")->status, 400);
+  EXPECT_EQ(start("-1")->status, 400);
+  EXPECT_EQ(station.lane(1)["state"], "idle");
+  EXPECT_EQ(start(std::to_string(now_ms + 600'000))->status, 202);
 }
 
 }  // namespace

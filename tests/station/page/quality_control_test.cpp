@@ -29,7 +29,8 @@ class QualityControlTest : public testing::Test {
   Result<db::Store> open() { return db::Store::open(posix_env(), folder_ / "s.db"); }
 
   tests::TemporaryFolder folder_;
-  QualityControl quality_{[this] { return open(); }, "bench-1", default_limits()};
+  QualityControl quality_{[this] { return open(); }, "bench-1", default_limits(),
+                          posix_env().clock};
 };
 
 TEST_F(QualityControlTest, ADecisionNeedsANameAndAReasonAndIsInTheStore) {

@@ -27,13 +27,15 @@ using Json = nlohmann::ordered_json;
 
 class Station {
  public:
+  static constexpr const char* kToken = "0123456789abcdef";
+
   // `its_bench`: one that outlives this program, where the units shall.
   explicit Station(std::vector<std::string> devices, const std::string& folder,
-                   std::string token = {}, int most_streams = 24,
-                   std::shared_ptr<mocks::VirtualBench> its_bench = {},
+                   int most_streams = 24, std::shared_ptr<mocks::VirtualBench> its_bench = {},
                    const ServerOptions& server_options = {})
       : bench_(its_bench ? std::move(its_bench) : std::make_shared<mocks::VirtualBench>()),
-        registry_(known_devices()) {
+        registry_(known_devices()),
+        operators_(posix_env(), folder + "/operators.json") {
     bench_->register_in(registry_);
     LanesOptions options;
     options.devices = std::move(devices);
@@ -43,14 +45,16 @@ class Station {
     options.retry_s = 0.02;
     auto opened = Lanes::open(
         posix_env(), registry_, options,
-        [this](const JigReport& report, const RunLabels& labels) -> Result<RunIds> {
+        [this](const JigReport& report, const RunLabels& labels) -> Result<RunInStore> {
           const std::lock_guard lock(mutex);
           if (store_is_away) {
             return fail(ErrorCode::io, "the disk is full");
           }
           reports.push_back(report);
           operators.push_back(labels.operator_name);
-          return RunIds{"abc123", "def456"};
+          authenticated.push_back(labels.is_authenticated);
+          kinds.push_back(labels.kind);
+          return RunInStore{{"abc123", "def456"}, is_kept_here, {"report.json"}};
         },
         [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); });
     EXPECT_OK(opened);
@@ -58,7 +62,7 @@ class Station {
     repairs = std::make_unique<RepairJob>(
         posix_env(), [folder] { return db::Store::open(posix_env(), folder + "/store.db"); });
     ApiOptions api_options;
-    api_options.token = std::move(token);
+    api_options.tls = !server_options.tls_certificate.empty();
     api_options.files_folder = folder;
     api_options.most_streams = most_streams;
     api = std::make_unique<Api>(
@@ -66,9 +70,12 @@ class Station {
         ApiParts{posix_env(),
                  *lanes,
                  *repairs,
+                 sign_in,
                  &practice_bench_,
                  [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); },
-                 {}});
+                 {},
+                 nullptr,
+                 &operators_});
     auto listening = Server::open(posix_env(), *api, server_options);
     EXPECT_OK(listening);
     server = *std::move(listening);
@@ -81,7 +88,13 @@ class Station {
   httplib::Client client() const {
     httplib::Client client("127.0.0.1", server->port());
     client.set_read_timeout(10);
+    client.set_default_headers({{"Authorization", std::string("Bearer ") + kToken}});
     return client;
+  }
+  // The lines of a request's head that say where it goes and who sends it.
+  std::string head() const {
+    return "Host: 127.0.0.1:" + std::to_string(server->port()) + "\r\nAuthorization: Bearer " +
+           kToken + "\r\n";
   }
   Json get(const std::string& path) const {
     const auto answer = client().Get(path);
@@ -116,15 +129,20 @@ class Station {
     return wait(number, [&](const Json& json) { return json["state"] == state; });
   }
 
+  SignIn sign_in{posix_env().clock, kToken};
   std::mutex mutex;
   std::vector<JigReport> reports;
   std::vector<std::string> operators;
-  bool store_is_away = false;
+  std::vector<std::string> kinds;
+  std::vector<bool> authenticated;
+  bool store_is_away = false;  // and the journal with it
+  bool is_kept_here = false;   // the journal has it
 
  private:
   std::shared_ptr<mocks::VirtualBench> bench_;
   cli::VirtualPracticeBench practice_bench_{*bench_};
   device::TransportRegistry registry_;  // the lanes' threads use it
+  Operators operators_;
 
  public:
   std::unique_ptr<Lanes> lanes;

@@ -1,0 +1,196 @@
+#include "station/access/operators.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.h"
+#include "station/access/secrets.h"
+
+namespace sixpoint::station {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostNameBytes = 60;
+constexpr std::size_t kMostNamesTried = 256;  // that wrong PINs are counted for
+constexpr std::uint64_t kMostFileBytes = 1U << 20U;
+
+tl::unexpected<Error> wrong_pin() {
+  return fail(ErrorCode::permission, "this name and this PIN do not belong together", {},
+              "try again; an engineer sets a new PIN with 'sixpoint operator add'");
+}
+
+}  // namespace
+
+std::string_view to_string(OperatorRole role) {
+  return role == OperatorRole::engineer ? "engineer" : "technician";
+}
+
+Result<OperatorRole> parse_operator_role(std::string_view text) {
+  for (const OperatorRole role : {OperatorRole::technician, OperatorRole::engineer}) {
+    if (text == to_string(role)) {
+      return role;
+    }
+  }
+  return fail(ErrorCode::usage, fmt::format("'{}' is no role", printable(text, 40)), {},
+              "say technician or engineer");
+}
+
+Result<std::vector<Operators::Entry>> Operators::read() const {
+  std::vector<Entry> entries;
+  const auto bytes = read_file(env_.files, path_, kMostFileBytes);
+  if (!bytes && bytes.error().code == ErrorCode::no_input) {
+    return entries;
+  }
+  if (!bytes) {
+    return fail(bytes.error());
+  }
+  try {
+    const Json json = Json::parse(bytes->begin(), bytes->end());
+    for (const Json& item : json.at("operators")) {
+      SIXPOINT_ASSIGN(const OperatorRole role,
+                      parse_operator_role(item.at("role").get<std::string>()));
+      entries.push_back({{item.at("name").get<std::string>(), role},
+                         item.at("salt").get<std::string>(),
+                         item.at("scrypt").get<std::string>()});
+    }
+  } catch (const Json::exception&) {
+    // Not as if there were none: then everybody could work under any name.
+    return fail(ErrorCode::bad_data, "the list of operators cannot be read", path_,
+                "remove the file, and add the operators again");
+  }
+  return entries;
+}
+
+Status Operators::write(const std::vector<Entry>& entries) const {
+  Json json;
+  json["schema"] = "sixpoint/operators/1";
+  json["operators"] = Json::array();
+  for (const Entry& entry : entries) {
+    json["operators"].push_back({{"name", entry.is.name},
+                                 {"role", to_string(entry.is.role)},
+                                 {"salt", entry.salt},
+                                 {"scrypt", entry.pin_hash}});
+  }
+  SIXPOINT_CHECK(make_private_folders(env_.files, folder_of(path_)));
+  return write_private_file(env_.files, path_,
+                            json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Result<std::vector<Operator>> Operators::list() const {
+  SIXPOINT_ASSIGN(const auto entries, read());
+  std::vector<Operator> operators;
+  operators.reserve(entries.size());
+  for (const Entry& entry : entries) {
+    operators.push_back(entry.is);
+  }
+  return operators;
+}
+
+Status Operators::add(const std::string& name, OperatorRole role, const std::string& pin) {
+  if (name.find_first_not_of(" \t") == std::string::npos || name.size() > kMostNameBytes ||
+      printable(name) != name) {
+    return fail(ErrorCode::usage,
+                fmt::format("a name has 1 to {} bytes that can be printed", kMostNameBytes),
+                printable(name, 80), "give the name as it shall stand in the records");
+  }
+  if (pin.size() < 4 || pin.size() > 12 ||
+      pin.find_first_not_of("0123456789") != std::string::npos) {
+    return fail(ErrorCode::usage, "a PIN is 4 to 12 digits", {}, "choose another one");
+  }
+  SIXPOINT_ASSIGN(auto entries, read());
+  std::erase_if(entries, [&](const Entry& entry) { return entry.is.name == name; });
+  const std::string salt = random_hex(16);
+  entries.push_back({{name, role}, salt, pin_hash(pin, salt)});
+  return write(entries);
+}
+
+Status Operators::disable(const std::string& name) {
+  SIXPOINT_ASSIGN(auto entries, read());
+  if (std::erase_if(entries, [&](const Entry& entry) { return entry.is.name == name; }) == 0) {
+    return fail(ErrorCode::no_input, "there is no operator of this name", printable(name, 80),
+                "'sixpoint operator list' names them");
+  }
+  return write(entries);
+}
+
+Result<Operator> Operators::sign_in(const std::string& where, const std::string& name,
+                                    const std::string& pin) {
+  SIXPOINT_ASSIGN(const auto entries, read());
+  {
+    const std::lock_guard lock(mutex_);
+    const auto now = env_.clock.elapsed();
+    for (auto& [whose, times] : wrong_pins_) {
+      std::erase_if(times, [&](const auto& when) { return now - when > kPinWait; });
+    }
+    std::erase_if(wrong_pins_, [](const auto& each) { return each.second.empty(); });
+    const auto wrong = wrong_pins_.find(name);
+    if (wrong_pins_.size() >= kMostNamesTried ||
+        (wrong != wrong_pins_.end() && wrong->second.size() >= kMostWrongPins)) {
+      return fail(ErrorCode::permission, "too many wrong PINs", printable(name, 80),
+                  "wait a minute, then try again");
+    }
+    // Counted before it is compared: many at once are no more tries than one after the other.
+    wrong_pins_[name].push_back(now);
+  }
+  const auto found = std::ranges::find(
+      entries, name, [](const Entry& entry) -> const std::string& { return entry.is.name; });
+  const bool known = found != entries.end();
+  const bool right = same_secret(pin_hash(pin, known ? found->salt : std::string("no operator")),
+                                 known ? found->pin_hash : std::string());
+  if (!known || !right) {
+    return wrong_pin();
+  }
+  const std::lock_guard lock(mutex_);
+  wrong_pins_.erase(name);
+  forget_idle();
+  places_[where] = {found->is, env_.clock.elapsed()};
+  return found->is;
+}
+
+void Operators::sign_out(const std::string& where) {
+  const std::lock_guard lock(mutex_);
+  places_.erase(where);
+}
+
+void Operators::forget_idle() {
+  const auto now = env_.clock.elapsed();
+  std::erase_if(places_, [&](const auto& place) { return now - place.second.used > kIdle; });
+}
+
+std::optional<Operator> Operators::at(const std::string& where) {
+  const std::lock_guard lock(mutex_);
+  forget_idle();
+  const auto place = places_.find(where);
+  return place == places_.end() ? std::nullopt : std::optional(place->second.who);
+}
+
+Result<SignedName> Operators::who(const std::string& where, const std::string& typed,
+                                  OperatorRole needed) {
+  SIXPOINT_ASSIGN(const auto entries, read());
+  if (entries.empty()) {
+    return SignedName{typed, false};
+  }
+  const std::lock_guard lock(mutex_);
+  forget_idle();
+  const auto place = places_.find(where);
+  // Who was removed from the list, or has another role now, signs in anew.
+  const bool is_listed =
+      place != places_.end() && std::ranges::any_of(entries, [&](const Entry& entry) {
+        return entry.is.name == place->second.who.name && entry.is.role == place->second.who.role;
+      });
+  if (!is_listed) {
+    return fail(ErrorCode::permission, "nobody is signed in here", {}, "sign in with your PIN");
+  }
+  if (needed == OperatorRole::engineer && place->second.who.role != OperatorRole::engineer) {
+    return fail(ErrorCode::permission, "an engineer signs for this",
+                printable(place->second.who.name, 80), "an engineer signs in with a PIN");
+  }
+  place->second.used = env_.clock.elapsed();
+  return SignedName{place->second.who.name, true};
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,154 @@
+// One test for each row of the tables in the header.
+#include "station/access/operators.h"
+
+#include <gmock/gmock.h>
+
+#include "base/atomic_file.h"
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "station/access/secrets.h"
+
+namespace sixpoint::station {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class OperatorsTest : public testing::Test {
+ protected:
+  std::string file() {
+    const auto bytes = read_file(memory_.files, kFile);
+    return bytes ? std::string(bytes->begin(), bytes->end()) : std::string();
+  }
+  void add_both() {
+    EXPECT_OK(operators_.add("Ada", OperatorRole::technician, "471100"));
+    EXPECT_OK(operators_.add("Eve", OperatorRole::engineer, "0815"));
+  }
+
+  static constexpr const char* kFile = "data/operators.json";
+  MemoryEnv memory_;
+  Operators operators_{memory_.env, kFile};
+};
+
+TEST_F(OperatorsTest, WithoutAnyTheNameIsAsTypedAndNotAuthenticated) {
+  for (const OperatorRole role : {OperatorRole::technician, OperatorRole::engineer}) {
+    const auto who = operators_.who("a", "Ada", role);
+    ASSERT_OK(who);
+    EXPECT_EQ(who->name, "Ada");
+    EXPECT_FALSE(who->is_authenticated);
+  }
+}
+
+TEST_F(OperatorsTest, WithSomeNobodyWorksUnderATypedName) {
+  add_both();
+  EXPECT_FAILS(operators_.who("a", "Ada", OperatorRole::technician), ErrorCode::permission);
+  EXPECT_FAILS(operators_.who("a", "Eve", OperatorRole::engineer), ErrorCode::permission);
+}
+
+TEST_F(OperatorsTest, ATechnicianMeasuresAndDoesNotSign) {
+  add_both();
+  EXPECT_OK(operators_.sign_in("a", "Ada", "471100"));
+  const auto who = operators_.who("a", "Eve", OperatorRole::technician);
+  ASSERT_OK(who);
+  EXPECT_EQ(who->name, "Ada") << "not what was typed";
+  EXPECT_TRUE(who->is_authenticated);
+  EXPECT_FAILS(operators_.who("a", "Eve", OperatorRole::engineer), ErrorCode::permission);
+  EXPECT_FAILS(operators_.who("b", "Ada", OperatorRole::technician), ErrorCode::permission);
+}
+
+TEST_F(OperatorsTest, AnEngineerMeasuresAndSigns) {
+  add_both();
+  EXPECT_OK(operators_.sign_in("a", "Eve", "0815"));
+  EXPECT_EQ(operators_.who("a", "", OperatorRole::technician)->name, "Eve");
+  EXPECT_EQ(operators_.who("a", "", OperatorRole::engineer)->name, "Eve");
+}
+
+TEST_F(OperatorsTest, WhoIsIdleSignsInAgain) {
+  add_both();
+  EXPECT_OK(operators_.sign_in("a", "Ada", "471100"));
+  for (int i = 0; i < 3; ++i) {
+    memory_.clock.sleep(kIdle - std::chrono::seconds(1));
+    EXPECT_OK(operators_.who("a", "", OperatorRole::technician)) << "each use counts anew";
+  }
+  memory_.clock.sleep(kIdle + std::chrono::seconds(1));
+  EXPECT_FALSE(operators_.at("a"));
+  EXPECT_FAILS(operators_.who("a", "", OperatorRole::technician), ErrorCode::permission);
+  EXPECT_OK(operators_.sign_in("a", "Ada", "471100"));
+  operators_.sign_out("a");
+  EXPECT_FAILS(operators_.who("a", "", OperatorRole::technician), ErrorCode::permission);
+}
+
+TEST_F(OperatorsTest, WhoWasRemovedIsSignedOut) {
+  add_both();
+  EXPECT_OK(operators_.sign_in("a", "Ada", "471100"));
+  EXPECT_OK(operators_.disable("Ada"));
+  EXPECT_FAILS(operators_.who("a", "", OperatorRole::technician), ErrorCode::permission);
+  EXPECT_FAILS(operators_.disable("Ada"), ErrorCode::no_input);
+}
+
+TEST_F(OperatorsTest, AListThatCannotBeReadLetsNobodyWork) {
+  EXPECT_OK(memory_.files.make_folders("data"));
+  for (const char* text : {"", "{", "[]", R"({"operators": [{"name": "Ada"}]})",
+                           R"({"operators": [{"name": 7, "role": "engineer"}]})"}) {
+    EXPECT_OK(write_file(memory_.files, kFile, text));
+    EXPECT_FALSE(operators_.who("a", "Ada", OperatorRole::technician)) << text;
+    EXPECT_FALSE(operators_.sign_in("a", "Ada", "471100")) << text;
+    EXPECT_OK(memory_.files.remove(kFile));
+  }
+}
+
+TEST_F(OperatorsTest, AWrongPinAndAnUnknownNameAreAnsweredAlike) {
+  add_both();
+  const auto wrong = operators_.sign_in("a", "Ada", "471101");
+  const auto unknown = operators_.sign_in("a", "Mallory", "471100");
+  EXPECT_FAILS(wrong, ErrorCode::permission);
+  EXPECT_FAILS(unknown, ErrorCode::permission);
+  EXPECT_EQ(wrong.error().brief(), unknown.error().brief());
+  EXPECT_FALSE(operators_.at("a"));
+}
+
+TEST_F(OperatorsTest, PinsAreNotTriedOut) {
+  add_both();
+  for (std::size_t i = 0; i < kMostWrongPins; ++i) {
+    EXPECT_FAILS(operators_.sign_in("a", "Ada", "1234"), ErrorCode::permission);
+  }
+  EXPECT_FAILS(operators_.sign_in("b", "Ada", "471100"), ErrorCode::permission);
+  EXPECT_OK(operators_.sign_in("b", "Eve", "0815")) << "others are not held up";
+  memory_.clock.sleep(kPinWait + std::chrono::seconds(1));
+  EXPECT_OK(operators_.sign_in("b", "Ada", "471100"));
+}
+
+TEST_F(OperatorsTest, TheFileHoldsNoPin) {
+  add_both();
+  EXPECT_THAT(file(), Not(HasSubstr("471100")));
+  EXPECT_THAT(file(), Not(HasSubstr("0815")));
+  EXPECT_OK(operators_.add("Bo", OperatorRole::technician, "471100"));
+  const auto before = file();
+  EXPECT_OK(operators_.add("Ada", OperatorRole::engineer, "471100")) << "a new role and PIN";
+  EXPECT_NE(file(), before) << "another salt";
+  EXPECT_EQ(operators_.list()->size(), 3U);
+  EXPECT_EQ(operators_.sign_in("a", "Ada", "471100")->role, OperatorRole::engineer);
+}
+
+TEST_F(OperatorsTest, WrongNamesAndPinsAreRefused) {
+  for (const std::string& name : {std::string(), std::string("  "), std::string(61, 'A'),
+                                  std::string("A\nda"), std::string("A\x1b[2J")}) {
+    EXPECT_FAILS(operators_.add(name, OperatorRole::engineer, "4711"), ErrorCode::usage);
+  }
+  for (const char* pin : {"", "123", "1234567890123", "12a4", "12 4"}) {
+    EXPECT_FAILS(operators_.add("Ada", OperatorRole::engineer, pin), ErrorCode::usage);
+  }
+  EXPECT_FAILS(parse_operator_role("boss"), ErrorCode::usage);
+  EXPECT_TRUE(operators_.list()->empty());
+}
+
+// Oracle: Python's hashlib.
+TEST(PinHash, IsScrypt) {
+  // hashlib.scrypt(b"4711", salt=b"salt", n=2**15, r=8, p=1, maxmem=2**26, dklen=32).hex()
+  EXPECT_EQ(pin_hash("4711", "salt"),
+            "0c65344f616e0bd3ff7ebfce9a69ac94197b0cf796a608be81117f5afd362706");
+  EXPECT_NE(pin_hash("4711", "salt"), pin_hash("4711", "tals"));
+}
+
+}  // namespace
+}  // namespace sixpoint::station
