@@ -464,10 +464,10 @@ int orders_on_a_wrong_unit(int orders, std::uint64_t first_seed, int& runs) {
     options.retry_s = 0.01;
     const auto lanes = Lanes::open(
                            posix_env(), devices, options,
-                           [&](const JigReport& report, const RunLabels&) -> Result<RunIds> {
+                           [&](const JigReport& report, const RunLabels&) -> Result<RunInStore> {
                              const std::lock_guard lock(mutex);
                              measured.push_back(report.serial);
-                             return RunIds{"abc", {}};
+                             return RunInStore{{"abc", {}}, false, {}};
                            },
                            [](const CaptureReport&) -> Result<std::string> { return "def"; })
                            .value();

@@ -8,7 +8,7 @@ include(GNUInstallDirs)
 
 set(sixpoint_package_folders base gt3x calib sim device mocks)
 set(sixpoint_package_rooms
-  base gt3x_container gt3x_log gt3x_forms gt3x calib sim_effects sim
+  base gt3x_container gt3x_log gt3x_forms gt3x calib_sums calib sim_effects sim
   device device_wire device_usb device_session device_jigs device_drive
   mocks_firmware mocks_faults mocks_in_process mocks_usb mocks_inert mocks)
 set(sixpoint_package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/sixpoint)

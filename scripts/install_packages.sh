@@ -18,7 +18,7 @@ test_packages=(
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 unzip zip
   libumockdev-dev umockdev
   busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils
-  poppler-utils zbar-tools
+  libxml2-utils openssl poppler-utils zbar-tools
   dpkg-dev file groff-base lintian systemd
 )
 package_packages=(dpkg-dev file)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The promises of docs/promises.md against the code and the tests that exist.
+"""The promises of docs/promises.md and the threats of docs/security.md against the code and the tests that exist.
 
   scripts/promises.py build    the folder in which the tests were built
 
@@ -54,7 +54,8 @@ def main():
                             check=True, capture_output=True, text=True).stdout
     tests = [test["name"] for test in json.loads(listed)["tests"]]
     wrong, known = [], set()
-    for cells in read_rows((project / "docs/promises.md").read_text()):
+    pages = [project / "docs/promises.md", project / "docs/security.md"]
+    for cells in read_rows("\n".join(page.read_text() for page in pages)):
         if cells[0] in known:
             wrong.append(f"{cells[0]}: twice")
         known.add(cells[0])
@@ -65,7 +66,7 @@ def main():
                 wrong.append(f"{file.relative_to(project)}: no promise {name}")
     if not known:
         wrong.append("no promises were found")
-    print("\n".join(wrong) if wrong else f"{len(known)} promises, each with its rule and its tests")
+    print("\n".join(wrong) if wrong else f"{len(known)} promises and threats, each with its rule and its tests")
     return 1 if wrong else 0
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds and tests everything, as CI does; works from a fresh clone on a fresh Debian 12 as root.
 #   scripts/test.sh               all: tests, the unit tests again under ASan and UBSan (built by
-#                                 clang), format, clang-tidy
+#                                 clang), a minute of fuzzing, format, clang-tidy
 #   scripts/test.sh --label L     builds what the tests of label L need and runs those
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -57,6 +57,9 @@ configure sanitize
 cmake --build build/sanitize -- --quiet
 step "Unit tests under the sanitizers"
 run_ctest build/sanitize -L '^unit$'
+
+step "Fuzz targets of recordings, a minute"
+fuzz/run.sh --seconds 60
 
 # A first run over all files takes half an hour on two cores, so the last changes come first.
 step "clang-tidy"

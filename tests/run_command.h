@@ -1,4 +1,4 @@
-// Runs the whole program inside a test: arguments in, exit code and both streams out.
+// Runs the whole program inside a test: arguments and input in, exit code and both streams out.
 #pragma once
 
 #include <sstream>
@@ -18,10 +18,11 @@ struct Answer {
   cli::Json json() const { return cli::Json::parse(out, nullptr, false); }
 };
 
-inline Answer run_command(Env& env, const std::vector<std::string>& arguments) {
+inline Answer run_command(Env& env, const std::vector<std::string>& arguments,
+                          const std::string& input = {}) {
   std::ostringstream out;
   std::ostringstream people;
-  std::istringstream in;
+  std::istringstream in(input);
   cli::Context context{env, out, people, in};
   Answer answer;
   answer.exit_code = cli::run_program(arguments, context);

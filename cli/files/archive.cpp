@@ -7,6 +7,7 @@
 #include "base/sha256.h"
 #include "cli/command.h"
 #include "cli/files/file_stream.h"
+#include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
 #include "cli/stop_request.h"
@@ -334,11 +335,24 @@ Status run_merge(const Options& options, Context& context) {
     SIXPOINT_ASSIGN(auto opened, open_existing_store(context, location));
     store.emplace(std::move(opened));
   }
+  // The manifest of the whole archive. Tasks that run at the same time leave none: each would
+  // write over those of the others.
+  std::optional<std::string> manifest_folder;
+  if (!options.dry_run) {
+    SIXPOINT_ASSIGN(manifest_folder, repair::output_folder_of(context.env.files, folder));
+  }
+  if (manifest_folder) {
+    SIXPOINT_CHECK(check_manifest(context.env.files, *manifest_folder));
+  }
   RepairTally tally;
+  std::vector<RepairReport> reports;
   FileStream files(context, options.json);
   const auto add = [&](const RepairReport& report) {
     tally.add(context, report);
     files.add(report);
+    if (manifest_folder) {
+      reports.push_back(report);
+    }
   };
   for (const repair::RefusedPath& refused : plan.refused) {
     add(failed_report(refused.path, refused.error));
@@ -368,6 +382,13 @@ Status run_merge(const Options& options, Context& context) {
     return {};
   }
   context.worsen(merged->complete() ? kExitPassed : kExitInconclusive);
+  if (manifest_folder) {
+    if (const auto status =
+            write_manifest(context.env.files, *manifest_folder, reports, context.env.clock.now());
+        !status) {
+      report_error(context, status.error());
+    }
+  }
   const Rerun rerun(context.env.files, options.plan);
   files.end({{"shards", shards_to_json(*merged, rerun)},
              {"summary", tally.to_json(false)},
@@ -488,7 +509,7 @@ void add_archive(CLI::App& app, Context& context) {
   merge.add_option("--store", of_merge.sources.store,
                    "the store to add to (default: the one that the plan took constants from)");
   merge.add_flag("--verify", of_merge.verify, "also read every repaired file again");
-  merge.add_flag("--dry-run", of_merge.dry_run, "add nothing to the store");
+  merge.add_flag("--dry-run", of_merge.dry_run, "add nothing to the store, write no manifest");
   add("status", "how far the shards are", run_status);
 }
 

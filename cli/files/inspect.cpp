@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "cli/files/salvage_option.h"
 #include "gt3x/forms/model.h"
 #include "repair/triage/inspection.h"
 #include "repair/triage/survey.h"
@@ -18,12 +19,41 @@ Json axes(const PerAxis<double>& values) {
 std::string filter_name(std::optional<calib::FilterConfiguration> filter) {
   return std::string(filter ? calib::to_string(*filter) : "unknown");
 }
-std::string time_or_dash(std::optional<std::uint32_t> unix_time) {
-  return unix_time ? to_iso8601(from_unix_seconds(*unix_time)) : "-";
+// Times of a recording are said by its clock.
+std::string time_or_dash(const gt3x::Clock& clock, std::optional<std::uint32_t> unix_time) {
+  return unix_time ? gt3x::clock_time(clock, *unix_time) : "-";
 }
 
-Json time_or_null(std::optional<std::uint32_t> unix_time) {
-  return unix_time ? Json(to_iso8601(from_unix_seconds(*unix_time))) : Json(nullptr);
+Json time_or_null(const gt3x::Clock& clock, std::optional<std::uint32_t> unix_time) {
+  return unix_time ? Json(gt3x::clock_time(clock, *unix_time)) : Json(nullptr);
+}
+
+Json to_json(const gt3x::Clock& clock) {
+  return {{"kind", gt3x::to_string(clock.kind)},
+          {"offset_minutes", clock.offset_minutes ? Json(*clock.offset_minutes) : Json(nullptr)},
+          {"why", clock.why}};
+}
+
+Json to_json(const gt3x::Irregular& irregular, const gt3x::Clock& clock) {
+  using enum gt3x::IrregularKind;
+  Json places = Json::array();
+  for (const gt3x::Irregular::Place& place : irregular.places) {
+    Json one = {{"kind", gt3x::to_string(place.kind)},
+                {"time", gt3x::clock_time(clock, place.unix_time)},
+                {"offset", place.offset}};
+    if (place.kind == odd_size) {
+      one["samples"] = place.value;
+    } else if (place.kind == jump) {
+      one["seconds"] = place.value;
+    }
+    places.push_back(std::move(one));
+  }
+  return {{"repeated_seconds", irregular.repeated_seconds()},
+          {"out_of_order", irregular.records_out_of_order()},
+          {"odd_sized_seconds", irregular.count(odd_size)},
+          {"jumps", irregular.count(jump)},
+          {"usb_and_samples", irregular.count(usb_and_samples)},
+          {"places", std::move(places)}};
 }
 
 Json to_json(const StoredConstants& constants) {
@@ -43,18 +73,31 @@ Json to_json(const repair::InspectedStill& still) {
             {"worst_error", any ? number(still.magnitude.worst_mg) : Json(nullptr)}}}};
 }
 
-Json damage_of(const gt3x::LogStatistics& log) {
+Json damage_of(const gt3x::LogStatistics& log, const gt3x::Clock& clock) {
   Json losses = Json::array();
   for (const gt3x::Loss& loss : log.losses) {
     losses.push_back({{"offset", loss.offset},
                       {"bytes", loss.bytes},
-                      {"after", time_or_null(loss.time_before)},
-                      {"before", time_or_null(loss.time_after)}});
+                      {"after", time_or_null(clock, loss.time_before)},
+                      {"before", time_or_null(clock, loss.time_after)}});
   }
   return {{"stretches", log.damaged_stretches},
           {"bytes", log.damaged_bytes},
           {"stray_bytes", log.stray_bytes},
           {"losses", std::move(losses)}};
+}
+
+// As in the answer of repair, but by the recording's clock, as the other times here.
+Json losses_of(const repair::Inspection& found) {
+  if (!found.losses) {
+    return nullptr;
+  }
+  Json losses = repair::losses_to_json(*found.losses);
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    losses[i]["from"] = time_or_null(found.clock, (*found.losses)[i].from);
+    losses[i]["to"] = time_or_null(found.clock, (*found.losses)[i].to);
+  }
+  return losses;
 }
 
 // Calls visit(name, count) for every type of record in the log.
@@ -78,7 +121,10 @@ Json to_json(const repair::Inspection& found, const std::string& path) {
   json["sample_rate_hz"] = found.rate_hz ? number(*found.rate_hz) : Json(nullptr);
   json["accel_scale_lsb_per_g"] =
       found.accel_scale_lsb_per_g ? number(*found.accel_scale_lsb_per_g) : Json(nullptr);
-  json["start"] = time_or_null(found.start);
+  json["clock"] = to_json(found.clock);
+  json["start"] = time_or_null(found.clock, found.start);
+  json["first_after_start_s"] =
+      found.first_after_start_s ? Json(*found.first_after_start_s) : Json(nullptr);
   json["samples"] = found.samples;
   json["duration_s"] = number(found.duration_s());
   Json& records = json["records"] = Json::object();
@@ -91,16 +137,18 @@ Json to_json(const repair::Inspection& found, const std::string& path) {
       {"constants_measured_under", filter_name(repair::filter_of_constants(found.facts))}};
   Json& gaps = json["gaps"] = Json::array();
   for (const repair::InspectedGap& gap : found.gaps) {
-    gaps.push_back({{"start", time_or_null(gap.start)},
+    gaps.push_back({{"start", time_or_null(found.clock, gap.start)},
                     {"seconds", gap.seconds},
                     {"kind", gt3x::to_string(gap.kind)}});
   }
   json["gap_count"] = found.gap_count;
   json["gap_seconds"] = found.gap_seconds;
+  json["irregular"] = to_json(found.irregular, found.clock);
   json["clipped_samples"] = found.clipped_samples;
   json["checksum_failures"] = found.log.checksum_failures;
   json["still"] = found.still ? to_json(*found.still) : Json(nullptr);
-  json["damage"] = damage_of(found.log);
+  json["damage"] = damage_of(found.log, found.clock);
+  json["losses"] = losses_of(found);
   json["already_repaired"] = found.already_repaired;
   Json& entries = json["entries"] = Json::array();
   for (const gt3x::EntryInfo& entry : found.entries) {
@@ -131,6 +179,18 @@ void print_still(const repair::InspectedStill& still, const PrintLine& line) {
   }
 }
 
+std::string clock_name(const gt3x::Clock& clock) {
+  switch (clock.kind) {
+    case gt3x::ClockKind::local:
+      return "local time";
+    case gt3x::ClockKind::utc:
+      return "UTC";
+    case gt3x::ClockKind::unknown:
+      break;
+  }
+  return "not known";
+}
+
 void print(std::ostream& out, const repair::Inspection& found, const std::string& path) {
   const PrintLine line = [&](const char* name, const std::string& value) {
     out << fmt::format("{:<20}{}\n", name, printable(value, 200));
@@ -144,7 +204,11 @@ void print(std::ostream& out, const repair::Inspection& found, const std::string
                                 found.accel_scale_lsb_per_g
                                     ? fmt::format("{} LSB/g", *found.accel_scale_lsb_per_g)
                                     : std::string("raw counts")));
-    line("start", time_or_dash(found.start));
+    line("clock", fmt::format("{}: {}", clock_name(found.clock), found.clock.why));
+    line("start", time_or_dash(found.clock, found.start));
+    if (found.first_after_start_s.value_or(0) != 0) {
+      line("  after Start Date", fmt::format("{} s", *found.first_after_start_s));
+    }
     line("duration",
          fmt::format("{:.1f} s, of which {} s are gaps", found.duration_s(), found.gap_seconds));
   }
@@ -167,10 +231,18 @@ void print(std::ostream& out, const repair::Inspection& found, const std::string
   for_each_record_type(found.log, [&](const auto& name, std::uint64_t count) {
     line("records", fmt::format("{:>9} {}", count, name));
   });
+  for (const gt3x::SalvageLoss& loss : found.losses.value_or(std::vector<gt3x::SalvageLoss>())) {
+    const std::string when = loss.from || loss.to
+                                 ? fmt::format("{} .. {} ", time_or_dash(found.clock, loss.from),
+                                               time_or_dash(found.clock, loss.to))
+                                 : "";
+    line("loss", fmt::format("{}{}: {}{}", when, gt3x::to_string(loss.kind),
+                             loss.entry.empty() ? "" : loss.entry + ": ", loss.why));
+  }
   constexpr std::size_t kGapsShown = 20;
   for (std::size_t i = 0; i < std::min(found.gaps.size(), kGapsShown); ++i) {
     const repair::InspectedGap& gap = found.gaps[i];
-    line("gap", fmt::format("{}  {:>7} s  {}", to_iso8601(from_unix_seconds(gap.start)),
+    line("gap", fmt::format("{}  {:>7} s  {}", gt3x::clock_time(found.clock, gap.start),
                             gap.seconds, gt3x::to_string(gap.kind)));
   }
   if (found.gap_count > kGapsShown) {
@@ -180,11 +252,13 @@ void print(std::ostream& out, const repair::Inspection& found, const std::string
 
 struct Options {
   std::string path;
+  bool salvage = false;
   bool json = false;
 };
 
 Status run(const Options& options, Context& context) {
-  SIXPOINT_ASSIGN(const repair::Inspection found, repair::inspect(context.env.files, options.path));
+  SIXPOINT_ASSIGN(const repair::Inspection found,
+                  repair::inspect(context.env.files, options.path, {options.salvage, {}}));
   if (options.json) {
     print_json(context, to_json(found, options.path));
   } else {
@@ -205,6 +279,7 @@ void add_inspect(CLI::App& app, Context& context) {
   auto [command, options] =
       add_command<Options>(app, context, "inspect", "what a .gt3x, .agdc or .agd file holds", run);
   command.add_option("FILE", options.path, "the recording")->required();
+  add_salvage_option(command, options.salvage);
 }
 
 }  // namespace sixpoint::cli

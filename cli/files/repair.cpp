@@ -7,6 +7,7 @@
 #include "cli/command.h"
 #include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
+#include "cli/files/salvage_option.h"
 #include "cli/output.h"
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
@@ -142,6 +143,7 @@ std::string line_that_goes_on(const Options& options) {
   flag(" --store-only", options.repair.store_only);
   flag(" --undo-rotation", options.repair.undo_rotation);
   flag(" --allow-prior", options.repair.allow_prior);
+  flag(" --salvage", options.repair.salvage);
   flag(" --force", options.repair.force);
   flag(" --redo-outdated", options.repair.redo_outdated);
   return line + " --resume";
@@ -214,6 +216,7 @@ void add_repair(CLI::App& app, Context& context) {
   command.add_flag("--resume", options.repair.resume,
                    "go on with an earlier run: what it finished is left as it is");
   add_redo_option(command, options.repair.redo_outdated);
+  add_salvage_option(command, options.repair.salvage);
   add_jobs_option(command, options.jobs);
 }
 

@@ -13,6 +13,7 @@ namespace sixpoint::cli {
   COMMAND(repair)                  \
   COMMAND(export)                  \
   COMMAND(compare)                 \
+  COMMAND(impact)                  \
   COMMAND(solve)                   \
   COMMAND(jig)                     \
   COMMAND(capture)                 \
@@ -21,6 +22,7 @@ namespace sixpoint::cli {
   COMMAND(check_unit)              \
   COMMAND(station_lock)            \
   COMMAND(retest)                  \
+  COMMAND(operator)                \
   COMMAND(statistics)              \
   COMMAND(gage_rr)                 \
   COMMAND(units)                   \

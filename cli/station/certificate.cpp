@@ -48,7 +48,7 @@ void add_certificate(CLI::App& app, Context& context) {
   auto [command, options] = add_command<Options>(app, context, "certificate",
                                                  "make the certificate of a jig run again", run);
   command.add_option("RUN", options.run, "the run's id, as 'sixpoint jig' said it")->required();
-  command.add_option("-o,--output", options.output, "the .pdf or .json to make");
+  command.add_option("-o,--output", options.output, "the .pdf, .json or .dcc.xml to make");
   command.add_option("--label", options.label, "and a label for the unit, as ZPL");
   add_output_options(command, options.outputs);
   add_store_option(command, options.store);

@@ -4,6 +4,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/output.h"
+#include "cli/station/operator.h"
 #include "cli/store_option.h"
 #include "station/records/station_records.h"
 
@@ -29,6 +30,7 @@ struct Options {
 // Adds an engineer's decision to the store and answers `done`.
 Status decide(const Options& options, Context& context, const char* command,
               const std::string& action, const std::string& done) {
+  SIXPOINT_CHECK(sign_off(context, options.operator_name));
   SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
   std::string reason = options.reason;
   if (!options.expect.empty()) {

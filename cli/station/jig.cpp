@@ -83,15 +83,7 @@ Result<std::string> retested_run(const Options& options, const std::string& seri
 }
 
 Result<station::JigDue> due_of(const Options& options) {
-  station::JigDue jig{{}, options.jig_exception, options.jig_exception_by};
-  if (!options.jig_due.empty()) {
-    const auto due = parse_iso8601(options.jig_due);
-    if (!due) {
-      return fail(ErrorCode::usage, due.error().what, "--jig-due", "write it as 2027-03-31");
-    }
-    jig.due = *due;
-  }
-  return jig;
+  return station::parse_jig_due(options.jig_due, options.jig_exception, options.jig_exception_by);
 }
 
 // What is known before the unit is measured. What can be refused is refused here, before the work.
@@ -483,7 +475,7 @@ constexpr std::array<TextOption, 12> kTextOptions = {{
     {"--limits", &Options::limits,
      "a TOML file of limits (docs/limits.md); else the built-in ones"},
     {"--certificate", &Options::certificate,
-     "the calibration certificate: a .pdf or .json to make"},
+     "the calibration certificate: a .pdf, .json or .dcc.xml to make"},
     {"--label", &Options::label, "a label for the unit, as ZPL; after a read-back only (--write)"},
     {"--state", &Options::state,
      "the folder that keeps the run while it is under way, so that the next program goes on with "

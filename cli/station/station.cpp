@@ -15,13 +15,18 @@
 #include "cli/devices/stop_signals.h"
 #include "cli/gravity_option.h"
 #include "cli/output.h"
+#include "cli/station/operator.h"
 #include "cli/station/practice_bench.h"
 #include "cli/store_option.h"
+#include "station/access/operators.h"
+#include "station/access/sign_in.h"
 #include "station/certificate/certificate.h"
+#include "station/certificate/dcc.h"
 #include "station/lanes/lanes.h"
 #include "station/page/api.h"
 #include "station/page/quality_control.h"
 #include "station/page/server.h"
+#include "station/records/jig_due.h"
 #include "station/records/run_records.h"
 #include "station/records/software.h"
 #include "station/records/station_guard.h"
@@ -34,7 +39,9 @@ namespace {
 struct Options {
   int port = 6020;
   std::string bind = "127.0.0.1";
-  std::string token;
+  std::string token_file;
+  std::string tls_certificate;
+  std::string tls_key;
   std::vector<std::string> devices;
   std::string store;
   std::string station;
@@ -42,12 +49,13 @@ struct Options {
   std::string files = ".";
   std::string limits;
   GravityOptions gravity;
+  std::string jig_id;
+  std::string jig_due;
+  std::string jig_exception;
+  std::string jig_exception_by;
+  bool write = false;
   double side_s = station::CaptureOptions{}.side_s;
 };
-
-bool is_loopback(const std::string& bind) {
-  return bind == "127.0.0.1" || bind == "localhost" || bind == "::1";
-}
 
 // The folder of runs under way. Another store or another station's name is another station.
 std::string state_folder(const Options& options) {
@@ -60,10 +68,12 @@ std::string state_folder(const Options& options) {
 // command's streams and exit code belong to one thread.
 class StationStore {
  public:
-  StationStore(Context& context, const Options& options, const station::JigSessionOptions& session)
+  StationStore(Context& context, const Options& options, const station::JigSessionOptions& session,
+               station::JigDue jig_due)
       : context_(context),
         options_(options),
         session_(session),
+        jig_due_(std::move(jig_due)),
         guard_(context.env, guard_folder(options.store), session.limits) {}
 
   Result<db::Store> open() {
@@ -71,14 +81,15 @@ class StationStore {
     return open_store(context_, options_.store);
   }
   Result<station::RetestState> may_start(const std::string& serial) {
+    SIXPOINT_CHECK(station::check_jig_due(jig_due_, context_.env.clock.now()));
     const std::lock_guard lock(mutex_);
     // A store that does not answer is no reason not to measure: keep_records() has a journal, and
     // the station remembers its lock.
     auto store = open_store(context_, options_.store);
     return guard_.may_start(store, serial, options_.station);
   }
-  Result<station::RunIds> add_run(const station::JigReport& report,
-                                  const station::RunLabels& labels);
+  Result<station::RunInStore> add_run(const station::JigReport& measured,
+                                      const station::RunLabels& labels);
   // Constants of a calibration file: beside it as FILE.constants.json, and in the store.
   Result<std::string> add_constants(const station::CaptureReport& report) {
     const std::lock_guard lock(mutex_);
@@ -92,25 +103,38 @@ class StationStore {
   Context& context_;
   const Options& options_;
   const station::JigSessionOptions session_;
+  const station::JigDue jig_due_;
   station::StationGuard guard_;
   std::mutex mutex_;
 };
 
-Result<station::RunIds> StationStore::add_run(const station::JigReport& report,
-                                              const station::RunLabels& labels) {
+Result<station::RunInStore> StationStore::add_run(const station::JigReport& measured,
+                                                  const station::RunLabels& labels) {
   const std::lock_guard lock(mutex_);
-  db::RunRecord run = station::run_record_before(session_, report.serial, report.jig);
+  db::RunRecord run = station::run_record_before(
+      session_, measured.serial, options_.jig_id.empty() ? measured.jig : options_.jig_id);
+  run.jig_due = jig_due_.due;
+  station::JigReport report = measured;
+  if (std::string note = station::jig_due_note(jig_due_, measured.started); !note.empty()) {
+    report.reasons.push_back(std::move(note));
+  }
+  run.kind = labels.kind;
   run.operator_name = labels.operator_name;
   run.station = labels.station;
   run.retest_of = labels.retest_of;
-  station::complete_run_record(run, report);
-  station::RunIds stored;
+  station::complete_run_record(run, report, {}, labels.is_authenticated);
+  station::RunInStore stored;
   auto store = open_store(context_, options_.store);
-  SIXPOINT_CHECK(
+  SIXPOINT_ASSIGN(
+      const db::Saved saved,
       keep_records(context_, options_.store, store, [&](db::RecordWriter& writer) -> Status {
-        SIXPOINT_ASSIGN(stored, station::add_run_records(writer, report, run));
+        SIXPOINT_ASSIGN(stored.ids, station::add_run_records(writer, report, run));
         return {};
       }));
+  stored.is_kept_here = !saved.in_store();
+  if (saved.in_store()) {
+    stored.documents = station::documents_of(run);  // made from the store alone
+  }
   if (const Status noted = guard_.note_verdict(report.serial, report.verdict); !noted) {
     context_.log().warn("{}", noted.error().brief());
   }
@@ -129,16 +153,21 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
     SIXPOINT_ASSIGN(auto label, station::label_zpl(run));
     return station::RunDocument{"text/plain; charset=utf-8", std::move(label)};
   }
-  if (kind == "certificate.pdf" || kind == "certificate.json") {
+  if (kind.starts_with("certificate.")) {
     SIXPOINT_ASSIGN(const auto certificate, station::certificate_of(run));
+    if (kind == "certificate.dcc.xml") {
+      return station::RunDocument{"application/xml", station::certificate_dcc(certificate)};
+    }
     if (kind == "certificate.json") {
       return station::RunDocument{"application/json", certificate.to_json().dump(2) + "\n"};
     }
-    SIXPOINT_ASSIGN(const Bytes pdf, station::certificate_pdf(certificate));
-    return station::RunDocument{"application/pdf", std::string(pdf.begin(), pdf.end())};
+    if (kind == "certificate.pdf") {
+      SIXPOINT_ASSIGN(const Bytes pdf, station::certificate_pdf(certificate));
+      return station::RunDocument{"application/pdf", std::string(pdf.begin(), pdf.end())};
+    }
   }
   return fail(ErrorCode::no_input, "a run has no such document", printable(kind, 40),
-              "ask for report.json, certificate.pdf, certificate.json or label.zpl");
+              "ask for report.json, certificate.pdf, .json or .dcc.xml, or label.zpl");
 }
 
 Result<station::LanesOptions> lanes_options(Context& context, const Options& options) {
@@ -151,19 +180,6 @@ Result<station::LanesOptions> lanes_options(Context& context, const Options& opt
   SIXPOINT_ASSIGN(const auto gravity, local_gravity(options.gravity));
   lanes.session.gravity = gravity.value_or(lanes.session.gravity);
   SIXPOINT_ASSIGN(lanes.session.limits, station::read_limits(context.env.files, options.limits));
-  if (!is_loopback(options.bind) && options.token.size() < 8) {
-    return fail(ErrorCode::usage,
-                fmt::format("on {} others can reach this station: it needs a --token of at least "
-                            "8 characters",
-                            printable(options.bind, 60)),
-                {}, "choose one, or leave --bind out");
-  }
-  if (options.token.find_first_not_of(
-          "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
-          "-_.~") != std::string::npos) {
-    return fail(ErrorCode::usage, "a token is letters, digits and -_.~", "--token",
-                "for example the output of 'openssl rand -hex 16'");
-  }
   return lanes;
 }
 
@@ -219,15 +235,42 @@ int serve_until_signal(station::Server& server, const sigset_t& signals, EndInTi
   return signal;
 }
 
+// Where the page listens, and its certificate.
+Result<station::ServerOptions> server_options(Context& context, const Options& options) {
+  SIXPOINT_CHECK(station::may_listen(options.bind, !options.tls_certificate.empty(),
+                                     !options.tls_key.empty()));
+  station::ServerOptions server;
+  server.bind = options.bind;
+  server.port = options.port;
+  if (!options.tls_certificate.empty()) {
+    constexpr std::uint64_t kMostPem_bytes = 1U << 20U;
+    SIXPOINT_ASSIGN(const Bytes certificate,
+                    read_file(context.env.files, options.tls_certificate, kMostPem_bytes));
+    SIXPOINT_ASSIGN(const Bytes key, read_file(context.env.files, options.tls_key, kMostPem_bytes));
+    server.tls_certificate.assign(certificate.begin(), certificate.end());
+    server.tls_key.assign(key.begin(), key.end());
+  }
+  return server;
+}
+
 Status serve(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(const auto listening, server_options(context, options));
   Outputs outputs(context, {}, /*json=*/false);
   SIXPOINT_CHECK(outputs.working_folder("--state", state_folder(options)));
   SIXPOINT_ASSIGN(auto lanes_asked, lanes_options(context, options));
+  SIXPOINT_ASSIGN(
+      const station::JigDue jig_due,
+      station::parse_jig_due(options.jig_due, options.jig_exception, options.jig_exception_by));
   // A store that cannot be used is refused before anything is measured.
   if (const auto store = open_store(context, options.store);
       !store && store.error().code == ErrorCode::usage) {
     return fail(store.error());
   }
+  SIXPOINT_ASSIGN(auto token, station::read_or_make_token(context.env.files,
+                                                          options.token_file.empty()
+                                                              ? state_folder(options) + "/token"
+                                                              : options.token_file));
+  station::SignIn sign_in(context.env.clock, std::move(token));
   const sigset_t signals = block_stop_signals();
   EndInTime end;  // after all that ends
   raise_descriptor_limit();
@@ -236,9 +279,10 @@ Status serve(const Options& options, Context& context) {
   device::TransportRegistry devices = station::known_devices();
   bench.register_in(devices);
   VirtualPracticeBench practice_bench(bench);
-  StationStore store(context, options, lanes_asked.session);
+  StationStore store(context, options, lanes_asked.session, jig_due);
   const auto open = [&] { return store.open(); };
-  station::QualityControl quality(open, options.station, lanes_asked.session.limits);
+  station::QualityControl quality(open, options.station, lanes_asked.session.limits,
+                                  context.env.clock);
   lanes_asked.may_start = [&](const std::string& serial) { return store.may_start(serial); };
   const station::StoreConstants store_constants = [&](const station::CaptureReport& report) {
     return store.add_constants(report);
@@ -253,23 +297,24 @@ Status serve(const Options& options, Context& context) {
                   station::Lanes::open(context.env, devices, std::move(lanes_asked), store_run,
                                        store_constants));
   station::RepairJob repairs(context.env, open);
+  station::Operators operators(context.env, operators_file());
   station::ApiOptions api_options;
   api_options.station = options.station;
   api_options.version = station::software_name();
   api_options.bind = options.bind;
-  api_options.token = options.token;
+  api_options.tls = !listening.tls_certificate.empty();
   api_options.files_folder = options.files;
-  station::Api api(api_options, {context.env, *lanes, repairs, &practice_bench, store_constants,
-                                 [&](const std::string& run, const std::string& kind) {
-                                   return store.document(run, kind);
-                                 },
-                                 &quality});
-  station::ServerOptions server_options;
-  server_options.bind = options.bind;
-  server_options.port = options.port;
-  SIXPOINT_ASSIGN(const auto server, station::Server::open(context.env, api, server_options));
-  context.out << fmt::format("http://{}:{}/{}\n", options.bind, server->port(),
-                             options.token.empty() ? "" : "?token=" + options.token)
+  api_options.write_default = options.write;
+  api_options.jig_due = jig_due.due;
+  station::Api api(
+      api_options,
+      {context.env, *lanes, repairs, sign_in, &practice_bench, store_constants,
+       [&](const std::string& run, const std::string& kind) { return store.document(run, kind); },
+       &quality, &operators});
+  SIXPOINT_ASSIGN(const auto server, station::Server::open(context.env, api, listening));
+  // A browser keeps what stands behind # for itself; the page takes it out of the address at once.
+  context.out << fmt::format("{}://{}:{}/#code={}\n", api_options.tls ? "https" : "http",
+                             options.bind, server->port(), sign_in.first_code())
               << std::flush;
   context.people << fmt::format(
                         "{} lane{}; Ctrl-C ends the station, runs go on at the next start\n",
@@ -291,9 +336,21 @@ void add_station(CLI::App& app, Context& context) {
       .add_option("--device", options.devices, "a lane's unit (docs/virtual.md); repeatable, to 16")
       ->required();
   add_store_option(command, options.store);
-  command.add_option("--bind", options.bind, "address to listen on; another one needs --token")
+  command.add_option("--bind", options.bind, "address to listen on; another one needs TLS")
       ->capture_default_str();
-  command.add_option("--token", options.token, "a page must send it to be served");
+  command.add_option("--tls-cert", options.tls_certificate, "PEM file: serves https");
+  command.add_option("--tls-key", options.tls_key, "PEM file with the key of --tls-cert");
+  command.add_option("--token-file", options.token_file,
+                     "file with the token of programs; made where it is not there (default: token "
+                     "in --state)");
+  // In the list of processes every user of the machine reads it.
+  command
+      .add_option_function<std::string>("--token",
+                                        [](const std::string&) {
+                                          throw CLI::ValidationError(
+                                              "--token", "others can read it: use --token-file");
+                                        })
+      ->group("");
   command.add_option("--station", options.station, "the station's name, for the record");
   command.add_option("--state", options.state,
                      "folder for runs under way (default: in the user's data folder)");
@@ -301,6 +358,16 @@ void add_station(CLI::App& app, Context& context) {
       .add_option("--files", options.files,
                   "folder below which the page may check and repair files")
       ->capture_default_str();
+  command.add_option("--jig-id", options.jig_id, "the jig's own number, for the record");
+  command.add_option("--jig-due", options.jig_due,
+                     "when the jig itself is due for calibration (2027-03-31); after that day "
+                     "nothing is measured");
+  command.add_option("--jig-exception", options.jig_exception,
+                     "why it is measured all the same, for the record");
+  command.add_option("--jig-exception-by", options.jig_exception_by,
+                     "the engineer who signs for that");
+  command.add_flag("--write", options.write,
+                   "the page's runs write the constants into the unit, unless a person says no");
   command.add_option("--limits", options.limits, "limits of the verdict (TOML)");
   command
       .add_option("--side-seconds", options.side_s,

@@ -154,7 +154,6 @@ Status write_plain_trial(FileSystem& files, const std::string& from, const std::
   }
   repair::RescaledLogOptions options;
   options.accel_scale_lsb_per_g = survey.accel_scale_lsb_per_g;
-  options.rate_hz = survey.rate_hz;
   options.first_constants = survey.constants.front();
   options.beyond_12_bits = survey.beyond_12_bits;
   options.affine = !survey.plausibility.plausible();

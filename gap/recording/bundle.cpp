@@ -56,6 +56,15 @@ Status read_recording(FileSystem& files, const std::string& path, Bundle& bundle
       damaged_s += item->seconds;
     }
   }
+  if (const std::uint64_t lost = reader.irregular().repeated_seconds() +
+                                 reader.irregular().count(gt3x::IrregularKind::late);
+      lost > 0) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("{} records repeat a second or come too late, so that the protocol's "
+                            "sample numbers no longer hold",
+                            lost),
+                path, "compare the file with the description of bundles");
+  }
   if (damaged_s > 0) {
     return fail(ErrorCode::bad_data,
                 fmt::format("{} seconds of the recording are damaged, so that the protocol's "

@@ -43,6 +43,9 @@ const std::map<std::string, Role>& common_roles() {
                                          {"--calibration-file", Role::input},
                                          {"--faults", Role::input},
                                          {"--files", Role::input},
+                                         {"--token-file", Role::input},
+                                         {"--tls-cert", Role::input},
+                                         {"--tls-key", Role::input},
                                          {"--state", Role::working_folder},
                                          {"--record", Role::output_to_keep},
                                          {"--certificate", Role::output},
@@ -78,6 +81,8 @@ const std::map<std::string, Role>& common_roles() {
                              "--operator",
                              "--reason",
                              "--station",
+                             "--role",
+                             "NAME",
                              "--seed",
                              "--rate",
                              "--patience",
@@ -136,6 +141,10 @@ const std::map<std::string, Role>& common_roles() {
                              "--records",
                              "--matters-mg",
                              "--realistic",
+                             "--format",
+                             "--fill-limit",
+                             "--epoch",
+                             "--cut",
                              "--why"}) {
       roles.emplace(name, Role::no_path);
     }
@@ -265,6 +274,8 @@ class EveryOutput : public tests::CommandTest {
         {"export --csv", {"export", path("rec.gt3x")}},
         {"export --output", {"export", path("rec.gt3x")}},
         {"compare --html", {"compare", path("rec.gt3x"), path("archive/rec.gt3x")}},
+        {"impact --csv", {"impact", path("rec.gt3x")}},
+        {"impact --html", {"impact", path("rec.gt3x")}},
         {"solve --output", {"solve", path("rec.gt3x")}},
         {"repair --output", {"repair", path("archive"), "--scan"}},
         {"check-unit chart --html", {"check-unit", "chart", "--store", path("s.db")}},

@@ -148,6 +148,18 @@ TEST_F(ArchiveCommand, AnswersAsOneRepairWould) {
   EXPECT_EQ(comparable(merged.json()), comparable(expected.json()));
   EXPECT_EQ(merged.json()["complete"], true);
   expect_same_outputs(folder_ / "whole", out_);
+  const auto manifest_of = [&](const std::string& folder) {
+    const Bytes text = read_file(files_, folder + "/manifest.json", 1U << 20U).value();
+    std::map<std::string, std::string> lines;
+    const Json manifest = Json::parse(text.begin(), text.end());
+    for (const Json& file : manifest["files"]) {
+      lines[file["input"]] = file["status"].dump() + file["source"].dump() +
+                             file["still_error_mg"].dump() + file["input_sha256"].dump();
+    }
+    EXPECT_EQ(lines.size(), 8U);
+    return lines;
+  };
+  EXPECT_EQ(manifest_of(out_), manifest_of(folder_ / "whole"));
   // For people the two say the same, line by line.
   const Answer words = run({"archive", "merge", plan_});
   const Answer as_repair =

@@ -101,6 +101,54 @@ TEST(Export, TimesStandInTheFirstColumn) {
   EXPECT_EQ(iso[11 + 3], first.substr(0, 19) + ".100," + plain[11 + 3]);
   EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "-", "--time=day"}).exit_code,
             64);
+  Bytes utc = {};
+  append_record(utc, gt3x::RecordType::metadata, gt3x::tests::kStart,
+                as_bytes(std::string_view(R"({"MetadataType":"LocalTimeLog","UsedUtc":true})")));
+  gt3x::tests::append_second(utc, 0);
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", utc));
+  EXPECT_EQ(lines({"--time"})[11 + 3].substr(0, 24), first.substr(0, 19) + ".100Z");
+}
+
+// Two hours are missing, for no reason that the file has.
+TEST(Export, TheFillLimitSaysHowMuchIsFilled) {
+  MemoryEnv memory;
+  Bytes log = made_log(2);
+  gt3x::tests::append_second(log, 7202);
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", log));
+  const auto lines = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"export", "f.gt3x", "--csv", "-"});
+    return run_command(memory.env, more);
+  };
+  const auto usual = lines({});
+  EXPECT_EQ(lines_of_csv(usual.out).size(), 11U + 90);
+  EXPECT_THAT(usual.people, testing::HasSubstr("--fill-limit 7200 fills it"));
+  const auto filled = lines({"--fill-limit", "7200"});
+  EXPECT_EQ(lines_of_csv(filled.out).size(), 11U + 7203 * 30);
+  EXPECT_THAT(filled.people, testing::Not(testing::HasSubstr("leaps")));
+  EXPECT_EQ(lines({"--fill-limit", "-1"}).exit_code, 64);
+  EXPECT_EQ(lines({"--fill-limit", "day"}).exit_code, 64);
+  EXPECT_EQ(lines({"--fill-limit", "60", "--no-fill"}).exit_code, 64);
+}
+
+TEST(Export, WritesAnArray) {
+  MemoryEnv memory;
+  ASSERT_OK(put_recording(memory.files, "f.gt3x", made_log(2)));
+  ASSERT_EQ(run_command(memory.env, {"export", "f.gt3x", "-o", "out", "--format", "npy"}).exit_code,
+            0);
+  const auto one = run_command(memory.env, {"export", "f.gt3x", "--csv", "-", "--format", "npy"});
+  const Bytes array = read_file(memory.files, "out/f.npy").value();
+  EXPECT_EQ(one.out, std::string(array.begin(), array.end()));
+  EXPECT_THAT(one.out, testing::HasSubstr("'descr': '<f4'"));
+  EXPECT_EQ(one.out.size(), 128U + 60 * 3 * 4);
+  for (const char* other : {"--time", "--unix", "--imu"}) {
+    EXPECT_EQ(run_command(memory.env, {"export", "f.gt3x", "--csv", "-", "--format", "npy", other})
+                  .exit_code,
+              64)
+        << other;
+  }
+  EXPECT_EQ(
+      run_command(memory.env, {"export", "f.gt3x", "--csv", "-", "--format", "parquet"}).exit_code,
+      64);
 }
 
 TEST(Export, SeveralRecordingsGoIntoAFolder) {

@@ -36,7 +36,7 @@ TEST(Inspect, SaysWhatTheContractAsks) {
   EXPECT_EQ(json["model"], "wGT3X-BT");
   EXPECT_EQ(json["sample_rate_hz"], 30.0);
   EXPECT_EQ(json["accel_scale_lsb_per_g"], 256.0);
-  EXPECT_EQ(json["start"], "2015-04-09T14:04:00Z");
+  EXPECT_EQ(json["start"], "2015-04-09T14:04:00");
   EXPECT_EQ(json["samples"], 12 * 30);
   EXPECT_EQ(json["duration_s"], 18.0);
   EXPECT_EQ(json["records"], Json::parse(R"({"ACTIVITY":13,"EVENT":1,"LUX":10,"METADATA":1,
@@ -46,14 +46,45 @@ TEST(Inspect, SaysWhatTheContractAsks) {
   EXPECT_EQ(json["filter"]["in_force"], "current");
   EXPECT_EQ(json["filter"]["constants_measured_under"], "legacy");
   EXPECT_EQ(json["gaps"], Json::parse(R"([
-      {"start":"2015-04-09T14:04:10Z","seconds":5,"kind":"idle_sleep"},
-      {"start":"2015-04-09T14:04:16Z","seconds":1,"kind":"damaged"}])"));
+      {"start":"2015-04-09T14:04:10","seconds":5,"kind":"idle_sleep"},
+      {"start":"2015-04-09T14:04:16","seconds":1,"kind":"damaged"}])"));
   EXPECT_EQ(json["clipped_samples"], 0);
   EXPECT_EQ(json["checksum_failures"], 1);
   EXPECT_EQ(json["still"]["blocks"], 0);
   EXPECT_THAT(answer.people, HasSubstr("wrong checksum"));
   const auto spoken = run_command(memory.env, {"inspect", "f.gt3x"});
   EXPECT_THAT(spoken.out, HasSubstr("MOS2A45130450 (wGT3X-BT), firmware 1.5.0"));
+}
+
+TEST(Inspect, SaysWhichClockItIsAndWhatIsIrregular) {
+  MemoryEnv memory;
+  Bytes log;
+  for (const char* text : {R"({"MetadataType":"LocalTimeLog","UsedUtc":true})",
+                           R"({"MetadataType":"SubjectTimeLog","UtcOffset":"-06:00:00"})"}) {
+    append_record(log, gt3x::RecordType::metadata, kStart, as_bytes(std::string_view(text)));
+  }
+  for (const std::uint32_t second : {1U, 2U, 2U, 4U, 3U}) {
+    append_second(log, second);
+  }
+  append_second(log, 5, 29);
+  ASSERT_OK(put_recording(memory.files, "f", log));
+  const Json json = run_command(memory.env, {"inspect", "f", "--json"}).json();
+  EXPECT_EQ(json["clock"]["kind"], "utc");
+  EXPECT_EQ(json["clock"]["offset_minutes"], -360);
+  EXPECT_THAT(json["clock"]["why"].get<std::string>(), HasSubstr("LocalTimeLog"));
+  EXPECT_EQ(json["start"], "2015-04-09T08:04:01-06:00");
+  EXPECT_EQ(json["first_after_start_s"], 1);
+  EXPECT_EQ(json["irregular"]["repeated_seconds"], 1);
+  EXPECT_EQ(json["irregular"]["out_of_order"], 1);
+  EXPECT_EQ(json["irregular"]["odd_sized_seconds"], 1);
+  EXPECT_EQ(json["irregular"]["jumps"], 0);
+  EXPECT_EQ(json["irregular"]["places"].size(), 3U);
+  EXPECT_EQ(json["irregular"]["places"][0]["kind"], "repeated");
+  EXPECT_EQ(json["irregular"]["places"][0]["time"], "2015-04-09T08:04:02-06:00");
+  EXPECT_EQ(json["irregular"]["places"][2]["samples"], 29);
+  const auto spoken = run_command(memory.env, {"inspect", "f"});
+  EXPECT_THAT(spoken.out, HasSubstr("2015-04-09T08:04:01-06:00"));
+  EXPECT_THAT(spoken.out, HasSubstr("UTC: the METADATA record LocalTimeLog"));
 }
 
 TEST(Inspect, ListsWhatWasLostWithItsTime) {
@@ -66,8 +97,8 @@ TEST(Inspect, ListsWhatWasLostWithItsTime) {
   EXPECT_EQ(answer.exit_code, 0);
   const Json damage = answer.json()["damage"];
   EXPECT_EQ(damage["bytes"], 50);
-  EXPECT_EQ(damage["losses"][0]["after"], "2015-04-09T14:04:02Z");
-  EXPECT_EQ(damage["losses"][0]["before"], "2015-04-09T14:04:04Z");
+  EXPECT_EQ(damage["losses"][0]["after"], "2015-04-09T14:04:02");
+  EXPECT_EQ(damage["losses"][0]["before"], "2015-04-09T14:04:04");
 }
 
 TEST(Inspect, SaysWhatIsWrongWithTheConstants) {

@@ -178,6 +178,38 @@ TEST_F(RepairCommand, UnusualFilesGetTheirLinesAndTheRestIsRepaired) {
   EXPECT_EQ(repaired.json()["summary"]["failed"], 3);
 }
 
+TEST_F(RepairCommand, SalvageOfAFileThatIsCutShort) {
+  const std::string path = archive_ + "/affected.gt3x";
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) * 3 / 4);
+  const std::vector<std::string> line = {"repair", path,          "-o",
+                                         out_,     "--constants", folder_ / "constants.json"};
+  const auto refused = run(line);
+  EXPECT_EQ(refused.exit_code, 65);
+  EXPECT_THAT(refused.out + refused.people, HasSubstr("--salvage"));
+  // info.txt stands behind the log and is lost: without a serial number nothing is decided.
+  std::vector<std::string> salvage = line;
+  salvage.emplace_back("--salvage");
+  salvage.emplace_back("--json");
+  const auto undecided = run(salvage);
+  EXPECT_EQ(undecided.exit_code, 1) << undecided.people;
+  const Json file = undecided.json()["files"][0];
+  EXPECT_EQ(file["status"], "not_repairable");
+  EXPECT_EQ(file["method"], "salvage");
+  EXPECT_EQ(file["losses"][0]["kind"], "missing");
+  const auto whole = run({"inspect", out_ + "/affected.gt3x", "--json"});
+  EXPECT_EQ(whole.exit_code, 0) << whole.people;
+  EXPECT_EQ(whole.json()["already_repaired"], false);
+  const auto seen = run({"inspect", path, "--salvage", "--json"});
+  EXPECT_EQ(seen.exit_code, 0) << seen.people;
+  EXPECT_GT(seen.json()["samples"], 30'000);
+  EXPECT_EQ(seen.json()["losses"], file["losses"]);
+  EXPECT_EQ(seen.json()["serial"], "");
+  const auto exported = run({"export", path, "--salvage", "--csv", folder_ / "out.csv"});
+  EXPECT_EQ(exported.exit_code, 0) << exported.people;
+  EXPECT_THAT(exported.people, HasSubstr("missing: log.bin"));
+  EXPECT_EQ(run({"export", path, "--csv", folder_ / "none.csv"}).exit_code, 65);
+}
+
 TEST_F(RepairCommand, DryRunWritesNothing) {
   const auto answer = run({"repair", archive_, "-o", out_, "--constants",
                            folder_ / "constants.json", "--dry-run", "--json"});

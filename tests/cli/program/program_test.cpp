@@ -39,15 +39,16 @@ TEST(ProgramRun, HelpListsEveryCommandInTheOrderOfTheList) {
   EXPECT_EQ(run({"--help"}), 0);
   std::size_t at = 0;
   for (const char* name :
-       {"inspect", "scan",   "repair",      "export",     "compare",      "solve",    "jig",
-        "capture", "limits", "certificate", "check-unit", "station-lock", "retest",   "statistics",
-        "gage-rr", "units",  "history",     "audit",      "store",        "simulate", "session",
-        "devices", "doctor", "virtual",     "station",    "archive",      "gap"}) {
+       {"inspect",      "scan",    "repair",   "export",     "compare",     "impact",
+        "solve",        "jig",     "capture",  "limits",     "certificate", "check-unit",
+        "station-lock", "retest",  "operator", "statistics", "gage-rr",     "units",
+        "history",      "audit",   "store",    "simulate",   "session",     "devices",
+        "doctor",       "virtual", "station",  "archive",    "gap"}) {
     const std::size_t next = run.out.str().find("\n  " + std::string(name) + " ", at);
     EXPECT_NE(next, std::string::npos) << name;
     at = std::min(next, run.out.str().size());
   }
-  EXPECT_EQ(commands().size(), 27U);
+  EXPECT_EQ(commands().size(), 29U);
 }
 
 TEST(ProgramRun, ARunLeavesNoCodeToTheNext) {

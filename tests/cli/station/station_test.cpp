@@ -1,4 +1,8 @@
 // sixpoint station by its contract (docs/station.md); tests/station/page has the page itself.
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
 #include <arpa/inet.h>
 #include <sys/socket.h>
 
@@ -12,16 +16,17 @@ using testing::HasSubstr;
 using testing::StartsWith;
 using tests::Child;
 
-// The whole answer of HTTP to a GET without more than its Host.
-std::string get(int port, const std::string& path) {
+// The whole answer of HTTP to a request with its Host and these lines.
+std::string get(int port, const std::string& path, const std::string& more_head = {},
+                const std::string& method = "GET") {
   const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const std::string request = "GET " + path +
+  const std::string request = method + " " + path +
                               " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
-                              "\r\nConnection: close\r\n\r\n";
+                              "\r\nConnection: close\r\n" + more_head + "\r\n";
   std::string answer;
   if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0 &&
       ::send(fd, request.data(), request.size(), MSG_NOSIGNAL) ==
@@ -73,19 +78,23 @@ TEST_F(StationCommand, RefusesWhatItCannotServe) {
   EXPECT_THAT(too_many.people, HasSubstr("16"));
 }
 
-// "--bind: another address needs --token", of eight characters and more that an address may hold.
-TEST_F(StationCommand, OnOtherAddressesItNeedsAToken) {
-  const auto bound = [&](const std::string& address, const std::string& token) {
-    return refused({"--device", "virtual:seed=7", "--bind", address, "--token", token});
+// Another address needs TLS; a token on the command line is in the list of processes.
+TEST_F(StationCommand, OnOtherAddressesItNeedsTls) {
+  const std::vector<std::string> unit = {"--device", "virtual:seed=7"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.end(), unit.begin(), unit.end());
+    return refused(more);
   };
-  const auto none = refused({"--device", "virtual:seed=7", "--bind", "0.0.0.0"});
-  EXPECT_EQ(none.exit_code, 64);
-  EXPECT_THAT(none.people, HasSubstr("--token"));
-  EXPECT_EQ(bound("0.0.0.0", "seven77").exit_code, 64);
-  for (const char* token : {"with a blank", "a/slash/in/it", "quote\"quote"}) {
-    EXPECT_EQ(bound("0.0.0.0", token).exit_code, 64) << token;
-    EXPECT_EQ(bound("127.0.0.1", token).exit_code, 64) << token;
-  }
+  const auto plain = with({"--bind", "0.0.0.0"});
+  EXPECT_EQ(plain.exit_code, 64);
+  EXPECT_THAT(plain.people, HasSubstr("--tls-cert"));
+  EXPECT_EQ(with({"--bind", "0.0.0.0", "--tls-cert", path("c.pem")}).exit_code, 64) << "no key";
+  EXPECT_EQ(with({"--tls-cert", path("none.pem"), "--tls-key", path("none.pem")}).exit_code, 66);
+  const auto token = with({"--token", "0123456789abcdef"});
+  EXPECT_EQ(token.exit_code, 64);
+  EXPECT_THAT(token.people, HasSubstr("--token-file"));
+  std::ofstream(path("token")) << "short";
+  EXPECT_EQ(with({"--token-file", path("token")}).exit_code, 65);
 }
 
 // Its one line is the address of the page; it serves there until a signal, and ends with 3 by
@@ -95,27 +104,159 @@ TEST_F(StationCommand, ServesItsPageUntilItIsStopped) {
     Child station(arguments({"--port", "0", "--device", "virtual:seed=7"}));
     const std::string address = station.line();
     ASSERT_THAT(address, StartsWith("http://127.0.0.1:"));
-    EXPECT_EQ(address.back(), '/');
     const int port = port_of(address);
     const std::string page = get(port, "/");
     EXPECT_THAT(page, StartsWith("HTTP/1.1 200"));
     EXPECT_THAT(page, HasSubstr("text/html"));
-    EXPECT_THAT(get(port, "/no-such-page"), StartsWith("HTTP/1.1 404"));
+    EXPECT_THAT(get(port, "/no-such-page"), StartsWith("HTTP/1.1 401")) << "no session";
     EXPECT_EQ(station.stop(signal), signal == SIGINT ? 3 : 0);
     EXPECT_EQ(get(port, "/"), "") << "nobody listens any more";
   }
 }
 
-// Without the token only what tells a person to give it; the address that is printed has it.
-TEST_F(StationCommand, ATokenIsAskedForAndPrinted) {
-  Child station(
-      arguments({"--port", "0", "--device", "virtual:seed=7", "--token", "0123456789abcdef"}));
+// Oracle: the TLS of Python, which checks the certificate and the name. Plain HTTP is not answered.
+TEST_F(StationCommand, ServesHttps) {
+  const auto command = [](const std::string& line) { return std::system(line.c_str()); };
+  ASSERT_EQ(command("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes "
+                    "-days 2 -subj /CN=bench -addext subjectAltName=IP:127.0.0.1 -keyout " +
+                    path("key.pem") + " -out " + path("cert.pem") + " 2>/dev/null"),
+            0);
+  Child station(arguments({"--port", "0", "--device", "virtual:seed=7", "--tls-cert",
+                           path("cert.pem"), "--tls-key", path("key.pem")}));
   const std::string address = station.line();
-  EXPECT_THAT(address, testing::EndsWith("/?token=0123456789abcdef"));
-  const int port = port_of(address);
-  EXPECT_THAT(get(port, "/api/lanes"), StartsWith("HTTP/1.1 401"));
-  EXPECT_THAT(get(port, "/?token=0123456789abcdee"), testing::Not(StartsWith("HTTP/1.1 200")));
-  EXPECT_THAT(get(port, "/?token=0123456789abcdef"), HasSubstr("Set-Cookie"));
+  ASSERT_THAT(address, StartsWith("https://127.0.0.1:"));
+  const std::string page = address.substr(0, address.find('#'));
+  const auto fetched = [&](const std::string& trusted) {
+    return command(
+        "python3 -c 'import ssl, sys, urllib.request; "
+        "sys.exit(urllib.request.urlopen(\"" +
+        page + "\", context=ssl.create_default_context(" + trusted +
+        ")).status != 200)' 2>/dev/null");
+  };
+  EXPECT_EQ(fetched("cafile=\"" + path("cert.pem") + "\""), 0);
+  EXPECT_NE(fetched(""), 0) << "one that nobody trusts";
+  EXPECT_THAT(get(std::atoi(page.c_str() + std::string_view("https://127.0.0.1:").size()), "/"),
+              testing::Not(HasSubstr("HTTP/1.1 200")));
+  std::ofstream(path("other.pem")) << "no key";
+  EXPECT_EQ(refused({"--device", "virtual:seed=7", "--tls-cert", path("cert.pem"), "--tls-key",
+                     path("other.pem")})
+                .exit_code,
+            65);
+}
+
+// The token is in a file of its owner alone; what is printed is a code for one browser.
+TEST_F(StationCommand, TheTokenIsInAFileAndACodeIsPrinted) {
+  const auto text_of = [](const std::string& file) {
+    std::ifstream in(file);
+    std::string line;
+    std::getline(in, line);
+    return line;
+  };
+  std::string token;
+  {
+    Child station(arguments({"--port", "0", "--device", "virtual:seed=7"}));
+    const std::string address = station.line();
+    EXPECT_THAT(address, testing::MatchesRegex("http://127.0.0.1:[0-9]+/#code=.{14}"));
+    token = text_of(path("state/token"));
+    EXPECT_EQ(token.size(), 32U);
+    EXPECT_THAT(address, testing::Not(HasSubstr(token)));
+    EXPECT_EQ(std::filesystem::status(path("state/token")).permissions(),
+              std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+    const int port = port_of(address);
+    EXPECT_THAT(get(port, "/api/state"), StartsWith("HTTP/1.1 401"));
+    EXPECT_THAT(get(port, "/api/state", "Authorization: Bearer " + token + "\r\n"),
+                StartsWith("HTTP/1.1 200"));
+  }
+  Child again(arguments({"--port", "0", "--device", "virtual:seed=7"}));
+  const int port = port_of(again.line());
+  EXPECT_THAT(get(port, "/api/state", "Authorization: Bearer " + token + "\r\n"),
+              StartsWith("HTTP/1.1 200"))
+      << "the token stays";
+}
+
+// PINs are read from standard input: an argument is in the list of processes.
+TEST_F(StationCommand, OperatorsAreNamedWithAPin) {
+  ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
+  const auto with_pin = [&](const std::string& pin, const std::vector<std::string>& words) {
+    return tests::run_command(posix_env(), words, pin + "\n");
+  };
+  EXPECT_THAT(run({"operator", "list"}).out, HasSubstr("none"));
+  EXPECT_EQ(with_pin("471100", {"operator", "add", "Ada"}).exit_code, 0);
+  EXPECT_EQ(with_pin("081500", {"operator", "add", "Eve", "--role", "engineer"}).exit_code, 0);
+  EXPECT_EQ(with_pin("12", {"operator", "add", "Bo"}).exit_code, 64);
+  EXPECT_EQ(with_pin("1234", {"operator", "add", "Bo", "--role", "boss"}).exit_code, 64);
+  EXPECT_EQ(run({"operator", "list"}).out, "Ada: technician\nEve: engineer\n");
+  const std::vector<std::string> sign = {"station-lock", "sign",       "--reason",  "cleaned",
+                                         "--store",      path("o.db"), "--operator"};
+  const auto signed_by = [&](const std::string& name, const std::string& pin) {
+    auto words = sign;
+    words.push_back(name);
+    return with_pin(pin, words).exit_code;
+  };
+  EXPECT_EQ(signed_by("Ada", "471100"), 77) << "a technician";
+  EXPECT_EQ(signed_by("Eve", "471100"), 77) << "not Eve's PIN";
+  EXPECT_EQ(signed_by("Eve", "081500"), 0);
+  EXPECT_EQ(run({"operator", "disable", "Ada"}).exit_code, 0);
+  EXPECT_EQ(run({"operator", "disable", "Ada"}).exit_code, 66);
+  ::unsetenv("XDG_DATA_HOME");
+}
+
+// A store that accepts and never answers holds a thread of the station for ten seconds; the station
+// ends without it, and says so.
+TEST_F(StationCommand, EndsInTimeWhateverItsThreadsWaitFor) {
+  const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(address);
+  ASSERT_EQ(::bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
+  ASSERT_EQ(::listen(listener, 16), 0);
+  ASSERT_EQ(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  // The first question, before the page is served, is refused at once.
+  std::jthread refuser([listener] { ::close(::accept(listener, nullptr, nullptr)); });
+  testing::internal::CaptureStderr();
+  Child station({"station", "--port", "0", "--device", "virtual:seed=7", "--state", path("state"),
+                 "--files", path("."), "--store",
+                 "postgresql://nobody@127.0.0.1:" + std::to_string(ntohs(address.sin_port)) +
+                     "/none?sslmode=disable"});
+  ASSERT_THAT(station.line(), StartsWith("http://"));
+  EXPECT_EQ(station.stop(SIGTERM), 0);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("ended while a lane was at work"));
+  ::close(listener);
+}
+
+// The jig's due date holds on the page as in the terminal. Oracle: the answer of the lane.
+TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
+  const auto result_with = [&](const std::vector<std::string>& more) {
+    auto words = arguments({"--port", "0", "--device", "virtual:seed=7,jig=auto"});
+    words.insert(words.end(), more.begin(), more.end());
+    Child station(words);
+    const int port = port_of(station.line());
+    std::ifstream in(path("state/token"));
+    std::string token;
+    std::getline(in, token);
+    const std::string head = "Authorization: Bearer " + token + "\r\n";
+    const auto lane = [&] {
+      const std::string answer = get(port, "/api/lanes/1", head);
+      return nlohmann::json::parse(answer.substr(answer.find("\r\n\r\n") + 4), nullptr, false);
+    };
+    for (int i = 0; i < 600 && lane().value("state", "") != "idle"; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    EXPECT_THAT(get(port, "/api/state", head), HasSubstr("\"jig_due\":\"2001-01-01"));
+    EXPECT_THAT(get(port, "/api/run", head, "POST"), StartsWith("HTTP/1.1 202"));
+    nlohmann::json result;
+    for (int i = 0; i < 600 && !(result = lane()["result"]).is_object(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return result;
+  };
+  const auto overdue = result_with({"--jig-due", "2001-01-01"});
+  EXPECT_EQ(overdue["verdict"], "refused") << overdue;
+  const auto signed_for = result_with(
+      {"--jig-due", "2001-01-01", "--jig-exception", "lab closed", "--jig-exception-by", "Eve"});
+  EXPECT_EQ(signed_for["verdict"], "pass") << signed_for;
+  EXPECT_EQ(refused({"--device", "virtual:seed=7", "--jig-due", "soon"}).exit_code, 64);
 }
 
 }  // namespace

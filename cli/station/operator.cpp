@@ -1,0 +1,108 @@
+// sixpoint operator: who works at the stations of this machine.
+#include "cli/station/operator.h"
+
+#include <fmt/format.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/store_option.h"
+#include "station/access/operators.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+struct Options {
+  std::string name;
+  std::string role = "technician";
+  bool json = false;
+};
+
+// Typed at a terminal it is not shown; from a pipe it is the first line.
+std::string read_pin(Context& context, const std::string& whose) {
+  context.people << fmt::format("PIN of {}: ", printable(whose, 80)) << std::flush;
+  termios shown{};
+  const bool at_terminal = tcgetattr(STDIN_FILENO, &shown) == 0;
+  if (at_terminal) {
+    termios hidden = shown;
+    hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+    tcsetattr(STDIN_FILENO, TCSANOW, &hidden);
+  }
+  std::string pin;
+  std::getline(context.in, pin);
+  if (at_terminal) {
+    tcsetattr(STDIN_FILENO, TCSANOW, &shown);
+  }
+  context.people << "\n";
+  return pin;
+}
+
+Status add(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(const auto role, station::parse_operator_role(options.role));
+  station::Operators operators(context.env, operators_file());
+  SIXPOINT_CHECK(operators.add(options.name, role, read_pin(context, options.name)));
+  Json json = document("operator");
+  json["name"] = options.name;
+  json["role"] = options.role;
+  return print_answer(
+      context, options.json, json,
+      fmt::format("{} is {} {} now\n", printable(options.name),
+                  role == station::OperatorRole::engineer ? "an" : "a", options.role));
+}
+
+Status disable(const Options& options, Context& context) {
+  SIXPOINT_CHECK(station::Operators(context.env, operators_file()).disable(options.name));
+  Json json = document("operator");
+  json["name"] = options.name;
+  return print_answer(context, options.json, json,
+                      fmt::format("{} is no operator any more\n", printable(options.name)));
+}
+
+Status list(const Options& options, Context& context) {
+  SIXPOINT_ASSIGN(const auto operators, station::Operators(context.env, operators_file()).list());
+  Json json = document("operator");
+  json["operators"] = Json::array();
+  std::string text;
+  for (const station::Operator& each : operators) {
+    json["operators"].push_back({{"name", each.name}, {"role", to_string(each.role)}});
+    text += fmt::format("{}: {}\n", printable(each.name), to_string(each.role));
+  }
+  return print_answer(context, options.json, json,
+                      text.empty() ? "none: names are as they are typed\n" : text);
+}
+
+}  // namespace
+
+std::string operators_file() { return data_folder() + "/operators.json"; }
+
+Status sign_off(Context& context, const std::string& name) {
+  station::Operators operators(context.env, operators_file());
+  SIXPOINT_ASSIGN(const auto all, operators.list());
+  if (all.empty()) {
+    return {};
+  }
+  SIXPOINT_CHECK(operators.sign_in("here", name, read_pin(context, name)));
+  SIXPOINT_CHECK(operators.who("here", name, station::OperatorRole::engineer));
+  return {};
+}
+
+void add_operator(CLI::App& app, Context& context) {
+  CLI::App& group =
+      add_group(app, "operator", "who works at the stations of this machine, with a PIN each");
+  const auto named = [&](const char* command, const char* about,
+                         Status (*work)(const Options&, Context&)) {
+    auto declared = add_command<Options>(group, context, "operator", command, about, work);
+    declared.command.add_option("NAME", declared.options.name, "as it stands in the records")
+        ->required();
+    return declared;
+  };
+  auto added =
+      named("add", "a new operator, or a new role and PIN; the PIN is read from stdin", add);
+  added.command.add_option("--role", added.options.role, "technician, or engineer: signs too")
+      ->capture_default_str();
+  named("disable", "this operator may not sign in any more", disable);
+  add_command<Options>(group, context, "operator", "list", "names and roles", list);
+}
+
+}  // namespace sixpoint::cli

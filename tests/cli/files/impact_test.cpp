@@ -1,0 +1,63 @@
+// sixpoint impact by its contract; tests/repair/impact has the numbers.
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.h"
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "repair/six_sides.h"
+#include "run_command.h"
+
+namespace sixpoint::cli {
+namespace {
+
+using testing::HasSubstr;
+using tests::run_command;
+
+class ImpactCommand : public testing::Test {
+ protected:
+  void SetUp() override { EXPECT_OK(tests::six_sides().write(memory_.files, "in.gt3x")); }
+  auto run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "impact");
+    return run_command(memory_.env, arguments);
+  }
+  MemoryEnv memory_;
+};
+
+TEST_F(ImpactCommand, AtRestARepairTakesTheFalseActivityAway) {
+  // What the sensor of the made recording really is.
+  ASSERT_OK(write_file(memory_.files, "c.json", R"({"serial": "MOS2A45130450", "filter": "current",
+    "constants": {"sensitivity_g_per_lsb": [0.00420698, 0.00397141, 0.00412712],
+                  "zero_lsb": [95.2, 52.3, 90.8]}})"));
+  ASSERT_EQ(run_command(memory_.env, {"repair", "in.gt3x", "-o", "out", "--constants", "c.json"})
+                .exit_code,
+            0);
+  const auto answer = run({"in.gt3x", "out/in.gt3x", "--cut", "more=20", "--json"});
+  ASSERT_EQ(answer.exit_code, 0) << answer.people;
+  const Json json = answer.json();
+  EXPECT_EQ(json["schema"], "sixpoint/impact/1");
+  EXPECT_EQ(json["epochs"], 14);
+  EXPECT_TRUE(json["enmo_uncertainty_mg"]["before"].is_null());
+  const Json& more = json["minutes_above"]["more"];
+  EXPECT_NEAR(more["after"].get<double>(), 10.0 / 60, 1e-9) << "it was moved for ten seconds";
+  EXPECT_GT(more["before"].get<double>(), 20.0 / 60);
+}
+
+TEST_F(ImpactCommand, OneRecordingWritesItsFiles) {
+  const auto answer = run({"in.gt3x", "--csv", "e.csv", "--html", "p.html"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  EXPECT_THAT(answer.out, HasSubstr("counts/min, X Y Z"));
+  EXPECT_TRUE(memory_.files.info("e.csv"));
+  EXPECT_TRUE(memory_.files.info("p.html"));
+  EXPECT_EQ(run({"in.gt3x", "--csv", "e.csv"}).exit_code, 73) << "it is there";
+}
+
+TEST_F(ImpactCommand, WhatIsWrongIsSaid) {
+  EXPECT_EQ(run({"in.gt3x", "--cut", "much=enmo:100"}).exit_code, 64);
+  EXPECT_EQ(run({"in.gt3x", "--epoch", "0"}).exit_code, 64);
+  EXPECT_EQ(run({"in.gt3x", "--epoch", "3000"}).exit_code, 65);
+  EXPECT_EQ(run({"none.gt3x"}).exit_code, 66);
+}
+
+}  // namespace
+}  // namespace sixpoint::cli
