@@ -6,7 +6,7 @@
 
 namespace sixpoint {
 
-// A device or a pipe: bytes go through as they come, or, once somebody seeks, all of them at the
+// A device or a pipe: bytes go through as they come, or, once the writer seeks, all of them at the
 // end.
 class AtomicFile::Held final : public WritableFile {
  public:

@@ -36,7 +36,7 @@ class AtomicFile {
   AtomicFile& operator=(AtomicFile&&) = delete;
   ~AtomicFile();
 
-  Status restrict_to_owner();  // before the first byte, so that nobody else reads one
+  Status restrict_to_owner();  // before the first byte, so that no other user reads one
   Status append(std::span<const std::uint8_t> bytes);
   Status append(std::string_view text);
   // For writers that seek; append() goes on from size(). What goes to a device or a pipe is then

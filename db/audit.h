@@ -11,7 +11,7 @@
 
 namespace sixpoint::db {
 
-// The end of the chain, to be written down elsewhere: whoever has it can ask later whether the
+// The end of the chain, to be written down elsewhere: who has it can ask later whether the
 // history up to there is still the same.
 struct StoreHead {
   std::int64_t rows = 0;

@@ -49,7 +49,7 @@ Result<Store> Store::open_to_read(Env& env, const std::string& location) {
                 fmt::format("the store has version {}, this program reads version {}", version,
                             kSchemaVersion),
                 database->location(),
-                "somebody who may write it has to open it once, with this program");
+                "a user who may write it has to open it once, with this program");
   }
   return Store(env, std::move(database));
 }

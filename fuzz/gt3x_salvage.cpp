@@ -47,7 +47,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto strict = read(memory.files, false);
   const auto salvaged = read(memory.files, true);
   if (!salvaged) {
-    // Without the option also the entries that nobody reads here may be damaged, not the other way.
+    // Without the option also the entries that no one reads here may be damaged, not the other way.
     return strict ? (std::abort(), 0) : 0;
   }
   if (strict && salvaged->samples != strict->samples) {

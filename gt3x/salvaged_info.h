@@ -23,7 +23,7 @@ namespace sixpoint::gt3x {
 
 struct SalvagedInfo {
   Info info;
-  std::string said;  // which lines the log gave, and which nobody knows
+  std::string said;  // which lines the log gave, and which no one knows
 };
 
 // `left`: what could be read of info.txt. Errors are those of the log's source.

@@ -257,7 +257,7 @@ struct SampleReader::State {
   }
 
   Result<std::optional<SampleItem>> final_gap() {
-    // Behind what was lost of a log nobody knows what the unit did: that is no gap to be filled.
+    // Behind what was lost of a log no one knows what the unit did: that is no gap to be filled.
     if (!by_clock || final_gap_given || !last_time || !last_sample_time ||
         recording.is_damaged("log.bin") || *last_sample_time <= *last_time + std::uint64_t{1}) {
       return std::nullopt;

@@ -32,7 +32,7 @@
 //
 // k = file counts per raw count by the constants before (old sensitivity times scale). Records of
 // 12 and 16 bits have the same scale, so the same uncertainty. Not in it: noise and bandwidth of
-// the sensor, samples that were clipped, and cross-axis terms that nobody has determined. Pure
+// the sensor, samples that were clipped, and cross-axis terms that no one has determined. Pure
 // function.
 #pragma once
 

@@ -172,7 +172,7 @@ Result<Answer> recall(const Options& options, Context& context) {
   for (const auto& entry : entries) {
     files.push_back({{"input", entry.repair.input},
                      {"serial", entry.repair.serial},
-                     {"mended_at", to_iso8601(entry.repair.made_at)},
+                     {"repaired_at", to_iso8601(entry.repair.made_at)},
                      {"input_sha256", entry.repair.input_sha256},
                      {"output_sha256", entry.repair.output_sha256},
                      {"method", entry.repair.method},

@@ -12,7 +12,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-// Nobody else can turn such a unit.
+// Only the program can turn such a unit.
 bool is_turned_by_words(const Context& context, const JigOptions& options) {
   return context.people_at_terminal && isatty(STDIN_FILENO) == 1 && options.jig.empty() &&
          options.device.starts_with("virtual:") && options.device.find("jig=") == std::string::npos;

@@ -444,7 +444,7 @@ Status make_private_file(const std::string& path) {
                            "check that the folder exists and is writable"));
 }
 
-// A store that nobody has open stands whole in its file, and is read as it stands: SQLite would
+// A store that no one has open stands whole in its file, and is read as it stands: SQLite would
 // make files beside it that its owner could not use. Where there is a log, SQLite reads both.
 Result<std::unique_ptr<Database>> open_to_read(const std::string& path) {
   const bool has_log = ::access((path + "-wal").c_str(), F_OK) == 0;

@@ -8,7 +8,7 @@
 // every index for every row: five times slower, and it says no more.)
 //
 // Entries are compared as sums of a keyed hash of each one (SipHash-1-3, a new key each time, so
-// that nobody can prepare a difference that cancels out): no sorting, and no memory per row.
+// that no one can prepare a difference that cancels out): no sorting, and no memory per row.
 #pragma once
 
 #include <string>

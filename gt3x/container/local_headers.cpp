@@ -117,7 +117,7 @@ class Finder {
     }
   }
 
-  // Whether packed bytes of this number can be believed: behind them stands the end of the file,
+  // Whether packed bytes of this number can be right: behind them stands the end of the file,
   // or something that belongs to an archive, or they reach behind the file.
   Result<bool> ends_at(std::uint64_t offset, std::uint64_t packed_size) {
     if (packed_size >= file_.size() || offset >= file_.size() - packed_size) {

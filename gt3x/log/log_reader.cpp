@@ -15,7 +15,7 @@ constexpr std::size_t kCapacity = 4 * kLookahead;
 constexpr std::size_t kMaxZerosInChain = 16;
 
 // Times of neighbouring records: the clock may be set back by an hour, and idle sleep or a shelf
-// may last two weeks. What lies outside is believed when the record behind it agrees.
+// may last two weeks. What lies outside is used when the record behind it agrees.
 constexpr std::int64_t kNearBack_s = 3600;
 constexpr std::int64_t kNearForward_s = std::int64_t{14} * 86400;
 

@@ -10,7 +10,7 @@
 //   serial, fault (a code of the page, such as obstructed), fault_at (the turn at which it comes,
 //   from 1; 3), lie_deg (it ends so far off and does not report it), wrong_pose_at (at this turn it
 //   goes to another pose and reports the one that was asked for), uncertainty_deg, stop_at (at this
-//   turn somebody presses its red button), stopped (1: the button was pressed before).
+//   turn its red button is pressed), stopped (1: the button was pressed before).
 #pragma once
 
 #include <memory>

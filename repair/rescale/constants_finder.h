@@ -37,7 +37,7 @@ struct ConstantsFinderOptions {
   // null.
   const ConstantsSnapshot* snapshot = nullptr;
   std::optional<std::string> calibration_file;
-  // What the user named beside the members above. A store that nobody named is the default store.
+  // What the user named beside the members above. A store that no one named is the default store.
   bool scan = false;
   bool store_named = false;
   // The file's own still periods, where a named source has nothing that fits.

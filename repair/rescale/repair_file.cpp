@@ -28,13 +28,13 @@ constexpr std::array<std::string_view, 6> kStatusNames = {
 
 // Reasons are JSON values that other programs may read, so their words stay as they are.
 constexpr const char* kNotDecided =
-    "what cannot be told affected is not mended: find out what is missing first";
-constexpr const char* kDoneBefore = "mended by an earlier run";
+    "what cannot be told affected is not repaired: find out what is missing first";
+constexpr const char* kDoneBefore = "repaired by an earlier run";
 constexpr const char* kMadeOtherwise =
     "the output that is there was made with other constants, options or rules than would be used "
     "now; --redo-outdated replaces it";
 constexpr const char* kMappedByLine =
-    "the counts cannot have come from whole raw counts by the file's constants (averaged, mended "
+    "the counts cannot have come from whole raw counts by the file's constants (averaged, repaired "
     "before, or resampled): {} of them mapped by the straight line";
 
 // Entries that a unit or its software writes beside the samples and that do not depend on them.
@@ -194,7 +194,7 @@ class Repair {
   }
 
   // What is wrong with constants from elsewhere by the file's own still periods, where these have a
-  // verified solution. Nobody asks the survey's blocks after this: it leaves a part of them.
+  // verified solution. No one asks the survey's blocks after this: it leaves a part of them.
   std::optional<std::string> own_still_periods_contradict() {
     // A thousand blocks, evenly taken, say the same as ten thousand and cost a tenth.
     constexpr std::size_t kEnoughBlocks = 1000;

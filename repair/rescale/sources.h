@@ -42,7 +42,7 @@ struct NamedSources {
   bool scan = false;
   bool store = false;
   bool or_scan = false;
-  bool default_store = false;  // nobody named it, and it is there
+  bool default_store = false;  // no one named it, and it is there
 };
 std::vector<SourceKind> sources_in_order(const NamedSources& named);
 

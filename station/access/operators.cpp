@@ -183,7 +183,8 @@ Result<SignedName> Operators::who(const std::string& where, const std::string& t
         return entry.is.name == place->second.who.name && entry.is.role == place->second.who.role;
       });
   if (!is_listed) {
-    return fail(ErrorCode::permission, "nobody is signed in here", {}, "sign in with your PIN");
+    return fail(ErrorCode::permission, "no operator is signed in here", {},
+                "sign in with your PIN");
   }
   if (needed == OperatorRole::engineer && place->second.who.role != OperatorRole::engineer) {
     return fail(ErrorCode::permission, "an engineer signs for this",

@@ -15,7 +15,7 @@
 // |-----------------------|------------------------------------|------------|----------------------|
 // | none                  | -                                  | either     | the name as typed, |
 // |                       |                                    |            | not authenticated |
-// | some                  | nobody, or idle for longer         | either     | permission error | |
+// | some                  | no one, or idle for longer         | either     | permission error | |
 // some                  | a technician                       | technician | that operator's name |
 // | some                  | a technician                       | engineer   | permission error | |
 // some                  | an engineer                        | either     | that operator's name |

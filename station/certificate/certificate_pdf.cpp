@@ -50,7 +50,7 @@ std::string upper(std::string_view text) {
 std::string date_of(UtcTime time) { return to_iso8601(time).substr(0, 10); }
 std::string or_not_stated(const std::string& text) { return text.empty() ? "not stated" : text; }
 
-// A name that somebody typed is no proof of who it was.
+// A name that was only typed is no proof of who it was.
 std::string operator_of(const Certificate& c) {
   return c.operator_name.empty() || c.operator_authenticated
              ? or_not_stated(c.operator_name)

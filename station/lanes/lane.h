@@ -211,7 +211,7 @@ class Lanes::Lane {
   std::unique_ptr<device::Unit> unit_;  // made and ended by the thread; others may cancel()
   device::Unit* opening_ = nullptr;     // the same, before it is unit_
   bool is_unstored_ = false;            // the store did not take the last run yet
-  std::string unwritten_serial_;        // whose constants may be written now; empty: nobody's
+  std::string unwritten_serial_;        // whose constants may be written now; empty: none
   device::Identity identity_;
   calib::Calibration approximation_;
   bool turns_by_itself_ = false;

@@ -5,7 +5,7 @@
 // | unit in the lane now | since the order       | answer                              |
 // |----------------------|-----------------------|-------------------------------------|
 // | the one it was for   | up to kOrderLife_s    | it holds: nothing                   |
-// | the one it was for   | longer                | dead: nobody expects it any more    |
+// | the one it was for   | longer                | dead: no one expects it any more    |
 // | another              | any                   | dead: no run, least of all a write  |
 // | none                 | any                   | dead: it does not wait for a unit   |
 //

@@ -24,7 +24,7 @@ ApiAnswer lane_refusal(const LaneRefusal& why) {
 
 std::string client_of(const ApiRequest& request) { return request.client.substr(0, kMostText); }
 
-// Of the clock that nobody sets.
+// Of the clock that no one sets.
 std::int64_t clock_ms(Clock& clock) {
   return std::chrono::duration_cast<std::chrono::milliseconds>(clock.elapsed()).count();
 }

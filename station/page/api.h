@@ -44,7 +44,7 @@ struct ApiRequest {
   std::string cookie;
   std::string client;  // X-Sixpoint-Client: the page that may command a run
   // X-Sixpoint-Before: milliseconds of the station's own clock (clock_ms of GET /api/me). A command
-  // that comes later is refused: nobody waits for it any more.
+  // that comes later is refused: no one waits for it any more.
   std::string before;
   std::map<std::string, std::string> parameters;  // of the query, the first of each name
 
@@ -120,7 +120,7 @@ class Api {
   std::string cookie_name() const;
   // Where a request comes from: the session of its browser.
   std::string place_of(const ApiRequest& request) const;
-  // Whose name stands in the record of what is asked for; the answer says why nobody's.
+  // Whose name stands in the record of what is asked for; the answer says why none.
   tl::expected<SignedName, ApiAnswer> signer(const ApiRequest& request, const std::string& typed,
                                              OperatorRole needed) const;
   nlohmann::ordered_json me(const ApiRequest& request) const;

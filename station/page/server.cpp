@@ -262,7 +262,7 @@ class Server::Impl::Connection : public Idle,
     limit_time();
     discard_input();
   }
-  // Below TLS: what comes is read by nobody.
+  // Below TLS: what comes is not read.
   void discard_input() {
     plain().async_read_some(asio::buffer(discarded_), then(&Connection::discard_input));
   }

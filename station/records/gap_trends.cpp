@@ -111,7 +111,7 @@ void mark_station(std::vector<JigTrend>& jigs) {
 }  // namespace
 
 std::string_view to_string(TrendCause cause) {
-  static constexpr std::array<std::string_view, 5> kNames = {"nobody", "unit", "jig", "station",
+  static constexpr std::array<std::string_view, 5> kNames = {"none", "unit", "jig", "station",
                                                              "too_few_units"};
   return kNames.at(static_cast<std::size_t>(cause));
 }

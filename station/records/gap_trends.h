@@ -29,7 +29,7 @@ using SkewPattern = std::array<double, 12>;
 Result<SkewPattern> skew_of_run(const StoredRun& run);
 
 enum class TrendCause { none, unit, jig, station, too_few_units };
-std::string_view to_string(TrendCause cause);  // "nobody" for none
+std::string_view to_string(TrendCause cause);  // "none" for none
 
 struct JigTrend {
   std::string jig;

@@ -7,7 +7,7 @@
 // | not known        | any       | any       | the unit may be measured                         |
 // | not over         | any       | any       | the unit may be measured                         |
 // | over             | none      | any       | configuration error: nothing is measured         |
-// | over             | a reason  | nobody    | usage error: an exception has a name             |
+// | over             | a reason  | no one    | usage error: an exception has a name             |
 // | over             | a reason  | a name    | the unit may be measured; jig_due_note() goes    |
 // |                  |           |           | into the run's record                            |
 //

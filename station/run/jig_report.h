@@ -74,7 +74,7 @@ struct JigReport {
 
   std::optional<device::CalibrationPage> as_found;
   double as_found_residual_mg = 0;  // of the page's constants, on the faces
-  // As read back from the unit; as_found where no write was begun; none where nobody knows.
+  // As read back from the unit; as_found where no write was begun; none where no one knows.
   std::optional<device::CalibrationPage> as_left;
   bool write_begun = false;  // and what the unit held after it was not read
   bool written = false;
@@ -89,7 +89,7 @@ struct JigReport {
   //     write_begun   as_left before   as_left after
   //     no            none             as_found: the unit was not touched
   //     no            read back        as it is
-  //     yes           any              none, with a reason: old or new constants, nobody knows
+  //     yes           any              none, with a reason: old or new constants, no one knows
   void settle_as_left();
   std::string brief() const;
   // The contract's keys but `run`, `stored_id` and `certificate`.

@@ -67,6 +67,9 @@ class Session {
 
  private:
   Status prepare(const std::optional<JigResume>& resume);
+  // True where reopen() is to be asked for the unit, which was unplugged.
+  bool may_come_back(const Error& error) const;
+  Status reopen(const Error& error);
   Status come_back(JigRun& run, const Error& error);
   Status end_away(JigRun& run, const Error& error);
   Status ask_jig(double now_s);
@@ -77,7 +80,7 @@ class Session {
   // The jig's own position against a placement that the unit's readings have judged.
   Status compare_with_jig(const JigAction& action);
   void count_stream();
-  Status begin_stream();
+  Status start_stream();  // under the filter of this run
   device::StreamStatistics whole_stream() const;
   void keep_interrupted(const JigRun& run, const Error& error);
   void keep_rows(std::string_view rows);
@@ -87,6 +90,7 @@ class Session {
   Status handle(JigRun& run, const std::vector<JigAction>& actions);
   void keep_raw(const device::SampleBlock& block);
   Status write_constants(JigRun& run);
+  Status back_in_write(JigRun& run, const Error& error);
   Status conclude(const JigRun& run);
 
   device::Unit* unit_;
@@ -163,7 +167,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
                             unit_->identity().battery_mv, kWritable_mv),
                 report_.serial, "charge the unit, or leave out --write");
   }
-  return choose_filter(*unit_, options_.filter);
+  return start_stream();
 }
 
 void Session::keep_rows(std::string_view rows) {
@@ -185,32 +189,37 @@ void Session::keep_raw(const device::SampleBlock& block) {
   keep_rows(rows);
 }
 
-// Waits for the unit and goes on with it. Ends the run when it does not come back.
-Status Session::come_back(JigRun& run, const Error& error) {
-  // Read now: reopen() may close the unit.
+bool Session::may_come_back(const Error& error) const {
+  return error.code == ErrorCode::device_unavailable && hooks_.reopen;
+}
+
+// Waits for the unit of this run. Where it does not come back, there is no unit any more.
+Status Session::reopen(const Error& error) {
+  // Read now: the hook may close the unit.
   count_stream();
-  for (;;) {
+  do {
     const Result<UnitOnJig> again = hooks_.reopen(error, [this] { return look_while_away(); });
     if (!again) {
-      unit_ = nullptr;  // not valid any more
+      unit_ = nullptr;
       jig_ = nullptr;
-      return end_away(run, again.error());
+      return fail(again.error());
     }
     unit_ = again->unit;
     jig_ = again->jig;
-    if (unit_->identity().serial != report_.serial) {
-      continue;
-    }
-    Status ready = choose_filter(*unit_, options_.filter);
-    if (ready) {
-      ready = begin_stream();
-    }
-    if (ready) {
-      break;
-    }
-    if (ready.error().code != ErrorCode::device_unavailable) {
+  } while (unit_->identity().serial != report_.serial);
+  return {};
+}
+
+// Waits for the unit and goes on with it. Ends the run when it does not come back.
+Status Session::come_back(JigRun& run, const Error& error) {
+  for (Status ready = fail(error); !ready;) {
+    if (!may_come_back(ready.error())) {
       return ready;
     }
+    if (const Status found = reopen(ready.error()); !found) {
+      return end_away(run, found.error());
+    }
+    ready = start_stream();
   }
   SIXPOINT_CHECK(handle(run, run.on_unit_back(seconds(unit_->clock().elapsed()))));
   for (const OperatorCommand command : std::exchange(said_while_away_, {})) {
@@ -323,8 +332,9 @@ void Session::count_stream() {
   }
 }
 
-Status Session::begin_stream() {
+Status Session::start_stream() {
   count_stream();
+  SIXPOINT_CHECK(choose_filter(*unit_, options_.filter));
   SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
   is_streaming_ = true;
   lost_ = 0;  // a new stream counts from 0
@@ -375,7 +385,6 @@ Status Session::take_block(JigRun& run, const device::SampleBlock& block, double
 }
 
 Status Session::stream(JigRun& run) {
-  SIXPOINT_CHECK(begin_stream());
   SIXPOINT_CHECK(handle(run, run.start(seconds(unit_->clock().elapsed()))));
   double last_block_s = seconds(unit_->clock().elapsed());
   while (run.phase() != JigPhase::finished && !ended_) {
@@ -386,7 +395,7 @@ Status Session::stream(JigRun& run) {
                    unit_->address(), "plug the unit in again and begin the run anew");
     }
     if (!block) {
-      if (block.error().code != ErrorCode::device_unavailable || !hooks_.reopen) {
+      if (!may_come_back(block.error())) {
         run.on_unit_gone();
         return fail(block.error());
       }
@@ -484,34 +493,54 @@ Status Session::write_constants(JigRun& run) {
       return {};
     }
   }
-  Status written_status = unit_->write_calibration(page);
+  Status written = unit_->write_calibration(page);
   // The unit holds the old page or the new one, whole: the write is repeated, once.
-  if (!written_status) {
-    if (written_status.error().code == ErrorCode::device_unavailable && hooks_.reopen) {
-      SIXPOINT_CHECK(come_back(run, written_status.error()));
-      if (run.phase() == JigPhase::finished) {
-        return {};
-      }
-      count_stream();
-      SIXPOINT_CHECK(unit_->stop_stream());
+  if (!written) {
+    SIXPOINT_CHECK(back_in_write(run, written.error()));
+    if (run.phase() == JigPhase::finished) {
+      return {};
     }
-    if (written_status.error().code != ErrorCode::device_unavailable || hooks_.reopen) {
-      written_status = unit_->write_calibration(page);
-    }
+    written = unit_->write_calibration(page);
   }
-  SIXPOINT_ASSIGN(report_.as_left, unit_->read_calibration());
+  auto holds = unit_->read_calibration();
+  if (!holds) {
+    SIXPOINT_CHECK(back_in_write(run, holds.error()));
+    if (run.phase() == JigPhase::finished) {
+      return {};
+    }
+    holds = unit_->read_calibration();
+  }
+  SIXPOINT_ASSIGN(report_.as_left, holds);
   report_.write_begun = false;
-  if (!written_status) {
+  if (!written && *holds != page) {
     ended_ = true;
-    report_.reasons.push_back(written_status.error().what);
+    report_.reasons.push_back(written.error().what);
     return {};
   }
   report_.written = true;
-  SIXPOINT_ASSIGN(const Calibration written, calib::calibration_from(report_.as_left->constants));
-  run.set_approximation(written);
-  SIXPOINT_CHECK(choose_filter(*unit_, options_.filter));
-  SIXPOINT_CHECK(begin_stream());
+  SIXPOINT_ASSIGN(const Calibration calibration, calib::calibration_from(holds->constants));
+  run.set_approximation(calibration);
+  if (const Status ready = start_stream(); !ready) {
+    SIXPOINT_CHECK(come_back(run, ready.error()));
+    if (run.phase() == JigPhase::finished) {
+      return {};
+    }
+  }
   return handle(run, run.on_written(seconds(unit_->clock().elapsed())));
+}
+
+// After an error in a write: waits for the unit where it was unplugged. It does not stream then.
+Status Session::back_in_write(JigRun& run, const Error& error) {
+  Status ready = fail(error);
+  while (!ready && may_come_back(ready.error())) {
+    SIXPOINT_CHECK(come_back(run, ready.error()));
+    if (run.phase() == JigPhase::finished) {
+      return {};
+    }
+    count_stream();
+    ready = unit_->stop_stream();
+  }
+  return !ready && ready.error().code == ErrorCode::device_unavailable ? ready : Status{};
 }
 
 Status Session::conclude(const JigRun& run) {
@@ -536,7 +565,13 @@ Status Session::conclude(const JigRun& run) {
 }
 
 Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
-  SIXPOINT_CHECK(prepare(resume));
+  Status ready = prepare(resume);
+  while (!ready && may_come_back(ready.error())) {
+    SIXPOINT_CHECK(reopen(ready.error()));
+    ready = prepare(resume);
+  }
+  SIXPOINT_CHECK(std::move(ready));
+  said_while_away_.clear();  // said before the run asked for anything
   JigRun machine(options_.run, approximation_);
   if (resume) {
     JigProgress progress = resume->progress;

@@ -53,7 +53,7 @@ TEST(ReportJson, JsonHasTheContractsKeys) {
   EXPECT_EQ(back->calibration, *report->calibration);
 }
 
-// Without points there is nothing to say: null, and no number that nobody measured.
+// Without points there is nothing to say: null, and no number that no one measured.
 TEST(ReportJson, AReportWithoutPointsHasNulls) {
   const Json json = to_json(SolveReport{});
   for (const char* key : {"filter", "constants", "standard_uncertainty"}) {

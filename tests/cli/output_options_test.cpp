@@ -405,18 +405,18 @@ TEST_F(EveryOutput, NothingThatHoldsMeasurementsIsWrittenOver) {
   EXPECT_GE(tried, 28U);
 }
 
-TEST_F(EveryOutput, AFileOfNobodyIsReplacedWithForceAlone) {
+TEST_F(EveryOutput, AFileOfUnknownOriginIsReplacedWithForceAlone) {
   for_each_option([&](const std::string& option, std::optional<Role> role) {
     if (!role || *role < Role::output || *role >= Role::folder) {
       return;
     }
     SCOPED_TRACE(option);
     const std::string target = path("target" + ending_for(option));
-    std::ofstream(target) << "of nobody";
+    std::ofstream(target) << "of another program";
     const Answer answer = write_to(option, target, false);
     EXPECT_EQ(answer.exit_code, 73) << answer.people;
     EXPECT_NE(answer.people.find("--force"), std::string::npos) << answer.people;
-    EXPECT_EQ(bytes_of(target), "of nobody");
+    EXPECT_EQ(bytes_of(target), "of another program");
     std::filesystem::remove(target);
   });
 }

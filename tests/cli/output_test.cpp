@@ -110,7 +110,7 @@ TEST_F(OutputLook, TellsThePartsOfRecordsOfTheProgram) {
   EXPECT_EQ(look("bundle/temperature.csv"), Target::record);
   EXPECT_EQ(look("bundle/report.html"), Target::plain);
   EXPECT_EQ(look("bundle"), Target::folder);
-  write("temperature.csv", "of nobody");
+  write("temperature.csv", "of another program");
   EXPECT_EQ(look("temperature.csv"), Target::plain);
   write("s.journal", R"({"schema":"sixpoint/session-journal/1"})");
   EXPECT_EQ(look("s.journal"), Target::record);

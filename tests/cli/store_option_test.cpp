@@ -209,7 +209,7 @@ TEST_F(RefusingStore, WithoutAJournalsFolderTheWorkingFolderTakesIt) {
 }
 
 // The store's file and folder may be read and not written: it answers, and the run is journalled.
-// Root may write everywhere, so a child is nobody.
+// Root may write everywhere, so a child is an ordinary user.
 TEST_F(RefusingStore, AReadOnlyPlaceLosesNoRun) {
   std::filesystem::create_directory(path("disc"));
   std::filesystem::create_directory(path("data"));

@@ -39,7 +39,7 @@ TEST(RecordingWriter, RefusesNamesThatLeaveTheArchive) {
 class FailingSource final : public ByteSource {
  public:
   Result<std::size_t> read(std::span<std::uint8_t>) override {
-    return fail(ErrorCode::bad_data, "the source broke", "here", "mend it");
+    return fail(ErrorCode::bad_data, "the source broke", "here", "repair it");
   }
 };
 

@@ -57,7 +57,7 @@ mkdir -p "$HOME" "$scratch/archive"
 status=0
 "$program" scan "$scratch/archive" >/dev/null 2>&1 || status=$?
 [ "$status" -eq 1 ] || failed "scan ended with $status, not with 1"
-"$program" repair "$scratch/archive" -o "$scratch/mended" --scan >/dev/null 2>&1 ||
+"$program" repair "$scratch/archive" -o "$scratch/repaired" --scan >/dev/null 2>&1 ||
   failed "repair ended with $?"
 
 # Every command has its section of the manual page, and its options; and the shell offers it.

@@ -101,7 +101,7 @@ const scenarios = {
     const station = await h.station(['virtual:seed=7,jig=auto'], { home });
     const page = await h.open(station.url);
     await start(page);
-    await page.getByText('nobody is signed in here').waitFor();
+    await page.getByText('no operator is signed in here').waitFor();
     await h.axe(page);
     await h.shot(page, 'pins-1-asked');
     await page.getByLabel('PIN').fill('0000');

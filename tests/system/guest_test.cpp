@@ -119,7 +119,7 @@ TEST(Kernel, HidrawAndUsbfsAtOnce) {
     ASSERT_TRUE(block->has_value());
   }
   EXPECT_EQ((*unit)->stream_statistics().lost_samples, 0U);
-  EXPECT_EQ(driver_of(bench_unit.port + ":1.0"), "usbhid") << "nobody took the HID driver off";
+  EXPECT_EQ(driver_of(bench_unit.port + ":1.0"), "usbhid") << "no one took the HID driver off";
 }
 
 // Mounts the unit's volume at /mnt for as long as it lives.

@@ -85,7 +85,7 @@ void enumerates_by_id_and_serial(UsbBench& bench) {
   const auto one = *device::attached_devices(filter);
   ASSERT_EQ(one.size(), 1U);
   EXPECT_EQ(one[0].port, b->port);
-  filter.serial = "NOBODY";
+  filter.serial = "NOSUCHUNIT";
   EXPECT_TRUE(device::attached_devices(filter)->empty());
   filter = {};
   filter.product_ids = {device::kJigProductId};
@@ -146,9 +146,9 @@ void opens_by_serial(UsbBench& bench) {
   const auto several = registry().open("usb:", posix_env());
   EXPECT_FAILS(several, ErrorCode::usage);
   EXPECT_NE(several.error().hint.find(b->serial), std::string::npos) << several.error().hint;
-  const auto nobody = registry().open("hid:NOBODY", posix_env());
-  EXPECT_FAILS(nobody, ErrorCode::device_unavailable);
-  EXPECT_NE(nobody.error().hint.find(a->serial), std::string::npos) << nobody.error().hint;
+  const auto none = registry().open("hid:NOSUCHUNIT", posix_env());
+  EXPECT_FAILS(none, ErrorCode::device_unavailable);
+  EXPECT_NE(none.error().hint.find(a->serial), std::string::npos) << nobody.error().hint;
   auto first = open(a->hid_address());
   auto second = open(b->usb_address());
   ASSERT_OK(first);
@@ -432,8 +432,8 @@ void permission_errors_name_the_rule(UsbBench& bench) {
   ASSERT_OK(plugged.status());
   const auto found = wait_for(1);
   ASSERT_EQ(found.size(), 1U);
-  constexpr uid_t kNobody = 65534;
-  ASSERT_EQ(::seteuid(kNobody), 0);
+  constexpr uid_t kOrdinaryUser = 65534;
+  ASSERT_EQ(::seteuid(kOrdinaryUser), 0);
   const auto refused = device::open_monitor(found[0], posix_env());
   ASSERT_EQ(::seteuid(0), 0);
   EXPECT_FAILS(refused, ErrorCode::permission);

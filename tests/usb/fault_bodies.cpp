@@ -280,7 +280,7 @@ void a_unit_at_another_node_is_found_again(UsbBench& bench) {
 
 constexpr StoredConstants kOtherConstants = {{300, 301, 302}, {-200, -201, -202}, {50, 51, 52}};
 
-void an_unreadable_page_is_refused_and_mended(UsbBench& bench) {
+void an_unreadable_page_is_refused_and_replaced(UsbBench& bench) {
   Plugged plugged(bench, faulty_unit(33, R"({"fault": "bad_page", "at_s": 0})"));
   ASSERT_OK(plugged.status());
   auto unit = open(plugged->hid_address());
@@ -408,7 +408,7 @@ const std::vector<UsbBody>& usb_fault_bodies() {
        another_sequence_is_never_taken_for_the_right_one},
       {"AUnitThatStartedAnewStreamsAgain", a_unit_that_started_anew_streams_again},
       {"AUnitAtAnotherNodeIsFoundAgain", a_unit_at_another_node_is_found_again},
-      {"AnUnreadablePageIsRefusedAndMended", an_unreadable_page_is_refused_and_mended},
+      {"AnUnreadablePageIsRefusedAndReplaced", an_unreadable_page_is_refused_and_replaced},
       {"ALowBatteryKeepsTheOldConstants", a_low_battery_keeps_the_old_constants},
       {"AFullFlashRefusesToRecord", a_full_flash_refuses_to_record},
       {"AJumpingClockIsNotedAndNothingIsLost", a_jumping_clock_is_noted_and_nothing_is_lost},

@@ -225,7 +225,7 @@ TEST_F(Program, FindsAUnitOfFilesAlone) {
 TEST_F(Program, SaysWhichSerialsThereAre) {
   auto unit = make_unit(1);
   ASSERT_OK(bench->plug_in(unit));
-  const ChildAnswer answer = run_child({"jig", "--device", "hid:NOBODY"});
+  const ChildAnswer answer = run_child({"jig", "--device", "hid:NOSUCHUNIT"});
   EXPECT_EQ(answer.exit_code, 69);
   EXPECT_NE(answer.people.find(unit.serial), std::string::npos) << answer.people;
 }

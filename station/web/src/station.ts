@@ -46,7 +46,7 @@ function change(part: Partial<Snapshot>) {
 }
 
 let stream: EventSource | null = null;
-// A page that nobody sees needs no stream: the browser has few connections for one address.
+// A page that no one sees needs no stream: the browser has few connections for one address.
 let leaving: ReturnType<typeof setTimeout> | undefined;
 document.addEventListener('visibilitychange', () => {
   clearTimeout(leaving);
@@ -154,7 +154,7 @@ const secret = clientId();
 // What the station calls this window before others (a lane's `client`).
 export let client = '';
 
-// A command is for now: after this time nobody waits for it any more, and the station refuses it by its own clock.
+// A command is for now: after this time no one waits for it any more, and the station refuses it by its own clock.
 const COMMAND_MS = 5000;
 const READ_MS = 20000;
 let clockAhead: number | null = null;  // not known before the first answer

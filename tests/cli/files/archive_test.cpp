@@ -80,7 +80,7 @@ class ArchiveCommand : public tests::CommandTest {
     for (Json file : json["files"]) {
       file.erase("output");
       file.erase("output_sha256");  // the mark holds the time of the repair
-      std::erase(file["reasons"].get_ref<Json::array_t&>(), Json("mended by an earlier run"));
+      std::erase(file["reasons"].get_ref<Json::array_t&>(), Json("repaired by an earlier run"));
       files[file["input"]] = file;
     }
     return files;
@@ -165,7 +165,7 @@ TEST_F(ArchiveCommand, AnswersAsOneRepairWould) {
   const Answer as_repair =
       run({"repair", archive_, "-o", folder_ / "whole", "--constants", constants_, "--resume"});
   EXPECT_EQ(words.out,
-            std::regex_replace(as_repair.out, std::regex(" *mended by an earlier run\n"), ""));
+            std::regex_replace(as_repair.out, std::regex(" *repaired by an earlier run\n"), ""));
 }
 
 TEST_F(ArchiveCommand, MissingAndFailedShardsAreNamedWithTheirCommand) {

@@ -27,7 +27,7 @@ struct Program {
 // Exit code 64 is EX_USAGE of sysexits.h.
 TEST(ProgramRun, ACommandThatThereIsNotIsUsage) {
   Program run;
-  EXPECT_EQ(run({"mend"}), 64);
+  EXPECT_EQ(run({"fix"}), 64);
   EXPECT_EQ(run.out.str(), "");
   EXPECT_THAT(run.people.str(), HasSubstr("sixpoint --help"));
   EXPECT_EQ(run({"units", "a\x1b[2Jb"}), 64);

@@ -110,7 +110,7 @@ TEST_F(StationCommand, ServesItsPageUntilItIsStopped) {
     EXPECT_THAT(page, HasSubstr("text/html"));
     EXPECT_THAT(get(port, "/no-such-page"), StartsWith("HTTP/1.1 401")) << "no session";
     EXPECT_EQ(station.stop(signal), signal == SIGINT ? 3 : 0);
-    EXPECT_EQ(get(port, "/"), "") << "nobody listens any more";
+    EXPECT_EQ(get(port, "/"), "") << "no one listens any more";
   }
 }
 
@@ -134,7 +134,7 @@ TEST_F(StationCommand, ServesHttps) {
         ")).status != 200)' 2>/dev/null");
   };
   EXPECT_EQ(fetched("cafile=\"" + path("cert.pem") + "\""), 0);
-  EXPECT_NE(fetched(""), 0) << "one that nobody trusts";
+  EXPECT_NE(fetched(""), 0) << "one that no list of trusted certificates has";
   EXPECT_THAT(get(std::atoi(page.c_str() + std::string_view("https://127.0.0.1:").size()), "/"),
               testing::Not(HasSubstr("HTTP/1.1 200")));
   std::ofstream(path("other.pem")) << "no key";
@@ -217,7 +217,7 @@ TEST_F(StationCommand, EndsInTimeWhateverItsThreadsWaitFor) {
   testing::internal::CaptureStderr();
   Child station({"station", "--port", "0", "--device", "virtual:seed=7", "--state", path("state"),
                  "--files", path("."), "--store",
-                 "postgresql://nobody@127.0.0.1:" + std::to_string(ntohs(address.sin_port)) +
+                 "postgresql://reader@127.0.0.1:" + std::to_string(ntohs(address.sin_port)) +
                      "/none?sslmode=disable"});
   ASSERT_THAT(station.line(), StartsWith("http://"));
   EXPECT_EQ(station.stop(SIGTERM), 0);

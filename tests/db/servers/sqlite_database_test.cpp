@@ -330,7 +330,7 @@ TEST_F(SqliteStoreTest, AFileThatMayNotBeWrittenIsReadOnlyWithAClearError) {
   ASSERT_EQ(::chmod(path().c_str(), 0444), 0);
   const pid_t child = ::fork();
   if (child == 0) {
-    // Root may write everywhere: be nobody.
+    // Root may write everywhere: be an ordinary user.
     if (::geteuid() == 0 && (::chmod(folder_.path().c_str(), 0555) != 0 || ::setuid(65534) != 0)) {
       ::_exit(100);
     }

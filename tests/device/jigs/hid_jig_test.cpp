@@ -108,7 +108,7 @@ TEST(HidJig, AFaultIsReleasedOnlyWhenItIsGone) {
   EXPECT_FAILS(bench.jig->release(), ErrorCode::device_unavailable);
   // Switched off and on, the door closed.
   *bench.twin = VirtualHidJig({}, bench.physics.get());
-  EXPECT_EQ(bench.jig->position()->fault, "the door is open") << "nobody said that it is free";
+  EXPECT_EQ(bench.jig->position()->fault, "the door is open") << "no one said that it is free";
   EXPECT_FAILS(bench.jig->go_to(Pose::plus_x), ErrorCode::device_unavailable);
   ASSERT_OK(bench.jig->release());
   EXPECT_OK(bench.jig->go_to(Pose::plus_x));

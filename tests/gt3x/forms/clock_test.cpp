@@ -39,7 +39,7 @@ std::string owner(const std::string& system) {
 // The table in the header, row by row.
 TEST(Clock, FollowsTheTable) {
   const Clock used_utc = clock_of({kUsedUtc, kSubjectTimeLog, owner("ActiLife")}, kTimeZone);
-  EXPECT_EQ(used_utc.kind, ClockKind::utc) << "the record says so, whoever wrote it";
+  EXPECT_EQ(used_utc.kind, ClockKind::utc) << "the record says so, any program may have written it";
   EXPECT_EQ(used_utc.offset_minutes, -360);
   EXPECT_EQ(clock_of({kUsedUtc}, kTimeZone).offset_minutes, -300);
   EXPECT_EQ(clock_of({kUsedUtc}).offset_minutes, std::nullopt);

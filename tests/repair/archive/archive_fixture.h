@@ -120,7 +120,7 @@ class Archive : public testing::Test {
   static std::string text_of(const RepairReport& report) {
     auto json = report.to_json();
     std::erase(json["reasons"].get_ref<nlohmann::ordered_json::array_t&>(),
-               nlohmann::ordered_json("mended by an earlier run"));
+               nlohmann::ordered_json("repaired by an earlier run"));
     return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   }
   static Outcome outcome_of(MemoryFiles& files, const std::vector<RepairReport>& reports) {

@@ -324,7 +324,7 @@ TEST_F(RepairFile, CountsClippedSamplesAndKeepsThemAtTheLimit) {
   EXPECT_EQ(samples_of(memory_.files, "wide.gt3x")[5][0], std::lround(256 * kTrue.to_g(0, 2047)));
 }
 
-// The hash in the answer is that of the file, though nobody read it again.
+// The hash in the answer is that of the file, though no one read it again.
 TEST_F(RepairFile, AnyNumberOfThreadsGivesTheSameBytesAndPackingTheSameSamples) {
   MadeRecording made = six_sides();
   const auto sides = made.raw;

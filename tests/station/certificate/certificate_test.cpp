@@ -50,7 +50,7 @@ TEST(Certificate, ADocumentThatIsNoneIsRefused) {
 
 // --- the label ---
 
-// A name that somebody typed is no proof.
+// A name that was only typed is no proof.
 TEST(Certificate, SaysWhetherTheOperatorWasAuthenticated) {
   db::RunRecord run = record_of(7, writing());
   EXPECT_EQ(certificate_of(run)->to_json()["operator_authenticated"], false);
@@ -60,7 +60,7 @@ TEST(Certificate, SaysWhetherTheOperatorWasAuthenticated) {
   EXPECT_EQ(certificate_of(run)->to_json()["operator_authenticated"], true);
 }
 
-// Nobody is offered a paper that is not there.
+// No one is offered a paper that is not there.
 TEST(Certificate, DocumentsAreThoseThatCanBeMade) {
   const std::vector<std::string> certificate = {"report.json", "certificate.pdf",
                                                 "certificate.json", "certificate.dcc.xml"};

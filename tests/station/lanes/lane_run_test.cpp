@@ -196,7 +196,7 @@ TEST(LaneRun, AnInterruptedRunWithoutItsUnitEndsWithItsData) {
   EXPECT_GT(station.reports.front().raw_csv.size(), 20'000U);
 }
 
-// The program was killed in mid-write, and the unit never comes back: nobody knows what it holds.
+// The program was killed in mid-write, and the unit never comes back: no one knows what it holds.
 TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
   for (const bool begun : {false, true}) {
     const tests::TemporaryFolder folder;

@@ -43,7 +43,7 @@ TEST(LaneUnit, AUnitThatIsPulledOutIsNoticedAndAgainWhenItIsBack) {
   ASSERT_EQ(hand(station, {{"do", "unplug"}}), 200);
   EXPECT_TRUE(station.wait_state(1, "absent")["unit"].is_null());
   const std::uint64_t seen = readings(station);
-  EXPECT_TRUE(station.lanes->live(1)["face"].is_null()) << "nobody knows how it lies now";
+  EXPECT_TRUE(station.lanes->live(1)["face"].is_null()) << "no one knows how it lies now";
   ASSERT_EQ(hand(station, {{"do", "plug"}}), 200);
   EXPECT_EQ(station.wait_state(1, "idle")["unit"]["serial"], "MOS2A45130007");
   EXPECT_TRUE(comes_more_than(station, seen));

@@ -18,8 +18,8 @@ TEST(Lanes, TheScannedSerialMustBeTheUnitsOwn) {
   EXPECT_EQ(station.post("/api/lanes/1/scan", {{"serial", "MOS2A45130007"}}), 200);
 }
 
-// A label that no lane holds: whoever scanned it starts nothing, until the right unit is there, its
-// label is scanned, or the scan is dismissed. Others are not held up.
+// A label that no lane holds: the person who scanned it starts nothing, until the right unit is
+// there, its label is scanned, or the scan is dismissed. Others are not held up.
 TEST(Lanes, ALabelThatNoLaneHoldsBlocksTheStartOfWhoScannedIt) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7,serial=MOS2A45130007,pace=20",

@@ -190,7 +190,7 @@ TEST_F(ApiQuality, OnlyAnEngineerSigns) {
   api.set_port(6020);
   ApiRequest sign = request("POST", "/api/station-lock");
   sign.body = R"({"operator": "Eve", "reason": "seat cleaned"})";
-  EXPECT_EQ(api.handle(sign).status, 403) << "nobody";
+  EXPECT_EQ(api.handle(sign).status, 403) << "no one";
   EXPECT_OK(operators.sign_in("the token", "Ada", "471100"));
   EXPECT_EQ(api.handle(sign).status, 403) << "a technician";
   EXPECT_TRUE(events().empty());
@@ -244,7 +244,7 @@ TEST_F(ApiQuality, TheRunsOfADayAndOfAUnitAreListed) {
   const Json unit = json(get("/api/runs", {{"serial", "sixpoint:mos2a45130001:0f"}}));
   ASSERT_EQ(unit["runs"].size(), 2U);
   EXPECT_EQ(unit["runs"][1]["operator"], "Ada");
-  EXPECT_EQ(json(get("/api/runs", {{"serial", "nobody"}}))["runs"].size(), 0U);
+  EXPECT_EQ(json(get("/api/runs", {{"serial", "no such unit"}}))["runs"].size(), 0U);
   EXPECT_EQ(get("/api/runs", {{"from", "yesterday"}}).status, 400);
   EXPECT_EQ(get("/api/runs").status, 400);
 }

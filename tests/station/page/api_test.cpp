@@ -126,7 +126,7 @@ TEST(Api, ACodeGivesOneBrowserASession) {
   EXPECT_NE(sign_in(Station::kToken)->get_header_value("Set-Cookie"), cookie) << "each its own";
 }
 
-// Whoever knows a client's identifier may stop its run: what others are shown is another name.
+// A person who knows a client's identifier may stop its run: what others are shown is another name.
 TEST(Api, IdentifiersOfClientsStaySecret) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7"}, folder.path());
@@ -170,7 +170,7 @@ TEST(Api, TheNameInARecordIsTheOneThatSignedIn) {
   EXPECT_EQ(station.post("/api/run", mallory), 403);
 }
 
-// A command that hung in the network for a while does not start a motor when nobody expects it.
+// A command that hung in the network for a while does not start a motor when no one expects it.
 TEST(Api, ACommandThatComesTooLateIsNotCarriedOut) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7"}, folder.path());

@@ -103,7 +103,7 @@ TEST(StatisticsPage, ACapabilityHasItsIntervalAndNoCpWithoutTwoLimits) {
   EXPECT_THAT(statistics_html(report, {}), HasSubstr("<td>1.50</td><td>1.33 "));
 }
 
-// Nothing that nobody measured: a dash, not "nan".
+// Nothing that no one measured: a dash, not "nan".
 TEST(StatisticsPage, WhatIsNotKnownIsADash) {
   StatisticsReport report;
   report.all.seconds_per_unit_median = std::numeric_limits<double>::quiet_NaN();

@@ -183,7 +183,7 @@ TEST(JigSession, AnUnreadablePageIsNoObstacle) {
 }
 
 // The motor of the virtual jig counts movements with hands in it. The hands come with a stop and
-// nobody takes them out here, so after it nothing may move.
+// no one takes them out here, so after it nothing may move.
 TEST(JigSession, TheOperatorsStopStopsTheMotorFirst) {
   VirtualBench bench;
   bool asked = false;
@@ -351,6 +351,42 @@ TEST(JigSession, LossesCountOverTheWholeRun) {
               0.001);
 }
 
+// The unit goes away at every single request before its first sample: a run that has begun waits.
+TEST(JigSession, AUnitThatGoesAwayWhileTheRunBeginsIsWaitedFor) {
+  int away = 0;
+  for (int away_at = 1; away_at <= 8; ++away_at) {
+    VirtualBench bench;
+    int requests = -1000;  // opening it takes some
+    const auto open = [&] {
+      device::Link link = mocks::link_to(bench.plugged, false);
+      link.reports = std::make_unique<mocks::TamperingTransport>(
+          std::move(link.reports),
+          [&](Bytes&) {
+            if (++requests == away_at) {
+              bench.plugged->unplugged = true;
+            }
+            return 1;
+          },
+          nullptr);
+      return device::WireUnit::open(std::move(link));
+    };
+    bench.unit = *open();
+    requests = 0;
+    JigHooks hooks;
+    hooks.reopen = [&](const Error&, const JigHooks::Look&) -> Result<UnitOnJig> {
+      ++away;
+      bench.plugged->unplugged = false;
+      SIXPOINT_ASSIGN(bench.unit, open());
+      return bench.on_jig();
+    };
+    const auto report = run_jig(bench.on_jig(), bench.env.env, {}, hooks);
+    ASSERT_OK(report);
+    EXPECT_EQ(report->verdict, JigVerdict::pass) << away_at << ' ' << report->brief();
+    EXPECT_TRUE(report->as_found);
+  }
+  EXPECT_GE(away, 5);
+}
+
 // The unit goes away at every single request of the write and of the reading that follows, and is
 // back or not, and goes away a second time or not. Oracle: the page in the unit's memory.
 TEST(JigSession, AsLeftIsWhatTheUnitHoldsOrUnknown) {
@@ -418,6 +454,10 @@ TEST(JigSession, AsLeftIsWhatTheUnitHoldsOrUnknown) {
     options.keep_interrupted = true;
     const auto report = run_jig(bench.on_jig(), bench.env.env, options, hooks);
     ASSERT_OK(report);
+    if (row.second == 0) {
+      EXPECT_EQ(report->verdict, JigVerdict::pass) << row.first << ' ' << report->brief();
+      EXPECT_TRUE(report->written);
+    }
     if (!report->as_left) {
       ++unknown;
       EXPECT_FALSE(report->usable());
