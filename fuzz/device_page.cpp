@@ -1,8 +1,8 @@
 // The calibration page: what is decoded and written into the same page is decoded again the same.
 #include <cstdlib>
 
+#include "base/crc_ccitt.h"
 #include "device/wire/calibration_page.h"
-#include "device/wire/protocol.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;
@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   // With the CRC put right, so that what lies behind it is reached.
-  const std::uint16_t crc = device::crc_ccitt(std::span(bytes).subspan(256, 254));
+  const std::uint16_t crc = crc_ccitt(std::span(bytes).subspan(256, 254));
   bytes[510] = static_cast<std::uint8_t>(crc >> 8U);
   bytes[511] = static_cast<std::uint8_t>(crc & 0xFFU);
   const auto page = device::decode_calibration_page(bytes);

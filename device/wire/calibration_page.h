@@ -3,9 +3,7 @@
 //   SIXPOINT_ASSIGN(const Bytes bytes, encode_calibration_page({constants, calibrated}));
 //   SIXPOINT_ASSIGN(const CalibrationPage page, decode_calibration_page(bytes));
 //
-// The layout is that of the public memory image of the GT3X+ family (eeprom.bin of the NHANES
-// release): "TUNE" at 256, int16 zero, positive, negative (X Y Z each), six bytes of date, and a
-// CRC-CCITT of bytes 256 to 509 at 510, big-endian. The CRC was confirmed on a real image.
+// The layout is that of the public memory image of the GT3X+ family (base/calibration_section.h).
 #pragma once
 
 #include <array>

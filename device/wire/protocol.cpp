@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
+#include "base/crc_ccitt.h"
 #include "device/wire/payload.h"
 
 namespace sixpoint::device {
@@ -58,17 +59,6 @@ std::string_view to_string(ReplyCode code) {
                                                        "unsupported version"};
   const auto index = static_cast<std::size_t>(code);
   return index < kNames.size() ? kNames[index] : "unknown code";
-}
-
-std::uint16_t crc_ccitt(std::span<const std::uint8_t> bytes) {
-  std::uint32_t crc = 0xFFFF;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= static_cast<std::uint32_t>(byte) << 8U;
-    for (int bit = 0; bit < 8; ++bit) {
-      crc = (crc & 0x8000U) != 0 ? ((crc << 1U) ^ 0x1021U) & 0xFFFFU : (crc << 1U) & 0xFFFFU;
-    }
-  }
-  return static_cast<std::uint16_t>(crc);
 }
 
 Report encode(const Message& message) {

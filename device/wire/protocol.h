@@ -69,9 +69,6 @@ enum class ReplyCode : std::uint8_t {
 std::string_view to_string(Command command);
 std::string_view to_string(ReplyCode code);
 
-// CRC-CCITT, polynomial 0x1021, start 0xFFFF, not reflected: "123456789" gives 0x29B1.
-std::uint16_t crc_ccitt(std::span<const std::uint8_t> bytes);
-
 struct Message {
   ReportKind kind = ReportKind::request;
   std::uint16_t sequence = 0;

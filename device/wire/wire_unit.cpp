@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "base/crc_ccitt.h"
 #include "device/wire/calibration_page.h"
 #include "device/wire/payload.h"
 

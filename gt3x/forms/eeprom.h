@@ -3,11 +3,9 @@
 //   SIXPOINT_ASSIGN(const UnitMemory memory, parse_eeprom(bytes));
 //   memory.constants.zero_lsb;  // what the unit subtracted
 //
-// The layout is public (the vendor's description of the NHANES release): serial number at 0; from
-// 256 on "TUNE", int16 zero, positive and negative (X Y Z each), six bytes of date, and at 349 the
-// firmware; at 510 the CRC-CCITT of bytes 256 to 509. Little-endian but for the CRC; the date is
-// year - 2000, day, month, hour, minute, second. Both were confirmed on a real image, whose counts
-// fit the constants by Eq. 1-6.
+// The layout is public (the vendor's description of the NHANES release): serial number at 0, the
+// constants and their date from 256 on (base/calibration_section.h), in it the firmware at 349,
+// little-endian. Confirmed on a real image, whose counts fit the constants by Eq. 1-6.
 #pragma once
 
 #include <cstddef>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/crc_ccitt.h"
 #include "base/time.h"
 
 namespace sixpoint::mocks {
@@ -16,7 +17,7 @@ FaultSubject subject_of(std::span<const std::uint8_t> report) {
 
 void renew_crc(Bytes& report) {
   if (report.size() == device::kReportBytes) {
-    const std::uint16_t crc = device::crc_ccitt(std::span(report).first(device::kReportBytes - 2));
+    const std::uint16_t crc = crc_ccitt(std::span(report).first(device::kReportBytes - 2));
     report[device::kReportBytes - 2] = static_cast<std::uint8_t>(crc & 0xFFU);
     report[device::kReportBytes - 1] = static_cast<std::uint8_t>(crc >> 8U);
   }

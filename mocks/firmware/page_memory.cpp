@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "device/wire/protocol.h"
+#include "base/crc_ccitt.h"
 
 namespace sixpoint::mocks {
 
@@ -25,7 +25,7 @@ PageMemory::PageMemory(std::span<const std::uint8_t> page) {
 }
 
 std::optional<std::uint32_t> PageMemory::generation(const Bank& bank) {
-  const std::uint16_t crc = device::crc_ccitt(std::span(bank).first(kCrc));
+  const std::uint16_t crc = crc_ccitt(std::span(bank).first(kCrc));
   if (bank[kMark] != kSealed || bank[kCrc] != (crc & 0xFFU) || bank[kCrc + 1] != (crc >> 8U)) {
     return std::nullopt;
   }
@@ -83,7 +83,7 @@ bool PageMemory::write(std::span<const std::uint8_t> page) {
       return false;
     }
   }
-  const std::uint16_t crc = device::crc_ccitt(std::span(bank).first(kCrc));
+  const std::uint16_t crc = crc_ccitt(std::span(bank).first(kCrc));
   if (!put(bank, kCrc, static_cast<std::uint8_t>(crc & 0xFFU)) ||
       !put(bank, kCrc + 1, static_cast<std::uint8_t>(crc >> 8U))) {
     return false;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/crc_ccitt.h"
 #include "device/wire/payload.h"
 #include "mocks/firmware/virtual_unit.h"
 
@@ -127,7 +128,7 @@ struct VirtualUnit::Commands {
     if (unit.options_.battery_mv < kLowBattery_mv) {
       return ReplyCode::battery_low;
     }
-    if (crc != unit.staged_->crc || crc != device::crc_ccitt(unit.staged_->bytes)) {
+    if (crc != unit.staged_->crc || crc != crc_ccitt(unit.staged_->bytes)) {
       return ReplyCode::crc_mismatch;
     }
     if (!unit.memory_.write(unit.staged_->bytes)) {
@@ -140,7 +141,7 @@ struct VirtualUnit::Commands {
     const sim::FilterConfiguration filter = unit.stream_filter_;
     unit.load_page();
     unit.stream_filter_ = filter;  // SET_FILTER holds until power-off
-    exchange.out = payload_of(device::crc_ccitt(unit.memory_.read().value_or(Bytes{})));
+    exchange.out = payload_of(crc_ccitt(unit.memory_.read().value_or(Bytes{})));
     return ReplyCode::ok;
   }
 
@@ -314,7 +315,7 @@ void VirtualUnit::answer_other_version(std::span<const std::uint8_t> report) {
   if (report.size() != device::kReportBytes || report[0] == device::kProtocolVersion) {
     return;
   }
-  const std::uint16_t crc = device::crc_ccitt(report.first(device::kReportBytes - 2));
+  const std::uint16_t crc = crc_ccitt(report.first(device::kReportBytes - 2));
   if (report[62] == (crc & 0xFFU) && report[63] == (crc >> 8U)) {
     replies_.push_back(device::encode({ReportKind::reply,
                                        static_cast<std::uint16_t>(report[2] | (report[3] << 8U)),

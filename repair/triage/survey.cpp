@@ -136,6 +136,29 @@ Error no_constants(std::string what, const std::string& path, std::string hint) 
   return {ErrorCode::bad_data, std::move(what), path, std::move(hint)};
 }
 
+// What the scan of the whole recording found.
+void take_scan(StillScan& scan, const std::string& path, Survey& result) {
+  result.blocks = scan.finish();
+  result.plausibility = scan.plausibility();
+  result.still_tally = scan.tally();
+  if (result.raw_calibration) {
+    for (calib::StillBlock& block : result.blocks) {
+      block.mean_g = result.raw_calibration->to_g(block.mean_lsb);
+    }
+  }
+  if (result.still_tally.thinned > 1) {
+    result.notes.push_back(fmt::format("of {} still periods, {} evenly taken ones were used",
+                                       result.still_tally.blocks, result.blocks.size()));
+  }
+  result.magnitude = magnitude_error(result.blocks);
+  result.duration_s = static_cast<double>(result.samples) / result.rate_hz;
+  if (result.samples == 0) {
+    result.constants_problem =
+        no_constants("the recording holds no samples", path,
+                     "it can be neither solved nor repaired; download it from the unit again");
+  }
+}
+
 // activity.bin: samples without records, and constants in the image of the unit's memory.
 Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOptions& options,
                        Survey& result) {
@@ -176,18 +199,10 @@ Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOption
         item->counts, [&](const gt3x::Counts& sample) { return item->clipped(sample); }));
     still.push(item->unix_time, item->counts);
   }
-  result.blocks = still.finish();
-  result.plausibility = still.plausibility();
-  result.still_tally = still.tally();
-  result.magnitude = magnitude_error(result.blocks);
-  result.duration_s = static_cast<double>(result.samples) / result.rate_hz;
-  if (result.samples == 0) {
-    result.constants_problem =
-        no_constants("the recording holds no samples", recording.path(),
-                     "it can be neither solved nor repaired; download it from the unit again");
-  } else if (result.constants_problem) {
+  if (result.constants_problem) {
     result.constants_problem->where = recording.path();
   }
+  take_scan(still, recording.path(), result);
   return {};
 }
 
@@ -388,28 +403,14 @@ class LogSurvey {
 
   void finish() {
     StillScan& scan = raw_still_ ? *raw_still_ : *still_;
-    result_.blocks = scan.finish();
-    result_.plausibility = scan.plausibility();
-    result_.still_tally = scan.tally();
+    take_scan(scan, recording_.path(), result_);
     if (raw_resting_) {
       result_.resting = raw_resting_->finish();
     }
-    if (result_.raw_calibration) {
-      for (calib::StillBlock& block : result_.blocks) {
-        block.mean_g = result_.raw_calibration->to_g(block.mean_lsb);
-      }
-    }
-    if (result_.still_tally.thinned > 1) {
-      result_.notes.push_back(fmt::format("of {} still periods, {} evenly taken ones were used",
-                                          result_.still_tally.blocks, result_.blocks.size()));
-    }
-    result_.magnitude = magnitude_error(result_.blocks);
-    result_.duration_s = static_cast<double>(result_.samples) / result_.rate_hz;
     if (result_.samples == 0) {
-      result_.constants_problem =
-          no_constants("the recording holds no samples", recording_.path(),
-                       "it can be neither solved nor repaired; download it from the unit again");
-    } else if (result_.raw_counts) {
+      return;
+    }
+    if (result_.raw_counts) {
       result_.constants_problem = no_constants(
           result_.raw_calibration
               ? "the recording holds raw counts, which no constants have been applied to"

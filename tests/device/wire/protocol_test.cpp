@@ -2,18 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "base/crc_ccitt.h"
 #include "base/random.h"
 #include "device/wire/payload.h"
 #include "expect_result.h"
 
 namespace sixpoint::device {
 namespace {
-
-// Oracle: the check value of CRC-16/CCITT-FALSE in the catalogue of CRC algorithms.
-TEST(Protocol, CrcHasItsPublishedCheckValue) {
-  EXPECT_EQ(crc_ccitt(as_bytes("123456789")), 0x29B1);
-  EXPECT_EQ(crc_ccitt({}), 0xFFFF);
-}
 
 // Oracle: docs/protocol.md, byte by byte.
 TEST(Protocol, AReportIsLaidOutAsWritten) {

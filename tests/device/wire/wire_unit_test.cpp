@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/crc_ccitt.h"
 #include "device/wire/made_bench.h"
 #include "device/wire/payload.h"
 #include "expect_result.h"

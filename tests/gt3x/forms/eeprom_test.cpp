@@ -51,7 +51,7 @@ TEST(Eeprom, WhatIsDamagedIsRefused) {
 TEST(Eeprom, BatteryEntriesWithoutADateAreLeftOut) {
   const Bytes bytes = {10,   26,   10,   13,   31,   0,    0x84, 0x10,  // 4228 mV
                        0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF,  // erased
-                       10,   31,   2,    13,   31,   0,    0x84, 0x10,  // 31 February
+                       2,    31,   10,   13,   31,   0,    0x84, 0x10,  // 31 February
                        10,   26};
   const auto readings = parse_old_battery(bytes);
   ASSERT_EQ(readings.size(), 1U);
