@@ -82,6 +82,7 @@ Json Lanes::Lane::run_json() const {
   json["refusals"] = progress.refusals;
   json["last_refusal"] = run_->last_refusal;
   json["waiting_since_ms"] = waiting_since_ms_;
+  json["started_ms"] = unix_ms(run_->started);
   return json;
 }
 

@@ -91,8 +91,12 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
         "written after the run: the readings that judge the constants are those of the run");
   }
   last_accepted_ = env_.clock.elapsed();
-  if (const std::lock_guard lock(mutex_); !run_) {
-    run_.emplace();
+  {
+    const std::lock_guard lock(mutex_);
+    if (!run_) {
+      run_.emplace();
+    }
+    run_->started = left && !order.last_run ? left->resume.started : env_.clock.now();
   }
   const auto report = run_jig(on_jig(), env_, session, run_hooks(stop, saver),
                               left ? std::optional(left->resume) : std::nullopt);
@@ -310,6 +314,7 @@ void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun&
   {
     const std::lock_guard lock(mutex_);
     run_.emplace().progress = left.resume.progress;
+    run_->started = left.resume.started;
     identity_.firmware = left.firmware;
   }
   const auto unit = wait_to_continue(stop, order, "run", LaneState::running);

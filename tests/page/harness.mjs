@@ -129,9 +129,9 @@ export async function bare(url) {
 }
 
 // A new browser, signed in by a code of its own, unless `url` has one.
-export async function open(url, { width = 1500, height = 1000 } = {}) {
+export async function open(url, { width = 1500, height = 1000, ...more } = {}) {
   await launch();
-  const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, ignoreHTTPSErrors: true });
+  const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, ignoreHTTPSErrors: true, locale: 'en-US', ...more });
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
   const problems = [];

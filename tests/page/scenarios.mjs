@@ -123,6 +123,52 @@ const scenarios = {
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 
+  // In German, at night, by ear.
+  async german() {
+    const station = await h.station(['virtual:seed=7', 'virtual:seed=8,jig=auto']);
+    const page = await h.open(station.url, { locale: 'de-DE', colorScheme: 'dark' });
+    const ground = () => page.evaluate(() => getComputedStyle(document.body.parentElement).backgroundColor);
+    check(await page.evaluate(() => document.documentElement.lang) === 'de', 'the page says that it is German');
+    check(await ground() === 'rgb(14, 22, 30)', `dark: ${await ground()}`);
+    const see = async (name) => { await h.axe(page); await h.shot(page, `german-${name}`); };
+    await page.locator('.prompt', { hasText: 'Bereit zur Messung' }).waitFor();
+    await see('1-ready');
+    await button(page, 'Messung beginnen').click();
+    await page.locator('.prompt', { hasText: 'nach oben' }).waitFor();
+    const side = (await page.locator('.prompt').textContent()).match(/[+−][XYZ]/)[0];
+    await page.locator('.hand').getByRole('button', { name: side, exact: true }).click();
+    await until('the side is taken', () => h.taken(page).then((count) => count === 1));
+    check(/1 von 14 Lagen .* \d+:\d\d min vergangen$/.test(await page.locator('.placements p').textContent()), await page.locator('.placements p').textContent());
+    await until('a tone for it', async () => (await page.evaluate(() => window.sixpointSounds)).join() === 'taken');
+    await see('2-running');
+    await page.locator('.cards').getByRole('button', { name: /^2/ }).click();
+    await button(page, 'Messung beginnen').click();
+    await page.locator('.result .verdict', { hasText: 'BESTANDEN - NICHT GESCHRIEBEN' }).waitFor();
+    await until('a tone for the end', async () => (await page.evaluate(() => window.sixpointSounds)).at(-1) === 'passed');
+    await see('3-done');
+    await page.getByText('Messwerte und Grenzen').waitFor();
+    for (const tab of ['Heute', 'Meine Dateien', 'Kontrollgeräte', 'Statistik']) {
+      await button(page, tab).click();
+      await until(`${tab} is there`, () => page.locator('main h2').count());
+      await see(`4-${tab}`);
+    }
+    // Quiet, and in English again, also after a reload.
+    await page.getByLabel('Töne').uncheck();
+    await page.getByLabel('Sprache').selectOption('en');
+    await button(page, 'Jig').click();
+    await page.locator('.cards').getByRole('button', { name: /^2/ }).click();
+    check(!await page.getByLabel('Sounds').isChecked(), 'the choice stays');
+    await button(page, 'Measure this unit again').click();
+    await until('the second run is over', async () => (await page.locator('.result .verdict').count()) === 0);
+    await page.locator('.result .verdict', { hasText: 'PASS' }).waitFor();
+    check((await page.evaluate(() => window.sixpointSounds)).length === 0, 'no tone after they were turned off');
+    check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
+    // Light, as long as the machine is.
+    const light = await h.open(station.url, { locale: 'fr-FR', colorScheme: 'light' });
+    await light.locator('.prompt').waitFor();
+    check(await light.evaluate(() => document.documentElement.lang) === 'en', 'English where there is no other');
+  },
+
   // The same over TLS, as on another address.
   async tls() {
     const home = h.folder();

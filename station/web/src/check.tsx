@@ -31,6 +31,12 @@ function ChartPicture({ chart, title }: { chart: Chart; title: string }) {
   );
   const middle = Math.min(BOTTOM - 18, Math.max(TOP + 18, y(chart.centre)));  // labels keep apart
   const edge = chart.in_force ? (x(chart.baseline - 1) + x(Math.min(chart.baseline, values.length - 1))) / 2 : 0;
+  // Round numbers, four to eight of them.
+  const rough = (high - low) / 4;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * (rough / power >= 5 ? 5 : rough / power >= 2 ? 2 : 1);
+  const first = Math.ceil(low / step);
+  const ticks = Array.from({ length: Math.floor(high / step) - first + 1 }, (_, i) => (first + i) * step);
   const rules = (i: number) => chart.signals.filter((signal) => signal.point === i).map((signal) => signal.rule).join(',');
   const last = values[values.length - 1];
   return (
@@ -46,6 +52,13 @@ function ChartPicture({ chart, title }: { chart: Chart; title: string }) {
           {level(rangeY(chart.upper_range), C.rangeLimit, chart.upper_range, true)}
         </>
       )}
+      {ticks.map((value) => (
+        <>
+          <line x1={LEFT - 5} x2={LEFT} y1={y(value)} y2={y(value)} stroke="#56636e" />
+          <text x={LEFT - 8} y={y(value) + 6} text-anchor="end">{text(value)}</text>
+        </>
+      ))}
+      <line x1={LEFT} x2={LEFT} y1={TOP} y2={BOTTOM} stroke="#56636e" />
       <polyline points={points(values, y, 0)} fill="none" stroke="#0b5cad" stroke-width="2" />
       <polyline points={points(ranges, rangeY, 1)} fill="none" stroke="#0b5cad" stroke-width="2" />
       <line x1={LEFT} x2={RIGHT} y1={RANGE_BOTTOM} y2={RANGE_BOTTOM} stroke="#56636e" />

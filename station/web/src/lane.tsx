@@ -3,6 +3,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { LiveBox, PosePicture } from './box';
 import { ResultBox, tone } from './result';
 import { S } from './strings';
+import { useSounds } from './sounds';
 import { ask, client, type Refusal } from './station';
 import { Spark, TraceChart } from './traces';
 import { POSES, type Lane, type Live, type Lock, type Pose, type State } from './types';
@@ -34,15 +35,28 @@ export function VirtualHand({ lane, setProblem }: { lane: number; setProblem: (p
   );
 }
 
+// Milliseconds since 1970, anew after each `step_ms`.
+function useNow(step_ms: number): number {
+  const [now, setNow] = useState(Date.now());
+  useEffect(() => {
+    const timer = setInterval(() => setNow(Date.now()), step_ms);
+    return () => clearInterval(timer);
+  }, [step_ms]);
+  return now;
+}
+
 function nowText(live: Live | undefined): string {
   return live?.face ? S.nowFace(live.face, live.angle_deg ?? 0) : S.nowUnknown;
 }
 
 function Placements({ lane }: { lane: Lane }) {
   const run = lane.run!;
+  const elapsed = Math.max(0, useNow(1000) - run.started_ms) / 1000;
+  // By the time that the placements so far took; the first two say too little.
+  const left = run.taken.length > 1 ? (elapsed / run.taken.length) * (run.of - run.taken.length) : 0;
   return (
     <section class="placements" aria-label={S.takenPoses}>
-      <p>{S.placements(run.taken.length, run.of)} · {S.phase[run.phase]}</p>
+      <p>{S.placements(run.taken.length, run.of)} · {S.phase[run.phase]} · <span class="clock">{S.elapsed(S.minutes(elapsed), left > 0 ? S.minutes(left) : '')}</span></p>
       <ol>
         {Array.from({ length: run.of }, (_, i) => {
           const taken = run.taken[i];
@@ -56,13 +70,8 @@ function Placements({ lane }: { lane: Lane }) {
 }
 
 export function CaptureSteps({ lane, say }: { lane: Lane; say: (word: string, body?: object) => void }) {
-  const [now, setNow] = useState(Date.now());
-  useEffect(() => {
-    const timer = setInterval(() => setNow(Date.now()), 250);
-    return () => clearInterval(timer);
-  }, []);
   const capture = lane.capture!;
-  const left = Math.max(0, Math.ceil((capture.until_ms - now) / 1000));
+  const left = Math.max(0, Math.ceil((capture.until_ms - useNow(250)) / 1000));
   return (
     <div class="capture">
       <p>{S.files.sideOf(capture.number, capture.of)}</p>
@@ -106,6 +115,7 @@ export function LaneView({ lane, live, operator, virtual, lock, writeDefault, se
     return () => window.removeEventListener('keydown', press);
   }, [lane.state, mine]);
   useEffect(() => setSure(false), [lane.state]);
+  useSounds(lane);
 
   // What came out stays until the next start, also when the unit is out; of another unit it is one line.
   const result = busy ? null : lane.result;
@@ -186,7 +196,7 @@ export function LaneCards({ state, chosen, follow, setFollow, choose }: {
               <button type="button" class={`card state-${lane.state} verdict-${verdict}`} aria-current={chosen === lane.lane ? 'true' : undefined} onClick={() => choose(lane.lane)}>
                 <span class="number">{lane.lane}</span>
                 <span class="what">
-                  <b>{verdict ? `${S.verdictSigns[verdict]} ${S.verdict(lane.result!)}` : lane.state === 'running' && lane.run ? S.placements(lane.run.taken.length, lane.run.of).split(' pl')[0] : S.states[lane.state]}</b>
+                  <b>{verdict ? `${S.verdictSigns[verdict]} ${S.verdict(lane.result!)}` : lane.state === 'running' && lane.run ? S.done(lane.run.taken.length, lane.run.of) : S.states[lane.state]}</b>
                   <span>{lane.unit?.serial ?? '–'}</span>
                   <span class="next">{place === 0 ? '☞ ' : ''}{place >= 0 && lane.run?.wanted ? S.prompt(lane) : place >= 0 ? S.states[lane.state] : ' '}</span>
                 </span>

@@ -8,7 +8,8 @@ import { LaneCards, LaneView } from './lane';
 import { LockBanner } from './lock';
 import { Statistics } from './statistics';
 import { Today } from './today';
-import { S } from './strings';
+import { soundsAreOn, turnSounds } from './sounds';
+import { chooseLanguage, language, LANGUAGES, S } from './strings';
 import { serialOf, useScanner } from './scanner';
 import { ask, current, subscribe, type Refusal } from './station';
 
@@ -23,6 +24,7 @@ function Page() {
   const [scanned, setScanned] = useState('');
   const [looked, setLooked] = useState('');  // whose runs the tab "Today" shows
   const [problem, setProblem] = useState<Refusal | null>(null);
+  const [sounds, setSounds] = useState(soundsAreOn());
 
   const go = (name: string) => { setTab(name); location.hash = name; };
   const scan = async (label: string) => {
@@ -96,7 +98,11 @@ function Page() {
           </div>
         )}
       </main>
-      <footer>{entry === 'open' && <AnotherBrowser setProblem={setProblem} />} <span>{state?.version}</span>{state?.jig_due && <b>{S.jigDue(state.jig_due.slice(0, 10), Date.parse(state.jig_due) < Date.now())}</b>}</footer>
+      <footer>{entry === 'open' && <AnotherBrowser setProblem={setProblem} />} <label class="check"><input type="checkbox" checked={sounds} onChange={(event) => { turnSounds(event.currentTarget.checked); setSounds(event.currentTarget.checked); }} /> {S.sounds}</label>
+        <label>{S.language} <select value={language} onChange={(event) => chooseLanguage(event.currentTarget.value)}>
+          {Object.entries(LANGUAGES).map(([name, text]) => <option value={name} lang={name}>{text}</option>)}
+        </select></label>
+        <span>{state?.version}</span>{state?.jig_due && <b>{S.jigDue(state.jig_due.slice(0, 10), Date.parse(state.jig_due) < Date.now())}</b>}</footer>
     </>
   );
 }

@@ -1,13 +1,19 @@
-// Every English text of the page.
+// Every English text of the page, and the choice of its language.
+import { DE } from './german';
 import type { Lane, Pose, Proportion, Result, Signature, Title } from './types';
 
 const axisOf = (pose: Pose) => pose[1].toUpperCase();
 export const faceName = (pose: Pose) =>
   `${pose[0] === '+' ? '+' : '−'}${axisOf(pose)}`;
 
-export const S = {
+export type Strings = typeof EN;
+export const LANGUAGES: Record<string, string> = { en: 'English', de: 'Deutsch' };
+
+const EN = {
   title: 'Sixpoint station',
   tabs: { jig: 'Jig', today: 'Today', files: 'My files', check: 'Check units', statistics: 'Statistics' } as Record<string, string>,
+  language: 'Language',
+  sounds: 'Sounds',
   connection: {
     live: 'Connected',
     crowded: 'Too many pages of this station are open: this one shows how it was a moment ago, without readings. Close others.',
@@ -82,6 +88,9 @@ export const S = {
     finished: 'Complete',
   } as Record<string, string>,
   placements: (done: number, of: number) => `${done} of ${of} placements`,
+  done: (done: number, of: number) => `${done} of ${of}`,
+  elapsed: (elapsed: string, left: string) => `${elapsed} gone${left ? `, about ${left} left` : ''}`,
+  minutes: (s: number) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')} min`,
   rounds: { faces: 'first round', faces_reversed: 'second round', reseat: 'put back', recheck: 'after writing' } as Record<string, string>,
   refused: (text: string) => `Not taken: ${text}. Once more, please.`,
   takenPoses: 'Taken so far',
@@ -272,7 +281,7 @@ export const S = {
     progress: (done: number, total: number) => `${done} of ${total} files`,
     status: {
       repaired: 'repaired', not_affected: 'not affected', not_repairable: 'cannot be repaired yet',
-      already_repaired: 'repaired before', failed: 'failed',
+      already_repaired: 'repaired before', outdated: 'outdated', failed: 'failed',
     } as Record<string, string>,
     jobStates: { running: 'Working …', done: 'Done.', cancelled: 'Stopped.', failed: 'It did not work.' } as Record<string, string>,
     table: { file: 'File', status: 'Result', before: 'Error before, mg', after: 'after, mg', why: 'Why' },
@@ -280,3 +289,15 @@ export const S = {
     file: 'File',
   },
 };
+
+// The browser's language, until another one is chosen on the page.
+export const language = (() => {
+  const chosen = localStorage.getItem('sixpoint-language') ?? navigator.language.slice(0, 2);
+  return chosen in LANGUAGES ? chosen : 'en';
+})();
+export function chooseLanguage(name: string) {
+  localStorage.setItem('sixpoint-language', name);
+  location.reload();
+}
+export const S: Strings = language === 'de' ? DE : EN;
+document.documentElement.lang = language;

@@ -5,7 +5,7 @@ export const POSES: Pose[] = ['+z', '-z', '+x', '-x', '+y', '-y'];
 export interface Run {
   phase: string; wanted: Pose | null; prompt: string; open: Pose[];
   taken: { round: string; pose: Pose; tilt_deg: number }[];
-  of: number; refusals: number; last_refusal: string; waiting_since_ms: number;
+  of: number; refusals: number; last_refusal: string; waiting_since_ms: number; started_ms: number;
 }
 export interface Result {
   kind: 'jig' | 'capture'; serial: string; verdict: string; reasons: string[]; stored: boolean;
