@@ -42,9 +42,11 @@ function(sixpoint_room FOLDER)
   endforeach()
   add_library(sixpoint_${name} STATIC ${ROOM_SOURCES})
   add_library(sixpoint::${name} ALIAS sixpoint_${name})
-  # For the modules of other languages (bindings/). Calls within a room stay direct all the same.
-  set_target_properties(sixpoint_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  target_compile_options(sixpoint_${name} PRIVATE -fno-semantic-interposition)
+  if(NOT FOLDER MATCHES "^cli")
+    # For the modules of other languages (bindings/). Calls within a room stay direct all the same.
+    set_target_properties(sixpoint_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(sixpoint_${name} PRIVATE -fno-semantic-interposition)
+  endif()
   target_include_directories(sixpoint_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
   target_link_libraries(sixpoint_${name}
     PUBLIC ${ROOM_NEIGHBOURS}

@@ -15,9 +15,11 @@ namespace {
 TEST(CalibrationSection, WhatIsWrittenIsReadAndTheRestStays) {
   std::array<std::uint8_t, kMemoryWithCalibration + 3> memory{};
   memory.fill(0x5A);
-  for (const std::optional<UtcTime> calibrated :
-       {std::optional<UtcTime>(), parse_iso8601("2013-11-12T14:32:13"),
-        parse_iso8601("2255-12-31T23:59:59"), parse_iso8601("2000-01-01T00:00:00")}) {
+  for (const char* const text :
+       {"", "2013-11-12T14:32:13", "2255-12-31T23:59:59", "2000-01-01T00:00:00"}) {
+    const auto time = parse_iso8601(text);
+    const auto calibrated = time ? std::optional(*time) : std::nullopt;
+    EXPECT_EQ(calibrated.has_value(), *text != '\0');
     const StoredConstants constants{{2047, 287, 303}, {-201, -2048, -192}, {61, -4, 0}};
     write_calibration_section({constants, calibrated}, memory);
     const auto read = read_calibration_section(memory);
