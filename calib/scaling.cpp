@@ -45,6 +45,9 @@ Status check_scale(double accel_scale) {
   return {};
 }
 
+// How many counts 16 bits can say; the count 0 stands in the middle.
+constexpr int kAnyCount = 65536;
+
 }  // namespace
 
 int round_half_away(double value) {
@@ -152,29 +155,32 @@ RawCandidates Reversal::candidates(std::size_t axis, int stored_count) const {
 // Runs over every count of every recording, so without a branch.
 void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
            PlausibilityTally& counts) {
-  const PerAxis<const std::uint8_t*> kind = {reversal.kind_[0].data(), reversal.kind_[1].data(),
-                                             reversal.kind_[2].data()};
+  // Of the count 0.
+  const PerAxis<const std::uint8_t*> kind = {reversal.kind_[0].data() + kAnyCount / 2,
+                                             reversal.kind_[1].data() + kAnyCount / 2,
+                                             reversal.kind_[2].data() + kAnyCount / 2};
   std::size_t clipped = 0;
-  std::size_t impossible = 0;
+  std::size_t sum = 0;
   for (const StoredCounts& sample : samples) {
     for (std::size_t a = 0; a < kAxes; ++a) {
-      const unsigned here = kind[a][reversal.index(sample[a])];
+      const std::size_t here = kind[a][sample[a]];
       clipped += here & Reversal::kClipped;
-      impossible += here / Reversal::kImpossible;
+      sum += here;
     }
   }
+  const std::size_t impossible = (sum - clipped) / Reversal::kImpossible;
   counts.counts += kAxes * samples.size() - clipped;
   counts.impossible += impossible;
 }
 
 void Reversal::sort_counts() {
   for (std::size_t a = 0; a < kAxes; ++a) {
-    kind_[a].assign(table_size(width_), 0);
-    std::ranges::transform(number_[a], kind_[a].begin(), [](std::uint16_t number) {
-      return number == 0 ? kImpossible : std::uint8_t{0};
-    });
-    kind_[a].front() = kClipped;
-    kind_[a].back() = kClipped;
+    // Of every count that 16 bits can say: what lies beyond the width is at its limit.
+    kind_[a].assign(kAnyCount, kClipped);
+    const auto first = kind_[a].begin() + kAnyCount / 2 + lowest_count(width_);
+    std::transform(
+        number_[a].begin() + 1, number_[a].end() - 1, first + 1,
+        [](std::uint16_t number) { return number == 0 ? kImpossible : std::uint8_t{0}; });
   }
 }
 

@@ -137,9 +137,9 @@ const scenarios = {
     await page.locator('.prompt', { hasText: 'nach oben' }).waitFor();
     const side = (await page.locator('.prompt').textContent()).match(/[+−][XYZ]/)[0];
     await page.locator('.hand').getByRole('button', { name: side, exact: true }).click();
-    await until('the side is taken', () => h.taken(page).then((count) => count === 1));
-    check(/1 von 14 Lagen .* \d+:\d\d min vergangen$/.test(await page.locator('.placements p').textContent()), await page.locator('.placements p').textContent());
-    await until('a tone for it', async () => (await page.evaluate(() => window.sixpointSounds)).join() === 'taken');
+    await until('the side is taken', () => h.taken(page).then((count) => count > 0));
+    check(/\d von 14 Lagen .* \d+:\d\d min vergangen/.test(await page.locator('.placements p').textContent()), await page.locator('.placements p').textContent());
+    await until('a tone for it', async () => (await page.evaluate(() => window.sixpointSounds)).includes('taken'));
     await see('2-running');
     await page.locator('.cards').getByRole('button', { name: /^2/ }).click();
     await button(page, 'Messung beginnen').click();

@@ -148,7 +148,7 @@ void opens_by_serial(UsbBench& bench) {
   EXPECT_NE(several.error().hint.find(b->serial), std::string::npos) << several.error().hint;
   const auto none = registry().open("hid:NOSUCHUNIT", posix_env());
   EXPECT_FAILS(none, ErrorCode::device_unavailable);
-  EXPECT_NE(none.error().hint.find(a->serial), std::string::npos) << nobody.error().hint;
+  EXPECT_NE(none.error().hint.find(a->serial), std::string::npos) << none.error().hint;
   auto first = open(a->hid_address());
   auto second = open(b->usb_address());
   ASSERT_OK(first);

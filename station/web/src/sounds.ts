@@ -35,17 +35,17 @@ function play(sound: Sound) {
 
 // Of the lane in front; what happened before it came to the front makes no sound.
 export function useSounds(lane: Lane) {
-  const last = lane.log.length ? lane.log[lane.log.length - 1] : null;
-  const heard = useRef(last?.id ?? 0);
+  const last = lane.log.length ? lane.log[lane.log.length - 1].id : 0;
+  const heard = useRef(last);
   const verdict = lane.state === 'done' ? lane.result?.verdict ?? '' : '';
   const seen = useRef(verdict);
   useEffect(() => {
-    if (last && last.id > heard.current) {
-      if (last.kind === 'accepted') play('taken');
-      if (last.kind === 'refused') play('refused');
-    }
-    heard.current = last?.id ?? 0;  // a new run counts from 1 again
-  }, [last?.id]);
+    // Lines come several at a time; a new run counts them from 1 again.
+    const fresh = lane.log.filter((line) => line.id > (last < heard.current ? 0 : heard.current)).map((line) => line.kind);
+    if (fresh.includes('refused')) play('refused');
+    else if (fresh.includes('accepted')) play('taken');
+    heard.current = last;
+  }, [last]);
   useEffect(() => {
     if (verdict && verdict !== seen.current) play(verdict === 'pass' || verdict === 'conditional_pass' ? 'passed' : 'failed');
     seen.current = verdict;
