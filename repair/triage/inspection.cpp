@@ -40,26 +40,32 @@ Result<gt3x::AgdcCalibration> agdc_calibration(gt3x::Recording& recording, doubl
   return gt3x::parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz));
 }
 
+constexpr double kUsualScale_lsb_per_g = 256;
+
 // Finds still blocks while the samples are read, so that no recording must fit into memory.
 class StillWatch {
  public:
-  StillWatch(bool use_constants, std::vector<std::string>& warnings)
-      : use_constants_(use_constants), warnings_(warnings) {}
+  StillWatch(bool use_constants, const gt3x::Info& info, std::vector<std::string>& warnings)
+      : use_constants_(use_constants), info_(info), warnings_(warnings) {}
 
-  // `constants`: of the samples before any PARAMETERS (the old form).
-  Status start(double rate_hz, double scale, const std::optional<StoredConstants>& constants) {
+  // `constants`: of the samples before any PARAMETERS (the old form). `rotated`: the axes are to
+  // be turned back.
+  Status start(double rate_hz, double scale, const std::optional<StoredConstants>& constants,
+               bool rotated) {
     SIXPOINT_ASSIGN(auto made, StillScan::make(rate_hz, scale));
     scan_.emplace(std::move(made));
+    rotated_ = rotated;
     return constants && use_constants_ ? scan_->set_constants(*constants) : Status();
   }
 
-  // `scale_lsb_per_g`: in force for these samples.
-  void push(const gt3x::SampleItem& item, double scale_lsb_per_g, bool rotated) {
+  void push(const gt3x::SampleItem& item, bool raw_counts) {
     if (!scan_) {
       return;
     }
     if (item.parameters != parameters_ && item.parameters != nullptr) {
-      Status status = scan_->set_scale(scale_lsb_per_g);
+      const auto scale_lsb_per_g =
+          raw_counts ? std::nullopt : gt3x::accel_scale_lsb_per_g(info_, item.parameters);
+      Status status = scan_->set_scale(scale_lsb_per_g.value_or(kUsualScale_lsb_per_g));
       if (status && item.parameters->constants && use_constants_) {
         status = scan_->set_constants(*item.parameters->constants);
       }
@@ -73,7 +79,7 @@ class StillWatch {
     if (item.broke_order) {
       scan_->break_run();
     }
-    if (rotated) {
+    if (rotated_) {
       turned_.assign(item.counts.begin(), item.counts.end());
       undo_rotation(turned_, item.type == gt3x::RecordType::activity ? calib::RecordWidth::bits12
                                                                      : calib::RecordWidth::bits16);
@@ -105,13 +111,13 @@ class StillWatch {
 
  private:
   bool use_constants_;
+  const gt3x::Info& info_;
   std::vector<std::string>& warnings_;
+  bool rotated_ = false;
   std::optional<StillScan> scan_;
   const gt3x::Parameters* parameters_ = nullptr;
   std::vector<gt3x::Counts> turned_;
 };
-
-constexpr double kUsualScale_lsb_per_g = 256;
 
 void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& item,
                   const gt3x::Info& info, bool raw_counts) {
@@ -131,7 +137,8 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
     if (found.rate_hz.value_or(0) > 0 && (found.accel_scale_lsb_per_g || raw_counts)) {
       if (const Status started = still.start(
               *found.rate_hz, found.accel_scale_lsb_per_g.value_or(kUsualScale_lsb_per_g),
-              found.form == "gt3x_old" ? found.constants : std::nullopt);
+              found.form == "gt3x_old" ? found.constants : std::nullopt,
+              triage(found.facts).axes_rotated && !found.already_repaired);
           !started) {
         found.problem = started.error();
       }
@@ -147,10 +154,7 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
     found.end_s = std::max(
         found.end_s, item.unix_time + static_cast<double>(item.counts.size()) / *found.rate_hz);
   }
-  const bool rotated = triage(found.facts).axes_rotated && !found.already_repaired;
-  const auto scale_lsb_per_g =
-      raw_counts ? std::nullopt : gt3x::accel_scale_lsb_per_g(info, item.parameters);
-  still.push(item, scale_lsb_per_g.value_or(kUsualScale_lsb_per_g), rotated);
+  still.push(item, raw_counts);
 }
 
 // What is irregular about the times, a line for each kind that was met.
@@ -313,7 +317,7 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   }
 
   // A repaired file keeps its PARAMETERS, but its counts come from other constants.
-  StillWatch still(!found.already_repaired, found.warnings);
+  StillWatch still(!found.already_repaired, info, found.warnings);
   gt3x::SampleReader reader(recording);
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
