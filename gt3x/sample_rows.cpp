@@ -23,39 +23,65 @@ Result<std::optional<AgdcCalibration>> agdc_calibration_of(Recording& recording,
   return parsed ? std::optional(*parsed) : std::nullopt;
 }
 
+}  // namespace
+
 // Rows for the seconds of a recording, one after the other.
-class Export {
+class RowSource::Rows {
  public:
-  Export(const Info& info, const RawCsvOptions& options, RowWriter& out, double rate_hz,
-         const std::optional<AgdcCalibration>& agdc)
-      : info_(info),
+  Rows(Recording& recording, const RawCsvOptions& options, double rate_hz,
+       const std::optional<AgdcCalibration>& agdc)
+      : path_(recording.path()),
+        info_(recording.info()),
         options_(options),
         rate_(static_cast<std::uint64_t>(std::llround(rate_hz))),
         agdc_(agdc),
-        out_(out) {}
+        reader_(recording, options.fill ? ReadOrder::of_the_clock : ReadOrder::of_the_file,
+                options.fill_limit_s) {}
 
-  Status take(const SampleItem& item, const SampleReader& reader) {
+  Result<bool> step(RowWriter& out) {
+    out_ = &out;
+    auto next = reader_.next();
+    Status status = next ? Status() : Status(fail(next.error()));
+    if (next && *next) {
+      status = take(**next);
+    }
+    if (!status) {
+      Error error = std::move(status).error();
+      error.where = error.where.empty() ? path_ : error.where;
+      return fail(std::move(error));
+    }
+    return next->has_value();
+  }
+
+  Result<RawCsvTally> tally() const {
+    if (tally_.samples == 0) {
+      return fail(ErrorCode::bad_data, "the recording holds no samples", path_,
+                  "check that the unit was started; download the recording again");
+    }
+    RawCsvTally tally = tally_;
+    tally.checksum_failures = reader_.statistics().checksum_failures;
+    tally.damaged_stretches = reader_.statistics().damaged_stretches;
+    tally.irregular = reader_.irregular();
+    return tally;
+  }
+
+  const SampleReader& reader() const { return reader_; }
+  const GapList& gaps() const { return gaps_; }
+  std::uint64_t rate_hz() const { return rate_; }
+
+ private:
+  Status take(const SampleItem& item) {
     if (!started_) {
-      SIXPOINT_CHECK(out_.begin(item.unix_time, reader.clock().kind == ClockKind::utc));
+      SIXPOINT_CHECK(out_->begin(item.unix_time, reader_.clock().kind == ClockKind::utc));
       started_ = true;
     }
     if (options_.fill && short_by_ > 0) {
       SIXPOINT_CHECK(fill(std::exchange(short_by_, 0)));  // goes on in the second before
     }
-    out_.at(item.unix_time);
+    out_->at(item.unix_time);
     return item.kind == SampleItem::Kind::recorded ? take_samples(item) : take_gap(item);
   }
 
-  Result<RawCsvTally> finish(const std::string& path) {
-    if (tally_.samples == 0) {
-      return fail(ErrorCode::bad_data, "the recording holds no samples", path,
-                  "check that the unit was started; download the recording again");
-    }
-    SIXPOINT_CHECK(out_.end());
-    return tally_;
-  }
-
- private:
   Status take_samples(const SampleItem& item) {
     SIXPOINT_CHECK(set_meaning(item));
     std::span<const Counts> counts = item.counts;
@@ -67,7 +93,7 @@ class Export {
       note_leap(item.unix_time, std::int64_t{item.unix_time} - std::int64_t{last_second_});
     }
     last_second_ = item.unix_time;
-    SIXPOINT_CHECK(out_.rows(counts));
+    SIXPOINT_CHECK(out_->rows(counts));
     last_ = counts.back();
     zeros_ = false;
     tally_.samples += counts.size();
@@ -81,7 +107,7 @@ class Export {
       return {};
     }
     if (item.type == RecordType::activity3 && agdc_ && !agdc_->already_applied) {
-      out_.set_meaning(&*agdc_, 0);
+      out_->set_meaning(&*agdc_, 0);
       return {};
     }
     const auto scale = accel_scale_lsb_per_g(info_, item.parameters);
@@ -98,7 +124,7 @@ class Export {
                   "the recording holds raw counts and no calibration.json that turns them into g",
                   {}, "export the raw counts with --raw");
     }
-    out_.set_meaning(nullptr, *scale);
+    out_->set_meaning(nullptr, *scale);
     return {};
   }
 
@@ -110,6 +136,7 @@ class Export {
   }
 
   Status take_gap(const SampleItem& item) {
+    gaps_.add(item);
     zeros_ = zeros_ || item.kind == SampleItem::Kind::usb || item.gap == GapKind::usb;
     if (!options_.fill) {
       return {};
@@ -132,14 +159,17 @@ class Export {
 
   Status fill(std::uint64_t lines) {
     tally_.filled += lines;
-    return out_.repeat(last_, lines, zeros_);
+    return out_->repeat(last_, lines, zeros_);
   }
 
-  const Info& info_;
-  const RawCsvOptions& options_;
+  std::string path_;
+  Info info_;
+  RawCsvOptions options_;
   std::uint64_t rate_;
-  const std::optional<AgdcCalibration>& agdc_;
-  RowWriter& out_;
+  std::optional<AgdcCalibration> agdc_;
+  SampleReader reader_;
+  GapList gaps_;
+  RowWriter* out_ = nullptr;
   RawCsvTally tally_;
   Counts last_{};
   bool zeros_ = false;  // since a USB record
@@ -149,37 +179,37 @@ class Export {
   bool started_ = false;
 };
 
-}  // namespace
-
-Result<RawCsvTally> write_rows(Recording& recording, const RawCsvOptions& options, RowWriter& out) {
+Result<RowSource> RowSource::open(Recording& recording, const RawCsvOptions& options) {
   const double rate_hz = recording.info().sample_rate_hz().value_or(0);
   if (!(rate_hz >= 1)) {
     return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all",
                 recording.path(), "download the recording from the unit again");
   }
   SIXPOINT_ASSIGN(const auto agdc, agdc_calibration_of(recording, rate_hz));
-  Export rows(recording.info(), options, out, rate_hz, agdc);
-  SampleReader reader(recording, options.fill ? ReadOrder::of_the_clock : ReadOrder::of_the_file,
-                      options.fill_limit_s);
+  return RowSource(std::make_unique<Rows>(recording, options, rate_hz, agdc));
+}
+
+RowSource::RowSource(std::unique_ptr<Rows> rows) : rows_(std::move(rows)) {}
+RowSource::RowSource(RowSource&&) noexcept = default;
+RowSource& RowSource::operator=(RowSource&&) noexcept = default;
+RowSource::~RowSource() = default;
+
+Result<bool> RowSource::step(RowWriter& out) { return rows_->step(out); }
+Result<RawCsvTally> RowSource::tally() const { return rows_->tally(); }
+const SampleReader& RowSource::reader() const { return rows_->reader(); }
+const GapList& RowSource::gaps() const { return rows_->gaps(); }
+std::uint64_t RowSource::rate_hz() const { return rows_->rate_hz(); }
+
+Result<RawCsvTally> write_rows(Recording& recording, const RawCsvOptions& options, RowWriter& out) {
+  SIXPOINT_ASSIGN(RowSource rows, RowSource::open(recording, options));
   for (;;) {
-    auto next = reader.next();
-    Status status = next ? Status() : Status(fail(next.error()));
-    if (next && *next) {
-      status = rows.take(**next, reader);
-    }
-    if (!status) {
-      Error error = std::move(status).error();
-      error.where = error.where.empty() ? recording.path() : error.where;
-      return fail(std::move(error));
-    }
-    if (!*next) {
+    SIXPOINT_ASSIGN(const bool more, rows.step(out));
+    if (!more) {
       break;
     }
   }
-  SIXPOINT_ASSIGN(RawCsvTally tally, rows.finish(recording.path()));
-  tally.checksum_failures = reader.statistics().checksum_failures;
-  tally.damaged_stretches = reader.statistics().damaged_stretches;
-  tally.irregular = reader.irregular();
+  SIXPOINT_ASSIGN(RawCsvTally tally, rows.tally());
+  SIXPOINT_CHECK(out.end());
   return tally;
 }
 

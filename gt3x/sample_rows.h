@@ -5,9 +5,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "gt3x/forms/agdc.h"
+#include "gt3x/gap_list.h"
 #include "gt3x/log/samples.h"
 #include "gt3x/raw_csv.h"
 #include "gt3x/recording.h"
@@ -32,6 +34,31 @@ class RowWriter {
   // The same row many times; `zeros`: of zeros, whatever the sample.
   virtual Status repeat(const Counts& sample, std::uint64_t times, bool zeros) = 0;
   virtual Status end() = 0;
+};
+
+// The rows of a recording, some at a time.
+class RowSource {
+ public:
+  // Errors as write_raw_csv(). `recording` may end before the source; `options` may too.
+  static Result<RowSource> open(Recording& recording, const RawCsvOptions& options);
+  RowSource(RowSource&&) noexcept;
+  RowSource& operator=(RowSource&&) noexcept;
+  ~RowSource();
+
+  // Gives `out` the next second, or the next missing ones; false at the end. The samples that
+  // rows() is given stay until the next call.
+  Result<bool> step(RowWriter& out);
+  // Behind the end; bad_data where there was no sample.
+  Result<RawCsvTally> tally() const;
+
+  const SampleReader& reader() const;
+  const GapList& gaps() const;  // with filling; without, gaps_of() has them
+  std::uint64_t rate_hz() const;
+
+ private:
+  class Rows;
+  explicit RowSource(std::unique_ptr<Rows> rows);
+  std::unique_ptr<Rows> rows_;
 };
 
 // As write_raw_csv().

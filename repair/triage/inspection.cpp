@@ -13,26 +13,6 @@
 namespace sixpoint::repair {
 namespace {
 
-void add_gap(Inspection& found, const gt3x::SampleItem& item) {
-  const bool usb_record = item.kind == gt3x::SampleItem::Kind::usb;
-  const gt3x::GapKind kind = usb_record ? gt3x::GapKind::usb : item.gap;
-  found.gap_seconds += item.seconds;
-  found.end_s = std::max(found.end_s, static_cast<double>(item.unix_time) + item.seconds);
-  if (!found.gaps.empty() && found.gaps.size() == found.gap_count) {
-    InspectedGap& last = found.gaps.back();
-    // A USB record and the missing seconds after it are one stretch of charging.
-    if (last.kind == gt3x::GapKind::usb && kind == gt3x::GapKind::usb &&
-        last.start + last.seconds == item.unix_time) {
-      last.seconds += item.seconds;
-      return;
-    }
-  }
-  ++found.gap_count;
-  if (found.gaps.size() < Inspection::kMostGapsListed) {
-    found.gaps.push_back({item.unix_time, item.seconds, kind});
-  }
-}
-
 // What an .agdc file carries beside its raw counts.
 Result<gt3x::AgdcCalibration> agdc_calibration(gt3x::Recording& recording, double rate_hz) {
   SIXPOINT_ASSIGN(const auto source, recording.open_entry("calibration.json"));
@@ -319,6 +299,7 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   // A repaired file keeps its PARAMETERS, but its counts come from other constants.
   StillWatch still(!found.already_repaired, info, found.warnings);
   gt3x::SampleReader reader(recording);
+  gt3x::GapList gaps;
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, reader.next());
     if (!item) {
@@ -326,7 +307,8 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
     }
     if (item->kind != gt3x::SampleItem::Kind::recorded) {
       still.break_run();
-      add_gap(found, *item);
+      gaps.add(*item);
+      found.end_s = std::max(found.end_s, static_cast<double>(item->unix_time) + item->seconds);
       continue;
     }
     if (item->type == gt3x::RecordType::activity3) {
@@ -335,6 +317,9 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
     const bool raw_counts = found.form == "agdc" && !(agdc && agdc->already_applied);
     take_samples(found, still, *item, info, raw_counts);
   }
+  found.gaps = gaps.listed();
+  found.gap_count = gaps.count();
+  found.gap_seconds = gaps.seconds();
   found.log = reader.statistics();
   found.irregular = reader.irregular();
   found.clock = reader.clock();

@@ -18,6 +18,7 @@
 #include "base/constants.h"
 #include "base/env.h"
 #include "calib/coverage.h"
+#include "gt3x/gap_list.h"
 #include "gt3x/recording.h"
 #include "gt3x/salvage_losses.h"
 #include "gt3x/sample_reader.h"
@@ -26,11 +27,7 @@
 
 namespace sixpoint::repair {
 
-struct InspectedGap {
-  std::uint32_t start = 0;  // Unix time
-  std::uint64_t seconds = 0;
-  gt3x::GapKind kind = gt3x::GapKind::unexplained;
-};
+using InspectedGap = gt3x::Gap;
 
 struct InspectedStill {
   calib::Coverage coverage;
@@ -38,8 +35,6 @@ struct InspectedStill {
 };
 
 struct Inspection {
-  static constexpr std::size_t kMostGapsListed = 10'000;
-
   std::string form;  // gt3x, gt3x_old, agdc or agd
   FileFacts facts;
   std::string device_type;
@@ -55,7 +50,7 @@ struct Inspection {
   gt3x::LogStatistics log;
   gt3x::Irregular irregular;
   std::optional<StoredConstants> constants;
-  std::vector<InspectedGap> gaps;
+  std::vector<InspectedGap> gaps;  // gt3x/gap_list.h: the first ones
   std::uint64_t gap_count = 0;
   std::uint64_t gap_seconds = 0;
   std::optional<InspectedStill> still;
