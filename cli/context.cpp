@@ -8,6 +8,8 @@
 #include <spdlog/logger.h>
 #include <spdlog/sinks/ostream_sink.h>
 
+#include "repair/batch/answers.h"
+
 namespace sixpoint::cli {
 
 namespace {
@@ -61,12 +63,7 @@ Status print_answer(Context& context, bool as_json, const Json& json, std::strin
   return {};
 }
 
-Json error_to_json(const Error& error) {
-  return {{"code", to_string(error.code)},
-          {"what", error.what},
-          {"where", error.where},
-          {"hint", error.hint}};
-}
+Json error_to_json(const Error& error) { return repair::error_to_json(error); }
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 

@@ -8,15 +8,12 @@
 //   const auto scanned = for_each_file<repair::ScannedFile>(context, "scanning", named, 0, scan);
 #pragma once
 
-#include <atomic>
-#include <cstddef>
-#include <functional>
-#include <optional>
-#include <thread>
+#include <string>
 #include <vector>
 
 #include "cli/context.h"
-#include "repair/triage/file_tree.h"
+#include "repair/batch/jobs.h"
+#include "repair/batch/named_files.h"
 
 namespace CLI {
 class App;
@@ -24,10 +21,9 @@ class App;
 
 namespace sixpoint::cli {
 
-// A file that the user named, or one below a folder that the user named.
-struct NamedFile : repair::FoundFile {
-  std::optional<Error> error;  // why it cannot be used; `relative` is then empty
-};
+using repair::for_each_job;
+using repair::NamedFile;
+using repair::threads_of;
 
 // In the order of `paths`. A folder without a file of these endings gives a warning.
 std::vector<NamedFile> named_files(Context& context, const std::vector<std::string>& paths,
@@ -35,15 +31,6 @@ std::vector<NamedFile> named_files(Context& context, const std::vector<std::stri
 
 // --jobs N
 void add_jobs_option(CLI::App& command, unsigned& jobs);
-// Threads that --jobs asks for; 0: one per core.
-unsigned threads_of(unsigned jobs);
-
-// Calls work(i) for every i below `count`, on up to `jobs` threads (0: one per core). Meanwhile
-// `watch(done)` is called on the calling thread. `work` must be safe to call from several threads
-// for different i. Once `stop` is set no further i is begun.
-void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& work,
-                  const std::function<void(std::size_t)>& watch,
-                  const std::atomic<bool>* stop = nullptr);
 
 // The answers of `work(file)`, which runs on up to `jobs` threads; `doing` names the progress bar.
 template <class Answer, class Work>

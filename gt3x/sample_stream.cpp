@@ -112,8 +112,11 @@ void put(const Piece& piece, std::uint64_t from, std::span<PerAxis<Value>> out) 
 }  // namespace
 
 struct SampleStream::State {
-  State(RowSource opened, bool raw, std::uint64_t expected_rows)
-      : source(std::move(opened)), raw_lsb(raw), expected(expected_rows) {}
+  State(RowSource opened, const SampleStreamOptions& options, std::uint64_t expected_rows)
+      : source(std::move(opened)),
+        raw_lsb(options.raw_lsb),
+        fill(options.fill),
+        expected(expected_rows) {}
 
   // The next piece that has rows; null at the end.
   Result<const Piece*> piece() {
@@ -177,6 +180,7 @@ struct SampleStream::State {
 
   RowSource source;
   bool raw_lsb;
+  bool fill;
   std::uint64_t expected;
   Pieces pieces;
   std::uint64_t taken = 0;  // rows of the first piece
@@ -200,7 +204,7 @@ Result<SampleStream> SampleStream::open(Recording& recording, const SampleStream
     }
   }
   // Nine nibbles to a sample.
-  return SampleStream(std::make_unique<State>(std::move(source), options.raw_lsb, bytes / 9 * 2));
+  return SampleStream(std::make_unique<State>(std::move(source), options, bytes / 9 * 2));
 }
 
 SampleStream::SampleStream(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -219,9 +223,14 @@ const std::vector<RowRun>& SampleStream::runs() const { return state_->runs; }
 const std::vector<RowScale>& SampleStream::scales() const { return state_->scales; }
 const GapList& SampleStream::gaps() const { return state_->source.gaps(); }
 std::uint64_t SampleStream::rows() const { return state_->rows; }
+bool SampleStream::fills() const { return state_->fill; }
 std::uint64_t SampleStream::rate_hz() const { return state_->source.rate_hz(); }
 const SampleReader& SampleStream::reader() const { return state_->source.reader(); }
 Result<RawCsvTally> SampleStream::tally() const { return state_->source.tally(); }
+std::uint64_t SampleStream::rows_at_hand() const {
+  const Piece* const piece = state_->pieces.first();
+  return piece == nullptr ? 0 : piece->rows() - state_->taken;
+}
 std::uint64_t SampleStream::expected_rows() const { return state_->expected; }
 
 void row_times_ns(std::span<const RowRun> runs, std::uint64_t rate_hz, std::uint64_t first_row,
@@ -271,14 +280,19 @@ Result<std::size_t> read_at(SampleStream& stream, void* memory, std::uint64_t ro
   return stream.read(std::span(static_cast<Row*>(memory) + row, static_cast<std::size_t>(count)));
 }
 
+Error too_large(std::uint64_t most_bytes) {
+  return {ErrorCode::io,
+          fmt::format("the samples take more than {} MB of memory", most_bytes / 1'000'000),
+          {},
+          "read it in blocks, or as stored counts; or do not fill what is missing"};
+}
+
 // Changes the size of the array's memory, which keeps its content.
 Status resize(RowArray& array, std::uint64_t rows, std::size_t row_bytes,
               std::uint64_t most_bytes) {
   const std::uint64_t most_rows = most_bytes / row_bytes;
   if (array.rows >= most_rows && rows > array.rows) {
-    return fail(ErrorCode::io,
-                fmt::format("the samples take more than {} MB of memory", most_bytes / 1'000'000),
-                {}, "read it in blocks, or as stored counts; or do not fill what is missing");
+    return fail(too_large(most_bytes));
   }
   rows = std::min(rows, most_rows);
   void* const memory = std::realloc(array.data.get(), static_cast<std::size_t>(rows * row_bytes));
@@ -315,6 +329,9 @@ Result<RowArray> read_all_rows(SampleStream& stream, RowValue value,
                          : read_at<PerAxis<double>>(stream, memory, array.rows, wanted);
     SIXPOINT_ASSIGN(const std::size_t rows, got);
     array.rows += rows;
+    if (stream.rows_at_hand() > options.most_bytes / row_bytes - array.rows) {
+      return fail(too_large(options.most_bytes));  // before memory is touched
+    }
     if (options.go_on) {
       SIXPOINT_CHECK(options.go_on());
     }

@@ -67,11 +67,14 @@ class SampleStream {
   const std::vector<RowScale>& scales() const;  // empty with raw_lsb
   const GapList& gaps() const;                  // with filling; without, gaps_of() has them
   std::uint64_t rows() const;
+  bool fills() const;  // SampleStreamOptions::fill
   std::uint64_t rate_hz() const;
   const SampleReader& reader() const;
   // Behind the end.
   Result<RawCsvTally> tally() const;
 
+  // Rows that are certain to come next: what is left of a second, or of missing ones.
+  std::uint64_t rows_at_hand() const;
   // About how many rows there will be: what the packed form has room for. Filled rows come on top.
   std::uint64_t expected_rows() const;
 

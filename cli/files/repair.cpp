@@ -1,6 +1,5 @@
 // sixpoint repair PATH... -o OUTDIR: repairs affected files; the originals stay as they are.
 #include <atomic>
-#include <map>
 
 #include <fmt/format.h>
 
@@ -13,9 +12,9 @@
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/archive/archive_scripts.h"
+#include "repair/batch/repair_files.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_file.h"
-#include "repair/triage/file_tree.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -52,73 +51,18 @@ Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Co
   return finder;
 }
 
-// Two inputs must not have one output: the second one is refused.
-void refuse_same_outputs(std::vector<NamedFile>& files, const std::string& folder) {
-  std::map<std::string, std::string> input_of;  // by the name below the output folder
-  for (NamedFile& file : files) {
-    if (file.error) {
-      continue;
-    }
-    const auto [other, fresh] = input_of.emplace(file.relative, file.path);
-    if (!fresh) {
-      file.error = Error{ErrorCode::cannot_create,
-                         fmt::format("{} would have the same name in {}", other->second, folder),
-                         file.path, "repair the two in separate runs, into separate folders"};
-    }
-  }
-}
-
-RepairReport repair_one(const NamedFile& file, const Options& options,
-                        const repair::RepairOptions& how, repair::ConstantsFinder& finder,
-                        Env& env) {
-  if (file.error) {
-    return failed_report(file.path, *file.error);
-  }
-  const std::string output = options.folder + "/" + file.relative;
-  if (!options.repair.dry_run) {
-    if (const auto made = env.files.make_folders(folder_of(output)); !made) {
-      return failed_report(file.path, made.error());
-    }
-  }
-  return repair::repair_file(env, file.path, output, finder, how);
-}
-
-// How one of `files` files is repaired. With fewer files than --jobs a file gets several threads.
-repair::RepairOptions options_of_file(const Options& options, std::size_t files) {
-  repair::RepairOptions how = options.repair;
-  how.resume = how.resume || how.redo_outdated;
-  const unsigned jobs = threads_of(options.jobs);
-  how.jobs = std::max(1U, jobs / static_cast<unsigned>(std::clamp<std::size_t>(files, 1, jobs)));
-  return how;
-}
-
 // Every file's report, but for those that were not begun when the operator stopped the run.
-std::vector<RepairReport> repair_files(const std::vector<NamedFile>& files, const Options& options,
-                                       repair::ConstantsFinder& finder, Context& context) {
-  std::vector<std::optional<RepairReport>> answers(files.size());
-  const repair::RepairOptions how = options_of_file(options, files.size());
+std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files, const Options& options,
+                                     repair::ConstantsFinder& finder, Context& context) {
   StopRequest stop;
   std::atomic<bool> stopping{false};
-  {
-    Progress progress(context, "repairing", files.size());
-    for_each_job(
-        files.size(), options.jobs,
-        [&](std::size_t i) {
-          answers[i] = repair_one(files[i], options, how, finder, context.env);
-        },
-        [&](std::size_t done) {
-          progress.at(done);
-          stopping = stop.requested();
-        },
-        &stopping);
-  }
-  std::vector<RepairReport> reports;
-  for (std::optional<RepairReport>& answer : answers) {
-    if (answer) {
-      reports.push_back(*std::move(answer));
-    }
-  }
-  return reports;
+  Progress progress(context, "repairing", files.size());
+  const auto watch = [&](std::size_t done) {
+    progress.at(done);
+    stopping = stop.requested();
+  };
+  return repair::repair_files(context.env, files, {options.folder, options.repair, options.jobs},
+                              finder, watch, &stopping);
 }
 
 // The command line that goes on with this run.
@@ -176,8 +120,8 @@ Status run(const Options& options, Context& context) {
   repair::ConstantsFinder finder(context.env, std::move(how));
 
   auto files = named_files(context, options.paths, {".gt3x"});
-  refuse_same_outputs(files, options.folder);
-  const auto reports = repair_files(files, options, finder, context);
+  repair::refuse_same_outputs(files, options.folder);
+  const auto reports = repair_all(files, options, finder, context);
   RepairTally tally;
   Json json = document("repair");
   Json& list = json["files"] = Json::array();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "repair/batch/answers.h"
 #include "repair/rescale/repair_records.h"
 #include "station/records/software.h"
 
@@ -60,25 +61,6 @@ Result<std::optional<db::Store>> store_of(Context& context, const RepairSources&
   return store;
 }
 
-Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(const auto bytes, read_file(files, path, 1U << 20));
-  auto record = calib::parse_constants_record(as_text(bytes));
-  if (!record) {
-    Error error = record.error();
-    error.where = path;
-    return fail(std::move(error));
-  }
-  return record;
-}
-
-RepairReport failed_report(const std::string& input, const Error& error) {
-  RepairReport report;
-  report.input = input;
-  report.error = error;
-  report.reasons.push_back(error.brief());
-  return report;
-}
-
 void RepairTally::add(Context& context, const RepairReport& report) {
   ++files_;
   ++counts_[report.status];
@@ -95,16 +77,7 @@ std::size_t RepairTally::of(RepairStatus status) const {
   return found == counts_.end() ? 0 : found->second;
 }
 
-Json RepairTally::to_json(bool dry_run) const {
-  Json summary = {{"files", files_}};
-  for (const RepairStatus status :
-       {RepairStatus::repaired, RepairStatus::not_affected, RepairStatus::not_repairable,
-        RepairStatus::already_repaired, RepairStatus::outdated, RepairStatus::failed}) {
-    summary[std::string(repair::to_string(status))] = of(status);
-  }
-  summary["dry_run"] = dry_run;
-  return summary;
-}
+Json RepairTally::to_json(bool dry_run) const { return repair::repair_summary(counts_, dry_run); }
 
 std::string RepairTally::brief(bool dry_run) const {
   return fmt::format(

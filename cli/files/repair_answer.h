@@ -17,6 +17,7 @@
 
 #include "cli/context.h"
 #include "cli/store_option.h"
+#include "repair/batch/repair_files.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/rescale/sources.h"
 
@@ -51,10 +52,8 @@ void add_redo_option(CLI::App& command, bool& redo_outdated);
 //   -        other cases                 the default store, where it exists
 Result<std::optional<db::Store>> store_of(Context& context, const RepairSources& sources);
 
-Result<calib::ConstantsRecord> read_constants(FileSystem& files, const std::string& path);
-
-// The report of a file that could not be read at all.
-repair::RepairReport failed_report(const std::string& input, const Error& error);
+using repair::failed_report;
+using repair::read_constants;
 
 // Counts reports by their status.
 class RepairTally {

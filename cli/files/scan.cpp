@@ -6,6 +6,7 @@
 #include "cli/command.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
+#include "repair/batch/answers.h"
 #include "repair/rescale/known_calibration.h"
 #include "repair/triage/scan_file.h"
 
@@ -33,19 +34,6 @@ void judge(Context& context, const ScannedFile& file) {
     context.worsen(file.verdict == to_string(repair::Verdict::affected) ? kExitFailed
                                                                         : kExitInconclusive);
   }
-}
-
-Json to_json(const ScannedFile& answer) {
-  Json json;
-  json["path"] = answer.path;
-  json["verdict"] = answer.verdict;
-  json["reasons"] = answer.reasons;
-  json["serial"] = answer.facts.serial;
-  json["firmware"] = answer.facts.firmware;
-  json["calibration_time"] = value_or_null(answer.facts.calibration_time);
-  json["evidence_mg"] = answer.evidence_mg ? number(*answer.evidence_mg) : Json(nullptr);
-  json["axes_rotated"] = answer.axes_rotated;
-  return json;
 }
 
 // The dates of calibration that the store knows. It is opened for the first file that needs one:
@@ -88,16 +76,6 @@ class DatesInStore {
   std::optional<db::Store> store_;
 };
 
-Json summary_of(const std::vector<ScannedFile>& answers) {
-  Json summary = {{"files", answers.size()}, {"affected", 0},   {"not_affected", 0},
-                  {"cannot_tell", 0},        {"unreadable", 0}, {"axes_rotated", 0}};
-  for (const ScannedFile& answer : answers) {
-    summary[answer.verdict] = summary[answer.verdict].get<int>() + 1;
-    summary["axes_rotated"] = summary["axes_rotated"].get<int>() + (answer.axes_rotated ? 1 : 0);
-  }
-  return summary;
-}
-
 Status run(const Options& options, Context& context) {
   const auto files = named_files(context, options.paths, {".gt3x", ".agdc", ".agd"});
   DatesInStore dates(context, options.store);
@@ -113,14 +91,14 @@ Status run(const Options& options, Context& context) {
   std::string text;
   for (const ScannedFile& answer : answers) {
     judge(context, answer);
-    list.push_back(to_json(answer));
+    list.push_back(repair::scanned_to_json(answer));
     text += fmt::format("{:<13} {}", answer.verdict, printable(answer.path));
     for (const std::string& reason : answer.reasons) {
       text += "\n              " + printable(reason);
     }
     text += '\n';
   }
-  const Json& summary = json["summary"] = summary_of(answers);
+  const Json& summary = json["summary"] = repair::scan_summary(answers);
   print_answer(context, options.json, json, text);
   if (!options.json) {
     const auto count = [&](const char* key) { return summary[key].get<int>(); };

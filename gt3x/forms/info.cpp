@@ -91,6 +91,16 @@ std::string Info::serialise() const {
   return text;
 }
 
+std::vector<std::pair<std::string, std::string>> Info::pairs() const {
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const Line& line : lines_) {
+    if (!line.key.empty()) {
+      pairs.emplace_back(line.key, line.value);
+    }
+  }
+  return pairs;
+}
+
 std::optional<std::string_view> Info::get(std::string_view key) const {
   const auto found = std::ranges::find(lines_, key, &Line::key);
   if (key.empty() || found == lines_.end()) {

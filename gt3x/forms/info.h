@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
@@ -32,6 +33,8 @@ class Info {
 
   // The value of the first line with this key, without blanks around it; keys are compared exactly.
   std::optional<std::string_view> get(std::string_view key) const;
+  // Every "Key: value" line, in order.
+  std::vector<std::pair<std::string, std::string>> pairs() const;
   // Changes the first line with this key, or adds one at the end. Line ends inside the value become
   // blanks.
   void set(std::string_view key, std::string_view value);

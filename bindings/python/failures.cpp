@@ -1,0 +1,23 @@
+#include "bindings/python/failures.h"
+
+namespace sixpoint::python {
+
+namespace py = pybind11;
+
+void register_failures(py::module_& /*module*/) {
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) {
+        std::rethrow_exception(thrown);
+      }
+    } catch (const Failure& failure) {
+      const Error& error = failure.error;
+      const py::object made = py::module_::import("sixpoint._errors")
+                                  .attr("error_of")(std::string(to_string(error.code)), error.what,
+                                                    error.where, error.hint);
+      PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(made.ptr())), made.ptr());
+    }
+  });
+}
+
+}  // namespace sixpoint::python

@@ -1,0 +1,175 @@
+"""Whole files: what they hold, which are affected, their constants, their repair."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from typing import Literal, Optional, Union
+
+from . import _core
+from ._answers import Inspection, RepairResult, ScanResult, SolveReport
+
+Path = Union[str, "os.PathLike[str]"]
+
+
+def _paths(paths: Path | Iterable[Path]) -> list[str]:
+    if isinstance(paths, (str, os.PathLike)):
+        return [os.fspath(paths)]
+    return [os.fspath(path) for path in paths]
+
+
+def _or_empty(path: Optional[Path]) -> str:
+    return "" if path is None else os.fspath(path)
+
+
+def inspect(path: Path, *, salvage: bool = False) -> Inspection:
+    """Say what a .gt3x, .agdc or .agd file holds; no verdict.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    salvage : bool
+        Read what is left of a damaged file.
+
+    Returns
+    -------
+    Inspection
+        As ``sixpoint inspect --json``.
+    """
+    return Inspection.from_json(json.loads(_core.inspect(os.fspath(path), salvage)))
+
+
+def scan(
+    paths: Path | Iterable[Path], *, jobs: int = 0, store: Optional[Path] = None
+) -> ScanResult:
+    """Find the files that the vendor's case 16CPAN03 affects.
+
+    Parameters
+    ----------
+    paths : path-like or iterable of them
+        Files, or folders whose .gt3x, .agdc and .agd files are taken.
+    jobs : int
+        Files at a time; 0: one for each core.
+    store : path-like, optional
+        A store that knows dates of calibration; none is looked for otherwise.
+
+    Returns
+    -------
+    ScanResult
+        As ``sixpoint scan --json``: an answer for each file, also for those that cannot be read.
+    """
+    return ScanResult.from_json(json.loads(_core.scan(_paths(paths), jobs, _or_empty(store))))
+
+
+def solve(
+    path: Path,
+    *,
+    method: Literal["ls", "ga"] = "ls",
+    seed: Optional[int] = None,
+    strict_nonzero: bool = False,
+    prior: Optional[Literal["population"]] = None,
+) -> SolveReport:
+    """Find a unit's constants from the still periods of a recording.
+
+    Parameters
+    ----------
+    path : path-like
+        The recording.
+    method : {"ls", "ga"}
+        Least squares, or the paper's genetic algorithm.
+    seed : int, optional
+        Seed of the genetic algorithm.
+    strict_nonzero : bool
+        Reject still periods in which an axis reads exactly zero, as the paper's formula says.
+    prior : {"population"}, optional
+        Where sides are missing, use what units of this model are like; never verified.
+
+    Returns
+    -------
+    SolveReport
+        As ``sixpoint solve --json``. Use the constants only where ``verified`` is true.
+    """
+    return SolveReport.from_json(
+        json.loads(
+            _core.solve(os.fspath(path), method, seed, strict_nonzero, prior == "population")
+        )
+    )
+
+
+def repair(
+    paths: Path | Iterable[Path],
+    output: Path,
+    *,
+    constants: Optional[Path] = None,
+    calibration_file: Optional[Path] = None,
+    scan: bool = False,
+    store: Optional[Path] = None,
+    or_scan: bool = False,
+    wide: bool = False,
+    store_only: bool = False,
+    undo_rotation: bool = False,
+    allow_prior: bool = False,
+    salvage: bool = False,
+    force: bool = False,
+    dry_run: bool = False,
+    resume: bool = False,
+    redo_outdated: bool = False,
+    jobs: int = 0,
+) -> RepairResult:
+    """Repair affected files into another folder; the originals are never changed.
+
+    Parameters
+    ----------
+    paths : path-like or iterable of them
+        Files, or folders whose .gt3x files are taken.
+    output : path-like
+        The folder for repaired files.
+    constants, calibration_file, scan, store
+        Where constants come from; what is named stands alone. Nothing named: the still periods of each
+        file itself. A store is only read: ``sixpoint repair`` also records there what it did.
+    or_scan : bool
+        The still periods of the file itself where what is named does not fit.
+    wide : bool
+        Write 16-bit records, in which nothing needs clipping.
+    store_only : bool
+        Store the entries of repaired files instead of deflating them.
+    undo_rotation : bool
+        Also turn back the axes of firmware 1.6.0 where the constants are right.
+    allow_prior : bool
+        Also use constants that rest on a population prior.
+    salvage : bool
+        Read what is left of a damaged file.
+    force : bool
+        Write a file also where its own still periods say that it does not help.
+    dry_run : bool
+        Compute everything, write nothing.
+    resume, redo_outdated : bool
+        Go on with an earlier run; replace outputs that would be made otherwise now.
+    jobs : int
+        Files at a time; 0: one for each core.
+
+    Returns
+    -------
+    RepairResult
+        As ``sixpoint repair --json``: an answer for each file, also for those that failed.
+    """
+    options = {
+        "constants": _or_empty(constants),
+        "calibration_file": _or_empty(calibration_file),
+        "scan": scan,
+        "store": _or_empty(store),
+        "or_scan": or_scan,
+        "wide": wide,
+        "store_only": store_only,
+        "undo_rotation": undo_rotation,
+        "allow_prior": allow_prior,
+        "salvage": salvage,
+        "force": force,
+        "dry_run": dry_run,
+        "resume": resume,
+        "redo_outdated": redo_outdated,
+        "jobs": jobs,
+    }
+    return RepairResult.from_json(json.loads(_core.repair(_paths(paths), os.fspath(output), options)))

@@ -1,0 +1,38 @@
+#include "repair/batch/jobs.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <vector>
+
+namespace sixpoint::repair {
+
+unsigned threads_of(unsigned jobs) {
+  return jobs > 0 ? jobs : std::max(1U, std::thread::hardware_concurrency());
+}
+
+void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& work,
+                  const std::function<void(std::size_t)>& watch, const std::atomic<bool>* stop) {
+  jobs = threads_of(jobs);
+  std::atomic<std::size_t> next{0};
+  std::atomic<std::size_t> done{0};
+  std::atomic<std::size_t> ended{0};  // threads
+  const auto stopped = [stop] { return stop != nullptr && *stop; };
+  const auto run = [&] {
+    for (std::size_t i = next++; i < count && !stopped(); i = next++) {
+      work(i);
+      ++done;
+    }
+    ++ended;
+  };
+  std::vector<std::jthread> threads;
+  for (unsigned i = 0; i < jobs && i < count; ++i) {
+    threads.emplace_back(run);
+  }
+  while (ended < threads.size()) {
+    watch(done);
+    std::this_thread::sleep_for(std::chrono::milliseconds(count - done < jobs ? 2 : 20));
+  }
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,115 @@
+#include "repair/batch/reading.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "base/bytes.h"
+#include "gt3x/container/byte_source.h"
+#include "gt3x/forms/agdc.h"
+#include "gt3x/log/log_reader.h"
+#include "repair/triage/survey.h"
+
+namespace sixpoint::repair {
+namespace {
+
+// What stands beside the raw counts of an .agdc; nothing where it cannot be read.
+std::optional<StoredConstants> agdc_constants(gt3x::Recording& recording, double rate_hz) {
+  const auto source = recording.open_entry("calibration.json");
+  if (!source) {
+    return std::nullopt;
+  }
+  const auto bytes = gt3x::read_all(**source, 1U << 20U);
+  if (!bytes) {
+    return std::nullopt;
+  }
+  const auto parsed = gt3x::parse_agdc_calibration(as_text(*bytes), static_cast<int>(rate_hz));
+  return parsed ? parsed->constants : std::nullopt;
+}
+
+void take_constants(Inspection& found, gt3x::Recording& recording,
+                    const gt3x::SampleReader& reader) {
+  if (found.form == "agdc") {
+    found.constants = agdc_constants(recording, found.rate_hz.value_or(0));
+    found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
+    return;
+  }
+  if (!recording.has_log()) {
+    if (const auto memory = unit_memory(recording)) {
+      found.constants = memory->constants;
+      found.facts.calibration_time = memory->calibration_time;
+    }
+    return;
+  }
+  if (reader.parameter_sets().empty()) {
+    return;
+  }
+  const gt3x::Parameters& first = reader.parameter_sets().front()->parameters;
+  found.constants = first.constants;
+  found.facts.calibration_time = first.calibration_time;
+  found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(recording.info(), &first);
+  if (found.facts.firmware.empty()) {
+    found.facts.firmware = first.firmware.value_or("");
+  }
+}
+
+void take_gaps(Inspection& found, const gt3x::GapList& gaps) {
+  found.gaps = gaps.listed();
+  found.gap_count = gaps.count();
+  found.gap_seconds = gaps.seconds();
+  for (const gt3x::Gap& gap : gaps.listed()) {
+    found.end_s =
+        std::max(found.end_s, static_cast<double>(gap.start) + static_cast<double>(gap.seconds));
+  }
+}
+
+}  // namespace
+
+Result<Inspection> reading_of(gt3x::Recording& recording, const gt3x::SampleStream& stream,
+                              bool salvage) {
+  const gt3x::SampleReader& reader = stream.reader();
+  const gt3x::Info& info = recording.info();
+  Inspection found;
+  found.log = reader.statistics();
+  found.form = !recording.has_log()                               ? "gt3x_old"
+               : found.log.count(gt3x::RecordType::activity3) > 0 ? "agdc"
+                                                                  : "gt3x";
+  found.facts.serial = info.serial();
+  found.facts.firmware = info.firmware();
+  found.device_type = info.device_type();
+  found.rate_hz = info.sample_rate_hz();
+  found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, nullptr);
+  found.entries = recording.entries();
+  found.clock = reader.clock();
+  SIXPOINT_ASSIGN(found.already_repaired, carries_repair_mark(recording));
+  take_constants(found, recording, reader);
+  if (!stream.runs().empty()) {
+    found.start = stream.runs().front().unix_time;
+    const gt3x::RowRun& last = stream.runs().back();
+    found.end_s = last.unix_time + static_cast<double>(stream.rows() - last.first_row) /
+                                       static_cast<double>(stream.rate_hz());
+  }
+  if (const auto start = info.start(); start && found.start) {
+    found.first_after_start_s = std::int64_t{*found.start} - to_unix_seconds(*start);
+  }
+  SIXPOINT_ASSIGN(const gt3x::RawCsvTally tally, stream.tally());
+  found.samples = tally.samples + tally.surplus_samples;
+  if (stream.fills()) {
+    found.irregular = reader.irregular();
+    take_gaps(found, stream.gaps());
+  } else {
+    SIXPOINT_ASSIGN(const gt3x::GapList gaps, gt3x::gaps_of(recording));
+    take_gaps(found, gaps);
+  }
+  if (tally.checksum_failures + tally.damaged_stretches > 0) {
+    found.warnings.push_back(
+        fmt::format("{} records with a wrong checksum and {} damaged stretches were left out",
+                    tally.checksum_failures, tally.damaged_stretches));
+  }
+  if (salvage) {
+    SIXPOINT_ASSIGN(found.losses, gt3x::salvage_losses(recording, found.log));
+  }
+  return found;
+}
+
+}  // namespace sixpoint::repair
