@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that are missing; nothing when none is. Sourced or run by the other
 # scripts:  install_packages.sh build|test...
-# Groups: build (to make the program), test (to test it as CI does), package (to make the .deb).
+# Groups: build (to make the program), test (to test it as CI does), package (to make the .deb), python
+# (to make and test the Python package).
 set -euo pipefail
 
 build_packages=(
@@ -22,6 +23,9 @@ test_packages=(
   dpkg-dev file groff-base lintian systemd
 )
 package_packages=(dpkg-dev file)
+python_packages=(
+  pybind11-dev python3 python3-dev python3-matplotlib python3-numpy python3-pandas python3-venv
+)
 
 # The page's tests need Node; a machine that has it from elsewhere keeps it (its package has npm inside
 # and does not go together with Debian's).
@@ -35,7 +39,8 @@ for group in "${@:-build}"; do
     build) wanted+=("${build_packages[@]}") ;;
     test) wanted+=("${test_packages[@]}") ;;
     package) wanted+=("${package_packages[@]}") ;;
-    *) echo "install_packages.sh: no group '$group'; there are: build test package" >&2; exit 64 ;;
+    python) wanted+=("${python_packages[@]}") ;;
+    *) echo "install_packages.sh: no group '$group'; there are: build test package python" >&2; exit 64 ;;
   esac
 done
 

@@ -1,12 +1,24 @@
 #!/usr/bin/env bash
-# Builds the Debian package: build/package/sixpoint_VERSION_ARCHITECTURE.deb. Works from a fresh clone
-# on a fresh Debian 12 as root, and again.
+# Builds packages into build/package. Works from a fresh clone on a fresh Debian 12 as root, and again.
+#   scripts/package.sh             the Debian package: sixpoint_VERSION_ARCHITECTURE.deb
+#   scripts/package.sh --python    the Python package: sixpoint-VERSION-cp311-cp311-linux_x86_64.whl
 set -euo pipefail
 cd "$(dirname "$0")/.."
-scripts/install_packages.sh build package
+kind=${1:-deb}
+case $kind in
+  deb) scripts/install_packages.sh build package ;;
+  --python) scripts/install_packages.sh build python ;;
+  *) echo "usage: scripts/package.sh [--python]" >&2; exit 64 ;;
+esac
 source scripts/build_environment.sh
 if [ ! -f build/CMakeCache.txt ]; then
   configure release -DSIXPOINT_TESTS=OFF -DSIXPOINT_BENCH=OFF
+fi
+if [ "$kind" = --python ]; then
+  cmake --build build --target sixpoint_python -- --quiet
+  rm -f build/package/*.whl
+  /usr/bin/python3 packaging/python/make_wheel.py build/python/sixpoint build/package
+  exit
 fi
 cmake --build build --target sixpoint sixpoint_package_files -- --quiet
 rm -f build/package/*.deb

@@ -41,8 +41,8 @@ def expected_frame(path, rate, scale):
     for kind, time, payload in records_of(path):
         if kind == 3 and payload == b"\x08":
             slept = True
-        if kind == 0 and len(payload) > 1:
-            samples = unpacked(payload)
+        if kind in (0, 26) and len(payload) > 1:
+            samples = unpacked(payload) if kind == 0 else np.frombuffer(payload, "<i2").reshape(-1, 3)
             if slept and last_time is not None:
                 for second in range(last_time + 1, time):
                     times.append(second + np.arange(rate) / rate)
