@@ -63,7 +63,7 @@ Status print_answer(Context& context, bool as_json, const Json& json, std::strin
   return {};
 }
 
-Json error_to_json(const Error& error) { return repair::error_to_json(error); }
+Json error_to_json(const Error& error) { return repair::error_document(error); }
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 

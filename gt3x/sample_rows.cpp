@@ -159,7 +159,7 @@ class RowSource::Rows {
 
   Status fill(std::uint64_t lines) {
     tally_.filled += lines;
-    return out_->repeat(last_, lines, zeros_);
+    return out_->repeat(last_, lines, zeros_ || options_.fill_zeros);
   }
 
   std::string path_;

@@ -196,6 +196,7 @@ Result<SampleStream> SampleStream::open(Recording& recording, const SampleStream
   how.raw_lsb = options.raw_lsb;
   how.fill = options.fill;
   how.fill_limit_s = options.fill_limit_s;
+  how.fill_zeros = options.fill_zeros;
   SIXPOINT_ASSIGN(RowSource source, RowSource::open(recording, how));
   std::uint64_t bytes = 0;
   for (const EntryInfo& entry : recording.entries()) {

@@ -46,6 +46,7 @@ struct SampleStreamOptions {
   bool raw_lsb = false;  // rows are read as counts only, and no scale is asked for
   bool fill = true;      // as RawCsvOptions
   std::uint64_t fill_limit_s = kUsualFillLimit_s;
+  bool fill_zeros = false;
 };
 
 class SampleStream {

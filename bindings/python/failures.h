@@ -1,6 +1,6 @@
 // Errors of the project as exceptions of Python.
 //
-//   const Recording recording = value_or_throw(gt3x::Recording::open(files, path));
+//   const gt3x::Recording recording = value_or_throw(gt3x::Recording::open(files, path));
 //
 // register_failures() makes a Failure that leaves a function an exception of sixpoint._errors.
 #pragma once

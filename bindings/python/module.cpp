@@ -2,7 +2,6 @@
 // documents, which sixpoint/_answers.py turns into dataclasses.
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,12 +14,11 @@
 #include "bindings/python/reading.h"
 #include "bindings/python/watched.h"
 #include "calib/solve.h"
-#include "db/store.h"
 #include "repair/batch/answers.h"
-#include "repair/batch/repair_files.h"
+#include "repair/batch/requests.h"
 #include "repair/rescale/constants_finder.h"
-#include "repair/rescale/known_calibration.h"
-#include "repair/triage/scan_file.h"
+#include "repair/triage/inspection.h"
+#include "repair/triage/survey.h"
 
 namespace sixpoint::python {
 namespace {
@@ -60,44 +58,31 @@ std::string inspect(const std::string& path, bool salvage) {
   return text_of(repair::inspection_to_json(value_or_throw(found), path));
 }
 
-std::string scan(const std::vector<std::string>& paths, unsigned jobs, const std::string& store) {
+// The answer of run_scan() and run_repair(), which are watched on this thread.
+template <class Request>
+std::string answer_of(const std::vector<std::string>& paths, const std::string& options,
+                      Request request,
+                      Result<Json> (*run)(Env&, const Request&, const repair::Watching&)) {
+  request.paths = paths;
+  value_or_throw(repair::take_options(options, request));
   Watched watched;
-  std::optional<db::Store> opened;
-  if (!store.empty()) {
-    opened = value_or_throw(db::Store::open_to_read(posix_env(), store));
-  }
-  std::mutex mutex;
-  const auto date_of = [&](const std::string& serial) -> repair::KnownDate {
-    if (!opened) {
-      return {};
-    }
-    const std::scoped_lock lock(mutex);
-    const auto history = opened->unit_history(serial);
-    return history ? repair::calibration_date(*history)
-                   : repair::KnownDate{std::nullopt, history.error().brief()};
-  };
-  std::vector<repair::ScannedFile> scanned;
-  {
+  const auto answer = [&] {
     const py::gil_scoped_release released;
-    const auto named =
-        repair::named_files(watched.files(), paths, {".gt3x", ".agdc", ".agd"}).files;
-    scanned.resize(named.size());
-    repair::for_each_job(
-        named.size(), jobs,
-        [&](std::size_t i) {
-          scanned[i] = named[i].error ? repair::unreadable_file(named[i].path, *named[i].error)
-                                      : repair::scan_file(watched.files(), named[i].path, date_of);
-        },
-        [&](std::size_t) { watched.look(); }, &watched.stop());
-  }
+    return run(watched.env(), request, {[&](std::size_t) { watched.look(); }, &watched.stop()});
+  }();
   watched.rethrow();
-  Json json;
-  json["files"] = Json::array();
-  for (const repair::ScannedFile& file : scanned) {
-    json["files"].push_back(repair::scanned_to_json(file));
-  }
-  json["summary"] = repair::scan_summary(scanned);
-  return text_of(json);
+  return text_of(value_or_throw(answer));
+}
+
+std::string scan(const std::vector<std::string>& paths, const std::string& options) {
+  return answer_of(paths, options, repair::ScanRequest{}, &repair::run_scan);
+}
+
+std::string repair_into(const std::vector<std::string>& paths, const std::string& folder,
+                        const std::string& options) {
+  repair::RepairRequest request;
+  request.folder = folder;
+  return answer_of(paths, options, std::move(request), &repair::run_repair);
 }
 
 std::string solve(const std::string& path, const std::string& method,
@@ -126,81 +111,6 @@ std::string solve(const std::string& path, const std::string& method,
   return text_of(json);
 }
 
-struct RepairSources {
-  std::string constants;
-  std::string calibration_file;
-  std::string store;
-  bool scan = false;
-  bool or_scan = false;
-};
-
-std::string repair_into(const std::vector<std::string>& paths, const std::string& folder,
-                        const RepairSources& sources, repair::RepairOptions how, unsigned jobs) {
-  Watched watched;
-  std::optional<db::Store> store;
-  std::vector<repair::RepairReport> reports;
-  {
-    const py::gil_scoped_release released;
-    repair::ConstantsFinderOptions finder;
-    finder.still = how.still;
-    finder.scan = sources.scan;
-    finder.or_scan = sources.or_scan;
-    finder.store_named = !sources.store.empty();
-    finder.allow_prior = how.allow_prior;
-    if (!sources.constants.empty()) {
-      finder.given = value_or_throw(repair::read_constants(watched.files(), sources.constants));
-    }
-    if (!sources.store.empty()) {
-      store = value_or_throw(db::Store::open_to_read(posix_env(), sources.store));
-      finder.store = &*store;
-    }
-    if (!sources.calibration_file.empty()) {
-      value_or_throw(watched.files().info(sources.calibration_file));
-      finder.calibration_file = sources.calibration_file;
-    }
-    repair::ConstantsFinder constants(watched.env(), std::move(finder));
-    auto named = repair::named_files(watched.files(), paths, {".gt3x"}).files;
-    repair::refuse_same_outputs(named, folder);
-    reports = repair::repair_files(
-        watched.env(), named, {folder, how, jobs}, constants, [&](std::size_t) { watched.look(); },
-        &watched.stop());
-  }
-  watched.rethrow();
-  Json json;
-  json["files"] = Json::array();
-  for (const repair::RepairReport& report : reports) {
-    json["files"].push_back(report.to_json());
-  }
-  json["summary"] = repair::repair_summary(repair::count_by_status(reports), how.dry_run);
-  return text_of(json);
-}
-
-std::string repair_call(const std::vector<std::string>& paths, const std::string& folder,
-                        const py::dict& options) {
-  RepairSources sources;
-  repair::RepairOptions how;
-  unsigned jobs = 0;
-  const auto take = [&](const char* name, auto& value) {
-    value = options[name].cast<std::remove_reference_t<decltype(value)>>();
-  };
-  take("constants", sources.constants);
-  take("calibration_file", sources.calibration_file);
-  take("store", sources.store);
-  take("scan", sources.scan);
-  take("or_scan", sources.or_scan);
-  take("wide", how.wide);
-  take("store_only", how.store_only);
-  take("undo_rotation", how.undo_rotation);
-  take("allow_prior", how.allow_prior);
-  take("salvage", how.salvage);
-  take("force", how.force);
-  take("dry_run", how.dry_run);
-  take("resume", how.resume);
-  take("redo_outdated", how.redo_outdated);
-  take("jobs", jobs);
-  return repair_into(paths, folder, sources, how, jobs);
-}
-
 }  // namespace
 }  // namespace sixpoint::python
 
@@ -219,8 +129,8 @@ PYBIND11_MODULE(_core, module) {
       .def("facts", &Reading::facts)
       .def("info", &Reading::info);
   module.def("inspect", &inspect, py::arg("path"), py::arg("salvage"));
-  module.def("scan", &scan, py::arg("paths"), py::arg("jobs"), py::arg("store"));
+  module.def("scan", &scan, py::arg("paths"), py::arg("options"));
   module.def("solve", &solve, py::arg("path"), py::arg("method"), py::arg("seed"),
              py::arg("strict_nonzero"), py::arg("population_prior"));
-  module.def("repair", &repair_call, py::arg("paths"), py::arg("folder"), py::arg("options"));
+  module.def("repair", &repair_into, py::arg("paths"), py::arg("folder"), py::arg("options"));
 }

@@ -99,7 +99,7 @@ Json losses_of(const Inspection& found) {
 
 }  // namespace
 
-Json error_to_json(const Error& error) {
+Json error_document(const Error& error) {
   return {{"code", to_string(error.code)},
           {"what", error.what},
           {"where", error.where},
@@ -154,7 +154,7 @@ Json inspection_to_json(const Inspection& found, const std::string& path) {
   }
   json["warnings"] = found.warnings;
   if (found.problem) {
-    json["error"] = error_to_json(*found.problem);
+    json["error"] = error_document(*found.problem);
   }
   return json;
 }

@@ -23,7 +23,7 @@ namespace sixpoint::repair {
 
 using Json = nlohmann::ordered_json;
 
-Json error_to_json(const Error& error);  // {code, what, where, hint}
+Json error_document(const Error& error);  // {code, what, where, hint}
 
 // The document of `sixpoint inspect` without its "schema".
 Json inspection_to_json(const Inspection& found, const std::string& path);

@@ -87,6 +87,23 @@ TEST(SampleStream, HasTheRowsOfTheExportInBlocksOfAnySize) {
   }
 }
 
+TEST(SampleStream, FillsWithZerosWhereItIsToldTo) {
+  MemoryEnv memory;
+  Bytes log = tests::made_log(2);
+  tests::append_second(log, 4, 12);
+  tests::append_second(log, 5);
+  Recording recording = opened(memory, log);
+  auto stream = SampleStream::open(recording, {true, true, kUsualFillLimit_s, true});
+  ASSERT_OK(stream);
+  const auto rows = streamed_in_blocks<Counts>(*stream, 100);
+  ASSERT_EQ(rows.size(), 6U * 30);
+  EXPECT_EQ(rows[59], tests::samples_of(1)[29]);
+  EXPECT_EQ(rows[60], Counts{});
+  EXPECT_EQ(rows[119], Counts{});
+  EXPECT_EQ(rows[4 * 30 + 11], tests::samples_of(4)[11]);
+  EXPECT_EQ(rows[4 * 30 + 12], Counts{});
+}
+
 TEST(SampleStream, TellsTheTimeOfEveryRow) {
   MemoryEnv memory;
   Recording recording = opened(memory, log_with_everything());

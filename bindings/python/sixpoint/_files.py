@@ -60,7 +60,8 @@ def scan(
     ScanResult
         As ``sixpoint scan --json``: an answer for each file, also for those that cannot be read.
     """
-    return ScanResult.from_json(json.loads(_core.scan(_paths(paths), jobs, _or_empty(store))))
+    options = {"jobs": jobs, "store": _or_empty(store)}
+    return ScanResult.from_json(json.loads(_core.scan(_paths(paths), json.dumps(options))))
 
 
 def solve(
@@ -172,4 +173,5 @@ def repair(
         "redo_outdated": redo_outdated,
         "jobs": jobs,
     }
-    return RepairResult.from_json(json.loads(_core.repair(_paths(paths), os.fspath(output), options)))
+    answer = _core.repair(_paths(paths), os.fspath(output), json.dumps(options))
+    return RepairResult.from_json(json.loads(answer))

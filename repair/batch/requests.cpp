@@ -1,0 +1,167 @@
+#include "repair/batch/requests.h"
+
+#include <mutex>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "db/store.h"
+#include "repair/batch/jobs.h"
+#include "repair/batch/named_files.h"
+#include "repair/batch/repair_files.h"
+#include "repair/rescale/constants_finder.h"
+#include "repair/rescale/known_calibration.h"
+
+namespace sixpoint::repair {
+namespace {
+
+// Takes the values of a JSON object one by one; what is left over at the end is an error.
+class Options {
+ public:
+  explicit Options(std::string_view text) : json_(Json::parse(text, nullptr, false)) {
+    if (!json_.is_object()) {
+      refuse("the options are no JSON object");
+    }
+  }
+
+  template <class Value>
+  void take(const char* name, Value& value) {
+    if (!json_.is_object() || !json_.contains(name)) {
+      return;
+    }
+    const Json& given = json_[name];
+    const bool fits = std::is_same_v<Value, bool>          ? given.is_boolean()
+                      : std::is_same_v<Value, std::string> ? given.is_string()
+                                                           : given.is_number_unsigned();
+    if (fits) {
+      value = given.get<Value>();
+    } else {
+      refuse(fmt::format("the option {} has a value of another type", name));
+    }
+    json_.erase(name);
+  }
+
+  Status done() {
+    if (!refused_ && !json_.empty()) {
+      refuse(fmt::format("there is no option {}", json_.begin().key()));
+    }
+    return refused_ ? Status(fail(*refused_)) : Status();
+  }
+
+ private:
+  void refuse(std::string what) {
+    refused_ = Error{ErrorCode::usage, std::move(what), {}, "see the documentation of the package"};
+  }
+
+  Json json_;
+  std::optional<Error> refused_;
+};
+
+// Dates of calibration that a store knows; from any thread.
+class KnownDates {
+ public:
+  explicit KnownDates(std::optional<db::Store> store) : store_(std::move(store)) {}
+
+  KnownDate of(const std::string& serial) {
+    if (!store_) {
+      return {};
+    }
+    const std::scoped_lock lock(mutex_);
+    const auto history = store_->unit_history(serial);
+    return history ? calibration_date(*history) : KnownDate{std::nullopt, history.error().brief()};
+  }
+
+ private:
+  std::mutex mutex_;
+  std::optional<db::Store> store_;
+};
+
+Result<std::optional<db::Store>> store_to_read(Env& env, const std::string& location) {
+  if (location.empty()) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(auto store, db::Store::open_to_read(env, location));
+  return store;
+}
+
+}  // namespace
+
+Status take_options(std::string_view json, ScanRequest& request) {
+  Options options(json);
+  options.take("jobs", request.jobs);
+  options.take("store", request.store);
+  return options.done();
+}
+
+Status take_options(std::string_view json, RepairRequest& request) {
+  Options options(json);
+  options.take("jobs", request.jobs);
+  options.take("constants", request.constants);
+  options.take("calibration_file", request.calibration_file);
+  options.take("store", request.store);
+  options.take("scan", request.scan);
+  options.take("or_scan", request.or_scan);
+  RepairOptions& how = request.repair;
+  options.take("wide", how.wide);
+  options.take("store_only", how.store_only);
+  options.take("undo_rotation", how.undo_rotation);
+  options.take("allow_prior", how.allow_prior);
+  options.take("salvage", how.salvage);
+  options.take("force", how.force);
+  options.take("dry_run", how.dry_run);
+  options.take("resume", how.resume);
+  options.take("redo_outdated", how.redo_outdated);
+  return options.done();
+}
+
+Result<Json> run_scan(Env& env, const ScanRequest& request, const Watching& watching) {
+  SIXPOINT_ASSIGN(auto store, store_to_read(env, request.store));
+  KnownDates dates(std::move(store));
+  const auto lookup = [&](const std::string& serial) { return dates.of(serial); };
+  const auto named = named_files(env.files, request.paths, {".gt3x", ".agdc", ".agd"}).files;
+  std::vector<ScannedFile> scanned(named.size());
+  const auto scan_one = [&](std::size_t i) {
+    scanned[i] = named[i].error ? unreadable_file(named[i].path, *named[i].error)
+                                : scan_file(env.files, named[i].path, lookup);
+  };
+  for_each_job(named.size(), request.jobs, scan_one, watching.watch, watching.stop);
+  Json json;
+  json["files"] = Json::array();
+  for (const ScannedFile& file : scanned) {
+    json["files"].push_back(scanned_to_json(file));
+  }
+  json["summary"] = scan_summary(scanned);
+  return json;
+}
+
+Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& watching) {
+  ConstantsFinderOptions how;
+  how.still = request.repair.still;
+  how.scan = request.scan;
+  how.or_scan = request.or_scan;
+  how.store_named = !request.store.empty();
+  how.allow_prior = request.repair.allow_prior;
+  if (!request.constants.empty()) {
+    SIXPOINT_ASSIGN(how.given, read_constants(env.files, request.constants));
+  }
+  SIXPOINT_ASSIGN(auto store, store_to_read(env, request.store));
+  how.store = store ? &*store : nullptr;
+  if (!request.calibration_file.empty()) {
+    SIXPOINT_CHECK(env.files.info(request.calibration_file));
+    how.calibration_file = request.calibration_file;
+  }
+  ConstantsFinder finder(env, std::move(how));
+  auto named = named_files(env.files, request.paths, {".gt3x"}).files;
+  refuse_same_outputs(named, request.folder);
+  const auto reports = repair_files(env, named, {request.folder, request.repair, request.jobs},
+                                    finder, watching.watch, watching.stop);
+  Json json;
+  json["files"] = Json::array();
+  for (const RepairReport& report : reports) {
+    json["files"].push_back(report.to_json());
+  }
+  json["summary"] = repair_summary(count_by_status(reports), request.repair.dry_run);
+  return json;
+}
+
+}  // namespace sixpoint::repair

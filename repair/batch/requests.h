@@ -1,0 +1,64 @@
+// A whole scan or repair by one call, as the packages of other languages ask for it: options in,
+// the document of the command out.
+//
+//   RepairRequest request;
+//   request.paths = {"archive"};
+//   request.folder = "repaired";
+//   SIXPOINT_CHECK(take_options(R"({"scan": true, "jobs": 2})", request));
+//   SIXPOINT_ASSIGN(const Json answer, run_repair(env, request));
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "base/env.h"
+#include "repair/batch/answers.h"
+
+namespace sixpoint::repair {
+
+struct ScanRequest {
+  std::vector<std::string> paths;  // files and folders
+  std::string store;               // that knows dates of calibration; empty: none
+  unsigned jobs = 0;
+};
+
+struct RepairRequest {
+  std::vector<std::string> paths;
+  std::string folder;  // for repaired files
+  // Where constants come from, as repair/rescale/sources.h. A store that is not named is not used,
+  // and one that is named is only read.
+  std::string constants;
+  std::string calibration_file;
+  std::string store;
+  bool scan = false;
+  bool or_scan = false;
+  RepairOptions repair;
+  unsigned jobs = 0;
+};
+
+// Sets what a JSON object names: {"jobs": 2, "store": "plant.db"}, for a repair also the other
+// fields above and, of RepairOptions, wide, store_only, undo_rotation, allow_prior, salvage, force,
+// dry_run, resume and redo_outdated. usage for a name that is none of these, and for a value of
+// another type.
+Status take_options(std::string_view json, ScanRequest& request);
+Status take_options(std::string_view json, RepairRequest& request);
+
+// On the calling thread `watch(done)` is called meanwhile (jobs.h); once `stop` is set, no further
+// file is begun.
+struct Watching {
+  std::function<void(std::size_t)> watch = [](std::size_t) {};
+  const std::atomic<bool>* stop = nullptr;
+};
+
+// {files, summary}. A file that cannot be read is an answer among the others; errors are those of
+// the store and of what the options name.
+Result<Json> run_scan(Env& env, const ScanRequest& request, const Watching& watching = {});
+Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& watching = {});
+
+}  // namespace sixpoint::repair

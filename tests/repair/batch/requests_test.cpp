@@ -1,0 +1,116 @@
+#include "repair/batch/requests.h"
+
+#include <gmock/gmock.h>
+
+#include "base/memory_env.h"
+#include "expect_result.h"
+#include "gt3x_made_log.h"
+#include "repair/batch/reading.h"
+#include "repair/batch/stoppable_files.h"
+
+namespace sixpoint::repair {
+namespace {
+
+TEST(Requests, TakeTheirOptionsAndNoOthers) {
+  RepairRequest request;
+  ASSERT_OK(
+      take_options(R"({"scan": true, "jobs": 3, "constants": "C.json", "wide": true})", request));
+  EXPECT_TRUE(request.scan);
+  EXPECT_TRUE(request.repair.wide);
+  EXPECT_EQ(request.jobs, 3U);
+  EXPECT_EQ(request.constants, "C.json");
+  EXPECT_FALSE(request.or_scan);
+  for (const char* wrong : {R"({"widee": true})", R"({"wide": 1})", R"({"jobs": -1})", "[]", "{"}) {
+    RepairRequest other;
+    EXPECT_FAILS(take_options(wrong, other), ErrorCode::usage);
+  }
+  ScanRequest scan;
+  EXPECT_FAILS(take_options(R"({"wide": true})", scan), ErrorCode::usage);
+}
+
+TEST(Requests, OfAScanAnswerForEveryFile) {
+  MemoryEnv memory;
+  ASSERT_OK(gt3x::tests::put_recording(memory.files, "a.gt3x", gt3x::tests::made_log(3)));
+  const auto answer = run_scan(memory.env, {{"a.gt3x", "nowhere.gt3x"}, "", 2});
+  ASSERT_OK(answer);
+  EXPECT_EQ((*answer)["files"].size(), 2U);
+  EXPECT_EQ((*answer)["files"][0]["verdict"], "affected");
+  EXPECT_EQ((*answer)["files"][1]["verdict"], "unreadable");
+  EXPECT_EQ((*answer)["summary"]["unreadable"], 1);
+}
+
+TEST(Requests, OfARepairNameTheConstantsThatAreMissing) {
+  MemoryEnv memory;
+  RepairRequest request;
+  request.paths = {"a.gt3x"};
+  request.folder = "out";
+  request.constants = "nowhere.json";
+  EXPECT_FAILS(run_repair(memory.env, request), ErrorCode::no_input);
+  request.constants.clear();
+  request.scan = true;
+  const auto answer = run_repair(memory.env, request);
+  ASSERT_OK(answer);
+  EXPECT_EQ((*answer)["files"][0]["status"], "failed");
+  EXPECT_EQ((*answer)["summary"]["failed"], 1);
+}
+
+TEST(Requests, ThatAreStoppedReadNothingMore) {
+  MemoryEnv memory;
+  ASSERT_OK(gt3x::tests::put_recording(memory.files, "a.gt3x", gt3x::tests::made_log(3)));
+  std::atomic<bool> stop{false};
+  StoppableFiles files(memory.files, stop);
+  const auto file = files.open("a.gt3x");
+  ASSERT_OK(file);
+  Bytes bytes(4);
+  EXPECT_OK((*file)->read_at(0, bytes));
+  stop = true;
+  EXPECT_FAILS((*file)->read_at(0, bytes), ErrorCode::io);
+}
+
+// What a reading tells of its file is what inspect() tells of it.
+TEST(Reading, SaysWhatInspectSays) {
+  Bytes log = gt3x::tests::made_log(3);
+  gt3x::tests::append_second(log, 5, 31);
+  gt3x::append_record(log, gt3x::RecordType::activity, gt3x::tests::kStart + 6, Bytes{0});
+  gt3x::tests::append_second(log, 12);
+  for (const bool fill : {true, false}) {
+    MemoryEnv memory;
+    ASSERT_OK(gt3x::tests::put_recording(memory.files, "a.gt3x", log));
+    auto recording = gt3x::Recording::open(memory.files, "a.gt3x");
+    ASSERT_OK(recording);
+    auto stream = gt3x::SampleStream::open(*recording, {true, fill});
+    ASSERT_OK(stream);
+    ASSERT_OK(gt3x::read_all_rows(*stream, gt3x::RowValue::lsb_int16));
+    const auto reading = reading_of(*recording, *stream);
+    const auto inspection = inspect(memory.files, "a.gt3x");
+    ASSERT_OK(reading);
+    ASSERT_OK(inspection);
+    const Json ours = inspection_to_json(*reading, "a.gt3x");
+    const Json theirs = inspection_to_json(*inspection, "a.gt3x");
+    for (const char* key : {"form",
+                            "serial",
+                            "firmware",
+                            "model",
+                            "sample_rate_hz",
+                            "accel_scale_lsb_per_g",
+                            "clock",
+                            "start",
+                            "samples",
+                            "records",
+                            "constants",
+                            "calibration_time",
+                            "filter",
+                            "gaps",
+                            "gap_count",
+                            "gap_seconds",
+                            "checksum_failures",
+                            "damage",
+                            "already_repaired",
+                            "entries"}) {
+      EXPECT_EQ(ours[key], theirs[key]) << key << fill;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sixpoint::repair
