@@ -2,7 +2,7 @@
 # Installs the Debian 12 packages that are missing; nothing when none is. Sourced or run by the other
 # scripts:  install_packages.sh build|test...
 # Groups: build (to make the program), test (to test it as CI does), package (to make the .deb), python
-# (to make and test the Python package).
+# and r (to make and test the packages of these languages).
 set -euo pipefail
 
 build_packages=(
@@ -26,6 +26,7 @@ package_packages=(dpkg-dev file)
 python_packages=(
   pybind11-dev python3 python3-dev python3-matplotlib python3-numpy python3-pandas python3-venv
 )
+r_packages=(r-base-dev r-cran-jsonlite)
 
 # The page's tests need Node; a machine that has it from elsewhere keeps it (its package has npm inside
 # and does not go together with Debian's).
@@ -40,7 +41,8 @@ for group in "${@:-build}"; do
     test) wanted+=("${test_packages[@]}") ;;
     package) wanted+=("${package_packages[@]}") ;;
     python) wanted+=("${python_packages[@]}") ;;
-    *) echo "install_packages.sh: no group '$group'; there are: build test package python" >&2; exit 64 ;;
+    r) wanted+=("${r_packages[@]}") ;;
+    *) echo "install_packages.sh: no group '$group'; there are: build test package python r" >&2; exit 64 ;;
   esac
 done
 

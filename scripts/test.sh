@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 label=""
 case "${1:-}" in
   "") ;;
-  --label) label=${2:?"--label needs a name: unit, usb, system, docs, python"} ;;
+  --label) label=${2:?"--label needs a name: unit, usb, system, docs, python, r"} ;;
   *) echo "usage: scripts/test.sh [--label L]" >&2; exit 64 ;;
 esac
 jobs=$(nproc)
@@ -30,7 +30,7 @@ run_ctest() {
   return "$status"
 }
 
-scripts/install_packages.sh build test python
+scripts/install_packages.sh build test python r
 # All packages are installed now: a server that is missing is a failure.
 export SIXPOINT_MUST_NOT_SKIP=1
 source scripts/build_environment.sh

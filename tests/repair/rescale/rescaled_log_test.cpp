@@ -5,6 +5,7 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "repair/six_sides.h"
+#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 namespace {

@@ -127,12 +127,12 @@ TEST(Inspection, TheGapUpToTheLastSampleTimeCounts) {
 
 TEST(Inspection, ListsSoManyGapsAndCountsAll) {
   Bytes log = made_log(1, 1);
-  constexpr std::uint32_t kGaps = Inspection::kMostGapsListed + 5;
+  constexpr std::uint32_t kGaps = gt3x::GapList::kMostListed + 5;
   for (std::uint32_t i = 1; i <= kGaps; ++i) {
     append_second(log, 2 * i, 1);
   }
   const Inspection found = inspected(log, made_info("1"));
-  EXPECT_THAT(found.gaps, SizeIs(Inspection::kMostGapsListed));
+  EXPECT_THAT(found.gaps, SizeIs(gt3x::GapList::kMostListed));
   EXPECT_EQ(found.gap_count, kGaps);
   EXPECT_EQ(found.gap_seconds, kGaps);
 }
