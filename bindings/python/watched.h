@@ -22,7 +22,7 @@
 
 namespace sixpoint::python {
 
-class Watched {
+class [[gnu::visibility("hidden")]] Watched {  // as the types of pybind11 that it holds
  public:
   Watched();
 
