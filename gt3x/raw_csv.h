@@ -55,7 +55,7 @@ struct RawCsvOptions {
   // the order of the file, and nothing else.
   bool fill = true;
   std::uint64_t fill_limit_s = kUsualFillLimit_s;  // fills_gap()
-  bool fill_zeros = false;  // what is filled in is zeros, never the last sample (other readers do so)
+  bool fill_zeros = false;  // fills with zeros, never with the last sample, as other readers do
   enum class Time { none, iso, seconds, unix_seconds };
   Time time = Time::none;
   // Who stands in the first line for who made the data. Empty: the vendor's own words, which are
