@@ -27,13 +27,15 @@ for seed in 1 2; do
 done
 Rscript "$source_folder/tests/r/package_test.R"
 # Ctrl-C ends a call: the loop is left by nothing else.
-Rscript -e 'library(sixpoint); cat("begins\n"); tryCatch(repeat scan_16cpan03("day1.gt3x"), interrupt = function(i) cat("interrupted\n"))' >out.txt &
-child=$!
-until grep -q begins out.txt; do sleep 0.1; done
-sleep 0.3
-kill -INT "$child"
-wait "$child" || true
-grep -q interrupted out.txt || { echo "FAILED: Ctrl-C did not end a scan"; cat out.txt; exit 1; }
+for call in scan_16cpan03 read_gt3x_sixpoint; do
+  Rscript -e "library(sixpoint); cat('begins\n'); tryCatch(repeat $call('day1.gt3x'), interrupt = function(i) cat('interrupted\n'))" >out.txt &
+  child=$!
+  until grep -q begins out.txt; do sleep 0.1; done
+  sleep 0.3
+  kill -INT "$child"
+  wait "$child" || true
+  grep -q interrupted out.txt || { echo "FAILED: Ctrl-C did not end $call"; cat out.txt; exit 1; }
+done
 # The examples of docs/r.md, in order, with unit.gt3x in the folder.
 cp day1.gt3x unit.gt3x
 awk '/^```r$/ { inside = 1; next } /^```/ { inside = 0 } inside' "$source_folder/docs/r.md" >snippets.R
