@@ -12,6 +12,7 @@
 #include "cli/output.h"
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
+#include "cli/workers.h"
 #include "repair/archive/archive_merge.h"
 #include "repair/archive/archive_plan.h"
 #include "repair/archive/archive_run.h"
@@ -40,6 +41,7 @@ struct Options {
   RepairSources sources;
   ArchiveDraft draft;  // as far as the options describe it
   std::size_t shard = 0;
+  unsigned jobs = 0;
   bool verify = false;
   bool redo_outdated = false;
   bool dry_run = false;
@@ -81,6 +83,7 @@ Status gather_constants(const RepairSources& sources, Context& context, ArchiveD
   }
   draft.repair.scan = sources.scan;
   draft.repair.or_scan = sources.or_scan;
+  draft.repair.no_pool = sources.no_pool;
   draft.repair.store_named = !sources.store.empty();
   SIXPOINT_ASSIGN(auto store, store_of(context, sources));
   if (store) {
@@ -169,6 +172,21 @@ Status take_plan_folder(const std::string& folder, FileSystem& files, Outputs& o
                                            : outputs.folder("--output", folder);
 }
 
+// The still periods of the units' files together: one pass over the affected files.
+void ask_units(const Options& options, const ArchiveDraft& draft, Context& context,
+               PlannedArchive& planned) {
+  if (!repair::asks_units(planned.plan.repair, draft.snapshot != nullptr)) {
+    return;
+  }
+  repair::ask_units(
+      context.env, draft.snapshot,
+      [&](std::size_t count, const std::function<void(std::size_t)>& work) {
+        Progress progress(context, "reading still periods", count);
+        for_each_job(count, options.jobs, work, [&](std::size_t done) { progress.at(done); });
+      },
+      planned);
+}
+
 Status run_plan(const Options& options, Context& context) {
   // --force is about files that repair refuses; a plan's folder is new in any case.
   Outputs outputs(context, {}, options.json);
@@ -190,6 +208,7 @@ Status run_plan(const Options& options, Context& context) {
   if (!planned) {
     return fail(planned.error());
   }
+  ask_units(options, draft, context, *planned);
   if (!options.dry_run) {
     SIXPOINT_CHECK(repair::write_plan(context.env, absolute(options.output), draft, *planned));
   }
@@ -492,6 +511,7 @@ void add_archive(CLI::App& app, Context& context) {
   add_source_options(plan, options.sources);
   add_repair_options(plan, options.draft.repair.options);
   plan.add_flag("--dry-run", options.dry_run, "print what would be planned, write nothing");
+  add_jobs_option(plan, options.jobs);
   const auto add = [&](const char* name, const char* about,
                        Status (*work)(const Options&, Context&)) {
     auto declared = add_command<Options>(group, context, "archive", name, about, work);

@@ -1,6 +1,8 @@
 // sixpoint repair PATH... -o OUTDIR: repairs affected files; the originals stay as they are.
+#include <algorithm>
 #include <atomic>
 #include <map>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -16,6 +18,7 @@
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/triage/file_tree.h"
+#include "repair/units/unit_pool.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -32,7 +35,8 @@ struct Options {
 };
 
 Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Context& context,
-                                                      std::optional<db::Store>& store) {
+                                                      std::optional<db::Store>& store,
+                                                      repair::UnitPool& pool) {
   const RepairSources& sources = options.sources;
   repair::ConstantsFinderOptions finder;
   finder.still = options.repair.still;
@@ -40,6 +44,7 @@ Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Co
   finder.or_scan = sources.or_scan;
   finder.store_named = !sources.store.empty();
   finder.allow_prior = options.repair.allow_prior;
+  finder.unit = sources.no_pool ? nullptr : &pool;
   if (!sources.constants.empty()) {
     SIXPOINT_ASSIGN(finder.given, read_constants(context.env.files, sources.constants));
   }
@@ -92,34 +97,96 @@ repair::RepairOptions options_of_file(const Options& options, std::size_t files)
   return how;
 }
 
-// Every file's report, but for those that were not begun when the operator stopped the run.
-std::vector<RepairReport> repair_files(const std::vector<NamedFile>& files, const Options& options,
-                                       repair::ConstantsFinder& finder, Context& context) {
-  std::vector<std::optional<RepairReport>> answers(files.size());
-  const repair::RepairOptions how = options_of_file(options, files.size());
-  StopRequest stop;
-  std::atomic<bool> stopping{false};
-  {
-    Progress progress(context, "repairing", files.size());
+// The files of one run: every file by itself, then those that wait for their unit's other files.
+class RepairRun {
+ public:
+  RepairRun(const std::vector<NamedFile>& files, const Options& options,
+            repair::ConstantsFinder& finder, repair::UnitPool& pool, Context& context)
+      : files_(files),
+        options_(options),
+        finder_(finder),
+        pool_(pool),
+        context_(context),
+        answers_(files.size()) {}
+
+  // Every file's report, but for those that were not done when the operator stopped the run.
+  std::vector<RepairReport> run() {
+    std::vector<std::size_t> all(files_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    pass("repairing", all);
+    const auto waiting = files_that_wait();
+    if (stopping_) {
+      forget(waiting);
+    } else if (!waiting.empty()) {
+      ask_units(waiting);
+    }
+    std::vector<RepairReport> reports;
+    for (std::optional<RepairReport>& answer : answers_) {
+      if (answer) {
+        reports.push_back(*std::move(answer));
+      }
+    }
+    return reports;
+  }
+
+ private:
+  void pass(const char* doing, const std::vector<std::size_t>& which) {
+    const repair::RepairOptions how = options_of_file(options_, which.size());
+    Progress progress(context_, doing, which.size());
     for_each_job(
-        files.size(), options.jobs,
-        [&](std::size_t i) {
-          answers[i] = repair_one(files[i], options, how, finder, context.env);
+        which.size(), options_.jobs,
+        [&](std::size_t k) {
+          const std::size_t i = which[k];
+          answers_[i] = repair_one(files_[i], options_, how, finder_, context_.env);
         },
         [&](std::size_t done) {
           progress.at(done);
-          stopping = stop.requested();
+          stopping_ = stop_.requested();
         },
-        &stopping);
+        &stopping_);
   }
-  std::vector<RepairReport> reports;
-  for (std::optional<RepairReport>& answer : answers) {
-    if (answer) {
-      reports.push_back(*std::move(answer));
+
+  std::vector<std::size_t> files_that_wait() const {
+    const auto paths = pool_.waiting();
+    std::vector<std::size_t> waiting;
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      if (answers_[i] && std::ranges::binary_search(paths, files_[i].path)) {
+        waiting.push_back(i);
+      }
+    }
+    return waiting;
+  }
+
+  // What a stopped run did not decide is not done: the next one decides.
+  void forget(const std::vector<std::size_t>& waiting) {
+    for (const std::size_t i : waiting) {
+      answers_[i].reset();
     }
   }
-  return reports;
-}
+
+  void ask_units(const std::vector<std::size_t>& waiting) {
+    pool_.close(context_.env.clock.now());
+    std::vector<std::size_t> again;
+    for (const std::size_t i : waiting) {
+      if (pool_.has_constants(files_[i].path)) {
+        again.push_back(i);
+        answers_[i].reset();
+      } else if (auto why = pool_.why_none(files_[i].path); !why.empty()) {
+        answers_[i]->reasons.push_back(std::move(why));
+      }
+    }
+    pass("repairing by the unit's other files", again);
+  }
+
+  const std::vector<NamedFile>& files_;
+  const Options& options_;
+  repair::ConstantsFinder& finder_;
+  repair::UnitPool& pool_;
+  Context& context_;
+  std::vector<std::optional<RepairReport>> answers_;
+  StopRequest stop_;
+  std::atomic<bool> stopping_{false};
+};
 
 // The command line that goes on with this run.
 std::string line_that_goes_on(const Options& options) {
@@ -139,6 +206,7 @@ std::string line_that_goes_on(const Options& options) {
   add("--store", options.sources.store);
   flag(" --scan", options.sources.scan);
   flag(" --or-scan", options.sources.or_scan);
+  flag(" --no-pool", options.sources.no_pool);
   flag(" --wide", options.repair.wide);
   flag(" --store-only", options.repair.store_only);
   flag(" --undo-rotation", options.repair.undo_rotation);
@@ -172,12 +240,13 @@ Status run(const Options& options, Context& context) {
   SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
   SIXPOINT_CHECK(check_manifest(context.env.files, options.folder));
   std::optional<db::Store> store;
-  SIXPOINT_ASSIGN(auto how, finder_options(options, context, store));
+  repair::UnitPool pool;
+  SIXPOINT_ASSIGN(auto how, finder_options(options, context, store, pool));
   repair::ConstantsFinder finder(context.env, std::move(how));
 
   auto files = named_files(context, options.paths, {".gt3x"});
   refuse_same_outputs(files, options.folder);
-  const auto reports = repair_files(files, options, finder, context);
+  const auto reports = RepairRun(files, options, finder, pool, context).run();
   RepairTally tally;
   Json json = document("repair");
   Json& list = json["files"] = Json::array();

@@ -20,6 +20,8 @@ void add_source_options(CLI::App& command, RepairSources& sources) {
   add_store_option(command, sources.store);
   command.add_flag("--or-scan", sources.or_scan,
                    "the still periods of the file itself where what is named does not fit");
+  command.add_flag("--no-pool", sources.no_pool,
+                   "never use the still periods of the unit's other files");
 }
 
 std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_store) {
@@ -30,6 +32,7 @@ std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_
   named.store = !sources.store.empty();
   named.or_scan = sources.or_scan;
   named.default_store = has_store && sources.store.empty();
+  named.unit_files = !sources.no_pool;
   return repair::sources_in_order(named);
 }
 

@@ -33,6 +33,7 @@ struct RepairSources {
   std::string calibration_file;  // --calibration-file FILE.gt3x
   bool scan = false;             // --scan
   bool or_scan = false;          // --or-scan
+  bool no_pool = false;          // --no-pool
 };
 void add_source_options(CLI::App& command, RepairSources& sources);
 // The order in which they are asked (repair/rescale/sources.h). `has_store`: store_of() gave one.

@@ -130,6 +130,11 @@ class ShardRun {
     finder.or_scan = plan_.repair.or_scan;
     finder.allow_prior = plan_.repair.options.allow_prior;
     finder.snapshot = snapshot_ ? &*snapshot_ : nullptr;
+    SIXPOINT_ASSIGN(auto units, read_units(files_, folder_, plan_));
+    if (units) {
+      units_.emplace(*std::move(units));
+      finder.unit = &*units_;
+    }
     if (plan_.repair.calibration_file) {
       const ArchiveCalibrationFile& file = *plan_.repair.calibration_file;
       SIXPOINT_ASSIGN(const auto digest, file_sha256(files_, file.path));
@@ -317,6 +322,7 @@ class ShardRun {
   const ArchivePlan& plan_;
   const ShardRunOptions& options_;
   std::optional<ConstantsSnapshot> snapshot_;
+  std::optional<KnownUnits> units_;
   std::optional<ConstantsFinder> finder_;
   std::set<std::string> made_;
 };

@@ -18,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kSchema = "sixpoint/archive-plan/";
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 constexpr std::uint64_t kLargestPlan = 256ULL << 20;
 constexpr std::uint64_t kLargestManifest = 1ULL << 30;
 
@@ -80,13 +80,15 @@ Json to_json(const ArchivePlan& plan) {
                      {"force", repair.options.force}};
   json["rules"] = kRepairRules;
   json["sources"] = {
-      {"scan", repair.scan}, {"store_named", repair.store_named}, {"or_scan", repair.or_scan}};
+      {"scan", repair.scan}, {"store_named", repair.store_named}, {"or_scan", repair.or_scan},
+      {"no_pool", repair.no_pool}};
   json["constants"] = repair.given ? calib::to_json(*repair.given) : Json(nullptr);
   json["calibration_file"] = repair.calibration_file
                                  ? Json{{"path", encode_path(repair.calibration_file->path)},
                                         {"sha256", repair.calibration_file->sha256}}
                                  : Json(nullptr);
   json["store"] = {{"location", encode_path(plan.store)}, {"sha256", plan.constants_sha256}};
+  json["units"] = {{"sha256", plan.units_sha256}};
   Json& shards = json["shards"] = Json::array();
   for (const ArchiveShard& shard : plan.shards) {
     shards.push_back(
@@ -123,6 +125,7 @@ Result<ArchivePlan> plan_of(const Json& json) {
   plan.repair.scan = sources.at("scan");
   plan.repair.store_named = sources.at("store_named");
   plan.repair.or_scan = sources.at("or_scan");
+  plan.repair.no_pool = sources.at("no_pool");
   if (const Json& given = json.at("constants"); !given.is_null()) {
     SIXPOINT_ASSIGN(plan.repair.given, calib::constants_record_from_json(given));
   }
@@ -132,6 +135,7 @@ Result<ArchivePlan> plan_of(const Json& json) {
   }
   SIXPOINT_ASSIGN(plan.store, decode_path(json.at("store").at("location").get<std::string>()));
   plan.constants_sha256 = json.at("store").at("sha256");
+  plan.units_sha256 = json.at("units").at("sha256");
   for (const Json& shard : json.at("shards")) {
     plan.shards.push_back({integer_of<std::size_t>(shard.at("files")),
                            integer_of<std::uint64_t>(shard.at("bytes")),
@@ -219,6 +223,11 @@ Status write_plan(Env& env, const std::string& folder, const ArchiveDraft& draft
     const std::string constants = draft.snapshot->to_json_lines();
     plan.constants_sha256 = text_sha256(constants);
     SIXPOINT_CHECK(write_file(files, folder + "/constants.jsonl", constants));
+  }
+  if (planned.units) {
+    const std::string units = planned.units->to_json_lines();
+    plan.units_sha256 = text_sha256(units);
+    SIXPOINT_CHECK(write_file(files, folder + "/units.jsonl", units));
   }
   const ArchiveScripts scripts{folder, draft.program, plan.shards.size(), draft.at_once};
   SIXPOINT_CHECK(write_file(files, folder + "/run.sbatch", slurm_script(scripts)));
@@ -323,6 +332,23 @@ Result<std::optional<ConstantsSnapshot>> read_snapshot(FileSystem& files, const 
     return fail(std::move(error));
   }
   return std::optional(*std::move(snapshot));
+}
+
+Result<std::optional<UnitAnswers>> read_units(FileSystem& files, const std::string& folder,
+                                              const ArchivePlan& plan) {
+  if (plan.units_sha256.empty()) {
+    return std::optional<UnitAnswers>();
+  }
+  const std::string path = folder + "/units.jsonl";
+  SIXPOINT_ASSIGN(const auto bytes, read_unchanged(files, path, "the units' constants were",
+                                                   plan.units_sha256));
+  auto units = UnitAnswers::parse(as_text(bytes));
+  if (!units) {
+    Error error = std::move(units).error();
+    error.where = path;
+    return fail(std::move(error));
+  }
+  return std::optional(*std::move(units));
 }
 
 }  // namespace sixpoint::repair
