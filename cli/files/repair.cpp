@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
@@ -15,6 +16,7 @@
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/archive/archive_scripts.h"
+#include "repair/archive/link_unaffected.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/triage/file_tree.h"
@@ -30,6 +32,8 @@ struct Options {
   std::string folder;
   RepairSources sources;
   repair::RepairOptions repair;
+  LinkKind link = LinkKind::none;
+  std::string report;
   unsigned jobs = 0;
   bool json = false;
 };
@@ -80,12 +84,9 @@ RepairReport repair_one(const NamedFile& file, const Options& options,
     return failed_report(file.path, *file.error);
   }
   const std::string output = options.folder + "/" + file.relative;
-  if (!options.repair.dry_run) {
-    if (const auto made = env.files.make_folders(folder_of(output)); !made) {
-      return failed_report(file.path, made.error());
-    }
-  }
-  return repair::repair_file(env, file.path, output, finder, how);
+  RepairReport report = repair::repair_file(env, file.path, output, finder, how);
+  repair::link_unaffected(env.files, link_file, options.link, output, report);
+  return report;
 }
 
 // How one of `files` files is repaired. With fewer files than --jobs a file gets several threads.
@@ -173,6 +174,7 @@ class RepairRun {
         answers_[i].reset();
       } else if (auto why = pool_.why_none(files_[i].path); !why.empty()) {
         answers_[i]->reasons.push_back(std::move(why));
+        answers_[i]->for_a_person = answers_[i]->for_a_person || pool_.contradicts(files_[i].path);
       }
     }
     pass("repairing by the unit's other files", again);
@@ -214,12 +216,15 @@ std::string line_that_goes_on(const Options& options) {
   flag(" --salvage", options.repair.salvage);
   flag(" --force", options.repair.force);
   flag(" --redo-outdated", options.repair.redo_outdated);
+  if (options.link != LinkKind::none) {
+    add("--link-unaffected", std::string(to_string(options.link)));
+  }
   return line + " --resume";
 }
 
 // What the run leaves in its folder, and how it goes on where it was stopped.
-Status conclude(const Options& options, const std::vector<RepairReport>& reports, std::size_t files,
-                Context& context) {
+Status conclude(const Options& options, const std::vector<RepairReport>& reports,
+                const std::vector<repair::UnitNeeds>& units, std::size_t files, Context& context) {
   const bool stopped = reports.size() < files;
   if (stopped) {
     context.worsen(kExitStopped);
@@ -227,6 +232,7 @@ Status conclude(const Options& options, const std::vector<RepairReport>& reports
   if (!options.repair.dry_run && context.env.files.info(options.folder)) {
     SIXPOINT_CHECK(
         write_manifest(context.env.files, options.folder, reports, context.env.clock.now()));
+    SIXPOINT_CHECK(write_units(context.env.files, options.folder, units));
   }
   if (stopped) {
     context.people << fmt::format("stopped: {} of {} files are done; to go on:\n  {}\n",
@@ -235,26 +241,52 @@ Status conclude(const Options& options, const std::vector<RepairReport>& reports
   return {};
 }
 
+// One run at a time in an output folder. Nothing where its file system has no locks.
+Result<std::unique_ptr<FileLock>> lock_of(const Options& options, Context& context) {
+  if (options.repair.dry_run) {
+    return nullptr;
+  }
+  SIXPOINT_CHECK(make_synced_folders(context.env.files, options.folder));
+  const std::string path = options.folder + "/.sixpoint-repair.lock";
+  auto lock = context.env.files.lock(path);
+  if (!lock) {
+    context.log().warn("{}: no lock: {}; let no other run write here", printable(options.folder),
+                       lock.error().what);
+    return nullptr;
+  }
+  if (*lock == nullptr) {
+    return fail(ErrorCode::cannot_create, "another run is repairing into this folder",
+                options.folder, "wait for it, or choose another folder");
+  }
+  return lock;
+}
+
 Status run(const Options& options, Context& context) {
   Outputs outputs(context, {}, options.json);
   SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
+  SIXPOINT_CHECK(outputs.file("--report", options.report));
   SIXPOINT_CHECK(check_manifest(context.env.files, options.folder));
   std::optional<db::Store> store;
   repair::UnitPool pool;
   SIXPOINT_ASSIGN(auto how, finder_options(options, context, store, pool));
   repair::ConstantsFinder finder(context.env, std::move(how));
 
+  SIXPOINT_ASSIGN(const auto lock, lock_of(options, context));
   auto files = named_files(context, options.paths, {".gt3x"});
   refuse_same_outputs(files, options.folder);
   const auto reports = RepairRun(files, options, finder, pool, context).run();
   RepairTally tally;
+  repair::UnitTable table;
   Json json = document("repair");
   Json& list = json["files"] = Json::array();
   for (const RepairReport& report : reports) {
     tally.add(context, report);
+    table.add(report);
     list.push_back(report.to_json());
   }
   json["summary"] = tally.to_json(options.repair.dry_run);
+  const auto units = table.rows();
+  json["units"] = repair::units_json(units);
   json["kept"] = nullptr;
   if (store) {
     Result<db::Store> opened = *std::move(store);
@@ -267,9 +299,14 @@ Status run(const Options& options, Context& context) {
     for (const RepairReport& report : reports) {
       print_report(context, report);
     }
+    print_units(context, units);
     context.people << tally.brief(options.repair.dry_run);
   }
-  return conclude(options, reports, files.size(), context);
+  if (!options.report.empty()) {
+    SIXPOINT_CHECK(write_study_report(context, outputs.files(), options.report,
+                                      "Repair into " + options.folder, reports));
+  }
+  return conclude(options, reports, units, files.size(), context);
 }
 
 }  // namespace
@@ -286,6 +323,8 @@ void add_repair(CLI::App& app, Context& context) {
                    "go on with an earlier run: what it finished is left as it is");
   add_redo_option(command, options.repair.redo_outdated);
   add_salvage_option(command, options.repair.salvage);
+  add_link_option(command, options.link);
+  command.add_option("--report", options.report, "a page (HTML) about the files and units");
   add_jobs_option(command, options.jobs);
 }
 

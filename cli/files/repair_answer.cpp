@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
+#include "repair/report/study_report.h"
 #include "repair/rescale/repair_records.h"
 #include "station/records/software.h"
 
@@ -47,6 +49,15 @@ void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
                    "also use constants that rest on a population prior");
   command.add_flag("--force", options.force,
                    "write a file also where its own still periods say that it does not help");
+}
+
+void add_link_option(CLI::App& command, LinkKind& link) {
+  command
+      .add_option_function<std::string>(
+          "--link-unaffected", [&link](const std::string& text) { link = *parse_link_kind(text); },
+          "hard or symbolic: links of the files that need no repair, so that the output folder "
+          "holds the whole study")
+      ->check(CLI::IsMember(std::vector<std::string>{"hard", "symbolic"}));
 }
 
 void add_redo_option(CLI::App& command, bool& redo_outdated) {
@@ -116,6 +127,25 @@ std::string RepairTally::brief(bool dry_run) const {
       files_, of(RepairStatus::repaired), dry_run ? " (dry run: nothing was written)" : "",
       of(RepairStatus::not_affected), of(RepairStatus::already_repaired),
       of(RepairStatus::not_repairable), of(RepairStatus::outdated), of(RepairStatus::failed));
+}
+
+Status write_study_report(Context& context, FileSystem& files, const std::string& path,
+                          const std::string& title, const std::vector<RepairReport>& reports) {
+  repair::StudyReport study;
+  for (const RepairReport& report : reports) {
+    study.add(report);
+  }
+  study.add_thumbnails(context.env.files);
+  return write_file(
+      files, path,
+      study.html({title, to_iso8601(context.env.clock.now()), station::software_and_build()}));
+}
+
+void print_units(Context& context, const std::vector<repair::UnitNeeds>& units) {
+  constexpr std::size_t kShown = 20;
+  if (!units.empty()) {
+    context.people << repair::units_text(units, kShown);
+  }
 }
 
 void print_report(Context& context, const RepairReport& report) {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "base/env.h"
+#include "base/link_file.h"
 #include "repair/rescale/constants_snapshot.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/triage/file_tree.h"
@@ -59,6 +60,7 @@ struct ArchiveRepair {
   bool store_named = false;
   bool or_scan = false;
   bool no_pool = false;
+  LinkKind link_unaffected = LinkKind::none;  // link_unaffected.h
 };
 
 struct ArchivePlan {
@@ -71,7 +73,7 @@ struct ArchivePlan {
   ArchiveRepair repair;
   std::string store;  // that keeps what was repaired, without a password; empty: no store
   std::string constants_sha256;  // of constants.jsonl; empty: no store is asked for constants
-  std::string units_sha256;  // of units.jsonl; empty: the units' other files are not asked
+  std::string units_sha256;      // of units.jsonl; empty: the units' other files are not asked
 
   std::size_t files() const;
   std::uint64_t bytes() const;
@@ -120,8 +122,8 @@ bool asks_units(const ArchiveRepair& repair, bool has_store);
 // wants.
 using ForEach =
     std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>;
-// Fills in planned.units, with `snapshot` for the store; one pass over the affected files. Reads the
-// calibration file where there is one.
+// Fills in planned.units, with `snapshot` for the store; one pass over the affected files. Reads
+// the calibration file where there is one.
 void ask_units(Env& env, const ConstantsSnapshot* snapshot, const ForEach& for_each,
                PlannedArchive& planned);
 

@@ -77,11 +77,13 @@ Json to_json(const ArchivePlan& plan) {
                      {"store_only", repair.options.store_only},
                      {"undo_rotation", repair.options.undo_rotation},
                      {"allow_prior", repair.options.allow_prior},
-                     {"force", repair.options.force}};
+                     {"force", repair.options.force},
+                     {"link_unaffected", to_string(repair.link_unaffected)}};
   json["rules"] = kRepairRules;
-  json["sources"] = {
-      {"scan", repair.scan}, {"store_named", repair.store_named}, {"or_scan", repair.or_scan},
-      {"no_pool", repair.no_pool}};
+  json["sources"] = {{"scan", repair.scan},
+                     {"store_named", repair.store_named},
+                     {"or_scan", repair.or_scan},
+                     {"no_pool", repair.no_pool}};
   json["constants"] = repair.given ? calib::to_json(*repair.given) : Json(nullptr);
   json["calibration_file"] = repair.calibration_file
                                  ? Json{{"path", encode_path(repair.calibration_file->path)},
@@ -121,6 +123,11 @@ Result<ArchivePlan> plan_of(const Json& json) {
   plan.repair.options.undo_rotation = options.at("undo_rotation");
   plan.repair.options.allow_prior = options.at("allow_prior");
   plan.repair.options.force = options.at("force");
+  const auto link = parse_link_kind(options.at("link_unaffected").get<std::string>());
+  if (!link) {
+    return fail(ErrorCode::bad_data, "a kind of link that is none");
+  }
+  plan.repair.link_unaffected = *link;
   const Json& sources = json.at("sources");
   plan.repair.scan = sources.at("scan");
   plan.repair.store_named = sources.at("store_named");
@@ -231,6 +238,8 @@ Status write_plan(Env& env, const std::string& folder, const ArchiveDraft& draft
   }
   const ArchiveScripts scripts{folder, draft.program, plan.shards.size(), draft.at_once};
   SIXPOINT_CHECK(write_file(files, folder + "/run.sbatch", slurm_script(scripts)));
+  SIXPOINT_CHECK(write_file(files, folder + "/submit.sh", submit_script(scripts)));
+  SIXPOINT_CHECK(write_file(files, folder + "/merge.sbatch", merge_script(scripts)));
   SIXPOINT_CHECK(write_file(files, folder + "/run_all.sh", shell_script(scripts)));
   Json json = to_json(plan);
   plan.id = text_sha256(text_of(json));
@@ -340,8 +349,8 @@ Result<std::optional<UnitAnswers>> read_units(FileSystem& files, const std::stri
     return std::optional<UnitAnswers>();
   }
   const std::string path = folder + "/units.jsonl";
-  SIXPOINT_ASSIGN(const auto bytes, read_unchanged(files, path, "the units' constants were",
-                                                   plan.units_sha256));
+  SIXPOINT_ASSIGN(const auto bytes,
+                  read_unchanged(files, path, "the units' constants were", plan.units_sha256));
   auto units = UnitAnswers::parse(as_text(bytes));
   if (!units) {
     Error error = std::move(units).error();

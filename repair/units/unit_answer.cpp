@@ -28,11 +28,10 @@ double start_of(const UnitFile& file) {
 
 bool same_blocks(const UnitFile& a, const UnitFile& b) {
   return !a.blocks.empty() &&
-         std::ranges::equal(a.blocks, b.blocks,
-                            [](const calib::StillBlock& one, const calib::StillBlock& other) {
-                              return one.start_time_s == other.start_time_s &&
-                                     one.mean_lsb == other.mean_lsb;
-                            });
+         std::ranges::equal(
+             a.blocks, b.blocks, [](const calib::StillBlock& one, const calib::StillBlock& other) {
+               return one.start_time_s == other.start_time_s && one.mean_lsb == other.mean_lsb;
+             });
 }
 
 // By time and content, so that neither names nor threads decide; copies are left out.
@@ -70,8 +69,8 @@ void take_sibling(const std::vector<UnitFile>& files, UnitAnswer& answer) {
   const SensorsOwn its = sensors_own(*best.own);
   for (const UnitFile* other : own) {
     const SensorsOwn theirs = sensors_own(*other->own);
-    const calib::Agreement between = calib::agreement(its.calibration, its.uncertainty,
-                                                      theirs.calibration, theirs.uncertainty);
+    const calib::Agreement between =
+        calib::agreement(its.calibration, its.uncertainty, theirs.calibration, theirs.uncertainty);
     if (!between.agree()) {
       answer.row = UnitRow::contradiction;
       answer.why = fmt::format(
@@ -82,8 +81,8 @@ void take_sibling(const std::vector<UnitFile>& files, UnitAnswer& answer) {
   }
   answer.row = UnitRow::sibling;
   answer.record = best.own;
-  answer.why = fmt::format("the constants are those of {}, another file of the unit",
-                           name_of(best));
+  answer.why =
+      fmt::format("the constants are those of {}, another file of the unit", name_of(best));
 }
 
 // RMS over the directions of one file.
@@ -92,8 +91,8 @@ double distance_mg(const UnitFile& file, const calib::ConstantsRecord& record) {
   const auto cells = calib::cells_of(file.blocks);
   double square = 0;
   for (const calib::DirectionCell& cell : cells) {
-    const PerAxis<double> g = has_terms ? record.cross_axis->to_g(cell.mean_lsb)
-                                        : record.calibration.to_g(cell.mean_lsb);
+    const PerAxis<double> g =
+        has_terms ? record.cross_axis->to_g(cell.mean_lsb) : record.calibration.to_g(cell.mean_lsb);
     const double off_g = std::hypot(g[0], g[1], g[2]) - 1;
     square += off_g * off_g;
   }
@@ -141,8 +140,8 @@ void judge_pool(const std::vector<UnitFile>& files, UnitAnswer& answer) {
 
 void take_pooled(const std::vector<UnitFile>& files, UtcTime now, UnitAnswer& answer) {
   std::vector<calib::StillBlock> blocks;
-  const auto first = std::ranges::find_if(
-      files, [](const UnitFile& file) { return !file.blocks.empty(); });
+  const auto first =
+      std::ranges::find_if(files, [](const UnitFile& file) { return !file.blocks.empty(); });
   for (const UnitFile& file : files) {
     for (calib::StillBlock block : file.blocks) {
       block.mean_g = first->file_constants.to_g(block.mean_lsb);
@@ -157,9 +156,8 @@ void take_pooled(const std::vector<UnitFile>& files, UtcTime now, UnitAnswer& an
   }
   answer.missing_sides = report->verification.missing_directions;
   if (!report->usable()) {
-    answer.why = fmt::format(
-        "the still periods of its {} files together do not suffice: {}", files.size(),
-        fmt::join(report->verification.reasons, "; "));
+    answer.why = fmt::format("the still periods of its {} files together do not suffice: {}",
+                             files.size(), fmt::join(report->verification.reasons, "; "));
     if (report->verification.contradicted) {
       refuse(answer, fmt::format("{}", fmt::join(report->verification.reasons, "; ")));
     }
@@ -206,6 +204,7 @@ UnitAnswer unit_answer(std::vector<UnitFile> files, UtcTime now) {
   }
   answer.missing_sides = calib::coverage_of(means_g).missing_directions();
   const bool has_own = std::ranges::any_of(files, [](const auto& file) { return !!file.own; });
+  answer.own_suffices = has_own;
   if (has_own) {
     answer.missing_sides.clear();
   }

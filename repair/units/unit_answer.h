@@ -52,8 +52,8 @@ inline constexpr double kUnitTolerance_mg = 16;
 struct UnitFile {
   std::string path;
   std::string serial;
-  calib::Calibration file_constants;      // those that are undone
-  std::vector<calib::StillBlock> blocks;  // mean_lsb counts; mean_g is made anew
+  calib::Calibration file_constants;          // those that are undone
+  std::vector<calib::StillBlock> blocks;      // mean_lsb counts; mean_g is made anew
   std::optional<calib::ConstantsRecord> own;  // verified
   bool is_calibration_file = false;
 };
@@ -64,8 +64,9 @@ std::string_view to_string(UnitRow row);
 struct UnitAnswer {
   UnitRow row = UnitRow::alone;
   std::optional<calib::ConstantsRecord> record;
-  std::string why;        // one sentence: where they are from, or why there are none
-  std::size_t files = 0;  // without copies
+  std::string why;            // one sentence: where they are from, or why there are none
+  std::size_t files = 0;      // without copies
+  bool own_suffices = false;  // of the only file, or of one of them
   // By the file's own constants, or where there are new ones by these: "+x" ... "-z".
   std::vector<std::string> missing_sides;
 };

@@ -39,6 +39,7 @@ Result<UnitAnswer> answer_of(const Json& json) {
   answer.row = *row;
   answer.why = json.at("why");
   answer.files = json.at("files");
+  answer.own_suffices = json.at("own_suffices");
   answer.missing_sides = json.at("missing_sides").get<std::vector<std::string>>();
   if (const Json& constants = json.at("constants"); !constants.is_null()) {
     SIXPOINT_ASSIGN(answer.record, calib::constants_record_from_json(constants));
@@ -63,6 +64,7 @@ void UnitAnswers::give(const std::string& serial, ConstantsChoice& choice) const
     return;
   }
   choice.reasons.push_back(answer->why);
+  choice.for_a_person = choice.for_a_person || answer->row == UnitRow::contradiction;
   if (answer->record) {
     choice.chosen = ChosenConstants{*answer->record, std::string(kMethod), ""};
   }
@@ -75,6 +77,7 @@ std::string UnitAnswers::to_json_lines() const {
                  {"row", to_string(answer.row)},
                  {"why", answer.why},
                  {"files", answer.files},
+                 {"own_suffices", answer.own_suffices},
                  {"missing_sides", answer.missing_sides},
                  {"constants", answer.record ? calib::to_json(*answer.record) : Json(nullptr)}}
                 .dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -200,18 +203,25 @@ std::vector<std::string> UnitPool::waiting() const {
   return paths;
 }
 
-bool UnitPool::has_constants(const std::string& path) const {
+const UnitAnswer* UnitPool::answer_of_waiting(const std::string& path) const {
   const std::lock_guard lock(mutex_);
   const auto found = waiting_.find(path);
-  const UnitAnswer* answer = found == waiting_.end() ? nullptr : answers_.find(found->second);
+  return found == waiting_.end() ? nullptr : answers_.find(found->second);
+}
+
+bool UnitPool::has_constants(const std::string& path) const {
+  const UnitAnswer* answer = answer_of_waiting(path);
   return answer != nullptr && answer->record.has_value();
 }
 
 std::string UnitPool::why_none(const std::string& path) const {
-  const std::lock_guard lock(mutex_);
-  const auto found = waiting_.find(path);
-  const UnitAnswer* answer = found == waiting_.end() ? nullptr : answers_.find(found->second);
+  const UnitAnswer* answer = answer_of_waiting(path);
   return answer == nullptr || answer->record ? "" : answer->why;
+}
+
+bool UnitPool::contradicts(const std::string& path) const {
+  const UnitAnswer* answer = answer_of_waiting(path);
+  return answer != nullptr && answer->row == UnitRow::contradiction;
 }
 
 void collect(FileSystem& files, const std::string& path, ConstantsSource& finder,

@@ -74,8 +74,11 @@ class UnitPool final : public UnitConstants {
   bool has_constants(const std::string& path) const;
   // Why a file that waited has no constants of its unit; empty for a unit of one file.
   std::string why_none(const std::string& path) const;
+  // The files of its unit contradict each other.
+  bool contradicts(const std::string& path) const;
 
  private:
+  const UnitAnswer* answer_of_waiting(const std::string& path) const;
   // A still block without what pooling has no use for.
   struct Kept {
     double start_time_s = 0;

@@ -145,6 +145,7 @@ const std::map<std::string, Role>& common_roles() {
                              "--fill-limit",
                              "--epoch",
                              "--cut",
+                             "--link-unaffected",
                              "--why"}) {
       roles.emplace(name, Role::no_path);
     }
@@ -158,6 +159,9 @@ const std::map<std::string, Role>& own_roles() {
   static const std::map<std::string, Role> kRoles = {
       {"repair --output", Role::working_folder},
       {"export --output", Role::folder},
+      {"scan --units", Role::output},
+      {"repair --report", Role::output},
+      {"archive report --output", Role::output},
       {"solve --output", Role::output},
       {"capture --output", Role::output_to_keep},
       {"capture --constants", Role::refused},

@@ -42,8 +42,7 @@ TEST(Sources, TheUnitsOtherFilesAreAskedBehindTheFilesOwnStillPeriods) {
   named.constants = true;
   EXPECT_THAT(sources_in_order(named), ElementsAre(kConstantsFile));
   named.or_scan = true;
-  EXPECT_THAT(sources_in_order(named),
-              ElementsAre(kConstantsFile, kScan, SourceKind::unit_files));
+  EXPECT_THAT(sources_in_order(named), ElementsAre(kConstantsFile, kScan, SourceKind::unit_files));
 }
 
 TEST(Sources, ADefaultStoreIsNeverAskedBesideSomethingNamed) {
@@ -105,7 +104,8 @@ TEST(Sources, WhatWasUsedIsReadAgainAsItWasWritten) {
 }
 
 TEST(Sources, KindsHaveTheNamesOfTheContract) {
-  for (const auto kind : {kConstantsFile, kCalibrationFile, kScan, kStore, SourceKind::unit_files}) {
+  for (const auto kind :
+       {kConstantsFile, kCalibrationFile, kScan, kStore, SourceKind::unit_files}) {
     EXPECT_EQ(parse_source_kind(to_string(kind)), kind);
   }
   EXPECT_EQ(to_string(kCalibrationFile), "calibration_file");
