@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/files/archive_options.h"
 #include "cli/files/file_stream.h"
@@ -168,6 +169,8 @@ Status run_merge(const Options& options, Context& context) {
   }
   if (manifest_folder) {
     SIXPOINT_CHECK(check_manifest(context.env.files, *manifest_folder));
+    // Not there where no file had to be written.
+    SIXPOINT_CHECK(make_synced_folders(context.env.files, *manifest_folder));
   }
   RepairTally tally;
   repair::UnitTable table;

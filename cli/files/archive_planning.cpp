@@ -101,7 +101,7 @@ void print_plan(const Options& options, const PlannedArchive& planned, Context& 
   }
   const std::string folder = repair::shell_word(options.output);
   context.people << fmt::format(
-      "with Slurm:     sbatch {0}/run.sbatch OUTDIR, then sixpoint archive merge {0}\n"
+      "with Slurm:     bash {0}/submit.sh OUTDIR\n"
       "on one machine: bash {0}/run_all.sh OUTDIR\n",
       folder);
 }

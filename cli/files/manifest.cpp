@@ -85,7 +85,8 @@ std::string line_of(const Json& entry) {
 
 Status check_manifest(FileSystem& files, const std::string& folder) {
   const bool ours = !manifest_in(files, folder).empty();
-  for (const std::string& path : {json_of(folder), csv_of(folder), units_of(folder)}) {
+  for (const std::string& path :
+       {json_of(folder), csv_of(folder), units_of(folder), folder + "/report.html"}) {
     if (!ours && files.info(path)) {
       return fail(ErrorCode::cannot_create, "this is no manifest of an earlier repair", path,
                   "choose another output folder, or move the file away");

@@ -20,7 +20,8 @@
 
 namespace sixpoint::cli {
 
-// cannot_create where manifest.json, manifest.csv or units.csv is there and is not ours.
+// cannot_create where one of manifest.json, manifest.csv, units.csv and report.html is there and is
+// not ours.
 Status check_manifest(FileSystem& files, const std::string& folder);
 
 Status write_manifest(FileSystem& files, const std::string& folder,

@@ -33,7 +33,7 @@ struct Options {
   RepairSources sources;
   repair::RepairOptions repair;
   LinkKind link = LinkKind::none;
-  std::string report;
+  bool report = false;
   unsigned jobs = 0;
   bool json = false;
 };
@@ -216,6 +216,7 @@ std::string line_that_goes_on(const Options& options) {
   flag(" --salvage", options.repair.salvage);
   flag(" --force", options.repair.force);
   flag(" --redo-outdated", options.repair.redo_outdated);
+  flag(" --report", options.report);
   if (options.link != LinkKind::none) {
     add("--link-unaffected", std::string(to_string(options.link)));
   }
@@ -264,7 +265,6 @@ Result<std::unique_ptr<FileLock>> lock_of(const Options& options, Context& conte
 Status run(const Options& options, Context& context) {
   Outputs outputs(context, {}, options.json);
   SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
-  SIXPOINT_CHECK(outputs.file("--report", options.report));
   SIXPOINT_CHECK(check_manifest(context.env.files, options.folder));
   std::optional<db::Store> store;
   repair::UnitPool pool;
@@ -302,8 +302,8 @@ Status run(const Options& options, Context& context) {
     print_units(context, units);
     context.people << tally.brief(options.repair.dry_run);
   }
-  if (!options.report.empty()) {
-    SIXPOINT_CHECK(write_study_report(context, outputs.files(), options.report,
+  if (options.report && !options.repair.dry_run) {
+    SIXPOINT_CHECK(write_study_report(context, context.env.files, options.folder + "/report.html",
                                       "Repair into " + options.folder, reports));
   }
   return conclude(options, reports, units, files.size(), context);
@@ -324,7 +324,8 @@ void add_repair(CLI::App& app, Context& context) {
   add_redo_option(command, options.repair.redo_outdated);
   add_salvage_option(command, options.repair.salvage);
   add_link_option(command, options.link);
-  command.add_option("--report", options.report, "a page (HTML) about the files and units");
+  command.add_flag("--report", options.report,
+                   "also report.html in the output folder: a page about files and units");
   add_jobs_option(command, options.jobs);
 }
 

@@ -36,9 +36,10 @@ std::string table_of(const std::string& head, const std::string& rows) {
 }
 
 std::string left_out(std::size_t all, std::size_t shown) {
-  return all > shown ? fmt::format("<p>... and {} more: see manifest.csv and units.csv in the "
-                                   "output folder.</p>\n",
-                                   all - shown)
+  return all > shown ? fmt::format(
+                           "<p>... and {} more: see manifest.csv and units.csv in the "
+                           "output folder.</p>\n",
+                           all - shown)
                      : "";
 }
 
@@ -260,8 +261,7 @@ std::string StudyReport::thumbnails() const {
     Svg svg;
     svg.line(kLeft, up(0), kWidth - 4, up(0), "stroke=\"#bbb\"");
     svg.text(kLeft - 4, up(highest) + 6, fmt::format("{:.0f}", highest), "text-anchor=\"end\"");
-    svg.text(kWidth - 4, kHeight - 3, fmt::format("{:.1f} h", curves.hours),
-             "text-anchor=\"end\"");
+    svg.text(kWidth - 4, kHeight - 3, fmt::format("{:.1f} h", curves.hours), "text-anchor=\"end\"");
     draw(svg, curves.before_mg, across, up, kBefore);
     draw(svg, curves.after_mg, across, up, kAfter);
     out += fmt::format(
@@ -270,9 +270,10 @@ std::string StudyReport::thumbnails() const {
         escaped(report->input), kWidth, kHeight, kWidth, svg.marks());
   }
   return out.empty() ? out
-                     : fmt::format("<h2>ENMO in mg, <span style=\"color:{}\">before</span> and "
-                                   "<span style=\"color:{}\">after</span></h2>\n{}",
-                                   kBefore, kAfter, out);
+                     : fmt::format(
+                           "<h2>ENMO in mg, <span style=\"color:{}\">before</span> and "
+                           "<span style=\"color:{}\">after</span></h2>\n{}",
+                           kBefore, kAfter, out);
 }
 
 std::string StudyReport::constants() const {
@@ -287,10 +288,10 @@ std::string StudyReport::constants() const {
     rows += row_of({escaped(key.first), escaped(key.second), std::to_string(files)});
   }
   return "<h2>Constants used</h2>\n" + (rows.empty() ? std::string("<p>None.</p>\n")
-                                                      : table_of("unit</th><th>source (made, "
-                                                                 "standard uncertainty at 1 "
-                                                                 "g)</th><th>files",
-                                                                 rows));
+                                                     : table_of("unit</th><th>source (made, "
+                                                                "standard uncertainty at 1 "
+                                                                "g)</th><th>files",
+                                                                rows));
 }
 
 std::string StudyReport::html(const StudyPage& page) const {

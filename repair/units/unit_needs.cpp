@@ -42,9 +42,8 @@ std::string what_would_help(const UnitNeeds& unit) {
   const std::string never = fmt::format("{} {} never up", fmt::join(unit.sides_missing, " "),
                                         unit.sides_missing.size() == 1 ? "was" : "were");
   if (unit.waiting > 0) {
-    const std::string wait =
-        fmt::format("{} {} for constants; ", files_text(unit.waiting),
-                    unit.waiting == 1 ? "waits" : "wait");
+    const std::string wait = fmt::format("{} {} for constants; ", files_text(unit.waiting),
+                                         unit.waiting == 1 ? "waits" : "wait");
     if (unit.contradiction) {
       return wait + "what is known of the unit contradicts itself: put the unit on the jig";
     }
@@ -55,9 +54,8 @@ std::string what_would_help(const UnitNeeds& unit) {
                        kHowTo);
   }
   if (unit.refused > 0) {
-    return fmt::format(
-        "{} not written with the constants that there are: read the reasons",
-        files_text(unit.refused));
+    return fmt::format("{} not written with the constants that there are: read the reasons",
+                       files_text(unit.refused));
   }
   if (unit.scanned > 0) {
     return unit.sides_missing.empty()
@@ -146,9 +144,9 @@ std::vector<UnitNeeds> UnitTable::rows() const {
 }
 
 std::string units_text(const std::vector<UnitNeeds>& rows, std::size_t limit) {
-  std::string text = fmt::format("{:<16} {:>6} {:>8} {:>8} {:>8}  {:<17}  {}\n", "unit", "files",
-                                 "affected", "repaired", "waiting", "sides covered",
-                                 "what would help");
+  std::string text =
+      fmt::format("{:<16} {:>6} {:>8} {:>8} {:>8}  {:<17}  {}\n", "unit", "files", "affected",
+                  "repaired", "waiting", "sides covered", "what would help");
   const std::size_t shown = limit == 0 ? rows.size() : std::min(limit, rows.size());
   for (std::size_t i = 0; i < shown; ++i) {
     const UnitNeeds& row = rows[i];
@@ -168,11 +166,10 @@ std::string units_csv(const std::vector<UnitNeeds>& rows) {
       "unit,files,affected,repaired,waiting,refused,scanned,cannot_tell,failed,sides_covered,"
       "sides_missing,help\r\n";
   for (const UnitNeeds& row : rows) {
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\r\n",
-                       field(printable(row.serial, 100)), row.files, row.affected, row.repaired,
-                       row.waiting, row.refused, row.scanned, row.cannot_tell, row.failed,
-                       fmt::join(row.sides_covered, " "), fmt::join(row.sides_missing, " "),
-                       field(row.help));
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\r\n", field(printable(row.serial, 100)),
+                       row.files, row.affected, row.repaired, row.waiting, row.refused, row.scanned,
+                       row.cannot_tell, row.failed, fmt::join(row.sides_covered, " "),
+                       fmt::join(row.sides_missing, " "), field(row.help));
   }
   return csv;
 }

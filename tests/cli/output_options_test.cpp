@@ -160,7 +160,6 @@ const std::map<std::string, Role>& own_roles() {
       {"repair --output", Role::working_folder},
       {"export --output", Role::folder},
       {"scan --units", Role::output},
-      {"repair --report", Role::output},
       {"archive report --output", Role::output},
       {"solve --output", Role::output},
       {"capture --output", Role::output_to_keep},
@@ -293,6 +292,8 @@ class EveryOutput : public tests::CommandTest {
         {"archive plan --output", {"archive", "plan", path("archive"), "--scan"}},
         {"station --state", {"station", "--port", "0", "--device", "virtual:seed=7"}},
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
+        {"archive report --output", {"archive", "report", path("plan")}},
+        {"scan --units", {"scan", path("archive")}},
     };
     for (const char* option : {"--certificate", "--label", "--record", "--state"}) {
       all.emplace(std::string("jig ") + option, jig);

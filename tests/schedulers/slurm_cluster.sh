@@ -45,7 +45,7 @@ JobRequeue=1
 NodeName=n[1-3] NodeHostname=$host NodeAddr=127.0.0.1 Port=[$((base + 1))-$((base + 3))] CPUs=2 RealMemory=4000
 PartitionName=all Nodes=ALL Default=YES State=UP MaxTime=INFINITE
 CONF
-  : >"$cluster/cgroup.conf"
+  echo "CgroupAutomount=no" >"$cluster/cgroup.conf"
   export SLURM_CONF=$cluster/slurm.conf
   slurmctld -f "$SLURM_CONF"
   for n in n1 n2 n3; do
@@ -61,16 +61,20 @@ CONF
   return 1
 }
 
-# kill_node n1: its daemon and all its tasks, at once, as by a power cut.
+# kill_node n1: its daemon, the keepers of its tasks and the tasks, at once, as by a power cut.
 kill_node() {
-  local node=$1 task
-  kill -9 "$(cat "$cluster/slurmd.$node.pid")"
+  local node=$1 task keeper tasks=() keepers=()
   for task in /proc/[0-9]*; do
-    if tr '\0' '\n' <"$task/environ" 2>/dev/null | grep -qx "SLURM_CONF=$SLURM_CONF" &&
-      tr '\0' '\n' <"$task/environ" 2>/dev/null | grep -qx "SLURMD_NODENAME=$node"; then
-      kill -9 "${task#/proc/}" 2>/dev/null || true
-    fi
+    task=${task#/proc/}
+    { tr '\0' '\n' <"/proc/$task/environ"; } 2>/dev/null | grep -qx "SLURMD_NODENAME=$node" || continue
+    { tr '\0' '\n' <"/proc/$task/environ"; } 2>/dev/null | grep -qx "SLURM_CONF=$SLURM_CONF" || continue
+    tasks+=("$task")
+    keeper=$(ps -o ppid= -p "$task" | tr -d ' ')
+    grep -q '^slurmstepd' "/proc/$keeper/comm" 2>/dev/null && keepers+=("$keeper")
   done
+  [ "${#keepers[@]}" -gt 0 ] || { echo "FAILED: no task of $node was found"; return 1; }
+  kill -9 "$(cat "$cluster/slurmd.$node.pid")" "${keepers[@]}" 2>/dev/null || true
+  kill -9 "${tasks[@]}" 2>/dev/null || true
 }
 
 stop_cluster() {

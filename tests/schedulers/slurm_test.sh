@@ -51,7 +51,7 @@ wait_for 150 merged || { echo "FAILED: the merge did not run"; squeue; tail "$sc
 scontrol show job "$merge" | grep -q "afterany:$array\|Dependency=(null)" ||
   { echo "FAILED: the merge did not wait for the array"; exit 1; }
 requeued=$(scontrol show job "$array" | grep -c 'Restarts=[1-9]' || true)
-[ "$requeued" -ge 1 ] || { echo "FAILED: no task was requeued"; scontrol show job "$array"; exit 1; }
+[ "$requeued" -ge 1 ] || { echo "FAILED: no task was requeued"; scontrol show job "$array" | grep -E "JobState|Restarts|NodeList"; exit 1; }
 
 # The shard that ran out of memory is named as missing, with the command that runs it again.
 status=$("$2" archive status "$data/plan" --json || true)

@@ -18,9 +18,10 @@ const LinkMaker kMake = [](const auto& from, const auto& to, LinkKind kind) {
 TEST(LinkUnaffected, FollowsTheTable) {
   RepairReport report;
   for (const auto& [status, linked] :
-       {std::pair(RepairStatus::not_affected, true), std::pair(RepairStatus::already_repaired, true),
-        std::pair(RepairStatus::repaired, false), std::pair(RepairStatus::not_repairable, false),
-        std::pair(RepairStatus::outdated, false), std::pair(RepairStatus::failed, false)}) {
+       {std::pair(RepairStatus::not_affected, true),
+        std::pair(RepairStatus::already_repaired, true), std::pair(RepairStatus::repaired, false),
+        std::pair(RepairStatus::not_repairable, false), std::pair(RepairStatus::outdated, false),
+        std::pair(RepairStatus::failed, false)}) {
     report.status = status;
     EXPECT_EQ(is_linked(report), linked) << to_string(status);
   }

@@ -32,11 +32,15 @@ class Units : public testing::Test {
     }
     return out;
   }
-  // The largest error of a value of 1 g, over both directions of the axes, against the true sensor.
-  static double error_mg(const calib::ConstantsRecord& record) {
+  // The largest error of a value of 1 g, over both directions of the axes, against the true sensor;
+  // without the negative side of the axis `without`.
+  static double error_mg(const calib::ConstantsRecord& record, std::size_t without = kAxes) {
     double worst_mg = 0;
     for (std::size_t a = 0; a < kAxes; ++a) {
       for (const double g : {-1.0, 1.0}) {
+        if (a == without && g < 0) {
+          continue;
+        }
         const double raw_lsb = g / tests::kTrue.sensitivity_g_per_lsb[a] + tests::kTrue.zero_lsb[a];
         worst_mg = std::max(worst_mg, 1000 * std::abs(record.calibration.to_g(a, raw_lsb) - g));
       }
@@ -162,12 +166,12 @@ TEST_F(Units, OneFileBeyondTheToleranceRefusesThePool) {
   EXPECT_THAT(answer.why, testing::AllOf(HasSubstr("strange.gt3x"), HasSubstr("limit 16 mg")));
 }
 
-// Another unit's file under this serial number, with zeros elsewhere as real units differ. What is
-// pooled all the same must leave its own files within the gate's limit of a repair (32 mg).
+// Another unit's file under this serial number, with zeros elsewhere as real units differ. Where
+// two files share no direction nothing can tell that they contradict each other; what is pooled
+// then must still be right within the gate's limit (32 mg) on the sides that the file itself took.
 TEST_F(Units, AnotherUnitsFileIsHardlyEverPooled) {
   Random random(5);
   int pooled = 0;
-  double worst_mg = 0;
   constexpr int kTrials = 30;
   for (int trial = 0; trial < kTrials; ++trial) {
     const auto seed = static_cast<std::uint64_t>(trial) * 10 + 1000;
@@ -181,12 +185,10 @@ TEST_F(Units, AnotherUnitsFileIsHardlyEverPooled) {
                                     kNow);
     if (answer.record) {
       ++pooled;
-      worst_mg = std::max(worst_mg, error_mg(*answer.record));
+      EXPECT_LT(error_mg(*answer.record, axis), 32) << trial;
     }
   }
-  RecordProperty("pooled", pooled);
-  EXPECT_LE(pooled, kTrials / 5) << worst_mg;
-  EXPECT_LT(worst_mg, 32);
+  EXPECT_LE(pooled, kTrials / 5);
 }
 
 TEST_F(Units, SeveralSerialNumbersAreAContradiction) {

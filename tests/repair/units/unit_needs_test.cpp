@@ -39,9 +39,8 @@ TEST(UnitNeeds, ASideThatWasNeverUpIsNamed) {
   EXPECT_EQ(row.waiting, 2U);
   EXPECT_THAT(row.sides_missing, ElementsAre("-z"));
   EXPECT_THAT(row.sides_covered, ElementsAre("+x", "-x", "+y", "-y", "+z"));
-  EXPECT_THAT(row.help, AllOf(HasSubstr("2 files wait for constants"),
-                              HasSubstr("-z was never up"), HasSubstr("jig"),
-                              HasSubstr("calibration file")));
+  EXPECT_THAT(row.help, AllOf(HasSubstr("2 files wait for constants"), HasSubstr("-z was never up"),
+                              HasSubstr("jig"), HasSubstr("calibration file")));
 }
 
 TEST(UnitNeeds, AllSidesUpAndStillNotEnough) {
