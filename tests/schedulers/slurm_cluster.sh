@@ -83,7 +83,7 @@ stop_cluster() {
   scancel -u root >/dev/null 2>&1 || true
   sleep 1
   for file in "$cluster"/slurmd.n*.pid "$cluster/slurmctld.pid" "$cluster/munge/pid"; do
-    [ -f "$file" ] && kill "$(cat "$file")" 2>/dev/null
+    if [ -f "$file" ]; then kill "$(cat "$file")" 2>/dev/null || true; fi
   done
   sleep 1
   return 0
