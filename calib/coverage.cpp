@@ -38,9 +38,9 @@ ValueSubset value_subset(double value_g) {
 
 bool Coverage::complete() const { return blocks > 0 && missing_directions().empty(); }
 
+constexpr PerAxis<std::array<const char*, 2>> kSides = {{{"+x", "-x"}, {"+y", "-y"}, {"+z", "-z"}}};
+
 std::vector<std::string> Coverage::missing_directions() const {
-  constexpr PerAxis<std::array<const char*, 2>> kSides = {
-      {{"+x", "-x"}, {"+y", "-y"}, {"+z", "-z"}}};
   std::vector<std::string> missing;
   for (std::size_t a = 0; a < kAxes; ++a) {
     if (blocks == 0 || !(max_g[a] > kCoverageLimit_g)) {
@@ -51,6 +51,19 @@ std::vector<std::string> Coverage::missing_directions() const {
     }
   }
   return missing;
+}
+
+std::vector<std::string> Coverage::covered_directions() const {
+  const std::vector<std::string> missing = missing_directions();
+  std::vector<std::string> covered;
+  for (const auto& sides : kSides) {
+    for (const char* side : sides) {
+      if (std::ranges::find(missing, side) == missing.end()) {
+        covered.emplace_back(side);
+      }
+    }
+  }
+  return covered;
 }
 
 Coverage coverage_of(std::span<const PerAxis<double>> means_g) {

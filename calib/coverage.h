@@ -35,6 +35,8 @@ struct Coverage {
   // The sides on which the unit must still be laid, out of "+x", "-x", "+y", "-y", "+z", "-z":
   // "+x" when no block has x above 0.3 g. Empty when complete.
   std::vector<std::string> missing_directions() const;
+  // The other ones.
+  std::vector<std::string> covered_directions() const;
 };
 
 // Of calibrated means in g, one per block.

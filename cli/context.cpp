@@ -96,26 +96,40 @@ Progress::Progress(Context& context, std::string doing, std::uint64_t total)
       start_(context.env.clock.elapsed()) {}
 
 Progress::~Progress() {
-  if (last_percent_ >= 0) {
+  if (context_.people_at_terminal && last_percent_ >= 0) {
     context_.people << "\r\x1b[K" << std::flush;
   }
 }
 
 void Progress::at(std::uint64_t done) {
-  if (!context_.people_at_terminal || total_ == 0) {
+  if (total_ == 0) {
     return;
   }
+  const double elapsed_s =
+      std::chrono::duration<double>(context_.env.clock.elapsed() - start_).count();
   const auto percent = static_cast<int>(std::min<std::uint64_t>(100, done * 100 / total_));
+  const double rate = elapsed_s > 0 ? static_cast<double>(done) / elapsed_s : 0;
+  const int left_s =
+      rate > 0 ? static_cast<int>(static_cast<double>(total_ - std::min(done, total_)) / rate) : 0;
+  if (!context_.people_at_terminal) {
+    // A line a minute, for logs.
+    const auto minute = static_cast<int>(elapsed_s / 60);
+    if (minute > 0 && minute != last_percent_) {
+      last_percent_ = minute;
+      context_.people << fmt::format("{}: {} of {} ({} %), {:.1f} a second, {} min left\n", doing_,
+                                     done, total_, percent, rate, (left_s + 59) / 60)
+                      << std::flush;
+    }
+    return;
+  }
   if (percent == last_percent_) {
     return;
   }
   last_percent_ = percent;
-  const double elapsed_s =
-      std::chrono::duration<double>(context_.env.clock.elapsed() - start_).count();
-  const int left_s = percent > 0 ? static_cast<int>(elapsed_s * (100 - percent) / percent) : 0;
   const int filled = percent / 5;
-  context_.people << fmt::format("\r{}  [{:=<{}}{: <{}}] {:3} %  {:02}:{:02} left", doing_, "",
-                                 filled, "", 20 - filled, percent, left_s / 60, left_s % 60)
+  context_.people << fmt::format("\r{}  [{:=<{}}{: <{}}] {:3} %  {:.1f} a second  {:02}:{:02} left",
+                                 doing_, "", filled, "", 20 - filled, percent, rate, left_s / 60,
+                                 left_s % 60)
                   << std::flush;
 }
 

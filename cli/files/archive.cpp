@@ -1,17 +1,19 @@
 // sixpoint archive plan|run|merge|status: an archive on a cluster, shard by shard
 // (docs/archive.md).
-#include <filesystem>
+#include <algorithm>
 
 #include <fmt/format.h>
 
-#include "base/sha256.h"
+#include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/files/archive_options.h"
 #include "cli/files/file_stream.h"
 #include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
+#include "cli/workers.h"
 #include "repair/archive/archive_merge.h"
 #include "repair/archive/archive_plan.h"
 #include "repair/archive/archive_run.h"
@@ -22,190 +24,13 @@
 namespace sixpoint::cli {
 namespace {
 
-using repair::ArchiveDraft;
 using repair::ArchivePlan;
 using repair::MergedArchive;
 using repair::MergedShard;
-using repair::PlannedArchive;
 using repair::RepairReport;
 using repair::ShardResult;
 
-constexpr std::size_t kLinksShown = 10;
-
-// Of all subcommands, because only one of them runs.
-struct Options {
-  std::vector<std::string> paths;
-  std::string plan;    // the folder of the plan
-  std::string output;  // plan: its folder; run: the folder for repaired files
-  RepairSources sources;
-  ArchiveDraft draft;  // as far as the options describe it
-  std::size_t shard = 0;
-  bool verify = false;
-  bool redo_outdated = false;
-  bool dry_run = false;
-  bool json = false;
-};
-
-// Tasks run in other folders. ".." stays: after a link it leads elsewhere than the path says.
-std::string absolute(const std::string& path) {
-  std::error_code error;
-  const std::filesystem::path whole = std::filesystem::absolute(path, error);
-  if (error) {
-    return path;
-  }
-  const bool climbs = std::find(whole.begin(), whole.end(), "..") != whole.end();
-  std::string text = (climbs ? whole : whole.lexically_normal()).string();
-  while (text.size() > 1 && text.ends_with('/')) {
-    text.pop_back();
-  }
-  return text;
-}
-
-// A progress bar that appears with the library's first call.
-std::function<void(std::size_t, std::size_t)> show_in(std::optional<Progress>& progress,
-                                                      Context& context, std::string doing) {
-  return [&progress, &context, doing = std::move(doing)](std::size_t done, std::size_t files) {
-    if (!progress) {
-      progress.emplace(context, doing, files);
-    }
-    progress->at(done);
-  };
-}
-
-// --- plan
-
-Status gather_constants(const RepairSources& sources, Context& context, ArchiveDraft& draft,
-                        std::optional<repair::ConstantsSnapshot>& snapshot) {
-  if (!sources.constants.empty()) {
-    SIXPOINT_ASSIGN(draft.repair.given, read_constants(context.env.files, sources.constants));
-  }
-  draft.repair.scan = sources.scan;
-  draft.repair.or_scan = sources.or_scan;
-  draft.repair.store_named = !sources.store.empty();
-  SIXPOINT_ASSIGN(auto store, store_of(context, sources));
-  if (store) {
-    const std::string place = store->database().location();
-    draft.store = place.find("://") == std::string::npos ? absolute(place) : place;
-    const auto order = order_of(sources, true);
-    if (std::ranges::find(order, repair::SourceKind::store) != order.end()) {
-      SIXPOINT_ASSIGN(snapshot, repair::ConstantsSnapshot::of_store(*store));
-      draft.snapshot = &*snapshot;
-    }
-  }
-  if (!sources.calibration_file.empty()) {
-    const std::string path = absolute(sources.calibration_file);
-    SIXPOINT_ASSIGN(std::string digest, file_sha256(context.env.files, path));
-    draft.repair.calibration_file = {path, std::move(digest)};
-  }
-  return {};
-}
-
-void print_plan(const Options& options, const PlannedArchive& planned, Context& context) {
-  const ArchivePlan& plan = planned.plan;
-  for (std::size_t k = 0; k < plan.shards.size(); ++k) {
-    context.out << fmt::format("shard {:05}  {} files  {:.1f} MB\n", k, plan.shards[k].files,
-                               static_cast<double>(plan.shards[k].bytes) / 1e6);
-  }
-  context.people << fmt::format("{} files, {:.1f} MB, in {} shards\n", plan.files(),
-                                static_cast<double>(plan.bytes()) / 1e6, plan.shards.size());
-  if (options.dry_run) {
-    context.people << "dry run: nothing was written\n";
-    return;
-  }
-  const std::string folder = repair::shell_word(options.output);
-  context.people << fmt::format(
-      "with Slurm:     sbatch {0}/run.sbatch OUTDIR, then sixpoint archive merge {0}\n"
-      "on one machine: bash {0}/run_all.sh OUTDIR\n",
-      folder);
-}
-
-void warn_about_plan(const PlannedArchive& planned, Context& context) {
-  for (std::size_t i = 0; i < planned.not_followed.size(); ++i) {
-    if (i == kLinksShown) {
-      context.log().warn("... and {} links more", planned.not_followed.size() - i);
-      break;
-    }
-    context.log().warn("{}: this link leads out of the tree and is not followed",
-                       printable(planned.not_followed[i]));
-  }
-  const std::size_t shards = planned.plan.shards.size();
-  if (shards > repair::kUsualMostShards) {
-    context.log().warn("{} shards: Slurm's MaxArraySize is 1001 unless your cluster says otherwise",
-                       shards);
-  }
-}
-
-void end_json_of_plan(const PlannedArchive& planned, bool dry_run, FileStream& files) {
-  const ArchivePlan& plan = planned.plan;
-  Json shards = Json::array();
-  std::size_t at = 0;
-  for (std::size_t k = 0; k < plan.shards.size(); ++k) {
-    for (std::size_t i = 0; i < plan.shards[k].files; ++i, ++at) {
-      const repair::ArchiveFile& file = planned.files[at];
-      files.add(Json{{"input", plan.input_of(file)},
-                     {"status", "planned"},
-                     {"shard", k},
-                     {"bytes", file.size}});
-    }
-    shards.push_back({{"shard", k},
-                      {"state", repair::to_string(repair::ShardState::missing)},
-                      {"files", plan.shards[k].files},
-                      {"bytes", plan.shards[k].bytes}});
-  }
-  files.end({{"shards", shards},
-             {"summary",
-              {{"files", plan.files()},
-               {"bytes", plan.bytes()},
-               {"shards", plan.shards.size()},
-               {"refused", plan.refused.size()},
-               {"links_not_followed", planned.not_followed.size()},
-               {"dry_run", dry_run}}},
-             {"plan", text_or_null(plan.id)}});
-}
-
-// The folder of a plan is new. One that a killed program left half made is gone on with.
-Status take_plan_folder(const std::string& folder, FileSystem& files, Outputs& outputs) {
-  return files.info(folder + "/plan.lock") ? outputs.working_folder("--output", folder)
-                                           : outputs.folder("--output", folder);
-}
-
-Status run_plan(const Options& options, Context& context) {
-  // --force is about files that repair refuses; a plan's folder is new in any case.
-  Outputs outputs(context, {}, options.json);
-  if (!options.dry_run) {
-    SIXPOINT_CHECK(take_plan_folder(absolute(options.output), context.env.files, outputs));
-  }
-  ArchiveDraft draft = options.draft;
-  std::optional<repair::ConstantsSnapshot> snapshot;
-  SIXPOINT_CHECK(gather_constants(options.sources, context, draft, snapshot));
-  for (const std::string& path : options.paths) {
-    draft.paths.push_back(absolute(path));
-  }
-  draft.software = station::software_and_build();
-  draft.program = this_program();
-  std::optional<Progress> progress;
-  draft.progress = show_in(progress, context, "hashing");
-  auto planned = repair::plan_archive(context.env, draft);
-  progress.reset();
-  if (!planned) {
-    return fail(planned.error());
-  }
-  if (!options.dry_run) {
-    SIXPOINT_CHECK(repair::write_plan(context.env, absolute(options.output), draft, *planned));
-  }
-  warn_about_plan(*planned, context);
-  FileStream files(context, options.json);
-  for (const repair::RefusedPath& refused : planned->plan.refused) {
-    files.add(failed_report(refused.path, refused.error));
-    context.worsen(refused.error.code);
-  }
-  if (options.json) {
-    end_json_of_plan(*planned, options.dry_run, files);
-  } else {
-    print_plan(options, *planned, context);
-  }
-  return {};
-}
+using Options = ArchiveOptions;
 
 // --- run
 
@@ -227,6 +52,7 @@ Status run_shard(const Options& options, Context& context) {
   how.output_folder = absolute(options.output);
   how.dry_run = options.dry_run;
   how.redo_outdated = options.redo_outdated;
+  how.make_link = link_file;
   StopRequest stop;
   how.stop = [&stop] { return stop.requested(); };
   how.software = station::software_and_build();
@@ -343,12 +169,16 @@ Status run_merge(const Options& options, Context& context) {
   }
   if (manifest_folder) {
     SIXPOINT_CHECK(check_manifest(context.env.files, *manifest_folder));
+    // Not there where no file had to be written.
+    SIXPOINT_CHECK(make_synced_folders(context.env.files, *manifest_folder));
   }
   RepairTally tally;
+  repair::UnitTable table;
   std::vector<RepairReport> reports;
   FileStream files(context, options.json);
   const auto add = [&](const RepairReport& report) {
     tally.add(context, report);
+    table.add(report);
     files.add(report);
     if (manifest_folder) {
       reports.push_back(report);
@@ -389,13 +219,21 @@ Status run_merge(const Options& options, Context& context) {
       report_error(context, status.error());
     }
   }
+  const auto units = table.rows();
+  if (manifest_folder) {
+    if (const auto status = write_units(context.env.files, *manifest_folder, units); !status) {
+      report_error(context, status.error());
+    }
+  }
   const Rerun rerun(context.env.files, options.plan);
   files.end({{"shards", shards_to_json(*merged, rerun)},
              {"summary", tally.to_json(false)},
+             {"units", repair::units_json(units)},
              {"complete", merged->complete()},
              {"files_missing", merged->files_missing()},
              {"kept", kept}});
   if (!options.json) {
+    print_units(context, units);
     context.people << tally.brief(false);
     if (!merged->complete()) {
       context.people << fmt::format("not complete: nothing is known of {} files yet\n",
@@ -404,6 +242,41 @@ Status run_merge(const Options& options, Context& context) {
     print_missing(*merged, rerun, context);
   }
   return {};
+}
+
+// --- report
+
+// The page about what is known so far; shards that are missing make the exit code 2.
+Status run_report(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.file("--output", options.output));
+  const std::string folder = absolute(options.plan);
+  SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
+  std::vector<RepairReport> reports;
+  for (const repair::RefusedPath& refused : plan.refused) {
+    reports.push_back(failed_report(refused.path, refused.error));
+  }
+  repair::MergeOptions how;
+  how.visit = [&](const ShardResult& result) -> Status {
+    reports.insert(reports.end(), result.files.begin(), result.files.end());
+    return {};
+  };
+  SIXPOINT_ASSIGN(const auto merged, repair::merge_archive(context.env.files, folder, plan, how));
+  context.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
+  SIXPOINT_CHECK(write_study_report(context, outputs.files(), options.output,
+                                    "Archive of the plan " + options.plan, reports));
+  repair::UnitTable table;
+  for (const RepairReport& report : reports) {
+    table.add(report);
+  }
+  Json json = document("archive");
+  json["files"] = reports.size();
+  json["files_missing"] = merged.files_missing();
+  json["complete"] = merged.complete();
+  json["units"] = repair::units_json(table.rows());
+  return print_answer(context, options.json, json,
+                      fmt::format("{} files in the report, {} have no result yet\n", reports.size(),
+                                  merged.files_missing()));
 }
 
 // --- status
@@ -476,7 +349,7 @@ void add_archive(CLI::App& app, Context& context) {
   CLI::App& group = add_group(app, "archive", "repair an archive on a cluster, shard by shard");
   auto [plan, options] =
       add_command<Options>(group, context, "archive", "plan",
-                           "write down what is repaired, in how many shards", run_plan);
+                           "write down what is repaired, in how many shards", run_archive_plan);
   plan.add_option("path", options.paths, "recordings (.gt3x) or folders of them")->required();
   plan.add_option("-o,--output", options.output, "the folder for the plan")->required();
   auto* shards = plan.add_option("--shards", options.draft.shards, "how many shards")
@@ -491,7 +364,9 @@ void add_archive(CLI::App& app, Context& context) {
                 "know files by SHA-256, not by size and time of change: reads all of them");
   add_source_options(plan, options.sources);
   add_repair_options(plan, options.draft.repair.options);
+  add_link_option(plan, options.draft.repair.link_unaffected);
   plan.add_flag("--dry-run", options.dry_run, "print what would be planned, write nothing");
+  add_jobs_option(plan, options.jobs);
   const auto add = [&](const char* name, const char* about,
                        Status (*work)(const Options&, Context&)) {
     auto declared = add_command<Options>(group, context, "archive", name, about, work);
@@ -510,6 +385,9 @@ void add_archive(CLI::App& app, Context& context) {
                    "the store to add to (default: the one that the plan took constants from)");
   merge.add_flag("--verify", of_merge.verify, "also read every repaired file again");
   merge.add_flag("--dry-run", of_merge.dry_run, "add nothing to the store, write no manifest");
+  auto [report, of_report] = add("report", "a page about the files and units", run_report);
+  report.add_option("-o,--output", of_report.output, "the page (HTML)")->required();
+  add_output_options(report, of_report.outputs);
   add("status", "how far the shards are", run_status);
 }
 

@@ -20,6 +20,7 @@ constexpr std::uint64_t kLargestManifest = 1ULL << 30;
 
 std::string json_of(const std::string& folder) { return folder + "/manifest.json"; }
 std::string csv_of(const std::string& folder) { return folder + "/manifest.csv"; }
+std::string units_of(const std::string& folder) { return folder + "/units.csv"; }
 
 // The manifest that is there; an empty object where there is none or it is not ours.
 Json manifest_in(FileSystem& files, const std::string& folder) {
@@ -84,7 +85,8 @@ std::string line_of(const Json& entry) {
 
 Status check_manifest(FileSystem& files, const std::string& folder) {
   const bool ours = !manifest_in(files, folder).empty();
-  for (const std::string& path : {json_of(folder), csv_of(folder)}) {
+  for (const std::string& path :
+       {json_of(folder), csv_of(folder), units_of(folder), folder + "/report.html"}) {
     if (!ours && files.info(path)) {
       return fail(ErrorCode::cannot_create, "this is no manifest of an earlier repair", path,
                   "choose another output folder, or move the file away");
@@ -121,6 +123,11 @@ Status write_manifest(FileSystem& files, const std::string& folder,
   SIXPOINT_CHECK(write_file(files, json_of(folder),
                             json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"));
   return write_file(files, csv_of(folder), csv);
+}
+
+Status write_units(FileSystem& files, const std::string& folder,
+                   const std::vector<repair::UnitNeeds>& units) {
+  return write_file(files, units_of(folder), repair::units_csv(units));
 }
 
 }  // namespace sixpoint::cli

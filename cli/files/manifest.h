@@ -5,6 +5,8 @@
 //   SIXPOINT_CHECK(check_manifest(files, "repaired"));            // before the work
 //   SIXPOINT_CHECK(write_manifest(files, "repaired", reports, now));
 //
+// units.csv beside them has a line per unit of the run (repair/units/unit_needs.h).
+//
 // Files of earlier runs into the same folder stay in it, unless this run met them again. Names that
 // are no UTF-8 are escaped (\xNN); the CSV is quoted as RFC 4180 has it.
 #pragma once
@@ -14,13 +16,17 @@
 
 #include "base/env.h"
 #include "repair/rescale/repair_file.h"
+#include "repair/units/unit_needs.h"
 
 namespace sixpoint::cli {
 
-// cannot_create where manifest.json or manifest.csv is there and is not ours.
+// cannot_create where one of manifest.json, manifest.csv, units.csv and report.html is there and is
+// not ours.
 Status check_manifest(FileSystem& files, const std::string& folder);
 
 Status write_manifest(FileSystem& files, const std::string& folder,
                       const std::vector<repair::RepairReport>& reports, UtcTime now);
+Status write_units(FileSystem& files, const std::string& folder,
+                   const std::vector<repair::UnitNeeds>& units);
 
 }  // namespace sixpoint::cli

@@ -1,8 +1,10 @@
 // sixpoint repair PATH... -o OUTDIR: repairs affected files; the originals stay as they are.
 #include <atomic>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
@@ -15,6 +17,7 @@
 #include "repair/batch/repair_files.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_file.h"
+#include "repair/units/unit_pool.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -26,12 +29,15 @@ struct Options {
   std::string folder;
   RepairSources sources;
   repair::RepairOptions repair;
+  LinkKind link = LinkKind::none;
+  bool report = false;
   unsigned jobs = 0;
   bool json = false;
 };
 
 Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Context& context,
-                                                      std::optional<db::Store>& store) {
+                                                      std::optional<db::Store>& store,
+                                                      repair::UnitPool& pool) {
   const RepairSources& sources = options.sources;
   repair::ConstantsFinderOptions finder;
   finder.still = options.repair.still;
@@ -39,6 +45,7 @@ Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Co
   finder.or_scan = sources.or_scan;
   finder.store_named = !sources.store.empty();
   finder.allow_prior = options.repair.allow_prior;
+  finder.unit = sources.no_pool ? nullptr : &pool;
   if (!sources.constants.empty()) {
     SIXPOINT_ASSIGN(finder.given, read_constants(context.env.files, sources.constants));
   }
@@ -51,18 +58,29 @@ Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Co
   return finder;
 }
 
-// Every file's report, but for those that were not begun when the operator stopped the run.
+// Every file's report, but for those that were not done when the operator stopped the run.
 std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files, const Options& options,
-                                     repair::ConstantsFinder& finder, Context& context) {
+                                     repair::ConstantsFinder& finder, repair::UnitPool& pool,
+                                     Context& context) {
+  repair::RepairFilesOptions how;
+  how.folder = options.folder;
+  how.repair = options.repair;
+  how.jobs = options.jobs;
+  how.link = options.link;
+  how.make_link = link_file;
   StopRequest stop;
   std::atomic<bool> stopping{false};
-  Progress progress(context, "repairing", files.size());
-  const auto watch = [&](std::size_t done) {
-    progress.at(done);
+  std::optional<Progress> progress;
+  repair::RepairWatch watch;
+  watch.begin = [&](const char* doing, std::size_t count) {
+    progress.reset();  // takes its line away
+    progress.emplace(context, doing, count);
+  };
+  watch.at = [&](std::size_t done) {
+    progress->at(done);
     stopping = stop.requested();
   };
-  return repair::repair_files(context.env, files, {options.folder, options.repair, options.jobs},
-                              finder, watch, &stopping);
+  return repair::repair_files(context.env, files, how, finder, pool, watch, &stopping);
 }
 
 // The command line that goes on with this run.
@@ -83,6 +101,7 @@ std::string line_that_goes_on(const Options& options) {
   add("--store", options.sources.store);
   flag(" --scan", options.sources.scan);
   flag(" --or-scan", options.sources.or_scan);
+  flag(" --no-pool", options.sources.no_pool);
   flag(" --wide", options.repair.wide);
   flag(" --store-only", options.repair.store_only);
   flag(" --undo-rotation", options.repair.undo_rotation);
@@ -90,12 +109,16 @@ std::string line_that_goes_on(const Options& options) {
   flag(" --salvage", options.repair.salvage);
   flag(" --force", options.repair.force);
   flag(" --redo-outdated", options.repair.redo_outdated);
+  flag(" --report", options.report);
+  if (options.link != LinkKind::none) {
+    add("--link-unaffected", std::string(to_string(options.link)));
+  }
   return line + " --resume";
 }
 
 // What the run leaves in its folder, and how it goes on where it was stopped.
-Status conclude(const Options& options, const std::vector<RepairReport>& reports, std::size_t files,
-                Context& context) {
+Status conclude(const Options& options, const std::vector<RepairReport>& reports,
+                const std::vector<repair::UnitNeeds>& units, std::size_t files, Context& context) {
   const bool stopped = reports.size() < files;
   if (stopped) {
     context.worsen(kExitStopped);
@@ -103,6 +126,7 @@ Status conclude(const Options& options, const std::vector<RepairReport>& reports
   if (!options.repair.dry_run && context.env.files.info(options.folder)) {
     SIXPOINT_CHECK(
         write_manifest(context.env.files, options.folder, reports, context.env.clock.now()));
+    SIXPOINT_CHECK(write_units(context.env.files, options.folder, units));
   }
   if (stopped) {
     context.people << fmt::format("stopped: {} of {} files are done; to go on:\n  {}\n",
@@ -111,25 +135,51 @@ Status conclude(const Options& options, const std::vector<RepairReport>& reports
   return {};
 }
 
+// One run at a time in an output folder. Nothing where its file system has no locks.
+Result<std::unique_ptr<FileLock>> lock_of(const Options& options, Context& context) {
+  if (options.repair.dry_run) {
+    return nullptr;
+  }
+  SIXPOINT_CHECK(make_synced_folders(context.env.files, options.folder));
+  const std::string path = options.folder + "/.sixpoint-repair.lock";
+  auto lock = context.env.files.lock(path);
+  if (!lock) {
+    context.log().warn("{}: no lock: {}; let no other run write here", printable(options.folder),
+                       lock.error().what);
+    return nullptr;
+  }
+  if (*lock == nullptr) {
+    return fail(ErrorCode::cannot_create, "another run is repairing into this folder",
+                options.folder, "wait for it, or choose another folder");
+  }
+  return lock;
+}
+
 Status run(const Options& options, Context& context) {
   Outputs outputs(context, {}, options.json);
   SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
   SIXPOINT_CHECK(check_manifest(context.env.files, options.folder));
   std::optional<db::Store> store;
-  SIXPOINT_ASSIGN(auto how, finder_options(options, context, store));
+  repair::UnitPool pool;
+  SIXPOINT_ASSIGN(auto how, finder_options(options, context, store, pool));
   repair::ConstantsFinder finder(context.env, std::move(how));
 
+  SIXPOINT_ASSIGN(const auto lock, lock_of(options, context));
   auto files = named_files(context, options.paths, {".gt3x"});
   repair::refuse_same_outputs(files, options.folder);
-  const auto reports = repair_all(files, options, finder, context);
+  const auto reports = repair_all(files, options, finder, pool, context);
   RepairTally tally;
+  repair::UnitTable table;
   Json json = document("repair");
   Json& list = json["files"] = Json::array();
   for (const RepairReport& report : reports) {
     tally.add(context, report);
+    table.add(report);
     list.push_back(report.to_json());
   }
   json["summary"] = tally.to_json(options.repair.dry_run);
+  const auto units = table.rows();
+  json["units"] = repair::units_json(units);
   json["kept"] = nullptr;
   if (store) {
     Result<db::Store> opened = *std::move(store);
@@ -142,9 +192,14 @@ Status run(const Options& options, Context& context) {
     for (const RepairReport& report : reports) {
       print_report(context, report);
     }
+    print_units(context, units);
     context.people << tally.brief(options.repair.dry_run);
   }
-  return conclude(options, reports, files.size(), context);
+  if (options.report && !options.repair.dry_run) {
+    SIXPOINT_CHECK(write_study_report(context, context.env.files, options.folder + "/report.html",
+                                      "Repair into " + options.folder, reports));
+  }
+  return conclude(options, reports, units, files.size(), context);
 }
 
 }  // namespace
@@ -161,6 +216,9 @@ void add_repair(CLI::App& app, Context& context) {
                    "go on with an earlier run: what it finished is left as it is");
   add_redo_option(command, options.repair.redo_outdated);
   add_salvage_option(command, options.repair.salvage);
+  add_link_option(command, options.link);
+  command.add_flag("--report", options.report,
+                   "also report.html in the output folder: a page about files and units");
   add_jobs_option(command, options.jobs);
 }
 

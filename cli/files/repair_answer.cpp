@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
 #include "repair/batch/answers.h"
+#include "repair/report/study_report.h"
 #include "repair/rescale/repair_records.h"
 #include "station/records/software.h"
 
@@ -21,6 +23,8 @@ void add_source_options(CLI::App& command, RepairSources& sources) {
   add_store_option(command, sources.store);
   command.add_flag("--or-scan", sources.or_scan,
                    "the still periods of the file itself where what is named does not fit");
+  command.add_flag("--no-pool", sources.no_pool,
+                   "never use the still periods of the unit's other files");
 }
 
 std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_store) {
@@ -31,6 +35,7 @@ std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_
   named.store = !sources.store.empty();
   named.or_scan = sources.or_scan;
   named.default_store = has_store && sources.store.empty();
+  named.unit_files = !sources.no_pool;
   return repair::sources_in_order(named);
 }
 
@@ -45,6 +50,15 @@ void add_repair_options(CLI::App& command, repair::RepairOptions& options) {
                    "also use constants that rest on a population prior");
   command.add_flag("--force", options.force,
                    "write a file also where its own still periods say that it does not help");
+}
+
+void add_link_option(CLI::App& command, LinkKind& link) {
+  command
+      .add_option_function<std::string>(
+          "--link-unaffected", [&link](const std::string& text) { link = *parse_link_kind(text); },
+          "hard or symbolic: links of the files that need no repair, so that the output folder "
+          "holds the whole study")
+      ->check(CLI::IsMember(std::vector<std::string>{"hard", "symbolic"}));
 }
 
 void add_redo_option(CLI::App& command, bool& redo_outdated) {
@@ -86,6 +100,25 @@ std::string RepairTally::brief(bool dry_run) const {
       files_, of(RepairStatus::repaired), dry_run ? " (dry run: nothing was written)" : "",
       of(RepairStatus::not_affected), of(RepairStatus::already_repaired),
       of(RepairStatus::not_repairable), of(RepairStatus::outdated), of(RepairStatus::failed));
+}
+
+Status write_study_report(Context& context, FileSystem& files, const std::string& path,
+                          const std::string& title, const std::vector<RepairReport>& reports) {
+  repair::StudyReport study;
+  for (const RepairReport& report : reports) {
+    study.add(report);
+  }
+  study.add_thumbnails(context.env.files);
+  return write_file(
+      files, path,
+      study.html({title, to_iso8601(context.env.clock.now()), station::software_and_build()}));
+}
+
+void print_units(Context& context, const std::vector<repair::UnitNeeds>& units) {
+  constexpr std::size_t kShown = 20;
+  if (!units.empty()) {
+    context.people << repair::units_text(units, kShown);
+  }
 }
 
 void print_report(Context& context, const RepairReport& report) {

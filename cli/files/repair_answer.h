@@ -15,11 +15,13 @@
 #include <string>
 #include <vector>
 
+#include "base/link_file.h"
 #include "cli/context.h"
 #include "cli/store_option.h"
 #include "repair/batch/repair_files.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/rescale/sources.h"
+#include "repair/units/unit_needs.h"
 
 namespace CLI {
 class App;
@@ -34,6 +36,7 @@ struct RepairSources {
   std::string calibration_file;  // --calibration-file FILE.gt3x
   bool scan = false;             // --scan
   bool or_scan = false;          // --or-scan
+  bool no_pool = false;          // --no-pool
 };
 void add_source_options(CLI::App& command, RepairSources& sources);
 // The order in which they are asked (repair/rescale/sources.h). `has_store`: store_of() gave one.
@@ -41,6 +44,8 @@ std::vector<repair::SourceKind> order_of(const RepairSources& sources, bool has_
 // --wide, --store-only, --undo-rotation, --allow-prior, --force
 void add_repair_options(CLI::App& command, repair::RepairOptions& options);
 
+// --link-unaffected hard|symbolic
+void add_link_option(CLI::App& command, LinkKind& link);
 // --redo-outdated
 void add_redo_option(CLI::App& command, bool& redo_outdated);
 
@@ -74,6 +79,14 @@ class RepairTally {
   std::size_t files_ = 0;
   std::map<repair::RepairStatus, std::size_t> counts_;
 };
+
+// Writes the page about the files (repair/report/study_report.h), which reads the worst of them.
+Status write_study_report(Context& context, FileSystem& files, const std::string& path,
+                          const std::string& title,
+                          const std::vector<repair::RepairReport>& reports);
+
+// The table of units for people, at most 20 of them; nothing where none needs a word.
+void print_units(Context& context, const std::vector<repair::UnitNeeds>& units);
 
 // A line on stdout with source and still error, and the reasons below it.
 void print_report(Context& context, const repair::RepairReport& report);

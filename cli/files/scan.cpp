@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/files/repair_answer.h"
+#include "cli/output.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/batch/answers.h"
@@ -16,6 +19,8 @@ namespace {
 struct Options {
   std::vector<std::string> paths;
   std::string store;
+  std::string units;
+  OutputOptions outputs;
   unsigned jobs = 0;
   bool json = false;
 };
@@ -77,7 +82,12 @@ class DatesInStore {
 };
 
 Status run(const Options& options, Context& context) {
+  Outputs outputs(context, options.outputs, options.json);
+  SIXPOINT_CHECK(outputs.file("--units", options.units));
   const auto files = named_files(context, options.paths, {".gt3x", ".agdc", ".agd"});
+  for (const NamedFile& file : options.units.empty() ? std::vector<NamedFile>() : files) {
+    SIXPOINT_CHECK(outputs.input(file.path));
+  }
   DatesInStore dates(context, options.store);
   SIXPOINT_CHECK(dates.check());
   const auto lookup = [&](const std::string& serial) { return dates.of(serial); };
@@ -89,8 +99,10 @@ Status run(const Options& options, Context& context) {
   Json json = document("scan");
   Json& list = json["files"] = Json::array();
   std::string text;
+  repair::UnitTable table;
   for (const ScannedFile& answer : answers) {
     judge(context, answer);
+    table.add(answer);
     list.push_back(repair::scanned_to_json(answer));
     text += fmt::format("{:<13} {}", answer.verdict, printable(answer.path));
     for (const std::string& reason : answer.reasons) {
@@ -98,9 +110,15 @@ Status run(const Options& options, Context& context) {
     }
     text += '\n';
   }
-  const Json& summary = json["summary"] = repair::scan_summary(answers);
+  const Json summary = json["summary"] = repair::scan_summary(answers);
+  const auto units = table.rows();
+  json["units"] = repair::units_json(units);
+  if (!options.units.empty()) {
+    SIXPOINT_CHECK(write_file(outputs.files(), options.units, repair::units_csv(units)));
+  }
   print_answer(context, options.json, json, text);
   if (!options.json) {
+    print_units(context, units);
     const auto count = [&](const char* key) { return summary[key].get<int>(); };
     context.people << fmt::format(
         "{} files: {} affected, {} not, {} cannot be told, {} unreadable\n", answers.size(),
@@ -116,6 +134,8 @@ void add_scan(CLI::App& app, Context& context) {
       add_command<Options>(app, context, "scan", "find the files that 16CPAN03 affects", run);
   command.add_option("path", options.paths, "recordings (.gt3x, .agdc, .agd) or folders of them")
       ->required();
+  command.add_option("--units", options.units, "a line per unit, as CSV: what is missing");
+  add_output_options(command, options.outputs);
   add_jobs_option(command, options.jobs);
   add_store_option(command, options.store);
 }

@@ -6,7 +6,9 @@
 //   SIXPOINT_ASSIGN(PlannedArchive planned, plan_archive(env, draft));
 //   SIXPOINT_CHECK(write_plan(env, "/data/plan", draft, planned));   // plan_folder.h
 //
-// Planning reads and writes nothing but names, sizes, times and, where asked for, hashes of files.
+// plan_archive() reads and writes nothing but names, sizes, times and, where asked for, hashes of
+// files. ask_units() also reads the affected files: what one file of a unit lacks another may hold,
+// in another shard (repair/units/unit_answer.h).
 #pragma once
 
 #include <functional>
@@ -16,9 +18,11 @@
 #include <vector>
 
 #include "base/env.h"
+#include "base/link_file.h"
 #include "repair/rescale/constants_snapshot.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/triage/file_tree.h"
+#include "repair/units/unit_pool.h"
 
 namespace sixpoint::repair {
 
@@ -55,6 +59,8 @@ struct ArchiveRepair {
   bool scan = false;
   bool store_named = false;
   bool or_scan = false;
+  bool no_pool = false;
+  LinkKind link_unaffected = LinkKind::none;  // link_unaffected.h
 };
 
 struct ArchivePlan {
@@ -67,6 +73,7 @@ struct ArchivePlan {
   ArchiveRepair repair;
   std::string store;  // that keeps what was repaired, without a password; empty: no store
   std::string constants_sha256;  // of constants.jsonl; empty: no store is asked for constants
+  std::string units_sha256;      // of units.jsonl; empty: the units' other files are not asked
 
   std::size_t files() const;
   std::uint64_t bytes() const;
@@ -96,6 +103,7 @@ struct PlannedArchive {
   ArchivePlan plan;
   std::vector<ArchiveFile> files;         // of shard 0, then of shard 1 ...
   std::vector<std::string> not_followed;  // links that lead out of the trees
+  std::optional<UnitAnswers> units;       // of ask_units()
 };
 
 // Without a given size: no more than what Slurm takes as it comes (MaxArraySize 1001).
@@ -105,6 +113,19 @@ inline constexpr std::size_t kMostShards = 100'000;
 // Reads the folders and writes nothing. no_input where a path is not there or there is no file;
 // usage where more shards are asked for than kMostShards.
 Result<PlannedArchive> plan_archive(Env& env, const ArchiveDraft& draft);
+
+// Would a repair ask the unit's other files at all? Not where other sources are named alone, nor
+// with no_pool.
+bool asks_units(const ArchiveRepair& repair, bool has_store);
+
+// How the files are looked at: work(i) for every i below `count`, on as many threads as the caller
+// wants.
+using ForEach =
+    std::function<void(std::size_t count, const std::function<void(std::size_t)>& work)>;
+// Fills in planned.units, with `snapshot` for the store; one pass over the affected files. Reads
+// the calibration file where there is one.
+void ask_units(Env& env, const ConstantsSnapshot* snapshot, const ForEach& for_each,
+               PlannedArchive& planned);
 
 // Where to cut a list of files so that no shard is larger than it must be: the ends of the shards,
 // in order. The files stay in order; no shard is empty.

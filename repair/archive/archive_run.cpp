@@ -130,6 +130,11 @@ class ShardRun {
     finder.or_scan = plan_.repair.or_scan;
     finder.allow_prior = plan_.repair.options.allow_prior;
     finder.snapshot = snapshot_ ? &*snapshot_ : nullptr;
+    SIXPOINT_ASSIGN(auto units, read_units(files_, folder_, plan_));
+    if (units) {
+      units_.emplace(*std::move(units));
+      finder.unit = &*units_;
+    }
     if (plan_.repair.calibration_file) {
       const ArchiveCalibrationFile& file = *plan_.repair.calibration_file;
       SIXPOINT_ASSIGN(const auto digest, file_sha256(files_, file.path));
@@ -149,7 +154,9 @@ class ShardRun {
         report->status == RepairStatus::outdated) {
       return false;
     }
-    return report->status != RepairStatus::repaired || files_.info(report->output).has_value();
+    const std::string& made =
+        report->status == RepairStatus::repaired ? report->output : report->linked;
+    return made.empty() || files_.info(made).has_value();
   }
 
   // The reports of earlier runs that still hold.
@@ -259,9 +266,6 @@ class ShardRun {
     }
     const std::string output = options_.output_folder + "/" + planned.relative;
     if (!options_.dry_run) {
-      if (const Status made = make_folder(folder_of(output)); !made) {
-        return failed(input, made.error());
-      }
       AtomicFile::remove_left_over(files_, output);
     }
     RepairOptions options = plan_.repair.options;
@@ -275,6 +279,7 @@ class ShardRun {
     const bool same_hash = planned.sha256.empty() || report.input_sha256.empty() ||
                            report.input_sha256 == planned.sha256;
     if (report.status == RepairStatus::failed || (same && same_hash)) {
+      link_unaffected(files_, options_.make_link, plan_.repair.link_unaffected, output, report);
       return report;
     }
     // Half of it may be of the old file. What an earlier run made is not touched.
@@ -317,6 +322,7 @@ class ShardRun {
   const ArchivePlan& plan_;
   const ShardRunOptions& options_;
   std::optional<ConstantsSnapshot> snapshot_;
+  std::optional<KnownUnits> units_;
   std::optional<ConstantsFinder> finder_;
   std::set<std::string> made_;
 };

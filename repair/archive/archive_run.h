@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "repair/archive/link_unaffected.h"
 #include "repair/archive/shard_results.h"
 
 namespace sixpoint::repair {
@@ -36,6 +37,10 @@ struct ShardRunOptions {
   std::size_t checkpoint_files = 128;
   std::chrono::seconds checkpoint_after{30};
   std::string software;
+  // Makes the links of ArchiveRepair::link_unaffected; not called for `none`.
+  LinkMaker make_link = [](const auto&, const auto& to, LinkKind) -> Status {
+    return fail(ErrorCode::cannot_create, "this run makes no links", to);
+  };
   std::function<void(std::size_t done, std::size_t files)> progress = [](auto, auto) {};
 };
 

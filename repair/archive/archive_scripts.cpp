@@ -54,6 +54,38 @@ exit "$status"
                      scripts.at_once > 0 ? fmt::format("%{}", scripts.at_once) : "");
 }
 
+std::string submit_script(const ArchiveScripts& scripts) {
+  return fmt::format(R"(#!/bin/bash
+# Submits this plan to Slurm:  bash submit.sh OUTDIR [option of sbatch...]
+# The array first; the merge waits until every task of it has ended, however it ended, and writes
+# its answer into merge.json and merge.log in the plan's folder. Prints both job numbers.
+set -euo pipefail
+plan={0}
+program=${{SIXPOINT:-{1}}}
+output=${{1:?'usage: bash submit.sh OUTDIR [option of sbatch...]'}}
+shift
+array=$(sbatch --parsable --output="$plan/results/slurm-%A-%a.log" "$@" "$plan/run.sbatch" "$output")
+array=${{array%%;*}}
+merge=$(sbatch --parsable --job-name=sixpoint-merge --mem=1G --dependency="afterany:$array"   --output="$plan/merge.log" "$@" "$plan/merge.sbatch" "$program")
+echo "array $array"
+echo "merge ${{merge%%;*}}"
+)",
+                     shell_word(scripts.folder), shell_word(scripts.program));
+}
+
+std::string merge_script(const ArchiveScripts& scripts) {
+  return fmt::format(R"(#!/bin/bash
+# Puts the results together, as a job behind the array: submitted by submit.sh.
+set -uo pipefail
+plan={0}
+"${{1:?'usage: sbatch merge.sbatch PROGRAM'}}" archive merge "$plan" --json >"$plan/merge.json.part"
+status=$?
+mv "$plan/merge.json.part" "$plan/merge.json"
+exit "$status"
+)",
+                     shell_word(scripts.folder));
+}
+
 std::string shell_script(const ArchiveScripts& scripts) {
   return fmt::format(R"(#!/bin/bash
 # Repairs this plan's files on this machine, without Slurm:  bash run_all.sh OUTDIR

@@ -1,4 +1,5 @@
-// The two scripts of a plan: its shards as a Slurm job array, and on one machine.
+// The scripts of a plan: its shards as a Slurm job array, with the merge behind it, and on one
+// machine.
 //
 //   const ArchiveScripts scripts{"/data/plan", "/usr/bin/sixpoint", 100, 64};
 //   const std::string batch = slurm_script(scripts);
@@ -16,6 +17,10 @@ struct ArchiveScripts {
 };
 
 std::string slurm_script(const ArchiveScripts& scripts);
+// Submits the array, and the merge as a job that waits for it. Prints the two job numbers.
+std::string submit_script(const ArchiveScripts& scripts);
+// The job that waits.
+std::string merge_script(const ArchiveScripts& scripts);
 std::string shell_script(const ArchiveScripts& scripts);
 
 // One argument of a shell command line, in quotes where it needs them.

@@ -18,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kSchema = "sixpoint/archive-plan/";
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 constexpr std::uint64_t kLargestPlan = 256ULL << 20;
 constexpr std::uint64_t kLargestManifest = 1ULL << 30;
 
@@ -77,16 +77,20 @@ Json to_json(const ArchivePlan& plan) {
                      {"store_only", repair.options.store_only},
                      {"undo_rotation", repair.options.undo_rotation},
                      {"allow_prior", repair.options.allow_prior},
-                     {"force", repair.options.force}};
+                     {"force", repair.options.force},
+                     {"link_unaffected", to_string(repair.link_unaffected)}};
   json["rules"] = kRepairRules;
-  json["sources"] = {
-      {"scan", repair.scan}, {"store_named", repair.store_named}, {"or_scan", repair.or_scan}};
+  json["sources"] = {{"scan", repair.scan},
+                     {"store_named", repair.store_named},
+                     {"or_scan", repair.or_scan},
+                     {"no_pool", repair.no_pool}};
   json["constants"] = repair.given ? calib::to_json(*repair.given) : Json(nullptr);
   json["calibration_file"] = repair.calibration_file
                                  ? Json{{"path", encode_path(repair.calibration_file->path)},
                                         {"sha256", repair.calibration_file->sha256}}
                                  : Json(nullptr);
   json["store"] = {{"location", encode_path(plan.store)}, {"sha256", plan.constants_sha256}};
+  json["units"] = {{"sha256", plan.units_sha256}};
   Json& shards = json["shards"] = Json::array();
   for (const ArchiveShard& shard : plan.shards) {
     shards.push_back(
@@ -119,10 +123,16 @@ Result<ArchivePlan> plan_of(const Json& json) {
   plan.repair.options.undo_rotation = options.at("undo_rotation");
   plan.repair.options.allow_prior = options.at("allow_prior");
   plan.repair.options.force = options.at("force");
+  const auto link = parse_link_kind(options.at("link_unaffected").get<std::string>());
+  if (!link) {
+    return fail(ErrorCode::bad_data, "a kind of link that is none");
+  }
+  plan.repair.link_unaffected = *link;
   const Json& sources = json.at("sources");
   plan.repair.scan = sources.at("scan");
   plan.repair.store_named = sources.at("store_named");
   plan.repair.or_scan = sources.at("or_scan");
+  plan.repair.no_pool = sources.at("no_pool");
   if (const Json& given = json.at("constants"); !given.is_null()) {
     SIXPOINT_ASSIGN(plan.repair.given, calib::constants_record_from_json(given));
   }
@@ -132,6 +142,7 @@ Result<ArchivePlan> plan_of(const Json& json) {
   }
   SIXPOINT_ASSIGN(plan.store, decode_path(json.at("store").at("location").get<std::string>()));
   plan.constants_sha256 = json.at("store").at("sha256");
+  plan.units_sha256 = json.at("units").at("sha256");
   for (const Json& shard : json.at("shards")) {
     plan.shards.push_back({integer_of<std::size_t>(shard.at("files")),
                            integer_of<std::uint64_t>(shard.at("bytes")),
@@ -220,8 +231,15 @@ Status write_plan(Env& env, const std::string& folder, const ArchiveDraft& draft
     plan.constants_sha256 = text_sha256(constants);
     SIXPOINT_CHECK(write_file(files, folder + "/constants.jsonl", constants));
   }
+  if (planned.units) {
+    const std::string units = planned.units->to_json_lines();
+    plan.units_sha256 = text_sha256(units);
+    SIXPOINT_CHECK(write_file(files, folder + "/units.jsonl", units));
+  }
   const ArchiveScripts scripts{folder, draft.program, plan.shards.size(), draft.at_once};
   SIXPOINT_CHECK(write_file(files, folder + "/run.sbatch", slurm_script(scripts)));
+  SIXPOINT_CHECK(write_file(files, folder + "/submit.sh", submit_script(scripts)));
+  SIXPOINT_CHECK(write_file(files, folder + "/merge.sbatch", merge_script(scripts)));
   SIXPOINT_CHECK(write_file(files, folder + "/run_all.sh", shell_script(scripts)));
   Json json = to_json(plan);
   plan.id = text_sha256(text_of(json));
@@ -323,6 +341,23 @@ Result<std::optional<ConstantsSnapshot>> read_snapshot(FileSystem& files, const 
     return fail(std::move(error));
   }
   return std::optional(*std::move(snapshot));
+}
+
+Result<std::optional<UnitAnswers>> read_units(FileSystem& files, const std::string& folder,
+                                              const ArchivePlan& plan) {
+  if (plan.units_sha256.empty()) {
+    return std::optional<UnitAnswers>();
+  }
+  const std::string path = folder + "/units.jsonl";
+  SIXPOINT_ASSIGN(const auto bytes,
+                  read_unchanged(files, path, "the units' constants were", plan.units_sha256));
+  auto units = UnitAnswers::parse(as_text(bytes));
+  if (!units) {
+    Error error = std::move(units).error();
+    error.where = path;
+    return fail(std::move(error));
+  }
+  return std::optional(*std::move(units));
 }
 
 }  // namespace sixpoint::repair

@@ -7,7 +7,9 @@
 //     plan.json           roots, options, shards with the SHA-256 of their manifests
 //     shards/00000.jsonl  one line per file: root, path below it, size, time of its last change
 //     constants.jsonl     what the store held, where there was one
+//     units.jsonl         what the files of each unit give together, where they are asked
 //     run.sbatch          the shards as a Slurm job array
+//     submit.sh           submits run.sbatch and, behind it, merge.sbatch
 //     run_all.sh          the shards on this machine
 //     results/            what the shards answer (shard_results.h)
 //
@@ -34,6 +36,9 @@ Result<ArchivePlan> read_plan(FileSystem& files, const std::string& folder);
 // names files outside of its root.
 Result<std::vector<ArchiveFile>> read_manifest(FileSystem& files, const std::string& folder,
                                                const ArchivePlan& plan, std::size_t shard);
+// What the files of each unit give together; nothing where they are not asked.
+Result<std::optional<UnitAnswers>> read_units(FileSystem& files, const std::string& folder,
+                                              const ArchivePlan& plan);
 // The constants of the store; nothing where the plan was made without one.
 Result<std::optional<ConstantsSnapshot>> read_snapshot(FileSystem& files, const std::string& folder,
                                                        const ArchivePlan& plan);

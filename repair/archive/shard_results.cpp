@@ -43,6 +43,9 @@ Result<RepairReport> report_of(const Json& json) {
   }
   report.status = *status;
   report.output = optional_of<std::string>(from.at("output")).value_or("");
+  if (from.contains("linked")) {
+    report.linked = optional_of<std::string>(from["linked"]).value_or("");
+  }
   report.method = optional_of<std::string>(from.at("method")).value_or("");
   report.reasons = from.at("reasons").get<std::vector<std::string>>();
   report.serial = from.at("serial");
@@ -54,9 +57,12 @@ Result<RepairReport> report_of(const Json& json) {
   report.clipped_before = integer_of<std::uint64_t>(from.at("clipped_before"));
   report.clipped_after = integer_of<std::uint64_t>(from.at("clipped_after"));
   report.still_blocks = integer_of<std::size_t>(from.at("still_blocks"));
+  report.verdict = optional_of<std::string>(from.value("verdict", Json())).value_or("");
+  report.sides = from.value("sides", std::vector<std::string>());
   report.still_error_before_mg = optional_of<double>(from.at("still_error_mg").at("before"));
   report.still_error_after_mg = optional_of<double>(from.at("still_error_mg").at("after"));
   report.rotation_undone = from.at("rotation_undone");
+  report.for_a_person = from.value("for_a_person", false);
   report.forced = from.at("forced");
   report.cross_axis_applied = from.at("cross_axis_applied");
   report.sample_uncertainty_mg = optional_of<PerAxis<double>>(from.at("sample_uncertainty_mg"));

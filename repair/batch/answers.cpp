@@ -169,6 +169,7 @@ Json scanned_to_json(const ScannedFile& answer) {
   json["calibration_time"] = time_or_null(answer.facts.calibration_time);
   json["evidence_mg"] = answer.evidence_mg ? number(*answer.evidence_mg) : Json(nullptr);
   json["axes_rotated"] = answer.axes_rotated;
+  json["sides"] = answer.sides;
   return json;
 }
 

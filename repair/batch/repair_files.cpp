@@ -1,6 +1,7 @@
 #include "repair/batch/repair_files.h"
 
 #include <algorithm>
+#include <numeric>
 #include <optional>
 
 #include "base/bytes.h"
@@ -9,19 +10,117 @@
 namespace sixpoint::repair {
 namespace {
 
-RepairReport repair_one(Env& env, const NamedFile& file, const std::string& folder,
-                        const RepairOptions& how, ConstantsSource& source) {
-  if (file.error) {
-    return failed_report(file.path, *file.error);
+class Run {
+ public:
+  Run(Env& env, const std::vector<NamedFile>& files, const RepairFilesOptions& options,
+      ConstantsSource& source, UnitPool& pool, const RepairWatch& watch,
+      const std::atomic<bool>* stop)
+      : env_(env),
+        files_(files),
+        options_(options),
+        source_(source),
+        pool_(pool),
+        watch_(watch),
+        stop_(stop),
+        answers_(files.size()) {}
+
+  std::vector<RepairReport> run() {
+    std::vector<std::size_t> all(files_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    pass("repairing", all);
+    const auto waiting = files_that_wait();
+    if (stop_ != nullptr && *stop_) {
+      forget(waiting);
+    } else if (!waiting.empty()) {
+      ask_units(waiting);
+    }
+    std::vector<RepairReport> reports;
+    for (std::optional<RepairReport>& answer : answers_) {
+      if (answer) {
+        reports.push_back(*std::move(answer));
+      }
+    }
+    return reports;
   }
-  const std::string output = folder + "/" + file.relative;
-  if (!how.dry_run) {
-    if (const auto made = env.files.make_folders(folder_of(output)); !made) {
-      return failed_report(file.path, made.error());
+
+ private:
+  RepairReport repair_one(const NamedFile& file, const RepairOptions& how) {
+    if (file.error) {
+      return failed_report(file.path, *file.error);
+    }
+    const std::string output = options_.folder + "/" + file.relative;
+    RepairReport report = repair_file(env_, file.path, output, source_, how);
+    link_unaffected(env_.files, options_.make_link, options_.link, output, report);
+    return report;
+  }
+
+  // With fewer files than --jobs a file gets several threads.
+  RepairOptions options_of_file(std::size_t files) const {
+    RepairOptions how = options_.repair;
+    how.resume = how.resume || how.redo_outdated;
+    const unsigned jobs = threads_of(options_.jobs);
+    how.jobs = std::max(1U, jobs / static_cast<unsigned>(std::clamp<std::size_t>(files, 1, jobs)));
+    return how;
+  }
+
+  void pass(const char* doing, const std::vector<std::size_t>& which) {
+    const RepairOptions how = options_of_file(which.size());
+    if (watch_.begin) {
+      watch_.begin(doing, which.size());
+    }
+    for_each_job(
+        which.size(), options_.jobs,
+        [&](std::size_t k) { answers_[which[k]] = repair_one(files_[which[k]], how); },
+        [&](std::size_t done) {
+          if (watch_.at) {
+            watch_.at(done);
+          }
+        },
+        stop_);
+  }
+
+  std::vector<std::size_t> files_that_wait() const {
+    const auto paths = pool_.waiting();
+    std::vector<std::size_t> waiting;
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      if (answers_[i] && std::ranges::binary_search(paths, files_[i].path)) {
+        waiting.push_back(i);
+      }
+    }
+    return waiting;
+  }
+
+  // What a stopped run did not decide is not done: the next one decides.
+  void forget(const std::vector<std::size_t>& waiting) {
+    for (const std::size_t i : waiting) {
+      answers_[i].reset();
     }
   }
-  return repair_file(env, file.path, output, source, how);
-}
+
+  void ask_units(const std::vector<std::size_t>& waiting) {
+    pool_.close(env_.clock.now());
+    std::vector<std::size_t> again;
+    for (const std::size_t i : waiting) {
+      if (pool_.has_constants(files_[i].path)) {
+        again.push_back(i);
+        answers_[i].reset();
+      } else if (auto why = pool_.why_none(files_[i].path); !why.empty()) {
+        answers_[i]->reasons.push_back(std::move(why));
+        answers_[i]->for_a_person = answers_[i]->for_a_person || pool_.contradicts(files_[i].path);
+      }
+    }
+    pass("repairing by the unit's other files", again);
+  }
+
+  Env& env_;
+  const std::vector<NamedFile>& files_;
+  const RepairFilesOptions& options_;
+  ConstantsSource& source_;
+  UnitPool& pool_;
+  const RepairWatch& watch_;
+  const std::atomic<bool>* stop_;
+  std::vector<std::optional<RepairReport>> answers_;
+};
 
 }  // namespace
 
@@ -46,25 +145,9 @@ RepairReport failed_report(const std::string& input, const Error& error) {
 
 std::vector<RepairReport> repair_files(Env& env, const std::vector<NamedFile>& files,
                                        const RepairFilesOptions& options, ConstantsSource& source,
-                                       const std::function<void(std::size_t)>& watch,
+                                       UnitPool& pool, const RepairWatch& watch,
                                        const std::atomic<bool>* stop) {
-  RepairOptions how = options.repair;
-  how.resume = how.resume || how.redo_outdated;
-  const unsigned jobs = threads_of(options.jobs);
-  how.jobs =
-      std::max(1U, jobs / static_cast<unsigned>(std::clamp<std::size_t>(files.size(), 1, jobs)));
-  std::vector<std::optional<RepairReport>> answers(files.size());
-  for_each_job(
-      files.size(), options.jobs,
-      [&](std::size_t i) { answers[i] = repair_one(env, files[i], options.folder, how, source); },
-      watch, stop);
-  std::vector<RepairReport> reports;
-  for (std::optional<RepairReport>& answer : answers) {
-    if (answer) {
-      reports.push_back(*std::move(answer));
-    }
-  }
-  return reports;
+  return Run(env, files, options, source, pool, watch, stop).run();
 }
 
 }  // namespace sixpoint::repair

@@ -2,8 +2,13 @@
 //
 //   auto named = named_files(env.files, {"archive"}, {".gt3x"});
 //   refuse_same_outputs(named.files, "repaired");
-//   ConstantsFinder finder(env, {});
-//   const auto reports = repair_files(env, named.files, {"repaired", {}, 0}, finder);
+//   UnitPool pool;
+//   ConstantsFinderOptions sources;
+//   sources.unit = &pool;
+//   ConstantsFinder finder(env, sources);
+//   RepairFilesOptions options;
+//   options.folder = "repaired";
+//   const auto reports = repair_files(env, named.files, options, finder, pool);
 #pragma once
 
 #include <atomic>
@@ -12,8 +17,10 @@
 #include <vector>
 
 #include "calib/constants.h"
+#include "repair/archive/link_unaffected.h"
 #include "repair/batch/named_files.h"
 #include "repair/rescale/repair_file.h"
+#include "repair/units/unit_pool.h"
 
 namespace sixpoint::repair {
 
@@ -23,14 +30,24 @@ struct RepairFilesOptions {
   // redo_outdated implies resume.
   RepairOptions repair;
   unsigned jobs = 0;  // files at a time; 0: one per core
+  // Files that need no repair get a name in the folder too (repair/archive/link_unaffected.h).
+  LinkKind link = LinkKind::none;
+  LinkMaker make_link;
 };
 
-// A report for each file, in their order, but for those that were not begun when `stop` was set.
-// `watch(done)`: jobs.h.
-std::vector<RepairReport> repair_files(
-    Env& env, const std::vector<NamedFile>& files, const RepairFilesOptions& options,
-    ConstantsSource& source, const std::function<void(std::size_t)>& watch = [](std::size_t) {},
-    const std::atomic<bool>* stop = nullptr);
+// Called on the calling thread; both may be empty.
+struct RepairWatch {
+  std::function<void(const char* doing, std::size_t files)> begin;  // a pass over so many files
+  std::function<void(std::size_t done)> at;                         // jobs.h
+};
+
+// Every file by itself, then those that wait for the other files of their unit, which `pool`
+// collected: the source asks it. A report for each file, in their order, but for those that were
+// not done when `stop` was set.
+std::vector<RepairReport> repair_files(Env& env, const std::vector<NamedFile>& files,
+                                       const RepairFilesOptions& options, ConstantsSource& source,
+                                       UnitPool& pool, const RepairWatch& watch = {},
+                                       const std::atomic<bool>* stop = nullptr);
 
 // The report of a file that could not be read at all.
 RepairReport failed_report(const std::string& input, const Error& error);

@@ -11,6 +11,7 @@
 #include "repair/batch/repair_files.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/known_calibration.h"
+#include "repair/units/unit_needs.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -101,6 +102,7 @@ Status take_options(std::string_view json, RepairRequest& request) {
   options.take("store", request.store);
   options.take("scan", request.scan);
   options.take("or_scan", request.or_scan);
+  options.take("no_pool", request.no_pool);
   RepairOptions& how = request.repair;
   options.take("wide", how.wide);
   options.take("store_only", how.store_only);
@@ -125,12 +127,15 @@ Result<Json> run_scan(Env& env, const ScanRequest& request, const Watching& watc
                                 : scan_file(env.files, named[i].path, lookup);
   };
   for_each_job(named.size(), request.jobs, scan_one, watching.watch, watching.stop);
+  UnitTable table;
   Json json;
   json["files"] = Json::array();
   for (const ScannedFile& file : scanned) {
+    table.add(file);
     json["files"].push_back(scanned_to_json(file));
   }
   json["summary"] = scan_summary(scanned);
+  json["units"] = units_json(table.rows());
   return json;
 }
 
@@ -150,17 +155,26 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
     SIXPOINT_CHECK(env.files.info(request.calibration_file));
     how.calibration_file = request.calibration_file;
   }
+  UnitPool pool;
+  how.unit = request.no_pool ? nullptr : &pool;
   ConstantsFinder finder(env, std::move(how));
   auto named = named_files(env.files, request.paths, {".gt3x"}).files;
   refuse_same_outputs(named, request.folder);
-  const auto reports = repair_files(env, named, {request.folder, request.repair, request.jobs},
-                                    finder, watching.watch, watching.stop);
+  RepairFilesOptions options;
+  options.folder = request.folder;
+  options.repair = request.repair;
+  options.jobs = request.jobs;
+  const auto reports =
+      repair_files(env, named, options, finder, pool, {{}, watching.watch}, watching.stop);
+  UnitTable table;
   Json json;
   json["files"] = Json::array();
   for (const RepairReport& report : reports) {
+    table.add(report);
     json["files"].push_back(report.to_json());
   }
   json["summary"] = repair_summary(count_by_status(reports), request.repair.dry_run);
+  json["units"] = units_json(table.rows());
   return json;
 }
 

@@ -38,6 +38,7 @@ struct RepairRequest {
   std::string store;
   bool scan = false;
   bool or_scan = false;
+  bool no_pool = false;  // do not ask the unit's other files
   RepairOptions repair;
   unsigned jobs = 0;
 };

@@ -158,6 +158,9 @@ Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
                                  ConstantsChoice& choice) {
   SIXPOINT_ASSIGN(const auto report, solve_survey(path, survey, options_.solve));
   if (!report.usable()) {
+    if (options_.unit != nullptr) {
+      options_.unit->add(path, survey, nullptr);
+    }
     choice.reasons.push_back("its own still periods do not suffice: " + refusal_of(report));
     choice.reasons.emplace_back(
         "needed: the unit on the jig, or a calibration file made by it under firmware 1.4.0 to "
@@ -168,6 +171,9 @@ Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
   origin.file = db::storable_path(path);
   origin.kind = "file_scan";
   SIXPOINT_ASSIGN(auto record, calib::record_of(report, env_.clock.now(), origin));
+  if (options_.unit != nullptr) {
+    options_.unit->add(path, survey, &record);
+  }
   choice.chosen = ChosenConstants{std::move(record), "scan", ""};
   return {};
 }
@@ -181,6 +187,7 @@ std::vector<SourceKind> ConstantsFinder::order() const {
   named.store = has_store && options_.store_named;
   named.or_scan = options_.or_scan;
   named.default_store = has_store && !options_.store_named;
+  named.unit_files = options_.unit != nullptr;
   return sources_in_order(named);
 }
 
@@ -198,6 +205,9 @@ Status ConstantsFinder::ask(SourceKind kind, const std::string& path, const Surv
       break;
     case SourceKind::store:
       SIXPOINT_CHECK(ask_store(survey, choice));
+      break;
+    case SourceKind::unit_files:
+      options_.unit->ask(path, survey, choice);
       break;
   }
   if (choice.chosen) {

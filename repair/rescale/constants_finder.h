@@ -12,6 +12,7 @@
 // |                                              | and its solution is verified                 |
 // | the file's own still periods (method 1)      | their solution is verified                   |
 // | the store (method 3, the jig) or a snapshot  | it has a set of this unit under `current`    |
+// | the unit's other files in this run           | repair/units/unit_answer.h has some          |
 //
 // A calibration file recorded under `legacy` would make the data worse, so it is refused.
 #pragma once
@@ -25,6 +26,7 @@
 #include "repair/rescale/constants_snapshot.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/rescale/sources.h"
+#include "repair/rescale/unit_constants.h"
 
 namespace sixpoint::repair {
 
@@ -37,6 +39,8 @@ struct ConstantsFinderOptions {
   // null.
   const ConstantsSnapshot* snapshot = nullptr;
   std::optional<std::string> calibration_file;
+  // The unit's other files. Not owned; may be null: they are not asked then.
+  UnitConstants* unit = nullptr;
   // What the user named beside the members above. A store that no one named is the default store.
   bool scan = false;
   bool store_named = false;

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/atomic_file.h"
 #include "base/sha256.h"
 #include "calib/application/agreement.h"
+#include "calib/coverage.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
 #include "repair/rescale/applied_map.h"
@@ -75,6 +77,7 @@ class Repair {
     report_.clipped_before = survey_.clipped_samples;
     report_.clipped_after = survey_.clipped_samples;
     report_.still_blocks = survey_.magnitude.blocks;
+    report_.sides = calib::coverage_of(survey_.blocks).covered_directions();
     if (survey_.magnitude.blocks > 0) {
       report_.still_error_before_mg = survey_.magnitude.mean_mg;
     }
@@ -102,6 +105,7 @@ class Repair {
       return false;
     }
     const Triage judged = triage(survey_.facts);
+    report_.verdict = to_string(judged.verdict);
     report_.reasons = judged.reasons;
     report_.reasons.insert(report_.reasons.end(), survey_.notes.begin(), survey_.notes.end());
     const bool rotation_only = judged.verdict == Verdict::not_affected && judged.axes_rotated;
@@ -146,6 +150,7 @@ class Repair {
     SIXPOINT_ASSIGN(auto choice, source_.choose(report_.input, survey_));
     report_.reasons.insert(report_.reasons.end(), choice.reasons.begin(), choice.reasons.end());
     if (!choice.chosen.has_value()) {
+      report_.for_a_person = choice.for_a_person;
       return {};
     }
     if (auto why = why_unfit(choice.chosen->record, survey_.facts, options_.allow_prior)) {
@@ -324,6 +329,7 @@ class Repair {
   }
 
   Status write_output(gt3x::Recording& recording, RescaledLog& log) {
+    SIXPOINT_CHECK(make_synced_folders(env_.files, folder_of(output_)));
     gt3x::WriterOptions how;
     how.packing = options_.store_only ? gt3x::Packing::store : gt3x::Packing::deflate;
     how.jobs = options_.jobs;
@@ -481,6 +487,7 @@ Json RepairReport::to_json() const {
   return {
       {"input", input},
       {"output", optional_text(output)},
+      {"linked", optional_text(linked)},
       {"status", sixpoint::repair::to_string(status)},
       {"method", optional_text(method)},
       {"reasons", reasons},
@@ -490,8 +497,11 @@ Json RepairReport::to_json() const {
       {"clipped_before", clipped_before},
       {"clipped_after", clipped_after},
       {"still_blocks", still_blocks},
+      {"verdict", optional_text(verdict)},
+      {"sides", sides},
       {"still_error_mg", still_error_to_json(*this)},
       {"rotation_undone", rotation_undone},
+      {"for_a_person", for_a_person},
       {"forced", forced},
       {"cross_axis_applied", cross_axis_applied},
       {"sample_uncertainty_mg", sample_uncertainty_to_json(*this)},

@@ -110,6 +110,7 @@ struct RepairOptions {
 struct RepairReport {
   std::string input;
   std::string output;  // empty where none was written
+  std::string linked;  // the name below the output folder that the input itself got, or empty
   RepairStatus status = RepairStatus::failed;
   std::string method;
   std::vector<std::string> reasons;
@@ -120,6 +121,9 @@ struct RepairReport {
   std::uint64_t clipped_before = 0;
   std::uint64_t clipped_after = 0;
   std::size_t still_blocks = 0;
+  std::string verdict;  // of triage(); empty for a file that was not judged
+  // Which sides were up in its still periods, by the file's own constants: out of "+x" ... "-z".
+  std::vector<std::string> sides;
   // Mean of |magnitude - 1 g| over still blocks. Of a file that is not written, `after` is what the
   // constants would have made of it.
   std::optional<double> still_error_before_mg;
@@ -128,7 +132,8 @@ struct RepairReport {
   bool resumed = false;  // repaired by an earlier run; method and constants are those of its mark
   std::string constants_id;
   std::optional<SourceUsed> source;
-  bool forced = false;  // written although the gate or the file's own still periods said no
+  bool for_a_person = false;  // no constants, because those that there are contradict each other
+  bool forced = false;        // written although the gate or the file's own still periods said no
   bool cross_axis_applied = false;  // not only six constants (applied_map.h)
   // Standard uncertainty of a sample, X Y Z; absent where the constants state none.
   std::optional<PerAxis<double>> sample_uncertainty_mg;
@@ -144,8 +149,8 @@ struct RepairReport {
   nlohmann::ordered_json to_json() const;
 };
 
-// Repairs `input` into `output`, whose folder must be there. Never fails as a function: what went
-// wrong stands in the report (`failed`, with the error).
+// Repairs `input` into `output`, whose folder is made when it is written. Never fails as a
+// function: what went wrong stands in the report (`failed`, with the error).
 RepairReport repair_file(Env& env, const std::string& input, const std::string& output,
                          ConstantsSource& source, const RepairOptions& options);
 

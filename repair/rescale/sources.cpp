@@ -15,8 +15,8 @@ namespace sixpoint::repair {
 namespace {
 
 // In the order of SourceKind.
-constexpr std::array<std::string_view, 4> kSourceNames = {"constants", "calibration_file", "scan",
-                                                          "store"};
+constexpr std::array<std::string_view, 5> kSourceNames = {"constants", "calibration_file", "scan",
+                                                          "store", "unit_files"};
 
 }  // namespace
 
@@ -44,6 +44,9 @@ std::vector<SourceKind> sources_in_order(const NamedSources& named) {
   }
   if (named.or_scan && order.back() != SourceKind::scan) {
     order.push_back(SourceKind::scan);
+  }
+  if (named.unit_files && order.back() == SourceKind::scan) {
+    order.push_back(SourceKind::unit_files);
   }
   return order;
 }

@@ -15,8 +15,11 @@
 // | nothing, a default store   | store, scan                                                |
 // | nothing, no default store  | scan                                                       |
 // | any of them, and --or-scan | as above, then scan                                        |
+// | scan stands in the order,  | as above, with unit_files behind scan                      |
+// | no --no-pool               |                                                            |
 //
 // The next source of the order is asked only where the one before has no constants that fit.
+// unit_files are the still periods of the unit's other files in the same run (repair/units).
 #pragma once
 
 #include <optional>
@@ -32,7 +35,7 @@
 
 namespace sixpoint::repair {
 
-enum class SourceKind { constants, calibration_file, scan, store };
+enum class SourceKind { constants, calibration_file, scan, store, unit_files };
 std::string_view to_string(SourceKind kind);  // as `method` and `source.kind` have it
 std::optional<SourceKind> parse_source_kind(std::string_view text);
 
@@ -43,6 +46,7 @@ struct NamedSources {
   bool store = false;
   bool or_scan = false;
   bool default_store = false;  // no one named it, and it is there
+  bool unit_files = false;     // the unit's other files may be asked: no --no-pool
 };
 std::vector<SourceKind> sources_in_order(const NamedSources& named);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/coverage.h"
 #include "repair/triage/agd.h"
 #include "repair/triage/file_tree.h"
 #include "repair/triage/survey.h"
@@ -104,6 +105,7 @@ ScannedFile scan_recording(FileSystem& files, const std::string& path) {
   }
   answer.facts = survey->facts;
   answer.reasons = survey->notes;
+  answer.sides = calib::coverage_of(survey->blocks).covered_directions();
   if (survey->magnitude.blocks > 0) {
     answer.evidence_mg = survey->magnitude.p95_mg;
     if (survey->magnitude.p95_mg > kEvidenceLimit_mg) {

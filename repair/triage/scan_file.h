@@ -39,6 +39,8 @@ struct ScannedFile {
   // 95th percentile of the distance of the still blocks' magnitude from 1 g.
   std::optional<double> evidence_mg;
   bool axes_rotated = false;
+  std::vector<std::string>
+      sides;  // up in still periods, by the file's own constants (calib/coverage.h)
   std::optional<Error> error;
 };
 

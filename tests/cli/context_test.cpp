@@ -7,6 +7,9 @@
 #include <set>
 
 #include <CLI/Option.hpp>
+#include <gmock/gmock.h>
+
+#include "base/memory_env.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -40,6 +43,28 @@ TEST(Context, AnErrorIsOneLineForPeopleAndADocumentWithJson) {
   EXPECT_EQ(Json::parse(out.str()), Json::parse(R"({"schema": "sixpoint/scan/1", "error": {
       "code": "no_input", "what": "it is not there", "where": "a.gt3x",
       "hint": "name another file"}})"));
+}
+
+TEST(Context, ProgressIsALineAMinuteInALog) {
+  MemoryEnv memory;
+  std::ostringstream out;
+  std::ostringstream people;
+  std::istringstream in;
+  Context context{memory.env, out, people, in};
+  Progress progress(context, "repairing", 100);
+  progress.at(1);
+  memory.clock.sleep(std::chrono::seconds(30));
+  progress.at(10);
+  EXPECT_EQ(people.str(), "");
+  memory.clock.sleep(std::chrono::seconds(30));
+  progress.at(30);
+  progress.at(31);
+  EXPECT_EQ(people.str(), "repairing: 30 of 100 (30 %), 0.5 a second, 3 min left\n");
+  memory.clock.sleep(std::chrono::minutes(1));
+  progress.at(60);
+  EXPECT_THAT(people.str(),
+              testing::EndsWith("repairing: 60 of 100 (60 %), 0.5 a second, 2 min left\n"));
+  EXPECT_EQ(out.str(), "");
 }
 
 TEST(Context, JsonHasNoNumberThatItCannotWrite) {

@@ -145,6 +145,7 @@ const std::map<std::string, Role>& common_roles() {
                              "--fill-limit",
                              "--epoch",
                              "--cut",
+                             "--link-unaffected",
                              "--why"}) {
       roles.emplace(name, Role::no_path);
     }
@@ -158,6 +159,8 @@ const std::map<std::string, Role>& own_roles() {
   static const std::map<std::string, Role> kRoles = {
       {"repair --output", Role::working_folder},
       {"export --output", Role::folder},
+      {"scan --units", Role::output},
+      {"archive report --output", Role::output},
       {"solve --output", Role::output},
       {"capture --output", Role::output_to_keep},
       {"capture --constants", Role::refused},
@@ -289,6 +292,8 @@ class EveryOutput : public tests::CommandTest {
         {"archive plan --output", {"archive", "plan", path("archive"), "--scan"}},
         {"station --state", {"station", "--port", "0", "--device", "virtual:seed=7"}},
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
+        {"archive report --output", {"archive", "report", path("plan")}},
+        {"scan --units", {"scan", path("archive")}},
     };
     for (const char* option : {"--certificate", "--label", "--record", "--state"}) {
       all.emplace(std::string("jig ") + option, jig);

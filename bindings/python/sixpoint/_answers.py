@@ -117,14 +117,16 @@ class ScannedFile(_Answer):
     calibration_time: Optional[str]
     evidence_mg: Optional[float]
     axes_rotated: bool
+    sides: list[str]
 
 
 @dataclass
 class ScanResult(_Answer):
-    """The answers of `sixpoint.scan`, and how many there are of each verdict."""
+    """The answers of `sixpoint.scan`, how many there are of each verdict, and what units need."""
 
     files: list[ScannedFile]
     summary: dict[str, int]
+    units: list[dict[str, Any]]
 
     @classmethod
     def _parts(cls) -> dict[str, type[_Answer]]:
@@ -137,6 +139,7 @@ class RepairedFile(_Answer):
 
     input: str
     output: Optional[str]
+    linked: Optional[str]
     status: Literal[
         "repaired", "not_affected", "not_repairable", "already_repaired", "outdated", "failed"
     ]
@@ -148,8 +151,11 @@ class RepairedFile(_Answer):
     clipped_before: int
     clipped_after: int
     still_blocks: int
+    verdict: Optional[str]
+    sides: list[str]
     still_error_mg: dict[str, Optional[float]]
     rotation_undone: bool
+    for_a_person: bool
     forced: bool
     cross_axis_applied: bool
     sample_uncertainty_mg: Vector
@@ -162,10 +168,11 @@ class RepairedFile(_Answer):
 
 @dataclass
 class RepairResult(_Answer):
-    """The answers of `sixpoint.repair`, and how many there are of each status."""
+    """The answers of `sixpoint.repair`, how many there are of each status, and what units need."""
 
     files: list[RepairedFile]
     summary: dict[str, Any]
+    units: list[dict[str, Any]]
 
     @classmethod
     def _parts(cls) -> dict[str, type[_Answer]]:

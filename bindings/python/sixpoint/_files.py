@@ -108,6 +108,7 @@ def repair(
     scan: bool = False,
     store: Optional[Path] = None,
     or_scan: bool = False,
+    no_pool: bool = False,
     wide: bool = False,
     store_only: bool = False,
     undo_rotation: bool = False,
@@ -132,6 +133,8 @@ def repair(
         file itself. A store is only read: ``sixpoint repair`` also records there what it did.
     or_scan : bool
         The still periods of the file itself where what is named does not fit.
+    no_pool : bool
+        Do not take constants from the still periods of the unit's other files.
     wide : bool
         Write 16-bit records, in which nothing needs clipping.
     store_only : bool
@@ -162,6 +165,7 @@ def repair(
         "scan": scan,
         "store": _or_empty(store),
         "or_scan": or_scan,
+        "no_pool": no_pool,
         "wide": wide,
         "store_only": store_only,
         "undo_rotation": undo_rotation,

@@ -58,7 +58,8 @@ class BadRecording : public testing::Test {
     EXPECT_THAT(names, testing::Each(testing::AnyOf("in.gt3x", "good.gt3x", "out")))
         << arguments[0];
     const auto out = memory_.files.list("out").value_or(std::vector<std::string>{});
-    EXPECT_THAT(out, testing::Each(testing::AnyOf("manifest.csv", "manifest.json")))
+    EXPECT_THAT(out, testing::Each(testing::AnyOf("manifest.csv", "manifest.json", "units.csv",
+                                                  ".sixpoint-repair.lock")))
         << arguments[0];
   }
   void expect_all_refused(int exit_code) {

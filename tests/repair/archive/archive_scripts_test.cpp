@@ -12,6 +12,11 @@ TEST_F(Archive, ScriptsKeepAnyFolderOneWord) {
   const std::string script = slurm_script({"/p", "sixpoint", 12, 5});
   EXPECT_THAT(script, HasSubstr("#SBATCH --array=0-11%5\n"));
   EXPECT_THAT(slurm_script({"/p", "sixpoint", 12, 0}), HasSubstr("#SBATCH --array=0-11\n"));
+  const std::string odd = "/it's; rm -rf $HOME";
+  EXPECT_THAT(submit_script({odd, "sixpoint", 12, 0}), HasSubstr("plan=" + shell_word(odd) + "\n"));
+  EXPECT_THAT(merge_script({odd, "sixpoint", 12, 0}), HasSubstr("plan=" + shell_word(odd) + "\n"));
+  EXPECT_THAT(submit_script({odd, "sixpoint", 12, 0}),
+              HasSubstr("--dependency=\"afterany:$array\""));
 }
 
 }  // namespace

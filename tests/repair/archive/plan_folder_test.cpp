@@ -70,7 +70,7 @@ TEST_F(HostilePlan, NamesThatLeaveTheArchiveAreRefused) {
 
 TEST_F(HostilePlan, AnotherVersionAndDamageAreDistinguished) {
   const std::string good = text("/plan/plan.json");
-  replace("/plan/plan.json", edited(good, "archive-plan/2", "archive-plan/3"));
+  replace("/plan/plan.json", edited(good, "archive-plan/3", "archive-plan/4"));
   EXPECT_FAILS(read_plan(memory_.files, "/plan"), ErrorCode::configuration);
   replace("/plan/plan.json", good.substr(0, good.size() / 2));
   EXPECT_FAILS(read_plan(memory_.files, "/plan"), ErrorCode::bad_data);

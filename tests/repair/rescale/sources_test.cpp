@@ -33,6 +33,18 @@ TEST(Sources, TheOrderByItsTable) {
   EXPECT_THAT(sources_in_order({no, no, yes, no, yes, yes}), ElementsAre(kScan));
 }
 
+TEST(Sources, TheUnitsOtherFilesAreAskedBehindTheFilesOwnStillPeriods) {
+  NamedSources named;
+  named.unit_files = true;
+  EXPECT_THAT(sources_in_order(named), ElementsAre(kScan, SourceKind::unit_files));
+  named.default_store = true;
+  EXPECT_THAT(sources_in_order(named), ElementsAre(kStore, kScan, SourceKind::unit_files));
+  named.constants = true;
+  EXPECT_THAT(sources_in_order(named), ElementsAre(kConstantsFile));
+  named.or_scan = true;
+  EXPECT_THAT(sources_in_order(named), ElementsAre(kConstantsFile, kScan, SourceKind::unit_files));
+}
+
 TEST(Sources, ADefaultStoreIsNeverAskedBesideSomethingNamed) {
   for (int named = 1; named < 16; ++named) {
     NamedSources sources;
@@ -92,7 +104,8 @@ TEST(Sources, WhatWasUsedIsReadAgainAsItWasWritten) {
 }
 
 TEST(Sources, KindsHaveTheNamesOfTheContract) {
-  for (const auto kind : {kConstantsFile, kCalibrationFile, kScan, kStore}) {
+  for (const auto kind :
+       {kConstantsFile, kCalibrationFile, kScan, kStore, SourceKind::unit_files}) {
     EXPECT_EQ(parse_source_kind(to_string(kind)), kind);
   }
   EXPECT_EQ(to_string(kCalibrationFile), "calibration_file");

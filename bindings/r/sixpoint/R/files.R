@@ -15,13 +15,15 @@ scan_16cpan03 <- function(paths, jobs = 0L, store = "") {
 }
 
 repair_16cpan03 <- function(paths, output, constants = "", calibration_file = "", scan = FALSE,
-                            store = "", or_scan = FALSE, wide = FALSE, store_only = FALSE,
+                            store = "", or_scan = FALSE, no_pool = FALSE, wide = FALSE,
+                            store_only = FALSE,
                             undo_rotation = FALSE, allow_prior = FALSE, salvage = FALSE,
                             force = FALSE, dry_run = FALSE, resume = FALSE,
                             redo_outdated = FALSE, jobs = 0L) {
   options <- options_json(
     constants = constants, calibration_file = calibration_file, scan = scan, store = store,
-    or_scan = or_scan, wide = wide, store_only = store_only, undo_rotation = undo_rotation,
+    or_scan = or_scan, no_pool = no_pool, wide = wide, store_only = store_only,
+    undo_rotation = undo_rotation,
     allow_prior = allow_prior, salvage = salvage, force = force, dry_run = dry_run,
     resume = resume, redo_outdated = redo_outdated, jobs = as.integer(jobs)
   )

@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# An archive on a real Slurm of three nodes on this machine: a task out of memory, one task twice at
+# once, a node killed in mid-run and its tasks requeued, the merge as a job behind the array.
+#   slurm_test.sh SOURCE_FOLDER SIXPOINT_PROGRAM
+set -euo pipefail
+here=$1/tests/schedulers
+skip() { exec "$1/tests/skip.sh" "$2"; }
+for needed in slurmctld slurmd munged sbatch unzip python3; do
+  command -v "$needed" >/dev/null ||
+    skip "$1" "no $needed; install slurmctld slurmd slurm-client munge unzip"
+done
+[ "$(id -u)" -eq 0 ] || skip "$1" "Slurm's daemons need root here"
+source "$here/slurm_cluster.sh"
+source "$here/archive.sh"
+
+scratch=$(mktemp -d)
+chmod 755 "$scratch"
+trap 'stop_cluster; rm -rf "$scratch"' EXIT
+make_archive "$scratch/data" "$1/tests/docs/scenario.json" "$2"
+start_cluster "$scratch/cluster" || { stop_cluster; skip "$1" "Slurm does not start on this machine"; }
+
+# The program as the tasks call it: slow enough to be killed in mid-run; the first task of shard 3
+# takes more memory than it asked for.
+cat >"$scratch/slow" <<WRAPPER
+#!/bin/bash
+if [ "\${SLURM_ARRAY_TASK_ID:-}" = 3 ] && mkdir "$scratch/greedy" 2>/dev/null; then
+  exec python3 -c 'import time; x = bytearray(1500 << 20); time.sleep(60)'
+fi
+[ -z "\${SLURM_ARRAY_TASK_ID:-}" ] || sleep 3
+exec "$2" "\$@"
+WRAPPER
+chmod +x "$scratch/slow"
+export SIXPOINT=$scratch/slow
+data=$scratch/data
+"$2" archive plan "$data/archive" -o "$data/plan" --store "$data/store.db" --shards 6 >/dev/null 2>&1
+jobs=$(bash "$data/plan/submit.sh" "$data/out")
+array=$(sed -n 's/^array //p' <<<"$jobs")
+merge=$(sed -n 's/^merge //p' <<<"$jobs")
+# Shard 1 a second time, at once: the lock lets one of them work, and the other one says so.
+twice=$(sbatch --parsable --array=1 --output="$scratch/twice.log" "$data/plan/run.sbatch" "$data/out")
+
+runs_on_n1() { [ -n "$(squeue -h -w n1 -t R -o %i)" ]; }
+wait_for 30 runs_on_n1 || { echo "FAILED: no task runs on n1"; squeue; exit 1; }
+sleep 1
+lost=$(squeue -h -w n1 -t R -o %i | tr '\n' ' ')
+kill_node n1
+echo "node n1 killed with the tasks $lost"
+
+merged() { [ -f "$data/plan/merge.json" ]; }
+wait_for 150 merged || { echo "FAILED: the merge did not run"; squeue; tail "$scratch"/cluster/log/slurmctld; exit 1; }
+scontrol show job "$merge" | grep -q "afterany:$array\|Dependency=(null)" ||
+  { echo "FAILED: the merge did not wait for the array"; exit 1; }
+requeued=$(scontrol show job "$array" | grep -c 'Restarts=[1-9]' || true)
+[ "$requeued" -ge 1 ] || { echo "FAILED: no task was requeued"; scontrol show job "$array" | grep -E "JobState|Restarts|NodeList"; exit 1; }
+
+# The shard that ran out of memory is named as missing, with the command that runs it again.
+status=$("$2" archive status "$data/plan" --json || true)
+python3 - "$data/plan/merge.json" <<'PYTHON'
+import json, sys
+merged = json.load(open(sys.argv[1]))
+missing = [s["shard"] for s in merged["shards"] if s["state"] != "done"]
+assert missing == [3], f"FAILED: missing shards {missing}"
+PYTHON
+wait_for 60 test -z "$(squeue -h -j "$twice" -o %i 2>/dev/null)" || true
+again=$(sbatch --parsable --array=3 --output="$scratch/again.log" "$data/plan/run.sbatch" "$data/out")
+gone() { [ -z "$(squeue -h -j "$again" -o %i 2>/dev/null)" ]; }
+wait_for 60 gone || { echo "FAILED: shard 3 did not end"; exit 1; }
+"$2" archive merge "$data/plan" >/dev/null 2>&1 || { echo "FAILED: the archive is not complete"; exit 1; }
+compare_with_one_repair "$data/out"
+echo "six tasks on three nodes, $requeued requeued, one out of memory: the same $repaired files as one repair"
