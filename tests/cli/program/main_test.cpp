@@ -62,6 +62,7 @@ TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
+    ::signal(SIGINT, SIG_DFL);  // this process may ignore it, and so would its child
     const std::string script = "exec " + std::string(SIXPOINT_PROGRAM) + " simulate --scenario " +
                                (folder_ / "s.json") + " -o " + (folder_ / "out.gt3x") +
                                to("o", "e");
