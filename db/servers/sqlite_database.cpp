@@ -20,6 +20,9 @@ namespace {
 // "sixp" in ASCII: tells our file from any other SQLite file.
 constexpr std::int64_t kApplicationId = 0x73697870;
 constexpr int kBusyTimeout_ms = 30'000;
+// While a store is made SQLite does not wait for another program that makes it too, but says at
+// once that it is busy: so it is asked again.
+constexpr int kBusyPause_ms = 100;
 
 Error to_error(const SQLite::Exception& exception, const std::string& path) {
   const std::string what = fmt::format("the store answers: {}", exception.what());
@@ -183,19 +186,26 @@ class SqliteDatabase final : public Database {
     if (sqlite3_db_readonly(database_.getHandle(), "main") == 1) {
       return read_only("the store may only be read here");
     }
-    try {
-      SIXPOINT_CHECK(take_if_empty());
-      database_.exec("PRAGMA journal_mode=WAL");
-      database_.exec("PRAGMA synchronous=FULL");
-      set_up_connection();
-    } catch (const SQLite::Exception& exception) {
-      // The file itself was opened: it is the files beside it that cannot be made.
-      if (exception.getErrorCode() == SQLITE_CANTOPEN) {
-        return read_only("nothing can be written beside the store");
+    for (int waited_ms = 0;; waited_ms += kBusyPause_ms) {
+      try {
+        database_.setBusyTimeout(kBusyPause_ms);
+        SIXPOINT_CHECK(take_if_empty());
+        database_.exec("PRAGMA journal_mode=WAL");
+        database_.exec("PRAGMA synchronous=FULL");
+        set_up_connection();
+        database_.setBusyTimeout(kBusyTimeout_ms);
+        return {};
+      } catch (const SQLite::Exception& exception) {
+        // The file itself was opened: it is the files beside it that cannot be made.
+        if (exception.getErrorCode() == SQLITE_CANTOPEN) {
+          return read_only("nothing can be written beside the store");
+        }
+        if (exception.getErrorCode() != SQLITE_BUSY || waited_ms >= kBusyTimeout_ms) {
+          return fail(to_error(exception, path_));
+        }
       }
-      return fail(to_error(exception, path_));
+      sqlite3_sleep(kBusyPause_ms);
     }
-    return {};
   }
 
   // For a connection that only reads; the first read shows whether it can.
@@ -213,11 +223,13 @@ class SqliteDatabase final : public Database {
   // An empty file gets our mark before anything else, and before WAL mode: then the mark stands in
   // the file itself, where look_at() finds it whatever happens next.
   Status take_if_empty() {
+    // In this order: another program that makes the store now sets the mark before it makes tables.
+    const bool empty = database_.execAndGet("SELECT count(*) FROM sqlite_schema").getInt() == 0;
     const std::int64_t id = database_.execAndGet("PRAGMA application_id").getInt64();
     if (id == kApplicationId) {
       return {};
     }
-    if (id != 0 || database_.execAndGet("SELECT count(*) FROM sqlite_schema").getInt() != 0) {
+    if (id != 0 || !empty) {
       return fail(not_ours(path_));
     }
     database_.exec("PRAGMA synchronous=FULL");
@@ -386,8 +398,11 @@ Result<Found> look_at_database(const std::string& path) {
     if (has_our_mark(looked)) {
       return Found::ours;
     }
-    const std::int64_t id = looked.execAndGet("PRAGMA application_id").getInt64();
     const bool empty = looked.execAndGet("SELECT count(*) FROM sqlite_schema").getInt64() == 0;
+    const std::int64_t id = looked.execAndGet("PRAGMA application_id").getInt64();
+    if (id == kApplicationId) {
+      return Found::ours;  // made at this moment
+    }
     if (id != 0 || !empty) {
       return fail(not_ours(path));
     }

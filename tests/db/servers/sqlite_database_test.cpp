@@ -2,6 +2,8 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <future>
+#include <latch>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -45,6 +47,26 @@ class SqliteStoreTest : public testing::Test {
   sixpoint::tests::TemporaryFolder folder_;
   MemoryEnv memory_;
 };
+
+// A station opens its store from several threads, and two stations may begin at the same moment.
+TEST_F(SqliteStoreTest, ThoseThatMakeAStoreAtOnceAllHaveIt) {
+  for (int round = 0; round < 25; ++round) {
+    const std::string name = folder_ / ("new" + std::to_string(round) + ".db");
+    std::latch together(4);
+    std::vector<std::future<Status>> made;
+    for (int i = 0; i < 4; ++i) {
+      made.push_back(std::async(std::launch::async, [&]() -> Status {
+        together.arrive_and_wait();
+        SIXPOINT_ASSIGN(auto store, Store::open(posix_env(), name));
+        return store.station_events() ? Status() : fail(ErrorCode::io, "it cannot be read");
+      }));
+    }
+    for (auto& each : made) {
+      const Status status = each.get();
+      EXPECT_OK(status);
+    }
+  }
+}
 
 TEST_F(SqliteStoreTest, OpensOnlyStores) {
   std::ofstream(path()) << "this is a text file, long enough to be looked at as a database header "
