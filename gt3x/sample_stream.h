@@ -93,7 +93,8 @@ void row_times_ns(std::span<const RowRun> runs, std::uint64_t rate_hz, std::uint
 enum class RowValue : std::uint8_t { lsb_int16, g_float32, g_float64 };
 std::size_t bytes_of_row(RowValue value);
 
-// All rows, one after the other, in memory of malloc() that the one who takes `data` frees by free().
+// All rows, one after the other, in memory of malloc() that the one who takes `data` frees by
+// free().
 struct RowArray {
   struct Free {
     void operator()(void* memory) const { std::free(memory); }
