@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/csv_field.h"
 #include "db/exchange.h"
 #include "db/export_json.h"
 #include "db/history.h"
@@ -60,7 +61,7 @@ std::string row_line(const HistoryRow& row) {
 
 // One field of a CSV file (RFC 4180), with one addition that spreadsheets do not mind: an empty
 // field is NULL, "" is an empty text.
-std::string csv_field(const Value& value) {
+std::string field(const Value& value) {
   if (const auto* integer = std::get_if<std::int64_t>(&value)) {
     return std::to_string(*integer);
   }
@@ -68,14 +69,7 @@ std::string csv_field(const Value& value) {
   if (text == nullptr) {
     return "";
   }
-  if (!text->empty() && text->find_first_of(",\"\r\n") == std::string::npos) {
-    return *text;
-  }
-  std::string quoted = "\"";
-  for (const char c : *text) {
-    quoted += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return quoted + '"';
+  return text->empty() ? "\"\"" : csv_field(*text);
 }
 
 Status export_table(Database& database, FileSystem& files, const Table& table,
@@ -89,7 +83,7 @@ Status export_table(Database& database, FileSystem& files, const Table& table,
     ++report.rows;
     std::string line;
     for (std::size_t i = 0; i + 1 < row.size(); ++i) {
-      line += csv_field(row[i]) + ",";
+      line += field(row[i]) + ",";
     }
     const auto* hash = std::get_if<Bytes>(&row.back());
     return out.append(line + (hash == nullptr ? "" : to_hex(*hash)) + "\r\n");

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/csv_field.h"
 #include "cli/context.h"
 #include "db/records.h"
 #include "station/records/software.h"
@@ -53,15 +54,7 @@ std::string field(const Json& value) {
   if (!value.is_string()) {
     return "";
   }
-  const auto& text = value.get_ref<const std::string&>();
-  if (text.find_first_of(",\"\r\n") == std::string::npos) {
-    return text;
-  }
-  std::string quoted = "\"";
-  for (const char c : text) {
-    quoted += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return quoted + "\"";
+  return csv_field(value.get_ref<const std::string&>());
 }
 
 std::string line_of(const Json& entry) {

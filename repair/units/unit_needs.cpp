@@ -7,6 +7,8 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "base/csv_field.h"
+
 namespace sixpoint::repair {
 namespace {
 
@@ -22,18 +24,6 @@ std::string files_text(std::size_t files) {
 
 std::string serial_text(const std::string& serial) {
   return serial.empty() ? "(not said)" : printable(serial, 40);
-}
-
-// A field as RFC 4180 has it.
-std::string field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) {
-    return text;
-  }
-  std::string quoted = "\"";
-  for (const char c : text) {
-    quoted += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return quoted + "\"";
 }
 
 }  // namespace
@@ -166,10 +156,11 @@ std::string units_csv(const std::vector<UnitNeeds>& rows) {
       "unit,files,affected,repaired,waiting,refused,scanned,cannot_tell,failed,sides_covered,"
       "sides_missing,help\r\n";
   for (const UnitNeeds& row : rows) {
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\r\n", field(printable(row.serial, 100)),
-                       row.files, row.affected, row.repaired, row.waiting, row.refused, row.scanned,
-                       row.cannot_tell, row.failed, fmt::join(row.sides_covered, " "),
-                       fmt::join(row.sides_missing, " "), field(row.help));
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\r\n",
+                       csv_field(printable(row.serial, 100)), row.files, row.affected, row.repaired,
+                       row.waiting, row.refused, row.scanned, row.cannot_tell, row.failed,
+                       fmt::join(row.sides_covered, " "), fmt::join(row.sides_missing, " "),
+                       csv_field(row.help));
   }
   return csv;
 }
