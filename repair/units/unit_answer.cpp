@@ -44,8 +44,7 @@ void put_in_order(std::vector<UnitFile>& files) {
     };
     return key(a) < key(b);
   });
-  const auto copies = std::ranges::unique(files, same_blocks);
-  files.erase(copies.begin(), copies.end());
+  files.erase(std::unique(files.begin(), files.end(), same_blocks), files.end());
 }
 
 std::string name_of(const UnitFile& file) { return printable(file.path, 200); }
