@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include <fmt/format.h>
+#include <spdlog/logger.h>
 
 #include "base/sha256.h"
 #include "cli/files/archive_options.h"

@@ -99,7 +99,7 @@ class Lanes::Lane {
     std::string last_refusal;
     JigProgress progress;
     std::vector<Pose> open;
-    UtcTime started{};
+    UtcTime started;
   };
   // A calibration file under way, also while its unit is away.
   struct CaptureView {
