@@ -17,7 +17,7 @@ if [ $# -gt 0 ]; then
 else
   mapfile -t files < <(git ls-files 'base/*.cpp' 'gt3x/*.cpp' 'calib/*.cpp' 'sim/*.cpp' \
     'device/*.cpp' 'mocks/*.cpp' 'db/*.cpp' 'repair/*.cpp' 'gap/*.cpp' 'station/*.cpp' 'cli/*.cpp' \
-    'packaging/*.cpp')
+    'packaging/*.cpp' 'bindings/*.cpp')
   # In the order of their last change; a clone without history leaves the order as it is.
   mapfile -t files < <({ git log --name-only --diff-filter=d --pretty=format: -n 400 -- '*.cpp'
                          printf '%s\n' "${files[@]}"; } |

@@ -5,6 +5,7 @@ namespace sixpoint::python {
 namespace py = pybind11;
 
 void register_failures(py::module_& /*module*/) {
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): the type is pybind11's.
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) {

@@ -120,8 +120,8 @@ void fill_times(const sixpoint_reading& reading, double* times_s) {
                        std::span(times_ns).first(count));
     for (std::size_t i = 0; i < count; ++i) {
       constexpr std::int64_t kHundredth_ns = 10'000'000;
-      times_s[row + i] =
-          static_cast<double>((times_ns[i] + kHundredth_ns / 2) / kHundredth_ns) / 100;
+      const std::int64_t hundredths = (times_ns[i] + kHundredth_ns / 2) / kHundredth_ns;
+      times_s[row + i] = static_cast<double>(hundredths) / 100;
     }
   }
 }
