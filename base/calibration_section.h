@@ -22,8 +22,8 @@
 #include <optional>
 #include <span>
 
-#include "base/constants.h"
 #include "base/result.h"
+#include "base/stored_constants.h"
 #include "base/time.h"
 
 namespace sixpoint {

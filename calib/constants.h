@@ -15,9 +15,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "base/constants.h"
 #include "base/measure.h"
 #include "base/result.h"
+#include "base/stored_constants.h"
 #include "base/time.h"
 
 namespace sixpoint::calib {

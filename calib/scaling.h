@@ -17,9 +17,9 @@
 #include <span>
 #include <vector>
 
-#include "base/constants.h"
 #include "base/measure.h"
 #include "base/result.h"
+#include "base/stored_constants.h"
 #include "calib/constants.h"
 
 namespace sixpoint::calib {

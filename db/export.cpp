@@ -2,7 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
-#include "base/csv_field.h"
+#include "base/text/csv_field.h"
 #include "db/exchange.h"
 #include "db/export_json.h"
 #include "db/history.h"

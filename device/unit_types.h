@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "base/constants.h"
 #include "base/measure.h"
 #include "base/sha256.h"
+#include "base/stored_constants.h"
 #include "base/time.h"
 #include "calib/constants.h"
 

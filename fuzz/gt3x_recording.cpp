@@ -1,9 +1,9 @@
 // A whole file: opened, read to its end, exported, copied. Errors are answers; crashes are not.
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
-#include "gt3x/raw_csv.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
+#include "gt3x/rows/raw_csv.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sixpoint;

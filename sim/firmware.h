@@ -13,7 +13,7 @@
 #include <optional>
 #include <string_view>
 
-#include "base/constants.h"
+#include "base/stored_constants.h"
 #include "gt3x/log/samples.h"
 #include "sim/effects/effect.h"
 #include "sim/unit_truth.h"

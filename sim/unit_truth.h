@@ -9,8 +9,8 @@
 #include <optional>
 #include <string>
 
-#include "base/constants.h"
 #include "base/measure.h"
+#include "base/stored_constants.h"
 #include "base/time.h"
 #include "calib/constants.h"
 

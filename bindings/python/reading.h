@@ -14,7 +14,7 @@
 #include <pybind11/pybind11.h>
 
 #include "gt3x/recording.h"
-#include "gt3x/sample_stream.h"
+#include "gt3x/rows/sample_stream.h"
 
 namespace sixpoint::python {
 

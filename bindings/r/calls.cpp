@@ -16,7 +16,7 @@
 
 #include "base/measure.h"
 #include "gt3x/recording.h"
-#include "gt3x/sample_stream.h"
+#include "gt3x/rows/sample_stream.h"
 #include "repair/batch/answers.h"
 #include "repair/batch/reading.h"
 #include "repair/batch/requests.h"

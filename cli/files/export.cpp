@@ -13,10 +13,10 @@
 #include "cli/workers.h"
 #include "gt3x/container/gzip_writer.h"
 #include "gt3x/forms/small_records.h"
-#include "gt3x/imu_csv.h"
-#include "gt3x/records_csv.h"
+#include "gt3x/rows/imu_csv.h"
+#include "gt3x/rows/records_csv.h"
+#include "gt3x/rows/samples_npy.h"
 #include "gt3x/salvage_losses.h"
-#include "gt3x/samples_npy.h"
 #include "repair/triage/survey.h"
 #include "station/records/software.h"
 

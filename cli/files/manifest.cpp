@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
-#include "base/csv_field.h"
+#include "base/text/csv_field.h"
 #include "cli/context.h"
 #include "db/records.h"
 #include "station/records/software.h"

@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
-#include "base/html.h"
+#include "base/text/html.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/workers.h"

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "base/svg.h"
+#include "base/text/svg.h"
 
 namespace sixpoint::gap {
 namespace {

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "base/html.h"
+#include "base/text/html.h"
 #include "gap/report/chart.h"
 
 namespace sixpoint::gap {

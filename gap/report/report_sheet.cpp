@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "base/svg.h"
+#include "base/text/svg.h"
 #include "gap/report/chart.h"
 
 namespace sixpoint::gap {

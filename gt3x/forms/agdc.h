@@ -15,9 +15,9 @@
 #include <string_view>
 #include <vector>
 
-#include "base/constants.h"
 #include "base/measure.h"
 #include "base/result.h"
+#include "base/stored_constants.h"
 #include "gt3x/log/samples.h"
 
 namespace sixpoint::gt3x {

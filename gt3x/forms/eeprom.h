@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "base/constants.h"
 #include "base/result.h"
+#include "base/stored_constants.h"
 #include "base/time.h"
 
 namespace sixpoint::gt3x {

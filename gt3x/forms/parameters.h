@@ -17,8 +17,8 @@
 #include <string>
 #include <utility>
 
-#include "base/constants.h"
 #include "base/env.h"
+#include "base/stored_constants.h"
 #include "base/time.h"
 
 namespace sixpoint::gt3x {

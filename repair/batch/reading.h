@@ -8,7 +8,7 @@
 #pragma once
 
 #include "gt3x/recording.h"
-#include "gt3x/sample_stream.h"
+#include "gt3x/rows/sample_stream.h"
 #include "repair/triage/inspection.h"
 
 namespace sixpoint::repair {

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "base/html.h"
-#include "base/svg.h"
+#include "base/text/html.h"
+#include "base/text/svg.h"
 #include "repair/compare/compare.h"
 
 namespace sixpoint::repair {

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "base/html.h"
-#include "base/svg.h"
+#include "base/text/html.h"
+#include "base/text/svg.h"
 #include "repair/impact/impact.h"
 
 namespace sixpoint::repair {

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "base/html.h"
-#include "base/svg.h"
+#include "base/text/html.h"
+#include "base/text/svg.h"
 #include "gt3x/recording.h"
 #include "repair/impact/epochs.h"
 #include "repair/triage/triage.h"

@@ -20,7 +20,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/constants.h"
+#include "base/stored_constants.h"
 #include "calib/constants.h"
 #include "calib/scaling.h"
 #include "gt3x/container/byte_source.h"

@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "base/constants.h"
 #include "base/env.h"
+#include "base/stored_constants.h"
 #include "calib/coverage.h"
 #include "gt3x/gap_list.h"
 #include "gt3x/recording.h"

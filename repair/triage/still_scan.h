@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/constants.h"
+#include "base/stored_constants.h"
 #include "calib/scaling.h"
 #include "calib/still_blocks.h"
 #include "gt3x/log/samples.h"

@@ -15,8 +15,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "base/constants.h"
 #include "base/env.h"
+#include "base/stored_constants.h"
 #include "calib/still_blocks.h"
 #include "gt3x/forms/eeprom.h"
 #include "gt3x/log/log_reader.h"

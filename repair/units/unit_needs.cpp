@@ -7,7 +7,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "base/csv_field.h"
+#include "base/text/csv_field.h"
 
 namespace sixpoint::repair {
 namespace {

@@ -15,9 +15,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "base/constants.h"
 #include "base/env.h"
 #include "base/result.h"
+#include "base/stored_constants.h"
 #include "db/store.h"
 #include "station/limits/verdict.h"
 

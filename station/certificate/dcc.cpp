@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/html.h"
 #include "base/measure.h"
+#include "base/text/html.h"
 #include "station/limits/limits.h"
 
 namespace sixpoint::station {

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "base/html.h"
-#include "base/svg.h"
+#include "base/text/html.h"
+#include "base/text/svg.h"
 #include "station/records/station_records.h"
 
 namespace sixpoint::station {

@@ -60,9 +60,9 @@
 #include <utility>
 #include <vector>
 
-#include "base/constants.h"
 #include "base/measure.h"
 #include "base/result.h"
+#include "base/stored_constants.h"
 #include "calib/constants.h"
 #include "device/jig.h"
 #include "device/unit_types.h"

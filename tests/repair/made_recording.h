@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "base/constants.h"
 #include "base/env.h"
+#include "base/stored_constants.h"
 #include "gt3x/forms/info.h"
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/record.h"

@@ -11,8 +11,8 @@
 #include "gt3x/forms/agdc.h"
 #include "gt3x/gap_list.h"
 #include "gt3x/log/samples.h"
-#include "gt3x/raw_csv.h"
 #include "gt3x/recording.h"
+#include "gt3x/rows/raw_csv.h"
 
 namespace sixpoint::gt3x {
 

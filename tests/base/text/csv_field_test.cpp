@@ -1,4 +1,4 @@
-#include "base/csv_field.h"
+#include "base/text/csv_field.h"
 
 #include <gtest/gtest.h>
 

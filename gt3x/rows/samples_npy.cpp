@@ -1,11 +1,11 @@
-#include "gt3x/samples_npy.h"
+#include "gt3x/rows/samples_npy.h"
 
 #include <bit>
 #include <cstring>
 
 #include <fmt/format.h>
 
-#include "gt3x/sample_rows.h"
+#include "gt3x/rows/sample_rows.h"
 
 namespace sixpoint::gt3x {
 namespace {

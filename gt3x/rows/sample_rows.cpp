@@ -1,4 +1,4 @@
-#include "gt3x/sample_rows.h"
+#include "gt3x/rows/sample_rows.h"
 
 #include <cmath>
 #include <utility>

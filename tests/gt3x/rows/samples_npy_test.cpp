@@ -1,4 +1,4 @@
-#include "gt3x/samples_npy.h"
+#include "gt3x/rows/samples_npy.h"
 
 #include <cstring>
 

@@ -16,8 +16,8 @@
 
 #include <cstdint>
 
-#include "gt3x/raw_csv.h"
 #include "gt3x/recording.h"
+#include "gt3x/rows/raw_csv.h"
 
 namespace sixpoint::gt3x {
 

@@ -1,4 +1,4 @@
-#include "gt3x/records_csv.h"
+#include "gt3x/rows/records_csv.h"
 
 #include <cmath>
 #include <fstream>

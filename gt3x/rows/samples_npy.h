@@ -17,8 +17,8 @@
 // It has no times: row n belongs to start + n / rate, where nothing is left out.
 #pragma once
 
-#include "gt3x/raw_csv.h"
 #include "gt3x/recording.h"
+#include "gt3x/rows/raw_csv.h"
 
 namespace sixpoint::gt3x {
 

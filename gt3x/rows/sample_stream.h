@@ -24,8 +24,8 @@
 
 #include "base/measure.h"
 #include "gt3x/gap_list.h"
-#include "gt3x/raw_csv.h"
 #include "gt3x/recording.h"
+#include "gt3x/rows/raw_csv.h"
 
 namespace sixpoint::gt3x {
 

@@ -1,4 +1,4 @@
-#include "gt3x/imu_csv.h"
+#include "gt3x/rows/imu_csv.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

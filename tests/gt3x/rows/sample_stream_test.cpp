@@ -1,4 +1,4 @@
-#include "gt3x/sample_stream.h"
+#include "gt3x/rows/sample_stream.h"
 
 #include <cstring>
 
@@ -6,7 +6,7 @@
 
 #include "base/memory_env.h"
 #include "expect_result.h"
-#include "gt3x/samples_npy.h"
+#include "gt3x/rows/samples_npy.h"
 #include "gt3x_made_log.h"
 #include "shared_data.h"
 

@@ -1,11 +1,11 @@
-#include "base/svg.h"
+#include "base/text/svg.h"
 
 #include <cmath>
 #include <iterator>
 
 #include <fmt/format.h>
 
-#include "base/html.h"
+#include "base/text/html.h"
 
 namespace sixpoint {
 

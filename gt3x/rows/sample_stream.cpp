@@ -1,4 +1,4 @@
-#include "gt3x/sample_stream.h"
+#include "gt3x/rows/sample_stream.h"
 
 #include <algorithm>
 #include <cstring>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "gt3x/sample_rows.h"
+#include "gt3x/rows/sample_rows.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -276,8 +276,8 @@ std::size_t bytes_of_row(RowValue value) {
 namespace {
 
 template <class Row>
-Result<std::size_t> read_at(SampleStream& stream, void* memory, std::uint64_t row,
-                            std::uint64_t count) {
+Result<std::size_t> read_rows_at(SampleStream& stream, void* memory, std::uint64_t row,
+                                 std::uint64_t count) {
   return stream.read(std::span(static_cast<Row*>(memory) + row, static_cast<std::size_t>(count)));
 }
 
@@ -289,8 +289,8 @@ Error too_large(std::uint64_t most_bytes) {
 }
 
 // Changes the size of the array's memory, which keeps its content.
-Status resize(RowArray& array, std::uint64_t rows, std::size_t row_bytes,
-              std::uint64_t most_bytes) {
+Status hold_rows(RowArray& array, std::uint64_t rows, std::size_t row_bytes,
+                 std::uint64_t most_bytes) {
   const std::uint64_t most_rows = most_bytes / row_bytes;
   if (array.rows >= most_rows && rows > array.rows) {
     return fail(too_large(most_bytes));
@@ -314,20 +314,20 @@ Result<RowArray> read_all_rows(SampleStream& stream, RowValue value,
   RowArray array;
   std::uint64_t room = std::clamp<std::uint64_t>(
       stream.expected_rows(), 1024, std::max<std::uint64_t>(1024, options.most_bytes / row_bytes));
-  SIXPOINT_CHECK(resize(array, room, row_bytes, options.most_bytes));
+  SIXPOINT_CHECK(hold_rows(array, room, row_bytes, options.most_bytes));
   for (;;) {
     if (array.rows == room) {
       room += room / 2 + kRowsBetween;
-      SIXPOINT_CHECK(resize(array, room, row_bytes, options.most_bytes));
+      SIXPOINT_CHECK(hold_rows(array, room, row_bytes, options.most_bytes));
       room = std::min(room, options.most_bytes / row_bytes);
     }
     const std::uint64_t wanted = std::min(room - array.rows, kRowsBetween);
     void* const memory = array.data.get();
     const auto got = value == RowValue::lsb_int16
-                         ? read_at<Counts>(stream, memory, array.rows, wanted)
+                         ? read_rows_at<Counts>(stream, memory, array.rows, wanted)
                      : value == RowValue::g_float32
-                         ? read_at<PerAxis<float>>(stream, memory, array.rows, wanted)
-                         : read_at<PerAxis<double>>(stream, memory, array.rows, wanted);
+                         ? read_rows_at<PerAxis<float>>(stream, memory, array.rows, wanted)
+                         : read_rows_at<PerAxis<double>>(stream, memory, array.rows, wanted);
     SIXPOINT_ASSIGN(const std::size_t rows, got);
     array.rows += rows;
     if (stream.rows_at_hand() > options.most_bytes / row_bytes - array.rows) {
@@ -341,7 +341,7 @@ Result<RowArray> read_all_rows(SampleStream& stream, RowValue value,
     }
   }
   if (array.rows > 0) {
-    SIXPOINT_CHECK(resize(array, array.rows, row_bytes, UINT64_MAX));
+    SIXPOINT_CHECK(hold_rows(array, array.rows, row_bytes, UINT64_MAX));
   }
   return array;
 }

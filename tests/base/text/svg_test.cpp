@@ -1,4 +1,4 @@
-#include "base/svg.h"
+#include "base/text/svg.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "gt3x/csv_header.h"
+#include "gt3x/rows/csv_header.h"
 
 #include <chrono>
 

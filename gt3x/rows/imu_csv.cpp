@@ -1,4 +1,4 @@
-#include "gt3x/imu_csv.h"
+#include "gt3x/rows/imu_csv.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "gt3x/csv_header.h"
 #include "gt3x/forms/sensor_schema.h"
+#include "gt3x/rows/csv_header.h"
 
 namespace sixpoint::gt3x {
 namespace {

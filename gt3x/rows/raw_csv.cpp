@@ -1,4 +1,4 @@
-#include "gt3x/raw_csv.h"
+#include "gt3x/rows/raw_csv.h"
 
 #include <array>
 #include <charconv>
@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include "gt3x/csv_header.h"
-#include "gt3x/sample_rows.h"
+#include "gt3x/rows/csv_header.h"
+#include "gt3x/rows/sample_rows.h"
 
 namespace sixpoint::gt3x {
 namespace {

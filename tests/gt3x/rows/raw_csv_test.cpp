@@ -1,4 +1,4 @@
-#include "gt3x/raw_csv.h"
+#include "gt3x/rows/raw_csv.h"
 
 #include <algorithm>
 #include <fstream>
