@@ -1,9 +1,7 @@
 // Every German text of the page. The type makes it complete: `npm run check` fails where one is missing.
-import type { Lane, Pose, Proportion, Result, Signature, Title } from './types';
-import type { Strings } from './strings';
+import type { Lane, Proportion, Result, Signature, Title } from './types';
+import { axisOf, faceName, type Strings } from './english';
 
-const axisOf = (pose: Pose) => pose[1].toUpperCase();
-const faceName = (pose: Pose) => `${pose[0] === '+' ? '+' : '−'}${axisOf(pose)}`;
 const decimal = (value: number, places: number) => value.toFixed(places).replace('.', ',');
 
 const verdicts: Record<string, string> = {
