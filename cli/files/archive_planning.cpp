@@ -161,7 +161,7 @@ Status take_plan_folder(const std::string& folder, FileSystem& files, Outputs& o
 // The still periods of the units' files together: one pass over the affected files.
 void ask_units(const Options& options, const ArchiveDraft& draft, Context& context,
                PlannedArchive& planned) {
-  if (!repair::asks_units(planned.plan.repair, draft.snapshot != nullptr)) {
+  if (!repair::asks_units(planned.plan.repair, draft.snapshot)) {
     return;
   }
   repair::ask_units(

@@ -202,33 +202,34 @@ Result<PlannedArchive> plan_archive(Env& env, const ArchiveDraft& draft) {
   return Planner(env, draft).make();
 }
 
-bool asks_units(const ArchiveRepair& repair, bool has_store) {
-  NamedSources named;
-  named.constants = repair.given.has_value();
-  named.calibration_file = repair.calibration_file.has_value();
-  named.scan = repair.scan;
-  named.store = has_store && repair.store_named;
-  named.or_scan = repair.or_scan;
-  named.default_store = has_store && !repair.store_named;
-  named.unit_files = !repair.no_pool;
-  return sources_in_order(named).back() == SourceKind::unit_files;
+ConstantsFinderOptions finder_options(const ArchiveRepair& repair,
+                                      const ConstantsSnapshot* snapshot) {
+  ConstantsFinderOptions options;
+  options.given = repair.given;
+  options.snapshot = snapshot;
+  options.scan = repair.scan;
+  options.store_named = repair.store_named;
+  options.or_scan = repair.or_scan;
+  options.allow_prior = repair.options.allow_prior;
+  if (repair.calibration_file) {
+    options.calibration_file = repair.calibration_file->path;
+  }
+  return options;
+}
+
+bool asks_units(const ArchiveRepair& repair, const ConstantsSnapshot* snapshot) {
+  ConstantsFinderOptions options = finder_options(repair, snapshot);
+  UnitPool pool;
+  options.unit = repair.no_pool ? nullptr : &pool;
+  return sources_in_order(options).back() == SourceKind::unit_files;
 }
 
 void ask_units(Env& env, const ConstantsSnapshot* snapshot, const ForEach& for_each,
                PlannedArchive& planned) {
   const ArchiveRepair& repair = planned.plan.repair;
   UnitPool pool;
-  ConstantsFinderOptions options;
-  options.given = repair.given;
-  options.scan = repair.scan;
-  options.store_named = repair.store_named;
-  options.or_scan = repair.or_scan;
-  options.allow_prior = repair.options.allow_prior;
-  options.snapshot = snapshot;
+  ConstantsFinderOptions options = finder_options(repair, snapshot);
   options.unit = &pool;
-  if (repair.calibration_file) {
-    options.calibration_file = repair.calibration_file->path;
-  }
   ConstantsFinder finder(env, std::move(options));
   for_each(planned.files.size(), [&](std::size_t i) {
     collect(env.files, planned.plan.input_of(planned.files[i]), finder, repair.options.still);

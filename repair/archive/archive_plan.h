@@ -19,6 +19,7 @@
 
 #include "base/env.h"
 #include "base/link_file.h"
+#include "repair/rescale/constants_finder.h"
 #include "repair/rescale/constants_snapshot.h"
 #include "repair/rescale/repair_file.h"
 #include "repair/triage/file_tree.h"
@@ -114,9 +115,14 @@ inline constexpr std::size_t kMostShards = 100'000;
 // usage where more shards are asked for than kMostShards.
 Result<PlannedArchive> plan_archive(Env& env, const ArchiveDraft& draft);
 
+// The sources of constants that a plan names, with `snapshot` (which may be null) for its store;
+// the unit's other files are the caller's to add.
+ConstantsFinderOptions finder_options(const ArchiveRepair& repair,
+                                      const ConstantsSnapshot* snapshot);
+
 // Would a repair ask the unit's other files at all? Not where other sources are named alone, nor
 // with no_pool.
-bool asks_units(const ArchiveRepair& repair, bool has_store);
+bool asks_units(const ArchiveRepair& repair, const ConstantsSnapshot* snapshot);
 
 // How the files are looked at: work(i) for every i below `count`, on as many threads as the caller
 // wants.

@@ -123,13 +123,7 @@ class ShardRun {
 
   Status prepare_constants() {
     SIXPOINT_ASSIGN(snapshot_, read_snapshot(files_, folder_, plan_));
-    ConstantsFinderOptions finder;
-    finder.given = plan_.repair.given;
-    finder.scan = plan_.repair.scan;
-    finder.store_named = plan_.repair.store_named;
-    finder.or_scan = plan_.repair.or_scan;
-    finder.allow_prior = plan_.repair.options.allow_prior;
-    finder.snapshot = snapshot_ ? &*snapshot_ : nullptr;
+    ConstantsFinderOptions finder = finder_options(plan_.repair, snapshot_ ? &*snapshot_ : nullptr);
     SIXPOINT_ASSIGN(auto units, read_units(files_, folder_, plan_));
     if (units) {
       units_.emplace(*std::move(units));
@@ -143,7 +137,6 @@ class ShardRun {
                     "the calibration file changed since the plan was made", file.path,
                     "put the old one back, or make another plan");
       }
-      finder.calibration_file = file.path;
     }
     finder_.emplace(env_, std::move(finder));
     return {};

@@ -69,6 +69,19 @@ std::string recording_kind(const Survey& survey) {
                                                                              : "file_scan";
 }
 
+std::vector<SourceKind> sources_in_order(const ConstantsFinderOptions& options) {
+  const bool has_store = options.store != nullptr || options.snapshot != nullptr;
+  NamedSources named;
+  named.constants = options.given.has_value();
+  named.calibration_file = options.calibration_file.has_value();
+  named.scan = options.scan;
+  named.store = has_store && options.store_named;
+  named.or_scan = options.or_scan;
+  named.default_store = has_store && !options.store_named;
+  named.unit_files = options.unit != nullptr;
+  return sources_in_order(named);
+}
+
 ConstantsFinder::ConstantsFinder(Env& env, ConstantsFinderOptions options)
     : env_(env), options_(std::move(options)) {}
 
@@ -178,19 +191,6 @@ Status ConstantsFinder::ask_scan(const std::string& path, const Survey& survey,
   return {};
 }
 
-std::vector<SourceKind> ConstantsFinder::order() const {
-  const bool has_store = options_.store != nullptr || options_.snapshot != nullptr;
-  NamedSources named;
-  named.constants = options_.given.has_value();
-  named.calibration_file = options_.calibration_file.has_value();
-  named.scan = options_.scan;
-  named.store = has_store && options_.store_named;
-  named.or_scan = options_.or_scan;
-  named.default_store = has_store && !options_.store_named;
-  named.unit_files = options_.unit != nullptr;
-  return sources_in_order(named);
-}
-
 Status ConstantsFinder::ask(SourceKind kind, const std::string& path, const Survey& survey,
                             ConstantsChoice& choice) {
   switch (kind) {
@@ -221,7 +221,7 @@ Status ConstantsFinder::ask(SourceKind kind, const std::string& path, const Surv
 
 Result<ConstantsChoice> ConstantsFinder::choose(const std::string& path, const Survey& survey) {
   ConstantsChoice choice;
-  for (const SourceKind kind : order()) {
+  for (const SourceKind kind : sources_in_order(options_)) {
     SIXPOINT_CHECK(ask(kind, path, survey, choice));
     if (choice.chosen || (choice.for_a_person && !options_.or_scan)) {
       break;

@@ -52,6 +52,9 @@ struct ConstantsFinderOptions {
   calib::StillBlockOptions still;
 };
 
+// The sources that a finder with these options asks, in order.
+std::vector<SourceKind> sources_in_order(const ConstantsFinderOptions& options);
+
 // Solves the still blocks of a surveyed recording; serial and filter of the report are filled in.
 // bad_data where the recording's constants cannot be undone or it was repaired already.
 Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,
@@ -77,7 +80,6 @@ class ConstantsFinder final : public ConstantsSource {
     std::string serial;
     std::string refusal;  // why there is no record
   };
-  std::vector<SourceKind> order() const;
   Status ask(SourceKind kind, const std::string& path, const Survey& survey,
              ConstantsChoice& choice);
   Status ask_store(const Survey& survey, ConstantsChoice& choice);

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "station/run/jig_judgement.h"
+#include "station/run/jig_watch.h"
+#include "station/run/unit_stream.h"
 
 namespace sixpoint::station {
 
@@ -23,34 +25,12 @@ double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
-device::StreamStatistics sum_of(device::StreamStatistics sum, const device::StreamStatistics& of) {
-  sum.samples += of.samples;
-  sum.lost_samples += of.lost_samples;
-  sum.duplicate_reports += of.duplicate_reports;
-  sum.damaged_reports += of.damaged_reports;
-  sum.overflowed_blocks += of.overflowed_blocks;
-  sum.failed_transfers += of.failed_transfers;
-  sum.clock_jumps += of.clock_jumps;
-  sum.clock_jumped_s += of.clock_jumped_s;
-  return sum;
-}
-
 // A returned unit of 2013-14: the firmware knows two configurations for it.
 bool has_two_filters(const std::string& serial,
                      const std::optional<device::CalibrationPage>& page) {
   constexpr std::int64_t kFilterChange_unix_s = 1'395'619'200;  // 2014-03-24
   return serial.starts_with("MOS") &&
          (!page || page->calibrated < from_unix_seconds(kFilterChange_unix_s));
-}
-
-// A program that was killed leaves its unit streaming, and such a unit takes no other filter.
-Status choose_filter(device::Unit& unit, calib::FilterConfiguration filter) {
-  Status chosen = unit.set_filter(filter);
-  if (chosen || chosen.error().code != ErrorCode::io) {
-    return chosen;
-  }
-  SIXPOINT_CHECK(unit.stop_stream());
-  return unit.set_filter(filter);
 }
 
 class Session {
@@ -61,7 +41,9 @@ class Session {
         env_(env),
         options_(options),
         hooks_(hooks),
-        gravity_g_(options.gravity.g()) {}
+        gravity_g_(options.gravity.g()),
+        stream_(options.filter, options.run.rate_hz),
+        watch_(options.jig_watch) {}
 
   Result<JigReport> run(const std::optional<JigResume>& resume);
 
@@ -72,16 +54,8 @@ class Session {
   Status reopen(const Error& error);
   Status come_back(JigRun& run, const Error& error);
   Status end_away(JigRun& run, const Error& error);
-  Status ask_jig(double now_s);
   Status look_while_away();
   Status obey(JigRun& run, OperatorCommand command);
-  // Turns the jig, where a look at it permits that.
-  Status place(Pose pose);
-  // The jig's own position against a placement that the unit's readings have judged.
-  Status compare_with_jig(const JigAction& action);
-  void count_stream();
-  Status start_stream();  // under the filter of this run
-  device::StreamStatistics whole_stream() const;
   void keep_interrupted(const JigRun& run, const Error& error);
   void keep_rows(std::string_view rows);
   Status stream(JigRun& run);
@@ -104,16 +78,11 @@ class Session {
   bool ended_ = false;
   std::optional<Error> gone_;  // why the unit did not come back
   std::string last_text_;      // text of the machine's last action
-  std::optional<double> jig_asked_s_;
-  int jig_disagreements_ = 0;
+  UnitStream stream_;
+  JigWatch watch_;
   // While the unit is away: what the operator said, and what the jig said.
   std::vector<OperatorCommand> said_while_away_;
   std::optional<Error> jig_while_away_;
-  bool is_streaming_ = false;
-  // Of this stream, already reported to the machine.
-  std::uint64_t lost_ = 0;
-  std::uint64_t clock_jumps_ = 0;
-  device::StreamStatistics before_;  // of the run's earlier streams
 };
 
 Status Session::prepare(const std::optional<JigResume>& resume) {
@@ -152,7 +121,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
       report_.as_left = now;
       report_.write_begun = !now;
     }
-    before_ = resume->stream;
+    stream_ = UnitStream(options_.filter, options_.run.rate_hz, resume->stream);
   }
   if (options_.filter == FilterConfiguration::legacy &&
       has_two_filters(report_.serial, report_.as_found)) {
@@ -167,7 +136,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
                             unit_->identity().battery_mv, kWritable_mv),
                 report_.serial, "charge the unit, or leave out --write");
   }
-  return start_stream();
+  return stream_.start(*unit_);
 }
 
 void Session::keep_rows(std::string_view rows) {
@@ -196,7 +165,7 @@ bool Session::may_come_back(const Error& error) const {
 // Waits for the unit of this run. Where it does not come back, there is no unit any more.
 Status Session::reopen(const Error& error) {
   // Read now: the hook may close the unit.
-  count_stream();
+  stream_.count(*unit_);
   do {
     const Result<UnitOnJig> again = hooks_.reopen(error, [this] { return look_while_away(); });
     if (!again) {
@@ -219,14 +188,14 @@ Status Session::come_back(JigRun& run, const Error& error) {
     if (const Status found = reopen(ready.error()); !found) {
       return end_away(run, found.error());
     }
-    ready = start_stream();
+    ready = stream_.start(*unit_);
   }
   SIXPOINT_CHECK(handle(run, run.on_unit_back(seconds(unit_->clock().elapsed()))));
   for (const OperatorCommand command : std::exchange(said_while_away_, {})) {
     SIXPOINT_CHECK(obey(run, command));
   }
   // After a power cut the jig does not know where the unit lies.
-  return run.open_poses().empty() ? Status{} : place(run.open_poses().front());
+  return run.open_poses().empty() ? Status{} : JigWatch::place(*jig_, run.open_poses().front());
 }
 
 // The unit did not come back, or the wait was ended.
@@ -276,82 +245,12 @@ Status Session::look_while_away() {
   return {};
 }
 
-Status Session::place(Pose pose) {
-  if (jig_->turns_by_itself()) {
-    SIXPOINT_CHECK(device::check_jig(*jig_));
-  }
-  return jig_->go_to(pose);
-}
-
-// A fault of the jig ends the run: no placement after it is certain.
-Status Session::ask_jig(double now_s) {
-  if (jig_ == nullptr || !jig_->turns_by_itself() ||
-      (jig_asked_s_ && now_s - *jig_asked_s_ < options_.jig_poll_s)) {
-    return {};
-  }
-  jig_asked_s_ = now_s;
-  return device::check_jig(*jig_);
-}
-
-Status Session::compare_with_jig(const JigAction& action) {
-  if (jig_ == nullptr || !jig_->turns_by_itself()) {
-    return {};
-  }
-  SIXPOINT_CHECK(device::check_jig(*jig_));  // a stop or a fault spoils this placement
-  const bool tilted = action.kind == JigAction::Kind::refused && action.text.starts_with("tilted");
-  if (action.kind != JigAction::Kind::accepted && !tilted) {
-    return {};
-  }
-  SIXPOINT_ASSIGN(const device::JigPosition jig, jig_->position());
-  if (!jig.pose) {
-    return {};  // it does not know
-  }
-  const auto disagree = [&](std::string what) {
-    return fail(ErrorCode::bad_data, std::move(what), jig_->name(),
-                "look how the unit is seated, and whether the jig turns truly");
-  };
-  if (*jig.pose != action.pose) {
-    return disagree(fmt::format("the jig says it stands at {} and the unit reads {}",
-                                device::to_string(*jig.pose), device::to_string(action.pose)));
-  }
-  jig_disagreements_ = tilted ? jig_disagreements_ + 1 : 0;
-  if (jig_disagreements_ >= options_.jig_disagreements) {
-    return disagree(
-        fmt::format("the jig says it stands at {} to {:.2g} degrees, and the unit was {} time "
-                    "after time",
-                    device::to_string(*jig.pose), jig.angle_uncertainty_deg, action.text));
-  }
-  return {};
-}
-
-// Where a stream ends, its numbers go to the run's.
-void Session::count_stream() {
-  if (is_streaming_) {
-    is_streaming_ = false;
-    before_ = sum_of(before_, unit_->stream_statistics());
-  }
-}
-
-Status Session::start_stream() {
-  count_stream();
-  SIXPOINT_CHECK(choose_filter(*unit_, options_.filter));
-  SIXPOINT_CHECK(unit_->start_stream(options_.run.rate_hz));
-  is_streaming_ = true;
-  lost_ = 0;  // a new stream counts from 0
-  clock_jumps_ = 0;
-  return {};
-}
-
-device::StreamStatistics Session::whole_stream() const {
-  return is_streaming_ ? sum_of(before_, unit_->stream_statistics()) : before_;
-}
-
 // The report of what was measured until the error; no verdict on the unit.
 void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
   report_.faces = run.faces();
-  report_.stream = whole_stream();
+  report_.stream = stream_.statistics(unit_);
   report_.settle_as_left();
   report_.verdict = JigVerdict::inconclusive;
   report_.codes = {error.code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted"};
@@ -366,12 +265,7 @@ Status Session::take_block(JigRun& run, const device::SampleBlock& block, double
                             calib::to_string(block.filter)),
                 report_.serial, "begin the run again");
   }
-  const device::StreamStatistics now = unit_->stream_statistics();
-  // A reading does not go across lost samples or a jump of the clock.
-  if (now.lost_samples > std::exchange(lost_, now.lost_samples)) {
-    SIXPOINT_CHECK(handle(run, run.on_loss()));
-  }
-  if (now.clock_jumps > std::exchange(clock_jumps_, now.clock_jumps)) {
+  if (stream_.lost_since_asked(*unit_)) {
     SIXPOINT_CHECK(handle(run, run.on_loss()));
   }
   keep_raw(block);
@@ -415,7 +309,7 @@ Status Session::stream(JigRun& run) {
     }
     if (run.phase() !=
         JigPhase::finished) {  // else the operator's stop would be a fault of the jig
-      SIXPOINT_CHECK(ask_jig(now_s));
+      SIXPOINT_CHECK(watch_.ask(*jig_, now_s));
     }
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
@@ -423,8 +317,7 @@ Status Session::stream(JigRun& run) {
 }
 
 Status Session::end_stream(const JigRun& run) {
-  count_stream();
-  const Status stopped = unit_->stop_stream();
+  const Status stopped = stream_.stop(*unit_);
   // The readings are complete: a unit that is unplugged now is no error.
   const bool may_fail = run.outcome() == JigOutcome::unit_gone ||
                         run.outcome() == JigOutcome::stopped ||
@@ -450,7 +343,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
         break;
       }
       case JigAction::Kind::write: {
-        report_.stream = whole_stream();  // judged with the rest
+        report_.stream = stream_.statistics(unit_);  // judged with the rest
         SIXPOINT_ASSIGN(const bool verified, judge_readings(report_, run));
         if (!verified) {
           ended_ = true;  // constants that failed are not written
@@ -460,7 +353,9 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
       }
       case JigAction::Kind::accepted:
       case JigAction::Kind::refused:
-        SIXPOINT_CHECK(compare_with_jig(action));
+        if (jig_ != nullptr) {
+          SIXPOINT_CHECK(watch_.compare(*jig_, action));
+        }
         break;
       case JigAction::Kind::dropped:
         break;
@@ -470,21 +365,20 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
     }
   }
   if (hooks_.progress && !actions.empty()) {
-    report_.stream = whole_stream();
+    report_.stream = stream_.statistics(unit_);
     hooks_.progress(report_, run);
   }
-  return wanted ? place(*wanted) : Status{};
+  return wanted ? JigWatch::place(*jig_, *wanted) : Status{};
 }
 
 Status Session::write_constants(JigRun& run) {
-  count_stream();
-  static_cast<void>(unit_->stop_stream());  // an unplugged unit gives an error below
+  static_cast<void>(stream_.stop(*unit_));  // an unplugged unit gives an error below
   // Today's date: the firmware concludes from it that the constants belong to `current`.
   const device::CalibrationPage page{
       report_.six->best().stored, std::chrono::floor<std::chrono::seconds>(unit_->clock().now())};
   report_.write_begun = true;
   if (hooks_.write_begins) {
-    report_.stream = before_;
+    report_.stream = stream_.statistics(unit_);
     if (const Status noted = hooks_.write_begins(report_, run); !noted) {
       report_.write_begun = false;
       report_.reasons.push_back("not written: that a write begins could not be noted down: " +
@@ -520,7 +414,7 @@ Status Session::write_constants(JigRun& run) {
   report_.written = true;
   SIXPOINT_ASSIGN(const Calibration calibration, calib::calibration_from(holds->constants));
   run.set_approximation(calibration);
-  if (const Status ready = start_stream(); !ready) {
+  if (const Status ready = stream_.start(*unit_); !ready) {
     SIXPOINT_CHECK(come_back(run, ready.error()));
     if (run.phase() == JigPhase::finished) {
       return {};
@@ -537,8 +431,7 @@ Status Session::back_in_write(JigRun& run, const Error& error) {
     if (run.phase() == JigPhase::finished) {
       return {};
     }
-    count_stream();
-    ready = unit_->stop_stream();
+    ready = stream_.stop(*unit_);
   }
   return !ready && ready.error().code == ErrorCode::device_unavailable ? ready : Status{};
 }
@@ -546,7 +439,7 @@ Status Session::back_in_write(JigRun& run, const Error& error) {
 Status Session::conclude(const JigRun& run) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
-  report_.stream = whole_stream();
+  report_.stream = stream_.statistics(unit_);
   SIXPOINT_CHECK(judge_readings(report_, run));
   report_.settle_as_left();
   if (report_.as_found) {

@@ -30,6 +30,7 @@
 #include "station/limits/verdict.h"
 #include "station/run/jig_report.h"
 #include "station/run/jig_run.h"
+#include "station/run/jig_watch.h"
 
 namespace sixpoint::station {
 
@@ -45,9 +46,7 @@ struct JigSessionOptions {
   // An error in mid-run gives a report with `ended_by`, so that the readings can be stored. Without
   // it, run_jig() returns the error alone.
   bool keep_interrupted = false;
-  double jig_poll_s = 0.25;  // between two questions to a motorised jig for faults
-  // After so many tilted placements in a row that the jig calls exact, its position is not trusted.
-  int jig_disagreements = 3;
+  JigWatchOptions jig_watch;
 };
 
 // Both belong to the caller and live until the next reopen().

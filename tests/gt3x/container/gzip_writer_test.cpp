@@ -1,10 +1,10 @@
 #include "gt3x/container/gzip_writer.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include "base/bytes.h"
 #include "expect_result.h"
+#include "gt3x/container/zlib_inflated.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -26,18 +26,8 @@ Bytes gzipped(std::string_view text, std::size_t step, unsigned jobs) {
 
 // Oracle: zlib reads the file, header, CRC and size included.
 std::string ungzipped(Bytes file, std::size_t size) {
-  z_stream state{};
-  EXPECT_EQ(inflateInit2(&state, 15 + 16), Z_OK);
-  std::string out(size + 1, ' ');
-  state.next_in = file.data();
-  state.avail_in = static_cast<uInt>(file.size());
-  state.next_out = reinterpret_cast<Bytef*>(out.data());
-  state.avail_out = static_cast<uInt>(out.size());
-  EXPECT_EQ(inflate(&state, Z_FINISH), Z_STREAM_END);
-  EXPECT_EQ(state.avail_in, 0U);
-  out.resize(state.total_out);
-  inflateEnd(&state);
-  return out;
+  const Bytes text = inflated_by_zlib(std::move(file), size, kGzipFile);
+  return {text.begin(), text.end()};
 }
 
 TEST(GzipWriter, ZlibReadsItAndTheBytesDependOnTheTextAlone) {

@@ -1,9 +1,9 @@
 #include "gt3x/container/piece_packer.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include "base/random.h"
+#include "gt3x/container/zlib_inflated.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -19,22 +19,6 @@ Bytes piece_of(std::size_t size, std::uint64_t kinds) {
 }
 
 // Oracle: zlib reads the joined stream.
-Bytes inflated_by_zlib(const Bytes& stream, std::size_t size) {
-  z_stream state{};
-  EXPECT_EQ(inflateInit2(&state, -15), Z_OK);
-  Bytes out(size + 1);
-  Bytes in = stream;
-  state.next_in = in.data();
-  state.avail_in = static_cast<uInt>(in.size());
-  state.next_out = out.data();
-  state.avail_out = static_cast<uInt>(out.size());
-  EXPECT_EQ(inflate(&state, Z_FINISH), Z_STREAM_END);
-  EXPECT_EQ(state.avail_in, 0U);
-  out.resize(state.total_out);
-  inflateEnd(&state);
-  return out;
-}
-
 TEST(PiecePacker, PiecesJoinToOneStreamAndUnpackAlone) {
   PiecePacker packer;
   for (const std::uint64_t kinds : {1U, 3U, 40U, 255U, 256U}) {
@@ -61,7 +45,7 @@ TEST(PiecePacker, PiecesJoinToOneStreamAndUnpackAlone) {
       packed.push_back(0);
       EXPECT_FALSE(unpack_piece(packed, place, back)) << "a byte too many";
     }
-    EXPECT_EQ(inflated_by_zlib(stream, all.size()), all) << kinds;
+    EXPECT_EQ(inflated_by_zlib(stream, all.size(), kRawStream), all) << kinds;
   }
 }
 

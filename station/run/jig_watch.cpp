@@ -1,0 +1,55 @@
+#include "station/run/jig_watch.h"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace sixpoint::station {
+
+Status JigWatch::place(device::Jig& jig, device::Pose pose) {
+  if (jig.turns_by_itself()) {
+    SIXPOINT_CHECK(device::check_jig(jig));
+  }
+  return jig.go_to(pose);
+}
+
+Status JigWatch::ask(device::Jig& jig, double now_s) {
+  if (!jig.turns_by_itself() || (asked_s_ && now_s - *asked_s_ < options_.poll_s)) {
+    return {};
+  }
+  asked_s_ = now_s;
+  return device::check_jig(jig);
+}
+
+Status JigWatch::compare(device::Jig& jig, const JigAction& action) {
+  if (!jig.turns_by_itself()) {
+    return {};
+  }
+  SIXPOINT_CHECK(device::check_jig(jig));  // a stop or a fault spoils this placement
+  const bool tilted = action.kind == JigAction::Kind::refused && action.text.starts_with("tilted");
+  if (action.kind != JigAction::Kind::accepted && !tilted) {
+    return {};
+  }
+  SIXPOINT_ASSIGN(const device::JigPosition position, jig.position());
+  if (!position.pose) {
+    return {};  // it does not know
+  }
+  const auto disagree = [&](std::string what) {
+    return fail(ErrorCode::bad_data, std::move(what), jig.name(),
+                "look how the unit is seated, and whether the jig turns truly");
+  };
+  if (*position.pose != action.pose) {
+    return disagree(fmt::format("the jig says it stands at {} and the unit reads {}",
+                                device::to_string(*position.pose), device::to_string(action.pose)));
+  }
+  disagreements_ = tilted ? disagreements_ + 1 : 0;
+  if (disagreements_ >= options_.most_disagreements) {
+    return disagree(
+        fmt::format("the jig says it stands at {} to {:.2g} degrees, and the unit was {} time "
+                    "after time",
+                    device::to_string(*position.pose), position.angle_uncertainty_deg, action.text));
+  }
+  return {};
+}
+
+}  // namespace sixpoint::station

@@ -1,0 +1,52 @@
+// What is asked of the jig while a run goes on: turn, look for faults, agree with the unit.
+//
+//   JigWatch watch({0.25, 3});
+//   SIXPOINT_CHECK(watch.place(jig, device::Pose::plus_x));
+//   SIXPOINT_CHECK(watch.ask(jig, 12.5));  // a stop or a fault of the jig is an error
+//
+// A jig that a person turns is asked nothing: every answer is success. The jig is not owned, and may
+// be another one at each call, when the unit was plugged in again. One object belongs to one thread.
+#pragma once
+
+#include <optional>
+
+#include "device/jig.h"
+#include "station/run/jig_run.h"
+
+namespace sixpoint::station {
+
+struct JigWatchOptions {
+  double poll_s = 0.25;  // between two questions to a motorised jig for faults
+  // After so many tilted placements in a row that the jig calls exact, its position is not trusted.
+  int most_disagreements = 3;
+};
+
+class JigWatch {
+ public:
+  explicit JigWatch(const JigWatchOptions& options) : options_(options) {}
+
+  // Turns the jig, where a look at it permits that.
+  static Status place(device::Jig& jig, device::Pose pose);
+
+  // Its stop or fault; at most every poll_s. It ends the run: no placement after it is certain.
+  Status ask(device::Jig& jig, double now_s);
+
+  // The jig's own position against a placement that the unit's readings have judged:
+  //
+  // | the jig says                          | the unit's readings    | then                     |
+  // |---------------------------------------|------------------------|--------------------------|
+  // | stopped, or a fault                   | any                    | that error               |
+  // | it does not know                      | any                    | success                  |
+  // | another pose                          | accepted or tilted     | bad_data                 |
+  // | this pose                             | accepted               | success                  |
+  // | this pose                             | tilted, the first ones | success                  |
+  // | this pose                             | tilted again and again | bad_data                 |
+  Status compare(device::Jig& jig, const JigAction& action);
+
+ private:
+  JigWatchOptions options_;
+  std::optional<double> asked_s_;
+  int disagreements_ = 0;
+};
+
+}  // namespace sixpoint::station

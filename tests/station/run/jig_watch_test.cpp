@@ -1,0 +1,97 @@
+#include "station/run/jig_watch.h"
+
+#include <gmock/gmock.h>
+
+#include "expect_result.h"
+#include "mocks/inert/inert.h"
+
+namespace sixpoint::station {
+namespace {
+
+using device::Pose;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+JigAction judged(JigAction::Kind kind, Pose pose, const std::string& text = "") {
+  JigAction action{};
+  action.kind = kind;
+  action.pose = pose;
+  action.text = text;
+  return action;
+}
+
+device::JigPosition standing_at(Pose pose) {
+  device::JigPosition position;
+  position.pose = pose;
+  return position;
+}
+
+TEST(JigWatch, AJigThatAPersonTurnsIsAskedNothing) {
+  mocks::InertJig jig;
+  jig.by_itself = false;
+  jig.next_position = fail(ErrorCode::io, "asked");
+  JigWatch watch({});
+  EXPECT_OK(watch.ask(jig, 0));
+  EXPECT_OK(watch.compare(jig, judged(JigAction::Kind::accepted, Pose::plus_x)));
+  EXPECT_OK(JigWatch::place(jig, Pose::plus_x));
+  EXPECT_THAT(jig.poses, ElementsAre(Pose::plus_x));
+}
+
+TEST(JigWatch, AsksForFaultsAtMostOnceAPeriodAndTurnsNothingAfterOne) {
+  mocks::InertJig jig;
+  JigWatch watch({0.25, 3});
+  EXPECT_OK(watch.ask(jig, 10));
+  jig.next_position->fault = "the door is open";
+  EXPECT_OK(watch.ask(jig, 10.2));
+  EXPECT_FAILS(watch.ask(jig, 10.25), ErrorCode::device_unavailable);
+  EXPECT_FAILS(JigWatch::place(jig, Pose::plus_x), ErrorCode::device_unavailable);
+  EXPECT_TRUE(jig.poses.empty());
+}
+
+// The table in jig_watch.h, a row each.
+TEST(JigWatch, RowFaultSpoilsThePlacement) {
+  mocks::InertJig jig;
+  jig.next_position = standing_at(Pose::plus_x);
+  jig.next_position->fault = "stopped by its button";
+  JigWatch watch({});
+  EXPECT_FAILS(watch.compare(jig, judged(JigAction::Kind::accepted, Pose::plus_x)),
+               ErrorCode::device_unavailable);
+}
+
+TEST(JigWatch, RowItDoesNotKnow) {
+  mocks::InertJig jig;
+  JigWatch watch({});
+  EXPECT_OK(watch.compare(jig, judged(JigAction::Kind::accepted, Pose::plus_x)));
+}
+
+TEST(JigWatch, RowAnotherPose) {
+  for (const auto& [kind, text] : {std::pair{JigAction::Kind::accepted, ""},
+                                   std::pair{JigAction::Kind::refused, "tilted by 7 degrees"}}) {
+    mocks::InertJig jig;
+    jig.next_position = standing_at(Pose::minus_y);
+    JigWatch watch({});
+    const Status status = watch.compare(jig, judged(kind, Pose::plus_x, text));
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::bad_data);
+    EXPECT_THAT(status.error().what, HasSubstr("stands at -y and the unit reads +x"));
+  }
+}
+
+TEST(JigWatch, RowsThisPose) {
+  mocks::InertJig jig;
+  jig.next_position = standing_at(Pose::plus_x);
+  JigWatch watch({0.25, 3});
+  const JigAction good = judged(JigAction::Kind::accepted, Pose::plus_x);
+  const JigAction tilted = judged(JigAction::Kind::refused, Pose::plus_x, "tilted by 7 degrees");
+  const JigAction noisy = judged(JigAction::Kind::refused, Pose::plus_x, "it was moved");
+  for (const JigAction& action : {good, tilted, tilted, noisy, good, tilted, tilted}) {
+    EXPECT_OK(watch.compare(jig, action)) << "a good placement between them begins the count anew";
+  }
+  const Status third = watch.compare(jig, tilted);
+  ASSERT_FALSE(third);
+  EXPECT_EQ(third.error().code, ErrorCode::bad_data);
+  EXPECT_THAT(third.error().what, HasSubstr("tilted by 7 degrees time after time"));
+}
+
+}  // namespace
+}  // namespace sixpoint::station
