@@ -75,6 +75,9 @@ std::string man_page(const CLI::App& app) {
           fmt::format(".TP\n{}\n{}\n", usage_of(*option),
                       option->get_description().empty() ? "\\&" : roff(option->get_description()));
     }
+    if (!command.get_footer().empty()) {
+      text += fmt::format(".PP\n{}\n", roff(command.get_footer()));
+    }
   });
   return text;
 }
@@ -113,9 +116,7 @@ int run(const std::vector<std::string>& arguments) {
   CLI::App app("", "sixpoint");
   cli::Context context{posix_env(), std::cout, std::cerr, std::cin};
   app.set_version_flag("--version", "");
-  for (const cli::CommandEntry& command : cli::commands()) {
-    command.add(app, context);
-  }
+  cli::declare_commands(app, context);
   page.replace(place, kPlace.size(), arguments[0] == "man" ? man_page(app) : completion(app));
   std::cout << page;
   return std::cout.flush() ? 0 : 74;

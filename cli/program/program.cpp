@@ -3,26 +3,52 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <fmt/format.h>
 #include <spdlog/logger.h>
 
+#include "cli/program/examples.h"
+#include "cli/program/suggestion.h"
 #include "station/records/software.h"
 
 namespace sixpoint::cli {
+
+namespace {
+
+// "store export" below `app`.
+CLI::App& command_of(CLI::App& app, std::string_view path) {
+  CLI::App* command = &app;
+  while (!path.empty()) {
+    const std::size_t end = std::min(path.find(' '), path.size());
+    command = command->get_subcommand(std::string(path.substr(0, end)));
+    path.remove_prefix(std::min(end + 1, path.size()));
+  }
+  return *command;
+}
+
+}  // namespace
+
+void declare_commands(CLI::App& app, Context& context) {
+  for (const CommandEntry& entry : commands()) {
+    entry.add(app, context);
+  }
+  for (const CommandExamples& of : command_examples()) {
+    command_of(app, of.command)
+        .footer(fmt::format("Examples:\n  {}\n", fmt::join(of.lines, "\n  ")));
+  }
+}
 
 int run_program(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app("Sixpoint measures the constants of activity monitors and repairs their recordings.",
                "sixpoint");
   app.set_version_flag("--version", station::software_name());
   app.require_subcommand(1);
+  app.failure_message(CLI::FailureMessage::simple);
+  declare_commands(app, context);
   app.footer(
       "First steps, without any device:\n"
       "  sixpoint jig --device virtual:seed=7,jig=auto --store bench.db\n"
       "  sixpoint station --device virtual:seed=7,pace=real --store bench.db\n"
-      "'sixpoint COMMAND --help' lists the options of a command.");
-  app.failure_message(CLI::FailureMessage::simple);
-  for (const CommandEntry& entry : commands()) {
-    entry.add(app, context);
-  }
+      "'sixpoint COMMAND --help' lists the options of a command.\n");
   // CLI11 takes the arguments in reverse order.
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   context.exit_code = 0;
@@ -33,8 +59,11 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
     if (error.get_exit_code() == 0) {  // --help, --version
       return app.exit(error, context.out, context.people);
     }
-    context.log().error("{}; 'sixpoint --help' and 'sixpoint COMMAND --help' list what there is",
-                        printable(error.what()));
+    context.log().error(
+        "{}",
+        unknown_word(app, arguments)
+            .value_or(printable(error.what()) +
+                      "; 'sixpoint --help' and 'sixpoint COMMAND --help' list what there is"));
     return static_cast<int>(ErrorCode::usage);
   } catch (const std::exception& error) {
     // The libraries return errors as values: an exception is a defect of this program.

@@ -26,6 +26,9 @@ struct CommandEntry {
 };
 const std::vector<CommandEntry>& commands();
 
+// Declares all of them, each with its examples (examples.h).
+void declare_commands(CLI::App& app, Context& context);
+
 // Parses, runs, returns the exit code. `arguments` do not hold the program's name. No state is left
 // behind: a test calls it many times in one process.
 int run_program(const std::vector<std::string>& arguments, Context& context);

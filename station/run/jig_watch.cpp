@@ -44,10 +44,10 @@ Status JigWatch::compare(device::Jig& jig, const JigAction& action) {
   }
   disagreements_ = tilted ? disagreements_ + 1 : 0;
   if (disagreements_ >= options_.most_disagreements) {
-    return disagree(
-        fmt::format("the jig says it stands at {} to {:.2g} degrees, and the unit was {} time "
-                    "after time",
-                    device::to_string(*position.pose), position.angle_uncertainty_deg, action.text));
+    return disagree(fmt::format(
+        "the jig says it stands at {} to {:.2g} degrees, and the unit was {} time "
+        "after time",
+        device::to_string(*position.pose), position.angle_uncertainty_deg, action.text));
   }
   return {};
 }

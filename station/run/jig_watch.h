@@ -4,8 +4,9 @@
 //   SIXPOINT_CHECK(watch.place(jig, device::Pose::plus_x));
 //   SIXPOINT_CHECK(watch.ask(jig, 12.5));  // a stop or a fault of the jig is an error
 //
-// A jig that a person turns is asked nothing: every answer is success. The jig is not owned, and may
-// be another one at each call, when the unit was plugged in again. One object belongs to one thread.
+// A jig that a person turns is asked nothing: every answer is success. The jig is not owned, and
+// may be another one at each call, when the unit was plugged in again. One object belongs to one
+// thread.
 #pragma once
 
 #include <optional>

@@ -1,10 +1,11 @@
-// The streams of one run: a unit that is plugged in again begins a new one, and the run's numbers go on.
+// The streams of one run: a unit that is plugged in again begins a new one, and the run's numbers
+// go on.
 //
 //   UnitStream stream(calib::FilterConfiguration::current, 100);
 //   SIXPOINT_CHECK(stream.start(unit));
 //   const bool whole = !stream.lost_since_asked(unit);  // nothing was lost yet
 //   SIXPOINT_CHECK(stream.stop(unit));
-//   stream.statistics(unit).samples;  // of all streams of the run
+//   stream.statistics(&unit).samples;  // of all streams of the run
 //
 // The unit is not owned. One object belongs to one thread.
 #pragma once

@@ -188,9 +188,7 @@ void for_each_option(const std::function<void(const std::string&, std::optional<
   std::istringstream in;
   Context context{posix_env(), stream, stream, in};
   CLI::App app;
-  for (const CommandEntry& entry : commands()) {
-    entry.add(app, context);
-  }
+  declare_commands(app, context);
   const std::function<void(const CLI::App&, const std::string&)> walk =
       [&](const CLI::App& command, const std::string& name) {
         for (const CLI::Option* option : command.get_options()) {

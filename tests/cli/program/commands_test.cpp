@@ -1,4 +1,5 @@
 // Every command of the list: its help, and options that are declared alike.
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <set>
@@ -7,6 +8,7 @@
 #include <CLI/Option.hpp>
 
 #include "cli/command_fixture.h"
+#include "cli/program/examples.h"
 #include "cli/program/program.h"
 
 namespace sixpoint::cli {
@@ -45,9 +47,7 @@ TEST(Commands, SharedOptionsAreDescribedAlike) {
   std::istringstream in;
   Context context{posix_env(), stream, stream, in};
   CLI::App app;
-  for (const CommandEntry& entry : commands()) {
-    entry.add(app, context);
-  }
+  declare_commands(app, context);
   visit(app, [&](const CLI::App& command) {
     for (const CLI::Option* option : command.get_options()) {
       for (const std::string& name : option->get_lnames()) {
@@ -58,6 +58,34 @@ TEST(Commands, SharedOptionsAreDescribedAlike) {
   for (const char* name : {"record", "wide", "undo-rotation", "allow-prior", "calibration-file"}) {
     EXPECT_EQ(descriptions[name].size(), 1U) << name;
   }
+}
+
+// tests/docs/run_examples.sh runs them.
+TEST(Commands, EveryOneHasTwoExamplesOfItself) {
+  std::ostringstream stream;
+  std::istringstream in;
+  Context context{posix_env(), stream, stream, in};
+  CLI::App app;
+  declare_commands(app, context);
+  std::size_t with_examples = 0;
+  visit(app, [&](const CLI::App& command) {
+    if (!command.get_subcommands([](const CLI::App*) { return true; }).empty()) {
+      return;
+    }
+    std::string path = command.get_name();
+    for (const CLI::App* above = command.get_parent(); above != &app; above = above->get_parent()) {
+      path.insert(0, above->get_name() + " ");
+    }
+    const auto found = std::ranges::find(command_examples(), path, &CommandExamples::command);
+    ASSERT_NE(found, command_examples().end()) << path;
+    for (const std::string_view line : found->lines) {
+      EXPECT_TRUE((std::string(line) + " ").starts_with("sixpoint " + path + " ")) << line;
+      EXPECT_NE(command.get_footer().find(line), std::string::npos) << line;
+    }
+    EXPECT_NE(found->lines[0], found->lines[1]);
+    ++with_examples;
+  });
+  EXPECT_EQ(with_examples, command_examples().size());
 }
 
 }  // namespace

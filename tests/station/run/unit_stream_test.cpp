@@ -47,7 +47,7 @@ class StreamingUnit final : public device::Unit {
 
 TEST(UnitStream, AUnitThatStillStreamsIsStoppedFirst) {
   StreamingUnit unit;
-  unit.filter_answer = fail(ErrorCode::io, "it streams");
+  unit.filter_answer = fail(ErrorCode::io, "it streams", {}, "stop it");
   UnitStream stream(FilterConfiguration::current, 100);
   ASSERT_OK(stream.start(unit));
   EXPECT_THAT(unit.asked, ElementsAre("filter", "stop", "filter", "start 100"));
@@ -55,7 +55,7 @@ TEST(UnitStream, AUnitThatStillStreamsIsStoppedFirst) {
 
 TEST(UnitStream, AnotherErrorOfTheFilterIsTheAnswer) {
   StreamingUnit unit;
-  unit.filter_answer = fail(ErrorCode::device_unavailable, "unplugged");
+  unit.filter_answer = fail(ErrorCode::device_unavailable, "unplugged", {}, "plug it in");
   UnitStream stream(FilterConfiguration::current, 100);
   EXPECT_FAILS(stream.start(unit), ErrorCode::device_unavailable);
   EXPECT_THAT(unit.asked, ElementsAre("filter"));

@@ -1,0 +1,122 @@
+#include "cli/program/suggestion.h"
+
+#include <algorithm>
+
+#include <CLI/App.hpp>
+#include <fmt/format.h>
+
+#include "base/error.h"
+
+namespace sixpoint::cli {
+
+namespace {
+
+std::size_t steps_between(const std::string& a, const std::string& b) {
+  // Rows of the table for a's first i letters: i - 2, i - 1 and i.
+  std::vector<std::size_t> before(b.size() + 1);
+  std::vector<std::size_t> above(b.size() + 1);
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) {
+    row[j] = j;
+  }
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    before = std::exchange(above, row);
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t other = a[i - 1] == b[j - 1] ? 0 : 1;
+      row[j] = std::min({above[j] + 1, row[j - 1] + 1, above[j - 1] + other});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        row[j] = std::min(row[j], before[j - 2] + 1);
+      }
+    }
+  }
+  return row[b.size()];
+}
+
+std::string did_you_mean(const std::string& typed, const std::vector<std::string>& known) {
+  const auto nearest = nearest_word(typed, known);
+  return nearest ? fmt::format("; did you mean '{}'?", *nearest) : std::string(";");
+}
+
+// Without those that --help does not list: old names that are refused.
+std::vector<std::string> option_names(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_group().empty()) {
+      continue;
+    }
+    for (const std::string& name : option->get_lnames()) {
+      names.push_back("--" + name);
+    }
+  }
+  return names;
+}
+
+std::vector<const CLI::App*> commands_of(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : commands_of(app)) {
+    names.push_back(command->get_name());
+  }
+  return names;
+}
+
+}  // namespace
+
+std::optional<std::string> nearest_word(const std::string& typed,
+                                        const std::vector<std::string>& known) {
+  const auto begins = [&](const std::string& word) { return word.starts_with(typed); };
+  if (std::ranges::count_if(known, begins) == 1) {
+    return *std::ranges::find_if(known, begins);
+  }
+  std::vector<std::string> nearest;
+  std::size_t fewest = typed.size();
+  for (const std::string& word : known) {
+    const std::size_t steps = steps_between(typed, word);
+    if (3 * steps > word.size() || steps > fewest) {
+      continue;
+    }
+    if (steps < fewest) {
+      nearest.clear();
+    }
+    nearest.push_back(word);
+    fewest = steps;
+  }
+  return nearest.size() == 1 ? std::optional(nearest.front()) : std::nullopt;
+}
+
+std::optional<std::string> unknown_word(const CLI::App& app,
+                                        const std::vector<std::string>& arguments) {
+  const CLI::App* command = &app;
+  std::string path = "sixpoint";
+  for (const std::string& word : arguments) {
+    if (word == "--") {
+      break;
+    }
+    if (word.starts_with("--")) {
+      const std::string name = word.substr(0, word.find('='));
+      if (command->get_option_no_throw(name) == nullptr) {
+        return fmt::format("'{}' has no option '{}'{} '{} --help' lists them", path,
+                           printable(name, 60), did_you_mean(name, option_names(*command)), path);
+      }
+      continue;
+    }
+    const auto commands = commands_of(*command);
+    if (word.starts_with('-') || commands.empty()) {
+      continue;
+    }
+    const auto found = std::ranges::find(commands, word, &CLI::App::get_name);
+    if (found == commands.end()) {
+      return fmt::format("'{}' has no command '{}'{} '{} --help' lists them", path,
+                         printable(word, 60), did_you_mean(word, command_names(*command)), path);
+    }
+    command = *found;
+    path += " " + word;
+  }
+  return std::nullopt;
+}
+
+}  // namespace sixpoint::cli
