@@ -27,7 +27,7 @@ package_packages=(dpkg-dev file)
 python_packages=(
   pybind11-dev python3 python3-dev python3-matplotlib python3-numpy python3-pandas python3-venv
 )
-r_packages=(r-base-dev r-cran-jsonlite)
+r_packages=(r-base-dev r-cran-jsonlite r-cran-knitr r-cran-markdown)
 
 # The page's tests need Node; a machine that has it from elsewhere keeps it (its package has npm inside
 # and does not go together with Debian's).

@@ -23,8 +23,8 @@ if [ "$kind" = --python ]; then
   exit
 fi
 if [ "$kind" = --r ]; then
-  cmake --build build --target sixpoint_r -- --quiet
-  packaging/r/make_package.sh "$PWD" build/package
+  cmake --build build --target sixpoint sixpoint_r -- --quiet
+  packaging/r/make_package.sh "$PWD" build build/package
   exit
 fi
 cmake --build build --target sixpoint sixpoint_package_files -- --quiet
