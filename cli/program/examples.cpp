@@ -26,7 +26,7 @@ const std::vector<CommandExamples>& command_examples() {
           "sixpoint compare day1.gt3x day1.gt3x --html compared.html"}},
       {"impact", {
           "sixpoint impact archive/day1.gt3x repaired/day1.gt3x",
-          "sixpoint impact archive/day1.gt3x repaired/day1.gt3x --cut moderate=100 --html impact.html"}},
+          "sixpoint impact archive repaired --cut moderate=100 --csv impact.csv"}},
       {"solve", {
           "sixpoint solve archive/day1.gt3x",
           "sixpoint solve archive/day1.gt3x --json"}},

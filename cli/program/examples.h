@@ -4,8 +4,9 @@
 //     std::cout << of.lines[0] << '\n';  // "sixpoint inspect day1.gt3x"
 //   }
 //
-// tests/docs/run_examples.sh runs every line, in the order of the list, in one folder: what one line
-// makes, a later one uses. In a line, RUN and CONSTANTS stand for identifiers that 'jig' and 'history' print.
+// tests/docs/run_examples.sh runs every line, in the order of the list, in one folder: what one
+// line makes, a later one uses. In a line, RUN and CONSTANTS stand for identifiers that 'jig' and
+// 'history' print.
 #pragma once
 
 #include <array>

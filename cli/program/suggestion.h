@@ -2,8 +2,9 @@
 //
 //   CLI::App app;
 //   declare_commands(app, context);
-//   unknown_word(app, {"scn", "a"});        // "'sixpoint' has no command 'scn'; did you mean 'scan'? ..."
-//   unknown_word(app, {"scan", "--jsn"});  // "'sixpoint scan' has no option '--jsn'; did you mean ..."
+//   unknown_word(app, {"scn", "a"});        // "'sixpoint' has no command 'scn'; did you mean
+//   'scan'? ..." unknown_word(app, {"scan", "--jsn"});  // "'sixpoint scan' has no option '--jsn';
+//   did you mean ..."
 #pragma once
 
 #include <optional>

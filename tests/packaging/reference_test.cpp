@@ -74,13 +74,15 @@ TEST_F(Reference, AnOptionIsATaggedParagraphOfItsCommand) {
 }
 
 // Oracle: groff_man(7): a line that begins with a dot or an apostrophe is a request. Those that
-// this program writes are .SS, .TP and .br; every hyphen of its own is \-.
+// this program writes are .SS, .TP, .PP and .br; every hyphen of its own is \-.
 TEST_F(Reference, NoWordOfACommandBecomesARequest) {
   std::istringstream lines(filled("man"));
   int sections = 0;
   for (std::string line; std::getline(lines, line);) {
     if (line.starts_with('.')) {
-      EXPECT_TRUE(line.starts_with(".SS sixpoint ") || line == ".TP" || line == ".br") << line;
+      EXPECT_TRUE(line.starts_with(".SS sixpoint ") || line == ".TP" || line == ".PP" ||
+                  line == ".br")
+          << line;
       sections += line.starts_with(".SS ") ? 1 : 0;
     }
     EXPECT_FALSE(line.starts_with('\'')) << line;

@@ -21,7 +21,8 @@ TEST(NearestWord, TheBeginningOfExactlyOne) {
 
 TEST(NearestWord, AThirdOfTheLettersAtMost) {
   EXPECT_EQ(nearest_word("scn", {"scan", "solve"}), "scan");
-  EXPECT_EQ(nearest_word("inpsect", {"inspect", "impact"}), "inspect") << "two neighbours exchanged";
+  EXPECT_EQ(nearest_word("inpsect", {"inspect", "impact"}), "inspect")
+      << "two neighbours exchanged";
   EXPECT_EQ(nearest_word("repaier", {"repair", "report"}), "repair");
   EXPECT_EQ(nearest_word("jgi", {"jig", "gap"}), "jig");
   EXPECT_EQ(nearest_word("gaq", {"gap"}), "gap");
@@ -52,15 +53,17 @@ class UnknownWord : public testing::Test {
 TEST_F(UnknownWord, NamesTheCommandAndTheOptionThatWereMeant) {
   EXPECT_EQ(of({"scn", "archive"}),
             "'sixpoint' has no command 'scn'; did you mean 'scan'? 'sixpoint --help' lists them");
-  EXPECT_EQ(of({"store", "exprot"}),
-            "'sixpoint store' has no command 'exprot'; did you mean 'export'? 'sixpoint store --help' "
-            "lists them");
+  EXPECT_EQ(
+      of({"store", "exprot"}),
+      "'sixpoint store' has no command 'exprot'; did you mean 'export'? 'sixpoint store --help' "
+      "lists them");
   EXPECT_EQ(of({"scan", "archive", "--jsn"}),
             "'sixpoint scan' has no option '--jsn'; did you mean '--json'? 'sixpoint scan --help' "
             "lists them");
-  EXPECT_EQ(of({"scan", "--strore=x", "archive"}),
-            "'sixpoint scan' has no option '--strore'; did you mean '--store'? 'sixpoint scan --help' "
-            "lists them");
+  EXPECT_EQ(
+      of({"scan", "--strore=x", "archive"}),
+      "'sixpoint scan' has no option '--strore'; did you mean '--store'? 'sixpoint scan --help' "
+      "lists them");
 }
 
 TEST_F(UnknownWord, SaysOnlyThatItIsUnknownWhereNothingIsNear) {
