@@ -8,6 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/files/archive_options.h"
 #include "cli/output.h"
 #include "cli/workers.h"
 #include "repair/archive/archive_merge.h"

@@ -98,17 +98,19 @@ std::string StudyImpact::brief() const {
         file.was.mad_mg, file.is.mad_mg, printable(file.after));
   }
   const Summary sum = summary();
-  text += fmt::format("{} files, {:.0f} minutes: ENMO {:.2f} -> {:.2f} mg, MAD {:.2f} -> {:.2f} mg\n",
-                      sum.files, sum.recorded_minutes, sum.enmo_before_mg, sum.enmo_after_mg,
-                      sum.mad_before_mg, sum.mad_after_mg);
+  text +=
+      fmt::format("{} files, {:.0f} minutes: ENMO {:.2f} -> {:.2f} mg, MAD {:.2f} -> {:.2f} mg\n",
+                  sum.files, sum.recorded_minutes, sum.enmo_before_mg, sum.enmo_after_mg,
+                  sum.mad_before_mg, sum.mad_after_mg);
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     text += fmt::format("minutes {} > {:g}, {}: {:.1f} -> {:.1f}\n", to_string(cuts[i].measure),
                         cuts[i].value, printable(cuts[i].name, 40), sum.minutes_before[i],
                         sum.minutes_after[i]);
   }
   if (sum.files > 0) {
-    text += fmt::format("{} of them move by more than twice their uncertainty, most {:+.2f} mg ({})\n",
-                        sum.moved, sum.most_mg, printable(sum.most_file));
+    text +=
+        fmt::format("{} of them move by more than twice their uncertainty, most {:+.2f} mg ({})\n",
+                    sum.moved, sum.most_mg, printable(sum.most_file));
   }
   if (sum.unknown > 0) {
     text += fmt::format("{} state no uncertainty\n", sum.unknown);
@@ -149,15 +151,15 @@ std::string study_csv(const StudyImpact& study) {
       "before,after,recorded_minutes,before_enmo_mg,after_enmo_mg,after_enmo_uncertainty_mg,"
       "before_mad_mg,after_mad_mg";
   for (const CutPoint& cut : study.cuts) {
-    csv += fmt::format(",{0},{1}", csv_field("before_minutes_" + cut.name),
-                       csv_field("after_minutes_" + cut.name));
+    csv += fmt::format(",{},{}", csv_field(fmt::format("before_minutes_{}", cut.name)),
+                       csv_field(fmt::format("after_minutes_{}", cut.name)));
   }
   csv += ",error\n";
   for (const FileImpact& file : study.files) {
-    csv += csv_field(file.before) + "," + csv_field(file.after);
+    csv += fmt::format("{},{}", csv_field(file.before), csv_field(file.after));
     if (file.error) {
-      csv += std::string(6 + 2 * study.cuts.size(), ',');
-      csv += "," + csv_field(file.error->brief()) + "\n";
+      csv.append(7 + 2 * study.cuts.size(), ',');
+      csv += fmt::format("{}\n", csv_field(file.error->brief()));
       continue;
     }
     csv += fmt::format(

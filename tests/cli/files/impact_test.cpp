@@ -45,44 +45,48 @@ TEST_F(ImpactCommand, AtRestARepairTakesTheFalseActivityAway) {
 
 // A folder of two recordings, of which one was repaired; then the same as a plan.
 TEST_F(ImpactCommand, OfAStudy) {
-  ASSERT_OK(write_file(memory_.files, "c.json", R"({"serial": "MOS2A45130450", "filter": "current",
+  ASSERT_OK(write_file(memory_.files, "/c.json", R"({"serial": "MOS2A45130450", "filter": "current",
     "constants": {"sensitivity_g_per_lsb": [0.00420698, 0.00397141, 0.00412712],
                   "zero_lsb": [95.2, 52.3, 90.8]}})"));
-  ASSERT_OK(memory_.files.make_folders("study/sub"));
-  EXPECT_OK(tests::six_sides().write(memory_.files, "study/sub/a.gt3x"));
-  EXPECT_OK(tests::six_sides().write(memory_.files, "study/b.gt3x"));
-  ASSERT_EQ(
-      run_command(memory_.env, {"repair", "study", "-o", "out", "--constants", "c.json"}).exit_code,
-      0);
-  ASSERT_OK(memory_.files.remove("out/b.gt3x"));
-  const auto answer =
-      run({"study", "out", "--cut", "more=20", "--csv", "study.csv", "--jobs", "2", "--json"});
+  ASSERT_OK(memory_.files.make_folders("/data/study/sub"));
+  EXPECT_OK(tests::six_sides().write(memory_.files, "/data/study/sub/a.gt3x"));
+  EXPECT_OK(tests::six_sides().write(memory_.files, "/data/study/b.gt3x"));
+  ASSERT_EQ(run_command(memory_.env,
+                        {"repair", "/data/study", "-o", "/data/out", "--constants", "/c.json"})
+                .exit_code,
+            0);
+  ASSERT_OK(memory_.files.remove("/data/out/b.gt3x"));
+  const auto answer = run({"/data/study", "/data/out", "--cut", "more=20", "--csv", "study.csv",
+                           "--jobs", "2", "--json"});
   ASSERT_EQ(answer.exit_code, 0) << answer.people;
   const Json json = answer.json();
   ASSERT_EQ(json["recordings"].size(), 1U);
-  EXPECT_EQ(json["recordings"][0]["after"], "out/sub/a.gt3x");
+  EXPECT_EQ(json["recordings"][0]["after"], "/data/out/sub/a.gt3x");
   EXPECT_EQ(json["summary"]["without_copy"], 1);
-  const auto alone = run({"study/sub/a.gt3x", "out/sub/a.gt3x", "--cut", "more=20", "--json"});
+  const auto alone =
+      run({"/data/study/sub/a.gt3x", "/data/out/sub/a.gt3x", "--cut", "more=20", "--json"});
   const Json one = alone.json();
   EXPECT_EQ(json["summary"]["enmo_mg"], one["enmo_mg"]);
   EXPECT_EQ(json["summary"]["minutes_above"]["more"]["after"],
             one["minutes_above"]["more"]["after"]);
   EXPECT_TRUE(memory_.files.info("study.csv"));
-  EXPECT_EQ(run({"study", "out/sub/a.gt3x"}).exit_code, 64) << "one of the two is a folder";
-  EXPECT_EQ(run({"study", "out", "--html", "p.html"}).exit_code, 64);
-  EXPECT_EQ(run({"study"}).exit_code, 66) << "no plan";
-  ASSERT_OK(memory_.files.make_folders("empty"));
-  EXPECT_EQ(run({"study", "empty"}).exit_code, 2) << "nothing to compare";
+  EXPECT_EQ(run({"/data/study", "/data/out/sub/a.gt3x"}).exit_code, 64)
+      << "one of the two is a folder";
+  EXPECT_EQ(run({"/data/study", "/data/out", "--html", "p.html"}).exit_code, 64);
+  EXPECT_EQ(run({"/data/study"}).exit_code, 66) << "no plan";
+  ASSERT_OK(memory_.files.make_folders("/data/empty"));
+  EXPECT_EQ(run({"/data/study", "/data/empty"}).exit_code, 2) << "nothing to compare";
 
-  ASSERT_EQ(run_command(memory_.env, {"archive", "plan", "study", "-o", "plan", "--shards", "1",
-                                      "--constants", "c.json"})
+  ASSERT_EQ(run_command(memory_.env, {"archive", "plan", "/data/study", "-o", "/data/plan",
+                                      "--shards", "1", "--constants", "/c.json"})
                 .exit_code,
             0);
-  EXPECT_EQ(run({"plan"}).exit_code, 2) << "it has not run";
-  ASSERT_EQ(
-      run_command(memory_.env, {"archive", "run", "plan", "--shard", "0", "-o", "again"}).exit_code,
-      0);
-  const auto of_plan = run({"plan", "--json"});
+  EXPECT_EQ(run({"/data/plan"}).exit_code, 2) << "it has not run";
+  ASSERT_EQ(run_command(memory_.env,
+                        {"archive", "run", "/data/plan", "--shard", "0", "-o", "/data/again"})
+                .exit_code,
+            0);
+  const auto of_plan = run({"/data/plan", "--json"});
   ASSERT_EQ(of_plan.exit_code, 0) << of_plan.people;
   EXPECT_EQ(of_plan.json()["summary"]["files"], 2);
   EXPECT_EQ(of_plan.json()["summary"]["enmo_mg"]["after"], one["enmo_mg"]["after"]);

@@ -20,8 +20,11 @@ ImpactSummary summary_of_hours(double hours, double enmo_mg, double above) {
 
 FileImpact file(const std::string& name, double hours, double before_mg, double after_mg,
                 std::optional<double> uncertainty_mg) {
-  FileImpact file{"in/" + name, "out/" + name, summary_of_hours(hours, before_mg, 12),
-                  summary_of_hours(hours, after_mg, 7), {}};
+  FileImpact file{"in/" + name,
+                  "out/" + name,
+                  summary_of_hours(hours, before_mg, 12),
+                  summary_of_hours(hours, after_mg, 7),
+                  {}};
   file.is.enmo_uncertainty_mg = uncertainty_mg;
   return file;
 }
