@@ -1,10 +1,10 @@
 # Makes a C++ source of the page's files: cmake -D FOLDER=... -D OUTPUT=... -P SixpointEmbed.cmake
-set(text "// Made by cmake/SixpointEmbed.cmake from station/web/dist.\n#include \"station/page/api.h\"\n\n")
+set(text "// Made by cmake/SixpointEmbed.cmake from station/web.\n#include \"station/page/api.h\"\n\n")
 string(APPEND text "namespace sixpoint::station {\nnamespace {\n")
 set(cases "")
 foreach(entry
-    "index.html|/|text/html; charset=utf-8" "page.js|/page.js|text/javascript; charset=utf-8"
-    "page.css|/page.css|text/css; charset=utf-8" "icon.svg|/icon.svg|image/svg+xml")
+    "src/index.html|/|text/html; charset=utf-8" "dist/page.js|/page.js|text/javascript; charset=utf-8"
+    "dist/page.css|/page.css|text/css; charset=utf-8" "src/icon.svg|/icon.svg|image/svg+xml")
   string(REPLACE "|" ";" parts "${entry}")
   list(GET parts 0 file)
   list(GET parts 1 path)

@@ -1,6 +1,6 @@
-// Builds the page: src/ -> dist/. `node build.mjs OUT` builds elsewhere (the test that dist/ is current).
+// Builds the page's script and styles: src/ -> dist/. `node build.mjs OUT` builds elsewhere (the test that dist/ is current).
 import { build } from 'esbuild';
-import { copyFileSync, mkdirSync } from 'node:fs';
+import { mkdirSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -24,5 +24,3 @@ await build({
   outdir: out,
   logLevel: 'warning',
 });
-copyFileSync(join(here, 'src/index.html'), join(out, 'index.html'));
-copyFileSync(join(here, 'src/icon.svg'), join(out, 'icon.svg'));

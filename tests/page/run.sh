@@ -32,7 +32,7 @@ if [ "$scenario" = bundle ]; then
     exit 1
   fi
   bytes=0
-  for file in "$web"/dist/*; do bytes=$((bytes + $(gzip -9 -c "$file" | wc -c))); done
+  for file in "$web"/dist/* "$web"/src/index.html "$web"/src/icon.svg; do bytes=$((bytes + $(gzip -9 -c "$file" | wc -c))); done
   echo "the page: $bytes bytes gzipped"
   [ "$bytes" -lt 60000 ] || { echo "FAILED: more than 60 kB"; exit 1; }
   exit 0
