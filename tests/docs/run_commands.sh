@@ -1,21 +1,23 @@
 #!/usr/bin/env bash
-# Runs every command that a ```sh block of README.md, docs/*.md or docs/devices/*.md prints, in a scratch folder that
-# looks as the reader's would: build/sixpoint and an archive. A command ends with 0 unless the line
-# says "# exits with N". Commands of scripts/ have tests of their own (demo) or are what runs this (test).
+# Runs every command that a ```sh block of README.md, docs/*.md, docs/tutorials/*.md or docs/devices/*.md prints, in a
+# scratch folder for each document that looks as the reader's would: build/sixpoint and an archive. A command ends with
+# 0 unless the line says "# exits with N". Commands of scripts/ have tests of their own (demo) or are what runs this (test).
 #   run_commands.sh SOURCE_FOLDER SIXPOINT_PROGRAM
 set -euo pipefail
 source_folder=$1
 program=$2
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-export HOME=$scratch/home SIXPOINT_SHARED=${SIXPOINT_SHARED:-$source_folder/../shared}
+export SIXPOINT_SHARED=${SIXPOINT_SHARED:-$source_folder/../shared}
 failures=0
 run=0
 
-for document in "$source_folder"/README.md "$source_folder"/docs/*.md "$source_folder"/docs/devices/*.md; do
+for document in "$source_folder"/README.md "$source_folder"/docs/*.md "$source_folder"/docs/devices/*.md \
+  "$source_folder"/docs/tutorials/*.md; do
   name=${document#"$source_folder"/}
   folder=$scratch/${name//\//_}
-  mkdir -p "$folder/build" "$folder/archive"
+  mkdir -p "$folder/build" "$folder/archive" "$folder/home"
+  export HOME=$folder/home  # a default store of its own
   ln -s "$program" "$folder/build/sixpoint"
   cp "$source_folder/tests/docs/scenario.json" "$folder/S.json"
   echo '{"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production"}' >"$folder/bundle.json"
