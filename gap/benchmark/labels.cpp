@@ -146,7 +146,7 @@ Result<TrialLabel> label_of(const GapTrial& trial, const std::string& bundle) {
 
 std::string bundle_name(std::uint64_t seed, std::uint64_t index) {
   Random random(seed + 0x9E3779B97F4A7C15ULL * (index + 1), kNameStream);
-  return fmt::format("b{:08x}", static_cast<std::uint32_t>(random.bits() >> 32U));
+  return fmt::format("b{:016x}", random.bits());
 }
 
 std::string labels_text(const Labels& labels) {

@@ -52,7 +52,7 @@ struct Labels {
 // typical size, where rounding hides nothing, and scaled back; others as they are.
 Result<TrialLabel> label_of(const GapTrial& trial, const std::string& bundle);
 
-// A name that says nothing of what is in the bundle: "b" and eight hex digits, from seed and index.
+// A name that says nothing of what is in the bundle: "b" and 16 hex digits, from seed and index.
 std::string bundle_name(std::uint64_t seed, std::uint64_t index);
 
 std::string labels_text(const Labels& labels);

@@ -12,13 +12,13 @@ constexpr double kSeating_mg = 0.17;
 constexpr double kGainSd_mg = 20;  // 2 % of 1 g
 constexpr double kOffsetSd_mg = 35;
 constexpr double kHost_s = 0.002 / 1.7320508075688772;  // standard deviation of +-2 ms
-constexpr double kPlainCounts = 2;
+constexpr double kPlainCounts = 1.25;  // a steady change that is rounded scatters by less than 1
 
-// The mean difference of one axis over some seconds.
+// The mean difference of one axis over some seconds, or over a segment.
 struct Piece {
   double mean_mg = 0;
   double rounding_mg2 = 0;  // variance of that mean by rounding
-  double noise_mg2 = 0;     // of a mean, seating included
+  double noise_mg2 = 0;     // the same by noise, of a segment by seating, too
   double gravity = 0;       // along the axis
   const std::string* segment = nullptr;
 };
@@ -35,20 +35,21 @@ class Comparison {
 
   void of_axis(std::size_t axis) {
     const double noise_mg2 = std::pow(run_.noise_mg[axis], 2) + lsb_mg_ * lsb_mg_ / 12;
-    std::vector<Piece> pieces;
+    std::vector<Piece> segments;
     for (const sim::ProtocolSegment& segment : run_.segments) {
       const auto length = static_cast<std::uint64_t>(kPiece_s * run_.rate_hz);
+      std::vector<Piece> pieces;
       for (std::uint64_t first = 0; first < segment.samples; first += length) {
         const std::uint64_t count = std::min(length, segment.samples - first);
         pieces.push_back(piece(segment, first, count, axis, noise_mg2));
       }
+      if (!pieces.empty()) {
+        segments.push_back(whole(segment, pieces, axis));
+      }
     }
-    take_out_gain_and_offset(pieces);
-    for (const Piece& piece : pieces) {
-      const double square =
-          (piece.mean_mg * piece.mean_mg - piece.rounding_mg2) / piece.noise_mg2;
-      shown_.means += square;
-      shown_.by_place[{static_cast<int>(axis), *piece.segment}] += square;
+    take_out_gain_and_offset(segments);
+    for (const Piece& segment : segments) {
+      add_mean(segment, static_cast<int>(axis));
     }
   }
 
@@ -83,8 +84,7 @@ class Comparison {
     Piece made;
     made.mean_mg = sum / n;
     made.rounding_mg2 = std::max(0.0, squares / n - made.mean_mg * made.mean_mg) / n;
-    made.noise_mg2 = noise_mg2 / n + kSeating_mg * kSeating_mg;
-    made.gravity = segment.rotation(static_cast<Eigen::Index>(axis), 2);
+    made.noise_mg2 = noise_mg2 / n;
     made.segment = &segment.name;
     double plain = 0;
     for (std::uint64_t i = 0; i < count; ++i) {
@@ -94,6 +94,36 @@ class Comparison {
     shown_.samples += plain;
     shown_.by_place[{static_cast<int>(axis), segment.name}] += plain;
     return made;
+  }
+
+  // The mean of a segment's pieces; what they differ from it has no part in the seating.
+  Piece whole(const sim::ProtocolSegment& segment, const std::vector<Piece>& pieces,
+              std::size_t axis) {
+    Piece all;
+    double weights = 0;
+    for (const Piece& piece : pieces) {
+      all.mean_mg += piece.mean_mg / piece.noise_mg2;
+      weights += 1 / piece.noise_mg2;
+    }
+    all.mean_mg /= weights;
+    for (const Piece& piece : pieces) {
+      const double share = 1 / piece.noise_mg2 / weights;
+      all.rounding_mg2 += share * share * piece.rounding_mg2;
+      Piece beside = piece;
+      beside.mean_mg -= all.mean_mg;
+      beside.rounding_mg2 *= 1 - share;
+      add_mean(beside, static_cast<int>(axis));
+    }
+    all.noise_mg2 = 1 / weights + kSeating_mg * kSeating_mg;
+    all.gravity = segment.rotation(static_cast<Eigen::Index>(axis), 2);
+    all.segment = &segment.name;
+    return all;
+  }
+
+  void add_mean(const Piece& piece, int axis) {
+    const double square = (piece.mean_mg * piece.mean_mg - piece.rounding_mg2) / piece.noise_mg2;
+    shown_.means += square;
+    shown_.by_place[{axis, *piece.segment}] += square;
   }
 
   // Weighted least squares with the priors of a unit; what they take is evidence, too.

@@ -58,6 +58,9 @@ const std::map<std::string, Role>& common_roles() {
                                          {"--scenario-out", Role::output},
                                          {"--constants-out", Role::output},
                                          {"--keep", Role::folder},
+                                         {"--export", Role::folder},
+                                         {"ANSWERS", Role::input},
+                                         {"FOLDER", Role::input},
                                          {"--journal", Role::input},
                                          {"--recording", Role::input},
                                          {"--program", Role::input},
@@ -174,6 +177,9 @@ const std::map<std::string, Role>& own_roles() {
       {"archive plan --output", Role::folder},
       {"archive run --output", Role::working_folder},
       {"gap diagnose --scenario", Role::refused},
+      {"gap challenge --labels", Role::output_to_keep},
+      {"gap score --labels", Role::input},
+      {"gap answers --output", Role::output},
   };
   return kRoles;
 }
