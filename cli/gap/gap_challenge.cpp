@@ -297,7 +297,8 @@ Status challenge(Options options, Context& context) {
   }
   const Scores scores = gap::score(outcomes, options.strip);
   if (!options.html.empty()) {
-    SIXPOINT_CHECK(write_file(outputs.files(), options.html, scores_page(options, scores, outcomes)));
+    SIXPOINT_CHECK(
+        write_file(outputs.files(), options.html, scores_page(options, scores, outcomes)));
   }
   if (options.json) {
     print_json(context, scores_json(options, scores, outcomes));

@@ -28,9 +28,8 @@ void set_one_time(const std::string& folder) {
 
 Result<gap::TrialLabel> write_trial(FileSystem& files, const ExportOptions& options,
                                     std::size_t index) {
-  SIXPOINT_ASSIGN(const gap::GapTrial trial,
-                  gap::draw_trial(options.seed, index, options.protocol, options.shares,
-                                  options.only));
+  SIXPOINT_ASSIGN(const gap::GapTrial trial, gap::draw_trial(options.seed, index, options.protocol,
+                                                             options.shares, options.only));
   const std::string name = gap::bundle_name(options.seed, index);
   const std::string folder = options.folder + "/" + name;
   SIXPOINT_CHECK(sim::write_bundle(files, folder, trial.scenario));
@@ -62,9 +61,8 @@ Result<std::vector<gap::TrialLabel>> write_trials(const ExportOptions& options, 
 Result<std::map<std::string, std::size_t>> count_kinds(const ExportOptions& options) {
   std::map<std::string, std::size_t> kinds;
   for (std::size_t i = 0; i < options.trials; ++i) {
-    SIXPOINT_ASSIGN(const gap::GapTrial trial,
-                    gap::draw_trial(options.seed, i, options.protocol, options.shares,
-                                    options.only));
+    SIXPOINT_ASSIGN(const gap::GapTrial trial, gap::draw_trial(options.seed, i, options.protocol,
+                                                               options.shares, options.only));
     kinds[std::string(gap::to_string(trial.kind))] += 1;
   }
   return kinds;

@@ -27,12 +27,12 @@ Json benchmark_json(const gap::BenchmarkScores& scores) {
   json["kinds"] = scores.kinds;
   json["measures"] = Json::array();
   for (const gap::Measure& measure : scores.measures) {
-    json["measures"].push_back({{"name", measure.name},
-                                {"value", number(measure.value)},
-                                {"interval",
-                                 {number(measure.interval[0]), number(measure.interval[1])}},
-                                {"interval_by", measure.interval_by},
-                                {"of", static_cast<std::uint64_t>(measure.of)}});
+    json["measures"].push_back(
+        {{"name", measure.name},
+         {"value", number(measure.value)},
+         {"interval", {number(measure.interval[0]), number(measure.interval[1])}},
+         {"interval_by", measure.interval_by},
+         {"of", static_cast<std::uint64_t>(measure.of)}});
   }
   json["power"] = Json::array();
   for (const gap::PowerStep& step : scores.power) {
@@ -51,18 +51,16 @@ void print(const gap::BenchmarkScores& scores, Context& context) {
     const std::string text =
         std::isfinite(measure.value)
             ? fmt::format("{:6.3f}  [{:.3f}, {:.3f}]  of {:.0f} ({})", measure.value,
-                          measure.interval[0], measure.interval[1], measure.of,
-                          measure.interval_by)
+                          measure.interval[0], measure.interval[1], measure.of, measure.interval_by)
             : "     -";
     context.text() << fmt::format("{:<26} {}\n", measure.name, text);
   }
   context.text() << "named, by size over the bound:\n";
   for (const gap::PowerStep& step : scores.power) {
-    context.text() << fmt::format(
-        "  {:<12} {}\n",
-        step.high > 1e6 ? fmt::format("{} and more", step.low)
-                        : fmt::format("{} to {}", step.low, step.high),
-        text_of(step.named));
+    context.text() << fmt::format("  {:<12} {}\n",
+                                  step.high > 1e6 ? fmt::format("{} and more", step.low)
+                                                  : fmt::format("{} to {}", step.low, step.high),
+                                  text_of(step.named));
   }
 }
 

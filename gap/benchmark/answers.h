@@ -5,11 +5,11 @@
 //
 // One JSON object a bundle (docs/gap-benchmark.md):
 //
-//   {"bundle": "b1c2d3e4",
-//    "effects": [{"name": "tilt", "probability": 0.97}],              strongest first
-//    "unknown": {"present": true, "probability": 0.9,
-//                "where": [{"axis": "X", "segment": "ramp_up"}]},    `where` may be left out
-//    "candidates": [{"name": "drift", "probability": 0.02}]}         may be left out
+//     {"bundle": "b1c2d3e4",
+//      "effects": [{"name": "tilt", "probability": 0.97}],              strongest first
+//      "unknown": {"present": true, "probability": 0.9,
+//                  "where": [{"axis": "X", "segment": "ramp_up"}]},    `where` may be left out
+//      "candidates": [{"name": "drift", "probability": 0.02}]}         may be left out
 //
 // Other members are not read, so that documents of `gap diagnose --json` are answers, too; their
 // `unknown.where` is in words, and the document's own `where` is taken from 3 sigma on. Answers

@@ -46,7 +46,8 @@ bool is_right(const Judged& judged) {
     case TrialKind::pair:
       break;
   }
-  return outcome.first_right();
+  const bool silent = judged.answer != nullptr && outcome.named.empty();
+  return outcome.first_right() || (silent && judged.must == 0);
 }
 
 Judged judge(const TrialLabel& label, const Answer* answer) {
@@ -75,7 +76,6 @@ Judged judge(const TrialLabel& label, const Answer* answer) {
     judged.confidence = (1 - judged.openness) *
                         (answer->effects.empty() ? 1 - most : answer->effects.front().second);
   }
-  judged.right = is_right(judged);
   for (const auto& [name, probability] : outcome.named) {
     judged.hits += outcome.has(name) ? 1 : 0;
   }
@@ -83,6 +83,7 @@ Judged judge(const TrialLabel& label, const Answer* answer) {
     judged.must += effect.must() ? 1 : 0;
     judged.must_named += effect.must() && is_named(outcome, effect.name) ? 1 : 0;
   }
+  judged.right = is_right(judged);
   return judged;
 }
 
@@ -114,16 +115,26 @@ class Scorer {
       return judged.label->kind == TrialKind::realistic;
     };
     measures = {
-        drawn("open_auc", [&](Drawn d) { return pairs(d, any, open); }, count(any)),
-        drawn("open_auc_realistic", [&](Drawn d) { return pairs(d, real, open); }, count(real)),
-        drawn("oscr", [&](Drawn d) { return pairs(d, any, sure); }, count(any)),
-        drawn("augrc", [this](Drawn d) { return risk(d); }, static_cast<double>(all_.size())),
-        drawn("top_label_calibration", [this](Drawn d) { return names(d, true); }, count_named()),
-        drawn("names_calibration", [this](Drawn d) { return names(d, false); }, count_named()),
-        drawn("unknown_calibration", [this](Drawn d) { return unknowns(d); }, count_given()),
-        drawn("recall", [this](Drawn d) { return sets(d).recall(); }, sets().must),
-        drawn("precision", [this](Drawn d) { return sets(d).precision(); }, sets().named),
-        drawn("f1", [this](Drawn d) { return sets(d).f1(); }, sets().truth),
+        drawn(
+            "open_auc", [&](Drawn d) { return pairs(d, any, open); }, count(any)),
+        drawn(
+            "open_auc_realistic", [&](Drawn d) { return pairs(d, real, open); }, count(real)),
+        drawn(
+            "oscr", [&](Drawn d) { return pairs(d, any, sure); }, count(any)),
+        drawn(
+            "augrc", [this](Drawn d) { return risk(d); }, static_cast<double>(all_.size())),
+        drawn(
+            "top_label_calibration", [this](Drawn d) { return names(d, true); }, count_named()),
+        drawn(
+            "names_calibration", [this](Drawn d) { return names(d, false); }, count_named()),
+        drawn(
+            "unknown_calibration", [this](Drawn d) { return unknowns(d); }, count_given()),
+        drawn(
+            "recall", [this](Drawn d) { return sets(d).recall(); }, sets().must),
+        drawn(
+            "precision", [this](Drawn d) { return sets(d).precision(); }, sets().named),
+        drawn(
+            "f1", [this](Drawn d) { return sets(d).f1(); }, sets().truth),
         share("exact_set", exact),
         share("first_right", scores.first_observable),
         share("dominant_first", scores.dominant),
@@ -131,9 +142,11 @@ class Scorer {
         share("alarms", scores.alarms),
         share("outside_honest", scores.withheld_honest),
         share("outside_confidently_wrong", scores.withheld_wrong),
-        drawn("localisation_f1", [this](Drawn d) { return places(d).f1(); }, places().truth),
-        drawn("half_named_at", [this](Drawn d) { return half_named_at(sized(d)); },
-              static_cast<double>(sized(everything()).size()))};
+        drawn(
+            "localisation_f1", [this](Drawn d) { return places(d).f1(); }, places().truth),
+        drawn(
+            "half_named_at", [this](Drawn d) { return half_named_at(sized(d)); },
+            static_cast<double>(sized(everything()).size()))};
   }
 
   std::vector<PowerStep> power() const {
@@ -209,9 +222,9 @@ class Scorer {
       const Judged& judged = all_[i];
       if (judged.names() > 0) {
         const auto& [name, probability] = judged.outcome.named.front();
-        said.push_back({labels_apart ? name : "", probability,
-                        judged.known() ? judged.outcome.first_right()
-                                       : judged.outcome.family_right()});
+        said.push_back(
+            {labels_apart ? name : "", probability,
+             judged.known() ? judged.outcome.first_right() : judged.outcome.family_right()});
       }
     }
     return calibration_error(said);

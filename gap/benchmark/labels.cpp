@@ -61,8 +61,7 @@ Result<LabelledEffect> parse_effect(const Json& json, std::size_t line) {
   };
   if (!text("name", effect.name) || !text("family", effect.family) ||
       !size("severity", effect.severity) || !size("size_over_bound", effect.size_over_bound)) {
-    return tl::unexpected(
-        bad(line, "an effect needs name, family, severity and size_over_bound"));
+    return tl::unexpected(bad(line, "an effect needs name, family, severity and size_over_bound"));
   }
   return effect;
 }

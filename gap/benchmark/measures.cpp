@@ -130,7 +130,8 @@ std::array<double, 2> bootstrap_interval(std::size_t count, const Statistic& sta
   }
   std::ranges::sort(values);
   const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1)))];
+    return values[static_cast<std::size_t>(
+        std::lround(share * static_cast<double>(values.size() - 1)))];
   };
   return {at(kTail), at(1 - kTail)};
 }

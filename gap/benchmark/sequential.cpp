@@ -47,10 +47,9 @@ std::vector<Row> rows_of(const Bundle& bundle) {
         row.gravity = bundle.gravity_in_sensor(segment)[row.axis];
         row.off_mg = lsb_mg * sum / n - 1000 * row.gravity;
         const double noise = kNoise_mg[axis] * std::sqrt(bundle.rate_hz / 100);
-        row.sigma_mg = std::sqrt((noise * noise + lsb_mg * lsb_mg / 12) / n +
-                                 kSeating_mg * kSeating_mg);
-        row.time_s = segment.host_start_s +
-                     (static_cast<double>(first) + n / 2) / bundle.rate_hz;
+        row.sigma_mg =
+            std::sqrt((noise * noise + lsb_mg * lsb_mg / 12) / n + kSeating_mg * kSeating_mg);
+        row.time_s = segment.host_start_s + (static_cast<double>(first) + n / 2) / bundle.rate_hz;
         row.warmer_c = bundle.temperature_at(row.time_s) - kReference_c;
         rows.push_back(row);
       }

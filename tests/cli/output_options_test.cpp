@@ -252,6 +252,9 @@ class EveryOutput : public tests::CommandTest {
     std::filesystem::create_directory(path("archive"));
     std::filesystem::copy_file(path("rec.gt3x"), path("archive/rec.gt3x"));
     must({"archive", "plan", path("archive"), "-o", path("plan"), "--scan"}, 0);
+    must({"gap", "challenge", "--export", path("bundles"), "--trials", "1", "--protocol",
+          "production"},
+         0);
     // A recording that was killed leaves its journal.
     write("cut.zip.journal", R"({"schema":"sixpoint/session-journal/1"})");
   }
@@ -298,6 +301,12 @@ class EveryOutput : public tests::CommandTest {
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
         {"archive report --output", {"archive", "report", path("plan")}},
         {"scan --units", {"scan", path("archive")}},
+        {"gap challenge --export",
+         {"gap", "challenge", "--trials", "1", "--protocol", "production"}},
+        {"gap challenge --labels",
+         {"gap", "challenge", "--trials", "1", "--protocol", "production", "--export",
+          path("exported")}},
+        {"gap answers --output", {"gap", "answers", path("bundles"), "--method", "sequential"}},
     };
     for (const char* option : {"--certificate", "--label", "--record", "--state"}) {
       all.emplace(std::string("jig ") + option, jig);

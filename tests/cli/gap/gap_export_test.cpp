@@ -16,8 +16,8 @@ class GapExport : public tests::CommandTest {
  protected:
   tests::Answer challenge(const std::string& folder, const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments = {
-        "gap",      "challenge",  "--export", path(folder), "--trials", "6",       "--seed", "11",
-        "--protocol", "production", "--json", "--outside",  "0.4",      "--none", "0.2"};
+        "gap",        "challenge",  "--export", path(folder), "--trials", "6",      "--seed", "11",
+        "--protocol", "production", "--json",   "--outside",  "0.4",      "--none", "0.2"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }

@@ -86,8 +86,8 @@ TEST_F(GapScore, DocumentsOfDiagnoseAndMethodsOfTheProject) {
 
   for (const char* method : {"diagnose", "closed-world", "sequential"}) {
     const std::string name = std::string(method) + ".jsonl";
-    const auto made = run({"gap", "answers", path("a"), "--method", method, "-o", path(name),
-                           "--json"});
+    const auto made =
+        run({"gap", "answers", path("a"), "--method", method, "-o", path(name), "--json"});
     ASSERT_EQ(made.exit_code, 0) << made.people;
     EXPECT_EQ(made.json()["bundles"], 8);
     EXPECT_EQ(made.json()["failed"], 0);
@@ -108,8 +108,7 @@ TEST_F(GapScore, Refusals) {
   EXPECT_EQ(dry.exit_code, 0);
   EXPECT_EQ(dry.json()["bundles"], 8);
   EXPECT_FALSE(std::filesystem::exists(path("x")));
-  EXPECT_EQ(run({"gap", "answers", path("a"), "--method", "guess", "-o", path("x")}).exit_code,
-            64);
+  EXPECT_EQ(run({"gap", "answers", path("a"), "--method", "guess", "-o", path("x")}).exit_code, 64);
   EXPECT_EQ(run({"gap", "answers", path("none"), "-o", path("x")}).exit_code, 66);
   EXPECT_EQ(score("none.jsonl").exit_code, 66);
   std::ofstream(path("bad.jsonl")) << "nonsense\n";

@@ -97,15 +97,30 @@ TEST_F(BenchmarkScore, PlacesAndPower) {
   const auto scores = score_answers(labels_, answers_, {.seed = 1, .draws = 50});
   ASSERT_OK(scores);
   const auto step = [&](double size) -> const Share& {
-    return std::ranges::find_if(scores->power, [&](const PowerStep& s) {
-             return size >= s.low && size < s.high;
-           })->named;
+    return std::ranges::find_if(scores->power,
+                                [&](const PowerStep& s) { return size >= s.low && size < s.high; })
+        ->named;
   };
   EXPECT_EQ(step(1).right, 1);
   EXPECT_EQ(step(3).of, 1);
   EXPECT_EQ(step(3).right, 0);
   EXPECT_EQ(step(4).right, 1);
   EXPECT_EQ(step(10).right, 1);
+}
+
+// One effect below twice the bound: silence is right, and so is its name; another name is not.
+TEST_F(BenchmarkScore, SilenceIsRightWhereNothingMustBeNamed) {
+  labels_.trials = {{"b1", TrialKind::single, {effect("tilt", 1.5)}, {}},
+                    {"b2", TrialKind::outside, {effect("noises_off", 5)}, {}}};
+  answers_ = {answer("b1", {}, false, 0), answer("b2", {}, true, 1)};
+  EXPECT_EQ(value("open_auc"), 1);
+  answers_[0].effects = {{"tilt", 0.95}};
+  EXPECT_EQ(value("open_auc"), 1);
+  answers_[0].effects = {{"drift", 0.95}};
+  EXPECT_EQ(value("open_auc"), 0);
+  labels_.trials[0].effects[0].size_over_bound = 2;
+  answers_[0].effects.clear();
+  EXPECT_EQ(value("open_auc"), 0);
 }
 
 TEST_F(BenchmarkScore, MissingAnswersAbstainAndAreCounted) {

@@ -24,11 +24,11 @@ GapTrial trial_of(const std::string& effects, TrialEffect truth) {
 // 18000 * 18 / 3 * (2 / 16.4816 + 1 / 31.5216) mg^-2 mg^2 = 16530: index 128.6, bound 3. What lies
 // within 1.25 counts of zero, a tenth of the energy at most, is left out.
 TEST(Labels, SizeOfALineOverItsBoundByItsClosedForm) {
-  const auto label = label_of(
-      trial_of(R"([{"name": "floor_vibration", "parameters": {"vector_mg": [6, 0, 0],
+  const auto label =
+      label_of(trial_of(R"([{"name": "floor_vibration", "parameters": {"vector_mg": [6, 0, 0],
                    "frequency_hz": 11}}])",
-               {"floor_vibration", 4}),
-      "b1");
+                        {"floor_vibration", 4}),
+               "b1");
   ASSERT_OK(label);
   ASSERT_EQ(label->effects.size(), 1U);
   EXPECT_NEAR(label->effects[0].size_over_bound, 128.6 / 3, 0.1 * 128.6 / 3);
@@ -58,8 +58,7 @@ TEST(Labels, OutsideKindsSayWhere) {
   TrialShares outside;
   outside.none = 0;
   outside.outside = 1;
-  const auto trial =
-      draw_trial(3, 1, sim::StandardProtocol::production, outside, {"zero_step"});
+  const auto trial = draw_trial(3, 1, sim::StandardProtocol::production, outside, {"zero_step"});
   if (!trial || trial->kind != TrialKind::outside) {
     GTEST_FAIL() << "no such kind";
   }

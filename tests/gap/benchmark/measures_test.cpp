@@ -94,8 +94,8 @@ TEST(Measures, BootstrapIntervalOfAMean) {
   EXPECT_EQ(bootstrap_interval(400, mean, 1), bootstrap_interval(400, mean, 1));
   EXPECT_NE(bootstrap_interval(400, mean, 1), bootstrap_interval(400, mean, 2));
   EXPECT_TRUE(std::isnan(bootstrap_interval(0, mean, 1)[0]));
-  EXPECT_TRUE(std::isnan(
-      bootstrap_interval(9, [](std::span<const std::size_t>) { return NAN; }, 1)[0]));
+  EXPECT_TRUE(std::isnan(bootstrap_interval(
+      9, [](std::span<const std::size_t>) { return NAN; }, 1)[0]));
 }
 
 }  // namespace
