@@ -1,6 +1,4 @@
 // gap challenge --export: bundles that do not tell what is in them, and labels that are sealed.
-#include "cli/gap/gap_export.h"
-
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -104,11 +102,12 @@ TEST_F(GapExport, ADiagnosisReadsTheBundles) {
 TEST_F(GapExport, RefusalsAndDryRun) {
   const auto dry = challenge("a", {"--dry-run"});
   EXPECT_EQ(dry.exit_code, 0);
-  EXPECT_TRUE(dry.json()["dry_run"].get<bool>());
-  EXPECT_EQ(dry.json()["labels_sha256"], nullptr);
+  const auto said = dry.json();
+  EXPECT_TRUE(said["dry_run"].get<bool>());
+  EXPECT_EQ(said["labels_sha256"], nullptr);
   EXPECT_FALSE(std::filesystem::exists(path("a")));
   std::size_t drawn = 0;
-  for (const auto& [kind, number] : dry.json()["kinds"].items()) {
+  for (const auto& [kind, number] : said["kinds"].items()) {
     drawn += number.get<std::size_t>();
   }
   EXPECT_EQ(drawn, 6U);

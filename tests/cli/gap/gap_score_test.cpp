@@ -1,7 +1,5 @@
 // gap score and gap answers: from exported bundles to scores, by this project's methods and by a
 // program that knows nothing of it.
-#include "cli/gap/gap_score.h"
-
 #include <filesystem>
 #include <fstream>
 

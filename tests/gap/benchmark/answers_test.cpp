@@ -13,8 +13,8 @@ namespace {
 class Answers : public ::testing::Test {
  protected:
   Result<std::vector<Answer>> read(const std::string& lines) {
-    EXPECT_OK(write_file(env_.env().files, "answers.jsonl", lines));
-    return read_answers(env_.env().files, "answers.jsonl");
+    EXPECT_OK(write_file(env_.env.files, "answers.jsonl", lines));
+    return read_answers(env_.env.files, "answers.jsonl");
   }
   MemoryEnv env_;
 };
@@ -99,7 +99,7 @@ TEST_F(Answers, HostileAnswersAreErrorsWithTheirLine) {
 }
 
 TEST_F(Answers, AFolderOfDocumentsNamedByBundle) {
-  FileSystem& files = env_.env().files;
+  FileSystem& files = env_.env.files;
   ASSERT_OK(files.make_folders("answers"));
   ASSERT_OK(write_file(files, "answers/b2.json", line("[]")));
   ASSERT_OK(write_file(files, "answers/b3.json", line("[]")));

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "made_bundle.h"
+#include "gap/made_bundle.h"
 
 namespace sixpoint::gap {
 namespace {
