@@ -24,7 +24,8 @@ double right_above(std::span<const Ranked> known, std::span<const double> unknow
   double pairs = 0;
   for (const Ranked& answer : known) {
     if (answer.right) {
-      const auto [low, high] = std::ranges::equal_range(sorted, answer.confidence);
+      const auto low = std::lower_bound(sorted.begin(), sorted.end(), answer.confidence);
+      const auto high = std::upper_bound(low, sorted.end(), answer.confidence);
       pairs += static_cast<double>(low - sorted.begin()) + 0.5 * static_cast<double>(high - low);
     }
   }

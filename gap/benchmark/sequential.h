@@ -9,7 +9,7 @@
 // exceeds its expectation by more than 3 standard deviations, the effect that lowers it most joins,
 // where that is more than its parameters cost (Schwarz, "Estimating the Dimension of a Model",
 // 1978). What is then left beyond 5.5 standard deviations is unknown, where a cell of axis and
-// segment is 3 sigma off. Eleven effects of the means are known; noise, lines, timing and digital
+// segment is 3 sigma off. Ten effects of the means are known; noise, lines, timing and digital
 // effects are not, nor bad samples. It shares nothing with the diagnosis but the reader of bundles.
 #pragma once
 
