@@ -10,6 +10,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/gap/gap_challenge.h"
+#include "cli/gap/gap_score.h"
 #include "cli/gap/gap_trends.h"
 #include "cli/output.h"
 #include "cli/store_option.h"
@@ -184,6 +185,8 @@ void add_gap(CLI::App& app, Context& context) {
   refuse_old_output(diagnosis, "--scenario", "--scenario-out");
   add_output_options(diagnosis, options.outputs);
   add_gap_challenge(group, context);
+  add_gap_score(group, context);
+  add_gap_answers(group, context);
   add_gap_trends(group, context);
 }
 

@@ -18,8 +18,9 @@
 #include <unistd.h>
 
 #include "base/atomic_file.h"
-#include "base/text/html.h"
 #include "cli/command.h"
+#include "cli/gap/challenge_scores.h"
+#include "cli/gap/gap_export.h"
 #include "cli/output.h"
 #include "cli/workers.h"
 #include "gap/challenge/outside.h"
@@ -37,23 +38,18 @@ namespace {
 using gap::GapTrial;
 using gap::Outcome;
 using gap::Scores;
-using gap::Share;
 
-struct Options {
+struct Options : ChallengeSetting {
   std::size_t trials = 100;
-  std::uint64_t seed = 1;
-  std::string protocol = "engineering";
   std::vector<std::string> only;
-  bool strip = false;
   gap::TrialShares shares;
   unsigned jobs = 1;
   std::string program;
   std::string keep;
   std::string html;
-  std::string recording;  // a bundle or a .gt3x file to which effects are added
-  // What the diagnosis says of that bundle as it is.
-  std::set<std::string> own_effects;
-  bool own_unknown = false;
+  std::string export_to;
+  std::string labels;
+  bool dry_run = false;
   OutputOptions outputs;
   bool json = false;
 };
@@ -185,177 +181,6 @@ Status learn_own(Env& env, Options& options, const std::string& folder) {
   return {};
 }
 
-Json to_json(const Share& share) {
-  Json json;
-  json["right"] = static_cast<std::uint64_t>(share.right);
-  json["of"] = static_cast<std::uint64_t>(share.of);
-  json["share"] = share.of > 0 ? Json(share.right / share.of) : Json(nullptr);
-  json["interval"] = share.interval();
-  return json;
-}
-
-std::string text_of(const Share& share) {
-  const auto [low, high] = share.interval();
-  return share.of == 0
-             ? "-"
-             : fmt::format("{:.0f} of {:.0f} = {:.1f} % ({:.1f} to {:.1f} %)", share.right,
-                           share.of, 100 * share.right / share.of, 100 * low, 100 * high);
-}
-
-Json to_json(const Outcome& outcome, std::size_t index) {
-  Json entry;
-  entry["trial"] = index;
-  entry["kind"] = gap::to_string(outcome.kind);
-  entry["truth"] = Json::array();
-  for (const gap::TrialEffect& effect : outcome.truth) {
-    entry["truth"].push_back({{"name", effect.name}, {"severity", effect.severity}});
-  }
-  entry["verdict"] = outcome.verdict;
-  entry["named"] = Json::array();
-  for (const auto& [name, probability] : outcome.named) {
-    entry["named"].push_back({{"name", name}, {"probability", number(probability)}});
-  }
-  entry["unknown"] = outcome.unknown;
-  entry["unknown_probability"] = number(outcome.unknown_probability);
-  entry["honest"] = outcome.honest();
-  entry["confidently_wrong"] = outcome.confidently_wrong();
-  entry["seconds"] = outcome.seconds;
-  if (!outcome.failure.empty()) {
-    entry["failure"] = outcome.failure;
-  }
-  return entry;
-}
-
-Json to_json(const Options& options, const Scores& scores, const std::vector<Outcome>& outcomes) {
-  Json json = document("gap-challenge");
-  json["trials"] = outcomes.size();
-  json["seed"] = options.seed;
-  json["protocol"] = options.protocol;
-  json["strip"] = options.strip;
-  if (!options.recording.empty()) {
-    json["recording"] = options.recording;
-    json["own_effects"] = options.own_effects;
-    json["own_unknown"] = options.own_unknown;
-  }
-  Json& result = json["scores"];
-  result["single_first_right"] = to_json(scores.first);
-  result["single_alone_and_right"] = to_json(scores.exact);
-  result["single_first_right_observable"] = to_json(scores.first_observable);
-  result["single_first_right_observable_severity_1"] = to_json(scores.first_large);
-  result["single_family_right"] = to_json(scores.family);
-  result["none_alarms"] = to_json(scores.alarms);
-  result["pair_f1"] = number(scores.f1());
-  result["realistic_dominant_first"] = to_json(scores.dominant);
-  result["realistic_recall"] = to_json(scores.recall);
-  result["realistic_precision"] = to_json(scores.precise);
-  result["realistic_exact_set"] = to_json(scores.exact_set);
-  result["realistic_needless_unknown"] = to_json(scores.needless);
-  result["withheld_honest"] = to_json(scores.withheld_honest);
-  result["withheld_confidently_wrong"] = to_json(scores.withheld_wrong);
-  result["expected_calibration_error"] = number(scores.calibration_error());
-  result["unknown_calibration_error"] = number(scores.unknown_calibration_error());
-  result["failures"] = to_json(scores.failures);
-  json["calibration"] = Json::array();
-  for (const Scores::Bin& bin : scores.bins) {
-    json["calibration"].push_back({{"probability", bin.of > 0 ? Json(bin.sum_p / bin.of) : Json()},
-                                   {"right", bin.of > 0 ? Json(bin.right / bin.of) : Json()},
-                                   {"candidates", static_cast<std::uint64_t>(bin.of)}});
-  }
-  json["by_effect"] = Json::array();
-  for (const auto& [name, effect] : scores.by_effect) {
-    json["by_effect"].push_back({{"name", name},
-                                 {"first_right", to_json(effect.first)},
-                                 {"family_right", to_json(effect.family)},
-                                 {"missed", static_cast<std::uint64_t>(effect.missed)},
-                                 {"not_observable", static_cast<std::uint64_t>(effect.blind)}});
-  }
-  json["outcomes"] = Json::array();
-  for (std::size_t i = 0; i < outcomes.size(); ++i) {
-    json["outcomes"].push_back(to_json(outcomes[i], i));
-  }
-  const double answered = scores.failures.of - scores.failures.right;
-  json["seconds"]["mean"] = number(answered > 0 ? scores.seconds_sum / answered : 0);
-  json["seconds"]["max"] = scores.seconds_max;
-  return json;
-}
-
-// What people read: the same lines on the terminal and in the page.
-std::vector<std::pair<std::string, std::string>> lines(const Scores& scores) {
-  return {{"one effect: first-named right", text_of(scores.first)},
-          {"  ... and nothing else named", text_of(scores.exact)},
-          {"  ... where this protocol can show it", text_of(scores.first_observable)},
-          {"  ... and at least of typical size", text_of(scores.first_large)},
-          {"  ... right family", text_of(scores.family)},
-          {"two effects: F1 of the set", fmt::format("{:.3f}", scores.f1())},
-          {"nothing missing: alarms", text_of(scores.alarms)},
-          {"realistic: dominant effect first", text_of(scores.dominant)},
-          {"  ... effects named (recall)", text_of(scores.recall)},
-          {"  ... names that are right (precision)", text_of(scores.precise)},
-          {"  ... exactly the effects that are there", text_of(scores.exact_set)},
-          {"  ... needless unknown", text_of(scores.needless)},
-          {"withheld: unknown, or right family", text_of(scores.withheld_honest)},
-          {"withheld: confidently wrong", text_of(scores.withheld_wrong)},
-          {"expected calibration error", fmt::format("{:.3f}", scores.calibration_error())},
-          {"  ... of unknown", fmt::format("{:.3f}", scores.unknown_calibration_error())},
-          {"failures of the program", text_of(scores.failures)}};
-}
-
-std::string page(const Options& options, const Scores& scores,
-                 const std::vector<Outcome>& outcomes) {
-  std::string html =
-      "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>gap challenge</title>"
-      "<style>body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}"
-      "table{border-collapse:collapse;margin:1em 0}td,th{padding:.2em .8em;text-align:left;"
-      "border-bottom:1px solid #ccc}td.n{text-align:right}.bad{color:#b00020}</style>";
-  html += fmt::format(
-      "<h1>Blind check of the gap diagnosis</h1><p>{} trials, {} protocol, seed {}{}. Shares with "
-      "95 % intervals.</p><table>",
-      outcomes.size(), options.protocol, options.seed,
-      options.strip ? ", true effects taken out of the catalogue" : "");
-  for (const auto& [what, value] : lines(scores)) {
-    html += fmt::format("<tr><td>{}</td><td>{}</td></tr>", what, value);
-  }
-  html +=
-      "</table><h2>By effect</h2><table><tr><th>effect<th>first-named right<th>family right"
-      "<th>missed<th>not observable</tr>";
-  for (const auto& [name, effect] : scores.by_effect) {
-    html += fmt::format(
-        "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{:.0f}</td><td class=\"n\">{:.0f}"
-        "</td></tr>",
-        name, text_of(effect.first), text_of(effect.family), effect.missed, effect.blind);
-  }
-  html += "</table><h2>Calibration</h2><table><tr><th>said<th>was<th>candidates</tr>";
-  for (const Scores::Bin& bin : scores.bins) {
-    if (bin.of > 0) {
-      html += fmt::format("<tr><td>{:.2f}</td><td>{:.2f}</td><td class=\"n\">{:.0f}</td></tr>",
-                          bin.sum_p / bin.of, bin.right / bin.of, bin.of);
-    }
-  }
-  html +=
-      "</table><h2>Trials</h2><table><tr><th>#<th>truth (severity)<th>named (probability)"
-      "<th>verdict</tr>";
-  const auto escaped = [](const std::string& text) { return html_escaped(printable(text, 200)); };
-  for (std::size_t i = 0; i < outcomes.size(); ++i) {
-    const Outcome& outcome = outcomes[i];
-    std::vector<std::string> truth;
-    for (const gap::TrialEffect& effect : outcome.truth) {
-      truth.push_back(fmt::format("{} ({:.2f})", effect.name, effect.severity));
-    }
-    std::vector<std::string> named;
-    for (const auto& [name, probability] : outcome.named) {
-      named.push_back(fmt::format("{} ({:.2f})", name, probability));
-    }
-    if (outcome.unknown) {
-      named.emplace_back("unknown");
-    }
-    html += fmt::format("<tr{}><td class=\"n\">{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                        outcome.confidently_wrong() ? " class=\"bad\"" : "", i,
-                        fmt::join(truth, ", "), escaped(fmt::format("{}", fmt::join(named, ", "))),
-                        escaped(outcome.failure.empty() ? outcome.verdict : outcome.failure));
-  }
-  return html + "</table></html>\n";
-}
-
 // Which effects are drawn, and of which shares: a recording takes fewer of them.
 Status check_effects(Options& options) {
   if (!options.recording.empty()) {
@@ -385,6 +210,29 @@ Status check_effects(Options& options) {
   return {};
 }
 
+// Bundles for others, instead of a diagnosis here.
+Status export_trials(const Options& options, sim::StandardProtocol protocol, Context& context) {
+  if (options.strip || !options.recording.empty() || !options.keep.empty() ||
+      !options.html.empty() || !options.program.empty()) {
+    return fail(ErrorCode::usage,
+                "--export goes without --strip, --recording, --keep, --html and --program", {},
+                "sixpoint gap score scores what another program answers");
+  }
+  ExportOptions how;
+  how.trials = options.trials;
+  how.seed = options.seed;
+  how.protocol = protocol;
+  how.only = options.only;
+  how.shares = options.shares;
+  how.folder = options.export_to;
+  how.labels = options.labels;
+  how.jobs = options.jobs;
+  how.dry_run = options.dry_run;
+  how.outputs = options.outputs;
+  how.json = options.json;
+  return export_challenge(how, context);
+}
+
 Status challenge(Options options, Context& context) {
   const auto protocol = sim::parse_standard_protocol(options.protocol);
   if (!protocol) {
@@ -392,6 +240,13 @@ Status challenge(Options options, Context& context) {
                 "production or engineering");
   }
   SIXPOINT_CHECK(check_effects(options));
+  if (!options.export_to.empty()) {
+    return export_trials(options, *protocol, context);
+  }
+  if (!options.labels.empty() || options.dry_run) {
+    return fail(ErrorCode::usage, "--labels and --dry-run belong to --export", {},
+                "name a folder with --export");
+  }
   if (options.program.empty()) {
     options.program = this_program();
   }
@@ -442,12 +297,13 @@ Status challenge(Options options, Context& context) {
   }
   const Scores scores = gap::score(outcomes, options.strip);
   if (!options.html.empty()) {
-    SIXPOINT_CHECK(write_file(outputs.files(), options.html, page(options, scores, outcomes)));
+    SIXPOINT_CHECK(
+        write_file(outputs.files(), options.html, scores_page(options, scores, outcomes)));
   }
   if (options.json) {
-    print_json(context, to_json(options, scores, outcomes));
+    print_json(context, scores_json(options, scores, outcomes));
   } else {
-    for (const auto& [what, value] : lines(scores)) {
+    for (const auto& [what, value] : scores_lines(scores)) {
       context.text() << fmt::format("{:<42} {}\n", what, value);
     }
   }
@@ -490,6 +346,11 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
   command.add_option("--program", options.program, "the sixpoint to test (default: this one)");
   command.add_option("--keep", options.keep, "leave bundles and answers in this folder");
   command.add_option("--html", options.html, "also write the scores as a page");
+  command.add_option("--export", options.export_to,
+                     "diagnose nothing: write the bundles to this new folder, for other programs");
+  command.add_option("--labels", options.labels,
+                     "with --export: the sealed labels (default: labels.jsonl in that folder)");
+  command.add_flag("--dry-run", options.dry_run, "with --export: say what would be written");
   add_output_options(command, options.outputs);
 }
 

@@ -173,7 +173,13 @@ const std::vector<CommandExamples>& command_examples() {
           "sixpoint gap diagnose bundle --without tilt,seating --html gap.html"}},
       {"gap challenge", {
           "sixpoint gap challenge --trials 3 --seed 5 --protocol production",
-          "sixpoint gap challenge --trials 3 --seed 5 --protocol production --json"}},
+          "sixpoint gap challenge --export bundles --labels labels.jsonl --trials 3 --protocol production"}},
+      {"gap answers", {
+          "sixpoint gap answers bundles -o answers.jsonl",
+          "sixpoint gap answers bundles --method sequential -o sequential.jsonl"}},
+      {"gap score", {
+          "sixpoint gap score answers.jsonl --labels labels.jsonl",
+          "sixpoint gap score sequential.jsonl --labels labels.jsonl --json"}},
       {"gap trends", {
           "sixpoint gap trends                # exits with 2: the store holds too few runs",
           "sixpoint gap trends --json         # exits with 2"}},

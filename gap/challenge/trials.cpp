@@ -369,8 +369,9 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
   if (dice < shares.none + shares.outside + shares.realistic) {
     trial.kind = TrialKind::realistic;
     trial.effects = drawing.realistic(gradual_effects());
-    for (const TrialEffect& drawn : trial.effects) {
+    for (TrialEffect& drawn : trial.effects) {
       SIXPOINT_ASSIGN(std::vector<EffectSpec> parts, drawing.effect(drawn.name, drawn.severity));
+      drawn.parts = parts.size();
       effects.insert(effects.end(), parts.begin(), parts.end());
     }
     return trial;
@@ -388,7 +389,7 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
     const double severity = drawing.severity();
     SIXPOINT_ASSIGN(std::vector<EffectSpec> parts, drawing.effect(name, severity));
     effects.insert(effects.end(), parts.begin(), parts.end());
-    trial.effects.push_back({name, severity});
+    trial.effects.push_back({name, severity, parts.size()});
   }
   return trial;
 }

@@ -34,6 +34,7 @@ std::string_view to_string(TrialKind kind);
 struct TrialEffect {
   std::string name;
   double severity = 1;
+  std::size_t parts = 1;  // of scenario.protocol->effects, in the same order
 };
 
 struct GapTrial {

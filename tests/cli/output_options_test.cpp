@@ -58,6 +58,9 @@ const std::map<std::string, Role>& common_roles() {
                                          {"--scenario-out", Role::output},
                                          {"--constants-out", Role::output},
                                          {"--keep", Role::folder},
+                                         {"--export", Role::folder},
+                                         {"ANSWERS", Role::input},
+                                         {"FOLDER", Role::input},
                                          {"--journal", Role::input},
                                          {"--recording", Role::input},
                                          {"--program", Role::input},
@@ -174,6 +177,9 @@ const std::map<std::string, Role>& own_roles() {
       {"archive plan --output", Role::folder},
       {"archive run --output", Role::working_folder},
       {"gap diagnose --scenario", Role::refused},
+      {"gap challenge --labels", Role::output_to_keep},
+      {"gap score --labels", Role::input},
+      {"gap answers --output", Role::output},
   };
   return kRoles;
 }
@@ -246,6 +252,9 @@ class EveryOutput : public tests::CommandTest {
     std::filesystem::create_directory(path("archive"));
     std::filesystem::copy_file(path("rec.gt3x"), path("archive/rec.gt3x"));
     must({"archive", "plan", path("archive"), "-o", path("plan"), "--scan"}, 0);
+    must({"gap", "challenge", "--export", path("bundles"), "--trials", "1", "--protocol",
+          "production"},
+         0);
     // A recording that was killed leaves its journal.
     write("cut.zip.journal", R"({"schema":"sixpoint/session-journal/1"})");
   }
@@ -292,6 +301,12 @@ class EveryOutput : public tests::CommandTest {
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
         {"archive report --output", {"archive", "report", path("plan")}},
         {"scan --units", {"scan", path("archive")}},
+        {"gap challenge --export",
+         {"gap", "challenge", "--trials", "1", "--protocol", "production"}},
+        {"gap challenge --labels",
+         {"gap", "challenge", "--trials", "1", "--protocol", "production", "--export",
+          path("exported")}},
+        {"gap answers --output", {"gap", "answers", path("bundles"), "--method", "sequential"}},
     };
     for (const char* option : {"--certificate", "--label", "--record", "--state"}) {
       all.emplace(std::string("jig ") + option, jig);

@@ -1,0 +1,88 @@
+#include "gap/benchmark/shown.h"
+
+#include <functional>
+
+#include <gtest/gtest.h>
+
+namespace sixpoint::gap {
+namespace {
+
+// Four segments of 10 s in which the X axis lies across gravity, and the differences of their
+// counts given by hand.
+struct Made {
+  sim::ProtocolRun run;
+  sim::ProtocolRecord without, with;
+  Made() {
+    for (std::uint64_t i = 0; i < 4; ++i) {
+      sim::ProtocolSegment segment;
+      segment.name = i < 2 ? "faces" : "reseat";
+      segment.first_sample = 1000 * i;
+      segment.samples = 1000;
+      run.segments.push_back(segment);
+    }
+    without.counts.resize(4000);
+    without.sample_time_s.resize(4000);
+    with = without;
+  }
+  void change(const std::function<int(std::size_t)>& difference) {
+    for (std::size_t i = 0; i < with.counts.size(); ++i) {
+      with.counts[i][0] = static_cast<std::int16_t>(difference(i));
+    }
+  }
+  Shown shown() const { return what_is_shown(run, without, with); }
+};
+
+constexpr double kLsb_mg = 1000.0 / 256;
+
+// By hand: a count up in two segments and down in the others; no offset takes any of it. Noise of
+// a mean: (3.9^2 + 3.90625^2 / 12) / 1000 + 0.17^2 = 0.0453816 mg^2; 15.258789 / 0.0453816 each.
+TEST(Shown, MeansByHand) {
+  Made made;
+  made.change([](std::size_t i) { return (i / 1000) % 2 == 0 ? 1 : -1; });
+  const Shown shown = made.shown();
+  EXPECT_NEAR(shown.means, 4 * 336.233, 0.05);
+  EXPECT_EQ(shown.samples, 0);
+  EXPECT_EQ(shown.times, 0);
+  EXPECT_NEAR(shown.index(), 36.673, 0.002);
+  EXPECT_NEAR(shown.by_place.at({0, "faces"}), 2 * 336.233, 0.05);
+  EXPECT_EQ(shown.by_place.at({1, "faces"}), 0);
+}
+
+// An offset of a count is what units have: of 35 mg it is a ninth.
+TEST(Shown, AnOffsetIsTheUnitsOwn) {
+  Made made;
+  made.change([](std::size_t) { return 1; });
+  EXPECT_NEAR(made.shown().means, kLsb_mg * kLsb_mg / (35 * 35), 1e-3);
+}
+
+// A line of two counts, up and down: 61.035 / 16.4816 each sample, and no mean.
+TEST(Shown, SamplesByHand) {
+  Made made;
+  made.change([](std::size_t i) { return i % 2 == 0 ? 2 : -2; });
+  const Shown shown = made.shown();
+  EXPECT_NEAR(shown.samples, 4000 * 3.70323, 1);
+  EXPECT_NEAR(shown.index(), std::sqrt(4000 * 3.70323), 0.1);
+}
+
+// A steady change of a third of a count, rounded: a third of the samples differ. What rounding
+// scatters is not taken for a signal: the mean alone shows.
+TEST(Shown, RoundingIsNoSignal) {
+  Made made;
+  made.change([](std::size_t i) { return i % 3 == 0 ? ((i / 1000) % 2 == 0 ? 1 : -1) : 0; });
+  const Shown shown = made.shown();
+  EXPECT_EQ(shown.samples, 0);
+  EXPECT_NEAR(shown.means, 4 * 336.233 / 9, 4 * 336.233 / 9 * 0.01);
+}
+
+// A clock off by 100 ppm in one segment: ten packets, sum of squares about the mean 82.5e-8 s^2,
+// of (2 ms)^2 / 3: 0.61875.
+TEST(Shown, TimesByHand) {
+  Made made;
+  for (std::size_t i = 0; i < 1000; ++i) {
+    made.with.sample_time_s[i] += 1e-4 * static_cast<double>(i) / 100;
+  }
+  EXPECT_NEAR(made.shown().times, 0.61875, 1e-9);
+}
+
+}  // namespace
+}  // namespace sixpoint::gap
