@@ -70,6 +70,7 @@ const std::map<std::string, Role>& common_roles() {
                                          {"file", Role::input},
                                          {"plan", Role::input},
                                          {"RECORDING", Role::input},
+                                         {"BEFORE", Role::input},
                                          {"BUNDLE", Role::input},
                                          {"SESSION", Role::input},
                                          {"CAPTURE", Role::input},
