@@ -24,9 +24,8 @@ Result<ParameterSet> parse_numbers_of(const Section& effect, std::string_view ke
         continue;  // not known: one unit
       }
       SIXPOINT_ASSIGN(given[name], parse_numbers(value, path));
-      if (spread && std::ranges::any_of(given[name], [](double sd) {
-            return !(sd >= 0 && sd <= kMostSpread);
-          })) {
+      if (spread && std::ranges::any_of(
+                        given[name], [](double sd) { return !(sd >= 0 && sd <= kMostSpread); })) {
         return wrong(path, "a spread is not negative");
       }
     }

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "sim/effects/effect.h"
-#include "sim/motion.h"
 #include "sim/effects/population.h"
+#include "sim/motion.h"
 #include "sim/protocol_run.h"
 #include "sim/unit_truth.h"
 

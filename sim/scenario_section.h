@@ -4,7 +4,8 @@
 //   double gain = 1;
 //   SIXPOINT_CHECK(unit.number("gain", gain, 0, 10));  // stays 1 where the key is missing
 //
-// Every error is `configuration` and names the path of the key. Private to the files that read JSON.
+// Every error is `configuration` and names the path of the key. Private to the files that read
+// JSON.
 #pragma once
 
 #include <Eigen/Core>

@@ -89,10 +89,10 @@ void print(const gap::AdoptedScenario& learnt, const Options& options, Context& 
                                   gap::to_string(effect.change), effect.decision.brief());
     for (const gap::AdoptedNumber& parameter : effect.decision.parameters) {
       for (const gap::MeanAndSpread& n : parameter.numbers) {
-        context.text() << fmt::format(
-            "  {:<22} {:>10.4g} +- {:<9.2g} spread {} ({} units)\n", parameter.parameter, n.mean,
-            n.standard_uncertainty, n.spread ? fmt::format("{:.3g}", *n.spread) : "not known",
-            n.units);
+        context.text() << fmt::format("  {:<22} {:>10.4g} +- {:<9.2g} spread {} ({} units)\n",
+                                      parameter.parameter, n.mean, n.standard_uncertainty,
+                                      n.spread ? fmt::format("{:.3g}", *n.spread) : "not known",
+                                      n.units);
       }
     }
   }
@@ -140,10 +140,10 @@ Status run(const Options& options, Context& context) {
   }
   SIXPOINT_CHECK(outputs.input(options.scenario));
   SIXPOINT_CHECK(outputs.input(options.store.empty() ? "" : store_file(options.store)));
-  SIXPOINT_ASSIGN(const std::string base, base_of(options, context.env.files));
   if (!options.dry_run) {
     SIXPOINT_CHECK(outputs.file("--output", options.output));
   }
+  SIXPOINT_ASSIGN(const std::string base, base_of(options, context.env.files));
   SIXPOINT_ASSIGN(const auto sources, find_sources(context, options.inputs, options.store));
   std::vector<gap::DocumentEvidence> documents;
   bool any = false;
@@ -179,7 +179,8 @@ void add_gap_adopt(CLI::App& gap_command, Context& context) {
   add_store_option(command, options.store);
   command.add_option("--scenario", options.scenario,
                      "the scenario that is extended; else the one that -o names, or a new one");
-  command.add_option("-o,--output,--scenario-out", options.output, "write the scenario to this file")
+  command
+      .add_option("-o,--output,--scenario-out", options.output, "write the scenario to this file")
       ->required();
   command
       .add_option("--least-units", options.rule.least_units,

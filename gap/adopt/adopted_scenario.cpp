@@ -99,7 +99,8 @@ Result<Earlier> read_earlier(std::string_view text) {
 }
 
 Earlier new_scenario(const std::vector<DocumentEvidence>& documents) {
-  const auto engineering = std::ranges::count(documents, "engineering", &DocumentEvidence::protocol);
+  const auto engineering =
+      std::ranges::count(documents, "engineering", &DocumentEvidence::protocol);
   const auto production = std::ranges::count(documents, "production", &DocumentEvidence::protocol);
   Earlier earlier;
   earlier.scenario = {{"schema", "sixpoint/scenario/1"},
@@ -222,8 +223,7 @@ std::vector<sim::PopulationEffect> population_of(const std::vector<AdoptionDecis
     for (const auto& [name, numbers] : *complete) {
       spread[name].resize(numbers.size(), 0);
     }
-    population.push_back(
-        {*kind, *std::move(complete), std::move(spread), decision.share_of_units});
+    population.push_back({*kind, *std::move(complete), std::move(spread), decision.share_of_units});
   }
   return population;
 }

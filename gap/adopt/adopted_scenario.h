@@ -28,7 +28,7 @@ namespace sixpoint::gap {
 
 // How one effect of the population came through an adoption.
 enum class AdoptionChange {
-  none,       // it was not there, and is not; or it is as it was
+  none,  // it was not there, and is not; or it is as it was
   added,
   changed,    // its numbers
   withdrawn,  // it was adopted earlier; with the further documents it no longer is
@@ -44,9 +44,9 @@ struct AdoptedEffect {
 struct AdoptedScenario {
   std::string text;  // of the file; the given one where nothing changed
   bool changed = false;
-  int adoption = 0;                        // number of this one; of the last one if none changed
-  std::size_t new_documents = 0;           // others were there already
-  std::vector<AdoptedEffect> effects;      // of all documents, by name
+  int adoption = 0;                         // number of this one; of the last one if none changed
+  std::size_t new_documents = 0;            // others were there already
+  std::vector<AdoptedEffect> effects;       // of all documents, by name
   std::vector<DocumentEvidence> documents;  // all, the earlier ones first
 };
 

@@ -54,7 +54,8 @@ EffectEvidence effect_of(const Json& finding) {
                            : 0;
   effect.confounded = finding.contains("confounded_with") && !finding["confounded_with"].empty();
   const Json none = Json::object();
-  const Json& sd = finding.contains("standard_uncertainty") ? finding["standard_uncertainty"] : none;
+  const Json& sd =
+      finding.contains("standard_uncertainty") ? finding["standard_uncertainty"] : none;
   for (const auto& [name, value] : finding.at("parameters").items()) {
     NamedValue parameter{name, numbers_of(value), {}};
     if (parameter.value.empty() || derived(effect.name, name)) {
@@ -142,12 +143,10 @@ Status check(const DocumentEvidence& evidence, const std::string& source) {
 }  // namespace
 
 bool every_unit_has_some(std::string_view effect) {
-  constexpr std::array kAll = {"misalignment",       "non_orthogonality",
-                               "second_order",       "third_order",
-                               "hysteresis",         "offset_tempco",
-                               "sensitivity_tempco", "warm_up",
-                               "drift",              "tilt",
-                               "clock_error"};
+  constexpr std::array kAll = {
+      "misalignment",  "non_orthogonality",  "second_order", "third_order", "hysteresis",
+      "offset_tempco", "sensitivity_tempco", "warm_up",      "drift",       "tilt",
+      "clock_error"};
   return std::ranges::find(kAll, effect) != kAll.end();
 }
 

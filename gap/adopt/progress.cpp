@@ -63,8 +63,7 @@ ProgressRecorder::ProgressRecorder(ScenarioHistory history)
     : learnt_from_(std::move(history.documents)) {
   progress_.history = std::move(history.states);
   if (!progress_.history.empty()) {
-    for (const sim::EffectSpec& effect :
-         sim::mean_effects(progress_.history.back().population)) {
+    for (const sim::EffectSpec& effect : sim::mean_effects(progress_.history.back().population)) {
       progress_.effects.push_back({effect.kind->name, is_scatter(effect.kind->name), 0, 0});
     }
   }
@@ -91,8 +90,7 @@ Status ProgressRecorder::add(const std::string& name, const RecordedBundle& reco
   for (std::size_t i = 0; i < progress_.effects.size(); ++i) {
     double without_mg = bundle.after_mg.back();
     if (!progress_.effects[i].scatter) {
-      std::vector<sim::EffectSpec> others =
-          sim::mean_effects(progress_.history.back().population);
+      std::vector<sim::EffectSpec> others = sim::mean_effects(progress_.history.back().population);
       std::erase_if(others, [&](const sim::EffectSpec& effect) {
         return effect.kind->name == progress_.effects[i].name;
       });
@@ -140,13 +138,14 @@ std::string GapProgress::brief() const {
                        all.before_mg, all.floor_mg);
   }
   const ProgressSum& sum = new_ones.bundles > 0 ? new_ones : all;
-  return fmt::format("{} recordings{}: {:.2f} mg before, {:.2f} mg after {} adoption{} (floor "
-                     "{:.2f} mg): {:.0f} % closed",
-                     sum.bundles,
-                     new_ones.bundles > 0 ? " from which the scenario did not learn"
-                                          : " from which the scenario learnt",
-                     sum.before_mg, sum.after_mg.back(), history.size(),
-                     history.size() == 1 ? "" : "s", sum.floor_mg, 100 * sum.closed_fraction);
+  return fmt::format(
+      "{} recordings{}: {:.2f} mg before, {:.2f} mg after {} adoption{} (floor "
+      "{:.2f} mg): {:.0f} % closed",
+      sum.bundles,
+      new_ones.bundles > 0 ? " from which the scenario did not learn"
+                           : " from which the scenario learnt",
+      sum.before_mg, sum.after_mg.back(), history.size(), history.size() == 1 ? "" : "s",
+      sum.floor_mg, 100 * sum.closed_fraction);
 }
 
 Json GapProgress::to_json() const {

@@ -55,7 +55,7 @@ struct GapProgress {
   std::vector<PopulationState> history;
   std::vector<BundleProgress> bundles;  // in the order in which they were added
   ProgressSum all;
-  ProgressSum new_ones;  // from which the scenario has not learnt
+  ProgressSum new_ones;                 // from which the scenario has not learnt
   std::vector<EffectProgress> effects;  // strongest first; over all recordings
   std::vector<std::string> losses;
 

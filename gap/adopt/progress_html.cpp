@@ -97,16 +97,16 @@ std::string sums_table(const GapProgress& progress) {
       "<table><caption>Gap, root mean square in mg</caption><tr><th>recordings</th><th>number</th>"
       "<th>before</th>";
   for (const PopulationState& state : progress.history) {
-    out += fmt::format("<th>after adoption {} ({})</th>", state.adoption,
-                       html_escaped(state.made_at));
+    out +=
+        fmt::format("<th>after adoption {} ({})</th>", state.adoption, html_escaped(state.made_at));
   }
   out += "<th>floor</th><th>closed</th></tr>";
   const auto row = [&](const char* name, const ProgressSum& sum) {
     if (sum.bundles == 0) {
       return;
     }
-    out += fmt::format("<tr><td>{}</td><td>{}</td><td>{:.3f}</td>", name, sum.bundles,
-                       sum.before_mg);
+    out +=
+        fmt::format("<tr><td>{}</td><td>{}</td><td>{:.3f}</td>", name, sum.bundles, sum.before_mg);
     for (const double mg : sum.after_mg) {
       out += fmt::format("<td>{:.3f}</td>", mg);
     }

@@ -21,9 +21,9 @@ bool one_of(std::string_view name, const std::array<std::string_view, N>& names)
 
 bool is_measured_by_size(std::string_view name) {
   constexpr std::array<std::string_view, 11> kBySize = {
-      "settling",   "floor_vibration", "electrical_line", "axis_rotation",
+      "settling",    "floor_vibration", "electrical_line",    "axis_rotation",
       "clock_error", "dropped_samples", "duplicated_samples", "saturation",
-      "wrap",       "idle_sleep",      "charging_zeros"};
+      "wrap",        "idle_sleep",      "charging_zeros"};
   return one_of(name, kBySize);
 }
 
@@ -58,8 +58,8 @@ sim::ProtocolRun run_of(const RecordedBundle& recorded, std::uint64_t seed) {
                                 segment.vibration->amplitude_g, 0};
     }
     run.segments.push_back(std::move(out));
-    end_s = std::max(end_s, segment.host_start_s +
-                                static_cast<double>(segment.samples) / bundle.rate_hz);
+    end_s = std::max(end_s,
+                     segment.host_start_s + static_cast<double>(segment.samples) / bundle.rate_hz);
   }
   for (double time_s = 0; time_s <= end_s + 1; time_s += 1) {
     run.temperature.push_back({time_s, bundle.temperature_at(time_s)});
@@ -131,9 +131,8 @@ Result<BundleGap> gap_with(const RecordedBundle& recorded,
   }
   if (!run.effects.empty()) {
     SIXPOINT_ASSIGN(with, sim::run_protocol(run));
-    if (std::ranges::any_of(run.effects, [](const auto& e) {
-          return is_measured_by_size(e.kind->name);
-        })) {
+    if (std::ranges::any_of(run.effects,
+                            [](const auto& e) { return is_measured_by_size(e.kind->name); })) {
       SIXPOINT_ASSIGN(simulated, simulated_sizes(recorded, run));
     }
     run.effects.clear();

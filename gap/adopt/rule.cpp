@@ -59,12 +59,10 @@ Votes votes_on(const std::string& name, const std::vector<DocumentEvidence>& doc
   return votes;
 }
 
-
 const NamedValue* find(const EffectEvidence& effect, const sim::Parameter& parameter) {
   const auto found = std::ranges::find_if(
       effect.parameters, [&](const NamedValue& p) { return p.name == parameter.name; });
-  return found == effect.parameters.end() ||
-                 found->value.size() != parameter.default_value.size()
+  return found == effect.parameters.end() || found->value.size() != parameter.default_value.size()
              ? nullptr
              : &*found;
 }
@@ -138,10 +136,17 @@ AdoptedNumber pooled(const sim::Parameter& parameter,
   return out;
 }
 
+// Of all numbers together: one of several is easily two uncertainties off by chance.
 bool about_zero(const AdoptedNumber& size) {
-  return std::ranges::all_of(size.numbers, [](const MeanAndSpread& n) {
-    return std::abs(n.mean) <= kBeyondZero * n.standard_uncertainty;
-  });
+  double square = 0;
+  double numbers = 0;
+  for (const MeanAndSpread& n : size.numbers) {
+    if (n.mean != 0) {
+      square += std::pow(n.mean / n.standard_uncertainty, 2);
+      numbers += 1;
+    }
+  }
+  return square <= kBeyondZero * kBeyondZero * numbers;
 }
 
 // The matrix of axis_rotation is a setting: there is none between two of them.
@@ -149,9 +154,8 @@ bool is_matrix(const sim::Parameter& parameter) { return parameter.default_value
 
 bool all_alike(const AdoptedNumber& setting) {
   constexpr double kSame = 1e-6;
-  return std::ranges::all_of(setting.numbers, [](const MeanAndSpread& n) {
-    return n.spread.value_or(0) < kSame;
-  });
+  return std::ranges::all_of(setting.numbers,
+                             [](const MeanAndSpread& n) { return n.spread.value_or(0) < kSame; });
 }
 
 // Sets the numbers; false where there is no mean.
@@ -168,9 +172,10 @@ bool take_numbers(const sim::EffectKind& kind, const Votes& votes, AdoptionDecis
   for (const auto& unit : everywhere ? all : naming) {
     out.bundles += unit.size();
   }
-  out.share_of_units = everywhere ? 1
-                                  : static_cast<double>(out.units_naming) /
-                                        static_cast<double>(std::max<std::size_t>(1, out.units_able));
+  out.share_of_units = everywhere
+                           ? 1
+                           : static_cast<double>(out.units_naming) /
+                                 static_cast<double>(std::max<std::size_t>(1, out.units_able));
   bool size = true;
   for (const sim::Parameter& parameter : kind.parameters) {
     const auto values = values_of(size && everywhere ? all : naming, parameter);

@@ -46,9 +46,9 @@ struct AdoptionDecision {
   std::string name;
   AdoptionOutcome outcome = AdoptionOutcome::not_named;
   std::size_t units_naming = 0;
-  std::size_t units_able = 0;  // whose protocol can show it
-  std::size_t bundles = 0;     // documents behind the numbers
-  double share_of_units = 1;   // that have it
+  std::size_t units_able = 0;             // whose protocol can show it
+  std::size_t bundles = 0;                // documents behind the numbers
+  double share_of_units = 1;              // that have it
   std::vector<AdoptedNumber> parameters;  // of what is adopted
 
   bool adopted() const {
@@ -72,8 +72,9 @@ struct AdoptionDecision {
 //   all are of one unit, which names it                    one_unit: its numbers, no spread
 //   fewer than least_units of several units name it        its_own
 //   settings without a mean that differ                    no_mean
-//   the mean of each of its sizes is within two standard
-//     uncertainties of 0                                   spread_only: mean 0
+//   a size that has a sign, and whose means are within
+//     two standard uncertainties of 0, taken together as a
+//     root mean square                                     spread_only: mean 0
 //   anything else                                          adopted
 //
 // A unit names an effect if more than half of its documents that can show it do: with

@@ -18,9 +18,9 @@ std::uint64_t stream_of(const EffectKind& kind) {
 
 double drawn(double mean, double spread, const Parameter& parameter, Random& random) {
   const double value = mean + spread * random.normal();
-  return parameter.low < 0 ? value
-                           : std::clamp(value, std::min(parameter.low, mean),
-                                        std::max(parameter.high, mean));
+  return parameter.low < 0
+             ? value
+             : std::clamp(value, std::min(parameter.low, mean), std::max(parameter.high, mean));
 }
 
 }  // namespace

@@ -68,6 +68,8 @@ const std::map<std::string, Role>& common_roles() {
                                          {"plan", Role::input},
                                          {"RECORDING", Role::input},
                                          {"BUNDLE", Role::input},
+                                         {"INPUT", Role::input},
+                                         {"SOURCE", Role::input},
                                          {"SESSION", Role::input},
                                          {"CAPTURE", Role::input},
                                          {"--scenario", Role::input},
@@ -140,6 +142,7 @@ const std::map<std::string, Role>& common_roles() {
                              "--time",
                              "--records",
                              "--matters-mg",
+                             "--least-units",
                              "--realistic",
                              "--format",
                              "--fill-limit",
@@ -174,6 +177,8 @@ const std::map<std::string, Role>& own_roles() {
       {"archive plan --output", Role::folder},
       {"archive run --output", Role::working_folder},
       {"gap diagnose --scenario", Role::refused},
+      {"gap adopt --output", Role::output},
+      {"gap report --output", Role::output},
   };
   return kRoles;
 }
@@ -288,6 +293,8 @@ class EveryOutput : public tests::CommandTest {
          {"session", "minimise", path("session.zip"), "--doing", "identify", "--replays", "1"}},
         {"session from-pcap --output", {"session", "from-pcap", path("s.json")}},
         {"archive plan --output", {"archive", "plan", path("archive"), "--scan"}},
+        {"gap adopt --output", {"gap", "adopt", path("bundle")}},
+        {"gap report --output", {"gap", "report", path("bundle"), "--scenario", path("b.json")}},
         {"station --state", {"station", "--port", "0", "--device", "virtual:seed=7"}},
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
         {"archive report --output", {"archive", "report", path("plan")}},

@@ -1,10 +1,11 @@
 #include "gap/adopt/mean_and_spread.h"
 
-#include <gtest/gtest.h>
 #include <array>
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 namespace sixpoint::gap {
 namespace {
