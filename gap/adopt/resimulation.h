@@ -22,6 +22,7 @@
 
 #include "base/result.h"
 #include "gap/judge/diagnose.h"
+#include "gap/recording/bundle.h"
 #include "sim/effects/effect.h"
 
 namespace sixpoint::gap {

@@ -15,7 +15,6 @@
 
 #include <vector>
 
-#include "base/result.h"
 #include "gap/judge/diagnosis.h"
 #include "gap/recording/bundle.h"
 
