@@ -107,6 +107,11 @@ Json content_of(const DocumentEvidence& evidence) {
 DocumentEvidence parse(const Json& json) {
   DocumentEvidence out;
   out.serial = json.at("serial").get<std::string>();
+  // A table of readings names no unit: then it stands for one.
+  if (out.serial.empty() && json.contains("bundle")) {
+    const std::string name = json["bundle"].get<std::string>();
+    out.serial = name.substr(name.find_last_of('/') + 1).substr(0, kLongestName);
+  }
   out.protocol = json.at("protocol").get<std::string>();
   out.inconclusive = json.at("inconclusive").get<bool>();
   out.unknown = json.at("unknown").at("present").get<bool>();

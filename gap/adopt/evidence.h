@@ -29,7 +29,7 @@ struct EffectEvidence {
 struct DocumentEvidence {
   std::string id;      // SHA-256 of what follows but `source` and `adoption`
   std::string source;  // for people: the file's or run's name
-  std::string serial;
+  std::string serial;  // of a table of readings, which has none: the file's name
   std::string protocol;
   bool inconclusive = false;
   bool unknown = false;                 // something is there that the catalogue lacks
@@ -38,7 +38,7 @@ struct DocumentEvidence {
   int adoption = 0;  // in which it came; 0: not yet
 };
 
-// bad_data where this is no document of `gap diagnose`, or holds no serial number.
+// bad_data where this is no document of `gap diagnose`, or names neither a unit nor a file.
 Result<DocumentEvidence> read_evidence(std::string_view json, const std::string& source);
 DocumentEvidence evidence_of(const Diagnosis& diagnosis);
 

@@ -21,12 +21,10 @@ class GapAdopt : public CommandTest {
   }
   // A production bundle of a unit with cross-axis terms.
   void simulate(const std::string& name, int seed) {
-    write("unit.json",
-          R"({"protocol": "production", "seed": )" + std::to_string(seed) +
-              R"(, "effects": [{"name": "non_orthogonality",
+    write("unit.json", R"({"protocol": "production", "seed": )" + std::to_string(seed) +
+                           R"(, "effects": [{"name": "non_orthogonality",
                   "parameters": {"yz_xz_xy": [0.008, 0.006, -0.007]}}]})");
-    ASSERT_EQ(
-        run({"simulate", "--scenario", path("unit.json"), "-o", path(name)}).exit_code, 0);
+    ASSERT_EQ(run({"simulate", "--scenario", path("unit.json"), "-o", path(name)}).exit_code, 0);
   }
   tests::Answer adopt(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"gap", "adopt"});
@@ -55,8 +53,8 @@ TEST_F(GapAdopt, LearnsFromBundlesAndFromAnswers) {
 
   EXPECT_EQ(adopt({path("c.json"), "-o", path("S.json")}).exit_code, 73) << "not silently";
   EXPECT_EQ(read("S.json"), one);
-  const auto second = adopt({path("c.json"), "--scenario", path("S.json"), "-o", path("T.json"),
-                             "--json"});
+  const auto second =
+      adopt({path("c.json"), "--scenario", path("S.json"), "-o", path("T.json"), "--json"});
   EXPECT_EQ(second.exit_code, 0) << second.people;
   EXPECT_EQ(second.json()["adoption"], 2);
   EXPECT_EQ(second.json()["documents"].size(), 3U);

@@ -17,8 +17,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 using tests::made_effect;
 
-constexpr UtcTime kMonday = from_unix_seconds(1'400'000'000);
-constexpr UtcTime kTuesday = from_unix_seconds(1'400'086'400);
+const UtcTime kMonday = from_unix_seconds(1'400'000'000);
+const UtcTime kTuesday = from_unix_seconds(1'400'086'400);
 
 // With an id that fits what it says, as a scenario checks it.
 DocumentEvidence document(const std::string& serial, double tempco, bool with_seating = false) {

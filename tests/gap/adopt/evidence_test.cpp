@@ -84,7 +84,7 @@ TEST(Evidence, ComesBackFromAScenario) {
   ASSERT_OK(again);
   EXPECT_EQ(to_json(*again), to_json(*read));
   kept["effects"][0]["parameters"]["rotation_vector_deg"][0] = 0.3;
-  EXPECT_FAILS(evidence_from_scenario(kept), ErrorCode::bad_data) << "changed by hand";
+  EXPECT_FAILS(evidence_from_scenario(kept), ErrorCode::bad_data);  // changed by hand
   kept.erase("serial");
   EXPECT_FAILS(evidence_from_scenario(kept), ErrorCode::bad_data);
 }
@@ -104,6 +104,10 @@ TEST(Evidence, RefusesWhatIsNoDiagnosis) {
   Json nameless = made_answer();
   nameless["serial"] = "";
   refused(nameless);
+  nameless["bundle"] = "data/table.csv";
+  const auto table = read_evidence(nameless.dump(), "x");
+  ASSERT_OK(table);
+  EXPECT_EQ(table->serial, "table.csv") << "a table of readings stands for a unit";
   Json wrong = made_answer();
   wrong["effects"][0]["probability"] = Json::object();
   EXPECT_OK(read_evidence(wrong.dump(), "x")) << "counts as 0";

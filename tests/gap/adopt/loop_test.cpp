@@ -1,9 +1,10 @@
 // The loop as a whole: units of a hidden population -> diagnosis -> adoption -> simulation with the
 // scenario -> the gap again. Oracle: the hidden population, which this file alone knows; its units
 // are made by tests/gap/made_bundle.h, which shares no code with the simulator or the diagnosis.
+#include <random>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "base/memory_env.h"
 #include "expect_result.h"
@@ -16,7 +17,7 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr UtcTime kNow = from_unix_seconds(1'400'000'000);
+const UtcTime kNow = from_unix_seconds(1'400'000'000);
 
 // Cross-axis terms yz, xz, xy of the hidden population.
 const Eigen::Vector3d kHiddenMean(0.006, -0.004, 0.005);
@@ -138,8 +139,7 @@ TEST(AdoptionLoop, AnOutsideKindIsNotAdopted) {
     SCOPED_TRACE(kind);
     std::vector<DocumentEvidence> documents;
     for (std::uint64_t i = 0; i < 3; ++i) {
-      const auto trial =
-          draw_trial(77, i, sim::StandardProtocol::engineering, outside, {kind});
+      const auto trial = draw_trial(77, i, sim::StandardProtocol::engineering, outside, {kind});
       ASSERT_OK(trial);
       MemoryEnv memory;
       ASSERT_OK(sim::write_bundle(memory.files, "b", trial->scenario));
@@ -153,8 +153,7 @@ TEST(AdoptionLoop, AnOutsideKindIsNotAdopted) {
     ASSERT_OK(learnt);
     for (const AdoptedEffect& effect : learnt->effects) {
       EXPECT_NE(effect.decision.name, kind);
-      EXPECT_FALSE(effect.decision.adopted() &&
-                   family_of(effect.decision.name) != family_of(kind))
+      EXPECT_FALSE(effect.decision.adopted() && family_of(effect.decision.name) != family_of(kind))
           << effect.decision.name << ": " << effect.decision.brief();
     }
   }

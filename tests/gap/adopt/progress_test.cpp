@@ -12,15 +12,15 @@ namespace {
 
 using testing::HasSubstr;
 
-tests::MadeForce crossed(double xy) {
+tests::MadeForce one_cross(double xy) {
   return [xy](const Segment& segment, double) {
     const Eigen::Vector3d f = segment.rotation.col(2);
     return Eigen::Vector3d(f[0] + xy * f[1], f[1] + xy * f[0], f[2]);
   };
 }
 
-RecordedBundle recorded(const char* serial, unsigned seed, double xy) {
-  Bundle bundle = tests::made_production({.seed = seed}, crossed(xy));
+RecordedBundle unit_with(const char* serial, unsigned seed, double xy) {
+  Bundle bundle = tests::made_production({.seed = seed}, one_cross(xy));
   bundle.protocol_serial = serial;
   auto made = recorded_bundle(std::move(bundle), {});
   EXPECT_OK(made);
@@ -34,8 +34,8 @@ sim::PopulationEffect cross_population(double xy) {
 }
 
 TEST(GapProgressReport, SaysWhatEachAdoptionClosed) {
-  const RecordedBundle known = recorded("A", 2, 0.008);
-  const RecordedBundle fresh = recorded("B", 3, 0.008);
+  const RecordedBundle known = unit_with("A", 2, 0.008);
+  const RecordedBundle fresh = unit_with("B", 3, 0.008);
   ScenarioHistory history;
   history.states = {{1, "2026-01-01T00:00:00Z", 1, {cross_population(0.004)}},
                     {2, "2026-02-01T00:00:00Z", 2, {cross_population(0.008)}}};
@@ -67,8 +67,8 @@ TEST(GapProgressReport, SaysWhatEachAdoptionClosed) {
   const std::string page = progress_html(progress);
   EXPECT_THAT(page, HasSubstr("<svg"));
   EXPECT_THAT(page, HasSubstr("b &lt;b&gt;"));
-  EXPECT_THAT(page, testing::Not(testing::AnyOf(HasSubstr("http"), HasSubstr("src="),
-                                                HasSubstr("<script"))))
+  EXPECT_THAT(page, testing::Not(
+                        testing::AnyOf(HasSubstr("http"), HasSubstr("src="), HasSubstr("<script"))))
       << "one page without other files";
 }
 
@@ -77,7 +77,7 @@ TEST(GapProgressReport, WithoutAdoptionsOrRecordingsItSaysSo) {
   EXPECT_FALSE(nothing.finish().usable());
   EXPECT_THAT(nothing.finish().brief(), HasSubstr("no recording"));
   EXPECT_THAT(progress_html(nothing.finish()), HasSubstr("no recording"));
-  ASSERT_OK(nothing.add("a", recorded("A", 2, 0.008)));
+  ASSERT_OK(nothing.add("a", unit_with("A", 2, 0.008)));
   EXPECT_THAT(nothing.finish().brief(), HasSubstr("learnt nothing"));
   EXPECT_FALSE(nothing.finish().usable());
   Bundle empty = tests::made_production({});

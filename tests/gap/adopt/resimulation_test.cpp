@@ -59,8 +59,8 @@ TEST(Resimulation, LinesAreComparedBySize) {
   };
   const RecordedBundle bundle = recorded(force);
   const auto nominal = gap_with(bundle, {});
-  const auto learnt = gap_with(
-      bundle, one("floor_vibration", {{"vector_mg", {2, 2, 2}}, {"frequency_hz", {14}}}));
+  const auto learnt =
+      gap_with(bundle, one("floor_vibration", {{"vector_mg", {2, 2, 2}}, {"frequency_hz", {14}}}));
   ASSERT_OK(nominal);
   ASSERT_OK(learnt);
   EXPECT_NEAR(nominal->by_size_mg, 2 / std::sqrt(2.0), 0.15);
@@ -102,8 +102,7 @@ TEST(Resimulation, AFilterMismatchCountsWithGainAndOffsets) {
   ASSERT_EQ(bundle->diagnosis.effects[0].name, "filter_mismatch");
   const auto nominal = gap_with(*bundle, {});
   const auto learnt = gap_with(
-      *bundle,
-      one("filter_mismatch", {{"gain", {0.88}}, {"offset_g", {0.12, -0.12, 0.12}}}));
+      *bundle, one("filter_mismatch", {{"gain", {0.88}}, {"offset_g", {0.12, -0.12, 0.12}}}));
   ASSERT_OK(nominal);
   ASSERT_OK(learnt);
   EXPECT_GT(nominal->by_size_mg, 100);

@@ -138,12 +138,12 @@ TEST(AdoptionRule, SizesThatWereNotNamedCountToo) {
 // Others are as large as in the units that have them; the share says how many do.
 TEST(AdoptionRule, WhatSomeUnitsHaveKeepsItsSize) {
   const auto seat = [](int number, const char* unit, bool named) {
-    return made_document(
-        number, unit,
-        named ? std::vector{made_effect("seating", "sd_deg", {0.1}, 0.01)} : std::vector<EffectEvidence>());
+    return made_document(number, unit,
+                         named ? std::vector{made_effect("seating", "sd_deg", {0.1}, 0.01)}
+                               : std::vector<EffectEvidence>());
   };
-  const AdoptionDecision half = only(
-      {seat(1, "A", true), seat(2, "B", true), seat(3, "C", false), seat(4, "D", false)});
+  const AdoptionDecision half =
+      only({seat(1, "A", true), seat(2, "B", true), seat(3, "C", false), seat(4, "D", false)});
   EXPECT_EQ(half.outcome, AdoptionOutcome::adopted);
   EXPECT_EQ(half.share_of_units, 0.5);
   EXPECT_NEAR(half.parameters[0].numbers[0].mean, 0.1, 1e-9);

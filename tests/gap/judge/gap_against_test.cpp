@@ -12,7 +12,7 @@ namespace {
 constexpr double kCross = 0.008;
 
 // A force between the axes, in the sensor's frame.
-tests::MadeForce crossed(double cross) {
+tests::MadeForce crossed_xy(double cross) {
   return [cross](const Segment& segment, double) {
     const Eigen::Vector3d up = segment.rotation.col(2);
     return Eigen::Vector3d(up[0] + cross * up[1], up[1] + cross * up[0], up[2]);
@@ -21,13 +21,13 @@ tests::MadeForce crossed(double cross) {
 
 // Oracle: the recording itself, made by other lines than the simulator's.
 TEST(GapAgainst, WhatTheSimulatorHasIsNoGap) {
-  const Bundle recorded = tests::made_production({.seed = 3}, crossed(kCross));
-  const auto with = tests::made_production({.seed = 4}, crossed(kCross)).samples;
+  const Bundle recorded = tests::made_production({.seed = 3}, crossed_xy(kCross));
+  const auto with = tests::made_production({.seed = 4}, crossed_xy(kCross)).samples;
   const auto without = tests::made_production({.seed = 4}).samples;
   const auto nominal = gap_against(recorded, without, without);
   const auto learnt = gap_against(recorded, with, without);
   const auto half = gap_against(
-      recorded, tests::made_production({.seed = 4}, crossed(kCross / 2)).samples, without);
+      recorded, tests::made_production({.seed = 4}, crossed_xy(kCross / 2)).samples, without);
   ASSERT_OK(nominal);
   ASSERT_OK(learnt);
   ASSERT_OK(half);
@@ -39,7 +39,7 @@ TEST(GapAgainst, WhatTheSimulatorHasIsNoGap) {
 
 // Oracle: the diagnosis' own measure of the same recording, which undoes more.
 TEST(GapAgainst, WithNothingOnItIsTheDiagnosisGapBefore) {
-  const Bundle recorded = tests::made_production({.seed = 3}, crossed(kCross));
+  const Bundle recorded = tests::made_production({.seed = 3}, crossed_xy(kCross));
   const auto diagnosis = diagnose(recorded);
   const auto nominal = gap_against(recorded, recorded.samples, recorded.samples);
   ASSERT_OK(diagnosis);
@@ -56,7 +56,7 @@ TEST(GapAgainst, RefusesAnotherProtocol) {
   fewer.pop_back();
   EXPECT_FAILS(gap_against(recorded, fewer, recorded.samples), ErrorCode::bad_data);
   EXPECT_FAILS(gap_against(recorded, recorded.samples, fewer), ErrorCode::bad_data);
-  EXPECT_FAILS(gap_against(Bundle(), {}, {}), ErrorCode::bad_data) << "no dwell";
+  EXPECT_FAILS(gap_against(Bundle(), {}, {}), ErrorCode::bad_data);  // no dwell
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
 #include "sim/effects/population.h"
 
-#include <gtest/gtest.h>
 #include <cmath>
+
+#include <gtest/gtest.h>
 
 #include "expect_result.h"
 
