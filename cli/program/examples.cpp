@@ -174,6 +174,12 @@ const std::vector<CommandExamples>& command_examples() {
       {"gap challenge", {
           "sixpoint gap challenge --trials 3 --seed 5 --protocol production",
           "sixpoint gap challenge --trials 3 --seed 5 --protocol production --json"}},
+      {"gap adopt", {
+          "sixpoint gap adopt bundle -o learnt.json",
+          "sixpoint gap adopt bundle --scenario learnt.json -o same.json --dry-run"}},
+      {"gap report", {
+          "sixpoint gap report bundle --scenario learnt.json -o progress.html",
+          "sixpoint gap report bundle --scenario learnt.json --json"}},
       {"gap trends", {
           "sixpoint gap trends                # exits with 2: the store holds too few runs",
           "sixpoint gap trends --json         # exits with 2"}},
