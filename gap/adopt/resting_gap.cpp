@@ -15,7 +15,8 @@ double length_error(const LengthFit& fit, const Eigen::Vector3d& raw) {
 }
 
 // What the effects do to a specific force in the sensor, g.
-Eigen::Vector3d added_by(const std::vector<sim::EffectSpec>& effects, const Eigen::Vector3d& true_g) {
+Eigen::Vector3d added_by(const std::vector<sim::EffectSpec>& effects,
+                         const Eigen::Vector3d& true_g) {
   sim::SimulatedBlock block;
   block.time_s = {0};
   block.motion.resize(1);

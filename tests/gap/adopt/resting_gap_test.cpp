@@ -56,9 +56,21 @@ TEST(RestingGap, ARealDaysSecondHalfIsCloserAfterAdoptingTheFirst) {
   RecordProperty("before_ug", static_cast<int>(1000 * before->gap_mg));
   RecordProperty("after_ug", static_cast<int>(1000 * after->gap_mg));
   EXPECT_EQ(before->rests, after->rests);
-  // Oracle: what a fit of the second half's own cross-axis terms leaves of it (2.8 of 7.0 mg, by
-  // gap diagnose). The first half's terms must close most of that.
-  EXPECT_LT(after->gap_mg, 0.6 * before->gap_mg);
+  // Oracle: the cross-axis terms that the second half itself has. The first half's close nine
+  // tenths of what those close.
+  const auto own_diagnosis = diagnose_table(memory.files, "second.csv", {}, rate);
+  ASSERT_OK(own_diagnosis);
+  const auto own_scenario = adopt("", {evidence_of(*own_diagnosis)}, from_unix_seconds(0));
+  ASSERT_OK(own_scenario);
+  const auto own_history = adoption_history(own_scenario->text);
+  ASSERT_OK(own_history);
+  const auto own = resting_gap(second->rests, sim::mean_effects(own_history->states[0].population));
+  ASSERT_OK(own);
+  const auto closed = [&](const RestingGap& gap) {
+    return before->gap_mg * before->gap_mg - gap.gap_mg * gap.gap_mg;
+  };
+  EXPECT_GT(closed(*after), 0.9 * closed(*own));
+  EXPECT_LT(after->gap_mg, 0.7 * before->gap_mg);
 }
 
 // Closed form: directions all round with a cross-axis term, and the simulator with the same one.

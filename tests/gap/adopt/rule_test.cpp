@@ -127,11 +127,12 @@ TEST(AdoptionRule, AnythingElseIsAdopted) {
 TEST(AdoptionRule, SizesThatWereNotNamedCountToo) {
   const AdoptionDecision all = only({made_document(1, "A", {made_tempco({.4, .4, .4})}),
                                      made_document(2, "B", {made_tempco({.4, .4, .4})}),
-                                     made_document(3, "C", {made_tempco({0.01, 0, 0}, false)}),
+                                     made_document(3, "C", {made_tempco({.4, .4, .4})}),
                                      made_document(4, "D", {made_tempco({0, 0, 0.01}, false)})});
+  EXPECT_EQ(all.outcome, AdoptionOutcome::adopted);
   EXPECT_EQ(all.units(), 4U);
-  EXPECT_EQ(all.units_naming, 2U);
-  EXPECT_NEAR(all.parameters[0].numbers[0].mean, 0.2, 0.01);
+  EXPECT_EQ(all.units_naming, 3U);
+  EXPECT_NEAR(all.parameters[0].numbers[0].mean, 0.3, 0.01);
   EXPECT_EQ(all.share_of_units, 1);
 }
 
