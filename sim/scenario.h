@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "sim/effects/effect.h"
+#include "sim/effects/population.h"
 #include "sim/motion.h"
 #include "sim/protocol_run.h"
 #include "sim/unit_truth.h"
@@ -46,7 +47,9 @@ struct Scenario {
   std::vector<MotionSpec> motions;  // empty where there is a protocol
   // A bundle instead of a plain recording; complete, with the scenario's effects and seed.
   std::optional<ProtocolRun> protocol;
+  // What acts on this unit: what the scenario says, and what is drawn for it from the population.
   std::vector<EffectSpec> effects;
+  std::vector<PopulationEffect> population;
 
   FilterConfiguration filter_in_force() const;
   // With the effects' answer to the shaker's tones.

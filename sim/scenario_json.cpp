@@ -1,6 +1,7 @@
 // The JSON of docs/scenario.md into a Scenario.
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -280,20 +281,6 @@ Result<MotionSpec> parse_motion(const Json& json, const std::string& path, std::
   return spec;
 }
 
-// A number, three, or three rows of three, as one list.
-Result<std::vector<double>> parse_numbers(const Json& json, const std::string& path) {
-  std::vector<double> numbers;
-  for (const Json& row : json.is_array() ? json : Json::array({json})) {
-    for (const Json& item : row.is_array() ? row : Json::array({row})) {
-      if (!item.is_number() || numbers.size() == kAxes * kAxes) {
-        return wrong(path, "this must be a number, three, or three rows of three");
-      }
-      numbers.push_back(item.get<double>());
-    }
-  }
-  return numbers;
-}
-
 Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
   SIXPOINT_ASSIGN(const Section effect, Section::of(json, path, {"name", "parameters"}));
   std::optional<std::string> name;
@@ -341,6 +328,26 @@ Status parse_effects(const Section& top, Scenario& scenario) {
     }
     for (std::size_t i = 0; i < effects->size(); ++i) {
       SIXPOINT_ASSIGN(EffectSpec spec, parse_effect((*effects)[i], fmt::format("/effects/{}", i)));
+      scenario.effects.push_back(std::move(spec));
+    }
+  }
+  const Json* population = top.find("population");
+  if (population == nullptr) {
+    return {};
+  }
+  SIXPOINT_ASSIGN(scenario.population, parse_population(*population));
+  std::uint64_t unit_seed = scenario.seed;
+  if (const Json* json = top.find("unit"); json != nullptr) {
+    SIXPOINT_ASSIGN(const Section unit, unit_section(*json));
+    SIXPOINT_CHECK(unit.seed("seed", unit_seed));
+  }
+  // What the scenario itself says of an effect holds.
+  std::set<const EffectKind*> own;
+  for (const EffectSpec& spec : scenario.effects) {
+    own.insert(spec.kind);
+  }
+  for (EffectSpec& spec : draw_effects(scenario.population, unit_seed)) {
+    if (!own.contains(spec.kind)) {
       scenario.effects.push_back(std::move(spec));
     }
   }
@@ -406,7 +413,7 @@ Result<Scenario> parse_document(const Json& json) {
                   Section::of(json, "",
                               {"schema", "seed", "unit", "start", "rate_hz", "record", "filter",
                                "temperature_c", "gravity_g", "turn_s", "motions", "effects",
-                               "protocol", "temperature", "seating_sd_deg"}));
+                               "protocol", "temperature", "seating_sd_deg", "population"}));
   std::optional<std::string> schema;
   SIXPOINT_CHECK(top.text("schema", schema, 60));
   if (schema && *schema != "sixpoint/scenario/1") {

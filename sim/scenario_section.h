@@ -4,7 +4,8 @@
 //   double gain = 1;
 //   SIXPOINT_CHECK(unit.number("gain", gain, 0, 10));  // stays 1 where the key is missing
 //
-// Every error is `configuration` and names the path of the key. Private to scenario_json.cpp.
+// Every error is `configuration` and names the path of the key. Private to the files that read
+// JSON.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,6 +16,7 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -22,6 +24,7 @@
 #include "base/measure.h"
 #include "base/result.h"
 #include "base/time.h"
+#include "sim/effects/population.h"
 
 namespace sixpoint::sim {
 
@@ -144,5 +147,22 @@ class Section {
   const Json* json_;
   std::string path_;
 };
+
+// A number, three, or three rows of three, as one list.
+inline Result<std::vector<double>> parse_numbers(const Json& json, const std::string& path) {
+  std::vector<double> numbers;
+  for (const Json& row : json.is_array() ? json : Json::array({json})) {
+    for (const Json& item : row.is_array() ? row : Json::array({row})) {
+      if (!item.is_number() || numbers.size() == kAxes * kAxes) {
+        return wrong(path, "this must be a number, three, or three rows of three");
+      }
+      numbers.push_back(item.get<double>());
+    }
+  }
+  return numbers;
+}
+
+// population_json.cpp: /population of a scenario.
+Result<std::vector<PopulationEffect>> parse_population(const Json& json);
 
 }  // namespace sixpoint::sim

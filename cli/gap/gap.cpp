@@ -9,7 +9,9 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/gap/gap_adopt.h"
 #include "cli/gap/gap_challenge.h"
+#include "cli/gap/gap_report.h"
 #include "cli/gap/gap_score.h"
 #include "cli/gap/gap_trends.h"
 #include "cli/output.h"
@@ -188,6 +190,8 @@ void add_gap(CLI::App& app, Context& context) {
   add_gap_score(group, context);
   add_gap_answers(group, context);
   add_gap_trends(group, context);
+  add_gap_adopt(group, context);
+  add_gap_report(group, context);
 }
 
 }  // namespace sixpoint::cli

@@ -180,6 +180,12 @@ const std::vector<CommandExamples>& command_examples() {
       {"gap score", {
           "sixpoint gap score answers.jsonl --labels labels.jsonl",
           "sixpoint gap score sequential.jsonl --labels labels.jsonl --json"}},
+      {"gap adopt", {
+          "sixpoint gap adopt bundle -o learnt.json",
+          "sixpoint gap adopt bundle --scenario learnt.json -o same.json --dry-run"}},
+      {"gap report", {
+          "sixpoint gap report bundle --scenario learnt.json -o progress.html",
+          "sixpoint gap report bundle --scenario learnt.json --json"}},
       {"gap trends", {
           "sixpoint gap trends                # exits with 2: the store holds too few runs",
           "sixpoint gap trends --json         # exits with 2"}},

@@ -72,6 +72,8 @@ const std::map<std::string, Role>& common_roles() {
                                          {"RECORDING", Role::input},
                                          {"BEFORE", Role::input},
                                          {"BUNDLE", Role::input},
+                                         {"INPUT", Role::input},
+                                         {"SOURCE", Role::input},
                                          {"SESSION", Role::input},
                                          {"CAPTURE", Role::input},
                                          {"--scenario", Role::input},
@@ -144,6 +146,7 @@ const std::map<std::string, Role>& common_roles() {
                              "--time",
                              "--records",
                              "--matters-mg",
+                             "--least-units",
                              "--realistic",
                              "--format",
                              "--fill-limit",
@@ -181,6 +184,8 @@ const std::map<std::string, Role>& own_roles() {
       {"gap challenge --labels", Role::output_to_keep},
       {"gap score --labels", Role::input},
       {"gap answers --output", Role::output},
+      {"gap adopt --output", Role::output},
+      {"gap report --output", Role::output},
   };
   return kRoles;
 }
@@ -298,6 +303,8 @@ class EveryOutput : public tests::CommandTest {
          {"session", "minimise", path("session.zip"), "--doing", "identify", "--replays", "1"}},
         {"session from-pcap --output", {"session", "from-pcap", path("s.json")}},
         {"archive plan --output", {"archive", "plan", path("archive"), "--scan"}},
+        {"gap adopt --output", {"gap", "adopt", path("bundle")}},
+        {"gap report --output", {"gap", "report", path("bundle"), "--scenario", path("b.json")}},
         {"station --state", {"station", "--port", "0", "--device", "virtual:seed=7"}},
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
         {"archive report --output", {"archive", "report", path("plan")}},
