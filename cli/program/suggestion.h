@@ -2,9 +2,8 @@
 //
 //   CLI::App app;
 //   declare_commands(app, context);
-//   unknown_word(app, {"scn", "a"});        // "'sixpoint' has no command 'scn'; did you mean
-//   'scan'? ..." unknown_word(app, {"scan", "--jsn"});  // "'sixpoint scan' has no option '--jsn';
-//   did you mean ..."
+//   const auto text = unknown_word(app, {"scn", "archive"});
+//   // 'sixpoint' has no command 'scn'; did you mean 'scan'? 'sixpoint --help' lists them
 #pragma once
 
 #include <optional>
