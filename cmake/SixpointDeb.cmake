@@ -17,14 +17,19 @@ add_custom_command(OUTPUT ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash 
   COMMAND gzip -9nkf ${reference}/changelog
   DEPENDS sixpoint_reference ${reference}/sixpoint.1.in ${reference}/changelog
           ${PROJECT_SOURCE_DIR}/packaging/bash/sixpoint.in VERBATIM)
+# What it is made of.
+add_custom_command(OUTPUT ${reference}/sbom.cdx.json
+  COMMAND ${PROJECT_SOURCE_DIR}/packaging/sbom.sh $<TARGET_FILE:sixpoint> ${PROJECT_SOURCE_DIR} ${PROJECT_VERSION}
+          > ${reference}/sbom.cdx.json
+  DEPENDS sixpoint ${PROJECT_SOURCE_DIR}/packaging/sbom.sh ${PROJECT_SOURCE_DIR}/station/web/package-lock.json VERBATIM)
 add_custom_target(sixpoint_package_files ALL
-  DEPENDS ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash ${reference}/changelog.gz)
+  DEPENDS ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash ${reference}/changelog.gz ${reference}/sbom.cdx.json)
 
 install(FILES ${reference}/sixpoint.1.gz DESTINATION share/man/man1 COMPONENT program)
 install(FILES ${reference}/sixpoint.bash DESTINATION share/bash-completion/completions RENAME sixpoint
         COMPONENT program)
 set(deb COMPONENT deb EXCLUDE_FROM_ALL)
-install(FILES packaging/deb/copyright ${reference}/changelog.gz README.md
+install(FILES packaging/deb/copyright ${reference}/changelog.gz ${reference}/sbom.cdx.json README.md
         DESTINATION share/doc/sixpoint ${deb})
 install(DIRECTORY docs/ DESTINATION share/doc/sixpoint/docs ${deb} FILES_MATCHING PATTERN "*.md")
 install(FILES packaging/udev/60-sixpoint-detect.rules packaging/udev/70-sixpoint-access.rules

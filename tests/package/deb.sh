@@ -33,6 +33,19 @@ for library in $(objdump -p "$root/usr/bin/sixpoint" | awk '/NEEDED/ { print $2 
   owner=$(dpkg -S "$(readlink -f "$path")" "$path" 2>/dev/null | sed -n '1s/:.*//p' || true)
   grep -qw -- "$owner" <<<"$depends" || failed "$library is in $owner, which Depends does not name: $depends"
 done
+# The list of parts names each of these libraries' packages, and no package twice.
+parts=$(python3 -c 'import json, sys; [print(c["name"]) for c in json.load(open(sys.argv[1]))["components"]]' \
+  "$root/usr/share/doc/sixpoint/sbom.cdx.json") || failed "sbom.cdx.json is no list of parts"
+[ -z "$(sort <<<"$parts" | uniq -d)" ] || failed "sbom.cdx.json names a part twice"
+for owner in $(tr ',' '\n' <<<"$depends" | sed 's/ *\([a-z0-9.+-]*\).*/\1/'); do
+  # A name that a package provides stands for that package.
+  provider=$(dpkg-query -W -f='${Package} ${Provides}\n' | awk -v name="$owner" '{ for (i = 2; i <= NF; ++i) if ($i == name || $i == name ",") print $1 }')
+  owner=${provider:-$owner}
+  [ "$owner" = fonts-dejavu-core ] || grep -qx -- "$owner" <<<"$parts" || failed "sbom.cdx.json lacks $owner"
+done
+for part in nlohmann-json3-dev libeigen3-dev preact uplot; do
+  grep -qx "$part" <<<"$parts" || failed "sbom.cdx.json lacks $part"
+done
 if (cd "$root" && md5sum --quiet -c DEBIAN/md5sums); then :; else failed "md5sums do not fit"; fi
 
 for file in usr/bin/sixpoint lib/udev/rules.d/60-sixpoint-detect.rules \
