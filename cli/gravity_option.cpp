@@ -17,7 +17,11 @@ Result<std::optional<calib::LocalGravity>> local_gravity(const GravityOptions& o
     return calib::gravity_entered(*options.m_per_s2);
   }
   if (options.latitude_deg) {
-    return calib::gravity_at(*options.latitude_deg, options.altitude_m);
+    return calib::gravity_at(*options.latitude_deg, options.altitude_m.value_or(0));
+  }
+  if (options.altitude_m) {
+    return fail(ErrorCode::usage, "an altitude alone does not say what gravity is", "--altitude",
+                "name the latitude too: --latitude DEGREES");
   }
   return std::nullopt;
 }

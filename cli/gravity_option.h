@@ -18,15 +18,16 @@ namespace sixpoint::cli {
 struct GravityOptions {
   std::optional<double> m_per_s2;
   std::optional<double> latitude_deg;
-  double altitude_m = 0;
+  std::optional<double> altitude_m;  // without: sea level
 };
 
 void add_gravity_options(CLI::App& command, GravityOptions& options);
 
-//   --gravity  --latitude  answer
-//   given      any         the value of --gravity
-//   -          given       computed from latitude and altitude (calib/poses/gravity.h)
-//   -          -           none: gravity is unknown
+//   --gravity  --latitude  --altitude  answer
+//   given      any         any         the value of --gravity
+//   -          given       any         computed from both (calib/poses/gravity.h)
+//   -          -           given       usage: an altitude alone says nothing
+//   -          -           -           none: gravity is unknown
 // usage where a value is impossible.
 Result<std::optional<calib::LocalGravity>> local_gravity(const GravityOptions& options);
 

@@ -3,6 +3,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include <pwd.h>
+#include <unistd.h>
+
 #include "base/atomic_file.h"
 #include "base/sha256.h"
 #include "cli/command.h"
@@ -19,8 +22,13 @@ std::string data_folder() {
     return std::string(data) + "/sixpoint";
   }
   const char* home = std::getenv("HOME");
+  if (home == nullptr || *home == '\0') {
+    // A service, or a shell that was cleaned: the folder that the system has for this user.
+    const passwd* user = ::getpwuid(::getuid());
+    home = user != nullptr ? user->pw_dir : "/nonexistent";
+  }
   // NOLINTEND(concurrency-mt-unsafe)
-  return std::string(home != nullptr ? home : ".") + "/.local/share/sixpoint";
+  return std::string(home) + "/.local/share/sixpoint";
 }
 
 std::string default_store() {
@@ -174,6 +182,13 @@ Result<std::string> place_of_new_store(Context& context, const std::string& loca
 Result<db::Store> open_store(Context& context, const std::string& location) {
   SIXPOINT_ASSIGN(const std::string path, place_of_new_store(context, location));
   return db::Store::open(context.env, path);
+}
+
+void warn_without_store(Context& context, const Result<db::Store>& store) {
+  if (!store) {
+    context.log().warn("the store cannot be used now: {}; what is measured is kept beside it",
+                       store.error().brief());
+  }
 }
 
 Result<db::Store> open_existing_store(Context& context, const std::string& location) {

@@ -6,7 +6,8 @@
 //   SIXPOINT_ASSIGN(const auto saved, keep_records(context, location, written, add_the_records));
 //
 // A location is a path of an SQLite file or the address of a server; empty stands for the default:
-// $SIXPOINT_STORE, else store.db in $XDG_DATA_HOME/sixpoint (~/.local/share/sixpoint).
+// $SIXPOINT_STORE, else store.db in $XDG_DATA_HOME/sixpoint (~/.local/share/sixpoint;
+// without $HOME that of the user's entry in passwd).
 #pragma once
 
 #include <functional>
@@ -29,6 +30,10 @@ CLI::Option* add_store_option(CLI::App& command, std::string& location);
 
 // Opens the store and makes it where it is missing. Only the folder of the default store is made.
 Result<db::Store> open_store(Context& context, const std::string& location);
+
+// Says before the work that the store is away or cannot be made; what is measured is kept all the
+// same (keep_records()).
+void warn_without_store(Context& context, const Result<db::Store>& store);
 
 // To read: no_input where there is no store, so that a wrong name makes no empty one.
 Result<db::Store> open_existing_store(Context& context, const std::string& location);

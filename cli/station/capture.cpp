@@ -83,6 +83,7 @@ Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
                                 printable(unit.identity().firmware));
   // The lock of the station and the limit on failures hold for every way to constants.
   auto store = open_store(context, options.store);
+  warn_without_store(context, store);
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
   SIXPOINT_CHECK(station::StationGuard(context.env, guard_folder(options.store), limits)
                      .may_start(store, unit.identity().serial, options.station));

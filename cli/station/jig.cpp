@@ -349,6 +349,7 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
   if (!store && store.error().code == ErrorCode::usage) {
     return fail(store.error());
   }
+  warn_without_store(context, store);
   station::StationGuard guard(context.env, guard_folder(options.store), session.limits);
   SIXPOINT_ASSIGN(session.retest, retest_state(context, options, identity.serial, guard, store));
   SIXPOINT_ASSIGN(auto record,

@@ -12,7 +12,8 @@ TEST(GravityOption, AnswersByItsTable) {
   EXPECT_NEAR(local_gravity({{}, 0.0, 0}).value()->m_per_s2, 9.7803253359, 1e-9);
   EXPECT_NEAR(local_gravity({{}, 90.0, 0}).value()->m_per_s2, 9.8321849378, 1e-9);
   EXPECT_DOUBLE_EQ(local_gravity({9.81, 90.0, 0}).value()->m_per_s2, 9.81) << "--gravity first";
-  EXPECT_FALSE(local_gravity({{}, {}, 500}).value()) << "an altitude alone says nothing";
+  EXPECT_NEAR(local_gravity({{}, 90.0, {}}).value()->m_per_s2, 9.8321849378, 1e-9);
+  EXPECT_FAILS(local_gravity({{}, {}, 500}), ErrorCode::usage);  // an altitude alone
   EXPECT_FAILS(local_gravity({9.0, {}, 0}), ErrorCode::usage);
   EXPECT_FAILS(local_gravity({{}, 91.0, 0}), ErrorCode::usage);
 }

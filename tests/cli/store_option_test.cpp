@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include <pwd.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -39,6 +40,21 @@ TEST_F(StoreTest, TheDefaultStoreIsThatOfTheEnvironment) {
   EXPECT_EQ(run({"units"}).exit_code, 66) << "reading makes no store";
   EXPECT_FALSE(std::filesystem::exists(path("data")));
   ::unsetenv("XDG_DATA_HOME");
+}
+
+// Oracle: the user's entry in passwd. The folder in which the program runs would be another store
+// each time.
+TEST_F(StoreTest, WithoutHomeTheDefaultStoreIsInTheUsersOwnFolder) {
+  ::unsetenv("XDG_DATA_HOME");
+  ::unsetenv("SIXPOINT_STORE");
+  const char* home = std::getenv("HOME");
+  const std::string kept = home == nullptr ? "" : home;
+  for (const bool empty : {false, true}) {
+    empty ? ::setenv("HOME", "", 1) : ::unsetenv("HOME");
+    EXPECT_EQ(cli::default_store(),
+              std::string(::getpwuid(::getuid())->pw_dir) + "/.local/share/sixpoint/store.db");
+  }
+  ::setenv("HOME", kept.c_str(), 1);
 }
 
 // Runs the jig on a store that refuses; what was measured must be in the journal, and in the store

@@ -62,7 +62,11 @@ TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    ::signal(SIGINT, SIG_DFL);  // this process may ignore it, and so would its child
+    // This process may ignore or block it, and so would its child.
+    ::signal(SIGINT, SIG_DFL);
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
     const std::string script = "exec " + std::string(SIXPOINT_PROGRAM) + " simulate --scenario " +
                                (folder_ / "s.json") + " -o " + (folder_ / "out.gt3x") +
                                to("o", "e");
