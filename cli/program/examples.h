@@ -10,8 +10,8 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string_view>
-#include <vector>
 
 namespace sixpoint::cli {
 
@@ -19,6 +19,6 @@ struct CommandExamples {
   std::string_view command;               // "store export"
   std::array<std::string_view, 2> lines;  // "sixpoint store export -o store.jsonl"
 };
-const std::vector<CommandExamples>& command_examples();
+std::span<const CommandExamples> command_examples();
 
 }  // namespace sixpoint::cli
