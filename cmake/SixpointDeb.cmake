@@ -17,19 +17,25 @@ add_custom_command(OUTPUT ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash 
   COMMAND gzip -9nkf ${reference}/changelog
   DEPENDS sixpoint_reference ${reference}/sixpoint.1.in ${reference}/changelog
           ${PROJECT_SOURCE_DIR}/packaging/bash/sixpoint.in VERBATIM)
-# What it is made of.
-add_custom_command(OUTPUT ${reference}/sbom.cdx.json
-  COMMAND ${PROJECT_SOURCE_DIR}/packaging/sbom.sh $<TARGET_FILE:sixpoint> ${PROJECT_SOURCE_DIR} ${PROJECT_VERSION}
-          > ${reference}/sbom.cdx.json
-  DEPENDS sixpoint ${PROJECT_SOURCE_DIR}/packaging/sbom.sh ${PROJECT_SOURCE_DIR}/station/web/package-lock.json VERBATIM)
+# What it is made of, by the packages of a Debian system.
+set(sbom "")
+find_program(SIXPOINT_DPKG_QUERY dpkg-query)
+if(SIXPOINT_DPKG_QUERY AND NOT SIXPOINT_SANITIZE AND NOT SIXPOINT_FUZZ)
+  set(sbom ${reference}/sbom.cdx.json)
+  add_custom_command(OUTPUT ${sbom}
+    COMMAND ${PROJECT_SOURCE_DIR}/packaging/sbom.sh $<TARGET_FILE:sixpoint> ${PROJECT_SOURCE_DIR}
+            ${PROJECT_VERSION} > ${sbom}
+    DEPENDS sixpoint ${PROJECT_SOURCE_DIR}/packaging/sbom.sh
+            ${PROJECT_SOURCE_DIR}/station/web/package-lock.json VERBATIM)
+endif()
 add_custom_target(sixpoint_package_files ALL
-  DEPENDS ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash ${reference}/changelog.gz ${reference}/sbom.cdx.json)
+  DEPENDS ${reference}/sixpoint.1.gz ${reference}/sixpoint.bash ${reference}/changelog.gz ${sbom})
 
 install(FILES ${reference}/sixpoint.1.gz DESTINATION share/man/man1 COMPONENT program)
 install(FILES ${reference}/sixpoint.bash DESTINATION share/bash-completion/completions RENAME sixpoint
         COMPONENT program)
 set(deb COMPONENT deb EXCLUDE_FROM_ALL)
-install(FILES packaging/deb/copyright ${reference}/changelog.gz ${reference}/sbom.cdx.json README.md
+install(FILES packaging/deb/copyright ${reference}/changelog.gz ${sbom} README.md
         DESTINATION share/doc/sixpoint ${deb})
 install(DIRECTORY docs/ DESTINATION share/doc/sixpoint/docs ${deb} FILES_MATCHING PATTERN "*.md")
 install(FILES packaging/udev/60-sixpoint-detect.rules packaging/udev/70-sixpoint-access.rules
