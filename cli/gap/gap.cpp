@@ -9,11 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
-#include "cli/gap/gap_adopt.h"
-#include "cli/gap/gap_challenge.h"
-#include "cli/gap/gap_report.h"
-#include "cli/gap/gap_score.h"
-#include "cli/gap/gap_trends.h"
+#include "cli/gap/gap_commands.h"
 #include "cli/output.h"
 #include "cli/store_option.h"
 #include "gap/judge/diagnose.h"

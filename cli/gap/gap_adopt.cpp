@@ -1,11 +1,10 @@
 // sixpoint gap adopt INPUT... -o SCENARIO: effects that several units have become a population.
-#include "cli/gap/gap_adopt.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/gap/gap_commands.h"
 #include "cli/gap/gap_sources.h"
 #include "cli/output.h"
 #include "cli/store_option.h"

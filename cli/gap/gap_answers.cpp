@@ -8,7 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
-#include "cli/gap/gap_score.h"
+#include "cli/gap/gap_commands.h"
 #include "cli/output.h"
 #include "cli/workers.h"
 #include "gap/benchmark/answers.h"

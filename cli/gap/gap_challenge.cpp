@@ -2,8 +2,6 @@
 //
 // Each trial is a bundle in a temporary folder; `gap diagnose` runs as a process of its own that
 // gets nothing but that folder, and with --strip a catalogue without the true effects.
-#include "cli/gap/gap_challenge.h"
-
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
@@ -20,6 +18,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/gap/challenge_scores.h"
+#include "cli/gap/gap_commands.h"
 #include "cli/gap/gap_export.h"
 #include "cli/output.h"
 #include "cli/workers.h"

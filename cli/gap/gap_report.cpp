@@ -1,12 +1,11 @@
 // sixpoint gap report SOURCE... --scenario S -o report.html: how the gap shrank with each adoption.
-#include "cli/gap/gap_report.h"
-
 #include <set>
 
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
 #include "cli/command.h"
+#include "cli/gap/gap_commands.h"
 #include "cli/gap/gap_sources.h"
 #include "cli/output.h"
 #include "cli/store_option.h"

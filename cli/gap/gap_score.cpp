@@ -1,6 +1,4 @@
 // sixpoint gap score ANSWERS --labels FILE: any program's answers against sealed labels.
-#include "cli/gap/gap_score.h"
-
 #include <cmath>
 
 #include <fmt/format.h>
@@ -8,6 +6,7 @@
 #include "base/sha256.h"
 #include "cli/command.h"
 #include "cli/gap/challenge_scores.h"
+#include "cli/gap/gap_commands.h"
 #include "gap/benchmark/benchmark_score.h"
 
 namespace sixpoint::cli {

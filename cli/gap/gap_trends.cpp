@@ -1,11 +1,11 @@
 // sixpoint gap trends --store DB: whether a skew belongs to the units, the jig or the station.
-#include "cli/gap/gap_trends.h"
+#include "station/records/gap_trends.h"
 
 #include <fmt/format.h>
 
 #include "cli/command.h"
+#include "cli/gap/gap_commands.h"
 #include "cli/store_option.h"
-#include "station/records/gap_trends.h"
 
 namespace sixpoint::cli {
 namespace {

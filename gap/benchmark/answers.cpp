@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "gap/benchmark/json_lines.h"
 #include "sim/effects/effect.h"
 
 namespace sixpoint::gap {
@@ -107,13 +108,7 @@ Status read_where(const Json& json, const std::string& source, Answer& answer) {
 }
 
 Status add_lines(std::string_view text, const std::string& path, std::vector<Answer>& answers) {
-  for (std::size_t line = 1; !text.empty(); ++line) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view row = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    if (row.empty()) {
-      continue;
-    }
+  for (const auto& [line, row] : rows_of(text)) {
     const std::string source = fmt::format("{}, line {}", path, line);
     const Json json = Json::parse(row, nullptr, false);
     const Json* bundle = member(json, "bundle");

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/random.h"
+#include "gap/benchmark/json_lines.h"
 #include "gap/benchmark/shown.h"
 
 namespace sixpoint::gap {
@@ -178,13 +179,7 @@ std::string labels_text(const Labels& labels) {
 Result<Labels> parse_labels(std::string_view text) {
   Labels labels;
   std::set<std::string> names;
-  for (std::size_t line = 1; !text.empty(); ++line) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view row = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    if (row.empty()) {
-      continue;
-    }
+  for (const auto& [line, row] : rows_of(text)) {
     const Json json = Json::parse(row, nullptr, false);
     if (line == 1) {
       if (!json.is_object() || json.value("schema", Json()) != kSchema) {
