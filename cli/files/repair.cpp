@@ -91,7 +91,6 @@ std::string line_that_goes_on(const Options& options) {
       line += fmt::format(" {} {}", name, repair::shell_word(value));
     }
   };
-  const auto flag = [&](const char* name, bool given) { line += given ? name : ""; };
   for (const std::string& path : options.paths) {
     line += fmt::format(" {}", repair::shell_word(path));
   }
@@ -99,17 +98,21 @@ std::string line_that_goes_on(const Options& options) {
   add("--constants", options.sources.constants);
   add("--calibration-file", options.sources.calibration_file);
   add("--store", options.sources.store);
-  flag(" --scan", options.sources.scan);
-  flag(" --or-scan", options.sources.or_scan);
-  flag(" --no-pool", options.sources.no_pool);
-  flag(" --wide", options.repair.wide);
-  flag(" --store-only", options.repair.store_only);
-  flag(" --undo-rotation", options.repair.undo_rotation);
-  flag(" --allow-prior", options.repair.allow_prior);
-  flag(" --salvage", options.repair.salvage);
-  flag(" --force", options.repair.force);
-  flag(" --redo-outdated", options.repair.redo_outdated);
-  flag(" --report", options.report);
+  const RepairSources& from = options.sources;
+  const repair::RepairOptions& how = options.repair;
+  for (const auto& [flag, given] : {std::pair(" --scan", from.scan),
+                                    {" --or-scan", from.or_scan},
+                                    {" --no-pool", from.no_pool},
+                                    {" --wide", how.wide},
+                                    {" --store-only", how.store_only},
+                                    {" --undo-rotation", how.undo_rotation},
+                                    {" --allow-prior", how.allow_prior},
+                                    {" --salvage", how.salvage},
+                                    {" --force", how.force},
+                                    {" --redo-outdated", how.redo_outdated},
+                                    {" --report", options.report}}) {
+    line += given ? flag : "";
+  }
   if (options.link != LinkKind::none) {
     add("--link-unaffected", std::string(to_string(options.link)));
   }

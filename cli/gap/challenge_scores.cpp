@@ -69,23 +69,26 @@ Json scores_json(const ChallengeSetting& options, const Scores& scores,
     json["own_unknown"] = options.own_unknown;
   }
   Json& result = json["scores"];
-  result["single_first_right"] = to_json(scores.first);
-  result["single_alone_and_right"] = to_json(scores.exact);
-  result["single_first_right_observable"] = to_json(scores.first_observable);
-  result["single_first_right_observable_severity_1"] = to_json(scores.first_large);
-  result["single_family_right"] = to_json(scores.family);
-  result["none_alarms"] = to_json(scores.alarms);
-  result["pair_f1"] = number(scores.f1());
-  result["realistic_dominant_first"] = to_json(scores.dominant);
-  result["realistic_recall"] = to_json(scores.recall);
-  result["realistic_precision"] = to_json(scores.precise);
-  result["realistic_exact_set"] = to_json(scores.exact_set);
-  result["realistic_needless_unknown"] = to_json(scores.needless);
-  result["withheld_honest"] = to_json(scores.withheld_honest);
-  result["withheld_confidently_wrong"] = to_json(scores.withheld_wrong);
-  result["expected_calibration_error"] = number(scores.calibration_error());
-  result["unknown_calibration_error"] = number(scores.unknown_calibration_error());
-  result["failures"] = to_json(scores.failures);
+  for (const auto& [name, value] :
+       {std::pair("single_first_right", to_json(scores.first)),
+        {"single_alone_and_right", to_json(scores.exact)},
+        {"single_first_right_observable", to_json(scores.first_observable)},
+        {"single_first_right_observable_severity_1", to_json(scores.first_large)},
+        {"single_family_right", to_json(scores.family)},
+        {"none_alarms", to_json(scores.alarms)},
+        {"pair_f1", number(scores.f1())},
+        {"realistic_dominant_first", to_json(scores.dominant)},
+        {"realistic_recall", to_json(scores.recall)},
+        {"realistic_precision", to_json(scores.precise)},
+        {"realistic_exact_set", to_json(scores.exact_set)},
+        {"realistic_needless_unknown", to_json(scores.needless)},
+        {"withheld_honest", to_json(scores.withheld_honest)},
+        {"withheld_confidently_wrong", to_json(scores.withheld_wrong)},
+        {"expected_calibration_error", number(scores.calibration_error())},
+        {"unknown_calibration_error", number(scores.unknown_calibration_error())},
+        {"failures", to_json(scores.failures)}}) {
+    result[name] = value;
+  }
   json["calibration"] = Json::array();
   for (const Scores::Bin& bin : scores.bins) {
     json["calibration"].push_back({{"probability", bin.of > 0 ? Json(bin.sum_p / bin.of) : Json()},

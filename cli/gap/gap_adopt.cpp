@@ -7,15 +7,13 @@
 #include "cli/gap/gap_commands.h"
 #include "cli/gap/gap_sources.h"
 #include "cli/output.h"
-#include "cli/store_option.h"
 #include "gap/adopt/adopted_scenario.h"
 
 namespace sixpoint::cli {
 namespace {
 
 struct Options {
-  std::vector<std::string> inputs;
-  std::string store;
+  SourceOptions sources;
   std::string scenario;
   std::string output;
   gap::AdoptionOptions rule;
@@ -130,20 +128,14 @@ Json to_json(const gap::AdoptedScenario& learnt, const Options& options) {
 }
 
 Status run(const Options& options, Context& context) {
-  if (options.inputs.empty() && options.store.empty()) {
-    return fail(ErrorCode::usage, "INPUT or --store is required", {}, "name what to learn from");
-  }
   Outputs outputs(context, options.outputs, options.json);
-  for (const std::string& input : options.inputs) {
-    SIXPOINT_CHECK(outputs.input(input));
-  }
+  SIXPOINT_CHECK(guard_sources(outputs, options.sources));
   SIXPOINT_CHECK(outputs.input(options.scenario));
-  SIXPOINT_CHECK(outputs.input(options.store.empty() ? "" : store_file(options.store)));
   if (!options.dry_run) {
     SIXPOINT_CHECK(outputs.file("--output", options.output));
   }
   SIXPOINT_ASSIGN(const std::string base, base_of(options, context.env.files));
-  SIXPOINT_ASSIGN(const auto sources, find_sources(context, options.inputs, options.store));
+  SIXPOINT_ASSIGN(const auto sources, find_sources(context, options.sources));
   std::vector<gap::DocumentEvidence> documents;
   bool any = false;
   for (const GapSource& source : sources) {
@@ -173,9 +165,8 @@ void add_gap_adopt(CLI::App& gap_command, Context& context) {
                            "effects that several units have go into a scenario, as means and "
                            "spreads that `simulate` and `virtual` use",
                            run);
-  command.add_option("INPUT", options.inputs,
+  add_source_options(command, options.sources, "INPUT",
                      "answers of `gap diagnose --json`, bundles, folders of bundles, stores");
-  add_store_option(command, options.store);
   command.add_option("--scenario", options.scenario,
                      "the scenario that is extended; else the one that -o names, or a new one");
   command

@@ -8,15 +8,13 @@
 #include "cli/gap/gap_commands.h"
 #include "cli/gap/gap_sources.h"
 #include "cli/output.h"
-#include "cli/store_option.h"
 #include "gap/adopt/progress.h"
 
 namespace sixpoint::cli {
 namespace {
 
 struct Options {
-  std::vector<std::string> inputs;
-  std::string store;
+  SourceOptions sources;
   std::string scenario;
   std::string output;
   OutputOptions outputs;
@@ -42,20 +40,13 @@ std::string text_of(const gap::GapProgress& progress) {
 }
 
 Status run(const Options& options, Context& context) {
-  if (options.inputs.empty() && options.store.empty()) {
-    return fail(ErrorCode::usage, "SOURCE or --store is required", {},
-                "name bundles, a folder of bundles or a store");
-  }
   Outputs outputs(context, options.outputs, options.json);
-  for (const std::string& input : options.inputs) {
-    SIXPOINT_CHECK(outputs.input(input));
-  }
+  SIXPOINT_CHECK(guard_sources(outputs, options.sources));
   SIXPOINT_CHECK(outputs.input(options.scenario));
-  SIXPOINT_CHECK(outputs.input(options.store.empty() ? "" : store_file(options.store)));
   SIXPOINT_CHECK(outputs.file("--output", options.output));
   SIXPOINT_ASSIGN(const Bytes scenario, read_file(context.env.files, options.scenario));
   SIXPOINT_ASSIGN(gap::ScenarioHistory history, gap::adoption_history(as_text(scenario)));
-  SIXPOINT_ASSIGN(const auto sources, find_sources(context, options.inputs, options.store));
+  SIXPOINT_ASSIGN(const auto sources, find_sources(context, options.sources));
   gap::ProgressRecorder recorder(std::move(history));
   Progress bar(context, "simulating", sources.size());
   std::size_t done = 0;
@@ -83,8 +74,7 @@ void add_gap_report(CLI::App& gap_command, Context& context) {
   auto [command, options] = add_command<Options>(
       gap_command, context, "gap-report", "report",
       "the gap over time: before, after each adoption of a scenario, and its floor", run);
-  command.add_option("SOURCE", options.inputs, "bundles, folders of bundles, stores");
-  add_store_option(command, options.store);
+  add_source_options(command, options.sources, "SOURCE", "bundles, folders of bundles, stores");
   command.add_option("--scenario", options.scenario, "the scenario that `gap adopt` made")
       ->required();
   command.add_option("-o,--output", options.output, "write the report as one page to this file");

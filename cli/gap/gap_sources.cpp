@@ -60,9 +60,25 @@ Status add_folder(FileSystem& files, const std::string& folder, std::vector<GapS
 
 }  // namespace
 
-Result<std::vector<GapSource>> find_sources(Context& context,
-                                            const std::vector<std::string>& inputs,
-                                            const std::string& store) {
+void add_source_options(CLI::App& command, SourceOptions& options, const char* name,
+                        const char* about) {
+  command.add_option(name, options.inputs, about);
+  add_store_option(command, options.store);
+}
+
+Status guard_sources(Outputs& outputs, const SourceOptions& options) {
+  if (options.inputs.empty() && options.store.empty()) {
+    return fail(ErrorCode::usage, "nothing is named to learn from", {},
+                "name bundles, a folder of bundles, answers of `gap diagnose --json` or a store");
+  }
+  for (const std::string& input : options.inputs) {
+    SIXPOINT_CHECK(outputs.input(input));
+  }
+  return outputs.input(options.store.empty() ? "" : store_file(options.store));
+}
+
+Result<std::vector<GapSource>> find_sources(Context& context, const SourceOptions& options) {
+  const auto& [inputs, store] = options;
   FileSystem& files = context.env.files;
   std::vector<GapSource> sources;
   for (const std::string& input : inputs) {

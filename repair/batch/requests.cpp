@@ -97,22 +97,26 @@ Status take_options(std::string_view json, ScanRequest& request) {
 Status take_options(std::string_view json, RepairRequest& request) {
   Options options(json);
   options.take("jobs", request.jobs);
-  options.take("constants", request.constants);
-  options.take("calibration_file", request.calibration_file);
-  options.take("store", request.store);
-  options.take("scan", request.scan);
-  options.take("or_scan", request.or_scan);
-  options.take("no_pool", request.no_pool);
+  for (const auto& [name, text] : {std::pair("constants", &request.constants),
+                                   {"calibration_file", &request.calibration_file},
+                                   {"store", &request.store}}) {
+    options.take(name, *text);
+  }
   RepairOptions& how = request.repair;
-  options.take("wide", how.wide);
-  options.take("store_only", how.store_only);
-  options.take("undo_rotation", how.undo_rotation);
-  options.take("allow_prior", how.allow_prior);
-  options.take("salvage", how.salvage);
-  options.take("force", how.force);
-  options.take("dry_run", how.dry_run);
-  options.take("resume", how.resume);
-  options.take("redo_outdated", how.redo_outdated);
+  for (const auto& [name, flag] : {std::pair("scan", &request.scan),
+                                   {"or_scan", &request.or_scan},
+                                   {"no_pool", &request.no_pool},
+                                   {"wide", &how.wide},
+                                   {"store_only", &how.store_only},
+                                   {"undo_rotation", &how.undo_rotation},
+                                   {"allow_prior", &how.allow_prior},
+                                   {"salvage", &how.salvage},
+                                   {"force", &how.force},
+                                   {"dry_run", &how.dry_run},
+                                   {"resume", &how.resume},
+                                   {"redo_outdated", &how.redo_outdated}}) {
+    options.take(name, *flag);
+  }
   return options.done();
 }
 
