@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "cli/command.h"
 #include "cli/output.h"
 #include "cli/store_option.h"
 #include "station/records/jig_bundle.h"
