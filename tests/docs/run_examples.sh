@@ -19,7 +19,7 @@ for day in 1 2; do
 done
 head -c 100000 archive/day1.gt3x >damaged.gt3x
 for name in broken broken-too; do  # recordings of a session that end without warning
-  timeout -s KILL 2 sixpoint jig --device virtual:seed=7,jig=auto,pace=real --store none.db --record $name.zip \
+  timeout -s KILL 4 sixpoint jig --device virtual:seed=7,jig=auto,pace=real --store none.db --record $name.zip \
     >/dev/null 2>&1 || true
 done
 python3 "$source_folder/tests/docs/make_inputs.py" readings.csv capture.pcap
@@ -37,7 +37,7 @@ for example in "${examples[@]}"; do
   done
   expected=$(sed -n 's/.*# exits with \([0-9]*\).*/\1/p' <<<"$line")
   case $line in
-    "sixpoint virtual"* | "sixpoint station "*) line="timeout --preserve-status 3 $line" ;;
+    "sixpoint virtual"* | "sixpoint station "*) line="timeout --preserve-status 5 $line" ;;
   esac
   status=0
   output=$(bash -c "$line" <<<'4711' 2>&1) || status=$?
