@@ -47,7 +47,7 @@ TEST_F(GapExport, TheSameSeedWritesTheSameBytes) {
   EXPECT_EQ(json["bundles"], 6);
   // The seal: the labels can't be changed afterwards.
   EXPECT_EQ(json["labels_sha256"], text_sha256(files.at("labels.jsonl")));
-  const auto list = nlohmann::json::parse(files.at("challenge.json"));
+  const auto list = nlohmann::ordered_json::parse(files.at("challenge.json"));
   EXPECT_EQ(list["labels_sha256"], json["labels_sha256"]);
   EXPECT_EQ(list["bundles"].size(), 6U);
 }
