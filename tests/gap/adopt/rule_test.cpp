@@ -1,6 +1,8 @@
 // A test for each row of the table in rule.h.
 #include "gap/adopt/rule.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "gap/adopt/made_evidence.h"
