@@ -1,8 +1,9 @@
 // What `gap adopt` and `gap report` read: bundles, folders of bundles, stores, and answers of
 // `gap diagnose --json`.
 //
-//   SIXPOINT_ASSIGN(const std::vector<GapSource> sources, find_sources(context, {{"bundles"},
-//   ""})); SIXPOINT_ASSIGN(const auto evidence, evidence_of_source(context, sources.front()));
+//   const SourceOptions options = {{"bundles"}, ""};
+//   SIXPOINT_ASSIGN(const std::vector<GapSource> sources, find_sources(context, options));
+//   SIXPOINT_ASSIGN(const auto evidence, evidence_of_source(context, sources.front()));
 //
 // A source is a name and how to get it; nothing of a recording is read before it is wanted.
 #pragma once
