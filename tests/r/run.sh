@@ -15,7 +15,8 @@ export SIXPOINT_PROGRAM=$binary_folder/sixpoint SIXPOINT_SOURCE=$source_folder
 export SIXPOINT_SHARED=${SIXPOINT_SHARED:-$source_folder/../shared}
 mkdir "$scratch/library" "$scratch/work"
 cd "$scratch"
-package=$("$source_folder/packaging/r/make_package.sh" "$source_folder" "$binary_folder" "$scratch/made")
+# With a relative name, as scripts/package.sh gives it.
+package=$(cd "$(dirname "$binary_folder")" && "$source_folder/packaging/r/make_package.sh" "$source_folder" "$(basename "$binary_folder")" "$scratch/made")
 # Clean: no error, no warning, no note. What needs a network or TeX is left out.
 R CMD check --no-manual "$package" >check.log 2>&1 || { cat check.log; exit 1; }
 grep '^Status: OK$' check.log >/dev/null || { cat check.log; exit 1; }
