@@ -146,6 +146,14 @@ export async function open(url, { width = 1500, height = 1000, ...more } = {}) {
   return page;
 }
 
+// What every open page shows at a failure: a machine of CI keeps the words and no picture.
+export async function describe() {
+  for (const page of browser?.contexts().flatMap((each) => each.pages()) ?? []) {
+    const text = await page.locator('body').innerText({ timeout: 5000 }).catch((error) => `no text: ${error.message}`);
+    console.error(`the page ${page.url()} shows:\n${text.slice(0, 3000)}\nproblems: ${page.problems ?? 'none'}`);
+  }
+}
+
 export async function shot(page, name) {
   await page.screenshot({ path: join(shots, `${name}.png`), fullPage: true });
 }
