@@ -87,6 +87,21 @@ struct StreamStatistics {
   double clock_jumped_s = 0;  // their sum
 };
 
+// Calls visit(name, member) for each of them: all that adds, writes or reads them goes through this
+// list, so that a new one is forgotten nowhere.
+template <class Visit>
+void for_each_count(Visit&& visit) {
+  using Of = StreamStatistics;
+  visit("samples", &Of::samples);
+  visit("lost_samples", &Of::lost_samples);
+  visit("duplicate_reports", &Of::duplicate_reports);
+  visit("damaged_reports", &Of::damaged_reports);
+  visit("overflowed_blocks", &Of::overflowed_blocks);
+  visit("failed_transfers", &Of::failed_transfers);
+  visit("clock_jumps", &Of::clock_jumps);
+  visit("clock_jumped_s", &Of::clock_jumped_s);
+}
+
 struct RecordingInfo {
   std::uint16_t id = 0;
   std::uint64_t bytes = 0;

@@ -136,15 +136,11 @@ std::vector<std::pair<std::string, std::string>> scores_lines(const Scores& scor
 std::string scores_page(const ChallengeSetting& options, const Scores& scores,
                         const std::vector<Outcome>& outcomes) {
   std::string html =
-      "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>gap challenge</title>"
-      "<style>body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}"
-      "table{border-collapse:collapse;margin:1em 0}td,th{padding:.2em .8em;text-align:left;"
-      "border-bottom:1px solid #ccc}td.n{text-align:right}.bad{color:#b00020}</style>";
-  html += fmt::format(
-      "<h1>Blind check of the gap diagnosis</h1><p>{} trials, {} protocol, seed {}{}. Shares with "
-      "95 % intervals.</p><table>",
-      outcomes.size(), options.protocol, options.seed,
-      options.strip ? ", true effects taken out of the catalogue" : "");
+      html_head("Blind check of the gap diagnosis", "td.n{text-align:right}.bad{color:#b00020}");
+  html +=
+      fmt::format("<p>{} trials, {} protocol, seed {}{}. Shares with 95 % intervals.</p><table>",
+                  outcomes.size(), options.protocol, options.seed,
+                  options.strip ? ", true effects taken out of the catalogue" : "");
   for (const auto& [what, value] : scores_lines(scores)) {
     html += fmt::format("<tr><td>{}</td><td>{}</td></tr>", what, value);
   }
@@ -186,7 +182,8 @@ std::string scores_page(const ChallengeSetting& options, const Scores& scores,
                         fmt::join(truth, ", "), escaped(fmt::format("{}", fmt::join(named, ", "))),
                         escaped(outcome.failure.empty() ? outcome.verdict : outcome.failure));
   }
-  return html + "</table></html>\n";
+  html += "</table>";
+  return html.append(kHtmlEnd);
 }
 
 }  // namespace sixpoint::cli

@@ -217,18 +217,17 @@ Status export_trials(const Options& options, sim::StandardProtocol protocol, Con
                 "--export goes without --strip, --recording, --keep, --html and --program", {},
                 "sixpoint gap score scores what another program answers");
   }
-  ExportOptions how;
-  how.trials = options.trials;
-  how.seed = options.seed;
-  how.protocol = protocol;
-  how.only = options.only;
-  how.shares = options.shares;
-  how.folder = options.export_to;
-  how.labels = options.labels;
-  how.jobs = options.jobs;
-  how.dry_run = options.dry_run;
-  how.outputs = options.outputs;
-  how.json = options.json;
+  const ExportOptions how = {.trials = options.trials,
+                             .seed = options.seed,
+                             .protocol = protocol,
+                             .only = options.only,
+                             .shares = options.shares,
+                             .folder = options.export_to,
+                             .labels = options.labels,
+                             .jobs = options.jobs,
+                             .dry_run = options.dry_run,
+                             .outputs = options.outputs,
+                             .json = options.json};
   return export_challenge(how, context);
 }
 

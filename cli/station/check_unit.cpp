@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/text/html.h"
 #include "cli/command.h"
 #include "cli/output.h"
 #include "cli/station/operator.h"
@@ -60,11 +61,11 @@ Status show_state(const Options& options, Context& context, const char* command)
       const auto state,
       station::station_state(store, options.station, limits.check_unit, context.env.clock.now()));
   if (!options.html.empty()) {
-    std::string page = "<!doctype html>\n<meta charset=utf-8><title>Check units</title>\n";
+    std::string page = html_head("Check units");
     for (const station::CheckUnitChart& chart : state.charts) {
       page += station::chart_svg(chart);
     }
-    SIXPOINT_CHECK(write_file(outputs.files(), options.html, page));
+    SIXPOINT_CHECK(write_file(outputs.files(), options.html, page.append(kHtmlEnd)));
   }
   context.worsen(state.locked ? kExitFailed : kExitPassed);
   Json json = document(command);

@@ -152,16 +152,7 @@ std::string bundles_table(const GapProgress& progress) {
 }  // namespace
 
 std::string progress_html(const GapProgress& progress) {
-  std::string out =
-      "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>The gap over "
-      "time</title><style>"
-      "body{font:15px/1.45 system-ui,sans-serif;max-width:900px;margin:1.5em auto;padding:0 "
-      "1em;color:#222}h1{font-size:1.2em}"
-      ".say{font-size:1.2em;padding:.7em 1em;background:#f2f0ea;border-left:5px solid #b5442e}"
-      "table{border-collapse:collapse;margin:1em 0;width:100%}caption{text-align:left;"
-      "font-weight:600}td,th{border-bottom:1px solid #ddd;padding:.15em .5em;text-align:left}"
-      "figure{margin:1em 0}figcaption{font-weight:600}svg text{font:12px system-ui,sans-serif}"
-      "</style><h1>Simulator against recordings</h1>";
+  std::string out = html_head("Simulator against recordings");
   out += fmt::format("<p class=\"say\">{}</p>", html_escaped(progress.brief()));
   if (!progress.bundles.empty()) {
     out += figure("All recordings, after each adoption", steps_chart(progress));
@@ -171,7 +162,7 @@ std::string progress_html(const GapProgress& progress) {
   for (const std::string& loss : progress.losses) {
     out += fmt::format("<p>Left out: {}</p>", html_escaped(loss));
   }
-  return out + "</html>\n";
+  return out.append(kHtmlEnd);
 }
 
 }  // namespace sixpoint::gap

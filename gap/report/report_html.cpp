@@ -65,22 +65,12 @@ std::string effects_table(const std::vector<EffectFinding>& list, const char* ca
 }  // namespace
 
 std::string report_html(const Diagnosis& d) {
-  std::string out =
-      "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Gap diagnosis</title><style>"
-      "body{font:15px/1.45 system-ui,sans-serif;max-width:1000px;margin:1.5em auto;padding:0 "
-      "1em;color:#222}"
-      "h1{font-size:1.2em}.say{font-size:1.25em;padding:.7em "
-      "1em;background:#f2f0ea;border-left:5px solid #b5442e}"
-      "table{border-collapse:collapse;margin:1em "
-      "0;width:100%}caption{text-align:left;font-weight:600}"
-      "td,th{border-bottom:1px solid #ddd;padding:.15em .5em;text-align:left}"
-      "figure{display:inline-block;width:460px;margin:.5em .5em 0 0}figcaption{font-weight:600}"
-      "svg text{font:11px "
-      "system-ui,sans-serif}.bar{background:#b5442e;height:1em}"
-      "@media print{figure{break-inside:avoid}}</style>";
-  out += fmt::format("<h1>Unit {}, firmware {}, protocol {}</h1><p class=\"say\">{}</p>",
-                     html_escaped(d.serial), html_escaped(d.firmware), html_escaped(d.protocol),
-                     html_escaped(d.brief()));
+  std::string out = html_head(
+      fmt::format("Gap diagnosis: unit {}, firmware {}, protocol {}", d.serial, d.firmware,
+                  d.protocol),
+      "body{max-width:1000px}figure{display:inline-block;width:460px;margin:.5em .5em 0 0}"
+      ".bar{background:#b5442e;height:1em}");
+  out += fmt::format("<p class=\"say\">{}</p>", html_escaped(d.brief()));
   for (const std::string& where : d.unknown.where) {
     out += fmt::format("<p>Not explained: {}</p>", html_escaped(where));
   }
@@ -108,7 +98,7 @@ std::string report_html(const Diagnosis& d) {
                        n.name, n.minutes, n.expected_nats,
                        html_escaped(fmt::format("{}", fmt::join(n.separates, ", "))));
   }
-  return out + "</html>\n";
+  return out.append(kHtmlEnd);
 }
 
 }  // namespace sixpoint::gap

@@ -188,11 +188,7 @@ std::string draw(const PairComparison& pair, const Trace& a, const Trace& b) {
 
 std::string compare_html(const std::vector<Trace>& traces,
                          const std::vector<PairComparison>& pairs) {
-  std::string page =
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-      "<title>Recordings compared</title><style>body{font:15px sans-serif;max-width:940px;"
-      "margin:2em auto;color:#222}svg{background:#f6f6f6}svg text{font-size:11px;fill:#444}"
-      "</style></head><body><h1>Recordings compared</h1>\n";
+  std::string page = html_head("Recordings compared", "svg{background:#f6f6f6}");
   for (const PairComparison& pair : pairs) {
     const auto a = std::ranges::find(traces, pair.a, &Trace::name);
     const auto b = std::ranges::find(traces, pair.b, &Trace::name);
@@ -200,7 +196,7 @@ std::string compare_html(const std::vector<Trace>& traces,
       page += draw(pair, *a, *b);
     }
   }
-  return page + "</body></html>\n";
+  return page.append(kHtmlEnd);
 }
 
 }  // namespace sixpoint::repair

@@ -92,13 +92,10 @@ std::string impact_html(const Impact& impact) {
       all.push_back(&**series);
     }
   }
-  return fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Impact of a "
-      "repair</title><style>body{{font:15px sans-serif;max-width:940px;margin:2em "
-      "auto;color:#222}}svg{{background:#fafafa}}svg text{{font-size:11px;fill:#444}}"
-      "@media print{{body{{margin:0}}}}</style></head><body><h1>Impact of a repair</h1>\n"
-      "{}<pre>{}</pre>\n<h2>ENMO over the time</h2>\n{}</body></html>\n",
-      names, html_escaped(impact.brief()), all.empty() ? std::string() : drawing(all));
+  std::string page = html_head("Impact of a repair", "svg{background:#fafafa}");
+  page += fmt::format("{}<pre>{}</pre>\n<h2>ENMO over the time</h2>\n{}", names,
+                      html_escaped(impact.brief()), all.empty() ? std::string() : drawing(all));
+  return page.append(kHtmlEnd);
 }
 
 }  // namespace sixpoint::repair

@@ -295,17 +295,13 @@ std::string StudyReport::constants() const {
 }
 
 std::string StudyReport::html(const StudyPage& page) const {
-  return fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>"
-      "<style>body{{font:14px sans-serif;max-width:1100px;margin:2em auto;color:#222}}"
-      "table{{border-collapse:collapse}}td,th{{border-bottom:1px solid #ddd;padding:3px 8px;"
-      "text-align:left;vertical-align:top;overflow-wrap:anywhere}}ul{{margin:0;padding-left:1em}}"
-      "figure{{display:inline-block;margin:4px}}figcaption{{font-size:11px;max-width:420px;"
-      "overflow-wrap:anywhere}}svg text{{font-size:10px;fill:#444}}thead{{display:table-header-"
-      "group}}tr{{break-inside:avoid}}@media print{{body{{margin:0;max-width:none}}}}</style>"
-      "</head><body><h1>{0}</h1>\n<p>{1}, {2}</p>\n{3}{4}{5}{6}{7}{8}</body></html>\n",
-      escaped(page.title), escaped(page.made_at), escaped(page.software), totals(), units(),
-      not_done(), files(), thumbnails(), constants());
+  std::string out = html_head(
+      page.title,
+      "body{max-width:1100px}ul{margin:0;padding-left:1em}figure{display:inline-block;margin:4px}"
+      "figcaption{font-size:11px;font-weight:400;max-width:420px;overflow-wrap:anywhere}");
+  out += fmt::format("<p>{}, {}</p>\n", escaped(page.made_at), escaped(page.software));
+  out += totals() + units() + not_done() + files() + thumbnails() + constants();
+  return out.append(kHtmlEnd);
 }
 
 }  // namespace sixpoint::repair

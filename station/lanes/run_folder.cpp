@@ -47,26 +47,15 @@ Status parse_common(const Json& json, Unfinished& work) {
 }
 
 Json stream_to_json(const device::StreamStatistics& stream) {
-  return {{"samples", stream.samples},
-          {"lost_samples", stream.lost_samples},
-          {"duplicate_reports", stream.duplicate_reports},
-          {"damaged_reports", stream.damaged_reports},
-          {"overflowed_blocks", stream.overflowed_blocks},
-          {"failed_transfers", stream.failed_transfers},
-          {"clock_jumps", stream.clock_jumps},
-          {"clock_jumped_s", stream.clock_jumped_s}};
+  Json json;
+  device::for_each_count([&](const char* name, auto member) { json[name] = stream.*member; });
+  return json;
 }
 
 device::StreamStatistics parse_stream(const Json& json) {
   device::StreamStatistics stream;
-  json.at("samples").get_to(stream.samples);
-  json.at("lost_samples").get_to(stream.lost_samples);
-  json.at("duplicate_reports").get_to(stream.duplicate_reports);
-  json.at("damaged_reports").get_to(stream.damaged_reports);
-  json.at("overflowed_blocks").get_to(stream.overflowed_blocks);
-  json.at("failed_transfers").get_to(stream.failed_transfers);
-  json.at("clock_jumps").get_to(stream.clock_jumps);
-  json.at("clock_jumped_s").get_to(stream.clock_jumped_s);
+  device::for_each_count(
+      [&](const char* name, auto member) { json.at(name).get_to(stream.*member); });
   return stream;
 }
 

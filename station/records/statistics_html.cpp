@@ -62,15 +62,10 @@ std::string failure_bars(const GroupStatistics& all) {
 }
 
 constexpr std::string_view kStyle =
-    "body{font:15px/1.45 sans-serif;color:#1a1a1a;margin:2em auto;max-width:60em;padding:0 1em}"
-    "h1{font-size:1.6em;margin-bottom:0}h2{font-size:1.15em;border-bottom:1px solid "
-    "#bbb;margin-top:2em}"
-    "table{border-collapse:collapse;width:100%}th,td{text-align:left;padding:.25em .6em;"
-    "border-bottom:1px solid #ddd;vertical-align:top}td{font-variant-numeric:tabular-nums}"
-    "th{font-weight:600}.bars td:first-of-type{white-space:nowrap}"
-    "small{color:#555}.locked{background:#fbe9e7;border-left:6px solid #b71c1c;padding:.6em 1em}"
-    ".open{background:#eef5ee;border-left:6px solid #2e7d32;padding:.6em 1em}"
-    "svg text{font:11px sans-serif;fill:#333}";
+    "h2{border-bottom:1px solid #bbb;margin-top:2em}th{font-weight:600}"
+    ".bars td:first-of-type{white-space:nowrap}small{color:#555}"
+    ".locked{background:#fbe9e7;border-left:6px solid #b71c1c;padding:.6em 1em}"
+    ".open{background:#eef5ee;border-left:6px solid #2e7d32;padding:.6em 1em}";
 
 constexpr double kLeft = 64;
 constexpr double kRight = 790;
@@ -185,11 +180,8 @@ std::string chart_svg(const CheckUnitChart& one) { return ControlDrawing(one).dr
 
 std::string statistics_html(const StatisticsReport& report,
                             const std::vector<StationState>& states) {
-  std::string html = fmt::format(
-      "<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>Statistics of the "
-      "station</title><style>{}</style></head><body>\n<h1>Statistics of the "
-      "station</h1>\n<p>{}</p>\n",
-      kStyle, html_escaped(report.brief()));
+  std::string html = html_head("Statistics of the station", kStyle);
+  html += fmt::format("<p>{}</p>\n", html_escaped(report.brief()));
   html += "<h2>Yield</h2>\n<table><thead><tr><th>" + html_escaped(report.by) +
           "</th><th>runs</th><th>units</th><th>yield</th><th>first pass</th>"
           "<th>time per unit (median)</th></tr></thead>\n<tbody>";
@@ -222,7 +214,7 @@ std::string statistics_html(const StatisticsReport& report,
         "<p><small>Squares: points that break a rule of Nelson's, with its number. Limits: mean "
         "\u00b1 3 \u00d7 mean moving range / 1.128 of the baseline.</small></p>\n";
   }
-  return html + "</body></html>\n";
+  return html.append(kHtmlEnd);
 }
 
 }  // namespace sixpoint::station

@@ -7,14 +7,7 @@ namespace sixpoint::station {
 namespace {
 
 device::StreamStatistics sum_of(device::StreamStatistics sum, const device::StreamStatistics& of) {
-  sum.samples += of.samples;
-  sum.lost_samples += of.lost_samples;
-  sum.duplicate_reports += of.duplicate_reports;
-  sum.damaged_reports += of.damaged_reports;
-  sum.overflowed_blocks += of.overflowed_blocks;
-  sum.failed_transfers += of.failed_transfers;
-  sum.clock_jumps += of.clock_jumps;
-  sum.clock_jumped_s += of.clock_jumped_s;
+  device::for_each_count([&](const char*, auto member) { sum.*member += of.*member; });
   return sum;
 }
 

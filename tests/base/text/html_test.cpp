@@ -1,5 +1,8 @@
 #include "base/text/html.h"
 
+#include <string>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 namespace sixpoint {
@@ -7,11 +10,26 @@ namespace {
 
 // Oracle: the HTML standard, "Serialising HTML fragments" and its named character references.
 TEST(Html, FourCharactersBecomeEntities) {
-  EXPECT_EQ(html_escaped("<"), "&lt;");
-  EXPECT_EQ(html_escaped(">"), "&gt;");
-  EXPECT_EQ(html_escaped("&"), "&amp;");
-  EXPECT_EQ(html_escaped("\""), "&quot;");
-  EXPECT_EQ(html_escaped("<a href=\"x\">R&D</a>"), "&lt;a href=&quot;x&quot;&gt;R&amp;D&lt;/a&gt;");
+  const std::pair<const char*, const char*> cases[] = {
+      {"<", "&lt;"},
+      {">", "&gt;"},
+      {"&", "&amp;"},
+      {"\"", "&quot;"},
+      {"<a href=\"x\">R&D</a>", "&lt;a href=&quot;x&quot;&gt;R&amp;D&lt;/a&gt;"}};
+  for (const auto& [text, escaped] : cases) {
+    EXPECT_EQ(html_escaped(text), escaped);
+  }
+}
+
+TEST(Html, AHeadEscapesItsTitleAndEndsWithTheStyleOfThePage) {
+  const std::string page = html_head("R&D <1>", "h1{color:red}") + std::string(kHtmlEnd);
+  EXPECT_TRUE(
+      page.starts_with("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+                       "<title>R&amp;D &lt;1&gt;</title><style>"));
+  EXPECT_TRUE(
+      page.ends_with("h1{color:red}</style></head><body>\n<h1>R&amp;D &lt;1&gt;</h1>\n"
+                     "</body></html>\n"));
+  EXPECT_EQ(page.find("http"), std::string::npos) << "no resource of another place";
 }
 
 TEST(Html, WhatIsAnEntityAlreadyIsEscapedAgain) {
