@@ -1,14 +1,19 @@
 // sixpoint history SERIAL: all records of a unit in the store, oldest first: constants, runs,
 // writes to it, repaired files, corrections.
+#include <algorithm>
+#include <cmath>
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "base/sha256.h"
 #include "calib/constants.h"
 #include "cli/command.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 #include "repair/rescale/applying_constants.h"
+#include "station/limits/verdict.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -129,35 +134,72 @@ Json array_of(const Records& records) {
   return array;
 }
 
+// "sensitivity 230.996 229.644 223.038 LSB/g, zero 77.58 58.72 118.72 LSB"
+std::string values_of(const db::ConstantsRecord& record) {
+  const Json document = json_in(record.document);
+  if (!document.is_object() || !document.contains("constants")) {
+    return {};
+  }
+  return constants_text(document["constants"]);
+}
+
+// What a run was judged by, beside its verdict: the residual and its limit, and why it did not
+// pass.
+std::string values_of(const db::RunRecord& run) {
+  std::string text;
+  const Json document = json_in(run.document);
+  if (document.is_object() && document.contains("quantities")) {
+    for (const auto& one : station::quantities_from_json(document["quantities"])) {
+      if (one.name == "verification_residual_mg" && std::isfinite(one.value)) {
+        text = fmt::format("{:.1f} mg off", one.value);
+        text += one.high ? fmt::format(" (limit {:g})", *one.high) : "";
+      }
+    }
+  }
+  for (const std::string& code : run.codes) {
+    text += (text.empty() ? "" : ", ") + printable(code, 60);
+  }
+  return text;
+}
+
+// A line per record, by the time of day at which it was made.
 void print(const db::UnitHistory& history, Context& context) {
+  std::vector<std::pair<UtcTime, std::vector<std::string>>> lines;
+  const auto line = [&](UtcTime time, std::string what, std::string state, const std::string& id,
+                        std::string values) {
+    lines.push_back({time,
+                     {local_time(time), std::move(what), std::move(state),
+                      id.empty() ? id : db::shown_id(id), std::move(values)}});
+  };
   const auto about = about_constants(history);
   for (std::size_t i = 0; i < history.constants.size(); ++i) {
     const db::ConstantsRecord& record = history.constants[i];
-    context.out << fmt::format("{}  {:<8} {:<14} {}  {}\n", to_iso8601(record.made_at),
-                               record.filter, record.method, db::shown_id(record.id),
-                               printable(about[i]));
+    line(record.made_at, "constants", record.filter + ", " + record.method, record.id,
+         fmt::format("{}; {}", values_of(record), printable(about[i])));
   }
   for (const auto& run : history.runs) {
-    context.out << fmt::format(
-        "{}  run {:<4} {:<14} {}  {}{}\n", to_iso8601(run.started), run.kind, run.verdict,
-        db::shown_id(run.id), printable(run.jig),
-        run.retest_of.empty() ? "" : "  repeats " + db::shown_id(run.retest_of));
+    line(run.started, "run " + run.kind, run.verdict, run.id,
+         fmt::format("{}{}{}", values_of(run),
+                     run.jig.empty() ? "" : fmt::format("; jig {}", printable(run.jig)),
+                     run.retest_of.empty() ? "" : "; repeats " + db::shown_id(run.retest_of)));
   }
   for (const auto& write : history.writes) {
-    context.out << fmt::format("{}  written into the unit by run {}\n", to_iso8601(write.written),
-                               db::shown_id(write.run_id));
+    line(write.written, "written into the unit", "", write.run_id, "by this run");
   }
   for (const auto& repair : history.repairs) {
-    context.out << fmt::format("{}  repaired {:<14} {}\n", to_iso8601(repair.made_at),
-                               repair.method, printable(repair.input));
+    line(repair.made_at, "repaired file", repair.method, repair.id, printable(repair.input));
   }
   for (const auto& correction : history.corrections) {
-    context.out << fmt::format(
-        "{}  {:<8} of {} {}: {} ({})\n", to_iso8601(correction.made_at), correction.action,
-        correction.table,
-        correction.table == "units" ? correction.row_id : db::shown_id(correction.row_id),
-        printable(correction.reason), printable(correction.operator_name));
+    line(correction.made_at, correction.action, correction.table,
+         correction.table == "units" ? "" : correction.row_id,
+         fmt::format("{} ({})", printable(correction.reason), printable(correction.operator_name)));
   }
+  std::ranges::stable_sort(lines, {}, [](const auto& one) { return one.first; });
+  Columns list({"when", "record", "state", "id", "values"});
+  for (auto& [time, texts] : lines) {
+    list.row(std::move(texts));
+  }
+  context.out << list.text();
 }
 
 Status run(const Options& options, Context& context) {

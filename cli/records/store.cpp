@@ -5,6 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 #include "db/exchange.h"
 #include "db/journal.h"
@@ -169,6 +170,7 @@ Result<Answer> recall(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const auto entries, store.recall_list(id));
   Answer answer;
   Json& files = answer.json["files"] = Json::array();
+  Columns table({"repaired", "unit", "why its constants were withdrawn", "file"});
   for (const auto& entry : entries) {
     files.push_back({{"input", entry.repair.input},
                      {"serial", entry.repair.serial},
@@ -180,10 +182,10 @@ Result<Answer> recall(const Options& options, Context& context) {
                      {"software", entry.repair.software},
                      {"withdrawn_at", to_iso8601(entry.withdrawn_at)},
                      {"reason", entry.reason}});
-    answer.text +=
-        fmt::format("{}  {:<16} {}  ({})\n", to_iso8601(entry.repair.made_at), entry.repair.serial,
-                    printable(entry.repair.input), printable(entry.reason));
+    table.row({local_time(entry.repair.made_at), entry.repair.serial, printable(entry.reason),
+               printable(entry.repair.input)});
   }
+  answer.text = table.text();
   return answer;
 }
 
@@ -193,14 +195,16 @@ Result<Answer> jig_units(const Options& options, Context& context) {
   Answer answer;
   answer.json["jig"] = options.id;
   Json& list = answer.json["units"] = Json::array();
+  Columns table({"unit", "runs", "last run", "verdict"});
   for (const auto& unit : units) {
     list.push_back({{"serial", unit.serial},
                     {"runs", unit.runs},
                     {"last_run", to_iso8601(unit.last_run)},
                     {"last_verdict", unit.last_verdict}});
-    answer.text += fmt::format("{:<16} {:>3} runs  last {}  {}\n", unit.serial, unit.runs,
-                               to_iso8601(unit.last_run), unit.last_verdict);
+    table.row(
+        {unit.serial, std::to_string(unit.runs), local_time(unit.last_run), unit.last_verdict});
   }
+  answer.text = table.text();
   return answer;
 }
 
@@ -235,14 +239,15 @@ Result<Answer> due(const Options& options, Context& context) {
                   store.units_due(context.env.clock.now() - std::chrono::hours(24) * options.days));
   Answer answer;
   Json& list = answer.json["units"] = Json::array();
+  Columns table({"unit", "type", "last constants"});
   for (const auto& unit : units) {
     list.push_back({{"serial", unit.serial},
                     {"model", unit.model},
                     {"last_constants", value_or_null(unit.last_constants)}});
-    answer.text +=
-        fmt::format("{:<16} {:<18} {}\n", unit.serial, unit.model,
-                    unit.last_constants ? to_iso8601(*unit.last_constants) : "no constants");
+    table.row(
+        {unit.serial, unit.model, unit.last_constants ? local_time(*unit.last_constants) : "none"});
   }
+  answer.text = table.text();
   return answer;
 }
 
@@ -256,6 +261,7 @@ Result<Answer> trend(const Options& options, Context& context) {
   Answer answer;
   answer.json["serial"] = options.id;
   Json& list = answer.json["points"] = Json::array();
+  Columns table({"made", "filter", "method", "jig", "id", "verdict", "values"});
   for (const auto& point : points) {
     const Json constants = Json::parse(point.constants.document, nullptr, false);
     list.push_back({{"made_at", to_iso8601(point.constants.made_at)},
@@ -269,11 +275,12 @@ Result<Answer> trend(const Options& options, Context& context) {
                     {"constants", constants.is_object() && constants.contains("constants")
                                       ? constants["constants"]
                                       : Json(nullptr)}});
-    answer.text +=
-        fmt::format("{}  {:<8} {:<10} {:<12} {}{}\n", to_iso8601(point.constants.made_at),
-                    point.constants.filter, point.constants.method, point.jig,
-                    db::shown_id(point.constants.id), point.withdrawn ? "  withdrawn" : "");
+    table.row({local_time(point.constants.made_at), point.constants.filter, point.constants.method,
+               printable(point.jig), db::shown_id(point.constants.id),
+               point.withdrawn ? "withdrawn" : point.verdict,
+               list.back()["constants"].is_null() ? "" : constants_text(list.back()["constants"])});
   }
+  answer.text = table.text();
   return answer;
 }
 

@@ -1,7 +1,8 @@
 // sixpoint units: the units in the store.
-#include <fmt/format.h>
+#include <string>
 
 #include "cli/command.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 
 namespace sixpoint::cli {
@@ -17,16 +18,16 @@ Status run(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const auto units, store.units());
   Json json = document("units");
   Json& list = json["units"] = Json::array();
-  std::string text;
+  Columns table({"unit", "type", "first seen", "sets of constants"});
   for (const auto& unit : units) {
     list.push_back({{"serial", unit.serial},
                     {"model", unit.model},
                     {"first_seen", to_iso8601(unit.first_seen)},
                     {"constants", unit.constants}});
-    text += fmt::format("{:<16} {:<18} first seen {}  {} sets of constants\n", unit.serial,
-                        unit.model, to_iso8601(unit.first_seen), unit.constants);
+    table.row(
+        {unit.serial, unit.model, local_time(unit.first_seen), std::to_string(unit.constants)});
   }
-  return print_answer(context, options.json, json, text);
+  return print_answer(context, options.json, json, table.text());
 }
 
 }  // namespace

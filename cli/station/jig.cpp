@@ -11,6 +11,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
+#include "cli/people_text.h"
 #include "cli/station/jig_options.h"
 #include "cli/station/record_option.h"
 #include "cli/stop_request.h"
@@ -311,7 +312,7 @@ Result<station::JigReport> run_and_store(
     const station::JigProgress& had = left->progress;
     context.people << fmt::format(
                           "the run of {} goes on; it has {} placements (--anew begins anew)\n",
-                          to_iso8601(left->started),
+                          local_time(left->started),
                           had.faces.size() + had.reversed.size() + had.reseat.size() +
                               had.recheck.size())
                    << std::flush;

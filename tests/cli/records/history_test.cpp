@@ -53,6 +53,14 @@ TEST_F(StoreTest, AJigRunIsStoredWithWhatItWasJudgedBy) {
   ASSERT_EQ(history["writes"].size(), 1U);
   EXPECT_EQ(history["writes"][0]["run"], run_2["id"]);
   EXPECT_EQ(history["writes"][0]["as_left"], history["writes"][0]["read_back"]);
+  const auto text = run({"history", "MOS2A45130007", "--store", path("a.db")}).out;
+  EXPECT_THAT(text, testing::StartsWith("when "));
+  EXPECT_THAT(text, testing::ContainsRegex("run jig +pass +[0-9a-f]{12}  [0-9.]+ mg off .limit 10"))
+      << "the value beside the verdict";
+  EXPECT_THAT(text, HasSubstr(" LSB/g, zero "));
+  EXPECT_THAT(text, testing::Not(testing::ContainsRegex("[0-9]\\.[0-9]{6,}Z"))) << "no nanoseconds";
+  const auto trend = run({"store", "trend", "MOS2A45130007", "--store", path("a.db")}).out;
+  EXPECT_THAT(trend, HasSubstr(" LSB/g, zero "));
   const auto of_jig = run({"store", "jig", "J-17", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(of_jig["units"][0]["runs"], 2);
   const auto yield = run({"store", "yield", "--store", path("a.db"), "--json"}).json();

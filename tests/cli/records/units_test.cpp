@@ -1,5 +1,6 @@
 // sixpoint units by its contract.
 #include "cli/command_fixture.h"
+#include "cli/people_text.h"
 
 namespace sixpoint {
 namespace {
@@ -13,8 +14,9 @@ TEST_F(StoreTest, UnitsListsTheUnitsOfTheStore) {
   EXPECT_EQ(answer.json(), cli::Json::parse(R"({"schema": "sixpoint/units/1", "units": [
       {"serial": "MOS2A1", "model": "w", "first_seen": "1970-01-01T00:16:40Z", "constants": 1}]})"));
   EXPECT_EQ(run({"units", "--store", path("a.db")}).out,
-            "MOS2A1           w                  first seen 1970-01-01T00:16:40Z  "
-            "1 sets of constants\n");
+            "unit    type  first seen                  sets of constants\n"
+            "MOS2A1  w     " +
+                cli::local_time(from_unix_seconds(1000)) + "  1\n");
   const auto none = run({"units", "--store", path("none.db"), "--json"});
   EXPECT_EQ(none.exit_code, 66);
   EXPECT_EQ(none.json()["error"]["code"], "no_input");

@@ -1,0 +1,41 @@
+// What people read of the store: times by the clock on their wall, and lists in columns.
+//
+//   Columns list({"when", "unit", "verdict"});
+//   list.row({local_time(run.started), run.serial, run.verdict});
+//   context.out << list.text();  // "when                       unit  verdict\n2026-..."
+//
+//   constants_text(document["constants"]);
+//   // "sensitivity 230.996 229.644 223.038 LSB/g, zero 77.58 58.72 118.72 LSB"
+//
+// JSON has UTC (to_iso8601) and no columns.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/time.h"
+#include "cli/context.h"
+
+namespace sixpoint::cli {
+
+// "2026-11-23 20:53:03 +01:00": of the process's time zone ($TZ, else the machine's), without a
+// fraction of a second. UTC with "+00:00" where the zone is not known.
+std::string local_time(UtcTime time);
+
+// Lines of columns under their names, each as wide as its widest text, two spaces apart; text() is
+// empty without a row. Width is counted in characters, not bytes. A row has at most as many texts
+// as there are names. Texts of others (names, reasons) come in by printable().
+class Columns {
+ public:
+  explicit Columns(std::vector<std::string> names);
+  void row(std::vector<std::string> texts);
+  std::string text() const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;  // the first: the names
+};
+
+// `constants` as calib::to_json() writes them; empty where it is not that.
+std::string constants_text(const Json& constants);
+
+}  // namespace sixpoint::cli
