@@ -11,9 +11,11 @@ if(SIXPOINT_WERROR)
   target_compile_options(sixpoint_warnings INTERFACE -Werror)
 endif()
 if(SIXPOINT_SANITIZE)
+  # ThreadSanitizer cannot be joined with the others.
+  set(sanitizers $<IF:$<STREQUAL:${SIXPOINT_SANITIZE},thread>,thread,address$<COMMA>undefined>)
   target_compile_options(sixpoint_warnings INTERFACE
-    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
-  target_link_options(sixpoint_warnings INTERFACE -fsanitize=address,undefined)
+    -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(sixpoint_warnings INTERFACE -fsanitize=${sanitizers})
 endif()
 if(SIXPOINT_FUZZ)
   # The rooms tell the fuzzer which ways were taken; without it, it flies blind.
