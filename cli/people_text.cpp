@@ -24,6 +24,20 @@ bool are_three(const Json& json, const char* key) {
          json[key][0].is_number() && json[key][1].is_number() && json[key][2].is_number();
 }
 
+// As a shell takes it for one word.
+std::string quoted(const std::string& word) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) {
+    return word;
+  }
+  std::string out = "'";
+  for (const char c : word) {
+    out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  }
+  return out + "'";
+}
+
 }  // namespace
 
 std::string local_time(UtcTime time) {
@@ -80,6 +94,27 @@ std::string constants_text(const Json& constants) {
     zero += fmt::format(" {:.2f}", constants["zero_lsb"][axis].get<double>());
   }
   return fmt::format("{} LSB/g, {} LSB", sensitivity, zero);
+}
+
+void next_step(Context& context, bool as_json, const std::vector<std::string>& words) {
+  if (as_json) {
+    return;
+  }
+  std::string line = "next: sixpoint";
+  for (const std::string& word : words) {
+    line.append(1, ' ').append(quoted(printable(word)));
+  }
+  context.people << line << '\n';
+}
+
+std::vector<std::string> some_paths(const std::vector<std::string>& paths) {
+  constexpr std::size_t kMost = 3;
+  std::vector<std::string> some(
+      paths.begin(), paths.begin() + static_cast<std::ptrdiff_t>(std::min(kMost, paths.size())));
+  if (paths.size() > kMost) {
+    some.emplace_back("...");
+  }
+  return some;
 }
 
 }  // namespace sixpoint::cli

@@ -4,6 +4,8 @@
 //   list.row({local_time(run.started), run.serial, run.verdict});
 //   context.out << list.text();  // "when                       unit  verdict\n2026-..."
 //
+//   next_step(context, as_json, {"repair", run.serial + ".gt3x", "-o", "repaired"});
+//   // "next: sixpoint repair MOS2A45130007.gt3x -o repaired"
 //   constants_text(document["constants"]);
 //   // "sensitivity 230.996 229.644 223.038 LSB/g, zero 77.58 58.72 118.72 LSB"
 //
@@ -37,5 +39,13 @@ class Columns {
 
 // `constants` as calib::to_json() writes them; empty where it is not that.
 std::string constants_text(const Json& constants);
+
+// The last line of a result: the command that people give next, on stderr. `words` are the command
+// and its arguments; a word with a blank or a quote is printed as a shell takes it, Nothing with
+// --json.
+void next_step(Context& context, bool as_json, const std::vector<std::string>& words);
+
+// For next_step(): the paths that the user named, at most three of them.
+std::vector<std::string> some_paths(const std::vector<std::string>& paths);
 
 }  // namespace sixpoint::cli

@@ -7,6 +7,7 @@
 #include "cli/command.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/batch/answers.h"
@@ -123,6 +124,12 @@ Status run(const Options& options, Context& context) {
     context.people << fmt::format(
         "{} files: {} affected, {} not, {} cannot be told, {} unreadable\n", answers.size(),
         count("affected"), count("not_affected"), count("cannot_tell"), count("unreadable"));
+    if (count("affected") > 0) {
+      std::vector<std::string> next = some_paths(options.paths);
+      next.insert(next.begin(), "repair");
+      next.insert(next.end(), {"-o", "repaired"});
+      next_step(context, options.json, next);
+    }
   }
   return {};
 }

@@ -9,6 +9,7 @@
 #include "cli/command.h"
 #include "cli/gravity_option.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 #include "db/records.h"
 #include "repair/rescale/constants_finder.h"
@@ -133,6 +134,8 @@ void print(const std::string& path, const Options& options, const Outcome& outco
     context.text() << "  stored as " << db::shown_id(outcome.saved->id) << '\n';
   } else if (options.save && !report.usable()) {
     context.log().warn("nothing stored: only verified constants are kept");
+  } else if (report.usable()) {
+    next_step(context, options.json, {"solve", path, "--save"});
   }
 }
 

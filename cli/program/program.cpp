@@ -40,7 +40,9 @@ void declare_commands(CLI::App& app, Context& context) {
 int run_program(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app("Sixpoint measures the constants of activity monitors and repairs their recordings.",
                "sixpoint");
-  app.set_version_flag("--version", station::software_name());
+  // Before the commands: they take it over.
+  app.set_help_flag("-h,--help", "print this text");
+  app.set_version_flag("--version", station::software_name(), "print the version");
   app.require_subcommand(1);
   app.failure_message(CLI::FailureMessage::simple);
   declare_commands(app, context);

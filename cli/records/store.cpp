@@ -351,8 +351,8 @@ void add_store(CLI::App& app, Context& context) {
   with(sub("jig", "units that were on a jig", jig_units), "jig", &Options::id, "the jig's name")
       ->required();
   const auto passed = sub("yield", "how many units passed, and how many at once", yield);
-  with(passed, "--from", &Options::from, "runs from this date on (ISO 8601, UTC)");
-  with(passed, "--to", &Options::to, "runs before this date");
+  with(passed, "--from", &Options::from, "runs that started then or later (2027-03-31; UTC)");
+  with(passed, "--to", &Options::to, "runs that started before this time");
   auto old = sub("due", "units whose constants are old or missing", due);
   old.command.add_option("--days", old.options.days, "how old constants may be")
       ->check(CLI::Range(0, 100'000))

@@ -189,7 +189,8 @@ void add_capture(CLI::App& app, Context& context) {
   command.add_option("--constants-out", options.constants_out,
                      "also write the constants into this constants.json");
   command.add_option("--station", options.station, "where it is recorded: its lock holds here too");
-  command.add_option("--limits", options.limits, "limits with the rules of check units (TOML)");
+  command.add_option("--limits", options.limits,
+                     "a TOML file of limits (docs/limits.md); else the built-in ones");
   refuse_old_output(command, "--constants", "--constants-out");
   const auto add_number = [&command = command](const char* name, auto& value, auto least, auto most,
                                                const char* about) {

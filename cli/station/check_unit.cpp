@@ -118,7 +118,8 @@ void add_decision_options(CLI::App& command, Options& options) {
 }
 
 void add_limits_option(CLI::App& command, Options& options) {
-  command.add_option("--limits", options.limits, "a limits file with a [check_unit] table");
+  command.add_option("--limits", options.limits,
+                     "a TOML file of limits (docs/limits.md); else the built-in ones");
 }
 
 void add_place_options(CLI::App& command, Options& options) {
@@ -188,7 +189,8 @@ void add_retest(CLI::App& app, Context& context) {
   command.add_flag("--release", options.release, "an engineer has checked it: it may");
   command.add_option("--operator", options.operator_name, "who decides");
   command.add_option("--reason", options.reason, "why, for the record");
-  command.add_option("--limits", options.limits, "a limits file with a [retest] table");
+  command.add_option("--limits", options.limits,
+                     "a TOML file of limits (docs/limits.md); else the built-in ones");
   add_store_option(command, options.store);
 }
 

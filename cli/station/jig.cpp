@@ -464,8 +464,7 @@ struct TextOption {
   const char* about;
 };
 constexpr std::array<TextOption, 12> kTextOptions = {{
-    {"--jig-id", &Options::jig_id,
-     "the jig's own number, for the record (which units were on it?)"},
+    {"--jig-id", &Options::jig_id, "the jig's own number, for the record"},
     {"--jig-due", &Options::jig_due,
      "when the jig itself is due for calibration (2027-03-31); after that day nothing is measured"},
     {"--jig-exception", &Options::jig_exception, "why it is measured all the same, for the record"},

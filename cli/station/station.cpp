@@ -368,7 +368,8 @@ void add_station(CLI::App& app, Context& context) {
                      "the engineer who signs for that");
   command.add_flag("--write", options.write,
                    "the page's runs write the constants into the unit, unless a person says no");
-  command.add_option("--limits", options.limits, "limits of the verdict (TOML)");
+  command.add_option("--limits", options.limits,
+                     "a TOML file of limits (docs/limits.md); else the built-in ones");
   command
       .add_option("--side-seconds", options.side_s,
                   "how long a unit rests on each side of a calibration file")

@@ -147,11 +147,12 @@ void add_statistics(CLI::App& app, Context& context) {
       app, context, "statistics",
       "yield, failure codes, capability, check units (docs/statistics.md)", run);
   command.add_option("--by", options.by, "station, jig, operator or firmware");
-  command.add_option("--from", options.from, "runs that started then or later (2027-03-31)");
-  command.add_option("--to", options.to, "runs that started before");
+  command.add_option("--from", options.from, "runs that started then or later (2027-03-31; UTC)");
+  command.add_option("--to", options.to, "runs that started before this time");
   command.add_option("--html", options.html, "a page with charts");
   add_output_options(command, options.outputs);
-  command.add_option("--limits", options.limits, "a limits file with a [check_unit] table");
+  command.add_option("--limits", options.limits,
+                     "a TOML file of limits (docs/limits.md); else the built-in ones");
   add_store_option(command, options.store);
 }
 

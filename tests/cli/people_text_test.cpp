@@ -2,8 +2,10 @@
 
 #include <cstdlib>
 #include <ctime>
+#include <sstream>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace sixpoint::cli {
@@ -68,6 +70,20 @@ TEST(ConstantsText, IsOneLineAndEmptyForAnythingElse) {
   EXPECT_EQ(constants_text(other), "");
   EXPECT_EQ(constants_text(nullptr), "");
   EXPECT_EQ(constants_text("text"), "");
+}
+
+TEST(NextStep, IsOneLineThatAShellTakes) {
+  std::ostringstream out;
+  std::ostringstream people;
+  std::istringstream in;
+  Context context{posix_env(), out, people, in};
+  next_step(context, true, {"scan"});
+  EXPECT_EQ(people.str(), "") << "with --json nothing";
+  next_step(context, false, {"repair", "a b.gt3x", "it's.gt3x", "-o", "repaired"});
+  EXPECT_EQ(people.str(), "next: sixpoint repair 'a b.gt3x' 'it'\\''s.gt3x' -o repaired\n");
+  EXPECT_EQ(out.str(), "");
+  EXPECT_THAT(some_paths({"a", "b", "c"}), testing::ElementsAre("a", "b", "c"));
+  EXPECT_THAT(some_paths({"a", "b", "c", "d"}), testing::ElementsAre("a", "b", "c", "..."));
 }
 
 }  // namespace
