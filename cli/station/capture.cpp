@@ -93,6 +93,13 @@ Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
     hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
       return ask_side(context, options.side_s, opened.jig->turns_by_itself(), side, number, of);
     };
+    if (!opened.jig->turns_by_itself()) {  // a jig would lay it the same way again
+      hooks.again = [&](const std::vector<device::Pose>& /*sides*/) {
+        context.people << "these sides have too few still readings: they are asked for again, the "
+                          "others are kept\n"
+                       << std::flush;
+      };
+    }
     SIXPOINT_ASSIGN(done.report, station::run_capture(opened.on_jig(), env, how, hooks));
   } else {
     context.people << "this unit offers files only: the recording that it holds is taken\n";

@@ -13,6 +13,7 @@
 #include "cli/devices/known_devices.h"
 #include "cli/people_text.h"
 #include "cli/station/jig_options.h"
+#include "cli/station/operator.h"
 #include "cli/station/record_option.h"
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
@@ -36,6 +37,7 @@ struct Options : JigOptions {
   std::string jig_exception_by;
   std::string retest_of;
   std::string operator_name;
+  std::string pin_file;
   std::string station;
   std::string filter = "current";
   std::string limits;
@@ -112,6 +114,7 @@ Result<db::RunRecord> record_before(const Options& options,
 
 Status check_outputs(const Options& options, Outputs& outputs) {
   SIXPOINT_CHECK(outputs.input(options.limits));
+  SIXPOINT_CHECK(outputs.input(options.pin_file));
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.file("--certificate", options.certificate));
   SIXPOINT_CHECK(outputs.file("--label", options.label));
@@ -329,6 +332,8 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
                      device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(check_outputs(options, outputs));
   SIXPOINT_ASSIGN(auto session, session_options(context, options));
+  SIXPOINT_ASSIGN(const station::SignedName who,
+                  who_measures(context, options.operator_name, options.pin_file));
   // Ctrl-C stops a motor and the run, which is stored. A run by hand goes on with the next program:
   // there Ctrl-C ends this one at once. Made before the threads of the device are.
   std::optional<StopRequest> stop(std::in_place);
@@ -357,7 +362,7 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
                   record_before(options, session, identity.serial, opened.jig->name(), store));
   Done done;
   const auto store_run = [&](const station::JigReport& report) -> Status {
-    station::complete_run_record(record, report, options.study);
+    station::complete_run_record(record, report, options.study, who.is_authenticated);
     station::RunIds stored;
     done.kept =
         keep_records(context, options.store, store, [&](db::RecordWriter& writer) -> Status {
@@ -463,7 +468,7 @@ struct TextOption {
   std::string Options::*text;
   const char* about;
 };
-constexpr std::array<TextOption, 12> kTextOptions = {{
+constexpr std::array<TextOption, 13> kTextOptions = {{
     {"--jig-id", &Options::jig_id, "the jig's own number, for the record"},
     {"--jig-due", &Options::jig_due,
      "when the jig itself is due for calibration (2027-03-31); after that day nothing is measured"},
@@ -472,6 +477,8 @@ constexpr std::array<TextOption, 12> kTextOptions = {{
     {"--retest-of", &Options::retest_of,
      "the run that this one repeats: its id, or 'last' for the unit's last one"},
     {"--operator", &Options::operator_name, "who runs it, for the record"},
+    {"--pin-file", &Options::pin_file,
+     "file with the PIN of --operator, where the machine has operators (default: it is asked for)"},
     {"--station", &Options::station, "where it is run, for the record"},
     {"--limits", &Options::limits,
      "a TOML file of limits (docs/limits.md); else the built-in ones"},

@@ -1,6 +1,8 @@
 // sixpoint operator: who works at the stations of this machine.
 #include "cli/station/operator.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <termios.h>
 #include <unistd.h>
@@ -85,6 +87,30 @@ Status sign_off(Context& context, const std::string& name) {
   SIXPOINT_CHECK(operators.sign_in("here", name, read_pin(context, name)));
   SIXPOINT_CHECK(operators.who("here", name, station::OperatorRole::engineer));
   return {};
+}
+
+Result<station::SignedName> who_measures(Context& context, const std::string& name,
+                                         const std::string& pin_file) {
+  station::Operators operators(context.env, operators_file());
+  SIXPOINT_ASSIGN(const auto all, operators.list());
+  if (all.empty()) {
+    return station::SignedName{name, false};
+  }
+  if (name.empty()) {
+    return fail(ErrorCode::permission, "this machine has operators", "--operator",
+                "name the one who measures; the PIN is asked for");
+  }
+  std::string pin;
+  if (pin_file.empty()) {
+    pin = read_pin(context, name);
+  } else {
+    constexpr std::uint64_t kMostFile_bytes = 4096;
+    SIXPOINT_ASSIGN(const Bytes text, read_file(context.env.files, pin_file, kMostFile_bytes));
+    pin.assign(text.begin(), std::find_if(text.begin(), text.end(),
+                                          [](auto c) { return c == '\r' || c == '\n'; }));
+  }
+  SIXPOINT_CHECK(operators.sign_in("here", name, pin));
+  return operators.who("here", name, station::OperatorRole::technician);
 }
 
 void add_operator(CLI::App& app, Context& context) {

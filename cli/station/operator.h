@@ -6,6 +6,7 @@
 #include <string>
 
 #include "cli/context.h"
+#include "station/access/operators.h"
 
 namespace sixpoint::cli {
 
@@ -15,5 +16,18 @@ std::string operators_file();
 // A decision of an engineer. Where the machine has operators, the PIN of this one is read from
 // standard input; permission where it is not an engineer's, or wrong. Without operators: anyone.
 Status sign_off(Context& context, const std::string& name);
+
+// Who measures. Where the machine has operators, `name` must be one, and the PIN is the first line
+// of `pin_file`, or asked for at the terminal, without echo; permission where it is wrong. Without
+// operators: the name as it was given, and not authenticated.
+//
+// | operators | --operator | PIN                        | answer                             |
+// |-----------|------------|----------------------------|------------------------------------|
+// | none      | any        | not asked                  | the name, not authenticated        |
+// | some      | one of them | right                     | the name, authenticated            |
+// | some      | one of them | wrong, or none was given  | permission                         |
+// | some      | not one of them, or empty | any        | permission                         |
+Result<station::SignedName> who_measures(Context& context, const std::string& name,
+                                         const std::string& pin_file);
 
 }  // namespace sixpoint::cli

@@ -26,6 +26,8 @@
 #include "station/page/api.h"
 #include "station/page/quality_control.h"
 #include "station/page/server.h"
+#include "station/printing/label_printer.h"
+#include "station/printing/print_rule.h"
 #include "station/records/jig_due.h"
 #include "station/records/run_records.h"
 #include "station/records/software.h"
@@ -48,6 +50,8 @@ struct Options {
   std::string state;
   std::string files = ".";
   std::string limits;
+  std::string printer;
+  std::string socket;
   GravityOptions gravity;
   std::string jig_id;
   std::string jig_due;
@@ -98,15 +102,43 @@ class StationStore {
     return saved.id;
   }
   Result<station::RunDocument> document(const std::string& run_id, const std::string& kind);
+  // Labels of runs go there by themselves from now on (print_rule.h).
+  void print_to(station::LabelPrinter* printer) { printer_ = printer; }
+  Status print_again(const std::string& run_id);
 
  private:
+  void print_label(const db::RunRecord& run);
+
   Context& context_;
   const Options& options_;
   const station::JigSessionOptions session_;
   const station::JigDue jig_due_;
   station::StationGuard guard_;
+  station::LabelPrinter* printer_ = nullptr;
   std::mutex mutex_;
 };
+
+// A label that cannot be kept for the printer is no reason to lose the run: it can be printed
+// again.
+void StationStore::print_label(const db::RunRecord& run) {
+  if (printer_ == nullptr || !station::why_no_label(run, /*in_store=*/true).empty()) {
+    return;
+  }
+  const auto added = station::label_zpl(run).and_then([&](const std::string& zpl) {
+    return printer_->add({run.id, run.serial, zpl});
+  });
+  if (!added) {
+    context_.log().warn("the label is not printed: {}", added.error().brief());
+  }
+}
+
+Status StationStore::print_again(const std::string& run_id) {
+  const std::lock_guard lock(mutex_);
+  SIXPOINT_ASSIGN(db::Store store, open_existing_store(context_, options_.store));
+  SIXPOINT_ASSIGN(const db::RunRecord run, store.run(run_id));
+  SIXPOINT_ASSIGN(const std::string zpl, station::label_zpl(run));
+  return printer_->add_again({run.id, run.serial, zpl});
+}
 
 Result<station::RunInStore> StationStore::add_run(const station::JigReport& measured,
                                                   const station::RunLabels& labels) {
@@ -134,6 +166,8 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
   stored.is_kept_here = !saved.in_store();
   if (saved.in_store()) {
     stored.documents = station::documents_of(run);  // made from the store alone
+    run.id = stored.ids.run_id;
+    print_label(run);
   }
   if (const Status noted = guard_.note_verdict(report.serial, report.verdict); !noted) {
     context_.log().warn("{}", noted.error().brief());
@@ -235,6 +269,31 @@ int serve_until_signal(station::Server& server, const sigset_t& signals, EndInTi
   return signal;
 }
 
+// What --printer names; nothing without.
+Result<std::optional<station::PrinterAddress>> printer_address(Context& context,
+                                                               const Options& options) {
+  if (options.printer.empty()) {
+    return std::nullopt;
+  }
+  SIXPOINT_ASSIGN(const auto printer, station::parse_printer(options.printer));
+  SIXPOINT_CHECK(station::check_printer(context.env.files, printer));
+  return printer;
+}
+
+// Null without a printer.
+Result<std::unique_ptr<station::LabelPrinter>> open_printer(
+    Env& env, const std::optional<station::PrinterAddress>& address, const std::string& folder) {
+  if (!address) {
+    return nullptr;
+  }
+  return station::LabelPrinter::open(
+      env, address->text(), folder,
+      [printer = *address](std::string_view zpl, const std::stop_token& stop) {
+        constexpr double kLongestLabel_s = 15;
+        return station::send_label(printer, zpl, stop, kLongestLabel_s);
+      });
+}
+
 // Where the page listens, and its certificate.
 Result<station::ServerOptions> server_options(Context& context, const Options& options) {
   SIXPOINT_CHECK(station::may_listen(options.bind, !options.tls_certificate.empty(),
@@ -242,6 +301,7 @@ Result<station::ServerOptions> server_options(Context& context, const Options& o
   station::ServerOptions server;
   server.bind = options.bind;
   server.port = options.port;
+  server.unix_socket = options.socket;
   if (!options.tls_certificate.empty()) {
     constexpr std::uint64_t kMostPem_bytes = 1U << 20U;
     SIXPOINT_ASSIGN(const Bytes certificate,
@@ -255,6 +315,7 @@ Result<station::ServerOptions> server_options(Context& context, const Options& o
 
 Status serve(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const auto listening, server_options(context, options));
+  SIXPOINT_ASSIGN(const auto printer_at, printer_address(context, options));
   Outputs outputs(context, {}, /*json=*/false);
   SIXPOINT_CHECK(outputs.working_folder("--state", state_folder(options)));
   SIXPOINT_ASSIGN(auto lanes_asked, lanes_options(context, options));
@@ -279,7 +340,10 @@ Status serve(const Options& options, Context& context) {
   device::TransportRegistry devices = station::known_devices();
   bench.register_in(devices);
   VirtualPracticeBench practice_bench(bench);
+  SIXPOINT_ASSIGN(const auto printer,
+                  open_printer(context.env, printer_at, state_folder(options) + "/labels"));
   StationStore store(context, options, lanes_asked.session, jig_due);
+  store.print_to(printer.get());
   const auto open = [&] { return store.open(); };
   station::QualityControl quality(open, options.station, lanes_asked.session.limits,
                                   context.env.clock);
@@ -310,7 +374,8 @@ Status serve(const Options& options, Context& context) {
       api_options,
       {context.env, *lanes, repairs, sign_in, &practice_bench, store_constants,
        [&](const std::string& run, const std::string& kind) { return store.document(run, kind); },
-       &quality, &operators});
+       &quality, &operators, printer.get(),
+       [&](const std::string& run) { return store.print_again(run); }});
   SIXPOINT_ASSIGN(const auto server, station::Server::open(context.env, api, listening));
   // A browser keeps what stands behind # for itself; the page takes it out of the address at once.
   context.out << fmt::format("{}://{}:{}/#code={}\n", api_options.tls ? "https" : "http",
@@ -370,6 +435,10 @@ void add_station(CLI::App& app, Context& context) {
                    "the page's runs write the constants into the unit, unless a person says no");
   command.add_option("--limits", options.limits,
                      "a TOML file of limits (docs/limits.md); else the built-in ones");
+  command.add_option("--socket", options.socket,
+                     "a unix socket for programs of this user: the same interface, without a code");
+  command.add_option("--printer", options.printer,
+                     "label printer that takes ZPL: /dev/usb/lp0 or tcp://HOST:9100");
   command
       .add_option("--side-seconds", options.side_s,
                   "how long a unit rests on each side of a calibration file")

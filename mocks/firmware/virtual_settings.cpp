@@ -107,8 +107,8 @@ bool read_switch(std::string_view value, std::string_view on, std::string_view o
 bool read_defect(std::string_view value, sim::GivenProperties& given) {
   given.current_sensitivity_lsb_per_g = PerAxis<double>{250, 250, 250};
   given.current_zero_lsb = PerAxis<double>{20, 20, 20};
-  if (value == "zero_high") {
-    (*given.current_zero_lsb)[0] = 225;
+  if (value == "zero_high" || value == "zero_low") {
+    (*given.current_zero_lsb)[0] = value == "zero_high" ? 225 : -225;
     return true;
   }
   if (value == "sensitivity_low" || value == "sensitivity_high") {
@@ -128,7 +128,7 @@ constexpr std::string_view kThreeCounts = "three whole counts such as 54/47/26";
 
 constexpr std::array<Setting, 17> kSettings = {{
     {"bad", [](auto value, auto& d) { return read_defect(value, d.given); },
-     "zero_high, sensitivity_low or sensitivity_high"},
+     "zero_high, zero_low, sensitivity_low or sensitivity_high"},
     {"seed",
      [](auto value, auto& d) { return read_number(value, std::uint64_t{0}, UINT64_MAX, d.seed); },
      "a whole number that is not negative"},

@@ -10,7 +10,7 @@
 //     pace: fast (time passes as it is waited for), real (the machine's clock), 2 to 100 (so many
 //       times the machine's clock)
 //     interfaces: all, storage (mass storage alone, over USB/IP)
-//     bad: zero_high, sensitivity_low, sensitivity_high: a unit that must fail with that
+//     bad: zero_high, zero_low, sensitivity_low, sensitivity_high: a unit that must fail with that
 //       code
 //     battery_mv, temperature_c
 //     faults: a fault plan's file, whose name holds no comma

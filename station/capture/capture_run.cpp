@@ -13,6 +13,7 @@
 #include "repair/triage/survey.h"
 #include "station/capture/calibration_file.h"
 #include "station/capture/recording_pieces.h"
+#include "station/capture/sides_to_repeat.h"
 
 namespace sixpoint::station {
 
@@ -118,14 +119,6 @@ Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<do
   return {};
 }
 
-// "c.gt3x" and 2: "c-2.gt3x".
-std::string piece_name(const std::string& output, std::size_t number) {
-  const std::size_t dot = output.rfind('.');
-  const std::size_t end =
-      dot == std::string::npos || output.find('/', dot) != std::string::npos ? output.size() : dot;
-  return fmt::format("{}-{}{}", output.substr(0, end), number, output.substr(end));
-}
-
 }  // namespace
 
 Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
@@ -176,18 +169,26 @@ class CaptureRun {
       progress_.started = unit().clock().now();
       SIXPOINT_CHECK(begin_recording());
     }
-    const Result<bool> all_sides = record_sides();
-    if (!all_sides && (gone_ || all_sides.error().code == ErrorCode::internal)) {
-      return fail(all_sides.error());  // the unit records on
+    for (int repeats = 0;; ++repeats) {
+      const Result<bool> all_sides = record_sides();
+      if (!all_sides && (gone_ || all_sides.error().code == ErrorCode::internal)) {
+        return fail(all_sides.error());  // the unit records on
+      }
+      SIXPOINT_CHECK(end_recording());
+      SIXPOINT_CHECK(all_sides);
+      if (!*all_sides) {
+        report_.stopped = true;
+        return report_;
+      }
+      SIXPOINT_CHECK(fetch_anew(repeats));
+      const auto sides = hooks_.again && may_make_pieces()
+                             ? sides_to_repeat(*report_.solved, repeats, options_.most_repeats)
+                             : std::vector<device::Pose>();
+      if (sides.empty()) {
+        return report_;
+      }
+      SIXPOINT_CHECK(ask_again(sides));
     }
-    SIXPOINT_CHECK(end_recording());
-    SIXPOINT_CHECK(all_sides);
-    if (!*all_sides) {
-      report_.stopped = true;
-      return report_;
-    }
-    SIXPOINT_CHECK(fetch());
-    return report_;
   }
 
  private:
@@ -255,6 +256,47 @@ class CaptureRun {
                                           gone, gone == 1 ? " is" : "s are"));
     }
     return begin_recording();
+  }
+
+  // The sides are recorded anew, in a recording of their own; the others stay as they are.
+  Status ask_again(const std::vector<device::Pose>& sides) {
+    std::string names;
+    for (const device::Pose side : sides) {
+      names += names.empty() ? "" : ", ";
+      names += device::to_string(side);
+      std::erase_if(progress_.done, [side](const auto& one) { return one.pose == side; });
+    }
+    report_.notes.push_back(
+        fmt::format("too few still readings with {} up: asked for again", names));
+    SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
+    hooks_.again(sides);
+    return {};
+  }
+
+  // The pieces that a repeated side makes have names of their own, and replace no file.
+  bool may_make_pieces() {
+    for (std::size_t number = 1; number <= device::kPoses.size(); ++number) {
+      const std::string name = piece_name(options_.output, number);
+      const auto& own = report_.pieces;
+      if (std::find(own.begin(), own.end(), name) == own.end() && env_.files.info(name)) {
+        report_.notes.push_back("no side is asked for again: there is a file " + name);
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // After a side was repeated: the file of before is one that this capture made.
+  Status fetch_anew(int repeats) {
+    if (repeats > 0) {
+      report_.pieces.push_back(options_.output);
+      for (const std::string& made : report_.pieces) {
+        SIXPOINT_CHECK(env_.files.remove(made));
+      }
+      report_.pieces.clear();
+      report_.solved.reset();
+    }
+    return fetch();
   }
 
   void save() {

@@ -10,10 +10,11 @@
 //   SIXPOINT_ASSIGN(CaptureReport report, run_capture({&unit, &jig}, env, options, hooks));
 //   report.usable();  // report.solved has the constants, report.notes what went wrong
 //
-// A unit that records sends no live samples, so the file is judged afterwards, and the judgement
-// says which sides to repeat. A capture goes on after the unit was unplugged and after the program
-// was restarted: what was recorded stays in the unit, the side under way is asked for again, and at
-// the end the pieces are joined (recording_pieces.h).
+// A unit that records sends no live samples, so the file is judged afterwards. Sides without still
+// readings are then asked for again, alone (sides_to_repeat.h), where the driver offers it. A
+// capture goes on after the unit was unplugged and after the program was restarted: what was
+// recorded stays in the unit, the side under way is asked for again, and at the end the pieces are
+// joined (recording_pieces.h).
 //
 // Blocking; hooks are called on the calling thread. Unit, jig and Env belong to the caller.
 #pragma once
@@ -40,6 +41,7 @@ struct CaptureOptions {
   calib::SolveOptions solve;
   double replug_patience_s = 60;  // for an unplugged unit, when its recording is downloaded
   int downloads = 5;              // attempts
+  int most_repeats = 2;           // a side that fails three times fails for another reason
 };
 
 // What an earlier program had of this capture.
@@ -68,6 +70,9 @@ struct CaptureHooks {
   std::function<SideAnswer()> next_answer = nullptr;
   // After every side: save this to go on after a restart.
   std::function<void(const CaptureResume&)> progress = nullptr;
+  // These sides have too few still readings and are asked for next. Where this is empty, the
+  // recording is judged as it is.
+  std::function<void(const std::vector<device::Pose>& sides)> again = nullptr;
   // The unit was unplugged. Waits until it is back and returns it, opened anew, or an error. Where
   // this is empty, the unit may be unplugged while it is turned: only the end waits for it.
   std::function<Result<UnitOnJig>(const Error&)> reopen = nullptr;

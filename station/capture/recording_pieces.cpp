@@ -45,6 +45,13 @@ class Chain final : public gt3x::ByteSource {
 
 }  // namespace
 
+std::string piece_name(const std::string& output, std::size_t number) {
+  const std::size_t dot = output.rfind('.');
+  const std::size_t end =
+      dot == std::string::npos || output.find('/', dot) != std::string::npos ? output.size() : dot;
+  return fmt::format("{}-{}{}", output.substr(0, end), number, output.substr(end));
+}
+
 Status join_recordings(FileSystem& files, const std::vector<std::string>& pieces,
                        const std::string& output) {
   std::optional<gt3x::Info> info;

@@ -10,6 +10,9 @@
 
 namespace sixpoint::station {
 
+// Of piece `number` of a capture: "c.gt3x" and 2 are "c-2.gt3x".
+std::string piece_name(const std::string& output, std::size_t number);
+
 // `output` has the records of `pieces` in order, byte for byte, and the info.txt of the first piece
 // with the end times of the last. It appears whole or not at all. bad_data where the pieces are not
 // of one unit.

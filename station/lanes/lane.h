@@ -107,6 +107,7 @@ class Lanes::Lane {
     std::size_t number = 0;    // of this side, from 1
     bool placed = false;
     double until_ms = 0;  // Unix time at which the unit has rested long enough on this side
+    std::vector<Pose> again = {};  // sides that are asked for once more
   };
 
   // The thread's loop (lane_unit.cpp).

@@ -45,7 +45,7 @@ SideAnswer Lanes::Lane::ask_side(const std::stop_token& stop, device::Pose side,
                                  std::size_t number) {
   std::unique_lock lock(mutex_);
   if (capture_->side != side) {
-    capture_ = CaptureView{side, number, turns_by_itself_, 0};
+    capture_ = CaptureView{side, number, turns_by_itself_, 0, std::move(capture_->again)};
     waiting_since_ms_ = unix_ms(env_.clock.now());
     changed();
   }
@@ -100,6 +100,19 @@ CaptureHooks Lanes::Lane::capture_hooks(const std::stop_token& stop, UnfinishedC
     }
     changed();
   };
+  if (!turns_by_itself_) {  // a jig would lay it the same way again
+    hooks.again = [&](const std::vector<device::Pose>& sides) {
+      const std::lock_guard lock(mutex_);
+      capture_->again = sides;
+      std::string names;
+      for (const device::Pose side : sides) {
+        names += ' ';
+        names += device::to_string(side);
+      }
+      add_log("again", "too few still readings, asked for again:" + names);
+      changed();
+    };
+  }
   hooks.reopen = [&](const Error& error) {
     {
       const std::lock_guard lock(mutex_);

@@ -113,10 +113,16 @@ Json Lanes::Lane::to_json() const {
   json["run"] = run_ ? run_json() : Json(nullptr);
   json["capture"] = nullptr;
   if (capture_) {
-    json["capture"] = {
-        {"side", name_or_null(capture_->side)}, {"number", capture_->number},
-        {"of", device::kPoses.size()},          {"placed", capture_->placed},
-        {"until_ms", capture_->until_ms},       {"side_s", shared_.options.capture.side_s}};
+    json["capture"] = {{"side", name_or_null(capture_->side)},
+                       {"number", capture_->number},
+                       {"of", device::kPoses.size()},
+                       {"placed", capture_->placed},
+                       {"until_ms", capture_->until_ms},
+                       {"side_s", shared_.options.capture.side_s},
+                       {"again", Json::array()}};
+    for (const Pose side : capture_->again) {
+      json["capture"]["again"].push_back(device::to_string(side));
+    }
   }
   json["result"] = result_;
   json["log"] = Json::array();

@@ -88,8 +88,14 @@ const std::vector<std::pair<std::string, std::string>>& common_headers() {
   return kHeaders;
 }
 
+// An answer's own header holds.
 ApiAnswer with_headers(ApiAnswer given) {
-  given.headers.insert(given.headers.end(), common_headers().begin(), common_headers().end());
+  for (const auto& header : common_headers()) {
+    if (std::none_of(given.headers.begin(), given.headers.end(),
+                     [&](const auto& own) { return own.first == header.first; })) {
+      given.headers.push_back(header);
+    }
+  }
   return given;
 }
 
@@ -111,7 +117,8 @@ std::string Api::cookie_name() const { return fmt::format("sixpoint_session_{}",
 std::optional<ApiAnswer> Api::check_session(const ApiRequest& request) const {
   constexpr std::string_view kBearer = "Bearer ";
   const std::string_view sent = request.authorization;
-  if ((sent.starts_with(kBearer) && parts_.sign_in.is_token(sent.substr(kBearer.size()))) ||
+  if (request.is_local_user ||
+      (sent.starts_with(kBearer) && parts_.sign_in.is_token(sent.substr(kBearer.size()))) ||
       parts_.sign_in.session_holds(cookie_value(request.cookie, cookie_name())) ||
       page_asset(request.path) || (request.method == "POST" && request.path == "/api/session")) {
     return std::nullopt;
@@ -136,6 +143,10 @@ ApiAnswer Api::open_session(const Json& body) const {
 }
 
 std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
+  if (request.is_local_user) {
+    return std::nullopt;  // no browser reaches a unix socket, and the name of its host means
+                          // nothing
+  }
   // Host: another name may have been made to point here (DNS rebinding).
   std::string_view name = request.host;
   const std::string port = fmt::format(":{}", port_.load());
@@ -234,6 +245,7 @@ Json Api::state() const {
   }
   json["queue"] = parts_.lanes.queue();
   json["job"] = parts_.repairs.to_json();
+  json["printer"] = parts_.printer != nullptr ? parts_.printer->to_json() : Json(nullptr);
   json["lock"] = parts_.quality != nullptr ? parts_.quality->lock() : Json(nullptr);
   return json;
 }
@@ -284,26 +296,9 @@ ApiAnswer Api::get(const ApiRequest& request) {
     return answer(200, parts_.lanes.to_json(*lane));
   }
   if (parts.size() == 3 && parts[0] == "runs") {
-    return get_document(parts[1], parts[2]);
+    return get_document(request, parts[1], parts[2]);
   }
   return unknown_route();
-}
-
-ApiAnswer Api::get_document(const std::string& run, const std::string& kind) const {
-  // The id of a run is hexadecimal; anything else could be a path.
-  if (!parts_.run_document || run.empty() || run.size() > 64 ||
-      run.find_first_not_of("0123456789abcdef") != std::string::npos) {
-    return unknown_route();
-  }
-  const auto document = parts_.run_document(run, kind);
-  if (!document) {
-    return refusal(document.error());
-  }
-  return {200,
-          document->content_type,
-          document->body,
-          {{"Content-Disposition",
-            fmt::format("attachment; filename=\"sixpoint-{}-{}\"", run.substr(0, 12), kind)}}};
 }
 
 ApiAnswer Api::post(const ApiRequest& request) {
@@ -364,6 +359,9 @@ ApiAnswer Api::post(const ApiRequest& request) {
   if (parts.size() == 2 && parts[0] == "repair" && parts[1] == "cancel") {
     parts_.repairs.cancel();
     return answer(200, parts_.repairs.to_json());
+  }
+  if (parts.size() == 3 && parts[0] == "runs" && parts[2] == "print") {
+    return print_label(request, parts[1]);
   }
   if (parts.size() == 3 && parts[0] == "lanes") {
     const auto lane = number_of(parts[1]);

@@ -29,6 +29,7 @@
 #include "station/lanes/lanes.h"
 #include "station/page/practice_bench.h"
 #include "station/page/repair_job.h"
+#include "station/printing/label_printer.h"
 
 namespace sixpoint::station {
 
@@ -43,6 +44,8 @@ struct ApiRequest {
   std::string authorization;  // Authorization
   std::string cookie;
   std::string client;  // X-Sixpoint-Client: the page that may command a run
+  // It came over the unix socket of the station, from the user who started it.
+  bool is_local_user = false;
   // X-Sixpoint-Before: milliseconds of the station's own clock (clock_ms of GET /api/me). A command
   // that comes later is refused: no one waits for it any more.
   std::string before;
@@ -78,6 +81,9 @@ struct RunDocument {
 using RunDocuments =
     std::function<Result<RunDocument>(const std::string& run, const std::string& kind)>;
 
+// Puts the label of a stored run on its way to the printer again; an error says why it has none.
+using PrintAgain = std::function<Status(const std::string& run)>;
+
 class QualityControl;  // quality_control.h
 
 // What the routes lead to; all of it outlives the Api.
@@ -91,6 +97,8 @@ struct ApiParts {
   RunDocuments run_document = {};
   QualityControl* quality = nullptr;  // null: no check units, no statistics
   Operators* operators = nullptr;     // null: names are as they are typed
+  LabelPrinter* printer = nullptr;    // null: the station has none
+  PrintAgain print_again = {};
 };
 
 class EventStream;
@@ -129,7 +137,9 @@ class Api {
   nlohmann::ordered_json state() const;
   ApiAnswer get(const ApiRequest& request);
   ApiAnswer post(const ApiRequest& request);
-  ApiAnswer get_document(const std::string& run, const std::string& kind) const;
+  ApiAnswer get_document(const ApiRequest& request, const std::string& run,
+                         const std::string& kind) const;
+  ApiAnswer print_label(const ApiRequest& request, const std::string& run) const;
   ApiAnswer start_run(const ApiRequest& request, const nlohmann::ordered_json& body);
   ApiAnswer command_lane(std::size_t lane, const std::string& command, const ApiRequest& request,
                          const nlohmann::ordered_json& body);
@@ -171,6 +181,7 @@ class EventStream {
   std::vector<std::uint64_t> next_reading_;
   std::uint64_t seen_job_ = 0;
   std::uint64_t seen_lock_ = 0;
+  std::uint64_t seen_printer_ = 0;
   std::vector<std::size_t> seen_queue_;
   std::chrono::nanoseconds last_sent_{0};
 };

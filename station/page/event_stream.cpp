@@ -63,6 +63,9 @@ void EventStream::add_changes(std::string& text) {
   if (has_changed(seen_job_, parts.repairs.changes())) {
     add_event(text, "job", parts.repairs.to_json());
   }
+  if (parts.printer != nullptr && has_changed(seen_printer_, parts.printer->changes())) {
+    add_event(text, "printer", parts.printer->to_json());
+  }
   if (parts.quality != nullptr && has_changed(seen_lock_, parts.quality->changes())) {
     add_event(text, "lock", parts.quality->lock());
   }

@@ -2,6 +2,7 @@
 #include "station/page/server.h"
 
 #include <array>
+#include <atomic>
 #include <charconv>
 #include <limits>
 #include <map>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/strand.hpp>
@@ -17,6 +19,9 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/ssl.hpp>
 #include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace sixpoint::station {
 
@@ -26,7 +31,9 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = boost::beast::http;
 using asio::ip::tcp;
+using asio::local::stream_protocol;
 using PlainStream = beast::tcp_stream;
+using LocalStream = beast::basic_stream<stream_protocol>;
 using TlsStream = beast::ssl_stream<beast::tcp_stream>;
 using NetworkError = boost::system::error_code;
 
@@ -103,9 +110,11 @@ struct Server::Impl {
       : env(its_env), api(its_api), options(its_options) {}
   Status listen();
   Status use_tls();
+  Status listen_locally();
   void accept();
-  template <class Stream, class... TlsContext>
-  void begin(tcp::socket socket, TlsContext&... tls_context);
+  void accept_locally();
+  template <class Stream, class Socket, class... TlsContext>
+  void begin(Socket socket, TlsContext&... tls_context);
 
   Env& env;
   Api& api;
@@ -113,10 +122,11 @@ struct Server::Impl {
   std::mutex mutex;  // guards `idle`
   // By order of arrival: connections whose request is not complete, or whose answer was sent.
   std::map<std::uint64_t, std::weak_ptr<Idle>> idle;
-  std::uint64_t arrivals = 0;
+  std::atomic<std::uint64_t> arrivals = 0;
   std::optional<asio::ssl::context> tls;  // where it serves https
   asio::io_context io;  // its destructor ends the connections, which use the members above
   tcp::acceptor acceptor{io};
+  stream_protocol::acceptor local_acceptor{io};
 };
 
 // One request and its answer, or one event stream. Everything runs on the connection's strand, and
@@ -125,16 +135,18 @@ template <class Stream>
 class Server::Impl::Connection : public Idle,
                                  public std::enable_shared_from_this<Connection<Stream>> {
  public:
-  template <class... TlsContext>
-  Connection(Impl& server, std::uint64_t number, tcp::socket socket, TlsContext&... tls_context)
+  template <class Socket, class... TlsContext>
+  Connection(Impl& server, std::uint64_t number, Socket socket, TlsContext&... tls_context)
       : server_(server),
         number_(number),
         stream_(std::move(socket), tls_context...),
         timer_(stream_.get_executor()) {
     NetworkError ignored;  // neither is needed for a right answer
-    plain().socket().set_option(tcp::no_delay(true), ignored);
-    plain().socket().set_option(tcp::socket::send_buffer_size(server_.options.most_unread_bytes),
-                                ignored);
+    if constexpr (!kIsLocal) {
+      plain().socket().set_option(tcp::no_delay(true), ignored);
+    }
+    plain().socket().set_option(
+        asio::socket_base::send_buffer_size(server_.options.most_unread_bytes), ignored);
     parser_.header_limit(kMostHead_bytes);
     parser_.body_limit(std::numeric_limits<std::uint64_t>::max());  // on_head() has the limit
   }
@@ -173,6 +185,8 @@ class Server::Impl::Connection : public Idle,
   }
 
  private:
+  static constexpr bool kIsLocal = std::is_same_v<Stream, LocalStream>;
+
   // Handler of an operation: goes on with `next`; closes the connection on an error.
   auto then(void (Connection::*next)()) {
     return [self = this->shared_from_this(), next](const NetworkError& error,
@@ -180,8 +194,8 @@ class Server::Impl::Connection : public Idle,
       error ? self->plain().close() : (self.get()->*next)();
     };
   }
-  // The TCP stream, below TLS where there is any.
-  PlainStream& plain() { return beast::get_lowest_layer(stream_); }
+  // The stream of the socket, below TLS where there is any.
+  auto& plain() { return beast::get_lowest_layer(stream_); }
   void limit_time() {
     plain().expires_after(std::chrono::seconds(server_.options.request_time_out_s));
   }
@@ -202,6 +216,7 @@ class Server::Impl::Connection : public Idle,
     }
     const auto& head = parser_.get();
     request_ = request_of(head);
+    request_.is_local_user = kIsLocal;
     // Before the body is read: a client without permission does not send a body either.
     if (const auto refusal = server_.api.guard(request_)) {
       return respond(*refusal);
@@ -256,7 +271,7 @@ class Server::Impl::Connection : public Idle,
   // the client would lose the answer.
   void finish() {
     NetworkError ignored;
-    plain().socket().shutdown(tcp::socket::shutdown_send, ignored);
+    plain().socket().shutdown(asio::socket_base::shutdown_send, ignored);
     busy_ = false;
     set_idle(true);
     limit_time();
@@ -330,6 +345,61 @@ Status Server::Impl::listen() {
               "another station may be running; choose another --port");
 }
 
+// Of the user who runs this program; the mode of the socket's file says the same.
+bool is_own_user(stream_protocol::socket& socket) {
+  ucred peer{};
+  socklen_t size = sizeof(peer);
+  return ::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+         peer.uid == ::geteuid();
+}
+
+Status Server::Impl::listen_locally() {
+  if (options.unix_socket.empty()) {
+    return {};
+  }
+  const std::string& path = options.unix_socket;
+  if (path.size() >= sizeof(sockaddr_un{}.sun_path)) {
+    return fail(ErrorCode::usage, "the name of this socket is too long", path,
+                "107 bytes at most: name one in /run/user");
+  }
+  const stream_protocol::endpoint endpoint(path);
+  NetworkError error;
+  if (const auto there = env.files.link_info(path)) {
+    if (there->kind != FileKind::socket) {
+      return fail(ErrorCode::usage, "there is something of that name that is no socket", path,
+                  "choose another --socket");
+    }
+    stream_protocol::socket probe{io};
+    probe.connect(endpoint, error);
+    if (error != asio::error::connection_refused) {
+      return fail(ErrorCode::device_unavailable, "another program listens on this socket", path,
+                  "choose another --socket");
+    }
+    SIXPOINT_CHECK(env.files.remove(path));  // a station that was killed left it
+  }
+  local_acceptor.open(endpoint.protocol(), error);
+  // Before the socket has its name: there is no moment in which others may connect.
+  if (error || ::fchmod(local_acceptor.native_handle(), S_IRUSR | S_IWUSR) != 0 ||
+      local_acceptor.bind(endpoint, error) ||
+      local_acceptor.listen(asio::socket_base::max_listen_connections, error)) {
+    return fail(ErrorCode::cannot_create, "this socket cannot be made", path,
+                "name it in a folder that is there and that you may write");
+  }
+  return {};
+}
+
+void Server::Impl::accept_locally() {
+  local_acceptor.async_accept(
+      asio::make_strand(io), [this](const NetworkError& error, stream_protocol::socket socket) {
+        if (error) {
+          env.clock.sleep(std::chrono::milliseconds(1));  // no descriptor is free
+        } else if (is_own_user(socket)) {
+          begin<LocalStream>(std::move(socket));
+        }
+        accept_locally();
+      });
+}
+
 void Server::Impl::accept() {
   acceptor.async_accept(
       asio::make_strand(io), [this](const NetworkError& error, tcp::socket socket) {
@@ -342,8 +412,8 @@ void Server::Impl::accept() {
       });
 }
 
-template <class Stream, class... TlsContext>
-void Server::Impl::begin(tcp::socket socket, TlsContext&... tls_context) {
+template <class Stream, class Socket, class... TlsContext>
+void Server::Impl::begin(Socket socket, TlsContext&... tls_context) {
   auto connection =
       std::make_shared<Connection<Stream>>(*this, ++arrivals, std::move(socket), tls_context...);
   connection->set_idle(true);
@@ -380,12 +450,18 @@ Status Server::Impl::use_tls() {
 }
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Server::~Server() { stop(); }
+Server::~Server() {
+  stop();
+  if (impl_->local_acceptor.is_open()) {
+    static_cast<void>(impl_->env.files.remove(impl_->options.unix_socket));
+  }
+}
 
 Result<std::unique_ptr<Server>> Server::open(Env& env, Api& api, const ServerOptions& options) {
   auto impl = std::make_unique<Impl>(env, api, options);
   SIXPOINT_CHECK(impl->use_tls());
   SIXPOINT_CHECK(impl->listen());
+  SIXPOINT_CHECK(impl->listen_locally());
   std::unique_ptr<Server> server(new Server(std::move(impl)));
   api.set_port(server->port());
   return server;
@@ -395,6 +471,9 @@ int Server::port() const { return impl_->acceptor.local_endpoint().port(); }
 
 void Server::serve() {
   impl_->accept();
+  if (impl_->local_acceptor.is_open()) {
+    impl_->accept_locally();
+  }
   std::vector<std::jthread> threads;
   for (std::size_t i = 0; i < impl_->options.threads; ++i) {
     threads.emplace_back([this] { impl_->io.run(); });

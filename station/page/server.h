@@ -37,6 +37,10 @@ struct ServerOptions {
   // Events that wait for a page that does not read them. The time-out above begins when they are
   // more; a page that reads has a few KiB waiting.
   int most_unread_bytes = 128 << 10;
+  // A unix socket for programs of the same user: the same interface, without session or token. Mode
+  // 0600, and other users are refused by their number too. Empty: none. One that a killed station
+  // left is replaced; anything else of that name is not.
+  std::string unix_socket = {};
   // PEM; both empty: plain HTTP.
   std::string tls_certificate = {};
   std::string tls_key = {};
@@ -44,9 +48,9 @@ struct ServerOptions {
 
 class Server {
  public:
-  // Listens; answers once serve() runs. device_unavailable when the address or port is taken,
-  // bad_data for a certificate and key that do not go together.
-  // `env` and `api` outlive the server.
+  // Listens; answers once serve() runs. device_unavailable when the address, port or socket is
+  // taken, usage where the socket's name is too long or is that of another file, bad_data for a
+  // certificate and key that do not go together. `env` and `api` outlive the server.
   static Result<std::unique_ptr<Server>> open(Env& env, Api& api, const ServerOptions& options);
   ~Server();
   Server(const Server&) = delete;

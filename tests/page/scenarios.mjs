@@ -1,6 +1,7 @@
 // The page in a real browser, against virtual units:  node scenarios.mjs SCENARIO PROGRAM SCREENSHOTS
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { createServer as createNetServer } from 'node:net';
 import { join } from 'node:path';
 import * as h from './harness.mjs';
 
@@ -464,7 +465,14 @@ const scenarios = {
       const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('link', { name }).click()]);
       return readFileSync(await download.path());
     };
-    const pdf = await fetched('Certificate (PDF)');
+    // The browser shows the certificate in a tab of its own, where it is printed; it is saved only by the link that says so.
+    const link = page.getByRole('link', { name: 'Certificate (PDF)' });
+    const [tab, answer] = await Promise.all([page.context().waitForEvent('page'),
+      page.context().waitForEvent('response', (each) => each.url().endsWith('/certificate.pdf')), link.click()]);
+    const headers = await answer.allHeaders();
+    check(headers['content-type'] === 'application/pdf' && headers['content-disposition'].startsWith('inline;'), `shown: ${JSON.stringify(headers)}`);
+    await tab.close();
+    const pdf = await fetched('Save the PDF');
     check(pdf.subarray(0, 5).toString() === '%PDF-' && pdf.length > 5000, 'a PDF comes');
     const json = JSON.parse((await fetched('Certificate (JSON)')).toString());
     check(json.unit.serial === 'MOS2A45130015' && json.operator === 'Ada', `it is this unit's and this operator's: ${json.operator}`);
@@ -472,6 +480,105 @@ const scenarios = {
     check(label.includes('^XA') && label.includes('MOS2A45130015'), 'a label comes after the read-back');
     const report = JSON.parse((await fetched('Report (JSON)')).toString());
     check(report.as_left.written === true && report.recheck.poses.length === 2, 'written, read back and measured again');
+  },
+
+  // The label of a unit that holds what was measured: the printer is away, the page says so, and no lane waits; after a
+  // restart of the station it is printed as soon as the printer is there, and again when a person asks.
+  async printer() {
+    const printed = [];
+    const printer = createNetServer((connection) => {
+      let label = '';
+      connection.on('data', (data) => { label += data; }).on('end', () => { printed.push(label); connection.end(); }).on('error', () => {});
+    });
+    const listen = (port) => new Promise((resolve) => printer.listen(port, '127.0.0.1', () => resolve(printer.address().port)));
+    const port = await listen(0);
+    await new Promise((resolve) => printer.close(resolve));
+    const devices = ['virtual:seed=15,serial=MOS2A45130015,jig=auto'];
+    const more = ['--printer', `tcp://127.0.0.1:${port}`];
+    const station = await h.station(devices, { more });
+    const page = await h.open(station.url);
+    // Not written: no label, and nothing that offers one.
+    await start(page);
+    await page.locator('.result .verdict', { hasText: 'PASS - NOT WRITTEN' }).waitFor();
+    await page.getByText(/Stored as run/).waitFor();
+    check((await page.getByRole('button', { name: /[Ll]abel/ }).count()) === 0, 'no label without a write');
+    await page.getByLabel('Write the constants into the unit').check();
+    await button(page, 'Measure this unit again').click();
+    await page.locator('.result .verdict', { hasText: 'PASS - WRITTEN' }).waitFor();
+    await page.getByText(/Label: waiting for the printer \(.*refused/).waitFor();
+    await button(page, 'Print label again').waitFor();
+    await h.axe(page);
+    await h.shot(page, 'printer-1-waiting');
+    check((await station.api('/api/lanes/1')).json.state === 'done', 'the lane waits for no printer');
+    check(printed.length === 0, 'nothing came');
+    check((await station.end('SIGTERM')) === 0, 'the station ends in order');
+    await listen(port);
+    try {
+      const next = await h.station(devices, { home: station.home, more });
+      const other = await h.open(next.url);
+      await h.until('the label of the run before', () => printed.length === 1);
+      check(printed[0].startsWith('^XA') && printed[0].includes('MOS2A45130015'), 'it is the label');
+      await button(other, 'Today').click();
+      await other.getByText('Label: printed').waitFor();
+      await button(other, 'Print label again').click();
+      await h.until('the label again', () => printed.length === 2);
+      check(printed[0] === printed[1], 'the same label');
+      await h.axe(other);
+      await h.shot(other, 'printer-2-printed');
+      check(other.problems.length === 0 && page.problems.length === 0, `no errors: ${other.problems} ${page.problems}`);
+    } finally {
+      printer.close();
+    }
+  },
+
+  // Six tabs of one browser, which has six connections for one address: they share one stream, each of them commands, and
+  // what no one sees has none.
+  async streams() {
+    const station = await h.station(['virtual:seed=7,pace=10']);
+    const page = await h.open(station.url);
+    const context = page.context();
+    const open = new Set();
+    let most = 0;
+    // From here on: the first tab's stream was opened before.
+    const count = (request) => { if (request.url().endsWith('/api/events')) { open.add(request); most = Math.max(most, open.size); } };
+    context.on('request', count);
+    context.on('requestfinished', (request) => open.delete(request));
+    context.on('requestfailed', (request) => open.delete(request));
+    await page.reload();
+    await page.getByText('Bench 1').first().waitFor();
+    const tabs = [page];
+    while (tabs.length < 6) {
+      const tab = await context.newPage();
+      tab.setDefaultTimeout(30_000);
+      await tab.goto(station.url);
+      tabs.push(tab);
+    }
+    for (const tab of tabs) await tab.locator('figcaption b', { hasText: /side up/ }).first().waitFor();
+    check(open.size === 1 && most === 1, `one stream for six tabs, not ${open.size} (${most} at most)`);
+    // The last tab commands; all of them show it.
+    await start(tabs[5]);
+    for (const tab of tabs) await tab.locator('.prompt', { hasText: /side up/ }).waitFor();
+    await h.place(tabs[5], 1);
+    for (const tab of tabs) await until('the placement on every tab', async () => (await h.taken(tab)) === 1);
+    // The tab with the stream is closed: another one has it, and the others go on.
+    const before = [...open];
+    await tabs.shift().close();
+    before.forEach((request) => open.delete(request)); // a closed tab says nothing of its requests
+    await until('another tab has the stream', () => open.size === 1, 20);
+    await h.place(tabs[4], 2);
+    for (const tab of tabs) await until('the placement on every tab', async () => (await h.taken(tab)) === 2);
+    check(open.size === 1, `again one stream for five tabs, not ${open.size}`);
+    // Hidden tabs give it back after ten seconds.
+    const hide = (tab, hidden) => tab.evaluate((is) => {
+      Object.defineProperty(document, 'hidden', { value: is, configurable: true });
+      document.dispatchEvent(new Event('visibilitychange'));
+    }, hidden);
+    for (const tab of tabs) await hide(tab, true);
+    await until('no stream where no one looks', () => open.size === 0, 30);
+    await hide(tabs[2], false);
+    await until('one where a person looks', () => open.size === 1, 20);
+    await h.place(tabs[2], 2);
+    check(await h.taken(tabs[2]) === 2, 'it shows what is');
   },
 
   // A check unit goes out of control: every screen says so, only check units are measured, and an engineer's
@@ -732,16 +839,17 @@ const scenarios = {
     await button(page, 'My files').click();
     await button(page, 'Start recording').click();
     const capture = page.locator('section', { hasText: '1. Record' }).first();
-    const side = async (number) => {
+    const side = async (number, laid) => {
       await page.getByText(`Side ${number} of 6`).waitFor();
-      const face = await wantedFace(capture);
+      const wanted = await wantedFace(capture);
+      const face = laid ?? wanted;
       await capture.locator('.hand').getByRole('button', { name: face, exact: true }).click();
       await button(page, 'It lies there').click();
       await page.getByText(/Leave it alone/).waitFor();
-      return face;
+      return wanted;
     };
     const next = (number) => page.getByText(`Side ${number} of 6`).waitFor();
-    await side(1);
+    const first = await side(1);
     await next(2);
     // Pulled out while it rests on its second side.
     const second = await side(2);
@@ -760,13 +868,20 @@ const scenarios = {
     await page.reload();
     await page.getByText('Side 3 of 6').waitFor();
     check(await button(page, 'Stop recording').isVisible(), 'and may be stopped');
+    // Laid on a side that was recorded already: in the end that side alone is asked for again.
+    let wrong;
     for (const number of [3, 4, 5, 6]) {
-      await side(number);
+      if (number === 5) wrong = await side(number, first); else await side(number);
       if (number < 6) await next(number + 1);
     }
+    await page.getByText(/Too few still readings of/).waitFor();
+    check((await page.getByText(/Too few still readings of/).first().textContent()).includes(wrong), `${wrong} is named`);
+    await h.shot(page, 'capture-2-again');
+    await h.axe(page);
+    check((await side(5)) === wrong, 'and it alone is asked for');
     await capture.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
     await page.getByText(/Constants saved in/).first().waitFor();
-    await h.shot(page, 'capture-2-done');
+    await h.shot(page, 'capture-3-done');
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 

@@ -149,7 +149,13 @@ export const EN = {
   stored: (r: Result) => r.stored ? `Stored as run ${(r.run ?? '').slice(0, 12)}`
     : r.kept_here ? `Kept here as run ${(r.run ?? '').slice(0, 12)}; it will be sent when the store answers` : r.problem ?? 'Storing …',
   todo: 'What to do',
-  documents: { certificate: 'Certificate (PDF)', json: 'Certificate (JSON)', dcc: 'Certificate (DCC)', label: 'Label (ZPL)', report: 'Report (JSON)' },
+  documents: { certificate: 'Certificate (PDF)', json: 'Certificate (JSON)', dcc: 'Certificate (DCC)', label: 'Label (ZPL)', report: 'Report (JSON)', save: 'Save the PDF' },
+  label: {
+    waiting: (why: string) => `Label: waiting for the printer${why ? ` (${why})` : ''}`,
+    printed: (_why: string) => 'Label: printed',
+    unconfirmed: (_why: string) => 'Label: sent; the printer did not confirm it. Look there, and print it again if it is missing.',
+    print: 'Print the label', again: 'Print label again',
+  },
   unit: (serial: string, firmware: string) => `${serial}, firmware ${firmware}`,
   low: (mv: number) => `Battery ${(mv / 1000).toFixed(2)} V`,
 
@@ -266,6 +272,7 @@ export const EN = {
     saved: (file: string) => `Constants saved in ${file} and in the store.`,
     usable: 'This file can be used: every side is in it.',
     notUsable: 'This file cannot be used yet.',
+    again: (sides: Pose[]) => `Too few still readings of ${sides.map(faceName).join(', ')}: it moved, or lay on another side. Only ${sides.length === 1 ? 'this side is' : 'these sides are'} asked for again; the others are kept.`,
     repeat: (sides: string[]) => `Repeat ${sides.length === 1 ? 'this side' : 'these sides'}: ${sides.join(', ')}`,
     sideOk: 'recorded', sideMissing: 'repeat',
     cannotHelp: 'A recording of this unit cannot help.',

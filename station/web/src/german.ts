@@ -145,7 +145,13 @@ export const DE: Strings = {
   stored: (r) => (r.stored ? `Gespeichert als Messung ${(r.run ?? '').slice(0, 12)}`
     : r.kept_here ? `Hier aufbewahrt als Messung ${(r.run ?? '').slice(0, 12)}; sie wird gesendet, sobald der Speicher antwortet` : r.problem ?? 'Wird gespeichert …'),
   todo: 'Was zu tun ist',
-  documents: { certificate: 'Kalibrierschein (PDF)', json: 'Kalibrierschein (JSON)', dcc: 'Kalibrierschein (DCC)', label: 'Etikett (ZPL)', report: 'Bericht (JSON)' },
+  documents: { certificate: 'Kalibrierschein (PDF)', json: 'Kalibrierschein (JSON)', dcc: 'Kalibrierschein (DCC)', label: 'Etikett (ZPL)', report: 'Bericht (JSON)', save: 'PDF speichern' },
+  label: {
+    waiting: (why: string) => `Etikett: wartet auf den Drucker${why ? ` (${why})` : ''}`,
+    printed: (_why: string) => 'Etikett: gedruckt',
+    unconfirmed: (_why: string) => 'Etikett: gesendet; der Drucker hat es nicht bestätigt. Dort nachsehen; fehlt es, noch einmal drucken.',
+    print: 'Etikett drucken', again: 'Etikett noch einmal drucken',
+  },
   unit: (serial, firmware) => `${serial}, Firmware ${firmware}`,
   low: (mv) => `Batterie ${decimal(mv / 1000, 2)} V`,
 
@@ -261,6 +267,7 @@ export const DE: Strings = {
     saved: (file) => `Konstanten gespeichert in ${file} und im Speicher.`,
     usable: 'Diese Datei ist brauchbar: Jede Seite ist darin.',
     notUsable: 'Diese Datei ist noch nicht brauchbar.',
+    again: (sides) => `Zu wenige ruhige Messwerte von ${sides.map(faceName).join(', ')}: es hat sich bewegt oder lag auf einer anderen Seite. Nur ${sides.length === 1 ? 'diese Seite wird' : 'diese Seiten werden'} noch einmal verlangt; die anderen bleiben.`,
     repeat: (sides) => `${sides.length === 1 ? 'Diese Seite' : 'Diese Seiten'} wiederholen: ${sides.join(', ')}`,
     sideOk: 'aufgezeichnet', sideMissing: 'wiederholen',
     cannotHelp: 'Eine Aufzeichnung dieses Geräts kann nicht helfen.',

@@ -6,7 +6,7 @@ import { S } from './strings';
 import { useSounds } from './sounds';
 import { ask, client, type Refusal } from './station';
 import { Spark, TraceChart } from './traces';
-import { POSES, type Lane, type Live, type Lock, type Pose, type State } from './types';
+import { POSES, type Lane, type Live, type Lock, type Pose, type Printer, type State } from './types';
 
 const BUSY = ['running', 'unit_away', 'wrong_unit', 'resuming', 'capturing'];
 
@@ -74,6 +74,7 @@ export function CaptureSteps({ lane, say }: { lane: Lane; say: (word: string, bo
   const left = Math.max(0, Math.ceil((capture.until_ms - useNow(250)) / 1000));
   return (
     <div class="capture">
+      {capture.again.length > 0 && <p class="notice bad" role="alert"><b aria-hidden="true">✖ </b>{S.files.again(capture.again)}</p>}
       <p>{S.files.sideOf(capture.number, capture.of)}</p>
       {capture.side && !capture.placed && (
         <button type="button" class="primary" onClick={() => say('placed')}>{S.files.placed}</button>
@@ -83,8 +84,8 @@ export function CaptureSteps({ lane, say }: { lane: Lane; say: (word: string, bo
   );
 }
 
-export function LaneView({ lane, live, operator, virtual, lock, writeDefault, setProblem }: {
-  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; lock: Lock | null; writeDefault: boolean; setProblem: (problem: Refusal | null) => void;
+export function LaneView({ lane, live, operator, virtual, lock, printer, writeDefault, setProblem }: {
+  lane: Lane; live: Live | undefined; operator: string; virtual: boolean; lock: Lock | null; printer: Printer | null; writeDefault: boolean; setProblem: (problem: Refusal | null) => void;
 }) {
   const watches = !!lock && !!lane.unit && lock.check_units.includes(lane.unit.serial);
   const locked = !!lock?.locked && !watches;
@@ -137,7 +138,7 @@ export function LaneView({ lane, live, operator, virtual, lock, writeDefault, se
       {lane.scan && <p class={lane.scan.matches ? 'notice good' : 'notice bad'}><b aria-hidden="true">{lane.scan.matches ? '✔ ' : '✖ '}</b>{S.scanned(lane.scan.serial, lane.scan.matches)}</p>}
       <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal)}</p>
 
-      {result && (others ? <p class={`last word-${tone(result.verdict)}`}>{S.lastUnit(result)}</p> : <ResultBox result={result} writeNow={writeNow} />)}
+      {result && (others ? <p class={`last word-${tone(result.verdict)}`}>{S.lastUnit(result)}</p> : <ResultBox result={result} writeNow={writeNow} printer={printer} setProblem={setProblem} />)}
       {lane.state === 'running' && lane.run && (
         <div class={`still still-${shown}`}>
           <span>{shown ? S.stillness[shown === 'leaving' && refusal ? 'refused' : shown] : ''}</span>

@@ -90,7 +90,7 @@ function Page() {
           : tab === 'statistics' ? <Statistics setProblem={setProblem} /> : (
           <div class={state.lanes.length > 1 ? 'bench' : 'bench single'}>
             {lane && <LaneView key={chosen} lane={lane} live={live[chosen]} operator={operator}
-              virtual={state.virtual_hands.includes(chosen)} lock={state.lock} writeDefault={state.write_default} setProblem={setProblem} />}
+              virtual={state.virtual_hands.includes(chosen)} lock={state.lock} printer={state.printer} writeDefault={state.write_default} setProblem={setProblem} />}
             {state.lanes.length > 1 && (
               <LaneCards state={state} chosen={chosen} follow={follow} setFollow={setFollow}
                 choose={(n) => { setChosen(n); setFollow(false); }} />

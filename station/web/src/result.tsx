@@ -1,7 +1,9 @@
 // What a run came to: the biggest words, what to do, where it is stored, its papers, its numbers.
 import { useState } from 'preact/hooks';
+import type { SetProblem } from './lock';
+import { ask } from './station';
 import { S } from './strings';
-import type { Quantity, Result } from './types';
+import type { Printer, Quantity, Result } from './types';
 
 const GOOD = ['pass', 'conditional_pass'];
 // The colour of the pane: good, bad, or (no verdict, stopped, not measured) neither.
@@ -14,7 +16,28 @@ export function Papers({ run, documents }: { run: string; documents: string[] })
     ['label.zpl', S.documents.label], ['report.json', S.documents.report]];
   const there = names.filter(([file]) => documents.includes(file));
   if (!there.length) return null;
-  return <p class="links">{there.map(([file, text]) => <a href={`/api/runs/${run}/${file}`} download>{text}</a>)}</p>;
+  const at = `/api/runs/${run}`;
+  return (
+    <p class="links">{there.map(([file, text]) => file === 'certificate.pdf'
+      ? <><a href={`${at}/${file}`} target="_blank" rel="noopener">{text}</a><a href={`${at}/${file}?download=1`} download>{S.documents.save}</a></>
+      : <a href={`${at}/${file}`} download>{text}</a>)}</p>
+  );
+}
+
+// What became of a run's label, where the station has a printer, and the way to print it again.
+export function PrintedLabel({ run, documents, printer, setProblem }: {
+  run: string; documents: string[]; printer: Printer | null; setProblem: SetProblem;
+}) {
+  if (!printer || !documents.includes('label.zpl')) return null;
+  const label = printer.labels.find((each) => each.run === run);
+  const print = async () => {
+    const answer = await ask(`/api/runs/${run}/print`, {});
+    setProblem(answer.ok ? null : answer.error);
+  };
+  return (
+    <p class="label">{label && <span role="status">{S.label[label.state](label.problem)}</span>}{' '}
+      <button type="button" onClick={() => { void print(); }}>{label ? S.label.again : S.label.print}</button></p>
+  );
 }
 
 const shown = (value: number) => (Math.abs(value) >= 100 ? value.toFixed(0) : Math.abs(value) >= 1 ? value.toFixed(2) : value.toFixed(3));
@@ -46,7 +69,9 @@ function Values({ quantities, open }: { quantities: Quantity[]; open: boolean })
   );
 }
 
-export function ResultBox({ result, writeNow }: { result: Result; writeNow?: () => void }) {
+export function ResultBox({ result, writeNow, printer = null, setProblem }: {
+  result: Result; writeNow?: () => void; printer?: Printer | null; setProblem?: SetProblem;
+}) {
   const jig = result.kind === 'jig';
   const pane = S.pane(result);
   const kind = tone(result.verdict);
@@ -64,6 +89,7 @@ export function ResultBox({ result, writeNow }: { result: Result; writeNow?: () 
       {result.repeat_sides && result.repeat_sides.length > 0 && <p>{S.files.repeat(result.repeat_sides)}</p>}
       {result.kind === 'capture' && result.stored && <p>{S.files.saved(`${result.file}.constants.json`)}</p>}
       {result.run && <Papers run={result.run} documents={result.documents ?? []} />}
+      {result.run && setProblem && <PrintedLabel run={result.run} documents={result.documents ?? []} printer={printer} setProblem={setProblem} />}
       {result.quantities && result.quantities.length > 0 && <Values quantities={result.quantities} open={kind === 'bad'} />}
     </section>
   );

@@ -1,5 +1,5 @@
 // The connection to the station: state by server-sent events, commands by POST.
-import type { Job, Lane, Live, Lock, Me, State } from './types';
+import type { Job, Lane, Live, Lock, Me, Printer, State } from './types';
 
 // Readings of one lane, the newest at `end`. Kept outside the page's state: they are drawn, not rendered.
 export const KEPT = 600;
@@ -45,67 +45,125 @@ function change(part: Partial<Snapshot>) {
   listeners.forEach((listener) => listener());
 }
 
+// One stream of events for all tabs and windows of this browser, which has six connections for one address: the tab that
+// holds the lock has the stream and passes the events on. A tab that no one sees takes no part.
+const channel = new BroadcastChannel('sixpoint-events');
+const LOCK = 'sixpoint-stream';
+const QUIET_MS = 15000; // of a stream; a new one begins with the whole state
+const SILENT_MS = 25000; // of the tab with the stream: another one takes it
+interface Passed { name: string; data: unknown }
+interface LiveEvent { queue: number[]; lanes: { lane: number; first: number; host_ms: number; mg: number[]; live: Live }[] }
 let stream: EventSource | null = null;
-// A page that no one sees needs no stream: the browser has few connections for one address.
+let part: AbortController | null = null; // this tab takes part
+let lastEventMs = 0;
+let early: Passed[] | null = null; // what came while the state was on its way
+
+function takeLive(data: LiveEvent) {
+  let differs = false;
+  const live = { ...snapshot.live };
+  for (const each of data.lanes) {
+    let trace = traces.get(each.lane);
+    if (!trace) traces.set(each.lane, (trace = new Trace()));
+    trace.take(each.first, each.mg, each.host_ms);
+    const old = live[each.lane];
+    if (!old || old.stillness !== each.live.stillness || old.dwell !== each.live.dwell ||
+        old.face !== each.live.face || Math.abs((old.angle_deg ?? 0) - (each.live.angle_deg ?? 0)) > 0.3) {
+      live[each.lane] = each.live;
+      differs = true;
+    }
+  }
+  const queue = snapshot.state?.queue ?? [];
+  const same = queue.length === data.queue.length && queue.every((lane, i) => lane === data.queue[i]);
+  if (!same && snapshot.state) change({ state: { ...snapshot.state, queue: data.queue }, live });
+  else if (differs) change({ live });
+}
+function put(part: Partial<State>) { if (snapshot.state) change({ state: { ...snapshot.state, ...part } }); }
+const uses: Record<string, (data: never) => void> = {
+  state: (state: State) => change({ state, connected: true, crowded: false }),
+  lane: (lane: Lane) => put({ lanes: snapshot.state?.lanes.map((each) => (each.lane === lane.lane ? lane : each)) }),
+  job: (job: Job) => put({ job }),
+  lock: (lock: Lock) => put({ lock }),
+  printer: (printer: Printer) => put({ printer }),
+  live: takeLive,
+  lost: () => change({ connected: false }),
+  crowded: (state: State) => change({ state, connected: false, crowded: true }),
+};
+function take(event: Passed) {
+  lastEventMs = Date.now();
+  uses[event.name](event.data as never);
+}
+function pass(name: string, data: unknown = null) {
+  take({ name, data });
+  channel.postMessage({ name, data });
+}
+channel.onmessage = ({ data }: MessageEvent<Passed>) => {
+  if (!part || stream) return;
+  if (early) early.push(data); else take(data);
+};
+
+// The stream of this browser, until it ends or this tab leaves; then another tab may have it.
+function hold(signal: AbortSignal): Promise<void> {
+  return new Promise((done) => {
+    const events = stream = new EventSource('/api/events');
+    early = null;
+    lastEventMs = Date.now();
+    for (const name of ['state', 'lane', 'job', 'lock', 'printer', 'live'])
+      events.addEventListener(name, (event) => pass(name, JSON.parse((event as MessageEvent<string>).data)));
+    const end = () => { clearInterval(watch); events.close(); if (stream === events) stream = null; done(); };
+    // The browser tries again by itself, except after an answer that is no stream.
+    events.onerror = () => pass('lost');
+    const watch = setInterval(() => {
+      if (events.readyState !== EventSource.CLOSED && Date.now() - lastEventMs <= QUIET_MS) return;
+      if (events.readyState === EventSource.CLOSED) void showWithoutStream();
+      pass('lost');
+      end();
+      again();
+    }, 1000);
+    signal.addEventListener('abort', end);
+  });
+}
+
+// Takes part: with the state as it is now, and in the queue for the stream. `steal` where the tab that has it is silent.
+function connect(steal = false) {
+  leave();
+  const own = part = new AbortController();
+  lastEventMs = Date.now();
+  const request = steal ? { steal: true } : { signal: own.signal };
+  navigator.locks.request(LOCK, request, () => (own.signal.aborted ? undefined : hold(own.signal))).catch(() => {
+    if (part === own && stream) { leave(); again(); } // another tab took it
+  });
+  early = [];
+  void ask<State>('/api/state').then((answer) => {
+    if (part !== own || !early) return; // the stream brought it
+    const meanwhile = early;
+    early = null;
+    if (answer.ok) take({ name: 'state', data: answer.data });
+    meanwhile.forEach(take);
+  });
+  const watch = setInterval(() => {
+    if (part !== own) return clearInterval(watch);
+    if (!stream && Date.now() - lastEventMs > SILENT_MS) { clearInterval(watch); connect(true); }
+  }, 1000);
+}
+function leave() {
+  part?.abort();
+  part = null;
+  stream = null;
+}
+function again() { setTimeout(() => { if (!stream && !document.hidden) void enter(); }, 1000); }
+
 let leaving: ReturnType<typeof setTimeout> | undefined;
 document.addEventListener('visibilitychange', () => {
   clearTimeout(leaving);
   if (!document.hidden) {
-    if (!stream && snapshot.entry === 'open') void enter();
-  } else leaving = setTimeout(() => { stream?.close(); stream = null; }, 10000);
+    if (!part && snapshot.entry === 'open') void enter();
+  } else leaving = setTimeout(leave, 10000);
 });
-function connect() {
-  stream?.close();
-  const events = stream = new EventSource('/api/events');
-  let lastEventMs = Date.now();
-  const on = <T>(name: string, use: (data: T) => void) =>
-    events.addEventListener(name, (event) => { lastEventMs = Date.now(); use(JSON.parse((event as MessageEvent<string>).data)); });
-  on<State>('state', (state) => change({ state, connected: true, crowded: false }));
-  on<Lane>('lane', (lane) => {
-    if (!snapshot.state) return;
-    const lanes = snapshot.state.lanes.map((each) => (each.lane === lane.lane ? lane : each));
-    change({ state: { ...snapshot.state, lanes } });
-  });
-  on<Job>('job', (job) => { if (snapshot.state) change({ state: { ...snapshot.state, job } }); });
-  on<Lock>('lock', (lock) => { if (snapshot.state) change({ state: { ...snapshot.state, lock } }); });
-  interface LiveEvent { queue: number[]; lanes: { lane: number; first: number; host_ms: number; mg: number[]; live: Live }[] }
-  on<LiveEvent>('live', (data) => {
-    let differs = false;
-    const live = { ...snapshot.live };
-    for (const each of data.lanes) {
-      let trace = traces.get(each.lane);
-      if (!trace) traces.set(each.lane, (trace = new Trace()));
-      trace.take(each.first, each.mg, each.host_ms);
-      const old = live[each.lane];
-      if (!old || old.stillness !== each.live.stillness || old.dwell !== each.live.dwell ||
-          old.face !== each.live.face || Math.abs((old.angle_deg ?? 0) - (each.live.angle_deg ?? 0)) > 0.3) {
-        live[each.lane] = each.live;
-        differs = true;
-      }
-    }
-    const queue = snapshot.state?.queue ?? [];
-    const same = queue.length === data.queue.length && queue.every((lane, i) => lane === data.queue[i]);
-    if (!same && snapshot.state) change({ state: { ...snapshot.state, queue: data.queue }, live });
-    else if (differs) change({ live });
-  });
-  // The browser tries again by itself, except after an answer that is no stream.
-  events.onerror = () => change({ connected: false });
-  const watch = setInterval(() => {
-    if (stream !== events) return clearInterval(watch);  // a newer one took its place
-    if (events.readyState === EventSource.CLOSED) void showWithoutStream();
-    if (events.readyState === EventSource.CLOSED || Date.now() - lastEventMs > 15000) {
-      clearInterval(watch);
-      events.close();
-      change({ connected: false });
-      setTimeout(() => { void enter(); }, 1000);
-    }
-  }, 1000);
-}
 
 // Too many pages have a stream: this one shows the state as it is now, and tries again.
 async function showWithoutStream() {
   const answer = await ask<State>('/api/state');
-  if (answer.ok) change({ state: answer.data, crowded: true });
+  if (answer.ok) pass('crowded', answer.data);
 }
 
 // Connects where this browser is signed in; else the page asks for a code.

@@ -1,6 +1,6 @@
 // The runs of today, and all runs of a unit whose label is scanned.
 import { useEffect, useState } from 'preact/hooks';
-import { Papers, tone } from './result';
+import { Papers, PrintedLabel, tone } from './result';
 import type { SetProblem } from './lock';
 import { S } from './strings';
 import { ask } from './station';
@@ -43,7 +43,7 @@ export function Today({ state, serial, setSerial, setProblem }: {
                     <th scope="row">{run.serial}</th>
                     <td class={`word-${tone(run.verdict)}`}>{S.pane({ kind: 'jig', serial: run.serial, verdict: run.verdict, reasons: [], stored: true, written: run.written }).word}</td>
                     <td>{run.operator}</td>
-                    <td><Papers run={run.run} documents={run.documents} /></td>
+                    <td><Papers run={run.run} documents={run.documents} /><PrintedLabel run={run.run} documents={run.documents} printer={state.printer} setProblem={setProblem} /></td>
                   </tr>
                 ))}</tbody>
               </table>

@@ -27,7 +27,7 @@ export interface Lane {
   unit: { serial: string; firmware: string; model: string; battery_mv: number } | null;
   scan: { serial: string; matches: boolean } | null;
   operator: string; client: string; write: boolean; run: Run | null; result: Result | null;
-  capture: { side: Pose | null; number: number; of: number; placed: boolean; until_ms: number; side_s: number } | null;
+  capture: { side: Pose | null; number: number; of: number; placed: boolean; until_ms: number; side_s: number; again: Pose[] } | null;
   log: { id: number; kind: string; text: string; at_ms: number }[];
 }
 export interface Live { stillness: string; dwell: number; face: Pose | null; angle_deg: number | null }
@@ -37,8 +37,10 @@ export interface Job {
 }
 export interface Signature { made_at: string; operator: string; reason: string; new_baseline: boolean }
 export interface Lock { locked: boolean; reasons: string[]; check_units: string[]; known_bad?: Record<string, string[]>; signature: Signature | null; problem: string }
+export interface Label { run: string; serial: string; state: 'waiting' | 'printed' | 'unconfirmed'; problem: string; failures: number }
+export interface Printer { printer: string; labels: Label[] }
 export interface State {
-  station: string; version: string; write_default: boolean; jig_due: string | null; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job; lock: Lock | null;
+  station: string; version: string; write_default: boolean; jig_due: string | null; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job; lock: Lock | null; printer: Printer | null;
 }
 
 export interface Title { name: string; title: string; unit: string; axis?: string }

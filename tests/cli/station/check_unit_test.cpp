@@ -60,7 +60,7 @@ TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
 // Oracle: the code in the name of the defect, and no other.
 TEST_F(StationCommands, AKnownBadUnitOpensTheStationByFailing) {
   int seed = 100;
-  for (const char* defect : {"zero_high", "sensitivity_low", "sensitivity_high"}) {
+  for (const char* defect : {"zero_high", "zero_low", "sensitivity_low", "sensitivity_high"}) {
     const auto failed = measure(fmt::format("seed={},bad={}", ++seed, defect));
     EXPECT_EQ(failed.exit_code, 1) << defect;
     EXPECT_EQ(failed.json()["codes"], cli::Json::array({defect}));
@@ -80,6 +80,10 @@ TEST_F(StationCommands, AKnownBadUnitOpensTheStationByFailing) {
   EXPECT_EQ(measure("seed=9").exit_code, 0);
   EXPECT_EQ(measure("seed=5,serial=MOS2A0BAD").exit_code, 0) << "it does not fail";
   EXPECT_EQ(measure("seed=9").exit_code, 78);
+  EXPECT_EQ(measure("seed=6,serial=MOS2A0BAD,bad=sensitivity_low").exit_code, 1) << "another code";
+  EXPECT_EQ(measure("seed=9").exit_code, 78);
+  EXPECT_EQ(measure("seed=7,serial=MOS2A0BAD,bad=zero_high").exit_code, 1) << "just that code";
+  EXPECT_EQ(measure("seed=9").exit_code, 0);
 }
 
 TEST_F(StationCommands, AUnitThatFailedIsMeasuredTwiceAndNotForever) {

@@ -72,6 +72,40 @@ TEST_F(CommandTest, JigRefusesByTheContractsCodes) {
 }
 
 // Ctrl-C in a run by a jig: the motor stops, the run is stored as stopped, exit 3.
+// The table of who_measures() (cli/station/operator.h), row by row. Oracle: the certificate.
+TEST_F(CommandTest, JigAsksForThePinWhereThereAreOperators) {
+  ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
+  int number = 0;
+  const auto measured = [&](const std::string& name, const std::string& typed,
+                            const std::vector<std::string>& more = {}) {
+    const std::string certificate = path("c" + std::to_string(++number) + ".json");
+    std::vector<std::string> words = {"jig",      "--device",   "virtual:seed=7,jig=auto",
+                                      "--store",  path("p.db"), "--certificate",
+                                      certificate};
+    if (!name.empty()) {
+      words.insert(words.end(), {"--operator", name});
+    }
+    words.insert(words.end(), more.begin(), more.end());
+    const int exit_code = tests::run_command(posix_env(), words, typed).exit_code;
+    std::ifstream in(certificate);
+    const auto json = cli::Json::parse(in, nullptr, false);
+    return std::pair(exit_code, json.is_object() && json["operator_authenticated"] == true);
+  };
+  EXPECT_EQ(measured("Ada", ""), std::pair(0, false)) << "no operators";
+  ASSERT_EQ(tests::run_command(posix_env(), {"operator", "add", "Ada"}, "471100\n").exit_code, 0);
+  EXPECT_EQ(measured("Ada", "471100\n"), std::pair(0, true));
+  EXPECT_EQ(measured("Ada", "471101\n"), std::pair(77, false));
+  EXPECT_EQ(measured("Ada", ""), std::pair(77, false));
+  EXPECT_EQ(measured("Bo", "471100\n"), std::pair(77, false));
+  EXPECT_EQ(measured("", "471100\n"), std::pair(77, false));
+  std::ofstream(path("pin")) << "471100\r\nmore\n";
+  EXPECT_EQ(measured("Ada", "", {"--pin-file", path("pin")}), std::pair(0, true));
+  std::ofstream(path("wrong")) << "1234\n";
+  EXPECT_EQ(measured("Ada", "471100\n", {"--pin-file", path("wrong")}), std::pair(77, false));
+  EXPECT_EQ(measured("Ada", "", {"--pin-file", path("none")}), std::pair(66, false));
+  ::unsetenv("XDG_DATA_HOME");
+}
+
 TEST_F(CommandTest, CtrlCInAnAutomaticRunStoresItAsStopped) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);

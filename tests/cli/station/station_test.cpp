@@ -97,6 +97,18 @@ TEST_F(StationCommand, OnOtherAddressesItNeedsTls) {
   EXPECT_EQ(with({"--token-file", path("token")}).exit_code, 65);
 }
 
+TEST_F(StationCommand, APrinterThatIsNoneIsRefused) {
+  std::ofstream(path("file")) << "content";
+  for (const std::string& printer :
+       {std::string("lp0"), std::string("http://printer:9100"), std::string("tcp://printer"),
+        std::string("tcp://ada@printer:9100"), path("file"), path("."),
+        std::string("/dev/../tmp")}) {
+    EXPECT_EQ(refused({"--device", "virtual:seed=7", "--printer", printer}).exit_code, 64)
+        << printer;
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("state/labels")));
+}
+
 // Its one line is the address of the page; it serves there until a signal, and ends with 3 by
 // Ctrl-C, with 0 by the one of a supervisor.
 TEST_F(StationCommand, ServesItsPageUntilItIsStopped) {

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "base/atomic_file.h"
 #include "expect_result.h"
 #include "mocks/inert/inert.h"
 #include "station/virtual_bench.h"
@@ -72,6 +73,81 @@ TEST(CaptureRun, SidesThatWereLeftOutAreNamed) {
   const auto& missing = report->solved->verification.missing_directions;
   EXPECT_THAT(missing, Contains("-z"));
   EXPECT_GE(missing.size(), 4U);
+}
+
+// A person who errs: the jig lays the unit where the person does, not where it was asked for.
+struct Person {
+  explicit Person(VirtualBench& its_bench) : bench(its_bench) {
+    hooks.ask = [this](device::Pose side, std::size_t, std::size_t) {
+      asked.push_back(side);
+      const device::Pose laid = errs(side) ? device::Pose::plus_z : side;
+      return bench.jig->go_to(laid) ? SideAnswer::placed : SideAnswer::stop;
+    };
+    hooks.again = [this](const std::vector<device::Pose>& sides) { repeated.push_back(sides); };
+    options.output = "c.gt3x";
+  }
+  bool errs(device::Pose side) { return side == wrong && errors-- > 0; }
+  Result<CaptureReport> capture() {
+    return run_capture({bench.unit.get(), &lazy}, bench.env.env, options, hooks);
+  }
+  VirtualBench& bench;
+  mocks::InertJig lazy;  // the hands are in `ask`
+  CaptureOptions options;
+  CaptureHooks hooks;
+  device::Pose wrong = device::Pose::minus_x;
+  int errors = 1;
+  std::vector<device::Pose> asked;
+  std::vector<std::vector<device::Pose>> repeated;
+};
+
+// Oracle: the sides that the person was asked for, and the virtual unit's truth.
+TEST(CaptureRun, AWrongSideIsAskedForAgainAloneAndTheOthersAreKept) {
+  VirtualBench bench;
+  Person person(bench);
+  const auto report = person.capture();
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->usable()) << report->solved->brief();
+  ASSERT_EQ(person.asked.size(), 7U);
+  EXPECT_EQ(person.asked.back(), device::Pose::minus_x);
+  EXPECT_THAT(person.repeated, testing::ElementsAre(testing::ElementsAre(device::Pose::minus_x)));
+  EXPECT_THAT(report->notes, Contains(HasSubstr("with -x up: asked for again")));
+  EXPECT_EQ(report->pieces.size(), 2U);
+  const sim::SensorTruth& truth = bench.plugged->unit.truth().current;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    EXPECT_NEAR(report->solved->calibration->zero_lsb[axis], truth.zero_lsb[axis], 0.8);
+  }
+}
+
+TEST(CaptureRun, ASideThatFailsAgainIsAskedForTwiceAndThenJudged) {
+  VirtualBench bench;
+  Person person(bench);
+  person.errors = 100;
+  const auto report = person.capture();
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->usable());
+  EXPECT_EQ(person.asked.size(), 8U);
+  EXPECT_EQ(person.repeated.size(), 2U);
+  EXPECT_THAT(report->solved->verification.missing_directions, testing::ElementsAre("-x"));
+
+  VirtualBench second;
+  Person corrects_late(second);
+  corrects_late.errors = 2;
+  const auto late = corrects_late.capture();
+  ASSERT_OK(late);
+  EXPECT_TRUE(late->usable()) << late->solved->brief();
+}
+
+// No file of another capture is replaced.
+TEST(CaptureRun, NoSideIsAskedForAgainWhereAPieceWouldReplaceAFile) {
+  VirtualBench bench;
+  Person person(bench);
+  ASSERT_OK(write_file(bench.env.files, "c-1.gt3x", "another capture"));
+  const auto report = person.capture();
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->usable());
+  EXPECT_EQ(person.asked.size(), 6U);
+  EXPECT_THAT(report->notes, Contains(HasSubstr("c-1.gt3x")));
+  EXPECT_EQ(bench.env.files.info("c-1.gt3x")->size, 15U);
 }
 
 TEST(CaptureRun, ThePersonMayStopAndTheUnitIsNotLeftRecording) {

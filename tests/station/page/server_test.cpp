@@ -3,10 +3,13 @@
 
 #include <Eigen/Core>  // before httplib.h, whose macro _res is a name in Eigen
 #include <array>
+#include <filesystem>
 #include <fstream>
 
 #include <arpa/inet.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "station/page/station_in_process.h"
@@ -254,6 +257,87 @@ TEST(Server, ClosesPagesThatDoNotRead) {
   for (const int descriptor : sockets) {
     close(descriptor);
   }
+}
+
+// What the station answers to a request over its unix socket, without a session and without the
+// token; empty where it cannot be reached.
+std::string answer_over(const std::string& socket_path, const std::string& request) {
+  const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  socket_path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+  std::string answer;
+  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0 &&
+      ::send(fd, request.data(), request.size(), MSG_NOSIGNAL) ==
+          static_cast<ssize_t>(request.size())) {
+    std::array<char, 4096> some{};
+    for (ssize_t n = 1; n > 0;) {
+      n = ::recv(fd, some.data(), some.size(), 0);
+      answer.append(some.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
+    }
+  }
+  ::close(fd);
+  return answer;
+}
+
+const char* const kAskState = "GET /api/state HTTP/1.1\r\nHost: station\r\n\r\n";
+
+TEST(Server, TheOwnerNeedsNoTokenOnTheUnixSocketAndOthersCannotOpenIt) {
+  const tests::TemporaryFolder folder;
+  const std::string path = folder / "station.sock";
+  ServerOptions options;
+  options.unix_socket = path;
+  {
+    Station station({"virtual:seed=7"}, folder.path(), 24, {}, options);
+    station.wait_state(1, "idle");
+    struct stat info {};
+    ASSERT_EQ(::lstat(path.c_str(), &info), 0);
+    EXPECT_TRUE(S_ISSOCK(info.st_mode));
+    EXPECT_EQ(info.st_mode & 0777U, 0600U);
+    EXPECT_EQ(info.st_uid, ::geteuid());
+    const std::string state = answer_over(path, kAskState);
+    EXPECT_THAT(state, testing::StartsWith("HTTP/1.1 200"));
+    EXPECT_THAT(state, HasSubstr("sixpoint/station/1"));
+    EXPECT_THAT(answer_over(path,
+                            "POST /api/run HTTP/1.1\r\nHost: station\r\nContent-Length: 0"
+                            "\r\n\r\n"),
+                testing::StartsWith("HTTP/1.1 202"));
+    EXPECT_THAT(answer_over(path, "nonsense\r\n\r\n"), testing::StartsWith("HTTP/1.1 400"));
+    // The port asks as before.
+    auto client = station.client();
+    client.set_default_headers({});
+    EXPECT_EQ(client.Get("/api/state")->status, 401);
+  }
+  EXPECT_FALSE(std::filesystem::exists(path)) << "removed at the end";
+}
+
+TEST(Server, ASocketReplacesOneThatWasLeftAndNothingElse) {
+  const tests::TemporaryFolder folder;
+  const std::string path = folder / "station.sock";
+  Station first({"virtual:seed=7"}, folder / "one");
+  const auto opened = [&](const std::string& socket_path) {
+    ServerOptions options;
+    options.unix_socket = socket_path;
+    return Server::open(posix_env(), *first.api, options);
+  };
+  std::ofstream(folder / "file") << "content";
+  EXPECT_FAILS(opened(folder / "file"), ErrorCode::usage);
+  EXPECT_EQ(std::filesystem::file_size(folder / "file"), 7U);
+  std::filesystem::create_symlink(folder / "file", folder / "link");
+  EXPECT_FAILS(opened(folder / "link"), ErrorCode::usage);
+  EXPECT_FAILS(opened(folder / std::string(120, 'a')), ErrorCode::usage);
+  EXPECT_FAILS(opened(folder / "none/station.sock"), ErrorCode::cannot_create);
+
+  // A station that was killed: its socket is there, and no one listens.
+  const int left = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+  ASSERT_EQ(::bind(left, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+  ::close(left);
+  const auto second = opened(path);
+  EXPECT_OK(second);
+  EXPECT_FAILS(opened(path), ErrorCode::device_unavailable);  // one that is alive
 }
 
 }  // namespace
