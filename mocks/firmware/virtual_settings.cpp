@@ -108,7 +108,7 @@ bool read_defect(std::string_view value, sim::GivenProperties& given) {
   given.current_sensitivity_lsb_per_g = PerAxis<double>{250, 250, 250};
   given.current_zero_lsb = PerAxis<double>{20, 20, 20};
   if (value == "zero_high" || value == "zero_low") {
-    (*given.current_zero_lsb)[0] = value == "zero_high" ? 225 : -225;
+    (*given.current_zero_lsb)[0] = value == "zero_high" ? 225 : -200;
     return true;
   }
   if (value == "sensitivity_low" || value == "sensitivity_high") {

@@ -154,10 +154,6 @@ export async function describe() {
   }
 }
 
-export async function shot(page, name) {
-  await page.screenshot({ path: join(shots, `${name}.png`), fullPage: true });
-}
-
 export function check(condition, what) {
   if (!condition) throw new Error(`not so: ${what}`);
 }
@@ -180,6 +176,12 @@ export async function axe(page) {
   const text = result.violations.map((each) => `${each.id} (${each.impact}): ${each.nodes.map((node) => node.target.join(' ') + ' ' + (node.any[0]?.message ?? '')).join('; ')}`);
   check(result.violations.length === 0, `axe finds nothing, but: ${text.join('\n')}`);
   check(result.passes === undefined || result.testEngine.name === 'axe-core', 'axe ran');
+}
+
+// A picture of a state of the page; axe looks at each of them.
+export async function shot(page, name) {
+  await page.screenshot({ path: join(shots, `${name}.png`), fullPage: true });
+  await axe(page);
 }
 
 // The technician: looks at what the page wants in the biggest words and turns the (virtual) unit there.

@@ -27,7 +27,6 @@ const scenarios = {
     const station = await h.station(['virtual:seed=7,pace=10']);
     const page = await h.open(station.url);
     await button(page, 'Start the measurement').waitFor();
-    await h.axe(page);
     await h.shot(page, 'whole-1-ready');
     await page.getByLabel('Your name').fill('Ada');
     await start(page);
@@ -35,13 +34,11 @@ const scenarios = {
     await h.turnAsAsked(page);
     await page.locator('.still-dwelling').waitFor();
     await h.shot(page, 'whole-2-measuring');
-    await h.axe(page);
     await h.place(page, 14);
     await page.locator('.result').waitFor();
     check((await page.locator('.result .verdict').textContent()).includes('PASS - NOT WRITTEN'), 'the verdict is a pass, and nothing is in the unit');
     await page.getByText(/Stored as run [0-9a-f]{12}/).waitFor();
     await h.shot(page, 'whole-3-verdict');
-    await h.axe(page);
     const lane = (await station.api('/api/lanes/1')).json;
     check(lane.operator === 'Ada', 'the operator is in the record');
     check(lane.run.taken.length === 14, 'fourteen placements');
@@ -54,7 +51,6 @@ const scenarios = {
     await page.locator('.result .verdict', { hasText: 'PASS - WRITTEN' }).waitFor();
     await page.getByRole('link', { name: 'Label (ZPL)' }).waitFor();
     await h.shot(page, 'whole-4-written');
-    await h.axe(page);
     await page.locator('.hand').getByRole('button', { name: 'Unplug', exact: true }).click();
     await page.getByText('Plug a unit in').waitFor();
     check(await page.locator('.result .verdict').isVisible(), 'the verdict stays when the unit is out');
@@ -66,7 +62,6 @@ const scenarios = {
     check((await page.locator('tbody tr').count()) === 2, 'the run and its write');
     check((await page.locator('tbody tr').first().textContent()).includes('PASS - WRITTEN'), 'the newest first');
     await h.shot(page, 'whole-5-today');
-    await h.axe(page);
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
   },
 
@@ -84,7 +79,6 @@ const scenarios = {
     const second = await h.bare(station.printed);  // the same code again
     await second.getByRole('heading', { name: 'Sign this browser in' }).waitFor();
     check((await second.getByText('MOS2').count()) === 0, 'nothing of the bench is shown');
-    await h.axe(second);
     await h.shot(second, 'sign-in-1-asked');
     await second.getByLabel('Code').fill('AAAA-AAAA-AAAA');
     await button(second, 'Sign in').click();
@@ -111,7 +105,6 @@ const scenarios = {
     const page = await h.open(station.url);
     await start(page);
     await page.getByText('no operator is signed in here').waitFor();
-    await h.axe(page);
     await h.shot(page, 'pins-1-asked');
     await page.getByLabel('PIN').fill('0000');
     await button(page, 'Begin').click();
@@ -126,7 +119,6 @@ const scenarios = {
     const certificate = (await station.api(`/api/runs/${lane.result.run}/certificate.json`)).json;
     check(certificate.operator === 'Ada' && certificate.operator_authenticated === true, JSON.stringify([certificate.operator, certificate.operator_authenticated]));
     await h.shot(page, 'pins-2-signed-in');
-    await h.axe(page);
     await button(page, 'Sign out').click();
     await page.getByLabel('PIN').waitFor();
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
@@ -260,7 +252,6 @@ const scenarios = {
     });
     await refusal(page, 'moved during the reading');
     await h.shot(page, 'slips-1-moved');
-    await h.axe(page);
     await hand('+Z');
     await refusal(page, 'is done already');
     await hand('Lean on an edge');
@@ -297,7 +288,6 @@ const scenarios = {
     await page.getByText('The unit is unplugged: plug it in again').waitFor();
     console.log(`unplugging was on the page after ${Date.now() - pulled} ms`);
     await h.shot(page, 'replug-1-unplugged');
-    await h.axe(page);
     await hand('Plug in');
     await until('it goes on', async () => /[+−][XYZ] side up/.test(await prompt(page)));
     check((await h.taken(page)) === 4, 'what was taken is still there');
@@ -371,7 +361,6 @@ const scenarios = {
         await page.locator('.hand').getByRole('button', { name: face, exact: true }).click();
         if (++pictures === 100) {
           await h.shot(page, 'sixteen-1-at-work');
-          await h.axe(page);
         }
       }
       return view.finished === 16;
@@ -419,7 +408,6 @@ const scenarios = {
     await page.getByRole('button', { name: 'Check', exact: true }).click();
     await page.getByText('This file can be used: every side is in it.').waitFor();
     await h.shot(page, 'files-2-checked');
-    await h.axe(page);
     // A recording in which two sides were forgotten.
     const partial = JSON.parse(readFileSync(join(h.source, 'tests/docs/scenario.json'), 'utf8'));
     partial.motions = ['+z', '-z', '+x', '-x'].map((pose) => ({ kind: 'still', duration_s: 40, pose }));
@@ -439,7 +427,6 @@ const scenarios = {
     await button(page, 'Repair my files').click();
     await page.getByText('Done. 2 of 2 files, 2 repaired').waitFor();
     await h.shot(page, 'files-4-repaired');
-    await h.axe(page);
     check(existsSync(join(home, 'repaired', 'day1.gt3x')), 'the repaired file is there');
     const job = (await station.api('/api/job')).json;
     check(job.files.every((file) => file.status === 'repaired'), 'all are repaired');
@@ -507,7 +494,6 @@ const scenarios = {
     await page.locator('.result .verdict', { hasText: 'PASS - WRITTEN' }).waitFor();
     await page.getByText(/Label: waiting for the printer \(.*refused/).waitFor();
     await button(page, 'Print label again').waitFor();
-    await h.axe(page);
     await h.shot(page, 'printer-1-waiting');
     check((await station.api('/api/lanes/1')).json.state === 'done', 'the lane waits for no printer');
     check(printed.length === 0, 'nothing came');
@@ -523,7 +509,6 @@ const scenarios = {
       await button(other, 'Print label again').click();
       await h.until('the label again', () => printed.length === 2);
       check(printed[0] === printed[1], 'the same label');
-      await h.axe(other);
       await h.shot(other, 'printer-2-printed');
       check(other.problems.length === 0 && page.problems.length === 0, `no errors: ${other.problems} ${page.problems}`);
     } finally {
@@ -604,7 +589,6 @@ const scenarios = {
     const label = await page.locator('.control svg').nth(3).getAttribute('aria-label');
     check(/Zero offset x, mg of check unit MOS2A45130007: 11 points, the last .* limits/.test(label), `the chart says what it shows: ${label}`);
     await h.shot(page, 'lock-1-charts');
-    await h.axe(page);
     // The check unit is measured, and has moved.
     check((await station.api('/api/run', { lane: 2, operator: 'Ada' })).status === 202, 'the check unit is measured');
     await page.getByRole('heading', { name: 'Station locked' }).waitFor();
@@ -613,7 +597,6 @@ const scenarios = {
     check((await page.locator('.chart .rule').count()) > 0, 'the point carries the number of its rule');
     await page.getByText('locks the station').first().waitFor();
     await h.shot(page, 'lock-2-out-of-control');
-    await h.axe(page);
     await button(page, 'Jig').click();
     await page.getByRole('heading', { name: 'Station locked' }).waitFor();
     check((await prompt(page)) === 'Station locked: check units only', 'the lane says so in its biggest words');
@@ -622,7 +605,6 @@ const scenarios = {
     const refused = await until('the station refuses', async () => (await station.api('/api/lanes/1')).json.result);
     check(refused.verdict === 'refused' && /is locked/.test(refused.reasons.join()), `and the server refuses too: ${refused.reasons}`);
     await h.shot(page, 'lock-3-jig');
-    await h.axe(page);
     // A signature without a name is none.
     check((await station.api('/api/station-lock', { operator: ' ', reason: 'x' }, { 'X-Sixpoint-Client': 'x' })).status === 400, 'a name is needed');
     check((await station.api('/api/station-lock', { operator: 'Mallory', reason: 'x' })).status === 403, 'and the page\'s own header');
@@ -641,7 +623,6 @@ const scenarios = {
     await page.keyboard.press('Tab');
     await page.keyboard.type('seat cleaned', { delay: 100 });
     await h.shot(page, 'lock-4-signing');
-    await h.axe(page);
     await page.keyboard.press('Enter');
     await page.getByRole('heading', { name: 'Station locked' }).waitFor({ state: 'detached' });
     check(await button(page, 'Start the measurement').isEnabled(), 'the station is open again');
@@ -700,7 +681,6 @@ const scenarios = {
     check(gage.grr_percent > 0 && gage.grr_percent < 30 && gage.usable, `a gage with some scatter: ${gage.grr_percent} %`);
     check((await page.locator('tr', { hasText: 'Part to part' }).textContent()).includes((gage.components.part.contribution_percent).toFixed(1)), 'the table has the parts');
     await h.shot(page, 'statistics-1');
-    await h.axe(page);
     await page.getByLabel('Before').fill('2001-01-01');
     await page.getByText('No runs were stored yet.').waitFor();
     check(page.problems.length === 0, `no errors on the page: ${page.problems}`);
@@ -805,6 +785,7 @@ const scenarios = {
         const over = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
         check(over <= 0, `${lanes} lanes, ${name}: ${over} px to scroll sideways`);
         await page.screenshot({ path: join(h.shots, `layout-${lanes}-${name}.png`) });
+        if (name.startsWith('bench')) await h.axe(page);
       };
       let first = true;
       for (const [name, width, height] of screens) {
@@ -857,7 +838,6 @@ const scenarios = {
     await page.getByText('The unit is unplugged: plug it in again').waitFor();
     await page.getByText('What was recorded stays').waitFor();
     await h.shot(page, 'capture-1-unplugged');
-    await h.axe(page);
     await capture.locator('.hand').getByRole('button', { name: 'Plug in', exact: true }).click();
     await button(page, 'It lies there').waitFor();
     check((await capture.locator('.prompt').textContent()).includes(second), 'the side under way is asked again');
@@ -877,7 +857,6 @@ const scenarios = {
     await page.getByText(/Too few still readings of/).waitFor();
     check((await page.getByText(/Too few still readings of/).first().textContent()).includes(wrong), `${wrong} is named`);
     await h.shot(page, 'capture-2-again');
-    await h.axe(page);
     check((await side(5)) === wrong, 'and it alone is asked for');
     await capture.locator('.result .verdict', { hasText: 'Pass' }).waitFor();
     await page.getByText(/Constants saved in/).first().waitFor();
@@ -1051,7 +1030,6 @@ const scenarios = {
     await bob.getByText('Ada is at work on this lane.').waitFor();
     check((await button(bob, 'Stop this run').count()) === 0, 'Bob cannot stop it');
     await h.shot(bob, 'operators-1-held');
-    await h.axe(bob);
     await button(bob, 'Take this lane over').click();
     await button(bob, 'Stop this run').waitFor();
     await ada.getByText('Bob is at work on this lane.').waitFor();
