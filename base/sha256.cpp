@@ -1,5 +1,6 @@
 #include "base/sha256.h"
 
+#include <algorithm>
 #include <new>
 
 #include <openssl/evp.h>
@@ -54,7 +55,8 @@ std::string text_sha256(std::string_view text) { return to_hex(sha256(as_bytes(t
 Result<Sha256Digest> file_digest(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(const auto file, files.open(path));
   Sha256 hash;
-  Bytes piece(1U << 20);
+  // No more than the file has: clearing a MiB would cost more than hashing a small file.
+  Bytes piece(std::clamp<std::uint64_t>(file->size(), 1, 1U << 20));
   std::uint64_t at = 0;
   while (true) {
     SIXPOINT_ASSIGN(const auto count, file->read_at(at, piece));

@@ -18,8 +18,13 @@ constexpr std::size_t kLargestPiece = std::size_t{1} << 30;
 
 class Inflate final : public ByteSource {
  public:
-  explicit Inflate(std::unique_ptr<ByteSource> packed)
-      : packed_(std::move(packed)), piece_(kPackedPiece), state_(new inflate_state) {
+  // `packed_size` may be wrong; 0 where nothing says it.
+  Inflate(std::unique_ptr<ByteSource> packed, std::uint64_t packed_size)
+      : packed_(std::move(packed)),
+        piece_(packed_size == 0 ? kPackedPiece
+                                : static_cast<std::size_t>(
+                                      std::min<std::uint64_t>(packed_size, kPackedPiece))),
+        state_(new inflate_state) {
     isal_inflate_init(state_.get());
     state_->crc_flag = ISAL_DEFLATE;
   }
@@ -155,7 +160,7 @@ std::unique_ptr<ByteSource> unpack_entry(std::unique_ptr<ByteSource> packed,
                                          const EntryFacts& facts) {
   if (facts.packing == Packing::deflate) {
     if (facts.points.packed_sizes.empty()) {
-      packed = std::make_unique<Inflate>(std::move(packed));
+      packed = std::make_unique<Inflate>(std::move(packed), facts.packed_size);
     } else {
       packed = unpack_pieces(std::move(packed), facts.points, facts.size);
     }
@@ -167,7 +172,7 @@ std::unique_ptr<ByteSource> salvage_entry(std::unique_ptr<ByteSource> packed,
                                           const EntryFacts& facts, const ArchiveLimits& limits,
                                           std::function<void(const EntryDamage&)> note) {
   if (facts.packing == Packing::deflate) {
-    packed = std::make_unique<Inflate>(std::move(packed));
+    packed = std::make_unique<Inflate>(std::move(packed), facts.packed_size);
   }
   auto entry = std::make_unique<CheckedEntry>(std::move(packed), facts);
   entry->salvage(limits, std::move(note));

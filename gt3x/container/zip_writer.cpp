@@ -78,9 +78,14 @@ Status fill(ByteSource& source, const Bytes* before, Bytes& piece) {
     piece.clear();
     return {};
   }
-  piece.resize(kPackedPieceSize);
+  // Memory comes as bytes do: clearing it all would cost more than packing a small entry.
+  constexpr std::size_t kFirst = std::size_t{64} * 1024;
+  piece.resize(before == nullptr ? kFirst : kPackedPieceSize);
   std::size_t filled = 0;
-  while (filled < piece.size()) {
+  while (filled < kPackedPieceSize) {
+    if (filled == piece.size()) {
+      piece.resize(2 * piece.size());
+    }
     SIXPOINT_ASSIGN(const std::size_t count, source.read(std::span(piece).subspan(filled)));
     if (count == 0) {
       break;
@@ -139,7 +144,10 @@ Status ZipWriter::add_whole(Entry entry, std::span<const std::uint8_t> bytes) {
   entry.crc32 = crc32_of(bytes, 0);
   Bytes packed;
   if (entry.packing == Packing::deflate) {
-    PiecePacker().pack(bytes, PiecePacker::Place::last, packed);
+    if (!packer_) {
+      packer_ = std::make_unique<PiecePacker>();
+    }
+    packer_->pack(bytes, PiecePacker::Place::last, packed);
     if (packed.size() < bytes.size()) {
       bytes = packed;
     } else {

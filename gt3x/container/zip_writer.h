@@ -21,12 +21,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "gt3x/container/byte_source.h"
 #include "gt3x/container/inflating_source.h"
+#include "gt3x/container/piece_packer.h"
 #include "gt3x/container/sync_points.h"
 
 namespace sixpoint::gt3x {
@@ -69,6 +71,7 @@ class ZipWriter {
   unsigned jobs_;
   std::uint64_t at_ = 0;
   std::vector<Entry> entries_;
+  std::unique_ptr<PiecePacker> packer_;  // of small entries, one after the other
 };
 
 }  // namespace sixpoint::gt3x

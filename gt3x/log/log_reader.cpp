@@ -11,6 +11,8 @@ constexpr int kChain = 7;
 // From any place in the window, so many bytes ahead must be visible unless the end is.
 constexpr std::size_t kLookahead = (kChain + 1) * (kMaxRecord + 16);
 constexpr std::size_t kCapacity = 4 * kLookahead;
+// Memory comes as bytes do: clearing it all would cost more than reading a small file.
+constexpr std::size_t kFirstPiece = std::size_t{64} * 1024;
 // Zero bytes that may stand between two records of a chain.
 constexpr std::size_t kMaxZerosInChain = 16;
 
@@ -61,15 +63,19 @@ class LogReader::Window {
     if (end_of_source_ || end_ - begin_ >= kLookahead) {
       return {};
     }
-    if (bytes_.empty()) {
-      bytes_.resize(kCapacity);
+    // The first records need no more than the view ahead; most readers of small files end there.
+    const std::size_t wanted = bytes_.empty() ? kLookahead : kCapacity;
+    if (begin_ < end_) {
+      std::memmove(bytes_.data(), bytes_.data() + begin_, end_ - begin_);
     }
-    std::memmove(bytes_.data(), bytes_.data() + begin_, end_ - begin_);
     base_ += begin_;
     end_ -= begin_;
     begin_ = 0;
     folded_.clear();
-    while (end_ < kCapacity) {
+    while (end_ < wanted) {
+      if (end_ == bytes_.size()) {
+        bytes_.resize(std::min(wanted, std::max(kFirstPiece, 2 * bytes_.size())));
+      }
       SIXPOINT_ASSIGN(const std::size_t count, source_->read(std::span(bytes_).subspan(end_)));
       if (count == 0) {
         end_of_source_ = true;
