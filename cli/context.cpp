@@ -1,6 +1,7 @@
 #include "cli/context.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 
@@ -101,7 +102,18 @@ Progress::~Progress() {
   }
 }
 
-void Progress::at(std::uint64_t done) {
+std::string bytes_text(std::uint64_t bytes) {
+  constexpr std::array<const char*, 5> kUnits = {"kB", "MB", "GB", "TB", "PB"};
+  double value = static_cast<double>(bytes) / 1000;
+  std::size_t unit = 0;
+  for (; value >= 999.5 && unit + 1 < kUnits.size(); ++unit) {
+    value /= 1000;
+  }
+  return bytes < 1000 ? fmt::format("{} bytes", bytes)
+                      : fmt::format("{:.{}f} {}", value, value < 9.95 ? 1 : 0, kUnits[unit]);
+}
+
+void Progress::at(std::uint64_t done, std::uint64_t bytes, std::uint64_t failed) {
   if (total_ == 0) {
     return;
   }
@@ -111,25 +123,32 @@ void Progress::at(std::uint64_t done) {
   const double rate = elapsed_s > 0 ? static_cast<double>(done) / elapsed_s : 0;
   const int left_s =
       rate > 0 ? static_cast<int>(static_cast<double>(total_ - std::min(done, total_)) / rate) : 0;
+  const auto said = [&](const char* between) {
+    return (bytes > 0 ? between + bytes_text(bytes) : "") +
+           (failed > 0 ? fmt::format("{}{} failed", between, failed) : "");
+  };
   if (!context_.people_at_terminal) {
     // A line a minute, for logs.
     const auto minute = static_cast<int>(elapsed_s / 60);
     if (minute > 0 && minute != last_percent_) {
       last_percent_ = minute;
-      context_.people << fmt::format("{}: {} of {} ({} %), {:.1f} a second, {} min left\n", doing_,
-                                     done, total_, percent, rate, (left_s + 59) / 60)
+      context_.people << fmt::format("{}: {} of {} ({} %){}, {:.1f} a second, {} min left\n",
+                                     doing_, done, total_, percent, said(", "), rate,
+                                     (left_s + 59) / 60)
                       << std::flush;
     }
     return;
   }
-  if (percent == last_percent_) {
+  if (percent == last_percent_ && failed == last_failed_) {
     return;
   }
   last_percent_ = percent;
+  last_failed_ = failed;
   const int filled = percent / 5;
-  context_.people << fmt::format("\r{}  [{:=<{}}{: <{}}] {:3} %  {:.1f} a second  {:02}:{:02} left",
-                                 doing_, "", filled, "", 20 - filled, percent, rate, left_s / 60,
-                                 left_s % 60)
+  context_.people << fmt::format(
+                         "\r{}  [{:=<{}}{: <{}}] {:3} %{}  {:.1f} a second  {:02}:{:02} left",
+                         doing_, "", filled, "", 20 - filled, percent, said("  "), rate,
+                         left_s / 60, left_s % 60)
                   << std::flush;
 }
 

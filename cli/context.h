@@ -105,20 +105,26 @@ Json value_or_null(const std::optional<Value>& value) {
 // The path of the program that runs; "sixpoint" where the system does not say.
 std::string this_program();
 
-// A bar such as "repairing  [=====>    ]  52 %  ETA 00:12" on a terminal, nothing elsewhere.
+// "1.2 GB": three digits at most, decimal.
+std::string bytes_text(std::uint64_t bytes);
+
+// A bar such as "repairing  [=====     ]  52 %  1.2 GB  2 failed  3.1 a second  00:12 left" on a
+// terminal; elsewhere the same as a line a minute, for logs. Bytes and failures are left out where
+// there are none.
 class Progress {
  public:
   Progress(Context& context, std::string doing, std::uint64_t total);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  void at(std::uint64_t done);
+  void at(std::uint64_t done, std::uint64_t bytes = 0, std::uint64_t failed = 0);
 
  private:
   Context& context_;
   std::string doing_;
   std::uint64_t total_;
   int last_percent_ = -1;
+  std::uint64_t last_failed_ = 0;
   std::chrono::nanoseconds start_;
 };
 

@@ -21,7 +21,7 @@ test_packages=(
   busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils
   libxml2-utils openssl poppler-utils zbar-tools
   dpkg-dev file groff-base lintian systemd
-  munge parallel slurm-client slurmctld slurmd
+  munge parallel slurm-client slurmctld slurmd snakemake
 )
 package_packages=(dpkg-dev file)
 python_packages=(

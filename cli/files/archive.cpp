@@ -1,4 +1,4 @@
-// sixpoint archive plan|run|merge|status: an archive on a cluster, shard by shard
+// sixpoint archive plan|run|submit|merge|report|status: an archive on a cluster, shard by shard
 // (docs/archive.md).
 #include <algorithm>
 
@@ -56,7 +56,12 @@ Status run_shard(const Options& options, Context& context) {
   StopRequest stop;
   how.stop = [&stop] { return stop.requested(); };
   how.software = station::software_and_build();
-  how.progress = show_in(progress, context, fmt::format("shard {}", options.shard));
+  how.progress = [&](const repair::RepairProgress& done, std::size_t files) {
+    if (!progress) {
+      progress.emplace(context, fmt::format("shard {}", options.shard), files);
+    }
+    progress->at(done.files, done.bytes, done.failed);
+  };
   const auto result = repair::run_shard(context.env, folder, plan, how);
   progress.reset();
   if (!result) {
@@ -125,6 +130,8 @@ Json shards_to_json(const MergedArchive& merged, const Rerun& rerun) {
          {"state", repair::to_string(shard.state)},
          {"files", shard.files},
          {"files_done", shard.files_done},
+         {"bytes", shard.bytes},
+         {"bytes_done", shard.bytes_done},
          {"failed", shard.failed},
          {"rerun", wants_rerun(shard) ? Json(rerun.shard(shard.shard)) : Json(nullptr)}});
   }
@@ -308,26 +315,29 @@ Status run_status(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const auto merged, standing(context.env.files, folder, plan, failed));
   context.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
   std::map<repair::ShardState, std::size_t> counts;
-  std::size_t files_done = 0;
+  repair::RepairProgress done;
   std::string text;
   for (const MergedShard& shard : merged.shards) {
     ++counts[shard.state];
-    files_done += shard.files_done;
-    text += fmt::format("shard {:05}  {:<8} {} of {} files{}\n", shard.shard,
+    done.files += shard.files_done;
+    done.bytes += shard.bytes_done;
+    done.failed += shard.failed;
+    text += fmt::format("shard {:05}  {:<8} {} of {} files, {} of {}{}\n", shard.shard,
                         repair::to_string(shard.state), shard.files_done, shard.files,
+                        bytes_text(shard.bytes_done), bytes_text(shard.bytes),
                         shard.failed > 0 ? fmt::format(", {} failed", shard.failed) : "");
   }
   if (!options.json) {
     context.out << text;
-    context.people << fmt::format("{} of {} shards, {} of {} files done\n",
-                                  counts[repair::ShardState::done], plan.shards.size(), files_done,
-                                  plan.files());
+    context.people << fmt::format("{} of {} shards, {} of {} files, {} of {} done, {} failed\n",
+                                  counts[repair::ShardState::done], plan.shards.size(), done.files,
+                                  plan.files(), bytes_text(done.bytes), bytes_text(plan.bytes()),
+                                  done.failed);
     return {};
   }
-  Json summary = {{"files", plan.files()},
-                  {"files_done", files_done},
-                  {"failed", failed.size()},
-                  {"refused", plan.refused.size()},
+  Json summary = {{"files", plan.files()},       {"files_done", done.files},
+                  {"bytes", plan.bytes()},       {"bytes_done", done.bytes},
+                  {"failed", done.failed},       {"refused", plan.refused.size()},
                   {"shards", plan.shards.size()}};
   for (const auto state :
        {repair::ShardState::done, repair::ShardState::running, repair::ShardState::partly,
@@ -379,6 +389,15 @@ void add_archive(CLI::App& app, Context& context) {
   run.add_option("-o,--output", of_run.output, "the folder for repaired files")->required();
   add_redo_option(run, of_run.redo_outdated);
   run.add_flag("--dry-run", of_run.dry_run, "compute everything, write nothing");
+  auto [submit, of_submit] =
+      add("submit", "hand the plan to Slurm: its shards, and the merge behind them",
+          run_archive_submit);
+  submit.add_option("-o,--output", of_submit.output, "the folder for repaired files")->required();
+  submit
+      .add_option("--sbatch", of_submit.sbatch,
+                  "an option for sbatch, such as --sbatch=--partition=long; may be repeated")
+      ->allow_extra_args(false);
+  submit.add_flag("--dry-run", of_submit.dry_run, "print the commands, submit nothing");
   auto [merge, of_merge] =
       add("merge", "the answers of all shards as one; adds them to the store", run_merge);
   merge.add_option("--store", of_merge.sources.store,

@@ -24,6 +24,7 @@ struct ArchiveOptions {
   repair::ArchiveDraft draft;  // as far as the options describe it
   std::size_t shard = 0;
   unsigned jobs = 0;
+  std::vector<std::string> sbatch;  // options for it
   bool verify = false;
   bool redo_outdated = false;
   bool dry_run = false;
@@ -39,5 +40,6 @@ std::function<void(std::size_t, std::size_t)> show_in(std::optional<Progress>& p
                                                       Context& context, std::string doing);
 
 Status run_archive_plan(const ArchiveOptions& options, Context& context);
+Status run_archive_submit(const ArchiveOptions& options, Context& context);
 
 }  // namespace sixpoint::cli

@@ -102,7 +102,7 @@ void print_plan(const Options& options, const PlannedArchive& planned, Context& 
   }
   const std::string folder = repair::shell_word(options.output);
   context.people << fmt::format(
-      "with Slurm:     bash {0}/submit.sh OUTDIR\n"
+      "with Slurm:     sixpoint archive submit {0} -o OUTDIR\n"
       "on one machine: bash {0}/run_all.sh OUTDIR\n",
       folder);
 }

@@ -76,8 +76,8 @@ std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files, const 
     progress.reset();  // takes its line away
     progress.emplace(context, doing, count);
   };
-  watch.at = [&](std::size_t done) {
-    progress->at(done);
+  watch.at = [&](const repair::RepairProgress& done) {
+    progress->at(done.files, done.bytes, done.failed);
     stopping = stop.requested();
   };
   return repair::repair_files(context.env, files, how, finder, pool, watch, &stopping);

@@ -160,6 +160,9 @@ constexpr CommandExamples kExamples[] = {
     {"archive run", {
         "sixpoint archive run plan --shard 0 -o repaired-archive",
         "sixpoint archive run plan --shard 1 -o repaired-archive --json"}},
+    {"archive submit", {
+        "sixpoint archive submit plan -o repaired-archive --dry-run",
+        "sixpoint archive submit plan -o repaired-archive --dry-run --sbatch=--partition=long"}},
     {"archive status", {
         "sixpoint archive status plan",
         "sixpoint archive status plan --json"}},

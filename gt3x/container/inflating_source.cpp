@@ -21,9 +21,9 @@ class Inflate final : public ByteSource {
   // `packed_size` may be wrong; 0 where nothing says it.
   Inflate(std::unique_ptr<ByteSource> packed, std::uint64_t packed_size)
       : packed_(std::move(packed)),
-        piece_(packed_size == 0 ? kPackedPiece
-                                : static_cast<std::size_t>(
-                                      std::min<std::uint64_t>(packed_size, kPackedPiece))),
+        piece_(packed_size == 0
+                   ? kPackedPiece
+                   : static_cast<std::size_t>(std::min<std::uint64_t>(packed_size, kPackedPiece))),
         state_(new inflate_state) {
     isal_inflate_init(state_.get());
     state_->crc_flag = ISAL_DEFLATE;

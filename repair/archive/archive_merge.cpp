@@ -51,17 +51,21 @@ Result<MergedArchive> merge_archive(FileSystem& files, const std::string& folder
     MergedShard shard;
     shard.shard = k;
     shard.files = plan.shards[k].files;
+    shard.bytes = plan.shards[k].bytes;
     auto result = read_result(files, folder, plan, k);
     if (!result) {
       const ShardStanding standing = standing_of(files, folder, plan, k);
       // It may have come to its end since the line before.
       shard.state = standing.state == ShardState::done ? ShardState::running : standing.state;
-      shard.files_done = standing.files_done;
+      shard.files_done = standing.done.files;
+      shard.bytes_done = standing.done.bytes;
+      shard.failed = standing.done.failed;
       merged.shards.push_back(shard);
       continue;
     }
     shard.state = ShardState::done;
     shard.files_done = shard.files;
+    shard.bytes_done = shard.bytes;
     for (RepairReport& report : result->files) {
       if (options.verify) {
         verify(files, report);

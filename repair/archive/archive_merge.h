@@ -26,7 +26,9 @@ struct MergedShard {
   ShardState state = ShardState::missing;
   std::size_t files = 0;
   std::size_t files_done = 0;
-  std::size_t failed = 0;  // of a shard that is done: files that the next run tries again
+  std::uint64_t bytes = 0;  // of the inputs
+  std::uint64_t bytes_done = 0;
+  std::size_t failed = 0;  // files that the next run tries again
 
   bool complete() const { return state == ShardState::done; }
 };

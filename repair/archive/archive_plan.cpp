@@ -231,9 +231,23 @@ void ask_units(Env& env, const ConstantsSnapshot* snapshot, const ForEach& for_e
   ConstantsFinderOptions options = finder_options(repair, snapshot);
   options.unit = &pool;
   ConstantsFinder finder(env, std::move(options));
+  const auto input = [&](std::size_t i) { return planned.plan.input_of(planned.files[i]); };
+  std::vector<std::string> may_help(planned.files.size());  // serial numbers
   for_each(planned.files.size(), [&](std::size_t i) {
-    collect(env.files, planned.plan.input_of(planned.files[i]), finder, repair.options.still);
+    may_help[i] = collect(env.files, input(i), finder, repair.options.still);
   });
+  std::vector<std::size_t> helpers;
+  const auto units = pool.units_that_lack();
+  for (std::size_t i = 0; i < may_help.size(); ++i) {
+    if (units.contains(may_help[i])) {
+      helpers.push_back(i);
+    }
+  }
+  if (!helpers.empty()) {
+    for_each(helpers.size(), [&](std::size_t k) {
+      collect_helper(env.files, input(helpers[k]), pool, repair.options.still);
+    });
+  }
   pool.close(env.clock.now());
   planned.units = pool.answers();
 }

@@ -168,9 +168,8 @@ class ShardRun {
 
   Status repair_files(const ShardFolder& shard, ShardResult& result) {
     auto reports = done_before(shard);
-    auto done = static_cast<std::size_t>(
-        std::ranges::count_if(reports, [](const auto& report) { return report.has_value(); }));
-    result.done_before = done;
+    RepairProgress done = progress_of(shard.manifest(), reports);
+    result.done_before = done.files;
     ShardReports fresh{options_.output_folder, options_.software, {}};
     std::size_t next_part = number_after(shard.parts());
     auto since = env_.clock.elapsed();
@@ -184,9 +183,9 @@ class ShardRun {
         break;
       }
       reports[i] = repair_one(shard, i);
-      ++done;
+      add_to(done, shard.manifest()[i], *reports[i]);
       fresh.reports.emplace_back(i, *reports[i]);
-      if (!options_.dry_run && done < reports.size() &&
+      if (!options_.dry_run && done.files < reports.size() &&
           (fresh.reports.size() >= options_.checkpoint_files ||
            env_.clock.elapsed() - since >= options_.checkpoint_after)) {
         SIXPOINT_CHECK(write_part(shard, next_part++, fresh));

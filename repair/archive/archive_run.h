@@ -41,7 +41,9 @@ struct ShardRunOptions {
   LinkMaker make_link = [](const auto&, const auto& to, LinkKind) -> Status {
     return fail(ErrorCode::cannot_create, "this run makes no links", to);
   };
-  std::function<void(std::size_t done, std::size_t files)> progress = [](auto, auto) {};
+  // Of the shard, with what earlier runs did.
+  std::function<void(const RepairProgress& done, std::size_t files)> progress =
+      [](const RepairProgress&, auto) {};
 };
 
 // cannot_create where another run holds the shard; usage where the output folder is another one

@@ -31,7 +31,7 @@ std::string slurm_script(const ArchiveScripts& scripts) {
   return fmt::format(R"(#!/bin/bash
 # Repairs this plan's files as a Slurm job array, one shard per task:  sbatch run.sbatch OUTDIR
 # What is done is not done again, and a task that was killed goes on where it was: submit it again
-# as often as you like. Then: sixpoint archive merge PLANDIR
+# as often as you like. Then: sixpoint archive merge PLANDIR. 'sixpoint archive submit' does both.
 #SBATCH --job-name=sixpoint
 #SBATCH --array=0-{2}{3}
 #SBATCH --ntasks=1
@@ -54,36 +54,38 @@ exit "$status"
                      scripts.at_once > 0 ? fmt::format("%{}", scripts.at_once) : "");
 }
 
-std::string submit_script(const ArchiveScripts& scripts) {
-  return fmt::format(R"(#!/bin/bash
-# Submits this plan to Slurm:  bash submit.sh OUTDIR [option of sbatch...]
-# The array first; the merge waits until every task of it has ended, however it ended, and writes
-# its answer into merge.json and merge.log in the plan's folder. Prints both job numbers.
-set -euo pipefail
-plan={0}
-program=${{SIXPOINT:-{1}}}
-output=${{1:?'usage: bash submit.sh OUTDIR [option of sbatch...]'}}
-shift
-array=$(sbatch --parsable --output="$plan/results/slurm-%A-%a.log" "$@" "$plan/run.sbatch" "$output")
-array=${{array%%;*}}
-merge=$(sbatch --parsable --job-name=sixpoint-merge --mem=1G --dependency="afterany:$array"   --output="$plan/merge.log" "$@" "$plan/merge.sbatch" "$program")
-echo "array $array"
-echo "merge ${{merge%%;*}}"
-)",
-                     shell_word(scripts.folder), shell_word(scripts.program));
+std::vector<std::string> array_command(const std::string& folder, const std::string& output,
+                                       const std::vector<std::string>& more) {
+  std::vector<std::string> words = {"sbatch", "--parsable",
+                                    "--output=" + folder + "/results/slurm-%A-%a.log"};
+  words.insert(words.end(), more.begin(), more.end());
+  words.insert(words.end(), {folder + "/run.sbatch", output});
+  return words;
+}
+
+std::vector<std::string> merge_command(const std::string& folder, const std::string& job,
+                                       const std::vector<std::string>& more) {
+  std::vector<std::string> words = {"sbatch", "--parsable", "--dependency=afterany:" + job,
+                                    "--output=" + folder + "/merge.log"};
+  words.insert(words.end(), more.begin(), more.end());
+  words.push_back(folder + "/merge.sbatch");
+  return words;
 }
 
 std::string merge_script(const ArchiveScripts& scripts) {
   return fmt::format(R"(#!/bin/bash
-# Puts the results together, as a job behind the array: submitted by submit.sh.
+# Puts the results together, as a job behind the array: 'sixpoint archive submit' submits both.
+#SBATCH --job-name=sixpoint-merge
+#SBATCH --mem=1G
 set -uo pipefail
 plan={0}
-"${{1:?'usage: sbatch merge.sbatch PROGRAM'}}" archive merge "$plan" --json >"$plan/merge.json.part"
+program=${{SIXPOINT:-{1}}}
+"$program" archive merge "$plan" --json >"$plan/merge.json.part"
 status=$?
 mv "$plan/merge.json.part" "$plan/merge.json"
 exit "$status"
 )",
-                     shell_word(scripts.folder));
+                     shell_word(scripts.folder), shell_word(scripts.program));
 }
 
 std::string shell_script(const ArchiveScripts& scripts) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace sixpoint::repair {
 
@@ -17,11 +18,16 @@ struct ArchiveScripts {
 };
 
 std::string slurm_script(const ArchiveScripts& scripts);
-// Submits the array, and the merge as a job that waits for it. Prints the two job numbers.
-std::string submit_script(const ArchiveScripts& scripts);
-// The job that waits.
+// The job that waits for the array.
 std::string merge_script(const ArchiveScripts& scripts);
 std::string shell_script(const ArchiveScripts& scripts);
+
+// The command lines that submit the array, and the merge as a job that waits until every task of
+// the array `job` has ended, however it ended. `more` are options of sbatch for both.
+std::vector<std::string> array_command(const std::string& folder, const std::string& output,
+                                       const std::vector<std::string>& more);
+std::vector<std::string> merge_command(const std::string& folder, const std::string& job,
+                                       const std::vector<std::string>& more);
 
 // One argument of a shell command line, in quotes where it needs them.
 std::string shell_word(const std::string& text);

@@ -238,7 +238,6 @@ Status write_plan(Env& env, const std::string& folder, const ArchiveDraft& draft
   }
   const ArchiveScripts scripts{folder, draft.program, plan.shards.size(), draft.at_once};
   SIXPOINT_CHECK(write_file(files, folder + "/run.sbatch", slurm_script(scripts)));
-  SIXPOINT_CHECK(write_file(files, folder + "/submit.sh", submit_script(scripts)));
   SIXPOINT_CHECK(write_file(files, folder + "/merge.sbatch", merge_script(scripts)));
   SIXPOINT_CHECK(write_file(files, folder + "/run_all.sh", shell_script(scripts)));
   Json json = to_json(plan);

@@ -9,7 +9,7 @@
 //     constants.jsonl     what the store held, where there was one
 //     units.jsonl         what the files of each unit give together, where they are asked
 //     run.sbatch          the shards as a Slurm job array
-//     submit.sh           submits run.sbatch and, behind it, merge.sbatch
+//     merge.sbatch        the merge, as a job behind the array
 //     run_all.sh          the shards on this machine
 //     results/            what the shards answer (shard_results.h)
 //

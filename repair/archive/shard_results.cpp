@@ -199,16 +199,31 @@ Result<ShardResult> read_result(FileSystem& files, const std::string& folder,
   return result;
 }
 
+void add_to(RepairProgress& done, const ArchiveFile& file, const RepairReport& report) {
+  ++done.files;
+  done.bytes += file.size;
+  done.failed += report.status == RepairStatus::failed ? 1 : 0;
+}
+
+RepairProgress progress_of(const std::vector<ArchiveFile>& manifest,
+                           const std::vector<std::optional<RepairReport>>& reports) {
+  RepairProgress done;
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    if (reports[i]) {
+      add_to(done, manifest[i], *reports[i]);
+    }
+  }
+  return done;
+}
+
 ShardStanding standing_of(FileSystem& files, const std::string& folder, const ArchivePlan& plan,
                           std::size_t shard) {
   const auto opened = ShardFolder::open(files, folder, plan, shard);
   if (!opened) {
-    return {ShardState::damaged};
+    return {ShardState::damaged, {}};
   }
-  const auto known = opened->known();
   ShardStanding standing;
-  standing.files_done = static_cast<std::size_t>(
-      std::ranges::count_if(known, [](const auto& one) { return one.has_value(); }));
+  standing.done = progress_of(opened->manifest(), opened->known());
   if (files.info(opened->lock_path())) {
     const auto lock = files.lock(opened->lock_path());
     if (lock && *lock == nullptr) {
@@ -221,7 +236,7 @@ ShardStanding standing_of(FileSystem& files, const std::string& folder, const Ar
     standing.state = ShardState::done;
   } else if (whole.error().code != ErrorCode::no_input) {
     standing.state = ShardState::damaged;
-  } else if (standing.files_done > 0) {
+  } else if (standing.done.files > 0) {
     standing.state = ShardState::partly;
   }
   return standing;

@@ -45,10 +45,15 @@ std::string_view to_string(ShardState state);
 
 struct ShardStanding {
   ShardState state = ShardState::missing;
-  std::size_t files_done = 0;
+  RepairProgress done;  // as it was last written down
 };
 ShardStanding standing_of(FileSystem& files, const std::string& folder, const ArchivePlan& plan,
                           std::size_t shard);
+
+// One file more, and of all files that have a report.
+void add_to(RepairProgress& done, const ArchiveFile& file, const RepairReport& report);
+RepairProgress progress_of(const std::vector<ArchiveFile>& manifest,
+                           const std::vector<std::optional<RepairReport>>& reports);
 
 // Reports of some files of a shard, as they are written.
 struct ShardReports {

@@ -46,11 +46,16 @@ class Run {
  private:
   RepairReport repair_one(const NamedFile& file, const RepairOptions& how) {
     if (file.error) {
+      ++failed_;
       return failed_report(file.path, *file.error);
     }
     const std::string output = options_.folder + "/" + file.relative;
     RepairReport report = repair_file(env_, file.path, output, source_, how);
     link_unaffected(env_.files, options_.make_link, options_.link, output, report);
+    if (const auto info = env_.files.info(file.path)) {
+      bytes_ += info->size;
+    }
+    failed_ += report.status == RepairStatus::failed ? 1 : 0;
     return report;
   }
 
@@ -63,20 +68,27 @@ class Run {
     return how;
   }
 
+  void begin(const char* doing, std::size_t files) {
+    bytes_ = 0;
+    failed_ = 0;
+    if (watch_.begin) {
+      watch_.begin(doing, files);
+    }
+  }
+
+  void at(std::size_t done) {
+    if (watch_.at) {
+      watch_.at({done, bytes_, failed_});
+    }
+  }
+
   void pass(const char* doing, const std::vector<std::size_t>& which) {
     const RepairOptions how = options_of_file(which.size());
-    if (watch_.begin) {
-      watch_.begin(doing, which.size());
-    }
+    begin(doing, which.size());
     for_each_job(
         which.size(), options_.jobs,
         [&](std::size_t k) { answers_[which[k]] = repair_one(files_[which[k]], how); },
-        [&](std::size_t done) {
-          if (watch_.at) {
-            watch_.at(done);
-          }
-        },
-        stop_);
+        [&](std::size_t done) { at(done); }, stop_);
   }
 
   std::vector<std::size_t> files_that_wait() const {
@@ -97,7 +109,33 @@ class Run {
     }
   }
 
+  // Files that need no repair, of units that lack constants.
+  void ask_helpers() {
+    const auto units = pool_.units_that_lack();
+    std::vector<std::size_t> helpers;
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      if (answers_[i] && answers_[i]->status == RepairStatus::not_affected &&
+          units.contains(answers_[i]->serial)) {
+        helpers.push_back(i);
+      }
+    }
+    if (helpers.empty()) {
+      return;
+    }
+    begin("reading the units' other files", helpers.size());
+    for_each_job(
+        helpers.size(), options_.jobs,
+        [&](std::size_t k) {
+          collect_helper(env_.files, files_[helpers[k]].path, pool_, options_.repair.still);
+        },
+        [&](std::size_t done) { at(done); }, stop_);
+  }
+
   void ask_units(const std::vector<std::size_t>& waiting) {
+    ask_helpers();
+    if (stop_ != nullptr && *stop_) {
+      return forget(waiting);
+    }
     pool_.close(env_.clock.now());
     std::vector<std::size_t> again;
     for (const std::size_t i : waiting) {
@@ -120,6 +158,9 @@ class Run {
   const RepairWatch& watch_;
   const std::atomic<bool>* stop_;
   std::vector<std::optional<RepairReport>> answers_;
+  // Of the pass that runs.
+  std::atomic<std::uint64_t> bytes_{0};
+  std::atomic<std::size_t> failed_{0};
 };
 
 }  // namespace

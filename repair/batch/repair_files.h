@@ -38,7 +38,7 @@ struct RepairFilesOptions {
 // Called on the calling thread; both may be empty.
 struct RepairWatch {
   std::function<void(const char* doing, std::size_t files)> begin;  // a pass over so many files
-  std::function<void(std::size_t done)> at;                         // jobs.h
+  std::function<void(const RepairProgress&)> at;                    // as jobs.h calls
 };
 
 // Every file by itself, then those that wait for the other files of their unit, which `pool`

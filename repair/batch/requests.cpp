@@ -168,8 +168,9 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   options.folder = request.folder;
   options.repair = request.repair;
   options.jobs = request.jobs;
-  const auto reports =
-      repair_files(env, named, options, finder, pool, {{}, watching.watch}, watching.stop);
+  const auto reports = repair_files(
+      env, named, options, finder, pool,
+      {{}, [&](const RepairProgress& done) { watching.watch(done.files); }}, watching.stop);
   UnitTable table;
   Json json;
   json["files"] = Json::array();

@@ -33,6 +33,13 @@ enum class RepairStatus {
 std::string_view to_string(RepairStatus status);
 std::optional<RepairStatus> parse_repair_status(std::string_view text);
 
+// How far a run over many files is.
+struct RepairProgress {
+  std::size_t files = 0;
+  std::uint64_t bytes = 0;  // of the inputs that are done
+  std::size_t failed = 0;   // of the files
+};
+
 struct RepairReport {
   std::string input;
   std::string output;  // empty where none was written

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -189,7 +191,9 @@ void take_pooled(const std::vector<UnitFile>& files, UtcTime now, UnitAnswer& an
 
 std::string_view to_string(UnitRow row) { return kRowNames[static_cast<std::size_t>(row)]; }
 
-UnitAnswer unit_answer(std::vector<UnitFile> files, UtcTime now) {
+namespace {
+
+UnitAnswer answer_of_all(std::vector<UnitFile> files, UtcTime now) {
   put_in_order(files);
   UnitAnswer answer;
   answer.files = files.size();
@@ -219,6 +223,27 @@ UnitAnswer unit_answer(std::vector<UnitFile> files, UtcTime now) {
     answer.why = "none of its files has a still period";
   } else {
     take_pooled(files, now, answer);
+  }
+  return answer;
+}
+
+}  // namespace
+
+bool may_help(const FileFacts& facts) {
+  return triage(facts).verdict == Verdict::not_affected &&
+         filter_in_force(facts) == calib::FilterConfiguration::current;
+}
+
+UnitAnswer unit_answer(std::vector<UnitFile> files, UtcTime now) {
+  std::vector<UnitFile> affected;
+  std::ranges::copy_if(files, std::back_inserter(affected), std::not_fn(&UnitFile::only_helps));
+  const bool helped = affected.size() < files.size() && !affected.empty();
+  UnitAnswer answer = answer_of_all(std::move(affected), now);
+  if (helped && !answer.own_suffices &&
+      (answer.row == UnitRow::alone || answer.row == UnitRow::missing)) {
+    if (UnitAnswer all = answer_of_all(std::move(files), now); all.row == UnitRow::pooled) {
+      return all;
+    }
   }
   return answer;
 }

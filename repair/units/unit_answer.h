@@ -24,6 +24,16 @@
 // | ... they are verified                                  | pooled        | of all together    |
 // | otherwise                                              | missing       | none               |
 //
+// Files that only help (may_help(): not affected, but recorded under the same filter configuration,
+// `current`, by a unit that was calibrated again later) are asked last, and can take nothing away:
+//
+// | the affected files by themselves      | with those that only help | answer |
+// |---------------------------------------|---------------------------|----------------------------|
+// | have verified constants of their own, | not looked at             | that of the affected files
+// | | are pooled, or contradict one another |                           | | | one, or missing |
+// pooled                    | pooled, of all             | | one, or missing | otherwise | that of
+// the affected files |
+//
 // Own constants agree as calib/application/agreement.h has it. A file's distance is the root mean
 // square over its directions of |magnitude - 1 g|. A file that is there twice, under whatever name,
 // counts once. The order in which files are given makes no difference.
@@ -41,6 +51,7 @@
 #include "base/time.h"
 #include "calib/constants.h"
 #include "calib/still_blocks.h"
+#include "repair/triage/triage.h"
 
 namespace sixpoint::repair {
 
@@ -56,6 +67,7 @@ struct UnitFile {
   std::vector<calib::StillBlock> blocks;      // mean_lsb counts; mean_g is made anew
   std::optional<calib::ConstantsRecord> own;  // verified
   bool is_calibration_file = false;
+  bool only_helps = false;  // not affected: it needs no constants itself
 };
 
 enum class UnitRow { alone, sibling, pooled, contradiction, missing };
@@ -70,6 +82,19 @@ struct UnitAnswer {
   // By the file's own constants, or where there are new ones by these: "+x" ... "-z".
   std::vector<std::string> missing_sides;
 };
+
+// Whether the still periods of a file that is not affected tell about the sensor as the unit's
+// affected files saw it. Constants belong to a filter configuration: the same sensor has others
+// under `legacy`, so a file of firmware below 1.4.0 or from 1.8.0 on of a unit calibrated before
+// 2014-03-24 must not be asked.
+//
+// | verdict      | filter in force | may help |
+// |--------------|-----------------|----------|
+// | not_affected | current         | yes      |
+// | not_affected | legacy          | no       |
+// | not_affected | cannot be told  | no       |
+// | any other    | any             | no       |
+bool may_help(const FileFacts& facts);
 
 UnitAnswer unit_answer(std::vector<UnitFile> files, UtcTime now);
 

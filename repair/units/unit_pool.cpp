@@ -136,7 +136,8 @@ std::vector<UnitPool::Kept> UnitPool::kept_of(const Survey& survey,
 }
 
 UnitFile UnitPool::expanded(const std::string& serial, const File& file) {
-  UnitFile out{file.path, serial, file.file_constants, {}, file.own, file.is_calibration_file};
+  UnitFile out{file.path,      serial, file.file_constants, {}, file.own, file.is_calibration_file,
+               file.only_helps};
   for (const Kept& kept : file.blocks) {
     calib::StillBlock block;
     block.start_time_s = kept.start_time_s;
@@ -153,6 +154,29 @@ UnitFile UnitPool::expanded(const std::string& serial, const File& file) {
 
 void UnitPool::add(const std::string& path, const Survey& survey,
                    const calib::ConstantsRecord* record) {
+  keep(path, survey, record, /*only_helps=*/false);
+}
+
+void UnitPool::add_helper(const std::string& path, const Survey& survey) {
+  keep(path, survey, nullptr, /*only_helps=*/true);
+}
+
+std::set<std::string> UnitPool::units_that_lack() const {
+  const std::lock_guard lock(mutex_);
+  std::set<std::string> units;
+  for (const auto& [path, serial] : waiting_) {
+    units.insert(serial);
+  }
+  std::erase_if(units, [&](const std::string& serial) {
+    const auto files = units_.find(serial);
+    return files == units_.end() ||
+           std::ranges::any_of(files->second, [](const File& file) { return !!file.own; });
+  });
+  return units;
+}
+
+void UnitPool::keep(const std::string& path, const Survey& survey,
+                    const calib::ConstantsRecord* record, bool only_helps) {
   if (survey.constants.empty()) {
     return;
   }
@@ -160,8 +184,12 @@ void UnitPool::add(const std::string& path, const Survey& survey,
   if (!constants) {
     return;
   }
-  File file{path, *constants, kept_of(survey, *constants), std::nullopt,
-            recording_kind(survey) == "calibration_file"};
+  File file{path,
+            *constants,
+            kept_of(survey, *constants),
+            std::nullopt,
+            recording_kind(survey) == "calibration_file",
+            only_helps};
   if (record != nullptr) {
     file.own = *record;
   }
@@ -224,17 +252,27 @@ bool UnitPool::contradicts(const std::string& path) const {
   return answer != nullptr && answer->row == UnitRow::contradiction;
 }
 
-void collect(FileSystem& files, const std::string& path, ConstantsSource& finder,
-             const calib::StillBlockOptions& still) {
+std::string collect(FileSystem& files, const std::string& path, ConstantsSource& finder,
+                    const calib::StillBlockOptions& still) {
   const auto facts = facts_of(files, path);
   if (!facts || triage(*facts).verdict != Verdict::affected) {
-    return;
+    return facts && may_help(*facts) ? facts->serial : std::string();
   }
   const auto surveyed = survey(files, path, still);
   // What follows is what repair_file() asks before it looks for constants.
   if (surveyed && !surveyed->already_repaired && !surveyed->constants_problem &&
       triage(surveyed->facts).verdict == Verdict::affected) {
     static_cast<void>(finder.choose(path, *surveyed));
+  }
+  return {};
+}
+
+void collect_helper(FileSystem& files, const std::string& path, UnitPool& pool,
+                    const calib::StillBlockOptions& still) {
+  const auto surveyed = survey(files, path, still);
+  if (surveyed && !surveyed->already_repaired && !surveyed->constants_problem &&
+      may_help(surveyed->facts)) {
+    pool.add_helper(path, *surveyed);
   }
 }
 

@@ -1,5 +1,6 @@
 // The still periods of the files of a run, by unit, and what they give together. Two passes: the
 // first asks every file by itself and collects; after close() the files that wait are asked again.
+// Between them collect_helper() reads files that are not affected, of units that lack constants.
 //
 //   UnitPool pool;
 //   ConstantsFinderOptions options;
@@ -18,6 +19,7 @@
 
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -64,6 +66,10 @@ class UnitPool final : public UnitConstants {
  public:
   void add(const std::string& path, const Survey& survey,
            const calib::ConstantsRecord* record) override;
+  // A file that needs no constants itself, but may_help() (unit_answer.h). Before close().
+  void add_helper(const std::string& path, const Survey& survey);
+  // Serial numbers of units whose files wait and have no constants of their own. Before close().
+  std::set<std::string> units_that_lack() const;
   // Before close(): nothing is chosen, and the file waits.
   void ask(const std::string& path, const Survey& survey, ConstantsChoice& choice) override;
 
@@ -94,7 +100,10 @@ class UnitPool final : public UnitConstants {
     std::vector<Kept> blocks;
     std::optional<calib::ConstantsRecord> own;
     bool is_calibration_file = false;
+    bool only_helps = false;
   };
+  void keep(const std::string& path, const Survey& survey, const calib::ConstantsRecord* record,
+            bool only_helps);
   static std::vector<Kept> kept_of(const Survey& survey, const calib::Calibration& constants);
   static UnitFile expanded(const std::string& serial, const File& file);
 
@@ -107,7 +116,12 @@ class UnitPool final : public UnitConstants {
 
 // The first pass over one file for a plan: headers first, and of an affected file its still periods
 // and `finder`'s answer, which collects. What cannot be read is left for the repair to report.
-void collect(FileSystem& files, const std::string& path, ConstantsSource& finder,
-             const calib::StillBlockOptions& still = {});
+// Returns the serial number of a file that is not affected but may_help(), empty for all others.
+std::string collect(FileSystem& files, const std::string& path, ConstantsSource& finder,
+                    const calib::StillBlockOptions& still = {});
+
+// The second pass: the still periods of a file that may_help() a unit that lacks constants.
+void collect_helper(FileSystem& files, const std::string& path, UnitPool& pool,
+                    const calib::StillBlockOptions& still = {});
 
 }  // namespace sixpoint::repair

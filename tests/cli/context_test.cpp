@@ -67,6 +67,40 @@ TEST(Context, ProgressIsALineAMinuteInALog) {
   EXPECT_EQ(out.str(), "");
 }
 
+TEST(Context, ProgressSaysBytesAndFailures) {
+  MemoryEnv memory;
+  std::ostringstream out;
+  std::ostringstream people;
+  std::istringstream in;
+  Context context{memory.env, out, people, in};
+  {
+    Progress log(context, "repairing", 100);
+    memory.clock.sleep(std::chrono::minutes(1));
+    log.at(30, 1'234'567'890, 2);
+    EXPECT_EQ(people.str(),
+              "repairing: 30 of 100 (30 %), 1.2 GB, 2 failed, 0.5 a second, 3 min left\n");
+  }
+  people.str("");
+  context.people_at_terminal = true;
+  Progress bar(context, "repairing", 100);
+  memory.clock.sleep(std::chrono::minutes(1));
+  bar.at(30, 45'000'000, 0);
+  EXPECT_THAT(people.str(), testing::EndsWith(" 30 %  45 MB  0.5 a second  02:20 left"));
+  bar.at(30, 45'000'000, 1);
+  EXPECT_THAT(people.str(), testing::EndsWith(" 30 %  45 MB  1 failed  0.5 a second  02:20 left"))
+      << "a failure is said at once";
+}
+
+TEST(Context, BytesInThreeDigits) {
+  EXPECT_EQ(bytes_text(0), "0 bytes");
+  EXPECT_EQ(bytes_text(999), "999 bytes");
+  EXPECT_EQ(bytes_text(1000), "1.0 kB");
+  EXPECT_EQ(bytes_text(12'345), "12 kB");
+  EXPECT_EQ(bytes_text(999'600), "1.0 MB");
+  EXPECT_EQ(bytes_text(4'000'000'000), "4.0 GB");
+  EXPECT_EQ(bytes_text(123'000'000'000'000), "123 TB");
+}
+
 TEST(Context, JsonHasNoNumberThatItCannotWrite) {
   EXPECT_EQ(number(1.5), 1.5);
   EXPECT_TRUE(number(std::numeric_limits<double>::quiet_NaN()).is_null());

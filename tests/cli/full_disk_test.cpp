@@ -4,11 +4,16 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 
 #include <sys/wait.h>
 
+#include "base/random.h"
+#include "base/sha256.h"
 #include "cli/command_fixture.h"
 #include "cli/store_option.h"
+#include "repair/jig_constants.h"
+#include "repair/made_recording.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -160,6 +165,94 @@ TEST_F(FullDisk, LosesNoJigRun) {
     EXPECT_EQ(run({"history", "MOS2A45130007", "--store", store, "--json"}).json()["runs"].size(),
               1U);
   }
+}
+
+class FullDiskOfAnArchive : public FullDisk {
+ protected:
+  static constexpr std::size_t kFiles = 4;
+
+  FullDiskOfAnArchive() {
+    std::filesystem::create_directory(path("archive"));
+    std::ofstream(path("c.json")) << tests::kConstants;
+    Random random(1);
+    for (std::size_t i = 0; i < kFiles; ++i) {
+      tests::MadeRecording made;
+      for (int k = 0; k < 1800; ++k) {
+        made.raw.push_back({static_cast<int>(random.below(700)) - 300,
+                            static_cast<int>(random.below(700)) - 300,
+                            static_cast<int>(random.below(700)) - 300});
+      }
+      EXPECT_TRUE(made.write(posix_env().files, path("archive/") + std::to_string(i) + ".gt3x"));
+    }
+  }
+  // Hashes of the recordings on the disk; nothing may be there that was not put in place.
+  std::map<std::string, std::string> recordings() const {
+    std::map<std::string, std::string> found;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(disk())) {
+      EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();
+      if (entry.path().extension() == ".gt3x") {
+        found[entry.path()] = file_sha256(posix_env().files, entry.path()).value();
+      }
+    }
+    return found;
+  }
+  // `work` on a disk that becomes full in its midst, and once more with space; `begin` comes first.
+  void fill_up(const std::string& work, const std::function<void()>& begin) {
+    int in_its_midst = 0;
+    for (int from = 1; from < kMostWrites; from += 3) {
+      SCOPED_TRACE(from);
+      empty_disk();
+      begin();
+      const int exit_code = run_full(from, work);
+      if (!disk_was_full()) {
+        EXPECT_EQ(exit_code, 0) << people();
+        EXPECT_GE(in_its_midst, 3);
+        return;
+      }
+      EXPECT_EQ(exit_code, 74) << people();
+      EXPECT_NE(people().find("No space left on device"), std::string::npos) << people();
+      const auto before = recordings();
+      in_its_midst += !before.empty() && before.size() < kFiles ? 1 : 0;
+      for (const auto& [name, digest] : before) {
+        EXPECT_EQ(run({"inspect", name}).exit_code, 0) << "every file that is there is whole";
+      }
+      const std::string again =
+          std::string(SIXPOINT_PROGRAM) + " " + work + " >" + path("out") + " 2>" + path("people");
+      ASSERT_EQ(std::system(again.c_str()), 0) << people();
+      const auto after = recordings();
+      EXPECT_EQ(after.size(), kFiles);
+      for (const auto& [name, digest] : before) {
+        EXPECT_EQ(after.at(name), digest) << "what was done is not done again";
+      }
+    }
+    FAIL() << "the work never ended before the disk was full";
+  }
+};
+
+TEST_F(FullDiskOfAnArchive, ARepairGoesOnWhenThereIsSpace) {
+  fill_up("repair " + path("archive") + " -o " + disk() + "/out --jobs 1 --resume --constants " +
+              path("c.json"),
+          [] {});
+}
+
+TEST_F(FullDiskOfAnArchive, AShardGoesOnWhenThereIsSpace) {
+  fill_up("archive run " + path("plan") + " --shard 0 -o " + disk() + "/out", [&] {
+    std::filesystem::remove_all(path("plan"));
+    ASSERT_EQ(run({"archive", "plan", path("archive"), "-o", path("plan"), "--constants",
+                   path("c.json"), "--shards", "1"})
+                  .exit_code,
+              0);
+  });
+}
+
+// The plan's own disk: what was repaired is known by its mark.
+TEST_F(FullDiskOfAnArchive, AShardWhoseResultCannotBeWrittenGoesOn) {
+  fill_up("archive run " + disk() + "/plan --shard 0 -o " + disk() + "/out", [&] {
+    ASSERT_EQ(run({"archive", "plan", path("archive"), "-o", disk() + "/plan", "--constants",
+                   path("c.json"), "--shards", "1"})
+                  .exit_code,
+              0);
+  });
 }
 
 }  // namespace

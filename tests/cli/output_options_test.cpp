@@ -156,6 +156,7 @@ const std::map<std::string, Role>& common_roles() {
                              "--epoch",
                              "--cut",
                              "--link-unaffected",
+                             "--sbatch",
                              "--why"}) {
       roles.emplace(name, Role::no_path);
     }
@@ -183,6 +184,7 @@ const std::map<std::string, Role>& own_roles() {
       {"session from-pcap --output", Role::output},
       {"archive plan --output", Role::folder},
       {"archive run --output", Role::working_folder},
+      {"archive submit --output", Role::working_folder},
       {"gap diagnose --scenario", Role::refused},
       {"gap challenge --labels", Role::output_to_keep},
       {"gap score --labels", Role::input},
@@ -310,6 +312,7 @@ class EveryOutput : public tests::CommandTest {
         {"gap report --output", {"gap", "report", path("bundle"), "--scenario", path("b.json")}},
         {"station --state", {"station", "--port", "0", "--device", "virtual:seed=7"}},
         {"archive run --output", {"archive", "run", path("plan"), "--shard", "0"}},
+        {"archive submit --output", {"archive", "submit", path("plan"), "--dry-run"}},
         {"archive report --output", {"archive", "report", path("plan")}},
         {"scan --units", {"scan", path("archive")}},
         {"gap challenge --export",
@@ -384,7 +387,7 @@ std::map<std::string, std::string> everything_in(const std::filesystem::path& pa
 
 bool has_force(const std::string& option) {
   return option != "repair --output" && option != "archive run --output" &&
-         option != "station --state";
+         option != "archive submit --output" && option != "station --state";
 }
 
 TEST_F(EveryOutput, NothingThatHoldsMeasurementsIsWrittenOver) {

@@ -33,7 +33,7 @@ chmod +x "$scratch/slow"
 export SIXPOINT=$scratch/slow
 data=$scratch/data
 "$2" archive plan "$data/archive" -o "$data/plan" --store "$data/store.db" --shards 6 >/dev/null 2>&1
-jobs=$(bash "$data/plan/submit.sh" "$data/out")
+jobs=$("$2" archive submit "$data/plan" -o "$data/out")
 array=$(sed -n 's/^array //p' <<<"$jobs")
 merge=$(sed -n 's/^merge //p' <<<"$jobs")
 # Shard 1 a second time, at once: the lock lets one of them work, and the other one says so.

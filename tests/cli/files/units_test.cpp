@@ -68,6 +68,24 @@ TEST_F(UnitsCommand, ShardsOfAPlanUseTheSameConstantsAsOneRepair) {
   EXPECT_EQ(run({"archive", "run", plan, "--shard", "0", "-o", out_}).exit_code, 78);
 }
 
+TEST_F(UnitsCommand, FilesAfterALaterCalibrationHelpInARepairAndInAPlan) {
+  auto again = half_sphere(2, -1, 2);
+  again.calibrated = 1'402'000'000;
+  EXPECT_OK(half_sphere(2, 1, 1).write(files_, archive_ + "/up.gt3x"));
+  EXPECT_EQ(run({"repair", archive_, "-o", folder_ / "without"}).exit_code, 1);
+  EXPECT_OK(again.write(files_, archive_ + "/again.gt3x"));
+  const auto answer = run({"repair", archive_, "-o", folder_ / "with", "--json"});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  EXPECT_EQ(answer.json()["summary"]["repaired"], 1);
+  EXPECT_EQ(answer.json()["summary"]["not_affected"], 1);
+  const std::string plan = folder_ / "plan";
+  EXPECT_EQ(run({"archive", "plan", archive_, "-o", plan, "--shards", "2"}).exit_code, 0);
+  for (const char* shard : {"0", "1"}) {
+    EXPECT_EQ(run({"archive", "run", plan, "--shard", shard, "-o", out_}).exit_code, 0);
+  }
+  EXPECT_EQ(run({"archive", "merge", plan, "--json"}).json()["summary"], answer.json()["summary"]);
+}
+
 TEST_F(UnitsCommand, WhatIsMissingStandsInTheTable) {
   EXPECT_OK(half_sphere(2, 1, 1).write(files_, archive_ + "/a.gt3x"));
   EXPECT_OK(half_sphere(2, 1, 2).write(files_, archive_ + "/b.gt3x"));

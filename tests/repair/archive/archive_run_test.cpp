@@ -117,15 +117,21 @@ TEST_F(Archive, WhatAStoppedRunDidIsNotDoneAgain) {
   // Stopped while the ninth file is looked at: eight are written down, two by two.
   struct Stop {};
   ShardRunOptions options = shard(0);
-  options.progress = [](std::size_t done, std::size_t) {
-    if (done == 9) {
+  options.progress = [](const RepairProgress& done, std::size_t) {
+    if (done.files == 9) {
       throw Stop{};
     }
   };
   EXPECT_THROW(static_cast<void>(run_shard(memory.env, "/plan", planned->plan, options)), Stop);
   auto standing = standing_of(memory.files, "/plan", planned->plan, 0);
   EXPECT_EQ(standing.state, ShardState::partly);
-  EXPECT_EQ(standing.files_done, 8U);
+  EXPECT_EQ(standing.done.files, 8U);
+  RepairProgress expected;
+  const auto manifest = read_manifest(memory.files, "/plan", planned->plan, 0).value();
+  for (std::size_t i = 0; i < 8; ++i) {
+    expected.bytes += manifest[i].size;
+  }
+  EXPECT_EQ(standing.done.bytes, expected.bytes);
   EXPECT_FAILS(read_result(memory.files, "/plan", planned->plan, 0), ErrorCode::no_input);
   const auto again = run_shard(memory.env, "/plan", planned->plan, shard(0));
   ASSERT_OK(again);
@@ -134,6 +140,7 @@ TEST_F(Archive, WhatAStoppedRunDidIsNotDoneAgain) {
     failed += again->files[i].status == RepairStatus::failed ? 1 : 0;
   }
   EXPECT_EQ(again->done_before, 8 - failed) << "what failed is tried again";
+  EXPECT_EQ(standing.done.failed, failed) << "status says so before the end";
   standing = standing_of(memory.files, "/plan", planned->plan, 0);
   EXPECT_EQ(standing.state, ShardState::done);
 }
@@ -145,8 +152,8 @@ TEST_F(Archive, TwoRunsOfOneShardAtATimeAreRefused) {
   ASSERT_OK(planned);
   std::size_t refused = 0;
   ShardRunOptions options = shard(0);
-  options.progress = [&](std::size_t done, std::size_t) {
-    if (done == 0) {
+  options.progress = [&](const RepairProgress& done, std::size_t) {
+    if (done.files == 0) {
       const auto other = run_shard(memory.env, "/plan", planned->plan, shard(0));
       EXPECT_FAILS(other, ErrorCode::cannot_create);
       EXPECT_EQ(standing_of(memory.files, "/plan", planned->plan, 0).state, ShardState::running);

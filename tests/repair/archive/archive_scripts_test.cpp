@@ -13,10 +13,18 @@ TEST_F(Archive, ScriptsKeepAnyFolderOneWord) {
   EXPECT_THAT(script, HasSubstr("#SBATCH --array=0-11%5\n"));
   EXPECT_THAT(slurm_script({"/p", "sixpoint", 12, 0}), HasSubstr("#SBATCH --array=0-11\n"));
   const std::string odd = "/it's; rm -rf $HOME";
-  EXPECT_THAT(submit_script({odd, "sixpoint", 12, 0}), HasSubstr("plan=" + shell_word(odd) + "\n"));
   EXPECT_THAT(merge_script({odd, "sixpoint", 12, 0}), HasSubstr("plan=" + shell_word(odd) + "\n"));
-  EXPECT_THAT(submit_script({odd, "sixpoint", 12, 0}),
-              HasSubstr("--dependency=\"afterany:$array\""));
+  EXPECT_THAT(merge_script({"/p", odd, 12, 0}),
+              HasSubstr("program=${SIXPOINT:-" + shell_word(odd) + "}\n"));
+}
+
+TEST_F(Archive, TheMergeWaitsForTheArrayHoweverItEnds) {
+  EXPECT_THAT(array_command("/p q", "/out", {"--partition=long"}),
+              testing::ElementsAre("sbatch", "--parsable", "--output=/p q/results/slurm-%A-%a.log",
+                                   "--partition=long", "/p q/run.sbatch", "/out"));
+  EXPECT_THAT(merge_command("/p", "123", {}),
+              testing::ElementsAre("sbatch", "--parsable", "--dependency=afterany:123",
+                                   "--output=/p/merge.log", "/p/merge.sbatch"));
 }
 
 }  // namespace

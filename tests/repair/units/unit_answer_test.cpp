@@ -191,6 +191,61 @@ TEST_F(Units, AnotherUnitsFileIsHardlyEverPooled) {
   EXPECT_LE(pooled, kTrials / 5);
 }
 
+// The unit came back and was calibrated again: its files after that are right, by other constants.
+MadeRecording calibrated_again(MadeRecording made) {
+  made.calibrated = 1'402'000'000;  // 2014-06-05
+  made.constants = {{310, 300, 300}, {-205, -220, -225}, {55, 40, 35}};
+  return made;
+}
+
+TEST_F(Units, FilesOfTheSameFilterThatAreNotAffectedHelp) {
+  const auto up = file(half_sphere(2, 1, 1), "up.gt3x");
+  auto down = file(calibrated_again(half_sphere(2, -1, 2)), "down.gt3x");
+  down.only_helps = true;
+  ASSERT_FALSE(up.own || down.own);
+  const auto answer = unit_answer({down, up}, kNow);
+  EXPECT_EQ(answer.row, UnitRow::pooled) << answer.why;
+  ASSERT_TRUE(answer.record);
+  EXPECT_LT(error_mg(*answer.record), 5) << "against the constants that the sensor was made with";
+}
+
+TEST_F(Units, FilesThatOnlyHelpTakeNothingAway) {
+  const auto alone = file(half_sphere(2, 1, 1), "a.gt3x");
+  const auto other = file(half_sphere(2, 1, 4), "b.gt3x");
+  const auto down = file(half_sphere(2, -1, 2), "down.gt3x");
+  const auto whole = file(tests::many_sides(), "whole.gt3x");
+  // A sensor that was replaced when the unit came back.
+  auto strange = file(calibrated_again(half_sphere(2, -1, 3, 15, {60, -60, 60})), "new.gt3x");
+  strange.only_helps = true;
+  for (const std::vector<UnitFile>& affected :
+       {std::vector<UnitFile>{alone}, {alone, other}, {alone, down}, {alone, whole}, {whole}}) {
+    auto all = affected;
+    all.push_back(strange);
+    const auto without = unit_answer(affected, kNow);
+    const auto with = unit_answer(all, kNow);
+    EXPECT_EQ(with.row, without.row) << without.why;
+    EXPECT_EQ(with.why, without.why);
+    EXPECT_EQ(with.files, without.files);
+    ASSERT_EQ(with.record.has_value(), without.record.has_value());
+    if (with.record) {
+      EXPECT_EQ(with.record->calibration, without.record->calibration);
+    }
+  }
+  EXPECT_EQ(unit_answer({strange}, kNow).row, UnitRow::alone) << "no file lacks anything";
+}
+
+TEST(MayHelp, FollowsTheTable) {
+  const UtcTime early = from_unix_seconds(1'384'266'733);
+  const UtcTime late = from_unix_seconds(1'402'000'000);
+  EXPECT_TRUE(may_help({"MOS2A45130450", "1.5.0", late})) << "not affected, current";
+  EXPECT_TRUE(may_help({"MOS2A45130450", "1.8.0", late}));
+  EXPECT_FALSE(may_help({"MOS2A45130450", "1.8.0", early})) << "not affected, legacy";
+  EXPECT_FALSE(may_help({"MOS2A45130450", "1.2.0", early}));
+  EXPECT_FALSE(may_help({"MOS2A45130450", "1.8.0", std::nullopt})) << "not said";
+  EXPECT_FALSE(may_help({"NEO1A45130450", "1.5.0", late})) << "no such question";
+  EXPECT_FALSE(may_help({"MOS2A45130450", "1.5.0", early})) << "affected";
+}
+
 TEST_F(Units, SeveralSerialNumbersAreAContradiction) {
   const auto up = file(half_sphere(2, 1, 1), "up.gt3x");
   auto down = file(half_sphere(2, -1, 2), "down.gt3x");

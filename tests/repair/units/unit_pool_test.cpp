@@ -85,13 +85,39 @@ TEST_F(Pool, AnswersComeBackFromDiskAsTheyWere) {
   }
 }
 
+TEST_F(Pool, AFileOfTheSameFilterHelpsAUnitThatLacksConstants) {
+  auto again = half_sphere(2, -1, 3);
+  again.calibrated = 1'402'000'000;  // after the change: not affected, the same filter
+  ASSERT_OK(again.write(memory_.files, "again.gt3x"));
+  ConstantsFinder finder(memory_.env, options_);
+  EXPECT_EQ(collect(memory_.files, "up.gt3x", finder), "") << "it is asked itself";
+  EXPECT_EQ(collect(memory_.files, "again.gt3x", finder), again.serial);
+  EXPECT_THAT(pool_.units_that_lack(), ElementsAre(again.serial));
+  collect_helper(memory_.files, "again.gt3x", pool_);
+  pool_.close(memory_.env.clock.now());
+  ASSERT_TRUE(pool_.has_constants("up.gt3x"));
+  const RepairReport report = repair(finder, "up.gt3x");
+  EXPECT_EQ(report.status, RepairStatus::repaired);
+  EXPECT_LT(*report.still_error_after_mg, 5);
+}
+
+TEST_F(Pool, AUnitWithConstantsOfItsOwnLacksNone) {
+  ASSERT_OK(tests::many_sides().write(memory_.files, "whole.gt3x"));
+  ConstantsFinder finder(memory_.env, options_);
+  collect(memory_.files, "up.gt3x", finder);
+  EXPECT_EQ(pool_.units_that_lack().size(), 1U);
+  collect(memory_.files, "whole.gt3x", finder);
+  EXPECT_THAT(pool_.units_that_lack(), testing::IsEmpty());
+}
+
 TEST_F(Pool, FilesThatAreNotAffectedAreNotCollected) {
   auto other = half_sphere(2, -1, 3);
   other.firmware = "1.8.0";  // another filter
   ASSERT_OK(other.write(memory_.files, "other.gt3x"));
   ConstantsFinder finder(memory_.env, options_);
   collect(memory_.files, "up.gt3x", finder);
-  collect(memory_.files, "other.gt3x", finder);
+  EXPECT_EQ(collect(memory_.files, "other.gt3x", finder), "");
+  collect_helper(memory_.files, "other.gt3x", pool_);
   pool_.close(memory_.env.clock.now());
   ASSERT_EQ(pool_.answers().all().size(), 1U);
   EXPECT_EQ(pool_.answers().all().begin()->second.row, UnitRow::alone);
