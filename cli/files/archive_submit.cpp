@@ -87,8 +87,7 @@ Result<std::string> submit(const Words& words) {
   }
   job = job.substr(0, job.find_first_of(";\n"));
   if (job.empty() || job.find_first_not_of("0123456789") != std::string::npos) {
-    return fail(
-        not_submitted(fmt::format("it answered {} and no job number", printable(job, 60))));
+    return fail(not_submitted(fmt::format("it answered {} and no job number", printable(job, 60))));
   }
   return job;
 }

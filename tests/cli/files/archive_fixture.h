@@ -103,8 +103,7 @@ class ArchiveCommand : public CommandTest {
     ASSERT_FALSE(names.empty());
     for (const std::string& name : names) {
       for (const char* entry : {"log.bin", "info.txt", "extra.bin"}) {
-        EXPECT_EQ(entry_of(files_, got + name, entry),
-                  entry_of(files_, expected + name, entry))
+        EXPECT_EQ(entry_of(files_, got + name, entry), entry_of(files_, expected + name, entry))
             << name << " " << entry;
       }
     }

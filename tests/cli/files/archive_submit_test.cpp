@@ -1,4 +1,5 @@
-// archive beside Slurm and on disks that refuse: what it hands to sbatch, and trees that are read only.
+// archive beside Slurm and on disks that refuse: what it hands to sbatch, and trees that are read
+// only.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -63,12 +64,13 @@ TEST_F(ArchiveCommand, AReadOnlyTreeIsReadAndStaysAsItIs) {
     return WEXITSTATUS(status);
   };
   // 65: one file of fill() is no recording.
-  EXPECT_EQ(as_other_user({"repair", archive_, "-o", work + "/one", "--constants", constants_}), 65);
+  EXPECT_EQ(as_other_user({"repair", archive_, "-o", work + "/one", "--constants", constants_}),
+            65);
   EXPECT_EQ(as_other_user({"archive", "plan", archive_, "-o", work + "/plan", "--constants",
                            constants_, "--shards", "1"}),
             0);
-  EXPECT_EQ(
-      as_other_user({"archive", "run", work + "/plan", "--shard", "0", "-o", work + "/two"}), 65);
+  EXPECT_EQ(as_other_user({"archive", "run", work + "/plan", "--shard", "0", "-o", work + "/two"}),
+            65);
   expect_same_outputs(work + "/one", work + "/two");
   EXPECT_EQ(everything_below(archive_), before);
   // Nothing can be written where nothing may be.
