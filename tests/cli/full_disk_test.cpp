@@ -43,8 +43,9 @@ class FullDisk : public tests::StoreTest {
     const int status = std::system(line.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
-  std::string people() const {
-    std::ifstream in(path("people"));
+  std::string people() const { return text_of("people"); }
+  std::string text_of(const std::string& name) const {
+    std::ifstream in(path(name));
     return {std::istreambuf_iterator<char>(in), {}};
   }
   void empty_disk() const {
@@ -210,7 +211,8 @@ class FullDiskOfAnArchive : public FullDisk {
         return;
       }
       EXPECT_EQ(exit_code, 74) << people();
-      EXPECT_NE(people().find("No space left on device"), std::string::npos) << people();
+      const std::string said = text_of("out") + people();
+      EXPECT_NE(said.find("No space left on device"), std::string::npos) << said;
       const auto before = recordings();
       in_its_midst += !before.empty() && before.size() < kFiles ? 1 : 0;
       for (const auto& [name, digest] : before) {

@@ -98,8 +98,9 @@ TEST_F(Reference, NoWordOfACommandBecomesARequest) {
 TEST_F(Reference, TheCompletionHasOneCaseForEachCommand) {
   const std::string text = filled("completion");
   EXPECT_THAT(text, HasSubstr("    'audit') commands='head verify' options='--help"));
-  EXPECT_THAT(text,
-              HasSubstr("    'archive') commands='plan run merge report status' options='--help"));
+  EXPECT_THAT(
+      text,
+      HasSubstr("    'archive') commands='plan run submit merge report status' options='--help"));
   EXPECT_THAT(text, HasSubstr("    'audit verify') commands='' options='"));
   EXPECT_THAT(text, Not(HasSubstr("--constants-out --constants "))) << "an old name is not offered";
   EXPECT_TRUE(text.starts_with("    '') commands='inspect scan repair ")) << text.substr(0, 80);

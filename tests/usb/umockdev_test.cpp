@@ -243,8 +243,10 @@ TEST_F(Program, WithoutPermissionNamesTheUdevRules) {
   ASSERT_EQ(::chmod(folder.path().c_str(), 0777), 0);
   std::filesystem::copy_file(SIXPOINT_PROGRAM, folder / "sixpoint");
   const auto as_nobody = [&](std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534",
-                                         "--clear-groups", folder / "sixpoint"});
+    // A person has a home of their own; root's operators are none of theirs.
+    arguments.insert(arguments.begin(),
+                     {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534", "--clear-groups",
+                      "/usr/bin/env", "HOME=" + folder.path(), folder / "sixpoint"});
     return run_program(arguments);
   };
   const ChildAnswer refused =
