@@ -177,7 +177,11 @@ class CaptureRun {
       SIXPOINT_CHECK(end_recording());
       SIXPOINT_CHECK(all_sides);
       if (!*all_sides) {
-        report_.stopped = true;
+        report_.stopped = repeats == 0;
+        if (!report_.stopped) {
+          report_.notes.emplace_back(
+              "stopped while a side was asked for again: the recording of before is judged");
+        }
         return report_;
       }
       SIXPOINT_CHECK(fetch_anew(repeats));

@@ -137,6 +137,23 @@ TEST(CaptureRun, ASideThatFailsAgainIsAskedForTwiceAndThenJudged) {
   EXPECT_TRUE(late->usable()) << late->solved->brief();
 }
 
+TEST(CaptureRun, WhoStopsAtARepeatedSideGetsTheJudgementOfTheFile) {
+  VirtualBench bench;
+  Person person(bench);
+  const auto ask = person.hooks.ask;
+  person.hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
+    return person.repeated.empty() ? ask(side, number, of) : SideAnswer::stop;
+  };
+  const auto report = person.capture();
+  ASSERT_OK(report);
+  EXPECT_FALSE(report->stopped);
+  EXPECT_FALSE(report->usable());
+  EXPECT_THAT(report->solved->verification.missing_directions, testing::ElementsAre("-x"));
+  EXPECT_THAT(report->notes, Contains(HasSubstr("the recording of before is judged")));
+  EXPECT_TRUE(bench.env.files.info("c.gt3x")) << "the file stays";
+  ASSERT_OK(bench.unit->start_stream(100));  // not left recording
+}
+
 // No file of another capture is replaced.
 TEST(CaptureRun, NoSideIsAskedForAgainWhereAPieceWouldReplaceAFile) {
   VirtualBench bench;
