@@ -174,14 +174,16 @@ class CaptureRun {
       if (!all_sides && (gone_ || all_sides.error().code == ErrorCode::internal)) {
         return fail(all_sides.error());  // the unit records on
       }
-      SIXPOINT_CHECK(end_recording());
-      SIXPOINT_CHECK(all_sides);
+      Status ended = end_recording();
+      if (ended && !all_sides) {
+        ended = fail(all_sides.error());
+      }
+      if (repeats > 0 && (!ended || !*all_sides)) {
+        return judged_as_it_is(ended ? "it was stopped" : ended.error().brief());
+      }
+      SIXPOINT_CHECK(ended);
       if (!*all_sides) {
-        report_.stopped = repeats == 0;
-        if (!report_.stopped) {
-          report_.notes.emplace_back(
-              "stopped while a side was asked for again: the recording of before is judged");
-        }
+        report_.stopped = true;
         return report_;
       }
       SIXPOINT_CHECK(fetch_anew(repeats));
@@ -191,7 +193,9 @@ class CaptureRun {
       if (sides.empty()) {
         return report_;
       }
-      SIXPOINT_CHECK(ask_again(sides));
+      if (const Status asked = ask_again(sides); !asked) {
+        return judged_as_it_is(asked.error().brief());
+      }
     }
   }
 
@@ -260,6 +264,12 @@ class CaptureRun {
                                           gone, gone == 1 ? " is" : "s are"));
     }
     return begin_recording();
+  }
+
+  // A side that cannot be repeated takes nothing away from what was recorded before.
+  CaptureReport judged_as_it_is(const std::string& why) {
+    report_.notes.push_back("no side was repeated, the recording of before is judged: " + why);
+    return report_;
   }
 
   // The sides are recorded anew, in a recording of their own; the others stay as they are.

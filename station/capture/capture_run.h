@@ -11,8 +11,8 @@
 //   report.usable();  // report.solved has the constants, report.notes what went wrong
 //
 // A unit that records sends no live samples, so the file is judged afterwards. Sides without still
-// readings are then asked for again, alone (sides_to_repeat.h), where the driver offers it; who
-// stops there gets the judgement of the file that is there. A capture goes on after the unit was
+// readings are then asked for again, alone (sides_to_repeat.h), where the driver offers it; where
+// that is stopped or fails, the file that is there is judged. A capture goes on after the unit was
 // unplugged and after the program was restarted: what was recorded stays in the unit, the side
 // under way is asked for again, and at the end the pieces are joined (recording_pieces.h).
 //
