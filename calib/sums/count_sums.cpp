@@ -57,7 +57,8 @@ SIXPOINT_INLINE CountSums sums_body(std::span<const std::int16_t> counts) {
 SIXPOINT_INLINE std::int64_t squares_body(std::span<const std::int16_t> counts) {
   std::int64_t sum = 0;
   for (const std::int16_t count : counts) {
-    sum += static_cast<std::int32_t>(count) * count;
+    const std::int32_t square = std::int32_t{count} * count;  // 32 bits: twice as many lanes
+    sum += square;
   }
   return sum;
 }
