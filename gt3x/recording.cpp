@@ -391,12 +391,19 @@ Result<std::unique_ptr<ByteSource>> Recording::Archive::open_packed(
 }
 
 Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& name) {
+  return open_entry(name, Unpacking::ahead);
+}
+
+Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& name, Unpacking how) {
   const auto index = archive_->index_of(name);
   if (!index) {
     return archive_->bad(fmt::format("the archive holds no {}", printable(name, 60)),
                          hint_about(Damage::refused));
   }
-  SIXPOINT_ASSIGN(const EntryFacts facts, archive_->facts_of(*index));
+  SIXPOINT_ASSIGN(EntryFacts facts, archive_->facts_of(*index));
+  if (how == Unpacking::when_asked) {
+    facts.points = {};
+  }
   const bool salvage = archive_->options.salvage;
   auto packed = Archive::open_packed(archive_, *index);
   if (!packed && packed.error().code == ErrorCode::bad_data && salvage) {
@@ -415,18 +422,22 @@ Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& nam
         });
   }
   auto unpacked = unpack_entry(*std::move(packed), facts);
-  if (facts.size < kReadAheadFrom) {
+  if (facts.size < kReadAheadFrom || how == Unpacking::when_asked) {
     return unpacked;
   }
   return std::make_unique<ReadAhead>(std::move(unpacked));
 }
 
-Result<LogReader> Recording::open_log() {
+Result<LogReader> Recording::open_log() { return open_log(Unpacking::ahead); }
+
+Result<LogReader> Recording::open_log_beginning() { return open_log(Unpacking::when_asked); }
+
+Result<LogReader> Recording::open_log(Unpacking how) {
   if (form() != RecordingForm::log) {
     return archive_->bad("the recording is of the old form (activity.bin) and has no records",
                          "only its samples can be read");
   }
-  SIXPOINT_ASSIGN(auto source, open_entry("log.bin"));
+  SIXPOINT_ASSIGN(auto source, open_entry("log.bin", how));
   return LogReader(std::move(source));
 }
 

@@ -88,9 +88,16 @@ class Recording {
   // bad_data for a file of the old form.
   Result<LogReader> open_log();
 
+  // The same for who wants the first records alone: unpacked on the caller's thread, in small
+  // pieces. To its end it takes longer than open_log().
+  Result<LogReader> open_log_beginning();
+
  private:
   friend class RecordingWriter;
   struct Archive;
+  enum class Unpacking { ahead, when_asked };
+  Result<std::unique_ptr<ByteSource>> open_entry(const std::string& name, Unpacking how);
+  Result<LogReader> open_log(Unpacking how);
   class PackedEntry;
   explicit Recording(std::shared_ptr<Archive> archive);
   std::shared_ptr<Archive> archive_;

@@ -6,10 +6,10 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "cli/child_process.h"
 #include "cli/command.h"
 #include "cli/files/archive_options.h"
 #include "cli/output.h"
@@ -27,28 +27,12 @@ Error not_submitted(std::string what) {
           "see what sbatch said; nothing is lost, submit again"};
 }
 
-// Starts a program with its standard output in `write_end`; what it says to people goes to them.
-Result<pid_t> start(const Words& words, int write_end) {
-  std::vector<char*> list;
-  for (const std::string& word : words) {
-    list.push_back(const_cast<char*>(word.c_str()));  // NOLINT: posix_spawn does not write
-  }
-  list.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, write_end, STDOUT_FILENO);
-  pid_t process = 0;
-  const int error = posix_spawnp(&process, list.front(), &actions, nullptr, list.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
+Error not_started(int error) {
   if (error == ENOENT) {
-    return fail(ErrorCode::device_unavailable, "there is no sbatch on this machine", "sbatch",
-                "run this on a machine of the cluster, or without Slurm: bash PLAN/run_all.sh "
-                "OUTDIR");
+    return {ErrorCode::device_unavailable, "there is no sbatch on this machine", "sbatch",
+            "run this on a machine of the cluster, or without Slurm: bash PLAN/run_all.sh OUTDIR"};
   }
-  if (error != 0) {
-    return fail(not_submitted(fmt::format("it cannot be started: {}", std::strerror(error))));
-  }
-  return process;
+  return not_submitted(fmt::format("it cannot be started: {}", std::strerror(error)));
 }
 
 std::string read_to_end(int read_end) {
@@ -70,12 +54,12 @@ Result<std::string> submit(const Words& words) {
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
     return fail(not_submitted(fmt::format("no pipe: {}", std::strerror(errno))));
   }
-  const auto process = start(words, ends[1]);
+  const auto process = start_child(words, ends[1], ChildErrors::shown);
   ::close(ends[1]);
   std::string job = process ? read_to_end(ends[0]) : std::string();
   ::close(ends[0]);
   if (!process) {
-    return fail(process.error());
+    return fail(not_started(process.error()));
   }
   int status = 0;
   while (::waitpid(*process, &status, 0) < 0 && errno == EINTR) {

@@ -11,11 +11,11 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "base/atomic_file.h"
+#include "cli/child_process.h"
 #include "cli/command.h"
 #include "cli/gap/challenge_scores.h"
 #include "cli/gap/gap_commands.h"
@@ -27,8 +27,6 @@
 #include "gap/challenge/score.h"
 #include "gap/challenge/trials.h"
 #include "sim/bundle_writer.h"
-
-extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
 
 namespace sixpoint::cli {
 
@@ -59,37 +57,28 @@ Result<int> run_process(const std::vector<std::string>& arguments, const std::st
   const auto failed = [&](const char* what) {
     return fail(ErrorCode::internal, what, arguments.front(), "name the program with --program");
   };
-  std::vector<char*> list;
-  for (const std::string& argument : arguments) {
-    list.push_back(const_cast<char*>(argument.c_str()));  // NOLINT: posix_spawn does not write
+  const int file = ::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (file < 0) {
+    return failed("the file of its answer can't be opened");
   }
-  list.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  pid_t process = 0;
-  const int spawned =
-      posix_spawn(&process, arguments.front().c_str(), &actions, nullptr, list.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (spawned != 0) {
+  const auto process = start_child(arguments, file, ChildErrors::dropped);
+  ::close(file);
+  if (!process) {
     return failed("the program can't be started");
   }
   const auto start = clock.elapsed();
   int status = 0;
   for (;;) {
-    const pid_t ended = waitpid(process, &status, WNOHANG);
-    if (ended == process) {
+    const pid_t ended = waitpid(*process, &status, WNOHANG);
+    if (ended == *process) {
       break;
     }
     if (ended < 0) {
       return failed("the program got lost");
     }
     if (std::chrono::duration<double>(clock.elapsed() - start).count() > limit_s) {
-      kill(process, SIGKILL);
-      waitpid(process, &status, 0);
+      kill(*process, SIGKILL);
+      waitpid(*process, &status, 0);
       return failed("the program took too long");
     }
     clock.sleep(std::chrono::milliseconds(2));

@@ -11,7 +11,7 @@ constexpr int kChain = 7;
 // From any place in the window, so many bytes ahead must be visible unless the end is.
 constexpr std::size_t kLookahead = (kChain + 1) * (kMaxRecord + 16);
 constexpr std::size_t kCapacity = 4 * kLookahead;
-// Memory comes as bytes do: clearing it all would cost more than reading a small file.
+// Read first: memory comes as bytes do, and most readers of a file's first records end in it.
 constexpr std::size_t kFirstPiece = std::size_t{64} * 1024;
 // Zero bytes that may stand between two records of a chain.
 constexpr std::size_t kMaxZerosInChain = 16;
@@ -34,7 +34,15 @@ class LogReader::Window {
   explicit Window(std::unique_ptr<ByteSource> source) : source_(std::move(source)) {}
 
   Result<std::optional<LogItem>> next() {
-    SIXPOINT_CHECK(fill());
+    if (bytes_.empty()) {
+      SIXPOINT_CHECK(fill(kFirstPiece));
+    }
+    if (const auto frame = plain_record()) {
+      return take_record(*frame);
+    }
+    if (!end_of_source_ && end_ - begin_ < kLookahead) {
+      SIXPOINT_CHECK(fill(kCapacity));
+    }
     if (begin_ == end_) {
       close_loss(std::nullopt);
       return std::nullopt;
@@ -59,12 +67,7 @@ class LogReader::Window {
     bool checksum_ok;
   };
 
-  Status fill() {
-    if (end_of_source_ || end_ - begin_ >= kLookahead) {
-      return {};
-    }
-    // The first records need no more than the view ahead; most readers of small files end there.
-    const std::size_t wanted = bytes_.empty() ? kLookahead : kCapacity;
+  Status fill(std::size_t wanted) {
     if (begin_ < end_) {
       std::memmove(bytes_.data(), bytes_.data() + begin_, end_ - begin_);
     }
@@ -84,6 +87,17 @@ class LogReader::Window {
       end_ += count;
     }
     return {};
+  }
+
+  // The record at the front, where it needs no look at what comes behind: is_record() would say
+  // the same of it with every byte ahead in sight.
+  std::optional<Frame> plain_record() const {
+    if (lost_) {
+      return std::nullopt;
+    }
+    const auto frame = frame_at(begin_);
+    return frame && frame->checksum_ok && followed_well(begin_ + frame->size) ? frame
+                                                                              : std::nullopt;
   }
 
   // The record that begins at `at`, where it is whole.

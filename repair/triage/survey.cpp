@@ -29,7 +29,7 @@ Result<bool> carries_repair_mark(gt3x::Recording& recording) {
   if (recording.has_entry(kRepairMark) || !recording.has_log()) {
     return recording.has_entry(kRepairMark);
   }
-  SIXPOINT_ASSIGN(auto log, recording.open_log());
+  SIXPOINT_ASSIGN(auto log, recording.open_log_beginning());
   while (true) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item.has_value()) {
@@ -74,7 +74,7 @@ void take_parameters(const gt3x::Parameters& parameters, FileFacts& facts) {
 
 // The first PARAMETERS record of the log whose checksum holds; nothing when there is none.
 Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& recording) {
-  SIXPOINT_ASSIGN(auto log, recording.open_log());
+  SIXPOINT_ASSIGN(auto log, recording.open_log_beginning());
   while (true) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item.has_value()) {

@@ -5,11 +5,7 @@ set -euo pipefail
 command -v parallel >/dev/null && parallel --version 2>/dev/null | grep -q GNU ||
   exec "$1/tests/skip.sh" "no GNU parallel; install parallel"
 source "$1/tests/schedulers/archive.sh"
-scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
-make_archive "$scratch/data" "$1/tests/docs/scenario.json" "$2"
-data=$scratch/data
-"$2" archive plan "$data/archive" -o "$data/plan" --store "$data/store.db" --shards 6 >/dev/null 2>&1
+make_archive "$@"
 run() {
   parallel --will-cite --halt never --joblog "$scratch/log" -j 3 \
     "$2" archive run "$data/plan" --shard '{}' -o "$data/out" ::: $(seq 0 5) >/dev/null 2>&1

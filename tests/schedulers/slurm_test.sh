@@ -13,10 +13,8 @@ done
 source "$here/slurm_cluster.sh"
 source "$here/archive.sh"
 
-scratch=$(mktemp -d)
-chmod 755 "$scratch"
+make_archive "$@"
 trap 'stop_cluster; rm -rf "$scratch"' EXIT
-make_archive "$scratch/data" "$1/tests/docs/scenario.json" "$2"
 start_cluster "$scratch/cluster" || { stop_cluster; skip "$1" "Slurm does not start on this machine"; }
 
 # The program as the tasks call it: slow enough to be killed in mid-run; the first task of shard 3
@@ -31,8 +29,6 @@ exec "$2" "\$@"
 WRAPPER
 chmod +x "$scratch/slow"
 export SIXPOINT=$scratch/slow
-data=$scratch/data
-"$2" archive plan "$data/archive" -o "$data/plan" --store "$data/store.db" --shards 6 >/dev/null 2>&1
 jobs=$("$2" archive submit "$data/plan" -o "$data/out")
 array=$(sed -n 's/^array //p' <<<"$jobs")
 merge=$(sed -n 's/^merge //p' <<<"$jobs")

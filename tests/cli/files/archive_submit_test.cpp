@@ -6,7 +6,6 @@
 #include <map>
 
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "base/sha256.h"
@@ -50,18 +49,7 @@ TEST_F(ArchiveCommand, AReadOnlyTreeIsReadAndStaysAsItIs) {
     ASSERT_EQ(::chown(work.c_str(), 65534, 65534), 0);
   }
   const auto as_other_user = [&](const std::vector<std::string>& words) {
-    const pid_t child = ::fork();
-    if (child == 0) {
-      // Root may write everywhere, so the child gives that up.
-      ::setenv("HOME", work.c_str(), 1);
-      if (::geteuid() == 0 && ::setuid(65534) != 0) {
-        ::_exit(100);
-      }
-      ::_exit(run(words).exit_code);
-    }
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    return WEXITSTATUS(status);
+    return tests::exit_code_as_other_user(words, work);
   };
   // 65: one file of fill() is no recording.
   EXPECT_EQ(as_other_user({"repair", archive_, "-o", work + "/one", "--constants", constants_}),

@@ -2,9 +2,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include "cli/command_fixture.h"
 
 namespace sixpoint {
@@ -152,17 +149,7 @@ TEST_F(StoreTest, AFileOrFolderThatMayNotBeWrittenIsSaidSo) {
   std::filesystem::permissions(path("locked"), std::filesystem::perms(0555));
   std::filesystem::permissions(folder_.path(), std::filesystem::perms(0555));
   const auto as_other_user = [&](const std::vector<std::string>& words) {
-    const pid_t child = ::fork();
-    if (child == 0) {
-      // Root may write everywhere, so the child gives that up.
-      if (::geteuid() == 0 && ::setuid(65534) != 0) {
-        ::_exit(100);
-      }
-      ::_exit(run(words).exit_code);
-    }
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    return WEXITSTATUS(status);
+    return tests::exit_code_as_other_user(words, folder_.path());
   };
   const std::vector<std::string> withdraw = {"store", "withdraw",   "x", "--reason",
                                              "y",     "--operator", "z", "--store"};

@@ -8,6 +8,7 @@
 
 #include "cli/command_fixture.h"
 #include "cli/run_child.h"
+#include "http_request.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -19,7 +20,6 @@ using tests::Child;
 // The whole answer of HTTP to a request with its Host and these lines.
 std::string get(int port, const std::string& path, const std::string& more_head = {},
                 const std::string& method = "GET") {
-  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
@@ -27,18 +27,7 @@ std::string get(int port, const std::string& path, const std::string& more_head 
   const std::string request = method + " " + path +
                               " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
                               "\r\nConnection: close\r\n" + more_head + "\r\n";
-  std::string answer;
-  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0 &&
-      ::send(fd, request.data(), request.size(), MSG_NOSIGNAL) ==
-          static_cast<ssize_t>(request.size())) {
-    std::array<char, 4096> some{};
-    for (ssize_t n = 1; n > 0;) {
-      n = ::recv(fd, some.data(), some.size(), 0);
-      answer.append(some.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
-    }
-  }
-  ::close(fd);
-  return answer;
+  return tests::answer_to(address, request);
 }
 
 class StationCommand : public tests::CommandTest {

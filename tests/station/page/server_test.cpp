@@ -12,6 +12,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "http_request.h"
 #include "station/page/station_in_process.h"
 
 namespace sixpoint::station {
@@ -21,21 +22,11 @@ using testing::HasSubstr;
 
 // The status line of the answer to these bytes.
 std::string answer_to(const Station& station, const std::string& bytes) {
-  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(station.server->port()));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  std::string answer;
-  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0 &&
-      ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(bytes.size())) {
-    std::array<char, 1024> some{};
-    for (ssize_t n = 1; n > 0 && answer.find("\r\n") == std::string::npos;) {
-      n = ::recv(fd, some.data(), some.size(), 0);
-      answer.append(some.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
-    }
-  }
-  ::close(fd);
+  const std::string answer = tests::answer_to(address, bytes, "\r\n");
   return answer.substr(0, answer.find("\r\n"));
 }
 
@@ -262,22 +253,10 @@ TEST(Server, ClosesPagesThatDoNotRead) {
 // What the station answers to a request over its unix socket, without a session and without the
 // token; empty where it cannot be reached.
 std::string answer_over(const std::string& socket_path, const std::string& request) {
-  const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   socket_path.copy(address.sun_path, sizeof(address.sun_path) - 1);
-  std::string answer;
-  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0 &&
-      ::send(fd, request.data(), request.size(), MSG_NOSIGNAL) ==
-          static_cast<ssize_t>(request.size())) {
-    std::array<char, 4096> some{};
-    for (ssize_t n = 1; n > 0;) {
-      n = ::recv(fd, some.data(), some.size(), 0);
-      answer.append(some.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
-    }
-  }
-  ::close(fd);
-  return answer;
+  return tests::answer_to(address, request);
 }
 
 const char* const kAskState = "GET /api/state HTTP/1.1\r\nHost: station\r\n\r\n";

@@ -1,0 +1,34 @@
+#include "cli/child_process.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <unistd.h>
+
+extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
+
+namespace sixpoint::cli {
+
+tl::expected<pid_t, int> start_child(const std::vector<std::string>& words, int output,
+                                     ChildErrors errors) {
+  std::vector<char*> list;
+  for (const std::string& word : words) {
+    list.push_back(const_cast<char*>(word.c_str()));  // NOLINT: posix_spawn does not write
+  }
+  list.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  if (errors == ChildErrors::dropped) {
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  }
+  pid_t process = 0;
+  const int error = posix_spawnp(&process, list.front(), &actions, nullptr, list.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) {
+    return tl::unexpected(error);
+  }
+  return process;
+}
+
+}  // namespace sixpoint::cli
