@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds packages into build/package. Works from a fresh clone on a fresh Debian 12 as root, and again.
-#   scripts/package.sh             the Debian package: sixpoint_VERSION_ARCHITECTURE.deb
+#   scripts/package.sh             the Debian packages: program, station, development, mocks (packaging/README.md)
 #   scripts/package.sh --python    the Python package: sixpoint-VERSION-cp311-cp311-linux_x86_64.whl
 #   scripts/package.sh --r         the R package: sixpoint_VERSION.tar.gz, and build/r/lib, which it links to
 set -euo pipefail

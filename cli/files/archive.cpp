@@ -11,6 +11,7 @@
 #include "cli/files/manifest.h"
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
@@ -247,6 +248,9 @@ Status run_merge(const Options& options, Context& context) {
                                     merged->files_missing());
     }
     print_missing(*merged, rerun, context);
+    if (merged->complete()) {
+      next_step(context, options.json, {"archive", "report", options.plan, "-o", "report.html"});
+    }
   }
   return {};
 }

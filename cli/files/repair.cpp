@@ -10,6 +10,7 @@
 #include "cli/files/repair_answer.h"
 #include "cli/files/salvage_option.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
@@ -134,6 +135,13 @@ Status conclude(const Options& options, const std::vector<RepairReport>& reports
   if (stopped) {
     context.people << fmt::format("stopped: {} of {} files are done; to go on:\n  {}\n",
                                   reports.size(), files, line_that_goes_on(options));
+    return {};
+  }
+  const auto asked = context.env.files.info(options.paths.front());
+  if (options.paths.size() == 1 && asked && asked->is_folder && !options.repair.dry_run &&
+      std::ranges::any_of(reports,
+                          [](const RepairReport& report) { return !report.output.empty(); })) {
+    next_step(context, options.json, {"impact", options.paths.front(), options.folder});
   }
   return {};
 }

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "cli/command.h"
+#include "cli/people_text.h"
 #include "cli/station/jig_options.h"
 #include "cli/station/record_option.h"
 #include "cli/store_option.h"
@@ -151,6 +152,10 @@ void print(Context& context, const Done& done) {
   }
   if (done.saved) {
     context.text() << fmt::format("constants stored as {}\n", db::shown_id(done.saved->id));
+  }
+  if (report.usable()) {
+    next_step(context, false,
+              {"repair", "RECORDINGS", "--calibration-file", report.file, "-o", "repaired"});
   }
 }
 

@@ -406,7 +406,7 @@ Json to_json(const Options& options, const Done& done) {
   return json;
 }
 
-void print(Context& context, const Done& done) {
+void print(Context& context, const Options& options, const Done& done) {
   const station::JigReport& report = done.report;
   context.text() << report.brief() << '\n';
   if (!report.usable()) {
@@ -431,6 +431,14 @@ void print(Context& context, const Done& done) {
   context.text() << fmt::format("run {}\n", db::shown_id(done.run_id));
   if (done.constants_id) {
     context.text() << fmt::format("constants stored as {}\n", db::shown_id(*done.constants_id));
+  }
+  if (report.usable() && options.study.empty() && !done.certified) {
+    std::vector<std::string> next = {"certificate", db::shown_id(done.run_id), "-o",
+                                     report.serial + ".pdf"};
+    if (!options.store.empty()) {
+      next.insert(next.end(), {"--store", options.store});
+    }
+    next_step(context, options.json, next);
   }
 }
 
@@ -457,7 +465,7 @@ Status run(const Options& options, Context& context) {
   if (options.json) {
     print_json(context, to_json(options, *done));
   } else {
-    print(context, *done);
+    print(context, options, *done);
   }
   return {};
 }

@@ -6,8 +6,10 @@ set -euo pipefail
 cmake=$1 build_folder=$2 example=$3 compiler=$4
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-"$cmake" --install "$build_folder" --component mocks --prefix "$scratch/prefix" >"$scratch/log" 2>&1 ||
-  { cat "$scratch/log"; exit 1; }
+for component in dev mocks; do
+  "$cmake" --install "$build_folder" --component $component --prefix "$scratch/prefix" >"$scratch/log" 2>&1 ||
+    { cat "$scratch/log"; exit 1; }
+done
 cp -r "$example" "$scratch/example"
 flags=""
 # Rooms that were built with the sanitizers need their run-time libraries.
