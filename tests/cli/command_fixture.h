@@ -5,6 +5,7 @@
 //   }
 #pragma once
 
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,19 @@ class CommandTest : public testing::Test {
     return run_command(posix_env(), arguments);
   }
   std::string path(const std::string& name) const { return folder_ / name; }
+  // The words of the command that an answer names as the next one, without "sixpoint".
+  static std::vector<std::string> next_of(const Answer& answer) {
+    std::vector<std::string> words;
+    const std::string before = "next: sixpoint ";
+    const std::size_t at = answer.people.rfind(before);
+    if (at != std::string::npos) {
+      std::istringstream line(answer.people.substr(at + before.size()));
+      for (std::string word; line >> word;) {
+        words.push_back(word);
+      }
+    }
+    return words;
+  }
   TemporaryFolder folder_;
 };
 

@@ -148,6 +148,8 @@ TEST_F(ArchiveCommand, ThePlainScriptRunsAllAndMerges) {
   const int status = std::system(line.c_str());
   EXPECT_EQ(WEXITSTATUS(status), 1) << "one file cannot be repaired";
   EXPECT_EQ(merge().json()["complete"], true);
+  EXPECT_THAT(next_of(run({"archive", "merge", plan_})),
+              testing::ElementsAre("archive", "report", plan_, "-o", "report.html"));
 }
 
 // The real program, killed again and again at any moment; what it leaves is what one repair leaves.

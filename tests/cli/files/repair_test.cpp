@@ -272,6 +272,8 @@ TEST_F(RepairCommand, PeopleSeeTheSourceTheErrorsAndTheReasons) {
   EXPECT_EQ(manifest["files"][0]["source"]["kind"], "constants");
   EXPECT_TRUE(std::filesystem::exists(out_ + "/manifest.csv"));
   EXPECT_EQ(run({"scan", out_}).exit_code, 0);
+  EXPECT_THAT(next_of(answer), testing::ElementsAre("impact", archive_, out_));
+  EXPECT_EQ(run(next_of(answer)).exit_code, 0);
 }
 
 // The program as people start it, stopped by Ctrl-C: exit 3, what is done stays, and the line that

@@ -23,9 +23,14 @@ TEST_F(CommandTest, CaptureMakesACalibrationFile) {
   EXPECT_EQ(solve.exit_code, 0);
   EXPECT_EQ(nlohmann::json::parse(solve.out)["constants"], json["constants"]);
 
-  const auto again = run({"capture", "--device", kDevice, "--jig", "virtual", "--store",
-                          path("s.db"), "-o", path("c.gt3x")});
-  EXPECT_EQ(again.exit_code, 73);
+  const auto capture_into = [&](const std::string& output) {
+    return run({"capture", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"), "-o",
+                output});
+  };
+  EXPECT_EQ(capture_into(path("c.gt3x")).exit_code, 73);
+  EXPECT_THAT(next_of(capture_into(path("d.gt3x"))),
+              testing::ElementsAre("repair", "RECORDINGS", "--calibration-file", path("d.gt3x"),
+                                   "-o", "repaired"));
 }
 
 TEST_F(CommandTest, CaptureRefusesAFirmwareWhoseFileCannotHelp) {

@@ -144,7 +144,13 @@ TEST_F(CommandTest, TheFirstCommandOfHelpEndsInAPass) {
     words.push_back(word == "bench.db" ? path("s.db") : word);
   }
   words.erase(words.begin());
-  EXPECT_EQ(run(words).exit_code, 0);
+  const auto passed = run(words);
+  EXPECT_EQ(passed.exit_code, 0);
+  auto next = next_of(passed);
+  ASSERT_EQ(next.size(), 6U) << passed.people;
+  EXPECT_THAT(next[3], testing::EndsWith(".pdf"));
+  next[3] = path(next[3]);
+  EXPECT_EQ(run(next).exit_code, 0);
 }
 
 TEST_F(CommandTest, AnOverdueJigMeasuresNothingWithoutASignedException) {
