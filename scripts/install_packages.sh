@@ -2,7 +2,7 @@
 # Installs the Debian 12 packages that are missing; nothing when none is. Sourced or run by the other
 # scripts:  install_packages.sh build|test...
 # Groups: build (to make the program), test (to test it as CI does), package (to make the .deb), python
-# and r (to make and test the packages of these languages).
+# and r (to make and test the packages of these languages), coverage (scripts/coverage.sh).
 set -euo pipefail
 
 build_packages=(
@@ -27,6 +27,7 @@ package_packages=(dpkg-dev file)
 python_packages=(
   pybind11-dev python3 python3-dev python3-matplotlib python3-numpy python3-pandas python3-venv
 )
+coverage_packages=(gcovr)
 r_packages=(r-base-dev r-cran-jsonlite r-cran-knitr r-cran-markdown)
 
 # The page's tests need Node; a machine that has it from elsewhere keeps it (its package has npm inside
@@ -43,7 +44,8 @@ for group in "${@:-build}"; do
     package) wanted+=("${package_packages[@]}") ;;
     python) wanted+=("${python_packages[@]}") ;;
     r) wanted+=("${r_packages[@]}") ;;
-    *) echo "install_packages.sh: no group '$group'; there are: build test package python r" >&2; exit 64 ;;
+    coverage) wanted+=("${coverage_packages[@]}") ;;
+    *) echo "install_packages.sh: no group '$group'; there are: build test package python r coverage" >&2; exit 64 ;;
   esac
 done
 

@@ -61,7 +61,8 @@ sim::ProtocolRun run_of(const RecordedBundle& recorded, std::uint64_t seed) {
     end_s = std::max(end_s,
                      segment.host_start_s + static_cast<double>(segment.samples) / bundle.rate_hz);
   }
-  for (double time_s = 0; time_s <= end_s + 1; time_s += 1) {
+  for (int second = 0; second <= static_cast<int>(end_s) + 1; ++second) {
+    const double time_s = second;
     run.temperature.push_back({time_s, bundle.temperature_at(time_s)});
   }
   return run;

@@ -33,6 +33,7 @@ Eigen::Vector3d added_by(const std::vector<sim::EffectSpec>& effects,
 std::vector<Eigen::Vector3d> at_rest(const std::vector<Eigen::Vector3d>& means,
                                      const LengthFit& fit) {
   std::vector<double> sizes;
+  sizes.reserve(means.size());
   for (const Eigen::Vector3d& mean : means) {
     sizes.push_back(std::abs(length_error(fit, mean)));
   }
@@ -54,6 +55,7 @@ std::vector<Eigen::Vector3d> at_rest(const std::vector<Eigen::Vector3d>& means,
 Result<RestingGap> resting_gap(const std::vector<RestingReading>& rests,
                                const std::vector<sim::EffectSpec>& effects) {
   std::vector<Eigen::Vector3d> means;
+  means.reserve(rests.size());
   for (const RestingReading& rest : rests) {
     means.push_back(rest.mean);
   }

@@ -286,6 +286,7 @@ std::vector<AdoptionDecision> decide_adoption(const std::vector<DocumentEvidence
     }
   }
   std::vector<AdoptionDecision> decisions;
+  decisions.reserve(names.size());
   for (const std::string& name : names) {
     decisions.push_back(decide(name, sorted, units.size(), options));
   }

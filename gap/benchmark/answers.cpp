@@ -154,7 +154,7 @@ Result<std::vector<Answer>> read_answers(FileSystem& files, const std::string& p
     constexpr std::string_view kEnding = ".json";
     for (const std::string& name : names) {
       if (name.ends_with(kEnding)) {
-        const std::string file = path + "/" + name;
+        const std::string file = fmt::format("{}/{}", path, name);
         SIXPOINT_ASSIGN(const Bytes text, read_file(files, file));
         const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
         SIXPOINT_ASSIGN(Answer answer,

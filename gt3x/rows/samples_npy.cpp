@@ -119,7 +119,7 @@ class NpyWriter final : public RowWriter {
   }
 
   Status flush() {
-    const Status done = sink_(bytes_);
+    Status done = sink_(bytes_);
     bytes_.clear();
     return done;
   }
