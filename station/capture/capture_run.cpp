@@ -381,7 +381,7 @@ class CaptureRun {
     }
     SIXPOINT_CHECK(look_at_jig());
     SIXPOINT_CHECK(on_jig_.jig->go_to(side));
-    const auto rested = rest();
+    auto rested = rest();
     SIXPOINT_CHECK(look_at_jig());
     return rested;
   }
