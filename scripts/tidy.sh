@@ -2,8 +2,8 @@
 # clang-tidy over the program's sources, on every core: those that differ, in themselves or in what they include of the
 # project, from what scripts/tidy.stamp names as clean, or the machine's own list of what was checked since.
 #   scripts/tidy.sh [--within SECONDS] [--stamp] [FILE...]     needs build/, built
-# --within starts no file after that time, and lists the files that are left. --stamp writes scripts/tidy.stamp anew:
-# what is clean of the files as they are now.
+# --within starts no file after that time; files that are left then are a failure. --stamp writes scripts/tidy.stamp
+# anew: what is clean of the files as they are now.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 within=0 write_stamp=0
@@ -48,7 +48,8 @@ fi
 asked=$(wc -l <"$work/asked") left=$(wc -l <"$work/left")
 echo "clang-tidy: $(($(wc -l <"$work/all") - left)) files are clean; $((asked - left)) of them were checked now"
 if [ "$left" -gt 0 ] && [ "$status" = 0 ]; then
-  echo "Not checked, because the time was over; 'scripts/tidy.sh' checks them all:"
+  echo "FAILED: not checked, because the time was over; run 'scripts/tidy.sh --stamp' and commit scripts/tidy.stamp:"
   cut -d' ' -f2 "$work/left"
+  status=1
 fi
 exit "$status"
