@@ -53,6 +53,7 @@ Status run_shard(const Options& options, Context& context) {
   how.output_folder = absolute(options.output);
   how.dry_run = options.dry_run;
   how.redo_outdated = options.redo_outdated;
+  how.threads = options.threads;
   how.make_link = link_file;
   StopRequest stop;
   how.stop = [&stop] { return stop.requested(); };
@@ -392,6 +393,9 @@ void add_archive(CLI::App& app, Context& context) {
   run.add_option("--shard", of_run.shard, "which one, counted from 0")->required();
   run.add_option("-o,--output", of_run.output, "the folder for repaired files")->required();
   add_redo_option(run, of_run.redo_outdated);
+  run.add_option("--jobs", of_run.threads, "threads that pack a file")
+      ->check(CLI::Range(1U, 256U))
+      ->capture_default_str();
   run.add_flag("--dry-run", of_run.dry_run, "compute everything, write nothing");
   auto [submit, of_submit] =
       add("submit", "hand the plan to Slurm: its shards, and the merge behind them",

@@ -12,6 +12,7 @@
 #include "cli/files/repair_answer.h"
 #include "cli/output.h"
 #include "repair/archive/archive_plan.h"
+#include "repair/archive/archive_run.h"
 
 namespace sixpoint::cli {
 
@@ -24,7 +25,8 @@ struct ArchiveOptions {
   repair::ArchiveDraft draft;  // as far as the options describe it
   std::size_t shard = 0;
   unsigned jobs = 0;
-  std::vector<std::string> sbatch;  // options for it
+  unsigned threads = repair::ShardRunOptions{}.threads;  // of 'run', for one file
+  std::vector<std::string> sbatch;                       // options for it
   bool verify = false;
   bool redo_outdated = false;
   bool dry_run = false;

@@ -264,6 +264,7 @@ class ShardRun {
     options.dry_run = options_.dry_run;
     options.resume = true;
     options.redo_outdated = options_.redo_outdated;
+    options.jobs = options_.threads;
     RepairReport report = repair_file(env_, input, output, *finder_, options);
     const auto after = files_.info(input);
     const bool same = after && after->size == before->size &&

@@ -30,6 +30,9 @@ struct ShardRunOptions {
   bool dry_run = false;
   // Replaces outputs that were made otherwise than the plan makes them (earlier_output.h).
   bool redo_outdated = false;
+  // Threads that deflate one file. 1: on a cluster a task has one core, and the tasks fill the
+  // node.
+  unsigned threads = 1;
   // Asked before every file: true ends the run there. What is done is written down.
   std::function<bool()> stop = [] { return false; };
   // What was done is written down after so many files or seconds, whichever comes first: what a

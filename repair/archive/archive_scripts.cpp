@@ -45,7 +45,7 @@ program=${{SIXPOINT:-{1}}}
 output=${{1:?'usage: sbatch run.sbatch OUTDIR'}}
 shard=${{SLURM_ARRAY_TASK_ID:?'run this with sbatch; on one machine use run_all.sh'}}
 status=0
-"$program" archive run "$plan" --shard "$shard" -o "$output" || status=$?
+"$program" archive run "$plan" --shard "$shard" -o "$output" --jobs "${{SLURM_CPUS_PER_TASK:-1}}" || status=$?
 # 1: the shard is done, and something in it cannot be repaired. The task did its work; merge says what.
 if [ "$status" -eq 1 ]; then status=0; fi
 exit "$status"

@@ -58,8 +58,9 @@ class ArchiveCommand : public CommandTest {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   }
-  Answer run_shard(std::size_t shard) {
-    return run({"archive", "run", plan_, "--shard", std::to_string(shard), "-o", out_, "--json"});
+  Answer run_shard(std::size_t shard, std::size_t jobs = 1) {
+    return run({"archive", "run", plan_, "--shard", std::to_string(shard), "-o", out_, "--jobs",
+                std::to_string(jobs), "--json"});
   }
   Answer merge(std::vector<std::string> more = {}) {
     std::vector<std::string> arguments = {"archive", "merge", plan_, "--json"};
