@@ -13,6 +13,6 @@ for target in "${targets[@]}"; do
   program=$(find build/threads/tests -name "$target" -type f)
   echo "== $target"
   # The first report ends the test program: no race is passed over.
-  TSAN_OPTIONS="halt_on_error=1 second_deadlock_stack=1" "$program" --gtest_brief=1 "$@" || status=1
+  TSAN_OPTIONS="halt_on_error=1 second_deadlock_stack=1 suppressions=$PWD/tests/threads.supp" "$program" --gtest_brief=1 "$@" || status=1
 done
 exit "$status"
