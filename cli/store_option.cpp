@@ -120,6 +120,11 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
   return kept;
 }
 
+std::string kept_as(const db::Saved& kept, const std::string& id) {
+  return fmt::format("{} as {}", kept.in_store() ? "stored" : "kept in the journal",
+                     db::shown_id(id));
+}
+
 Json kept_to_json(const db::Saved& kept) {
   return {{"in", kept.in_store() ? "store" : "journal"},
           {"folder", text_or_null(kept.folder)},

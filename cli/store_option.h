@@ -70,6 +70,8 @@ std::string journal_folder(const std::string& location);
 Result<db::Saved> keep_records(Context& context, const std::string& location,
                                Result<db::Store>& store,
                                const std::function<Status(db::RecordWriter&)>& work);
+// "stored as 3cb89c474fa2"; "kept in the journal as ..." where the store took nothing.
+std::string kept_as(const db::Saved& kept, const std::string& id);
 // {"in": "store" | "journal", "folder", "error"}
 Json kept_to_json(const db::Saved& kept);
 

@@ -131,7 +131,7 @@ void print(const std::string& path, const Options& options, const Outcome& outco
     context.text() << "  note: " << printable(note, 1000) << '\n';
   }
   if (outcome.saved) {
-    context.text() << "  stored as " << db::shown_id(outcome.saved->id) << '\n';
+    context.text() << "  " << kept_as(outcome.saved->place, outcome.saved->id) << '\n';
   } else if (options.save && !report.usable()) {
     context.log().warn("nothing stored: only verified constants are kept");
   } else if (report.usable()) {

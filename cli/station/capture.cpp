@@ -151,7 +151,7 @@ void print(Context& context, const Done& done) {
     context.text() << fmt::format("repeat these sides: {}\n", fmt::join(missing, " "));
   }
   if (done.saved) {
-    context.text() << fmt::format("constants stored as {}\n", db::shown_id(done.saved->id));
+    context.text() << "constants " << kept_as(done.saved->place, done.saved->id) << '\n';
   }
   if (report.usable()) {
     next_step(context, false,

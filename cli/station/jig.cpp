@@ -430,9 +430,9 @@ void print(Context& context, const Options& options, const Done& done) {
   }
   context.text() << fmt::format("run {}\n", db::shown_id(done.run_id));
   if (done.constants_id) {
-    context.text() << fmt::format("constants stored as {}\n", db::shown_id(*done.constants_id));
+    context.text() << "constants " << kept_as(*done.kept, *done.constants_id) << '\n';
   }
-  if (report.usable() && options.study.empty() && !done.certified) {
+  if (report.usable() && options.study.empty() && !done.certified && done.kept->in_store()) {
     std::vector<std::string> next = {"certificate", db::shown_id(done.run_id), "-o",
                                      report.serial + ".pdf"};
     if (!options.store.empty()) {
