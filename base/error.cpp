@@ -10,7 +10,7 @@ namespace sixpoint {
 
 namespace {
 
-constexpr std::array<std::pair<ErrorCode, std::string_view>, 9> kNames = {{
+constexpr std::array<std::pair<ErrorCode, std::string_view>, 9> kErrorNames = {{
     {ErrorCode::usage, "usage"},
     {ErrorCode::bad_data, "bad_data"},
     {ErrorCode::no_input, "no_input"},
@@ -23,16 +23,18 @@ constexpr std::array<std::pair<ErrorCode, std::string_view>, 9> kNames = {{
 }};
 
 const auto* entry_of(ErrorCode code) {
-  return std::ranges::find(kNames, code, &std::pair<ErrorCode, std::string_view>::first);
+  return std::ranges::find(kErrorNames, code, &std::pair<ErrorCode, std::string_view>::first);
 }
 
 }  // namespace
 
-bool is_error_code(int number) { return entry_of(static_cast<ErrorCode>(number)) != kNames.end(); }
+bool is_error_code(int number) {
+  return entry_of(static_cast<ErrorCode>(number)) != kErrorNames.end();
+}
 
 std::string_view to_string(ErrorCode code) {
   const auto* entry = entry_of(code);
-  return entry == kNames.end() ? "internal" : entry->second;
+  return entry == kErrorNames.end() ? "internal" : entry->second;
 }
 
 std::string printable(std::string_view text, std::size_t limit) {

@@ -10,15 +10,15 @@
 namespace sixpoint {
 namespace {
 
-constexpr std::array<std::string_view, 3> kNames = {"none", "hard", "symbolic"};
+constexpr std::array<std::string_view, 3> kLinkNames = {"none", "hard", "symbolic"};
 
 }  // namespace
 
-std::string_view to_string(LinkKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
+std::string_view to_string(LinkKind kind) { return kLinkNames[static_cast<std::size_t>(kind)]; }
 
 std::optional<LinkKind> parse_link_kind(std::string_view text) {
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
-    if (kNames[i] == text) {
+  for (std::size_t i = 0; i < kLinkNames.size(); ++i) {
+    if (kLinkNames[i] == text) {
       return static_cast<LinkKind>(i);
     }
   }

@@ -71,7 +71,7 @@ double paule_mandel(const std::vector<double>& residual_g, const std::vector<dou
 }
 
 // Finite, and at least one.
-Status check(std::span<const StillBlock> blocks) {
+Status check_blocks(std::span<const StillBlock> blocks) {
   if (blocks.empty()) {
     return fail(ErrorCode::bad_data, "no still block", "least squares",
                 "lay the unit still on each of its six sides for a minute");
@@ -465,7 +465,7 @@ class BlockFitter {
 
 Result<BlockFit> fit_blocks(std::span<const StillBlock> blocks, const Calibration& start,
                             const BlockFitOptions& options) {
-  SIXPOINT_CHECK(check(blocks));
+  SIXPOINT_CHECK(check_blocks(blocks));
   return BlockFitter(blocks, start, options).run();
 }
 

@@ -253,8 +253,8 @@ int cross_axis_priors(const LeastSquaresOptions& options) {
                                   : 0;
 }
 
-Status check(std::span<const GravityPoint> points, const Calibration& start,
-             const LeastSquaresOptions& options) {
+Status check_points(std::span<const GravityPoint> points, const Calibration& start,
+                    const LeastSquaresOptions& options) {
   SIXPOINT_CHECK(validate(start));
   const auto needed =
       static_cast<std::size_t>(options.model.parameters() - cross_axis_priors(options));
@@ -314,7 +314,7 @@ const Descent& best_of(const std::vector<Descent>& descents) {
 Result<LeastSquaresFit> least_squares(std::span<const GravityPoint> points,
                                       const Calibration& start,
                                       const LeastSquaresOptions& options) {
-  SIXPOINT_CHECK(check(points, start, options));
+  SIXPOINT_CHECK(check_points(points, start, options));
   Problem problem{points, start, options};
   const int n = problem.size();
 

@@ -18,7 +18,7 @@ constexpr int kConstants = 6;
 constexpr int kRates = 9;
 constexpr int kParameters = 12;
 using Row = Eigen::Matrix<double, kParameters, 1>;
-using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
+using DriftMatrix = Eigen::Matrix<double, kParameters, kParameters>;
 using Head = Eigen::Matrix<double, kConstants, kConstants>;
 
 // One uninterrupted stay on a side.
@@ -185,9 +185,9 @@ Visits visits_of(std::span<const DriftPoint> points, const ZeroDriftOptions& opt
 // Between visits, those of one direction sharing its misfit (Woodbury), and along each visit, which
 // holds information on the rates alone.
 struct Information {
-  Matrix between = Matrix::Zero();
+  DriftMatrix between = DriftMatrix::Zero();
   Row pull = Row::Zero();
-  Matrix along = Matrix::Zero();
+  DriftMatrix along = DriftMatrix::Zero();
   Row along_pull = Row::Zero();
 };
 
@@ -320,7 +320,8 @@ std::optional<ZeroDrift> zero_drift(std::span<const DriftPoint> points,
   }
   const double half_s = out.span_s / 2;
   const Information information = information_of(visits, half_s, options);
-  const Matrix with = (information.between + information.along).ldlt().solve(Matrix::Identity());
+  const DriftMatrix with =
+      (information.between + information.along).ldlt().solve(DriftMatrix::Identity());
   const Eigen::Matrix<double, kRates, kRates> without =
       information.between.topLeftCorner<kRates, kRates>().ldlt().solve(
           Eigen::Matrix<double, kRates, kRates>::Identity());

@@ -48,6 +48,10 @@ function(sixpoint_room FOLDER)
     # For the modules of other languages (bindings/). Calls within a room stay direct all the same.
     set_target_properties(sixpoint_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
     target_compile_options(sixpoint_${name} PRIVATE -fno-semantic-interposition)
+    # Six tenths of the time of a compilation is reading headers: eight files are compiled as one. So
+    # names in the anonymous namespaces of a room's files differ.
+    set_target_properties(sixpoint_${name} PROPERTIES
+      UNITY_BUILD ${SIXPOINT_UNITY} UNITY_BUILD_BATCH_SIZE 8)
   endif()
   target_include_directories(sixpoint_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
   target_link_libraries(sixpoint_${name}

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kChunk = 1U << 20;
+constexpr std::size_t kWrittenAtOnce = 1U << 20;
 
 // Appends to an AtomicFile in large pieces.
 class BufferedFile {
@@ -23,7 +23,7 @@ class BufferedFile {
   }
   Status append(std::string_view text) {
     buffer_ += text;
-    return buffer_.size() < kChunk ? Status() : flush();
+    return buffer_.size() < kWrittenAtOnce ? Status() : flush();
   }
   Status commit() {
     SIXPOINT_CHECK(flush());

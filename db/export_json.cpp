@@ -17,7 +17,7 @@ std::optional<Bytes> bytes_of(const Json& json, const char* key) {
              : std::nullopt;
 }
 
-Result<Value> to_value(const Json& json, const Column& column) {
+Result<Value> value_of(const Json& json, const Column& column) {
   if (json.is_null() && !column.required) {
     return Value();
   }
@@ -88,7 +88,7 @@ Result<Row> row_from_json(const Table& table, const Json& json) {
     const std::string name(column.name);
     known += json.contains(name) ? 1 : 0;
     SIXPOINT_ASSIGN(row.emplace_back(),
-                    to_value(json.contains(name) ? json[name] : Json(nullptr), column));
+                    value_of(json.contains(name) ? json[name] : Json(nullptr), column));
   }
   if (known != json.size()) {
     return fail(ErrorCode::bad_data, "it has columns that this program does not know", {},

@@ -14,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 // The largest capture (records.cpp) in hex digits, and its name.
 constexpr std::size_t kLongestLine = 256U << 20;
-constexpr std::size_t kChunk = 1U << 20;
+constexpr std::size_t kReadAtOnce = 1U << 20;
 
 // Lines of a file, however long the file is.
 class LineReader {
@@ -41,7 +41,7 @@ class LineReader {
         return fail(ErrorCode::bad_data, fmt::format("line {} is too long", number_ + 1), path_,
                     "this is no export of a store");
       }
-      Bytes piece(kChunk);
+      Bytes piece(kReadAtOnce);
       SIXPOINT_ASSIGN(const std::size_t count, file_->read_at(offset_, piece));
       buffer_ += as_text(std::span(piece).first(count));
       offset_ += count;

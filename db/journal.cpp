@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::string_view kFormat = "sixpoint/journal-entry/2";
+constexpr std::string_view kEntryFormat = "sixpoint/journal-entry/2";
 // Captures of 100 MiB each in hex digits, and room for several.
 constexpr std::uint64_t kLargestEntry = 1ULL << 30;
 
@@ -146,7 +146,7 @@ Result<std::string> Journal::add(NewRows rows) {
     std::from_chars(names.back().data(), names.back().data() + names.back().size(), last);
   }
   const std::string record = to_json(rows).dump();
-  const Json line = {{"schema", kFormat}, {"sha256", text_sha256(record)}, {"record", record}};
+  const Json line = {{"schema", kEntryFormat}, {"sha256", text_sha256(record)}, {"record", record}};
   SIXPOINT_CHECK(write_private_file(
       *files_, fmt::format("{}/{:010}-{}.json", folder_, last + 1, rows.id), line.dump() + "\n"));
   return std::move(rows.id);

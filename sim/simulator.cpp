@@ -6,7 +6,7 @@ namespace sixpoint::sim {
 
 namespace {
 
-constexpr std::uint64_t kNoiseStream = 0x6E6F6973;
+constexpr std::uint64_t kSensorNoiseStream = 0x6E6F6973;
 
 NumberFormat format_under(const std::vector<std::unique_ptr<Effect>>& effects) {
   NumberFormat format;
@@ -23,7 +23,7 @@ Simulator::Simulator(const UnitTruth& unit, const SimulatorOptions& options, Mot
     : options_(options),
       motion_(motion),
       effects_(std::move(effects)),
-      sensor_(unit, options.filter, Random(options.seed, kNoiseStream)),
+      sensor_(unit, options.filter, Random(options.seed, kSensorNoiseStream)),
       firmware_(unit, options.stored_bits, format_under(effects_)) {
   options_.plan.rate_hz = options_.rate_hz;
   for (const auto& effect : effects_) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint64_t kProtocolStream = 0x70726F74;
 constexpr double kRoom_c = 23;
-constexpr double kTwoPi = 2 * std::numbers::pi;
+constexpr double kFullTurn_rad = 2 * std::numbers::pi;
 
 // Rows of the sensor's frame: which axis of it points up, the others in cyclic order.
 std::vector<Eigen::Matrix3d> faces() {
@@ -97,7 +97,7 @@ class Drawing {
       const double longitude = i * std::numbers::pi * (3 - std::sqrt(5.0));
       const Eigen::Vector3d up(std::sqrt(1 - z * z) * std::cos(longitude),
                                std::sqrt(1 - z * z) * std::sin(longitude), z);
-      const Eigen::AngleAxisd yaw(random_.uniform(0, kTwoPi), Eigen::Vector3d::UnitZ());
+      const Eigen::AngleAxisd yaw(random_.uniform(0, kFullTurn_rad), Eigen::Vector3d::UnitZ());
       list.emplace_back(
           Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up).toRotationMatrix() *
           yaw.toRotationMatrix());
@@ -108,8 +108,8 @@ class Drawing {
   void tone(const std::string& name, const Eigen::Matrix3d& rotation, double frequency_hz,
             double amplitude_g, double duration_s) {
     add(name, SegmentKind::vibration, rotation, duration_s);
-    segments_.back().vibration =
-        Tone{Eigen::Vector3d::UnitZ(), frequency_hz, amplitude_g, random_.uniform(0, kTwoPi)};
+    segments_.back().vibration = Tone{Eigen::Vector3d::UnitZ(), frequency_hz, amplitude_g,
+                                      random_.uniform(0, kFullTurn_rad)};
   }
 
   void shakers() {
@@ -118,7 +118,7 @@ class Drawing {
       pause(60, 95);
       bool first = true;
       for (const double frequency_hz : {2.0, 4.0, 7.0, 11.0, 16.0, 22.0, 30.0, 40.0}) {
-        const double omega = kTwoPi * frequency_hz;
+        const double omega = kFullTurn_rad * frequency_hz;
         const double reach_g = kStroke_m * omega * omega / kStandardGravity_m_per_s2;
         at_s_ += first ? 0 : 3;
         first = false;

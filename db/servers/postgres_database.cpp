@@ -76,7 +76,7 @@ void read_field(const pqxx::field& field, Value& value) {
   }
 }
 
-void read_row(const pqxx::row& fields, Row& row) {
+void read_fields(const pqxx::row& fields, Row& row) {
   row.resize(fields.size());
   for (pqxx::row::size_type i = 0; i < fields.size(); ++i) {
     read_field(fields[i], row[i]);
@@ -187,7 +187,7 @@ class PostgresDatabase final : public Database {
         std::vector<Row> rows;
         rows.reserve(result.size());
         for (const pqxx::row& row : result) {
-          read_row(row, rows.emplace_back());
+          read_fields(row, rows.emplace_back());
         }
         return rows;
       });
@@ -428,7 +428,7 @@ class PostgresRows final : public RowStream {
       return false;
     }
     return database_.guarded([&]() -> Result<bool> {
-      read_row(batch_[at_++], row);
+      read_fields(batch_[at_++], row);
       return true;
     });
   }

@@ -54,7 +54,7 @@ std::vector<std::string> names_of(sqlite3& database, const std::string& sql,
 }
 
 // A name as SQL writes it.
-std::string quoted(std::string_view name) {
+std::string quoted_name(std::string_view name) {
   std::string text = "\"";
   for (const char c : name) {
     text += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -162,7 +162,7 @@ std::vector<Index> indexes_of(sqlite3& database, const std::string& table) {
     index.name = std::move(name);
     for (const std::string& column :
          names_of(database, "SELECT name FROM pragma_index_info(?)", index.name)) {
-      index.columns += quoted(column) + ", ";
+      index.columns += quoted_name(column) + ", ";
       ++index.column_count;
     }
     indexes.push_back(std::move(index));
@@ -179,7 +179,7 @@ bool read_table(sqlite3& database, const std::string& table, const Key& key,
   }
   columns += "rowid";
   const Statement statement =
-      prepare(database, fmt::format("SELECT {} FROM {} NOT INDEXED", columns, quoted(table)));
+      prepare(database, fmt::format("SELECT {} FROM {} NOT INDEXED", columns, quoted_name(table)));
   int result = statement == nullptr ? SQLITE_ERROR : sqlite3_step(statement.get());
   std::string entry;
   for (; result == SQLITE_ROW; result = sqlite3_step(statement.get())) {
@@ -202,7 +202,7 @@ std::string check_index(sqlite3& database, const std::string& table, const Key& 
   const std::string columns = index.columns + "rowid";
   const Statement statement =
       prepare(database, fmt::format("SELECT {0} FROM {1} INDEXED BY {2} ORDER BY {0}", columns,
-                                    quoted(table), quoted(index.name)));
+                                    quoted_name(table), quoted_name(index.name)));
   int result = statement == nullptr ? SQLITE_ERROR : sqlite3_step(statement.get());
   Entries entries;
   std::string entry;

@@ -26,7 +26,7 @@ constexpr std::uint8_t kBulk = 3;
 
 using std::chrono::nanoseconds;
 
-tl::unexpected<Error> broken(std::string what, std::size_t packet = 0) {
+tl::unexpected<Error> broken_capture(std::string what, std::size_t packet = 0) {
   return fail(ErrorCode::bad_data, std::move(what),
               packet == 0 ? "capture" : fmt::format("capture, packet {}", packet),
               "capture with 'tcpdump -i usbmonN -w capture.pcap', Wireshark or USBPcap");
@@ -57,7 +57,7 @@ struct Packet {
   std::span<const std::uint8_t> data;
 };
 
-std::string name_of(std::uint32_t link_type) {
+std::string link_name(std::uint32_t link_type) {
   switch (link_type) {
     case 266:
       return "USB on macOS";
@@ -87,7 +87,7 @@ Result<FileHeader> parse_file_header(std::span<const std::uint8_t> bytes) {
                 "convert it with 'editcap -F pcap OLD NEW' (a tool of Wireshark)");
   };
   if (bytes.size() < kFileHeader_bytes) {
-    return broken("this is no capture: it is too short");
+    return broken_capture("this is no capture: it is too short");
   }
   FileHeader header;
   for (const bool big : {false, true}) {
@@ -106,15 +106,15 @@ Result<FileHeader> parse_file_header(std::span<const std::uint8_t> bytes) {
           header.link_type == kUsbPcap) {
         return header;
       }
-      return broken(
+      return broken_capture(
           fmt::format("this capture is of link type {} ({}); 189 and 220 (USB on Linux) "
                       "and 249 (USBPcap) are read",
-                      header.link_type, name_of(header.link_type)));
+                      header.link_type, link_name(header.link_type)));
     }
   }
   return bytes[0] == 0x1F && bytes[1] == 0x8B
-             ? broken("this capture is compressed; unpack it with gunzip")
-             : broken("this is no capture, neither pcap nor pcapng");
+             ? broken_capture("this capture is compressed; unpack it with gunzip")
+             : broken_capture("this is no capture, neither pcap nor pcapng");
 }
 
 // usbmon's header (Documentation/usb/usbmon.rst), of 48 or 64 bytes, in the order of the file.
@@ -123,7 +123,7 @@ Result<Packet> parse_usbmon(const FileHeader& file, std::span<const std::uint8_t
   const Order order = file.order;
   const std::size_t header_bytes = file.link_type == kLinuxUsb ? 48 : 64;
   if (body.size() < header_bytes) {
-    return broken("a packet is shorter than its header", number);
+    return broken_capture("a packet is shorter than its header", number);
   }
   Packet packet;
   packet.event = body[8];
@@ -135,7 +135,7 @@ Result<Packet> parse_usbmon(const FileHeader& file, std::span<const std::uint8_t
   const auto rest_us = order.get<std::int32_t>(body, 24);
   constexpr std::int64_t kLatest_s = 4'294'967'295;
   if (whole_s < 0 || whole_s > kLatest_s || rest_us < 0 || rest_us > 1'000'000) {
-    return broken("a packet's time cannot be", number);
+    return broken_capture("a packet's time cannot be", number);
   }
   packet.time = std::chrono::seconds(whole_s) + std::chrono::microseconds(rest_us);
   const auto length = order.get<std::uint32_t>(body, 36);
@@ -152,7 +152,7 @@ Result<Packet> parse_usbpcap(std::span<const std::uint8_t> body, nanoseconds tim
   const Order little;
   const std::size_t header_bytes = body.size() < 2 ? 0 : little.get<std::uint16_t>(body, 0);
   if (header_bytes < kHeader_bytes || header_bytes > body.size()) {
-    return broken("a packet is shorter than its header", number);
+    return broken_capture("a packet is shorter than its header", number);
   }
   Packet packet;
   const bool up = (body[16] & 1U) != 0;
@@ -215,7 +215,7 @@ class Collector {
 
   Result<Session> finish() {
     if (session_.transfers.empty()) {
-      return broken(
+      return broken_capture(
           "the capture holds no transfer of a unit; name it with --bus and --device-number");
     }
     session_.device = fmt::format("usb bus {} device {}", bus_.value_or(0), device_.value_or(0));
@@ -257,14 +257,14 @@ Result<Session> session_from_pcap(std::span<const std::uint8_t> bytes, const Pca
   bytes = bytes.subspan(kFileHeader_bytes);
   for (std::size_t number = 1; !bytes.empty(); ++number) {
     if (number > kMostPackets) {
-      return broken("the capture has more packets than a session is made of", number);
+      return broken_capture("the capture has more packets than a session is made of", number);
     }
     if (bytes.size() < kPacketHeader_bytes) {
-      return broken("the capture ends within a packet's header", number);
+      return broken_capture("the capture ends within a packet's header", number);
     }
     const auto ticks = order.get<std::uint32_t>(bytes, 4);
     if (ticks > (file.nanosecond_times ? 1'000'000'000U : 1'000'000U)) {
-      return broken("a packet's time cannot be", number);
+      return broken_capture("a packet's time cannot be", number);
     }
     const nanoseconds time = std::chrono::seconds(order.get<std::uint32_t>(bytes, 0)) +
                              nanoseconds(file.nanosecond_times ? 1 : 1000) * ticks;

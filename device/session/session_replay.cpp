@@ -42,7 +42,7 @@ std::string key_of(std::span<const std::uint8_t> bytes) {
   return key;
 }
 
-std::string name_of(std::span<const std::uint8_t> bytes) {
+std::string message_name(std::span<const std::uint8_t> bytes) {
   const Result<Message> message = decode(bytes);
   return message ? fmt::format("'{}'", to_string(message->command))
                  : fmt::format("{} bytes that are no request", bytes.size());
@@ -159,9 +159,9 @@ class Player {
     const SessionTransfer& transfer = session_.transfers[next];
     if (transfer.kind == Kind::reopened || masked(transfer.bytes) != masked(bytes)) {
       return fail(ErrorCode::bad_data,
-                  fmt::format("the program sends {} where the session has {}", name_of(bytes),
+                  fmt::format("the program sends {} where the session has {}", message_name(bytes),
                               transfer.kind == Kind::reopened ? "the device opened again"
-                                                              : name_of(transfer.bytes)),
+                                                              : message_name(transfer.bytes)),
                   fmt::format("replayed session, transfer {}", next + 1),
                   "use the options of the recording, or match=key");
     }
@@ -219,9 +219,10 @@ class Player {
     }
     const auto found = answers_.find(key_of(bytes));
     if (found == answers_.end()) {
-      return fail(ErrorCode::bad_data,
-                  fmt::format("the session has no answer to {} with this content", name_of(bytes)),
-                  "replayed session", "record a session in which it is asked");
+      return fail(
+          ErrorCode::bad_data,
+          fmt::format("the session has no answer to {} with this content", message_name(bytes)),
+          "replayed session", "record a session in which it is asked");
     }
     std::deque<std::size_t>& uses = found->second;
     const std::size_t index = uses.front();

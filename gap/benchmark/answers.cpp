@@ -16,7 +16,7 @@ using Named = std::vector<std::pair<std::string, double>>;
 
 constexpr double kPlace_sigma = 3;
 
-tl::unexpected<Error> bad(const std::string& source, std::string what) {
+tl::unexpected<Error> bad_answer(const std::string& source, std::string what) {
   return fail(ErrorCode::bad_data, std::move(what), source,
               "docs/gap-benchmark.md says what an answer holds");
 }
@@ -33,7 +33,7 @@ Result<double> probability_of(const Json& json, const std::string& source) {
   const Json* value = member(json, "probability");
   if (value == nullptr || !value->is_number() || !(value->get<double>() >= 0) ||
       !(value->get<double>() <= 1)) {
-    return bad(source, "a probability between 0 and 1 is missing");
+    return bad_answer(source, "a probability between 0 and 1 is missing");
   }
   return value->get<double>();
 }
@@ -42,19 +42,19 @@ Result<Named> names_of(const Json& list, const std::string& source) {
   Named named;
   std::set<std::string> seen;
   if (!list.is_array()) {
-    return bad(source, "effects and candidates are lists");
+    return bad_answer(source, "effects and candidates are lists");
   }
   for (const Json& entry : list) {
     const Json* name = member(entry, "name");
     if (name == nullptr || !name->is_string()) {
-      return bad(source, "an effect needs a name");
+      return bad_answer(source, "an effect needs a name");
     }
     const auto text = name->get<std::string>();
     if (!sim::find_effect(text)) {
-      return bad(source, fmt::format("the catalogue has no effect \"{}\"", shortened(text)));
+      return bad_answer(source, fmt::format("the catalogue has no effect \"{}\"", shortened(text)));
     }
     if (!seen.insert(text).second) {
-      return bad(source, fmt::format("the effect {} is there twice", text));
+      return bad_answer(source, fmt::format("the effect {} is there twice", text));
     }
     SIXPOINT_ASSIGN(const double probability, probability_of(entry, source));
     named.emplace_back(text, probability);
@@ -67,7 +67,7 @@ Result<Place> place_of(const Json& json, const std::string& source) {
   const Json* segment = member(json, "segment");
   const int index = axis != nullptr && axis->is_string() ? axis_of(axis->get<std::string>()) : -1;
   if (index < 0 || segment == nullptr || !segment->is_string()) {
-    return bad(source, "a place needs axis (X, Y, Z) and segment");
+    return bad_answer(source, "a place needs axis (X, Y, Z) and segment");
   }
   return Place{index, segment->get<std::string>()};
 }
@@ -79,7 +79,7 @@ Status read_where(const Json& json, const std::string& source, Answer& answer) {
     return {};
   }
   if (!places->is_array()) {
-    return bad(source, "unknown.where is a list");
+    return bad_answer(source, "unknown.where is a list");
   }
   bool words = false;
   std::set<Place> found;
@@ -113,7 +113,7 @@ Status add_lines(std::string_view text, const std::string& path, std::vector<Ans
     const Json json = Json::parse(row, nullptr, false);
     const Json* bundle = member(json, "bundle");
     if (bundle == nullptr || !bundle->is_string()) {
-      return bad(source, "a line is one JSON object with the member bundle");
+      return bad_answer(source, "a line is one JSON object with the member bundle");
     }
     SIXPOINT_ASSIGN(Answer answer, parse_answer(json, bundle->get<std::string>(), source));
     answers.push_back(std::move(answer));
@@ -129,7 +129,7 @@ Result<Answer> parse_answer(const Json& json, const std::string& bundle,
   const Json* unknown = member(json, "unknown");
   const Json* present = unknown == nullptr ? nullptr : member(*unknown, "present");
   if (effects == nullptr || present == nullptr || !present->is_boolean()) {
-    return bad(source, "an answer needs effects, and unknown with present and probability");
+    return bad_answer(source, "an answer needs effects, and unknown with present and probability");
   }
   Answer answer;
   answer.bundle = bundle;
@@ -166,7 +166,8 @@ Result<std::vector<Answer>> read_answers(FileSystem& files, const std::string& p
   std::set<std::string> seen;
   for (const Answer& answer : answers) {
     if (!seen.insert(answer.bundle).second) {
-      return bad(path, fmt::format("the bundle {} has two answers", shortened(answer.bundle)));
+      return bad_answer(path,
+                        fmt::format("the bundle {} has two answers", shortened(answer.bundle)));
     }
   }
   return answers;

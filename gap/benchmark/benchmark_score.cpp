@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
@@ -10,8 +9,6 @@
 
 namespace sixpoint::gap {
 namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // One bundle, its answer, and what the header's tables make of them.
 struct Judged {
@@ -170,9 +167,9 @@ class Scorer {
   // Of sets of names, or of places.
   struct Counts {
     double hits = 0, named = 0, truth = 0, must = 0, must_named = 0;
-    double recall() const { return must > 0 ? must_named / must : kNone; }
-    double precision() const { return named > 0 ? hits / named : kNone; }
-    double f1() const { return named + truth > 0 ? 2 * hits / (named + truth) : kNone; }
+    double recall() const { return must > 0 ? must_named / must : kNotDefined; }
+    double precision() const { return named > 0 ? hits / named : kNotDefined; }
+    double f1() const { return named + truth > 0 ? 2 * hits / (named + truth) : kNotDefined; }
   };
 
   std::vector<std::size_t> everything() const {
@@ -292,7 +289,7 @@ class Scorer {
   }
 
   static Measure share(const char* name, const Share& share) {
-    return {name, share.of > 0 ? share.right / share.of : kNone, share.interval(), "wilson",
+    return {name, share.of > 0 ? share.right / share.of : kNotDefined, share.interval(), "wilson",
             share.of};
   }
 

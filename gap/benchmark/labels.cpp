@@ -43,7 +43,7 @@ double enlarge(std::vector<sim::EffectSpec>& parts, double severity) {
   return enlarged ? factor : 1;
 }
 
-Error bad(std::size_t line, std::string_view what) {
+Error bad_label(std::size_t line, std::string_view what) {
   return Error{ErrorCode::bad_data, std::string(what), fmt::format("line {} of the labels", line),
                "take the file that gap challenge --export wrote"};
 }
@@ -62,7 +62,8 @@ Result<LabelledEffect> parse_effect(const Json& json, std::size_t line) {
   };
   if (!text("name", effect.name) || !text("family", effect.family) ||
       !size("severity", effect.severity) || !size("size_over_bound", effect.size_over_bound)) {
-    return tl::unexpected(bad(line, "an effect needs name, family, severity and size_over_bound"));
+    return tl::unexpected(
+        bad_label(line, "an effect needs name, family, severity and size_over_bound"));
   }
   return effect;
 }
@@ -72,7 +73,7 @@ Result<TrialLabel> parse_label(const Json& json, std::size_t line) {
   if (!json.is_object() || !json.contains("bundle") || !json["bundle"].is_string() ||
       !json.contains("kind") || !json["kind"].is_string() || !json.contains("effects") ||
       !json["effects"].is_array() || !json.contains("where") || !json["where"].is_array()) {
-    return tl::unexpected(bad(line, "a label needs bundle, kind, effects and where"));
+    return tl::unexpected(bad_label(line, "a label needs bundle, kind, effects and where"));
   }
   label.bundle = json["bundle"].get<std::string>();
   constexpr std::array kKinds = {TrialKind::none, TrialKind::single, TrialKind::pair,
@@ -80,7 +81,7 @@ Result<TrialLabel> parse_label(const Json& json, std::size_t line) {
   const auto kind = std::ranges::find(kKinds, json["kind"].get<std::string>(),
                                       [](TrialKind k) { return std::string(to_string(k)); });
   if (kind == kKinds.end()) {
-    return tl::unexpected(bad(line, "there is no such kind of trial"));
+    return tl::unexpected(bad_label(line, "there is no such kind of trial"));
   }
   label.kind = *kind;
   for (const Json& effect : json["effects"]) {
@@ -88,14 +89,14 @@ Result<TrialLabel> parse_label(const Json& json, std::size_t line) {
     label.effects.push_back(std::move(parsed));
   }
   if (label.effects.empty() != (label.kind == TrialKind::none)) {
-    return tl::unexpected(bad(line, "kind and effects contradict each other"));
+    return tl::unexpected(bad_label(line, "kind and effects contradict each other"));
   }
   for (const Json& place : json["where"]) {
     const bool whole = place.is_object() && place.contains("axis") && place["axis"].is_string() &&
                        place.contains("segment") && place["segment"].is_string();
     const int axis = whole ? axis_of(place["axis"].get<std::string>()) : -1;
     if (axis < 0) {
-      return tl::unexpected(bad(line, "a place needs axis (X, Y, Z) and segment"));
+      return tl::unexpected(bad_label(line, "a place needs axis (X, Y, Z) and segment"));
     }
     label.where.emplace(axis, place["segment"].get<std::string>());
   }
@@ -183,7 +184,7 @@ Result<Labels> parse_labels(std::string_view text) {
     const Json json = Json::parse(row, nullptr, false);
     if (line == 1) {
       if (!json.is_object() || json.value("schema", Json()) != kSchema) {
-        return tl::unexpected(bad(line, fmt::format("this is no file of {}", kSchema)));
+        return tl::unexpected(bad_label(line, fmt::format("this is no file of {}", kSchema)));
       }
       const auto& seed = json.value("seed", Json());
       const auto& protocol = json.value("protocol", Json());
@@ -193,12 +194,12 @@ Result<Labels> parse_labels(std::string_view text) {
     }
     SIXPOINT_ASSIGN(TrialLabel label, parse_label(json, line));
     if (!names.insert(label.bundle).second) {
-      return tl::unexpected(bad(line, "the bundle has two labels"));
+      return tl::unexpected(bad_label(line, "the bundle has two labels"));
     }
     labels.trials.push_back(std::move(label));
   }
   if (labels.trials.empty()) {
-    return tl::unexpected(bad(1, "there are no labels"));
+    return tl::unexpected(bad_label(1, "there are no labels"));
   }
   std::ranges::sort(labels.trials, {}, &TrialLabel::bundle);
   return labels;

@@ -2,22 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 
 #include "base/random.h"
 
 namespace sixpoint::gap {
-namespace {
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
 
 double right_above(std::span<const Ranked> known, std::span<const double> unknown) {
   if (known.empty() || unknown.empty()) {
-    return kNone;
+    return kNotDefined;
   }
   std::vector<double> sorted(unknown.begin(), unknown.end());
   std::ranges::sort(sorted);
@@ -34,7 +28,7 @@ double right_above(std::span<const Ranked> known, std::span<const double> unknow
 
 double area_under_risk_coverage(std::span<const Ranked> answers) {
   if (answers.empty()) {
-    return kNone;
+    return kNotDefined;
   }
   std::vector<Ranked> sorted(answers.begin(), answers.end());
   std::ranges::sort(sorted, std::greater(), &Ranked::confidence);
@@ -56,7 +50,7 @@ double area_under_risk_coverage(std::span<const Ranked> answers) {
 
 double calibration_error(std::span<const Said> said) {
   if (said.empty()) {
-    return kNone;
+    return kNotDefined;
   }
   constexpr int kBins = 10;
   std::map<std::pair<std::string, int>, double> differences;
@@ -82,7 +76,7 @@ double half_named_at(std::span<const Sized> effects) {
     }
   }
   if (points.size() < 4) {
-    return kNone;
+    return kNotDefined;
   }
   double a = 0;
   double b = 1;
@@ -110,7 +104,7 @@ double half_named_at(std::span<const Sized> effects) {
     }
   }
   const double half = std::exp(-a / b);
-  return b > 0 && half > 1 / (kReach * kReach) && half < kReach * kReach ? half : kNone;
+  return b > 0 && half > 1 / (kReach * kReach) && half < kReach * kReach ? half : kNotDefined;
 }
 
 std::array<double, 2> bootstrap_interval(std::size_t count, const Statistic& statistic,
@@ -127,7 +121,7 @@ std::array<double, 2> bootstrap_interval(std::size_t count, const Statistic& sta
     }
   }
   if (values.empty() || 2 * values.size() < draws) {
-    return {kNone, kNone};
+    return {kNotDefined, kNotDefined};
   }
   std::ranges::sort(values);
   const auto at = [&](double share) {

@@ -13,11 +13,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace sixpoint::gap {
+
+inline constexpr double kNotDefined = std::numeric_limits<double>::quiet_NaN();
 
 struct Ranked {
   double confidence = 0;

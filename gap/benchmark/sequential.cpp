@@ -6,11 +6,12 @@
 #include <cmath>
 #include <map>
 
+#include "gap/benchmark/shown.h"
+
 namespace sixpoint::gap {
 namespace {
 
 constexpr double kPiece_s = 10;
-constexpr double kSeating_mg = 0.17;
 constexpr std::array<double, 3> kNoise_mg = {3.9, 3.9, 5.5};  // at 100 Hz
 constexpr double kEnough_sd = 3;
 constexpr double kUnknown_sd = 5.5;

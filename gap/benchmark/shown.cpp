@@ -7,8 +7,7 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr double kPiece_s = 10;
-constexpr double kSeating_mg = 0.17;
+constexpr double kShownPiece_s = 10;
 constexpr double kGainSd_mg = 20;  // 2 % of 1 g
 constexpr double kOffsetSd_mg = 35;
 constexpr double kHost_s = 0.002 / 1.7320508075688772;  // standard deviation of +-2 ms
@@ -37,7 +36,7 @@ class Comparison {
     const double noise_mg2 = std::pow(run_.noise_mg[axis], 2) + lsb_mg_ * lsb_mg_ / 12;
     std::vector<Piece> segments;
     for (const sim::ProtocolSegment& segment : run_.segments) {
-      const auto length = static_cast<std::uint64_t>(kPiece_s * run_.rate_hz);
+      const auto length = static_cast<std::uint64_t>(kShownPiece_s * run_.rate_hz);
       std::vector<Piece> pieces;
       for (std::uint64_t first = 0; first < segment.samples; first += length) {
         const std::uint64_t count = std::min(length, segment.samples - first);

@@ -29,6 +29,8 @@
 namespace sixpoint::gap {
 
 inline constexpr double kShownAt = 3;  // standard deviations; convention
+// Standard deviation of a mean from placement to placement, if nothing else is known (docs/gap.md).
+inline constexpr double kSeating_mg = 0.17;
 
 struct Shown {
   double means = 0, samples = 0, times = 0;                // squares

@@ -21,8 +21,8 @@ namespace {
 
 constexpr std::uint64_t kFractionStream = 0x66726163;
 constexpr std::size_t kBlock = 512;
-constexpr double kLow12 = -2048;
-constexpr double kHigh12 = 2047;
+constexpr double kLowest_lsb = -2048;
+constexpr double kHighest_lsb = 2047;
 
 class Adding {
  public:
@@ -103,7 +103,7 @@ class Adding {
         const double lsb =
             block_.sensed_g[i][static_cast<Eigen::Index>(axis)] * bundle_.accel_scale_lsb_per_g;
         block_.stored[i][axis] =
-            static_cast<std::int16_t>(format_.to_integer(lsb, kLow12, kHigh12, clipped));
+            static_cast<std::int16_t>(format_.to_integer(lsb, kLowest_lsb, kHighest_lsb, clipped));
       }
     }
     for (const auto& effect : effects_) {

@@ -18,7 +18,7 @@ constexpr double kHarmonics_g = 0.5;        // smaller tones show no harmonics
 // A tone whose residual has this many times the noise's variance adds to the noise itself.
 constexpr double kLoudResidual = 1.3;
 // How well the response's form is known at least, as a share of what it takes off or adds.
-constexpr double kFormShare = 0.003;
+constexpr double kToneFormShare = 0.003;
 
 // Numbers the conditions in the order of their appearance.
 class Conditions {
@@ -65,7 +65,7 @@ Eigen::MatrixXd tone_covariance(const Block& block, const ToneFit& tone, const N
                                                              static_cast<Eigen::Index>(j));
     }
   }
-  const double form_mg = std::hypot(response.tone_form_share, kFormShare * std::log(gain)) *
+  const double form_mg = std::hypot(response.tone_form_share, kToneFormShare * std::log(gain)) *
                          tone.in_phase_mg[tone.axis];
   v(rows[1], rows[1]) += form_mg * form_mg;
   return v;

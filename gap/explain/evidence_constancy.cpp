@@ -19,7 +19,7 @@ constexpr std::array<double, 3> kAngleSizes_deg = {0.02, 0.1, 0.4};
 constexpr std::array<double, 2> kEffectShares = {0.15, 0.6};
 // Real effects bend from their plain equations by this share, and slow ones by the second over
 // time (gap.md: forms are bent by up to a tenth).
-constexpr double kFormShare = 0.1;
+constexpr double kFormShareInSize = 0.1;
 constexpr double kFormShareInTime = 0.1;
 // A change begins at this many times what the form may be bent.
 constexpr double kBeyondForm = 2;
@@ -76,7 +76,7 @@ std::vector<Term> terms_of(const EvidenceModel& model, const Fit& fit,
         size = std::max(size, std::abs(parameter(fit.state, group.first + i)));
       }
       term.sizes = scaled(kEffectShares, size);
-      term.form = kFormShare * size;
+      term.form = kFormShareInSize * size;
       term.slow = group.effect == "drift" || group.effect == "warm_up";
       if (term.slow) {
         slow_mg += size * (group.effect == "drift" ? hours : 1);

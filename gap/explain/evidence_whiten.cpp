@@ -14,7 +14,6 @@ constexpr double kDerivativeStep = 0.02;
 constexpr double kRegular = 1e-9;
 // A rotation by one degree moves 1 g by this many mg (1000 pi / 180).
 constexpr double kMgPerDegree = 17.45;
-constexpr double kRadPerDeg = M_PI / 180;
 
 // Placements are independent of each other under these kinds of scatter.
 bool by_placement_only(Scatter scatter) {
@@ -38,7 +37,7 @@ Eigen::MatrixXd covariance_of(const Block& a, const Block& b, Scatter scatter, d
     const double sd_deg = one_placement ? std::hypot(seat_deg, turn_deg) : turn_deg;
     v += sd_deg * sd_deg * seating_lever(a) * seating_lever(b).transpose();
     // To second order a turn by (x, y) takes x^2 + y^2 off: its mean square is 8 sd^4.
-    const double loss = 8 * std::pow(sd_deg * kRadPerDeg, 4);
+    const double loss = 8 * std::pow(sd_deg * M_PI / 180, 4);
     v += loss * seating_loss(a) * seating_loss(b).transpose();
   }
   if (scatter != Scatter::nominal && scatter != Scatter::seating) {

@@ -47,7 +47,7 @@ constexpr double kPinkCost_nats = 2;     // a size found on a grid
 constexpr double kFormLeft = 0.1;
 // Mounts and straps (gap.md: 8 to 25 Hz, q of 1.5 to 4), with room on either side.
 constexpr double kMountLowest_hz = 4, kMountHighest_hz = 45, kMountHighest_q = 8;
-constexpr double kLowest_hz = 4;          // of corners and resonances tried
+constexpr double kLowestCorner_hz = 4;    // of corners and resonances tried
 constexpr double kHighestOfRate = 0.495;  // corners: what the bilinear transform can hold
 constexpr double kSmallTone_g = 1.5;      // larger tones also show curvature of third order
 constexpr double kLineGuard_hz = 2.1;     // four bins beside a line
@@ -188,12 +188,13 @@ class Search {
   }
 
   void search_low_pass(double& best) {
-    const auto corners = static_cast<int>(std::log(0.492 * rate_hz_ / kLowest_hz) / std::log(1.05));
+    const auto corners =
+        static_cast<int>(std::log(0.492 * rate_hz_ / kLowestCorner_hz) / std::log(1.05));
     for (const LowPassForm form :
          {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue}) {
       for (const int order : {4, 2, 1, 3, 6, 8}) {
         for (int k = 0; k <= corners; ++k) {
-          try_low_pass({kLowest_hz * std::pow(1.05, k), 0, order, 0, 0, form}, best);
+          try_low_pass({kLowestCorner_hz * std::pow(1.05, k), 0, order, 0, 0, form}, best);
         }
       }
     }
@@ -243,12 +244,12 @@ class Search {
       }
     };
     const auto frequencies =
-        static_cast<int>(std::log(0.5 * rate_hz_ / kLowest_hz) / std::log(1.02));
+        static_cast<int>(std::log(0.5 * rate_hz_ / kLowestCorner_hz) / std::log(1.02));
     for (const ResonanceForm form :
          {ResonanceForm::base_excited, ResonanceForm::second_order, ResonanceForm::peak}) {
       for (int i = 0; i < frequencies; ++i) {
         for (int k = 0; k < 35; ++k) {
-          try_one({kLowest_hz * std::pow(1.02, i), 0.7 * std::pow(1.08, k), form, 0});
+          try_one({kLowestCorner_hz * std::pow(1.02, i), 0.7 * std::pow(1.08, k), form, 0});
         }
       }
     }

@@ -32,7 +32,7 @@ struct Moment {
   std::array<double, 3> square{};
 };
 
-struct Sums {
+struct TextureSums {
   std::array<double, 3> n{}, square{}, fourth{};
   std::array<std::array<double, kLags>, 3> lagged{};
   std::vector<Piece> pieces;
@@ -77,7 +77,7 @@ std::optional<std::array<int, 3>> difference_at(const CleanSamples& clean, std::
 }
 
 // `run`: one dwell, or ten seconds of a long record.
-void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretch, Sums& sums) {
+void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretch, TextureSums& sums) {
   constexpr double kFewest = 4;  // differences of a piece
   const double scale = std::sqrt(static_cast<double>(stretch) / 2);
   std::array<Piece, 3> pieces;
@@ -120,9 +120,9 @@ void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretc
   }
 }
 
-Sums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretch) {
+TextureSums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretch) {
   const std::size_t most = 10 * static_cast<std::size_t>(bundle.rate_hz);
-  Sums sums;
+  TextureSums sums;
   for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
     for (const RestPiece& run : rest_pieces(bundle, s, most)) {
       add_run(clean, run, stretch, sums);
@@ -131,7 +131,7 @@ Sums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretc
   return sums;
 }
 
-double tails(const Sums& sums) {
+double tails(const TextureSums& sums) {
   double up = 0;
   double down = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -148,10 +148,10 @@ double tails(const Sums& sums) {
 }
 
 // Bartlett's test of equal variances.
-double dwells(const std::vector<const Sums*>& scales) {
+double dwells(const std::vector<const TextureSums*>& scales) {
   double statistic = 0;
   double freedom = 0;
-  for (const Sums* sums : scales) {
+  for (const TextureSums* sums : scales) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!sums->free_of_grid(axis)) {
         continue;
@@ -178,14 +178,14 @@ double dwells(const std::vector<const Sums*>& scales) {
   return freedom > 0 ? normal_of(std::max(0.0, statistic), freedom) : 0;
 }
 
-void moments(const std::vector<const Sums*>& scales, Texture::Scale& found) {
+void moments(const std::vector<const TextureSums*>& scales, Texture::Scale& found) {
   struct Energy {
     std::size_t segment = 0;
     double chi = 0;
     double freedom = 0;
   };
   std::map<std::size_t, Energy> energies;
-  for (const Sums* sums : scales) {
+  for (const TextureSums* sums : scales) {
     std::array<double, 3> per{};
     std::array<double, 3> bunch{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -233,12 +233,12 @@ Texture noise_texture(const Bundle& bundle, const CleanSamples& clean) {
   if (bundle.rate_hz < 10) {
     return texture;
   }
-  std::vector<Sums> all;
+  std::vector<TextureSums> all;
   all.reserve(kStretches.size());
   for (const std::size_t stretch : kStretches) {
     all.push_back(sums_at(bundle, clean, stretch));
   }
-  std::vector<const Sums*> fine;
+  std::vector<const TextureSums*> fine;
   texture.scales.reserve(all.size() + 1);
   for (std::size_t i = 0; i < all.size(); ++i) {
     Texture::Scale scale;

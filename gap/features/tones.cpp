@@ -14,8 +14,8 @@ constexpr double kCut = 60;
 constexpr double kPiece = 8;       // a cut and three unknowns
 constexpr double kEvenDrift = 12;  // a frequency, found on a grid of hundreds
 
-// Sums over samples up to an index: enough to fit 1, cos, sin on any stretch.
-struct Sums {
+// ToneSums over samples up to an index: enough to fit 1, cos, sin on any stretch.
+struct ToneSums {
   double n = 0, c = 0, s = 0, cc = 0, cs = 0, ss = 0, y = 0, yc = 0, ys = 0, yy = 0;
   void add(double value, double angle) {
     const double cosine = std::cos(angle);
@@ -31,7 +31,7 @@ struct Sums {
     ys += value * sine;
     yy += value * value;
   }
-  Sums operator-(const Sums& o) const {
+  ToneSums operator-(const ToneSums& o) const {
     return {n - o.n,   c - o.c, s - o.s,   cc - o.cc, cs - o.cs,
             ss - o.ss, y - o.y, yc - o.yc, ys - o.ys, yy - o.yy};
   }
@@ -45,7 +45,7 @@ struct PieceFit {
   double amplitude() const { return std::hypot(x[1], x[2]); }
 };
 
-PieceFit fit_piece(const Sums& d) {
+PieceFit fit_piece(const ToneSums& d) {
   PieceFit fit;
   fit.n = d.n;
   if (d.n < 5) {
@@ -61,9 +61,9 @@ PieceFit fit_piece(const Sums& d) {
   return fit;
 }
 
-std::vector<Sums> prefix_sums(const std::vector<double>& y, const std::vector<std::uint8_t>& good,
-                              double w) {
-  std::vector<Sums> sums(y.size() + 1);
+std::vector<ToneSums> prefix_sums(const std::vector<double>& y,
+                                  const std::vector<std::uint8_t>& good, double w) {
+  std::vector<ToneSums> sums(y.size() + 1);
   for (std::size_t i = 0; i < y.size(); ++i) {
     sums[i + 1] = sums[i];
     if (good[i] != 0) {
@@ -170,7 +170,7 @@ class ToneAnalysis {
 
   // Takes back cuts that gain nothing against the noise that is there (the halves of split(), or
   // scatter that the tone adds).
-  void merge(const std::vector<Sums>& sums, std::vector<std::size_t>& cuts) const {
+  void merge(const std::vector<ToneSums>& sums, std::vector<std::size_t>& cuts) const {
     while (cuts.size() > 2) {
       double least = 1e300;
       std::size_t at = 0;
@@ -220,7 +220,7 @@ class ToneAnalysis {
     return best;
   }
 
-  double cost(const std::vector<Sums>& sums, std::vector<std::size_t> cuts) const {
+  double cost(const std::vector<ToneSums>& sums, std::vector<std::size_t> cuts) const {
     std::sort(cuts.begin(), cuts.end());
     double total = 0;
     for (std::size_t p = 0; p + 1 < cuts.size(); ++p) {
@@ -229,7 +229,7 @@ class ToneAnalysis {
     return total;
   }
 
-  void split(const std::vector<Sums>& sums, std::size_t first, std::size_t last,
+  void split(const std::vector<ToneSums>& sums, std::size_t first, std::size_t last,
              std::vector<std::size_t>& cuts, int depth) const {
     if (last - first < 2 * kShortestPiece || depth > 12) {
       return;
@@ -270,7 +270,7 @@ class ToneAnalysis {
     // Phase first, then everything in phase with it.
     double phase0 = 0;
     for (int round = 0; round < 2; ++round) {
-      Sums total;
+      ToneSums total;
       for (std::size_t i = 0; i < y_.size(); ++i) {
         if (good_[i] != 0) {
           total.add(y_[i], angle(i));

@@ -10,7 +10,7 @@ namespace sixpoint::gap {
 namespace {
 
 // What is subtracted from a test because small effects of the catalogue or heavy tails add to it.
-constexpr double kChance_sd = 1;
+constexpr double kSlowChance_sd = 1;
 // Slow noise that is not accepted is an alarm from here on: e^12 is 160,000 to one.
 constexpr double kSlowNoise_nats = 12;
 constexpr double kUnknownScatter_sd = 3;  // added to an unknown scatter's own
@@ -68,8 +68,8 @@ void test_spectrum(const Records& records, const Explanation& explanation, const
   if (scatter != Scatter::random_walk && scatter != Scatter::flicker && nats > kSlowNoise_nats) {
     found.alarm(nats_to_sd(nats), "spectrum: slow noise inside the dwells");
   }
-  found.test(slow.jump_sd - kChance_sd, "mean: the zero jumps within records");
-  found.test(slow.axis_sd - kChance_sd, "spectrum: wander of one axis inside the dwells");
+  found.test(slow.jump_sd - kSlowChance_sd, "mean: the zero jumps within records");
+  found.test(slow.axis_sd - kSlowChance_sd, "spectrum: wander of one axis inside the dwells");
   found.test(slow.misfit_sd, "spectrum: wander inside the dwells");
   const Response& response = records.response;
   // 1/f noise lifts the lowest bins.
@@ -124,7 +124,7 @@ void test_tone_residual(const Request& request, const Records& records, const To
                    std::sqrt(2 / static_cast<double>(tone.samples) +
                              (jitter ? kJitterVariance : 0) + std::pow(slow_mg2 / total, 2));
   found.test(
-      jitter ? z / kJitterTests : z - kChance_sd,
+      jitter ? z / kJitterTests : z - kSlowChance_sd,
       fmt::format("tone: residual at {} Hz, {} g", vibration.frequency_hz, vibration.amplitude_g));
 }
 

@@ -155,7 +155,7 @@ constexpr double kParity_sd = 6;
 constexpr double kParityAlarm_sd = 30;
 constexpr std::size_t kFewOutliers = 3;
 constexpr double kOutlierAlarm_sd = 10;
-constexpr double kChance_sd = 0.5;  // what small effects of the catalogue add to a test
+constexpr double kCodesChance_sd = 0.5;  // what small effects of the catalogue add to a test
 constexpr double kKurtosisChance_sd = 1;
 
 // Equal tests of single codes: parity and outliers.
@@ -199,22 +199,23 @@ Findings judge_codes(const Request& request, const Records& records, double slow
         codes.spread_freedom > 0
             ? (codes.spread_sd - wider * std::sqrt(codes.spread_freedom / 2)) / (1 + wider)
             : 0;
-    found.test(spread - kChance_sd,
+    found.test(spread - kCodesChance_sd,
                fmt::format("codes: the noise changes from dwell to dwell (worst: {})",
                            request.bundle.segments[codes.worst_segment].name));
     found.test(codes.kurtosis_sd / (1 + wider) - kKurtosisChance_sd,
                "codes: the noise is not Gaussian");
     found.test(
-        std::abs(codes.code_sd) / (1 + wider) - kChance_sd,
+        std::abs(codes.code_sd) / (1 + wider) - kCodesChance_sd,
         fmt::format("codes: axis {} has the value {} {} often than its neighbours let expect",
                     "XYZ"[codes.code_axis], codes.code, codes.code_sd < 0 ? "less" : "more"));
   }
   if (!line) {
-    found.test(std::abs(codes.cross_correlation_sd) / std::sqrt(1 + wider) - kChance_sd,
+    found.test(std::abs(codes.cross_correlation_sd) / std::sqrt(1 + wider) - kCodesChance_sd,
                "codes: the noise of two axes goes together");
   }
   if (!coloured && !before.accepted("duplicated_samples") && !line) {
-    found.test(codes.repeats_excess_sd - kChance_sd, "codes: values repeat more often than chance");
+    found.test(codes.repeats_excess_sd - kCodesChance_sd,
+               "codes: values repeat more often than chance");
   }
   return found;
 }

@@ -18,7 +18,7 @@ constexpr double kClockRange_ppm = 1500;
 constexpr double kPossibleClock_ppm = 20'000;
 constexpr double kDatasheetClock_ppm = 200;  // also in the catalogue
 constexpr double kNoClock_ppm = 1e9;         // uncertainty where nothing shows it
-constexpr double kChance_sd = 1;             // what small effects of the catalogue add to a test
+constexpr double kClockChance_sd = 1;        // what small effects of the catalogue add to a test
 constexpr double kRmsPerG_mg = 707;          // of a sine of 1 g
 
 // Slips (conventions): evidence of one, odds of none where each would show, alarms.
@@ -116,11 +116,11 @@ void judge_clock(const Request& request, const HostTiming& host, const std::vect
     ppm = by_tones.ppm;
     sd = std::max(by_tones.sd_ppm, 1.0);
   } else if (by_tones.count >= 3) {
-    found.test(std::abs(by_tones.ppm - ppm) / std::hypot(by_tones.sd_ppm, sd) - kChance_sd,
+    found.test(std::abs(by_tones.ppm - ppm) / std::hypot(by_tones.sd_ppm, sd) - kClockChance_sd,
                "timing: the tones' frequencies are off against the host's clock");
   }
   if (by_tones.count >= 4 && by_tones.lost + by_tones.repeated == 0) {
-    found.test(chi_to_sd(by_tones.chi, by_tones.count - 1) - kChance_sd,
+    found.test(chi_to_sd(by_tones.chi, by_tones.count - 1) - kClockChance_sd,
                "timing: the tones' frequencies contradict each other");
   }
   if (sd >= 0.1 * kNoClock_ppm) {

@@ -12,7 +12,7 @@ namespace sixpoint::gap {
 namespace {
 
 constexpr double kLeft = 64;
-constexpr double kRight = Chart::kWidth - 8;
+constexpr double kPlotRight = Chart::kWidth - 8;
 constexpr double kBottom = Chart::kHeight - 34;
 constexpr double kTop = 16;
 constexpr std::array<const char*, 3> kColours = {"#b5442e", "#2e7d4f", "#2f5fa8"};
@@ -75,11 +75,11 @@ std::string Chart::drawing() const {
     svg.text(kLeft, kHeight / 2, "this protocol does not show it", "fill=\"#777\"");
     return svg.marks();
   }
-  const SvgScale x_scale = scale_of(scaled_x(low_x_), scaled_x(high_x_), kLeft, kRight);
+  const SvgScale x_scale = scale_of(scaled_x(low_x_), scaled_x(high_x_), kLeft, kPlotRight);
   const SvgScale y_scale = scale_of(scaled_y(low_y_), scaled_y(high_y_), kBottom, kTop);
   for (const double y :
        log_y_ ? log_ticks(y_scale.low, y_scale.high) : round_ticks(y_scale.low, y_scale.high)) {
-    svg.line(kLeft, y_scale(y), kRight, y_scale(y), "stroke=\"#ddd\"");
+    svg.line(kLeft, y_scale(y), kPlotRight, y_scale(y), "stroke=\"#ddd\"");
     svg.text(kLeft - 4, y_scale(y) + 4, fmt::format("{:.6g}", log_y_ ? std::pow(10, y) : y),
              "text-anchor=\"end\"");
   }

@@ -39,9 +39,9 @@ std::vector<std::string> wrapped(const std::string& text, std::size_t columns, s
   return lines;
 }
 
-constexpr double kWidth = kPageWidth - 2 * kMargin;
-constexpr double kHalf = kWidth / 2 - 8;
-constexpr double kRight = kMargin + kWidth / 2 + 8;  // the right column's left edge
+constexpr double kInnerWidth = kPageWidth - 2 * kMargin;
+constexpr double kHalf = kInnerWidth / 2 - 8;
+constexpr double kRight = kMargin + kInnerWidth / 2 + 8;  // the right column's left edge
 constexpr const char* kRed = "#b5442e";
 constexpr const char* kBold = "font-weight=\"bold\"";
 
@@ -78,7 +78,7 @@ class Sheet {
     const auto sentence = wrapped(d_.brief(), kSentenceColumns, 6);
     y += 12;
     const double height = 14 + 19 * static_cast<double>(sentence.size());
-    box(kMargin, y, kWidth, height, "#f2f0ea");
+    box(kMargin, y, kInnerWidth, height, "#f2f0ea");
     box(kMargin, y, 5, height, kRed);
     y += 4;
     for (const std::string& line : sentence) {
@@ -163,7 +163,7 @@ class Sheet {
       }
     }
     const double cell =
-        (kWidth - 24) / static_cast<double>(std::max<std::size_t>(1, segments.size()));
+        (kInnerWidth - 24) / static_cast<double>(std::max<std::size_t>(1, segments.size()));
     for (std::size_t k = 0; k < segments.size(); ++k) {
       const double left = kMargin + 24 + cell * static_cast<double>(k);
       text(left + cell / 2, y + 15, 8.5, segments[k], "text-anchor=\"middle\"");

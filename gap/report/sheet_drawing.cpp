@@ -11,7 +11,7 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr double kWidth = 794;  // A4 at 96 dots per inch
+constexpr double kSheetWidth = 794;  // A4 at 96 dots per inch
 constexpr double kHeight = 1123;
 constexpr double kPointsPerDot = 0.75;
 constexpr int kPngScale = 2;
@@ -42,7 +42,7 @@ Status draw(const std::string& svg, cairo_surface_t* surface, double scale) {
   }
   const std::unique_ptr<cairo_t, Free> cairo(cairo_create(surface));
   cairo_scale(cairo.get(), scale, scale);
-  const RsvgRectangle page = {0, 0, kWidth, kHeight};
+  const RsvgRectangle page = {0, 0, kSheetWidth, kHeight};
   const bool drawn = rsvg_handle_render_document(handle.get(), cairo.get(), &page, &error) != 0;
   g_clear_error(&error);
   if (!drawn || cairo_status(cairo.get()) != CAIRO_STATUS_SUCCESS) {
@@ -55,7 +55,7 @@ Status draw(const std::string& svg, cairo_surface_t* surface, double scale) {
 
 Result<Bytes> sheet_png(const std::string& svg) {
   const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24,
-                                                   static_cast<int>(kWidth) * kPngScale,
+                                                   static_cast<int>(kSheetWidth) * kPngScale,
                                                    static_cast<int>(kHeight) * kPngScale));
   SIXPOINT_CHECK(draw(svg, surface.get(), kPngScale));
   Bytes bytes;
@@ -67,8 +67,8 @@ Result<Bytes> sheet_png(const std::string& svg) {
 
 Result<Bytes> sheet_pdf(const std::string& svg) {
   Bytes bytes;
-  const Surface surface(cairo_pdf_surface_create_for_stream(append, &bytes, kWidth * kPointsPerDot,
-                                                            kHeight * kPointsPerDot));
+  const Surface surface(cairo_pdf_surface_create_for_stream(
+      append, &bytes, kSheetWidth * kPointsPerDot, kHeight * kPointsPerDot));
   SIXPOINT_CHECK(draw(svg, surface.get(), kPointsPerDot));
   cairo_surface_finish(surface.get());
   if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) {

@@ -13,7 +13,7 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr double kBlock_s = 4;                // paper, Step 2
+constexpr double kRestBlock_s = 4;            // paper, Step 2
 constexpr double kSlope_g_per_sample = 5e-4;  // paper, Step 2
 constexpr double kNoise_g = 0.009;            // of the noisiest axis, rounding included
 constexpr double kHum_g = 0.04;               // the fan of a climate chamber
@@ -25,7 +25,7 @@ constexpr int kTemperatureRecord = 30;        // of .agdc
 class RestFinder {
  public:
   explicit RestFinder(double rate_hz)
-      : length_(static_cast<std::size_t>(std::max(20.0, std::round(kBlock_s * rate_hz)))) {}
+      : length_(static_cast<std::size_t>(std::max(20.0, std::round(kRestBlock_s * rate_hz)))) {}
 
   void push(double time_s, const Eigen::Vector3d& g, std::optional<double> temperature_c) {
     if (run_.empty()) {

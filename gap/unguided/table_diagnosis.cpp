@@ -104,7 +104,7 @@ std::optional<HeldOut> hold_out(const std::vector<Placement>& placements) {
   return out;
 }
 
-double rms_mg(const std::vector<double>& errors_g) {
+double root_mean_square_mg(const std::vector<double>& errors_g) {
   double sum = 0;
   for (const double e : errors_g) {
     sum += e * e;
@@ -206,8 +206,8 @@ double noise_g(const std::vector<RestingReading>& rests, const LengthFit& fit) {
 
 GapSize gap_of(const Fits& fits, bool explained, double floor_mg) {
   GapSize gap;
-  gap.before_mg = rms_mg(fits.held_out.square);
-  gap.after_mg = explained ? rms_mg(fits.held_out.cross) : gap.before_mg;
+  gap.before_mg = root_mean_square_mg(fits.held_out.square);
+  gap.after_mg = explained ? root_mean_square_mg(fits.held_out.cross) : gap.before_mg;
   gap.floor_mg = floor_mg;
   const double spread = std::sqrt(2.0 / static_cast<double>(fits.means.size()));
   gap.after_interval_mg = {gap.after_mg * (1 - spread), gap.after_mg * (1 + spread)};

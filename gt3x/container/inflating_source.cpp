@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kPackedPiece = std::size_t{256} * 1024;
 // isa-l counts in 32 bits, and so does its CRC function.
-constexpr std::size_t kLargestPiece = std::size_t{1} << 30;
+constexpr std::size_t kLargestRead = std::size_t{1} << 30;
 
 class Inflate final : public ByteSource {
  public:
@@ -33,7 +33,7 @@ class Inflate final : public ByteSource {
     if (broken_ != nullptr) {
       return fail(ErrorCode::bad_data, broken_, {}, {});
     }
-    const std::size_t wanted = std::min(out.size(), kLargestPiece);
+    const std::size_t wanted = std::min(out.size(), kLargestRead);
     state_->next_out = out.data();
     state_->avail_out = static_cast<std::uint32_t>(wanted);
     while (state_->avail_out == wanted && state_->block_state != ISAL_BLOCK_FINISH) {
@@ -93,7 +93,7 @@ class CheckedEntry final : public ByteSource {
     if (ended_) {
       return std::size_t{0};
     }
-    auto count = bytes_->read(out.first(std::min(out.size(), kLargestPiece)));
+    auto count = bytes_->read(out.first(std::min(out.size(), kLargestRead)));
     if (!count) {
       // The disk's own errors say where; those of the unpacking do not.
       if (!count.error().where.empty()) {

@@ -4,20 +4,15 @@
 #include <optional>
 
 #include "gt3x/container/file_bytes.h"
+#include "gt3x/container/zip_format.h"
 
 namespace sixpoint::gt3x {
 namespace {
 
-constexpr std::uint32_t kLocalHeader = 0x04034b50;
-constexpr std::uint32_t kCentralHeader = 0x02014b50;
-constexpr std::uint32_t kDescriptor = 0x08074b50;
 constexpr std::size_t kLocalHeaderSize = 30;
 constexpr std::size_t kCentralHeaderSize = 46;
 constexpr std::size_t kDescriptorSize = 24;  // the longer one, of zip64
 constexpr std::uint16_t kEncrypted = 1U << 0U;
-constexpr std::uint16_t kDescribedBehind = 1U << 3U;
-constexpr std::uint16_t kZip64Id = 1;
-constexpr std::uint64_t kSee64 = 0xFFFFFFFF;
 constexpr std::uint64_t kNewestVersion = 63;
 constexpr std::size_t kPiece = std::size_t{256} * 1024;
 
@@ -73,7 +68,7 @@ class Finder {
       take_zip64(std::span(names).subspan(name_size), entry.header);
     }
     entry.offset = at + kLocalHeaderSize + name_size + extra_size;
-    const bool described_behind = (flags & kDescribedBehind) != 0;
+    const bool described_behind = (flags & zip::kDescribedBehind) != 0;
     if (!described_behind) {
       SIXPOINT_ASSIGN(const bool ends_there, ends_at(entry.offset, entry.header.packed_size));
       if (ends_there) {
@@ -108,8 +103,8 @@ class Finder {
   static void take_zip64(std::span<const std::uint8_t> extra, EntryHeader& header) {
     for (std::size_t at = 0; at + 4 <= extra.size();) {
       const auto size = static_cast<std::size_t>(number_at(extra, at + 2, 2));
-      if (number_at(extra, at, 2) == kZip64Id && size >= 16 && header.size == kSee64 &&
-          header.packed_size == kSee64) {
+      if (number_at(extra, at, 2) == zip::kZip64Id && size >= 16 && header.size == zip::kSee64 &&
+          header.packed_size == zip::kSee64) {
         header.size = number_at(extra, at + 4, 8);
         header.packed_size = number_at(extra, at + 12, 8);
       }
@@ -127,7 +122,7 @@ class Finder {
     }
     SIXPOINT_ASSIGN(const Bytes behind, bytes_at(file_, offset + packed_size, 4));
     const auto signature = number_at(behind, 0, 4);
-    return behind.size() < 4 || signature == kLocalHeader || signature == kCentralHeader;
+    return behind.size() < 4 || signature == zip::kLocalHeader || signature == zip::kCentralHeader;
   }
 
   // The first header at `from` or behind it. With `described`, where packed bytes begin, also the
@@ -154,21 +149,21 @@ class Finder {
     Place place;
     place.at = at;
     switch (number_at(bytes, 0, 4)) {
-      case kLocalHeader: {
+      case zip::kLocalHeader: {
         const std::uint64_t name_size = number_at(bytes, 26, 2);
         const bool whole = bytes.size() >= kLocalHeaderSize + name_size;
         const bool takes =
             whole && plausible(number_at(bytes, 4, 2), number_at(bytes, 8, 2), name_size);
         return takes ? std::optional(place) : std::nullopt;
       }
-      case kCentralHeader:
+      case zip::kCentralHeader:
         place.kind = Kind::central;
         return bytes.size() >= kCentralHeaderSize &&
                        plausible(number_at(bytes, 6, 2), number_at(bytes, 10, 2),
                                  number_at(bytes, 28, 2))
                    ? std::optional(place)
                    : std::nullopt;
-      case kDescriptor:
+      case zip::kDescriptor:
         return described == nullptr ? std::nullopt : descriptor_at(bytes, at, *described);
       default:
         return std::nullopt;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kLevel = 6;
 // An empty block with fixed codes that is the last of its stream.
-constexpr std::array<std::uint8_t, 2> kEnd = {0x03, 0x00};
+constexpr std::array<std::uint8_t, 2> kEmptyLastBlock = {0x03, 0x00};
 // Length and complement of a stored block without bytes.
 constexpr std::array<std::uint8_t, 4> kEmptyStored = {0x00, 0x00, 0xFF, 0xFF};
 
@@ -48,7 +48,7 @@ void PiecePacker::pack(std::span<const std::uint8_t> piece, Place place, Bytes& 
 
 bool unpack_piece(Bytes& packed, PiecePacker::Place place, std::span<std::uint8_t> piece) {
   if (place == PiecePacker::Place::inner) {
-    packed.insert(packed.end(), kEnd.begin(), kEnd.end());
+    packed.insert(packed.end(), kEmptyLastBlock.begin(), kEmptyLastBlock.end());
   }
   const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> unpacker(
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);

@@ -8,7 +8,7 @@ namespace {
 constexpr std::uint8_t kVersion = 1;
 constexpr std::size_t kHeadSize = 5;  // version and piece size
 constexpr std::size_t kMostPieces = 16'000;
-constexpr std::uint32_t kLargestPiece = std::uint32_t{4} << 20;
+constexpr std::uint32_t kLargestPieceSize = std::uint32_t{4} << 20;
 
 void put(Bytes& out, std::uint64_t value, unsigned bytes) {
   for (unsigned i = 0; i < bytes; ++i) {
@@ -49,7 +49,7 @@ std::optional<SyncPoints> parse_sync_points(std::span<const std::uint8_t> field,
   SyncPoints points;
   points.piece_size = number_at(field, 1);
   const std::size_t count = (field.size() - kHeadSize) / 4;
-  if (points.piece_size == 0 || points.piece_size > kLargestPiece || count == 0 ||
+  if (points.piece_size == 0 || points.piece_size > kLargestPieceSize || count == 0 ||
       count != (entry.bytes + points.piece_size - 1) / points.piece_size) {
     return std::nullopt;
   }

@@ -7,33 +7,24 @@
 #include <isa-l/crc.h>
 
 #include "gt3x/container/pack_line.h"
+#include "gt3x/container/zip_format.h"
 
 namespace sixpoint::gt3x {
 namespace {
 
-// APPNOTE 4.3 to 4.5.
-constexpr std::uint32_t kLocalHeader = 0x04034b50;
-constexpr std::uint32_t kDataDescriptor = 0x08074b50;
-constexpr std::uint32_t kCentralHeader = 0x02014b50;
-constexpr std::uint32_t kEnd64 = 0x06064b50;
-constexpr std::uint32_t kEnd64Locator = 0x07064b50;
-constexpr std::uint32_t kEnd = 0x06054b50;
-constexpr std::uint16_t kZip64Id = 1;
 constexpr std::uint16_t kNeeds = 20;  // deflate
 constexpr std::uint16_t kNeedsZip64 = 45;
 constexpr std::uint16_t kMadeBy = 3U << 8U | kNeedsZip64;  // Unix: the attributes below
 constexpr std::uint32_t kAttributes = 0100644U << 16U;
-constexpr std::uint16_t kDescribedBehind = 1U << 3U;
 constexpr std::uint16_t kUtf8Name = 1U << 11U;
 constexpr std::uint16_t kStored = 0;
 constexpr std::uint16_t kDeflated = 8;
 // 1980-01-01 00:00:00, the zero of MS-DOS time.
 constexpr std::uint16_t kDosDate = 0x21;
 constexpr std::uint16_t kDosTime = 0;
-constexpr std::uint32_t kSee64 = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint16_t kSee64Entries = std::numeric_limits<std::uint16_t>::max();
 // Deflate makes what it cannot pack a little larger.
-constexpr std::uint64_t kSurelyBelow64 = kSee64 - (std::uint64_t{16} << 20);
+constexpr std::uint64_t kSurelyBelow64 = zip::kSee64 - (std::uint64_t{16} << 20);
 
 // A header's numbers, little-endian.
 class Header {
@@ -42,7 +33,9 @@ class Header {
   Header& u32(std::uint64_t value) { return put(value, 4); }
   Header& u64(std::uint64_t value) { return put(value, 8); }
   // In 32 bits, or the sign that the number stands elsewhere.
-  Header& u32_or_sign(std::uint64_t value) { return u32(std::min<std::uint64_t>(value, kSee64)); }
+  Header& u32_or_sign(std::uint64_t value) {
+    return u32(std::min<std::uint64_t>(value, zip::kSee64));
+  }
   Header& bytes(std::span<const std::uint8_t> more) {
     out_.insert(out_.end(), more.begin(), more.end());
     return *this;
@@ -63,7 +56,7 @@ std::uint16_t method_of(Packing packing) { return packing == Packing::store ? kS
 
 std::uint16_t flags_of(const std::string& name, bool described_behind) {
   const bool ascii = std::ranges::all_of(name, [](char c) { return (c & 0x80) == 0; });
-  return static_cast<std::uint16_t>((described_behind ? kDescribedBehind : 0) |
+  return static_cast<std::uint16_t>((described_behind ? zip::kDescribedBehind : 0) |
                                     (ascii ? 0 : kUtf8Name));
 }
 
@@ -107,18 +100,18 @@ Status ZipWriter::begin(Entry& entry) {
   entry.offset = at_;
   Header extra;
   if (entry.zip64) {
-    extra.u16(kZip64Id).u16(16).u64(entry.size).u64(entry.packed_size);
+    extra.u16(zip::kZip64Id).u16(16).u64(entry.size).u64(entry.packed_size);
   }
   Header header;
-  header.u32(kLocalHeader)
+  header.u32(zip::kLocalHeader)
       .u16(entry.zip64 ? kNeedsZip64 : kNeeds)
       .u16(flags_of(entry.name, entry.described_behind))
       .u16(method_of(entry.packing))
       .u16(kDosTime)
       .u16(kDosDate)
       .u32(entry.crc32)
-      .u32(entry.zip64 ? kSee64 : entry.packed_size)
-      .u32(entry.zip64 ? kSee64 : entry.size)
+      .u32(entry.zip64 ? zip::kSee64 : entry.packed_size)
+      .u32(entry.zip64 ? zip::kSee64 : entry.size)
       .u16(entry.name.size())
       .u16(extra.out().size())
       .bytes(as_bytes(entry.name))
@@ -168,7 +161,7 @@ Status ZipWriter::add_packed(const std::string& name, ByteSource& packed, const 
   entry.size = facts.size;
   entry.crc32 = facts.crc32;
   entry.packed_size = facts.packed_size;
-  entry.zip64 = std::max(facts.size, facts.packed_size) >= kSee64;
+  entry.zip64 = std::max(facts.size, facts.packed_size) >= zip::kSee64;
   SIXPOINT_CHECK(begin(entry));
   Bytes piece;
   std::uint64_t copied = 0;
@@ -187,17 +180,17 @@ Status ZipWriter::add_packed(const std::string& name, ByteSource& packed, const 
 
 Status ZipWriter::add_in_pieces(Entry entry, ByteSource& source, Bytes first, Bytes second) {
   entry.described_behind = true;
-  entry.zip64 = source.size().value_or(kSee64) > kSurelyBelow64;
+  entry.zip64 = source.size().value_or(zip::kSee64) > kSurelyBelow64;
   SIXPOINT_CHECK(begin(entry));
   SIXPOINT_CHECK(entry.packing == Packing::deflate
                      ? put_pieces_packed(entry, source, std::move(first), std::move(second))
                      : put_pieces_stored(entry, source, std::move(first), std::move(second)));
-  if (!entry.zip64 && std::max(entry.size, entry.packed_size) >= kSee64) {
+  if (!entry.zip64 && std::max(entry.size, entry.packed_size) >= zip::kSee64) {
     return fail(ErrorCode::internal, "the entry is longer than its source said", entry.name,
                 "please report it with the command line");
   }
   Header behind;
-  behind.u32(kDataDescriptor).u32(entry.crc32);
+  behind.u32(zip::kDescriptor).u32(entry.crc32);
   if (entry.zip64) {
     behind.u64(entry.packed_size).u64(entry.size);
   } else {
@@ -242,17 +235,17 @@ Status ZipWriter::finish() {
   for (const Entry& entry : entries_) {
     Header zip64;
     for (const std::uint64_t number : {entry.size, entry.packed_size, entry.offset}) {
-      if (number >= kSee64) {
+      if (number >= zip::kSee64) {
         zip64.u64(number);
       }
     }
     Header extra;
     if (!zip64.out().empty()) {
-      extra.u16(kZip64Id).u16(zip64.out().size()).bytes(zip64.out());
+      extra.u16(zip::kZip64Id).u16(zip64.out().size()).bytes(zip64.out());
     }
     extra.bytes(to_extra_field(entry.points));
     Header header;
-    header.u32(kCentralHeader)
+    header.u32(zip::kCentralHeader)
         .u16(kMadeBy)
         .u16(entry.zip64 || !zip64.out().empty() ? kNeedsZip64 : kNeeds)
         .u16(flags_of(entry.name, entry.described_behind))
@@ -275,14 +268,15 @@ Status ZipWriter::finish() {
   }
   const std::uint64_t size = at_ - start;
   Header end;
-  if (start >= kSee64 || size >= kSee64 || entries_.size() >= kSee64Entries) {
+  if (start >= zip::kSee64 || size >= zip::kSee64 || entries_.size() >= kSee64Entries) {
     const std::uint64_t end64 = at_;
-    end.u32(kEnd64).u64(44).u16(kMadeBy).u16(kNeedsZip64).u32(0).u32(0);
+    end.u32(zip::kEnd64).u64(44).u16(kMadeBy).u16(kNeedsZip64).u32(0).u32(0);
     end.u64(entries_.size()).u64(entries_.size()).u64(size).u64(start);
-    end.u32(kEnd64Locator).u32(0).u64(end64).u32(1);
+    end.u32(zip::kEnd64Locator).u32(0).u64(end64).u32(1);
   }
   const auto count = std::min<std::uint64_t>(entries_.size(), kSee64Entries);
-  end.u32(kEnd).u16(0).u16(0).u16(count).u16(count).u32_or_sign(size).u32_or_sign(start).u16(0);
+  end.u32(zip::kEnd).u16(0).u16(0).u16(count).u16(count).u32_or_sign(size).u32_or_sign(start).u16(
+      0);
   return put(end.out());
 }
 

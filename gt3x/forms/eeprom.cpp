@@ -10,10 +10,10 @@ namespace {
 
 using Memory = std::span<const std::uint8_t>;
 
-constexpr std::size_t kSerialSize = 16;
+constexpr std::size_t kPageSerialSize = 16;
 constexpr std::size_t kFirmware = 349;
 
-tl::unexpected<Error> bad(std::string what) {
+tl::unexpected<Error> bad_page(std::string what) {
   return fail(ErrorCode::bad_data, std::move(what), "eeprom.bin",
               "take the constants from the unit, or from another recording of it");
 }
@@ -23,10 +23,10 @@ tl::unexpected<Error> bad(std::string what) {
 Result<UnitMemory> parse_eeprom(Memory bytes) {
   const auto section = read_calibration_section(bytes);
   if (!section) {
-    return bad(section.error().what);
+    return bad_page(section.error().what);
   }
   UnitMemory memory;
-  for (std::size_t i = 0; i < kSerialSize && bytes[i] != 0 && bytes[i] != 0xFF; ++i) {
+  for (std::size_t i = 0; i < kPageSerialSize && bytes[i] != 0 && bytes[i] != 0xFF; ++i) {
     memory.serial += static_cast<char>(bytes[i]);
   }
   memory.constants = section->constants;

@@ -20,7 +20,7 @@ std::uint16_t two_bytes(std::span<const std::uint8_t> bytes) {
   return static_cast<std::uint16_t>(bytes[0] | (bytes[1] << 8));
 }
 
-tl::unexpected<Error> bad(std::string what) {
+tl::unexpected<Error> bad_record(std::string what) {
   return fail(ErrorCode::bad_data, std::move(what), {},
               "download the recording from the unit again");
 }
@@ -32,7 +32,7 @@ Result<SensorColumn> parse_column(std::span<const std::uint8_t> bytes) {
   const unsigned first_bit = bytes[1];
   const unsigned bits = bytes[2];
   if (first_bit % 8 != 0 || (bits != 8 && bits != 16 && bits != 32)) {
-    return bad(fmt::format("a sensor's column of {} bits at bit {}", bits, first_bit));
+    return bad_record(fmt::format("a sensor's column of {} bits at bit {}", bits, first_bit));
   }
   column.first_byte = first_bit / 8;
   column.bytes = bits / 8;
@@ -79,14 +79,14 @@ std::vector<std::string> SensorSchema::labels() const {
 
 Result<SensorSchema> parse_sensor_schema(std::span<const std::uint8_t> payload) {
   if (payload.size() < kSchemaHeader) {
-    return bad("a SENSOR_SCHEMA record is cut short");
+    return bad_record("a SENSOR_SCHEMA record is cut short");
   }
   SensorSchema schema;
   schema.id = two_bytes(payload);
   const std::size_t columns = two_bytes(payload.subspan(2));
   if (columns == 0 || columns > kMostColumns ||
       payload.size() != kSchemaHeader + columns * kColumnSize) {
-    return bad(
+    return bad_record(
         fmt::format("a SENSOR_SCHEMA record of {} bytes for {} columns", payload.size(), columns));
   }
   for (std::size_t i = 0; i < columns; ++i) {
@@ -101,12 +101,12 @@ Result<SensorSchema> parse_sensor_schema(std::span<const std::uint8_t> payload) 
 Result<std::vector<std::vector<double>>> parse_sensor_data(const SensorSchema& schema,
                                                            std::span<const std::uint8_t> payload) {
   if (payload.size() < kDataHeader || two_bytes(payload) != schema.id) {
-    return bad("a SENSOR_DATA record of another schema");
+    return bad_record("a SENSOR_DATA record of another schema");
   }
   const auto bytes = payload.subspan(kDataHeader);
   if (bytes.size() % schema.sample_bytes != 0) {
-    return bad(fmt::format("a SENSOR_DATA record of {} bytes for samples of {}", bytes.size(),
-                           schema.sample_bytes));
+    return bad_record(fmt::format("a SENSOR_DATA record of {} bytes for samples of {}",
+                                  bytes.size(), schema.sample_bytes));
   }
   std::vector<std::vector<double>> samples;
   for (std::size_t at = 0; at < bytes.size(); at += schema.sample_bytes) {

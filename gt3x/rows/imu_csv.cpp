@@ -32,7 +32,7 @@ void append_value(std::string& line, double value) {
   line += text == "-0" ? "0" : text;
 }
 
-std::string header(const Info& info, std::uint32_t start, const SensorSchema& schema) {
+std::string csv_header(const Info& info, std::uint32_t start, const SensorSchema& schema) {
   std::string text = csv_header(info,
                                 fmt::format("Created By Sixpoint in the form of ActiGraph Link IMU "
                                             "9DOF Sensor Firmware v{} date format M/d/yyyy at {} "
@@ -102,7 +102,7 @@ Result<ImuCsvTally> write_imu_csv(Recording& recording, const TextSink& sink) {
       continue;
     }
     if (tally.seconds == 0) {
-      SIXPOINT_CHECK(sink(header(recording.info(), record.unix_time, *schema)));
+      SIXPOINT_CHECK(sink(csv_header(recording.info(), record.unix_time, *schema)));
     }
     ++tally.seconds;
     tally.samples += samples->size();

@@ -36,7 +36,7 @@ class RowCount final : public RowWriter {
 
 // Magic, version, length and a dictionary, filled up to a multiple of 64 bytes (the format's
 // description: numpy.lib.format).
-std::string header(std::uint64_t rows, bool raw_lsb) {
+std::string npy_header(std::uint64_t rows, bool raw_lsb) {
   constexpr std::size_t kBefore = 10;
   constexpr std::size_t kAlign = 64;
   std::string dictionary =
@@ -58,7 +58,7 @@ class NpyWriter final : public RowWriter {
   NpyWriter(std::uint64_t rows, bool raw_lsb, const TextSink& sink)
       : rows_(rows), raw_lsb_(raw_lsb), sink_(sink) {}
 
-  Status begin(std::uint32_t, bool) override { return sink_(header(rows_, raw_lsb_)); }
+  Status begin(std::uint32_t, bool) override { return sink_(npy_header(rows_, raw_lsb_)); }
   void set_meaning(const AgdcCalibration* agdc, double scale_lsb_per_g) override {
     agdc_ = agdc;
     scale_lsb_per_g_ = scale_lsb_per_g;
@@ -107,8 +107,8 @@ class NpyWriter final : public RowWriter {
       }
       append(g);
     }
-    constexpr std::size_t kPiece = std::size_t{64} * 1024;
-    return bytes_.size() < kPiece ? Status{} : flush();
+    constexpr std::size_t kWrittenAtOnce = std::size_t{64} * 1024;
+    return bytes_.size() < kWrittenAtOnce ? Status{} : flush();
   }
 
   template <class Row>

@@ -7,7 +7,7 @@ namespace sixpoint::mocks {
 namespace {
 
 // A turn by a person; a knock is quicker.
-constexpr double kTurn_s = 1.5;
+constexpr double kTurnByHand_s = 1.5;
 constexpr double kKnock_s = 0.15;
 constexpr double kKnock_deg = 12;
 
@@ -19,7 +19,7 @@ Eigen::Vector3d up_of(device::Pose pose) {
 }
 
 void turn_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, double tilt_deg) {
-  plugged.unit.turn_to(up, plugged.clock->elapsed(), kTurn_s, tilt_deg);
+  plugged.unit.turn_to(up, plugged.clock->elapsed(), kTurnByHand_s, tilt_deg);
 }
 
 void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up) {

@@ -6,7 +6,7 @@ namespace sixpoint::mocks {
 
 namespace {
 
-constexpr double kTurn_s = 1.5;
+constexpr double kTurnByMotor_s = 1.5;
 
 }  // namespace
 
@@ -18,7 +18,7 @@ Status VirtualJig::go_to(device::Pose pose) {
                 "look at the jig; when no hand is in it, say that it is free");
   }
   plugged_->motor.begin_movement();
-  plugged_->unit.turn_to({up[0], up[1], up[2]}, plugged_->clock->elapsed(), kTurn_s,
+  plugged_->unit.turn_to({up[0], up[1], up[2]}, plugged_->clock->elapsed(), kTurnByMotor_s,
                          std::exchange(tilt_next_deg_, 0.0));
   pose_ = pose;
   return {};

@@ -66,7 +66,7 @@ void put_big32(Bytes& out, std::uint32_t value) {
   }
 }
 
-void put_text(Bytes& out, std::string_view text, std::size_t width) {
+void put_padded(Bytes& out, std::string_view text, std::size_t width) {
   for (std::size_t i = 0; i < width; ++i) {
     out.push_back(static_cast<std::uint8_t>(i < text.size() ? text[i] : ' '));
   }
@@ -240,7 +240,7 @@ MassStorage::Plan MassStorage::inquiry(std::span<const std::uint8_t> command) {
       answer = {0, 0, 0, 2, 0x00, 0x80};
     } else if (command[2] == 0x80) {
       answer = {0, 0x80, 0, static_cast<std::uint8_t>(identity_.serial.size())};
-      put_text(answer, identity_.serial, identity_.serial.size() & 0xFFU);
+      put_padded(answer, identity_.serial, identity_.serial.size() & 0xFFU);
     } else {
       return refuse(kBadField);
     }
@@ -251,9 +251,9 @@ MassStorage::Plan MassStorage::inquiry(std::span<const std::uint8_t> command) {
   }
   // A disk whose medium can change; SPC-2; 31 bytes follow the fifth.
   answer = {0x00, 0x80, 0x04, 0x02, 31, 0, 0, 0};
-  put_text(answer, identity_.vendor, 8);
-  put_text(answer, identity_.product, 16);
-  put_text(answer, identity_.revision, 4);
+  put_padded(answer, identity_.vendor, 8);
+  put_padded(answer, identity_.product, 16);
+  put_padded(answer, identity_.revision, 4);
   return Plan::answer(std::move(answer), allocation);
 }
 

@@ -32,10 +32,6 @@ std::uint8_t high(std::size_t word) { return static_cast<std::uint8_t>((word >> 
 
 void append(Bytes& out, const Bytes& bytes) { out.insert(out.end(), bytes.begin(), bytes.end()); }
 
-std::uint16_t little_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return static_cast<std::uint16_t>(bytes[at] | (bytes[at + 1] << 8U));
-}
-
 tl::unexpected<Error> bad_descriptor(const char* what) {
   return fail(ErrorCode::bad_data, what, "configuration descriptor",
               "report this as a defect of the device");
@@ -80,6 +76,10 @@ void append_utf16(Bytes& out, std::string_view text) {
 }
 
 }  // namespace
+
+std::uint16_t little_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
+  return static_cast<std::uint16_t>(bytes[at] | (bytes[at + 1] << 8U));
+}
 
 std::uint16_t UsbDescriptors::vendor_id() const { return little_endian(device, 8); }
 std::uint16_t UsbDescriptors::product_id() const { return little_endian(device, 10); }

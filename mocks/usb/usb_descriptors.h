@@ -24,6 +24,9 @@ inline constexpr std::uint8_t kStorageClass = 8;
 inline constexpr std::uint16_t kUsEnglish = 0x0409;     // the one language of the strings
 inline constexpr std::uint16_t kBulkPacketBytes = 512;  // high speed
 
+// The number of two bytes at `at`, the low one first, as all of USB has them.
+std::uint16_t little_endian(std::span<const std::uint8_t> bytes, std::size_t at);
+
 // All as bytes on the wire, but the strings, which are text (UTF-8).
 struct UsbDescriptors {
   UsbSpeed speed = UsbSpeed::high;

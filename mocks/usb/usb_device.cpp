@@ -7,6 +7,8 @@
 #include <linux/hid.h>
 #include <linux/usb/ch9.h>
 
+#include "mocks/usb/usb_descriptors.h"
+
 namespace sixpoint::mocks {
 
 namespace {
@@ -15,10 +17,6 @@ enum class Recipient : std::uint8_t { device = 0, interface = 1, endpoint = 2, o
 
 Recipient recipient_of(const SetupPacket& setup) {
   return static_cast<Recipient>(std::min(setup.request_type & 0x1FU, 3U));
-}
-
-std::uint16_t little_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return static_cast<std::uint16_t>(bytes[at] | (bytes[at + 1] << 8U));
 }
 
 }  // namespace

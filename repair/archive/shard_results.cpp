@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kResultSchema = "sixpoint/archive-result/1";
 constexpr std::uint64_t kLargestResult = 1ULL << 30;
-std::string line_of(std::size_t index, const RepairReport& report) {
+std::string result_line(std::size_t index, const RepairReport& report) {
   Json json = {
       {"file", index},
       {"report", report.to_json()},
@@ -33,7 +33,7 @@ std::optional<T> optional_of(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<T>());
 }
 
-// What line_of() wrote; nlohmann's exceptions go to read().
+// What result_line() wrote; nlohmann's exceptions go to read().
 Result<RepairReport> report_of(const Json& json) {
   const Json& from = json.at("report");
   RepairReport report;
@@ -101,7 +101,7 @@ std::vector<std::string> ShardFolder::parts() const {
 Status ShardFolder::write(const std::string& path, const ShardReports& reports) const {
   std::string body;
   for (const auto& [index, report] : reports.reports) {
-    body += line_of(index, report);
+    body += result_line(index, report);
   }
   const Json header = {{"schema", kResultSchema},
                        {"plan", plan_->id},

@@ -14,12 +14,12 @@ namespace {
 constexpr double kWidth = 900;
 constexpr double kHeight = 260;
 constexpr double kLeft = 60;
-constexpr std::size_t kColumns = 600;
+constexpr std::size_t kCurvePoints = 600;
 constexpr std::array<const char*, 2> kColours = {"#d1495b", "#1b6ca8"};
 
 struct Means {
-  std::vector<double> sum = std::vector<double>(kColumns);
-  std::vector<double> number = std::vector<double>(kColumns);
+  std::vector<double> sum = std::vector<double>(kCurvePoints);
+  std::vector<double> number = std::vector<double>(kCurvePoints);
 };
 
 // Mean ENMO of each column of the time.
@@ -27,7 +27,7 @@ Means means_of(const EpochSeries& series, double from, double to) {
   Means means;
   for (const Epoch& epoch : series.epochs) {
     const double share = (epoch.unix_time - from) / (to - from);
-    const auto column = std::min(kColumns - 1, static_cast<std::size_t>(share * kColumns));
+    const auto column = std::min(kCurvePoints - 1, static_cast<std::size_t>(share * kCurvePoints));
     means.sum[column] += epoch.enmo_mg;
     means.number[column] += 1;
   }
@@ -46,7 +46,7 @@ std::string drawing(const std::vector<const EpochSeries*>& all) {
   double highest = 1;
   for (const EpochSeries* series : all) {
     means.push_back(means_of(*series, from, to));
-    for (std::size_t i = 0; i < kColumns; ++i) {
+    for (std::size_t i = 0; i < kCurvePoints; ++i) {
       if (means.back().number[i] > 0) {
         highest = std::max(highest, means.back().sum[i] / means.back().number[i]);
       }
@@ -66,9 +66,9 @@ std::string drawing(const std::vector<const EpochSeries*>& all) {
   svg.text_upward(12, kHeight / 2, "ENMO in mg");
   for (std::size_t which = 0; which < all.size(); ++which) {
     std::vector<std::pair<double, double>> line;
-    for (std::size_t i = 0; i < kColumns; ++i) {
+    for (std::size_t i = 0; i < kCurvePoints; ++i) {
       if (means[which].number[i] > 0) {
-        const double hour = across.high * (static_cast<double>(i) + 0.5) / kColumns;
+        const double hour = across.high * (static_cast<double>(i) + 0.5) / kCurvePoints;
         line.emplace_back(across(hour), up(means[which].sum[i] / means[which].number[i]));
       }
     }

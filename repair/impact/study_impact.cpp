@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json pair_of(double before, double after) { return {{"before", before}, {"after", after}}; }
+Json number_pair(double before, double after) { return {{"before", before}, {"after", after}}; }
 
 double change_mg(const FileImpact& file) { return file.is.enmo_mg - file.was.enmo_mg; }
 
@@ -23,16 +23,16 @@ Json file_json(const FileImpact& file, const std::vector<CutPoint>& cuts) {
     return json;
   }
   json["recorded_minutes"] = file.is.recorded_minutes;
-  json["enmo_mg"] = pair_of(file.was.enmo_mg, file.is.enmo_mg);
+  json["enmo_mg"] = number_pair(file.was.enmo_mg, file.is.enmo_mg);
   json["enmo_uncertainty_mg"] =
       file.is.enmo_uncertainty_mg ? Json(*file.is.enmo_uncertainty_mg) : Json(nullptr);
-  json["mad_mg"] = pair_of(file.was.mad_mg, file.is.mad_mg);
+  json["mad_mg"] = number_pair(file.was.mad_mg, file.is.mad_mg);
   const auto moved = moves(file);
   json["moves"] = moved ? Json(*moved) : Json(nullptr);
   Json& minutes = json["minutes_above"] = Json::object();
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     minutes[printable(cuts[i].name, 200)] =
-        pair_of(file.was.minutes[i].above, file.is.minutes[i].above);
+        number_pair(file.was.minutes[i].above, file.is.minutes[i].above);
   }
   return json;
 }
@@ -129,15 +129,16 @@ Json StudyImpact::to_json() const {
   const Summary sum = summary();
   Json minutes = Json::object();
   for (std::size_t i = 0; i < cuts.size(); ++i) {
-    minutes[printable(cuts[i].name, 200)] = pair_of(sum.minutes_before[i], sum.minutes_after[i]);
+    minutes[printable(cuts[i].name, 200)] =
+        number_pair(sum.minutes_before[i], sum.minutes_after[i]);
   }
   json["summary"] = {
       {"files", sum.files},
       {"failed", sum.failed},
       {"without_copy", without_copy},
       {"recorded_minutes", sum.recorded_minutes},
-      {"enmo_mg", pair_of(sum.enmo_before_mg, sum.enmo_after_mg)},
-      {"mad_mg", pair_of(sum.mad_before_mg, sum.mad_after_mg)},
+      {"enmo_mg", number_pair(sum.enmo_before_mg, sum.enmo_after_mg)},
+      {"mad_mg", number_pair(sum.mad_before_mg, sum.mad_after_mg)},
       {"minutes_above", std::move(minutes)},
       {"moved", sum.moved},
       {"uncertainty_not_stated", sum.unknown},

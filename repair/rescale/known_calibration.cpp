@@ -8,7 +8,7 @@
 namespace sixpoint::repair {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 void add_date(const Json& from, const char* key, std::set<UtcTime>& dates) {
   if (!from.is_object() || !from.contains(key) || !from[key].is_string()) {

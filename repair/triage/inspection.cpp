@@ -20,8 +20,6 @@ Result<gt3x::AgdcCalibration> agdc_calibration(gt3x::Recording& recording, doubl
   return gt3x::parse_agdc_calibration(as_text(bytes), static_cast<int>(rate_hz));
 }
 
-constexpr double kUsualScale_lsb_per_g = 256;
-
 // Finds still blocks while the samples are read, so that no recording must fit into memory.
 class StillWatch {
  public:

@@ -57,7 +57,6 @@ Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording) {
 
 namespace {
 
-constexpr double kUsualScale_lsb_per_g = 256;
 constexpr double kHum_g = 0.04;  // standard deviation under a climate chamber's fan
 
 void take_parameters(const gt3x::Parameters& parameters, FileFacts& facts) {

@@ -40,6 +40,9 @@ bool is_repair_mark(const gt3x::Record& record);
 // Either of the two; reads the log up to its first good record.
 Result<bool> carries_repair_mark(gt3x::Recording& recording);
 
+// The scale of samples whose file names none (wGT3X-BT at 8 g and 12 bits).
+inline constexpr double kUsualScale_lsb_per_g = 256;
+
 // Samples in one ACTIVITY2 record.
 inline constexpr std::size_t kMaxWideSamples = gt3x::kMaxPayload / sizeof(gt3x::Counts);
 

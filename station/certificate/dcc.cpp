@@ -13,13 +13,14 @@ namespace sixpoint::station {
 
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr double kStandardGravity_m_per_s2 = 9.80665;
 constexpr const char* kAcceleration = R"(\metre\second\tothe{-2})";
 constexpr const char* kOne = R"(\one)";
 
 // What XML can hold: UTF-8 without control characters; never empty, which the schema forbids.
 std::string said(const std::string& content) {
-  using Json = nlohmann::json;
   const std::string utf8 =
       Json::parse(Json(content).dump(-1, ' ', false, Json::error_handler_t::replace))
           .get<std::string>();

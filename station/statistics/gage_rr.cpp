@@ -146,7 +146,9 @@ SumsOfSquares sums_of_squares(const Balanced& study) {
   return sums;
 }
 
-Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+Json number_json(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
 
 Json json_of(const std::vector<AnovaRow>& rows) {
   Json json = Json::array();
@@ -155,8 +157,8 @@ Json json_of(const std::vector<AnovaRow>& rows) {
                     {"degrees_of_freedom", row.degrees_of_freedom},
                     {"sum_of_squares", row.sum_of_squares},
                     {"mean_square", row.mean_square},
-                    {"f", or_null(row.f)},
-                    {"p", or_null(row.p)}});
+                    {"f", number_json(row.f)},
+                    {"p", number_json(row.p)}});
   }
   return json;
 }
@@ -244,7 +246,7 @@ Json GageReport::to_json() const {
           {"operators", operators},
           {"trials", trials},
           {"grr_percent", grr_percent},
-          {"grr_percent_of_tolerance", or_null(grr_percent_of_tolerance)},
+          {"grr_percent_of_tolerance", number_json(grr_percent_of_tolerance)},
           {"ndc", ndc},
           {"judgement", judgement()},
           {"usable", usable()},
