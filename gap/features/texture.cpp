@@ -77,7 +77,8 @@ std::optional<std::array<int, 3>> difference_at(const CleanSamples& clean, std::
 }
 
 // `run`: one dwell, or ten seconds of a long record.
-void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretch, TextureSums& sums) {
+void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretch,
+             TextureSums& sums) {
   constexpr double kFewest = 4;  // differences of a piece
   const double scale = std::sqrt(static_cast<double>(stretch) / 2);
   std::array<Piece, 3> pieces;
