@@ -11,7 +11,8 @@ case "${1:-}" in
   --label) label=${2:?"--label needs a name: unit, usb, system, docs, python, r"} ;;
   *) echo "usage: scripts/test.sh [--label L]" >&2; exit 64 ;;
 esac
-jobs=$(nproc)
+# Page, USB and scheduler tests wait for most of their time: more of them run at a time than there are cores.
+jobs=$(($(nproc) + 2))
 
 step() { printf '\n== %s\n' "$*"; }
 # ctest's own lines; skips are listed with their reasons, because a skip is not a pass.

@@ -7,7 +7,11 @@
 
 namespace sixpoint::repair {
 
+namespace {
+
 using Json = nlohmann::ordered_json;
+
+}  // namespace
 
 Result<std::optional<ConstantsSnapshot::Entry>> ConstantsSnapshot::of_unit(
     db::Store& store, const std::string& serial) {

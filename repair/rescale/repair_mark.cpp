@@ -8,9 +8,9 @@
 
 namespace sixpoint::repair {
 
-using Json = nlohmann::ordered_json;
-
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr std::uint64_t kLargestMark = 1U << 20;
 constexpr std::size_t kLossesInRecord = 20;

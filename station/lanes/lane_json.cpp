@@ -7,9 +7,9 @@
 
 namespace sixpoint::station {
 
-using Json = nlohmann::ordered_json;
-
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 template <class T>
 Json name_or_null(const std::optional<T>& value) {

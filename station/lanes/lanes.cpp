@@ -8,9 +8,9 @@
 
 namespace sixpoint::station {
 
-using Json = nlohmann::ordered_json;
-
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostUnmatched = 256;  // clients with a scan that no lane matched
 

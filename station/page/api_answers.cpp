@@ -4,9 +4,9 @@
 
 namespace sixpoint::station {
 
-using Json = nlohmann::ordered_json;
-
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 int http_status(ErrorCode code) {
   switch (code) {
