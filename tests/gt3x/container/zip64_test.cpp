@@ -1,12 +1,11 @@
-// Entries and places beyond 4 GiB, on the real disk: the file has holes where its bytes are zero, so that
-// it takes little of the disk.
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <gtest/gtest.h>
-#include <zip.h>
-
+// Entries and places beyond 4 GiB, on the real disk: the file has holes where its bytes are zero,
+// so that it takes little of the disk.
 #include <algorithm>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <zip.h>
 
 #include "expect_result.h"
 #include "gt3x/container/archive_end.h"
@@ -28,8 +27,7 @@ constexpr const char* kInfo =
 class LongSource final : public ByteSource {
  public:
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
-    const auto count =
-        static_cast<std::size_t>(std::min<std::uint64_t>(out.size(), kBeyond - at_));
+    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(out.size(), kBeyond - at_));
     std::fill_n(out.begin(), count, std::uint8_t{0});
     at_ += count;
     if (count > 0 && at_ == kBeyond) {
@@ -55,8 +53,7 @@ class HoleyFile {
   Status put(std::span<const std::uint8_t> bytes) {
     const bool zeros = std::ranges::all_of(bytes, [](std::uint8_t b) { return b == 0; });
     if (!zeros) {
-      const auto written =
-          ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(size_));
+      const auto written = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(size_));
       EXPECT_EQ(written, static_cast<ssize_t>(bytes.size()));
     }
     size_ += bytes.size();
