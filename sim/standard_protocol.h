@@ -5,8 +5,9 @@
 //
 // production: six faces, the same in reverse order, and six placements after the unit was taken
 // off; 10 s each, three minutes. production+: that, and three faces once more after the jig was
-// turned by half a turn about the vertical; 48 s more. engineering: that, and yaws, oblique poses, the shaker, twenty
-// still minutes, temperature ramps and soaks; 75 minutes of recording in about three hours.
+// turned by half a turn about the vertical; 48 s more. engineering: that, and yaws, oblique poses,
+// the shaker, twenty still minutes, temperature ramps and soaks; 75 minutes of recording in about
+// three hours.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +28,8 @@ std::vector<ProtocolSegment> draw_protocol(StandardProtocol protocol, std::uint6
                                            double rate_hz = 100);
 
 // Goes on after the last segment of the run with one more, by its name, as a station would: one of
-// the engineering protocol, or `half_turn`, three faces turned by half a turn about the vertical. The temperature becomes that of the whole run.
-// usage for another name.
+// the engineering protocol, or `half_turn`, three faces turned by half a turn about the vertical.
+// The temperature becomes that of the whole run. usage for another name.
 Status extend_run(ProtocolRun& run, std::string_view segment, std::uint64_t seed);
 
 // The temperature of the unit, one point a second from power-on to the end of the last segment: the

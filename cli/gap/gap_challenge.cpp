@@ -164,8 +164,7 @@ Result<Followed> run_trial(Env& env, const Options& options, sim::StandardProtoc
   Followed followed;
   SIXPOINT_ASSIGN(followed.before, answer_trial(env, options, trial, name));
   if (options.follow && !followed.before.suggestions.empty()) {
-    SIXPOINT_CHECK(
-        gap::follow(trial.scenario, followed.before.suggestions.front().segment));
+    SIXPOINT_CHECK(gap::follow(trial.scenario, followed.before.suggestions.front().segment));
     SIXPOINT_ASSIGN(followed.after, answer_trial(env, options, trial, name + "-followed"));
   }
   return followed;
@@ -220,11 +219,11 @@ Status check_effects(Options& options) {
 Status export_trials(const Options& options, sim::StandardProtocol protocol, Context& context) {
   if (options.strip || options.follow || !options.recording.empty() || !options.keep.empty() ||
       !options.html.empty() || !options.program.empty()) {
-    return fail(ErrorCode::usage,
-                "--export goes without --strip, --follow-suggestion, --recording, --keep, --html and "
-                "--program",
-                {},
-                "sixpoint gap score scores what another program answers");
+    return fail(
+        ErrorCode::usage,
+        "--export goes without --strip, --follow-suggestion, --recording, --keep, --html and "
+        "--program",
+        {}, "sixpoint gap score scores what another program answers");
   }
   const ExportOptions how = {.trials = options.trials,
                              .seed = options.seed,
@@ -344,7 +343,8 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
   command.add_option("--trials", options.trials, "how many bundles")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000}));
   command.add_option("--seed", options.seed, "the same seed draws the same trials");
-  command.add_option("--protocol", options.protocol, "production, production+ or engineering (default)");
+  command.add_option("--protocol", options.protocol,
+                     "production, production+ or engineering (default)");
   command.add_option("--effects", options.only, "draw only these")->delimiter(',');
   command.add_flag("--strip", options.strip, "take the true effects out of the catalogue");
   command.add_option(

@@ -34,10 +34,10 @@ struct MeanOfEffects {
 };
 
 struct Gain {
-  double followed = 0;       // trials with a suggestion
-  double nothing_to_do = 0;  // trials without one
-  double minutes = 0;        // of the segments, mean
-  double expected_nats = 0;  // mean
+  double followed = 0;              // trials with a suggestion
+  double nothing_to_do = 0;         // trials without one
+  double minutes = 0;               // of the segments, mean
+  double expected_nats = 0;         // mean
   Share named_before, named_after;  // of the effects that are there
   MeanOfEffects probability_before, probability_after;
   MeanOfEffects named_gain, probability_gain;  // after less before, of the same effects

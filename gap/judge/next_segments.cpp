@@ -12,7 +12,7 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr double kLeastNats = 0.01;  // a question of which a segment says less is not named
+constexpr double kLeastNats = 0.02;  // a question of which a segment says less is not named
 constexpr double kEvenOdds = 0.5;
 constexpr double kBeyondDoubt_nats = 1e9;
 constexpr double kStep_g = 0.05;  // as the forward model's
@@ -22,8 +22,8 @@ std::vector<PlannedPiece> six_faces(double pause_s, double seconds, bool reverse
   std::vector<PlannedPiece> pieces;
   for (int i = 0; i < 6; ++i) {
     const int pose = reversed ? 5 - i : i;
-    pieces.push_back({planned_face(pose / 2, pose % 2 == 0 ? 1 : -1), pause_s, seconds, true,
-                      temperature_c});
+    pieces.push_back(
+        {planned_face(pose / 2, pose % 2 == 0 ? 1 : -1), pause_s, seconds, true, temperature_c});
   }
   return pieces;
 }
@@ -32,8 +32,8 @@ std::vector<PlannedPiece> yaws() {
   std::vector<PlannedPiece> pieces;
   for (int quarter = 0; quarter < 4; ++quarter) {
     for (int pose = 0; pose < 6; ++pose) {
-      pieces.push_back({planned_face(pose / 2, pose % 2 == 0 ? 1 : -1,
-                                     quarter * std::numbers::pi / 2)});
+      pieces.push_back(
+          {planned_face(pose / 2, pose % 2 == 0 ? 1 : -1, quarter * std::numbers::pi / 2)});
     }
   }
   return pieces;
@@ -69,8 +69,13 @@ std::vector<PlannedPiece> shaker(const std::vector<double>& frequencies_hz, doub
     for (const double frequency_hz : frequencies_hz) {
       const double omega = 2 * std::numbers::pi * frequency_hz;
       const double reach_g = std::max(most_g > 1 ? most_g : 0, kStroke_m * omega * omega / 9.81);
-      pieces.push_back({planned_face(axis, 1), first ? 80.0 : 3.0, 10, first, {},
-                        std::min(most_g, reach_g), frequency_hz});
+      pieces.push_back({planned_face(axis, 1),
+                        first ? 80.0 : 3.0,
+                        10,
+                        first,
+                        {},
+                        std::min(most_g, reach_g),
+                        frequency_hz});
       first = false;
     }
   }
@@ -115,8 +120,7 @@ std::vector<Block> blocks_of(const std::vector<PlannedPiece>& pieces,
     if (block.tone) {
       piece.rotation.col(2).cwiseAbs().maxCoeff(&block.axis);
     }
-    const Eigen::Vector3d mean_mg2 =
-        block.noise_mg.array().square() / (piece.seconds * rate_hz);
+    const Eigen::Vector3d mean_mg2 = block.noise_mg.array().square() / (piece.seconds * rate_hz);
     const Eigen::Index size = block.harmonics ? 8 : block.tone ? 6 : 3;
     block.value_mg = Eigen::VectorXd::Zero(size);
     // An amplitude has twice the variance of a mean.
@@ -162,10 +166,9 @@ class Expectation {
     const std::vector<int> own = model_.groups_of(effect);
     const std::vector<int> others = without(own);
     // Effects that the means do not show count like one that they do.
-    const double nats = own.empty() ? log_prior_of_count(others.size() + 1) -
-                                          log_prior_of_count(others.size())
-                                    : model_.log_prior(with_group(others, own.front())) -
-                                          model_.log_prior(others);
+    const double nats =
+        own.empty() ? log_prior_of_count(others.size() + 1) - log_prior_of_count(others.size())
+                    : model_.log_prior(with_group(others, own.front())) - model_.log_prior(others);
     return probability_of(nats);
   }
 
@@ -186,8 +189,7 @@ class Expectation {
     const Eigen::MatrixXd ratio = after.solve(now.covariance);
     const double moved = now.mean.dot(after.solve(now.mean) - before.solve(now.mean));
     const double log_det = 2 * (half_log_determinant(before) - half_log_determinant(after));
-    return 0.5 *
-           std::max(0.0, ratio.trace() - static_cast<double>(ratio.rows()) - log_det + moved);
+    return 0.5 * std::max(0.0, ratio.trace() - static_cast<double>(ratio.rows()) - log_det + moved);
   }
 
  private:
@@ -198,8 +200,7 @@ class Expectation {
 
   std::vector<int> without(const std::vector<int>& own) const {
     std::vector<int> others = best_.subset.groups;
-    std::erase_if(others,
-                  [&](int g) { return std::find(own.begin(), own.end(), g) != own.end(); });
+    std::erase_if(others, [&](int g) { return std::find(own.begin(), own.end(), g) != own.end(); });
     return others;
   }
 
@@ -359,7 +360,9 @@ double information_nats(double probability, double weight_nats) {
   // What is left of the entropy, by trapezoids over the reading: log(1 + e^x) without overflow.
   constexpr int kSteps = 400;
   constexpr double kReach_sd = 8;
-  const auto soft = [](double x) { return x > 0 ? x + std::log1p(std::exp(-x)) : std::log1p(std::exp(x)); };
+  const auto soft = [](double x) {
+    return x > 0 ? x + std::log1p(std::exp(-x)) : std::log1p(std::exp(x));
+  };
   const double odds_nats = std::log(p / (1 - p));
   double left = 0, sum = 0;
   for (int i = 0; i <= kSteps; ++i) {

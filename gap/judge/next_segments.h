@@ -7,21 +7,20 @@
 // of what is expected with the effect from what is expected without it. For a size that is normal
 // with mean m and covariance C now and C' after the segment this is
 //     w = (tr(C'^-1 C) - k - log det(C'^-1 C) + m' (C'^-1 - C^-1) m) / 2   nats, k numbers
-// (Kullback 1959, 9.1), both covariances beside everything else of the best explanation. The expected
-// information of the segment is the sum over the questions (Lindley 1956, "On a measure of the
-// information provided by an experiment"): questions count as independent.
+// (Kullback 1959, 9.1), both covariances beside everything else of the best explanation. The
+// expected information of the segment is the sum over the questions (Lindley 1956, "On a measure of
+// the information provided by an experiment"): questions count as independent.
 //
 // What a question is:
 //
-// | the effect                                               | probability       | weight           |
+// | the effect                                               | probability       | weight |
 // |----------------------------------------------------------|-------------------|------------------|
-// | not observable, and the means show it                    | prior beside what | w                |
-// |                                                          | was found         |                  |
-// | not observable, samples show it (clock, mount, range ...)| the same          | beyond all doubt |
-// | observable, and the means show it                        | its own           | w                |
-// | accepted, another looks like it and the means show both  | even odds         | w beside it      |
-// | accepted, another looks like it, samples show one        | even odds         | beyond all doubt |
-// | the protocol with the segment still lacks what it needs  | no question       |                  |
+// | not observable, and the means show it                    | prior beside what | w | | | was
+// found         |                  | | not observable, samples show it (clock, mount, range ...)|
+// the same          | beyond all doubt | | observable, and the means show it | its own           |
+// w                | | accepted, another looks like it and the means show both  | even odds | w
+// beside it      | | accepted, another looks like it, samples show one        | even odds         |
+// beyond all doubt | | the protocol with the segment still lacks what it needs  | no question | |
 //
 // Internal to gap/judge.
 #pragma once
@@ -42,10 +41,10 @@ struct PlannedPiece {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // laboratory to sensor
   double pause_s = 6;                                      // before it
   double seconds = 10;
-  bool placed = true;                       // anew; false: it follows in the same seat
+  bool placed = true;                        // anew; false: it follows in the same seat
   std::optional<double> temperature_c = {};  // none: as at the recording's end
-  double vibration_g = 0;                   // of a tone along the vertical
-  double frequency_hz = 0;                  // from half of the sample rate on it says nothing
+  double vibration_g = 0;                    // of a tone along the vertical
+  double frequency_hz = 0;                   // from half of the sample rate on it says nothing
 };
 
 // A segment that could be recorded, and what a protocol can do with it.

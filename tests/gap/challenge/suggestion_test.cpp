@@ -1,8 +1,8 @@
 #include "gap/challenge/suggestion.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
+
+#include <gtest/gtest.h>
 
 #include "gap/judge/next_segments.h"
 #include "sim/standard_protocol.h"

@@ -1,11 +1,12 @@
-#include <gtest/gtest.h>
+#include "gap/judge/next_segments.h"
 
 #include <cmath>
 #include <limits>
 
+#include <gtest/gtest.h>
+
 #include "gap/explain/catalogue.h"
 #include "gap/judge/made_step.h"
-#include "gap/judge/next_segments.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -38,14 +39,15 @@ TEST(InformationNats, LiesBetweenNothingAndTheEntropy) {
 }
 
 // Six faces three times, diagnosed; what to record next.
-std::map<std::string, NextSegment> offers_for(const tests::Made& made, const Findings& given = {}) {
+std::map<std::string, NextSegment> offers_for(
+    const tests::Made& made, const Findings& given = {},
+    const std::vector<Offer>& choice = standard_offers()) {
   const auto answer = diagnose(made.bundle, made.options);
   EXPECT_TRUE(answer);
   const std::vector<ToneFit> tones;
-  const Records records = {made.clean, made.noise, code_statistics(made.bundle, made.clean),
-                           {},         {},         0,
-                           {},         {},         {},
-                           slow_noise(made.bundle, made.clean, made.noise)};
+  const Records records = {
+      made.clean, made.noise, code_statistics(made.bundle, made.clean),       {}, {}, 0, {},
+      {},         {},         slow_noise(made.bundle, made.clean, made.noise)};
   const std::vector<Block> blocks =
       make_blocks(made.bundle, made.clean, made.noise, tones, records.response);
   const Explanation explanation = explain(made.request, blocks, records.slow);
@@ -55,7 +57,7 @@ std::map<std::string, NextSegment> offers_for(const tests::Made& made, const Fin
   out.not_observable = answer->not_observable;
   std::map<std::string, NextSegment> offers;
   for (const NextSegment& next : next_segments(made.request, protocol_kind(made.bundle).abilities,
-                                               explanation, found, out)) {
+                                               explanation, found, out, choice)) {
     offers[next.name] = next;
   }
   return offers;
@@ -87,6 +89,32 @@ TEST(NextSegments, OneRowForEachSortOfQuestion) {
   for (const auto& [name, next] : offers) {
     EXPECT_FALSE(name != "soak" && separates(next, "sensitivity_tempco")) << name;
     EXPECT_FALSE(separates(next, "rounding_floor")) << name << ": no protocol shows it";
+  }
+}
+
+// Why the protocol production+ is production and a half turn: of what can be done in less than a
+// minute with a jig of six faces, that says most.
+TEST(NextSegments, AHalfTurnBuysMostUnderAMinute) {
+  Offer again{"again", kRepeats, {}}, reseat{"reseat", kRepeats, {}},
+      quarter{"quarter", kRepeats, {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    again.pieces.push_back({planned_face(axis, 1)});
+    quarter.pieces.push_back({planned_face(axis, 1, M_PI / 2)});
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    reseat.pieces.push_back({planned_face(axis, 1), 20});
+  }
+  const Offer long_dwell{"long_dwell", 0, {{planned_face(2, 1), 6, 48}}};
+  const Offer oblique{"oblique", 0, planned_obliques(3)};
+  const Offer& half_turn = standard_offers().front();
+  ASSERT_EQ(half_turn.name, "half_turn");
+  const tests::Made made(tests::made_production({}));
+  auto nats = offers_for(made, {}, {half_turn, again, quarter, reseat, long_dwell, oblique});
+  for (const auto& [name, next] : nats) {
+    EXPECT_LE(next.minutes, 1) << name;
+    if (name != "half_turn") {
+      EXPECT_GT(nats["half_turn"].expected_nats, 1.2 * next.expected_nats) << name;
+    }
   }
 }
 
