@@ -12,7 +12,8 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr double kLeastNats = 0.02;  // a question of which a segment says less is not named
+constexpr double kLeastNats = 0.01;  // a question of which a segment says less is not named
+constexpr double kCertain = 0.99;    // a name that is this likely is no question any more
 constexpr double kEvenOdds = 0.5;
 constexpr double kBeyondDoubt_nats = 1e9;
 constexpr double kStep_g = 0.05;  // as the forward model's
@@ -268,7 +269,7 @@ class Questions {
 
   void observable(const CatalogueEntry& entry, double probability) {
     const std::string name(entry.name);
-    if (expected_.in_means(name) && enough(offer_, abilities_, entry)) {
+    if (expected_.in_means(name) && enough(offer_, abilities_, entry) && probability < kCertain) {
       ask(name, probability, expected_.weight_nats(name));
     }
   }

@@ -13,14 +13,15 @@
 //
 // What a question is:
 //
-// | the effect                                               | probability       | weight |
-// |----------------------------------------------------------|-------------------|------------------|
-// | not observable, and the means show it                    | prior beside what | w | | | was
-// found         |                  | | not observable, samples show it (clock, mount, range ...)|
-// the same          | beyond all doubt | | observable, and the means show it | its own           |
-// w                | | accepted, another looks like it and the means show both  | even odds | w
-// beside it      | | accepted, another looks like it, samples show one        | even odds         |
-// beyond all doubt | | the protocol with the segment still lacks what it needs  | no question | |
+// | the effect                                        | probability           | weight      |
+// |---------------------------------------------------|-----------------------|-------------|
+// | not observable, and the means show it             | prior, given the found| w           |
+// | not observable, samples show it (clock, range ...)| prior, given the found| beyond doubt|
+// | observable, and the means show it                 | its own, below 0.99   | w           |
+// | observable, with 0.99 and more                    | no question           |             |
+// | named, another looks like it, means show both     | even odds             | w beside it |
+// | named, another looks like it, samples show one    | even odds             | beyond doubt|
+// | what it needs is still missing with the segment   | no question           |             |
 //
 // Internal to gap/judge.
 #pragma once

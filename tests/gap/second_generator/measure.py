@@ -17,13 +17,13 @@ import generate
 
 # name: stratum, protocol, count, seed, rates
 SETS = {
-    "realistic": ("realistic", "engineering", 60, 901, False),
-    "realistic_rates": ("realistic", "engineering", 30, 902, True),
+    "realistic": ("realistic", "engineering", 40, 901, False),
+    "realistic_rates": ("realistic", "engineering", 20, 902, True),
     "realistic_production": ("realistic", "production", 60, 903, False),
-    "triple": ("triple", "engineering", 60, 904, False),
+    "triple": ("triple", "engineering", 40, 904, False),
     "triple_production": ("triple", "production", 60, 905, False),
-    "none": ("none", "engineering", 40, 906, False),
-    "none_rates": ("none", "engineering", 60, 907, True),
+    "none": ("none", "engineering", 20, 906, False),
+    "none_rates": ("none", "engineering", 30, 907, True),
     "none_production": ("none", "production", 100, 908, True),
 }
 
