@@ -108,7 +108,16 @@ TEST(NextSegments, AHalfTurnBuysMostUnderAMinute) {
   const Offer oblique{"oblique", 0, planned_obliques(3)};
   const Offer& half_turn = standard_offers().front();
   ASSERT_EQ(half_turn.name, "half_turn");
-  const tests::Made made(tests::made_production({}));
+  // A unit that has a little of everything: tilt and misalignment of a tenth of a degree, a third
+  // of a percent of cross-axis, a bad seat.
+  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.0015, Eigen::Vector3d::UnitX()).matrix();
+  const Eigen::Matrix3d turned = Eigen::AngleAxisd(0.002, Eigen::Vector3d::UnitZ()).matrix();
+  const tests::Made made(tests::made_production(
+      {.seating_deg = 0.02}, [&](const Segment& segment, double) -> Eigen::Vector3d {
+        Eigen::Matrix3d cross = Eigen::Matrix3d::Identity();
+        cross(0, 1) = cross(1, 0) = 0.003;
+        return cross * turned * segment.rotation * tilt * Eigen::Vector3d::UnitZ();
+      }));
   auto nats = offers_for(made, {}, {half_turn, again, quarter, reseat, long_dwell, oblique});
   ASSERT_TRUE(nats.contains("half_turn"));
   for (const auto& [name, next] : nats) {
