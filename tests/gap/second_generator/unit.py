@@ -87,8 +87,6 @@ class Unit:
             out += 1e-3 * np.sin(w)[:, None] * np.array(q["vector_mg"])
         if "filter_mismatch" in p:
             out = out * p["filter_mismatch"]["gain"] + np.array(p["filter_mismatch"]["offset_g"])
-        if "saturation" in p:
-            out = np.clip(out, -p["saturation"]["level_g"], p["saturation"]["level_g"])
         return self.gain * out + self.offset_g
 
 
@@ -127,6 +125,8 @@ def stored(unit, effects, segments, temperature, rate_hz, rng):
             walk, walked_until = path[-1], host[-1]
             a = a + 1e-3 * path
         a = a + 1e-3 * unit.noise_mg * rng.normal(size=(n, 3))
+        if "saturation" in by:  # the converter's range: noise is clipped, too
+            a = np.clip(a, -by["saturation"]["level_g"], by["saturation"]["level_g"])
         if "axis_rotation" in by:
             a = a @ np.array(by["axis_rotation"]["matrix"], float).reshape(3, 3).T
         a = a / LSB_G
