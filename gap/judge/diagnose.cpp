@@ -130,6 +130,9 @@ Diagnosis diagnose(const Request& request) {
   out.plots = make_plots(request, records, explanation.best(), found);
   out.plots.residuals = std::move(residuals.plot);
   out.where = std::move(residuals.where);
+  if (!found.alarms.empty()) {
+    out.unknown.where = locate_unknown(request, records, explanation, found);
+  }
   finish(request, std::move(found), out);
   return out;
 }

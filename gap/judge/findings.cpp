@@ -65,16 +65,11 @@ double probability_it_matters(const EffectFinding& f, double matters_mg) {
 
 // Of something unknown, by convention.
 double unknown_probability(const Findings& found) {
-  if (!found.alarms.empty()) {
-    constexpr double kAlarm = 0.9;  // of a weak one
-    constexpr double kPerSd = 0.02, kMost = 0.999;
-    return std::min(kMost, kAlarm + kPerSd * (found.alarms.front().sd - kAlarm_sd));
+  double sd = found.worst_sd;
+  for (const Alarm& alarm : found.alarms) {
+    sd = std::max(sd, alarm.sd);
   }
-  // Without a suspicious test, and what a test just below the threshold adds.
-  constexpr double kQuiet = 0.03, kSuspect = 0.3;
-  constexpr double kChance_sd = 3;  // the largest of some forty tests reaches it by chance
-  return kQuiet +
-         kSuspect * std::clamp((found.worst_sd - kChance_sd) / (kAlarm_sd - kChance_sd), 0.0, 1.0);
+  return 1 / (1 + std::exp(-0.1 * (sd - kAlarm_sd)));
 }
 
 }  // namespace
@@ -129,6 +124,11 @@ void Findings::test(double sd, const std::string& where) {
   }
 }
 
+void Findings::suspect(double nats) {
+  constexpr double kSdPerNat = 1.0 / 3;
+  worst_sd = std::max(worst_sd, kAlarm_sd + kSdPerNat * (nats - kUnknownWins_nats));
+}
+
 void Findings::append(Findings later) {
   const auto join = [](auto& list, auto& more) {
     list.insert(list.end(), std::make_move_iterator(more.begin()),
@@ -149,7 +149,7 @@ void finish(const Request& request, Findings found, Diagnosis& out) {
             [](const Alarm& a, const Alarm& b) { return a.sd > b.sd; });
   constexpr std::size_t kMostPlaces = 8;
   for (std::size_t i = 0; i < std::min(kMostPlaces, found.alarms.size()); ++i) {
-    out.unknown.where.push_back(found.alarms[i].where);
+    out.unknown.why.push_back(found.alarms[i].where);
   }
   out.unknown.present = !found.alarms.empty();
   out.unknown.probability = unknown_probability(found);
@@ -194,7 +194,7 @@ Diagnosis inconclusive(const Request& request, Findings found, const std::string
   complete(request, found);
   out.candidates = std::move(found.candidates);
   out.verdict = Verdict::unexplained;
-  out.unknown = {true, kProbability, {why}};
+  out.unknown = {true, kProbability, {why}, {}};
   for (const CatalogueEntry& entry : catalogue()) {
     if (request.allowed(std::string(entry.name))) {
       out.not_observable.emplace_back(entry.name, entry.segment);

@@ -39,7 +39,7 @@ struct Findings {
   std::vector<EffectFinding> effects;     // accepted ones
   std::vector<EffectFinding> candidates;  // all that were judged
   std::vector<Alarm> alarms;
-  double worst_sd = 0;  // of all tests, alarms or not
+  double worst_sd = 0;  // of all tests and other causes, alarms or not
   // Mean squares per axis of what effects add to the gap that the means do not show.
   std::vector<double> outside_means_mg2;
 
@@ -47,6 +47,11 @@ struct Findings {
   void add(const Request& request, EffectFinding finding);
   void alarm(double sd, std::string where) { alarms.push_back({sd, std::move(where)}); }
   void test(double sd, const std::string& where);
+  // Log odds of a cause that the catalogue lacks, whether or not they are an alarm. On the scale of
+  // the tests: at kUnknownWins_nats as much as a test at kAlarm_sd, a third of a standard deviation
+  // for a nat (convention), so that even odds before the data (kLogPriorUnknown) are the 3 standard
+  // deviations that the largest of forty tests has by chance.
+  void suspect(double nats);
   void append(Findings later);
   bool accepted(const std::string& effect) const;
 };

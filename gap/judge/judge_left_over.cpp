@@ -57,6 +57,7 @@ void test_means(const Request& request, const Explanation& explanation, bool tru
 // Slow noise and the noise's spectrum.
 void test_spectrum(const Records& records, const Explanation& explanation, const Findings& before,
                    Findings& found) {
+  found.suspect(explanation.unknown_nats());
   if (explanation.unknown_wins()) {
     const double gain = explanation.best_unknown()->nats - explanation.best_known().nats;
     found.alarm(nats_to_sd(gain) + kUnknownScatter_sd,

@@ -126,6 +126,9 @@ struct Residuals {
 };
 Residuals locate_residuals(const Request& request, const Records& records,
                            const Explanation& explanation, const Findings& found);
+// Axes and segments in which the named effects leave something; worst first.
+std::vector<UnknownPlace> locate_unknown(const Request& request, const Records& records,
+                                         const Explanation& explanation, const Findings& found);
 Plots make_plots(const Request& request, const Records& records, const Fit& best,
                  const Findings& found);
 

@@ -79,7 +79,7 @@ TEST(Diagnosis, BriefSaysWhatWasFoundAndHowMuchIsLeft) {
   d.effects.push_back(named("drift"));
   EXPECT_THAT(d.brief(), StartsWith("tilt (or misalignment, seating) and drift explain the gap:"));
   d.verdict = gap::Verdict::partly_explained;
-  d.unknown.where = {"mean: the zero moves", "codes"};
+  d.unknown.why = {"mean: the zero moves", "codes"};
   EXPECT_THAT(d.brief(), AllOf(HasSubstr("a part of the gap"), EndsWith("mean: the zero moves")));
   d.verdict = gap::Verdict::unexplained;
   EXPECT_THAT(d.brief(), AllOf(HasSubstr("nothing in the catalogue"), Not(HasSubstr("tilt")),

@@ -125,7 +125,7 @@ TEST(Findings, InconclusiveNamesNothing) {
   const Diagnosis d = inconclusive(asked.request, found, "too little", {});
   EXPECT_FALSE(d.usable());
   EXPECT_TRUE(d.effects.empty());
-  EXPECT_EQ(d.unknown.where.front(), "too little");
+  EXPECT_EQ(d.unknown.why.front(), "too little");
   EXPECT_EQ(d.not_observable.size(), catalogue().size() - 1);
   for (const EffectFinding& candidate : d.candidates) {
     EXPECT_LE(candidate.probability, 0.5);
