@@ -50,9 +50,9 @@ struct UnknownPlace {
 struct UnknownFinding {
   bool present = false;
   double probability = 0;
-  std::vector<std::string> why;      // strongest first, in words
-  std::vector<UnknownPlace> where;   // strongest first; none where it is in the times alone
-  double size_mg = 0;                // rms per axis that nothing named explains, above the floor
+  std::vector<std::string> why;     // strongest first, in words
+  std::vector<UnknownPlace> where;  // strongest first; none where it is in the times alone
+  double size_mg = 0;               // rms per axis that nothing named explains, above the floor
 };
 
 struct GapSize {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "gap/explain/catalogue.h"
 
@@ -12,6 +13,12 @@ namespace {
 // Log odds beyond these say no more: e^9 is 8000 to one.
 constexpr double kLeast_nats = -40;
 constexpr double kMost_nats = 9;
+
+// Of something unknown, without and with much evidence, and how fast it grows between: fitted on
+// realistic units and outside kinds (docs/gap.md, Conventions).
+constexpr double kQuietProbability = 0.03;
+constexpr double kAlarmProbability = 0.98;
+constexpr double kUnknownWidth_sd = 0.6;
 
 bool contains(const std::vector<EffectFinding>& list, const std::string& name) {
   return std::any_of(list.begin(), list.end(),
@@ -63,13 +70,15 @@ double probability_it_matters(const EffectFinding& f, double matters_mg) {
   return f.probability * 0.5 * std::erfc(-z / M_SQRT2);
 }
 
-// Of something unknown, by convention.
+// Of something unknown: monotone in the strongest evidence for it, even odds where that is an
+// alarm.
 double unknown_probability(const Findings& found) {
   double sd = found.worst_sd;
   for (const Alarm& alarm : found.alarms) {
     sd = std::max(sd, alarm.sd);
   }
-  return 1 / (1 + std::exp(-0.1 * (sd - kAlarm_sd)));
+  const double share = 1 / (1 + std::exp(-(sd - kAlarm_sd) / kUnknownWidth_sd));
+  return kQuietProbability + (kAlarmProbability - kQuietProbability) * share;
 }
 
 }  // namespace
@@ -84,6 +93,24 @@ double chi_to_sd(double chi, double freedom) {
   }
   const double s = 2 / (9 * freedom);
   return (std::cbrt(chi / freedom) - (1 - s)) / std::sqrt(s);
+}
+
+std::vector<UnknownPlace> noise_places(const Request& request, int axis) {
+  std::set<std::string> names;
+  for (const Segment& segment : request.bundle.segments) {
+    if (segment.at_rest()) {
+      names.insert(segment.name);
+    }
+  }
+  std::vector<UnknownPlace> places;
+  for (const std::string& name : names) {
+    for (int a = 0; a < 3; ++a) {
+      if (axis < 0 || a == axis) {
+        places.push_back({a, name, "noise"});
+      }
+    }
+  }
+  return places;
 }
 
 std::string parameter_name(const std::string& effect) {
@@ -117,10 +144,10 @@ void Findings::add(const Request& request, EffectFinding finding) {
   candidates.push_back(std::move(finding));
 }
 
-void Findings::test(double sd, const std::string& where) {
+void Findings::test(double sd, const std::string& where, const std::vector<UnknownPlace>& places) {
   worst_sd = std::max(worst_sd, sd);
   if (sd > kAlarm_sd) {
-    alarm(sd, where);
+    alarm(sd, where, places);
   }
 }
 
@@ -142,6 +169,17 @@ void Findings::append(Findings later) {
 }
 
 bool Findings::accepted(const std::string& effect) const { return contains(effects, effect); }
+
+void Findings::accept_among_many(std::size_t before) {
+  if (before + effects.size() < kManyEffects) {
+    return;
+  }
+  for (const EffectFinding& f : candidates) {
+    if (f.nats > kAcceptAmongMany_nats && !accepted(f.name)) {
+      effects.push_back(f);
+    }
+  }
+}
 
 void finish(const Request& request, Findings found, Diagnosis& out) {
   complete(request, found);

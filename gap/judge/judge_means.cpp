@@ -304,6 +304,7 @@ Findings judge_means(const Request& request, const Explanation& explanation, con
   // Nothing separates it from an offset of half an LSB: what is known is the prior.
   found.add(request,
             {.name = "rounding_floor", .nats = kLogPriorEffect, .confounded_with = {"offset"}});
+  found.accept_among_many(before.effects.size());
   const std::map<std::string, double> gap_mg2 = explanation.gap_mg2();
   for (auto* list : {&found.effects, &found.candidates}) {
     for (EffectFinding& f : *list) {

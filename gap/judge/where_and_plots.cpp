@@ -201,8 +201,7 @@ std::vector<UnknownPlace> locate_unknown(const Request& request, const Records& 
     const Block& block = explanation.model().block_of_row(row);
     const Segment& segment = request.bundle.segments[block.segment];
     const int feature = explanation.model().feature_of_row(row);
-    Excess& cell =
-        means[{feature < kSecondHarmonic ? feature % 3 : block.axis, segment.name}];
+    Excess& cell = means[{feature < kSecondHarmonic ? feature % 3 : block.axis, segment.name}];
     cell.square += std::pow(left[static_cast<std::size_t>(row)], 2);
     cell.n += 1;
     cell.factor = factor_of(block, segment, request.bundle.rate_hz);
@@ -228,6 +227,15 @@ std::vector<UnknownPlace> locate_unknown(const Request& request, const Records& 
   std::vector<UnknownPlace> places;
   for (auto& [index, place] : sorted) {
     places.push_back(std::move(place));
+  }
+  for (const Alarm& alarm : found.alarms) {
+    for (const UnknownPlace& place : alarm.places) {
+      if (std::none_of(places.begin(), places.end(), [&](const UnknownPlace& have) {
+            return have.axis == place.axis && have.segment == place.segment;
+          })) {
+        places.push_back(place);
+      }
+    }
   }
   return places;
 }
