@@ -17,7 +17,7 @@ constexpr double kMost_nats = 9;
 // Of something unknown, without and with much evidence, and how fast it grows between: fitted on
 // realistic units and outside kinds (docs/gap.md, Conventions).
 constexpr double kQuietProbability = 0.03;
-constexpr double kAlarmProbability = 0.98;
+constexpr double kAlarmProbability = 0.87;
 constexpr double kUnknownWidth_sd = 0.6;
 
 bool contains(const std::vector<EffectFinding>& list, const std::string& name) {
@@ -70,8 +70,7 @@ double probability_it_matters(const EffectFinding& f, double matters_mg) {
   return f.probability * 0.5 * std::erfc(-z / M_SQRT2);
 }
 
-// Of something unknown: monotone in the strongest evidence for it, even odds where that is an
-// alarm.
+// Of something unknown: monotone in the strongest evidence for it, steepest where that alarms.
 double unknown_probability(const Findings& found) {
   double sd = found.worst_sd;
   for (const Alarm& alarm : found.alarms) {

@@ -137,12 +137,11 @@ void test_clipped_tone(const Request& request, const Records& records, const Ton
   const double h = records.response.tone_gain(s.vibration->frequency_hz, request.bundle.rate_hz);
   const double expected_mg = 1000 * h * s.vibration->amplitude_g *
                              std::abs((s.rotation * s.vibration->direction_lab)[tone.axis]) * gain;
-  // Known to this share, hardly on the flank of a resonance; an alarm grows by 20 sd for each time
-  // that it is off by that.
-  const double far = records.response.resonance_significant ? 0.5 : 0.03;
+  // Known to this share; an alarm grows by 20 sd for each time that it is off by that.
+  constexpr double kFar = 0.03;
   constexpr double kAlarm_sd_per_share = 20;
   const double off = std::abs(tone.in_phase_mg[tone.axis] / expected_mg - 1);
-  found.test(off > far ? kAlarm_sd_per_share * off / far : 0,
+  found.test(off > kFar ? kAlarm_sd_per_share * off / kFar : 0,
              fmt::format("tone: amplitude of the clipped tone at {} Hz", s.vibration->frequency_hz),
              {{tone.axis, s.name, "amplitude"}});
 }
@@ -169,7 +168,9 @@ void test_tones(const Request& request, const Records& records, const Fit& fit,
         request, records, tone,
         slow_variance_mg2(fit, before, samples / request.bundle.rate_hz, request.bundle.rate_hz),
         before.accepted("truncation"), found);
-    if (tone.clipped_share > 0 && records.jitter_s == 0) {
+    // Most of a tone that a resonance lifts is clipped: what is left does not tell its amplitude.
+    if (tone.clipped_share > 0 && records.jitter_s == 0 &&
+        !records.response.resonance_significant) {
       test_clipped_tone(request, records, tone, fit.state.gain[tone.axis], found);
     }
   }
