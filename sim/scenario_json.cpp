@@ -216,12 +216,14 @@ Result<std::vector<ProtocolSegment>> parse_segments(const Json& json, std::uint6
   if (json.is_string()) {
     const auto standard = parse_standard_protocol(json.get_ref<const std::string&>());
     if (!standard) {
-      return wrong("/protocol", "this must be production, engineering, or a list of segments");
+      return wrong("/protocol",
+                   "this must be production, production+, engineering, or a list of segments");
     }
     return draw_protocol(*standard, seed, rate_hz);
   }
   if (!json.is_array() || json.empty() || json.size() > kMostMotions) {
-    return wrong("/protocol", "this must be production, engineering, or a list of segments");
+    return wrong("/protocol",
+                 "this must be production, production+, engineering, or a list of segments");
   }
   std::vector<ProtocolSegment> segments;
   std::uint64_t end = 0;
