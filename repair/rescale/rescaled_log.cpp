@@ -5,7 +5,6 @@
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/record.h"
 #include "repair/triage/still_scan.h"
-#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -67,7 +66,7 @@ bool is_epoch(const gt3x::Record& record) {
 RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options)
     : log_(std::move(log)),
       options_(options),
-      still_(options.still, options.accel_scale_lsb_per_g),
+      still_(options.accel_scale_lsb_per_g),
       accel_scale_lsb_per_g_(options.accel_scale_lsb_per_g) {}
 
 Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
@@ -77,6 +76,19 @@ Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
     SIXPOINT_CHECK(source->set_source(options.first_constants, options.accel_scale_lsb_per_g));
   }
   return source;
+}
+
+void RescaledLog::survey_with(LogSurvey& survey) {
+  survey_ = &survey;
+  survey.on_block([this](std::uint64_t first_sample, int samples) {
+    still_.expect({first_sample, samples});
+  });
+}
+
+void RescaledLog::expect_still(std::span<const StillWindow> windows) {
+  for (const StillWindow& window : windows) {
+    still_.expect(window);
+  }
 }
 
 Status RescaledLog::set_source(const std::optional<StoredConstants>& constants,
@@ -197,6 +209,9 @@ Result<bool> RescaledLog::pull() {
   }
   if (!item.has_value()) {
     return !pending_.empty();
+  }
+  if (survey_ != nullptr) {
+    SIXPOINT_CHECK(survey_->take(*item));
   }
   const gt3x::Record& record = item->record;
   if (item->kind == gt3x::LogItem::Kind::record && record.checksum_ok) {
