@@ -38,9 +38,11 @@ inline constexpr double kFormShare = 0.05;
 // dwells) are heavier, and `gap challenge --none 1` counts 0 in 300.
 inline constexpr double kAlarm_sd = 5.5;
 
-// The nominal unit: noise of one sample at 100 Hz per axis, and the spread of gains and offsets
-// from unit to unit (ADXL362 datasheet, typical values).
+// The nominal unit: noise of one sample at 100 Hz per axis (its density is the same at every rate,
+// so at another one it is that times the root of the rates' ratio), and the spread of gains and
+// offsets from unit to unit (ADXL362 datasheet, typical values).
 inline constexpr std::array<double, 3> kNominalNoise_mg = {3.9, 3.9, 5.5};
+inline constexpr double kNominalNoiseAt_hz = 100;
 inline constexpr double kGainSd = 0.02;
 inline constexpr double kOffsetSd_mg = 35;
 

@@ -184,7 +184,9 @@ void test_noise(const Request& request, const Response& response, const Fit& fit
   constexpr double kReach = 0.13;  // the nominal noise within 10 %, the error of its estimate added
   constexpr double kAtLimit_sd = 6, kPerShare_sd = 20;  // alarm
   for (std::size_t a = 0; a < 3; ++a) {
-    const double ratio = response.white_mg[a] / kNominalNoise_mg[a];
+    const double nominal_mg =
+        kNominalNoise_mg[a] * std::sqrt(request.bundle.rate_hz / kNominalNoiseAt_hz);
+    const double ratio = response.white_mg[a] / nominal_mg;
     // Noise may arise before or behind the gain.
     const double gain = fit.state.gain[static_cast<Eigen::Index>(a)];
     const double low = (1 - kReach) * std::min(1.0, gain);
