@@ -3,9 +3,10 @@
 //     gt3x_bench                       a made day at 100 Hz, in memory, without repair
 //     gt3x_bench FILE CONSTANTS.json   a recording, and repair by these constants
 //
-// Every line has its ratio against what libraries alone need for the same bytes in the same run:
-// libdeflate inflates log.bin, libdeflate packs it at the level that is written, memcpy copies it.
-// Seconds of processor are those of all threads.
+// Every line has its ratios, of seconds and of seconds of processor (of all threads), against what
+// libraries and the disk alone need for the same bytes in the same run, on one thread: libdeflate
+// inflates log.bin; for a stored repair also the bytes are written, synced and renamed; for a
+// deflated one libdeflate packs them at the level and in the pieces that are written.
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include <libdeflate.h>
 #include <sys/resource.h>
 
+#include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "calib/constants.h"
@@ -89,30 +91,45 @@ Bytes log_of(FileSystem& files, const std::string& path) {
 
 class Table {
  public:
-  void baseline(const Taken& inflate, const Taken& deflate, const Taken& copy) {
+  void baseline(const Taken& copy, const Taken& inflate, const Taken& write, const Taken& deflate) {
     inflate_ = inflate;
-    deflate_ = deflate;
-    std::printf("%-34s %8s %10s %8s\n", "", "seconds", "processor", "ratio");
+    write_ = sum(inflate, write);
+    deflate_ = sum(inflate, deflate);
+    std::printf("%-34s %8s %10s %8s %10s\n", "", "seconds", "processor", "ratio", "of proc.");
     print("memcpy", copy, copy);
     print("libdeflate inflates", inflate, inflate);
-    print("libdeflate packs at level 6", deflate, deflate);
+    print("libdeflate inflates, write", write_, write_);
+    print("libdeflate inflates, packs", deflate_, deflate_);
   }
-  // Against inflating alone.
   void reads(const char* name, const Taken& taken) const { print(name, taken, inflate_); }
-  // Against inflating and packing.
-  void packs(const char* name, const Taken& taken) const {
-    print(name, taken,
-          {inflate_.seconds + deflate_.seconds, inflate_.processor_s + deflate_.processor_s});
-  }
+  void stores(const char* name, const Taken& taken) const { print(name, taken, write_); }
+  void packs(const char* name, const Taken& taken) const { print(name, taken, deflate_); }
 
  private:
+  static Taken sum(const Taken& one, const Taken& other) {
+    return {one.seconds + other.seconds, one.processor_s + other.processor_s};
+  }
   static void print(const char* name, const Taken& taken, const Taken& against) {
-    std::printf("%-34s %8.3f %10.3f %8.2f\n", name, taken.seconds, taken.processor_s,
-                taken.processor_s / against.processor_s);
+    std::printf("%-34s %8.3f %10.3f %8.2f %10.2f\n", name, taken.seconds, taken.processor_s,
+                taken.seconds / against.seconds, taken.processor_s / against.processor_s);
   }
   Taken inflate_;
+  Taken write_;
   Taken deflate_;
 };
+
+// The bytes as a file, in pieces as an archive is written, whole and synced.
+void write_whole(FileSystem& files, const std::string& path, const Bytes& bytes) {
+  static_cast<void>(files.remove(path));
+  auto out = AtomicFile::create(files, path);
+  for (std::size_t at = 0; out && at < bytes.size(); at += gt3x::kPackedPieceSize) {
+    static_cast<void>(out->append(
+        std::span(bytes).subspan(at, std::min(gt3x::kPackedPieceSize, bytes.size() - at))));
+  }
+  if (!out || !out->commit()) {
+    std::puts("the bytes could not be written");
+  }
+}
 
 void measure_repair(Env& env, const std::string& path, const calib::ConstantsRecord& constants,
                     const Table& table) {
@@ -132,7 +149,7 @@ void measure_repair(Env& env, const std::string& path, const calib::ConstantsRec
     if (report.status != repair::RepairStatus::repaired) {
       std::puts(report.brief().c_str());
     } else if (jobs == 0) {
-      table.reads("repair, stored", taken);
+      table.stores("repair, stored, --jobs 1", taken);
     } else {
       table.packs(jobs == 1 ? "repair, deflated, --jobs 1" : "repair, deflated, --jobs 2", taken);
     }
@@ -180,11 +197,14 @@ int main(int count, char** arguments) {
                                     out.size());
       }
     });
+    const std::string written = path + ".bench.log";
+    const Taken write = taken_by([&] { write_whole(env.files, written, log); });
+    static_cast<void>(env.files.remove(written));
     libdeflate_free_compressor(packer);
     libdeflate_free_decompressor(unpacker);
     std::printf("log.bin: %.1f MB, packed %.1f MB\n", 1e-6 * static_cast<double>(log.size()),
                 1e-6 * static_cast<double>(whole.size()));
-    table.baseline(inflate, deflate, copy);
+    table.baseline(copy, inflate, write, deflate);
   }
   auto recording = gt3x::Recording::open(env.files, path);
   if (!recording) {

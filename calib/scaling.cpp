@@ -1,6 +1,7 @@
 #include "calib/scaling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -271,28 +272,46 @@ StoredCounts Rescale::with_terms(const StoredCounts& in, PerAxis<std::uint8_t>& 
 void Rescale::apply(std::span<const StoredCounts> in, std::span<StoredCounts> out,
                     RescaleTally& counts) const {
   const std::size_t size = std::min(in.size(), out.size());
-  for (std::size_t i = 0; i < size; ++i) {
-    PerAxis<std::uint8_t> flags{};
-    StoredCounts fresh{};
-    if (has_terms_) {
-      fresh = with_terms(in[i], flags);
-    } else {
-      for (std::size_t a = 0; a < kAxes; ++a) {
-        const std::size_t slot = index(in[i][a]);
-        flags[a] = flags_[a][slot];
-        fresh[a] = count_[a][slot];
-      }
-    }
-    out[i] = fresh;
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      if (flags[a] != 0) {
-        counts.clipped_before[a] += (flags[a] & kClippedBefore) != 0 ? 1U : 0U;
-        counts.clipped_after[a] += (flags[a] & kClippedAfter) != 0 ? 1U : 0U;
-        counts.affine[a] += (flags[a] & kAffine) != 0 ? 1U : 0U;
-      }
-    }
-  }
   counts.samples += size;
+  const auto count = [&](const PerAxis<std::uint8_t>& flags) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      counts.clipped_before[a] += (flags[a] & kClippedBefore) != 0 ? 1U : 0U;
+      counts.clipped_after[a] += (flags[a] & kClippedAfter) != 0 ? 1U : 0U;
+      counts.affine[a] += (flags[a] & kAffine) != 0 ? 1U : 0U;
+    }
+  };
+  if (has_terms_) {
+    for (std::size_t i = 0; i < size; ++i) {
+      PerAxis<std::uint8_t> flags{};
+      out[i] = with_terms(in[i], flags);
+      count(flags);
+    }
+    return;
+  }
+  // Every count of a recording is looked up here, so without a branch. Few chunks hold a count with
+  // a flag. `in` may be `out`: a chunk is written when its flags were counted.
+  constexpr std::size_t kChunk = 256;
+  std::array<StoredCounts, kChunk> fresh;
+  const PerAxis<const std::int16_t*> tables = {count_[0].data(), count_[1].data(),
+                                               count_[2].data()};
+  const PerAxis<const std::uint8_t*> flags = {flags_[0].data(), flags_[1].data(), flags_[2].data()};
+  for (std::size_t begin = 0; begin < size; begin += kChunk) {
+    const auto chunk = in.subspan(begin, std::min(kChunk, size - begin));
+    unsigned any = 0;
+    for (std::size_t i = 0; i < chunk.size(); ++i) {
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const std::size_t slot = index(chunk[i][a]);
+        fresh[i][a] = tables[a][slot];
+        any |= flags[a][slot];
+      }
+    }
+    if (any != 0) {
+      for (const StoredCounts& sample : chunk) {
+        count({flags[0][index(sample[0])], flags[1][index(sample[1])], flags[2][index(sample[2])]});
+      }
+    }
+    std::copy_n(fresh.begin(), chunk.size(), out.begin() + static_cast<std::ptrdiff_t>(begin));
+  }
 }
 
 }  // namespace sixpoint::calib

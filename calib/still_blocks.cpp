@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "calib/sums/split_axes.h"
+
 namespace sixpoint::calib {
 
 namespace {
@@ -17,8 +19,12 @@ constexpr double kNoiseSigmas = 5;  // see StillBlockOptions::noisy_sd_g
 Result<StillBlockFinder> StillBlockFinder::make(const Reversal& reversal, double rate_hz,
                                                 const StillBlockOptions& options) {
   if (!(rate_hz >= 5 && rate_hz <= 1000)) {
-    return fail(ErrorCode::bad_data, fmt::format("a sample rate of {} Hz is impossible", rate_hz),
-                "still blocks", "the recording's info.txt is damaged");
+    return fail(ErrorCode::bad_data,
+                fmt::format("still periods are searched at 5 to 1000 samples a second, not at {:g}",
+                            rate_hz),
+                "still blocks",
+                "what it holds can be exported; where info.txt names a wrong rate, download the "
+                "recording from the unit again");
   }
   if (!(options.block_s >= 1 && options.block_s <= 60) || !(options.step_s > 0) ||
       !(options.max_slope_g_per_sample > 0) || !(options.max_residual_g > 0) ||
@@ -60,13 +66,12 @@ void StillBlockFinder::push(double start_time_s, std::span<const StoredCounts> s
     const auto slice = stored.subspan(begin, std::min(kSlice, stored.size() - begin));
     marks_.push_back({run_[0].size(), start_time_s + static_cast<double>(begin) / rate_hz_});
     const std::size_t old_size = run_[0].size();
+    PerAxis<std::int16_t*> out{};
     for (std::size_t a = 0; a < kAxes; ++a) {
       run_[a].resize(old_size + slice.size());
-      std::int16_t* out = run_[a].data() + old_size;
-      for (std::size_t i = 0; i < slice.size(); ++i) {
-        out[i] = slice[i][a];
-      }
+      out[a] = run_[a].data() + old_size;
     }
+    split_axes(slice, out[0], out[1], out[2]);
     tally_.samples += slice.size();
     calib::tally(*reversal_, slice, tally_.plausibility);
     search();

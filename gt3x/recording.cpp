@@ -421,8 +421,9 @@ Result<std::unique_ptr<ByteSource>> Recording::open_entry(const std::string& nam
                         fmt::format("{}; {} bytes of it could be read", damage.why, damage.bytes));
         });
   }
+  const bool on_threads = !facts.points.packed_sizes.empty();  // piecewise_source.h
   auto unpacked = unpack_entry(*std::move(packed), facts);
-  if (facts.size < kReadAheadFrom || how == Unpacking::when_asked) {
+  if (facts.size < kReadAheadFrom || on_threads || how == Unpacking::when_asked) {
     return unpacked;
   }
   return std::make_unique<ReadAhead>(std::move(unpacked));

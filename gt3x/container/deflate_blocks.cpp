@@ -21,18 +21,22 @@ constexpr unsigned extra_bits_of_distance(std::size_t symbol) {
   return symbol < 4 ? 0 : static_cast<unsigned>(symbol / 2 - 1);
 }
 
-// How many bits a code takes with its extra bits, and what comes behind it.
+// How many bits a code takes with its extra bits, and what comes behind it. One step may pass
+// several literals and what follows them.
 struct Step {
   enum class Kind : std::uint8_t { none, symbol, distance, end, longer };
   Kind kind = Kind::none;
   std::uint8_t bits = 0;
 };
 
-// The codes of one alphabet (RFC 1951, 3.2.2). Codes of up to kDirectBits bits are looked up, the
+// The codes of one alphabet (RFC 1951, 3.2.2). Codes of up to `direct_bits` bits are looked up, the
 // few longer ones are found bit by bit.
 class Codes {
  public:
-  static constexpr std::size_t kDirectBits = 11;
+  static constexpr std::size_t kMostDirectBits = 13;
+
+  explicit Codes(std::size_t direct_bits)
+      : direct_bits_(direct_bits), direct_size_(std::size_t{1} << direct_bits) {}
 
   // False where the lengths make no prefix code. An incomplete one is taken: with one distance or
   // none it is legal, and what it leaves open is met as Kind::none.
@@ -52,7 +56,7 @@ class Codes {
         return false;
       }
     }
-    direct_.fill(Step{});
+    std::fill_n(direct_.begin(), direct_size_, Step{});
     for (std::size_t symbol = 0; symbol < lengths.size(); ++symbol) {
       const std::size_t length = lengths[symbol];
       if (length == 0) {
@@ -61,25 +65,47 @@ class Codes {
       const Step step = step_of(symbol, static_cast<unsigned>(length));
       const std::uint32_t code = reversed(next[length]++, length);
       sorted_[place[length]++] = step;
-      if (length > kDirectBits) {
-        direct_[code & (kDirect - 1)] = Step{Step::Kind::longer, 0};
+      if (length > direct_bits_) {
+        direct_[code & (direct_size_ - 1)] = Step{Step::Kind::longer, 0};
         continue;
       }
-      for (std::size_t at = code; at < kDirect; at += std::size_t{1} << length) {
+      for (std::size_t at = code; at < direct_size_; at += std::size_t{1} << length) {
         direct_[at] = step;
+        code_bits_[at] = static_cast<std::uint8_t>(length);
       }
     }
     return true;
   }
 
+  // For an alphabet in which a literal is followed by a code of the same: one step passes as many
+  // codes as lie whole within the bits that are looked up.
+  void join_literals() {
+    const std::array<Step, kMostDirect> single = direct_;
+    for (std::size_t at = 0; at < direct_size_; ++at) {
+      Step joined = single[at];
+      std::size_t known = direct_bits_ - code_bits_[at];
+      while (joined.kind == Step::Kind::symbol) {
+        const std::size_t rest = at >> joined.bits;
+        const Step next = single[rest];
+        if (next.kind == Step::Kind::none || next.kind == Step::Kind::longer ||
+            code_bits_[rest] > known) {
+          break;
+        }
+        known -= code_bits_[rest];
+        joined = {next.kind, static_cast<std::uint8_t>(joined.bits + next.bits)};
+      }
+      direct_[at] = joined;
+    }
+  }
+
   // `word`: the next bits of the stream, at least kMostCodeBits of them.
   Step step(std::uint64_t word) const {
-    const Step found = direct_[word & (kDirect - 1)];
+    const Step found = direct_[word & (direct_size_ - 1)];
     return found.kind == Step::Kind::longer ? longer_step(word) : found;
   }
 
  private:
-  static constexpr std::size_t kDirect = std::size_t{1} << kDirectBits;
+  static constexpr std::size_t kMostDirect = std::size_t{1} << kMostDirectBits;
 
   static std::uint32_t reversed(std::uint32_t code, std::size_t length) {
     std::uint32_t out = 0;
@@ -106,7 +132,10 @@ class Codes {
 
   std::array<std::uint16_t, kMostCodeBits + 1> counts_{};  // codes of each length
   std::array<Step, kMostLengthSymbols + 2> sorted_{};      // by length, then by symbol
-  std::array<Step, kDirect> direct_{};
+  std::size_t direct_bits_;
+  std::size_t direct_size_;
+  std::array<Step, kMostDirect> direct_{};
+  std::array<std::uint8_t, kMostDirect> code_bits_{};  // of the first code, without extra bits
 };
 
 class Walk {
@@ -184,7 +213,11 @@ class Walk {
       return Step{Step::Kind::symbol,
                   static_cast<std::uint8_t>(bits + extra_bits_of_distance(symbol))};
     };
-    return lengths_.make(lengths, length_step) && distances_.make(distances, distance_step);
+    if (!lengths_.make(lengths, length_step) || !distances_.make(distances, distance_step)) {
+      return false;
+    }
+    lengths_.join_literals();
+    return true;
   }
 
   bool make_fixed_codes() {  // RFC 1951, 3.2.6
@@ -275,8 +308,8 @@ class Walk {
   bool pass_symbols() {
     const Codes* codes = &lengths_;
     while (at_ < end()) {
-      // 57 bits are there. A length takes 20 with its extra bits, a distance 28, one follows the
-      // other.
+      // 57 bits are there. A step among lengths takes 20 with its extra bits, a distance 28, one
+      // follows the other.
       std::uint64_t bits = word();
       unsigned used = 0;
       for (int i = 0; i < 2; ++i) {
@@ -296,8 +329,9 @@ class Walk {
 
   std::span<const std::uint8_t> stream_;
   std::uint64_t at_ = 0;  // bit
-  Codes lengths_;
-  Codes distances_;
+  // Of lengths as many as the fastest cache holds: the more bits, the more literals in one step.
+  Codes lengths_{Codes::kMostDirectBits};
+  Codes distances_{9};
 };
 
 }  // namespace

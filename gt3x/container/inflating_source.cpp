@@ -70,6 +70,77 @@ class Inflate final : public ByteSource {
   const char* broken_ = nullptr;
 };
 
+// What is left of an entry with an index: of a damaged piece what comes before its damage, and all
+// of the pieces behind it. Ends in an error where anything was lost.
+class SalvagedPieces final : public ByteSource {
+ public:
+  SalvagedPieces(std::unique_ptr<ByteSource> packed, SyncPoints points, std::uint64_t size)
+      : packed_(std::move(packed)), points_(std::move(points)), left_(size) {}
+
+  Result<std::size_t> read(std::span<std::uint8_t> out) override {
+    while (taken_ == piece_.size()) {
+      if (next_ == points_.packed_sizes.size()) {
+        return lost_ == 0 ? Result<std::size_t>(std::size_t{0})
+                          : fail(ErrorCode::bad_data,
+                                 fmt::format("{} of its {} pieces make no sense from a place on",
+                                             lost_, points_.packed_sizes.size()));
+      }
+      SIXPOINT_CHECK(take_next());
+    }
+    const std::size_t count = std::min(out.size(), piece_.size() - taken_);
+    std::copy_n(piece_.begin() + static_cast<std::ptrdiff_t>(taken_), count, out.begin());
+    taken_ += count;
+    return count;
+  }
+
+ private:
+  Status take_next() {
+    Bytes packed(points_.packed_sizes[next_]);
+    std::size_t filled = 0;
+    while (filled < packed.size()) {
+      SIXPOINT_ASSIGN(const std::size_t more, packed_->read(std::span(packed).subspan(filled)));
+      if (more == 0) {
+        break;
+      }
+      filled += more;
+    }
+    packed.resize(filled);
+    piece_.resize(std::min<std::uint64_t>(points_.piece_size, left_));
+    left_ -= piece_.size();
+    taken_ = 0;
+    const bool last = ++next_ == points_.packed_sizes.size();
+    Bytes whole = packed;
+    if (!unpack_piece(whole, last ? PiecePacker::Place::last : PiecePacker::Place::inner, piece_)) {
+      ++lost_;
+      piece_.resize(before_damage(std::move(packed)));
+    }
+    return {};
+  }
+
+  // Fills piece_ up to the damage; how many bytes.
+  std::size_t before_damage(Bytes packed) {
+    const std::uint64_t size = packed.size();
+    Inflate bytes(std::make_unique<MemorySource>(std::move(packed)), size);
+    std::size_t done = 0;
+    while (done < piece_.size()) {
+      const auto count = bytes.read(std::span(piece_).subspan(done));
+      if (!count || *count == 0) {
+        break;
+      }
+      done += *count;
+    }
+    return done;
+  }
+
+  std::unique_ptr<ByteSource> packed_;
+  SyncPoints points_;
+  std::uint64_t left_;    // bytes of the pieces behind piece_
+  std::size_t next_ = 0;  // piece
+  std::size_t lost_ = 0;  // pieces, or their ends
+  Bytes piece_;
+  std::size_t taken_ = 0;  // of it
+};
+
 // Counts and checks what passes.
 class CheckedEntry final : public ByteSource {
  public:
@@ -171,8 +242,10 @@ std::unique_ptr<ByteSource> unpack_entry(std::unique_ptr<ByteSource> packed,
 std::unique_ptr<ByteSource> salvage_entry(std::unique_ptr<ByteSource> packed,
                                           const EntryFacts& facts, const ArchiveLimits& limits,
                                           std::function<void(const EntryDamage&)> note) {
-  if (facts.packing == Packing::deflate) {
+  if (facts.packing == Packing::deflate && facts.points.packed_sizes.empty()) {
     packed = std::make_unique<Inflate>(std::move(packed), facts.packed_size);
+  } else if (facts.packing == Packing::deflate) {
+    packed = std::make_unique<SalvagedPieces>(std::move(packed), facts.points, facts.size);
   }
   auto entry = std::make_unique<CheckedEntry>(std::move(packed), facts);
   entry->salvage(limits, std::move(note));

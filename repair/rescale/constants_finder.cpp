@@ -230,4 +230,20 @@ Result<ConstantsChoice> ConstantsFinder::choose(const std::string& path, const S
   return choice;
 }
 
+std::optional<ChosenConstants> ConstantsFinder::foreseen(const FileFacts& facts) {
+  Survey head;
+  head.facts = facts;
+  ConstantsChoice choice;
+  for (const SourceKind kind : sources_in_order(options_)) {
+    if (kind == SourceKind::scan || kind == SourceKind::unit_files ||
+        !ask(kind, {}, head, choice) || choice.for_a_person) {
+      return std::nullopt;
+    }
+    if (choice.chosen) {
+      return std::move(choice.chosen);
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace sixpoint::repair

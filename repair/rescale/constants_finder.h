@@ -73,6 +73,8 @@ class ConstantsFinder final : public ConstantsSource {
  public:
   ConstantsFinder(Env& env, ConstantsFinderOptions options);
   Result<ConstantsChoice> choose(const std::string& path, const Survey& survey) override;
+  // Of the sources before the first that needs samples.
+  std::optional<ChosenConstants> foreseen(const FileFacts& facts) override;
 
  private:
   struct CalibrationFile {

@@ -10,6 +10,7 @@
 #include "base/sha256.h"
 #include "calib/application/agreement.h"
 #include "calib/coverage.h"
+#include "gt3x/container/read_ahead.h"
 #include "gt3x/recording.h"
 #include "gt3x/recording_writer.h"
 #include "repair/rescale/applied_map.h"
@@ -25,6 +26,12 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // Reasons are JSON values that other programs may read, so their words stay as they are.
+// So much of a log says whether its counts can have come from its constants.
+constexpr std::uint64_t kBeginning_samples = 100'000;
+
+// From so many bytes of log.bin on.
+constexpr std::uint64_t kOnThreadsFrom = std::uint64_t{4} << 20;
+
 constexpr const char* kNotDecided =
     "what cannot be told affected is not repaired: find out what is missing first";
 constexpr const char* kDoneBefore = "repaired by an earlier run";
@@ -42,6 +49,25 @@ bool is_independent_of_samples(const std::string& name) {
       "firmware.bin", "capsense.bin", "metadata.bin", kSalvageMark};
   return std::ranges::find(kNames, name) != kNames.end();
 }
+
+std::vector<StillWindow> windows_of(const Survey& survey) {
+  std::vector<StillWindow> windows;
+  for (const calib::StillBlock& block : survey.blocks) {
+    windows.push_back({block.first_sample, block.samples});
+  }
+  return windows;
+}
+
+// A source that another object owns.
+class Borrowed final : public gt3x::ByteSource {
+ public:
+  explicit Borrowed(gt3x::ByteSource& source) : source_(source) {}
+  Result<std::size_t> read(std::span<std::uint8_t> out) override { return source_.read(out); }
+  std::optional<std::uint64_t> size() const override { return source_.size(); }
+
+ private:
+  gt3x::ByteSource& source_;
+};
 
 class Repair {
  public:
@@ -64,8 +90,10 @@ class Repair {
 
  private:
   Status work() {
-    SIXPOINT_ASSIGN(survey_,
-                    survey(env_.files, report_.input, options_.still, {options_.salvage, {}}));
+    if (!survey_and_write()) {
+      SIXPOINT_ASSIGN(survey_,
+                      survey(env_.files, report_.input, options_.still, {options_.salvage, {}}));
+    }
     report_.losses = survey_.losses;
     report_.serial = survey_.facts.serial;
     report_.calibration_time = survey_.facts.calibration_time;
@@ -91,6 +119,56 @@ class Repair {
       }
     }
     return write();
+  }
+
+  // One pass (repair_file.h); where it was not tried or did not come to its end, two find out why.
+  Status survey_and_write() {
+    const auto another_way = fail(ErrorCode::internal, "not in one pass", report_.input);
+    if (options_.dry_run || options_.salvage || env_.files.info(output_)) {
+      return another_way;
+    }
+    SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(env_.files, report_.input));
+    const auto entry = std::ranges::find(recording.entries(), "log.bin", &gt3x::EntryInfo::name);
+    if (entry == recording.entries().end() || entry->size < options_.one_pass_from_bytes) {
+      return another_way;
+    }
+    Repair head(env_, report_.input, output_, source_, options_);
+    SIXPOINT_ASSIGN(head.survey_, survey_beginning(recording, options_.still, kBeginning_samples));
+    head.survey_.log_bytes = entry->size;
+    if (!head.foresee()) {
+      return another_way;
+    }
+    SIXPOINT_ASSIGN(head.report_.input_sha256, file_sha256(env_.files, report_.input));
+    SIXPOINT_ASSIGN(auto passing, LogSurvey::begin(recording, options_.still));
+    SIXPOINT_ASSIGN(auto reader, recording.open_log());
+    const RescaledLogOptions how = head.log_options();
+    SIXPOINT_ASSIGN(auto log, RescaledLog::make(std::move(reader), how));
+    log->survey_with(passing);
+    SIXPOINT_ASSIGN(auto writer, begin_output());
+    SIXPOINT_CHECK(head.write_entries(recording, *log, writer));
+    survey_ = passing.finish(log->statistics());
+    written_.emplace(WrittenLog{std::move(recording), how, std::move(log), std::move(writer),
+                                head.report_.input_sha256});
+    return {};
+  }
+
+  // What will be decided if the whole file says what its beginning says; false where it is not
+  // written then, or where that depends on more.
+  bool foresee() {
+    report_.serial = survey_.facts.serial;
+    if (survey_.constants.empty() || !needs_work()) {
+      return false;
+    }
+    if (report_.method.empty()) {
+      auto constants = source_.foreseen(survey_.facts);
+      if (!constants) {
+        return false;
+      }
+      take_chosen(*std::move(constants));
+      map_ = applied_map(chosen_->record, survey_);
+      state_map();
+    }
+    return true;
   }
 
   // The table in repair_file.h up to the constants; false where the status is decided.
@@ -153,11 +231,20 @@ class Repair {
       report_.reasons.push_back(*std::move(why));
       return {};
     }
-    chosen_ = std::move(choice.chosen);
+    take_chosen(*std::move(choice.chosen));
+    return {};
+  }
+
+  void take_chosen(ChosenConstants constants) {
+    chosen_ = std::move(constants);
     report_.method = chosen_->method;
     report_.constants_id = chosen_->constants_id;
     report_.source = source_used(chosen_->method, chosen_->constants_id, chosen_->record);
-    return {};
+  }
+
+  void state_map() {
+    report_.cross_axis_applied = map_->has_terms();
+    report_.sample_uncertainty_mg = map_->sample_uncertainty_mg;
   }
 
   // Whether the constants that were chosen may be used on this file: the gate, and what its own
@@ -189,8 +276,7 @@ class Repair {
       report_.forced = false;
       return false;
     }
-    report_.cross_axis_applied = map_->has_terms();
-    report_.sample_uncertainty_mg = map_->sample_uncertainty_mg;
+    state_map();
     return true;
   }
 
@@ -235,16 +321,13 @@ class Repair {
     options.leave_out_damage = options_.salvage;
     options.mark = mark_record_of(report_);
     options.size = options_.wide ? survey_.log_bytes_wide : survey_.log_bytes;
-    for (const calib::StillBlock& block : survey_.blocks) {
-      options.still.push_back({block.first_sample, block.samples});
-    }
     return options;
   }
 
-  void take(RescaledLog& log) {
+  void take(RescaledLog& log, std::span<const StillWindow> windows) {
     report_.clipped_before = log.tally().clipped_before;
     report_.clipped_after = log.tally().clipped_after;
-    if (const auto after_mg = log.still_error_mg()) {
+    if (const auto after_mg = log.still_error_mg(windows)) {
       report_.still_error_after_mg = after_mg;
     }
     if (log.tally().affine_counts > 0) {
@@ -266,16 +349,26 @@ class Repair {
   }
 
   Status write() {
-    SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
-    const RescaledLogOptions how = log_options();  // with the mark, which holds the hash
-    survey_.blocks = {};                           // all that they had to say was said by now
-    SIXPOINT_ASSIGN(auto recording,
-                    gt3x::Recording::open(env_.files, report_.input, {options_.salvage, {}}));
-    SIXPOINT_ASSIGN(auto reader, recording.open_log());
-    SIXPOINT_ASSIGN(const auto log, RescaledLog::make(std::move(reader), how));
-    if (options_.dry_run) {
-      SIXPOINT_CHECK(read_through(*log));
+    if (written_) {
+      report_.input_sha256 = written_->input_sha256;
     } else {
+      SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
+    }
+    const RescaledLogOptions how = log_options();  // with the mark, which holds the hash
+    const std::vector<StillWindow> windows = windows_of(survey_);
+    survey_.blocks = {};  // all that they had to say was said by now
+    if (!written_ || !(written_->how == how)) {
+      written_.reset();
+      SIXPOINT_ASSIGN(auto recording,
+                      gt3x::Recording::open(env_.files, report_.input, {options_.salvage, {}}));
+      SIXPOINT_ASSIGN(auto reader, recording.open_log());
+      SIXPOINT_ASSIGN(auto log, RescaledLog::make(std::move(reader), how));
+      log->expect_still(windows);
+      if (options_.dry_run) {
+        SIXPOINT_CHECK(read_through(*log));
+        finish(recording, *log, windows);
+        return {};
+      }
       const auto mark = mark_in(env_.files, output_);
       const EarlierOutput earlier =
           judge_earlier_output(found_output(mark), report_.input_sha256, recipe());
@@ -283,12 +376,21 @@ class Repair {
           !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
         return take_earlier_output(earlier, mark.value_or(Json()));
       }
-      SIXPOINT_CHECK(write_output(recording, *log));
+      SIXPOINT_ASSIGN(auto writer, begin_output());
+      SIXPOINT_CHECK(write_entries(recording, *log, writer));
+      written_.emplace(WrittenLog{std::move(recording), how, std::move(log), std::move(writer),
+                                  report_.input_sha256});
     }
-    take(*log);
-    name_what_was_not_repaired(recording, log->tally().epoch_records);
-    take_status_of_written();
+    SIXPOINT_CHECK(commit(written_->writer));
+    finish(written_->recording, *written_->log, windows);
     return {};
+  }
+
+  void finish(const gt3x::Recording& recording, RescaledLog& log,
+              std::span<const StillWindow> windows) {
+    take(log, windows);
+    name_what_was_not_repaired(recording, log.tally().epoch_records);
+    take_status_of_written();
   }
 
   // Epochs were computed by the unit, or by software, from the samples as they were.
@@ -324,22 +426,37 @@ class Repair {
     return {};
   }
 
-  Status write_output(gt3x::Recording& recording, RescaledLog& log) {
+  Result<gt3x::RecordingWriter> begin_output() {
     SIXPOINT_CHECK(make_synced_folders(env_.files, folder_of(output_)));
     gt3x::WriterOptions how;
     how.packing = options_.store_only ? gt3x::Packing::store : gt3x::Packing::deflate;
     how.jobs = options_.jobs;
-    SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(env_.files, output_, how));
+    return gt3x::RecordingWriter::create(env_.files, output_, how);
+  }
+
+  // All but the mark. A large log is read on a thread of its own: packing or writing it takes as
+  // long as reading it, or longer.
+  Status write_entries(gt3x::Recording& recording, RescaledLog& log,
+                       gt3x::RecordingWriter& writer) const {
+    const std::string salvage_mark = mark_name(report_);
     for (const gt3x::EntryInfo& entry : recording.entries()) {
-      if (entry.name == mark_name(report_)) {
+      if (entry.name == salvage_mark) {
         continue;  // a file that was salvaged before; its record in the log stays
       }
-      SIXPOINT_CHECK(entry.name == "log.bin" ? writer.add(entry.name, log)
-                                             : carry_over(recording, entry.name, writer));
+      if (entry.name == "log.bin" && entry.size < kOnThreadsFrom) {
+        SIXPOINT_CHECK(writer.add(entry.name, log));
+      } else if (entry.name == "log.bin") {
+        gt3x::ReadAhead ahead(std::make_unique<Borrowed>(log));
+        SIXPOINT_CHECK(writer.add(entry.name, ahead));
+      } else {
+        SIXPOINT_CHECK(carry_over(recording, entry.name, writer));
+      }
     }
-    if (!recording.has_entry("info.txt")) {
-      SIXPOINT_CHECK(writer.add("info.txt", recording.info().serialise()));
-    }
+    return recording.has_entry("info.txt") ? Status()
+                                           : writer.add("info.txt", recording.info().serialise());
+  }
+
+  Status commit(gt3x::RecordingWriter& writer) {
     report_.repaired_at = env_.clock.now();
     SIXPOINT_CHECK(writer.add(mark_name(report_),
                               mark_of(report_, chosen_, survey_, recipe(), *report_.repaired_at)
@@ -447,6 +564,15 @@ class Repair {
   Survey survey_;
   std::optional<ChosenConstants> chosen_;
   std::optional<AppliedMap> map_;  // of chosen_
+  // The new file up to its mark, in the temporary file.
+  struct WrittenLog {
+    gt3x::Recording recording;
+    RescaledLogOptions how;
+    std::unique_ptr<RescaledLog> log;
+    gt3x::RecordingWriter writer;
+    std::string input_sha256;
+  };
+  std::optional<WrittenLog> written_;
   RepairReport report_;
 };
 

@@ -29,6 +29,12 @@
 // | not_repairable by now, an output of this input is there | outdated: it is never replaced     |
 // | cannot be read or written                               | failed, with the error             |
 //
+// One pass or two: where the head of a large log, and constants that do not depend on the file
+// (ConstantsSource::foreseen), say what will be written, the log is surveyed and written to the
+// temporary file in the same pass. At its end everything is decided as always, from the whole
+// survey; where that leads to other bytes, or to none, the temporary file is dropped, and what is
+// written is written in a second pass. So the answer never depends on how it came about.
+//
 // Constants may be used when why_unfit() (sources.h) says nothing. Where they are not from the file
 // itself, and its own still periods give a verified solution, the two must agree
 // (calib/application/agreement.h).
@@ -68,6 +74,11 @@ class ConstantsSource {
  public:
   virtual ~ConstantsSource() = default;
   virtual Result<ConstantsChoice> choose(const std::string& path, const Survey& survey) = 0;
+  // What choose() will probably answer for a file that says this of itself; nothing where that
+  // depends on its samples. As safe as choose().
+  virtual std::optional<ChosenConstants> foreseen(const FileFacts& /*facts*/) {
+    return std::nullopt;
+  }
 };
 
 struct RepairOptions {
@@ -95,6 +106,8 @@ struct RepairOptions {
   // An output that was made otherwise than it would be made now is replaced.
   bool redo_outdated = false;
   calib::StillBlockOptions still;
+  // From so many bytes of log.bin on one pass is tried: below, two are as fast.
+  std::uint64_t one_pass_from_bytes = std::uint64_t{4} << 20;
 };
 
 // Repairs `input` into `output`, whose folder is made when it is written. Never fails as a

@@ -1,11 +1,11 @@
 #include "repair/rescale/rescaled_log.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "gt3x/forms/parameters.h"
 #include "gt3x/log/record.h"
 #include "repair/triage/still_scan.h"
-#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -25,16 +25,27 @@ std::uint64_t count_at_limit(std::span<const gt3x::Counts> samples, calib::Recor
   }));
 }
 
-// Compared number by number: as arrays they would be compared by a call of memcmp each.
-std::uint64_t count_changed(std::span<const gt3x::Counts> before,
-                            std::span<const gt3x::Counts> after) {
+// What a pass over the samples before and after finds; compared as words, because as arrays they
+// would be compared by a call of memcmp each.
+struct Compared {
   std::uint64_t changed = 0;
+  bool zeros = false;  // a sample that is zero on all axes was there before
+};
+Compared compare(std::span<const gt3x::Counts> before, std::span<const gt3x::Counts> after) {
+  const auto word_of = [](const gt3x::Counts& sample) {
+    std::uint32_t xy = 0;
+    std::memcpy(&xy, sample.data(), sizeof xy);
+    return xy | std::uint64_t{static_cast<std::uint16_t>(sample[2])} << 32U;
+  };
+  Compared found;
+  std::uint64_t zeros = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
-    const int difference =
-        (before[i][0] ^ after[i][0]) | (before[i][1] ^ after[i][1]) | (before[i][2] ^ after[i][2]);
-    changed += difference != 0 ? 1U : 0U;
+    const std::uint64_t was = word_of(before[i]);
+    found.changed += was != word_of(after[i]) ? 1U : 0U;
+    zeros += was == 0 ? 1U : 0U;
   }
-  return changed;
+  found.zeros = zeros > 0;
+  return found;
 }
 
 bool is_zero(const gt3x::Counts& sample) { return (sample[0] | sample[1] | sample[2]) == 0; }
@@ -67,7 +78,7 @@ bool is_epoch(const gt3x::Record& record) {
 RescaledLog::RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options)
     : log_(std::move(log)),
       options_(options),
-      still_(options.still, options.accel_scale_lsb_per_g),
+      still_(options.accel_scale_lsb_per_g),
       accel_scale_lsb_per_g_(options.accel_scale_lsb_per_g) {}
 
 Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
@@ -77,6 +88,19 @@ Result<std::unique_ptr<RescaledLog>> RescaledLog::make(gt3x::LogReader log,
     SIXPOINT_CHECK(source->set_source(options.first_constants, options.accel_scale_lsb_per_g));
   }
   return source;
+}
+
+void RescaledLog::survey_with(LogSurvey& survey) {
+  survey_ = &survey;
+  survey.on_block([this](std::uint64_t first_sample, int samples) {
+    still_.expect({first_sample, samples});
+  });
+}
+
+void RescaledLog::expect_still(std::span<const StillWindow> windows) {
+  for (const StillWindow& window : windows) {
+    still_.expect(window);
+  }
 }
 
 Status RescaledLog::set_source(const std::optional<StoredConstants>& constants,
@@ -126,19 +150,27 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
   const auto limit_before =
       options_.beyond_12_bits ? calib::RecordWidth::bits16 : calib::RecordWidth::bits12;
   const auto limit_after = options_.wide ? calib::RecordWidth::bits16 : limit_before;
-  fresh_samples_ = samples_;
+  fresh_samples_.resize(samples_.size());
+  if (options_.undo_rotation || !map_.has_value()) {
+    std::ranges::copy(samples_, fresh_samples_.begin());
+  }
   if (options_.undo_rotation) {
     undo_rotation(fresh_samples_, limit_before);
   }
   if (map_.has_value()) {
     calib::RescaleTally counts;
-    maps_[*map_].rescale.apply(fresh_samples_, fresh_samples_, counts);
+    maps_[*map_].rescale.apply(options_.undo_rotation ? fresh_samples_ : samples_, fresh_samples_,
+                               counts);
     tally_.affine_counts += counts.affine[0] + counts.affine[1] + counts.affine[2];
+  }
+  Compared compared = compare(samples_, fresh_samples_);
+  if (map_.has_value() && compared.zeros) {
     keep_charging_zeros(samples_, fresh_samples_);
+    compared = compare(samples_, fresh_samples_);
   }
   tally_.clipped_before += count_at_limit(samples_, limit_before);
   tally_.clipped_after += count_at_limit(fresh_samples_, limit_after);
-  tally_.changed_samples += count_changed(samples_, fresh_samples_);
+  tally_.changed_samples += compared.changed;
   tally_.samples += samples_.size();
   ++tally_.sample_records;
   still_.push(fresh_samples_);
@@ -197,6 +229,9 @@ Result<bool> RescaledLog::pull() {
   }
   if (!item.has_value()) {
     return !pending_.empty();
+  }
+  if (survey_ != nullptr) {
+    SIXPOINT_CHECK(survey_->take(*item));
   }
   const gt3x::Record& record = item->record;
   if (item->kind == gt3x::LogItem::Kind::record && record.checksum_ok) {

@@ -27,6 +27,7 @@
 #include "gt3x/log/log_reader.h"
 #include "gt3x/log/samples.h"
 #include "repair/rescale/still_windows.h"
+#include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
 
@@ -54,8 +55,8 @@ struct RescaledLogOptions {
   // Bytes that will come out at most, but for the mark, where they are known (Survey::log_bytes,
   // log_bytes_wide).
   std::optional<std::uint64_t> size;
-  // Where the input was still (Survey::blocks): still_error_mg() judges what came out there.
-  std::vector<StillWindow> still;
+
+  bool operator==(const RescaledLogOptions&) const = default;
 };
 
 struct RescaledLogTally {
@@ -74,15 +75,24 @@ class RescaledLog final : public gt3x::ByteSource {
   static Result<std::unique_ptr<RescaledLog>> make(gt3x::LogReader log,
                                                    const RescaledLogOptions& options);
 
+  // Before the first read(): every item goes through `survey` too, on the thread that reads, and
+  // the still blocks that it finds are expected (below). Not owned. Its errors come from read().
+  void survey_with(LogSurvey& survey);
+  // Before the first read(): where the input was still (Survey::blocks).
+  void expect_still(std::span<const StillWindow> windows);
+
   // bad_data where PARAMETERS bring constants that Eq. 1-3 cannot be used with.
   Result<std::size_t> read(std::span<std::uint8_t> out) override;
   std::optional<std::uint64_t> size() const override;
 
   // Complete after read() has answered 0.
   const RescaledLogTally& tally() const { return tally_; }
-  // Mean of |magnitude - 1 g| of what came out in the still windows, by its own scale; nothing
-  // without a window.
-  std::optional<double> still_error_mg() const { return still_.mean_mg(); }
+  const gt3x::LogStatistics& statistics() const { return log_.statistics(); }  // of the input
+  // Mean of |magnitude - 1 g| of what came out in these windows, which were expected, by its own
+  // scale; nothing without a window.
+  std::optional<double> still_error_mg(std::span<const StillWindow> windows) {
+    return still_.mean_mg(windows);
+  }
 
  private:
   RescaledLog(gt3x::LogReader log, const RescaledLogOptions& options);
@@ -94,6 +104,7 @@ class RescaledLog final : public gt3x::ByteSource {
 
   gt3x::LogReader log_;
   RescaledLogOptions options_;
+  LogSurvey* survey_ = nullptr;
   WindowError still_;
   std::optional<StoredConstants> constants_;
   double accel_scale_lsb_per_g_;

@@ -1,12 +1,14 @@
 // How far what is written is from 1 g, at the moments when the input was still.
 //
-//   const std::vector<StillWindow> windows = {{0, 120}, {300, 120}};
-//   WindowError error(windows, 256);  // LSB/g
-//   error.push(samples);              // a record of them, again and again
-//   const std::optional<double> left_mg = error.mean_mg();
+//   WindowError error(256);       // LSB/g
+//   error.expect({300, 120});     // windows in order, at the latest when their end has passed
+//   error.push(samples);          // a record of them, again and again
+//   const std::vector<StillWindow> windows = {{300, 120}};
+//   const std::optional<double> left_mg = error.mean_mg(windows);
 //
 // A repair compares two states of the same seconds, so it takes the windows that the survey found
-// (calib/still_blocks.h) and does not look for others.
+// (calib/still_blocks.h) and does not look for others. The survey may find them as the samples
+// pass: the last kLongestWindow of these wait until all windows that hold them are known.
 #pragma once
 
 #include <cstddef>
@@ -27,26 +29,39 @@ struct StillWindow {
 
 class WindowError {
  public:
-  // Windows in order, none within another.
-  WindowError(std::vector<StillWindow> windows, double accel_scale_lsb_per_g);
+  // No still block is longer (60 s at 1000 Hz).
+  static constexpr std::size_t kLongestWindow = std::size_t{1} << 16;
+
+  explicit WindowError(double accel_scale_lsb_per_g)
+      : accel_scale_lsb_per_g_(accel_scale_lsb_per_g) {}
 
   // Of the samples from here on; no window may hold samples of two scales.
-  void set_scale(double accel_scale_lsb_per_g) { accel_scale_lsb_per_g_ = accel_scale_lsb_per_g; }
+  void set_scale(double accel_scale_lsb_per_g);
+
+  // Windows in order, none within another. One that ends before the samples of the last push() did
+  // must not be longer than kLongestWindow.
+  void expect(const StillWindow& window) { windows_.push_back({window, std::nullopt}); }
 
   // The samples that follow those of the call before.
   void push(std::span<const gt3x::Counts> samples);
 
-  // Mean of |magnitude of the window's mean - 1 g|, over the windows that are complete; nothing
-  // where none is.
-  std::optional<double> mean_mg() const;
+  // Behind the last samples: mean of |magnitude of the window's mean - 1 g|, over those of these
+  // windows, in order, that were expected and are complete; nothing where none is.
+  std::optional<double> mean_mg(std::span<const StillWindow> windows);
 
  private:
-  std::vector<StillWindow> windows_;
+  void judge(std::span<const gt3x::Counts> samples);
+
+  struct Judged {
+    StillWindow window;
+    std::optional<double> error_mg;
+  };
+  std::vector<Judged> windows_;
   double accel_scale_lsb_per_g_;
-  std::uint64_t pushed_ = 0;
-  std::size_t next_ = 0;         // window that is not complete
-  PerAxis<std::int64_t> sum_{};  // of its samples so far
-  double sum_of_errors_mg_ = 0;
+  std::vector<gt3x::Counts> waiting_;  // pushed, and not judged yet
+  std::uint64_t judged_ = 0;           // samples
+  std::size_t next_ = 0;               // window that is not complete
+  PerAxis<std::int64_t> sum_{};        // of its samples so far
 };
 
 }  // namespace sixpoint::repair

@@ -101,6 +101,22 @@ void StillScan::push(std::uint32_t unix_time, std::span<const gt3x::Counts> samp
   }
   last_time_ = unix_time;
   finder_->push(unix_time, samples);
+  if (on_block_) {
+    tell_of_blocks();
+  }
+}
+
+void StillScan::tell_of_blocks() {
+  const std::vector<calib::StillBlock>& blocks = finder_->blocks();
+  const std::uint64_t before = tally_.samples;  // of the finders before
+  auto first = blocks.end();
+  while (first != blocks.begin() && before + std::prev(first)->first_sample >= told_to_) {
+    --first;
+  }
+  for (; first != blocks.end(); ++first) {
+    on_block_(before + first->first_sample, first->samples);
+    told_to_ = before + first->first_sample + 1;
+  }
 }
 
 void StillScan::break_run() {

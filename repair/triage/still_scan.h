@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -56,6 +57,12 @@ class StillScan {
   // Holds for the blocks that end after it (.agdc).
   void set_temperature(std::optional<double> celsius);
 
+  // From now on push() tells of every block that it finds and keeps, in order: its first sample, of
+  // all that were pushed, and its number of samples. Blocks that are thinned out later were told
+  // of all the same.
+  using OnBlock = std::function<void(std::uint64_t first_sample, int samples)>;
+  void on_block(OnBlock tell) { on_block_ = std::move(tell); }
+
   // Finishes. Blocks in order of time; mean_lsb are raw counts whatever constants were in force:
   // means of the recovered integers, or, where the file's counts cannot have come from integers
   // (plausibility() says so; seen in every real 30 Hz unit, whose firmware seems to average), the
@@ -72,6 +79,7 @@ class StillScan {
   Status start_raw_counts();
   Result<const calib::Reversal*> reversal_of(const StoredConstants& constants);
   void close_finder();
+  void tell_of_blocks();
   void append(std::vector<calib::StillBlock> blocks);
   void thin();
 
@@ -85,6 +93,8 @@ class StillScan {
   std::vector<std::unique_ptr<const calib::Reversal>> raw_counts_;
   const calib::Reversal* reversal_ = nullptr;  // of the finder
   std::optional<calib::StillBlockFinder> finder_;
+  OnBlock on_block_;
+  std::uint64_t told_to_ = 0;  // blocks that begin before this sample were told of
   std::optional<std::uint32_t> last_time_;
   std::optional<double> temperature_c_;
   std::vector<calib::StillBlock> blocks_;

@@ -205,36 +205,59 @@ Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOption
   return {};
 }
 
-// One pass over the log of a recording.
-class LogSurvey {
- public:
-  LogSurvey(gt3x::Recording& recording, const calib::StillBlockOptions& options, Survey& result)
-      : recording_(recording), options_(options), result_(result) {}
+}  // namespace
 
-  Status run() {
-    SIXPOINT_CHECK(begin());
-    SIXPOINT_ASSIGN(auto log, recording_.open_log());
-    while (true) {
-      SIXPOINT_ASSIGN(const auto item, log.next());
-      if (!item.has_value()) {
-        break;
-      }
-      result_.log_bytes += item->raw.size();
-      result_.log_bytes_wide += item->raw.size();
-      if (item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok) {
-        SIXPOINT_CHECK(take(item->record));
-      } else if (item->kind != gt3x::LogItem::Kind::stray) {
-        // Zero bytes between records are legal and end no run.
-        still_->break_run();
-        break_raw_run();
-      }
+Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
+  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
+  FileFacts facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
+  if (!recording.has_log()) {
+    if (const auto memory = unit_memory(recording)) {
+      facts.calibration_time = memory->calibration_time;
     }
-    result_.log = log.statistics();
-    finish();
-    return {};
+  } else {
+    SIXPOINT_ASSIGN(const auto first, first_parameters(recording));
+    if (first) {
+      take_parameters(*first, facts);
+    }
   }
+  return facts;
+}
 
- private:
+namespace {
+
+// What stands outside the samples.
+Result<Survey> begin_survey(gt3x::Recording& recording) {
+  Survey result;
+  result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
+  result.model = gt3x::model_of(result.facts.serial);
+  SIXPOINT_ASSIGN(result.already_repaired, carries_repair_mark(recording));
+  result.rate_hz = recording.info().sample_rate_hz().value_or(0);
+  if (result.rate_hz <= 0) {
+    return fail(ErrorCode::bad_data, "info.txt gives no sample rate above 0", recording.path(),
+                "download the recording from the unit again");
+  }
+  return result;
+}
+
+Result<Survey> survey_log(gt3x::Recording& recording, const calib::StillBlockOptions& options) {
+  SIXPOINT_ASSIGN(auto passing, LogSurvey::begin(recording, options));
+  SIXPOINT_ASSIGN(auto log, recording.open_log());
+  while (true) {
+    SIXPOINT_ASSIGN(const auto item, log.next());
+    if (!item.has_value()) {
+      return passing.finish(log.statistics());
+    }
+    SIXPOINT_CHECK(passing.take(*item));
+  }
+}
+
+}  // namespace
+
+class LogSurvey::Pass {
+ public:
+  Pass(gt3x::Recording& recording, const calib::StillBlockOptions& options, Survey begun)
+      : recording_(recording), options_(options), result_(std::move(begun)) {}
+
   // Finds out the scale, and the constants of the samples before the first PARAMETERS record.
   Status begin() {
     SIXPOINT_ASSIGN(const auto first, first_parameters(recording_));
@@ -251,6 +274,31 @@ class LogSurvey {
     return {};
   }
 
+  void on_block(StillScan::OnBlock tell) { still_->on_block(std::move(tell)); }
+
+  Status take(const gt3x::LogItem& item) {
+    result_.log_bytes += item.raw.size();
+    result_.log_bytes_wide += item.raw.size();
+    if (item.kind == gt3x::LogItem::Kind::record && item.record.checksum_ok) {
+      return take_good(item.record);
+    }
+    if (item.kind != gt3x::LogItem::Kind::stray) {
+      // Zero bytes between records are legal and end no run.
+      still_->break_run();
+      break_raw_run();
+    }
+    return {};
+  }
+
+  std::uint64_t samples() const { return result_.samples; }
+
+  Survey finish(const gt3x::LogStatistics& log) {
+    result_.log = log;
+    end();
+    return std::move(result_);
+  }
+
+ private:
   void take_scale(const std::optional<gt3x::Parameters>& first) {
     std::optional<double> scale = first ? first->accel_scale_lsb_per_g : std::nullopt;
     if (!scale) {
@@ -316,7 +364,7 @@ class LogSurvey {
     scale_lsb_per_g_ = scale_lsb_per_g;
   }
 
-  Status take(const gt3x::Record& record) {
+  Status take_good(const gt3x::Record& record) {
     // A one-byte payload in place of samples is a USB event.
     const bool has_samples = record.payload.size() > 1;
     if (record.is(gt3x::RecordType::parameters)) {
@@ -400,7 +448,7 @@ class LogSurvey {
     }
   }
 
-  void finish() {
+  void end() {
     StillScan& scan = raw_still_ ? *raw_still_ : *still_;
     take_scan(scan, recording_.path(), result_);
     if (raw_resting_) {
@@ -423,8 +471,8 @@ class LogSurvey {
   }
 
   gt3x::Recording& recording_;
-  const calib::StillBlockOptions& options_;
-  Survey& result_;
+  calib::StillBlockOptions options_;
+  Survey result_;
   bool rotated_ = false;
   double scale_lsb_per_g_ = 0;  // in force
   std::optional<StillScan> still_;
@@ -434,39 +482,45 @@ class LogSurvey {
   std::vector<gt3x::Counts> samples_;
 };
 
-}  // namespace
+LogSurvey::LogSurvey(std::unique_ptr<Pass> pass) : pass_(std::move(pass)) {}
+LogSurvey::LogSurvey(LogSurvey&&) noexcept = default;
+LogSurvey& LogSurvey::operator=(LogSurvey&&) noexcept = default;
+LogSurvey::~LogSurvey() = default;
 
-Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
-  SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
-  FileFacts facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
-  if (!recording.has_log()) {
-    if (const auto memory = unit_memory(recording)) {
-      facts.calibration_time = memory->calibration_time;
+Result<LogSurvey> LogSurvey::begin(gt3x::Recording& recording,
+                                   const calib::StillBlockOptions& options) {
+  SIXPOINT_ASSIGN(auto begun, begin_survey(recording));
+  auto pass = std::make_unique<Pass>(recording, options, std::move(begun));
+  SIXPOINT_CHECK(pass->begin());
+  return LogSurvey(std::move(pass));
+}
+
+void LogSurvey::on_block(StillScan::OnBlock tell) { pass_->on_block(std::move(tell)); }
+Status LogSurvey::take(const gt3x::LogItem& item) { return pass_->take(item); }
+Survey LogSurvey::finish(const gt3x::LogStatistics& log) { return pass_->finish(log); }
+
+Result<Survey> survey_beginning(gt3x::Recording& recording, const calib::StillBlockOptions& options,
+                                std::uint64_t samples) {
+  SIXPOINT_ASSIGN(auto passing, LogSurvey::begin(recording, options));
+  SIXPOINT_ASSIGN(auto log, recording.open_log_beginning());
+  while (passing.pass_->samples() < samples) {
+    SIXPOINT_ASSIGN(const auto item, log.next());
+    if (!item.has_value()) {
+      break;
     }
-  } else {
-    SIXPOINT_ASSIGN(const auto first, first_parameters(recording));
-    if (first) {
-      take_parameters(*first, facts);
-    }
+    SIXPOINT_CHECK(passing.take(*item));
   }
-  return facts;
+  return passing.finish(log.statistics());
 }
 
 Result<Survey> survey(FileSystem& files, const std::string& path,
                       const calib::StillBlockOptions& options, const gt3x::RecordingOptions& how) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path, how));
   Survey result;
-  result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
-  result.model = gt3x::model_of(result.facts.serial);
-  SIXPOINT_ASSIGN(result.already_repaired, carries_repair_mark(recording));
-  result.rate_hz = recording.info().sample_rate_hz().value_or(0);
-  if (result.rate_hz <= 0) {
-    return fail(ErrorCode::bad_data, "info.txt gives no sample rate above 0", path,
-                "download the recording from the unit again");
-  }
   if (recording.has_log()) {
-    SIXPOINT_CHECK(LogSurvey(recording, options, result).run());
+    SIXPOINT_ASSIGN(result, survey_log(recording, options));
   } else {
+    SIXPOINT_ASSIGN(result, begin_survey(recording));
     SIXPOINT_CHECK(survey_old_form(recording, options, result));
   }
   if (how.salvage) {

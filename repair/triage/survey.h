@@ -4,11 +4,13 @@
 //   triage(found.facts);              // is it affected?
 //   found.magnitude.mean_mg;          // how far from 1 g it is at rest
 //
-// Everything that triage, solving and repair need to know before a byte is written. Memory is
+// Everything that triage, solving and repair need to know before a file gets its name. Memory is
 // bounded by the still blocks (calib::StillBlockOptions::max_blocks).
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -102,6 +104,41 @@ Result<FileFacts> facts_of(FileSystem& files, const std::string& path);
 Result<Survey> survey(FileSystem& files, const std::string& path,
                       const calib::StillBlockOptions& options = {},
                       const gt3x::RecordingOptions& how = {});
+
+// The same for a log that is read for another purpose too, item by item.
+//
+//   SIXPOINT_ASSIGN(auto passing, LogSurvey::begin(recording, options));
+//   SIXPOINT_CHECK(passing.take(*item));  // each item of recording.open_log(), in order
+//   const Survey found = passing.finish(log.statistics());
+//
+// One object belongs to one thread at a time; the recording must outlive it.
+class LogSurvey {
+ public:
+  // Reads the log's first records; errors as survey() has them.
+  static Result<LogSurvey> begin(gt3x::Recording& recording,
+                                 const calib::StillBlockOptions& options);
+  LogSurvey(LogSurvey&&) noexcept;
+  LogSurvey& operator=(LogSurvey&&) noexcept;
+  ~LogSurvey();
+
+  // From now on take() tells of every still block that it finds and keeps (StillScan::on_block).
+  void on_block(StillScan::OnBlock tell);
+  Status take(const gt3x::LogItem& item);
+  // Behind the last item, with what the reader counted. Losses are not filled in.
+  Survey finish(const gt3x::LogStatistics& log);
+
+ private:
+  friend Result<Survey> survey_beginning(gt3x::Recording& recording,
+                                         const calib::StillBlockOptions& options,
+                                         std::uint64_t samples);
+  class Pass;
+  explicit LogSurvey(std::unique_ptr<Pass> pass);
+  std::unique_ptr<Pass> pass_;
+};
+
+// Of the records up to so many samples alone: what the whole of a log will probably say.
+Result<Survey> survey_beginning(gt3x::Recording& recording, const calib::StillBlockOptions& options,
+                                std::uint64_t samples);
 
 // [{kind, entry, from, to, why}], times by the file's clock, no zone; null for what is not known.
 nlohmann::ordered_json losses_to_json(const std::vector<gt3x::SalvageLoss>& losses);

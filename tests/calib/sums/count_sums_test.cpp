@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "calib/sums/split_axes.h"
 
 namespace sixpoint::calib {
 namespace {
@@ -43,6 +44,26 @@ TEST(CountSums, AreExactAtEveryLength) {
     expect_sums_by_definition(counts_of(size, size));
   }
   expect_sums_by_definition(counts_of(60'000, 7));
+}
+
+TEST(CountSums, SplitAxesPutsEveryCountInItsPlace) {
+  for (std::size_t size = 0; size <= 70; ++size) {
+    const auto counts = counts_of(3 * size, size);
+    std::vector<std::array<std::int16_t, 3>> samples(size);
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      samples[i / 3][i % 3] = counts[i];
+    }
+    constexpr std::int16_t kBehind = 77;
+    std::array<std::vector<std::int16_t>, 3> axes;
+    axes.fill(std::vector<std::int16_t>(size + 1, kBehind));
+    split_axes(samples, axes[0].data(), axes[1].data(), axes[2].data());
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t i = 0; i < size; ++i) {
+        ASSERT_EQ(axes[a][i], samples[i][a]) << size << " sample " << i << " axis " << a;
+      }
+      EXPECT_EQ(axes[a][size], kBehind) << "nothing is written behind";
+    }
+  }
 }
 
 TEST(CountSums, AreExactAtTheEndsOfTheRange) {

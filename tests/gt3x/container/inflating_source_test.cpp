@@ -5,6 +5,7 @@
 
 #include "base/random.h"
 #include "expect_result.h"
+#include "gt3x/container/piece_packer.h"
 
 namespace sixpoint::gt3x {
 namespace {
@@ -161,6 +162,64 @@ TEST(InflatingSource, SalvageGivesTheBeginningAndTellsTheDamageOnce) {
       EXPECT_EQ(told[0].bytes, left->size());
     }
   }
+}
+
+// Oracle: the bytes before they were packed. Bytes all over the stream are changed, one at a time:
+// the pieces that do not hold the change come out as they were.
+TEST(InflatingSource, SalvageGoesOnBehindADamagedPiece) {
+  constexpr std::size_t kPieceSize = 3000;
+  const Bytes bytes = some_bytes(4 * kPieceSize + 500, 60);
+  EntryFacts facts = facts_of(bytes);
+  facts.points.piece_size = kPieceSize;
+  Bytes stream;
+  PiecePacker packer;
+  for (std::size_t at = 0; at < bytes.size(); at += kPieceSize) {
+    const bool last = at + kPieceSize >= bytes.size();
+    Bytes packed;
+    packer.pack(std::span(bytes).subspan(at, std::min(kPieceSize, bytes.size() - at)),
+                last ? PiecePacker::Place::last : PiecePacker::Place::inner, packed);
+    facts.points.packed_sizes.push_back(static_cast<std::uint32_t>(packed.size()));
+    stream.insert(stream.end(), packed.begin(), packed.end());
+  }
+  const auto salvaged = [&](const Bytes& packed, std::vector<EntryDamage>& damages) {
+    const auto source = salvage_entry(std::make_unique<MemorySource>(packed), facts, {},
+                                      [&](const EntryDamage& one) { damages.push_back(one); });
+    return read_all(*source, 1U << 20).value();
+  };
+  std::vector<EntryDamage> none;
+  ASSERT_EQ(salvaged(stream, none), bytes);
+  EXPECT_TRUE(none.empty());
+  std::size_t went_on = 0;
+  std::size_t begin = 0;  // of a piece in the stream
+  for (std::size_t piece = 0; piece < facts.points.packed_sizes.size(); ++piece) {
+    const std::size_t end = begin + facts.points.packed_sizes[piece];
+    for (std::size_t at = begin; at < end; at += 7) {
+      SCOPED_TRACE(at);
+      Bytes damaged = stream;
+      damaged[at] ^= 0x24U;
+      std::vector<EntryDamage> damages;
+      const Bytes got = salvaged(damaged, damages);
+      ASSERT_EQ(damages.size(), 1U);
+      ASSERT_NE(damages[0].kind, Damage::none);
+      const std::size_t before = piece * kPieceSize;
+      ASSERT_GE(got.size(), before);
+      ASSERT_TRUE(std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(before),
+                             got.begin()));
+      const std::size_t behind = bytes.size() - std::min(bytes.size(), before + kPieceSize);
+      ASSERT_GE(got.size(), before + behind);
+      ASSERT_TRUE(std::equal(bytes.end() - static_cast<std::ptrdiff_t>(behind), bytes.end(),
+                             got.end() - static_cast<std::ptrdiff_t>(behind)));
+      went_on += damages[0].kind == Damage::broken_stream && behind > 0 ? 1U : 0U;
+    }
+    begin = end;
+  }
+  EXPECT_GT(went_on, 20U) << "changes that break a piece's stream";
+  // Cut off: what is there.
+  std::vector<EntryDamage> damages;
+  const Bytes half =
+      salvaged(Bytes(stream.begin(), stream.begin() + facts.points.packed_sizes[0]), damages);
+  EXPECT_EQ(half, Bytes(bytes.begin(), bytes.begin() + kPieceSize));
+  ASSERT_EQ(damages.size(), 1U);
 }
 
 TEST(InflatingSource, SalvageOfMoreBytesThanSaidIsCutOff) {

@@ -1,9 +1,13 @@
 #include "repair/rescale/repair_file.h"
 
+#include <limits>
+#include <map>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "base/random.h"
 #include "base/sha256.h"
@@ -39,6 +43,7 @@ class FixedConstants final : public ConstantsSource {
     choice.chosen = chosen;
   }
   Result<ConstantsChoice> choose(const std::string&, const Survey&) override { return choice; }
+  std::optional<ChosenConstants> foreseen(const FileFacts&) override { return choice.chosen; }
   ConstantsChoice choice;
 };
 
@@ -52,8 +57,27 @@ Bytes without_mark(const Bytes& log) {
 
 class RepairFile : public testing::Test {
  protected:
-  RepairReport repair(const RepairOptions& options = {}) {
-    return repair_file(memory_.env, "in.gt3x", "out.gt3x", source_, options);
+  // In two passes and in one, which must give the same answer and the same bytes.
+  RepairReport repair(RepairOptions options = {}) {
+    const auto before = output();
+    options.one_pass_from_bytes = std::numeric_limits<std::uint64_t>::max();
+    const RepairReport in_two = repair_file(memory_.env, "in.gt3x", "out.gt3x", source_, options);
+    const auto by_two = output();
+    if (by_two) {
+      EXPECT_OK(memory_.files.remove("out.gt3x"));
+    }
+    if (before) {
+      EXPECT_OK(memory_.files.create("out.gt3x").value()->write_at(0, *before));
+    }
+    options.one_pass_from_bytes = 0;
+    RepairReport in_one = repair_file(memory_.env, "in.gt3x", "out.gt3x", source_, options);
+    EXPECT_EQ(in_one.to_json().dump(1), in_two.to_json().dump(1));
+    EXPECT_TRUE(output() == by_two);
+    return in_one;
+  }
+  std::optional<Bytes> output() {
+    return exists("out.gt3x") ? std::optional(read_file(memory_.files, "out.gt3x").value())
+                              : std::nullopt;
   }
   bool exists(const std::string& path) { return memory_.files.info(path).has_value(); }
   // The repair fails and gives no output. Returns what the error says.
@@ -404,7 +428,7 @@ TEST_F(RepairFile, AffectedFileWithoutConstantsIsBadData) {
 
 // At every disk operation in turn the power goes: the original is whole, the output whole or
 // absent.
-TEST_F(RepairFile, SurvivesAPowerCutAtEveryOperation) {
+void cut_the_power_everywhere(FixedConstants& source, const RepairOptions& options) {
   MadeRecording made = six_sides();
   made.raw.resize(600);
   for (std::size_t stop = 0;; ++stop) {
@@ -412,7 +436,7 @@ TEST_F(RepairFile, SurvivesAPowerCutAtEveryOperation) {
     ASSERT_OK(made.write(memory.files, "in.gt3x"));
     const Bytes original = read_file(memory.files, "in.gt3x").value();
     memory.files.fail_after(stop);
-    const auto report = repair_file(memory.env, "in.gt3x", "out.gt3x", source_, {});
+    const auto report = repair_file(memory.env, "in.gt3x", "out.gt3x", source, options);
     memory.files.stop_failing();
     memory.files.lose_power();
     EXPECT_EQ(read_file(memory.files, "in.gt3x").value(), original);
@@ -427,6 +451,97 @@ TEST_F(RepairFile, SurvivesAPowerCutAtEveryOperation) {
     }
     EXPECT_EQ(report.status, RepairStatus::failed);
   }
+}
+
+TEST_F(RepairFile, SurvivesAPowerCutAtEveryOperation) {
+  RepairOptions options;
+  cut_the_power_everywhere(source_, options);
+  options.one_pass_from_bytes = 0;
+  cut_the_power_everywhere(source_, options);
+}
+
+// Counts how often a file is opened.
+class CountingFiles final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
+    ++opened[path];
+    return disk().open(path);
+  }
+  std::map<std::string, int> opened;
+};
+
+// Without this, the tests above would hold if one pass were never taken.
+TEST_F(RepairFile, OnePassOpensTheInputOnceAndOnceForItsHash) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  CountingFiles files(memory_.files);
+  Env env{memory_.clock, files};
+  RepairOptions options;
+  options.one_pass_from_bytes = 0;
+  ASSERT_EQ(repair_file(env, "in.gt3x", "one.gt3x", source_, options).status,
+            RepairStatus::repaired);
+  EXPECT_EQ(files.opened["in.gt3x"], 2);
+  files.opened.clear();
+  options.one_pass_from_bytes = std::uint64_t{1} << 20;
+  ASSERT_EQ(repair_file(env, "in.gt3x", "two.gt3x", source_, options).status,
+            RepairStatus::repaired);
+  EXPECT_EQ(files.opened["in.gt3x"], 4) << "to see how large it is, survey, hash, write";
+}
+
+// Where the rest of a file says something else than its first 100,000 samples, what was written
+// until then is dropped; the answer is that of two passes.
+TEST_F(RepairFile, WhatTheBeginningSaysNeedNotHold) {
+  MadeRecording made = six_sides();
+  const auto sides = made.raw;
+  while (made.raw.size() < 150'000) {
+    made.raw.insert(made.raw.end(), sides.begin(), sides.end());
+  }
+  const auto end = static_cast<std::uint32_t>(made.start + made.raw.size() / made.rate_hz);
+  const auto with_end = [&](const std::function<void(Bytes&)>& put) {
+    Bytes log = made.log();
+    put(log);
+    EXPECT_OK(made.write(memory_.files, "in.gt3x", log));
+  };
+  // Counts that no integers lead to: half of the file is such.
+  with_end([&](Bytes& log) {
+    Random random(7);
+    std::vector<Counts> samples(made.rate_hz);
+    for (std::uint32_t second = 0; second < 5000; ++second) {
+      for (Counts& sample : samples) {
+        for (std::int16_t& count : sample) {
+          count = static_cast<std::int16_t>(random.below(1000));
+        }
+      }
+      Bytes payload;
+      gt3x::append_activity(payload, samples);
+      gt3x::append_record(log, gt3x::RecordType::activity, end + second, payload);
+    }
+  });
+  EXPECT_EQ(repair().status, RepairStatus::repaired);
+  ASSERT_OK(memory_.files.remove("out.gt3x"));
+  // Other constants.
+  MadeRecording later = made;
+  later.constants.zero_lsb = {70, 14, 50};
+  later.start = end + 1;
+  with_end([&](Bytes& log) {
+    const Bytes more = later.log();
+    log.insert(log.end(), more.begin(), more.end());
+  });
+  EXPECT_EQ(repair().status, RepairStatus::repaired);
+  ASSERT_OK(memory_.files.remove("out.gt3x"));
+  // Constants that cannot be used.
+  later.constants = {{1, 1, 1}, {1, 1, 1}, {0, 0, 0}};
+  with_end([&](Bytes& log) {
+    gt3x::append_record(log, gt3x::RecordType::parameters, end, later.parameters());
+  });
+  EXPECT_EQ(repair().status, RepairStatus::failed);
+  // Another scale, and counts beyond 12 bits.
+  with_end([&](Bytes& log) {
+    Bytes payload;
+    gt3x::append_activity2(payload, std::vector<Counts>(30, Counts{2100, 0, -2100}));
+    gt3x::append_record(log, gt3x::RecordType::activity2, end, payload);
+  });
+  EXPECT_EQ(repair().status, RepairStatus::repaired);
 }
 
 TEST_F(RepairFile, ADamagedZipGivesNoOutput) {

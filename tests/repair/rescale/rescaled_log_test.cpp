@@ -48,16 +48,18 @@ TEST(RescaledLog, SmallPiecesGiveTheSameBytes) {
   const Bytes expected = gt3x::read_all(*whole, 1U << 20).value();
   EXPECT_EQ(expected.size(), log.size());
   EXPECT_NE(expected, log);
-  options.still = {{0, 120}};
+  const std::vector<StillWindow> still = {{0, 120}};
   auto pieces = RescaledLog::make(reader_of(log), options).value();
+  pieces->expect_still(still);
   Bytes got;
   Bytes piece(7);
   while (const std::size_t count = pieces->read(piece).value()) {
     got.insert(got.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(count));
   }
   EXPECT_EQ(got, expected);
-  ASSERT_TRUE(pieces->still_error_mg());
-  EXPECT_LT(*pieces->still_error_mg(), 5) << "at rest the right constants give 1 g";
+  const auto left_mg = pieces->still_error_mg(still);
+  ASSERT_TRUE(left_mg);
+  EXPECT_LT(*left_mg, 5) << "at rest the right constants give 1 g";
 }
 
 TEST(RescaledLog, TheMarkStandsBeforeTheFirstRecordAndTheRestIsAsItWas) {
@@ -168,13 +170,16 @@ TEST(RescaledLog, FollowsTheAccelerationScaleInForce) {
   RescaledLogOptions options;
   options.fresh = tests::kTrue;
   options.first_constants = tests::kStored;
+  std::vector<StillWindow> still;
   for (const int side : {0, 1, 2, 4, 5}) {  // the scale changes while it lies on the fourth
-    options.still.push_back({static_cast<std::uint64_t>(side) * 300 + 90, 120});
+    still.push_back({static_cast<std::uint64_t>(side) * 300 + 90, 120});
   }
   auto rescaled = RescaledLog::make(reader_of(tests::log_of_two_scales(made)), options).value();
+  rescaled->expect_still(still);
   const Bytes out = gt3x::read_all(*rescaled, 1U << 20).value();
-  ASSERT_TRUE(rescaled->still_error_mg());
-  EXPECT_LT(*rescaled->still_error_mg(), 5);
+  const auto left_mg = rescaled->still_error_mg(still);
+  ASSERT_TRUE(left_mg);
+  EXPECT_LT(*left_mg, 5);
   // The last second of the second half, sample by sample, by the formula.
   auto log = reader_of(out);
   std::vector<gt3x::Counts> last;
