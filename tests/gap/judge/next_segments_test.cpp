@@ -39,9 +39,7 @@ TEST(InformationNats, LiesBetweenNothingAndTheEntropy) {
 }
 
 // Six faces three times, diagnosed; what to record next.
-std::map<std::string, NextSegment> offers_for(
-    const tests::Made& made, const Findings& given = {},
-    const std::vector<Offer>& choice = standard_offers()) {
+std::map<std::string, NextSegment> offers_for(const tests::Made& made, const Findings& given = {}) {
   const auto answer = diagnose(made.bundle, made.options);
   EXPECT_TRUE(answer);
   const std::vector<ToneFit> tones;
@@ -56,8 +54,8 @@ std::map<std::string, NextSegment> offers_for(
   Diagnosis out;
   out.not_observable = answer->not_observable;
   std::map<std::string, NextSegment> offers;
-  for (const NextSegment& next : next_segments(made.request, protocol_kind(made.bundle).abilities,
-                                               explanation, found, out, choice)) {
+  for (const NextSegment& next :
+       next_segments(made.request, protocol_kind(made.bundle).abilities, explanation, found, out)) {
     offers[next.name] = next;
   }
   return offers;
@@ -90,24 +88,6 @@ TEST(NextSegments, OneRowForEachSortOfQuestion) {
     EXPECT_FALSE(name != "soak" && separates(next, "sensitivity_tempco")) << name;
     EXPECT_FALSE(separates(next, "rounding_floor")) << name << ": no protocol shows it";
   }
-}
-
-// A half turn changes the sign of what the jig's tilt does, and not of what the sensor does; the
-// same faces again change neither.
-TEST(NextSegments, AHalfTurnTellsTiltFromMisalignmentAtLeastAsWellAsTheSameFaces) {
-  const Offer& half_turn = standard_offers().front();
-  ASSERT_EQ(half_turn.name, "half_turn");
-  EXPECT_LE(half_turn.minutes(), 1);
-  Offer again{"again", 0, half_turn.pieces};
-  for (int axis = 0; axis < 3; ++axis) {
-    again.pieces[static_cast<std::size_t>(axis)].rotation = planned_face(axis, 1);
-  }
-  const tests::Made made(tests::made_production({}));
-  Findings given;
-  given.effects = {{.name = "tilt", .probability = 0.95, .confounded_with = {"misalignment"}}};
-  auto nats = offers_for(made, given, {half_turn, again});
-  EXPECT_GE(nats["half_turn"].expected_nats, nats["again"].expected_nats);
-  EXPECT_TRUE(separates(nats["half_turn"], "tilt/misalignment"));
 }
 
 TEST(NextSegments, WhatIsNamedForCertainIsNotAsked) {
