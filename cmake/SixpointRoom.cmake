@@ -17,10 +17,6 @@ if(SIXPOINT_SANITIZE)
     -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(sixpoint_warnings INTERFACE -fsanitize=${sanitizers})
 endif()
-if(SIXPOINT_FUZZ)
-  # The rooms tell the fuzzer which ways were taken; without it, it flies blind.
-  target_compile_options(sixpoint_warnings INTERFACE -fsanitize=fuzzer-no-link)
-endif()
 
 # What ccache needs to keep objects that were compiled with a precompiled header.
 add_library(sixpoint_precompiled_flags INTERFACE)
@@ -52,6 +48,10 @@ function(sixpoint_room FOLDER)
     # names in the anonymous namespaces of a room's files differ.
     set_target_properties(sixpoint_${name} PROPERTIES
       UNITY_BUILD ${SIXPOINT_UNITY} UNITY_BUILD_BATCH_SIZE 8)
+  endif()
+  if(SIXPOINT_FUZZ)
+    # The rooms tell the fuzzer which ways were taken; without it, it flies blind.
+    target_compile_options(sixpoint_${name} PRIVATE -fsanitize=fuzzer-no-link)
   endif()
   target_include_directories(sixpoint_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
   target_link_libraries(sixpoint_${name}

@@ -326,6 +326,14 @@ bool follows_without_pause(const ProtocolSegment& before, const ProtocolSegment&
          std::abs(pause_s(before, next, rate_hz)) <= allowance_s(before, rate_hz);
 }
 
+PerAxis<double> nominal_noise_mg(double rate_hz) {
+  PerAxis<double> noise_mg = ProtocolRun().noise_mg;
+  for (double& axis_mg : noise_mg) {
+    axis_mg *= std::sqrt(rate_hz / ProtocolRun().rate_hz);
+  }
+  return noise_mg;
+}
+
 bool same_placement(const ProtocolSegment& before, const ProtocolSegment& next, double rate_hz) {
   constexpr double kBetweenTones_s = 3;
   return follows_without_pause(before, next, rate_hz) ||

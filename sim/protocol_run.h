@@ -51,6 +51,11 @@ struct TemperaturePoint {
   double temperature_c = 0;
 };
 
+// White noise of the nominal unit per axis, standard deviation of one sample. Its density is the
+// same at every sample rate (ADXL362 datasheet: the bandwidth follows the rate), so it grows with
+// the root of the rate.
+PerAxis<double> nominal_noise_mg(double rate_hz);
+
 struct ProtocolRun {
   double rate_hz = 100;
   double accel_scale_lsb_per_g = 256;
@@ -59,7 +64,7 @@ struct ProtocolRun {
   std::vector<TemperaturePoint> temperature;  // in the order of time; none: 25 C throughout
   PerAxis<double> gain = {1, 1, 1};
   PerAxis<double> offset_g = {0, 0, 0};
-  PerAxis<double> noise_mg = {3.9, 3.9, 5.5};  // standard deviation per sample
+  PerAxis<double> noise_mg = {3.9, 3.9, 5.5};  // standard deviation per sample; of 100 Hz
   double seating_sd_deg = 0.01;                // per axis, new at every placement
   std::vector<EffectSpec> effects;
   std::uint64_t seed = 1;

@@ -216,12 +216,14 @@ Result<std::vector<ProtocolSegment>> parse_segments(const Json& json, std::uint6
   if (json.is_string()) {
     const auto standard = parse_standard_protocol(json.get_ref<const std::string&>());
     if (!standard) {
-      return wrong("/protocol", "this must be production, engineering, or a list of segments");
+      return wrong("/protocol",
+                   "this must be production, production+, engineering, or a list of segments");
     }
     return draw_protocol(*standard, seed, rate_hz);
   }
   if (!json.is_array() || json.empty() || json.size() > kMostMotions) {
-    return wrong("/protocol", "this must be production, engineering, or a list of segments");
+    return wrong("/protocol",
+                 "this must be production, production+, engineering, or a list of segments");
   }
   std::vector<ProtocolSegment> segments;
   std::uint64_t end = 0;
@@ -363,7 +365,7 @@ Status parse_protocol_unit(const Json& json, ProtocolRun& run) {
   std::uint64_t seed = run.seed;
   SIXPOINT_CHECK(unit.seed("seed", seed));
   if (seed != run.seed) {
-    run.noise_mg = ProtocolRun().noise_mg;
+    run.noise_mg = nominal_noise_mg(run.rate_hz);
     draw_nuisances(run, seed);
   }
   const auto replace = [&unit](std::string_view key, PerAxis<double>& value, double low,
@@ -387,6 +389,7 @@ Status parse_protocol(const Section& top, Scenario& scenario) {
   scenario.wide = true;
   ProtocolRun run;
   run.rate_hz = scenario.rate_hz;
+  run.noise_mg = nominal_noise_mg(run.rate_hz);
   run.accel_scale_lsb_per_g = scenario.unit.accel_scale_lsb_per_g;
   run.gravity_g = scenario.gravity_g;
   run.effects = scenario.effects;

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <numbers>
 
+#include "base/error.h"
 #include "base/random.h"
 
 namespace sixpoint::sim {
@@ -13,6 +16,7 @@ namespace sixpoint::sim {
 namespace {
 
 constexpr std::uint64_t kProtocolStream = 0x70726F74;
+constexpr std::uint64_t kExtensionStream = 0x65787465;
 constexpr double kRoom_c = 23;
 constexpr double kFullTurn_rad = 2 * std::numbers::pi;
 
@@ -32,6 +36,14 @@ class Drawing {
  public:
   Drawing(std::uint64_t seed, double rate_hz) : random_(seed, kProtocolStream), rate_hz_(rate_hz) {
     at_s_ = random_.uniform(30, 41);
+  }
+  // Goes on after the last of these.
+  Drawing(std::vector<ProtocolSegment> segments, std::uint64_t seed, double rate_hz)
+      : random_(seed, kExtensionStream), rate_hz_(rate_hz), segments_(std::move(segments)) {
+    if (!segments_.empty()) {
+      const ProtocolSegment& last = segments_.back();
+      at_s_ = last.host_start_s + static_cast<double>(last.samples) / rate_hz;
+    }
   }
 
   void add(std::string name, SegmentKind kind, const Eigen::Matrix3d& rotation, double duration_s,
@@ -75,6 +87,19 @@ class Drawing {
     poses("reseat", shuffled(order), 15, 25);
   }
 
+  // The six poses of the segment `faces`, last first; of none, the standard order.
+  std::vector<Eigen::Matrix3d> reversed() const {
+    std::vector<Eigen::Matrix3d> order;
+    for (const ProtocolSegment& segment : segments_) {
+      if (segment.name == "faces" && order.size() < faces().size()) {
+        order.push_back(segment.rotation);
+      }
+    }
+    order = order.empty() ? faces() : order;
+    std::reverse(order.begin(), order.end());
+    return order;
+  }
+
   void yaws() {
     std::vector<Eigen::Matrix3d> list;
     for (const Eigen::Matrix3d& face : faces()) {
@@ -87,6 +112,17 @@ class Drawing {
       }
     }
     poses("yaw", shuffled(list), 4, 8);
+  }
+
+  // Three faces once more, turned by half a turn about the vertical.
+  void half_turn() {
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+    turn(0, 0) = turn(1, 1) = -1;
+    std::vector<Eigen::Matrix3d> list;
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      list.emplace_back(faces()[axis] * turn);
+    }
+    poses("half_turn", list, 4, 8);
   }
 
   void obliques() {
@@ -126,6 +162,9 @@ class Drawing {
              10);
       }
     }
+  }
+
+  void high_shakers() {
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       pause(60, 95);
       tone("shaker_high", faces()[axis], 20, 6, 10);
@@ -134,22 +173,29 @@ class Drawing {
     }
   }
 
-  void temperatures() {
-    const Eigen::Matrix3d flat = Eigen::Matrix3d::Identity();
-    struct Step {
-      const char* name;
-      double duration_s;
-      double from_c;
-      double to_c;
-    };
-    pause(1500, 1900);
-    for (const Step& step : {Step{"ramp_up", 120, 15, 15}, Step{"ramp_up", 240, 15, 27.5},
-                             Step{"ramp_up", 90, 27.5, 27.5}, Step{"ramp_up", 480, 27.5, 40},
-                             Step{"ramp_up", 90, 40, 40}, Step{"ramp_down", 240, 40, 27.5},
-                             Step{"ramp_down", 90, 27.5, 27.5}, Step{"ramp_down", 480, 27.5, 15},
-                             Step{"ramp_down", 210, 15, 15}}) {
-      add(step.name, SegmentKind::ramp, flat, step.duration_s, {step.from_c, step.to_c});
+  void still() {
+    at_s_ += 120;
+    add("still", SegmentKind::still, Eigen::Matrix3d::Identity(), 1200);
+  }
+
+  struct Step {
+    double duration_s;
+    double from_c;
+    double to_c;
+  };
+  void ramp(const char* name, const std::vector<Step>& steps) {
+    for (const Step& step : steps) {
+      add(name, SegmentKind::ramp, Eigen::Matrix3d::Identity(), step.duration_s,
+          {step.from_c, step.to_c});
     }
+  }
+  void ramp_up() {
+    pause(1500, 1900);
+    ramp("ramp_up",
+         {{120, 15, 15}, {240, 15, 27.5}, {90, 27.5, 27.5}, {480, 27.5, 40}, {90, 40, 40}});
+  }
+
+  void soaks() {
     for (const double soak_c : {12.0, 40.0}) {
       pause(1750, 2400);
       bool first = true;
@@ -168,9 +214,31 @@ class Drawing {
     yaws();
     obliques();
     shakers();
-    at_s_ += 120;
-    add("still", SegmentKind::still, Eigen::Matrix3d::Identity(), 1200);
-    temperatures();
+    high_shakers();
+    still();
+    ramp_up();
+    ramp("ramp_down", {{240, 40, 27.5}, {90, 27.5, 27.5}, {480, 27.5, 15}, {210, 15, 15}});
+    soaks();
+  }
+
+  bool segment(std::string_view name) {
+    const std::map<std::string_view, std::function<void()>> kinds = {
+        {"faces", [&] { poses("faces", shuffled(faces()), 4, 8); }},
+        {"faces_reversed", [&] { poses("faces_reversed", reversed(), 4, 8); }},
+        {"reseat", [&] { poses("reseat", shuffled(faces()), 15, 25); }},
+        {"half_turn", [&] { half_turn(); }},
+        {"yaw", [&] { yaws(); }},
+        {"oblique", [&] { obliques(); }},
+        {"shaker", [&] { shakers(); }},
+        {"shaker_high", [&] { high_shakers(); }},
+        {"still", [&] { still(); }},
+        {"ramp_up", [&] { ramp_up(); }},
+        {"soak", [&] { soaks(); }}};
+    const auto found = kinds.find(name);
+    if (found != kinds.end()) {
+      found->second();
+    }
+    return found != kinds.end();
   }
 
   std::vector<ProtocolSegment> segments() && { return std::move(segments_); }
@@ -185,11 +253,13 @@ class Drawing {
 }  // namespace
 
 std::string_view to_string(StandardProtocol protocol) {
-  return protocol == StandardProtocol::production ? "production" : "engineering";
+  constexpr std::array<std::string_view, 3> kNames = {"production", "production+", "engineering"};
+  return kNames[static_cast<std::size_t>(protocol)];
 }
 
 std::optional<StandardProtocol> parse_standard_protocol(std::string_view name) {
-  for (const auto protocol : {StandardProtocol::production, StandardProtocol::engineering}) {
+  for (const auto protocol : {StandardProtocol::production, StandardProtocol::production_plus,
+                              StandardProtocol::engineering}) {
     if (to_string(protocol) == name) {
       return protocol;
     }
@@ -200,12 +270,31 @@ std::optional<StandardProtocol> parse_standard_protocol(std::string_view name) {
 std::vector<ProtocolSegment> draw_protocol(StandardProtocol protocol, std::uint64_t seed,
                                            double rate_hz) {
   Drawing drawing(seed, rate_hz);
-  if (protocol == StandardProtocol::production) {
-    drawing.production();
-  } else {
-    drawing.engineering();
+  switch (protocol) {
+    case StandardProtocol::production:
+      drawing.production();
+      break;
+    case StandardProtocol::production_plus:
+      drawing.production();
+      drawing.half_turn();
+      break;
+    case StandardProtocol::engineering:
+      drawing.engineering();
+      break;
   }
   return std::move(drawing).segments();
+}
+
+Status extend_run(ProtocolRun& run, std::string_view segment, std::uint64_t seed) {
+  Drawing drawing(run.segments, seed, run.rate_hz);
+  if (!drawing.segment(segment)) {
+    return fail(ErrorCode::usage, "there is no such segment", printable(segment, 40),
+                "one of faces, faces_reversed, reseat, half_turn, yaw, oblique, shaker, "
+                "shaker_high, still, ramp_up and soak");
+  }
+  run.segments = std::move(drawing).segments();
+  run.temperature = unit_temperature(run.segments, run.rate_hz);
+  return {};
 }
 
 std::vector<TemperaturePoint> unit_temperature(const std::vector<ProtocolSegment>& segments,

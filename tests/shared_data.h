@@ -24,9 +24,14 @@ inline std::string shared_file(const std::string& relative) {
 
 // First line of a test that needs a real recording. The recordings belong to others and may not be
 // copied into the project, so a checkout alone has none. Without them the test cannot say anything,
-// and says so; scripts/test.sh counts and prints these skips.
-#define SIXPOINT_NEED_SHARED(relative)                                                 \
-  if (!std::filesystem::exists(::sixpoint::tests::shared_file(relative)))              \
-  GTEST_SKIP() << "SKIPPED, NOT PASSED: the recording " << (relative) << " is not in " \
-               << ::sixpoint::tests::shared_folder()                                   \
-               << "; put the shared folder beside the checkout or set SIXPOINT_SHARED"
+// and says so; scripts/test.sh counts and prints these skips. Where SIXPOINT_MUST_HAVE_SHARED is
+// set, as in CI, that is a failure.
+#define SIXPOINT_NEED_SHARED(relative)                                                            \
+  if (!std::filesystem::exists(::sixpoint::tests::shared_file(relative))) {                       \
+    ASSERT_EQ(std::getenv("SIXPOINT_MUST_HAVE_SHARED"), nullptr)                                  \
+        << "the recording " << (relative) << " is not in " << ::sixpoint::tests::shared_folder(); \
+    GTEST_SKIP() << "SKIPPED, NOT PASSED: the recording " << (relative) << " is not in "          \
+                 << ::sixpoint::tests::shared_folder()                                            \
+                 << "; put the shared folder beside the checkout or set SIXPOINT_SHARED";         \
+  }                                                                                               \
+  static_assert(true)

@@ -30,6 +30,15 @@ std::string text_of(const Share& share) {
 
 namespace {
 
+Json mean_json(const gap::MeanOfEffects& mean) {
+  return {{"mean", number(mean.mean)},
+          {"interval", {number(mean.interval[0]), number(mean.interval[1])}}};
+}
+
+std::string mean_text(const gap::MeanOfEffects& mean) {
+  return fmt::format("{:.3f} ({:.3f} to {:.3f})", mean.mean, mean.interval[0], mean.interval[1]);
+}
+
 Json outcome_json(const Outcome& outcome, std::size_t index) {
   Json entry;
   entry["trial"] = index;
@@ -55,6 +64,50 @@ Json outcome_json(const Outcome& outcome, std::size_t index) {
 }
 
 }  // namespace
+
+Json gain_json(const gap::Gain& gain) {
+  Json json;
+  json["trials"] = static_cast<std::uint64_t>(gain.followed);
+  json["without_suggestion"] = static_cast<std::uint64_t>(gain.nothing_to_do);
+  json["minutes"] = number(gain.minutes);
+  json["expected_nats"] = number(gain.expected_nats);
+  json["named"] = {{"before", to_json(gain.named_before)}, {"after", to_json(gain.named_after)}};
+  json["named_gain"] = mean_json(gain.named_gain);
+  json["probability"] = {{"before", mean_json(gain.probability_before)},
+                         {"after", mean_json(gain.probability_after)}};
+  json["probability_gain"] = mean_json(gain.probability_gain);
+  json["false_names"] = {{"before", to_json(gain.false_before)},
+                         {"after", to_json(gain.false_after)}};
+  json["by_segment"] = Json::array();
+  for (const auto& [segment, own] : gain.by_segment) {
+    json["by_segment"].push_back({{"segment", segment},
+                                  {"trials", static_cast<std::uint64_t>(own.trials)},
+                                  {"named_before", to_json(own.before)},
+                                  {"named_after", to_json(own.after)}});
+  }
+  return json;
+}
+
+std::vector<std::pair<std::string, std::string>> gain_lines(const gap::Gain& gain) {
+  std::vector<std::pair<std::string, std::string>> lines = {
+      {"with the segment suggested first: trials",
+       fmt::format("{:.0f} ({:.0f} without a suggestion), {:.1f} minutes more each", gain.followed,
+                   gain.nothing_to_do, gain.minutes)},
+      {"  ... effects there and named, before", text_of(gain.named_before)},
+      {"  ... after", text_of(gain.named_after)},
+      {"  ... gain (95 %)", mean_text(gain.named_gain)},
+      {"  ... probability of what is there, before", mean_text(gain.probability_before)},
+      {"  ... after", mean_text(gain.probability_after)},
+      {"  ... gain (95 %)", mean_text(gain.probability_gain)},
+      {"  ... names of what is not there, before", text_of(gain.false_before)},
+      {"  ... after", text_of(gain.false_after)}};
+  for (const auto& [segment, own] : gain.by_segment) {
+    lines.emplace_back("  ... " + segment,
+                       fmt::format("{:.0f} trials: {:.0f} -> {:.0f} of {:.0f} effects named",
+                                   own.trials, own.before.right, own.after.right, own.after.of));
+  }
+  return lines;
+}
 
 Json scores_json(const ChallengeSetting& options, const Scores& scores,
                  const std::vector<Outcome>& outcomes) {

@@ -15,6 +15,7 @@
 
 #include "cli/context.h"
 #include "gap/challenge/score.h"
+#include "gap/challenge/suggestion.h"
 
 namespace sixpoint::cli {
 
@@ -35,6 +36,10 @@ Json scores_json(const ChallengeSetting& setting, const gap::Scores& scores,
 std::vector<std::pair<std::string, std::string>> scores_lines(const gap::Scores& scores);
 std::string scores_page(const ChallengeSetting& setting, const gap::Scores& scores,
                         const std::vector<gap::Outcome>& outcomes);
+
+// What the segment suggested first is worth.
+Json gain_json(const gap::Gain& gain);
+std::vector<std::pair<std::string, std::string>> gain_lines(const gap::Gain& gain);
 
 // {right, of, share, interval}, and the same for people.
 Json to_json(const gap::Share& share);

@@ -93,8 +93,8 @@ void print(const gap::Diagnosis& d, Context& context) {
     }
     context.text() << (effect.outside_datasheet ? "  (outside the datasheet)\n" : "\n");
   }
-  for (const std::string& where : d.unknown.where) {
-    context.text() << "  unknown: " << printable(where, 300) << '\n';
+  for (const std::string& why : d.unknown.why) {
+    context.text() << "  unknown: " << printable(why, 300) << '\n';
   }
   for (const gap::NextSegment& next : d.next_segments) {
     context.text() << fmt::format("  next: {} ({:.0f} min) would show {}\n", next.name,

@@ -25,6 +25,7 @@
 #include "gap/challenge/outside.h"
 #include "gap/challenge/recorded.h"
 #include "gap/challenge/score.h"
+#include "gap/challenge/suggestion.h"
 #include "gap/challenge/trials.h"
 #include "sim/bundle_writer.h"
 
@@ -32,6 +33,7 @@ namespace sixpoint::cli {
 
 namespace {
 
+using gap::Followed;
 using gap::GapTrial;
 using gap::Outcome;
 using gap::Scores;
@@ -46,6 +48,7 @@ struct Options : ChallengeSetting {
   std::string html;
   std::string export_to;
   std::string labels;
+  bool follow = false;
   bool dry_run = false;
   OutputOptions outputs;
   bool json = false;
@@ -110,13 +113,12 @@ bool is_plain(const std::string& recording) {
   return std::filesystem::is_regular_file(recording, error);
 }
 
-Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtocol protocol,
-                          const std::string& folder, std::size_t index) {
-  SIXPOINT_ASSIGN(const GapTrial trial,
-                  gap::draw_trial(options.seed, index, protocol, options.shares, options.only));
+// Writes the trial and diagnoses it.
+Result<Outcome> answer_trial(Env& env, const Options& options, const GapTrial& trial,
+                             const std::string& name) {
   Outcome outcome = gap::outcome_of(trial);
   const bool plain = is_plain(options.recording);
-  const std::string bundle = fmt::format("{}/{:06}{}", folder, index, plain ? ".gt3x" : "");
+  const std::string bundle = name + (plain ? ".gt3x" : "");
   if (options.recording.empty()) {
     SIXPOINT_CHECK(sim::write_bundle(env.files, bundle, trial.scenario));
   } else if (plain) {
@@ -151,6 +153,21 @@ Result<Outcome> run_trial(Env& env, const Options& options, sim::StandardProtoco
     std::filesystem::remove(answer, ignored);
   }
   return outcome;
+}
+
+// One trial; with --follow-suggestion twice: as it is, and with the segment that it suggests.
+Result<Followed> run_trial(Env& env, const Options& options, sim::StandardProtocol protocol,
+                           const std::string& folder, std::size_t index) {
+  SIXPOINT_ASSIGN(GapTrial trial,
+                  gap::draw_trial(options.seed, index, protocol, options.shares, options.only));
+  const std::string name = fmt::format("{}/{:06}", folder, index);
+  Followed followed;
+  SIXPOINT_ASSIGN(followed.before, answer_trial(env, options, trial, name));
+  if (options.follow && !followed.before.suggestions.empty()) {
+    SIXPOINT_CHECK(gap::follow(trial.scenario, followed.before.suggestions.front().segment));
+    SIXPOINT_ASSIGN(followed.after, answer_trial(env, options, trial, name + "-followed"));
+  }
+  return followed;
 }
 
 // Diagnoses the recording to which effects will be added, as it is.
@@ -200,11 +217,13 @@ Status check_effects(Options& options) {
 
 // Bundles for others, instead of a diagnosis here.
 Status export_trials(const Options& options, sim::StandardProtocol protocol, Context& context) {
-  if (options.strip || !options.recording.empty() || !options.keep.empty() ||
+  if (options.strip || options.follow || !options.recording.empty() || !options.keep.empty() ||
       !options.html.empty() || !options.program.empty()) {
-    return fail(ErrorCode::usage,
-                "--export goes without --strip, --recording, --keep, --html and --program", {},
-                "sixpoint gap score scores what another program answers");
+    return fail(
+        ErrorCode::usage,
+        "--export goes without --strip, --follow-suggestion, --recording, --keep, --html and "
+        "--program",
+        {}, "sixpoint gap score scores what another program answers");
   }
   const ExportOptions how = {.trials = options.trials,
                              .seed = options.seed,
@@ -224,7 +243,7 @@ Status challenge(Options options, Context& context) {
   const auto protocol = sim::parse_standard_protocol(options.protocol);
   if (!protocol) {
     return fail(ErrorCode::usage, "there is no such protocol", options.protocol,
-                "production or engineering");
+                "production, production+ or engineering");
   }
   SIXPOINT_CHECK(check_effects(options));
   if (!options.export_to.empty()) {
@@ -233,6 +252,10 @@ Status challenge(Options options, Context& context) {
   if (!options.labels.empty() || options.dry_run) {
     return fail(ErrorCode::usage, "--labels and --dry-run belong to --export", {},
                 "name a folder with --export");
+  }
+  if (options.follow && (options.strip || !options.recording.empty())) {
+    return fail(ErrorCode::usage, "--follow-suggestion goes without --strip and --recording", {},
+                "a recording cannot be made longer");
   }
   if (options.program.empty()) {
     options.program = this_program();
@@ -264,7 +287,7 @@ Status challenge(Options options, Context& context) {
                   options.recording, "give the recording of a unit that reads right");
     }
   }
-  std::vector<Result<Outcome>> results(options.trials, Result<Outcome>(Outcome{}));
+  std::vector<Result<Followed>> results(options.trials, Result<Followed>(Followed{}));
   {
     Progress progress(context, "trials", options.trials);
     for_each_job(
@@ -275,12 +298,14 @@ Status challenge(Options options, Context& context) {
   if (temporary) {
     std::filesystem::remove_all(folder, error);
   }
+  std::vector<Followed> trials;
   std::vector<Outcome> outcomes;
-  for (Result<Outcome>& result : results) {
+  for (Result<Followed>& result : results) {
     if (!result) {
       return tl::unexpected(result.error());
     }
-    outcomes.push_back(std::move(*result));
+    outcomes.push_back(result->before);
+    trials.push_back(std::move(*result));
   }
   const Scores scores = gap::score(outcomes, options.strip);
   if (!options.html.empty()) {
@@ -288,9 +313,18 @@ Status challenge(Options options, Context& context) {
         write_file(outputs.files(), options.html, scores_page(options, scores, outcomes)));
   }
   if (options.json) {
-    print_json(context, scores_json(options, scores, outcomes));
+    Json json = scores_json(options, scores, outcomes);
+    if (options.follow) {
+      json["followed"] = gain_json(gap::gain_of(trials));
+    }
+    print_json(context, json);
   } else {
-    for (const auto& [what, value] : scores_lines(scores)) {
+    auto lines = scores_lines(scores);
+    if (options.follow) {
+      const auto more = gain_lines(gap::gain_of(trials));
+      lines.insert(lines.end(), more.begin(), more.end());
+    }
+    for (const auto& [what, value] : lines) {
       context.text() << fmt::format("{:<42} {}\n", what, value);
     }
   }
@@ -309,7 +343,8 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
   command.add_option("--trials", options.trials, "how many bundles")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000}));
   command.add_option("--seed", options.seed, "the same seed draws the same trials");
-  command.add_option("--protocol", options.protocol, "production or engineering (default)");
+  command.add_option("--protocol", options.protocol,
+                     "production, production+ or engineering (default)");
   command.add_option("--effects", options.only, "draw only these")->delimiter(',');
   command.add_flag("--strip", options.strip, "take the true effects out of the catalogue");
   command.add_option(
@@ -329,6 +364,8 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
                   "share of trials with many small effects and one that dominates")
       ->check(CLI::Range(0.0, 1.0));
   command.add_flag("--rates", options.shares.any_rate, "draw sample rates from 20 to 100 Hz");
+  command.add_flag("--follow-suggestion", options.follow,
+                   "also record the segment that each answer suggests first, and show the gain");
   command.add_option("--jobs", options.jobs, "diagnoses at a time (0 = one per core)");
   command.add_option("--program", options.program, "the sixpoint to test (default: this one)");
   command.add_option("--keep", options.keep, "leave bundles and answers in this folder");

@@ -14,8 +14,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Named = std::vector<std::pair<std::string, double>>;
 
-constexpr double kPlace_sigma = 3;
-
 tl::unexpected<Error> bad_answer(const std::string& source, std::string what) {
   return fail(ErrorCode::bad_data, std::move(what), source,
               "docs/gap-benchmark.md says what an answer holds");
@@ -72,37 +70,19 @@ Result<Place> place_of(const Json& json, const std::string& source) {
   return Place{index, segment->get<std::string>()};
 }
 
-// Where the unknown is: places, or with words there, the places of the document.
-Status read_where(const Json& json, const std::string& source, Answer& answer) {
-  const Json* places = member(*member(json, "unknown"), "where");
+// Where the unknown is.
+Status read_where(const Json& unknown, const std::string& source, Answer& answer) {
+  const Json* places = member(unknown, "where");
   if (places == nullptr) {
     return {};
   }
   if (!places->is_array()) {
     return bad_answer(source, "unknown.where is a list");
   }
-  bool words = false;
-  std::set<Place> found;
+  answer.where.emplace();
   for (const Json& entry : *places) {
-    if (entry.is_string()) {
-      words = true;
-      continue;
-    }
     SIXPOINT_ASSIGN(Place place, place_of(entry, source));
-    found.insert(std::move(place));
-  }
-  const Json* document = member(json, "where");
-  if (words && document != nullptr && document->is_array()) {
-    for (const Json& entry : *document) {
-      const Json* sigma = member(entry, "sigma");
-      if (sigma != nullptr && sigma->is_number() && sigma->get<double>() >= kPlace_sigma) {
-        SIXPOINT_ASSIGN(Place place, place_of(entry, source));
-        found.insert(std::move(place));
-      }
-    }
-  }
-  if (!words || !found.empty()) {
-    answer.where = std::move(found);
+    answer.where->insert(std::move(place));
   }
   return {};
 }
@@ -139,7 +119,7 @@ Result<Answer> parse_answer(const Json& json, const std::string& bundle,
   if (const Json* candidates = member(json, "candidates"); candidates != nullptr) {
     SIXPOINT_ASSIGN(answer.candidates, names_of(*candidates, source));
   }
-  SIXPOINT_CHECK(read_where(json, source, answer));
+  SIXPOINT_CHECK(read_where(*unknown, source, answer));
   return answer;
 }
 

@@ -11,8 +11,7 @@
 //                  "where": [{"axis": "X", "segment": "ramp_up"}]},    `where` may be left out
 //      "candidates": [{"name": "drift", "probability": 0.02}]}         may be left out
 //
-// Other members are not read, so that documents of `gap diagnose --json` are answers, too; their
-// `unknown.where` is in words, and the document's own `where` is taken from 3 sigma on. Answers
+// Other members are not read, so that documents of `gap diagnose --json` are answers, too. Answers
 // are not trusted: what is not of this form is bad_data, with the file and the line.
 #pragma once
 

@@ -24,6 +24,25 @@ Named list_of(const Json& json, const char* key) {
   return found;
 }
 
+std::vector<Suggestion> suggestions_of(const Json& json) {
+  std::vector<Suggestion> list;
+  const auto next = json.find("next_segments");
+  if (next == json.end() || !next->is_array()) {
+    return list;
+  }
+  const auto number_of = [](const Json& entry, const char* key) {
+    const auto value = entry.find(key);
+    return value != entry.end() && value->is_number() ? value->get<double>() : 0.0;
+  };
+  for (const Json& entry : *next) {
+    if (entry.is_object() && entry.contains("name") && entry["name"].is_string()) {
+      list.push_back({entry["name"].get<std::string>(), number_of(entry, "minutes"),
+                      number_of(entry, "expected_nats")});
+    }
+  }
+  return list;
+}
+
 void score_single(const Outcome& outcome, Scores& scores) {
   const TrialEffect& truth = outcome.truth.front();
   scores.first.count(outcome.first_right());
@@ -139,6 +158,7 @@ void read_answer(const Json& json, Outcome& outcome) {
   for (const auto& [name, probability] : list_of(json, "not_observable")) {
     outcome.not_observable.insert(name);
   }
+  outcome.suggestions = suggestions_of(json);
   if (!outcome.named.empty()) {
     const Json& first = json["effects"][0];
     if (const auto other = first.find("confounded_with");

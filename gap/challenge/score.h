@@ -19,6 +19,13 @@
 
 namespace sixpoint::gap {
 
+// A segment that the diagnosis suggests.
+struct Suggestion {
+  std::string segment;
+  double minutes = 0;
+  double expected_nats = 0;
+};
+
 // What came of one trial. Cases of the three judgements, each for trials without a failure:
 //
 // | the diagnosis                                            | honest | confidently wrong |
@@ -37,6 +44,7 @@ struct Outcome {
   std::vector<std::pair<std::string, double>> candidates;  // all, with probabilities
   std::set<std::string> confounded;                        // with the first one named
   std::set<std::string> not_observable;
+  std::vector<Suggestion> suggestions;  // what to record next, best first
   bool unknown = false;
   double unknown_probability = 0;
   double seconds = 0;

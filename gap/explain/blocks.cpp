@@ -65,6 +65,13 @@ Eigen::MatrixXd tone_covariance(const Block& block, const ToneFit& tone, const N
                                                              static_cast<Eigen::Index>(j));
     }
   }
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    v(kToneAmplitude + a, kToneAmplitude + a) += tone.line_mg2[0][a];
+  }
+  if (block.harmonics) {
+    v(kSecondHarmonic, kSecondHarmonic) += tone.line_mg2[1][tone.axis];
+    v(kThirdHarmonic, kThirdHarmonic) += tone.line_mg2[2][tone.axis];
+  }
   const double form_mg = std::hypot(response.tone_form_share, kToneFormShare * std::log(gain)) *
                          tone.in_phase_mg[tone.axis];
   v(rows[1], rows[1]) += form_mg * form_mg;

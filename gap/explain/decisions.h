@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace sixpoint::gap {
 
@@ -19,6 +20,10 @@ inline constexpr double kShareOfRealUnits = 0.1;
 inline constexpr double kLogPriorUnknown = -4.5;
 // An effect is accepted from nine to one on: log 9.
 inline constexpr double kAccept_nats = 2.2;
+// Beside kManyEffects others the unit is a real one that has a little of everything: then from
+// seven to three on, log(7 / 3), which leaves 0.97 and more of all names right.
+inline constexpr double kAcceptAmongMany_nats = 0.85;
+inline constexpr std::size_t kManyEffects = 4;
 // An unknown cause takes the place of a named one from twenty to one on: log 20.
 inline constexpr double kUnknownWins_nats = 3;
 // Log odds of something that was not asked for.
@@ -33,9 +38,11 @@ inline constexpr double kFormShare = 0.05;
 // dwells) are heavier, and `gap challenge --none 1` counts 0 in 300.
 inline constexpr double kAlarm_sd = 5.5;
 
-// The nominal unit: noise of one sample at 100 Hz per axis, and the spread of gains and offsets
-// from unit to unit (ADXL362 datasheet, typical values).
+// The nominal unit: noise of one sample at 100 Hz per axis (its density is the same at every rate,
+// so at another one it is that times the root of the rates' ratio), and the spread of gains and
+// offsets from unit to unit (ADXL362 datasheet, typical values).
 inline constexpr std::array<double, 3> kNominalNoise_mg = {3.9, 3.9, 5.5};
+inline constexpr double kNominalNoiseAt_hz = 100;
 inline constexpr double kGainSd = 0.02;
 inline constexpr double kOffsetSd_mg = 35;
 

@@ -78,15 +78,51 @@ double Explanation::held_out_nats(const std::string& effect) const {
   return gain;
 }
 
-Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) const {
-  HeldOut out;
-  // Per column of the explanation: whether a simulation has it.
+std::vector<bool> Explanation::columns_of(const std::set<std::string>& named) const {
   std::vector<bool> counts(kNuisanceParameters, true);
   for (const int g : best().subset.groups) {
     for (int i = 0; i < model_.group(g).count; ++i) {
       counts.push_back(i < 3 && named.count(model_.group(g).effect) != 0);
     }
   }
+  return counts;
+}
+
+std::vector<double> Explanation::left_over_sigma(const std::set<std::string>& named) const {
+  const std::vector<bool> counts = columns_of(named);
+  const Whitened w = model_.whiten(linear_, Scatter::nominal, 0);
+  Posterior fitted;
+  model_.evidence_of(w.sums, best().subset.groups, &fitted);
+  Eigen::VectorXd left_mg = linear_.col(model_.columns());
+  for (std::size_t c = 0; c < counts.size(); ++c) {
+    if (counts[c]) {
+      left_mg -= linear_.col(fitted.columns[c]) * fitted.mean[static_cast<Eigen::Index>(c)];
+    }
+  }
+  const Scatter scatter = best().scatter;
+  const double size2 = named.count(std::string(to_string(scatter))) != 0
+                           ? best().scatter_size * best().scatter_size
+                           : 0;
+  const std::vector<Block>& blocks = model_.blocks();
+  const double start_s = blocks.empty() ? 0 : blocks.front().middle_s - blocks.front().seconds / 2;
+  std::vector<double> sigma;
+  for (int row = 0; row < model_.rows(); ++row) {
+    const Block& block = model_.block_of_row(row);
+    const int feature = model_.feature_of_row(row);
+    double variance_mg2 = nominal_variance_mg2(block, feature);
+    if (scatter == Scatter::seating) {
+      variance_mg2 += size2 * seating_lever(block).row(feature).squaredNorm();
+    } else if (feature < kToneAmplitude) {
+      variance_mg2 += size2 * scatter_kernel(scatter, block, block, start_s);
+    }
+    sigma.push_back(left_mg[row] / std::sqrt(variance_mg2));
+  }
+  return sigma;
+}
+
+Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) const {
+  HeldOut out;
+  const std::vector<bool> counts = columns_of(named);
   if (model_.rows() == 0) {
     return out;
   }

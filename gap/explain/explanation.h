@@ -104,6 +104,9 @@ class Explanation {
   // `named`: effects that count as explained; of others, and of what bends an effect from its plain
   // law, the estimates are taken out, as a simulation with the named effects would leave them out.
   HeldOut held_out(const std::set<std::string>& named) const;
+  // Per row: what the named effects leave, all conditions fitted, in standard deviations of noise,
+  // nominal seating and named scatter.
+  std::vector<double> left_over_sigma(const std::set<std::string>& named) const;
 
  private:
   struct Tried {
@@ -115,6 +118,8 @@ class Explanation {
     double occam_nats = 0;  // what the free numbers cost
   };
   Information information(int g, std::vector<int> others) const;
+  // Per column of the best explanation: whether a simulation with the named effects has it.
+  std::vector<bool> columns_of(const std::set<std::string>& named) const;
   // What one kind of scatter explains.
   struct Trial {
     std::optional<Fit> fit;

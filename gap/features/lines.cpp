@@ -182,6 +182,28 @@ struct Peak {
   double nats = 0;  // above the threshold
 };
 
+// Stretches of more than `least` samples, in equal pieces of at most `most`.
+std::vector<Stretch> pieces(const std::vector<Stretch>& all, double least, double most) {
+  std::vector<Stretch> cut;
+  for (const Stretch& s : all) {
+    if (static_cast<double>(s.samples) <= least) {
+      continue;
+    }
+    const auto count = static_cast<std::size_t>(std::ceil(static_cast<double>(s.samples) / most));
+    const std::size_t length = s.samples / count;
+    for (std::size_t k = 0; k < count; ++k) {
+      Stretch piece = s;
+      piece.samples = length;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const auto first = s.x[a].begin() + static_cast<std::ptrdiff_t>(k * length);
+        piece.x[a].assign(first, first + static_cast<std::ptrdiff_t>(length));
+      }
+      cut.push_back(std::move(piece));
+    }
+  }
+  return cut;
+}
+
 // Finds one line after the other, the strongest first.
 class LineFinder {
  public:
@@ -189,6 +211,7 @@ class LineFinder {
       : rate_hz_(rate_hz), noise_(noise), all_(std::move(all)) {
     constexpr double kLong_s = 60;
     constexpr double kDwell_s = 30;
+    constexpr double kPiece_s = 420;  // of long records: what the scan takes in one transform
     longest_ = &*std::max_element(all_.begin(), all_.end(), [](const Stretch& a, const Stretch& b) {
       return a.samples < b.samples;
     });
@@ -199,7 +222,12 @@ class LineFinder {
       }
     }
     if (static_cast<double>(longest_->samples) > kLong_s * rate_hz_) {
-      scans_.emplace_back(Kind::of_longest, scan_powers(rate_hz_, {longest_}, noise));
+      const std::vector<Stretch> cut = pieces(all_, kLong_s * rate_hz_, kPiece_s * rate_hz_);
+      std::vector<const Stretch*> set;
+      for (const Stretch& piece : cut) {
+        set.push_back(&piece);
+      }
+      scans_.emplace_back(Kind::of_long, scan_powers(rate_hz_, set, noise));
     } else {
       scans_.emplace_back(Kind::in_step, scan_in_step(rate_hz_, all_, noise));
     }
@@ -228,7 +256,7 @@ class LineFinder {
   }
 
  private:
-  enum class Kind { of_longest, of_dwells, in_step };
+  enum class Kind { of_long, of_dwells, in_step };
 
   std::optional<Peak> best_peak(const LineScan& scan) const {
     constexpr double kGuard_hz = 0.6;  // convention: wider than a line in a dwell of 7 s

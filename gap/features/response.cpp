@@ -125,10 +125,11 @@ class Search {
       return;
     }
     // Where a harmonic folds onto the tone itself (a third of the sample rate), neither is known.
-    const double sd =
-        std::max(tone.residual_mg, noise.white_mg[axis]) *
-        std::sqrt(std::max(2 / static_cast<double>(tone.samples), tone.covariance_shape(1, 1))) /
-        measured;
+    const double sd = std::hypot(std::max(tone.residual_mg, noise.white_mg[axis]) *
+                                     std::sqrt(std::max(2 / static_cast<double>(tone.samples),
+                                                        tone.covariance_shape(1, 1))),
+                                 std::sqrt(tone.line_mg2[0][tone.axis])) /
+                      measured;
     // Each slip costs a piece at its edges, known to a sample.
     const double slipped = 0.01 * std::sqrt(static_cast<double>(tone.slips.size()));
     // A third-order term bends 1 g tones by up to 0.3 mg of 1 g.

@@ -34,8 +34,10 @@ class Deviation {
            segment.approach_g.cwiseAbs().maxCoeff() >= kStep_g;
   }
 
-  // One axis of one dwell, its rest taken from what follows; `variance` of one sample.
-  void add(const CleanSamples& clean, const Segment& segment, std::size_t axis, double variance) {
+  // One axis of one dwell, its rest and the lines taken from what follows; `variance` of one
+  // sample.
+  void add(const CleanSamples& clean, const Segment& segment, std::size_t axis, double variance,
+           const std::vector<double>& lines_hz) {
     constexpr std::size_t kLeast = 100;  // samples at rest
     const double step_mg = 1000 * segment.approach_g[static_cast<Eigen::Index>(axis)];
     if (std::abs(step_mg) < kAxisStep_mg || !(variance > 0)) {
@@ -46,11 +48,12 @@ class Deviation {
     if (clean.count_usable(from, samples) < kLeast) {
       return;
     }
-    const double rest = clean.mean_mg(from, samples, axis);
+    const std::vector<double> rest = rest_of(clean, segment.first_sample, samples, axis, lines_hz);
     ++steps_;
     for (std::size_t i = 0; i < length_; ++i) {
       if (clean.usable(segment.first_sample + i)) {
-        share_[i] += step_mg * (clean.value_mg(segment.first_sample + i, axis) - rest) / variance;
+        share_[i] +=
+            step_mg * (clean.value_mg(segment.first_sample + i, axis) - rest[i]) / variance;
         weight_[i] += step_mg * step_mg / variance;
       }
     }
@@ -143,6 +146,42 @@ class Deviation {
  private:
   double at_s(std::size_t i) const { return static_cast<double>(i) / rate_hz_; }
 
+  // Level and lines at each of the first samples, by least squares from `samples` behind them.
+  std::vector<double> rest_of(const CleanSamples& clean, std::size_t first, std::size_t samples,
+                              std::size_t axis, const std::vector<double>& lines_hz) const {
+    if (lines_hz.empty()) {
+      return std::vector<double>(length_, clean.mean_mg(first + length_, samples, axis));
+    }
+    constexpr double kRegular = 1e-6;  // lines of nearly one frequency
+    const auto columns = static_cast<Eigen::Index>(1 + 2 * lines_hz.size());
+    const auto row_of = [&](std::size_t i) {
+      Eigen::VectorXd row = Eigen::VectorXd::Ones(columns);
+      for (std::size_t k = 0; k < lines_hz.size(); ++k) {
+        const double p = 2 * M_PI * lines_hz[k] * at_s(i);
+        row[static_cast<Eigen::Index>(1 + 2 * k)] = std::cos(p);
+        row[static_cast<Eigen::Index>(2 + 2 * k)] = std::sin(p);
+      }
+      return row;
+    };
+    Eigen::MatrixXd a =
+        kRegular * static_cast<double>(samples) * Eigen::MatrixXd::Identity(columns, columns);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(columns);
+    const double level_mg = clean.mean_mg(first + length_, samples, axis);
+    for (std::size_t i = length_; i < length_ + samples; ++i) {
+      if (clean.usable(first + i)) {
+        const Eigen::VectorXd row = row_of(i);
+        a.selfadjointView<Eigen::Lower>().rankUpdate(row);
+        b += row * (clean.value_mg(first + i, axis) - level_mg);
+      }
+    }
+    const Eigen::VectorXd x = a.selfadjointView<Eigen::Lower>().ldlt().solve(b);
+    std::vector<double> rest(length_);
+    for (std::size_t i = 0; i < length_; ++i) {
+      rest[i] = level_mg + row_of(i).dot(x);
+    }
+    return rest;
+  }
+
   std::pair<StepResponse::Mode, double> fit_at(const std::vector<double>& data, double frequency_hz,
                                                double decay_s) const {
     Eigen::Matrix2d a = Eigen::Matrix2d::Zero();
@@ -175,15 +214,14 @@ class Deviation {
 }  // namespace
 
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
-                           const NoiseSpectrum& noise, double line_power_mg2,
+                           const NoiseSpectrum& noise, const std::vector<double>& lines_hz,
                            const std::function<bool(const Segment&)>& use) {
   StepResponse response;
   Deviation deviation(bundle.rate_hz);
   for (const Segment& segment : bundle.segments) {
     if (deviation.takes(segment) && (!use || use(segment))) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        deviation.add(clean, segment, axis,
-                      noise.white_mg[axis] * noise.white_mg[axis] + line_power_mg2);
+        deviation.add(clean, segment, axis, noise.white_mg[axis] * noise.white_mg[axis], lines_hz);
       }
     }
   }
@@ -213,11 +251,11 @@ StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
 }
 
 double held_out_step_nats(const Bundle& bundle, const CleanSamples& clean,
-                          const NoiseSpectrum& noise, double line_power_mg2) {
+                          const NoiseSpectrum& noise, const std::vector<double>& lines_hz) {
   std::array<StepResponse, 2> half;
   for (int k = 0; k < 2; ++k) {
     half[static_cast<std::size_t>(k)] =
-        step_response(bundle, clean, noise, line_power_mg2,
+        step_response(bundle, clean, noise, lines_hz,
                       [&](const Segment& segment) { return segment.pose % 2 == k; });
   }
   if (!half[0].usable || !half[1].usable) {

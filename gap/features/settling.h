@@ -41,15 +41,15 @@ struct StepResponse {
   double left_without_sd = 0;  // ... with nothing taken off
 };
 
-// `use`: which segments count (empty: all). `line_power_mg2`: mean square of spectral lines, which
-// is noise to a step.
+// `use`: which segments count (empty: all). `lines_hz`: spectral lines, which are fitted to the
+// rest of each dwell and taken off.
 StepResponse step_response(const Bundle& bundle, const CleanSamples& clean,
-                           const NoiseSpectrum& noise, double line_power_mg2 = 0,
+                           const NoiseSpectrum& noise, const std::vector<double>& lines_hz = {},
                            const std::function<bool(const Segment&)>& use = {});
 
 // Log likelihood over nothing of dwells in one half of the poses, predicted from the ringing fitted
 // to the other half; both halves added.
 double held_out_step_nats(const Bundle& bundle, const CleanSamples& clean,
-                          const NoiseSpectrum& noise, double line_power_mg2 = 0);
+                          const NoiseSpectrum& noise, const std::vector<double>& lines_hz = {});
 
 }  // namespace sixpoint::gap

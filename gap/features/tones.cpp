@@ -84,6 +84,9 @@ class ToneAnalysis {
     const Eigen::Vector3d along = segment_.rotation * segment_.vibration->direction_lab;
     along.cwiseAbs().maxCoeff(&fit_.axis);
     noise2_ = std::pow(options.noise_mg[static_cast<std::size_t>(fit_.axis)], 2);
+    for (const SpectralLine& line : options.lines) {
+      noise2_ += std::pow(line_in_sensor(line)[fit_.axis], 2) / 2;
+    }
     good_.resize(segment_.samples);
     y_.resize(segment_.samples);
     for (std::size_t i = 0; i < segment_.samples; ++i) {
@@ -113,10 +116,32 @@ class ToneAnalysis {
     }
     find_slips();
     fit_all();
+    add_lines();
     return fit_;
   }
 
  private:
+  Eigen::Vector3d line_in_sensor(const SpectralLine& line) const {
+    return line.in_lab ? Eigen::Vector3d(segment_.rotation * line.vector_mg) : line.vector_mg;
+  }
+
+  // What a line shows at another frequency in a record of this length: its size times a sinc.
+  void add_lines() {
+    const double seconds = static_cast<double>(fit_.samples) / bundle_.rate_hz;
+    const auto folded_hz = [&](double f) { return std::abs(std::remainder(f, bundle_.rate_hz)); };
+    for (const SpectralLine& line : options_.lines) {
+      for (std::size_t k = 0; k < fit_.line_mg2.size(); ++k) {
+        const double tone_hz = static_cast<double>(k + 1) * segment_.vibration->frequency_hz;
+        const double turns = M_PI * seconds * (folded_hz(line.frequency_hz) - folded_hz(tone_hz));
+        const double share = std::abs(turns) < 1e-6 ? 1 : std::sin(turns) / turns;
+        fit_.line_mg2[k] += (share * line_in_sensor(line)).cwiseAbs2() / 2;
+      }
+    }
+    // A frequency is known as well as the phase from one half of the record to the other.
+    const double white_mg2 = 2 * noise2_ / static_cast<double>(fit_.samples);
+    fit_.frequency_sd_ppm *= std::sqrt(1 + fit_.line_mg2[0][fit_.axis] / white_mg2);
+  }
+
   void find_slips() {
     const auto sums = prefix_sums(y_, good_, w_);
     std::vector<std::size_t> cuts = {0, y_.size()};

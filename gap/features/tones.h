@@ -19,6 +19,7 @@
 #include <optional>
 #include <vector>
 
+#include "gap/features/lines.h"
 #include "gap/recording/bundle.h"
 #include "gap/recording/clean.h"
 
@@ -43,6 +44,10 @@ struct ToneFit {
   // (level, in_phase, second, third) on `axis`: inverse normal matrix, to be multiplied by the
   // noise's variance. Other axes: 1/n and 2/n.
   Eigen::Matrix4d covariance_shape = Eigen::Matrix4d::Zero();
+  // Variance per axis that spectral lines add to what is found at the tone's frequency and at its
+  // second and third harmonic: their phase is not known.
+  std::array<Eigen::Vector3d, 3> line_mg2{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                          Eigen::Vector3d::Zero()};
   double residual_mg = 0;  // rms on `axis`
   // Squared residuals weighted by sin^2 p (slope) and cos^2 p (crest), mg^2, and 1 sd of either for
   // white residuals: jitter shows on slopes, a noisy gain on crests.
@@ -56,6 +61,7 @@ struct ToneFit {
 struct ToneOptions {
   double clock_ppm = 0;                           // from the host's clock
   std::array<double, 3> noise_mg{4.1, 4.1, 5.6};  // of one sample, rounding included
+  std::vector<SpectralLine> lines = {};           // that go through the tones, too
 };
 
 // One per segment of kind vibration, in order.

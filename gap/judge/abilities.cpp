@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "gap/explain/catalogue.h"
+#include "gap/judge/next_segments.h"
 #include "gap/judge/steps.h"
 
 namespace sixpoint::gap {
@@ -148,60 +149,6 @@ Observable observable(const Request& request, unsigned abilities, const Records&
   return Observable::yes;
 }
 
-// Segments that could be recorded, how long they take, and what they show.
-struct Offer {
-  const char* name;
-  double minutes;
-  unsigned gives;
-};
-constexpr std::array<Offer, 9> kOffers = {{{"faces", 1.7, kPoses | kMoves},
-                                           {"faces_reversed", 1.7, kBothWays | kRepeats},
-                                           {"reseat", 2.7, kRepeats},
-                                           {"yaw", 6.5, kYaws},
-                                           {"shaker", 9, kShaker},
-                                           {"shaker_high", 6, kHighShaker | kFullScale},
-                                           {"still", 20, kLongRecord | kHours},
-                                           {"ramp_up", 18, kTemperature | kHours},
-                                           {"soak", 46, kSoak | kTemperature | kHours}}};
-
-// What a segment is expected to say: of an effect that can't be seen yet the entropy of "is it
-// there" at one in thirty, of two that look alike log 2.
-constexpr double kEntropy_nats = 0.135;
-constexpr double kEither_nats = 0.69;
-
-std::vector<NextSegment> next_segments(unsigned abilities, const Diagnosis& out,
-                                       const Findings& found) {
-  std::vector<NextSegment> list;
-  for (const Offer& offer : kOffers) {
-    if ((offer.gives & ~abilities) == 0) {
-      continue;
-    }
-    NextSegment next{offer.name, offer.minutes, 0, {}};
-    for (const auto& [name, segment] : out.not_observable) {
-      if (segment == offer.name) {
-        next.separates.push_back(name);
-        next.expected_nats += kEntropy_nats;
-      }
-    }
-    for (const EffectFinding& e : found.effects) {
-      for (const std::string& other : e.confounded_with) {
-        const CatalogueEntry* entry = find_entry(other);
-        if (entry != nullptr && entry->segment == offer.name) {
-          next.separates.push_back(e.name + "/" + other);
-          next.expected_nats += kEither_nats;
-        }
-      }
-    }
-    if (!next.separates.empty()) {
-      list.push_back(std::move(next));
-    }
-  }
-  std::sort(list.begin(), list.end(), [](const NextSegment& a, const NextSegment& b) {
-    return a.expected_nats / a.minutes > b.expected_nats / b.minutes;
-  });
-  return list;
-}
-
 }  // namespace
 
 void list_not_observable(const Request& request, const ProtocolKind& kind, const Records& records,
@@ -218,7 +165,7 @@ void list_not_observable(const Request& request, const ProtocolKind& kind, const
       out.not_observable.emplace_back(name, segment.empty() ? "none" : std::string(segment));
     }
   }
-  out.next_segments = next_segments(kind.abilities, out, found);
+  out.next_segments = next_segments(request, kind.abilities, explanation, found, out);
 }
 
 }  // namespace sixpoint::gap

@@ -22,9 +22,9 @@ constexpr std::size_t kLeastPoses = 4;
 
 Records judge_records(const Request& request, CleanSamples clean, NoiseSpectrum noise,
                       Findings& found) {
-  Timing timing = judge_timing(request, clean, noise);
   const CodeStatistics codes = code_statistics(request.bundle, clean);
   Lines lines = judge_lines(request, clean, noise, codes);
+  Timing timing = judge_timing(request, clean, noise, lines);
   ResponseStep response = judge_response(request, noise, timing.tones, lines);
   Settling settling = judge_settling(request, clean, noise, lines);
   for (Findings* step : {&timing.found, &lines.found, &response.found, &settling.found}) {
@@ -130,6 +130,9 @@ Diagnosis diagnose(const Request& request) {
   out.plots = make_plots(request, records, explanation.best(), found);
   out.plots.residuals = std::move(residuals.plot);
   out.where = std::move(residuals.where);
+  if (!found.alarms.empty()) {
+    out.unknown.where = locate_unknown(request, records, explanation, found);
+  }
   finish(request, std::move(found), out);
   return out;
 }

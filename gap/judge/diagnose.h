@@ -25,7 +25,7 @@
 // What it can't do: separate effects that one unit shows alike (`confounded_with`: local_gravity
 // and gain, rounding_floor and offset); show an effect for which the protocol has no segment
 // (`not_observable`); name a cause that the catalogue lacks, which is at most `unknown`, or silence
-// if the noise hides it; find more than five effects of the means at once.
+// if the noise hides it; find more than twelve effects of the means at once.
 //
 // Deterministic. One call runs in one thread and keeps nothing; calls may run in parallel.
 // Errors: usage for a name in `without` that the catalogue does not have.

@@ -110,10 +110,10 @@ std::string Diagnosis::brief() const {
           "{} explain{} a part of the gap ({:.2f} mg -> {:.2f} mg), and something unknown is left: "
           "{}",
           names, plural ? "" : "s", gap.before_mg, gap.after_mg,
-          unknown.where.empty() ? "" : unknown.where.front());
+          unknown.why.empty() ? "" : unknown.why.front());
     case Verdict::unexplained:
       return fmt::format("there is a gap that nothing in the catalogue explains: {}",
-                         unknown.where.empty() ? "" : unknown.where.front());
+                         unknown.why.empty() ? "" : unknown.why.front());
   }
   return "";
 }
@@ -145,6 +145,12 @@ Json augmented_scenario(const Diagnosis& diagnosis) {
 }
 
 Json Diagnosis::to_json() const {
+  Json places = Json::array();
+  for (const UnknownPlace& place : unknown.where) {
+    places.push_back({{"axis", std::string(1, "XYZ"[place.axis])},
+                      {"segment", place.segment},
+                      {"factor", place.factor}});
+  }
   Json json = {{"bundle", bundle},
                {"serial", serial},
                {"firmware", firmware},
@@ -158,7 +164,8 @@ Json Diagnosis::to_json() const {
                 {{"present", unknown.present},
                  {"probability", finite(unknown.probability)},
                  {"size_mg", finite(unknown.size_mg)},
-                 {"where", unknown.where}}}};
+                 {"where", std::move(places)},
+                 {"why", unknown.why}}}};
   json["not_observable"] = Json::array();
   for (const auto& [name, segment] : not_observable) {
     const auto judged =

@@ -41,11 +41,18 @@ struct EffectFinding {
   std::optional<double> bound = {};
 };
 
+struct UnknownPlace {
+  int axis = 0;
+  std::string segment;
+  std::string factor;  // pose, yaw, temperature, frequency, amplitude, time, noise
+};
+
 struct UnknownFinding {
   bool present = false;
   double probability = 0;
-  std::vector<std::string> where;  // strongest first, in words
-  double size_mg = 0;              // rms per axis that nothing named explains, above the floor
+  std::vector<std::string> why;     // strongest first, in words
+  std::vector<UnknownPlace> where;  // strongest first; none where it is in the times alone
+  double size_mg = 0;               // rms per axis that nothing named explains, above the floor
 };
 
 struct GapSize {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "gap/explain/catalogue.h"
 
@@ -12,6 +13,12 @@ namespace {
 // Log odds beyond these say no more: e^9 is 8000 to one.
 constexpr double kLeast_nats = -40;
 constexpr double kMost_nats = 9;
+
+// Of something unknown, without and with much evidence, and how fast it grows between: fitted on
+// realistic units and outside kinds (docs/gap.md, Conventions).
+constexpr double kQuietProbability = 0.03;
+constexpr double kAlarmProbability = 0.87;
+constexpr double kUnknownWidth_sd = 0.6;
 
 bool contains(const std::vector<EffectFinding>& list, const std::string& name) {
   return std::any_of(list.begin(), list.end(),
@@ -63,18 +70,14 @@ double probability_it_matters(const EffectFinding& f, double matters_mg) {
   return f.probability * 0.5 * std::erfc(-z / M_SQRT2);
 }
 
-// Of something unknown, by convention.
+// Of something unknown: monotone in the strongest evidence for it, steepest where that alarms.
 double unknown_probability(const Findings& found) {
-  if (!found.alarms.empty()) {
-    constexpr double kAlarm = 0.9;  // of a weak one
-    constexpr double kPerSd = 0.02, kMost = 0.999;
-    return std::min(kMost, kAlarm + kPerSd * (found.alarms.front().sd - kAlarm_sd));
+  double sd = found.worst_sd;
+  for (const Alarm& alarm : found.alarms) {
+    sd = std::max(sd, alarm.sd);
   }
-  // Without a suspicious test, and what a test just below the threshold adds.
-  constexpr double kQuiet = 0.03, kSuspect = 0.3;
-  constexpr double kChance_sd = 3;  // the largest of some forty tests reaches it by chance
-  return kQuiet +
-         kSuspect * std::clamp((found.worst_sd - kChance_sd) / (kAlarm_sd - kChance_sd), 0.0, 1.0);
+  const double share = 1 / (1 + std::exp(-(sd - kAlarm_sd) / kUnknownWidth_sd));
+  return kQuietProbability + (kAlarmProbability - kQuietProbability) * share;
 }
 
 }  // namespace
@@ -89,6 +92,24 @@ double chi_to_sd(double chi, double freedom) {
   }
   const double s = 2 / (9 * freedom);
   return (std::cbrt(chi / freedom) - (1 - s)) / std::sqrt(s);
+}
+
+std::vector<UnknownPlace> noise_places(const Request& request, int axis) {
+  std::set<std::string> names;
+  for (const Segment& segment : request.bundle.segments) {
+    if (segment.at_rest()) {
+      names.insert(segment.name);
+    }
+  }
+  std::vector<UnknownPlace> places;
+  for (const std::string& name : names) {
+    for (int a = 0; a < 3; ++a) {
+      if (axis < 0 || a == axis) {
+        places.push_back({a, name, "noise"});
+      }
+    }
+  }
+  return places;
 }
 
 std::string parameter_name(const std::string& effect) {
@@ -122,11 +143,16 @@ void Findings::add(const Request& request, EffectFinding finding) {
   candidates.push_back(std::move(finding));
 }
 
-void Findings::test(double sd, const std::string& where) {
+void Findings::test(double sd, const std::string& where, const std::vector<UnknownPlace>& places) {
   worst_sd = std::max(worst_sd, sd);
   if (sd > kAlarm_sd) {
-    alarm(sd, where);
+    alarm(sd, where, places);
   }
+}
+
+void Findings::suspect(double nats) {
+  constexpr double kSdPerNat = 1.0 / 3;
+  worst_sd = std::max(worst_sd, kAlarm_sd + kSdPerNat * (nats - kUnknownWins_nats));
 }
 
 void Findings::append(Findings later) {
@@ -143,13 +169,24 @@ void Findings::append(Findings later) {
 
 bool Findings::accepted(const std::string& effect) const { return contains(effects, effect); }
 
+void Findings::accept_among_many(std::size_t before) {
+  if (before + effects.size() < kManyEffects) {
+    return;
+  }
+  for (const EffectFinding& f : candidates) {
+    if (f.nats > kAcceptAmongMany_nats && !accepted(f.name)) {
+      effects.push_back(f);
+    }
+  }
+}
+
 void finish(const Request& request, Findings found, Diagnosis& out) {
   complete(request, found);
   std::sort(found.alarms.begin(), found.alarms.end(),
             [](const Alarm& a, const Alarm& b) { return a.sd > b.sd; });
   constexpr std::size_t kMostPlaces = 8;
   for (std::size_t i = 0; i < std::min(kMostPlaces, found.alarms.size()); ++i) {
-    out.unknown.where.push_back(found.alarms[i].where);
+    out.unknown.why.push_back(found.alarms[i].where);
   }
   out.unknown.present = !found.alarms.empty();
   out.unknown.probability = unknown_probability(found);
@@ -194,7 +231,7 @@ Diagnosis inconclusive(const Request& request, Findings found, const std::string
   complete(request, found);
   out.candidates = std::move(found.candidates);
   out.verdict = Verdict::unexplained;
-  out.unknown = {true, kProbability, {why}};
+  out.unknown = {true, kProbability, {why}, {}};
   for (const CatalogueEntry& entry : catalogue()) {
     if (request.allowed(std::string(entry.name))) {
       out.not_observable.emplace_back(entry.name, entry.segment);

@@ -33,23 +33,42 @@ struct Request {
 struct Alarm {
   double sd = 0;  // beyond chance
   std::string where;
+  std::vector<UnknownPlace> places = {};  // that it is about, beside those of locate_unknown()
 };
 
 struct Findings {
   std::vector<EffectFinding> effects;     // accepted ones
   std::vector<EffectFinding> candidates;  // all that were judged
   std::vector<Alarm> alarms;
-  double worst_sd = 0;  // of all tests, alarms or not
+  double worst_sd = 0;  // of all tests and other causes, alarms or not
   // Mean squares per axis of what effects add to the gap that the means do not show.
   std::vector<double> outside_means_mg2;
 
   // Sets the probability; an effect that is not allowed is left out.
   void add(const Request& request, EffectFinding finding);
-  void alarm(double sd, std::string where) { alarms.push_back({sd, std::move(where)}); }
-  void test(double sd, const std::string& where);
+  void alarm(double sd, std::string where, std::vector<UnknownPlace> places = {}) {
+    alarms.push_back({sd, std::move(where), std::move(places)});
+  }
+  void test(double sd, const std::string& where, const std::vector<UnknownPlace>& places = {});
+  // Log odds of a cause that the catalogue lacks, whether or not they are an alarm. On the scale of
+  // the tests: at kUnknownWins_nats as much as a test at kAlarm_sd, a third of a standard deviation
+  // for a nat (convention), so that even odds before the data (kLogPriorUnknown) are the 3 standard
+  // deviations that the largest of forty tests has by chance.
+  void suspect(double nats);
   void append(Findings later);
   bool accepted(const std::string& effect) const;
+  // Accepts weaker candidates where the unit shows that it has a little of everything. `before`:
+  // how many effects other findings hold.
+  //
+  // | accepted effects, `before` and here | a candidate is accepted above  |
+  // |-------------------------------------|--------------------------------|
+  // | up to three                         | kAccept_nats, 9 to 1           |
+  // | kManyEffects, four, and more        | kAcceptAmongMany_nats, 7 to 3  |
+  void accept_among_many(std::size_t before);
 };
+
+// All that lies still, of one axis or of all (-1): where the noise is measured.
+std::vector<UnknownPlace> noise_places(const Request& request, int axis = -1);
 
 // Probability for log odds, kept within what the model can be trusted with: at most 1 - 1e-4.
 double probability_of(double nats);

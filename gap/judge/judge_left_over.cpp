@@ -55,8 +55,9 @@ void test_means(const Request& request, const Explanation& explanation, bool tru
 }
 
 // Slow noise and the noise's spectrum.
-void test_spectrum(const Records& records, const Explanation& explanation, const Findings& before,
-                   Findings& found) {
+void test_spectrum(const Request& request, const Records& records, const Explanation& explanation,
+                   const Findings& before, Findings& found) {
+  found.suspect(explanation.unknown_nats());
   if (explanation.unknown_wins()) {
     const double gain = explanation.best_unknown()->nats - explanation.best_known().nats;
     found.alarm(nats_to_sd(gain) + kUnknownScatter_sd,
@@ -74,7 +75,7 @@ void test_spectrum(const Records& records, const Explanation& explanation, const
   const Response& response = records.response;
   // 1/f noise lifts the lowest bins.
   if (!before.accepted("flicker")) {
-    found.test(response.noise_left_sd, "spectrum: the noise is not flat");
+    found.test(response.noise_left_sd, "spectrum: the noise is not flat", noise_places(request));
   }
   // Truncation, which bends small tones, is in the model of the means.
   if ((response.tone_form_share == 0 || response.tone_form_share > kKnownForm) &&
@@ -125,7 +126,8 @@ void test_tone_residual(const Request& request, const Records& records, const To
                              (jitter ? kJitterVariance : 0) + std::pow(slow_mg2 / total, 2));
   found.test(
       jitter ? z / kJitterTests : z - kSlowChance_sd,
-      fmt::format("tone: residual at {} Hz, {} g", vibration.frequency_hz, vibration.amplitude_g));
+      fmt::format("tone: residual at {} Hz, {} g", vibration.frequency_hz, vibration.amplitude_g),
+      {{tone.axis, request.bundle.segments[tone.segment].name, "frequency"}});
 }
 
 // Amplitude of a clipped tone, which is not among the means. `gain`: of its axis.
@@ -135,14 +137,13 @@ void test_clipped_tone(const Request& request, const Records& records, const Ton
   const double h = records.response.tone_gain(s.vibration->frequency_hz, request.bundle.rate_hz);
   const double expected_mg = 1000 * h * s.vibration->amplitude_g *
                              std::abs((s.rotation * s.vibration->direction_lab)[tone.axis]) * gain;
-  // Known to this share, hardly on the flank of a resonance; an alarm grows by 20 sd for each time
-  // that it is off by that.
-  const double far = records.response.resonance_significant ? 0.5 : 0.03;
+  // Known to this share; an alarm grows by 20 sd for each time that it is off by that.
+  constexpr double kFar = 0.03;
   constexpr double kAlarm_sd_per_share = 20;
   const double off = std::abs(tone.in_phase_mg[tone.axis] / expected_mg - 1);
-  found.test(
-      off > far ? kAlarm_sd_per_share * off / far : 0,
-      fmt::format("tone: amplitude of the clipped tone at {} Hz", s.vibration->frequency_hz));
+  found.test(off > kFar ? kAlarm_sd_per_share * off / kFar : 0,
+             fmt::format("tone: amplitude of the clipped tone at {} Hz", s.vibration->frequency_hz),
+             {{tone.axis, s.name, "amplitude"}});
 }
 
 void test_tones(const Request& request, const Records& records, const Fit& fit,
@@ -158,7 +159,8 @@ void test_tones(const Request& request, const Records& records, const Fit& fit,
     for (Eigen::Index a = 0; a < 3; ++a) {
       if (a != tone.axis && tone.clipped_share == 0) {
         chi += std::pow(tone.quadrature_mg[a], 2) /
-               (2 * records.noise.variance_at(static_cast<std::size_t>(a), frequency_hz) / samples);
+               (2 * records.noise.variance_at(static_cast<std::size_t>(a), frequency_hz) / samples +
+                tone.line_mg2[0][a]);
         freedom += 1;
       }
     }
@@ -166,7 +168,9 @@ void test_tones(const Request& request, const Records& records, const Fit& fit,
         request, records, tone,
         slow_variance_mg2(fit, before, samples / request.bundle.rate_hz, request.bundle.rate_hz),
         before.accepted("truncation"), found);
-    if (tone.clipped_share > 0 && records.jitter_s == 0) {
+    // Most of a tone that a resonance lifts is clipped: what is left does not tell its amplitude.
+    if (tone.clipped_share > 0 && records.jitter_s == 0 &&
+        !records.response.resonance_significant) {
       test_clipped_tone(request, records, tone, fit.state.gain[tone.axis], found);
     }
   }
@@ -175,11 +179,14 @@ void test_tones(const Request& request, const Records& records, const Fit& fit,
   }
 }
 
-void test_noise(const Response& response, const Fit& fit, bool truncated, Findings& found) {
+void test_noise(const Request& request, const Response& response, const Fit& fit, bool truncated,
+                Findings& found) {
   constexpr double kReach = 0.13;  // the nominal noise within 10 %, the error of its estimate added
   constexpr double kAtLimit_sd = 6, kPerShare_sd = 20;  // alarm
   for (std::size_t a = 0; a < 3; ++a) {
-    const double ratio = response.white_mg[a] / kNominalNoise_mg[a];
+    const double nominal_mg =
+        kNominalNoise_mg[a] * std::sqrt(request.bundle.rate_hz / kNominalNoiseAt_hz);
+    const double ratio = response.white_mg[a] / nominal_mg;
     // Noise may arise before or behind the gain.
     const double gain = fit.state.gain[static_cast<Eigen::Index>(a)];
     const double low = (1 - kReach) * std::min(1.0, gain);
@@ -188,7 +195,8 @@ void test_noise(const Response& response, const Fit& fit, bool truncated, Findin
     if ((ratio < low && !truncated) || ratio > high) {
       found.alarm(
           kAtLimit_sd + kPerShare_sd * std::max(low - ratio, ratio - high),
-          fmt::format("spectrum: noise of axis {} is {:.2f} times the nominal", "XYZ"[a], ratio));
+          fmt::format("spectrum: noise of axis {} is {:.2f} times the nominal", "XYZ"[a], ratio),
+          noise_places(request, static_cast<int>(a)));
     }
   }
 }
@@ -215,11 +223,11 @@ Findings judge_left_over(const Request& request, const Records& records,
     return slow_variance_mg2(fit, before, seconds, request.bundle.rate_hz);
   };
   test_means(request, explanation, truncated, found);
-  test_spectrum(records, explanation, before, found);
+  test_spectrum(request, records, explanation, before, found);
   // Slow noise adds to the response to a move over three seconds, to a dwell's variance over seven.
   test_settling(records, slow_mg2(3), before.accepted("settling"), found);
   test_tones(request, records, fit, before, found);
-  test_noise(records.response, fit, truncated, found);
+  test_noise(request, records.response, fit, truncated, found);
   found.append(judge_codes(request, records, slow_mg2(7), before));
   found.append(judge_texture(request, records, before));
   return found;

@@ -160,6 +160,7 @@ double judge_changes(const Explanation& explanation, Findings& found) {
   for (const Inconstancy& change : explanation.inconstancies()) {
     const double nats = change.nats + kLogPriorUnknown;
     most = std::max(most, nats);
+    found.suspect(nats);
     if (nats > kUnknownWins_nats) {
       found.alarm(other_wins_sd(change.nats),
                   fmt::format("mean: {} changes with {}", change.term, change.factor));
@@ -175,6 +176,7 @@ double other_causes(const Explanation& explanation, const EffectFinding& f, doub
       changing, kUnknownWins_nats - kPaysForChange * std::max(0.0, f.nats - kCertain_nats));
   if (f.name != "drift" && f.name != "warm_up") {
     const double grows = explanation.changing_nats(f.name) + kLogPriorUnknown;
+    found.suspect(grows);
     if (grows > kUnknownWins_nats) {
       found.alarm(other_wins_sd(grows),
                   fmt::format("mean: {} that changes while the recording runs", f.name));
@@ -233,6 +235,7 @@ void judge_scatter(const Request& request, const Explanation& explanation, const
                                         : slow_structure(explanation.model().blocks(), fit, slow,
                                                          explanation.model().options().lsb_mg);
     f.other_nats = std::max(explanation.unknown_nats(), structure.other_nats);
+    found.suspect(f.other_nats);
     const double other_size = other_size_nats(slow, kind, size) + kLogPriorUnknown;
     // Even odds are enough for another cause: then neither is named.
     if (other_size > std::max(0.0, f.other_nats)) {
@@ -301,6 +304,7 @@ Findings judge_means(const Request& request, const Explanation& explanation, con
   // Nothing separates it from an offset of half an LSB: what is known is the prior.
   found.add(request,
             {.name = "rounding_floor", .nats = kLogPriorEffect, .confounded_with = {"offset"}});
+  found.accept_among_many(before.effects.size());
   const std::map<std::string, double> gap_mg2 = explanation.gap_mg2();
   for (auto* list : {&found.effects, &found.candidates}) {
     for (EffectFinding& f : *list) {

@@ -82,6 +82,14 @@ void judge_resonance(const Request& request, const Response& response,
        .gap_mg2 = gap_mg2});
 }
 
+std::vector<double> frequencies_of(const Lines& lines) {
+  std::vector<double> frequencies_hz;
+  for (const SpectralLine& line : lines.list) {
+    frequencies_hz.push_back(line.frequency_hz);
+  }
+  return frequencies_hz;
+}
+
 }  // namespace
 
 Lines judge_lines(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise,
@@ -144,9 +152,7 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
 ResponseStep judge_response(const Request& request, const NoiseSpectrum& noise,
                             const std::vector<ToneFit>& tones, const Lines& lines) {
   ResponseOptions options;
-  for (const SpectralLine& line : lines.list) {
-    options.lines_hz.push_back(line.frequency_hz);
-  }
+  options.lines_hz = frequencies_of(lines);
   options.allow_low_pass = request.allowed("bandwidth");
   options.allow_resonance = request.allowed("soft_mount");
   const std::vector<ToneFit> whole = whole_tones(tones);
@@ -171,7 +177,8 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   // Mean square of a decaying sine over a dwell; share of the dwells that ring: a convention.
   constexpr double kDwell_s = 10, kRingingShare = 0.6;
   Settling settling;
-  settling.step = step_response(request.bundle, clean, noise, lines.power_mg2);
+  const std::vector<double> lines_hz = frequencies_of(lines);
+  settling.step = step_response(request.bundle, clean, noise, lines_hz);
   const StepResponse& step = settling.step;
   if (!step.usable) {
     return settling;
@@ -184,7 +191,7 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
                           kLogPriorEffect};
   const bool significant = f.nats > kAccept_nats;
   if (significant) {
-    f.held_out_gain_nats = held_out_step_nats(request.bundle, clean, noise, lines.power_mg2);
+    f.held_out_gain_nats = held_out_step_nats(request.bundle, clean, noise, lines_hz);
   }
   f.parameters = {
       {"amplitude", {step.amplitude}, {std::hypot(sd, kFormShare * step.amplitude)}},

@@ -129,16 +129,19 @@ Findings judge_texture(const Request& request, const Records& records, const Fin
   // once in ten thousand bundles.
   constexpr double kExactAlarm_sd = 4.5;
   constexpr double kExact = kAlarm_sd - kExactAlarm_sd;
+  const std::vector<UnknownPlace> everywhere = noise_places(request);
   for (const Texture::Scale& scale : noise_texture(request.bundle, records.clean).scales) {
     const std::string noise =
         scale.samples == 0
             ? "the fast noise"
             : fmt::format("the noise within {:.2g} s",
                           2 * static_cast<double>(scale.samples) / request.bundle.rate_hz);
-    found.test(std::abs(scale.tails_sd) + kExact, fmt::format("codes: {} is not Gaussian", noise));
+    found.test(std::abs(scale.tails_sd) + kExact, fmt::format("codes: {} is not Gaussian", noise),
+               everywhere);
     found.test(scale.dwells_sd + kExact,
-               fmt::format("codes: {} changes from dwell to dwell", noise));
-    found.test(scale.moments_sd + kExact, fmt::format("codes: {} comes and goes", noise));
+               fmt::format("codes: {} changes from dwell to dwell", noise), everywhere);
+    found.test(scale.moments_sd + kExact, fmt::format("codes: {} comes and goes", noise),
+               everywhere);
     found.test(scale.loudest_sd + kExact,
                fmt::format("codes: {} is loud for a moment (segment {})", noise,
                            request.bundle.segments[scale.loudest_segment].name));
@@ -159,13 +162,15 @@ constexpr double kCodesChance_sd = 0.5;  // what small effects of the catalogue 
 constexpr double kKurtosisChance_sd = 1;
 
 // Equal tests of single codes: parity and outliers.
-void judge_single_codes(const CodeStatistics& codes, bool truncated, Findings& found) {
+void judge_single_codes(const Request& request, const CodeStatistics& codes, bool truncated,
+                        Findings& found) {
   for (std::size_t a = 0; a < 3; ++a) {
     const double off = std::abs(codes.odd_share[a] - 0.5);
     if (off > (truncated ? kParityShareTruncated : kParityShare) &&
         off > kParity_sd * codes.parity_sd[a]) {
       found.alarm(kParityAlarm_sd,
-                  fmt::format("codes: odd and even values of axis {} are not alike", "XYZ"[a]));
+                  fmt::format("codes: odd and even values of axis {} are not alike", "XYZ"[a]),
+                  noise_places(request, static_cast<int>(a)));
     }
   }
   if (codes.outliers >= kFewOutliers) {
@@ -185,10 +190,11 @@ Findings judge_codes(const Request& request, const Records& records, double slow
   if (codes.samples == 0) {
     return found;
   }
+  const std::vector<UnknownPlace> everywhere = noise_places(request);
   const bool line = !records.lines.list.empty();
   const bool truncated = before.accepted("truncation");
   const bool coloured = records.response.low_pass_significant;
-  judge_single_codes(codes, truncated, found);
+  judge_single_codes(request, codes, truncated, found);
   // What slow noise adds to the variance of a dwell is random: relative variance of that variance.
   const double white =
       *std::min_element(records.noise.white_mg.begin(), records.noise.white_mg.end());
@@ -201,21 +207,23 @@ Findings judge_codes(const Request& request, const Records& records, double slow
             : 0;
     found.test(spread - kCodesChance_sd,
                fmt::format("codes: the noise changes from dwell to dwell (worst: {})",
-                           request.bundle.segments[codes.worst_segment].name));
+                           request.bundle.segments[codes.worst_segment].name),
+               everywhere);
     found.test(codes.kurtosis_sd / (1 + wider) - kKurtosisChance_sd,
-               "codes: the noise is not Gaussian");
+               "codes: the noise is not Gaussian", everywhere);
     found.test(
         std::abs(codes.code_sd) / (1 + wider) - kCodesChance_sd,
         fmt::format("codes: axis {} has the value {} {} often than its neighbours let expect",
-                    "XYZ"[codes.code_axis], codes.code, codes.code_sd < 0 ? "less" : "more"));
+                    "XYZ"[codes.code_axis], codes.code, codes.code_sd < 0 ? "less" : "more"),
+        noise_places(request, static_cast<int>(codes.code_axis)));
   }
   if (!line) {
     found.test(std::abs(codes.cross_correlation_sd) / std::sqrt(1 + wider) - kCodesChance_sd,
-               "codes: the noise of two axes goes together");
+               "codes: the noise of two axes goes together", everywhere);
   }
   if (!coloured && !before.accepted("duplicated_samples") && !line) {
     found.test(codes.repeats_excess_sd - kCodesChance_sd,
-               "codes: values repeat more often than chance");
+               "codes: values repeat more often than chance", everywhere);
   }
   return found;
 }

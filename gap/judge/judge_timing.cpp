@@ -77,12 +77,13 @@ ToneClock tone_clock(const std::vector<ToneFit>& tones) {
   return clock;
 }
 
-ToneOptions tone_options(const NoiseSpectrum& noise, const HostTiming& host) {
+ToneOptions tone_options(const NoiseSpectrum& noise, const HostTiming& host, const Lines& lines) {
   // A rate that is neither significant nor known well is better left out.
   constexpr double kSignificant_sd = 5;
   constexpr double kKnown_ppm = 20;
   constexpr double kLeastNoise_mg = 0.5;
   ToneOptions options;
+  options.lines = lines.list;
   for (std::size_t a = 0; a < 3; ++a) {
     options.noise_mg[a] = std::max(kLeastNoise_mg, noise.white_mg[a]);
   }
@@ -261,10 +262,11 @@ void judge_jitter(const Request& request, const NoiseSpectrum& noise, Timing& ti
 
 double clock_ppm_of(const ToneFit& tone) { return 1e6 * (1 / (1 + 1e-6 * tone.frequency_ppm) - 1); }
 
-Timing judge_timing(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise) {
+Timing judge_timing(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise,
+                    const Lines& lines) {
   Timing timing;
   timing.host = host_timing(request.bundle);
-  timing.tones = fit_tones(request.bundle, clean, tone_options(noise, timing.host));
+  timing.tones = fit_tones(request.bundle, clean, tone_options(noise, timing.host, lines));
   const ToneClock by_tones = tone_clock(timing.tones);
   judge_clock(request, timing.host, timing.tones, by_tones, timing.found);
   judge_slips(request, timing.host, by_tones, timing.found);

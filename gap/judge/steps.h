@@ -45,15 +45,6 @@ struct PoseCheck {
 };
 PoseCheck judge_poses(const Bundle& bundle, const CleanSamples& clean);
 
-// judge_timing.cpp
-struct Timing {
-  HostTiming host;
-  std::vector<ToneFit> tones;  // one per vibration segment; amplitudes free of jitter
-  double jitter_s = 0;         // accepted; 0: none
-  Findings found;
-};
-Timing judge_timing(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise);
-
 // judge_records.cpp
 struct Lines {
   std::vector<SpectralLine> list;
@@ -62,6 +53,19 @@ struct Lines {
 };
 Lines judge_lines(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise,
                   const CodeStatistics& codes);
+
+// judge_timing.cpp
+struct Timing {
+  HostTiming host;
+  std::vector<ToneFit> tones;  // one per vibration segment; amplitudes free of jitter
+  double jitter_s = 0;         // accepted; 0: none
+  Findings found;
+};
+// `lines` go through the tones, too.
+Timing judge_timing(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise,
+                    const Lines& lines = {});
+
+// judge_records.cpp
 struct ResponseStep {
   Response response;
   Findings found;
@@ -126,6 +130,10 @@ struct Residuals {
 };
 Residuals locate_residuals(const Request& request, const Records& records,
                            const Explanation& explanation, const Findings& found);
+// Axes and segments in which the named effects leave something, worst first; then those that the
+// alarms are about.
+std::vector<UnknownPlace> locate_unknown(const Request& request, const Records& records,
+                                         const Explanation& explanation, const Findings& found);
 Plots make_plots(const Request& request, const Records& records, const Fit& best,
                  const Findings& found);
 

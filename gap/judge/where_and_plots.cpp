@@ -32,6 +32,53 @@ struct Cell {
   std::string factor;
 };
 
+// What is more than chance in one axis of one segment.
+struct Excess {
+  double square = 0;  // sum of squares, in variances
+  double n = 0;
+  std::string factor;
+
+  // Detection index of what is there beyond noise, once it is 3 and its chance is below a
+  // thousandth (a chi-square exceeds n by 3 of its standard deviations); else 0. `known`: relative
+  // uncertainty of the noise's variance.
+  double index(double known) const {
+    constexpr double kShown = 9, kBeyondChance_sd = 3;
+    const double more = square - n;
+    return more > std::max(kShown, kBeyondChance_sd * std::sqrt(2 * n) + known * n)
+               ? std::sqrt(more)
+               : 0;
+  }
+};
+using Excesses = std::map<std::pair<int, std::string>, Excess>;
+
+// Of the noise within pieces of one second.
+Excesses noise_excesses(const Request& request, const Records& records) {
+  Excesses cells;
+  const CleanSamples& clean = records.clean;
+  const auto second = static_cast<std::size_t>(request.bundle.rate_hz);
+  for (const Segment& segment : request.bundle.segments) {
+    const std::size_t end = segment.first_sample + segment.samples;
+    std::size_t first = segment.first_sample + segment.quiet_start(request.bundle.rate_hz);
+    for (; segment.at_rest() && second > 1 && first + second <= end; first += second) {
+      if (clean.count_usable(first, second) < second) {
+        continue;
+      }
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double mean_mg = clean.mean_mg(first, second, a);
+        double square_mg2 = 0;
+        for (std::size_t i = first; i < first + second; ++i) {
+          square_mg2 += std::pow(clean.value_mg(i, a) - mean_mg, 2);
+        }
+        Excess& cell = cells[{static_cast<int>(a), segment.name}];
+        cell.square += square_mg2 / std::max(1e-9, std::pow(records.noise.white_mg[a], 2));
+        cell.n += static_cast<double>(second - 1);
+        cell.factor = "noise";
+      }
+    }
+  }
+  return cells;
+}
+
 // Overlapping estimate over means of one second (IEEE 1139-2008). `sum`: their running sums.
 double allan_variance(const std::vector<double>& sum, std::size_t seconds) {
   double square = 0;
@@ -139,6 +186,58 @@ Residuals locate_residuals(const Request& request, const Records& records,
             [](const Location& a, const Location& b) { return a.sigma > b.sigma; });
   out.where.resize(std::min(kMostPlaces, out.where.size()));
   return out;
+}
+
+std::vector<UnknownPlace> locate_unknown(const Request& request, const Records& records,
+                                         const Explanation& explanation, const Findings& found) {
+  constexpr double kNoiseKnown = 0.02;  // its spectrum bends a little
+  std::set<std::string> named;
+  for (const EffectFinding& effect : found.effects) {
+    named.insert(effect.name);
+  }
+  Excesses means;
+  const std::vector<double> left = explanation.left_over_sigma(named);
+  for (int row = 0; row < explanation.model().rows(); ++row) {
+    const Block& block = explanation.model().block_of_row(row);
+    const Segment& segment = request.bundle.segments[block.segment];
+    const int feature = explanation.model().feature_of_row(row);
+    Excess& cell = means[{feature < kSecondHarmonic ? feature % 3 : block.axis, segment.name}];
+    cell.square += std::pow(left[static_cast<std::size_t>(row)], 2);
+    cell.n += 1;
+    cell.factor = factor_of(block, segment, request.bundle.rate_hz);
+  }
+  std::map<std::pair<int, std::string>, std::pair<double, std::string>> worst;
+  const auto add = [&](const Excesses& cells, double known) {
+    for (const auto& [place, cell] : cells) {
+      if (const double index = cell.index(known); index > worst[place].first) {
+        worst[place] = {index, cell.factor};
+      }
+    }
+  };
+  add(means, 0);
+  add(noise_excesses(request, records), kNoiseKnown);
+  std::vector<std::pair<double, UnknownPlace>> sorted;
+  for (const auto& [place, most] : worst) {
+    if (most.first > 0) {
+      sorted.push_back({most.first, {place.first, place.second, most.second}});
+    }
+  }
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<UnknownPlace> places;
+  for (auto& [index, place] : sorted) {
+    places.push_back(std::move(place));
+  }
+  for (const Alarm& alarm : found.alarms) {
+    for (const UnknownPlace& place : alarm.places) {
+      if (std::none_of(places.begin(), places.end(), [&](const UnknownPlace& have) {
+            return have.axis == place.axis && have.segment == place.segment;
+          })) {
+        places.push_back(place);
+      }
+    }
+  }
+  return places;
 }
 
 Plots make_plots(const Request& request, const Records& records, const Fit& best,

@@ -71,8 +71,8 @@ std::string report_html(const Diagnosis& d) {
       "body{max-width:1000px}figure{display:inline-block;width:460px;margin:.5em .5em 0 0}"
       ".bar{background:#b5442e;height:1em}");
   out += fmt::format("<p class=\"say\">{}</p>", html_escaped(d.brief()));
-  for (const std::string& where : d.unknown.where) {
-    out += fmt::format("<p>Not explained: {}</p>", html_escaped(where));
+  for (const std::string& why : d.unknown.why) {
+    out += fmt::format("<p>Not explained: {}</p>", html_escaped(why));
   }
   for (const std::string& loss : d.losses) {
     out += fmt::format("<p>Note: {}</p>", html_escaped(loss));

@@ -108,9 +108,9 @@ class Sheet {
       y += 16;
       text(kMargin, y, 11, "none");
     }
-    for (std::size_t i = 0; i < std::min<std::size_t>(3, d_.unknown.where.size()); ++i) {
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, d_.unknown.why.size()); ++i) {
       y += 15;
-      text(kMargin, y, 10, wrapped("not explained: " + d_.unknown.where[i], 62, 1).front(),
+      text(kMargin, y, 10, wrapped("not explained: " + d_.unknown.why[i], 62, 1).front(),
            "fill=\"#b5442e\"");
     }
     return y;

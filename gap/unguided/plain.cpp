@@ -171,7 +171,7 @@ void find_far_length(const Means& means, Diagnosis& out) {
     }
   }
   if (farthest_sigma > kFar_sigma) {
-    out.unknown.where.push_back(
+    out.unknown.why.push_back(
         fmt::format("mean: a length at rest of {:.3f} g is {:.1f} standard deviations from what "
                     "units read; more sides would say why",
                     length_g, farthest_sigma));
@@ -210,7 +210,7 @@ void judge_lengths(const Means& means, const RecordingRests& recording,
         {"offset_g", {e[3], e[4], e[5]}, {kGainStated_sd, kGainStated_sd, kGainStated_sd}});
     add(out, std::move(finding));
   } else if (gain_nats > kSurely_nats) {
-    out.unknown.where.push_back("mean: lengths at rest are far from 1 g");
+    out.unknown.why.push_back("mean: lengths at rest are far from 1 g");
   }
   const bool mismatch = allowed && nats > kAccept_nats;
   const LengthModel& model = mismatch ? other : nominal;
@@ -219,9 +219,9 @@ void judge_lengths(const Means& means, const RecordingRests& recording,
     find_far_length(means, out);
   }
   if (out.gap.after_mg > kNeitherMode_mg) {
-    out.unknown.where.push_back("mean: lengths at rest fit neither acquisition mode");
+    out.unknown.why.push_back("mean: lengths at rest fit neither acquisition mode");
   }
-  out.unknown.present = !out.unknown.where.empty();
+  out.unknown.present = !out.unknown.why.empty();
   for (int a = 0; a < 3; ++a) {
     out.where.push_back({a, "still periods", "pose", 1000 * std::abs(model.estimate[3 + a]), 0});
   }

@@ -246,14 +246,14 @@ void judge(const Fits& fits, const std::vector<RestingReading>& rests,
   if (explained) {
     out.effects = out.candidates;
   } else if (fits.accepted()) {
-    out.unknown.where.emplace_back("mean: lengths at rest depend on pairs of axes");
+    out.unknown.why.emplace_back("mean: lengths at rest depend on pairs of axes");
   }
   const double floor_mg = 1000 * noise_g(rests, fits.cross);
   out.gap = gap_of(fits, explained, floor_mg);
   if (out.gap.after_mg > kLost_mg) {
-    out.unknown.where.emplace_back("mean: lengths at rest fit no linear sensor");
+    out.unknown.why.emplace_back("mean: lengths at rest fit no linear sensor");
   }
-  out.unknown.present = !out.unknown.where.empty();
+  out.unknown.present = !out.unknown.why.empty();
   out.where = locations_of(fits, floor_mg);
 }
 

@@ -199,6 +199,19 @@ TEST(ScenarioJson, AProtocolsUnitIsDrawnAsTheManualSays) {
   EXPECT_NEAR(std::sqrt(offset2), 0.035, 0.0035);
 }
 
+// Closed form: of a white density, the variance of a sample is proportional to the rate.
+TEST(ScenarioJson, NoiseOfAProtocolHasOneDensityAtEveryRate) {
+  for (const int rate_hz : {20, 30, 50, 90}) {
+    const auto scenario = parse_scenario(fmt::format(
+        R"({{"rate_hz": {}, "protocol": [{{"first_sample": 0, "samples": 10}}]}})", rate_hz));
+    ASSERT_OK(scenario);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const double density = std::pow(scenario->protocol->noise_mg[axis], 2) / rate_hz;
+      EXPECT_NEAR(density / (std::pow(axis == 2 ? 5.5 : 3.9, 2) / 100), 1, 0.11) << rate_hz;
+    }
+  }
+}
+
 // One number, three, or three rows of three: docs/scenario.md.
 TEST(ScenarioJson, AParameterIsANumberAListOrAMatrix) {
   const auto scenario = parse_scenario(R"({"motions": [{"kind": "still"}], "effects": [

@@ -97,6 +97,47 @@ TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRunOfTheWholeProtocol) {
   EXPECT_GE(engineering["scores"]["single_first_right_observable"]["share"].get<double>(), 0.8);
 }
 
+// The program answers with `tilt` once the bundle has yaws: the gain is all trials.
+TEST_F(GapChallenge, FollowsWhatTheAnswerSuggests) {
+  const std::string path = program(R"(if grep -q '"yaw"' "$3/protocol.json"; then
+  echo '{"verdict": "explained", "effects": [{"name": "tilt", "probability": 0.95}],
+         "candidates": [{"name": "tilt", "probability": 0.95}], "unknown": {"present": false}}'
+else
+  echo '{"verdict": "no_gap", "effects": [], "candidates": [{"name": "tilt", "probability": 0.25}],
+         "unknown": {"present": false}, "next_segments": [
+           {"name": "yaw", "minutes": 6.4, "expected_nats": 0.4, "separates": ["tilt"]},
+           {"name": "shaker", "minutes": 9, "expected_nats": 0.1, "separates": []}]}'
+fi)");
+  const std::vector<std::string> tilts = {"--program", path, "--trials",  "4", "--effects", "tilt",
+                                          "--none",    "0",  "--outside", "0", "--pairs",   "0"};
+  std::vector<std::string> followed = tilts;
+  followed.emplace_back("--follow-suggestion");
+  const auto json = challenge(followed).json();
+  EXPECT_EQ(json["followed"]["trials"], 4);
+  EXPECT_EQ(json["followed"]["minutes"], 6.4);
+  EXPECT_EQ(json["followed"]["named"]["before"]["right"], 0);
+  EXPECT_EQ(json["followed"]["named"]["after"]["right"], 4);
+  EXPECT_NEAR(json["followed"]["probability_gain"]["mean"].get<double>(), 0.7, 1e-9);
+  EXPECT_EQ(json["followed"]["by_segment"][0]["segment"], "yaw");
+  EXPECT_EQ(json["scores"]["single_first_right"]["right"], 0) << "the trials as they were";
+  EXPECT_FALSE(challenge(tilts).json().contains("followed"));
+  followed.emplace_back("--strip");
+  EXPECT_EQ(challenge(followed).exit_code, 64);
+}
+
+// With the real diagnosis: more is named, and nothing that is not there.
+TEST_F(GapChallenge, WhatTheDiagnosisSuggestsHelps) {
+  const auto answer =
+      challenge({"--program", SIXPOINT_BINARY_DIR "/sixpoint", "--trials", "6", "--realistic", "1",
+                 "--none", "0", "--outside", "0", "--pairs", "0", "--follow-suggestion"});
+  ASSERT_EQ(answer.exit_code, 0) << answer.people;
+  const auto followed = answer.json()["followed"];
+  EXPECT_EQ(followed["trials"], 6) << "three minutes leave much open";
+  EXPECT_GT(followed["expected_nats"].get<double>(), 0);
+  EXPECT_GE(followed["named"]["after"]["right"].get<int>(),
+            followed["named"]["before"]["right"].get<int>());
+}
+
 // Semi-synthetic: the effect is added to what was recorded, whose own effects count for nothing.
 TEST_F(GapChallenge, AddsEffectsToARecording) {
   std::ofstream(folder_ / "unit.json")

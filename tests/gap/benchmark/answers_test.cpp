@@ -53,13 +53,12 @@ TEST_F(Answers, WhereAndCandidatesComeBackAsWritten) {
   EXPECT_TRUE(again->front().unknown);
 }
 
-// A document of gap diagnose says where in words, and has places of its own.
-TEST_F(Answers, PlacesOfADiagnosisFromThreeSigmaOn) {
+// Of a document of gap diagnose the places of the unknown count, not those of the whole gap.
+TEST_F(Answers, PlacesOfTheUnknownOfADiagnosis) {
   const auto text = nlohmann::ordered_json::parse(
       R"({"effects": [], "unknown": {"present": true, "probability": 0.9, "where":
-          ["it changes"]}, "where": [{"axis": "X", "segment": "faces", "sigma": 3.5},
-          {"axis": "Y", "segment": "faces", "sigma": 2.5}, {"axis": "Z", "segment": "still",
-          "sigma": null}]})");
+          [{"axis": "X", "segment": "faces", "factor": "pose"}], "why": ["it changes"]},
+          "where": [{"axis": "Y", "segment": "faces", "sigma": 9.5}]})");
   const auto answer = parse_answer(text, "b1", "test");
   ASSERT_OK(answer);
   EXPECT_EQ(answer->where, (std::set<Place>{{0, "faces"}}));
@@ -89,6 +88,7 @@ TEST_F(Answers, HostileAnswersAreErrorsWithTheirLine) {
       line("[]", R"("unknown": true)"),
       line("[]", R"("unknown": {"present": true, "probability": 1, "where": [{"axis": "W"}]})"),
       line("[]", R"("unknown": {"present": true, "probability": 1, "where": 3})"),
+      line("[]", R"("unknown": {"present": true, "probability": 1, "where": ["in words"]})"),
       line("[]") + line("[]"),
       line("[" + std::string(100'000, '[')),
   };

@@ -21,6 +21,20 @@ TEST(Settling, FrequencyDecayAndShare) {
   EXPECT_GT(step.gain_nats, 100);
 }
 
+// A line of 8 mg whose phase at each move happens to be alike looks like ringing; its frequency is
+// known, and the rest of each dwell holds it without the moves.
+TEST(Settling, ALineIsNoRinging) {
+  const Bundle bundle = tests::made_production({}, [](const Segment& s, double t) {
+    return Eigen::Vector3d(s.rotation.col(2) + 0.008 * std::cos(2 * M_PI * 7.3 * t) * s.approach_g);
+  });
+  const CleanSamples clean = clean_samples(bundle);
+  const NoiseSpectrum noise = noise_spectrum(bundle, clean);
+  EXPECT_GT(step_response(bundle, clean, noise).gain_nats, 100);
+  const StepResponse step = step_response(bundle, clean, noise, {7.3});
+  ASSERT_TRUE(step.usable);
+  EXPECT_LT(step.gain_nats, 12) << "the largest of some hundred frequencies and decays";
+}
+
 TEST(Settling, NotUsableWithoutSteps) {
   Bundle bundle = tests::made_production({});
   for (Segment& segment : bundle.segments) {

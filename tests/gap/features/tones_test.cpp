@@ -51,6 +51,23 @@ TEST(Tones, AmplitudeAndSlips) {
   }
 }
 
+// A line of A at a distance of d Hz adds A sinc(d T) to a tone of T seconds, in any phase.
+TEST(Tones, LinesNearbyMakeAmplitudesUncertain) {
+  const Bundle bundle = one_tone(10, 0.6, [](std::size_t) { return 0; });
+  SpectralLine line;
+  line.frequency_hz = 10.05;
+  line.vector_mg = {0, 2, 4};
+  const auto fit = fit_tones(bundle, clean_samples(bundle), {.lines = {line}}).front();
+  const double turns = M_PI * 0.05 * static_cast<double>(fit.samples) / 100;
+  const double share = std::sin(turns) / turns;
+  EXPECT_NEAR(fit.line_mg2[0][2], 16 * share * share / 2, 0.01);
+  EXPECT_NEAR(fit.line_mg2[0][1], 4 * share * share / 2, 0.01);
+  EXPECT_LT(fit.line_mg2[1][2], 0.01) << "10 Hz off the second harmonic";
+  const auto without = fit_tones(bundle, clean_samples(bundle), {}).front();
+  EXPECT_EQ(without.line_mg2[0][2], 0);
+  EXPECT_GT(fit.frequency_sd_ppm, 5 * without.frequency_sd_ppm);
+}
+
 TEST(Tones, JitterShowsOnSlopes) {
   std::mt19937_64 random(9);
   std::normal_distribution<double> normal(0, 0.05);  // 0.5 ms

@@ -79,7 +79,7 @@ TEST(Diagnosis, BriefSaysWhatWasFoundAndHowMuchIsLeft) {
   d.effects.push_back(named("drift"));
   EXPECT_THAT(d.brief(), StartsWith("tilt (or misalignment, seating) and drift explain the gap:"));
   d.verdict = gap::Verdict::partly_explained;
-  d.unknown.where = {"mean: the zero moves", "codes"};
+  d.unknown.why = {"mean: the zero moves", "codes"};
   EXPECT_THAT(d.brief(), AllOf(HasSubstr("a part of the gap"), EndsWith("mean: the zero moves")));
   d.verdict = gap::Verdict::unexplained;
   EXPECT_THAT(d.brief(), AllOf(HasSubstr("nothing in the catalogue"), Not(HasSubstr("tilt")),
@@ -125,6 +125,8 @@ TEST(Diagnosis, DocumentHoldsNumbersInTheirShape) {
   d.gap.after_interval_mg = {0.25, 0.5};
   d.gap.by_feature[3] = {7, 2};
   d.where = {{2, "soak", "temperature", 1.5, 9}};
+  d.unknown.where = {{1, "ramp_up", "temperature"}};
+  d.unknown.why = {"mean: the zero moves"};
   d.not_observable = {{"wrap", "shaker_full_scale"}};
   const Json json = d.to_json();
   const Json& found = json["candidates"][0];
@@ -139,6 +141,9 @@ TEST(Diagnosis, DocumentHoldsNumbersInTheirShape) {
   EXPECT_EQ(json["gap"]["by_feature"]["codes"]["after_sigma"], 2);
   EXPECT_EQ(json["where"][0]["axis"], "Z");
   EXPECT_EQ(json["where"][0]["segment"], "soak");
+  EXPECT_EQ(json["unknown"]["where"],
+            Json::parse(R"([{"axis": "Y", "segment": "ramp_up", "factor": "temperature"}])"));
+  EXPECT_EQ(json["unknown"]["why"], Json::array({"mean: the zero moves"}));
   EXPECT_EQ(json["not_observable"][0]["needs_segment"], "shaker_full_scale");
   EXPECT_TRUE(json["effects"].empty());
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "expect_result.h"
 #include "gap/judge/made_step.h"
 
 namespace sixpoint::gap {
@@ -29,6 +30,43 @@ TEST(MakePlots, AllanDeviationOfWhiteNoise) {
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(plots.allan_mg[1][i] / (noise_mg / std::sqrt(100 * plots.allan_s[i])), 1, 0.15);
   }
+}
+
+bool is_there(const std::vector<UnknownPlace>& places, int axis, const std::string& segment) {
+  return std::any_of(places.begin(), places.end(), [&](const UnknownPlace& place) {
+    return place.axis == axis && place.segment == segment;
+  });
+}
+
+// The zero of z moves by 8 mg between two runs of segments: z shows it, x and y do not.
+TEST(LocateUnknown, AZeroThatMovesIsOnItsAxis) {
+  const Bundle bundle = tests::made_production({}, [](const Segment& s, double) {
+    return Eigen::Vector3d(s.rotation.col(2) +
+                           Eigen::Vector3d(0, 0, s.name == "reseat" ? 0.008 : 0));
+  });
+  const auto diagnosis = diagnose(bundle);
+  ASSERT_OK(diagnosis);
+  ASSERT_TRUE(diagnosis->unknown.present);
+  EXPECT_TRUE(is_there(diagnosis->unknown.where, 2, "reseat"));
+  EXPECT_FALSE(is_there(diagnosis->unknown.where, 0, "reseat"));
+  EXPECT_FALSE(is_there(diagnosis->unknown.where, 1, "faces"));
+}
+
+// Noise of y half as loud again in one run of segments.
+TEST(LocateUnknown, LouderNoiseIsWhereItIsLoud) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal(0, 0.0045);
+  const Bundle bundle = tests::made_production({}, [&](const Segment& s, double) {
+    return Eigen::Vector3d(s.rotation.col(2) +
+                           Eigen::Vector3d(0, s.name == "reseat" ? normal(random) : 0, 0));
+  });
+  const auto diagnosis = diagnose(bundle);
+  ASSERT_OK(diagnosis);
+  ASSERT_TRUE(diagnosis->unknown.present);
+  ASSERT_FALSE(diagnosis->unknown.where.empty());
+  EXPECT_EQ(diagnosis->unknown.where.front().axis, 1);
+  EXPECT_EQ(diagnosis->unknown.where.front().segment, "reseat");
+  EXPECT_EQ(diagnosis->unknown.where.front().factor, "noise");
 }
 
 }  // namespace

@@ -267,7 +267,7 @@ TEST_F(HeaderAndProtocol, AWrongScaleThatBothSayIsAnUnknown) {
   ASSERT_OK(diagnosis);
   EXPECT_TRUE(diagnosis->effects.empty());
   ASSERT_TRUE(diagnosis->unknown.present);
-  EXPECT_EQ(diagnosis->unknown.where.front().find("scale"), 0U);
+  EXPECT_EQ(diagnosis->unknown.why.front().find("scale"), 0U);
   // A true mismatch of a unit of 341 stays what it is: its zeros give it away.
   expect_mismatch(341, 341, 341);
 }
@@ -327,7 +327,7 @@ TEST_F(HeaderAndProtocol, AProtocolOfAnotherRecordingNamesNothing) {
     EXPECT_TRUE(diagnosis->effects.empty()) << diagnosis->effects.front().name;
     EXPECT_EQ(diagnosis->inconclusive, inconclusive);
     ASSERT_TRUE(diagnosis->unknown.present);
-    const auto& where = diagnosis->unknown.where;
+    const auto& where = diagnosis->unknown.why;
     EXPECT_TRUE(std::any_of(where.begin(), where.end(), [&](const std::string& at) {
       return at.find(why) != std::string::npos;
     })) << where.front();
