@@ -19,12 +19,13 @@ constexpr double kNoiseSigmas = 5;  // see StillBlockOptions::noisy_sd_g
 Result<StillBlockFinder> StillBlockFinder::make(const Reversal& reversal, double rate_hz,
                                                 const StillBlockOptions& options) {
   if (!(rate_hz >= 5 && rate_hz <= 1000)) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("still periods are searched at 5 to 1000 samples a second, not at {:g}",
-                            rate_hz),
-                "still blocks",
-                "what it holds can be exported; where info.txt names a wrong rate, download the "
-                "recording from the unit again");
+    return fail(
+        ErrorCode::bad_data,
+        fmt::format("still periods are searched at sample rates of 5 to 1000 Hz, not at {:g} Hz",
+                    rate_hz),
+        "still blocks",
+        "what it holds can be exported; where info.txt names a wrong rate, download the "
+        "recording from the unit again");
   }
   if (!(options.block_s >= 1 && options.block_s <= 60) || !(options.step_s > 0) ||
       !(options.max_slope_g_per_sample > 0) || !(options.max_residual_g > 0) ||

@@ -22,7 +22,7 @@ namespace sixpoint::gt3x {
 class ReadAhead final : public ByteSource {
  public:
   static constexpr std::size_t kPieces = 4;
-  static constexpr std::size_t kPieceSize = std::size_t{512} * 1024;
+  static constexpr std::size_t kPieceSize = std::size_t{256} * 1024;
 
   explicit ReadAhead(std::unique_ptr<ByteSource> source) : source_(std::move(source)) {}
   ReadAhead(const ReadAhead&) = delete;

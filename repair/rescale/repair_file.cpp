@@ -135,7 +135,9 @@ class Repair {
     Repair head(env_, report_.input, output_, source_, options_);
     SIXPOINT_ASSIGN(head.survey_, survey_beginning(recording, options_.still, kBeginning_samples));
     head.survey_.log_bytes = entry->size;
-    if (!head.foresee()) {
+    const bool windows_wait =
+        options_.still.block_s * head.survey_.rate_hz <= double{WindowError::kLongestWindow};
+    if (!windows_wait || !head.foresee()) {
       return another_way;
     }
     SIXPOINT_ASSIGN(head.report_.input_sha256, file_sha256(env_.files, report_.input));

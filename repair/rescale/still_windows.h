@@ -29,8 +29,8 @@ struct StillWindow {
 
 class WindowError {
  public:
-  // No still block is longer (60 s at 1000 Hz).
-  static constexpr std::size_t kLongestWindow = std::size_t{1} << 16;
+  // Twice a still block of the paper (4 s) at 1000 Hz.
+  static constexpr std::size_t kLongestWindow = std::size_t{1} << 13;
 
   explicit WindowError(double accel_scale_lsb_per_g)
       : accel_scale_lsb_per_g_(accel_scale_lsb_per_g) {}
