@@ -211,7 +211,9 @@ class CodeSums {
     if (pairs_ > 0) {
       codes_.repeats_excess_sd = (repeats_ - repeats_far_) / std::sqrt(repeats_ + repeats_far_ + 1);
     }
-    codes_.kurtosis_sd = fourth_ / fourth_n_ / std::sqrt(24 / fourth_n_);
+    if (fourth_n_ > 0) {
+      codes_.kurtosis_sd = fourth_ / fourth_n_ / std::sqrt(24 / fourth_n_);
+    }
     for (const double c : cross_) {
       const double z = c / std::sqrt(n);
       if (std::abs(z) > std::abs(codes_.cross_correlation_sd)) {
@@ -249,8 +251,10 @@ class CodeSums {
       if (std::abs(z[axis]) > 6 + 0.75 / sd[axis]) {
         ++codes_.outliers;
       }
-      fourth_ += std::pow(z[axis], 4) - 3;
-      fourth_n_ += 1;
+      if (sd[axis] * sd[axis] - 1.0 / 12 > kFreeOfGrid_lsb2) {
+        fourth_ += std::pow(z[axis], 4) - 3;
+        fourth_n_ += 1;
+      }
     }
     cross_[0] += z[1] * z[2];
     cross_[1] += z[0] * z[2];

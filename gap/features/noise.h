@@ -30,6 +30,12 @@ struct NoiseSpectrum {
 };
 NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean);
 
+// Variance of a sample, rounding's own twelfth taken off, below which its distribution shows the
+// grid of counts, LSB^2: of the cumulants of a rounded Gaussian value the grid's share is exp(-2
+// pi^2 x 0.5), a few in 10^5 (Widrow and Kollar 2008, chapter 5). Units at 50 Hz and less are below
+// it on x and y.
+inline constexpr double kFreeOfGrid_lsb2 = 0.5;
+
 // Numbers that should be plain: odd and even values alike, repeats no more often than chance, no
 // value far out, equal noise in every dwell.
 struct CodeStatistics {
@@ -44,7 +50,7 @@ struct CodeStatistics {
   double spread_sd = 0;
   double spread_freedom = 0;
   std::size_t worst_segment = 0;
-  double kurtosis_sd = 0;  // excess kurtosis over its standard deviation
+  double kurtosis_sd = 0;  // excess kurtosis over its standard deviation, of axes free of the grid
   // The code whose count is furthest from what Gaussian noise puts there, all dwells together.
   double code_sd = 0;
   std::size_t code_axis = 0;

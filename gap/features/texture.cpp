@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 
+#include "gap/features/noise.h"
 #include "gap/recording/at_rest.h"
 
 namespace sixpoint::gap {
@@ -14,9 +15,6 @@ namespace {
 constexpr std::array<std::size_t, 7> kStretches = {1, 2, 4, 8, 16, 32, 64};
 constexpr std::size_t kMoment = 128;  // samples
 constexpr std::size_t kLags = 4;
-// Variance of a difference, rounding's own twelfth taken off, below which its distribution shows
-// the grid of counts, LSB^2: the grid's share is then exp(-2 pi^2 2 x 0.25), a few in 10^5.
-constexpr double kFree_lsb2 = 0.25;
 
 // One axis of one dwell (or ten seconds of a long record) at one scale.
 struct Piece {
@@ -40,7 +38,7 @@ struct TextureSums {
 
   double variance(std::size_t axis) const { return n[axis] > 0 ? square[axis] / n[axis] : 0; }
   bool free_of_grid(std::size_t axis) const {
-    return n[axis] > 200 && variance(axis) - 1.0 / 12 > kFree_lsb2;
+    return n[axis] > 200 && variance(axis) - 1.0 / 12 > kFreeOfGrid_lsb2;
   }
   double correlation(std::size_t axis, std::size_t lag) const {
     return square[axis] > 0 ? lagged[axis][lag] / square[axis] : 0;

@@ -19,14 +19,15 @@ TEST(Noise, WhiteLevelIncludesRounding) {
   EXPECT_EQ(codes.outliers, 0U);
 }
 
-// Counts of Gaussian noise of 1.5 LSB about `mean`, one dwell of 10 s per axis alike.
-Bundle counts_about(double mean, const std::function<int(int)>& stored) {
+// Counts of Gaussian noise of `sd` LSB about `mean`, one dwell, the axes alike.
+Bundle counts_about(double mean, const std::function<int(int)>& stored, double sd = 1.5,
+                    std::size_t samples = 1000) {
   Bundle bundle;
   Segment segment;
-  segment.samples = 1000;
+  segment.samples = samples;
   segment.settled = true;
   std::mt19937_64 random(21);
-  std::normal_distribution<double> normal(mean, 1.5);
+  std::normal_distribution<double> normal(mean, sd);
   for (std::size_t n = 0; n < segment.samples; ++n) {
     gt3x::Counts counts;
     for (std::int16_t& x : counts) {
@@ -46,6 +47,19 @@ TEST(Noise, OddAndEvenCodesAreAlikeUnlessABitIsStuck) {
   EXPECT_NEAR(codes.odd_share[0], 0.5, 5 * std::sqrt(0.25 / 1000));
   const Bundle stuck = counts_about(100.3, [](int x) { return x & ~1; });
   EXPECT_EQ(code_statistics(stuck, clean_samples(stuck)).odd_share[1], 0);
+}
+
+// Oracle: the noise is Gaussian before it is rounded. At 0.75 LSB the grid of counts does not show
+// in 100,000 samples; at 0.45 LSB it does, so that the form of the noise cannot be judged.
+TEST(Noise, TheGridOfCountsIsNotTakenForTheNoisesForm) {
+  const auto kurtosis_sd = [](double sd) {
+    const Bundle bundle = counts_about(
+        100.5, [](int x) { return x; }, sd, 100'000);
+    return code_statistics(bundle, clean_samples(bundle)).kurtosis_sd;
+  };
+  EXPECT_NE(kurtosis_sd(0.75), 0);
+  EXPECT_LT(std::abs(kurtosis_sd(0.75)), 4);
+  EXPECT_EQ(kurtosis_sd(0.45), 0);
 }
 
 TEST(Noise, AnOutlierIsCounted) {
