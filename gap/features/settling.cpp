@@ -1,5 +1,6 @@
 #include "gap/features/settling.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
