@@ -224,6 +224,7 @@ class LineFinder {
     if (static_cast<double>(longest_->samples) > kLong_s * rate_hz_) {
       const std::vector<Stretch> cut = pieces(all_, kLong_s * rate_hz_, kPiece_s * rate_hz_);
       std::vector<const Stretch*> set;
+      set.reserve(cut.size());
       for (const Stretch& piece : cut) {
         set.push_back(&piece);
       }
