@@ -128,6 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"AListOfLimits", "[[noise_mg]]\nhigh = 3\n", "l.toml:1", "no table"},
         BadFile{"NoCoverage", "[decision]\ncoverage_factor = 0\n", "l.toml:2", "outside"},
         BadFile{"ShortBaseline", "[check_unit]\nbaseline_runs = 1\n", "l.toml:2", "outside"},
+        BadFile{"AKeyThatIsNone", "[*b", "l.toml:1", "no TOML"},
         BadFile{"NoToml", "\n\n[noise_mg\n", "l.toml:3", "no TOML"},
         BadFile{"Binary", "\x01\x02\x03", "l.toml:1", "no TOML"}),
     [](const auto& one) { return one.param.name; });
