@@ -225,6 +225,7 @@ std::vector<UnknownPlace> locate_unknown(const Request& request, const Records& 
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<UnknownPlace> places;
+  places.reserve(sorted.size());
   for (auto& [index, place] : sorted) {
     places.push_back(std::move(place));
   }
