@@ -42,6 +42,7 @@ std::vector<PlannedPiece> yaws() {
 
 std::vector<PlannedPiece> half_turn() {
   std::vector<PlannedPiece> pieces;
+  pieces.reserve(3);
   for (int axis = 0; axis < 3; ++axis) {
     pieces.push_back({planned_face(axis, 1, std::numbers::pi)});
   }
