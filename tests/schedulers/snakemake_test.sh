@@ -14,17 +14,17 @@ exec "$2" "\$@"
 WRAPPER
 chmod +x "$scratch/once"
 run() {
-  mkdir -p "$scratch/work"
-  snakemake --snakefile "$1/examples/snakemake/Snakefile" --directory "$scratch/work" --cores 3 --keep-going \
+  mkdir -p "$scratch/project"
+  snakemake --snakefile "$1/examples/snakemake/Snakefile" --directory "$scratch/project" --cores 3 --keep-going \
     --config "plan=$data/plan" "output=$data/out" "sixpoint=$scratch/once" >"$scratch/log" 2>&1
 }
 if run "$@"; then
   echo "FAILED: a shard that fails went unseen"
   exit 1
 fi
-[ ! -f "$scratch/work/merge.json" ] || { echo "FAILED: merged without shard 3"; exit 1; }
+[ ! -f "$scratch/project/merge.json" ] || { echo "FAILED: merged without shard 3"; exit 1; }
 run "$@" || { echo "FAILED: the second run"; cat "$scratch/log"; exit 1; }
-python3 - "$scratch/work/merge.json" <<'PYTHON'
+python3 - "$scratch/project/merge.json" <<'PYTHON'
 import json, sys
 merged = json.load(open(sys.argv[1]))
 assert merged["complete"], "FAILED: not complete"
