@@ -131,6 +131,9 @@ Result<Json> run_scan(Env& env, const ScanRequest& request, const Watching& watc
                                 : scan_file(env.files, named[i].path, lookup);
   };
   for_each_job(named.size(), request.jobs, scan_one, watching.watch, watching.stop);
+  if (watching.stop != nullptr && *watching.stop) {
+    return fail(ErrorCode::io, "it was stopped", {}, "run it again");
+  }
   UnitTable table;
   Json json;
   json["files"] = Json::array();

@@ -7,10 +7,11 @@
 namespace sixpoint::gap {
 namespace {
 
-// Gaussian noise of 3.9 mg, on top of the pose.
+// Gaussian noise on top of the pose.
 struct MadeNoise {
+  explicit MadeNoise(double sd_g = 0.0039) : normal(0, sd_g) {}
   std::mt19937_64 random{11};
-  std::normal_distribution<double> normal{0, 0.0039};
+  std::normal_distribution<double> normal;
   Eigen::Vector3d operator()() { return {normal(random), normal(random), normal(random)}; }
 };
 
@@ -56,17 +57,24 @@ TEST(Texture, WhiteAndFilteredGaussianNoiseArePlain) {
   }));
 }
 
-TEST(Texture, WhatIsNoLinearFilterHasTails) {
-  MadeNoise noise;
+// Noise that passes a mechanism with play: it follows only what goes beyond the play.
+Texture texture_with_play(double noise_sd_g, double play_g) {
+  MadeNoise noise(noise_sd_g);
   Eigen::Vector3d held = Eigen::Vector3d::Constant(9);
-  const Texture texture = texture_of([&](const Segment& s, double) {
-    constexpr double kPlay_g = 0.002;
-    const Eigen::Vector3d now = s.rotation.col(2) + noise();
-    held =
-        held.cwiseMax((now.array() - kPlay_g).matrix()).cwiseMin((now.array() + kPlay_g).matrix());
+  return texture_of([&](const Segment& s, double) {
+    const Eigen::Array3d now = s.rotation.col(2) + noise();
+    held = held.cwiseMax((now - play_g).matrix()).cwiseMin((now + play_g).matrix());
     return held;
   });
-  EXPECT_GT(texture.scales.front().tails_sd, 8);
+}
+
+TEST(Texture, WhatIsNoLinearFilterHasTails) {
+  EXPECT_GT(texture_with_play(0.0078, 0.004).scales.front().tails_sd, 8);
+}
+
+// kFreeOfGrid_lsb2: here the grid of counts gives the noise its form.
+TEST(Texture, NoiseBelowTheGridIsNotJudged) {
+  EXPECT_EQ(texture_with_play(0.0039, 0.002).scales.front().tails_sd, 0);
 }
 
 TEST(Texture, KnocksAndSpellsAreFoundWhereTheyAre) {

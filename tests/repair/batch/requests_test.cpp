@@ -65,6 +65,9 @@ TEST(Requests, ThatAreStoppedReadNothingMore) {
   EXPECT_OK((*file)->read_at(0, bytes));
   stop = true;
   EXPECT_FAILS((*file)->read_at(0, bytes), ErrorCode::io);
+  // Files that no thread had begun have no verdict.
+  const auto nothing = [](std::size_t) {};
+  EXPECT_FAILS(run_scan(memory.env, {{"a.gt3x"}, "", 1}, {nothing, &stop}), ErrorCode::io);
 }
 
 // What a reading tells of its file is what inspect() tells of it.
