@@ -18,6 +18,27 @@ constexpr double kEvenOdds = 0.5;
 constexpr double kBeyondDoubt_nats = 1e9;
 constexpr double kStep_g = 0.05;  // as the forward model's
 
+// `axis` up (or down), turned about the vertical.
+Eigen::Matrix3d planned_face(int axis, double sign, double yaw_rad = 0) {
+  const Eigen::Vector3d up = sign * Eigen::Vector3d::Unit(axis);
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up).toRotationMatrix() *
+         Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+}
+
+// Directions, even over the sphere.
+std::vector<PlannedPiece> planned_obliques(int count) {
+  std::vector<PlannedPiece> pieces;
+  for (int i = 0; i < count; ++i) {  // a Fibonacci lattice
+    const double z = 1 - (2.0 * i + 1) / count;
+    const double longitude = i * std::numbers::pi * (3 - std::sqrt(5.0));
+    const Eigen::Vector3d up(std::sqrt(1 - z * z) * std::cos(longitude),
+                             std::sqrt(1 - z * z) * std::sin(longitude), z);
+    pieces.push_back(
+        {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up).toRotationMatrix()});
+  }
+  return pieces;
+}
+
 std::vector<PlannedPiece> six_faces(double pause_s, double seconds, bool reversed,
                                     std::optional<double> temperature_c = {}) {
   std::vector<PlannedPiece> pieces;
@@ -312,25 +333,6 @@ double Offer::minutes() const {
   return std::round(seconds / 6) / 10;
 }
 
-Eigen::Matrix3d planned_face(int axis, double sign, double yaw_rad) {
-  const Eigen::Vector3d up = sign * Eigen::Vector3d::Unit(axis);
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up).toRotationMatrix() *
-         Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-}
-
-std::vector<PlannedPiece> planned_obliques(int count) {
-  std::vector<PlannedPiece> pieces;
-  for (int i = 0; i < count; ++i) {  // a Fibonacci lattice
-    const double z = 1 - (2.0 * i + 1) / count;
-    const double longitude = i * std::numbers::pi * (3 - std::sqrt(5.0));
-    const Eigen::Vector3d up(std::sqrt(1 - z * z) * std::cos(longitude),
-                             std::sqrt(1 - z * z) * std::sin(longitude), z);
-    pieces.push_back(
-        {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up).toRotationMatrix()});
-  }
-  return pieces;
-}
-
 const std::vector<Offer>& standard_offers() {
   static const std::vector<Offer> kOffers = {
       {"half_turn", 0, half_turn()},
@@ -380,10 +382,10 @@ double information_nats(double probability, double weight_nats) {
 
 std::vector<NextSegment> next_segments(const Request& request, unsigned abilities,
                                        const Explanation& explanation, const Findings& found,
-                                       const Diagnosis& out, const std::vector<Offer>& offers) {
+                                       const Diagnosis& out) {
   Expectation expected(request, explanation);
   std::vector<NextSegment> list;
-  for (const Offer& offer : offers) {
+  for (const Offer& offer : standard_offers()) {
     expected.plan(offer.pieces);
     Questions questions(offer, abilities, expected);
     for (const CatalogueEntry& entry : catalogue()) {

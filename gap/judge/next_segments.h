@@ -58,10 +58,6 @@ struct Offer {
 // Those of the engineering protocol, and `half_turn`: three faces once more, turned by half a turn
 // about the vertical.
 const std::vector<Offer>& standard_offers();
-// Six-face poses and the like for an offer. `axis` 0 to 2 up (or down), turned about the vertical.
-Eigen::Matrix3d planned_face(int axis, double sign, double yaw_rad = 0);
-// `count` directions, even over the sphere.
-std::vector<PlannedPiece> planned_obliques(int count);
 
 // Expected information about a question that is answered yes with this probability, nats: the
 // mutual information with a normal reading whose log likelihood ratio is on average +-weight_nats
@@ -72,7 +68,6 @@ double information_nats(double probability, double weight_nats);
 // `out` holds what is not observable.
 std::vector<NextSegment> next_segments(const Request& request, unsigned abilities,
                                        const Explanation& explanation, const Findings& found,
-                                       const Diagnosis& out,
-                                       const std::vector<Offer>& offers = standard_offers());
+                                       const Diagnosis& out);
 
 }  // namespace sixpoint::gap

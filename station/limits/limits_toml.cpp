@@ -193,10 +193,24 @@ class Reader {
   Limits& limits_;
 };
 
+// Everything in a limits file but its comments is ASCII. toml++ 3.3 looks letters from U+00A1 to
+// U+0499 outside of quotes up in a table that has no row for them (undefined behaviour), so that
+// nothing beyond ASCII is given to it; a byte order mark is no part of the text.
+std::string ascii_of(std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) {
+    text.remove_prefix(kByteOrderMark.size());
+  }
+  std::string ascii(text);
+  std::replace_if(
+      ascii.begin(), ascii.end(), [](char c) { return static_cast<unsigned char>(c) > 0x7F; }, '?');
+  return ascii;
+}
+
 }  // namespace
 
 Result<Limits> parse_limits(std::string_view text, const std::string& source) {
-  const toml::parse_result parsed = toml::parse(text);
+  const toml::parse_result parsed = toml::parse(ascii_of(text));
   if (!parsed) {
     return fail(ErrorCode::configuration,
                 fmt::format("no TOML: {}", printable(parsed.error().description(), 200)),

@@ -129,9 +129,21 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"NoCoverage", "[decision]\ncoverage_factor = 0\n", "l.toml:2", "outside"},
         BadFile{"ShortBaseline", "[check_unit]\nbaseline_runs = 1\n", "l.toml:2", "outside"},
         BadFile{"AKeyThatIsNone", "[*b", "l.toml:1", "no TOML"},
+        BadFile{"ALetterBeyondAscii", "[noise_mg]\n\317\273[b", "l.toml:2", "no TOML"},
+        BadFile{"ASpaceBeyondAscii", "[noise_mg]\nhigh\302\240= 3\n", "l.toml:2", "no TOML"},
         BadFile{"NoToml", "\n\n[noise_mg\n", "l.toml:3", "no TOML"},
         BadFile{"Binary", "\x01\x02\x03", "l.toml:1", "no TOML"}),
     [](const auto& one) { return one.param.name; });
+
+// As an editor of Windows and a German technician leave it.
+TEST(Limits, AByteOrderMarkAndCommentsInAnyLanguageAreRead) {
+  const auto limits = parse_limits(
+      "\xEF\xBB\xBF[noise_mg]\r\nhigh = 3  # gr\xC3\xB6\xC3\x9F"
+      "er nicht\r\n",
+      "l.toml");
+  ASSERT_OK(limits);
+  EXPECT_EQ(limits->of("noise_mg").high, 3);
+}
 
 TEST(Limits, AFileIsNamedWithoutItsFolderAndAHugeOneIsRefused) {
   MemoryEnv env;
