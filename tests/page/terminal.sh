@@ -55,9 +55,10 @@ wait_for "u and Enter: undo the last pose"
 turn_until() { # TEXT
   local text now asked=""
   for _ in $(seq 1500); do
-    text=$(screen)
+    text=$(screen || true)
     if grep -qF -- "$1" <<<"$text"; then return 0; fi
-    now=$(grep -nE '(turn the unit to|turn it to|lay the unit on) [+-][xyz]' <<<"$text" | tail -1)
+    # Nothing may be asked yet.
+    now=$(grep -nE '(turn the unit to|turn it to|lay the unit on) [+-][xyz]' <<<"$text" | tail -1 || true)
     if [ -n "$now" ] && [ "$now" != "$asked" ]; then
       asked=$now
       sed -E 's/.*(to|on) ([+-][xyz]): its.*/turn \2/' <<<"$now" >"$hand"

@@ -43,6 +43,19 @@ def diagnose(program, bundle):
     return json.loads(done.stdout) if done.returncode in (0, 1, 2) else None
 
 
+def flat(value):
+    return [x for row in value for x in flat(row)] if isinstance(value, list) else [value]
+
+
+def covered(told, truth):
+    """Of each number that has an uncertainty: whether the true one is within twice that, and of which parameter."""
+    for name, p in told.items():
+        if name in truth and isinstance(p, dict) and p.get("sd") is not None:
+            for value, sd, real in zip(flat(p["value"]), flat(p["sd"]), flat(truth[name])):
+                if sd > 0:
+                    yield abs(value - real) <= 2 * sd, name
+
+
 class Scores:
     def __init__(self):
         self.shares = {}
@@ -70,6 +83,11 @@ class Scores:
             self.count("recall", name in named)
         for name in named:
             self.count("precision", name in there)
+        truth = {e["name"]: e["parameters"] for e in label["effects"]}
+        for e in answer["effects"]:
+            for right, of in covered(e["parameters"], truth.get(e["name"], {})):
+                self.count("two sigma", right)
+                self.count(f"  {e['name']}.{of}", right)
         self.count("exact set", must <= set(named) <= there and not unknown)
         self.count("needless unknown", unknown)
 
