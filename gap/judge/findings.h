@@ -84,7 +84,8 @@ inline double nats_to_sd(double nats) { return std::sqrt(2 * nats); }
 // The contract's name of the parameters that the forward model estimates; empty for other effects.
 std::string parameter_name(const std::string& effect);
 
-// Completes the answer: candidates for the whole catalogue, order, unknown, verdict.
+// Completes the answer: candidates for the whole catalogue, order, unknown, verdict. What is named
+// is less probable the more evidence there is for something unknown.
 void finish(const Request& request, Findings found, Diagnosis& out);
 // The answer where the recording does not allow a diagnosis. Names no effect.
 Diagnosis inconclusive(const Request& request, Findings found, const std::string& why,

@@ -104,6 +104,26 @@ TEST(Findings, UnknownGrowsWithItsEvidence) {
   EXPECT_NEAR(probability(20, -20), 0.87, 1e-6);
 }
 
+// What the catalogue lacks often looks like what it has.
+TEST(Findings, ANameIsLessProbableBesideSomethingUnknown) {
+  const Asked asked;
+  double last = 1;
+  for (double sd = 2; sd < 9; sd += 0.5) {
+    Findings found;
+    found.add(asked.request, {.name = "tilt", .nats = 100});
+    found.test(sd, "a test");
+    Diagnosis out;
+    finish(asked.request, found, out);
+    EXPECT_LT(out.effects.front().probability, last);
+    last = out.effects.front().probability;
+    EXPECT_EQ(out.candidates.front().probability, last);
+    if (sd == 2) {
+      EXPECT_GT(last, 0.99);
+    }
+  }
+  EXPECT_NEAR(last, 0.4, 0.01);
+}
+
 TEST(Findings, TestsAlarmBeyondTheirThreshold) {
   Findings found;
   found.test(5.4, "quiet");

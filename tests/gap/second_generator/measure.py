@@ -47,11 +47,14 @@ def flat(value):
     return [x for row in value for x in flat(row)] if isinstance(value, list) else [value]
 
 
-def covered(told, truth):
+def covered(effect, truth):
     """Of each number that has an uncertainty: whether the true one is within twice that, and of which parameter."""
-    for name, p in told.items():
-        if name in truth and isinstance(p, dict) and p.get("sd") is not None:
-            for value, sd, real in zip(flat(p["value"]), flat(p["sd"]), flat(truth[name])):
+    for name, sds in effect["standard_uncertainty"].items():
+        if name in truth:
+            values, sds, real_ones = map(flat, (effect["parameters"][name], sds, truth[name]))
+            if name == "vector_mg" and sum(v * r for v, r in zip(values, real_ones)) < 0:
+                values = [-v for v in values]  # of an oscillation, whose phase is free
+            for value, sd, real in zip(values, sds, real_ones):
                 if sd > 0:
                     yield abs(value - real) <= 2 * sd, name
 
@@ -85,7 +88,7 @@ class Scores:
             self.count("precision", name in there)
         truth = {e["name"]: e["parameters"] for e in label["effects"]}
         for e in answer["effects"]:
-            for right, of in covered(e["parameters"], truth.get(e["name"], {})):
+            for right, of in covered(e, truth.get(e["name"], {})):
                 self.count("two sigma", right)
                 self.count(f"  {e['name']}.{of}", right)
         self.count("exact set", must <= set(named) <= there and not unknown)
