@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "gap/explain/catalogue.h"
-#include "gap/judge/next_segments.h"
 #include "gap/judge/steps.h"
 
 namespace sixpoint::gap {
@@ -165,7 +164,6 @@ void list_not_observable(const Request& request, const ProtocolKind& kind, const
       out.not_observable.emplace_back(name, segment.empty() ? "none" : std::string(segment));
     }
   }
-  out.next_segments = next_segments(request, kind.abilities, explanation, found, out);
 }
 
 }  // namespace sixpoint::gap

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "gap/explain/catalogue.h"
+#include "gap/judge/next_segments.h"
 #include "gap/judge/steps.h"
 
 namespace sixpoint::gap {
@@ -125,6 +126,7 @@ Diagnosis diagnose(const Request& request) {
   found.append(judge_left_over(request, records, explanation, found));
 
   list_not_observable(request, kind, records, explanation, found, out);
+  out.next_segments = next_segments(request, kind.abilities, explanation, found, out);
   out.gap = measure_gap(records, explanation, found);
   Residuals residuals = locate_residuals(request, records, explanation, found);
   out.plots = make_plots(request, records, explanation.best(), found);

@@ -19,8 +19,9 @@
 // `held_out_gain_nats` is predictive: conditions that were not fitted, without a prior.
 //
 // Probability: of the effect being present, from its nats and from those of other causes that would
-// take its place. It assumes the priors of decisions.h and that the model is right; `gap challenge`
-// measures its calibration (docs/gap.md). It is not the probability that the effect matters.
+// take its place; it is lower beside something unknown. It assumes the priors of decisions.h;
+// `gap challenge` measures its calibration (docs/gap.md). It is not the probability that the effect
+// matters.
 //
 // What it can't do: separate effects that one unit shows alike (`confounded_with`: local_gravity
 // and gain, rounding_floor and offset); show an effect for which the protocol has no segment

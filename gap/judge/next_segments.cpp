@@ -278,7 +278,7 @@ class Questions {
         expected_(expected),
         next_{offer.name, offer.minutes(), 0, {}} {}
 
-  void not_observable(const CatalogueEntry& entry, const std::string& needs_segment) {
+  void add_not_observable(const CatalogueEntry& entry, const std::string& needs_segment) {
     const std::string name(entry.name);
     if (!expected_.in_means(name)) {
       if (shows(offer_, abilities_, entry, needs_segment)) {
@@ -289,14 +289,14 @@ class Questions {
     }
   }
 
-  void observable(const CatalogueEntry& entry, double probability) {
+  void add_observable(const CatalogueEntry& entry, double probability) {
     const std::string name(entry.name);
     if (expected_.in_means(name) && enough(offer_, abilities_, entry) && probability < kCertain) {
       ask(name, probability, expected_.weight_nats(name));
     }
   }
 
-  void either(const std::string& name, const CatalogueEntry& other) {
+  void add_either(const std::string& name, const CatalogueEntry& other) {
     const std::string other_name(other.name);
     const bool in_means = expected_.in_means(name) && expected_.in_means(other_name);
     if (in_means ? enough(offer_, abilities_, other)
@@ -393,17 +393,17 @@ std::vector<NextSegment> next_segments(const Request& request, unsigned abilitie
       const auto blind = std::find_if(out.not_observable.begin(), out.not_observable.end(),
                                       [&](const auto& n) { return n.first == entry.name; });
       if (blind != out.not_observable.end()) {
-        questions.not_observable(entry, blind->second);
+        questions.add_not_observable(entry, blind->second);
       } else if (const auto f =
                      std::find_if(found.candidates.begin(), found.candidates.end(), named);
                  f != found.candidates.end()) {
-        questions.observable(entry, f->probability);
+        questions.add_observable(entry, f->probability);
       }
     }
     for (const EffectFinding& e : found.effects) {
       for (const std::string& other : e.confounded_with) {
         if (const CatalogueEntry* entry = find_entry(other)) {
-          questions.either(e.name, *entry);
+          questions.add_either(e.name, *entry);
         }
       }
     }

@@ -73,7 +73,7 @@ class Scores:
             self.count("failures", True)
             return
         named = [e["name"] for e in answer["effects"]]
-        there = {e["name"] for e in label["effects"]}
+        there = {e["name"]: e["parameters"] for e in label["effects"]}
         must = {e["name"] for e in label["effects"] if e["must"]}
         unknown = answer["unknown"]["present"]
         if not there:
@@ -86,12 +86,11 @@ class Scores:
             self.count("recall", name in named)
         for name in named:
             self.count("precision", name in there)
-        truth = {e["name"]: e["parameters"] for e in label["effects"]}
         for e in answer["effects"]:
-            for right, of in covered(e, truth.get(e["name"], {})):
+            for right, of in covered(e, there.get(e["name"], {})):
                 self.count("two sigma", right)
                 self.count(f"  {e['name']}.{of}", right)
-        self.count("exact set", must <= set(named) <= there and not unknown)
+        self.count("exact set", must <= set(named) <= there.keys() and not unknown)
         self.count("needless unknown", unknown)
 
     def lines(self):
