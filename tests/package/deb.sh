@@ -14,7 +14,7 @@ have() {
   echo "SKIPPED, NOT PASSED: $2 needs $1"
   return 1
 }
-have dpkg-shlibdeps "the package" || exit 77
+command -v dpkg-shlibdeps >/dev/null || { "$source_folder/tests/skip.sh" "the package needs dpkg-shlibdeps"; exit $?; }
 
 "$cpack" --config "$build_folder/CPackConfig.cmake" -B "$scratch/made" >"$scratch/log" 2>&1 ||
   { cat "$scratch/log"; exit 1; }

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Runs one scenario of the page in Debian's Chromium, or a check of its bundle.
 #   run.sh SCENARIO SIXPOINT_PROGRAM SCREENSHOTS [USB_STATION]    bundle: dist/ is what the sources build to
-# Ends with 77 where there is no Node, npm or Chromium, or npm cannot fetch what the lock file names.
+# Skipped (tests/skip.sh: in CI a failure) where there is no Node, npm or Chromium, or npm cannot fetch what the lock file
+# names.
 set -euo pipefail
 scenario=$1 program=$2 shots=$3
 source_folder=$(cd "$(dirname "$0")/../.." && pwd)
 web=$source_folder/station/web
-skip() { echo "SKIPPED: $*"; exit 77; }
+skip() { "$source_folder/tests/skip.sh" "$*"; exit $?; }
 command -v node >/dev/null && command -v npm >/dev/null || skip "node and npm are not installed (scripts/install_packages.sh test)"
 [ "$scenario" = bundle ] || [ -x "${CHROMIUM:-/usr/bin/chromium}" ] || skip "there is no Chromium at ${CHROMIUM:-/usr/bin/chromium}"
 

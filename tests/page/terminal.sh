@@ -4,7 +4,9 @@
 #   terminal.sh SIXPOINT_PROGRAM [USB_STATION]
 set -euo pipefail
 program=$1 usb_station=${2:-}
-command -v tmux >/dev/null || { echo "SKIPPED: tmux is not installed (scripts/install_packages.sh test)"; exit 77; }
+tests=$(cd "$(dirname "$0")/.." && pwd)
+skip() { "$tests/skip.sh" "$*"; exit $?; }
+command -v tmux >/dev/null || skip "tmux is not installed (scripts/install_packages.sh test)"
 folder=$(mktemp -d)
 tmux=(tmux -S "$folder/socket" -f /dev/null)
 trap '"${tmux[@]}" kill-server 2>/dev/null || true; rm -rf "$folder"' EXIT
@@ -44,7 +46,7 @@ wait_for "stopped by the operator"
 wait_for "ended with 3"
 echo "the terminal run: undo, stop, and a whole run"
 
-[ -n "$usb_station" ] || { echo "SKIPPED: the run by hand needs umockdev (Debian packages libumockdev-dev and umockdev)"; exit 77; }
+[ -n "$usb_station" ] || skip "the run by hand needs umockdev (Debian packages libumockdev-dev and umockdev)"
 hand=$folder/hand
 mkfifo "$hand"
 "${tmux[@]}" send-keys -t t "clear" Enter

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What the USB and system suites do where their carrier is missing: 77 and a line that names the
+# What the USB, system, page and package suites do where their carrier is missing: 77 and a line that names the
 # package; 1 where SIXPOINT_MUST_NOT_SKIP is set. Each missing piece is played: by a PATH without it,
 # by an apt that finds no kernel, by a preload library that is none.
 #   skip_test.sh SOURCE_FOLDER [USB_TESTS]
@@ -66,5 +66,9 @@ if [ -n "$usb_tests" ]; then
   env LD_LIBRARY_PATH="$scratch/library" "$usb_tests" --gtest_list_tests >"$scratch/out" ||
     { echo "FAILED: without it ctest cannot list the tests"; failures=1; }
 fi
+expect "tmux" "tmux is not installed" env PATH="$(hidden_path tmux)" "$1/tests/page/terminal.sh" /bin/true
+expect "node" "node and npm are not installed" env PATH="$(hidden_path node)" "$1/tests/page/run.sh" whole /bin/true "$scratch"
+expect "dpkg-shlibdeps" "the package needs dpkg-shlibdeps" env PATH="$(hidden_path dpkg-shlibdeps)" \
+  "$1/tests/package/deb.sh" /bin/true "$scratch" "$1"
 expect "anything" "no carrier; install one" "$1/tests/skip.sh" "no carrier; install one"
 exit $failures
