@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Boots the image of make_image.sh under TCG and runs one script as root inside; its exit code is
-# this one's.
+# Boots the image of make_image.sh under TCG and runs one script as root inside, with guest.sh
+# beside it; its exit code is this one's.
 #   run_in_qemu.sh FOLDER SCRIPT
 set -euo pipefail
 folder=$1
@@ -13,11 +13,12 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/root"
 cp "$script" "$work/root/run.sh"
+cp "$(dirname "$0")/guest.sh" "$work/root/guest.sh"
 # A second archive behind the first: the kernel unpacks both.
 (cat "$folder/root.cpio" && cd "$work/root" && find . -mindepth 1 | cpio --quiet -o -H newc) >"$work/initrd"
 
-# Always TCG: /dev/kvm may exist and hang.
-timeout 240 qemu-system-x86_64 -machine q35,usb=off -accel tcg -cpu max -m 512 -nodefaults -nographic \
+# Always TCG: /dev/kvm may exist and hang. Each guest needs a minute or two; a busy machine takes three times as long.
+timeout 480 qemu-system-x86_64 -machine q35,usb=off -accel tcg -cpu max -m 512 -nodefaults -nographic \
   -no-reboot -serial stdio -kernel "$folder/vmlinux" -initrd "$work/initrd" \
   -append "console=ttyS0 quiet panic=-1 rdinit=/init" </dev/null | tr -d '\r' | tee "$work/log"
 status=$(sed -n 's/^SIXPOINT-GUEST-EXIT \([0-9]*\)$/\1/p' "$work/log")
