@@ -53,18 +53,21 @@ mkfifo "$hand"
 "${tmux[@]}" clear-history -t t
 "${tmux[@]}" send-keys -t t "SIXPOINT_HAND=$hand $usb_station $program jig --jig manual --device {device} --store $folder/usb.db --operator Ada --write; echo all over" Enter
 wait_for "u and Enter: undo the last pose"
-# Turns the unit where the terminal asks for it, every question once, until TEXT is there.
+# Where the unit lies. Nobody turns it again because a question is repeated: that would be another movement.
+lies=""
+turn() {
+  lies=$1
+  echo "turn $1" >"$hand"
+}
+# Turns the unit to where the terminal asks for it, until TEXT is there.
 turn_until() { # TEXT
-  local text now asked=""
+  local text asked
   for _ in $(seq 1500); do
     text=$(screen || true)
     if grep -qF -- "$1" <<<"$text"; then return 0; fi
     # Nothing may be asked yet.
-    now=$(grep -nE '(turn the unit to|turn it to|lay the unit on) [+-][xyz]' <<<"$text" | tail -1 || true)
-    if [ -n "$now" ] && [ "$now" != "$asked" ]; then
-      asked=$now
-      sed -E 's/.*(to|on) ([+-][xyz]): its.*/turn \2/' <<<"$now" >"$hand"
-    fi
+    asked=$(sed -nE 's/.*(turn the unit to|turn it to|lay the unit on) ([+-][xyz]).*/\2/p' <<<"$text" | tail -1)
+    if [ -n "$asked" ] && [ "$asked" != "$lies" ]; then turn "$asked"; fi
     sleep 0.1
   done
   echo "FAILED: '$1' never came; the terminal shows:"
@@ -72,7 +75,7 @@ turn_until() { # TEXT
   exit 1
 }
 turn_until "+x is taken"
-echo "turn -z" >"$hand"
+turn -z
 wait_for "refused: -z is done already"
 "${tmux[@]}" send-keys -t t u Enter
 wait_for "+x is taken back"
@@ -82,6 +85,7 @@ echo wait >"$hand"
 wait_for "the program has ended"
 # The emulated kernel does not always notice that a killed program's files are closed; a new plug it does.
 printf 'unplug\nplug\nstart\n' >"$hand"
+lies=""
 wait_for "goes on; it has "
 taken=$(screen | sed -nE 's/.*goes on; it has ([0-9]+) placements.*/\1/p')
 [ "$taken" -ge 3 ] || { echo "FAILED: only $taken placements were kept"; screen; exit 1; }

@@ -112,6 +112,8 @@ class Interrupt(InFolder):
     """A call that is repeated for ever ends with KeyboardInterrupt, and nothing else ends it."""
 
     def interrupted(self, code, *arguments):
+        # The package loads its parts when they are first named; an interrupt in numpy's import is lost there.
+        code = "import sys, sixpoint\nsixpoint.read, sixpoint.scan, sixpoint.repair\nprint('begins', flush=True)\n" + code
         child = subprocess.Popen(
             [sys.executable, "-c", code, *map(str, arguments)], stdout=subprocess.PIPE, text=True
         )
@@ -127,9 +129,6 @@ class Interrupt(InFolder):
 
     def test_read(self):
         code = (
-            "import sys, sixpoint\n"
-            "from sixpoint import _core\n"
-            "print('begins', flush=True)\n"
             "try:\n"
             "    while True:\n"
             "        sixpoint.read(sys.argv[1], unit='lsb', fill_limit_s=400 * 86400)\n"
@@ -141,8 +140,6 @@ class Interrupt(InFolder):
     def test_scan_and_repair(self):
         for call in ("sixpoint.scan(sys.argv[1:])", "sixpoint.repair(sys.argv[1:], 'o', scan=True, dry_run=True)"):
             code = (
-                "import sys, sixpoint\n"
-                "print('begins', flush=True)\n"
                 "try:\n"
                 f"    while True: {call}\n"
                 "except KeyboardInterrupt:\n"
@@ -152,8 +149,6 @@ class Interrupt(InFolder):
 
     def test_repair_leaves_nothing_half_written(self):
         code = (
-            "import sys, sixpoint\n"
-            "print('begins', flush=True)\n"
             "try:\n"
             "    while True: sixpoint.repair(sys.argv[1], sys.argv[2], scan=True, redo_outdated=True, wide=True)\n"
             "except KeyboardInterrupt:\n"
