@@ -12,6 +12,7 @@
 #include "cli/gap/gap_commands.h"
 #include "cli/output.h"
 #include "cli/store_option.h"
+#include "gap/adopt/learnt_sizes.h"
 #include "gap/judge/diagnose.h"
 #include "gap/recording/bundle.h"
 #include "gap/report/report_html.h"
@@ -27,6 +28,7 @@ struct Options {
   std::string bundle;
   std::string run;
   std::string store;
+  std::string population;
   std::vector<std::string> without;
   double matters_mg = gap::DiagnoseOptions{}.matters_mg;
   std::string html;
@@ -78,6 +80,10 @@ Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
   how.without = std::set<std::string>(options.without.begin(), options.without.end());
   how.matters_mg = options.matters_mg;
   how.seed = options.seed;
+  if (!options.population.empty()) {
+    SIXPOINT_ASSIGN(const Bytes scenario, read_file(context.env.files, options.population));
+    SIXPOINT_ASSIGN(how.learnt, gap::learnt_sizes(as_text(scenario)));
+  }
   SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, diagnose_input(options, std::move(how), context));
   diagnosis.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
   return diagnosis;
@@ -108,6 +114,7 @@ void print(const gap::Diagnosis& d, Context& context) {
 Status take_outputs(const Options& options, Outputs& outputs) {
   SIXPOINT_CHECK(outputs.input(options.bundle));
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
+  SIXPOINT_CHECK(outputs.input(options.population));
   SIXPOINT_CHECK(outputs.file("--html", options.html));
   SIXPOINT_CHECK(outputs.file("--png", options.png));
   SIXPOINT_CHECK(outputs.file("--pdf", options.pdf));
@@ -168,6 +175,9 @@ void add_gap(CLI::App& app, Context& context) {
   diagnosis.add_option("--run", options.run, "a stored jig run instead of a bundle")
       ->excludes(bundle);
   add_store_option(diagnosis, options.store);
+  diagnosis.add_option(
+      "--population", options.population,
+      "a scenario of `gap adopt`: what units like this one have is expected of it");
   diagnosis.add_option("--without", options.without, "effects taken out of the catalogue")
       ->delimiter(',');
   diagnosis

@@ -11,7 +11,7 @@ bool Fit::contains(const std::string& effect) const {
 
 EvidenceModel::EvidenceModel(const std::vector<Block>& blocks, EvidenceOptions options)
     : blocks_(blocks), options_(std::move(options)) {
-  for (const ParameterGroup& group : parameter_groups()) {
+  for (const ParameterGroup& group : parameter_groups(options_.learnt)) {
     if (group.effect == "gain" || group.effect == "offset" || allowed(group.effect)) {
       // Groups that differ in their prior size only share their columns.
       const auto same = std::find_if(groups_.begin(), groups_.end(), [&](const ParameterGroup& g) {

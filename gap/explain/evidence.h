@@ -66,6 +66,7 @@ struct EvidenceOptions {
   std::function<bool(const std::string&)> allowed = {};  // catalogue name; empty: all
   // Log likelihood of a size of random_walk or flicker from the records themselves.
   std::function<double(Scatter, double)> record_nats = {};
+  std::vector<LearntSize> learnt = {};
 };
 
 struct Fit {
@@ -123,7 +124,8 @@ class EvidenceModel {
   // The same with it; an estimate far beyond an effect's largest size has none.
   double evidence(const Whitened& w, const std::vector<int>& groups,
                   Posterior* posterior = nullptr) const;
-  // Of these groups beside this scatter, over none: see log_prior_of_count().
+  // Of these groups beside this scatter, over none: see log_prior_of_count(), and
+  // learnt_log_prior() of what was learnt.
   double log_prior(const std::vector<int>& groups, Scatter scatter = Scatter::nominal) const;
   // The likeliest subset; every subset that was tried is added to `tried`. `swap`: also tries each
   // other effect in the place of each one found (some hundred subsets more).
@@ -133,6 +135,8 @@ class EvidenceModel {
  private:
   Subset climb(const Whitened& w, Subset from, bool generous, bool swap,
                std::vector<Subset>& tried) const;
+  // Of these groups and this scatter, those whose prior is that of their count.
+  std::size_t counted(const std::vector<int>& groups, Scatter scatter) const;
   Subset attempt(const Whitened& w, std::vector<int> groups, std::vector<Subset>& tried) const;
   bool fits(const std::vector<int>& groups, int g) const;
   Eigen::Index whiten_blocks(std::size_t first, std::size_t last, Scatter scatter, double size,

@@ -122,7 +122,7 @@ double Explanation::expected_nats(const std::string& effect) const {
   double best = kNoEvidence_nats;
   for (const int g : model_.groups_of(effect)) {
     const double smallest = model_.group(g).smallest;
-    if (smallest > 0) {
+    if (smallest > 0 && !model_.group(g).learnt) {
       const Information known = information(g, {});
       best = std::max(best, 0.5 * smallest * smallest * known.per_size2 - known.occam_nats +
                                 model_.log_prior({g}));
@@ -137,6 +137,9 @@ std::optional<double> Explanation::bound(const std::string& effect) const {
   std::erase_if(others, [&](int g) { return std::find(own.begin(), own.end(), g) != own.end(); });
   std::optional<double> least;
   for (const int g : own) {
+    if (model_.group(g).learnt) {
+      continue;  // the bound is that of an effect about which nothing is known
+    }
     const Information known = information(g, others);
     const double prior = model_.log_prior(with_group(others, g), best().scatter) -
                          model_.log_prior(others, best().scatter);

@@ -147,7 +147,7 @@ Refit refit(const EvidenceModel& model, const Fit& fit, const Regressors& all) {
   Eigen::Index at = 0;
   for (const int g : with_nuisances(fit.subset.groups)) {
     for (int i = 0; i < model.group(g).count; ++i) {
-      prior_mean[at] = model.group(g).prior_mean;
+      prior_mean[at] = model.group(g).mean_of(i);
       prior_sd[at++] = model.group(g).sd_of(i);
     }
   }

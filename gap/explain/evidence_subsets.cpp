@@ -39,7 +39,7 @@ double EvidenceModel::evidence_of(const NormalSums& sums, const std::vector<int>
     for (int k = 0; k < group(g).count; ++k) {
       columns.push_back(first_column(g) + k);
       sds.push_back(group(g).sd_of(k));
-      means.push_back(group(g).prior_mean);
+      means.push_back(group(g).mean_of(k));
     }
   }
   const auto n = std::ssize(columns);
@@ -80,7 +80,7 @@ double EvidenceModel::evidence(const Whitened& w, const std::vector<int>& groups
   Eigen::Index at = kNuisanceParameters;
   for (const int g : groups) {
     for (int i = 0; i < group(g).count; ++i, ++at) {
-      const double off = std::abs(own.mean[at] - group(g).prior_mean);
+      const double off = std::abs(own.mean[at] - group(g).mean_of(i));
       if (off - kBeyond_sd * std::sqrt(own.covariance(at, at)) > most_of(group(g), i)) {
         nats -= kImpossible_nats;
       }
@@ -104,14 +104,24 @@ double log_prior_of_count(std::size_t count) {
   return log_sum(kFew + static_cast<double>(count) * kLogPriorEffect, kEven) - log_sum(kFew, kEven);
 }
 
+std::size_t EvidenceModel::counted(const std::vector<int>& groups, Scatter scatter) const {
+  const auto effects =
+      std::count_if(groups.begin(), groups.end(), [&](int g) { return !group(g).learnt; });
+  const bool also_scatter = scatter != Scatter::nominal && in_catalogue(scatter);
+  return static_cast<std::size_t>(effects) + (also_scatter ? 1 : 0);
+}
+
 double EvidenceModel::log_prior(const std::vector<int>& groups, Scatter scatter) const {
-  const bool counts = scatter != Scatter::nominal && in_catalogue(scatter);
   // The scatter's own prior is in Whitened::outside_nats already.
-  double sum =
-      log_prior_of_count(groups.size() + (counts ? 1 : 0)) - (counts ? kLogPriorEffect : 0);
+  const bool counts = scatter != Scatter::nominal && in_catalogue(scatter);
+  double sum = log_prior_of_count(counted(groups, scatter)) - (counts ? kLogPriorEffect : 0);
   for (const int g : groups) {
+    const std::vector<int> same = groups_of(group(g).effect);
     // The shapes of an effect share its prior.
-    sum -= std::log(static_cast<double>(groups_of(group(g).effect).size()));
+    sum -= std::log(static_cast<double>(std::count_if(same.begin(), same.end(), [&](int other) {
+      return group(other).learnt.has_value() == group(g).learnt.has_value();
+    })));
+    sum += group(g).learnt ? learnt_log_prior(*group(g).learnt) : 0;
   }
   return sum;
 }
@@ -135,9 +145,8 @@ bool EvidenceModel::fits(const std::vector<int>& groups, int g) const {
 // to begin with, are found together.
 Subset EvidenceModel::climb(const Whitened& w, Subset from, bool generous, bool swap,
                             std::vector<Subset>& tried) const {
-  const std::size_t scatters = w.scatter != Scatter::nominal && in_catalogue(w.scatter) ? 1 : 0;
   const auto height = [&](const Subset& s) {
-    return s.nats - (generous ? log_prior_of_count(s.groups.size() + scatters) : 0);
+    return s.nats - (generous ? log_prior_of_count(counted(s.groups, w.scatter)) : 0);
   };
   for (;;) {
     Subset best = from;

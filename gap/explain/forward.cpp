@@ -1,6 +1,7 @@
 #include "gap/explain/forward.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <span>
@@ -13,6 +14,7 @@ constexpr int kPhasesTruncated = 720;  // the step about zero is some LSB wide i
 constexpr double kRadPerDeg = M_PI / 180;
 constexpr double kLeastNoise_lsb = 0.3;  // rounding alone scatters by 1 / sqrt(12) LSB
 constexpr double kLeastStep_g = 0.05;
+constexpr int kFirstEffect = 6;  // parameter; gains and offsets stand before it
 
 Eigen::Matrix3d turn(const Eigen::Vector3d& vector_deg) {
   const double angle = vector_deg.norm() * kRadPerDeg;
@@ -93,6 +95,13 @@ bool varies_in_size(const ParameterGroup& group) {
          group.effect != "local_gravity";
 }
 
+// Gains and offsets are free, and truncation has no size.
+bool can_be_learnt(const ParameterGroup& group, const LearntSize& size) {
+  const auto numbers = static_cast<std::size_t>(std::min(3, group.count));
+  return group.first >= kFirstEffect && group.effect != "truncation" &&
+         size.mean.size() == numbers && size.sd.size() == numbers;
+}
+
 // Steps below kLeastStep_g are none.
 double sign_of_step(double step_g) {
   return std::abs(step_g) < kLeastStep_g ? 0 : std::copysign(1.0, step_g);
@@ -151,7 +160,9 @@ double parameter(const ForwardState& state, int position) {
   return parameter(copy, position);
 }
 
-std::vector<ParameterGroup> parameter_groups() {
+double absent_value(const std::string& effect) { return effect == "local_gravity" ? 1 : 0; }
+
+std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& learnt) {
   // Nuisances are free here (sd of 0.3): their own priors, 2 % and 35 mg, are judged afterwards.
   // Effects: prior sd about the middle of the catalogue's realistic sizes, `largest` their upper
   // end, `smallest` their lower (where the catalogue names none: a third of the typical).
@@ -187,6 +198,14 @@ std::vector<ParameterGroup> parameter_groups() {
         groups.back().prior_sd *= share;
         groups.back().curve_sd *= share;
         groups.back().cubic_sd *= share;
+      }
+    }
+  }
+  for (const LearntSize& size : learnt) {
+    for (std::size_t i = 0; i < full; ++i) {
+      if (groups[i].effect == size.effect && can_be_learnt(groups[i], size)) {
+        groups.push_back(groups[i]);
+        groups.back().learnt = size;
       }
     }
   }

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "gap/explain/learnt_size.h"
 #include "gap/recording/bundle.h"
 
 namespace sixpoint::gap {
@@ -59,16 +60,29 @@ struct ParameterGroup {
   double tau_s = 0;     // shape of warm_up
   int shape = 1;        // shape of hysteresis
   double cubic_sd = 0;  // of the seventh number on
+  // In the place of prior_mean and prior_sd where it is there: what earlier units had.
+  std::optional<LearntSize> learnt = {};
 
-  // Prior standard deviation of the group's i-th number.
-  double sd_of(int i) const { return i < 3 ? prior_sd : i < 6 ? curve_sd : cubic_sd; }
+  // Prior mean and standard deviation of the group's i-th number.
+  double mean_of(int i) const {
+    return learnt && i < 3 ? learnt->mean[static_cast<std::size_t>(i)] : prior_mean;
+  }
+  double sd_of(int i) const {
+    return learnt && i < 3 ? learnt->sd[static_cast<std::size_t>(i)]
+           : i < 3         ? prior_sd
+           : i < 6         ? curve_sd
+                           : cubic_sd;
+  }
 };
 inline constexpr int kForwardParameters = 49;
 // Every group, with each shape of warm_up and hysteresis as a group of its own, and each effect
 // that every unit has a little of twice: at its typical size, and at a fifth of it; those that bend
-// also at four times of it.
-std::vector<ParameterGroup> parameter_groups();
+// also at four times of it. Behind them each shape of what was learnt, for the effects among them.
+std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& learnt = {});
 inline constexpr double kReference_c = 25;
+// The catalogue's parameter of a unit without the effect, from which the model's numbers count: its
+// `ratio` of local_gravity is 1 there, all others are 0.
+double absent_value(const std::string& effect);
 
 double& parameter(ForwardState& state, int position);
 double parameter(const ForwardState& state, int position);

@@ -35,7 +35,9 @@
 #include <cstdint>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "gap/explain/learnt_size.h"
 #include "gap/judge/diagnosis.h"
 #include "gap/recording/bundle.h"
 
@@ -48,6 +50,8 @@ struct DiagnoseOptions {
   // An effect matters from this root mean square per axis on: twice what noise and seating leave of
   // the mean of a ten-second dwell.
   double matters_mg = 0.4;
+  // What earlier units of the same kind had, of effects that the means show: learnt_sizes.h.
+  std::vector<LearntSize> learnt = {};
   std::uint64_t seed = 0;  // goes into the augmented scenario
 };
 

@@ -51,6 +51,7 @@ Json finding_json(const EffectFinding& finding) {
   json["share_of_gap"] = finite(finding.share_of_gap);
   json["probability_it_matters"] = finite(finding.probability_it_matters);
   json["bound"] = finding.bound ? finite(*finding.bound) : Json(nullptr);
+  json["learnt_from_units"] = finding.learnt_from_units;
   json["outside_datasheet"] = finding.outside_datasheet;
   json["confounded_with"] = finding.confounded_with;
   return json;

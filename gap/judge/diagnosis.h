@@ -39,6 +39,8 @@ struct EffectFinding {
   double probability_it_matters = 0;
   // The size, in the unit of the first parameter, that this recording shows half of the time.
   std::optional<double> bound = {};
+  // Earlier units behind the sizes that were expected of it; 0: the catalogue's sizes.
+  std::size_t learnt_from_units = 0;
 };
 
 struct UnknownPlace {

@@ -136,11 +136,13 @@ std::vector<NamedValue> parameters_of(const std::string& name,
                                       const Explanation::Estimate& estimate) {
   std::vector<NamedValue> parameters;
   if (name != "truncation") {
+    std::vector<double> value = estimate.value;
     std::vector<double> sd = estimate.sd;
     for (std::size_t i = 0; i < sd.size(); ++i) {
-      sd[i] = std::hypot(sd[i], kFormShare * estimate.value[i]);
+      sd[i] = std::hypot(sd[i], kFormShare * value[i]);
+      value[i] += absent_value(name);
     }
-    parameters.push_back({parameter_name(name), estimate.value, std::move(sd)});
+    parameters.push_back({parameter_name(name), std::move(value), std::move(sd)});
   }
   if (name == "tilt") {
     const double angle = std::hypot(estimate.value[0], estimate.value[1]);
@@ -191,6 +193,12 @@ double other_causes(const Explanation& explanation, const EffectFinding& f, doub
   return other;
 }
 
+std::size_t learnt_from(const std::vector<LearntSize>& learnt, const std::string& name) {
+  const auto found = std::find_if(learnt.begin(), learnt.end(),
+                                  [&](const LearntSize& size) { return size.effect == name; });
+  return found == learnt.end() ? 0 : found->units;
+}
+
 void judge_effect(const Request& request, const Explanation& explanation, const std::string& name,
                   double changing, const Findings& before, Findings& found) {
   const auto estimate = explanation.estimate(name);
@@ -203,7 +211,8 @@ void judge_effect(const Request& request, const Explanation& explanation, const 
                   .nats = in ? std::max(kPresent_nats, gain) : std::min(kAbsent_nats, gain),
                   .parameters = parameters_of(name, *estimate),
                   .held_out_gain_nats = explanation.held_out_nats(name),
-                  .bound = explanation.bound(name)};
+                  .bound = explanation.bound(name),
+                  .learnt_from_units = learnt_from(request.options.learnt, name)};
   if (in) {
     f.confounded_with = confounded(request, explanation, name, found, before);
     // It must stand out beside unknown scatter, and help where it was not fitted.
@@ -272,9 +281,9 @@ Explanation explain(const Request& request, const std::vector<Block>& blocks,
         return 0.0;
     }
   };
-  return Explanation(
-      blocks, {request.lsb_mg(),
-               [&request](const std::string& name) { return request.allowed(name); }, record_nats});
+  return Explanation(blocks, {request.lsb_mg(),
+                              [&request](const std::string& name) { return request.allowed(name); },
+                              record_nats, request.options.learnt});
 }
 
 Findings judge_means(const Request& request, const Explanation& explanation, const SlowNoise& slow,

@@ -36,7 +36,7 @@ inline Marginal marginal(const gap::EvidenceModel& model, const Eigen::MatrixXd&
     for (int k = 0; k < model.group(g).count; ++k) {
       const Eigen::VectorXd column = linear.col(model.first_column(g) + k);
       all.covariance += std::pow(model.group(g).sd_of(k), 2) * column * column.transpose();
-      all.off -= model.group(g).prior_mean * column;
+      all.off -= model.group(g).mean_of(k) * column;
     }
   }
   return all;
