@@ -73,6 +73,24 @@ TEST_F(GapAdopt, LearnsFromBundlesAndFromAnswers) {
   EXPECT_EQ(found["effects"][0]["name"], "non_orthogonality");
 }
 
+TEST_F(GapAdopt, TheNextDiagnosisExpectsThePopulation) {
+  simulate("unit", 4);
+  write("P.json", R"({"protocol": "production", "population": {"effects": [
+    {"name": "non_orthogonality", "units": 6, "mean": {"yz_xz_xy": [0.008, 0.006, -0.007]},
+     "spread": {"yz_xz_xy": [0.001, 0.001, 0.001]}}]}})");
+  const auto diagnose = [&](const char* population) {
+    return run({"gap", "diagnose", path("unit"), "--population", path(population), "--json"});
+  };
+  const auto learnt = diagnose("P.json").json()["effects"];
+  ASSERT_EQ(learnt.size(), 1U);
+  EXPECT_EQ(learnt[0]["name"], "non_orthogonality");
+  EXPECT_EQ(learnt[0]["learnt_from_units"], 6);
+  const auto alone = run({"gap", "diagnose", path("unit"), "--json"}).json()["effects"];
+  EXPECT_EQ(alone[0]["learnt_from_units"], 0) << "the catalogue's sizes";
+  EXPECT_EQ(diagnose("unit.json").exit_code, 78) << "a scenario without a population";
+  EXPECT_EQ(diagnose("none.json").exit_code, 66);
+}
+
 // A unit's raw counts, six faces and three repeats: the run is read as `gap trends` reads it.
 TEST_F(GapAdopt, TakesTheRunsOfAStore) {
   for (const char* seed : {"7", "8"}) {
