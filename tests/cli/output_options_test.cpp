@@ -78,7 +78,8 @@ const std::map<std::string, Role>& common_roles() {
                                          {"SESSION", Role::input},
                                          {"CAPTURE", Role::input},
                                          {"--scenario", Role::input},
-                                         {"--constants", Role::input}};
+                                         {"--constants", Role::input},
+                                         {"--population", Role::input}};
     for (const char* name : {"--device",
                              "--jig",
                              "--gravity",

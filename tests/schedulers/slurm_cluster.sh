@@ -52,7 +52,7 @@ CONF
     mkdir -p "$cluster/spool.$n"
     slurmd -N "$n" -f "$SLURM_CONF"
   done
-  for _ in $(seq 40); do
+  for _ in $(seq 120); do
     [ "$(sinfo -h -t idle -o %D 2>/dev/null)" = 3 ] && return 0
     sleep 0.5
   done
@@ -61,20 +61,20 @@ CONF
   return 1
 }
 
-# kill_node n1: its daemon, the keepers of its tasks and the tasks, at once, as by a power cut.
+# kill_node n1 PID...: its daemon, the named processes of its tasks and all above them up to the keeper of the task,
+# at once, as by a power cut.
 kill_node() {
-  local node=$1 task keeper tasks=() keepers=()
-  for task in /proc/[0-9]*; do
-    task=${task#/proc/}
-    { tr '\0' '\n' <"/proc/$task/environ"; } 2>/dev/null | grep -qx "SLURMD_NODENAME=$node" || continue
-    { tr '\0' '\n' <"/proc/$task/environ"; } 2>/dev/null | grep -qx "SLURM_CONF=$SLURM_CONF" || continue
-    tasks+=("$task")
-    keeper=$(ps -o ppid= -p "$task" | tr -d ' ')
-    grep -q '^slurmstepd' "/proc/$keeper/comm" 2>/dev/null && keepers+=("$keeper")
+  local node=$1 task line=()
+  shift
+  for task in "$@"; do
+    while [ "${task:-1}" != 1 ]; do
+      line+=("$task")
+      grep -q '^slurmstepd' "/proc/$task/comm" && break
+      task=$(ps -o ppid= -p "$task" | tr -d ' ')
+    done
+    [ "${task:-1}" != 1 ] || { echo "FAILED: a task of $node has no keeper"; return 1; }
   done
-  [ "${#keepers[@]}" -gt 0 ] || { echo "FAILED: no task of $node was found"; return 1; }
-  kill -9 "$(cat "$cluster/slurmd.$node.pid")" "${keepers[@]}" 2>/dev/null || true
-  kill -9 "${tasks[@]}" 2>/dev/null || true
+  kill -9 "$(cat "$cluster/slurmd.$node.pid")" "${line[@]}"
 }
 
 stop_cluster() {

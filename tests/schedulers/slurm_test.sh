@@ -17,14 +17,18 @@ make_archive "$@"
 trap 'stop_cluster; rm -rf "$scratch"' EXIT
 start_cluster "$scratch/cluster" || { stop_cluster; skip "$1" "Slurm does not start on this machine"; }
 
-# The program as the tasks call it: slow enough to be killed in mid-run; the first task of shard 3
+# The program as the tasks call it: on n1 it waits to be killed with the node; the first task of shard 3
 # takes more memory than it asked for.
+mkdir "$scratch/on_n1"
 cat >"$scratch/slow" <<WRAPPER
 #!/bin/bash
+if [ "\${SLURMD_NODENAME:-}" = n1 ]; then
+  touch "$scratch/on_n1/\$\$"
+  exec sleep 300
+fi
 if [ "\${SLURM_ARRAY_TASK_ID:-}" = 3 ] && mkdir "$scratch/greedy" 2>/dev/null; then
   exec python3 -c 'import time; x = bytearray(1500 << 20); time.sleep(60)'
 fi
-[ -z "\${SLURM_ARRAY_TASK_ID:-}" ] || sleep 3
 exec "$2" "\$@"
 WRAPPER
 chmod +x "$scratch/slow"
@@ -35,12 +39,11 @@ merge=$(sed -n 's/^merge //p' <<<"$jobs")
 # Shard 1 a second time, at once: the lock lets one of them work, and the other one says so.
 twice=$(sbatch --parsable --array=1 --output="$scratch/twice.log" "$data/plan/run.sbatch" "$data/out")
 
-runs_on_n1() { [ -n "$(squeue -h -w n1 -t R -o %i)" ]; }
-wait_for 30 runs_on_n1 || { echo "FAILED: no task runs on n1"; squeue; exit 1; }
-sleep 1
-lost=$(squeue -h -w n1 -t R -o %i | tr '\n' ' ')
-kill_node n1
-echo "node n1 killed with the tasks $lost"
+two_on_n1() { [ "$(ls "$scratch/on_n1" | wc -l)" = 2 ]; }
+wait_for 60 two_on_n1 || { echo "FAILED: no two tasks run on n1"; squeue; exit 1; }
+# shellcheck disable=SC2046 # a word each
+kill_node n1 $(ls "$scratch/on_n1")
+echo "node n1 killed with two tasks"
 
 merged() { [ -f "$data/plan/merge.json" ]; }
 wait_for 150 merged || { echo "FAILED: the merge did not run"; squeue; tail "$scratch"/cluster/log/slurmctld; exit 1; }
