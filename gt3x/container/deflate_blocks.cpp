@@ -4,340 +4,190 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <new>
+
+#include <zlib.h>
 
 namespace sixpoint::gt3x {
 namespace {
 
-constexpr std::size_t kMostCodeBits = 15;
-constexpr std::size_t kEndOfBlock = 256;
-constexpr std::size_t kMostLengthSymbols = 286;
-constexpr std::size_t kMostDistanceSymbols = 30;
+// How far a match reaches back (RFC 1951, 2).
+constexpr std::size_t kWindow = 32'768;
+// libdeflate ends a block after 300,000 bytes, or 5,000 later where nothing but that would follow
+// (its deflate_compress.c). A larger last block is found from the front.
+constexpr std::size_t kMostUnpacked = 320 * std::size_t{1024};
+// Fewer bytes of agreement prove nothing.
+constexpr std::size_t kLeastUnpacked = 1024;
+constexpr std::size_t kMostHeaderBits = 3 + 14 + 19 * 3;
 
-// Extra bits behind a symbol (RFC 1951, 3.2.5).
-constexpr unsigned extra_bits_of_length(std::size_t symbol) {
-  return symbol < 265 || symbol == 285 ? 0 : static_cast<unsigned>((symbol - 261) / 4);
+// Of four lengths of 3 bits each: the share, in 128ths, of all words that codes of these lengths
+// begin. A whole code has 128.
+constexpr auto kSharesOfFour = [] {
+  std::array<std::uint16_t, 4096> shares{};
+  for (std::size_t four = 0; four < shares.size(); ++four) {
+    for (unsigned i = 0; i < 4; ++i) {
+      const std::size_t length = (four >> (3 * i)) & 7;
+      shares[four] = static_cast<std::uint16_t>(shares[four] + (length > 0 ? 128U >> length : 0));
+    }
+  }
+  return shares;
+}();
+
+// The bits from `at` on, 57 at least; zeros behind the end.
+std::uint64_t bits_at(std::span<const std::uint8_t> stream, std::uint64_t at) {
+  const std::size_t byte = std::min<std::size_t>(at / 8, stream.size());
+  std::uint64_t bits = 0;
+  if (stream.size() - byte >= sizeof bits && std::endian::native == std::endian::little) {
+    std::memcpy(&bits, stream.data() + byte, sizeof bits);
+  } else {
+    for (std::size_t i = 0; i < sizeof bits && byte + i < stream.size(); ++i) {
+      bits |= std::uint64_t{stream[byte + i]} << (8 * i);
+    }
+  }
+  return bits >> (at % 8);
 }
-constexpr unsigned extra_bits_of_distance(std::size_t symbol) {
-  return symbol < 4 ? 0 : static_cast<unsigned>(symbol / 2 - 1);
-}
 
-// How many bits a code takes with its extra bits, and what comes behind it. One step may pass
-// several literals and what follows them.
-struct Step {
-  enum class Kind : std::uint8_t { none, symbol, distance, end, longer };
-  Kind kind = Kind::none;
-  std::uint8_t bits = 0;
-};
-
-// The codes of one alphabet (RFC 1951, 3.2.2). Codes of up to `direct_bits` bits are looked up, the
-// few longer ones are found bit by bit.
-class Codes {
- public:
-  static constexpr std::size_t kMostDirectBits = 13;
-
-  explicit Codes(std::size_t direct_bits)
-      : direct_bits_(direct_bits), direct_size_(std::size_t{1} << direct_bits) {}
-
-  // False where the lengths make no prefix code. An incomplete one is taken: with one distance or
-  // none it is legal, and what it leaves open is met as Kind::none.
-  template <class StepOf>
-  bool make(std::span<const std::uint8_t> lengths, StepOf step_of) {
-    counts_.fill(0);
-    for (const std::uint8_t length : lengths) {
-      ++counts_[length];
-    }
-    counts_[0] = 0;
-    std::array<std::uint32_t, kMostCodeBits + 2> next{};
-    std::array<std::uint32_t, kMostCodeBits + 2> place{};
-    for (std::size_t bits = 1; bits <= kMostCodeBits; ++bits) {
-      next[bits + 1] = (next[bits] + counts_[bits]) << 1U;
-      place[bits + 1] = place[bits] + counts_[bits];
-      if (next[bits] + counts_[bits] > (1U << bits)) {
-        return false;
-      }
-    }
-    std::fill_n(direct_.begin(), direct_size_, Step{});
-    for (std::size_t symbol = 0; symbol < lengths.size(); ++symbol) {
-      const std::size_t length = lengths[symbol];
-      if (length == 0) {
-        continue;
-      }
-      const Step step = step_of(symbol, static_cast<unsigned>(length));
-      const std::uint32_t code = reversed(next[length]++, length);
-      sorted_[place[length]++] = step;
-      if (length > direct_bits_) {
-        direct_[code & (direct_size_ - 1)] = Step{Step::Kind::longer, 0};
-        continue;
-      }
-      for (std::size_t at = code; at < direct_size_; at += std::size_t{1} << length) {
-        direct_[at] = step;
-        code_bits_[at] = static_cast<std::uint8_t>(length);
-      }
-    }
-    return true;
-  }
-
-  // For an alphabet in which a literal is followed by a code of the same: one step passes as many
-  // codes as lie whole within the bits that are looked up.
-  void join_literals() {
-    const std::array<Step, kMostDirect> single = direct_;
-    for (std::size_t at = 0; at < direct_size_; ++at) {
-      Step joined = single[at];
-      std::size_t known = direct_bits_ - code_bits_[at];
-      while (joined.kind == Step::Kind::symbol) {
-        const std::size_t rest = at >> joined.bits;
-        const Step next = single[rest];
-        if (next.kind == Step::Kind::none || next.kind == Step::Kind::longer ||
-            code_bits_[rest] > known) {
-          break;
-        }
-        known -= code_bits_[rest];
-        joined = {next.kind, static_cast<std::uint8_t>(joined.bits + next.bits)};
-      }
-      direct_[at] = joined;
-    }
-  }
-
-  // `word`: the next bits of the stream, at least kMostCodeBits of them.
-  Step step(std::uint64_t word) const {
-    const Step found = direct_[word & (direct_size_ - 1)];
-    return found.kind == Step::Kind::longer ? longer_step(word) : found;
-  }
-
- private:
-  static constexpr std::size_t kMostDirect = std::size_t{1} << kMostDirectBits;
-
-  static std::uint32_t reversed(std::uint32_t code, std::size_t length) {
-    std::uint32_t out = 0;
-    for (std::size_t i = 0; i < length; ++i) {
-      out |= ((code >> i) & 1U) << (length - 1 - i);
-    }
-    return out;
-  }
-
-  Step longer_step(std::uint64_t word) const {
-    std::uint32_t code = 0;
-    std::uint32_t first = 0;
-    std::uint32_t place = 0;
-    for (std::size_t bits = 1; bits <= kMostCodeBits; ++bits) {
-      code = (code << 1U) | static_cast<std::uint32_t>((word >> (bits - 1)) & 1U);
-      if (code >= first && code - first < counts_[bits]) {
-        return sorted_[place + code - first];
-      }
-      place += counts_[bits];
-      first = (first + counts_[bits]) << 1U;
-    }
-    return {};
-  }
-
-  std::array<std::uint16_t, kMostCodeBits + 1> counts_{};  // codes of each length
-  std::array<Step, kMostLengthSymbols + 2> sorted_{};      // by length, then by symbol
-  std::size_t direct_bits_;
-  std::size_t direct_size_;
-  std::array<Step, kMostDirect> direct_{};
-  std::array<std::uint8_t, kMostDirect> code_bits_{};  // of the first code, without extra bits
-};
-
-class Walk {
- public:
-  explicit Walk(std::span<const std::uint8_t> stream) : stream_(stream) {}
-
-  std::optional<LastBlock> run() {
-    for (;;) {
-      LastBlock block;
-      block.begin_bit = at_;
-      const bool last = take(1) != 0;
-      if (!pass_block(take(2)) || at_ > end()) {
-        return std::nullopt;
-      }
-      if (last) {
-        block.end_bit = at_;
-        return block;
-      }
-    }
-  }
-
- private:
-  std::uint64_t end() const { return std::uint64_t{stream_.size()} * 8; }
-
-  // The bits from at_ on, 57 at least; zeros behind the end.
-  std::uint64_t word() const {
-    const std::size_t byte = std::min<std::size_t>(at_ / 8, stream_.size());
-    std::uint64_t bits = 0;
-    if (stream_.size() - byte >= sizeof bits && std::endian::native == std::endian::little) {
-      std::memcpy(&bits, stream_.data() + byte, sizeof bits);
-    } else {
-      for (std::size_t i = 0; i < sizeof bits && byte + i < stream_.size(); ++i) {
-        bits |= std::uint64_t{stream_[byte + i]} << (8 * i);
-      }
-    }
-    return bits >> (at_ % 8);
-  }
-
-  std::uint32_t take(unsigned count) {
-    const std::uint64_t bits = word() & ((std::uint64_t{1} << count) - 1);
-    at_ += count;
-    return static_cast<std::uint32_t>(bits);
-  }
-
-  bool pass_block(std::uint32_t kind) {
-    switch (kind) {
-      case 0:
-        return pass_stored();
-      case 1:
-        return make_fixed_codes() && pass_symbols();
-      case 2:
-        return read_codes() && pass_symbols();
-      default:
-        return false;
-    }
-  }
-
-  bool pass_stored() {
-    at_ = (at_ + 7) / 8 * 8;
-    const std::uint32_t size = take(16);
-    const std::uint32_t check = take(16);
-    at_ += std::uint64_t{size} * 8;
-    return (size ^ check) == 0xFFFF;
-  }
-
-  bool make_codes(std::span<const std::uint8_t> lengths, std::span<const std::uint8_t> distances) {
-    const auto length_step = [](std::size_t symbol, unsigned bits) {
-      const auto kind = symbol < kEndOfBlock    ? Step::Kind::symbol
-                        : symbol == kEndOfBlock ? Step::Kind::end
-                                                : Step::Kind::distance;
-      return Step{kind, static_cast<std::uint8_t>(
-                            bits + (symbol > kEndOfBlock ? extra_bits_of_length(symbol) : 0))};
-    };
-    const auto distance_step = [](std::size_t symbol, unsigned bits) {
-      return Step{Step::Kind::symbol,
-                  static_cast<std::uint8_t>(bits + extra_bits_of_distance(symbol))};
-    };
-    if (!lengths_.make(lengths, length_step) || !distances_.make(distances, distance_step)) {
-      return false;
-    }
-    lengths_.join_literals();
-    return true;
-  }
-
-  bool make_fixed_codes() {  // RFC 1951, 3.2.6
-    std::array<std::uint8_t, kMostLengthSymbols + 2> lengths{};
-    std::fill(lengths.begin(), lengths.begin() + 144, std::uint8_t{8});
-    std::fill(lengths.begin() + 144, lengths.begin() + 256, std::uint8_t{9});
-    std::fill(lengths.begin() + 256, lengths.begin() + 280, std::uint8_t{7});
-    std::fill(lengths.begin() + 280, lengths.end(), std::uint8_t{8});
-    std::array<std::uint8_t, kMostDistanceSymbols> distances{};
-    distances.fill(5);
-    return make_codes(lengths, distances);
-  }
-
-  bool read_codes() {  // RFC 1951, 3.2.7
-    constexpr std::array<std::uint8_t, 19> kOrder = {16, 17, 18, 0, 8,  7, 9,  6, 10, 5,
-                                                     11, 4,  12, 3, 13, 2, 14, 1, 15};
-    const std::size_t length_count = take(5) + 257;
-    const std::size_t distance_count = take(5) + 1;
-    const std::size_t code_count = take(4) + 4;
-    if (length_count > kMostLengthSymbols || distance_count > kMostDistanceSymbols) {
-      return false;
-    }
-    std::array<std::uint8_t, kOrder.size()> code_lengths{};
-    for (std::size_t i = 0; i < code_count; ++i) {
-      code_lengths[kOrder[i]] = static_cast<std::uint8_t>(take(3));
-    }
-    std::array<std::uint8_t, kMostLengthSymbols + kMostDistanceSymbols> all{};
-    if (!read_lengths(code_lengths, std::span(all).first(length_count + distance_count))) {
-      return false;
-    }
-    return make_codes(std::span(all).first(length_count),
-                      std::span(all).subspan(length_count, distance_count));
-  }
-
-  // The lengths of both alphabets, one behind the other, packed by `code_lengths`.
-  bool read_lengths(std::span<const std::uint8_t> code_lengths, std::span<std::uint8_t> all) {
-    constexpr unsigned kMostBits = 7;
-    std::array<std::uint8_t, 1U << kMostBits> symbol_of{};
-    std::array<std::uint8_t, 1U << kMostBits> bits_of{};
-    std::uint32_t code = 0;
-    for (unsigned bits = 1; bits <= kMostBits; ++bits, code <<= 1U) {
-      for (std::size_t symbol = 0; symbol < code_lengths.size(); ++symbol) {
-        if (code_lengths[symbol] != bits) {
-          continue;
-        }
-        if (code >= (1U << bits)) {
-          return false;
-        }
-        std::uint32_t turned = 0;
-        for (unsigned i = 0; i < bits; ++i) {
-          turned |= ((code >> i) & 1U) << (bits - 1 - i);
-        }
-        for (std::size_t at = turned; at < symbol_of.size(); at += std::size_t{1} << bits) {
-          symbol_of[at] = static_cast<std::uint8_t>(symbol);
-          bits_of[at] = static_cast<std::uint8_t>(bits);
-        }
-        ++code;
-      }
-    }
-    for (std::size_t i = 0; i < all.size();) {
-      const std::size_t at = word() & (symbol_of.size() - 1);
-      const unsigned symbol = symbol_of[at];
-      if (bits_of[at] == 0) {
-        return false;
-      }
-      at_ += bits_of[at];
-      if (symbol < 16) {
-        all[i++] = static_cast<std::uint8_t>(symbol);
-        continue;
-      }
-      if (symbol == 16 && i == 0) {
-        return false;
-      }
-      const std::uint8_t repeated = symbol == 16 ? all[i - 1] : std::uint8_t{0};
-      const std::size_t count = symbol == 16   ? 3 + take(2)
-                                : symbol == 17 ? 3 + take(3)
-                                               : 11 + take(7);
-      if (count > all.size() - i) {
-        return false;
-      }
-      std::fill_n(all.begin() + static_cast<std::ptrdiff_t>(i), count, repeated);
-      i += count;
-    }
-    return true;
-  }
-
-  // Whether a code is a literal or a length cannot be foretold, so no branch depends on it.
-  bool pass_symbols() {
-    const Codes* codes = &lengths_;
-    while (at_ < end()) {
-      // 57 bits are there. A step among lengths takes 20 with its extra bits, a distance 28, one
-      // follows the other.
-      std::uint64_t bits = word();
-      unsigned used = 0;
-      for (int i = 0; i < 2; ++i) {
-        const Step step = codes->step(bits);
-        used += step.bits;
-        bits >>= step.bits;
-        if (step.kind == Step::Kind::end || step.kind == Step::Kind::none) {
-          at_ += used;
-          return step.kind == Step::Kind::end;
-        }
-        codes = step.kind == Step::Kind::distance ? &distances_ : &lengths_;
-      }
-      at_ += used;
-    }
+// Whether a last block with codes of its own could begin here, by the first 74 bits: `word` are
+// those from here on. Of a thousand places that do not, one looks as if.
+bool could_begin(std::span<const std::uint8_t> stream, std::uint64_t at, std::uint64_t word) {
+  constexpr unsigned kMostCounted = 29;  // beyond the least number of lengths, of distances
+  if (((word >> 3) & 31) > kMostCounted || ((word >> 8) & 31) > kMostCounted) {
     return false;
   }
+  const unsigned lengths = static_cast<unsigned>((word >> 13) & 15) + 4;
+  std::uint64_t rest = bits_at(stream, at + 17) & ((std::uint64_t{1} << (3 * lengths)) - 1);
+  unsigned share = 0;
+  for (; rest != 0; rest >>= 12U) {
+    share += kSharesOfFour[rest & 4095];
+  }
+  return share == 128;
+}
 
-  std::span<const std::uint8_t> stream_;
-  std::uint64_t at_ = 0;  // bit
-  // Of lengths as many as the fastest cache holds: the more bits, the more literals in one step.
-  Codes lengths_{Codes::kMostDirectBits};
-  Codes distances_{9};
+// What zlib says where it stopped.
+struct Stop {
+  std::uint64_t unused_bits;  // of the last byte taken
+  bool in_last;               // the block is the last
+  bool at_its_end;
 };
+Stop stop_of(const z_stream& zlib) {
+  const auto said = static_cast<unsigned>(zlib.data_type);
+  return {said & 63, (said & 64) != 0, (said & 128) != 0};
+}
+
+// zlib's inflate only reads what it is given, its interface is older than const.
+Bytef* given(const std::uint8_t* bytes) { return const_cast<Bytef*>(bytes); }
 
 }  // namespace
 
-std::optional<LastBlock> find_last_block(std::span<const std::uint8_t> stream) {
-  return Walk(stream).run();
+LastBlockFinder::LastBlockFinder() : zlib_(std::make_unique<z_stream>()), unpacked_(kMostUnpacked) {
+  if (inflateInit2(zlib_.get(), -MAX_WBITS) != Z_OK) {
+    throw std::bad_alloc();
+  }
+}
+
+LastBlockFinder::~LastBlockFinder() { inflateEnd(zlib_.get()); }
+
+// Sets zlib at `bit` and lets it read the header of a block.
+bool LastBlockFinder::header_at(std::span<const std::uint8_t> stream, std::uint64_t bit) {
+  inflateReset(zlib_.get());
+  std::size_t byte = bit / 8;
+  if (const int passed = static_cast<int>(bit % 8); passed > 0) {
+    inflatePrime(zlib_.get(), 8 - passed, stream[byte++] >> passed);
+  }
+  zlib_->next_in = given(stream.data() + byte);
+  zlib_->avail_in = static_cast<uInt>(stream.size() - byte);
+  zlib_->next_out = unpacked_.data();
+  zlib_->avail_out = static_cast<uInt>(unpacked_.size());
+  return inflate(zlib_.get(), Z_TREES) == Z_OK;
+}
+
+// How many bytes the block has whose header was read, where it is the last and ends the stream.
+std::optional<std::size_t> LastBlockFinder::unpack_rest(std::span<const std::uint8_t> before) {
+  inflateSetDictionary(zlib_.get(), before.data(), static_cast<uInt>(before.size()));
+  const int answer = inflate(zlib_.get(), Z_BLOCK);
+  const Stop stop = stop_of(*zlib_);
+  if (answer != Z_OK || !stop.in_last || !stop.at_its_end || zlib_->avail_in != 0) {
+    return std::nullopt;
+  }
+  return unpacked_.size() - zlib_->avail_out;
+}
+
+std::optional<LastBlock> LastBlockFinder::block_at(std::span<const std::uint8_t> stream,
+                                                   std::span<const std::uint8_t> bytes,
+                                                   std::uint64_t bit) {
+  // How many bytes does not depend on what lies before them, which is only known when their number
+  // is.
+  static constexpr std::array<std::uint8_t, kWindow> kAnything{};
+  if (!header_at(stream, bit)) {
+    return std::nullopt;
+  }
+  const auto size = unpack_rest(kAnything);
+  if (!size || *size < kLeastUnpacked || *size > bytes.size()) {
+    return std::nullopt;
+  }
+  const auto own = bytes.last(*size);
+  const auto before = bytes.first(bytes.size() - *size);
+  if (!header_at(stream, bit) ||
+      unpack_rest(before.last(std::min(before.size(), kWindow))) != size ||
+      !std::equal(own.begin(), own.end(), unpacked_.begin())) {
+    return std::nullopt;
+  }
+  return LastBlock{bit, std::uint64_t{stream.size()} * 8 - stop_of(*zlib_).unused_bits};
+}
+
+std::optional<LastBlock> LastBlockFinder::from_the_end(std::span<const std::uint8_t> stream,
+                                                       std::span<const std::uint8_t> bytes) {
+  constexpr unsigned kAtOnce = 32;  // a header's first 17 bits lie behind each of them in a word
+  const std::uint64_t end = std::uint64_t{stream.size()} * 8;
+  // No block is larger packed than stored.
+  const std::uint64_t most = std::uint64_t{kMostUnpacked} * 8 + kMostHeaderBits;
+  const std::uint64_t least = end > most ? end - most : 0;
+  for (std::uint64_t at = end / kAtOnce + 1; at-- > least / kAtOnce;) {
+    const std::uint64_t word = bits_at(stream, at * kAtOnce);
+    // 1: the last; 01: codes of its own, their second bit first.
+    std::uint32_t begins = static_cast<std::uint32_t>(word & ~(word >> 1) & (word >> 2));
+    while (begins != 0) {
+      const unsigned bit = kAtOnce - 1 - static_cast<unsigned>(std::countl_zero(begins));
+      begins ^= 1U << bit;
+      if (could_begin(stream, at * kAtOnce + bit, word >> bit)) {
+        if (const auto found = block_at(stream, bytes, at * kAtOnce + bit)) {
+          return found;
+        }
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<LastBlock> LastBlockFinder::from_the_front(std::span<const std::uint8_t> stream) {
+  inflateReset(zlib_.get());
+  zlib_->next_in = given(stream.data());
+  zlib_->avail_in = static_cast<uInt>(stream.size());
+  LastBlock block;
+  for (;;) {
+    zlib_->next_out = unpacked_.data();
+    zlib_->avail_out = static_cast<uInt>(unpacked_.size());
+    const int answer = inflate(zlib_.get(), Z_BLOCK);
+    if (answer != Z_OK) {
+      return std::nullopt;
+    }
+    const Stop stop = stop_of(*zlib_);
+    if (!stop.at_its_end) {
+      continue;
+    }
+    const std::uint64_t bit = std::uint64_t{zlib_->total_in} * 8 - stop.unused_bits;
+    if (stop.in_last) {
+      block.end_bit = bit;
+      return (bit + 7) / 8 == stream.size() ? std::optional(block) : std::nullopt;
+    }
+    block.begin_bit = bit;
+  }
+}
+
+std::optional<LastBlock> LastBlockFinder::find(std::span<const std::uint8_t> stream,
+                                               std::span<const std::uint8_t> bytes) {
+  const auto found = from_the_end(stream, bytes);
+  return found ? found : from_the_front(stream);
 }
 
 }  // namespace sixpoint::gt3x

@@ -6,8 +6,6 @@
 
 #include <libdeflate.h>
 
-#include "gt3x/container/deflate_blocks.h"
-
 namespace sixpoint::gt3x {
 namespace {
 
@@ -42,7 +40,7 @@ void PiecePacker::pack(std::span<const std::uint8_t> piece, Place place, Bytes& 
                                             packed.size()));
   if (place == Place::inner) {
     // libdeflate wrote the stream: it is one.
-    open_end(packed, find_last_block(packed).value());
+    open_end(packed, finder_.find(packed, piece).value());
   }
 }
 

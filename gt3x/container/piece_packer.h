@@ -21,6 +21,7 @@
 #include <span>
 
 #include "base/bytes.h"
+#include "gt3x/container/deflate_blocks.h"
 
 struct libdeflate_compressor;
 
@@ -42,6 +43,7 @@ class PiecePacker {
 
  private:
   libdeflate_compressor* compressor_;
+  LastBlockFinder finder_;
 };
 
 // The bytes of a piece that was packed at this place; false where `packed` is not exactly that of

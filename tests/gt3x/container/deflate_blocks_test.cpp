@@ -1,6 +1,7 @@
 #include "gt3x/container/deflate_blocks.h"
 
 #include <gtest/gtest.h>
+#include <libdeflate.h>
 #include <zlib.h>
 
 #include "base/bytes.h"
@@ -14,14 +15,24 @@ struct Packed {
   Bytes bytes;
 };
 
-// Several blocks: the kinds of bytes change.
-Packed packed_by_zlib(std::size_t size, int level, int strategy, std::uint64_t seed) {
+std::optional<LastBlock> find_in(std::span<const std::uint8_t> stream, const Bytes& bytes) {
+  return LastBlockFinder().find(stream, bytes);
+}
+
+// The kinds of bytes change, which makes several blocks.
+Bytes changing_bytes(std::size_t size, std::uint64_t seed) {
   Random random(seed);
-  Packed made;
+  Bytes bytes;
   for (std::size_t i = 0; i < size; ++i) {
     const std::uint64_t kinds = 1 + (i / 30'000 * 97 + seed) % 256;
-    made.bytes.push_back(static_cast<std::uint8_t>(random.below(kinds)));
+    bytes.push_back(static_cast<std::uint8_t>(random.below(kinds)));
   }
+  return bytes;
+}
+
+Packed packed_by_zlib(std::size_t size, int level, int strategy, std::uint64_t seed) {
+  Packed made;
+  made.bytes = changing_bytes(size, seed);
   z_stream stream{};
   EXPECT_EQ(deflateInit2(&stream, level, Z_DEFLATED, -15, 9, strategy), Z_OK);
   made.stream.resize(deflateBound(&stream, size) + 100);
@@ -35,7 +46,8 @@ Packed packed_by_zlib(std::size_t size, int level, int strategy, std::uint64_t s
   return made;
 }
 
-// Oracle: zlib's inflate, which stops at the end of every block and says how many bits are left.
+// Oracle: zlib's inflate from the front, which stops at the end of every block and says how many
+// bits are left.
 LastBlock last_block_by_zlib(Packed& packed) {
   z_stream stream{};
   EXPECT_EQ(inflateInit2(&stream, -15), Z_OK);
@@ -71,7 +83,7 @@ TEST(DeflateBlocks, TheLastBlockIsWhereZlibFindsIt) {
       for (const int level : {0, 1, 6, 9}) {
         Packed packed = packed_by_zlib(size, level, strategy, size + 7);
         const LastBlock wanted = last_block_by_zlib(packed);
-        const auto found = find_last_block(packed.stream);
+        const auto found = find_in(packed.stream, packed.bytes);
         ASSERT_TRUE(found) << size << " " << strategy << " " << level;
         EXPECT_EQ(found->begin_bit, wanted.begin_bit) << size << " " << strategy << " " << level;
         EXPECT_EQ(found->end_bit, wanted.end_bit) << size << " " << strategy << " " << level;
@@ -80,6 +92,43 @@ TEST(DeflateBlocks, TheLastBlockIsWhereZlibFindsIt) {
     }
   }
   EXPECT_GT(several, 5) << "streams of one block prove little";
+}
+
+// What is joined in earnest. One finder for all, as a packer has it.
+TEST(DeflateBlocks, TheLastBlockOfLibdeflatesStreams) {
+  const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> packer(
+      libdeflate_alloc_compressor(6), &libdeflate_free_compressor);
+  LastBlockFinder finder;
+  int several = 0;
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    Packed packed;
+    packed.bytes = changing_bytes(1000 + seed * 45'000, seed * 11);
+    if (seed % 4 == 1) {  // one kind of bytes: blocks as long as they get
+      std::fill(packed.bytes.begin(), packed.bytes.end(), std::uint8_t{7});
+    }
+    packed.stream.resize(libdeflate_deflate_compress_bound(packer.get(), packed.bytes.size()));
+    packed.stream.resize(libdeflate_deflate_compress(packer.get(), packed.bytes.data(),
+                                                     packed.bytes.size(), packed.stream.data(),
+                                                     packed.stream.size()));
+    const LastBlock wanted = last_block_by_zlib(packed);
+    const auto found = finder.find(packed.stream, packed.bytes);
+    ASSERT_TRUE(found) << seed;
+    EXPECT_EQ(found->begin_bit, wanted.begin_bit) << seed;
+    EXPECT_EQ(found->end_bit, wanted.end_bit) << seed;
+    several += found->begin_bit > 0 ? 1 : 0;
+  }
+  EXPECT_GT(several, 12) << "streams of one block prove little";
+}
+
+// Bytes that are no longer those of the stream show no agreement; the stream is read from the
+// front.
+TEST(DeflateBlocks, ADifferenceIsNoAgreement) {
+  Packed packed = packed_by_zlib(200'000, 6, Z_DEFAULT_STRATEGY, 5);
+  const LastBlock wanted = last_block_by_zlib(packed);
+  packed.bytes.back() ^= 1U;
+  const auto found = find_in(packed.stream, packed.bytes);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->begin_bit, wanted.begin_bit);
 }
 
 // Skewed frequencies give codes of up to 15 bits.
@@ -105,7 +154,7 @@ TEST(DeflateBlocks, LongCodes) {
   packed.stream.resize(stream.total_out);
   deflateEnd(&stream);
   const LastBlock wanted = last_block_by_zlib(packed);
-  const auto found = find_last_block(packed.stream);
+  const auto found = find_in(packed.stream, packed.bytes);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->begin_bit, wanted.begin_bit);
   EXPECT_EQ(found->end_bit, wanted.end_bit);
@@ -113,10 +162,13 @@ TEST(DeflateBlocks, LongCodes) {
 
 TEST(DeflateBlocks, WhatIsCutShortHasNone) {
   const Packed packed = packed_by_zlib(2000, 6, Z_DEFAULT_STRATEGY, 1);
-  ASSERT_TRUE(find_last_block(packed.stream));
+  ASSERT_TRUE(find_in(packed.stream, packed.bytes));
   for (std::size_t size = 0; size < packed.stream.size(); ++size) {
-    EXPECT_FALSE(find_last_block(std::span(packed.stream).first(size))) << size;
+    EXPECT_FALSE(find_in(std::span(packed.stream).first(size), packed.bytes)) << size;
   }
+  Bytes longer = packed.stream;
+  longer.push_back(0);
+  EXPECT_FALSE(find_in(longer, packed.bytes));
 }
 
 // No flipped bit makes it read beyond the stream (the sanitizers look), and what it then finds lies
@@ -127,7 +179,7 @@ TEST(DeflateBlocks, DamageIsSurvived) {
   for (std::size_t bit = 0; bit < packed.stream.size() * 8; ++bit) {
     Bytes damaged = packed.stream;
     damaged[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
-    if (const auto last = find_last_block(damaged)) {
+    if (const auto last = find_in(damaged, packed.bytes)) {
       ++found;
       EXPECT_LT(last->begin_bit, last->end_bit);
       EXPECT_LE(last->end_bit, damaged.size() * 8);
