@@ -1,11 +1,12 @@
 #include "gt3x/container/pack_line.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace sixpoint::gt3x {
 
 PackLine::PackLine(unsigned jobs, Sink sink)
-    : on_threads_(jobs > 1), sink_(std::move(sink)), slots_(on_threads_ ? jobs : 1U) {}
+    : sink_(std::move(sink)), packers_(std::max(jobs, 1U)), slots_(jobs > 1 ? jobs + 1 : 1U) {}
 
 Status PackLine::write_oldest() {
   Slot& slot = slots_[written_++ % slots_.size()];
@@ -19,14 +20,24 @@ Status PackLine::put(Bytes& piece, PiecePacker::Place place) {
   if (begun_ - written_ == slots_.size()) {
     SIXPOINT_CHECK(write_oldest());
   }
-  Slot& slot = slots_[begun_++ % slots_.size()];
+  Slot& slot = slots_[begun_ % slots_.size()];
+  PiecePacker& packer = packers_[begun_ % packers_.size()];
   slot.piece.swap(piece);
-  const auto pack = [&slot, place] { slot.packer.pack(slot.piece, place, slot.packed); };
-  if (on_threads_) {
-    slot.done = std::async(std::launch::async, pack);
+  if (packers_.size() == 1) {
+    packer.pack(slot.piece, place, slot.packed);
   } else {
-    pack();
+    std::shared_future<void> before;  // the packer's last piece
+    if (begun_ >= packers_.size()) {
+      before = slots_[(begun_ - packers_.size()) % slots_.size()].done;
+    }
+    slot.done = std::async(std::launch::async, [&slot, &packer, place, before] {
+      if (before.valid()) {
+        before.wait();
+      }
+      packer.pack(slot.piece, place, slot.packed);
+    });
   }
+  ++begun_;
   return {};
 }
 

@@ -8,8 +8,9 @@
 //   SIXPOINT_CHECK(line.put(second, PiecePacker::Place::last));
 //   SIXPOINT_CHECK(line.finish());
 //
-// The sink is called on the calling thread. Memory: for every thread a piece, its packed bytes
-// and libdeflate's tables, 3 MB together. One object belongs to one thread.
+// The sink is called on the calling thread. One piece more than there are threads is under way, so
+// that no thread waits for the sink. Memory: a piece and its packed bytes for each of them, 2 MB,
+// and 1 MB of tables for every thread. One object belongs to one thread.
 #pragma once
 
 #include <functional>
@@ -35,17 +36,16 @@ class PackLine {
 
  private:
   struct Slot {
-    PiecePacker packer;
     Bytes piece;
     Bytes packed;
-    std::future<void> done;  // its end waits for the thread that uses the above
+    std::shared_future<void> done;  // its end waits for the thread that uses the above
   };
   Status write_oldest();
 
-  bool on_threads_;
   Sink sink_;
-  std::vector<Slot> slots_;  // in turn
-  std::size_t begun_ = 0;    // pieces
+  std::vector<PiecePacker> packers_;  // in turn, one for each thread
+  std::vector<Slot> slots_;           // in turn
+  std::size_t begun_ = 0;             // pieces
   std::size_t written_ = 0;
 };
 

@@ -10,7 +10,7 @@ namespace {
 constexpr int kChain = 7;
 // From any place in the window, so many bytes ahead must be visible unless the end is.
 constexpr std::size_t kLookahead = (kChain + 1) * (kMaxRecord + 16);
-constexpr std::size_t kCapacity = 4 * kLookahead;
+constexpr std::size_t kCapacity = 2 * kLookahead;
 // Read first: memory comes as bytes do, and most readers of a file's first records end in it.
 constexpr std::size_t kFirstPiece = std::size_t{64} * 1024;
 // Zero bytes that may stand between two records of a chain.

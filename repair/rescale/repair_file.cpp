@@ -140,6 +140,7 @@ class Repair {
     if (!windows_wait || !head.foresee()) {
       return another_way;
     }
+    head.survey_.blocks = {};  // the whole survey has its own
     SIXPOINT_ASSIGN(head.report_.input_sha256, file_sha256(env_.files, report_.input));
     SIXPOINT_ASSIGN(auto passing, LogSurvey::begin(recording, options_.still));
     SIXPOINT_ASSIGN(auto reader, recording.open_log());
