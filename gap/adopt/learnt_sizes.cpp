@@ -30,13 +30,19 @@ std::vector<double> numbers_of(const Json& effect, const char* key, const std::s
   return numbers;
 }
 
+// Null where no two units were there to differ.
+bool spread_is_unknown(const Json& effect, const std::string& parameter) {
+  const Json& all = effect.value("spread", Json::object());
+  return all.is_null() || (all.is_object() && all.contains(parameter) && all[parameter].is_null());
+}
+
 // Standard deviation of Student's t of units - 1 degrees of freedom.
 double widened(std::size_t units, const LearntSizesOptions& options) {
   const auto n = static_cast<double>(units);
   return units == 0 ? 1 : units < 4 ? options.widened_for_few : std::sqrt((n - 1) / (n - 3));
 }
 
-// `group`: of this effect, at its typical size. None where one unit alone is behind it.
+// `group`: of this effect, at its typical size. None where nothing is known of the next unit.
 std::optional<LearntSize> learnt_of(const sim::PopulationEffect& parsed, const Json& effect,
                                     const ParameterGroup& group,
                                     const LearntSizesOptions& options) {
@@ -47,7 +53,7 @@ std::optional<LearntSize> learnt_of(const sim::PopulationEffect& parsed, const J
   learnt.mean = parsed.mean.at(parameter);
   learnt.sd = parsed.spread.at(parameter);
   const std::vector<double> uncertainty = numbers_of(effect, "standard_uncertainty", parameter);
-  if (learnt.units == 1) {
+  if (learnt.units == 1 || spread_is_unknown(effect, parameter)) {
     return std::nullopt;
   }
   for (std::size_t i = 0; i < learnt.sd.size(); ++i) {

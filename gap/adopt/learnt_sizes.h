@@ -25,8 +25,9 @@ struct LearntSizesOptions {
 };
 
 // By name. Effects of the population that the means of dwells and tones do not show (clock, lines,
-// scatter ...) are left out, and so is what one unit alone had: it says nothing of the next. An
-// entry without `units`, written by hand, is taken at its word. Empty where nothing was adopted.
+// scatter ...) are left out, and so is what one unit alone had, or whose spread is null: it says
+// nothing of the next. An entry without `units`, written by hand, is taken at its word. Empty where
+// nothing was adopted.
 // configuration where this is no scenario, or has no `population`.
 Result<std::vector<LearntSize>> learnt_sizes(std::string_view scenario,
                                              const LearntSizesOptions& options = {});

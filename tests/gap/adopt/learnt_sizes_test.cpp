@@ -22,13 +22,15 @@ constexpr const char* kPopulation = R"({"protocol": "production", "population": 
   {"name": "tilt", "units": 3, "mean": {"rotation_vector_deg": [0.2, 0.1, 0]},
    "spread": {"rotation_vector_deg": [0.03, 0.02, 0]}},
   {"name": "drift", "units": 1, "mean": {"mg_per_h": [1, 1, 1]}, "spread": {"mg_per_h": null}},
+  {"name": "non_orthogonality", "mean": {"yz_xz_xy": [0.001, 0, 0]}, "spread": {"yz_xz_xy": null}},
   {"name": "seating", "units": 5, "mean": {"sd_deg": 0.08}, "spread": {"sd_deg": 0.02}},
   {"name": "local_gravity", "mean": {"ratio": 1.001}, "spread": {"ratio": 0.0002}}]}})";
 
 TEST(LearntSizes, SpreadAndUncertaintyOfTheMeanAddUp) {
   const auto learnt = learnt_sizes(kPopulation);
   ASSERT_OK(learnt);
-  ASSERT_EQ(learnt->size(), 3U) << "one unit says nothing of the next, scatter is not in the means";
+  ASSERT_EQ(learnt->size(), 3U) << "neither one unit nor an unknown spread says anything of the "
+                                   "next; scatter is not in the means";
   const LearntSize& gravity = (*learnt)[0];
   EXPECT_EQ(gravity.effect, "local_gravity");
   EXPECT_EQ(gravity.units, 0U) << "written by hand";
