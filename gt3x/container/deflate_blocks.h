@@ -9,14 +9,13 @@
 // The first bit of a block says whether it is the last of its stream (RFC 1951, 3.2.3). libdeflate
 // makes whole streams only and does not tell where its blocks begin. Two ways lead there:
 //
-//   from the end   every bit at which a last block with codes of its own could begin (3.2.7) is
-//                  tried with zlib, backwards. The block is found where zlib unpacks from that bit
-//                  to the very end of the stream, and what comes out is the end of `bytes`, at
-//                  least 1,024 of them: that does not happen by chance.
-//   from the front where that finds nothing (a short stream, a stored block, fixed codes), zlib
-//                  unpacks the whole stream and stops at every block.
+// From the end: every bit at which a last block with codes of its own could begin (3.2.7) is tried
+// with zlib, backwards. The block is found where zlib unpacks from that bit to the very end of the
+// stream, and what comes out is the end of `bytes`, at least 1,024 of them: that does not happen by
+// chance. Takes a thirtieth of the time of packing at level 6.
 //
-// The first takes a thirtieth of the time of packing at level 6, the second a fifth.
+// From the front, where that finds nothing (a short stream, a stored block, fixed codes): zlib
+// unpacks the whole stream and stops at every block. Takes a fifth.
 #pragma once
 
 #include <cstdint>
