@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds and tests everything, as CI does; works from a fresh clone on a fresh Debian 12 as root.
 #   scripts/test.sh               all: tests, the unit tests again under ASan and UBSan (built by
-#                                 clang), a minute of fuzzing, format, clang-tidy
+#                                 clang; NOT_SANITIZED in tests/ names those left out), a minute of fuzzing, format, clang-tidy
 #   scripts/test.sh --label L     builds what the tests of label L need and runs those
 set -euo pipefail
 cd "$(dirname "$0")/.."
