@@ -22,10 +22,12 @@ set(sbom "")
 find_program(SIXPOINT_DPKG_QUERY dpkg-query)
 if(SIXPOINT_DPKG_QUERY AND NOT SIXPOINT_SANITIZE AND NOT SIXPOINT_FUZZ)
   set(sbom ${reference}/sbom.cdx.json)
+  get_property(parts GLOBAL PROPERTY SIXPOINT_PARTS)
+  list(TRANSFORM parts REPLACE "(.+)" "$<TARGET_FILE:\\1>" OUTPUT_VARIABLE part_files)
   add_custom_command(OUTPUT ${sbom}
-    COMMAND ${PROJECT_SOURCE_DIR}/packaging/sbom.sh $<TARGET_FILE:sixpoint> ${PROJECT_SOURCE_DIR}
-            ${PROJECT_VERSION} > ${sbom}
-    DEPENDS sixpoint ${PROJECT_SOURCE_DIR}/packaging/sbom.sh
+    COMMAND ${PROJECT_SOURCE_DIR}/packaging/sbom.sh ${PROJECT_SOURCE_DIR} ${PROJECT_VERSION}
+            $<TARGET_FILE:sixpoint> ${part_files} > ${sbom}
+    DEPENDS sixpoint ${parts} ${PROJECT_SOURCE_DIR}/packaging/sbom.sh
             ${PROJECT_SOURCE_DIR}/station/web/package-lock.json VERBATIM)
 endif()
 add_custom_target(sixpoint_package_files ALL

@@ -59,6 +59,24 @@ function(sixpoint_room FOLDER)
     PRIVATE ${ROOM_PRIVATE_NEIGHBOURS} $<BUILD_INTERFACE:sixpoint_warnings>)
 endfunction()
 
+# sixpoint_part(FOLDER NAME): the room as a library that the program loads when it first needs it
+# (base/parts/part.h). Programs find it in the folder of their RUNPATH. What links to the room instead has
+# its table inside, which is asked for by name because nothing else refers to it.
+set(SIXPOINT_PARTS_DESTINATION lib/sixpoint)
+set(CMAKE_BUILD_RPATH ${PROJECT_BINARY_DIR}/${SIXPOINT_PARTS_DESTINATION})
+function(sixpoint_part FOLDER NAME)
+  string(REPLACE / _ room ${FOLDER})
+  target_link_options(sixpoint_${room} INTERFACE -Wl,-u,sixpoint_part_${NAME})
+  add_library(sixpoint_part_${NAME} MODULE $<TARGET_OBJECTS:sixpoint_${room}>)
+  target_link_libraries(sixpoint_part_${NAME} PRIVATE sixpoint_${room} sixpoint_warnings)
+  target_link_options(sixpoint_part_${NAME} PRIVATE -Wl,--exclude-libs,ALL -Wl,--as-needed)
+  set_target_properties(sixpoint_part_${NAME} PROPERTIES
+    OUTPUT_NAME sixpoint-${NAME}-${PROJECT_VERSION} LINKER_LANGUAGE CXX SKIP_BUILD_RPATH ON
+    LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BUILD_RPATH})
+  install(TARGETS sixpoint_part_${NAME} DESTINATION ${SIXPOINT_PARTS_DESTINATION} COMPONENT program)
+  set_property(GLOBAL APPEND PROPERTY SIXPOINT_PARTS sixpoint_part_${NAME})
+endfunction()
+
 # sixpoint_wing(FOLDER room...): all rooms of a folder under one name, for tests, benchmarks and other
 # projects. No room links to a wing.
 function(sixpoint_wing FOLDER)

@@ -2,9 +2,10 @@
 # The parts that the program is made of, as CycloneDX 1.4 JSON on stdout: libraries that it loads, libraries that are
 # compiled in, and what the page bundles. Versions are those of this machine's packages; without a time, so
 # that the same build gives the same file.
-#   sbom.sh PROGRAM SOURCE_FOLDER VERSION
+#   sbom.sh SOURCE_FOLDER VERSION PROGRAM PART...
 set -euo pipefail
-program=$1 source_folder=$2 version=$3
+source_folder=$1 version=$2
+shift 2
 
 # Short names of the package's copyright file, where it has the form that machines read.
 licences_of() {
@@ -31,7 +32,7 @@ printf '{"bomFormat": "CycloneDX", "specVersion": "1.4", "version": 1,\n'
 printf '  "metadata": {"component": {"type": "application", "name": "sixpoint", "version": "%s"}},\n  "components": [\n' "$version"
 separator=''
 # A library stands in its package under /lib or under /usr/lib.
-loaded=$(ldd "$program" | awk '$3 ~ /^\// { print $3 }' | xargs -n 1 readlink -f | sort -u)
+loaded=$(ldd "$@" | awk '$3 ~ /^\// { print $3 }' | xargs -n 1 readlink -f | sort -u)
 owners=$(sed 's#^/usr/#/#; s#^.*#/usr&\n&#' <<<"$loaded" | xargs dpkg -S 2>/dev/null || true)
 for library in $loaded; do
   grep -q -- "/${library##*/}\$" <<<"$owners" || { echo "sbom.sh: $library is in no package" >&2; exit 1; }

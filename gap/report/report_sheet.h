@@ -13,7 +13,8 @@ namespace sixpoint::gap {
 
 std::string report_sheet(const Diagnosis& diagnosis);
 
-// A sheet drawn by librsvg and cairo. internal where they refuse it.
+// A sheet drawn by librsvg and cairo, which are loaded at the first call. internal where they
+// refuse it, cannot_create where they do not load.
 Result<Bytes> sheet_png(const std::string& svg);
 Result<Bytes> sheet_pdf(const std::string& svg);
 

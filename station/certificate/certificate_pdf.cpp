@@ -79,12 +79,11 @@ std::string_view meaning_of(JigVerdict verdict) {
 class Sheet : PageFlow {
  public:
   // `pages`: for "Page 1 of 2"; the sheet is drawn once to count them.
-  Sheet(const Certificate& certificate, const QrCode& qr, std::size_t pages)
-      : PageFlow(
-            fmt::format("Calibration certificate {} of {}", certificate.run, certificate.serial),
-            certificate.ended,
-            fmt::format("Certificate {}  \u00b7  {}", certificate.run, certificate.serial),
-            "Not an accredited calibration", pages),
+  Sheet(std::unique_ptr<PdfDocument> pdf, const Certificate& certificate, const QrCode& qr,
+        std::size_t pages)
+      : PageFlow(std::move(pdf),
+                 fmt::format("Certificate {}  \u00b7  {}", certificate.run, certificate.serial),
+                 "Not an accredited calibration", pages),
         certificate_(certificate) {
     head(qr);
     unit_and_calibration();
@@ -110,19 +109,19 @@ class Sheet : PageFlow {
   }
 
   void head(const QrCode& qr) {
-    pdf_.text(kLeft_mm, 26, "Calibration certificate", {PdfFont::bold, 18});
-    pdf_.text(kLeft_mm, 32.5, "Accelerometer of an activity monitor, measured in six orientations",
-              {PdfFont::regular, 9, kGrey});
-    pdf_.text(kLeft_mm, 40, "Certificate", kLabel);
-    pdf_.text(kLeft_mm + 20, 40, certificate_.run, kMono);
+    pdf_->text(kLeft_mm, 26, "Calibration certificate", {PdfFont::bold, 18});
+    pdf_->text(kLeft_mm, 32.5, "Accelerometer of an activity monitor, measured in six orientations",
+               {PdfFont::regular, 9, kGrey});
+    pdf_->text(kLeft_mm, 40, "Certificate", kLabel);
+    pdf_->text(kLeft_mm + 20, 40, certificate_.run, kMono);
     const double module_mm = kQr_mm / static_cast<double>(qr.size);
     for (std::size_t row = 0; row < qr.size; ++row) {
       for (std::size_t column = 0; column < qr.size; ++column) {
         if (qr.at(row, column)) {
           // Slightly wider and higher, so that no viewer shows light lines between modules.
-          pdf_.box(kRight_mm - kQr_mm + static_cast<double>(column) * module_mm,
-                   kTop_mm + static_cast<double>(row) * module_mm, module_mm + 0.01,
-                   module_mm + 0.01, 0);
+          pdf_->box(kRight_mm - kQr_mm + static_cast<double>(column) * module_mm,
+                    kTop_mm + static_cast<double>(row) * module_mm, module_mm + 0.01,
+                    module_mm + 0.01, 0);
         }
       }
     }
@@ -148,21 +147,21 @@ class Sheet : PageFlow {
 
   void verdict() {
     y_mm_ += 2.5;
-    const Row meaning = pdf_.lines(meaning_of(certificate_.verdict), kWidth_mm - 66, kBody);
+    const Row meaning = pdf_->lines(meaning_of(certificate_.verdict), kWidth_mm - 66, kBody);
     const double height_mm = std::max(12.0, 4.5 + kLine_mm * static_cast<double>(meaning.size()));
-    pdf_.box(kLeft_mm, y_mm_ - 3, kWidth_mm, height_mm, 0.92);
-    pdf_.box(kLeft_mm, y_mm_ - 3, 1.6, height_mm, is_passed(certificate_.verdict) ? 0.35 : 0);
+    pdf_->box(kLeft_mm, y_mm_ - 3, kWidth_mm, height_mm, 0.92);
+    pdf_->box(kLeft_mm, y_mm_ - 3, 1.6, height_mm, is_passed(certificate_.verdict) ? 0.35 : 0);
     const bool passed = is_passed(certificate_.verdict);
-    pdf_.text(kLeft_mm + 5, y_mm_ + (passed ? 2.6 : 4.4), upper(to_string(certificate_.verdict)),
-              {PdfFont::bold, 12});
+    pdf_->text(kLeft_mm + 5, y_mm_ + (passed ? 2.6 : 4.4), upper(to_string(certificate_.verdict)),
+               {PdfFont::bold, 12});
     if (passed) {
-      pdf_.text(kLeft_mm + 5, y_mm_ + 7.2,
-                certificate_.written ? "WRITTEN INTO THE UNIT" : "NOT WRITTEN INTO THE UNIT",
-                {PdfFont::bold, 8});
+      pdf_->text(kLeft_mm + 5, y_mm_ + 7.2,
+                 certificate_.written ? "WRITTEN INTO THE UNIT" : "NOT WRITTEN INTO THE UNIT",
+                 {PdfFont::bold, 8});
     }
     double at_mm = y_mm_ + (meaning.size() == 1 ? 4.2 : 2);
     for (const std::string& line : meaning) {
-      pdf_.text(kLeft_mm + 62, at_mm, line, kBody);
+      pdf_->text(kLeft_mm + 62, at_mm, line, kBody);
       at_mm += kLine_mm;
     }
     y_mm_ += height_mm + 0.6;
@@ -376,7 +375,7 @@ class Sheet : PageFlow {
     constexpr double kHalf_mm = (kWidth_mm - 12) / 2;
     constexpr double kSecond_mm = kRight_mm - kHalf_mm;
     for (const double x_mm : {kLeft_mm, kSecond_mm}) {
-      pdf_.line(x_mm, y_mm_, x_mm + kHalf_mm, y_mm_, 0.2, 0);
+      pdf_->line(x_mm, y_mm_, x_mm + kHalf_mm, y_mm_, 0.2, 0);
     }
     y_mm_ += 4;
     const std::string& name = certificate_.operator_name;
@@ -391,12 +390,21 @@ class Sheet : PageFlow {
   const Certificate& certificate_;
 };
 
+Result<std::unique_ptr<PdfDocument>> empty_document(const Certificate& certificate) {
+  return new_pdf_document(
+      fmt::format("Calibration certificate {} of {}", certificate.run, certificate.serial),
+      certificate.ended);
+}
+
 }  // namespace
 
 Result<Bytes> certificate_pdf(const Certificate& certificate) {
   SIXPOINT_ASSIGN(const QrCode qr,
                   qr_code(fmt::format("sixpoint:{}:{}", certificate.serial, certificate.run)));
-  return Sheet(certificate, qr, Sheet(certificate, qr, 0).pages()).bytes();
+  SIXPOINT_ASSIGN(auto counted, empty_document(certificate));
+  const std::size_t pages = Sheet(std::move(counted), certificate, qr, 0).pages();
+  SIXPOINT_ASSIGN(auto pdf, empty_document(certificate));
+  return Sheet(std::move(pdf), certificate, qr, pages).bytes();
 }
 
 }  // namespace sixpoint::station

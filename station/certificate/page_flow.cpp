@@ -17,9 +17,9 @@ constexpr TextStyle kCell{PdfFont::regular, 7.5};
 
 }  // namespace
 
-PageFlow::PageFlow(const std::string& title, UtcTime made, std::string footer,
-                   std::string second_footer, std::size_t pages)
-    : pdf_(title, made),
+PageFlow::PageFlow(std::unique_ptr<PdfDocument> pdf, std::string footer, std::string second_footer,
+                   std::size_t pages)
+    : pdf_(std::move(pdf)),
       footer_(std::move(footer)),
       second_footer_(std::move(second_footer)),
       pages_(pages) {
@@ -27,21 +27,21 @@ PageFlow::PageFlow(const std::string& title, UtcTime made, std::string footer,
 }
 
 void PageFlow::text(double x_mm, std::string_view text, const TextStyle& style, Align align) {
-  pdf_.text(x_mm, y_mm_, text, style, align);
+  pdf_->text(x_mm, y_mm_, text, style, align);
 }
 void PageFlow::rule(double y_mm, double thickness_mm, double grey) {
-  pdf_.line(kLeft_mm, y_mm, kRight_mm, y_mm, thickness_mm, grey);
+  pdf_->line(kLeft_mm, y_mm, kRight_mm, y_mm, thickness_mm, grey);
 }
 std::string PageFlow::cut(const std::string& long_text, double width_mm, const TextStyle& style) {
-  return pdf_.lines(long_text, width_mm, style).front();
+  return pdf_->lines(long_text, width_mm, style).front();
 }
 
 void PageFlow::add_page() {
-  pdf_.add_page();
+  pdf_->add_page();
   rule(279, 0.2, 0.6);
   y_mm_ = 283.5;
   text(kLeft_mm, cut(footer_, 140, kNote), kNote);
-  text(kRight_mm, fmt::format("Page {} of {}", pdf_.pages(), pages_), kNote, Align::right);
+  text(kRight_mm, fmt::format("Page {} of {}", pdf_->pages(), pages_), kNote, Align::right);
   y_mm_ += 4;
   text(kLeft_mm, second_footer_, kNote);
   y_mm_ = kTop_mm;
@@ -66,7 +66,7 @@ void PageFlow::section(std::string_view title, double least_mm) {
 
 void PageFlow::paragraph(std::string_view words, const TextStyle& style) {
   const double step_mm = style.size_pt * 0.49;
-  for (const std::string& line : pdf_.lines(words, kWidth_mm, style)) {
+  for (const std::string& line : pdf_->lines(words, kWidth_mm, style)) {
     need(step_mm);
     text(kLeft_mm, line, style);
     y_mm_ += step_mm;
@@ -80,7 +80,7 @@ void PageFlow::grid(const std::vector<std::array<Entry, 2>>& rows) {
   for (const auto& row : rows) {
     std::array<Row, 2> values;
     for (std::size_t side = 0; side < 2; ++side) {
-      values[side] = pdf_.lines(row[side].value, kHalf_mm - kKey_mm, row[side].style);
+      values[side] = pdf_->lines(row[side].value, kHalf_mm - kKey_mm, row[side].style);
     }
     const std::size_t lines = std::max(values[0].size(), values[1].size());
     need(kLine_mm * static_cast<double>(lines));
@@ -88,8 +88,8 @@ void PageFlow::grid(const std::vector<std::array<Entry, 2>>& rows) {
       const double x_mm = kLeft_mm + static_cast<double>(side) * (kHalf_mm + kGap_mm);
       text(x_mm, row[side].key, kLabel);
       for (std::size_t i = 0; i < values[side].size(); ++i) {
-        pdf_.text(x_mm + kKey_mm, y_mm_ + kLine_mm * static_cast<double>(i), values[side][i],
-                  row[side].style);
+        pdf_->text(x_mm + kKey_mm, y_mm_ + kLine_mm * static_cast<double>(i), values[side][i],
+                   row[side].style);
       }
     }
     y_mm_ += kLine_mm * static_cast<double>(lines) + 0.3;
@@ -111,7 +111,7 @@ void PageFlow::table_head(const std::vector<Column>& columns) {
   std::vector<Row> heads;
   std::size_t lines = 1;
   for (const Column& column : columns) {
-    heads.push_back(pdf_.lines(column.head, column.width_mm - 1.5, kHead));
+    heads.push_back(pdf_->lines(column.head, column.width_mm - 1.5, kHead));
     lines = std::max(lines, heads.back().size());
   }
   for (std::size_t line = 0; line < lines; ++line) {  // aligned at the bottom

@@ -1,7 +1,8 @@
 // Pages that fill from top to bottom: headings, paragraphs, names with values, tables. A new page
 // begins where something does not fit; every page has a footer with its number.
 //
-//   PageFlow flow("Title", when, "Certificate 12", "Not accredited", 2);
+//   SIXPOINT_ASSIGN(auto pdf, new_pdf_document("Title", when));
+//   PageFlow flow(std::move(pdf), "Certificate 12", "Not accredited", 2);
 //   flow.section("Results", 20);
 //   flow.paragraph("All is well.");
 //
@@ -9,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,11 +45,11 @@ struct Entry {
 class PageFlow {
  public:
   // `pages`: for "Page 1 of 2". Where it is not known, draw twice: first to count the pages.
-  PageFlow(const std::string& title, UtcTime made, std::string footer, std::string second_footer,
+  PageFlow(std::unique_ptr<PdfDocument> pdf, std::string footer, std::string second_footer,
            std::size_t pages);
 
-  std::size_t pages() const { return pdf_.pages(); }
-  Result<Bytes> bytes() { return pdf_.bytes(); }
+  std::size_t pages() const { return pdf_->pages(); }
+  Result<Bytes> bytes() { return pdf_->bytes(); }
 
   void text(double x_mm, std::string_view text, const TextStyle& style, Align align = Align::left);
   void rule(double y_mm, double thickness_mm, double grey);
@@ -62,7 +64,7 @@ class PageFlow {
   void table(const std::vector<Column>& columns, const std::vector<Row>& rows);
 
  protected:
-  PdfDocument pdf_;
+  std::unique_ptr<PdfDocument> pdf_;
   double y_mm_ = kTop_mm;  // the next baseline
 
  private:

@@ -1,143 +1,14 @@
-// The only file of the certificate that includes cairo and pango.
 #include "station/certificate/pdf_document.h"
 
-#include <cairo-pdf.h>
-#include <fmt/format.h>
-#include <pango/pangocairo.h>
+#include "base/parts/part.h"
+
+extern "C" [[gnu::weak]] const sixpoint::station::PdfPart sixpoint_part_pdf;
 
 namespace sixpoint::station {
 
-namespace {
-
-constexpr double kPoints_per_mm = 72 / 25.4;
-
-struct Free {
-  void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
-  void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
-  void operator()(PangoLayout* layout) const { g_object_unref(layout); }
-  void operator()(PangoFontDescription* font) const { pango_font_description_free(font); }
-};
-
-cairo_status_t append(void* bytes, const unsigned char* data, unsigned int length) {
-  static_cast<Bytes*>(bytes)->insert(static_cast<Bytes*>(bytes)->end(), data, data + length);
-  return CAIRO_STATUS_SUCCESS;
-}
-
-// Pango and cairo take valid UTF-8 only.
-std::string as_utf8(std::string_view text) {
-  std::string out;
-  const char* bad = nullptr;
-  while (g_utf8_validate(text.data(), static_cast<gssize>(text.size()), &bad) == 0) {
-    const auto good = static_cast<std::size_t>(bad - text.data());
-    out += text.substr(0, good);
-    out += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[good]));
-    text.remove_prefix(good + 1);
-  }
-  out += text;
-  return printable(out, out.size());
-}
-
-}  // namespace
-
-struct PdfDocument::Impl {
-  Bytes bytes;
-  std::unique_ptr<cairo_surface_t, Free> surface;
-  std::unique_ptr<cairo_t, Free> cairo;
-  std::unique_ptr<PangoLayout, Free> layout;
-  std::size_t pages = 0;
-
-  // The layout, set to this text on lines of at most `width_mm`; negative: on one line.
-  PangoLayout* set(std::string_view text, double width_mm, const TextStyle& style) {
-    const std::unique_ptr<PangoFontDescription, Free> font(pango_font_description_new());
-    pango_font_description_set_family(
-        font.get(), style.font == PdfFont::mono ? "DejaVu Sans Mono" : "DejaVu Sans");
-    pango_font_description_set_weight(
-        font.get(), style.font == PdfFont::bold ? PANGO_WEIGHT_BOLD : PANGO_WEIGHT_NORMAL);
-    pango_font_description_set_absolute_size(font.get(),
-                                             style.size_pt / kPoints_per_mm * PANGO_SCALE);
-    pango_layout_set_font_description(layout.get(), font.get());
-    pango_layout_set_width(layout.get(),
-                           width_mm < 0 ? -1 : static_cast<int>(width_mm * PANGO_SCALE));
-    const std::string utf8 = as_utf8(text);
-    pango_layout_set_text(layout.get(), utf8.data(), static_cast<int>(utf8.size()));
-    return layout.get();
-  }
-  void set_grey(double grey) { cairo_set_source_rgb(cairo.get(), grey, grey, grey); }
-};
-
-PdfDocument::PdfDocument(const std::string& title, UtcTime made) : impl_(new Impl) {
-  cairo_surface_t* const surface = cairo_pdf_surface_create_for_stream(
-      append, &impl_->bytes, kWidth_mm * kPoints_per_mm, kHeight_mm * kPoints_per_mm);
-  impl_->surface.reset(surface);
-  cairo_pdf_surface_set_metadata(surface, CAIRO_PDF_METADATA_TITLE, as_utf8(title).c_str());
-  cairo_pdf_surface_set_metadata(surface, CAIRO_PDF_METADATA_CREATOR, "sixpoint");
-  const std::string date = to_iso8601(std::chrono::floor<std::chrono::seconds>(made));
-  cairo_pdf_surface_set_metadata(surface, CAIRO_PDF_METADATA_CREATE_DATE, date.c_str());
-  impl_->cairo.reset(cairo_create(surface));
-  cairo_scale(impl_->cairo.get(), kPoints_per_mm, kPoints_per_mm);
-  impl_->layout.reset(pango_cairo_create_layout(impl_->cairo.get()));
-  pango_context_set_round_glyph_positions(pango_layout_get_context(impl_->layout.get()), FALSE);
-  pango_layout_set_wrap(impl_->layout.get(), PANGO_WRAP_WORD_CHAR);
-}
-
-PdfDocument::~PdfDocument() = default;
-
-void PdfDocument::add_page() {
-  if (impl_->pages++ > 0) {
-    cairo_show_page(impl_->cairo.get());
-  }
-}
-
-std::size_t PdfDocument::pages() const { return impl_->pages; }
-
-std::vector<std::string> PdfDocument::lines(std::string_view text, double width_mm,
-                                            const TextStyle& style) {
-  PangoLayout* const layout = impl_->set(text, width_mm, style);
-  std::vector<std::string> lines;
-  for (int i = 0; i < pango_layout_get_line_count(layout); ++i) {
-    const PangoLayoutLine* line = pango_layout_get_line_readonly(layout, i);
-    std::string& text_of_line = lines.emplace_back(
-        pango_layout_get_text(layout) + line->start_index, static_cast<std::size_t>(line->length));
-    text_of_line.erase(text_of_line.find_last_not_of(' ') + 1);
-  }
-  return lines;
-}
-
-void PdfDocument::text(double x_mm, double y_mm, std::string_view text, const TextStyle& style,
-                       Align align) {
-  PangoLayoutLine* const line = pango_layout_get_line_readonly(impl_->set(text, -1, style), 0);
-  PangoRectangle extent;
-  pango_layout_line_get_extents(line, nullptr, &extent);
-  impl_->set_grey(style.grey);
-  cairo_move_to(impl_->cairo.get(),
-                align == Align::left ? x_mm : x_mm - pango_units_to_double(extent.width), y_mm);
-  pango_cairo_show_layout_line(impl_->cairo.get(), line);
-}
-
-void PdfDocument::line(double x1_mm, double y1_mm, double x2_mm, double y2_mm, double width_mm,
-                       double grey) {
-  impl_->set_grey(grey);
-  cairo_set_line_width(impl_->cairo.get(), width_mm);
-  cairo_move_to(impl_->cairo.get(), x1_mm, y1_mm);
-  cairo_line_to(impl_->cairo.get(), x2_mm, y2_mm);
-  cairo_stroke(impl_->cairo.get());
-}
-
-void PdfDocument::box(double x_mm, double y_mm, double width_mm, double height_mm, double grey) {
-  impl_->set_grey(grey);
-  cairo_rectangle(impl_->cairo.get(), x_mm, y_mm, width_mm, height_mm);
-  cairo_fill(impl_->cairo.get());
-}
-
-Result<Bytes> PdfDocument::bytes() {
-  const cairo_status_t drawn = cairo_status(impl_->cairo.get());
-  cairo_surface_finish(impl_->surface.get());
-  if (drawn != CAIRO_STATUS_SUCCESS ||
-      cairo_surface_status(impl_->surface.get()) != CAIRO_STATUS_SUCCESS) {
-    return fail(ErrorCode::internal, "cairo could not write the PDF", "certificate",
-                "please report this");
-  }
-  return std::move(impl_->bytes);
+Result<std::unique_ptr<PdfDocument>> new_pdf_document(const std::string& title, UtcTime made) {
+  SIXPOINT_ASSIGN(const PdfPart* pdf, part("pdf", &sixpoint_part_pdf));
+  return pdf->begin(title, made);
 }
 
 }  // namespace sixpoint::station

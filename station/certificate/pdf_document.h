@@ -1,9 +1,9 @@
 // A PDF of A4 pages: text, lines and boxes, placed in millimetres from the top left corner.
 //
-//   PdfDocument pdf("Title", when);
-//   pdf.add_page();
-//   pdf.text(20, 30, "Measured by Łukasz", {PdfFont::bold, 10});
-//   SIXPOINT_ASSIGN(const Bytes bytes, pdf.bytes());
+//   SIXPOINT_ASSIGN(const auto pdf, new_pdf_document("Title", when));
+//   pdf->add_page();
+//   pdf->text(20, 30, "Measured by Łukasz", {PdfFont::bold, 10});
+//   SIXPOINT_ASSIGN(const Bytes bytes, pdf->bytes());
 //
 // Text is UTF-8, in the fonts DejaVu Sans and DejaVu Sans Mono (Debian package fonts-dejavu-core),
 // which are embedded. Pango takes a character that they lack from another installed font. Where no
@@ -37,29 +37,36 @@ class PdfDocument {
   static constexpr double kWidth_mm = 210;
   static constexpr double kHeight_mm = 297;
 
-  // `made`: the document's own date.
-  PdfDocument(const std::string& title, UtcTime made);
-  PdfDocument(const PdfDocument&) = delete;
-  PdfDocument& operator=(const PdfDocument&) = delete;
-  ~PdfDocument();
+  virtual ~PdfDocument() = default;
 
-  void add_page();  // all that follows is drawn there
-  std::size_t pages() const;
+  virtual void add_page() = 0;  // all that follows is drawn there
+  virtual std::size_t pages() const = 0;
 
   // The text in lines of at most `width_mm`, at least one. A word that is wider is cut.
-  std::vector<std::string> lines(std::string_view text, double width_mm, const TextStyle& style);
+  virtual std::vector<std::string> lines(std::string_view text, double width_mm,
+                                         const TextStyle& style) = 0;
   // `y_mm` is the baseline. Align::right: the text ends at `x_mm`.
-  void text(double x_mm, double y_mm, std::string_view text, const TextStyle& style,
-            Align align = Align::left);
-  void line(double x1_mm, double y1_mm, double x2_mm, double y2_mm, double width_mm, double grey);
-  void box(double x_mm, double y_mm, double width_mm, double height_mm, double grey);  // filled
+  virtual void text(double x_mm, double y_mm, std::string_view text, const TextStyle& style,
+                    Align align) = 0;
+  void text(double x_mm, double y_mm, std::string_view words, const TextStyle& style) {
+    text(x_mm, y_mm, words, style, Align::left);
+  }
+  virtual void line(double x1_mm, double y1_mm, double x2_mm, double y2_mm, double width_mm,
+                    double grey) = 0;
+  virtual void box(double x_mm, double y_mm, double width_mm, double height_mm,
+                   double grey) = 0;  // filled
 
   // Ends the document. internal when cairo failed anywhere before.
-  Result<Bytes> bytes();
+  virtual Result<Bytes> bytes() = 0;
+};
 
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+// An empty document, drawn by station/pdf, which is loaded at the first call: cannot_create where
+// it does not load. `made`: the document's own date.
+Result<std::unique_ptr<PdfDocument>> new_pdf_document(const std::string& title, UtcTime made);
+
+// What station/pdf gives to this room (base/parts/part.h).
+struct PdfPart {
+  std::unique_ptr<PdfDocument> (*begin)(const std::string& title, UtcTime made);
 };
 
 }  // namespace sixpoint::station

@@ -30,27 +30,29 @@ for name in sixpoint sixpoint-station libsixpoint-dev libsixpoint-mocks-dev; do
 done
 package=$(echo "$scratch"/made/sixpoint_*.deb)
 
-# What it needs: every library that the program loads belongs to a package that it names.
+# What it needs: every library that the program or a part of it loads belongs to a package that it names.
+parts=("$root"/usr/lib/sixpoint/libsixpoint-*.so)
+[ ${#parts[@]} -eq 3 ] || failed "not three parts: ${parts[*]}"
 depends=$(dpkg-deb -f "$package" Depends)
 known=$(ldconfig -p)
-for library in $(objdump -p "$root/usr/bin/sixpoint" | awk '/NEEDED/ { print $2 }'); do
+for library in $(objdump -p "$root/usr/bin/sixpoint" "${parts[@]}" | awk '/NEEDED/ { print $2 }' | sort -u); do
   case $library in ld-linux* | libm.so* | libc.so*) continue ;; esac
   path=$(awk -v name="$library" '$1 == name && !seen { print $NF; seen = 1 }' <<<"$known")
   owner=$(dpkg -S "$(readlink -f "$path")" "$path" 2>/dev/null | sed -n '1s/:.*//p' || true)
   grep -qw -- "$owner" <<<"$depends" || failed "$library is in $owner, which Depends does not name: $depends"
 done
-# The list of parts names each of these libraries' packages, and no package twice.
-parts=$(python3 -c 'import json, sys; [print(c["name"]) for c in json.load(open(sys.argv[1]))["components"]]' \
+# The list of what it is made of names each of these libraries' packages, and no package twice.
+pieces=$(python3 -c 'import json, sys; [print(c["name"]) for c in json.load(open(sys.argv[1]))["components"]]' \
   "$root/usr/share/doc/sixpoint/sbom.cdx.json") || failed "sbom.cdx.json is no list of parts"
-[ -z "$(sort <<<"$parts" | uniq -d)" ] || failed "sbom.cdx.json names a part twice"
+[ -z "$(sort <<<"$pieces" | uniq -d)" ] || failed "sbom.cdx.json names a part twice"
 for owner in $(tr ',' '\n' <<<"$depends" | sed 's/ *\([a-z0-9.+-]*\).*/\1/'); do
   # A name that a package provides stands for that package.
   provider=$(dpkg-query -W -f='${Package} ${Provides}\n' | awk -v name="$owner" '{ for (i = 2; i <= NF; ++i) if ($i == name || $i == name ",") print $1 }')
   owner=${provider:-$owner}
-  [ "$owner" = fonts-dejavu-core ] || grep -qx -- "$owner" <<<"$parts" || failed "sbom.cdx.json lacks $owner"
+  [ "$owner" = fonts-dejavu-core ] || grep -qx -- "$owner" <<<"$pieces" || failed "sbom.cdx.json lacks $owner"
 done
-for part in nlohmann-json3-dev libeigen3-dev preact uplot; do
-  grep -qx "$part" <<<"$parts" || failed "sbom.cdx.json lacks $part"
+for piece in nlohmann-json3-dev libeigen3-dev preact uplot; do
+  grep -qx "$piece" <<<"$pieces" || failed "sbom.cdx.json lacks $piece"
 done
 
 for file in usr/bin/sixpoint lib/udev/rules.d/60-sixpoint-detect.rules \
@@ -64,6 +66,11 @@ grep -qx /etc/default/sixpoint-station "$root/DEBIAN.sixpoint-station/conffiles"
 if grep -rIlF -e "$build_folder" -e "$source_folder" "$root" || grep -qF "$source_folder" "$root/usr/bin/sixpoint"; then
   failed "the package names the folders it was built in"
 fi
+# Libraries for work that few commands do are loaded by the parts alone: they were most of the program's start.
+needed=$(LD_LIBRARY_PATH='' ldd "$root/usr/bin/sixpoint")
+for library in libpq libpqxx libcairo libpango librsvg; do
+  grep -q "$library" <<<"$needed" && failed "$library is loaded with every command"
+done
 
 # The program from there.
 program=$root/usr/bin/sixpoint
@@ -78,6 +85,17 @@ status=0
 [ "$status" -eq 1 ] || failed "scan ended with $status, not with 1"
 "$program" repair "$scratch/archive" -o "$scratch/repaired" --scan >/dev/null 2>&1 ||
   failed "repair ended with $?"
+# Its parts: found beside it; and without one, the message names it and says what to do.
+nobody=postgresql://nobody@127.0.0.1:1/none
+said() { "$program" history MOS2A00000001 --store "$nobody" 2>&1 || echo "ended with $?"; }
+words=$(said)
+grep -q 'ended with 69' <<<"$words" || failed "no server is there: $words"
+mkdir "$scratch/elsewhere"
+mv "$root"/usr/lib/sixpoint/libsixpoint-postgres-* "$scratch/elsewhere"
+words=$(said)
+grep -q 'ended with 73' <<<"$words" && grep -q 'libsixpoint-postgres.*install the whole package again' <<<"$words" ||
+  failed "the part is not there: $words"
+mv "$scratch"/elsewhere/* "$root/usr/lib/sixpoint"
 
 # Every command has its section of the manual page, and its options; and the shell offers it.
 page=$(gunzip -c "$root/usr/share/man/man1/sixpoint.1.gz" | sed 's/\\-/-/g; s/\\f[BIR]//g')

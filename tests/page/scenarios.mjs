@@ -364,7 +364,7 @@ const scenarios = {
         }
       }
       return view.finished === 16;
-    }, 240);
+    }, 480);
     console.log(`sixteen units in ${((Date.now() - began) / 1000).toFixed(0)} s at sixteen times the real pace`);
     await h.shot(page, 'sixteen-2-done');
     for (let lane = 1; lane <= 16; ++lane) {

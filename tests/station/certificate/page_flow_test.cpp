@@ -22,7 +22,11 @@ using testing::ElementsAre;
 constexpr UtcTime kMade{std::chrono::sys_days{std::chrono::year{2026} / 3 / 4}};
 constexpr double kFooterRule_mm = 279;  // the body ends above it
 
-PageFlow flow_of(std::size_t pages) { return {"Title", kMade, "FooterOne", "FooterTwo", pages}; }
+PageFlow flow_of(std::size_t pages, std::string footer = "FooterOne") {
+  auto pdf = new_pdf_document("Title", kMade);
+  EXPECT_OK(pdf);
+  return {*std::move(pdf), std::move(footer), "FooterTwo", pages};
+}
 
 struct Word {
   std::string text;
@@ -115,7 +119,7 @@ TEST(PageFlow, AFooterTooLongForItsLineIsCut) {
   for (int i = 0; i < 100; ++i) {
     footer += " certificate";
   }
-  PageFlow flow("Title", kMade, footer + " end", "second", 1);
+  PageFlow flow = flow_of(1, footer + " end");
   const std::vector<Word> words = words_of(flow);
   EXPECT_THAT(pages_with(words, "begin"), ElementsAre(1));
   EXPECT_THAT(pages_with(words, "end"), ElementsAre());

@@ -1,4 +1,4 @@
-#include "db/servers/postgres_address.h"
+#include "db/postgres/postgres_address.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,8 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "db/postgres/postgres_address.h"
 #include "db/servers/database.h"
-#include "db/servers/postgres_address.h"
+#include "db/servers/postgres_part.h"
 
 namespace sixpoint::db {
 namespace {
@@ -450,9 +451,7 @@ Result<std::unique_ptr<RowStream>> PostgresDatabase::stream(const std::string& s
   return std::make_unique<PostgresRows>(*this, name);
 }
 
-}  // namespace
-
-Result<std::unique_ptr<Database>> open_postgres(const std::string& location) {
+Result<std::unique_ptr<Database>> open(const std::string& location) {
   SIXPOINT_ASSIGN(auto address, parse_postgres_address(location));
   auto database = std::make_unique<PostgresDatabase>(std::move(address));
   SIXPOINT_CHECK(database->connect());
@@ -460,4 +459,7 @@ Result<std::unique_ptr<Database>> open_postgres(const std::string& location) {
   return database;
 }
 
+}  // namespace
 }  // namespace sixpoint::db
+
+extern "C" const sixpoint::db::PostgresPart sixpoint_part_postgres = {&sixpoint::db::open};

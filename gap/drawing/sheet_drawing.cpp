@@ -1,4 +1,3 @@
-// The only file of this room that includes librsvg and cairo.
 #include <functional>
 #include <memory>
 
@@ -6,7 +5,7 @@
 #include <cairo.h>
 #include <librsvg/rsvg.h>
 
-#include "gap/report/report_sheet.h"
+#include "gap/report/drawing_part.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -51,9 +50,7 @@ Status draw(const std::string& svg, cairo_surface_t* surface, double scale) {
   return {};
 }
 
-}  // namespace
-
-Result<Bytes> sheet_png(const std::string& svg) {
+Result<Bytes> png(const std::string& svg) {
   const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24,
                                                    static_cast<int>(kSheetWidth) * kPngScale,
                                                    static_cast<int>(kHeight) * kPngScale));
@@ -65,7 +62,7 @@ Result<Bytes> sheet_png(const std::string& svg) {
   return bytes;
 }
 
-Result<Bytes> sheet_pdf(const std::string& svg) {
+Result<Bytes> pdf(const std::string& svg) {
   Bytes bytes;
   const Surface surface(cairo_pdf_surface_create_for_stream(
       append, &bytes, kSheetWidth * kPointsPerDot, kHeight * kPointsPerDot));
@@ -77,4 +74,8 @@ Result<Bytes> sheet_pdf(const std::string& svg) {
   return bytes;
 }
 
+}  // namespace
 }  // namespace sixpoint::gap
+
+extern "C" const sixpoint::gap::DrawingPart sixpoint_part_drawing = {&sixpoint::gap::png,
+                                                                     &sixpoint::gap::pdf};

@@ -1,10 +1,9 @@
-#include "station/certificate/pdf_document.h"
-
 #include <fstream>
 
 #include <gmock/gmock.h>
 
 #include "expect_result.h"
+#include "station/certificate/pdf_document.h"
 #include "station/certificate/poppler.h"
 #include "temporary_folder.h"
 
@@ -15,16 +14,22 @@ using testing::HasSubstr;
 
 constexpr UtcTime kPrinted{std::chrono::sys_days{std::chrono::year{2026} / 3 / 4}};
 
+std::unique_ptr<PdfDocument> document(const std::string& title) {
+  auto pdf = new_pdf_document(title, kPrinted);
+  EXPECT_OK(pdf);
+  return *std::move(pdf);
+}
+
 Bytes two_pages(const std::string& title) {
-  PdfDocument pdf(title, kPrinted);
-  pdf.add_page();
-  pdf.text(20, 30, "left", {});
-  pdf.text(190, 30, "right", {PdfFont::bold, 12, 0.4}, Align::right);
-  pdf.box(20, 40, 10, 5, 0);
-  pdf.add_page();
-  pdf.line(20, 40, 190, 40, 0.2, 0);
-  EXPECT_EQ(pdf.pages(), 2U);
-  const auto bytes = pdf.bytes();
+  const auto pdf = document(title);
+  pdf->add_page();
+  pdf->text(20, 30, "left", {});
+  pdf->text(190, 30, "right", {PdfFont::bold, 12, 0.4}, Align::right);
+  pdf->box(20, 40, 10, 5, 0);
+  pdf->add_page();
+  pdf->line(20, 40, 190, 40, 0.2, 0);
+  EXPECT_EQ(pdf->pages(), 2U);
+  const auto bytes = pdf->bytes();
   EXPECT_OK(bytes);
   return *bytes;
 }
@@ -58,11 +63,11 @@ TEST(PdfDocument, PopplerReadsTheTextWhereItWasPlaced) {
 }
 
 TEST(PdfDocument, LinesHoldAllWordsAndCutAWordThatIsTooWide) {
-  PdfDocument pdf("a", kPrinted);
-  pdf.add_page();
-  EXPECT_EQ(pdf.lines("", 50, {}), std::vector<std::string>{""});
-  EXPECT_EQ(pdf.lines("one line", 50, {}), std::vector<std::string>{"one line"});
-  const auto cut = pdf.lines(std::string(100, 'W'), 20, {});
+  const auto pdf = document("a");
+  pdf->add_page();
+  EXPECT_EQ(pdf->lines("", 50, {}), std::vector<std::string>{""});
+  EXPECT_EQ(pdf->lines("one line", 50, {}), std::vector<std::string>{"one line"});
+  const auto cut = pdf->lines(std::string(100, 'W'), 20, {});
   EXPECT_GT(cut.size(), 3U);
   std::string joined;
   for (const std::string& line : cut) {
@@ -72,11 +77,11 @@ TEST(PdfDocument, LinesHoldAllWordsAndCutAWordThatIsTooWide) {
 }
 
 TEST(PdfDocument, ControlCharactersAndOtherBytesAreEscaped) {
-  PdfDocument pdf("a", kPrinted);
-  pdf.add_page();
-  EXPECT_EQ(pdf.lines("a\nb\xff"
-                      "c",
-                      100, {}),
+  const auto pdf = document("a");
+  pdf->add_page();
+  EXPECT_EQ(pdf->lines("a\nb\xff"
+                       "c",
+                       100, {}),
             std::vector<std::string>{"a\\x0ab\\xffc"});
 }
 
