@@ -163,6 +163,9 @@ Status run(const Options& options, Context& context) {
   }
   SIXPOINT_CHECK(outputs.input(options.save ? store_file(options.store) : ""));
   SIXPOINT_CHECK(outputs.file("--output", options.output));
+  if (options.save) {
+    warn_without_store(context, open_store(context, options.store));
+  }
   Json json = document("solve");
   Json list = Json::array();
   for (const std::string& path : options.files) {

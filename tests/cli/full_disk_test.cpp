@@ -1,5 +1,6 @@
 // A disk that is full from the n-th write on, for every n until the work is done before that: the
-// program as a process, with full_disk_preload.cpp in it.
+// program as a process, with full_disk_preload.cpp in it. Under the sanitizers, where each start of it
+// takes a second, for every fifth n.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -14,11 +15,13 @@
 #include "cli/store_option.h"
 #include "repair/jig_constants.h"
 #include "repair/made_recording.h"
+#include "sanitized.h"
 
 namespace sixpoint::cli {
 namespace {
 
 constexpr int kMostWrites = 3000;
+constexpr int kStep = tests::kSanitized ? 5 : 1;
 
 class FullDisk : public tests::StoreTest {
  protected:
@@ -71,7 +74,7 @@ TEST_F(FullDisk, AStoreKeepsWhatItAcknowledged) {
   const std::int64_t before = verified_rows(path("base.db"));
   const std::string store = disk() + "/s.db";
   int refused = 0;
-  for (int from = 1; from < kMostWrites; ++from) {
+  for (int from = 1; from < kMostWrites; from += kStep) {
     SCOPED_TRACE(from);
     empty_disk();
     std::filesystem::copy_file(path("base.db"), store);
@@ -96,7 +99,7 @@ TEST_F(FullDisk, AStoreKeepsWhatItAcknowledged) {
 
 TEST_F(FullDisk, AStoreThatCouldNotBeMadeIsMadeAtTheNextTry) {
   const std::string store = disk() + "/new.db";
-  for (int from = 1; from < kMostWrites; ++from) {
+  for (int from = 1; from < kMostWrites; from += kStep) {
     SCOPED_TRACE(from);
     empty_disk();
     const int exit_code = run_full(from, kSign + store);
@@ -127,7 +130,7 @@ TEST_F(FullDisk, AnOutputIsWholeOrIsNotThere) {
                                   "statistics --store " + path("s.db") + " --html " + target}) {
     SCOPED_TRACE(work);
     bool done = false;
-    for (int from = 1; from < kMostWrites && !done; ++from) {
+    for (int from = 1; from < kMostWrites && !done; from += kStep) {
       SCOPED_TRACE(from);
       empty_disk();
       const int exit_code = run_full(from, work);
@@ -200,7 +203,7 @@ class FullDiskOfAnArchive : public FullDisk {
   // `work` on a disk that becomes full in its midst, and once more with space; `begin` comes first.
   void fill_up(const std::string& work, const std::function<void()>& begin) {
     int in_its_midst = 0;
-    for (int from = 1; from < kMostWrites; from += 3) {
+    for (int from = 1; from < kMostWrites; from += 2 + kStep) {
       SCOPED_TRACE(from);
       empty_disk();
       begin();

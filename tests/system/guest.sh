@@ -34,8 +34,9 @@ with_faults() {
   sixpoint virtual --device "virtual:seed=7,serial=MOS2A45130007,pace=$pace" --jig --faults F.json >offered 2>hints &
   server=$!
   wait_for grep -q listening offered
-  attach 1-1
-  attach 1-2
+  # The kernel may still be putting the units of the test before away: "open vhci_driver" is refused then.
+  wait_for attach 1-1
+  wait_for attach 1-2
   wait_for [ -e /dev/hidraw1 ]
   udevadm settle --timeout=10
   plug_in_again &

@@ -40,7 +40,7 @@ echo "== a unit that is files alone: found, mounted, calibrated from its mount p
 sixpoint virtual --device virtual:seed=7,serial=MOS2A45130008,interfaces=storage >offered2 2>hints &
 server=$!
 wait_for grep -q listening offered2
-attach 1-1
+wait_for attach 1-1
 wait_for has_disk 1-1:1.0
 udevadm settle --timeout=10
 [ "$(cat /sys/bus/usb/devices/1-1/bNumInterfaces)" -eq 1 ]

@@ -133,6 +133,16 @@ TEST_F(SolveCommand, MissingSidesAreNamedAndNothingIsStored) {
   EXPECT_EQ(with_prior.json()["verdict"], "rests_on_prior");
 }
 
+// Of constants that are not verified nothing is stored; so what is said of the store was said before the work.
+TEST_F(SolveCommand, AStoreThatCannotBeMadeIsSaidBeforeTheWork) {
+  const std::string path = write(sides_recording({0, 1, 2, 4}), "four.gt3x");
+  const auto answer = run({"solve", path, "--save", "--store", folder_ / "nowhere/store.db"});
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.people, HasSubstr("the store cannot be used now"));
+  EXPECT_THAT(run({"solve", path, "--store", folder_ / "nowhere/store.db"}).people,
+              testing::Not(HasSubstr("the store cannot be used now")));
+}
+
 TEST_F(SolveCommand, UsageAndBadInput) {
   const std::string path = write(sides_recording({0}), "one.gt3x");
   EXPECT_EQ(run({"solve", path, "--method", "magic"}).exit_code, 64);
