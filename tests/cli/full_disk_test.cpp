@@ -1,6 +1,6 @@
 // A disk that is full from the n-th write on, for every n until the work is done before that: the
-// program as a process, with full_disk_preload.cpp in it. Under the sanitizers, where each start of it
-// takes a second, for every fifth n.
+// program as a process, with full_disk_preload.cpp in it. Under the sanitizers, where each start of
+// it takes a second, for every fifth n.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>

@@ -133,7 +133,8 @@ TEST_F(SolveCommand, MissingSidesAreNamedAndNothingIsStored) {
   EXPECT_EQ(with_prior.json()["verdict"], "rests_on_prior");
 }
 
-// Of constants that are not verified nothing is stored; so what is said of the store was said before the work.
+// Of constants that are not verified nothing is stored; so what is said of the store was said
+// before the work.
 TEST_F(SolveCommand, AStoreThatCannotBeMadeIsSaidBeforeTheWork) {
   const std::string path = write(sides_recording({0, 1, 2, 4}), "four.gt3x");
   const auto answer = run({"solve", path, "--save", "--store", folder_ / "nowhere/store.db"});
