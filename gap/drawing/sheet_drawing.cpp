@@ -5,7 +5,7 @@
 #include <cairo.h>
 #include <librsvg/rsvg.h>
 
-#include "gap/report/drawing_part.h"
+#include "gap/report/report_sheet.h"
 
 namespace sixpoint::gap {
 namespace {

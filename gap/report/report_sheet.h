@@ -18,4 +18,10 @@ std::string report_sheet(const Diagnosis& diagnosis);
 Result<Bytes> sheet_png(const std::string& svg);
 Result<Bytes> sheet_pdf(const std::string& svg);
 
+// What gap/drawing gives to this room (base/parts/part.h).
+struct DrawingPart {
+  Result<Bytes> (*png)(const std::string& svg);
+  Result<Bytes> (*pdf)(const std::string& svg);
+};
+
 }  // namespace sixpoint::gap

@@ -1,6 +1,5 @@
 // PNG and PDF of a sheet: drawn by gap/drawing.
 #include "base/parts/part.h"
-#include "gap/report/drawing_part.h"
 #include "gap/report/report_sheet.h"
 
 extern "C" [[gnu::weak]] const sixpoint::gap::DrawingPart sixpoint_part_drawing;
