@@ -7,6 +7,7 @@
 
 #include "db/postgres/postgres_address.h"
 #include "db/servers/database.h"
+#include "db/servers/postgres_part.h"
 
 namespace sixpoint::db {
 namespace {

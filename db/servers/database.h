@@ -128,13 +128,6 @@ Result<std::unique_ptr<Database>> open_sqlite_in_memory();
 // device_unavailable where the server does not answer, went away or has no room; permission for a
 // wrong password or missing rights; no_input for a database that is not there; bad_data for one
 // that holds other tables. No message ever holds the password.
-//
-// The room db/postgres is loaded at the first call: cannot_create where it does not load.
 Result<std::unique_ptr<Database>> open_postgres(const std::string& location);
-
-// What db/postgres gives to this room (base/parts/part.h).
-struct PostgresPart {
-  Result<std::unique_ptr<Database>> (*open)(const std::string& location);
-};
 
 }  // namespace sixpoint::db

@@ -1,5 +1,6 @@
 #include "base/parts/part.h"
 #include "db/servers/database.h"
+#include "db/servers/postgres_part.h"
 
 extern "C" [[gnu::weak]] const sixpoint::db::PostgresPart sixpoint_part_postgres;
 
