@@ -1,5 +1,5 @@
-// What db/postgres gives to this room (base/parts/part.h), which loads it at the first store that is on
-// such a server.
+// What db/postgres gives to this room (base/parts/part.h), which loads it at the first store that
+// is on such a server.
 //
 //   SIXPOINT_ASSIGN(const auto database, postgres->open("postgresql://ada@host/plant"));
 //
