@@ -78,8 +78,9 @@ TEST(LaneJson, ARunShowsWhatIsTakenAndWhatIsOpen) {
     faces.insert(taken["pose"].get<std::string>());
   }
   EXPECT_EQ(faces, (std::set<std::string>{"+x", "-x", "+y", "-y", "+z", "-z"}));
-  // On a busy machine the hand can come while a reading runs, which is refused rightly.
-  EXPECT_EQ(run["refusals"] == 0, run["last_refusal"] == "") << run.dump();
+  // On a busy machine a hand can come while a reading runs, which is refused rightly: once for each.
+  EXPECT_LE(run["refusals"], 3) << run.dump();
+  EXPECT_EQ(run["last_refusal"], "") << "what was refused is forgotten when a pose is taken";
 }
 
 // With writing, the unit is placed twice more, to check what was written.
