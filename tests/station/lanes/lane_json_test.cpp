@@ -78,7 +78,7 @@ TEST(LaneJson, ARunShowsWhatIsTakenAndWhatIsOpen) {
     faces.insert(taken["pose"].get<std::string>());
   }
   EXPECT_EQ(faces, (std::set<std::string>{"+x", "-x", "+y", "-y", "+z", "-z"}));
-  // On a busy machine a hand can come while a reading runs, which is refused rightly: once for each.
+  // On a busy machine a hand can come while a reading runs, which is refused rightly.
   EXPECT_LE(run["refusals"], 3) << run.dump();
   EXPECT_EQ(run["last_refusal"], "") << "what was refused is forgotten when a pose is taken";
 }
