@@ -38,4 +38,4 @@ if [ "$scenario" = bundle ]; then
   [ "$bytes" -lt 60000 ] || { echo "FAILED: more than 60 kB"; exit 1; }
   exit 0
 fi
-exec timeout 280 node "$source_folder/tests/page/scenarios.mjs" "$scenario" "$program" "$shots" ${4:+"$4"}
+exec timeout 560 node "$source_folder/tests/page/scenarios.mjs" "$scenario" "$program" "$shots" ${4:+"$4"}
