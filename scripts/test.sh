@@ -14,6 +14,7 @@ esac
 # Page, USB and scheduler tests wait for most of their time: more of them run at a time than there are cores.
 jobs=$(($(nproc) + 2))
 
+second_try=""
 step() { printf '\n== %s\n' "$*"; }
 # ctest's own lines; skips are listed with their reasons, because a skip is not a pass.
 run_ctest() {
@@ -28,7 +29,20 @@ run_ctest() {
     grep 'Skipped' "$log" || true
   fi
   rm -f "$log"
-  return "$status"
+  [ "$status" -eq 0 ] || run_failed_alone "$folder" || return "$status"
+}
+# The tests that failed once more, one at a time, so that what they say is the last that is printed. Tests that drive a
+# browser, a virtual machine or an installed package run in real time and can fail because others took the
+# processor: those pass when they pass alone, and are named. What else fails stays a failure.
+run_failed_alone() {
+  local folder=$1 failed others
+  names() { ctest --test-dir "$folder" -N "$@" | sed -n 's/^ *Test *#[0-9]*: //p'; }
+  failed=$(names --rerun-failed)
+  others=$(grep -vxFf <(names -L '^(page|system|program)$') <<<"$failed" || true)
+  [ -n "$failed" ] && [ "$(wc -l <<<"$failed")" -le 10 ] || return 1
+  step "What failed, alone: ${failed//$'\n'/ }"
+  ctest --test-dir "$folder" --rerun-failed --output-on-failure -j 1 && [ -z "$others" ] || return 1
+  second_try+=$failed$'\n'
 }
 
 scripts/install_packages.sh build test python r
@@ -70,3 +84,4 @@ step "clang-tidy"
 scripts/tidy.sh --within 2400
 
 step "Everything passed"
+[ -z "$second_try" ] || printf 'These tests failed beside others and passed alone:\n%s' "$second_try"
