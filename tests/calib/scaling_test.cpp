@@ -263,6 +263,18 @@ TEST(Rescale, ClippedStaysAtTheLimitAndIsCounted) {
   EXPECT_EQ(counts.samples, 3U);
   EXPECT_EQ(counts.clipped_before, (PerAxis<std::uint64_t>{1, 1, 0}));
   EXPECT_EQ(counts.clipped_after, (PerAxis<std::uint64_t>{1, 1, 0}));
+  // Also where the new constants would bring it below the limit: the sensor may have felt any more.
+  Calibration weaker = *calibration_from(affected());
+  for (double& sensitivity : weaker.sensitivity_g_per_lsb) {
+    sensitivity *= 0.8;
+  }
+  RescaleTally below;
+  Rescale::make(*reversal, weaker, {})->apply(in, out, below);
+  EXPECT_EQ(out[0][0], 2047);
+  EXPECT_EQ(out[0][1], -2048);
+  EXPECT_LT(out[1][0], 1700);
+  EXPECT_GT(out[1][1], -1700);
+  EXPECT_EQ(below.clipped_before, (PerAxis<std::uint64_t>{1, 1, 0}));
   // Wide records have room for them.
   RescaleTally wide;
   Rescale::make(*reversal, stronger, {.output = RecordWidth::bits16})->apply(in, out, wide);

@@ -231,6 +231,7 @@ TEST(SixPose, LocalGravityIsTakenOut) {
   const auto right = solve_six_poses(used, held_out, options);
   ASSERT_OK(right);
   EXPECT_LT(difference_over_sphere(truth(unit), right->per_axis.calibration).worst_mg, 0.5);
+  EXPECT_LT(difference_over_sphere(truth(unit), right->as_published.calibration).worst_mg, 0.5);
   const auto wrong = solve_six_poses(used, held_out);
   ASSERT_OK(wrong);
   EXPECT_NEAR(difference_over_sphere(truth(unit), wrong->per_axis.calibration).rms_mg, 2.7, 0.4);
