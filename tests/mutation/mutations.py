@@ -72,7 +72,7 @@ MUTATIONS = [
              'repair', 'Triage.*'),
     Mutation('charging_zeros', 'zeros of a charging unit are rescaled', 'repair/rescale/rescaled_log.cpp',
              '    keep_charging_zeros(samples_, fresh_samples_);\n', '',
-             'repair', 'RescaledLog.*'),
+             'repair', 'RepairFile.ChargingZerosStayZero'),
     # The store.
     Mutation('hash_chain', 'a row does not depend on the one before', 'db/chain.cpp',
              'bytes_.assign(previous.begin(), previous.end());\n  put_text',
@@ -94,7 +94,7 @@ MUTATIONS = [
              'station', 'JigSession.LossesCountOverTheWholeRun'),
     Mutation('filter_of_run', 'a run is measured under the filter that the unit has', 'station/run/unit_stream.cpp',
              '  SIXPOINT_CHECK(choose_filter(unit, filter_));\n', '',
-             'station', 'JigSession.FindsTheSensorUnderCurrent'),
+             'station', 'JigSession.MeasuresUnderItsFilterWhateverTheUnitHad'),
     Mutation('write_noted', 'a write begins before it is noted on the disk', 'station/run/jig_session.cpp',
              '    if (const Status noted = hooks_.write_begins(report_, run); !noted) {',
              '    if (const Status noted; !noted) {',

@@ -42,6 +42,16 @@ TEST(JigSession, FindsTheSensorUnderCurrent) {
   }
 }
 
+TEST(JigSession, MeasuresUnderItsFilterWhateverTheUnitHad) {
+  VirtualBench bench;
+  ASSERT_OK(bench.unit->set_filter(FilterConfiguration::legacy));
+  const auto report = bench.run();
+  ASSERT_OK(report);
+  EXPECT_EQ(report->verdict, JigVerdict::pass) << report->brief();
+  EXPECT_EQ(report->record().filter, FilterConfiguration::current);
+  EXPECT_EQ(bench.unit->filter()->stream, FilterConfiguration::current);
+}
+
 TEST(JigSession, ATiltedPlacementIsAskedForAgain) {
   VirtualBench bench;
   int places = 0;
