@@ -248,10 +248,14 @@ TEST(Rescale, WithCrossAxisTermsAClippedCountStaysAndOthersAreClippedOnTheirOwn)
 
 TEST(Rescale, ClippedStaysAtTheLimitAndIsCounted) {
   const auto reversal = Reversal::make(affected(), 256, RecordWidth::bits12);
-  Calibration stronger = *calibration_from(affected());
-  for (double& sensitivity : stronger.sensitivity_g_per_lsb) {
-    sensitivity *= 1.2;
-  }
+  const auto scaled = [](double factor) {
+    Calibration made = *calibration_from(affected());
+    for (double& sensitivity : made.sensitivity_g_per_lsb) {
+      sensitivity *= factor;
+    }
+    return made;
+  };
+  const Calibration stronger = scaled(1.2);
   const std::vector<StoredCounts> in = {{2047, -2048, 0}, {1900, -1900, 10}, {100, 100, 100}};
   std::vector<StoredCounts> out(in.size());
   RescaleTally counts;
@@ -264,12 +268,8 @@ TEST(Rescale, ClippedStaysAtTheLimitAndIsCounted) {
   EXPECT_EQ(counts.clipped_before, (PerAxis<std::uint64_t>{1, 1, 0}));
   EXPECT_EQ(counts.clipped_after, (PerAxis<std::uint64_t>{1, 1, 0}));
   // Also where the new constants would bring it below the limit: the sensor may have felt any more.
-  Calibration weaker = *calibration_from(affected());
-  for (double& sensitivity : weaker.sensitivity_g_per_lsb) {
-    sensitivity *= 0.8;
-  }
   RescaleTally below;
-  Rescale::make(*reversal, weaker, {})->apply(in, out, below);
+  Rescale::make(*reversal, scaled(0.8), {})->apply(in, out, below);
   EXPECT_EQ(out[0][0], 2047);
   EXPECT_EQ(out[0][1], -2048);
   EXPECT_LT(out[1][0], 1700);
