@@ -13,7 +13,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct DevicesCommandOptions {
   bool json = false;
   bool watch = false;
   std::optional<double> for_s;
@@ -64,7 +64,7 @@ Json to_json(const device::AttachedDevice& attached) {
                                         : Json(nullptr)}};
 }
 
-void print(Context& context, const device::AttachedDevice& attached) {
+void print_devices(Context& context, const device::AttachedDevice& attached) {
   const auto [address, access, unmounted] = standing_of(attached);
   context.out << fmt::format("{:<24} {:<20} port {:<8} {}\n",
                              printable(address.empty() ? attached.serial : address),
@@ -85,7 +85,7 @@ device::DiscoveryFilter every_product() {
   return every;
 }
 
-Status list(const Options& options, Context& context) {
+Status list(const DevicesCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto attached, device::attached_devices(every_product()));
   Json json = document("devices");
   Json& devices = json["devices"] = Json::array();
@@ -93,7 +93,7 @@ Status list(const Options& options, Context& context) {
     if (options.json) {
       devices.push_back(to_json(one));
     } else {
-      print(context, one);
+      print_devices(context, one);
     }
   }
   if (options.json) {
@@ -105,7 +105,7 @@ Status list(const Options& options, Context& context) {
 }
 
 // One line per event until Ctrl-C or --for; with --json one document per line.
-Status watch(const Options& options, Context& context) {
+Status watch(const DevicesCommandOptions& options, Context& context) {
   sigset_t before;
   const sigset_t signals = block_stop_signals(&before);
   SIXPOINT_ASSIGN(const auto hotplug, device::HotplugWatch::start(every_product()));
@@ -138,7 +138,7 @@ Status watch(const Options& options, Context& context) {
       context.out << json.dump() << '\n';
     } else if (arrived) {
       context.out << "arrived  ";
-      print(context, one);
+      print_devices(context, one);
     } else {
       context.out << fmt::format("left     {:<24} {:<20} port {}\n", one.serial,
                                  one.model.empty() ? "?" : one.model, one.port);
@@ -150,15 +150,15 @@ Status watch(const Options& options, Context& context) {
   return status;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_devices(const DevicesCommandOptions& options, Context& context) {
   return options.watch ? watch(options, context) : list(options, context);
 }
 
 }  // namespace
 
 void add_devices(CLI::App& app, Context& context) {
-  auto [command, options] =
-      add_command<Options>(app, context, "devices", "list the devices that are plugged in", run);
+  auto [command, options] = add_command<DevicesCommandOptions>(
+      app, context, "devices", "list the devices that are plugged in", run_devices);
   auto* watching = command.add_flag("--watch", options.watch,
                                     "print what arrives and leaves until Ctrl-C; with --json one "
                                     "document per line");

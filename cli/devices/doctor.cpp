@@ -17,7 +17,7 @@ namespace {
 // A week at 100 Hz is 280 MB; an archive repair writes several at a time.
 constexpr std::uintmax_t kEnoughSpace_bytes = 2ULL << 30;
 
-struct Options {
+struct DoctorCommandOptions {
   std::string store;
   bool json = false;
 };
@@ -28,7 +28,7 @@ struct Check {
   std::string hint;
 };
 
-Check check_store(const Options& options, Context& context) {
+Check check_store(const DoctorCommandOptions& options, Context& context) {
   if (!store_exists(context, options.store)) {
     return {"store", true,
             fmt::format("{} is made at the first run",
@@ -46,7 +46,7 @@ Check check_store(const Options& options, Context& context) {
 }
 
 // Are there measurements that the store did not take yet?
-Check check_journal(const Options& options, Context& context) {
+Check check_journal(const DoctorCommandOptions& options, Context& context) {
   const std::string folder = journal_folder(options.store);
   if (!context.env.files.info(folder)) {
     return {"journal", true, "nothing waits for the store"};
@@ -113,7 +113,7 @@ Check check_udev_rules() {
   return {"udev", true, "detection and access rules are installed"};
 }
 
-Status run(const Options& options, Context& context) {
+Status run_doctor(const DoctorCommandOptions& options, Context& context) {
   const std::vector<Check> checks = {
       {"version", true, station::software_name()},
       check_store(options, context),
@@ -137,8 +137,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_doctor(CLI::App& app, Context& context) {
-  auto [command, options] =
-      add_command<Options>(app, context, "doctor", "check that this machine is ready", run);
+  auto [command, options] = add_command<DoctorCommandOptions>(
+      app, context, "doctor", "check that this machine is ready", run_doctor);
   add_store_option(command, options.store);
 }
 

@@ -16,7 +16,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct SessionCommandOptions {
   std::string input;
   std::string output;
   std::string work = "jig";
@@ -57,8 +57,8 @@ Json summary_of(const device::Session& session) {
 }
 
 // The summary of `session`, which `path` holds; `remark` says what was done with it.
-void print(Context& context, bool as_json, const std::string& path, const device::Session& session,
-           const std::string& remark) {
+void print_session(Context& context, bool as_json, const std::string& path,
+                   const device::Session& session, const std::string& remark) {
   Json json = summary_of(session);
   std::string text = fmt::format("{}: {} transfers in {:.1f} s with {}\n", printable(path),
                                  session.transfers.size(), json["duration_s"].get<double>(),
@@ -70,14 +70,14 @@ void print(Context& context, bool as_json, const std::string& path, const device
   print_answer(context, as_json, json, text);
 }
 
-Status show(const Options& options, Context& context) {
+Status show(const SessionCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, options.input));
-  print(context, options.json, options.input, session, {});
+  print_session(context, options.json, options.input, session, {});
   return {};
 }
 
-Status minimise(const Options& options, Context& context) {
+Status minimise(const SessionCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(options.input));
   SIXPOINT_CHECK(outputs.file("--output", options.output));
@@ -88,11 +88,11 @@ Status minimise(const Options& options, Context& context) {
   how.most_replays = options.most_replays;
   const MinimiseReport report = cli::minimise(session, how);
   SIXPOINT_CHECK(device::write_session(outputs.files(), options.output, report.session));
-  print(context, options.json, options.output, report.session, report.brief());
+  print_session(context, options.json, options.output, report.session, report.brief());
   return {};
 }
 
-Status from_pcap(const Options& options, Context& context) {
+Status from_pcap(const SessionCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(options.input));
   SIXPOINT_CHECK(outputs.file("--output", options.output));
@@ -109,11 +109,11 @@ Status from_pcap(const Options& options, Context& context) {
     return fail(std::move(error));
   }
   SIXPOINT_CHECK(device::write_session(outputs.files(), options.output, *session));
-  print(context, options.json, options.output, *session, {});
+  print_session(context, options.json, options.output, *session, {});
   return {};
 }
 
-Status recover(const Options& options, Context& context) {
+Status recover(const SessionCommandOptions& options, Context& context) {
   const std::string suffix = device::journal_of("");
   std::string target = options.input;
   if (target.ends_with(suffix)) {
@@ -129,9 +129,9 @@ Status recover(const Options& options, Context& context) {
   SIXPOINT_ASSIGN(const auto recovered, device::recover_session(outputs.files(), journal, output));
   SIXPOINT_ASSIGN(const device::Session session,
                   device::read_session(context.env.files, recovered.target));
-  print(context, options.json, recovered.target, session,
-        fmt::format("recovered; {} bytes after the last whole transfer were dropped",
-                    recovered.dropped_bytes));
+  print_session(context, options.json, recovered.target, session,
+                fmt::format("recovered; {} bytes after the last whole transfer were dropped",
+                            recovered.dropped_bytes));
   return {};
 }
 
@@ -142,12 +142,13 @@ void add_session(CLI::App& app, Context& context) {
       add_group(app, "session",
                 "recorded sessions (--record): show, recover, minimise, make of a USB capture");
   const auto add = [&](const char* name, const char* purpose, const char* input,
-                       Status (*work)(const Options&, Context&)) {
-    auto declared = add_command<Options>(group, context, "session", name, purpose, work);
+                       Status (*work)(const SessionCommandOptions&, Context&)) {
+    auto declared =
+        add_command<SessionCommandOptions>(group, context, "session", name, purpose, work);
     declared.command.add_option(input, declared.options.input)->required();
     return declared;
   };
-  const auto add_output = [](Declared<Options> made, const char* about) {
+  const auto add_output = [](Declared<SessionCommandOptions> made, const char* about) {
     add_output_options(made.command, made.options.outputs);
     return made.command.add_option("-o,--output", made.options.output, about);
   };

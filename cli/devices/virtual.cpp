@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kMostUnits = 64;
 
-struct Options {
+struct VirtualCommandOptions {
   int port = 3240;
   int count = 1;
   std::string scenario;
@@ -115,7 +115,7 @@ struct FirstUnit {
   mocks::FaultPlan plan;
 };
 
-Result<FirstUnit> first_unit(Context& context, const Options& options) {
+Result<FirstUnit> first_unit(Context& context, const VirtualCommandOptions& options) {
   constexpr std::string_view kScheme = "virtual:";
   std::string_view text = options.device;
   if (text.starts_with(kScheme)) {
@@ -152,7 +152,7 @@ mocks::VirtualUnitOptions draw_next(const mocks::VirtualUnitOptions& first, std:
   return unit;
 }
 
-Result<Bench> make_bench(Context& context, const Options& options) {
+Result<Bench> make_bench(Context& context, const VirtualCommandOptions& options) {
   SIXPOINT_ASSIGN(FirstUnit first, first_unit(context, options));
   const mocks::VirtualUnitOptions& unit = first.settings.unit;
   const std::shared_ptr<Clock> clock = mocks::clock_of(first.settings, context.env.clock);
@@ -187,7 +187,7 @@ Result<Bench> make_bench(Context& context, const Options& options) {
   return bench;
 }
 
-void print(Context& context, bool as_json, const Bench& bench, std::uint16_t port) {
+void print_virtual(Context& context, bool as_json, const Bench& bench, std::uint16_t port) {
   Json json = document("virtual");
   json["usbip"] = {{"host", "127.0.0.1"}, {"port", port}};
   Json& devices = json["devices"] = Json::array();
@@ -215,7 +215,7 @@ void print(Context& context, bool as_json, const Bench& bench, std::uint16_t por
                  << std::flush;
 }
 
-Status serve(const Options& options, Context& context) {
+Status serve(const VirtualCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const Bench bench, make_bench(context, options));
   mocks::UsbipServerOptions how;
   how.port = static_cast<std::uint16_t>(options.port);
@@ -232,7 +232,7 @@ Status serve(const Options& options, Context& context) {
       ::kill(::getpid(), SIGTERM);
     }
   });
-  print(context, options.json, bench, server->port());
+  print_virtual(context, options.json, bench, server->port());
   int signal = 0;
   sigwait(&signals, &signal);
   server->stop();
@@ -244,7 +244,7 @@ Status serve(const Options& options, Context& context) {
 }  // namespace
 
 void add_virtual(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<VirtualCommandOptions>(
       app, context, "virtual", "offer virtual units, and a jig, over USB/IP until Ctrl-C", serve);
   command
       .add_option("--usbip", options.port,

@@ -31,18 +31,16 @@ using repair::MergedShard;
 using repair::RepairReport;
 using repair::ShardResult;
 
-using Options = ArchiveOptions;
-
 // --- run
 
-repair::ShardState state_of(const Options& options, const ShardResult& result) {
+repair::ShardState state_of(const ArchiveOptions& options, const ShardResult& result) {
   if (options.dry_run) {
     return repair::ShardState::missing;
   }
   return result.stopped ? repair::ShardState::partly : repair::ShardState::done;
 }
 
-Status run_shard(const Options& options, Context& context) {
+Status run_shard(const ArchiveOptions& options, Context& context) {
   const std::string folder = absolute(options.plan);
   SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
   Outputs outputs(context, {}, options.json);
@@ -160,7 +158,7 @@ void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& con
   }
 }
 
-Status run_merge(const Options& options, Context& context) {
+Status run_merge(const ArchiveOptions& options, Context& context) {
   const std::string folder = absolute(options.plan);
   SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
   // The store that is named, else the one that the constants came from.
@@ -259,7 +257,7 @@ Status run_merge(const Options& options, Context& context) {
 // --- report
 
 // The page about what is known so far; shards that are missing make the exit code 2.
-Status run_report(const Options& options, Context& context) {
+Status run_report(const ArchiveOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.file("--output", options.output));
   const std::string folder = absolute(options.plan);
@@ -313,7 +311,7 @@ Result<MergedArchive> standing(FileSystem& files, const std::string& folder,
   return merged;
 }
 
-Status run_status(const Options& options, Context& context) {
+Status run_status(const ArchiveOptions& options, Context& context) {
   const std::string folder = absolute(options.plan);
   SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
   std::vector<RepairReport> failed;
@@ -362,9 +360,9 @@ Status run_status(const Options& options, Context& context) {
 
 void add_archive(CLI::App& app, Context& context) {
   CLI::App& group = add_group(app, "archive", "repair an archive on a cluster, shard by shard");
-  auto [plan, options] =
-      add_command<Options>(group, context, "archive", "plan",
-                           "write down what is repaired, in how many shards", run_archive_plan);
+  auto [plan, options] = add_command<ArchiveOptions>(
+      group, context, "archive", "plan", "write down what is repaired, in how many shards",
+      run_archive_plan);
   plan.add_option("path", options.paths, "recordings (.gt3x) or folders of them")->required();
   plan.add_option("-o,--output", options.output, "the folder for the plan")->required();
   auto* shards = plan.add_option("--shards", options.draft.shards, "how many shards")
@@ -383,8 +381,8 @@ void add_archive(CLI::App& app, Context& context) {
   plan.add_flag("--dry-run", options.dry_run, "print what would be planned, write nothing");
   add_jobs_option(plan, options.jobs);
   const auto add = [&](const char* name, const char* about,
-                       Status (*work)(const Options&, Context&)) {
-    auto declared = add_command<Options>(group, context, "archive", name, about, work);
+                       Status (*work)(const ArchiveOptions&, Context&)) {
+    auto declared = add_command<ArchiveOptions>(group, context, "archive", name, about, work);
     declared.command.add_option("plan", declared.options.plan, "the folder of the plan")
         ->required();
     return declared;

@@ -46,8 +46,6 @@ namespace {
 using repair::ArchiveDraft;
 using repair::ArchivePlan;
 using repair::PlannedArchive;
-using Options = ArchiveOptions;
-
 constexpr std::size_t kLinksShown = 10;
 
 Status gather_constants(const RepairSources& sources, Context& context, ArchiveDraft& draft,
@@ -87,7 +85,7 @@ std::vector<repair::UnitNeeds> units_of(const PlannedArchive& planned) {
   return table.rows();
 }
 
-void print_plan(const Options& options, const PlannedArchive& planned, Context& context) {
+void print_plan(const ArchiveOptions& options, const PlannedArchive& planned, Context& context) {
   const ArchivePlan& plan = planned.plan;
   for (std::size_t k = 0; k < plan.shards.size(); ++k) {
     context.out << fmt::format("shard {:05}  {} files  {:.1f} MB\n", k, plan.shards[k].files,
@@ -159,7 +157,7 @@ Status take_plan_folder(const std::string& folder, FileSystem& files, Outputs& o
 }
 
 // The still periods of the units' files together: one pass over the affected files.
-void ask_units(const Options& options, const ArchiveDraft& draft, Context& context,
+void ask_units(const ArchiveOptions& options, const ArchiveDraft& draft, Context& context,
                PlannedArchive& planned) {
   if (!repair::asks_units(planned.plan.repair, draft.snapshot)) {
     return;

@@ -8,7 +8,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct CompareCommandOptions {
   std::vector<std::string> paths;
   std::string html;
   double max_lag_s = repair::CompareOptions{}.max_lag_s;
@@ -16,7 +16,7 @@ struct Options {
   bool json = false;
 };
 
-Status run(const Options& options, Context& context) {
+Status run_compare(const CompareCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   for (const std::string& path : options.paths) {
     SIXPOINT_CHECK(outputs.input(path));
@@ -58,8 +58,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_compare(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
-      app, context, "compare", "recordings of units that were moved together", run);
+  auto [command, options] = add_command<CompareCommandOptions>(
+      app, context, "compare", "recordings of units that were moved together", run_compare);
   command.add_option("RECORDING", options.paths, "two or three recordings")
       ->required()
       ->expected(2, 3);

@@ -23,7 +23,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct ExportCommandOptions {
   std::vector<std::string> paths;
   std::string csv;
   std::string folder;
@@ -47,7 +47,7 @@ struct Done {
   std::vector<std::string> warnings;
 };
 
-gt3x::RawCsvOptions::Time time_of(const Options& options) {
+gt3x::RawCsvOptions::Time time_of(const ExportCommandOptions& options) {
   using Time = gt3x::RawCsvOptions::Time;
   if (options.unix_time) {
     return Time::unix_seconds;
@@ -92,7 +92,7 @@ void add_time_warnings(const gt3x::RawCsvTally& tally, std::vector<std::string>&
   }
 }
 
-Result<Done> export_samples(gt3x::Recording& recording, const Options& options,
+Result<Done> export_samples(gt3x::Recording& recording, const ExportCommandOptions& options,
                             const gt3x::TextSink& sink) {
   gt3x::RawCsvOptions how;
   how.raw_lsb = options.raw;
@@ -140,7 +140,7 @@ Result<Done> export_records(gt3x::Recording& recording, const std::string& name,
   return done;
 }
 
-Result<Done> export_kind(gt3x::Recording& recording, const Options& options,
+Result<Done> export_kind(gt3x::Recording& recording, const ExportCommandOptions& options,
                          const gt3x::TextSink& sink) {
   if (options.imu) {
     return export_imu(recording, sink);
@@ -149,7 +149,7 @@ Result<Done> export_kind(gt3x::Recording& recording, const Options& options,
                                  : export_records(recording, options.records, sink);
 }
 
-Result<Done> export_recording(gt3x::Recording& recording, const Options& options,
+Result<Done> export_recording(gt3x::Recording& recording, const ExportCommandOptions& options,
                               const gt3x::TextSink& sink) {
   SIXPOINT_ASSIGN(Done done, export_kind(recording, options, sink));
   if (options.salvage) {
@@ -161,7 +161,7 @@ Result<Done> export_recording(gt3x::Recording& recording, const Options& options
   return done;
 }
 
-Status export_file(const Options& options, Context& context, FileSystem& files,
+Status export_file(const ExportCommandOptions& options, Context& context, FileSystem& files,
                    const std::string& path, const std::string& csv) {
   SIXPOINT_ASSIGN(auto recording,
                   gt3x::Recording::open(context.env.files, path, {options.salvage, {}}));
@@ -186,13 +186,13 @@ Status export_file(const Options& options, Context& context, FileSystem& files,
 }
 
 // "a/day1.gt3x" -> "a/day1.csv", "a/day1.npy.gz"
-std::string export_name(const std::string& recording, const Options& options) {
+std::string export_name(const std::string& recording, const ExportCommandOptions& options) {
   return recording.substr(0, recording.rfind('.')) + "." + options.format +
          (options.gzip ? ".gz" : "");
 }
 
 // A file that fails does not stop the others.
-Status export_into_folder(const Options& options, Outputs& outputs, Context& context) {
+Status export_into_folder(const ExportCommandOptions& options, Outputs& outputs, Context& context) {
   const auto named = named_files(context, options.paths, {".gt3x", ".agdc"});
   for (const NamedFile& file : named) {
     if (!file.error) {
@@ -221,7 +221,7 @@ Status export_into_folder(const Options& options, Outputs& outputs, Context& con
   return {};
 }
 
-Status run(const Options& options, Context& context) {
+Status run_export(const ExportCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, /*json=*/false);
   if (options.csv.empty() == options.folder.empty()) {
     return fail(ErrorCode::usage, "export writes one file (--csv) or a folder of them (--output)",
@@ -247,8 +247,9 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_export(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
-      app, context, "export", "the samples of recordings as the vendor's raw CSV writes them", run);
+  auto [command, options] = add_command<ExportCommandOptions>(
+      app, context, "export", "the samples of recordings as the vendor's raw CSV writes them",
+      run_export);
   command.add_option("path", options.paths, "recordings (.gt3x, .agdc) or folders of them")
       ->required();
   command.add_option("--csv", options.csv, "the file of one recording, - for standard output");

@@ -20,7 +20,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct ImpactCommandOptions {
   std::vector<std::string> paths;
   int epoch_s = repair::EpochOptions{}.epoch_s;
   bool low_frequency_extension = false;
@@ -32,7 +32,7 @@ struct Options {
   bool json = false;
 };
 
-Result<repair::EpochSeries> series_of(const Options& options, const std::string& path,
+Result<repair::EpochSeries> series_of(const ImpactCommandOptions& options, const std::string& path,
                                       Context& context) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(context.env.files, path));
   repair::EpochOptions how;
@@ -42,7 +42,7 @@ Result<repair::EpochSeries> series_of(const Options& options, const std::string&
   return repair::epochs_of(recording, how);
 }
 
-Result<std::vector<repair::CutPoint>> cut_points(const Options& options) {
+Result<std::vector<repair::CutPoint>> cut_points(const ImpactCommandOptions& options) {
   std::vector<repair::CutPoint> cuts;
   for (const std::string& text : options.cuts) {
     SIXPOINT_ASSIGN(auto cut, repair::parse_cut_point(text));
@@ -52,7 +52,7 @@ Result<std::vector<repair::CutPoint>> cut_points(const Options& options) {
 }
 
 // The repaired copy's epochs, and what its mark says of their uncertainty.
-Status read_copy(const Options& options, const std::string& path, Context& context,
+Status read_copy(const ImpactCommandOptions& options, const std::string& path, Context& context,
                  repair::Impact& impact) {
   SIXPOINT_ASSIGN(impact.after, series_of(options, path, context));
   if (const auto mark = repair::mark_in(context.env.files, path)) {
@@ -61,8 +61,8 @@ Status read_copy(const Options& options, const std::string& path, Context& conte
   return {};
 }
 
-Status run_recording(const Options& options, const repair::Impact& asked, Outputs& outputs,
-                     Context& context) {
+Status run_recording(const ImpactCommandOptions& options, const repair::Impact& asked,
+                     Outputs& outputs, Context& context) {
   repair::Impact impact = asked;
   SIXPOINT_ASSIGN(impact.before, series_of(options, options.paths[0], context));
   if (options.paths.size() > 1) {
@@ -88,7 +88,8 @@ bool is_folder(Context& context, const std::string& path) {
 }
 
 // Recordings below the first folder, and those of the same names below the second.
-Status pair_folders(const Options& options, Context& context, repair::StudyImpact& study) {
+Status pair_folders(const ImpactCommandOptions& options, Context& context,
+                    repair::StudyImpact& study) {
   repair::FileTreeOptions how;
   how.endings = {".gt3x"};
   SIXPOINT_ASSIGN(const auto before, repair::find_files(context.env.files, options.paths[0], how));
@@ -103,7 +104,8 @@ Status pair_folders(const Options& options, Context& context, repair::StudyImpac
   return {};
 }
 
-Status pair_plan(const Options& options, Context& context, repair::StudyImpact& study) {
+Status pair_plan(const ImpactCommandOptions& options, Context& context,
+                 repair::StudyImpact& study) {
   const std::string folder = absolute(options.paths[0]);
   SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
   repair::MergeOptions how;
@@ -123,8 +125,8 @@ Status pair_plan(const Options& options, Context& context, repair::StudyImpact& 
   return {};
 }
 
-Status measure(const Options& options, Context& context, const repair::StudyImpact& study,
-               repair::FileImpact& file) {
+Status measure(const ImpactCommandOptions& options, Context& context,
+               const repair::StudyImpact& study, repair::FileImpact& file) {
   repair::Impact impact;
   impact.cuts = study.cuts;
   SIXPOINT_ASSIGN(impact.before, series_of(options, file.before, context));
@@ -135,7 +137,7 @@ Status measure(const Options& options, Context& context, const repair::StudyImpa
   return {};
 }
 
-Status run_study(const Options& options, repair::StudyImpact study, Outputs& outputs,
+Status run_study(const ImpactCommandOptions& options, repair::StudyImpact study, Outputs& outputs,
                  Context& context) {
   if (!options.html.empty()) {
     return fail(ErrorCode::usage, "a page is made of one recording and its copy", "--html",
@@ -168,7 +170,7 @@ Status run_study(const Options& options, repair::StudyImpact study, Outputs& out
   return print_answer(context, options.json, json, study.brief());
 }
 
-Status run(const Options& options, Context& context) {
+Status run_impact(const ImpactCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_ASSIGN(const auto cuts, cut_points(options));
   const auto folders = std::ranges::count_if(
@@ -198,8 +200,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_impact(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(app, context, "impact",
-                                                 "what a repair changes in a study's results", run);
+  auto [command, options] = add_command<ImpactCommandOptions>(
+      app, context, "impact", "what a repair changes in a study's results", run_impact);
   command
       .add_option("BEFORE", options.paths,
                   "a recording and its repaired copy; a folder and that of its repaired copies; or "

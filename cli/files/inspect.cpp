@@ -61,7 +61,7 @@ std::string clock_name(const gt3x::Clock& clock) {
   return "not known";
 }
 
-void print(std::ostream& out, const repair::Inspection& found, const std::string& path) {
+void print_inspect(std::ostream& out, const repair::Inspection& found, const std::string& path) {
   const PrintLine line = [&](const char* name, const std::string& value) {
     out << fmt::format("{:<20}{}\n", name, printable(value, 200));
   };
@@ -120,13 +120,13 @@ void print(std::ostream& out, const repair::Inspection& found, const std::string
   }
 }
 
-struct Options {
+struct InspectCommandOptions {
   std::string path;
   bool salvage = false;
   bool json = false;
 };
 
-Status run(const Options& options, Context& context) {
+Status run_inspect(const InspectCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const repair::Inspection found,
                   repair::inspect(context.env.files, options.path, {options.salvage, {}}));
   if (options.json) {
@@ -134,7 +134,7 @@ Status run(const Options& options, Context& context) {
     json.update(repair::inspection_to_json(found, options.path));
     print_json(context, json);
   } else {
-    print(context.out, found, options.path);
+    print_inspect(context.out, found, options.path);
   }
   for (const std::string& warning : found.warnings) {
     context.log().warn("{}: {}", printable(options.path), warning);
@@ -148,8 +148,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_inspect(CLI::App& app, Context& context) {
-  auto [command, options] =
-      add_command<Options>(app, context, "inspect", "what a .gt3x, .agdc or .agd file holds", run);
+  auto [command, options] = add_command<InspectCommandOptions>(
+      app, context, "inspect", "what a .gt3x, .agdc or .agd file holds", run_inspect);
   command.add_option("FILE", options.path, "the recording")->required();
   add_salvage_option(command, options.salvage);
 }

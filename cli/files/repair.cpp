@@ -25,7 +25,7 @@ namespace {
 
 using repair::RepairReport;
 
-struct Options {
+struct RepairCommandOptions {
   std::vector<std::string> paths;
   std::string folder;
   RepairSources sources;
@@ -36,7 +36,8 @@ struct Options {
   bool json = false;
 };
 
-Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Context& context,
+Result<repair::ConstantsFinderOptions> finder_options(const RepairCommandOptions& options,
+                                                      Context& context,
                                                       std::optional<db::Store>& store,
                                                       repair::UnitPool& pool) {
   const RepairSources& sources = options.sources;
@@ -60,7 +61,8 @@ Result<repair::ConstantsFinderOptions> finder_options(const Options& options, Co
 }
 
 // Every file's report, but for those that were not done when the operator stopped the run.
-std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files, const Options& options,
+std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files,
+                                     const RepairCommandOptions& options,
                                      repair::ConstantsFinder& finder, repair::UnitPool& pool,
                                      Context& context) {
   repair::RepairFilesOptions how;
@@ -85,7 +87,7 @@ std::vector<RepairReport> repair_all(const std::vector<NamedFile>& files, const 
 }
 
 // The command line that goes on with this run.
-std::string line_that_goes_on(const Options& options) {
+std::string line_that_goes_on(const RepairCommandOptions& options) {
   std::string line = "sixpoint repair";
   const auto add = [&](const char* name, const std::string& value) {
     if (!value.empty()) {
@@ -121,7 +123,7 @@ std::string line_that_goes_on(const Options& options) {
 }
 
 // What the run leaves in its folder, and how it goes on where it was stopped.
-Status conclude(const Options& options, const std::vector<RepairReport>& reports,
+Status conclude(const RepairCommandOptions& options, const std::vector<RepairReport>& reports,
                 const std::vector<repair::UnitNeeds>& units, std::size_t files, Context& context) {
   const bool stopped = reports.size() < files;
   if (stopped) {
@@ -147,7 +149,7 @@ Status conclude(const Options& options, const std::vector<RepairReport>& reports
 }
 
 // One run at a time in an output folder. Nothing where its file system has no locks.
-Result<std::unique_ptr<FileLock>> lock_of(const Options& options, Context& context) {
+Result<std::unique_ptr<FileLock>> lock_of(const RepairCommandOptions& options, Context& context) {
   if (options.repair.dry_run) {
     return nullptr;
   }
@@ -166,7 +168,7 @@ Result<std::unique_ptr<FileLock>> lock_of(const Options& options, Context& conte
   return lock;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_repair(const RepairCommandOptions& options, Context& context) {
   Outputs outputs(context, {}, options.json);
   SIXPOINT_CHECK(outputs.working_folder("--output", options.folder));
   SIXPOINT_CHECK(check_manifest(context.env.files, options.folder));
@@ -216,8 +218,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_repair(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(app, context, "repair",
-                                                 "repair affected files into another folder", run);
+  auto [command, options] = add_command<RepairCommandOptions>(
+      app, context, "repair", "repair affected files into another folder", run_repair);
   command.add_option("path", options.paths, "recordings (.gt3x) or folders of them")->required();
   command.add_option("-o,--output", options.folder, "the folder for repaired files")->required();
   add_source_options(command, options.sources);

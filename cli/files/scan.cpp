@@ -17,7 +17,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct ScanCommandOptions {
   std::vector<std::string> paths;
   std::string store;
   std::string units;
@@ -82,7 +82,7 @@ class DatesInStore {
   std::optional<db::Store> store_;
 };
 
-Status run(const Options& options, Context& context) {
+Status run_scan(const ScanCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.file("--units", options.units));
   const auto files = named_files(context, options.paths, {".gt3x", ".agdc", ".agd"});
@@ -137,8 +137,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_scan(CLI::App& app, Context& context) {
-  auto [command, options] =
-      add_command<Options>(app, context, "scan", "find the files that 16CPAN03 affects", run);
+  auto [command, options] = add_command<ScanCommandOptions>(
+      app, context, "scan", "find the files that 16CPAN03 affects", run_scan);
   command.add_option("path", options.paths, "recordings (.gt3x, .agdc, .agd) or folders of them")
       ->required();
   command.add_option("--units", options.units, "a line per unit, as CSV: what is missing");

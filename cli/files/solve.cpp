@@ -18,7 +18,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct SolveCommandOptions {
   std::vector<std::string> files;
   std::string method = "ls";
   std::optional<std::uint64_t> seed;
@@ -32,7 +32,7 @@ struct Options {
   bool json = false;
 };
 
-Result<calib::SolveOptions> solve_options(const Options& options) {
+Result<calib::SolveOptions> solve_options(const SolveCommandOptions& options) {
   calib::SolveOptions solve;
   SIXPOINT_ASSIGN(solve.method, calib::parse_solve_method(options.method));
   solve.seed = options.seed.value_or(solve.seed);
@@ -60,8 +60,8 @@ struct Outcome {
 //   verified           -o          --save
 //   rest on a prior    -o          never
 //   not verified       never       never
-Status keep(const std::string& path, const Options& options, const repair::Survey& survey,
-            Outcome& outcome, Context& context, Outputs& outputs) {
+Status keep(const std::string& path, const SolveCommandOptions& options,
+            const repair::Survey& survey, Outcome& outcome, Context& context, Outputs& outputs) {
   const bool to_file =
       !options.output.empty() && (outcome.report.usable() || outcome.report.from_prior);
   const bool to_store = options.save && outcome.report.usable();
@@ -80,7 +80,7 @@ Status keep(const std::string& path, const Options& options, const repair::Surve
   return {};
 }
 
-Result<Outcome> solve_one(const std::string& path, const Options& options,
+Result<Outcome> solve_one(const std::string& path, const SolveCommandOptions& options,
                           calib::SolveOptions solve, Context& context, Outputs& outputs) {
   calib::StillBlockOptions still;
   still.strict_nonzero = options.strict_nonzero;
@@ -99,8 +99,8 @@ Result<Outcome> solve_one(const std::string& path, const Options& options,
   return outcome;
 }
 
-void print(const std::string& path, const Options& options, const Outcome& outcome,
-           Context& context) {
+void print_solve(const std::string& path, const SolveCommandOptions& options,
+                 const Outcome& outcome, Context& context) {
   const calib::SolveReport& report = outcome.report;
   context.text() << fmt::format("{}: {}\n", printable(path), printable(report.brief(), 2000));
   if (report.calibration) {
@@ -150,7 +150,7 @@ Json to_json(Json json, const std::string& path, const Outcome& outcome) {
 }
 
 // With one recording the document is its answer; with several it lists one answer per recording.
-Status run(const Options& options, Context& context) {
+Status run_solve(const SolveCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto solve, solve_options(options));
   const bool single = options.files.size() == 1;
   if (!options.output.empty() && !single) {
@@ -180,7 +180,7 @@ Status run(const Options& options, Context& context) {
     }
     context.worsen(outcome->report.usable() ? kExitPassed : kExitFailed);
     if (!options.json) {
-      print(path, options, *outcome, context);
+      print_solve(path, options, *outcome, context);
     } else if (single) {
       json = to_json(std::move(json), path, *outcome);
     } else {
@@ -199,9 +199,9 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_solve(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<SolveCommandOptions>(
       app, context, "solve",
-      "constants from the still periods of a calibration file or any recording", run);
+      "constants from the still periods of a calibration file or any recording", run_solve);
   command.add_option("files", options.files, "recordings (.gt3x)")->required();
   command.add_option("--method", options.method,
                      "ls: least squares (default); ga: the paper's genetic algorithm");

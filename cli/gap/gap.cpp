@@ -24,7 +24,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct GapCommandOptions {
   std::string bundle;
   std::string run;
   std::string store;
@@ -50,7 +50,7 @@ int exit_code_of(const gap::Diagnosis& diagnosis) {
              : kExitFailed;
 }
 
-Result<gap::Diagnosis> diagnose_input(const Options& options, gap::DiagnoseOptions how,
+Result<gap::Diagnosis> diagnose_input(const GapCommandOptions& options, gap::DiagnoseOptions how,
                                       Context& context) {
   FileSystem& files = context.env.files;
   if (!options.run.empty()) {
@@ -74,7 +74,7 @@ Result<gap::Diagnosis> diagnose_input(const Options& options, gap::DiagnoseOptio
   return gap::diagnose_plain(files, options.bundle, how);
 }
 
-Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
+Result<gap::Diagnosis> diagnose(const GapCommandOptions& options, Context& context) {
   const auto start = context.env.clock.elapsed();
   gap::DiagnoseOptions how;
   how.without = std::set<std::string>(options.without.begin(), options.without.end());
@@ -89,7 +89,7 @@ Result<gap::Diagnosis> diagnose(const Options& options, Context& context) {
   return diagnosis;
 }
 
-void print(const gap::Diagnosis& d, Context& context) {
+void print_gap(const gap::Diagnosis& d, Context& context) {
   context.text() << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
   for (const gap::EffectFinding& effect : d.effects) {
     context.text() << fmt::format("  {:<20} p {:.3f}  held out {:+.1f} nats", effect.name,
@@ -111,7 +111,7 @@ void print(const gap::Diagnosis& d, Context& context) {
   }
 }
 
-Status take_outputs(const Options& options, Outputs& outputs) {
+Status take_outputs(const GapCommandOptions& options, Outputs& outputs) {
   SIXPOINT_CHECK(outputs.input(options.bundle));
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.input(options.population));
@@ -121,7 +121,8 @@ Status take_outputs(const Options& options, Outputs& outputs) {
   return outputs.file("--scenario-out", options.scenario_out);
 }
 
-Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, FileSystem& files) {
+Status write_reports(const GapCommandOptions& options, const gap::Diagnosis& diagnosis,
+                     FileSystem& files) {
   if (!options.html.empty()) {
     SIXPOINT_CHECK(write_file(files, options.html, gap::report_html(diagnosis)));
   }
@@ -140,7 +141,7 @@ Status write_reports(const Options& options, const gap::Diagnosis& diagnosis, Fi
   return {};
 }
 
-Status run(const Options& options, Context& context) {
+Status run_gap(const GapCommandOptions& options, Context& context) {
   if (options.bundle.empty() && options.run.empty()) {
     return fail(ErrorCode::usage, "BUNDLE or --run is required", {}, "name one of them");
   }
@@ -150,7 +151,7 @@ Status run(const Options& options, Context& context) {
   context.worsen(exit_code_of(diagnosis));
   SIXPOINT_CHECK(write_reports(options, diagnosis, outputs.files()));
   if (!options.json) {
-    print(diagnosis, context);
+    print_gap(diagnosis, context);
     return {};
   }
   Json json = document("gap-diagnose");
@@ -162,9 +163,9 @@ Status run(const Options& options, Context& context) {
 
 void add_gap(CLI::App& app, Context& context) {
   CLI::App& group = add_group(app, "gap", "simulator and recording: where they differ, and why");
-  auto [diagnosis, options] =
-      add_command<Options>(group, context, "gap-diagnose", "diagnose",
-                           "which effect explains a recording of a known protocol", run);
+  auto [diagnosis, options] = add_command<GapCommandOptions>(
+      group, context, "gap-diagnose", "diagnose",
+      "which effect explains a recording of a known protocol", run_gap);
   CLI::Option* bundle = diagnosis.add_option(
       "BUNDLE", options.bundle,
       "folder with recording.gt3x and protocol.json, a plain recording, or a table of readings "

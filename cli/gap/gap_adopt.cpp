@@ -12,7 +12,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct GapAdoptCommandOptions {
   SourceOptions sources;
   std::string scenario;
   std::string output;
@@ -29,7 +29,7 @@ bool is_json_object(std::string_view text) {
 
 // The scenario that is extended: --scenario, or what the output's name has already. Empty: a new
 // one.
-Result<std::string> base_of(const Options& options, FileSystem& files) {
+Result<std::string> base_of(const GapAdoptCommandOptions& options, FileSystem& files) {
   if (!options.scenario.empty()) {
     SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.scenario));
     return std::string(as_text(text));
@@ -75,7 +75,8 @@ std::string why_not(const gap::DocumentEvidence& document) {
   return document.inconclusive ? "inconclusive" : document.unknown ? "unknown" : "";
 }
 
-void print(const gap::AdoptedScenario& learnt, const Options& options, Context& context) {
+void print_gap_adopt(const gap::AdoptedScenario& learnt, const GapAdoptCommandOptions& options,
+                     Context& context) {
   for (const gap::AdoptedEffect& effect : learnt.effects) {
     if (!effect.decision.adopted() && effect.decision.units_naming == 0 &&
         effect.decision.outcome != gap::AdoptionOutcome::unknown_beside &&
@@ -106,7 +107,7 @@ void print(const gap::AdoptedScenario& learnt, const Options& options, Context& 
                          : fmt::format("{}: nothing new, unchanged\n", options.output));
 }
 
-Json to_json(const gap::AdoptedScenario& learnt, const Options& options) {
+Json learnt_json(const gap::AdoptedScenario& learnt, const GapAdoptCommandOptions& options) {
   Json json = document("gap-adopt");
   json["scenario"] = options.output;
   json["written"] = learnt.changed && !options.dry_run;
@@ -127,7 +128,7 @@ Json to_json(const gap::AdoptedScenario& learnt, const Options& options) {
   return json;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_gap_adopt(const GapAdoptCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(guard_sources(outputs, options.sources));
   SIXPOINT_CHECK(outputs.input(options.scenario));
@@ -151,20 +152,20 @@ Status run(const Options& options, Context& context) {
   }
   context.worsen(any ? kExitPassed : kExitInconclusive);
   if (options.json) {
-    return print_json(context, to_json(learnt, options));
+    return print_json(context, learnt_json(learnt, options));
   }
-  print(learnt, options, context);
+  print_gap_adopt(learnt, options, context);
   return {};
 }
 
 }  // namespace
 
 void add_gap_adopt(CLI::App& gap_command, Context& context) {
-  auto [command, options] =
-      add_command<Options>(gap_command, context, "gap-adopt", "adopt",
-                           "effects that several units have go into a scenario, as means and "
-                           "spreads that `simulate` and `virtual` use",
-                           run);
+  auto [command, options] = add_command<GapAdoptCommandOptions>(
+      gap_command, context, "gap-adopt", "adopt",
+      "effects that several units have go into a scenario, as means and "
+      "spreads that `simulate` and `virtual` use",
+      run_gap_adopt);
   add_source_options(command, options.sources, "INPUT",
                      "answers of `gap diagnose --json`, bundles, folders of bundles, stores");
   command.add_option("--scenario", options.scenario,

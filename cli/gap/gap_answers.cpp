@@ -20,7 +20,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct GapAnswersCommandOptions {
   std::string folder;
   std::string method = "diagnose";
   std::string output;
@@ -51,7 +51,8 @@ gap::Answer closed_world(const gap::Diagnosis& diagnosis, const std::string& nam
   return answer;
 }
 
-Result<gap::Answer> answer_of(FileSystem& files, const Options& options, const std::string& name) {
+Result<gap::Answer> answer_of(FileSystem& files, const GapAnswersCommandOptions& options,
+                              const std::string& name) {
   SIXPOINT_ASSIGN(const gap::Bundle bundle, gap::read_bundle(files, options.folder + "/" + name));
   if (options.method == "sequential") {
     return gap::answer_by_regression(bundle, name);
@@ -84,7 +85,7 @@ Result<std::vector<std::string>> bundles_of(FileSystem& files, const std::string
   return names;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_gap_answers(const GapAnswersCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(options.folder));
   SIXPOINT_CHECK(outputs.file("--output", options.output));
@@ -126,9 +127,9 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_gap_answers(CLI::App& gap_command, Context& context) {
-  auto [command, options] =
-      add_command<Options>(gap_command, context, "gap-answers", "answers",
-                           "what a method of this project answers to an exported challenge", run);
+  auto [command, options] = add_command<GapAnswersCommandOptions>(
+      gap_command, context, "gap-answers", "answers",
+      "what a method of this project answers to an exported challenge", run_gap_answers);
   command.add_option("FOLDER", options.folder, "the folder that gap challenge --export wrote")
       ->required();
   command

@@ -38,7 +38,7 @@ using gap::GapTrial;
 using gap::Outcome;
 using gap::Scores;
 
-struct Options : ChallengeSetting {
+struct GapChallengeCommandOptions : ChallengeSetting {
   std::size_t trials = 100;
   std::vector<std::string> only;
   gap::TrialShares shares;
@@ -114,8 +114,8 @@ bool is_plain(const std::string& recording) {
 }
 
 // Writes the trial and diagnoses it.
-Result<Outcome> answer_trial(Env& env, const Options& options, const GapTrial& trial,
-                             const std::string& name) {
+Result<Outcome> answer_trial(Env& env, const GapChallengeCommandOptions& options,
+                             const GapTrial& trial, const std::string& name) {
   Outcome outcome = gap::outcome_of(trial);
   const bool plain = is_plain(options.recording);
   const std::string bundle = name + (plain ? ".gt3x" : "");
@@ -156,8 +156,9 @@ Result<Outcome> answer_trial(Env& env, const Options& options, const GapTrial& t
 }
 
 // One trial; with --follow-suggestion twice: as it is, and with the segment that it suggests.
-Result<Followed> run_trial(Env& env, const Options& options, sim::StandardProtocol protocol,
-                           const std::string& folder, std::size_t index) {
+Result<Followed> run_trial(Env& env, const GapChallengeCommandOptions& options,
+                           sim::StandardProtocol protocol, const std::string& folder,
+                           std::size_t index) {
   SIXPOINT_ASSIGN(GapTrial trial,
                   gap::draw_trial(options.seed, index, protocol, options.shares, options.only));
   const std::string name = fmt::format("{}/{:06}", folder, index);
@@ -171,7 +172,7 @@ Result<Followed> run_trial(Env& env, const Options& options, sim::StandardProtoc
 }
 
 // Diagnoses the recording to which effects will be added, as it is.
-Status learn_own(Env& env, Options& options, const std::string& folder) {
+Status learn_own(Env& env, GapChallengeCommandOptions& options, const std::string& folder) {
   Outcome own;
   SIXPOINT_CHECK(diagnose(env, {options.program, "gap", "diagnose", options.recording, "--json"},
                           folder + "/own.answer.json", own));
@@ -187,7 +188,7 @@ Status learn_own(Env& env, Options& options, const std::string& folder) {
 }
 
 // Which effects are drawn, and of which shares: a recording takes fewer of them.
-Status check_effects(Options& options) {
+Status check_effects(GapChallengeCommandOptions& options) {
   if (!options.recording.empty()) {
     options.shares.outside = 0;
     options.shares.pair = 0;
@@ -216,7 +217,8 @@ Status check_effects(Options& options) {
 }
 
 // Bundles for others, instead of a diagnosis here.
-Status export_trials(const Options& options, sim::StandardProtocol protocol, Context& context) {
+Status export_trials(const GapChallengeCommandOptions& options, sim::StandardProtocol protocol,
+                     Context& context) {
   if (options.strip || options.follow || !options.recording.empty() || !options.keep.empty() ||
       !options.html.empty() || !options.program.empty()) {
     return fail(
@@ -239,7 +241,7 @@ Status export_trials(const Options& options, sim::StandardProtocol protocol, Con
   return export_challenge(how, context);
 }
 
-Status challenge(Options options, Context& context) {
+Status challenge(GapChallengeCommandOptions options, Context& context) {
   const auto protocol = sim::parse_standard_protocol(options.protocol);
   if (!protocol) {
     return fail(ErrorCode::usage, "there is no such protocol", options.protocol,
@@ -337,7 +339,7 @@ Status challenge(Options options, Context& context) {
 }  // namespace
 
 void add_gap_challenge(CLI::App& gap_command, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<GapChallengeCommandOptions>(
       gap_command, context, "gap-challenge", "challenge",
       "draws effects, hides them from the diagnosis, and scores its answers", challenge);
   command.add_option("--trials", options.trials, "how many bundles")

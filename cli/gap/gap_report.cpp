@@ -13,7 +13,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct GapReportCommandOptions {
   SourceOptions sources;
   std::string scenario;
   std::string output;
@@ -21,7 +21,7 @@ struct Options {
   bool json = false;
 };
 
-std::string text_of(const gap::GapProgress& progress) {
+std::string progress_text(const gap::GapProgress& progress) {
   std::string text = progress.brief() + "\n";
   for (const gap::EffectProgress& effect : progress.effects) {
     text += effect.scatter
@@ -39,7 +39,7 @@ std::string text_of(const gap::GapProgress& progress) {
   return text;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_gap_report(const GapReportCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(guard_sources(outputs, options.sources));
   SIXPOINT_CHECK(outputs.input(options.scenario));
@@ -65,15 +65,16 @@ Status run(const Options& options, Context& context) {
   context.worsen(progress.usable() ? kExitPassed : kExitInconclusive);
   Json json = document("gap-report");
   json.update(progress.to_json());
-  return print_answer(context, options.json, json, text_of(progress));
+  return print_answer(context, options.json, json, progress_text(progress));
 }
 
 }  // namespace
 
 void add_gap_report(CLI::App& gap_command, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<GapReportCommandOptions>(
       gap_command, context, "gap-report", "report",
-      "the gap over time: before, after each adoption of a scenario, and its floor", run);
+      "the gap over time: before, after each adoption of a scenario, and its floor",
+      run_gap_report);
   add_source_options(command, options.sources, "SOURCE", "bundles, folders of bundles, stores");
   command.add_option("--scenario", options.scenario, "the scenario that `gap adopt` made")
       ->required();

@@ -12,7 +12,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct GapScoreCommandOptions {
   std::string answers;
   std::string labels;
   std::uint64_t seed = gap::BenchmarkOptions{}.seed;
@@ -43,7 +43,7 @@ Json benchmark_json(const gap::BenchmarkScores& scores) {
   return json;
 }
 
-void print(const gap::BenchmarkScores& scores, Context& context) {
+void print_gap_score(const gap::BenchmarkScores& scores, Context& context) {
   context.text() << fmt::format("{} bundles, {} without an answer\n", scores.bundles,
                                 scores.missing);
   for (const gap::Measure& measure : scores.measures) {
@@ -63,7 +63,7 @@ void print(const gap::BenchmarkScores& scores, Context& context) {
   }
 }
 
-Status run(const Options& options, Context& context) {
+Status run_gap_score(const GapScoreCommandOptions& options, Context& context) {
   FileSystem& files = context.env.files;
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.labels));
   SIXPOINT_ASSIGN(const gap::Labels labels, gap::parse_labels(as_text(text)));
@@ -72,7 +72,7 @@ Status run(const Options& options, Context& context) {
   how.seed = options.seed;
   SIXPOINT_ASSIGN(const gap::BenchmarkScores scores, gap::score_answers(labels, answers, how));
   if (!options.json) {
-    print(scores, context);
+    print_gap_score(scores, context);
     return {};
   }
   Json json = document("gap-score");
@@ -87,9 +87,9 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_gap_score(CLI::App& gap_command, Context& context) {
-  auto [command, options] =
-      add_command<Options>(gap_command, context, "gap-score", "score",
-                           "scores any program's answers to an exported challenge", run);
+  auto [command, options] = add_command<GapScoreCommandOptions>(
+      gap_command, context, "gap-score", "score",
+      "scores any program's answers to an exported challenge", run_gap_score);
   command
       .add_option("ANSWERS", options.answers,
                   "a JSON Lines file, or a folder with NAME.json for each bundle NAME")

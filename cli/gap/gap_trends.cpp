@@ -10,7 +10,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct GapTrendsCommandOptions {
   std::string store;
   bool json = false;
 };
@@ -29,7 +29,7 @@ Json to_json(const station::JigTrend& trend) {
   return json;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_gap_trends(const GapTrendsCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto runs, station::stored_jig_runs(store));
   const station::GapTrends trends = station::find_trends(runs);
@@ -71,9 +71,9 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_gap_trends(CLI::App& gap_command, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<GapTrendsCommandOptions>(
       gap_command, context, "gap-trends", "trends",
-      "whether a skew belongs to the units, to the jig or to the station", run);
+      "whether a skew belongs to the units, to the jig or to the station", run_gap_trends);
   add_store_option(command, options.store);
 }
 

@@ -15,7 +15,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options {
+struct SimulateCommandOptions {
   std::string scenario;
   std::string output;
   std::string truth;
@@ -37,7 +37,7 @@ Result<Json> answer_of(FileSystem& files, const sim::Scenario& scenario,
   return json;
 }
 
-Result<Json> simulate_bundle(const Options& options, const sim::Scenario& scenario,
+Result<Json> simulate_bundle(const SimulateCommandOptions& options, const sim::Scenario& scenario,
                              Outputs& outputs) {
   if (!options.truth.empty()) {
     return fail(ErrorCode::usage, "--truth cannot be used with a protocol", {},
@@ -55,7 +55,7 @@ Result<Json> simulate_bundle(const Options& options, const sim::Scenario& scenar
   return json;
 }
 
-Result<Json> simulate(Context& context, const Options& options) {
+Result<Json> simulate(Context& context, const SimulateCommandOptions& options) {
   Outputs outputs(context, options.outputs, options.json);
   FileSystem& files = outputs.files();
   SIXPOINT_CHECK(outputs.input(options.scenario));
@@ -101,7 +101,7 @@ Result<Json> simulate(Context& context, const Options& options) {
   return json;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_simulate(const SimulateCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const Json json, simulate(context, options));
   return print_answer(
       context, options.json, json,
@@ -113,9 +113,10 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_simulate(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<SimulateCommandOptions>(
       app, context, "simulate",
-      "make a recording or a bundle from a scenario; the same scenario gives the same bytes", run);
+      "make a recording or a bundle from a scenario; the same scenario gives the same bytes",
+      run_simulate);
   command.add_option("--scenario", options.scenario, "what happens (docs/scenario.md)")->required();
   command
       .add_option("-o,--output", options.output, "the .gt3x file to make, or the bundle's folder")

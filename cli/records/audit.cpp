@@ -5,13 +5,13 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct AuditCommandOptions {
   std::string store;
   std::string head;
   bool json = false;
 };
 
-Status verify(const Options& options, Context& context) {
+Status verify(const AuditCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto report, store.audit(options.head));
   context.worsen(report.ok ? kExitPassed : kExitFailed);
@@ -28,7 +28,7 @@ Status verify(const Options& options, Context& context) {
   return {};
 }
 
-Status print_head(const Options& options, Context& context) {
+Status print_head(const AuditCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto head, store.head());
   Json json = document("audit");
@@ -40,11 +40,11 @@ Status print_head(const Options& options, Context& context) {
 
 void add_audit(CLI::App& app, Context& context) {
   CLI::App& group = add_group(app, "audit", "check the history in the store");
-  auto [ending, of_head] =
-      add_command<Options>(group, context, "audit", "head",
-                           "the end of the chain, to be written down elsewhere", print_head);
+  auto [ending, of_head] = add_command<AuditCommandOptions>(
+      group, context, "audit", "head", "the end of the chain, to be written down elsewhere",
+      print_head);
   add_store_option(ending, of_head.store);
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<AuditCommandOptions>(
       group, context, "audit", "verify", "find rows that were changed, removed or moved", verify);
   add_store_option(command, options.store);
   command.add_option(

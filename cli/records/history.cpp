@@ -18,7 +18,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct HistoryCommandOptions {
   std::string serial;
   std::string store;
   bool json = false;
@@ -163,7 +163,7 @@ std::string values_of(const db::RunRecord& run) {
 }
 
 // A line per record, by the time of day at which it was made.
-void print(const db::UnitHistory& history, Context& context) {
+void print_history(const db::UnitHistory& history, Context& context) {
   std::vector<std::pair<UtcTime, std::vector<std::string>>> lines;
   const auto line = [&](UtcTime time, std::string what, std::string state, const std::string& id,
                         std::string values) {
@@ -202,7 +202,7 @@ void print(const db::UnitHistory& history, Context& context) {
   context.out << list.text();
 }
 
-Status run(const Options& options, Context& context) {
+Status run_history(const HistoryCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto history, store.unit_history(options.serial));
   if (history.empty()) {
@@ -210,7 +210,7 @@ Status run(const Options& options, Context& context) {
                 "'sixpoint units' lists the units in the store");
   }
   if (!options.json) {
-    print(history, context);
+    print_history(history, context);
     return {};
   }
   Json json = document("history");
@@ -231,8 +231,9 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_history(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
-      app, context, "history", "all records of a unit in the store: constants, runs, repairs", run);
+  auto [command, options] = add_command<HistoryCommandOptions>(
+      app, context, "history", "all records of a unit in the store: constants, runs, repairs",
+      run_history);
   command.add_option("serial", options.serial, "the unit's serial number")->required();
   add_store_option(command, options.store);
 }

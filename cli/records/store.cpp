@@ -13,7 +13,7 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct StoreCommandOptions {
   std::string store;
   std::string path;
   std::string id;
@@ -45,7 +45,7 @@ Answer answer_of(const db::ExchangeReport& report, const std::string& file,
   return answer;
 }
 
-Result<Answer> export_store(const Options& options, Context& context) {
+Result<Answer> export_store(const StoreCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(options.csv ? outputs.folder("--output", options.path)
@@ -57,7 +57,7 @@ Result<Answer> export_store(const Options& options, Context& context) {
   return answer_of(report, options.path, report.brief());
 }
 
-Result<Answer> import_store(const Options& options, Context& context) {
+Result<Answer> import_store(const StoreCommandOptions& options, Context& context) {
   // A missing input must not leave an empty store behind.
   SIXPOINT_CHECK(context.env.files.info(options.path));
   db::ExchangeReport report;
@@ -72,7 +72,7 @@ Result<Answer> import_store(const Options& options, Context& context) {
                    fmt::format("{}; {} were new", report.brief(), report.added));
 }
 
-Result<Answer> back_up(const Options& options, Context& context) {
+Result<Answer> back_up(const StoreCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.file_to_keep("--output", options.path));
@@ -83,12 +83,12 @@ Result<Answer> back_up(const Options& options, Context& context) {
 }
 
 // A store that is there, for a command that adds to it: one that may not be written is refused.
-Result<db::Store> open_to_add(const Options& options, Context& context) {
+Result<db::Store> open_to_add(const StoreCommandOptions& options, Context& context) {
   return store_exists(context, options.store) ? open_store(context, options.store)
                                               : open_existing_store(context, options.store);
 }
 
-Result<Answer> catch_up(const Options& options, Context& context) {
+Result<Answer> catch_up(const StoreCommandOptions& options, Context& context) {
   const std::string folder =
       options.journal.empty() ? journal_folder(options.store) : options.journal;
   if (!options.journal.empty()) {
@@ -112,7 +112,8 @@ std::string login_name() {
 }
 
 // Adds a row about an old one: withdraw, reinstate, prefer, note.
-Result<Answer> correct(db::Store& store, const Options& options, const std::string& action) {
+Result<Answer> correct(db::Store& store, const StoreCommandOptions& options,
+                       const std::string& action) {
   const db::Correction correction{
       .table = options.table,
       .row_id = options.id,
@@ -127,7 +128,7 @@ Result<Answer> correct(db::Store& store, const Options& options, const std::stri
   return answer;
 }
 
-Result<Answer> withdraw(const Options& options, Context& context) {
+Result<Answer> withdraw(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "withdraw"));
   const auto id = answer.json["about"]["id"].get<std::string>();
@@ -139,14 +140,14 @@ Result<Answer> withdraw(const Options& options, Context& context) {
   return answer;
 }
 
-Result<Answer> reinstate(const Options& options, Context& context) {
+Result<Answer> reinstate(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "reinstate"));
   answer.note = "these constants apply again";
   return answer;
 }
 
-Result<Answer> prefer(const Options& options, Context& context) {
+Result<Answer> prefer(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "prefer"));
   answer.json["preferred"] = answer.json["about"]["id"];
@@ -154,14 +155,14 @@ Result<Answer> prefer(const Options& options, Context& context) {
   return answer;
 }
 
-Result<Answer> note(const Options& options, Context& context) {
+Result<Answer> note(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
   SIXPOINT_ASSIGN(Answer answer, correct(store, options, "note"));
   answer.note = fmt::format("noted about {} {}", options.table, printable(options.id));
   return answer;
 }
 
-Result<Answer> recall(const Options& options, Context& context) {
+Result<Answer> recall(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   std::string id;
   if (!options.id.empty()) {
@@ -189,7 +190,7 @@ Result<Answer> recall(const Options& options, Context& context) {
   return answer;
 }
 
-Result<Answer> jig_units(const Options& options, Context& context) {
+Result<Answer> jig_units(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto units, store.units_of_jig(options.id));
   Answer answer;
@@ -208,7 +209,7 @@ Result<Answer> jig_units(const Options& options, Context& context) {
   return answer;
 }
 
-Result<Answer> yield(const Options& options, Context& context) {
+Result<Answer> yield(const StoreCommandOptions& options, Context& context) {
   UtcTime from = UtcTime::min();
   UtcTime to = UtcTime::max();
   if (!options.from.empty()) {
@@ -233,7 +234,7 @@ Result<Answer> yield(const Options& options, Context& context) {
   return answer;
 }
 
-Result<Answer> due(const Options& options, Context& context) {
+Result<Answer> due(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto units,
                   store.units_due(context.env.clock.now() - std::chrono::hours(24) * options.days));
@@ -251,7 +252,7 @@ Result<Answer> due(const Options& options, Context& context) {
   return answer;
 }
 
-Result<Answer> trend(const Options& options, Context& context) {
+Result<Answer> trend(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto points, store.trend(options.id));
   if (points.empty()) {
@@ -284,23 +285,24 @@ Result<Answer> trend(const Options& options, Context& context) {
   return answer;
 }
 
-Declared<Options> add(CLI::App& parent, Context& context, const char* name, const char* about,
-                      Result<Answer> (*work)(const Options&, Context&)) {
-  const auto declared =
-      add_command<Options>(parent, context, "store", name, about,
-                           [work](const Options& options, Context& here) -> Status {
-                             SIXPOINT_ASSIGN(const Answer answer, work(options, here));
-                             if (!answer.note.empty()) {
-                               here.people << answer.note << '\n';
-                             }
-                             return print_answer(here, options.json, answer.json, answer.text);
-                           });
+Declared<StoreCommandOptions> add(CLI::App& parent, Context& context, const char* name,
+                                  const char* about,
+                                  Result<Answer> (*work)(const StoreCommandOptions&, Context&)) {
+  const auto declared = add_command<StoreCommandOptions>(
+      parent, context, "store", name, about,
+      [work](const StoreCommandOptions& options, Context& here) -> Status {
+        SIXPOINT_ASSIGN(const Answer answer, work(options, here));
+        if (!answer.note.empty()) {
+          here.people << answer.note << '\n';
+        }
+        return print_answer(here, options.json, answer.json, answer.text);
+      });
   add_store_option(declared.command, declared.options.store);
   return declared;
 }
 
 // --why and --operator, for rows about other rows.
-void add_correction_options(const Declared<Options>& correction) {
+void add_correction_options(const Declared<StoreCommandOptions>& correction) {
   auto [command, options] = correction;
   command.add_option("--why,--reason", options.reason, "why, or what")->required();
   command.add_option("--operator", options.operator_name,
@@ -312,53 +314,58 @@ void add_correction_options(const Declared<Options>& correction) {
 void add_store(CLI::App& app, Context& context) {
   CLI::App& group = add_group(app, "store", "move, save and ask the whole store");
   const auto sub = [&](const char* name, const char* about,
-                       Result<Answer> (*work)(const Options&, Context&)) {
+                       Result<Answer> (*work)(const StoreCommandOptions&, Context&)) {
     return add(group, context, name, about, work);
   };
   // Declares the first argument of a subcommand, or its -o.
-  const auto with = [](Declared<Options> declared, const char* name, std::string Options::*value,
-                       const char* about) {
+  const auto with = [](Declared<StoreCommandOptions> declared, const char* name,
+                       std::string StoreCommandOptions::*value, const char* about) {
     return declared.command.add_option(name, declared.options.*value, about);
   };
   auto out = sub("export", "write the whole store as JSON Lines or CSV", export_store);
-  with(out, "-o,--output", &Options::path, "the file; with --csv the folder")->required();
+  with(out, "-o,--output", &StoreCommandOptions::path, "the file; with --csv the folder")
+      ->required();
   add_output_options(out.command, out.options.outputs);
   out.command.add_flag("--csv", out.options.csv, "one CSV file per table instead of JSON Lines");
   with(sub("import", "continue a store with the rows of an export", import_store), "file",
-       &Options::path, "what 'store export' wrote: JSON Lines")
+       &StoreCommandOptions::path, "what 'store export' wrote: JSON Lines")
       ->required();
   auto copy = sub("backup", "copy the store into an SQLite file while others work", back_up);
-  with(copy, "-o,--output", &Options::path, "the copy")->required();
+  with(copy, "-o,--output", &StoreCommandOptions::path, "the copy")->required();
   add_output_options(copy.command, copy.options.outputs);
   with(sub("catch-up", "store what the store did not take when it was measured", catch_up),
-       "--journal", &Options::journal,
+       "--journal", &StoreCommandOptions::journal,
        "the folder of a journal that was written elsewhere (default: this station's)");
   for (const auto& correction :
        {sub("withdraw", "constants apply no more; they stay in the history", withdraw),
         sub("reinstate", "withdrawn constants apply again", reinstate),
         sub("prefer", "of a unit's sets, these constants apply", prefer)}) {
-    with(correction, "id", &Options::id, "the constants' id ('sixpoint history')")->required();
+    with(correction, "id", &StoreCommandOptions::id, "the constants' id ('sixpoint history')")
+        ->required();
     add_correction_options(correction);
   }
   const auto noted = sub("note", "add what is wrong or missing in a row", note);
-  with(noted, "table", &Options::table,
+  with(noted, "table", &StoreCommandOptions::table,
        "the row's table: units, runs, constants, unit_writes, repairs ...")
       ->required();
-  with(noted, "id", &Options::id, "the row's id; of a unit its serial number")->required();
+  with(noted, "id", &StoreCommandOptions::id, "the row's id; of a unit its serial number")
+      ->required();
   add_correction_options(noted);
   with(sub("recall", "files repaired with constants that were withdrawn", recall), "id",
-       &Options::id, "only these constants");
-  with(sub("jig", "units that were on a jig", jig_units), "jig", &Options::id, "the jig's name")
+       &StoreCommandOptions::id, "only these constants");
+  with(sub("jig", "units that were on a jig", jig_units), "jig", &StoreCommandOptions::id,
+       "the jig's name")
       ->required();
   const auto passed = sub("yield", "how many units passed, and how many at once", yield);
-  with(passed, "--from", &Options::from, "runs that started then or later (2027-03-31; UTC)");
-  with(passed, "--to", &Options::to, "runs that started before this time");
+  with(passed, "--from", &StoreCommandOptions::from,
+       "runs that started then or later (2027-03-31; UTC)");
+  with(passed, "--to", &StoreCommandOptions::to, "runs that started before this time");
   auto old = sub("due", "units whose constants are old or missing", due);
   old.command.add_option("--days", old.options.days, "how old constants may be")
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str();
   with(sub("trend", "all calibrations of one unit, for its control chart", trend), "serial",
-       &Options::id, "the unit's serial number")
+       &StoreCommandOptions::id, "the unit's serial number")
       ->required();
 }
 

@@ -8,12 +8,12 @@
 namespace sixpoint::cli {
 namespace {
 
-struct Options {
+struct UnitsCommandOptions {
   std::string store;
   bool json = false;
 };
 
-Status run(const Options& options, Context& context) {
+Status run_units(const UnitsCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto units, store.units());
   Json json = document("units");
@@ -33,8 +33,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_units(CLI::App& app, Context& context) {
-  auto [command, options] =
-      add_command<Options>(app, context, "units", "list the units in the store", run);
+  auto [command, options] = add_command<UnitsCommandOptions>(
+      app, context, "units", "list the units in the store", run_units);
   add_store_option(command, options.store);
 }
 

@@ -16,7 +16,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options : JigOptions {
+struct CaptureCommandOptions : JigOptions {
   std::string output;
   std::string constants_out;
   std::string station;
@@ -27,12 +27,13 @@ struct Options : JigOptions {
   int patience_s = 60;
 };
 
-struct Done {
+struct CaptureDone {
   station::CaptureReport report;
   std::optional<SavedConstants> saved;
 };
 
-Result<station::CaptureOptions> capture_options(Context& context, const Options& options,
+Result<station::CaptureOptions> capture_options(Context& context,
+                                                const CaptureCommandOptions& options,
                                                 const std::string& serial) {
   station::CaptureOptions capture;
   capture.rate_hz = options.rate_hz;
@@ -67,8 +68,8 @@ station::SideAnswer ask_side(Context& context, double side_s, bool by_itself, de
                                                                       : station::SideAnswer::stop;
 }
 
-Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
-                     device::SessionRecorder& recorder) {
+Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& options,
+                            Outputs& outputs, device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.input(options.limits));
   SIXPOINT_CHECK(outputs.file("--constants-out", options.constants_out));
@@ -88,7 +89,7 @@ Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
   SIXPOINT_CHECK(station::StationGuard(context.env, guard_folder(options.store), limits)
                      .may_start(store, unit.identity().serial, options.station));
-  Done done;
+  CaptureDone done;
   if (unit.abilities().records_on_command) {
     station::CaptureHooks hooks;
     hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
@@ -113,7 +114,7 @@ Result<Done> capture(Context& context, const Options& options, Outputs& outputs,
   return done;
 }
 
-Json to_json(const Done& done) {
+Json to_json(const CaptureDone& done) {
   Json json = document("capture");
   if (done.report.solved) {
     json.update(calib::to_json(*done.report.solved));
@@ -132,7 +133,7 @@ Json to_json(const Done& done) {
   return json;
 }
 
-void print(Context& context, const Done& done) {
+void print_capture(Context& context, const CaptureDone& done) {
   const station::CaptureReport& report = done.report;
   for (const std::string& note : report.notes) {
     context.people << "note: " << note << '\n';
@@ -172,10 +173,10 @@ int exit_code_of(const station::CaptureReport& report) {
              : kExitFailed;
 }
 
-Status run(const Options& options, Context& context) {
+Status run_capture(const CaptureCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   device::SessionRecorder recorder;
-  const Result<Done> done = capture(context, options, outputs, recorder);
+  const Result<CaptureDone> done = capture(context, options, outputs, recorder);
   finish_session(context, recorder, options.record);
   if (!done) {
     return fail(done.error());
@@ -184,7 +185,7 @@ Status run(const Options& options, Context& context) {
   if (options.json) {
     print_json(context, to_json(*done));
   } else {
-    print(context, *done);
+    print_capture(context, *done);
   }
   return {};
 }
@@ -192,9 +193,9 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_capture(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<CaptureCommandOptions>(
       app, context, "capture",
-      "make a calibration file: the unit records on its six sides, and is solved", run);
+      "make a calibration file: the unit records on its six sides, and is solved", run_capture);
   add_jig_options(command, options);
   command.add_option("-o,--output", options.output,
                      "the .gt3x to make (default: SERIAL-calibration-DAY.gt3x)");

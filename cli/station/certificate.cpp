@@ -12,7 +12,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options {
+struct CertificateCommandOptions {
   std::string run;
   std::string store;
   std::string output;
@@ -21,7 +21,7 @@ struct Options {
   bool json = false;
 };
 
-Status run(const Options& options, Context& context) {
+Status run_certificate(const CertificateCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.file("--output", options.output));
@@ -45,8 +45,8 @@ Status run(const Options& options, Context& context) {
 }  // namespace
 
 void add_certificate(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(app, context, "certificate",
-                                                 "make the certificate of a jig run again", run);
+  auto [command, options] = add_command<CertificateCommandOptions>(
+      app, context, "certificate", "make the certificate of a jig run again", run_certificate);
   command.add_option("RUN", options.run, "the run's id, as 'sixpoint jig' said it")->required();
   command.add_option("-o,--output", options.output, "the .pdf, .json or .dcc.xml to make");
   command.add_option("--label", options.label, "and a label for the unit, as ZPL");

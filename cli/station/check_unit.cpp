@@ -13,7 +13,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options {
+struct CheckUnitCommandOptions {
   std::string serial;
   std::string station;
   std::string operator_name;
@@ -29,7 +29,7 @@ struct Options {
 };
 
 // Adds an engineer's decision to the store and answers `done`.
-Status decide(const Options& options, Context& context, const char* command,
+Status decide(const CheckUnitCommandOptions& options, Context& context, const char* command,
               const std::string& action, const std::string& done) {
   SIXPOINT_CHECK(sign_off(context, options.operator_name));
   SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
@@ -50,7 +50,7 @@ Status decide(const Options& options, Context& context, const char* command,
   return print_answer(context, options.json, json, done + "\n");
 }
 
-Status show_state(const Options& options, Context& context, const char* command) {
+Status show_state(const CheckUnitCommandOptions& options, Context& context, const char* command) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.input(options.limits));
@@ -83,13 +83,13 @@ Status show_state(const Options& options, Context& context, const char* command)
   return print_answer(context, options.json, json, text);
 }
 
-Status sign(const Options& options, Context& context) {
+Status sign(const CheckUnitCommandOptions& options, Context& context) {
   return decide(options, context, "station-lock",
                 options.new_baseline ? "sign_new_baseline" : "sign",
                 "signed; the station may go on");
 }
 
-Status retest(const Options& options, Context& context) {
+Status retest(const CheckUnitCommandOptions& options, Context& context) {
   if (options.release) {
     return decide(options, context, "retest", "release",
                   printable(options.serial) + " may be measured again");
@@ -112,27 +112,29 @@ Status retest(const Options& options, Context& context) {
                   state.passes_needed, state.passes_needed == 1 ? "" : "es"));
 }
 
-void add_decision_options(CLI::App& command, Options& options) {
+void add_decision_options(CLI::App& command, CheckUnitCommandOptions& options) {
   command.add_option("--operator", options.operator_name, "who decides")->required();
   command.add_option("--reason", options.reason, "why, for the record")->required();
 }
 
-void add_limits_option(CLI::App& command, Options& options) {
+void add_limits_option(CLI::App& command, CheckUnitCommandOptions& options) {
   command.add_option("--limits", options.limits,
                      "a TOML file of limits (docs/limits.md); else the built-in ones");
 }
 
-void add_place_options(CLI::App& command, Options& options) {
+void add_place_options(CLI::App& command, CheckUnitCommandOptions& options) {
   command.add_option("--station", options.station, "the station, as given to 'sixpoint jig'");
   add_store_option(command, options.store);
 }
 
-Declared<Options> add_state(CLI::App& group, Context& context, const char* group_name,
-                            const char* name, const char* about) {
-  const auto declared = add_command<Options>(group, context, group_name, name, about,
-                                             [group_name](const Options& options, Context& here) {
-                                               return show_state(options, here, group_name);
-                                             });
+Declared<CheckUnitCommandOptions> add_state(CLI::App& group, Context& context,
+                                            const char* group_name, const char* name,
+                                            const char* about) {
+  const auto declared = add_command<CheckUnitCommandOptions>(
+      group, context, group_name, name, about,
+      [group_name](const CheckUnitCommandOptions& options, Context& here) {
+        return show_state(options, here, group_name);
+      });
   add_limits_option(declared.command, declared.options);
   add_place_options(declared.command, declared.options);
   return declared;
@@ -145,9 +147,9 @@ void add_check_unit(CLI::App& app, Context& context) {
       app, "check-unit", "units that check the station, and their charts (docs/statistics.md)");
   const auto add_action = [&](const char* name, const char* about, const char* action,
                               const char* done) {
-    auto [command, options] = add_command<Options>(
+    auto [command, options] = add_command<CheckUnitCommandOptions>(
         group, context, "check-unit", name, about,
-        [action, done](const Options& its, Context& here) {
+        [action, done](const CheckUnitCommandOptions& its, Context& here) {
           return decide(its, here, "check-unit", action, printable(its.serial) + done);
         });
     command.add_option("SERIAL", options.serial)->required();
@@ -173,9 +175,9 @@ void add_station_lock(CLI::App& app, Context& context) {
   CLI::App& group =
       add_group(app, "station-lock", "is the station locked by its check units; sign for it");
   add_state(group, context, "station-lock", "status", "exit 1 when it is locked");
-  auto [command, options] =
-      add_command<Options>(group, context, "station-lock", "sign",
-                           "an engineer has checked it; the station may go on", sign);
+  auto [command, options] = add_command<CheckUnitCommandOptions>(
+      group, context, "station-lock", "sign", "an engineer has checked it; the station may go on",
+      sign);
   add_decision_options(command, options);
   command.add_flag("--new-baseline", options.new_baseline,
                    "the jig was changed: earlier runs of the check units do not count any more");
@@ -183,7 +185,7 @@ void add_station_lock(CLI::App& app, Context& context) {
 }
 
 void add_retest(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<CheckUnitCommandOptions>(
       app, context, "retest", "may this unit be measured again (docs/verdicts.md)", retest);
   command.add_option("SERIAL", options.serial)->required();
   command.add_flag("--release", options.release, "an engineer has checked it: it may");

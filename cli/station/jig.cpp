@@ -30,7 +30,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options : JigOptions {
+struct JigCommandOptions : JigOptions {
   std::string jig_id;
   std::string jig_due;
   std::string jig_exception;
@@ -51,7 +51,7 @@ struct Options : JigOptions {
   bool write = false;
 };
 
-struct Done {
+struct JigDone {
   station::JigReport report;
   std::string run_id;
   std::optional<std::string> constants_id;
@@ -61,7 +61,7 @@ struct Done {
 };
 
 // The id of the jig run that `--retest-of` names: an id, or the unit's last.
-Result<std::string> retested_run(const Options& options, const std::string& serial,
+Result<std::string> retested_run(const JigCommandOptions& options, const std::string& serial,
                                  Result<db::Store>& store) {
   if (!store) {
     return fail(store.error());
@@ -85,12 +85,12 @@ Result<std::string> retested_run(const Options& options, const std::string& seri
   return earlier->id;
 }
 
-Result<station::JigDue> due_of(const Options& options) {
+Result<station::JigDue> due_of(const JigCommandOptions& options) {
   return station::parse_jig_due(options.jig_due, options.jig_exception, options.jig_exception_by);
 }
 
 // What is known before the unit is measured. What can be refused is refused here, before the work.
-Result<db::RunRecord> record_before(const Options& options,
+Result<db::RunRecord> record_before(const JigCommandOptions& options,
                                     const station::JigSessionOptions& session,
                                     const std::string& serial, const std::string& jig,
                                     Result<db::Store>& store) {
@@ -112,7 +112,7 @@ Result<db::RunRecord> record_before(const Options& options,
   return run;
 }
 
-Status check_outputs(const Options& options, Outputs& outputs) {
+Status check_outputs(const JigCommandOptions& options, Outputs& outputs) {
   SIXPOINT_CHECK(outputs.input(options.limits));
   SIXPOINT_CHECK(outputs.input(options.pin_file));
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
@@ -138,8 +138,8 @@ Status check_outputs(const Options& options, Outputs& outputs) {
 
 // Certificate and label from the record as it is stored, so that they can be made again from there.
 // An error is reported, and the run goes on.
-void make_papers(Context& context, const Options& options, Outputs& outputs,
-                 const db::RunRecord& run, Done& done) {
+void make_papers(Context& context, const JigCommandOptions& options, Outputs& outputs,
+                 const db::RunRecord& run, JigDone& done) {
   const auto report = [&](const Status& made, bool& flag) {
     flag = made.has_value();
     if (!made) {
@@ -186,8 +186,8 @@ std::optional<station::OperatorCommand> operator_at_terminal(Context& context,
 
 // The folder of the run on disk; empty where the run is not saved: a jig that turns by itself
 // begins again in two minutes, and a gage study measures each run whole.
-std::string run_folder(const Context& context, const Options& options, const device::Jig& jig,
-                       const std::string& serial) {
+std::string run_folder(const Context& context, const JigCommandOptions& options,
+                       const device::Jig& jig, const std::string& serial) {
   const bool has_person = context.people_at_terminal && !jig.turns_by_itself();
   if (!options.study.empty() || (options.state.empty() && !has_person)) {
     return {};
@@ -196,7 +196,8 @@ std::string run_folder(const Context& context, const Options& options, const dev
          run_folder_name(options.store, serial);
 }
 
-station::UnfinishedRun unfinished_run(const Options& options, const device::Identity& identity,
+station::UnfinishedRun unfinished_run(const JigCommandOptions& options,
+                                      const device::Identity& identity,
                                       calib::FilterConfiguration filter) {
   return {.device = options.device,
           .serial = identity.serial,
@@ -207,7 +208,8 @@ station::UnfinishedRun unfinished_run(const Options& options, const device::Iden
           .filter = filter};
 }
 
-Result<station::JigSessionOptions> session_options(Context& context, const Options& options) {
+Result<station::JigSessionOptions> session_options(Context& context,
+                                                   const JigCommandOptions& options) {
   station::JigSessionOptions session;
   SIXPOINT_ASSIGN(session.limits, station::read_limits(context.env.files, options.limits));
   SIXPOINT_ASSIGN(session.filter, calib::parse_filter_configuration(options.filter));
@@ -227,7 +229,7 @@ Result<station::JigSessionOptions> session_options(Context& context, const Optio
 
 // What the unit's earlier runs demand of this one. Where the store does not answer, the station
 // remembers what it said last.
-Result<station::RetestState> retest_state(Context& context, const Options& options,
+Result<station::RetestState> retest_state(Context& context, const JigCommandOptions& options,
                                           const std::string& serial, station::StationGuard& guard,
                                           Result<db::Store>& store) {
   if (!options.study.empty()) {
@@ -256,8 +258,8 @@ void show(Context& context, const station::JigAction& action) {
   context.people << std::flush;
 }
 
-station::JigHooks terminal_hooks(Context& context, const Options& options, const JiggedUnit& opened,
-                                 std::optional<StopRequest>& stop) {
+station::JigHooks terminal_hooks(Context& context, const JigCommandOptions& options,
+                                 const JiggedUnit& opened, std::optional<StopRequest>& stop) {
   station::JigHooks hooks;
   hooks.on_action = [&context](const station::JigAction& action) { show(context, action); };
   hooks.reopen = station::wait_for_unit(
@@ -290,7 +292,7 @@ station::JigHooks terminal_hooks(Context& context, const Options& options, const
 // The run itself. It is saved in a folder while it is under way, so that the next program can go on
 // with it, until `store_run` has stored the report.
 Result<station::JigReport> run_and_store(
-    Context& context, const Options& options, const JiggedUnit& opened,
+    Context& context, const JigCommandOptions& options, const JiggedUnit& opened,
     const station::JigSessionOptions& session, std::optional<StopRequest>& stop,
     const std::function<Status(const station::JigReport&)>& store_run) {
   station::JigHooks hooks = terminal_hooks(context, options, opened, stop);
@@ -328,8 +330,8 @@ Result<station::JigReport> run_and_store(
   return report;
 }
 
-Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
-                     device::SessionRecorder& recorder) {
+Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outputs& outputs,
+                        device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(check_outputs(options, outputs));
   SIXPOINT_ASSIGN(auto session, session_options(context, options));
   SIXPOINT_ASSIGN(const station::SignedName who,
@@ -360,7 +362,7 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
   SIXPOINT_ASSIGN(session.retest, retest_state(context, options, identity.serial, guard, store));
   SIXPOINT_ASSIGN(auto record,
                   record_before(options, session, identity.serial, opened.jig->name(), store));
-  Done done;
+  JigDone done;
   const auto store_run = [&](const station::JigReport& report) -> Status {
     station::complete_run_record(record, report, options.study, who.is_authenticated);
     station::RunIds stored;
@@ -389,7 +391,7 @@ Result<Done> measure(Context& context, const Options& options, Outputs& outputs,
   return done;
 }
 
-Json to_json(const Options& options, const Done& done) {
+Json to_json(const JigCommandOptions& options, const JigDone& done) {
   Json json = document("jig");
   json["run"] = done.run_id;
   json.update(done.report.to_json());
@@ -406,7 +408,7 @@ Json to_json(const Options& options, const Done& done) {
   return json;
 }
 
-void print(Context& context, const Options& options, const Done& done) {
+void print_jig(Context& context, const JigCommandOptions& options, const JigDone& done) {
   const station::JigReport& report = done.report;
   context.text() << report.brief() << '\n';
   if (!report.usable()) {
@@ -442,15 +444,15 @@ void print(Context& context, const Options& options, const Done& done) {
   }
 }
 
-int exit_code_of(const Done& done) {
+int exit_code_of(const JigDone& done) {
   const std::optional<Error>& ended_by = done.report.ended_by;
   return ended_by ? static_cast<int>(ended_by->code) : station::exit_code_of(done.report.verdict);
 }
 
-Status run(const Options& options, Context& context) {
+Status run_jig(const JigCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   device::SessionRecorder recorder;
-  const Result<Done> done = measure(context, options, outputs, recorder);
+  const Result<JigDone> done = measure(context, options, outputs, recorder);
   finish_session(context, recorder, options.record);
   if (!done) {
     return fail(done.error());
@@ -465,7 +467,7 @@ Status run(const Options& options, Context& context) {
   if (options.json) {
     print_json(context, to_json(options, *done));
   } else {
-    print(context, options, *done);
+    print_jig(context, options, *done);
   }
   return {};
 }
@@ -473,38 +475,40 @@ Status run(const Options& options, Context& context) {
 // The options that are texts.
 struct TextOption {
   const char* name;
-  std::string Options::*text;
+  std::string JigCommandOptions::*text;
   const char* about;
 };
 constexpr std::array<TextOption, 13> kTextOptions = {{
-    {"--jig-id", &Options::jig_id, "the jig's own number, for the record"},
-    {"--jig-due", &Options::jig_due,
+    {"--jig-id", &JigCommandOptions::jig_id, "the jig's own number, for the record"},
+    {"--jig-due", &JigCommandOptions::jig_due,
      "when the jig itself is due for calibration (2027-03-31); after that day nothing is measured"},
-    {"--jig-exception", &Options::jig_exception, "why it is measured all the same, for the record"},
-    {"--jig-exception-by", &Options::jig_exception_by, "the engineer who signs for that"},
-    {"--retest-of", &Options::retest_of,
+    {"--jig-exception", &JigCommandOptions::jig_exception,
+     "why it is measured all the same, for the record"},
+    {"--jig-exception-by", &JigCommandOptions::jig_exception_by, "the engineer who signs for that"},
+    {"--retest-of", &JigCommandOptions::retest_of,
      "the run that this one repeats: its id, or 'last' for the unit's last one"},
-    {"--operator", &Options::operator_name, "who runs it, for the record"},
-    {"--pin-file", &Options::pin_file,
+    {"--operator", &JigCommandOptions::operator_name, "who runs it, for the record"},
+    {"--pin-file", &JigCommandOptions::pin_file,
      "file with the PIN of --operator, where the machine has operators (default: it is asked for)"},
-    {"--station", &Options::station, "where it is run, for the record"},
-    {"--limits", &Options::limits,
+    {"--station", &JigCommandOptions::station, "where it is run, for the record"},
+    {"--limits", &JigCommandOptions::limits,
      "a TOML file of limits (docs/limits.md); else the built-in ones"},
-    {"--certificate", &Options::certificate,
+    {"--certificate", &JigCommandOptions::certificate,
      "the calibration certificate: a .pdf, .json or .dcc.xml to make"},
-    {"--label", &Options::label, "a label for the unit, as ZPL; after a read-back only (--write)"},
-    {"--state", &Options::state,
+    {"--label", &JigCommandOptions::label,
+     "a label for the unit, as ZPL; after a read-back only (--write)"},
+    {"--state", &JigCommandOptions::state,
      "the folder that keeps the run while it is under way, so that the next program goes on with "
      "it; a person at a terminal has one by default"},
-    {"--study", &Options::study,
+    {"--study", &JigCommandOptions::study,
      "this run belongs to a gage study of that name (sixpoint gage-rr)"},
 }};
 
 }  // namespace
 
 void add_jig(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
-      app, context, "jig", "measure a unit in its six poses and store its constants", run);
+  auto [command, options] = add_command<JigCommandOptions>(
+      app, context, "jig", "measure a unit in its six poses and store its constants", run_jig);
   add_jig_options(command, options);
   for (const TextOption& option : kTextOptions) {
     command.add_option(option.name, options.*option.text, option.about);

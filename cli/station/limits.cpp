@@ -9,25 +9,25 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options {
+struct LimitsCommandOptions {
   std::string file;
   bool json = false;
 };
 
-Status answer(const Options& options, Context& context, const station::Limits& limits,
+Status answer(const LimitsCommandOptions& options, Context& context, const station::Limits& limits,
               const std::string& text) {
   Json json = document("limits");
   json.update(station::to_json(limits));
   return print_answer(context, options.json, json, text);
 }
 
-Status check(const Options& options, Context& context) {
+Status check(const LimitsCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.file));
   return answer(options, context, limits,
                 fmt::format("{} holds; SHA-256 {}\n", limits.source, limits.sha256));
 }
 
-Status print(const Options& options, Context& context) {
+Status print_limits(const LimitsCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.file));
   return answer(options, context, limits, station::to_toml(limits));
 }
@@ -36,11 +36,12 @@ Status print(const Options& options, Context& context) {
 
 void add_limits(CLI::App& app, Context& context) {
   CLI::App& group = add_group(app, "limits", "what a jig run is judged by (docs/limits.md)");
-  const auto checked = add_command<Options>(group, context, "limits", "check",
-                                            "does a limits file contradict itself?", check);
+  const auto checked = add_command<LimitsCommandOptions>(
+      group, context, "limits", "check", "does a limits file contradict itself?", check);
   checked.command.add_option("FILE", checked.options.file, "a TOML file")->required();
-  const auto printed = add_command<Options>(
-      group, context, "limits", "print", "the built-in limits as TOML, or those of a file", print);
+  const auto printed = add_command<LimitsCommandOptions>(
+      group, context, "limits", "print", "the built-in limits as TOML, or those of a file",
+      print_limits);
   printed.command.add_option("FILE", printed.options.file, "a TOML file");
 }
 

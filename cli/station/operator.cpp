@@ -15,7 +15,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options {
+struct OperatorCommandOptions {
   std::string name;
   std::string role = "technician";
   bool json = false;
@@ -40,7 +40,7 @@ std::string read_pin(Context& context, const std::string& whose) {
   return pin;
 }
 
-Status add(const Options& options, Context& context) {
+Status add(const OperatorCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto role, station::parse_operator_role(options.role));
   station::Operators operators(context.env, operators_file());
   SIXPOINT_CHECK(operators.add(options.name, role, read_pin(context, options.name)));
@@ -53,7 +53,7 @@ Status add(const Options& options, Context& context) {
                   role == station::OperatorRole::engineer ? "an" : "a", options.role));
 }
 
-Status disable(const Options& options, Context& context) {
+Status disable(const OperatorCommandOptions& options, Context& context) {
   SIXPOINT_CHECK(station::Operators(context.env, operators_file()).disable(options.name));
   Json json = document("operator");
   json["name"] = options.name;
@@ -61,7 +61,7 @@ Status disable(const Options& options, Context& context) {
                       fmt::format("{} is no operator any more\n", printable(options.name)));
 }
 
-Status list(const Options& options, Context& context) {
+Status list(const OperatorCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto operators, station::Operators(context.env, operators_file()).list());
   Json json = document("operator");
   json["operators"] = Json::array();
@@ -117,8 +117,9 @@ void add_operator(CLI::App& app, Context& context) {
   CLI::App& group =
       add_group(app, "operator", "who works at the stations of this machine, with a PIN each");
   const auto named = [&](const char* command, const char* about,
-                         Status (*work)(const Options&, Context&)) {
-    auto declared = add_command<Options>(group, context, "operator", command, about, work);
+                         Status (*work)(const OperatorCommandOptions&, Context&)) {
+    auto declared =
+        add_command<OperatorCommandOptions>(group, context, "operator", command, about, work);
     declared.command.add_option("NAME", declared.options.name, "as it stands in the records")
         ->required();
     return declared;
@@ -128,7 +129,7 @@ void add_operator(CLI::App& app, Context& context) {
   added.command.add_option("--role", added.options.role, "technician, or engineer: signs too")
       ->capture_default_str();
   named("disable", "this operator may not sign in any more", disable);
-  add_command<Options>(group, context, "operator", "list", "names and roles", list);
+  add_command<OperatorCommandOptions>(group, context, "operator", "list", "names and roles", list);
 }
 
 }  // namespace sixpoint::cli

@@ -38,7 +38,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options {
+struct StationCommandOptions {
   int port = 6020;
   std::string bind = "127.0.0.1";
   std::string token_file;
@@ -62,7 +62,7 @@ struct Options {
 };
 
 // The folder of runs under way. Another store or another station's name is another station.
-std::string state_folder(const Options& options) {
+std::string state_folder(const StationCommandOptions& options) {
   return options.state.empty()
              ? data_folder() + "/station/" + run_folder_name(options.store, options.station)
              : options.state;
@@ -72,8 +72,8 @@ std::string state_folder(const Options& options) {
 // command's streams and exit code belong to one thread.
 class StationStore {
  public:
-  StationStore(Context& context, const Options& options, const station::JigSessionOptions& session,
-               station::JigDue jig_due)
+  StationStore(Context& context, const StationCommandOptions& options,
+               const station::JigSessionOptions& session, station::JigDue jig_due)
       : context_(context),
         options_(options),
         session_(session),
@@ -110,7 +110,7 @@ class StationStore {
   void print_label(const db::RunRecord& run);
 
   Context& context_;
-  const Options& options_;
+  const StationCommandOptions& options_;
   const station::JigSessionOptions session_;
   const station::JigDue jig_due_;
   station::StationGuard guard_;
@@ -204,7 +204,8 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
               "ask for report.json, certificate.pdf, .json or .dcc.xml, or label.zpl");
 }
 
-Result<station::LanesOptions> lanes_options(Context& context, const Options& options) {
+Result<station::LanesOptions> lanes_options(Context& context,
+                                            const StationCommandOptions& options) {
   station::LanesOptions lanes;
   lanes.devices = options.devices;
   lanes.state_folder = state_folder(options);
@@ -270,8 +271,8 @@ int serve_until_signal(station::Server& server, const sigset_t& signals, EndInTi
 }
 
 // What --printer names; nothing without.
-Result<std::optional<station::PrinterAddress>> printer_address(Context& context,
-                                                               const Options& options) {
+Result<std::optional<station::PrinterAddress>> printer_address(
+    Context& context, const StationCommandOptions& options) {
   if (options.printer.empty()) {
     return std::nullopt;
   }
@@ -295,7 +296,8 @@ Result<std::unique_ptr<station::LabelPrinter>> open_printer(
 }
 
 // Where the page listens, and its certificate.
-Result<station::ServerOptions> server_options(Context& context, const Options& options) {
+Result<station::ServerOptions> server_options(Context& context,
+                                              const StationCommandOptions& options) {
   SIXPOINT_CHECK(station::may_listen(options.bind, !options.tls_certificate.empty(),
                                      !options.tls_key.empty()));
   station::ServerOptions server;
@@ -313,7 +315,7 @@ Result<station::ServerOptions> server_options(Context& context, const Options& o
   return server;
 }
 
-Status serve(const Options& options, Context& context) {
+Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto listening, server_options(context, options));
   SIXPOINT_ASSIGN(const auto printer_at, printer_address(context, options));
   Outputs outputs(context, {}, /*json=*/false);
@@ -392,8 +394,8 @@ Status serve(const Options& options, Context& context) {
 }  // namespace
 
 void add_station(CLI::App& app, Context& context) {
-  auto [command, options] =
-      add_command<Options>(app, context, "station", "serve the technician's page", serve);
+  auto [command, options] = add_command<StationCommandOptions>(
+      app, context, "station", "serve the technician's page", serve);
   command.add_option("--port", options.port, "0: any that is free; the address is printed")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();

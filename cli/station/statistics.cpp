@@ -13,7 +13,7 @@ namespace sixpoint::cli {
 
 namespace {
 
-struct Options {
+struct StatisticsCommandOptions {
   std::string store;
   std::string by;
   std::string from;
@@ -34,7 +34,7 @@ struct Answer {
   std::vector<station::StationState> states;
 };
 
-Result<Answer> collect(Context& context, const Options& options) {
+Result<Answer> collect(Context& context, const StatisticsCommandOptions& options) {
   SIXPOINT_ASSIGN(const auto filter, station::runs_between(options.from, options.to, "--"));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
@@ -55,7 +55,7 @@ Result<Answer> collect(Context& context, const Options& options) {
   return answer;
 }
 
-void print(Context& context, const Answer& answer) {
+void print_statistics(Context& context, const Answer& answer) {
   const auto percent = [](const station::Proportion& part) {
     return part.of == 0 ? std::string("-") : fmt::format("{:.1f} %", 100 * part.value());
   };
@@ -86,7 +86,7 @@ void print(Context& context, const Answer& answer) {
   }
 }
 
-Status run(const Options& options, Context& context) {
+Status run_statistics(const StatisticsCommandOptions& options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.input(options.limits));
@@ -97,7 +97,7 @@ Status run(const Options& options, Context& context) {
                               station::statistics_html(answer.report, answer.states)));
   }
   if (!options.json) {
-    print(context, answer);
+    print_statistics(context, answer);
     return {};
   }
   Json json = document("statistics");
@@ -109,7 +109,8 @@ Status run(const Options& options, Context& context) {
   return print_json(context, json);
 }
 
-Result<std::vector<station::GageReading>> readings_of(const Options& options, Context& context) {
+Result<std::vector<station::GageReading>> readings_of(const StatisticsCommandOptions& options,
+                                                      Context& context) {
   if (!options.study.empty()) {
     SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
     return station::gage_readings(store, options.study, options.quantity, options.axis);
@@ -121,7 +122,7 @@ Result<std::vector<station::GageReading>> readings_of(const Options& options, Co
   return station::parse_gage_csv(as_text(bytes), options.file);
 }
 
-Status gage_rr(const Options& options, Context& context) {
+Status gage_rr(const StatisticsCommandOptions& options, Context& context) {
   station::GageOptions gage;
   if (options.tolerance > 0) {
     gage.tolerance = options.tolerance;
@@ -143,9 +144,9 @@ Status gage_rr(const Options& options, Context& context) {
 }  // namespace
 
 void add_statistics(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<StatisticsCommandOptions>(
       app, context, "statistics",
-      "yield, failure codes, capability, check units (docs/statistics.md)", run);
+      "yield, failure codes, capability, check units (docs/statistics.md)", run_statistics);
   command.add_option("--by", options.by, "station, jig, operator or firmware");
   command.add_option("--from", options.from, "runs that started then or later (2027-03-31; UTC)");
   command.add_option("--to", options.to, "runs that started before this time");
@@ -157,7 +158,7 @@ void add_statistics(CLI::App& app, Context& context) {
 }
 
 void add_gage_rr(CLI::App& app, Context& context) {
-  auto [command, options] = add_command<Options>(
+  auto [command, options] = add_command<StatisticsCommandOptions>(
       app, context, "gage-rr",
       "repeatability and reproducibility by ANOVA; exit 1: not good enough", gage_rr);
   auto* file = command.add_option("FILE", options.file, "CSV with part, operator, value");

@@ -1,1 +1,0 @@
-// An object needs a source; what it is for is precompiled.h.
