@@ -1,7 +1,7 @@
 # The program calibrates a unit on a motorised jig, through fault plans.
 . /guest.sh
 cd /tmp
-pace=4
+pace=10
 run="jig --device hid:MOS2A45130007 --jig hid:J600001 --store bench.db --dwell 0.5 --filter current"
 with_faults 74 'charge the unit' '{"fault": "battery_low", "at_s": 0}' $run --write
 with_faults 1 'y axis is stuck' '{"fault": "axis_stuck", "of": "samples", "at_report": 20, "axis": "y"}' $run
