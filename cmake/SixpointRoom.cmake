@@ -47,10 +47,6 @@ function(sixpoint_room FOLDER)
   # compiled as one. So names in the anonymous namespaces of a room's files differ.
   set_target_properties(sixpoint_${name} PROPERTIES
     UNITY_BUILD ${SIXPOINT_UNITY} UNITY_BUILD_BATCH_SIZE 8)
-  if(SIXPOINT_SANITIZE AND FOLDER MATCHES "^(cli|station)")
-    # Half of the time of such a compilation is optimising, and what takes long in a test is in other rooms.
-    target_compile_options(sixpoint_${name} PRIVATE -O0)
-  endif()
   if(SIXPOINT_FUZZ)
     # The rooms tell the fuzzer which ways were taken; without it, it flies blind.
     target_compile_options(sixpoint_${name} PRIVATE -fsanitize=fuzzer-no-link)
