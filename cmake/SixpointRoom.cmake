@@ -18,14 +18,6 @@ if(SIXPOINT_SANITIZE)
   target_link_options(sixpoint_warnings INTERFACE -fsanitize=${sanitizers})
 endif()
 
-# What ccache needs to keep objects that were compiled with a precompiled header.
-add_library(sixpoint_precompiled_flags INTERFACE)
-if(NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
-  target_compile_options(sixpoint_precompiled_flags INTERFACE
-    $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>
-    "SHELL:$<$<CXX_COMPILER_ID:Clang>:-Xclang -fno-pch-timestamp>")
-endif()
-
 function(sixpoint_room FOLDER)
   cmake_parse_arguments(ROOM "" "" "SOURCES;NEIGHBOURS;PRIVATE_NEIGHBOURS" ${ARGN})
   string(REPLACE / _ name ${FOLDER})
