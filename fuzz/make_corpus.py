@@ -1,19 +1,26 @@
 #!/usr/bin/env python3
-"""Makes a starting corpus for the targets of recordings: make_corpus.py FOLDER
+"""Makes a starting corpus: make_corpus.py FOLDER
 
-FOLDER/TARGET gets the files of the conformance suite (tests/gt3x/conformance), or the parts of them that the target
-reads, and small ones written here. Python's standard library alone.
+FOLDER/TARGET gets, for the targets of recordings, the files of the conformance suite (tests/gt3x/conformance) or the
+parts of them that the target reads; for those of texts, the examples of the documents; and small ones written here.
+Python's standard library alone.
 """
 import json
 import pathlib
+import re
 import sqlite3
 import struct
 import sys
 import tempfile
 import zipfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "tests/gt3x/conformance"))
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests/gt3x/conformance"))
 import make  # noqa: E402
+
+# The document whose blocks of code the target reads.
+EXAMPLES = {"calib_constants": "constants-file.md", "sim_scenario": "scenario.md", "mocks_fault_plan": "faults.md",
+            "station_limits": "limits.md"}
 
 CALIBRATIONS = (
     {"isCalibrated": False, "calibrationMethod": 2, "deviceType": "x", "calibrationResults": [
@@ -90,6 +97,14 @@ def main():
         save("gt3x_sensor_schema", b"\0\0" + payload)
     save("repair_agd", agd([("deviceserial", "MOS2A45130450"), ("deviceversion", "1.5.0")]))
     save("repair_agd", agd([]))
+    for target, document in EXAMPLES.items():
+        for block in re.findall(r"^```(?:json|toml)\n(.*?)^```", (ROOT / "docs" / document).read_text(), re.M | re.S):
+            save(target, block.encode())
+    for document in sorted((ROOT / "docs").rglob("*.md")):
+        for setting in re.findall(r"virtual:([a-z0-9_=,.+-]+)", document.read_text()):
+            save("mocks_settings", setting.encode())
+    rests = "".join(f"{second / 10},{second % 3 - 1},0.01,-0.02\n" for second in range(900))
+    save("gap_table", b"\0" + ("time_s,x_g,y_g,z_g\n" + rests).encode())
     print({target: len(contents) for target, contents in sorted(saved.items())})
 
 

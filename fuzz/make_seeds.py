@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Makes a starting corpus of a recorded session: make_seeds.py SESSION.zip FOLDER
+"""Makes a starting corpus of what the program writes: make_seeds.py WRITTEN FOLDER
 
-FOLDER/device_protocol gets one report of each kind and command, FOLDER/device_session pieces of the
-session, FOLDER/device_pcap its beginning as a USB capture in every form that is read (docs/sessions.md),
-written from the formats' public descriptions. A session: sixpoint jig --record session.zip.
+WRITTEN holds session.zip, a recorded session, store.jsonl, an export of a store, and bundle, a folder (fuzz/run.sh).
+FOLDER/device_protocol gets one report of each kind and command, FOLDER/device_session pieces of the session,
+FOLDER/device_pcap its beginning as a USB capture in every form that is read (docs/sessions.md), written from the formats'
+public descriptions; FOLDER/db_import and FOLDER/db_journal the first rows of the store; FOLDER/gap_bundle the bundle's
+texts.
 """
 import itertools
 import json
@@ -51,7 +53,8 @@ def pcap(transfers, link, order):
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
-    lines = zipfile.ZipFile(sys.argv[1]).read("transfers.jsonl").splitlines(keepends=True)
+    written = pathlib.Path(sys.argv[1])
+    lines = zipfile.ZipFile(written / "session.zip").read("transfers.jsonl").splitlines(keepends=True)
     transfers = [json.loads(line) for line in lines]
 
     def save(target, name, content):
@@ -71,6 +74,18 @@ def main():
             (LINK_USBMON, LINK_USBMON_MAPPED, LINK_USBPCAP), "<>", (3, 14)):
         name = f"{link}-{'big' if order == '>' else 'little'}-{count}"
         save("device_pcap", f"{name}.pcap", pcap(seen[:count], link, order))
+
+    exported = [json.loads(line) for line in (written / "store.jsonl").read_text().splitlines()]
+    rows = [line for line in exported if "row" in line]
+    for count in range(1, len(rows) + 1):
+        head = exported[0] | {"rows": count, "head": rows[count - 1]["hash"]}
+        save("db_import", f"first{count}", "".join(json.dumps(line) + "\n" for line in [head, *rows[:count]]).encode())
+    # The first byte makes the target add the checksum.
+    entry = {"schema": "sixpoint/journal-entry/2", "rows": [{key: row[key] for key in ("table", "row")} for row in rows]}
+    save("db_journal", "rows", b"\0" + json.dumps(entry).encode())
+    # The first byte says which of the three it is.
+    for which, name in enumerate(("protocol.json", "temperature.csv", "host_clock.csv")):
+        save("gap_bundle", name, bytes([which]) + (written / "bundle" / name).read_bytes())
 
 
 if __name__ == "__main__":

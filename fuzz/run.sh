@@ -27,13 +27,17 @@ configure sanitize
 ninja -C build/sanitize ${SIXPOINT_BUILD_JOBS:+-j "$SIXPOINT_BUILD_JOBS"} "${targets[@]}" >/dev/null
 mkdir -p build/fuzz/findings
 python3 fuzz/make_corpus.py build/fuzz/seeds
-# A session of a virtual unit is the start of the targets that read what devices say.
+# What the program writes is the start of the targets that read devices, stores and bundles.
 if [ -x build/sixpoint ]; then
   work=$(mktemp -d)
   trap 'rm -rf "$work"' EXIT
-  build/sixpoint jig --device virtual:seed=1,jig=auto --record "$work/session.zip" --store "$work/bench.db" \
-    >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
-  python3 fuzz/make_seeds.py "$work/session.zip" build/fuzz/seeds
+  echo '{"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production"}' >"$work/scenario.json"
+  {
+    build/sixpoint jig --device virtual:seed=1,jig=auto --record "$work/session.zip" --store "$work/bench.db" &&
+      build/sixpoint store export --store "$work/bench.db" -o "$work/store.jsonl" &&
+      build/sixpoint simulate --scenario "$work/scenario.json" -o "$work/bundle"
+  } >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
+  python3 fuzz/make_seeds.py "$work" build/fuzz/seeds
 fi
 
 share=$((seconds * $(nproc) / ${#targets[@]}))
@@ -42,7 +46,7 @@ run_one() {
   local target=$1 log=build/fuzz/$1.log known=()
   mkdir -p "build/fuzz/corpus/$target" "build/fuzz/seeds/$target"
   [ -d "fuzz/corpus/$target" ] && known=("fuzz/corpus/$target")
-  if ! "build/sanitize/fuzz/$target" -max_total_time="$share" -timeout=10 -rss_limit_mb=1024 -max_len=20000 \
+  if ! "build/sanitize/fuzz/$target" -max_total_time="$share" -timeout=10 -rss_limit_mb=1024 -max_len=30000 \
       -artifact_prefix="build/fuzz/findings/$target-" -print_final_stats=1 "build/fuzz/corpus/$target" \
       "build/fuzz/seeds/$target" "${known[@]}" >"$log" 2>&1; then
     tail -n 40 "$log"
