@@ -48,7 +48,8 @@ Result<Saved> save(FileSystem& files, Result<Store>& store, const SavePlaces& pl
     if (save_in_folder(files, folder, work)) {
       saved.folder = folder;
       saved.last_resort = true;
-      saved.refusal->what += fmt::format("; nor does the journal: {}", journalled.error().brief());
+      saved.refusal->what += fmt::format("; nor does the journal, {}: {}", journalled.error().where,
+                                         journalled.error().what);
       return saved;
     }
   }
