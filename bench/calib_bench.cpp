@@ -541,7 +541,8 @@ void confidence(int units, unsigned seed, SolveMethod method) {
     ++verified;
     const double off = sphere_error(unit, *report->calibration).worst_mg;
     largest = std::max(largest, off);
-    // Wrong: beyond 10 mg, or beyond four times what it says of itself.
+    // Wrong and confident: off by more than 10 mg, and by more than four times what it says of
+    // itself.
     double stated = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       stated = std::max(stated, report->statistical.zero_mg[a]);
