@@ -36,8 +36,7 @@ bool is_postgres(const std::string& location) {
 Result<Store> Store::open(Env& env, const std::string& location) {
   SIXPOINT_ASSIGN(auto database,
                   is_postgres(location) ? open_postgres(location) : open_sqlite(location));
-  SIXPOINT_CHECK(migrate(*database));
-  return Store(env, std::move(database));
+  return in(env, std::move(database));
 }
 
 Result<Store> Store::open_to_read(Env& env, const std::string& location) {
@@ -54,10 +53,14 @@ Result<Store> Store::open_to_read(Env& env, const std::string& location) {
   return Store(env, std::move(database));
 }
 
-Result<Store> Store::in_memory(Env& env) {
-  SIXPOINT_ASSIGN(auto database, open_sqlite_in_memory());
+Result<Store> Store::in(Env& env, std::unique_ptr<Database> database) {
   SIXPOINT_CHECK(migrate(*database));
   return Store(env, std::move(database));
+}
+
+Result<Store> Store::in_memory(Env& env) {
+  SIXPOINT_ASSIGN(auto database, open_sqlite_in_memory());
+  return in(env, std::move(database));
 }
 
 Result<std::string> Store::add(NewRows rows) {

@@ -37,6 +37,8 @@ class Store final : public RecordWriter {
   // Only to read, also where nothing may be written: a store of an earlier version is refused
   // (configuration), and so is a place where there is none (no_input).
   static Result<Store> open_to_read(Env& env, const std::string& location);
+  // In a database that is open: one that is empty becomes a store. Errors as migrate().
+  static Result<Store> in(Env& env, std::unique_ptr<Database> database);
   // Ends with its object: for tests.
   static Result<Store> in_memory(Env& env);
 

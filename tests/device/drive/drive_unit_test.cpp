@@ -6,6 +6,7 @@
 #include "base/memory_env.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
+#include "failing_files.h"
 #include "gt3x/recording.h"
 #include "mocks/firmware/virtual_drive.h"
 
@@ -85,6 +86,44 @@ TEST(DriveUnit, AnotherUnitInItsPlaceIsNoticed) {
   EXPECT_FAILS(copied, ErrorCode::device_unavailable);
   EXPECT_THAT(copied.error().what, HasSubstr("is now MOS2B99990001"));
   EXPECT_FALSE(bench.memory.files.info("r.gt3x")) << "nothing wrong is kept";
+}
+
+// Whatever call of the disk fails: it is said, no wrong recording is there, and it succeeds again.
+TEST(DriveUnit, EachCallOfTheDiskMayFail) {
+  DriveBench bench;
+  tests::FailingFiles files(bench.memory.files);
+  Env env{bench.memory.clock, files};
+  const auto each_call_fails = [&](const char* name, auto operation) {
+    SCOPED_TRACE(name);
+    for (std::size_t call = 0;; ++call) {
+      files.fail_at(call);
+      const auto result = operation();
+      files.stop_failing();
+      if (!files.has_failed()) {
+        EXPECT_OK(result);
+        EXPECT_GT(call, 0U);
+        return;
+      }
+      EXPECT_FAILS(result, ErrorCode::io);
+    }
+  };
+  each_call_fails("open", [&] { return DriveUnit::open("usb", env); });
+  const auto unit = *DriveUnit::open("usb", env);
+  each_call_fails("identify", [&] { return unit->identify(); });
+  each_call_fails("recordings", [&] { return unit->recordings(); });
+  const RecordingInfo recording = unit->recordings()->front();
+  int tries = 0;
+  each_call_fails("download", [&] {
+    const std::string path = "r" + std::to_string(++tries) + ".gt3x";
+    const Status result = unit->download(recording, bench.memory.files, path);
+    if (!result) {
+      EXPECT_FALSE(bench.memory.files.info(path)) << path;
+    }
+    return result;
+  });
+  each_call_fails("download, its own disk", [&] {
+    return unit->download(recording, files, "s" + std::to_string(++tries) + ".gt3x");
+  });
 }
 
 }  // namespace

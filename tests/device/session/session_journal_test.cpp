@@ -8,6 +8,7 @@
 
 #include "base/atomic_file.h"
 #include "device/wire/wire_unit.h"
+#include "failing_files.h"
 #include "made_session.h"
 #include "temporary_folder.h"
 
@@ -247,6 +248,72 @@ TEST(SessionJournal, AKilledProgramLosesNoTransfer) {
   ASSERT_OK(session);
   EXPECT_EQ(session->transfers.size(), 31U);
   expect_beginning_of_whole(*session);
+}
+
+// Whatever call of the disk fails: it is said, and the journal holds the beginning.
+TEST(SessionJournal, EachCallOfTheDiskMayFail) {
+  for (std::size_t call = 0;; ++call) {
+    SCOPED_TRACE("call " + std::to_string(call));
+    MemoryFiles memory;
+    tests::FailingFiles files(memory);
+    files.fail_at(call);
+    const Status recorded = record_whole(files, "s.zip");
+    if (!files.has_failed()) {
+      EXPECT_OK(recorded);
+      EXPECT_GT(call, 5U);
+      break;
+    }
+    if (recorded) {  // the journal was closed in vain, behind a session that is whole
+      EXPECT_EQ(read_session(memory, "s.zip")->transfers, whole().transfers);
+      continue;
+    }
+    EXPECT_EQ(recorded.error().code, ErrorCode::io);
+    if (memory.info(journal_of("s.zip")) && !memory.info("s.zip")) {
+      const auto recovered = recover_session(memory, journal_of("s.zip"), "r.zip");
+      if (recovered) {
+        const auto session = read_session(memory, "r.zip");
+        ASSERT_OK(session);
+        expect_beginning_of_whole(*session);
+      } else {  // broken before its first line was whole
+        EXPECT_EQ(recovered.error().code, ErrorCode::bad_data) << recovered.error().brief();
+      }
+    }
+  }
+}
+
+TEST(SessionJournal, RecoveringAndReadingMayFailAtEachCall) {
+  MemoryFiles memory;
+  auto journal = *SessionJournal::create(memory, "s.zip");
+  ASSERT_OK(journal.begin(whole().device, whole().started));
+  for (const SessionTransfer& transfer : whole().transfers) {
+    ASSERT_OK(journal.append(transfer));
+  }
+  const Bytes bytes = *read_file(memory, journal_of("s.zip"));
+  ASSERT_OK(write_session(memory, "whole.zip", whole()));
+  bool recovered = false;
+  bool read = false;
+  for (std::size_t call = 0; !recovered || !read; ++call) {
+    SCOPED_TRACE("call " + std::to_string(call));
+    const std::string name = std::to_string(call);
+    ASSERT_OK(write_file(memory, name + ".journal", as_text(bytes)));
+    tests::FailingFiles files(memory);
+    files.fail_at(call);
+    const auto result = recover_session(files, name + ".journal", name + ".zip");
+    recovered = !files.has_failed();
+    EXPECT_EQ(result.has_value(), recovered);
+    files.fail_at(call);
+    const auto session = read_session(files, "whole.zip");
+    read = !files.has_failed();
+    files.stop_failing();
+    EXPECT_EQ(session.has_value(), read);
+    files.fail_at(call);
+    const Status written = write_session(files, name + ".written.zip", whole());
+    EXPECT_EQ(written.has_value(), !files.has_failed());
+    // The last call syncs the folder: the session is there, and that it stays is not sure.
+    if (written || memory.info(name + ".written.zip")) {
+      EXPECT_EQ(read_session(memory, name + ".written.zip")->transfers, whole().transfers);
+    }
+  }
 }
 
 }  // namespace
