@@ -103,8 +103,7 @@ TEST_F(FailingDatabaseTest, NothingIsAddedByHalf) {
     return store_->add_constants(constants("MOS2A45130008", "current", 5), "wGT3X-BT");
   });
   each_call_fails("write", [&] {
-    return store_->add_unit_write(
-        {run_id_, kSerial, from_unix_seconds(2'500), "[]", "[1]", "[1]"});
+    return store_->add_unit_write({run_id_, kSerial, from_unix_seconds(2'500), "[]", "[1]", "[1]"});
   });
   each_call_fails("repair", [&] { return store_->add_repair(repair_with(constants_id_)); });
   each_call_fails("event", [&] {
