@@ -62,7 +62,7 @@ class Audit {
   Result<AuditReport> report() {
     const auto head = read_head(database_);
     if (!head && head.error().code != ErrorCode::bad_data) {
-      return fail(head.error());  // the server did not answer: nobody touched anything
+      return fail(head.error());  // no answer says nothing about the rows
     }
     if (!head || head->rows != last_seq_ || head->hash != previous_) {
       add("the head does not name the last row: rows at the end were removed or added");
