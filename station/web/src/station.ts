@@ -174,7 +174,7 @@ async function enter() {
     if (answer.ok) {
       const me: Me & { client: string; clock_ms: number } = await answer.json();
       client = me.client;
-      clockAhead = me.clock_ms - performance.now();
+      takeClock(me);
       change({ entry: 'open', me });
       return connect();
     }
@@ -216,6 +216,7 @@ export let client = '';
 const COMMAND_MS = 5000;
 const READ_MS = 20000;
 let clockAhead: number | null = null;  // not known before the first answer
+const takeClock = (me: { clock_ms: number }) => { clockAhead = me.clock_ms - performance.now(); };
 const before = (): Record<string, string> =>
   (clockAhead === null ? {} : { 'X-Sixpoint-Before': String(Math.round(performance.now() + clockAhead + COMMAND_MS)) });
 
@@ -232,6 +233,12 @@ export async function ask<T>(path: string, body?: unknown): Promise<{ ok: true; 
     if (answer.status === 401 && path !== '/api/session') change({ entry: 'sign_in' });
     // Idle for too long, or signed out in another window: the page asks for the PIN again.
     if (data.error?.code === 'operator_needed') change({ me: { ...snapshot.me, operator: null } });
+    // This machine may have slept, which stops the browser's clock and not the station's: without the station's time as
+    // it is now no command would be taken any more, however often it is given.
+    if (data.error?.code === 'too_late') {
+      const me = await ask<{ clock_ms: number }>('/api/me');
+      if (me.ok) takeClock(me.data);
+    }
     return answer.ok ? { ok: true, data } : { ok: false, error: data.error };
   } catch {
     return { ok: false, error: { what: 'the station does not answer', hint: '' } };
