@@ -67,6 +67,7 @@ Status gather_constants(const RepairSources& sources, Context& context, ArchiveD
       draft.snapshot = &*snapshot;
     }
   }
+  SIXPOINT_CHECK(check_calibration_file(context, sources));
   if (!sources.calibration_file.empty()) {
     const std::string path = absolute(sources.calibration_file);
     SIXPOINT_ASSIGN(std::string digest, file_sha256(context.env.files, path));

@@ -53,8 +53,8 @@ Result<repair::ConstantsFinderOptions> finder_options(const RepairCommandOptions
   }
   SIXPOINT_ASSIGN(store, store_of(context, sources));
   finder.store = store ? &*store : nullptr;
+  SIXPOINT_CHECK(check_calibration_file(context, sources));
   if (!sources.calibration_file.empty()) {
-    SIXPOINT_CHECK(context.env.files.info(sources.calibration_file));
     finder.calibration_file = sources.calibration_file;
   }
   return finder;

@@ -160,6 +160,19 @@ TEST_F(RepairCommand, CalibrationFileOfTheSameUnitUnderCurrentOnly) {
   EXPECT_THAT(stranger["reasons"].dump(), HasSubstr("MOS2A45130451"));
 }
 
+TEST_F(RepairCommand, ACalibrationFileThatIsNoRecordingIsRefusedBeforeTheWork) {
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"repair"}, std::vector<std::string>{"archive", "plan"}}) {
+    std::vector<std::string> words = command;
+    words.insert(words.end(),
+                 {archive_, "-o", out_, "--calibration-file", folder_ / "constants.json"});
+    const auto answer = run(words);
+    EXPECT_EQ(answer.exit_code, 65) << command.front();
+    EXPECT_THAT(answer.people, HasSubstr("constants in JSON are given by --constants"));
+    EXPECT_FALSE(std::filesystem::exists(out_)) << command.front();
+  }
+}
+
 // A tree as disks hold them: links in circles and into nothing, a FIFO, a device.
 TEST_F(RepairCommand, UnusualFilesGetTheirLinesAndTheRestIsRepaired) {
   std::filesystem::create_symlink("..", archive_ + "/sub/up");
