@@ -37,6 +37,19 @@ void declare_commands(CLI::App& app, Context& context) {
   }
 }
 
+namespace {
+
+// As it was typed, as far as it was understood: sixpoint store export.
+std::string words_of_command(const CLI::App& app) {
+  std::string words = app.get_name();
+  for (const CLI::App* command : app.get_subcommands()) {
+    words += " " + words_of_command(*command);
+  }
+  return words;
+}
+
+}  // namespace
+
 int run_program(const std::vector<std::string>& arguments, Context& context) {
   CLI::App app("Sixpoint measures the constants of activity monitors and repairs their recordings.",
                "sixpoint");
@@ -61,11 +74,10 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
     if (error.get_exit_code() == 0) {  // --help, --version
       return app.exit(error, context.out, context.people);
     }
-    context.log().error(
-        "{}",
-        unknown_word(app, arguments)
-            .value_or(printable(error.what()) +
-                      "; 'sixpoint --help' and 'sixpoint COMMAND --help' list what there is"));
+    context.log().error("{}",
+                        unknown_word(app, arguments)
+                            .value_or(fmt::format("{}; '{} --help' lists what there is",
+                                                  printable(error.what()), words_of_command(app))));
     return static_cast<int>(ErrorCode::usage);
   } catch (const std::exception& error) {
     // The libraries return errors as values: an exception is a defect of this program.

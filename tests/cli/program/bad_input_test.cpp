@@ -12,6 +12,7 @@
 
 namespace sixpoint::cli {
 namespace {
+using testing::HasSubstr;
 
 using tests::MadeRecording;
 using tests::run_command;
@@ -166,6 +167,14 @@ TEST_F(BadRecording, CommandLines) {
   EXPECT_EQ(run_command(memory_.env, {"repair", "in.gt3x"}).exit_code, 64) << "no -o";
   EXPECT_EQ(run_command(memory_.env, {"--help"}).exit_code, 0);
   EXPECT_EQ(run_command(memory_.env, {"station"}).exit_code, 64);
+}
+
+TEST_F(BadRecording, WhatIsMissingNamesTheHelpOfItsCommand) {
+  EXPECT_THAT(run_command(memory_.env, {}).people, HasSubstr("'sixpoint --help'"));
+  EXPECT_THAT(run_command(memory_.env, {"history"}).people,
+              HasSubstr("serial is required; 'sixpoint history --help' lists"));
+  EXPECT_THAT(run_command(memory_.env, {"store", "trend"}).people,
+              HasSubstr("serial is required; 'sixpoint store trend --help' lists"));
 }
 
 }  // namespace
