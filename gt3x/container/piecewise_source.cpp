@@ -1,15 +1,19 @@
 #include "gt3x/container/piecewise_source.h"
 
 #include <algorithm>
-#include <future>
+#include <condition_variable>
+#include <mutex>
 #include <thread>
 #include <vector>
 
 namespace sixpoint::gt3x {
 namespace {
 
-// More than these wait for the one thread that works on the records.
-constexpr unsigned kMostThreads = 4;
+// One core is for who works on the records. More threads than these wait for it.
+constexpr std::size_t kMostThreads = 4;
+std::size_t unpacking_threads() {
+  return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 2, kMostThreads + 1) - 1;
+}
 
 class PiecewiseInflate final : public ByteSource {
  public:
@@ -17,27 +21,47 @@ class PiecewiseInflate final : public ByteSource {
       : packed_(std::move(packed)),
         points_(std::move(points)),
         size_(size),
-        slots_(std::clamp(std::thread::hardware_concurrency(), 1U, kMostThreads) + 1) {}
+        most_threads_(std::min(points_.packed_sizes.size(), unpacking_threads())),
+        slots_(most_threads_ + 2) {}
+  PiecewiseInflate(const PiecewiseInflate&) = delete;
+  PiecewiseInflate& operator=(const PiecewiseInflate&) = delete;
+  ~PiecewiseInflate() override {
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+    }
+    changed_.notify_all();
+    for (std::thread& thread : threads_) {
+      thread.join();
+    }
+  }
 
   std::optional<std::uint64_t> size() const override { return size_; }
 
   Result<std::size_t> read(std::span<std::uint8_t> out) override {
     const std::size_t count = points_.packed_sizes.size();
-    while (begun_ < count && begun_ - current_ < slots_.size()) {
-      SIXPOINT_CHECK(begin_next());
+    while (threads_.size() < most_threads_) {
+      threads_.emplace_back([this] { run(); });
     }
     if (current_ == count) {
       return std::size_t{0};
     }
     Slot& slot = slots_[current_ % slots_.size()];
-    if (slot.done.valid() && !slot.done.get()) {
-      return fail(ErrorCode::bad_data, "the packed data make no sense");
+    if (taken_ == 0) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [&] { return slot.done; });
     }
+    SIXPOINT_CHECK(slot.status);
     const std::size_t bytes = std::min(out.size(), slot.piece.size() - taken_);
     std::copy_n(slot.piece.begin() + static_cast<std::ptrdiff_t>(taken_), bytes, out.begin());
     taken_ += bytes;
     if (taken_ == slot.piece.size()) {
-      ++current_;
+      {
+        const std::lock_guard lock(mutex_);
+        slot.done = false;
+        ++current_;
+      }
+      changed_.notify_all();
       taken_ = 0;
     }
     return bytes;
@@ -47,37 +71,79 @@ class PiecewiseInflate final : public ByteSource {
   struct Slot {
     Bytes packed;
     Bytes piece;
-    std::future<bool> done;  // its end waits for the thread that uses the above
+    Status status;
+    bool done = false;  // the above are the reader's, until it is at the end of the piece
   };
 
-  Status begin_next() {
-    Slot& slot = slots_[begun_ % slots_.size()];
-    slot.packed.resize(points_.packed_sizes[begun_]);
-    for (std::size_t filled = 0; filled < slot.packed.size();) {
-      SIXPOINT_ASSIGN(const std::size_t more,
-                      packed_->read(std::span(slot.packed).subspan(filled)));
+  // Of each thread: the next piece, again and again.
+  void run() {
+    const std::size_t count = points_.packed_sizes.size();
+    for (;;) {
+      std::unique_lock turn(turn_);
+      {
+        std::unique_lock lock(mutex_);
+        changed_.wait(
+            lock, [&] { return stop_ || begun_ == count || begun_ - current_ < slots_.size(); });
+        if (stop_ || begun_ == count) {
+          return;
+        }
+      }
+      const std::size_t number = begun_++;
+      Slot& slot = slots_[number % slots_.size()];
+      Status status = read_packed(number, slot.packed);
+      if (!status) {
+        begun_ = count;  // what would be read next is not what the index says
+      }
+      turn.unlock();
+      if (status) {
+        status = unpack(number, slot);
+      }
+      {
+        const std::lock_guard lock(mutex_);
+        slot.status = std::move(status);
+        slot.done = true;
+      }
+      changed_.notify_all();
+    }
+  }
+
+  Status read_packed(std::size_t number, Bytes& packed) {
+    packed.resize(points_.packed_sizes[number]);
+    for (std::size_t filled = 0; filled < packed.size();) {
+      SIXPOINT_ASSIGN(const std::size_t more, packed_->read(std::span(packed).subspan(filled)));
       if (more == 0) {
         return fail(ErrorCode::bad_data, "the packed data end too early");
       }
       filled += more;
     }
-    const bool last = begun_ + 1 == points_.packed_sizes.size();
-    const std::uint64_t before = std::uint64_t{points_.piece_size} * begun_;
-    slot.piece.resize(last ? size_ - before : points_.piece_size);
-    const auto place = last ? PiecePacker::Place::last : PiecePacker::Place::inner;
-    slot.done = std::async(std::launch::async,
-                           [&slot, place] { return unpack_piece(slot.packed, place, slot.piece); });
-    ++begun_;
     return {};
   }
 
+  Status unpack(std::size_t number, Slot& slot) const {
+    const bool last = number + 1 == points_.packed_sizes.size();
+    const std::uint64_t before = std::uint64_t{points_.piece_size} * number;
+    slot.piece.resize(last ? size_ - before : points_.piece_size);
+    const auto place = last ? PiecePacker::Place::last : PiecePacker::Place::inner;
+    return unpack_piece(slot.packed, place, slot.piece)
+               ? Status()
+               : fail(ErrorCode::bad_data, "the packed data make no sense");
+  }
+
+  std::mutex turn_;  // to take the next piece and read its packed bytes
   std::unique_ptr<ByteSource> packed_;
+  std::size_t begun_ = 0;  // pieces
+
   SyncPoints points_;
   std::uint64_t size_;
+  std::size_t most_threads_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
   std::vector<Slot> slots_;  // in turn
-  std::size_t begun_ = 0;    // pieces
   std::size_t current_ = 0;  // piece that read() is in
-  std::size_t taken_ = 0;    // bytes of it
+  bool stop_ = false;
+
+  std::size_t taken_ = 0;  // bytes of it; of the reading side
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace

@@ -5,9 +5,10 @@
 //   const auto bytes = unpack_pieces(std::move(packed), points, 2'200'000);
 //   SIXPOINT_ASSIGN(const std::size_t count, bytes->read(piece));
 //
-// The packed bytes are read on the thread that calls read(). Memory: for every thread, and once
-// more, a piece and its packed bytes. read() answers bad_data where the pieces are not what the
-// index says.
+// These threads read the packed bytes too, one at a time and in order; they begin with the first
+// read() and end with the object, also in the middle. Memory: for every thread, and twice more, a
+// piece and its packed bytes. read() answers bad_data where the pieces are not what the index says,
+// and an error of `packed` at its place; after an error the same one.
 #pragma once
 
 #include <cstdint>

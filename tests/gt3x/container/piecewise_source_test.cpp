@@ -84,5 +84,51 @@ TEST(PiecewiseSource, AnIndexThatIsWrongIsAnError) {
   EXPECT_TRUE(is_bad_data(*cut));
 }
 
+// A disk that fails behind some bytes.
+class FailingSource final : public ByteSource {
+ public:
+  FailingSource(Bytes bytes, std::size_t good) : bytes_(std::move(bytes)), good_(good) {}
+  Result<std::size_t> read(std::span<std::uint8_t> out) override {
+    if (done_ == good_) {
+      return fail(ErrorCode::io, "cannot be read", "the disk", "try again");
+    }
+    const std::size_t count = std::min(out.size(), good_ - done_);
+    std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(done_), count, out.begin());
+    done_ += count;
+    return count;
+  }
+
+ private:
+  Bytes bytes_;
+  std::size_t good_;
+  std::size_t done_ = 0;
+};
+
+TEST(PiecewiseSource, AnErrorOfTheDiskComesBehindThePiecesBeforeIt) {
+  const InPieces made = in_pieces(17, 500);
+  for (const std::size_t whole : {std::size_t{0}, std::size_t{1}, std::size_t{9}}) {
+    std::size_t good = 1;  // of the piece that breaks
+    for (std::size_t i = 0; i < whole; ++i) {
+      good += made.points.packed_sizes[i];
+    }
+    const auto source = unpack_pieces(std::make_unique<FailingSource>(made.stream, good),
+                                      made.points, made.bytes.size());
+    Bytes all;
+    Bytes piece(1 << 20);
+    auto got = source->read(piece);
+    while (got && *got > 0) {
+      all.insert(all.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(*got));
+      got = source->read(piece);
+    }
+    ASSERT_FALSE(got);
+    EXPECT_EQ(got.error().code, ErrorCode::io);
+    EXPECT_EQ(got.error().where, "the disk");
+    EXPECT_EQ(all, Bytes(made.bytes.begin(),
+                         made.bytes.begin() +
+                             static_cast<std::ptrdiff_t>(whole * made.points.piece_size)));
+    EXPECT_EQ(source->read(piece).error().code, ErrorCode::io) << "and again";
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::gt3x
