@@ -62,7 +62,6 @@ void unpack12_plain(const std::uint8_t* payload, std::span<Counts> samples,
 // the disk's order lies in bytes 3v / 2 and the one behind, which become one big-endian word; an
 // even value is its upper 12 bits, an odd one its lower 12.
 constexpr std::size_t kGroup = 8;
-constexpr std::size_t kGroupBytes = 36;
 constexpr std::array<std::size_t, 3> kLoadAt = {0, 12, 20};  // 16 bytes from there hold all eight
 
 struct Shuffles {
@@ -90,20 +89,27 @@ constexpr Shuffles shuffles_of(const PerAxis<std::size_t>& order) {
 constexpr Shuffles kActivityShuffles = shuffles_of(kActivityOrder);
 constexpr Shuffles kActivity3Shuffles = shuffles_of(kActivity3Order);
 
-// Whole groups, as many as the bytes allow; returns how many samples.
+// Whole groups, and one that ends with the last pair; returns how many samples.
 [[gnu::target("ssse3")]] std::size_t unpack12_ssse3(std::span<const std::uint8_t> payload,
                                                     std::span<Counts> samples,
                                                     const Shuffles& shuffles) {
   const auto load = [](const void* at) { return _mm_loadu_si128(static_cast<const __m128i*>(at)); };
   std::size_t done = 0;
-  const std::uint8_t* from = payload.data();
-  for (; done + kGroup <= samples.size(); done += kGroup, from += kGroupBytes) {
+  while (done + kGroup <= samples.size()) {
+    const std::uint8_t* const from = payload.data() + done * 9 / 2;
     for (std::size_t part = 0; part < 3; ++part) {
       const __m128i words =
           _mm_shuffle_epi8(load(from + kLoadAt[part]), load(shuffles.bytes[part].data()));
       const __m128i values =
           _mm_srai_epi16(_mm_mullo_epi16(words, load(shuffles.shift_left[part].data())), 4);
       _mm_storeu_si128(reinterpret_cast<__m128i*>(samples[done].data() + part * 8), values);
+    }
+    done += kGroup;
+    // What is left is less than a group: some samples before it go through once more. An even
+    // sample begins a byte.
+    const std::size_t left = samples.size() - done;
+    if (left > 1 && left < kGroup) {
+      done -= (kGroup - left + 1) / 2 * 2;
     }
   }
   return done;
