@@ -22,6 +22,9 @@ R CMD check --no-manual "$package" >check.log 2>&1 || { cat check.log; exit 1; }
 grep '^Status: OK$' check.log >/dev/null || { cat check.log; exit 1; }
 R CMD INSTALL --library="$scratch/library" "$package" >install.log 2>&1 || { cat install.log; exit 1; }
 unset SIXPOINT_R_LIBRARY
+mkdir other
+R CMD INSTALL --library=other "$package" >without.log 2>&1 && { echo "FAILED: installed without its library"; exit 1; }
+grep -q '^SIXPOINT_R_LIBRARY to its build/r/lib$' without.log || { cat without.log; exit 1; }
 cd work
 for seed in 1 2; do
   sed "s/\"seed\": 1/\"seed\": $seed/" "$source_folder/tests/docs/scenario.json" >"s$seed.json"
