@@ -53,6 +53,16 @@ Error to_error(const SQLite::Exception& exception, const std::string& path) {
   }
 }
 
+// The seam: nothing that SQLiteCpp throws goes further.
+template <class Work>
+auto answered(const std::string& path, const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const SQLite::Exception& exception) {
+    return fail(to_error(exception, path));
+  }
+}
+
 void bind(SQLite::Statement& statement, std::span<const Value> parameters) {
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const std::string name = fmt::format("${}", i + 1);
@@ -133,15 +143,13 @@ class SqliteRows final : public RowStream {
     bind(statement_, parameters);
   }
   Result<bool> next(Row& row) override {
-    try {
+    return answered(path_, [&]() -> Result<bool> {
       if (!statement_.executeStep()) {
         return false;
       }
       read_row(statement_, row);
       return true;
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path_));
-    }
+    });
   }
 
  private:
@@ -258,16 +266,14 @@ class SqliteDatabase final : public Database {
 
   Result<std::unique_ptr<RowStream>> stream(const std::string& sql,
                                             std::span<const Value> parameters) override {
-    try {
+    return answered(path_, [&]() -> Result<std::unique_ptr<RowStream>> {
       return std::make_unique<SqliteRows>(database_, sql, parameters, path_);
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path_));
-    }
+    });
   }
 
   Result<std::vector<Row>> query(const std::string& sql,
                                  std::span<const Value> parameters) override {
-    try {
+    return answered(path_, [&]() -> Result<std::vector<Row>> {
       auto& statement = prepared(sql);
       const Reset reset(statement);
       bind(statement, parameters);
@@ -276,9 +282,7 @@ class SqliteDatabase final : public Database {
         read_row(statement, rows.emplace_back());
       }
       return rows;
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path_));
-    }
+    });
   }
 
   Result<std::vector<std::string>> check_indexes() override {
@@ -286,18 +290,16 @@ class SqliteDatabase final : public Database {
     if (file == nullptr || *file == '\0') {
       return std::vector<std::string>();  // in memory: nothing that a second connection could read
     }
-    try {
+    return answered(path_, [&]() -> Result<std::vector<std::string>> {
       SQLite::Database own(address_of(path_, setting_to_read_),
                            SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout_ms);
       own.exec("BEGIN");
       return check_sqlite_indexes(*own.getHandle());
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path_));
-    }
+    });
   }
 
   Result<bool> copy_to_file(const std::string& path) override {
-    try {
+    return answered(path, [&]() -> Result<bool> {
       SQLite::Database copy(address_of(path, "mode=rwc"),
                             SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_URI,
                             kBusyTimeout_ms);
@@ -306,17 +308,12 @@ class SqliteDatabase final : public Database {
       // In one step: a copy in many steps begins again whenever another process writes.
       backup.executeStep(-1);
       return true;
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path));
-    }
+    });
   }
 
   Result<std::int64_t> schema_version() override {
-    try {
-      return database_.execAndGet("PRAGMA user_version").getInt64();
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path_));
-    }
+    SIXPOINT_ASSIGN(const auto rows, query("PRAGMA user_version", {}));
+    return integer_of(rows[0][0]);
   }
 
   Status set_schema_version(std::int64_t version) override {
@@ -340,12 +337,10 @@ class SqliteDatabase final : public Database {
 
  private:
   Status run(const std::string& sql) {
-    try {
+    return answered(path_, [&]() -> Status {
       database_.exec(sql);
       return {};
-    } catch (const SQLite::Exception& exception) {
-      return fail(to_error(exception, path_));
-    }
+    });
   }
 
   // The store has a few dozen statements; each is compiled once.
@@ -392,7 +387,7 @@ bool has_our_mark(SQLite::Database& database) {
 // What SQLite sees in the file alone, without a lock and without a file beside it. Opening the file
 // by other means would, at its close, end the locks of this process's other connections.
 Result<Found> look_at_database(const std::string& path) {
-  try {
+  auto found = answered(path, [&]() -> Result<Found> {
     SQLite::Database looked(address_of(path, "immutable=1"),
                             SQLite::OPEN_READONLY | SQLite::OPEN_URI);
     if (has_our_mark(looked)) {
@@ -418,13 +413,12 @@ Result<Found> look_at_database(const std::string& path) {
       }
     }
     return fail(not_ours(path));
-  } catch (const SQLite::Exception& exception) {
-    if (exception.getErrorCode() == SQLITE_CANTOPEN && ::access(path.c_str(), R_OK) != 0) {
-      return fail(ErrorCode::permission, "the store may not be read by this user", path,
-                  "ask its owner: a store is its owner's alone (mode 0600)");
-    }
-    return fail(to_error(exception, path));
+  });
+  if (!found && ::access(path.c_str(), R_OK) != 0) {
+    return fail(ErrorCode::permission, "the store may not be read by this user", path,
+                "ask its owner: a store is its owner's alone (mode 0600)");
   }
+  return found;
 }
 
 Result<Found> look_at(const std::string& path) {
@@ -451,65 +445,62 @@ Status make_private_file(const std::string& path) {
     ::close(file);
     return {};
   }
-  return errno == EEXIST && ::access(path.c_str(), F_OK) == 0
-             ? Status()
-             : Status(fail(errno == EACCES || errno == EROFS ? ErrorCode::permission
-                                                             : ErrorCode::cannot_create,
-                           fmt::format("the store cannot be made: {}", std::strerror(errno)), path,
-                           "check that the folder exists and is writable"));
+  if (errno == EEXIST && ::access(path.c_str(), F_OK) == 0) {
+    return {};
+  }
+  return fail(errno == EACCES || errno == EROFS ? ErrorCode::permission : ErrorCode::cannot_create,
+              fmt::format("the store cannot be made: {}", std::strerror(errno)), path,
+              "check that the folder exists and is writable");
 }
 
 // A store that no one has open stands whole in its file, and is read as it stands: SQLite would
 // make files beside it that its owner could not use. Where there is a log, SQLite reads both.
 Result<std::unique_ptr<Database>> open_to_read(const std::string& path) {
   const bool has_log = ::access((path + "-wal").c_str(), F_OK) == 0;
-  try {
+  auto opened = answered(path, [&]() -> Result<std::unique_ptr<Database>> {
     auto database = std::make_unique<SqliteDatabase>(path, has_log ? "mode=ro" : "immutable=1");
     database->prepare_to_read();
     return database;
-  } catch (const SQLite::Exception& exception) {
-    if (exception.getErrorCode() != SQLITE_CANTOPEN || !has_log) {
-      return fail(to_error(exception, path));
-    }
+  });
+  // The file itself was read before: it is the one beside it that cannot be opened.
+  if (!opened && opened.error().code == ErrorCode::cannot_create && has_log) {
+    return fail(ErrorCode::permission,
+                "what was written last is in a file beside the store that may not be used here",
+                path, "ask its owner to open it once, for example with 'sixpoint units'");
   }
-  return fail(ErrorCode::permission,
-              "what was written last is in a file beside the store that may not be used here", path,
-              "ask its owner to open it once, for example with 'sixpoint units'");
+  return opened;
 }
 
 }  // namespace
 
 Result<std::unique_ptr<Database>> open_sqlite_in_memory() {
-  try {
+  return answered("memory", []() -> Result<std::unique_ptr<Database>> {
     auto database = std::make_unique<SqliteDatabase>();
     SIXPOINT_CHECK(database->prepare());
     return database;
-  } catch (const SQLite::Exception& exception) {
-    return fail(to_error(exception, "memory"));
-  }
+  });
 }
 
 Result<std::unique_ptr<Database>> open_sqlite(const std::string& path, Access access) {
   SIXPOINT_ASSIGN(const Found found, look_at(path));
-  if (access == Access::read && found != Found::ours) {
-    return found == Found::nothing
-               ? fail(ErrorCode::no_input, "there is no store", path, "check the path")
-               : fail(ErrorCode::bad_data, "this file is empty and no store", path,
-                      "name another file with --store");
+  if (access == Access::read) {
+    if (found == Found::nothing) {
+      return fail(ErrorCode::no_input, "there is no store", path, "check the path");
+    }
+    if (found == Found::empty) {
+      return fail(ErrorCode::bad_data, "this file is empty and no store", path,
+                  "name another file with --store");
+    }
+    return open_to_read(path);
   }
   if (found == Found::nothing) {
     SIXPOINT_CHECK(make_private_file(path));
   }
-  try {
-    if (access == Access::read) {
-      return open_to_read(path);
-    }
+  return answered(path, [&]() -> Result<std::unique_ptr<Database>> {
     auto database = std::make_unique<SqliteDatabase>(path);
     SIXPOINT_CHECK(database->prepare());
     return database;
-  } catch (const SQLite::Exception& exception) {
-    return fail(to_error(exception, path));
-  }
+  });
 }
 
 }  // namespace sixpoint::db
