@@ -36,5 +36,20 @@ TEST_F(StoreTest, ATransactionWithoutCommitLeavesNothing) {
   EXPECT_EQ(count(), 1);
 }
 
+TEST_F(StoreTest, AStatementThatTheServerDoesNotKnowIsAnErrorThatNamesTheStore) {
+  Store store = open();
+  Database& database = store.database();
+  const auto refused = [&](const auto& result) {
+    EXPECT_FAILS(result, ErrorCode::internal);
+    EXPECT_THAT(result.error().what, testing::HasSubstr("nonsense"));
+    EXPECT_EQ(result.error().where, database.location());
+  };
+  refused(database.query("SELECT nonsense FROM units"));
+  refused(database.execute("INSERT INTO nonsense VALUES (1)"));
+  const auto transaction = Transaction::reading(database);
+  ASSERT_OK(transaction);
+  refused(database.stream("SELECT nonsense FROM units", {}));
+}
+
 }  // namespace
 }  // namespace sixpoint::db

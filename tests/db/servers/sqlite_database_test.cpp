@@ -384,6 +384,170 @@ TEST_F(SqliteStoreTest, AFileThatMayNotBeWrittenIsReadOnlyWithAClearError) {
   EXPECT_EQ(open()->history("MOS2A1")->size(), 1U);
 }
 
+// Root may read and write everything: until its end this process is an ordinary user.
+class AsOrdinaryUser {
+ public:
+  AsOrdinaryUser() {
+    if (was_root_ && ::setresuid(kNobody, kNobody, 0) != 0) {
+      throw std::runtime_error("cannot become an ordinary user");
+    }
+  }
+  AsOrdinaryUser(const AsOrdinaryUser&) = delete;
+  AsOrdinaryUser& operator=(const AsOrdinaryUser&) = delete;
+  ~AsOrdinaryUser() {
+    if (was_root_ && ::setresuid(0, 0, 0) != 0) {
+      std::abort();
+    }
+  }
+
+ private:
+  static constexpr uid_t kNobody = 65534;
+  bool was_root_ = ::geteuid() == 0;
+};
+
+// What a user without rights is told. Empty: the store opens.
+TEST_F(SqliteStoreTest, SaysWhichRightIsMissing) {
+  const struct {
+    const char* name;
+    mode_t file;
+    mode_t log;
+    mode_t folder;
+    const char* to_write;
+    const char* to_read;
+  } cases[] = {
+      {"store.db", 0444, 0444, 0755, "the store may only be read here", ""},
+      {"store.db", 0666, 0444, 0555, "the store answers: attempt to write a readonly database", ""},
+      {"store.db", 0, 0444, 0555, "the store may not be read by this user",
+       "the store may not be read by this user"},
+      {"none.db", 0, 0, 0555, "the store cannot be made: Permission denied", "there is no store"},
+      // Its owner has it open, and what was written last is in the log.
+      {"open.db", 0444, 0, 0555, "the store may only be read here",
+       "what was written last is in a file beside the store"},
+      {"open.db", 0666, 0, 0555, "nothing can be written beside the store",
+       "what was written last is in a file beside the store"},
+  };
+  { ASSERT_OK(open()->add_constants(constants(1), "w")); }
+  {
+    const sixpoint::tests::TemporaryFolder owners;
+    auto store = Store::open(memory_.env, owners / "store.db");
+    ASSERT_OK(store);
+    ASSERT_OK(store->add_constants(constants(1), "w"));
+    std::filesystem::copy_file(owners / "store.db", folder_ / "open.db");
+    std::filesystem::copy_file(owners / "store.db-wal", folder_ / "open.db-wal");
+  }
+  for (const auto& each : cases) {
+    const std::string place = folder_ / each.name;
+    SCOPED_TRACE(place + ", " + each.to_write);
+    ::chmod(place.c_str(), each.file);
+    ::chmod((place + "-wal").c_str(), each.log);
+    ::chmod(folder_.path().c_str(), each.folder);
+    const auto names = names_in(folder_.path());
+    {
+      const AsOrdinaryUser user;
+      const auto writes = Store::open(memory_.env, place);
+      EXPECT_FAILS(writes, ErrorCode::permission);
+      EXPECT_THAT(writes.error().what, testing::StartsWith(each.to_write));
+      EXPECT_EQ(writes.error().where, place);
+      auto reads = Store::open_to_read(memory_.env, place);
+      ASSERT_EQ(reads.has_value(), std::string(each.to_read).empty());
+      if (reads) {
+        EXPECT_EQ(reads->history("MOS2A1")->size(), 1U);
+        EXPECT_FAILS(reads->add_constants(constants(2), "w"), ErrorCode::permission);
+      } else {
+        EXPECT_THAT(reads.error().what, testing::StartsWith(each.to_read));
+        EXPECT_EQ(reads.error().where, place);
+        EXPECT_FALSE(reads.error().hint.empty());
+      }
+    }
+    EXPECT_EQ(names_in(folder_.path()), names);
+    ::chmod(folder_.path().c_str(), 0755);
+  }
+}
+
+// Until its end no file of this process grows beyond `size_bytes`, as on a disk that is full.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t size_bytes) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{size_bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    ::signal(SIGXFSZ, signal_before_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*signal_before_)(int) = ::signal(SIGXFSZ, SIG_IGN);
+};
+
+TEST_F(SqliteStoreTest, AfterAFullDiskTheSameStoreGoesOn) {
+  auto store = open();
+  ASSERT_OK(store);
+  const auto add_run = [&](int number) {
+    RunRecord run;
+    run.serial = "MOS2A1";
+    run.filter = "current";
+    run.started = from_unix_seconds(number);
+    run.document = "{}";
+    return store->add_run(run, {{"raw", Bytes(300'000, static_cast<std::uint8_t>(number))}});
+  };
+  ASSERT_OK(add_run(1));
+  {
+    const FullDisk full(std::filesystem::file_size(path() + "-wal"));
+    const auto refused = add_run(2);
+    EXPECT_FAILS(refused, ErrorCode::io);
+    EXPECT_EQ(refused.error().where, path());
+    EXPECT_THAT(refused.error().hint, testing::HasSubstr("free some space"));
+  }
+  ASSERT_OK(add_run(3));
+  const auto runs = store->unit_history("MOS2A1").value().runs;
+  ASSERT_EQ(runs.size(), 2U);
+  EXPECT_EQ(runs[1].started, from_unix_seconds(3));
+  EXPECT_TRUE(store->audit()->ok);
+}
+
+// A writer that would have to forget what it has read: SQLite refuses it without waiting.
+TEST_F(SqliteStoreTest, WhereAnotherProgramWroteMeanwhileItSaysThatTheStoreIsBusy) {
+  auto reader = open();
+  ASSERT_OK(reader);
+  ASSERT_OK(reader->database().begin_reading());
+  ASSERT_OK(open()->add_constants(constants(1), "w"));
+  const auto refused = reader->database().execute("INSERT INTO attachments VALUES ('a', x'00')");
+  EXPECT_FAILS(refused, ErrorCode::io);
+  EXPECT_THAT(refused.error().hint, testing::HasSubstr("another program keeps the store busy"));
+  reader->database().roll_back();
+  EXPECT_OK(reader->add_constants(constants(2), "w"));
+  EXPECT_EQ(reader->history("MOS2A1")->size(), 2U);
+}
+
+TEST_F(SqliteStoreTest, AStoreWhoseFileWasRemovedIsNotAuditedAsWhole) {
+  auto store = open();
+  ASSERT_OK(store);
+  ASSERT_OK(store->add_constants(constants(1), "w"));
+  std::filesystem::remove(path());
+  const auto audit = store->audit();
+  EXPECT_FAILS(audit, ErrorCode::cannot_create);
+  EXPECT_EQ(audit.error().where, path());
+}
+
+TEST_F(SqliteStoreTest, ToReadOneOfAnEarlierVersionItMustBeBroughtUpToDateFirst) {
+  run_sql(
+#include "db/store_version_1.sql.inc"
+  );
+  const auto early = Store::open_to_read(memory_.env, path());
+  EXPECT_FAILS(early, ErrorCode::configuration);
+  EXPECT_THAT(early.error().what, testing::HasSubstr("version 1"));
+  EXPECT_EQ(early.error().where, path());
+  { ASSERT_OK(open()); }
+  auto now = Store::open_to_read(memory_.env, path());
+  ASSERT_OK(now);
+  EXPECT_EQ(now->history("MOS2A1")->size(), 1U);
+}
+
 // Kills a writing child at a random moment, again and again on one file. What the child said is
 // stored must be there. SIXPOINT_KILLS sets how often.
 TEST_F(SqliteStoreTest, KilledAtRandomMomentsItKeepsEveryAcknowledgedRow) {
