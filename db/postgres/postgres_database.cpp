@@ -40,17 +40,11 @@ Result<std::optional<std::string>> to_parameter(const Value& value, const std::s
   return std::optional<std::string>();
 }
 
-// libpqxx 6 leaves the state out where it has a type of its own for it.
+// libpqxx 6 leaves the state out of this one type.
 std::string state_of(const pqxx::sql_error& exception) {
-  const auto is = [&]<class T>(const T*) { return dynamic_cast<const T*>(&exception) != nullptr; };
-  return !exception.sqlstate().empty()                                   ? exception.sqlstate()
-         : is(static_cast<const pqxx::insufficient_privilege*>(nullptr)) ? "42501"
-         : is(static_cast<const pqxx::integrity_constraint_violation*>(nullptr)) ? "23000"
-         : is(static_cast<const pqxx::data_exception*>(nullptr))                 ? "22000"
-         : is(static_cast<const pqxx::too_many_connections*>(nullptr))           ? "53300"
-         : is(static_cast<const pqxx::insufficient_resources*>(nullptr))         ? "53000"
-         : is(static_cast<const pqxx::plpgsql_raise*>(nullptr))                  ? "P0001"
-                                                                                 : "";
+  return dynamic_cast<const pqxx::insufficient_privilege*>(&exception) != nullptr
+             ? "42501"
+             : exception.sqlstate();
 }
 
 void read_field(const pqxx::field& field, Value& value) {
@@ -219,15 +213,14 @@ class PostgresDatabase final : public Database {
   }
 
   Status set_schema_version(std::int64_t version) override {
-    for (const std::string& sql :
-         {std::string("CREATE TABLE IF NOT EXISTS sixpoint_schema (one BIGINT PRIMARY KEY CHECK "
-                      "(one = 1), version BIGINT NOT NULL)"),
-          fmt::format("INSERT INTO sixpoint_schema VALUES (1, {0}) ON CONFLICT (one) DO UPDATE SET "
-                      "version = {0}",
-                      version)}) {
-      SIXPOINT_CHECK(execute(sql, {}));
-    }
-    return {};
+    SIXPOINT_CHECK(
+        execute("CREATE TABLE IF NOT EXISTS sixpoint_schema (one BIGINT PRIMARY KEY CHECK "
+                "(one = 1), version BIGINT NOT NULL)",
+                {}));
+    return execute(fmt::format("INSERT INTO sixpoint_schema VALUES (1, {0}) ON CONFLICT (one) DO "
+                               "UPDATE SET version = {0}",
+                               version),
+                   {});
   }
 
   std::vector<std::string> append_only_statements(const std::string& table) const override {
