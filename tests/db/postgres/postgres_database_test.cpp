@@ -52,6 +52,152 @@ TEST_F(PostgresStoreTest, SaysWhatIsWrongAndNeverThePassword) {
   EXPECT_THAT((*database)->location(), Not(HasSubstr("s3cret")));
 }
 
+TEST_F(PostgresStoreTest, SaysWhichUserOrDatabaseTheServerDoesNotTake) {
+  const auto with = [&](const std::string& name, const std::string& password) {
+    std::string where = server().location("postgres", password);
+    return where.replace(where.find("station:"), 7, name);
+  };
+  location();
+  const std::string closed = place_->location("closed");
+  place_->tamper("main", "ALTER DATABASE " + closed.substr(closed.rfind('/') + 1) +
+                             " ALLOW_CONNECTIONS false");
+  place_->tamper("main", "CREATE ROLE guest NOLOGIN PASSWORD 'guests'");
+  std::string by_socket = server().superuser("postgres");
+  by_socket.replace(by_socket.find("user=postgres"), 13, "user=nobody");
+  const struct {
+    std::string where;
+    ErrorCode code;
+    const char* what;
+  } cases[] = {
+      {with("station", ""), ErrorCode::permission, "no password"},
+      {with("guest", "guests"), ErrorCode::permission, "not permitted to log in"},
+      {by_socket, ErrorCode::permission, "pg_hba.conf"},
+      {closed, ErrorCode::device_unavailable, "not currently accepting connections"},
+      // The server's words hold the password, which is the user's name here.
+      {with("station", "station"), ErrorCode::permission, "for user \"***\""},
+  };
+  for (const auto& each : cases) {
+    SCOPED_TRACE(each.what);
+    const auto database = open_postgres(each.where);
+    EXPECT_FAILS(database, each.code);
+    EXPECT_THAT(database.error().what, HasSubstr(each.what));
+    EXPECT_THAT(database.error().where, testing::StartsWith("postgresql://"));
+  }
+  place_->tamper("main", "DROP ROLE guest");
+}
+
+TEST_F(PostgresStoreTest, ADatabaseThatKeepsTextsOtherwiseIsNoPlaceForAStore) {
+  location();
+  ASSERT_TRUE(place_->statements(
+      "main", "CREATE DATABASE other_texts ENCODING 'SQL_ASCII' TEMPLATE template0"));
+  const auto refused = Store::open(memory_.env, server().location("other_texts"));
+  EXPECT_FAILS(refused, ErrorCode::configuration);
+  EXPECT_THAT(refused.error().what, HasSubstr("SQL_ASCII"));
+  EXPECT_THAT(refused.error().hint, HasSubstr("UTF8"));
+  EXPECT_TRUE(place_->statements("main", "DROP DATABASE other_texts"));
+}
+
+TEST_F(PostgresStoreTest, SaysWhatEachOfTheServersErrorsMeans) {
+  // Appendix A of PostgreSQL's manual has the states.
+  const struct {
+    const char* state;
+    ErrorCode code;
+    const char* hint;
+  } cases[] = {
+      {"08006", ErrorCode::device_unavailable, "check that the server runs"},
+      {"22003", ErrorCode::bad_data, "cannot be stored as it is"},
+      {"23505", ErrorCode::bad_data, "write a correction"},
+      {"25006", ErrorCode::permission, "the server's administrator"},
+      {"28000", ErrorCode::permission, "the server's administrator"},
+      {"42501", ErrorCode::permission, "the server's administrator"},
+      {"42P01", ErrorCode::internal, "please report this"},
+      {"53100", ErrorCode::io, "free some space"},
+      {"53200", ErrorCode::io, "free some space"},
+      {"53300", ErrorCode::device_unavailable, "check that the server runs"},
+      {"55P03", ErrorCode::io, "another program keeps the store busy"},
+      {"57P03", ErrorCode::device_unavailable, "check that the server runs"},
+      {"P0001", ErrorCode::bad_data, "write a correction"},
+      {"XX001", ErrorCode::bad_data, "restore the last backup"},
+  };
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  for (const auto& each : cases) {
+    SCOPED_TRACE(each.state);
+    const auto answer = store->database().execute(
+        std::string("DO $$ BEGIN RAISE EXCEPTION 'the server says' USING ERRCODE = '") +
+        each.state + "'; END $$");
+    EXPECT_FAILS(answer, each.code);
+    EXPECT_THAT(answer.error().what, HasSubstr("the server says"));
+    EXPECT_EQ(answer.error().where, store->database().location());
+    EXPECT_THAT(answer.error().hint, HasSubstr(each.hint));
+    EXPECT_OK(store->head()) << "the same connection goes on";
+  }
+}
+
+TEST_F(PostgresStoreTest, ATextWithAZeroByteIsRefusedAndNotCutOff) {
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  const auto refused = store->database().execute("INSERT INTO attachments VALUES ($1, '')",
+                                                 std::vector<Value>{std::string("a\0b", 3)});
+  EXPECT_FAILS(refused, ErrorCode::bad_data);
+  EXPECT_THAT(refused.error().what, HasSubstr("zero byte"));
+  EXPECT_TRUE(store->database().query("SELECT sha256 FROM attachments")->empty());
+}
+
+TEST_F(PostgresStoreTest, AWriterThatWaitsInVainForAnotherSaysSo) {
+  auto writing = Store::open(memory_.env, location());
+  auto waiting = Store::open(memory_.env, location());
+  ASSERT_OK(waiting);
+  ASSERT_OK(writing->database().begin_writing());
+  ASSERT_OK(waiting->database().execute("SET lock_timeout = '1ms'"));
+  const auto refused = waiting->add_constants(constants(1), "w");
+  EXPECT_FAILS(refused, ErrorCode::io);
+  EXPECT_THAT(refused.error().hint, HasSubstr("another program keeps the store busy"));
+  writing->database().roll_back();
+  EXPECT_OK(waiting->add_constants(constants(1), "w")) << "the same store goes on";
+}
+
+TEST_F(PostgresStoreTest, AConnectionThatTheServerEndsIsMadeAnew) {
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  const auto end_connections = [&] {
+    place_->tamper("main",
+                   "SELECT pg_terminate_backend(pid, 60000) FROM pg_stat_activity WHERE usename = "
+                   "'station' AND datname = current_database()");
+  };
+  end_connections();
+  EXPECT_OK(store->add_constants(constants(1), "w"));
+  end_connections();
+  EXPECT_EQ(store->history("MOS2A1").value().size(), 1U);
+  // Within a transaction, what went before is lost: it is an error.
+  ASSERT_OK(store->database().begin_writing());
+  end_connections();
+  EXPECT_FAILS(store->database().query("SELECT 1"), ErrorCode::device_unavailable);
+  store->database().roll_back();
+  EXPECT_OK(store->add_constants(constants(2), "w"));
+  EXPECT_EQ(store->history("MOS2A1").value().size(), 2U);
+}
+
+TEST_F(PostgresStoreTest, WhereTheServerVanishesAtTheCommitItSaysThatTheRowMayBeThere) {
+  auto store = Store::open(memory_.env, location());
+  ASSERT_OK(store);
+  Database& database = store->database();
+  ASSERT_OK(database.begin_writing());
+  server().kill();
+  const auto status = database.commit();
+  EXPECT_FAILS(status, ErrorCode::device_unavailable);
+  EXPECT_THAT(status.error().what, HasSubstr("whether it did is not known"));
+  EXPECT_THAT(status.error().hint, HasSubstr("run the command again"));
+  database.roll_back();
+  // Every later call says it too, until the server is there again.
+  EXPECT_FAILS(database.execute("SELECT 1"), ErrorCode::device_unavailable);
+  EXPECT_FAILS(database.query("SELECT 1"), ErrorCode::device_unavailable);
+  EXPECT_FAILS(database.begin_reading(), ErrorCode::device_unavailable);
+  server().start();
+  EXPECT_OK(database.query("SELECT 1"));
+  EXPECT_OK(store->add_constants(constants(1), "w"));
+}
+
 TEST_F(PostgresStoreTest, OpensOnlyStores) {
   const std::string foreign = place_->location("foreign");
   ASSERT_TRUE(place_->statements("foreign", "CREATE TABLE mine (a int)"));
