@@ -343,11 +343,16 @@ class PostgresDatabase final : public Database {
     return gone(why);
   }
 
+  Error busy(const std::exception& exception) const {
+    return {ErrorCode::io, fmt::format("the store answers: {}", said(exception)), address_.shown,
+            "another program keeps the store busy; try again"};
+  }
+
   Error sql_error(const pqxx::sql_error& exception) const {
     const std::string what = fmt::format("the store answers: {}", said(exception));
     const std::string state = state_of(exception);
     const std::string& where = address_.shown;
-    if (state.starts_with("08") || state.starts_with("57P") || state == "53300") {
+    if (state.starts_with("57P")) {
       return gone(said(exception));
     }
     if (state.starts_with("28") || state == "42501" || state == "25006") {
@@ -357,8 +362,8 @@ class PostgresDatabase final : public Database {
     if (state.starts_with("53")) {
       return {ErrorCode::io, what, where, "free some space on the server's disk and try again"};
     }
-    if (state == "55P03" || state.starts_with("40")) {
-      return {ErrorCode::io, what, where, "another program keeps the store busy; try again"};
+    if (state == "55P03") {
+      return busy(exception);
     }
     if (state.starts_with("23") || state == "P0001") {
       return {ErrorCode::bad_data, what, where,
@@ -381,10 +386,9 @@ class PostgresDatabase final : public Database {
     try {
       return work();
     } catch (const pqxx::sql_error& exception) {
-      if (connection_ != nullptr && !connection_->is_open()) {
-        return fail(gone(said(exception)));
-      }
-      return fail(sql_error(exception));
+      return fail(is_open() ? sql_error(exception) : gone(said(exception)));
+    } catch (const pqxx::transaction_rollback& exception) {  // states 40..., no sql_error
+      return fail(busy(exception));
     } catch (const pqxx::broken_connection& exception) {
       return fail(connection_ == nullptr ? connection_error(exception) : gone(said(exception)));
     } catch (const std::exception& exception) {

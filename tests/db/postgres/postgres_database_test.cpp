@@ -109,6 +109,8 @@ TEST_F(PostgresStoreTest, SaysWhatEachOfTheServersErrorsMeans) {
       {"23505", ErrorCode::bad_data, "write a correction"},
       {"25006", ErrorCode::permission, "the server's administrator"},
       {"28000", ErrorCode::permission, "the server's administrator"},
+      {"40001", ErrorCode::io, "another program keeps the store busy"},
+      {"40P01", ErrorCode::io, "another program keeps the store busy"},
       {"42501", ErrorCode::permission, "the server's administrator"},
       {"42P01", ErrorCode::internal, "please report this"},
       {"53100", ErrorCode::io, "free some space"},
