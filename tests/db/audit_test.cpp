@@ -15,6 +15,7 @@ TEST_F(StoreTest, AHeadThatWasWrittenDownFindsAHistoryThatWasWrittenAnew) {
     EXPECT_TRUE(store.audit(written_down)->ok);
     EXPECT_TRUE(store.audit(std::string(64, '0'))->ok) << "the head of an empty store";
     EXPECT_FAILS(store.audit("no head"), ErrorCode::usage);
+    EXPECT_FAILS(store.audit("00ff"), ErrorCode::usage);
   }
   place_->erase("main");
   Store forged = open();
@@ -104,6 +105,38 @@ TEST_F(StoreTest, AnAuditSeesOneMomentWhileOthersWrite) {
   }
   stop = true;
   writer.join();
+}
+
+TEST_F(StoreTest, AnAuditIsSaidInOneSentenceAndAsJson) {
+  Store store = open();
+  ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 100), "w"));
+  const auto whole = store.audit();
+  ASSERT_OK(whole);
+  EXPECT_EQ(whole->brief(), "3 rows, nothing touched, head " + whole->head);
+  EXPECT_EQ(whole->to_json().dump(),
+            R"({"ok":true,"rows":3,"head":")" + whole->head + R"(","findings":[]})");
+  EXPECT_EQ(store.head()->to_json().dump(), R"({"rows":3,"head":")" + whole->head + R"("})");
+  place_->tamper("main", "UPDATE constants SET made_at_ns = 7");
+  const auto touched = store.audit();
+  ASSERT_OK(touched);
+  ASSERT_EQ(touched->findings.size(), 1U);
+  EXPECT_EQ(touched->brief(), "3 rows, 1 findings, the first: " + touched->findings[0]);
+  EXPECT_THAT(touched->findings[0], testing::HasSubstr("row 3 (constants "));
+  EXPECT_EQ(touched->to_json()["ok"], false);
+  EXPECT_EQ(touched->to_json()["findings"][0], touched->findings[0]);
+}
+
+TEST_F(StoreTest, OfManyFindingsAnAuditNamesTheFirst20) {
+  Store store = open();
+  for (int i = 0; i < 25; ++i) {
+    ASSERT_OK(store.add_constants(constants("MOS2A1", "current", i), "w"));
+  }
+  place_->tamper("main", "UPDATE constants SET made_at_ns = made_at_ns + 1");
+  const auto audit = store.audit();
+  ASSERT_OK(audit);
+  ASSERT_EQ(audit->findings.size(), 20U);
+  EXPECT_THAT(audit->findings.front(), testing::HasSubstr("row 3 (constants "));
+  EXPECT_THAT(audit->findings.back(), testing::HasSubstr("row 22 (constants "));
 }
 
 }  // namespace

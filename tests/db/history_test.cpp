@@ -41,5 +41,23 @@ TEST_F(StoreTest, ACopiedRowMustFollowTheChain) {
   EXPECT_EQ(writer.head().hash, Bytes(hash.begin(), hash.end()));
 }
 
+TEST_F(StoreTest, WithoutItsHeadAStoreTakesNoRow) {
+  Store store = open();
+  ASSERT_OK(store.add_constants(constants("MOS2A1", "current", 1), "w"));
+  for (const std::string& change :
+       {"UPDATE head SET hash = " + place_->empty_bytes(), std::string("DELETE FROM head")}) {
+    SCOPED_TRACE(change);
+    place_->tamper("main", change);
+    const auto added = store.add_constants(constants("MOS2A1", "current", 2), "w");
+    EXPECT_FAILS(added, ErrorCode::bad_data);
+    EXPECT_EQ(added.error().where, store.database().location());
+    EXPECT_THAT(added.error().hint, testing::HasSubstr("backup"));
+    EXPECT_FAILS(store.head(), ErrorCode::bad_data);
+    EXPECT_EQ(store.history("MOS2A1")->size(), 1U);
+    EXPECT_THAT(store.audit()->findings,
+                testing::ElementsAre(testing::HasSubstr("the head does not name the last row")));
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::db

@@ -307,5 +307,82 @@ TEST_F(StoreTest, ManyWritersLoseNothing) {
   EXPECT_EQ(audit->rows, kWriters * (kRows + 1) + 1) << "units and constants, and the one filter";
 }
 
+TEST_F(StoreTest, ADecisionAtAStationHasANameAReasonAndAKnownAction) {
+  Store store = open();
+  const auto event = [](const std::string& station, const std::string& action,
+                        const std::string& serial) {
+    return StationEvent{"", {}, station, serial, action, "Ada", "she says so"};
+  };
+  for (const char* action : {"check_unit", "check_unit_end", "release"}) {
+    EXPECT_OK(store.add_station_event(event("S1", action, "MOS2A1"))) << action;
+    EXPECT_FAILS(store.add_station_event(event("S1", action, "")), ErrorCode::bad_data);
+  }
+  EXPECT_OK(store.add_station_event(event("S2", "sign", "")));
+  EXPECT_OK(store.add_station_event(event("S2", "sign_new_baseline", "")));
+  const auto unknown = store.add_station_event(event("S2", "erase", ""));
+  EXPECT_FAILS(unknown, ErrorCode::usage);
+  EXPECT_THAT(unknown.error().what, testing::HasSubstr("'erase'"));
+  for (std::string StationEvent::*member : {&StationEvent::operator_name, &StationEvent::reason}) {
+    StationEvent nameless = event("S2", "sign", "");
+    nameless.*member = "";
+    EXPECT_FAILS(store.add_station_event(nameless), ErrorCode::usage);
+  }
+  const auto actions = [&](const std::string& station) {
+    std::vector<std::string> names;
+    const auto events = store.station_events(station).value();
+    for (const StationEvent& each : events) {
+      names.push_back(each.action);
+    }
+    return names;
+  };
+  EXPECT_THAT(actions("S1"), testing::ElementsAre("check_unit", "check_unit_end", "release"));
+  EXPECT_THAT(actions("S2"), testing::ElementsAre("sign", "sign_new_baseline"));
+  EXPECT_EQ(actions("").size(), 5U);
+}
+
+TEST_F(StoreTest, VisitsTheRunsThatAFilterNames) {
+  Store store = open();
+  const auto add = [&](const std::string& kind, const std::string& serial,
+                       const std::string& station, std::int64_t time_s) {
+    RunRecord run = jig_run(serial);
+    run.kind = kind;
+    run.station = station;
+    run.started = from_unix_seconds(time_s);
+    ASSERT_OK(store.add_run(run, {}));
+  };
+  add("jig", "A", "S1", 30);
+  add("jig", "A", "S2", 20);
+  add("jig", "B", "S1", 10);
+  add("scan", "A", "S1", 40);
+  const auto started = [&](const RunFilter& filter) {
+    std::vector<std::int64_t> times_s;
+    EXPECT_OK(store.for_each_run(filter, [&](const RunRecord& run) {
+      times_s.push_back(to_unix_seconds(run.started));
+      return Status();
+    }));
+    return times_s;
+  };
+  using testing::ElementsAre;
+  EXPECT_THAT(started({}), ElementsAre(10, 20, 30)) << "of jigs, by their time";
+  EXPECT_THAT(started({"", "", ""}), ElementsAre(10, 20, 30, 40));
+  EXPECT_THAT(started({"jig", "A", ""}), ElementsAre(20, 30));
+  EXPECT_THAT(started({"jig", "", "S1"}), ElementsAre(10, 30));
+  EXPECT_THAT(started({"jig", "", "", from_unix_seconds(20)}), ElementsAre(20, 30));
+  EXPECT_THAT(started({"jig", "", "", {}, from_unix_seconds(20)}), ElementsAre(10));
+  EXPECT_THAT(started({"jig", "A", "S2", from_unix_seconds(0), from_unix_seconds(99)}),
+              ElementsAre(20));
+  EXPECT_FAILS(
+      store.for_each_run(
+          {}, [](const RunRecord&) -> Status { return fail(ErrorCode::io, "stop", {}, "none"); }),
+      ErrorCode::io);
+}
+
+TEST_F(StoreTest, AFileThatNoRepairMadeHasNoRepair) {
+  Store store = open();
+  const auto none = store.repair_of_output(std::string(64, '0'));
+  ASSERT_OK(none);
+  EXPECT_FALSE(none->has_value());
+}
+
 }  // namespace
 }  // namespace sixpoint::db
