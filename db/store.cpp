@@ -133,22 +133,24 @@ Result<std::string> Store::whole_key(std::string_view table_name, const std::str
   if (rows.size() == 1) {
     return text_of(rows[0][0]);
   }
-  const std::string name = fmt::format("'{}'", printable(given, 60));
-  return rows.empty()
-             ? fail(ErrorCode::no_input, fmt::format("no {} {}", table.name, name),
-                    database_->location(), "'sixpoint history SERIAL' lists them")
-             : fail(ErrorCode::usage, fmt::format("several {} begin with {}", table.name, name),
-                    database_->location(), "give more of its digits");
+  if (rows.empty()) {
+    return fail(ErrorCode::no_input, fmt::format("no {} '{}'", table.name, printable(given, 60)),
+                database_->location(), "'sixpoint history SERIAL' lists them");
+  }
+  return fail(ErrorCode::usage,
+              fmt::format("several {} begin with '{}'", table.name, printable(given, 60)),
+              database_->location(), "give more of its digits");
 }
 
 Status Store::refuse_withdrawn(const std::string& constants_id) {
   SIXPOINT_ASSIGN(const auto sets,
                   select<ConstantsRecord>("WHERE id = $1", std::vector<Value>{constants_id}));
   SIXPOINT_ASSIGN(const UnitHistory history, constants_history(sets.at(0).serial));
-  return history.is_withdrawn(constants_id)
-             ? Status(fail(ErrorCode::usage, "constants that are withdrawn apply to nothing",
-                           constants_id, "reinstate them first, or prefer another set"))
-             : Status();
+  if (history.is_withdrawn(constants_id)) {
+    return fail(ErrorCode::usage, "constants that are withdrawn apply to nothing", constants_id,
+                "reinstate them first, or prefer another set");
+  }
+  return {};
 }
 
 Status Store::withdraw_constants(const std::string& id, const std::string& operator_name,
@@ -179,9 +181,10 @@ Result<std::string> Store::add_station_event(const StationEvent& event) {
 }
 
 Result<std::vector<StationEvent>> Store::station_events(const std::string& station) {
-  return station.empty()
-             ? select<StationEvent>("ORDER BY seq")
-             : select<StationEvent>("WHERE station = $1 ORDER BY seq", std::vector<Value>{station});
+  if (station.empty()) {
+    return select<StationEvent>("ORDER BY seq");
+  }
+  return select<StationEvent>("WHERE station = $1 ORDER BY seq", std::vector<Value>{station});
 }
 
 Status Store::for_each_run(const RunFilter& filter,

@@ -44,7 +44,7 @@ Result<PostgresAddress> parse_postgres_address(const std::string& location) {
                 "--store postgresql://...", "in a password, write @ as %40, / as %2F and : as %3A");
   }
   PostgresAddress address;
-  address.password = given.contains("password") ? given["password"] : "";
+  address.password = given["password"];
   const auto part = [&](const char* key, const char* before) {
     return !given[key].empty() ? before + given[key] : std::string();
   };
