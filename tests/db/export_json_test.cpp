@@ -42,6 +42,11 @@ TEST(ExportJson, AnAttachmentMustHaveTheHashThatIsItsName) {
   bad["bytes"] = "0103";
   EXPECT_FAILS(attachment_from_json(bad), ErrorCode::bad_data);
   EXPECT_FAILS(attachment_from_json(Json::object()), ErrorCode::bad_data);
+  for (const char* key : {"attachment", "bytes"}) {
+    Json other_type = json;
+    other_type[key] = 1;
+    EXPECT_FAILS(attachment_from_json(other_type), ErrorCode::bad_data);
+  }
 }
 
 TEST(ExportJson, TheFirstLineNamesFormatAndVersion) {
@@ -52,6 +57,14 @@ TEST(ExportJson, TheFirstLineNamesFormatAndVersion) {
   newer["store_version"] = 4;
   EXPECT_FAILS(header_from_json(newer), ErrorCode::configuration);
   EXPECT_FAILS(header_from_json(Json{{"schema", "other"}}), ErrorCode::bad_data);
+  for (const char* key : {"schema", "store_version", "rows", "head"}) {
+    SCOPED_TRACE(key);
+    Json bad = json;
+    bad[key] = Json::array();
+    EXPECT_FAILS(header_from_json(bad), ErrorCode::bad_data);
+    bad.erase(key);
+    EXPECT_FAILS(header_from_json(bad), ErrorCode::bad_data);
+  }
 }
 
 TEST(ExportJson, ALineIsAnObjectAndNotDeep) {

@@ -6,6 +6,7 @@
 #include "db/exchange.h"
 #include "db/journal.h"
 #include "store_fixture.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::db {
 namespace {
@@ -166,6 +167,18 @@ TEST_F(FailingDatabaseTest, AnImportIsWholeOrNotThere) {
   store_.emplace(Store::in(memory_.env, std::move(database)).value());
   each_call_fails("import", [&] { return import_json_lines(*store_, memory_.files, "all.jsonl"); });
   EXPECT_EQ(store_->units().value().size(), 1U);
+}
+
+TEST_F(FailingDatabaseTest, ABackupIsWholeOrNotThere) {
+  const sixpoint::tests::TemporaryFolder folder;
+  Env env{memory_.clock, posix_env().files};
+  const std::string path = folder / "backup.db";
+  each_call_fails("backup", [&] {
+    const auto report = backup(*store_, env, path);
+    EXPECT_EQ(report.has_value(), env.files.info(path).has_value());
+    return report;
+  });
+  EXPECT_EQ(Store::open(env, path)->head()->head, store_->head()->head);
 }
 
 TEST_F(FailingDatabaseTest, TheJournalKeepsWhatTheStoreDidNotTake) {

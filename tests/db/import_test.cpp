@@ -2,6 +2,7 @@
 #include <fstream>
 
 #include "db/exchange_fixture.h"
+#include "failing_files.h"
 
 namespace sixpoint::db {
 namespace {
@@ -91,6 +92,11 @@ TEST_F(ExchangeTest, RefusesEveryBrokenFileWhole) {
   broken.push_back(changed(last, "\"reason\"", "\"reasons\""));
   broken.push_back(changed(last, "\"hash\":\"", "\"hash\":\"zz"));
   broken.push_back(changed(last, "\"row\":{", "\"row\":[[[[[[[{"));
+  for (const char* key : {"seq", "table", "row", "hash"}) {
+    const std::string written = std::string("\"") + key + "\":";
+    broken.push_back(changed(last, written, "\"other\":"));
+    broken.push_back(changed(last, written, written + "[],\"other\":"));
+  }
   auto swapped = good;
   std::swap(swapped[last], swapped[last - 1]);
   broken.push_back(swapped);
@@ -149,6 +155,48 @@ TEST_F(ExchangeTest, IntoANewFileAnImportIsWholeOrNotThere) {
   }
   EXPECT_EQ(posix_env().files.list(folder_.path()).value(), names_before)
       << "neither a store nor a temporary file is left";
+}
+
+TEST_F(ExchangeTest, ARowThatTheStoreHasMustBeTheSameInTheFile) {
+  Store store = open("first");
+  fill(store);
+  ASSERT_OK(export_json_lines(store, memory_.files, "a.jsonl"));
+  const std::string head = store.audit()->head;
+  const auto good = lines("a.jsonl");
+  const std::size_t last = good.size() - 1;
+  for (const auto& [from, to] : {std::pair("\"reason\":\"wrong", "\"reason\":\"right"),
+                                 std::pair("\"hash\":\"", "\"hash\":\"00")}) {
+    auto all = good;
+    all[last].replace(all[last].find(from), std::string(from).size(), to);
+    write("changed.jsonl", all);
+    const auto refused = import_json_lines(store, memory_.files, "changed.jsonl");
+    EXPECT_FAILS(refused, ErrorCode::bad_data);
+    EXPECT_THAT(refused.error().what, HasSubstr("is not what the store has in its place"));
+    EXPECT_EQ(refused.error().where, "changed.jsonl, line " + std::to_string(good.size()));
+    EXPECT_EQ(store.audit()->head, head);
+  }
+}
+
+TEST_F(ExchangeTest, AFileThatCannotBeReadToItsEndIsNotImported) {
+  Store first = open("first");
+  fill(first);
+  ASSERT_OK(export_json_lines(first, memory_.files, "a.jsonl"));
+  sixpoint::tests::FailingFiles files(memory_.files);
+  Store second = open("second");
+  std::size_t failures = 0;
+  for (;; ++failures) {
+    files.fail_at(failures);
+    const auto report = import_json_lines(second, files, "a.jsonl");
+    if (!files.has_failed()) {
+      ASSERT_OK(report);
+      break;
+    }
+    EXPECT_FAILS(report, ErrorCode::io);
+    EXPECT_EQ(report.error().where, "a.jsonl");
+    EXPECT_EQ(second.audit()->rows, 0);
+  }
+  EXPECT_EQ(failures, 3U) << "open, the whole file, its end";
+  EXPECT_EQ(second.audit()->head, first.audit()->head);
 }
 
 }  // namespace

@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "failing_files.h"
 #include "place.h"
 
 namespace sixpoint::db {
@@ -258,6 +260,31 @@ TEST_F(OldJournalTest, AnEntryThatLacksAKeyOrIsOfNoKnownKindIsRefused) {
       {{"kind", "run"}, {"serial", "MOS2A1"}},
       {{"kind", "correction"}},
       {{"kind", 3}},
+      {{"kind", "run"},
+       {"model", "w"},
+       {"serial", "MOS2A1"},
+       {"run_kind", "jig"},
+       {"filter", "current"},
+       {"started_ns", 1},
+       {"ended_ns", 1},
+       {"operator", ""},
+       {"station", ""},
+       {"jig", ""},
+       {"verdict", ""},
+       {"software", ""},
+       {"document", "{}"},
+       {"captures", {{{"name", "raw"}, {"bytes", "no hex"}}}}},
+      {{"kind", "unit_write"}, {"serial", 1}},
+      {{"kind", "repair"}, {"serial", "MOS2A1"}, {"made_at_ns", "now"}},
+      {{"id", "x"},
+       {"rows", nullptr},
+       {"attachments", {{{"attachment", "the name of other bytes"}, {"bytes", "00"}}}}},
+      // The id is not the one that the content has.
+      {{"id", "x"},
+       {"rows",
+        {{{"table", "captures"},
+          {"row", {{"id", "x"}, {"run_id", "r"}, {"name", "raw"}, {"sha256", "00"}}}}}},
+       {"attachments", nullptr}},
       {{"id", "x"}, {"rows", {{{"table", "none"}, {"row", nullptr}}}}, {"attachments", nullptr}},
       {{"id", "x"},
        {"rows",
@@ -285,6 +312,87 @@ TEST_F(JournalTest, ATimeBeyondAllTimesIsRefused) {
   Store store = open_store("main");
   EXPECT_FAILS(journal.catch_up(store), ErrorCode::bad_data);
   EXPECT_EQ(store.audit()->rows, 0);
+}
+
+TEST_F(JournalTest, AFileThatIsNoEntryIsRefusedByItsName) {
+  Journal journal = open_journal();
+  Store store = open_store("main");
+  const std::string path = "journal/0000000001-x.json";
+  for (const char* text : {"", "[]", "{}", R"({"record":"{}"})", R"({"record":{},"sha256":"00"})",
+                           R"({"record":"{}","sha256":"00"})", R"({"record":"{}","sha256":0})"}) {
+    SCOPED_TRACE(text);
+    ASSERT_OK(write_file(memory_.files, path, text));
+    const auto refused = journal.catch_up(store);
+    EXPECT_FAILS(refused, ErrorCode::bad_data);
+    EXPECT_EQ(refused.error().where, path);
+    EXPECT_THAT(refused.error().hint, testing::HasSubstr("do not delete it"));
+    EXPECT_TRUE(memory_.files.info(path).has_value());
+  }
+  EXPECT_EQ(store.audit()->rows, 0);
+}
+
+TEST_F(JournalTest, WhateverCallOfTheDiskFailsTheStoreHasEveryRunOnceInTheEnd) {
+  sixpoint::tests::FailingFiles files(memory_.files);
+  Store store = open_store("main");
+  const std::string folder = "a/journal";
+  std::size_t runs = 0;
+  std::size_t failures = 0;
+  // Until no call is left to fail, of those that write an entry and those that give it to the
+  // store.
+  for (bool failed = true; failed; ++failures) {
+    files.fail_at(failures);
+    auto journal = Journal::open(files, folder);
+    const auto added =
+        journal ? journal->add_run(run(static_cast<int>(failures)), {}) : fail(journal.error());
+    const auto taken = added ? journal->catch_up(store) : fail(added.error());
+    failed = files.has_failed();
+    EXPECT_EQ(taken.has_value(), !failed) << failures;
+    files.stop_failing();
+    runs += added ? 1 : 0;
+    auto again = Journal::open(files, folder);
+    ASSERT_OK(again);
+    const std::size_t pending = again->pending().value();
+    ASSERT_OK(again->catch_up(store));
+    const std::size_t stored = store.unit_history("MOS2A1").value().runs.size();
+    EXPECT_GE(stored, runs) << failures;
+    EXPECT_LE(stored, runs + (added ? 0 : 1)) << failures;
+    EXPECT_LE(pending, 1U);
+    runs = stored;
+  }
+  EXPECT_GT(failures, 8U);
+}
+
+// Another program gives entries to the store at the same time: the first one between this program's
+// look at the folder and its reading, the second between its reading and its removal.
+class SharedFolder final : public sixpoint::ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Result<std::vector<std::string>> list(const std::string& folder) override {
+    auto names = ForwardingFiles::list(folder);
+    SIXPOINT_CHECK(ForwardingFiles::remove(folder + "/" + names.value().front()));
+    return names;
+  }
+  Status remove(const std::string& path) override {
+    SIXPOINT_CHECK(ForwardingFiles::remove(path));
+    return ForwardingFiles::remove(path);
+  }
+};
+
+TEST_F(JournalTest, AnEntryThatAnotherProgramGaveToTheStoreIsNoError) {
+  {
+    Journal journal = open_journal();
+    ASSERT_OK(journal.add_run(run(1), {}));
+    ASSERT_OK(journal.add_run(run(2), {}));
+  }
+  SharedFolder files(memory_.files);
+  Store store = open_store("main");
+  const auto taken = Journal::open(files, "journal").value().catch_up(store);
+  ASSERT_OK(taken);
+  EXPECT_EQ(*taken, 1U);
+  const auto runs = store.unit_history("MOS2A1").value().runs;
+  ASSERT_EQ(runs.size(), 1U);
+  EXPECT_EQ(runs[0].started, from_unix_seconds(2));
+  EXPECT_EQ(open_journal().pending().value(), 0U);
 }
 
 }  // namespace

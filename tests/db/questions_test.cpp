@@ -1,5 +1,7 @@
 #include "db/questions.h"
 
+#include <array>
+
 #include "store_fixture.h"
 
 namespace sixpoint::db {
@@ -80,6 +82,38 @@ TEST_F(StoreTest, AnswersWhatPeopleAsk) {
   EXPECT_FALSE((*due)[0].last_constants.has_value());
   EXPECT_EQ((*due)[1].serial, "D");
   EXPECT_EQ((*due)[2].serial, "B");
+}
+
+TEST(UnitHistory, IsEmptyWhereNothingIsKnownOfTheUnit) {
+  EXPECT_TRUE(UnitHistory().empty());
+  std::array<UnitHistory, 5> known;
+  known[0].constants.resize(1);
+  known[1].runs.resize(1);
+  known[2].writes.resize(1);
+  known[3].repairs.resize(1);
+  known[4].corrections.resize(1);
+  for (const UnitHistory& history : known) {
+    EXPECT_FALSE(history.empty());
+  }
+}
+
+TEST_F(StoreTest, ARetestIsCountedAsOne) {
+  Store store = open();
+  RunRecord run = jig_run("A");
+  run.verdict = "fail";
+  run.started = from_unix_seconds(10);
+  run.retest_of = "";
+  const std::string first = store.add_run(run, {}).value();
+  run.verdict = "pass";
+  run.started = from_unix_seconds(20);
+  run.retest_of = first;
+  ASSERT_OK(store.add_run(run, {}));
+  const auto yield = store.yield(from_unix_seconds(0), from_unix_seconds(99));
+  ASSERT_OK(yield);
+  EXPECT_EQ(yield->runs, 2U);
+  EXPECT_EQ(yield->retests, 1U);
+  EXPECT_EQ(yield->passed, 1U);
+  EXPECT_EQ(yield->passed_first_time, 0U);
 }
 
 }  // namespace

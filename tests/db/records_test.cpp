@@ -100,9 +100,54 @@ TEST(Records, RefusesWhatAColumnMayNotHold) {
   refused([](RunRecord& r) { r.station = std::string("a\0b", 3); });
   refused([](RunRecord& r) { r.model = std::string(201, 'm'); });
   refused([](RunRecord& r) { r.codes = {"\xed\xa0\x80"}; });  // a surrogate
+  refused([](RunRecord& r) { r.codes = {std::string(2001, 'c')}; });
+  refused([](RunRecord& r) { r.document = std::string(1, '\0'); });
   RunRecord longest = run();
   longest.serial = std::string(200, 'M');
   EXPECT_OK(rows_of(longest, {}));
+}
+
+// The first and the last characters of each length, and the bytes beside them (RFC 3629, 4).
+TEST(Records, ATextIsUtf8) {
+  RunRecord named = run();
+  for (const char* good :
+       {"\x7f", "\xc2\x80", "\xdf\xbf", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xee\x80\x80",
+        "\xef\xbf\xbf", "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf"}) {
+    named.station = good;
+    EXPECT_OK(rows_of(named, {}));
+  }
+  for (const char* bad :
+       {"\x80", "\xc1\xbf", "\xc2\x7f", "\xc2\xc0", "\xe0\x9f\xbf", "\xed\xa0\x80", "\xef\xbf\xc0",
+        "\xf0\x8f\xbf\xbf", "\xf4\x90\x80\x80", "\xf5\x80\x80\x80", "\xf0\x90\x80"}) {
+    named.station = bad;
+    EXPECT_FAILS(rows_of(named, {}), ErrorCode::bad_data);
+  }
+}
+
+TEST(Records, ACaptureAbove100MiBIsRefusedByItsName) {
+  const auto refused = rows_of(run(), {{"long one", Bytes((100U << 20) + 1)}});
+  EXPECT_FAILS(refused, ErrorCode::bad_data);
+  EXPECT_THAT(refused.error().what, testing::HasSubstr("long one has 104857601 bytes"));
+  EXPECT_THAT(refused.error().hint, testing::HasSubstr("104857600"));
+}
+
+TEST(Records, ARowHasTheColumnsOfItsTable) {
+  EXPECT_FAILS(new_row(table("units"), Row(2, std::string("a"))), ErrorCode::internal);
+  const auto none = new_row(table("units"), {Value(), std::string("w"), std::int64_t{1}});
+  EXPECT_FAILS(none, ErrorCode::bad_data);
+  EXPECT_THAT(none.error().what, testing::HasSubstr("serial"));
+  const auto text = new_row(table("units"), {std::string("M"), std::string("w"), std::string("1")});
+  EXPECT_FAILS(text, ErrorCode::bad_data);
+  EXPECT_THAT(text.error().what, testing::HasSubstr("first_seen_ns"));
+}
+
+// What only another program can have written there.
+TEST(Records, CodesOfAnotherFormAreReadAsFarAsTheyGo) {
+  Row row = rows_of(run(), {})->rows[2].second;
+  row[18] = std::string(R"(["tilted",7])");
+  EXPECT_EQ(record_of<RunRecord>(row).codes, (std::vector<std::string>{"tilted", "7"}));
+  row[18] = std::string("{}");
+  EXPECT_TRUE(record_of<RunRecord>(row).codes.empty());
 }
 
 TEST(Records, APathOfAnyBytesCanBeStored) {
