@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "expect_result.h"
+#include "mocks/inert/inert.h"
 
 namespace sixpoint::device {
 namespace {
@@ -37,6 +38,19 @@ TEST(Jig, AManualJigWaitsForAPerson) {
   EXPECT_FALSE(jig.position()->pose) << "it does not know where the unit is";
   EXPECT_EQ(jig.position()->fault, "");
   ASSERT_OK(jig.stop());
+}
+
+// Oracle: jig.h. What the jig says comes from outside: it is shown without its control characters.
+TEST(Jig, AStopAFaultOrASilentJigIsTheAnswerOfTheCheck) {
+  mocks::InertJig jig;
+  EXPECT_OK(check_jig(jig));
+  jig.next_position->fault = "door\x1b[2J";
+  const Status stopped = check_jig(jig);
+  EXPECT_FAILS(stopped, ErrorCode::device_unavailable);
+  EXPECT_EQ(stopped.error().what, "the jig stopped: door\\x1b[2J");
+  EXPECT_EQ(stopped.error().where, "inert");
+  jig.next_position = fail(ErrorCode::bad_data, "the jig's state cannot be", "jig", "switch it");
+  EXPECT_FAILS(check_jig(jig), ErrorCode::bad_data);
 }
 
 }  // namespace

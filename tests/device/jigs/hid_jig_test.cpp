@@ -1,10 +1,15 @@
 #include "device/jigs/hid_jig.h"
 
+#include <functional>
+#include <limits>
 #include <thread>
 
 #include <gmock/gmock.h>
 
 #include "base/memory_env.h"
+#include "device/breaking_link.h"
+#include "device/made_units.h"
+#include "device/wire/payload.h"
 #include "expect_result.h"
 #include "mocks/in_process/in_process.h"
 #include "mocks/in_process/virtual_hid_jig.h"
@@ -16,6 +21,8 @@ namespace {
 using mocks::VirtualHidJig;
 using mocks::VirtualHidJigOptions;
 using testing::HasSubstr;
+using tests::Break;
+using tests::breaking;
 
 struct HidJigBench {
   explicit HidJigBench(const VirtualHidJigOptions& options = {}) {
@@ -26,6 +33,25 @@ struct HidJigBench {
     physics = std::make_unique<mocks::VirtualJig>(plugged);
     twin = std::make_shared<VirtualHidJig>(options, physics.get());
     jig = *HidJig::open(mocks::link_to_jig(twin, clock));
+  }
+  // Each request and reply passes through a function, which may make another message of it.
+  using Change = std::function<void(Message&)>;
+  Link changed(const Change& request, const Change& reply) const {
+    const auto tamper = [](const Change& change) {
+      return [change](Bytes& bytes) {
+        if (const auto message = decode(bytes); message && change) {
+          Message other = *message;
+          change(other);
+          const Report report = encode(other);
+          bytes.assign(report.begin(), report.end());
+        }
+        return 1;
+      };
+    };
+    Link link = mocks::link_to_jig(twin, clock);
+    link.reports = std::make_unique<mocks::TamperingTransport>(std::move(link.reports),
+                                                               tamper(request), tamper(reply));
+    return link;
   }
   std::shared_ptr<ManualClock> clock;
   std::shared_ptr<mocks::PluggedUnit> plugged;
@@ -217,9 +243,36 @@ TEST(HidJig, ASilentOrHostileJigIsRefused) {
   EXPECT_FAILS(open_with([&](const Message& m) { return answer(m, {}); }), ErrorCode::bad_data);
   EXPECT_FAILS(open_with([&](const Message& m) { return answer(m, Bytes(54, 1)); }),
                ErrorCode::bad_data);
-  EXPECT_FAILS(decode_jig_state(Bytes{9, 0, 0, 0, 0, 0, 0, 0, 0}), ErrorCode::bad_data);
-  EXPECT_FAILS(decode_jig_state(Bytes{1, 7, 0, 0, 0, 0, 0, 0, 0}), ErrorCode::bad_data);
-  EXPECT_FAILS(decode_jig_state(Bytes{1, 255, 0, 0, 0, 0, 0, 0, 0}), ErrorCode::bad_data);
+}
+
+// The limits of docs/devices/motorised-jig.md, each by one field of a message that holds.
+TEST(HidJig, AnImpossibleStateOrIdentityIsRefused) {
+  const auto state_of = [](int motion, int pose, std::int32_t angle_mdeg) {
+    return payload_of(static_cast<std::uint8_t>(motion), static_cast<std::uint8_t>(pose),
+                      angle_mdeg, std::uint16_t{50}, std::uint8_t{0});
+  };
+  EXPECT_OK(decode_jig_state(state_of(1, 5, 180'000)));
+  EXPECT_OK(decode_jig_state(state_of(2, 255, -180'000)));
+  for (const Bytes& payload :
+       {Bytes{}, Bytes{1, 0, 0, 0, 0, 0, 0, 0}, state_of(5, 0, 0), state_of(1, 6, 0),
+        state_of(1, 254, 0), state_of(1, 0, 180'001), state_of(1, 0, -180'001),
+        state_of(1, 0, std::numeric_limits<std::int32_t>::min()), state_of(1, 255, 0)}) {
+    SCOPED_TRACE(to_hex(payload));
+    EXPECT_FAILS(decode_jig_state(payload), ErrorCode::bad_data);
+  }
+  const JigIdentity whole{{"J1", "1.0", "SixJig"}, 1};
+  EXPECT_EQ(*decode_jig_identity(encode_jig_identity(whole)), whole);
+  Bytes short_one = encode_jig_identity(whole);
+  short_one.pop_back();
+  EXPECT_FAILS(decode_jig_identity(short_one), ErrorCode::bad_data);
+  for (const JigIdentity& wrong :
+       {JigIdentity{{"J1", "1.0", "SixJig"}, 0}, JigIdentity{{"", "1.0", "SixJig"}, 1},
+        JigIdentity{{"J\x1b", "1.0", "SixJig"}, 1}, JigIdentity{{"J1", "", "SixJig"}, 1},
+        JigIdentity{{"J1", "1 0", "SixJig"}, 1}, JigIdentity{{"J1", "1.0", ""}, 1},
+        JigIdentity{{"J1", "1.0", "Six Jig"}, 1}}) {
+    SCOPED_TRACE(wrong.serial + "," + wrong.firmware + "," + wrong.model);
+    EXPECT_FAILS(decode_jig_identity(encode_jig_identity(wrong)), ErrorCode::bad_data);
+  }
   JigState state;
   state.motion = JigMotion::standing;
   state.pose = Pose::minus_y;
@@ -228,6 +281,181 @@ TEST(HidJig, ASilentOrHostileJigIsRefused) {
   ASSERT_OK(back);
   EXPECT_EQ(back->pose, state.pose);
   EXPECT_NEAR(back->angle_off_deg, -0.031, 1e-9);
+}
+
+// A cable that is pulled at any transfer is said; a transfer that failed once is repeated.
+TEST(HidJig, EachTransferMayFail) {
+  struct Row {
+    const char* name;
+    std::function<Status(HidJig&)> operation;
+  };
+  const std::vector<Row> rows = {
+      {"position",
+       [](HidJig& jig) -> Status {
+         SIXPOINT_CHECK(jig.position());
+         return {};
+       }},
+      {"go to", [](HidJig& jig) { return jig.go_to(Pose::plus_x); }},
+      {"stop", [](HidJig& jig) { return jig.stop(); }},
+      {"release", [](HidJig& jig) { return jig.release(); }},
+  };
+  for (const Row& row : rows) {
+    for (const ErrorCode code : {ErrorCode::device_unavailable, ErrorCode::io}) {
+      for (std::size_t call = 0;; ++call) {
+        SCOPED_TRACE(row.name + (", call " + std::to_string(call)));
+        HidJigBench bench;
+        const auto broken = std::make_shared<Break>();
+        broken->code = code;
+        const auto jig =
+            *HidJig::open(breaking(mocks::link_to_jig(bench.twin, bench.clock), broken));
+        broken->left = call;
+        const Status result = row.operation(*jig);
+        if (!broken->happened) {
+          EXPECT_OK(result);
+          EXPECT_GT(call, 1U);
+          break;
+        }
+        EXPECT_EQ(result.has_value(), code == ErrorCode::io);
+        EXPECT_TRUE(result || result.error().code == code) << result.error().brief();
+        EXPECT_OK(jig->position()) << "the next one is as if nothing had been";
+      }
+    }
+  }
+  HidJigBench bench;
+  for (const std::size_t call : {0U, 1U}) {
+    const auto broken = std::make_shared<Break>(Break{call});
+    EXPECT_FAILS(HidJig::open(breaking(mocks::link_to_jig(bench.twin, bench.clock), broken)),
+                 ErrorCode::device_unavailable);
+  }
+}
+
+// The jig is held by the program also where the jig did not hear of it.
+TEST(HidJig, AStopOrAReleaseThatTheJigDidNotHearHolds) {
+  HidJigBench bench;
+  const auto broken = std::make_shared<Break>();
+  const auto jig = *HidJig::open(breaking(mocks::link_to_jig(bench.twin, bench.clock), broken));
+  broken->left = 0;
+  EXPECT_FAILS(jig->stop(), ErrorCode::device_unavailable);
+  for (std::size_t call = 0;; ++call) {
+    SCOPED_TRACE("call " + std::to_string(call));
+    const Status turned = jig->go_to(Pose::plus_x);
+    EXPECT_FAILS(turned, ErrorCode::device_unavailable);
+    EXPECT_THAT(turned.error().what, HasSubstr("emergency stop"));
+    EXPECT_EQ(bench.plugged->motor.movements, 0);
+    broken->left = call;
+    broken->happened = false;
+    if (const Status released = jig->release(); released) {
+      EXPECT_FALSE(broken->happened);
+      EXPECT_GT(call, 1U);
+      break;
+    }
+  }
+  broken->left.reset();
+  EXPECT_OK(jig->go_to(Pose::plus_x));
+}
+
+// Its button is pressed between the look at it and the command.
+TEST(HidJig, ARefusalIsSaidWithItsReason) {
+  HidJigBench bench;
+  const auto press = [&](Message& request) {
+    if (request.command == static_cast<Command>(JigCommand::go_to)) {
+      bench.twin->press_stop();
+    }
+  };
+  const auto jig = *HidJig::open(bench.changed(press, {}));
+  const Status refused = jig->go_to(Pose::plus_x);
+  EXPECT_FAILS(refused, ErrorCode::device_unavailable);
+  EXPECT_EQ(refused.error().what, "the jig refused: busy");
+  EXPECT_EQ(bench.plugged->motor.movements, 0);
+}
+
+// Oracle: the state of the jig. A reply that belongs to nothing that was asked says another one.
+TEST(HidJig, RepliesToSomethingElseAreDropped) {
+  const std::vector<HidJigBench::Change> rows = {
+      [](Message& reply) { reply.kind = ReportKind::samples; },
+      [](Message& reply) { reply.kind = ReportKind::request; },
+      [](Message& reply) { ++reply.sequence; },
+      [](Message& reply) { reply.command = static_cast<Command>(JigCommand::identify); },
+  };
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    SCOPED_TRACE(row);
+    HidJigBench bench;
+    ASSERT_OK(bench.jig->go_to(Pose::plus_x));
+    bench.clock->sleep(std::chrono::seconds(3));
+    bool lies = false;
+    const auto jig = *HidJig::open(bench.changed({}, [&](Message& reply) {
+      if (lies) {
+        lies = false;
+        JigState state;
+        state.motion = JigMotion::standing;
+        state.pose = Pose::minus_x;
+        reply.payload = encode_jig_state(state);
+        rows[row](reply);
+      }
+    }));
+    lies = true;
+    const auto position = jig->position();
+    ASSERT_OK(position);
+    EXPECT_FALSE(lies);
+    EXPECT_EQ(position->pose, Pose::plus_x);
+  }
+}
+
+// What the jig says can not be: nothing moves, and the operation says it.
+TEST(HidJig, AStateThatCanNotBeEndsEachOperation) {
+  HidJigBench bench;
+  const auto jig = *HidJig::open(bench.changed({}, [](Message& reply) {
+    if (reply.command == static_cast<Command>(JigCommand::state)) {
+      reply.payload = Bytes(9, 0xFE);
+    }
+  }));
+  EXPECT_FAILS(jig->position(), ErrorCode::bad_data);
+  EXPECT_FAILS(jig->go_to(Pose::plus_x), ErrorCode::bad_data);
+  EXPECT_FAILS(jig->release(), ErrorCode::bad_data);
+  EXPECT_EQ(bench.plugged->motor.movements, 0);
+}
+
+// A later firmware has more faults than this program knows.
+TEST(HidJig, AFaultOfNoKnownCodeHoldsTheJig) {
+  HidJigBench bench;
+  const auto jig = *HidJig::open(bench.changed({}, [](Message& reply) {
+    if (reply.command == static_cast<Command>(JigCommand::state)) {
+      JigState state;
+      state.motion = JigMotion::fault;
+      state.fault = static_cast<JigFault>(77);
+      reply.payload = encode_jig_state(state);
+    }
+  }));
+  EXPECT_EQ(jig->position()->fault, "a fault of no known code");
+  EXPECT_FAILS(jig->go_to(Pose::plus_x), ErrorCode::device_unavailable);
+  const Status released = jig->release();
+  EXPECT_FAILS(released, ErrorCode::device_unavailable);
+  EXPECT_EQ(released.error().what, "the jig is not free yet: a fault of no known code");
+}
+
+// docs/protocol.md: 1, 2, 3 ... 65535, 1 ...
+TEST(HidJig, After65535RequestsTheSequenceIs1Again) {
+  HidJigBench bench;
+  std::uint16_t last = 0;
+  const auto jig =
+      *HidJig::open(bench.changed([&](Message& request) { last = request.sequence; }, {}));
+  EXPECT_EQ(last, 1);
+  for (int request = 2; request <= 65'535; ++request) {
+    ASSERT_OK(jig->position());
+    ASSERT_EQ(last, request);
+  }
+  EXPECT_OK(jig->position());
+  EXPECT_EQ(last, 1);
+}
+
+TEST(HidJig, AnAddressThatNoJigHasIsUnavailable) {
+  MemoryEnv memory;
+  const auto unit = *tests::virtual_units().open("virtual:seed=7", memory.env);
+  JigRegistry jigs;
+  register_hid_jig(jigs);
+  const auto none = jigs.open("hid:NO-SUCH-JIG", memory.env, *unit);
+  EXPECT_FAILS(none, ErrorCode::device_unavailable);
+  EXPECT_THAT(none.error().what, HasSubstr("NO-SUCH-JIG"));
 }
 
 }  // namespace

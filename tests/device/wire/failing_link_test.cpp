@@ -1,12 +1,12 @@
 // A unit whose link breaks at any call: each operation says so or is complete, and a link that is
 // opened anew finds the unit as it was or as it was asked to be.
 #include <functional>
-#include <optional>
 
 #include <gtest/gtest.h>
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "device/breaking_link.h"
 #include "device/wire/made_bench.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
@@ -16,50 +16,10 @@ namespace sixpoint::device {
 namespace {
 
 using tests::Bench;
+using tests::Break;
+using tests::breaking;
 using tests::FailingFiles;
 using tests::record;
-
-// Both channels of a link count their calls here; one of them fails.
-struct Break {
-  std::optional<std::size_t> left;
-  bool happened = false;
-
-  Status next_call() {
-    if (!left || (*left)-- > 0) {
-      return {};
-    }
-    left.reset();
-    happened = true;
-    return fail(ErrorCode::device_unavailable, "the cable was pulled", {}, "plug it in");
-  }
-};
-
-class BreakingTransport final : public Transport {
- public:
-  BreakingTransport(std::unique_ptr<Transport> inner, std::shared_ptr<Break> broken)
-      : inner_(std::move(inner)), break_(std::move(broken)) {}
-  Status write(std::span<const std::uint8_t> bytes, std::chrono::nanoseconds time_out) override {
-    SIXPOINT_CHECK(break_->next_call());
-    return inner_->write(bytes, time_out);
-  }
-  Result<std::size_t> read(std::span<std::uint8_t> out,
-                           std::chrono::nanoseconds time_out) override {
-    SIXPOINT_CHECK(break_->next_call());
-    return inner_->read(out, time_out);
-  }
-  void cancel() override { inner_->cancel(); }
-
- private:
-  std::unique_ptr<Transport> inner_;
-  std::shared_ptr<Break> break_;
-};
-
-Link breaking(Bench& bench, const std::shared_ptr<Break>& broken) {
-  Link link = bench.link();
-  link.reports = std::make_unique<BreakingTransport>(std::move(link.reports), broken);
-  link.bulk = std::make_unique<BreakingTransport>(std::move(link.bulk), broken);
-  return link;
-}
 
 // Lets the first call of `operation` break the link, then the second ..., each on an open unit of
 // the same bench. `check` looks at the unit by a link of its own.
@@ -68,7 +28,7 @@ void each_call_breaks(Bench& bench, const std::function<Status(Unit&)>& operatio
   for (std::size_t call = 0;; ++call) {
     SCOPED_TRACE("call " + std::to_string(call));
     const auto broken = std::make_shared<Break>();
-    auto unit = *WireUnit::open(breaking(bench, broken));
+    auto unit = *WireUnit::open(breaking(bench.link(), broken));
     broken->left = call;
     const Status result = operation(*unit);
     if (!result) {
@@ -92,7 +52,7 @@ TEST(FailingLink, OpeningSaysThatTheUnitIsGone) {
   Bench bench;
   for (std::size_t call = 0;; ++call) {
     const auto broken = std::make_shared<Break>(Break{call});
-    const auto unit = WireUnit::open(breaking(bench, broken));
+    const auto unit = WireUnit::open(breaking(bench.link(), broken));
     if (unit) {
       EXPECT_FALSE(broken->happened);
       EXPECT_GT(call, 1U);

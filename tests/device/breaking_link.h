@@ -1,0 +1,64 @@
+// A link of which one call fails, as when a cable is pulled: for tests that let each call fail in
+// turn.
+//
+//   const auto broken = std::make_shared<Break>();
+//   Link link = breaking(mocks::link_to(plugged, false), broken);
+//   broken->left = 2;  // the third of the following calls fails, and no other
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "device/transport.h"
+
+namespace sixpoint::tests {
+
+// Both channels of a link count their calls here; one of them fails.
+struct Break {
+  std::optional<std::size_t> left;  // calls before the one that fails
+  ErrorCode code = ErrorCode::device_unavailable;
+  bool happened = false;
+
+  Status next_call() {
+    if (!left || (*left)-- > 0) {
+      return {};
+    }
+    left.reset();
+    happened = true;
+    return fail(code, "the cable was pulled", {}, "plug it in");
+  }
+};
+
+class BreakingTransport final : public device::Transport {
+ public:
+  BreakingTransport(std::unique_ptr<device::Transport> inner, std::shared_ptr<Break> broken)
+      : inner_(std::move(inner)), break_(std::move(broken)) {}
+  Status write(std::span<const std::uint8_t> bytes, std::chrono::nanoseconds time_out) override {
+    SIXPOINT_CHECK(break_->next_call());
+    return inner_->write(bytes, time_out);
+  }
+  Result<std::size_t> read(std::span<std::uint8_t> out,
+                           std::chrono::nanoseconds time_out) override {
+    SIXPOINT_CHECK(break_->next_call());
+    return inner_->read(out, time_out);
+  }
+  void cancel() override { inner_->cancel(); }
+
+ private:
+  std::unique_ptr<device::Transport> inner_;
+  std::shared_ptr<Break> break_;
+};
+
+inline device::Link breaking(device::Link link, const std::shared_ptr<Break>& broken) {
+  link.reports = std::make_unique<BreakingTransport>(std::move(link.reports), broken);
+  if (link.bulk) {
+    link.bulk = std::make_unique<BreakingTransport>(std::move(link.bulk), broken);
+  }
+  return link;
+}
+
+}  // namespace sixpoint::tests
