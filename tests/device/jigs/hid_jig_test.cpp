@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "base/memory_env.h"
-#include "device/breaking_link.h"
+#include "device/made_links.h"
 #include "device/made_units.h"
 #include "device/wire/payload.h"
 #include "expect_result.h"
@@ -34,24 +34,8 @@ struct HidJigBench {
     twin = std::make_shared<VirtualHidJig>(options, physics.get());
     jig = *HidJig::open(mocks::link_to_jig(twin, clock));
   }
-  // Each request and reply passes through a function, which may make another message of it.
-  using Change = std::function<void(Message&)>;
-  Link changed(const Change& request, const Change& reply) const {
-    const auto tamper = [](const Change& change) {
-      return [change](Bytes& bytes) {
-        if (const auto message = decode(bytes); message && change) {
-          Message other = *message;
-          change(other);
-          const Report report = encode(other);
-          bytes.assign(report.begin(), report.end());
-        }
-        return 1;
-      };
-    };
-    Link link = mocks::link_to_jig(twin, clock);
-    link.reports = std::make_unique<mocks::TamperingTransport>(std::move(link.reports),
-                                                               tamper(request), tamper(reply));
-    return link;
+  Link changed(const tests::Change& request, const tests::Change& reply) const {
+    return tests::changed(mocks::link_to_jig(twin, clock), request, reply);
   }
   std::shared_ptr<ManualClock> clock;
   std::shared_ptr<mocks::PluggedUnit> plugged;
@@ -371,7 +355,7 @@ TEST(HidJig, ARefusalIsSaidWithItsReason) {
 
 // Oracle: the state of the jig. A reply that belongs to nothing that was asked says another one.
 TEST(HidJig, RepliesToSomethingElseAreDropped) {
-  const std::vector<HidJigBench::Change> rows = {
+  const std::vector<tests::Change> rows = {
       [](Message& reply) { reply.kind = ReportKind::samples; },
       [](Message& reply) { reply.kind = ReportKind::request; },
       [](Message& reply) { ++reply.sequence; },

@@ -6,7 +6,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
-#include "device/breaking_link.h"
+#include "device/made_links.h"
 #include "device/wire/made_bench.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
@@ -59,6 +59,24 @@ TEST(FailingLink, OpeningSaysThatTheUnitIsGone) {
       return;
     }
     EXPECT_EQ(unit.error().code, ErrorCode::device_unavailable);
+  }
+}
+
+// Oracle: wire_unit.h: a request whose transfer failed is repeated, and what failed is counted.
+TEST(FailingLink, ATransferThatFailedOnceIsRepeated) {
+  Bench bench;
+  const CalibrationPage stored = *(*WireUnit::open(bench.link()))->read_calibration();
+  for (std::size_t call = 0;; ++call) {
+    SCOPED_TRACE("call " + std::to_string(call));
+    const auto broken = std::make_shared<Break>(Break{call, ErrorCode::io});
+    const auto unit = WireUnit::open(breaking(bench.link(), broken));
+    ASSERT_OK(unit);
+    EXPECT_EQ(*(*unit)->read_calibration(), stored);
+    EXPECT_EQ((*unit)->stream_statistics().failed_transfers, broken->happened ? 1U : 0U);
+    if (!broken->happened) {
+      EXPECT_GT(call, 20U) << "eleven chunks of a page, written and read";
+      break;
+    }
   }
 }
 

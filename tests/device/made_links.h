@@ -1,19 +1,22 @@
-// A link of which one call fails, as when a cable is pulled: for tests that let each call fail in
-// turn.
+// Links that break or lie.
 //
 //   const auto broken = std::make_shared<Break>();
 //   Link link = breaking(mocks::link_to(plugged, false), broken);
 //   broken->left = 2;  // the third of the following calls fails, and no other
+//   link = changed(std::move(link), {}, [](Message& reply) { reply.code = ReplyCode::busy; });
 #pragma once
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <utility>
 
 #include "device/transport.h"
+#include "device/wire/protocol.h"
+#include "mocks/inert/inert.h"
 
 namespace sixpoint::tests {
 
@@ -58,6 +61,26 @@ inline device::Link breaking(device::Link link, const std::shared_ptr<Break>& br
   if (link.bulk) {
     link.bulk = std::make_unique<BreakingTransport>(std::move(link.bulk), broken);
   }
+  return link;
+}
+
+// Each message to the device and from it passes through a function, which may make another one of
+// it; it goes on with the right CRC. A function may be empty.
+using Change = std::function<void(device::Message&)>;
+inline device::Link changed(device::Link link, const Change& on_write, const Change& on_read) {
+  const auto tamper = [](const Change& change) {
+    return [change](Bytes& bytes) {
+      if (const auto message = device::decode(bytes); message && change) {
+        device::Message other = *message;
+        change(other);
+        const device::Report report = device::encode(other);
+        bytes.assign(report.begin(), report.end());
+      }
+      return 1;
+    };
+  };
+  link.reports = std::make_unique<mocks::TamperingTransport>(std::move(link.reports),
+                                                             tamper(on_write), tamper(on_read));
   return link;
 }
 
