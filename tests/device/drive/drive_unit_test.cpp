@@ -126,5 +126,105 @@ TEST(DriveUnit, EachCallOfTheDiskMayFail) {
   });
 }
 
+// The unit records on while it is copied, or another log.bin is put in its place.
+TEST(DriveUnit, ALogThatChangesWhileItIsReadIsThrownAway) {
+  DriveBench bench;
+  const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
+  const RecordingInfo listed = unit->recordings()->front();
+  const Bytes log = *read_file(bench.memory.files, "usb/log.bin");
+  std::uint64_t reported = 0;
+  ASSERT_OK(unit->download(listed, bench.memory.files, "r.gt3x",
+                           [&](std::uint64_t bytes) { reported = bytes; }));
+  EXPECT_EQ(reported, log.size());
+  Bytes longer = log;
+  longer.push_back(0);
+  ASSERT_OK(write_file(bench.memory.files, "usb/log.bin", as_text(longer)));
+  const Status changed = unit->download(listed, bench.memory.files, "s.gt3x");
+  EXPECT_FAILS(changed, ErrorCode::bad_data);
+  EXPECT_EQ(changed.error().what, "log.bin changed while it was read");
+  EXPECT_FALSE(bench.memory.files.info("s.gt3x"));
+}
+
+// Oracle: unit.h, reconnect().
+TEST(DriveUnit, ReconnectingWaitsUntilTheSameUnitIsMountedAgain) {
+  DriveBench bench;
+  auto& files = bench.memory.files;
+  const auto unit = *bench.registry->open("drive:usb", bench.memory.env);
+  EXPECT_OK(unit->reconnect(std::chrono::seconds(1))) << "it was not away";
+  const Bytes info = *read_file(files, "usb/info.txt");
+  ASSERT_OK(files.remove("usb/info.txt"));
+  const auto began = unit->clock().elapsed();
+  const Status away = unit->reconnect(std::chrono::seconds(5));
+  EXPECT_FAILS(away, ErrorCode::device_unavailable);
+  EXPECT_EQ(away.error().what, "the unit's folder did not come back");
+  EXPECT_GE(unit->clock().elapsed() - began, std::chrono::seconds(5));
+  const Status stopped = unit->reconnect(std::chrono::seconds(5), []() -> Status {
+    return fail(ErrorCode::internal, "stopped", {}, "begin anew");
+  });
+  EXPECT_FAILS(stopped, ErrorCode::internal);
+  int looks = 0;
+  EXPECT_OK(unit->reconnect(std::chrono::seconds(5), [&]() -> Status {
+    return ++looks == 3 ? write_file(files, "usb/info.txt", as_text(info)) : Status{};
+  }));
+  EXPECT_EQ(looks, 3);
+  // Another unit ends the wait at once.
+  ASSERT_OK(files.remove("usb/info.txt"));
+  std::string other(as_text(info));
+  const std::string serial = unit->identity().serial;
+  other.replace(other.find(serial), serial.size(), "MOS2B99990001");
+  ASSERT_OK(write_file(files, "usb/info.txt", other));
+  const Status swapped = unit->reconnect(std::chrono::hours(1));
+  EXPECT_FAILS(swapped, ErrorCode::device_unavailable);
+  EXPECT_THAT(swapped.error().what, HasSubstr("is now MOS2B99990001"));
+  EXPECT_EQ(unit->identity().serial, serial);
+}
+
+// info.txt comes from the unit: whatever stands in it, the identity is one that can be shown.
+TEST(DriveUnit, WhatInfoSaysIsBroughtIntoItsLimits) {
+  DriveBench bench;
+  const auto identity_of = [&](const std::string& more) {
+    EXPECT_OK(bench.memory.files.make_folders("drive"));
+    EXPECT_OK(write_file(bench.memory.files, "drive/log.bin", ""));
+    if (bench.memory.files.info("drive/info.txt")) {
+      EXPECT_OK(bench.memory.files.remove("drive/info.txt"));
+    }
+    EXPECT_OK(write_file(bench.memory.files, "drive/info.txt",
+                         "Serial Number: MOS2A00000007\r\n" + more));
+    return (*bench.registry->open("drive:drive///", bench.memory.env))->identity();
+  };
+  const Identity bare = identity_of("");
+  EXPECT_EQ(bare.serial, "MOS2A00000007");
+  EXPECT_EQ(bare.firmware, "");
+  EXPECT_EQ(bare.battery_mv, 0) << "takes no command that needs charge";
+  EXPECT_EQ(bare.accel_scale_lsb_per_g, 256);
+  const Identity odd = identity_of(
+      "Firmware: 1.5 \x1b[2J\r\nDevice Type: wGT3X\xc3\xbf and so on and so on\r\n"
+      "Battery Voltage: 99999\r\nAcceleration Scale: 1e9\r\n");
+  EXPECT_EQ(odd.firmware, "1.5__[2J");
+  EXPECT_EQ(odd.model, "wGT3X___and_");
+  EXPECT_EQ(odd.battery_mv, 60'000);
+  EXPECT_LE(odd.accel_scale_lsb_per_g, 65'535);
+  EXPECT_GE(odd.accel_scale_lsb_per_g, 1);
+  const Identity low = identity_of("Battery Voltage: -1\r\nAcceleration Scale: 0.1\r\n");
+  EXPECT_EQ(low.battery_mv, 0);
+  EXPECT_GE(low.accel_scale_lsb_per_g, 1);
+}
+
+TEST(DriveUnit, AFileOrAnEmptyInfoIsNoUnit) {
+  DriveBench bench;
+  const auto open = [&](const char* address) {
+    return bench.registry->open(address, bench.memory.env);
+  };
+  EXPECT_FAILS(open("drive:usb/log.bin"), ErrorCode::no_input);
+  EXPECT_EQ(open("drive:///").error().where, "/") << "the name of a folder is left";
+  ASSERT_OK(bench.memory.files.make_folders("blank"));
+  ASSERT_OK(write_file(bench.memory.files, "blank/log.bin", ""));
+  ASSERT_OK(write_file(bench.memory.files, "blank/info.txt", ""));
+  EXPECT_FAILS(open("drive:blank"), ErrorCode::bad_data);
+  const auto unit = *open("drive:usb");
+  ASSERT_OK(bench.memory.files.remove("usb/log.bin"));
+  EXPECT_FAILS(unit->recordings(), ErrorCode::no_input);
+}
+
 }  // namespace
 }  // namespace sixpoint::device

@@ -255,5 +255,57 @@ TEST(Pcap, RefusesWhatItDoesNotReadAndSaysWhatItIs) {
   EXPECT_THAT(session_from_pcap(pcapng, {}).error().hint, HasSubstr("editcap -F pcap"));
 }
 
+// One packet of a capture is damaged: it is named, and no session is made of the rest.
+TEST(Pcap, APacketThatContradictsItselfIsNamed) {
+  const Session session = tests::made_session(2);
+  constexpr std::size_t kFirstPacket = 24;
+  constexpr std::size_t kFirstBody = kFirstPacket + 16;
+  struct Row {
+    std::uint32_t link_type;
+    std::size_t at;
+    Bytes bytes;
+    const char* what;
+  };
+  const Bytes most(8, 0xFF);
+  const std::vector<Row> rows = {
+      {220, kFirstPacket + 8, {63, 0, 0, 0}, "shorter than its header"},
+      {189, kFirstPacket + 8, {47, 0, 0, 0}, "shorter than its header"},
+      {249, kFirstPacket + 8, {1, 0, 0, 0}, "shorter than its header"},
+      {249, kFirstBody, {26, 0}, "shorter than its header"},
+      {249, kFirstBody, {255, 255}, "shorter than its header"},
+      {220, kFirstPacket + 4, {0x41, 0x42, 0x0F, 0}, "time cannot be"},    // 1 000 001 us
+      {220, kFirstBody + 16, most, "time cannot be"},                      // -1 s
+      {220, kFirstBody + 16, {0, 0, 0, 0, 1, 0, 0, 0}, "time cannot be"},  // 2^32 s
+      {220, kFirstBody + 24, {0xFF, 0xFF, 0xFF, 0xFF}, "time cannot be"},  // -1 us
+      {220, kFirstBody + 24, {0x41, 0x42, 0x0F, 0}, "time cannot be"},     // 1 000 001 us
+  };
+  for (const Row& row : rows) {
+    SCOPED_TRACE(std::to_string(row.link_type) + " at " + std::to_string(row.at));
+    Bytes bytes = captured(session, Form::microseconds, row.link_type, false).bytes;
+    ASSERT_OK(session_from_pcap(bytes, {}));
+    std::copy(row.bytes.begin(), row.bytes.end(),
+              bytes.begin() + static_cast<std::ptrdiff_t>(row.at));
+    const auto made = session_from_pcap(bytes, {});
+    EXPECT_FAILS(made, ErrorCode::bad_data);
+    EXPECT_THAT(made.error().what, HasSubstr(row.what));
+    EXPECT_EQ(made.error().where, "capture, packet 1");
+  }
+  EXPECT_THAT(
+      session_from_pcap(captured(session, Form::microseconds, 147, false).bytes, {}).error().what,
+      HasSubstr("link type 147 (another bus)"));
+}
+
+// The bus alone may be named: then the first unit on it is the one.
+TEST(Pcap, TheBusAloneMayBeNamed) {
+  const Bytes whole = captured(tests::made_session(2), Form::microseconds, 220, false).bytes;
+  PcapOptions named;
+  named.bus = 3;
+  EXPECT_EQ(session_from_pcap(whole, named)->device, "usb bus 3 device 9");
+  named.bus = 7;
+  const auto none = session_from_pcap(whole, named);
+  EXPECT_FAILS(none, ErrorCode::bad_data);
+  EXPECT_THAT(none.error().what, HasSubstr("no transfer of a unit"));
+}
+
 }  // namespace
 }  // namespace sixpoint::device

@@ -1,9 +1,10 @@
 #include "device/session/session.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
 #include "expect_result.h"
+#include "gt3x/recording_writer.h"
 #include "made_session.h"
 
 namespace sixpoint::device {
@@ -63,6 +64,84 @@ TEST(Session, LinesThatAreNoTransfersAreRefused) {
     SCOPED_TRACE(line);
     EXPECT_FAILS(parse_lines(line), ErrorCode::bad_data);
   }
+}
+
+// An archive whose parts are written here: each of the rows is a session but for one thing.
+TEST(Session, AnArchiveThatContradictsItselfIsRefusedByName) {
+  const std::string lines =
+      "{\"t_ns\":5,\"kind\":\"reopened\"}\n\n{\"t_ns\":7,\"kind\":\"reopened\"}\n";
+  const std::string back = "{\"t_ns\":5,\"kind\":\"reopened\"}\n{\"t_ns\":4,\"kind\":\"reopened\"}";
+  const std::string schema = R"("schema":"sixpoint/session/1")";
+  const std::string started = R"(,"started":"2020-09-13T12:26:40Z")";
+  const auto hash = [](const std::string& text) {
+    return R"(,"sha256":")" + to_hex(sha256(as_bytes(text))) + "\"";
+  };
+  const auto read = [](const std::string& head, const std::optional<std::string>& transfers) {
+    MemoryFiles files;
+    auto zip = *gt3x::RecordingWriter::create(files, "s.zip");
+    EXPECT_OK(zip.add("session.json", head));
+    if (transfers) {
+      EXPECT_OK(zip.add("transfers.jsonl", *transfers));
+    }
+    EXPECT_OK(zip.commit());
+    return read_session(files, "s.zip");
+  };
+  const auto whole = read("{" + schema + started + hash(lines) + "}", lines);
+  ASSERT_OK(whole);
+  EXPECT_EQ(whole->transfers.size(), 2U) << "an empty line is none";
+  EXPECT_EQ(whole->device, "");
+  EXPECT_FALSE(whole->truncated);
+  struct Row {
+    std::string head;
+    std::optional<std::string> transfers;
+    const char* what;
+  };
+  const std::string version = "no session of a version that this program reads";
+  const std::vector<Row> rows = {
+      {"no JSON", lines, version.c_str()},
+      {"[1]", lines, version.c_str()},
+      {R"({"schema":"sixpoint/session/2")" + started + hash(lines) + "}", lines, version.c_str()},
+      {"{" + schema + hash(lines) + "}", lines, "does not say when it began"},
+      {"{" + schema + R"(,"started":7)" + hash(lines) + "}", lines, "does not say when it began"},
+      {"{" + schema + R"(,"started":"today")" + hash(lines) + "}", lines, "today"},
+      {"{" + schema + started + hash(lines) + "}", std::nullopt, "holds no transfers.jsonl"},
+      {"{" + schema + started + "}", lines, "was changed after it was recorded"},
+      {"{" + schema + started + hash(lines) + "}", back, "was changed after it was recorded"},
+      {"{" + schema + started + hash(back) + "}", back, "time goes back"},
+  };
+  for (const Row& row : rows) {
+    const auto session = read(row.head, row.transfers);
+    EXPECT_FAILS(session, ErrorCode::bad_data);
+    EXPECT_THAT(session.error().what, testing::HasSubstr(row.what));
+  }
+  EXPECT_EQ(read(rows.back().head, back).error().where, "s.zip, transfer 2");
+}
+
+// What is compared where sessions are compared: every part of a transfer.
+TEST(Session, TransfersThatDifferInOnePartDiffer) {
+  const SessionTransfer one{SessionTransfer::Kind::to_device, SessionChannel::reports,
+                            std::chrono::nanoseconds(1), Bytes{1},
+                            Error{ErrorCode::io, "a", "b", "c"}};
+  std::vector<SessionTransfer> others(6, one);
+  others[0].kind = SessionTransfer::Kind::from_device;
+  others[1].channel = SessionChannel::bulk;
+  others[2].time = std::chrono::nanoseconds(2);
+  others[3].bytes = {2};
+  others[4].error.reset();
+  others[5].error->code = ErrorCode::bad_data;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    EXPECT_FALSE(one == others[i]) << i;
+    EXPECT_EQ(parse_lines(to_lines({others[i]}))->front(), others[i]) << "none is lost in the file";
+  }
+}
+
+TEST(Session, ATransferLargerThanAnyIsRefused) {
+  const auto line = [](std::size_t bytes) {
+    return R"({"t_ns":1,"kind":"in","channel":"bulk","hex":")" + std::string(2 * bytes, '0') +
+           "\"}";
+  };
+  EXPECT_OK(parse_lines(line(1U << 20U)));
+  EXPECT_FAILS(parse_lines(line((1U << 20U) + 1)), ErrorCode::bad_data);
 }
 
 }  // namespace

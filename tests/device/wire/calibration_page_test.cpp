@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/calibration_section.h"
 #include "base/env.h"
 #include "expect_result.h"
 #include "gt3x/recording.h"
@@ -83,6 +84,38 @@ TEST(CalibrationPage, RefusesToWriteWhatCannotBe) {
   page = page_of_450();
   page.calibrated = from_unix_seconds(0);
   EXPECT_FAILS(encode_calibration_page(page), ErrorCode::configuration);
+}
+
+// A section with a right CRC, whose content no calibration gives: a unit must not look calibrated.
+TEST(CalibrationPage, AWholeSectionWithoutAValidCalibrationIsRefused) {
+  Bytes bytes(kPageBytes, 0xFF);
+  write_calibration_section({page_of_450().constants, {}}, bytes);
+  const auto undated = decode_calibration_page(bytes);
+  EXPECT_FAILS(undated, ErrorCode::bad_data);
+  EXPECT_EQ(undated.error().what, "the page's date does not exist");
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    StoredConstants constants = page_of_450().constants;
+    constants.positive_lsb[axis] = constants.negative_lsb[axis];
+    write_calibration_section({constants, page_of_450().calibrated}, bytes);
+    const auto flat = decode_calibration_page(bytes);
+    EXPECT_FAILS(flat, ErrorCode::bad_data);
+    EXPECT_NE(flat.error().hint.find("calibrate it on the jig"), std::string::npos);
+  }
+}
+
+// The page holds the years 2000 to 2255.
+TEST(CalibrationPage, ADateOutsideOfThePageIsNotWritten) {
+  using namespace std::chrono_literals;
+  const auto at = [](std::chrono::sys_days day) {
+    CalibrationPage page = page_of_450();
+    page.calibrated = UtcTime(day);
+    return page;
+  };
+  EXPECT_FAILS(encode_calibration_page(at(1999y / 12 / 31)), ErrorCode::configuration);
+  EXPECT_FAILS(encode_calibration_page(at(2256y / 1 / 1)), ErrorCode::configuration);
+  for (const auto& page : {at(2000y / 1 / 1), at(2255y / 12 / 31)}) {
+    EXPECT_EQ(*decode_calibration_page(*encode_calibration_page(page)), page);
+  }
 }
 
 }  // namespace

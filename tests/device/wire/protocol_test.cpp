@@ -1,6 +1,7 @@
 #include "device/wire/protocol.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include "base/crc_ccitt.h"
 #include "base/random.h"
@@ -183,6 +184,46 @@ TEST(Samples, ColderThanAbsoluteZeroIsDamage) {
   message.payload[12] = 0xFF;
   message.payload[13] = 0x80;
   EXPECT_FAILS(decode_samples(message), ErrorCode::bad_data);
+}
+
+// A block with a right CRC (zlib's, as the header says) and one wrong field.
+TEST(Protocol, ABulkBlockWithAWrongHeaderIsRefused) {
+  struct Row {
+    std::size_t at;
+    std::uint8_t value;
+  };
+  const Bytes whole = encode_bulk({7, true, 4096, Bytes(100, 0x11)});
+  const auto with = [&](const Row& row) {
+    Bytes bytes(whole.begin(), whole.end() - 4);
+    bytes[row.at] = row.value;
+    const auto crc = ::crc32(0, bytes.data(), static_cast<unsigned>(bytes.size()));
+    for (unsigned shift = 0; shift < 32; shift += 8) {
+      bytes.push_back(static_cast<std::uint8_t>((crc >> shift) & 0xFFU));
+    }
+    return bytes;
+  };
+  EXPECT_EQ(with({0, 'S'}), whole);
+  for (const Row& row : {Row{0, 's'}, Row{3, '2'}, Row{16, 0}, Row{16, 99}, Row{16, 101}}) {
+    const auto block = decode_bulk(with(row));
+    EXPECT_FAILS(block, ErrorCode::bad_data);
+    EXPECT_EQ(block.error().what, "a bulk block's header makes no sense") << row.at;
+  }
+}
+
+TEST(Protocol, WhatIsOfAnotherKindIsNotTakenForSamplesOrAFilter) {
+  SampleBlock block;
+  block.counts.assign(2, RawCounts{});
+  Message message = encode_samples(block);
+  EXPECT_OK(decode_samples(message));
+  message.kind = ReportKind::reply;
+  EXPECT_FAILS(decode_samples(message), ErrorCode::bad_data);
+  EXPECT_FAILS(decode_filter(Bytes{0, 2}), ErrorCode::bad_data);
+  Identity identity;
+  identity.serial = "MOS2A45130450";
+  identity.version = 0;
+  EXPECT_FAILS(decode_identity(encode_identity(identity)), ErrorCode::bad_data);
+  EXPECT_EQ(to_string(static_cast<Command>(77)), "unknown");
+  EXPECT_EQ(to_string(static_cast<ReplyCode>(77)), "unknown code");
 }
 
 }  // namespace
