@@ -120,14 +120,6 @@ bool passes(const DiscoveryFilter& filter, const AttachedDevice& device) {
          (filter.serial.empty() || device.serial == filter.serial);
 }
 
-Result<Udev> open_udev() {
-  Udev context(udev_new());
-  if (!context) {
-    return fail(ErrorCode::io, "udev does not answer", "/sys", "is /sys mounted?");
-  }
-  return context;
-}
-
 std::string names(const std::vector<AttachedDevice>& devices) {
   std::vector<std::string> list;
   list.reserve(devices.size());
@@ -145,7 +137,7 @@ bool AttachedDevice::complete() const {
 }
 
 Result<std::vector<AttachedDevice>> attached_devices(const DiscoveryFilter& filter) {
-  SIXPOINT_ASSIGN(const Udev context, open_udev());
+  const Udev context(udev_new());
   std::vector<AttachedDevice> devices;
   SIXPOINT_ASSIGN(const auto hidraw, hidraw_nodes(context.get()));
   SIXPOINT_CHECK(for_each(context.get(), "usb", [&](udev_device* device) {
@@ -218,7 +210,7 @@ Status check_access(const AttachedDevice& device) {
 }
 
 Result<std::string> mount_point(const AttachedDevice& device) {
-  SIXPOINT_ASSIGN(const Udev context, open_udev());
+  const Udev context(udev_new());
   std::vector<std::string> nodes;  // of the disk and of its partitions
   SIXPOINT_CHECK(for_each(context.get(), "block", [&](udev_device* block) {
     udev_device* usb = usb_parent(block, "usb_device");

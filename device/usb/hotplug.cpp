@@ -15,19 +15,17 @@ using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
 
 struct HotplugWatch::Monitor {
+  struct Unref {
+    void operator()(udev* context) const { udev_unref(context); }
+    void operator()(udev_monitor* monitor) const { udev_monitor_unref(monitor); }
+  };
   ~Monitor() {
-    if (monitor != nullptr) {
-      udev_monitor_unref(monitor);
-    }
-    if (context != nullptr) {
-      udev_unref(context);
-    }
     if (cancel_fd >= 0) {
       ::close(cancel_fd);
     }
   }
-  udev* context = nullptr;
-  udev_monitor* monitor = nullptr;
+  std::unique_ptr<udev, Unref> context{udev_new()};
+  std::unique_ptr<udev_monitor, Unref> events;
   int cancel_fd = -1;
   bool cancelled = false;
 };
@@ -40,16 +38,13 @@ HotplugWatch::~HotplugWatch() = default;
 Result<std::unique_ptr<HotplugWatch>> HotplugWatch::start(DiscoveryFilter filter) {
   auto monitor = std::make_unique<Monitor>();
   monitor->cancel_fd = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  monitor->context = udev_new();
-  if (monitor->context == nullptr || monitor->cancel_fd < 0) {
-    return fail(ErrorCode::io, "udev does not answer", "/sys", "is /sys mounted?");
-  }
   // "udev": events come when udevd is done with the device, and its access policy is in force.
-  monitor->monitor = udev_monitor_new_from_netlink(monitor->context, "udev");
-  if (monitor->monitor == nullptr ||
-      udev_monitor_filter_add_match_subsystem_devtype(monitor->monitor, "usb", "usb_device") < 0 ||
-      udev_monitor_filter_add_match_subsystem_devtype(monitor->monitor, "hidraw", nullptr) < 0 ||
-      udev_monitor_enable_receiving(monitor->monitor) < 0) {
+  monitor->events.reset(udev_monitor_new_from_netlink(monitor->context.get(), "udev"));
+  udev_monitor* const events = monitor->events.get();
+  if (monitor->cancel_fd < 0 || events == nullptr ||
+      udev_monitor_filter_add_match_subsystem_devtype(events, "usb", "usb_device") < 0 ||
+      udev_monitor_filter_add_match_subsystem_devtype(events, "hidraw", nullptr) < 0 ||
+      udev_monitor_enable_receiving(events) < 0) {
     return fail(ErrorCode::io, "udev's events cannot be received", "netlink",
                 "does this machine or container allow netlink sockets?");
   }
@@ -60,9 +55,7 @@ Result<std::unique_ptr<HotplugWatch>> HotplugWatch::start(DiscoveryFilter filter
 
 Status HotplugWatch::scan() {
   SIXPOINT_ASSIGN(auto now, attached_devices(filter_));
-  now.erase(std::remove_if(now.begin(), now.end(),
-                           [](const AttachedDevice& device) { return !device.complete(); }),
-            now.end());
+  std::erase_if(now, [](const AttachedDevice& device) { return !device.complete(); });
   const auto is_in = [](const std::vector<AttachedDevice>& list, const AttachedDevice& device) {
     return std::find(list.begin(), list.end(), device) != list.end();
   };
@@ -90,8 +83,8 @@ Result<std::optional<HotplugEvent>> HotplugWatch::next(nanoseconds time_out) {
       return std::nullopt;
     }
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(std::min(left, kScanInterval));
-    std::array<pollfd, 2> wake = {
-        {{udev_monitor_get_fd(monitor_->monitor), POLLIN, 0}, {monitor_->cancel_fd, POLLIN, 0}}};
+    std::array<pollfd, 2> wake = {{{udev_monitor_get_fd(monitor_->events.get()), POLLIN, 0},
+                                   {monitor_->cancel_fd, POLLIN, 0}}};
     if (::poll(wake.data(), wake.size(), static_cast<int>(wait.count())) < 0 && errno != EINTR) {
       return fail(ErrorCode::io, "udev's events cannot be received", "netlink", "try again");
     }
@@ -100,12 +93,12 @@ Result<std::optional<HotplugEvent>> HotplugWatch::next(nanoseconds time_out) {
       break;
     }
     // Events that came together make one scan.
-    while (udev_device* device = udev_monitor_receive_device(monitor_->monitor)) {
+    while (udev_device* device = udev_monitor_receive_device(monitor_->events.get())) {
       udev_device_unref(device);
     }
     SIXPOINT_CHECK(scan());
   }
-  if (monitor_->cancelled || events_.empty()) {
+  if (monitor_->cancelled) {
     return std::nullopt;
   }
   std::optional<HotplugEvent> event(std::move(events_.front()));

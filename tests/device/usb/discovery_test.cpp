@@ -9,6 +9,7 @@
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
 #include "mocks/in_process/in_process.h"
+#include "open_files_limit.h"
 
 namespace sixpoint::device {
 namespace {
@@ -37,6 +38,24 @@ TEST(Discovery, ADeviceIsCompleteWithTheNodesOfItsKind) {
   EXPECT_TRUE(files.complete()) << "has no HID interface";
   monitor.hidraw_node = "/dev/hidraw0";
   EXPECT_TRUE(monitor.complete());
+}
+
+TEST(Discovery, AProgramWithTooManyOpenFilesIsToldSo) {
+  const auto each = [](const auto& operation) {
+    int refused = 0;
+    for (;; ++refused) {
+      const tests::OpenFilesLimit limit(refused);
+      const auto result = operation();
+      if (result) {
+        break;
+      }
+      EXPECT_FAILS(result, ErrorCode::io);
+      ASSERT_LT(refused, 100);
+    }
+    EXPECT_GE(refused, 1);
+  };
+  each([] { return attached_devices(); });
+  each([] { return mount_point({}); });
 }
 
 // Another unit may be plugged in between finding a device and opening it.
