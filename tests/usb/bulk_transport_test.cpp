@@ -9,11 +9,12 @@
 #include <thread>
 #include <vector>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "base/sha256.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
+#include "mocks/usb/usb_jig.h"
 #include "temporary_folder.h"
 #include "usb/misbehaving.h"
 #include "usb/plugged.h"
@@ -182,6 +183,99 @@ TEST_F(BulkTransport, ASecondOpenerIsToldThatTheInterfaceIsTaken) {
 TEST_F(BulkTransport, WhereNoDeviceIsThereIsNothingToOpen) {
   EXPECT_FAILS(device::open_bulk_transport({99, 99}, "/dev/bus/usb/099/099"),
                ErrorCode::device_unavailable);
+}
+
+// What the device does not take is said, and what it takes later goes through as before.
+TEST_F(BulkTransport, WhatTheDeviceDoesNotTakeIsAnIoError) {
+  std::atomic<UsbAnswer::Kind> answer = UsbAnswer::Kind::stall;
+  wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    return endpoint == device::kBulkOutEndpoint ? std::optional(UsbAnswer{answer, {}})
+                                                : std::nullopt;
+  };
+  auto bulk = open_bulk();
+  ASSERT_OK(bulk);
+  const Status stalled = (*bulk)->write(Bytes(100), seconds(5));
+  EXPECT_FAILS(stalled, ErrorCode::io);
+  EXPECT_THAT(stalled.error().what, testing::HasSubstr("stalled"));
+  answer = UsbAnswer::Kind::nothing_yet;
+  for (int i = 0; i < 2; ++i) {
+    const Status silent = (*bulk)->write(Bytes(100), milliseconds(20));
+    EXPECT_FAILS(silent, ErrorCode::io);
+    EXPECT_THAT(silent.error().what, testing::HasSubstr("did not take it in time"));
+  }
+  answer = UsbAnswer::Kind::done;
+  EXPECT_OK((*bulk)->write(Bytes(100), seconds(5)));
+  EXPECT_OK((*bulk)->write(Bytes(), seconds(5))) << "a packet without bytes";
+}
+
+TEST_F(BulkTransport, AfterUnpluggingNothingIsReadOrWritten) {
+  auto bulk = open_bulk();
+  ASSERT_OK(bulk);
+  Bytes buffer(device::kBulkBlockBytes);
+  EXPECT_EQ(*(*bulk)->read(buffer, milliseconds(1)), 0U);
+  bus->unplug(nodes.port);
+  EXPECT_FAILS((*bulk)->write(Bytes(10), seconds(5)), ErrorCode::device_unavailable);
+  // One answer for each transfer that was under way, and then for each that cannot be any more.
+  for (int i = 0; i < 2 * device::BulkTransportOptions{}.transfers; ++i) {
+    EXPECT_FAILS((*bulk)->read(buffer, seconds(5)), ErrorCode::device_unavailable);
+  }
+}
+
+TEST_F(BulkTransport, AfterCancelNothingIsReadOrWritten) {
+  std::atomic<int> asked = 0;
+  wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    asked += endpoint == device::kBulkOutEndpoint ? 1 : 0;
+    return endpoint == device::kBulkOutEndpoint ? std::optional(UsbAnswer::nothing_yet())
+                                                : std::nullopt;
+  };
+  auto bulk = open_bulk();
+  ASSERT_OK(bulk);
+  auto writing = std::async(std::launch::async,
+                            [&] { return (*bulk)->write(Bytes(100), std::chrono::hours(1)); });
+  while (asked == 0) {
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  (*bulk)->cancel();
+  EXPECT_FAILS(writing.get(), ErrorCode::device_unavailable);
+  Bytes buffer(device::kBulkBlockBytes);
+  EXPECT_FAILS((*bulk)->read(buffer, seconds(5)), ErrorCode::device_unavailable);
+  EXPECT_FAILS((*bulk)->write(Bytes(100), seconds(5)), ErrorCode::device_unavailable);
+}
+
+// A jig has reports and nothing else.
+TEST_F(BulkTransport, ADeviceWithoutABulkInterfaceIsRefusedByName) {
+  wilful->own_descriptors = mocks::UsbJig({}, nullptr, unit.clock).descriptors();
+  ASSERT_OK(bus->plug_in(wilful));
+  device::DiscoveryFilter jigs;
+  jigs.product_ids = {device::kJigProductId};
+  const auto found = device::attached_devices(jigs);
+  ASSERT_OK(found);
+  const auto bulk =
+      device::open_bulk_transport({found->at(0).bus, found->at(0).address}, "the node");
+  EXPECT_FAILS(bulk, ErrorCode::bad_data);
+  EXPECT_EQ(bulk.error().what, "the device has no bulk interface");
+}
+
+// At least one transfer is under way, whatever the options say.
+TEST_F(BulkTransport, WithoutTransfersInItsOptionsItReadsOneAtATime) {
+  std::atomic<int> left = 3;
+  wilful->on_in = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    if (endpoint != device::kBulkInEndpoint) {
+      return std::nullopt;
+    }
+    return left-- > 0 ? UsbAnswer::done(Bytes(10, 7)) : UsbAnswer::nothing_yet();
+  };
+  ASSERT_OK(bus->plug_in(wilful));
+  const auto found = device::attached_devices();
+  ASSERT_OK(found);
+  auto bulk =
+      device::open_bulk_transport({found->at(0).bus, found->at(0).address}, "the node", {0});
+  ASSERT_OK(bulk);
+  Bytes buffer(device::kBulkBlockBytes);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(*(*bulk)->read(buffer, seconds(5)), 10U);
+  }
+  EXPECT_EQ(*(*bulk)->read(buffer, milliseconds(1)), 0U);
 }
 
 }  // namespace

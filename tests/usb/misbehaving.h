@@ -20,7 +20,9 @@ class Wilful final : public mocks::UsbDevice {
  public:
   explicit Wilful(std::shared_ptr<mocks::UsbDevice> inner) : inner_(std::move(inner)) {}
 
-  const mocks::UsbDescriptors& descriptors() const override { return inner_->descriptors(); }
+  const mocks::UsbDescriptors& descriptors() const override {
+    return own_descriptors ? *own_descriptors : inner_->descriptors();
+  }
   Clock& clock() override { return inner_->clock(); }
   mocks::UsbAnswer control(const mocks::SetupPacket& setup,
                            std::span<const std::uint8_t> data) override {
@@ -46,6 +48,7 @@ class Wilful final : public mocks::UsbDevice {
   // Called by the carrier's threads; set before the device is plugged in.
   std::function<std::optional<mocks::UsbAnswer>(std::uint8_t)> on_out;
   std::function<std::optional<mocks::UsbAnswer>(std::uint8_t)> on_in;
+  std::optional<mocks::UsbDescriptors> own_descriptors;  // instead of the unit's
   std::atomic<int> cleared_halts = 0;
 
  private:
