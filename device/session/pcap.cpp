@@ -191,13 +191,14 @@ std::optional<SessionTransfer> transfer_of(const Packet& packet) {
   return transfer;
 }
 
-// Collects the transfers of one device: the named one, or the first that sends or gets a report.
+// Collects the transfers of one device: the named one, or where its bus or its number is not named,
+// the first that fits and sends or gets a report.
 class Collector {
  public:
   explicit Collector(const PcapOptions& options) : bus_(options.bus), device_(options.device) {}
 
   void take(const Packet& packet) {
-    if (!device_ && is_report(packet.data) && (!bus_ || packet.bus == *bus_)) {
+    if (!is_chosen() && may_be_it(packet) && is_report(packet.data)) {
       bus_ = packet.bus;
       device_ = packet.device;
       for (const Packet& earlier : before_) {
@@ -206,7 +207,7 @@ class Collector {
       before_.clear();
     }
     constexpr std::size_t kMostBefore = 100'000;
-    if (device_) {
+    if (is_chosen()) {
       keep(packet);
     } else if (before_.size() < kMostBefore) {
       before_.push_back(packet);
@@ -218,14 +219,21 @@ class Collector {
       return broken_capture(
           "the capture holds no transfer of a unit; name it with --bus and --device-number");
     }
-    session_.device = fmt::format("usb bus {} device {}", bus_.value_or(0), device_.value_or(0));
+    session_.device = fmt::format("usb bus {} device {}", *bus_, *device_);
     session_.started = UtcTime(*start_);
     return std::move(session_);
   }
 
  private:
+  // A device has its number on its bus alone.
+  bool is_chosen() const { return bus_ && device_; }
+  bool may_be_it(const Packet& packet) const {
+    return packet.bus == bus_.value_or(packet.bus) &&
+           packet.device == device_.value_or(packet.device);
+  }
+
   void keep(const Packet& packet) {
-    if ((bus_ && packet.bus != *bus_) || packet.device != *device_) {
+    if (!may_be_it(packet)) {
       return;
     }
     auto transfer = transfer_of(packet);

@@ -18,7 +18,8 @@
 namespace sixpoint::device {
 
 struct PcapOptions {
-  // The device. Without it: the first one that sends or gets a whole report of the protocol.
+  // The device. Where one of the two is missing: the first one with the other that sends or gets a
+  // whole report of the protocol.
   std::optional<std::uint16_t> bus;
   std::optional<std::uint16_t> device;
 };

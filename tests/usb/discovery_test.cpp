@@ -76,8 +76,7 @@ TEST_F(UsbDiscovery, AUnitWithoutASerialNumberIsNamedByItsPort) {
   ASSERT_OK(bus->plug_in(wilful, "1-2"));
   const auto several = device::find_device({}, clock);
   EXPECT_FAILS(several, ErrorCode::usage);
-  EXPECT_EQ(several.error().hint,
-            "name one by its serial number: " + unit.serial + ", port 1-3");
+  EXPECT_EQ(several.error().hint, "name one by its serial number: " + unit.serial + ", port 1-3");
 }
 
 // Other makers' devices have no model of ours, also with one of our product ids.

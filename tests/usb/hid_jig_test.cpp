@@ -33,8 +33,8 @@ class UsbHidJig : public Misbehaving {
 
 TEST_F(UsbHidJig, IsOpenedByItsSerialNumberAndTurns) {
   const auto clock = std::make_shared<LeapingClock>();
-  auto jig_nodes = bus->plug_in(
-      std::make_shared<mocks::UsbJig>(mocks::VirtualHidJigOptions{}, nullptr, clock));
+  auto jig_nodes =
+      bus->plug_in(std::make_shared<mocks::UsbJig>(mocks::VirtualHidJigOptions{}, nullptr, clock));
   ASSERT_OK(jig_nodes);
   EXPECT_FAILS(open_jig("hid:J999999"), ErrorCode::device_unavailable);
   for (const char* address : {"hid:J600001", "hid:"}) {

@@ -295,9 +295,16 @@ TEST(Pcap, APacketThatContradictsItselfIsNamed) {
       HasSubstr("link type 147 (another bus)"));
 }
 
-// The bus alone may be named: then the first unit on it is the one.
-TEST(Pcap, TheBusAloneMayBeNamed) {
-  const Bytes whole = captured(tests::made_session(2), Form::microseconds, 220, false).bytes;
+// A bus or a number alone names the first unit that has it. Each bus has its own device 9.
+TEST(Pcap, TheBusOrTheNumberAloneMayBeNamed) {
+  const Session session = tests::made_session(2);
+  const Bytes whole = captured(session, Form::microseconds, 220, false).bytes;
+  PcapOptions numbered;
+  numbered.device = 9;
+  const auto made = session_from_pcap(whole, numbered);
+  ASSERT_OK(made);
+  EXPECT_EQ(made->device, "usb bus 3 device 9");
+  EXPECT_EQ(made->transfers.size(), session.transfers.size()) << "the other bus has its own 9";
   PcapOptions named;
   named.bus = 3;
   EXPECT_EQ(session_from_pcap(whole, named)->device, "usb bus 3 device 9");
