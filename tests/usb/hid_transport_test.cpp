@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -143,6 +144,42 @@ TEST_F(HidTransport, AfterCancelNothingIsReadOrWritten) {
   ASSERT_OK(reports);
   (*reports)->cancel();
   Bytes buffer(device::kReportBytes);
+  EXPECT_FAILS((*reports)->read(buffer, seconds(5)), ErrorCode::device_unavailable);
+  EXPECT_FAILS((*reports)->write(Bytes(64), seconds(5)), ErrorCode::device_unavailable);
+}
+
+// A file that is there, and is no device: as one that was unplugged while it was opened.
+TEST_F(HidTransport, ANodeOfAnotherKindIsUnavailable) {
+  const auto opened = device::open_hid_transport("/dev/null");
+  EXPECT_FAILS(opened, ErrorCode::device_unavailable);
+  EXPECT_EQ(opened.error().where, "/dev/null");
+}
+
+// Another thread ends the write that waits for a device that takes nothing.
+TEST_F(HidTransport, CancelEndsAWriteThatWaits) {
+  std::atomic<int> asked = 0;
+  wilful->on_out = [&](std::uint8_t endpoint) -> std::optional<UsbAnswer> {
+    asked += endpoint == device::kHidOutEndpoint ? 1 : 0;
+    return endpoint == device::kHidOutEndpoint ? std::optional(UsbAnswer::nothing_yet())
+                                               : std::nullopt;
+  };
+  auto reports = open_reports();
+  ASSERT_OK(reports);
+  auto writing = std::async(std::launch::async,
+                            [&] { return (*reports)->write(Bytes(64), std::chrono::hours(1)); });
+  while (asked == 0) {
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  (*reports)->cancel();
+  EXPECT_FAILS(writing.get(), ErrorCode::device_unavailable);
+}
+
+TEST_F(HidTransport, AfterUnpluggingNothingIsReadOrWritten) {
+  auto reports = open_reports();
+  ASSERT_OK(reports);
+  bus->unplug(nodes.port);
+  Bytes buffer(device::kReportBytes);
+  EXPECT_FAILS((*reports)->read(buffer, std::chrono::hours(1)), ErrorCode::device_unavailable);
   EXPECT_FAILS((*reports)->read(buffer, seconds(5)), ErrorCode::device_unavailable);
   EXPECT_FAILS((*reports)->write(Bytes(64), seconds(5)), ErrorCode::device_unavailable);
 }

@@ -316,5 +316,51 @@ TEST(SessionJournal, RecoveringAndReadingMayFailAtEachCall) {
   }
 }
 
+// It may be anybody's file: it is not made into a session, and not removed.
+TEST(SessionJournal, AFileThatBeginsOtherwiseIsNoJournal) {
+  const std::string schema = R"("schema":"sixpoint/session-journal/1")";
+  const std::string started = R"("started":"2020-09-13T12:26:40Z")";
+  const auto recover = [](MemoryFiles& files, const std::string& first_line) {
+    EXPECT_OK(write_file(files, "s.zip.journal", first_line + "\n"));
+    return recover_session(files, "s.zip.journal", "s.zip");
+  };
+  MemoryFiles whole_one;
+  EXPECT_OK(recover(whole_one, "{" + schema + "," + started + "}"));
+  EXPECT_EQ(read_session(whole_one, "s.zip")->device, "") << "it may lack the device's name";
+  for (const std::string& line :
+       {std::string(), std::string("no JSON"), std::string("[1]"), "{" + started + "}",
+        R"({"schema":1,)" + started + "}", R"({"schema":"sixpoint/session/1",)" + started + "}",
+        "{" + schema + "}", "{" + schema + R"(,"started":5})",
+        "{" + schema + R"(,"started":"x"})"}) {
+    SCOPED_TRACE(line);
+    MemoryFiles files;
+    const auto recovered = recover(files, line);
+    EXPECT_FAILS(recovered, ErrorCode::bad_data);
+    EXPECT_EQ(recovered.error().what, "this is no journal of a session");
+    EXPECT_TRUE(files.info("s.zip.journal"));
+    EXPECT_FALSE(files.info("s.zip"));
+  }
+}
+
+// Bytes of an older file may look like a transfer: one that was before the last is none of these.
+TEST(SessionJournal, ATransferThatGoesBackInTimeEndsIt) {
+  MemoryFiles files;
+  auto journal = *SessionJournal::create(files, "s.zip");
+  ASSERT_OK(journal.begin("virtual:", UtcTime{}));
+  SessionTransfer transfer{SessionTransfer::Kind::from_device,
+                           SessionChannel::bulk,
+                           std::chrono::nanoseconds(5),
+                           Bytes{1},
+                           {}};
+  ASSERT_OK(journal.append(transfer));
+  transfer.time = std::chrono::nanoseconds(4);
+  ASSERT_OK(journal.append(transfer));
+  const auto recovered = recover_session(files, "s.zip.journal", "s.zip");
+  ASSERT_OK(recovered);
+  EXPECT_EQ(recovered->head.transfers, 1U);
+  EXPECT_GT(recovered->dropped_bytes, 0U);
+  EXPECT_EQ(read_session(files, "s.zip")->transfers.size(), 1U);
+}
+
 }  // namespace
 }  // namespace sixpoint::device

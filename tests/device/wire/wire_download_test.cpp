@@ -1,4 +1,5 @@
 // Downloads of a WireUnit: what is saved is what the unit holds, or nothing is.
+#include <functional>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -6,6 +7,7 @@
 #include "base/atomic_file.h"
 #include "base/memory_env.h"
 #include "base/sha256.h"
+#include "device/made_links.h"
 #include "device/wire/made_bench.h"
 #include "device/wire/wire_unit.h"
 #include "expect_result.h"
@@ -186,6 +188,85 @@ TEST(WireDownload, SilenceOnTheBulkChannelEndsTheDownload) {
   EXPECT_NE(came.error().what.find("stopped at byte 0 of " + std::to_string(info.bytes)),
             std::string::npos)
       << came.error().what;
+  EXPECT_FALSE(env.files.info("x.gt3x"));
+}
+
+TEST(WireDownload, AnOfferOfAnotherLengthIsRefused) {
+  const std::vector<tests::Change> rows = {[](Message& reply) { reply.payload[0] ^= 1; },
+                                           [](Message& reply) { reply.payload.pop_back(); }};
+  for (const tests::Change& row : rows) {
+    Bench bench;
+    const auto unit = *WireUnit::open(tests::changed(bench.link(), {}, [&](Message& reply) {
+      if (reply.command == Command::download) {
+        row(reply);
+      }
+    }));
+    const RecordingInfo info = record(bench, *unit, 60);
+    MemoryEnv env;
+    const Status came = unit->download(info, env.files, "x.gt3x");
+    EXPECT_FAILS(came, ErrorCode::bad_data);
+    EXPECT_EQ(came.error().what, "the unit offers another length than its list says");
+    EXPECT_FALSE(env.files.info("x.gt3x"));
+  }
+}
+
+// Oracle: the unit's own bytes. A whole block, with a right CRC, that belongs elsewhere: before the
+// first right one of a request it is left over from an earlier one, and later the rest is asked for
+// again. More blocks are in no pipe than the 64 that are dropped: then too.
+TEST(WireDownload, BlocksThatBelongElsewhereAreDropped) {
+  const auto forged = [](const Bytes& bytes, const std::function<void(BulkBlock&)>& change) {
+    BulkBlock block = *decode_bulk(bytes);
+    change(block);
+    return encode_bulk(block);
+  };
+  const Bytes too_long(kBulkContentBytes, 0xEE);
+  const std::vector<std::function<void(BulkBlock&)>> rows = {
+      [](BulkBlock& block) { ++block.recording; },
+      [](BulkBlock& block) { ++block.offset; },
+      [&](BulkBlock& block) { block.content = too_long; },
+  };
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    for (const int times : {1, 70}) {
+      for (const int at : {0, 1}) {
+        SCOPED_TRACE(testing::Message() << row << ", " << times << " times, at block " << at);
+        Bench bench;
+        Link link = bench.link();
+        int number = 0;
+        link.bulk =
+            std::make_unique<TamperingTransport>(std::move(link.bulk), nullptr, [&](Bytes& bytes) {
+              // The last block is the one that must not be longer than what is left.
+              const bool now =
+                  row == 2 ? decode_bulk(bytes)->last && number++ == 0 : number++ == at;
+              if (now) {
+                bytes = forged(bytes, rows[row]);
+              }
+              return now ? times : 1;
+            });
+        const auto unit = *WireUnit::open(std::move(link));
+        const RecordingInfo info = record(bench, *unit, 600);
+        ASSERT_GT(info.bytes, 3 * kBulkContentBytes);
+        MemoryEnv env;
+        ASSERT_OK(unit->download(info, env.files, "x.gt3x"));
+        EXPECT_EQ(*read_file(env.files, "x.gt3x"), bench.plugged->unit.recordings()[0]);
+      }
+    }
+  }
+}
+
+// A unit that sends nothing but other blocks does not keep the station for ever.
+TEST(WireDownload, AFloodOfOtherBlocksEndsTheDownload) {
+  Bench bench;
+  Link link = bench.link();
+  const Bytes other = encode_bulk({99, false, 0, Bytes(1000, 0xEE)});
+  link.bulk =
+      std::make_unique<TamperingTransport>(std::move(link.bulk), nullptr, [&](Bytes& bytes) {
+        bytes = other;
+        return 100;
+      });
+  const auto unit = *WireUnit::open(std::move(link));
+  const RecordingInfo info = record(bench, *unit, 600);
+  MemoryEnv env;
+  EXPECT_FAILS(unit->download(info, env.files, "x.gt3x"), ErrorCode::device_unavailable);
   EXPECT_FALSE(env.files.info("x.gt3x"));
 }
 
