@@ -11,6 +11,8 @@
 
 #include <fcntl.h>
 #include <hidapi.h>
+#include <linux/hidraw.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "device/usb/usb_errors.h"
@@ -34,20 +36,27 @@ std::mutex& opening() {
   return mutex;
 }
 
+// hidapi gives the reason as text only, and hid_open_path() of version 0.13 frees memory twice
+// where the node is there and does not answer as hidraw: so the kernel is asked first.
 Result<Handle> open_handle(const std::string& node) {
-  const std::lock_guard lock(opening());
-  errno = 0;
-  Handle handle(hid_open_path(node.c_str()));
-  if (handle) {
-    return handle;
-  }
-  // hidapi gives the reason as text only; the kernel gives an errno.
+  const auto refuse = [&](int reason) {
+    return usb_error(reason, "cannot open the unit's reports", node);
+  };
   const int plain = ::open(node.c_str(), O_RDWR | O_CLOEXEC);
-  const int reason = plain < 0 ? errno : ENODEV;
-  if (plain >= 0) {
-    ::close(plain);
+  if (plain < 0) {
+    return refuse(errno);
   }
-  return usb_error(reason, "cannot open the unit's reports", node);
+  int size = 0;
+  Handle handle;
+  if (::ioctl(plain, HIDIOCGRDESCSIZE, &size) >= 0) {
+    const std::lock_guard lock(opening());
+    handle.reset(hid_open_path(node.c_str()));
+  }
+  ::close(plain);
+  if (!handle) {
+    return refuse(ENODEV);
+  }
+  return handle;
 }
 
 // What the two threads and the transport share. A thread that hangs in the kernel keeps it alive.
