@@ -16,8 +16,8 @@ using std::chrono::steady_clock;
 
 struct HotplugWatch::Monitor {
   struct Unref {
-    void operator()(udev* context) const { udev_unref(context); }
-    void operator()(udev_monitor* monitor) const { udev_monitor_unref(monitor); }
+    void operator()(udev* one) const { udev_unref(one); }
+    void operator()(udev_monitor* one) const { udev_monitor_unref(one); }
   };
   ~Monitor() {
     if (cancel_fd >= 0) {
