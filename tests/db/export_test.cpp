@@ -1,4 +1,8 @@
 // Export: the whole store as JSON Lines or CSV.
+#include <algorithm>
+
+#include <nlohmann/json.hpp>
+
 #include "db/exchange_fixture.h"
 #include "db/history.h"
 #include "failing_files.h"
