@@ -48,8 +48,7 @@ class PiecewiseInflate final : public ByteSource {
     }
     Slot& slot = slots_[current_ % slots_.size()];
     if (taken_ == 0) {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [&] { return slot.done; });
+      wait_for(slot);
     }
     SIXPOINT_CHECK(slot.status);
     const std::size_t bytes = std::min(out.size(), slot.piece.size() - taken_);
@@ -75,36 +74,62 @@ class PiecewiseInflate final : public ByteSource {
     bool done = false;  // the above are the reader's, until it is at the end of the piece
   };
 
+  // Who waits here unpacks the next pieces meanwhile, as far as nobody else takes them.
+  void wait_for(const Slot& slot) {
+    for (;;) {
+      std::unique_lock turn(turn_, std::try_to_lock);
+      {
+        std::unique_lock lock(mutex_);
+        if (slot.done) {
+          return;
+        }
+        if (!turn || !may_begin()) {
+          turn = {};
+          changed_.wait(lock, [&] { return slot.done; });
+          return;
+        }
+      }
+      unpack_next(std::move(turn));
+    }
+  }
+
   // Of each thread: the next piece, again and again.
   void run() {
-    const std::size_t count = points_.packed_sizes.size();
     for (;;) {
       std::unique_lock turn(turn_);
       {
         std::unique_lock lock(mutex_);
-        changed_.wait(
-            lock, [&] { return stop_ || begun_ == count || begun_ - current_ < slots_.size(); });
-        if (stop_ || begun_ == count) {
+        changed_.wait(lock, [&] { return stop_ || all_begun() || may_begin(); });
+        if (stop_ || all_begun()) {
           return;
         }
       }
-      const std::size_t number = begun_++;
-      Slot& slot = slots_[number % slots_.size()];
-      Status status = read_packed(number, slot.packed);
-      if (!status) {
-        begun_ = count;  // what would be read next is not what the index says
-      }
-      turn.unlock();
-      if (status) {
-        status = unpack(number, slot);
-      }
-      {
-        const std::lock_guard lock(mutex_);
-        slot.status = std::move(status);
-        slot.done = true;
-      }
-      changed_.notify_all();
+      unpack_next(std::move(turn));
     }
+  }
+
+  // Both with `turn_` and `mutex_` held.
+  bool all_begun() const { return begun_ == points_.packed_sizes.size(); }
+  bool may_begin() const { return !all_begun() && begun_ - current_ < slots_.size(); }
+
+  // The next piece into its slot; others may take the one behind it as soon as its bytes are read.
+  void unpack_next(std::unique_lock<std::mutex> turn) {
+    const std::size_t number = begun_++;
+    Slot& slot = slots_[number % slots_.size()];
+    Status status = read_packed(number, slot.packed);
+    if (!status) {
+      begun_ = points_.packed_sizes.size();  // what would be read next is not what the index says
+    }
+    turn.unlock();
+    if (status) {
+      status = unpack(number, slot);
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      slot.status = std::move(status);
+      slot.done = true;
+    }
+    changed_.notify_all();
   }
 
   Status read_packed(std::size_t number, Bytes& packed) {

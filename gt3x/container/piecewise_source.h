@@ -6,9 +6,10 @@
 //   SIXPOINT_ASSIGN(const std::size_t count, bytes->read(piece));
 //
 // These threads read the packed bytes too, one at a time and in order; they begin with the first
-// read() and end with the object, also in the middle. Memory: for every thread, and twice more, a
-// piece and its packed bytes. read() answers bad_data where the pieces are not what the index says,
-// and an error of `packed` at its place; after an error the same one.
+// read() and end with the object, also in the middle. Who waits in read() helps them. Memory: for
+// every thread, and twice more, a piece and its packed bytes. read() answers bad_data where the
+// pieces are not what the index says, and an error of `packed` at its place; after an error the
+// same one.
 #pragma once
 
 #include <cstdint>
