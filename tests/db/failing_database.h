@@ -9,6 +9,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,11 +21,18 @@ namespace sixpoint::db::tests {
 class FailingDatabase final : public Database {
  public:
   void fail_at(std::size_t call) {
+    const std::lock_guard lock(mutex_);
     left_ = call;
     failed_ = false;
   }
-  void stop_failing() { left_.reset(); }
-  bool has_failed() const { return failed_; }
+  void stop_failing() {
+    const std::lock_guard lock(mutex_);
+    left_.reset();
+  }
+  bool has_failed() const {
+    const std::lock_guard lock(mutex_);
+    return failed_;
+  }
 
   Status begin_writing() override {
     SIXPOINT_CHECK(next_call());
@@ -94,6 +102,7 @@ class FailingDatabase final : public Database {
   };
 
   Status next_call() {
+    const std::lock_guard lock(mutex_);
     if (!left_.has_value()) {
       return {};
     }
@@ -107,6 +116,7 @@ class FailingDatabase final : public Database {
   }
 
   std::unique_ptr<Database> database_ = open_sqlite_in_memory().value();
+  mutable std::mutex mutex_;         // an audit asks for the indexes on a thread of its own
   std::optional<std::size_t> left_;  // calls before the one that fails
   bool failed_ = false;
 };
