@@ -34,6 +34,14 @@ TEST(Limits, WhatIsPrintedIsRead) {
   EXPECT_EQ(parse_limits(to_toml(default_limits()), "x")->sha256, default_limits().sha256);
 }
 
+TEST(Limits, ANegativeZeroIsZero) {
+  const auto limits = parse_limits("[zero_offset_mg]\nlow = -0.0\nhigh = 5\n", "l.toml");
+  ASSERT_OK(limits);
+  const std::string printed = to_toml(*limits);
+  EXPECT_EQ(printed.find("-0\n"), std::string::npos) << printed;
+  EXPECT_EQ(to_toml(*parse_limits(printed, "again.toml")), printed);
+}
+
 TEST(Limits, WhatIsLeftOutKeepsItsValue) {
   const auto limits = parse_limits("[zero_offset_mg]\nhigh = 100\n", "l.toml");
   ASSERT_OK(limits);
