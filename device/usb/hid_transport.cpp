@@ -36,8 +36,8 @@ std::mutex& opening() {
   return mutex;
 }
 
-// hidapi gives the reason as text only, and hid_open_path() of version 0.13 frees memory twice
-// where the node is there and does not answer as hidraw: so the kernel is asked first.
+// hidapi gives the reason as text only, and hid_open_path() of version 0.13 uses memory that it has
+// freed where the node is there and does not answer as hidraw: so the kernel is asked first.
 Result<Handle> open_handle(const std::string& node) {
   const auto refuse = [&](int reason) {
     return usb_error(reason, "cannot open the unit's reports", node);

@@ -62,8 +62,8 @@ class Reader {
       return wrong(node.source(),
                    fmt::format("{} = {} is outside {} to {}", key, *value, least, most));
     }
-    return *value +
-           0.0;  // -0 becomes 0: printed as a whole number, -0 would be read as another one
+    // -0 becomes 0: what is printed of it would be read as another number.
+    return *value + 0.0;
   }
 
   Result<int> integer(const toml::node& node, std::string_view key, int least, int most) const {
