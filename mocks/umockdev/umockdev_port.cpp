@@ -110,6 +110,7 @@ void UmockdevPort::finish(Urb urb, int status) {
 }
 
 void UmockdevPort::serve() {
+  forget_closed_files();
   if (!gone_) {
     serve_urbs();
     serve_hid_writes();
@@ -214,34 +215,36 @@ void UmockdevPort::on_connected(UMockdevIoctlBase* base, UMockdevIoctlClient* cl
                                 gpointer port) {
   auto& self = *static_cast<UmockdevPort*>(port);
   const std::lock_guard lock(self.shared_.mutex);
+  self.clients_.emplace(client, static_cast<UMockdevIoctlClient*>(g_object_ref(client)));
   if (base == self.hid_handler_) {
     self.readers_.insert(client);
     self.shared_.wake.notify_all();
   }
 }
 
-void UmockdevPort::on_vanished(UMockdevIoctlBase* base, UMockdevIoctlClient* client,
-                               gpointer port) {
-  auto& self = *static_cast<UmockdevPort*>(port);
-  const std::lock_guard lock(self.shared_.mutex);
-  if (base == self.hid_handler_) {
-    self.readers_.erase(client);
-    if (self.readers_.empty()) {
-      self.reports_.clear();
+// A closed file gives up its claims and its transfers, whether its program closed it or was killed.
+// umockdev declares signals for that and never sends them.
+void UmockdevPort::forget_closed_files() {
+  for (auto at = clients_.begin(); at != clients_.end();) {
+    UMockdevIoctlClient* const client = at->first;
+    if (umockdev_ioctl_client_get_connected(client) != FALSE) {
+      ++at;
+      continue;
     }
+    if (readers_.erase(client) > 0 && readers_.empty()) {
+      reports_.clear();
+    }
+    std::erase_if(claimed_, [client](const auto& owner) { return owner.second == client; });
+    const auto is_its = [client](const Urb& urb) { return urb.client == client; };
+    std::erase_if(pending_, is_its);
+    std::erase_if(reapable_, is_its);
+    at = clients_.erase(at);
   }
-  // A closed file gives up its claims and its transfers.
-  std::erase_if(self.claimed_, [client](const auto& owner) { return owner.second == client; });
-  const auto is_its = [client](const Urb& urb) { return urb.client == client; };
-  std::erase_if(self.pending_, is_its);
-  std::erase_if(self.reapable_, is_its);
-  self.usb_->set_ready(!self.reapable_.empty());
 }
 
 bool UmockdevPort::attach(UMockdevTestbed* testbed) {
   const auto connect = [&](const std::string& node, UMockdevIoctlBase* handler) {
     g_signal_connect(handler, "client-connected", G_CALLBACK(on_connected), this);
-    g_signal_connect(handler, "client-vanished", G_CALLBACK(on_vanished), this);
     return umockdev_testbed_attach_ioctl(testbed, node.c_str(), handler, nullptr) != FALSE;
   };
   usb_handler_ = umockdev_ioctl_base_new();

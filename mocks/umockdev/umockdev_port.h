@@ -91,8 +91,8 @@ class UmockdevPort {
   template <auto kAnswer>
   static gboolean on_call(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer port);
   static void on_connected(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer port);
-  static void on_vanished(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer port);
 
+  void forget_closed_files();
   bool carry_out(Urb& urb);
   void finish(Urb urb, int status);
   void serve_urbs();
@@ -135,7 +135,8 @@ class UmockdevPort {
   std::map<std::uint8_t, std::string> drivers_;
   std::deque<Urb> pending_;
   std::deque<Urb> reapable_;
-  std::set<UMockdevIoctlClient*> readers_;  // of the hidraw node
+  std::map<UMockdevIoctlClient*, ClientReference> clients_;  // with a node open, or until lately
+  std::set<UMockdevIoctlClient*> readers_;                   // of the hidraw node
   std::deque<Bytes> reports_;
   std::list<HidWrite> hid_writes_;
   nanoseconds stalled_until_{0};

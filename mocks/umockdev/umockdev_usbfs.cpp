@@ -19,6 +19,7 @@ int UmockdevPort::claim(UMockdevIoctlClient* client, unsigned interface) {
   if (configuration_.interface(number) == nullptr) {
     return ENOENT;
   }
+  forget_closed_files();
   if (const auto owner = claimed_.find(number); owner != claimed_.end()) {
     return owner->second == client ? 0 : EBUSY;
   }

@@ -89,6 +89,10 @@ ChildAnswer run_child(const std::vector<std::string>& arguments,
   return run(sixpoint(arguments), {}, people, input);
 }
 
+ChildAnswer run_child_signalled(const std::vector<std::string>& arguments, const OnLine& on_line) {
+  return run(sixpoint(arguments), {}, on_line);
+}
+
 ChildAnswer run_child_lines(const std::vector<std::string>& arguments, const OnLine& on_line) {
   return run(sixpoint(arguments), on_line, {});
 }

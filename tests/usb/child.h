@@ -21,6 +21,9 @@ struct ChildAnswer {
 ChildAnswer run_child(const std::vector<std::string>& arguments,
                       const std::function<void(const std::string&)>& on_line = {},
                       const std::string& input = "/dev/null");
+// `on_line` gets each line of stderr, and the child to signal.
+ChildAnswer run_child_signalled(const std::vector<std::string>& arguments,
+                                const std::function<void(const std::string&, pid_t)>& on_line);
 // Runs any program: its path, and its arguments.
 ChildAnswer run_program(const std::vector<std::string>& words);
 // `on_line` gets each line of stdout, and the child to signal.

@@ -344,5 +344,22 @@ TEST_F(Program, EndsWithDeviceUnavailableWhenTheCableIsPulled) {
       << answer.people;
 }
 
+// As in the kernel, what a killed program held is free.
+TEST_F(Program, ThatIsKilledLetsGoOfItsUnit) {
+  auto unit = make_unit(7);
+  ASSERT_OK(bench->plug_in(unit));
+  TemporaryFolder folder;
+  for (int round = 0; round < 5; ++round) {
+    const ChildAnswer answer = run_child_signalled(
+        {"jig", "--device", unit.hid_address(), "--jig", "manual", "--store", folder / "store.db"},
+        [](const std::string& line, pid_t child) {
+          if (line.starts_with("turn the unit")) {
+            ::kill(child, SIGKILL);
+          }
+        });
+    EXPECT_EQ(answer.exit_code, 128 + SIGKILL) << round << ": " << answer.people;
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::tests
