@@ -190,6 +190,7 @@ std::vector<Block> make_blocks(const Bundle& bundle, const CleanSamples& clean,
       blocks.push_back(tone_block(block, bundle, noise, tone, response, conditions));
     }
   }
+  set_ripples(blocks);
   return blocks;
 }
 

@@ -17,6 +17,7 @@
 // Constant after construction, but for set_time_constant(); safe to read from several threads.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <functional>
 #include <string>
@@ -59,6 +60,17 @@ struct Posterior {
   Eigen::VectorXd mean;  // per column used
   Eigen::MatrixXd covariance;
   std::vector<int> columns;
+};
+
+// The estimate by one subset, and what its covariance is made of: that costs six times the rest.
+struct Solution {
+  double nats = 0;       // log evidence
+  Eigen::VectorXd mean;  // per column used
+  Eigen::VectorXd sd;    // of the prior
+  std::vector<int> columns;
+  Eigen::LLT<Eigen::MatrixXd> normal;  // in units of the prior
+
+  Posterior posterior() const;
 };
 
 struct EvidenceOptions {
@@ -118,10 +130,9 @@ class EvidenceModel {
   Whitened whiten(Eigen::MatrixXd linear, Scatter scatter, double size) const;
 
   // evidence_subsets.cpp
-  // Log evidence of these groups beside the nuisances, without the covariance's determinant.
-  double evidence_of(const NormalSums& sums, const std::vector<int>& groups,
-                     Posterior* posterior = nullptr) const;
-  // The same with it; an estimate far beyond an effect's largest size has none.
+  // These groups beside the nuisances, without the covariance's determinant.
+  Solution solve(const NormalSums& sums, const std::vector<int>& groups) const;
+  // Log evidence with it; an estimate far beyond an effect's largest size has none.
   double evidence(const Whitened& w, const std::vector<int>& groups,
                   Posterior* posterior = nullptr) const;
   // Of these groups beside this scatter, over none: see log_prior_of_count(), and
@@ -131,6 +142,9 @@ class EvidenceModel {
   // other effect in the place of each one found (some hundred subsets more).
   Subset search(const Whitened& w, std::vector<Subset>& tried, bool swap = false) const;
   Fit make_fit(const Whitened& w, const Subset& subset, const ForwardState& at) const;
+  // Rows less the numbers that they determine; what the prior determines is none (effective number
+  // of parameters: MacKay, Bayesian Interpolation, Neural Computation 4, 1992).
+  double freedom_of(const Fit& fit) const;
 
  private:
   Subset climb(const Whitened& w, Subset from, bool generous, bool swap,

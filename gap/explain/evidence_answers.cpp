@@ -165,8 +165,7 @@ std::map<std::string, double> Explanation::gap_mg2() const {
   std::map<std::string, double> found;
   const Posterior& posterior = best().posterior;
   const Whitened w = model_.whiten(linear_, Scatter::nominal, 0);
-  Posterior nuisances;
-  model_.evidence_of(w.sums, {}, &nuisances);
+  const Posterior nuisances = model_.solve(w.sums, {}).posterior();
   // What gains and offsets take over, by least squares of the whitened rows.
   const Eigen::MatrixXd own = used_columns(w.x, nuisances);
   const Eigen::MatrixXd own_mg = used_columns(linear_, nuisances);

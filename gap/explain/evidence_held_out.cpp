@@ -71,7 +71,7 @@ double Explanation::held_out_nats(const std::string& effect) const {
   for (int fold = 0; fold < folds_of(model_.blocks()); ++fold) {
     const NormalSums others = leave_out(model_, data_, fold).others;
     const auto predictive = [&](const std::vector<int>& groups) {
-      return model_.evidence_of(data_.sums, groups) - model_.evidence_of(others, groups);
+      return model_.solve(data_.sums, groups).nats - model_.solve(others, groups).nats;
     };
     gain += predictive(with) - predictive(without);
   }
@@ -91,8 +91,7 @@ std::vector<bool> Explanation::columns_of(const std::set<std::string>& named) co
 std::vector<double> Explanation::left_over_sigma(const std::set<std::string>& named) const {
   const std::vector<bool> counts = columns_of(named);
   const Whitened w = model_.whiten(linear_, Scatter::nominal, 0);
-  Posterior fitted;
-  model_.evidence_of(w.sums, best().subset.groups, &fitted);
+  const Posterior fitted = model_.solve(w.sums, best().subset.groups).posterior();
   Eigen::VectorXd left_mg = linear_.col(model_.columns());
   for (std::size_t c = 0; c < counts.size(); ++c) {
     if (counts[c]) {
@@ -134,10 +133,8 @@ Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) c
     if (left.rows.empty()) {
       continue;
     }
-    Posterior nothing;
-    Posterior accepted;
-    model_.evidence_of(left.others, {}, &nothing);
-    model_.evidence_of(left.others, best().subset.groups, &accepted);
+    const Posterior nothing = model_.solve(left.others, {}).posterior();
+    Posterior accepted = model_.solve(left.others, best().subset.groups).posterior();
     for (std::size_t c = 0; c < counts.size(); ++c) {
       accepted.mean[static_cast<Eigen::Index>(c)] *= counts[c] ? 1 : 0;
     }

@@ -1,6 +1,6 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "gap/explain/evidence.h"
@@ -31,22 +31,22 @@ double most_of(const ParameterGroup& group, int i) {
 
 }  // namespace
 
-double EvidenceModel::evidence_of(const NormalSums& sums, const std::vector<int>& groups,
-                                  Posterior* posterior) const {
-  std::vector<int> columns;
+Solution EvidenceModel::solve(const NormalSums& sums, const std::vector<int>& groups) const {
+  Solution solved;
   std::vector<double> sds, means;
   for (const int g : with_nuisances(groups)) {
     for (int k = 0; k < group(g).count; ++k) {
-      columns.push_back(first_column(g) + k);
+      solved.columns.push_back(first_column(g) + k);
       sds.push_back(group(g).sd_of(k));
       means.push_back(group(g).mean_of(k));
     }
   }
-  const auto n = std::ssize(columns);
-  const Eigen::VectorXd sd = Eigen::Map<const Eigen::VectorXd>(sds.data(), n);
+  const auto n = std::ssize(solved.columns);
+  solved.sd = Eigen::Map<const Eigen::VectorXd>(sds.data(), n);
+  const Eigen::VectorXd& sd = solved.sd;
   const Eigen::VectorXd mu = Eigen::Map<const Eigen::VectorXd>(means.data(), n);
-  Eigen::MatrixXd m = sums.a(columns, columns);
-  Eigen::VectorXd v = sums.b(columns);
+  Eigen::MatrixXd m = sums.a(solved.columns, solved.columns);
+  Eigen::VectorXd v = sums.b(solved.columns);
   const double square = sums.yy - 2 * mu.dot(v) + mu.dot(m * mu);
   v -= m * mu;
   // In units of the prior's standard deviations.
@@ -57,37 +57,40 @@ double EvidenceModel::evidence_of(const NormalSums& sums, const std::vector<int>
     }
   }
   m.diagonal().array() += 1;
-  const Eigen::LLT<Eigen::MatrixXd> llt(m);
-  const Eigen::VectorXd z = llt.solve(v);
-  if (posterior != nullptr) {
-    posterior->covariance = llt.solve(Eigen::MatrixXd::Identity(n, n));
-    posterior->mean.resize(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      posterior->mean[i] = mu[i] + sd[i] * z[i];
-      for (Eigen::Index j = 0; j < n; ++j) {
-        posterior->covariance(i, j) *= sd[i] * sd[j];
-      }
-    }
-    posterior->columns = std::move(columns);
-  }
-  return -half_log_determinant(llt) + 0.5 * v.dot(z) - 0.5 * square;
+  solved.normal.compute(m);
+  const Eigen::VectorXd z = solved.normal.solve(v);
+  solved.mean = mu + sd.cwiseProduct(z);
+  solved.nats = -half_log_determinant(solved.normal) + 0.5 * v.dot(z) - 0.5 * square;
+  return solved;
+}
+
+Posterior Solution::posterior() const {
+  const auto n = std::ssize(columns);
+  return {mean, sd.asDiagonal() * normal.solve(Eigen::MatrixXd::Identity(n, n)) * sd.asDiagonal(),
+          columns};
 }
 
 double EvidenceModel::evidence(const Whitened& w, const std::vector<int>& groups,
                                Posterior* posterior) const {
-  Posterior own;
-  double nats = evidence_of(w.sums, groups, &own) - w.half_log_det + w.outside_nats;
+  const Solution solved = solve(w.sums, groups);
+  double nats = solved.nats - w.half_log_det + w.outside_nats;
+  // The covariance costs six times the solution, and nearly no estimate is far beyond its largest
+  // size.
+  std::optional<Posterior> own;
   Eigen::Index at = kNuisanceParameters;
   for (const int g : groups) {
     for (int i = 0; i < group(g).count; ++i, ++at) {
-      const double off = std::abs(own.mean[at] - group(g).mean_of(i));
-      if (off - kBeyond_sd * std::sqrt(own.covariance(at, at)) > most_of(group(g), i)) {
+      const double beyond = std::abs(solved.mean[at] - group(g).mean_of(i)) - most_of(group(g), i);
+      if (beyond > 0 && !own) {
+        own = solved.posterior();
+      }
+      if (beyond > 0 && beyond > kBeyond_sd * std::sqrt(own->covariance(at, at))) {
         nats -= kImpossible_nats;
       }
     }
   }
   if (posterior != nullptr) {
-    *posterior = std::move(own);
+    *posterior = own ? *std::move(own) : solved.posterior();
   }
   return nats;
 }
@@ -251,6 +254,17 @@ Fit EvidenceModel::make_fit(const Whitened& w, const Subset& subset, const Forwa
   }
   fit.residual = residual_of(w, fit.posterior);
   return fit;
+}
+
+double EvidenceModel::freedom_of(const Fit& fit) const {
+  double freedom = rows();
+  Eigen::Index at = 0;
+  for (const int g : with_nuisances(fit.subset.groups)) {
+    for (int i = 0; i < group(g).count; ++i, ++at) {
+      freedom -= 1 - fit.posterior.covariance(at, at) / std::pow(group(g).sd_of(i), 2);
+    }
+  }
+  return freedom;
 }
 
 }  // namespace sixpoint::gap

@@ -168,8 +168,7 @@ std::optional<Fit> fit_zero_step(const EvidenceModel& model, const Whitened& nom
   std::vector<int> groups;
   std::optional<Fit> best;
   for (int round = 0; round < kRounds; ++round) {
-    Posterior posterior;
-    model.evidence_of(sums, groups, &posterior);
+    const Posterior posterior = model.solve(sums, groups).posterior();
     const Step step = likeliest_step(starts, residual_of(nominal, posterior),
                                      used_columns(nominal.x, posterior), posterior);
     if (step.start == nullptr) {

@@ -21,9 +21,8 @@ constexpr double kLeastTau_s = 20;
 constexpr double kMostTau_s = 2000;
 constexpr double kTauFactor = 1.25;
 
-double chi_sd(const Fit& fit) {
-  const double n =
-      static_cast<double>(fit.residual.size()) - static_cast<double>(fit.posterior.columns.size());
+double chi_sd(const EvidenceModel& model, const Fit& fit) {
+  const double n = model.freedom_of(fit);
   return n > 0 ? (fit.residual.squaredNorm() - n) / std::sqrt(2 * n) : 0;
 }
 
@@ -180,7 +179,7 @@ Explanation::Explanation(const std::vector<Block>& blocks, EvidenceOptions optio
     : model_(blocks, std::move(options)) {
   const ForwardState nominal_at = explain_nominal();
   // Scatter can only help where the residuals scatter more than noise and seating do.
-  if (chi_sd(best_nominal_) >= kScatters_sd || records_show_slow_noise()) {
+  if (chi_sd(model_, best_nominal_) >= kScatters_sd || records_show_slow_noise()) {
     const Eigen::MatrixXd linear = model_.linearise(model_.first_guess());
     Whitened unknown_data;
     for (const Scatter scatter :

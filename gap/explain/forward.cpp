@@ -85,8 +85,7 @@ constexpr double kSmallShare = 0.2;
 // Of one that is far beyond the catalogue's sizes.
 constexpr double kLargeShare = 4;
 
-// Real effects bend from their plain laws by up to a tenth over this range of temperature.
-constexpr double kBend = 0.1;
+// Tempcos bend by kBend over this range of temperature.
 constexpr double kBend_c = 20;
 
 // Gains and offsets are free, truncation is there or not, and gravity is known within one range.
@@ -119,9 +118,12 @@ Eigen::Vector3d slow_zero_mg(const ForwardState& s, const Block& block) {
   Eigen::Vector3d slow_mg = warm * s.tempco_mg_per_c + warm * warm * s.tempco_curve_mg_per_c2 +
                             warm * warm * warm * s.tempco_cubic_mg_per_c3 +
                             hours * s.drift_mg_per_h + decay(s.warm_up_tau_s) * s.warm_up_mg;
-  // Zero in most calls, and an exponential costs.
+  // Zero in most calls, and both cost.
   if (!s.quick_warm_up_mg.isZero(0)) {
     slow_mg += decay(s.warm_up_tau_s / 4) * s.quick_warm_up_mg;
+  }
+  if (!s.drift_ripple_mg_per_h.isZero(0)) {
+    slow_mg += s.drift_ripple_mg_per_h * block.ripple_h;
   }
   for (Eigen::Index a = 0; a < 3; ++a) {
     slow_mg[a] +=
@@ -145,8 +147,8 @@ double& parameter(ForwardState& s, int position) {
        spans_of(s.gain, s.offset_mg, s.tilt_deg, s.misalignment_deg, s.cross, s.second_mg_per_g2,
                 s.third_mg_per_g3, s.hysteresis_mg, s.tempco_mg_per_c, s.tempco_curve_mg_per_c2,
                 s.tempco_cubic_mg_per_c3, s.sensitivity_percent_per_c,
-                s.sensitivity_curve_percent_per_c2, s.warm_up_mg, s.quick_warm_up_mg,
-                s.drift_mg_per_h)) {
+                s.sensitivity_curve_percent_per_c2, s.sensitivity_cubic_percent_per_c3,
+                s.warm_up_mg, s.quick_warm_up_mg, s.drift_mg_per_h, s.drift_ripple_mg_per_h)) {
     if (at < values.size()) {
       return values[at];
     }
@@ -167,7 +169,8 @@ std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& lear
   // Effects: prior sd about the middle of the catalogue's realistic sizes, `largest` their upper
   // end, `smallest` their lower (where the catalogue names none: a third of the typical).
   // A zero bends over temperature by some hundredths of its slope per degree, and by a tenth of its
-  // slope over 20 C as a cubic; a sensitivity bends by a tenth over 20 C.
+  // slope over 20 C as a cubic; a sensitivity bends by a tenth over 20 C, either way. A drift
+  // ripples by a tenth of all that it drifts, from crest to trough.
   std::vector<ParameterGroup> groups = {
       {"gain", 0, 3, 0.3, 1, 0, 10},
       {"offset", 3, 3, 300, 0, 0, 1e4},
@@ -177,16 +180,17 @@ std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& lear
       {"second_order", 14, 3, 0.35, 0, 0, 0.6, 0.12},
       {"third_order", 17, 3, 0.05, 0, 0, 0.08, 0.012},
       {"offset_tempco", 23, 9, 0.5, 0, 0.004, 1, 0.2, 0, 1, kBend * 0.5 / (kBend_c * kBend_c)},
-      {"sensitivity_tempco", 32, 6, 0.03, 0, kBend * 0.03 / kBend_c, 0.05, 0.01},
-      {"drift", 44, 3, 2.5, 0, 0, 5, 1},
-      {"local_gravity", 47, 1, 0.0015, 0, 0, 0.0027, 0.0005},
-      {"truncation", 48, 1, 0.05, 1, 0, 0.35},
+      {"sensitivity_tempco", 32, 9, 0.03, 0, kBend * 0.03 / kBend_c, 0.05, 0.01, 0, 1,
+       kBend * 0.03 / (kBend_c * kBend_c)},
+      {"drift", 47, 3 + 3 * kRipples, 2.5, 0, kRippleShare * 2.5, 5, 1, 0, 1, kRippleShare * 2.5},
+      {"local_gravity", 68, 1, 0.0015, 0, 0, 0.0027, 0.0005},
+      {"truncation", 69, 1, 0.05, 1, 0, 0.35},
   };
   for (const int shape : {1, 0, 2}) {
     groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0.2, 0, shape});
   }
   for (const double tau_s : {75.0, 120.0, 180.0, 270.0, 400.0, 600.0}) {
-    groups.push_back({"warm_up", 38, 6, 4, 0, kBend * 4, 10, 1, tau_s, 1});
+    groups.push_back({"warm_up", 41, 6, 4, 0, kBend * 4, 10, 1, tau_s, 1});
   }
   // A prior of one width would count a small size as unlikely: 1.6 nats for each number of it. How
   // much an effect bends goes with its size.
@@ -212,6 +216,21 @@ std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& lear
   return groups;
 }
 
+void set_ripples(std::vector<Block>& blocks) {
+  if (blocks.empty()) {
+    return;
+  }
+  const double start_s = blocks.front().middle_s;
+  const double span_s = blocks.back().middle_s - start_s;
+  for (Block& block : blocks) {
+    const double turns = span_s > 0 ? (block.middle_s - start_s) / span_s : 0;
+    for (int k = 0; k < kRipples; ++k) {
+      const double angle = 2 * M_PI * (k / 2 + 1) * turns;
+      block.ripple_h[k] = span_s / 3600 * (k % 2 == 0 ? std::sin(angle) : std::cos(angle));
+    }
+  }
+}
+
 Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg) {
   const Eigen::Matrix3d tilt = turn(Eigen::Vector3d(s.tilt_deg[0], s.tilt_deg[1], 0));
   Eigen::Matrix3d cross;
@@ -221,9 +240,10 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   const Eigen::Vector3d swing = chain * block.vibration_lab_g;
   const Eigen::Vector3d slow_mg = slow_zero_mg(s, block);
   const double warm = block.temperature_c - kReference_c;
-  const Eigen::Vector3d sensitivity = Eigen::Vector3d::Ones() +
-                                      0.01 * warm * s.sensitivity_percent_per_c +
-                                      0.01 * warm * warm * s.sensitivity_curve_percent_per_c2;
+  const Eigen::Vector3d sensitivity =
+      Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c +
+      0.01 * warm * warm * s.sensitivity_curve_percent_per_c2 +
+      0.01 * warm * warm * warm * s.sensitivity_cubic_percent_per_c3;
   // What axis a shows at the specific force v, in a noise of sigma.
   const auto stored_mg = [&](Eigen::Index a, double v, double sigma) {
     double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *

@@ -21,6 +21,15 @@
 
 namespace sixpoint::gap {
 
+// Real effects bend from their plain laws by up to this share.
+inline constexpr double kBend = 0.1;
+// Functions of time by which a drift ripples: sine and cosine of one, two and three periods in the
+// recording.
+inline constexpr int kRipples = 6;
+// Amplitude of one of them as a share of all that the drift adds: a ripple of kBend from crest to
+// trough.
+inline constexpr double kRippleShare = kBend / 2;
+
 // The parameters; parameter() gives them by position, in this order.
 struct ForwardState {
   Eigen::Vector3d gain = Eigen::Vector3d::Ones();
@@ -36,10 +45,13 @@ struct ForwardState {
   Eigen::Vector3d tempco_cubic_mg_per_c3 = Eigen::Vector3d::Zero();
   Eigen::Vector3d sensitivity_percent_per_c = Eigen::Vector3d::Zero();
   Eigen::Vector3d sensitivity_curve_percent_per_c2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sensitivity_cubic_percent_per_c3 = Eigen::Vector3d::Zero();
   Eigen::Vector3d warm_up_mg = Eigen::Vector3d::Zero();
   Eigen::Vector3d quick_warm_up_mg =
       Eigen::Vector3d::Zero();  // with a quarter of the time constant
   Eigen::Vector3d drift_mg_per_h = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 3, kRipples> drift_ripple_mg_per_h =
+      Eigen::Matrix<double, 3, kRipples>::Zero();  // times Block::ripple_h
   double gravity_ratio = 0;
   double truncation = 0;  // 1: toward zero instead of nearest
   // Shape of effects that are not linear in their parameters.
@@ -74,7 +86,7 @@ struct ParameterGroup {
                            : cubic_sd;
   }
 };
-inline constexpr int kForwardParameters = 49;
+inline constexpr int kForwardParameters = 70;
 // Every group, with each shape of warm_up and hysteresis as a group of its own, and each effect
 // that every unit has a little of twice: at its typical size, and at a fifth of it; those that bend
 // also at four times of it. Behind them each shape of what was learnt, for the effects among them.
@@ -101,6 +113,8 @@ struct Block {
   int axis = 0;         // of tones
   double middle_s = 0;  // host time
   double seconds = 0;
+  // The functions of the drift's ripple, each times the length of the recording in hours.
+  Eigen::Matrix<double, kRipples, 1> ripple_h = Eigen::Matrix<double, kRipples, 1>::Zero();
   double temperature_c = 25;
   Eigen::Vector3d gravity_lab_g = Eigen::Vector3d::UnitZ();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
@@ -114,6 +128,9 @@ struct Block {
   Eigen::MatrixXd white_mg2;  // covariance of the noise
   Eigen::Index size() const { return value_mg.size(); }
 };
+
+// Block::ripple_h of all blocks of a recording, from their times.
+void set_ripples(std::vector<Block>& blocks);
 
 // Predicted features, as long as block.value_mg. `lsb_mg` is the width of a stored count.
 Eigen::VectorXd predict(const ForwardState& state, const Block& block, double lsb_mg);

@@ -22,9 +22,8 @@ constexpr double kKnownRinging = 0.03;  // share of the ringing's own test
 void test_means(const Request& request, const Explanation& explanation, bool truncated,
                 Findings& found) {
   const Fit& fit = explanation.best();
-  const double n = static_cast<double>(fit.residual.size());
-  const double p = static_cast<double>(fit.posterior.columns.size());
-  found.test(chi_to_sd(fit.residual.squaredNorm(), n - p), "mean: dwells and tones together");
+  found.test(chi_to_sd(fit.residual.squaredNorm(), explanation.model().freedom_of(fit)),
+             "mean: dwells and tones together");
   struct Group {
     double chi = 0, rows = 0, freedom = 0;
   };

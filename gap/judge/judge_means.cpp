@@ -60,6 +60,34 @@ bool zero_bends(const Fit& fit) {
   return false;
 }
 
+// Whether the drift ripples significantly more than belongs to it; kRippleShare of it does, and of
+// the smallest realistic drift always.
+bool drift_ripples(const Fit& fit) {
+  constexpr double kBeyond = 2;
+  constexpr double kSurely_sd = 3;
+  Eigen::Index at = kNuisanceParameters;
+  for (const ParameterGroup& group : fit.groups) {
+    if (group.effect == "drift") {
+      const double drift_mg_per_h =
+          std::max(group.smallest, fit.state.drift_mg_per_h.cwiseAbs().maxCoeff());
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        double square = 0;
+        double variance = 0;
+        for (Eigen::Index i = at + 3 + axis; i < at + group.count; i += 3) {
+          square += std::pow(fit.posterior.mean[i], 2);
+          variance += fit.posterior.covariance(i, i);
+        }
+        if (std::sqrt(square) - kSurely_sd * std::sqrt(variance) >
+            kBeyond * kRippleShare * drift_mg_per_h) {
+          return true;
+        }
+      }
+    }
+    at += group.count;
+  }
+  return false;
+}
+
 // Log likelihood over white noise of one kind of slow noise, along the sizes that were tried.
 struct SizeCurve {
   std::vector<double> sizes;  // ascending
@@ -188,6 +216,10 @@ double other_causes(const Explanation& explanation, const EffectFinding& f, doub
   if (f.name == "offset_tempco" && zero_bends(explanation.best())) {
     found.alarm(2 * kAlarm_sd,
                 "mean: the zero bends over temperature more than a zero's drift does");
+    other = kUnknownWins_nats;
+  }
+  if (f.name == "drift" && drift_ripples(explanation.best())) {
+    found.alarm(2 * kAlarm_sd, "mean: the zero wanders with time more than a drift does");
     other = kUnknownWins_nats;
   }
   return other;

@@ -232,7 +232,7 @@ class Expectation {
     int chosen = -1;
     double most = kNoEvidence_nats;
     for (const int g : model_.groups_of(effect)) {
-      const double nats = model_.evidence_of(own_, with_group(others, g));
+      const double nats = model_.solve(own_, with_group(others, g)).nats;
       if (chosen < 0 || nats > most) {
         most = nats;
         chosen = g;
@@ -242,8 +242,7 @@ class Expectation {
   }
 
   Size size_of(int g, const std::vector<int>& others, const NormalSums& sums) const {
-    Posterior posterior;
-    model_.evidence_of(sums, with_group(others, g), &posterior);
+    const Posterior posterior = model_.solve(sums, with_group(others, g)).posterior();
     const auto at = std::find(posterior.columns.begin() + kNuisanceParameters,
                               posterior.columns.end(), model_.first_column(g)) -
                     posterior.columns.begin();

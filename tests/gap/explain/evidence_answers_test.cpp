@@ -54,11 +54,12 @@ TEST(EvidenceAnswers, EstimateHasTheUncertaintyOfLeastSquares) {
     const Eigen::MatrixXd lever = kNominalSeating_deg * seating_lever(model.block_of_row(i));
     v.block<3, 3>(i, i) = model.block_of_row(i).white_mg2 + lever * lever.transpose();
   }
-  const Eigen::MatrixXd x = linear.leftCols(9);  // gain, offset, drift
+  const Eigen::MatrixXd x = linear.leftCols(9);  // gain, offset, drift, and no ripple (no times)
   ASSERT_EQ(model.first_column(drift), 6);
   Eigen::MatrixXd information = x.transpose() * v.inverse() * x;
   for (int i = 0; i < 9; ++i) {
-    information(i, i) += 1 / std::pow(model.group(i / 3).prior_sd, 2);
+    const ParameterGroup& own = i < 6 ? model.group(i / 3) : explanation.best().groups.front();
+    information(i, i) += 1 / std::pow(own.prior_sd, 2);
   }
   const Eigen::MatrixXd covariance = information.inverse();
   const auto estimate = explanation.estimate("drift");

@@ -109,5 +109,22 @@ TEST(EvidenceSubsets, AnEstimateFarBeyondAnEffectsSizeHasNoEvidence) {
       << "15 mg/C is more than four times the largest size";
 }
 
+// Gains, offsets and three of a drift are determined by 54 rows; its ripple, which needs the
+// blocks' times in the recording, is not: the prior determines it.
+TEST(EvidenceSubsets, FreedomCountsWhatTheDataDetermine) {
+  const auto blocks = tests::made_dwells(
+      [](const Block& b) -> Eigen::Vector3d {
+        return b.middle_s / 3600 * Eigen::Vector3d(9, -6, 7);
+      },
+      5, 120);
+  const EvidenceModel model(blocks, tests::only({"drift"}));
+  const ForwardState at = model.first_guess();
+  const Whitened data = model.whiten(model.linearise(at), Scatter::nominal, 0);
+  std::vector<Subset> tried;
+  const Fit fit = model.make_fit(data, model.search(data, tried), at);
+  ASSERT_EQ(fit.posterior.columns.size(), 6U + 21);
+  EXPECT_NEAR(model.freedom_of(fit), 54 - 9, 0.1);
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

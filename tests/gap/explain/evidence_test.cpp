@@ -18,14 +18,15 @@ TEST(EvidenceModel, FirstGuessIsTheLineThroughTheMeans) {
   EXPECT_NEAR(state.offset_mg[1], -10, 1e-3);
 }
 
-// The list of the catalogue by hand: gain 3, offset 3, tilt 2, drift 3 numbers, in this order.
+// The list of the catalogue by hand: gain 3, offset 3, tilt 2, drift 3 numbers and 18 of its
+// ripple, in this order.
 TEST(EvidenceModel, OnlyAllowedEffectsHaveColumns) {
   const auto blocks = tests::made_dwells();
   const EvidenceModel model(blocks, tests::only({"tilt", "drift"}));
-  ASSERT_EQ(model.group_count(), 6) << "two sizes of each effect";
+  ASSERT_EQ(model.group_count(), 7) << "two sizes of each effect, three of one that bends";
   EXPECT_EQ(model.group(0).effect, "gain");
   EXPECT_EQ(model.group(1).effect, "offset");
-  EXPECT_EQ(model.columns(), 3 + 3 + 2 + 3);
+  EXPECT_EQ(model.columns(), 3 + 3 + 2 + 3 + 18);
   EXPECT_EQ(model.rows(), 18 * 3);
   for (const char* effect : {"tilt", "drift"}) {
     ASSERT_FALSE(model.groups_of(effect).empty()) << effect;

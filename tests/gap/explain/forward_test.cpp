@@ -105,14 +105,36 @@ TEST(Forward, TempcosAndWarmUpBend) {
   ForwardState s;
   s.tempco_cubic_mg_per_c3 = {1e-3, 0, 0};
   s.sensitivity_curve_percent_per_c2 = {0, 0, 1e-3};
+  s.sensitivity_cubic_percent_per_c3 = {0, 0, 1e-4};
   s.quick_warm_up_mg = {0, 4, 0};
   Block block = dwell(Eigen::Matrix3d::Identity());
   block.temperature_c = 35;
   block.middle_s = s.warm_up_tau_s / 4;
   const Eigen::VectorXd y = predict(s, block, kLsb_mg);
-  EXPECT_NEAR(y[0], 1, 1e-9);                  // 10^3 of it
-  EXPECT_NEAR(y[1], 4 * std::exp(-1), 2e-3);   // the block has a length
-  EXPECT_NEAR(y[2], 1000 * (1 + 1e-3), 1e-9);  // 10^2 of it, in per cent
+  EXPECT_NEAR(y[0], 1, 1e-9);                         // 10^3 of it
+  EXPECT_NEAR(y[1], 4 * std::exp(-1), 2e-3);          // the block has a length
+  EXPECT_NEAR(y[2], 1000 * (1 + 1e-3 + 1e-3), 1e-9);  // 10^2 and 10^3 of it, in per cent
+}
+
+// Three blocks of a recording of two hours: at a quarter of it the sine of one period is 1, the
+// cosine of two is -1.
+TEST(Forward, ADriftRipples) {
+  std::vector<Block> blocks(3, dwell(Eigen::Matrix3d::Identity()));
+  blocks[0].middle_s = 600;
+  blocks[1].middle_s = 600 + 1800;
+  blocks[2].middle_s = 600 + 7200;
+  set_ripples(blocks);
+  ForwardState s;
+  s.drift_ripple_mg_per_h.col(0) = Eigen::Vector3d(0.5, 0, 0);
+  s.drift_ripple_mg_per_h.col(3) = Eigen::Vector3d(0, 0.25, 0);
+  const auto added = [&](const Block& block) -> Eigen::VectorXd {
+    return predict(s, block, kLsb_mg) - predict({}, block, kLsb_mg);
+  };
+  EXPECT_NEAR(added(blocks[1])[0], 2 * 0.5, 1e-9);
+  EXPECT_NEAR(added(blocks[1])[1], -2 * 0.25, 1e-9);
+  EXPECT_NEAR(added(blocks[2])[0], 0, 1e-9);
+  EXPECT_NEAR(added(blocks[2])[1], 2 * 0.25, 1e-9);
+  EXPECT_NEAR(added(blocks[2])[2], 0, 1e-9);
 }
 
 TEST(Forward, EveryParameterHasItsPlace) {

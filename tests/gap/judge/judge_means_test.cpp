@@ -63,5 +63,46 @@ TEST(JudgeMeans, AZeroThatMovesOnceAlarms) {
   EXPECT_TRUE(explanation.unknown_wins() || !found.alarms.empty());
 }
 
+// Three hours of a drift of 5 mg/h: from the plain law, with a ripple of `share` of it from crest
+// to trough (2.3 periods, which are none of the model's own functions).
+Findings of_rippling_drift(double share, unsigned seed) {
+  constexpr double kSpan_s = 17 * 640;
+  auto blocks = tests::made_dwells(
+      [&](const Block& b) -> Eigen::Vector3d {
+        const double ripple_h =
+            share / 2 * kSpan_s / 3600 * std::sin(2 * M_PI * 2.3 * b.middle_s / kSpan_s);
+        return (b.middle_s / 3600 + ripple_h) * Eigen::Vector3d(5, -3, 1);
+      },
+      seed, 640);
+  set_ripples(blocks);
+  const Made made(tests::made_production({}));
+  const SlowNoise slow = no_slow_noise();
+  const Explanation explanation = explain(made.request, blocks, slow);
+  Findings found = judge_means(made.request, explanation, slow, {});
+  if (explanation.unknown_wins()) {
+    found.alarm(2 * kAlarm_sd, "unknown");
+  }
+  return found;
+}
+
+TEST(JudgeMeans, ADriftThatRipplesByATenthKeepsItsName) {
+  for (const double share : {0.0, 0.04, 0.1}) {
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      const Findings found = of_rippling_drift(share, seed);
+      EXPECT_TRUE(found.alarms.empty()) << share << ", " << found.alarms.front().where;
+      const EffectFinding* drift = effect(found, "drift");
+      ASSERT_NE(drift, nullptr) << share;
+      EXPECT_NEAR(drift->parameters[0].value[0], 5, 0.5) << share;
+      EXPECT_EQ(found.effects.size(), 1U) << share;
+    }
+  }
+}
+
+TEST(JudgeMeans, AZeroThatWandersByMoreThanADriftDoesAlarms) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    EXPECT_FALSE(of_rippling_drift(0.6, seed).alarms.empty());
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::gap
