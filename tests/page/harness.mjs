@@ -208,5 +208,7 @@ export async function place(page, count) {
     await until('the pose is taken', async () =>
       (await taken(page)) > before || (await page.locator('.result').count()) > 0 || (await page.locator('.prompt').textContent()) !== asked);
     if (await page.locator('.result').count()) return;
+    // The prompt may be a moment ahead of the count: who turns once too often has one placement too many.
+    await until('the count', async () => (await taken(page)) > before, 1).catch(() => {});
   }
 }
