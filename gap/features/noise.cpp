@@ -286,8 +286,11 @@ class CodeSums {
         all.push_back(d.variance);
       }
       const double typical = upper_median(all);
-      // A variance over n white samples scatters by sqrt(2/n); rounding adds a grid's part of it.
-      const double grid = 4 * M_PI * M_PI * std::exp(-2 * M_PI * M_PI * typical) / 12;
+      // A variance over n white samples scatters by sqrt(2/n). Rounding adds, besides its twelfth,
+      // up to so much with the cosine of where between two counts the mean lies.
+      const double before_rounding = std::max(0.0, typical - 1.0 / 12);
+      const double grid = (4 * before_rounding + 1 / (M_PI * M_PI)) *
+                          std::exp(-2 * M_PI * M_PI * before_rounding) / typical;
       for (const Dwell& d : dwells) {
         const double z = (d.variance / typical - 1) / std::sqrt(2 / d.n + grid * grid);
         chi += z * z;
