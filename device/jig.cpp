@@ -34,7 +34,13 @@ PerAxis<double> direction_of(Pose pose) {
   return force_g;
 }
 
+Status Jig::go_to_half_turned(Pose /*pose*/) {
+  return fail(ErrorCode::usage, "this jig does not turn a unit about the vertical", name(),
+              "turn the unit by hand (--jig manual)");
+}
+
 Status ManualJig::go_to(Pose /*pose*/) { return {}; }
+Status ManualJig::go_to_half_turned(Pose /*pose*/) { return {}; }
 Result<JigPosition> ManualJig::position() { return JigPosition{std::nullopt, 0, 0.5, {}}; }
 Status ManualJig::stop() { return {}; }
 Status ManualJig::release() { return {}; }

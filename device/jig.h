@@ -59,6 +59,11 @@ class Jig {
   virtual bool turns_by_itself() const = 0;
   // Begins to turn. The unit is in its pose some time later: watch the unit's own readings.
   virtual Status go_to(Pose pose) = 0;
+  // True where a face can also be laid half a turn about the vertical from how go_to() lays it. A
+  // person can; a motor that tips the unit from face to face cannot.
+  virtual bool can_half_turn() const { return false; }
+  // As go_to(), and turned so. usage, and nothing moves, where can_half_turn() is false.
+  virtual Status go_to_half_turned(Pose pose);
   virtual Result<JigPosition> position() = 0;
   virtual Status stop() = 0;  // emergency stop: no movement until release()
   // The operator saw the jig and says that it is free. device_unavailable while its fault stays.
@@ -74,6 +79,8 @@ class ManualJig final : public Jig {
   std::string name() const override { return "manual"; }
   bool turns_by_itself() const override { return false; }
   Status go_to(Pose pose) override;
+  bool can_half_turn() const override { return true; }
+  Status go_to_half_turned(Pose pose) override;
   Result<JigPosition> position() override;
   Status stop() override;
   Status release() override;

@@ -325,6 +325,8 @@ class ReplayedJig final : public Jig {
   std::string name() const override { return "replayed session"; }
   bool turns_by_itself() const override { return true; }
   Status go_to(Pose /*pose*/) override { return {}; }
+  bool can_half_turn() const override { return true; }
+  Status go_to_half_turned(Pose /*pose*/) override { return {}; }
   Result<JigPosition> position() override { return JigPosition{}; }
   Status stop() override { return {}; }
   Status release() override { return {}; }

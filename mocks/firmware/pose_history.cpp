@@ -14,7 +14,7 @@ constexpr std::uint64_t kSeatingStream = 0x73656174;
 
 PoseHistory::PoseHistory(double gravity_g, double seating_deg, std::uint64_t seed)
     : gravity_g_(gravity_g), seating_deg_(seating_deg), random_(seed, kSeatingStream) {
-  pose_ = seated(Eigen::Vector3d::UnitZ(), 0);
+  pose_ = seated(Eigen::Vector3d::UnitZ(), 0, false);
   turns_.push_back({-1, 0, sim::still(pose_, gravity_g_)});
 }
 
@@ -28,10 +28,10 @@ void PoseHistory::at(double time_s, sim::MotionState& state) {
 }
 
 void PoseHistory::turn_to(const Eigen::Vector3d& up, double now_s, double duration_s,
-                          double tilt_deg) {
+                          double tilt_deg, bool half_turned) {
   sim::MotionState from;
   at(now_s, from);
-  pose_ = seated(up, tilt_deg);
+  pose_ = seated(up, tilt_deg, half_turned);
   turns_.push_back(
       {now_s, duration_s, sim::turn(from.rotation, pose_, duration_s, random_.bits(), gravity_g_)});
 }
@@ -47,8 +47,11 @@ bool PoseHistory::is_turning(double now_s) const {
   return now_s < turns_.back().start_s + turns_.back().duration_s;
 }
 
-Eigen::Matrix3d PoseHistory::seated(const Eigen::Vector3d& up, double tilt_deg) {
-  const Eigen::Matrix3d pose = sim::rotation_with_up(up);
+Eigen::Matrix3d PoseHistory::seated(const Eigen::Vector3d& up, double tilt_deg, bool half_turned) {
+  Eigen::Matrix3d pose = sim::rotation_with_up(up);
+  if (half_turned) {
+    pose.leftCols<2>() *= -1;  // right, away from the person: now left, towards him
+  }
   const double rad = std::numbers::pi / 180;
   const Eigen::Vector3d scatter =
       seating_deg_ * rad * Eigen::Vector3d(random_.normal(), random_.normal(), 0);

@@ -24,8 +24,10 @@ class PoseHistory final : public sim::Motion {
   PoseHistory(double gravity_g, double seating_deg, std::uint64_t seed);
 
   void at(double time_s, sim::MotionState& state) override;
-  // `tilt_deg`: how far the pose ends off, in a random direction.
-  void turn_to(const Eigen::Vector3d& up, double now_s, double duration_s, double tilt_deg);
+  // `tilt_deg`: how far the pose ends off, in a random direction. `half_turned`: about the
+  // vertical, from sim::rotation_with_up(up).
+  void turn_to(const Eigen::Vector3d& up, double now_s, double duration_s, double tilt_deg,
+               bool half_turned = false);
   void stop(double now_s);
   bool is_turning(double now_s) const;
 
@@ -35,7 +37,7 @@ class PoseHistory final : public sim::Motion {
     double duration_s;
     std::unique_ptr<sim::Motion> motion;
   };
-  Eigen::Matrix3d seated(const Eigen::Vector3d& up, double tilt_deg);
+  Eigen::Matrix3d seated(const Eigen::Vector3d& up, double tilt_deg, bool half_turned);
 
   double gravity_g_;
   double seating_deg_;

@@ -126,7 +126,15 @@ struct Setting {
 
 constexpr std::string_view kThreeCounts = "three whole counts such as 54/47/26";
 
-constexpr std::array<Setting, 17> kSettings = {{
+bool read_rotation(std::string_view value, PerAxis<double>& vector_deg) {
+  const auto read = axes_of<double>(value, -10, 10);
+  vector_deg = read.value_or(vector_deg);
+  return read.has_value();
+}
+
+constexpr std::string_view kRotation = "a rotation vector of -10 to 10 degrees such as 0.1/-0.2/0";
+
+constexpr std::array<Setting, 19> kSettings = {{
     {"bad", [](auto value, auto& d) { return read_defect(value, d.given); },
      "zero_high, zero_low, sensitivity_low or sensitivity_high"},
     {"seed",
@@ -190,6 +198,12 @@ constexpr std::array<Setting, 17> kSettings = {{
        return read_number(value, -200.0, 200.0, d.settings.unit.temperature_c);
      },
      "a temperature such as 24.5"},
+    {"jig_tilt_deg",
+     [](auto value, auto& d) { return read_rotation(value, d.settings.unit.jig_tilt_deg); },
+     kRotation},
+    {"misalignment_deg",
+     [](auto value, auto& d) { return read_rotation(value, d.settings.unit.misalignment_deg); },
+     kRotation},
     {"faults",
      [](auto value, auto& d) {
        d.settings.faults_file = std::string(value);

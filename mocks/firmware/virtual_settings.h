@@ -13,6 +13,8 @@
 //     bad: zero_high, zero_low, sensitivity_low, sensitivity_high: a unit that must fail with that
 //       code
 //     battery_mv, temperature_c
+//     jig_tilt_deg, misalignment_deg: the jig's base out of level, the sensor rotated in the case,
+//       as rotation vectors a/b/c
 //     faults: a fault plan's file, whose name holds no comma
 //
 // A setting that is missing comes from the seed, or is the default of VirtualUnitOptions.

@@ -103,8 +103,8 @@ std::uint64_t VirtualUnit::flash_left() const {
 }
 
 void VirtualUnit::turn_to(const Eigen::Vector3d& up, nanoseconds now, double duration_s,
-                          double tilt_deg) {
-  poses_->turn_to(up, seconds(now), duration_s, tilt_deg);
+                          double tilt_deg, bool half_turned) {
+  poses_->turn_to(up, seconds(now), duration_s, tilt_deg, half_turned);
 }
 
 bool VirtualUnit::is_turning(nanoseconds now) const { return poses_->is_turning(seconds(now)); }
@@ -137,6 +137,23 @@ sim::SimulatorOptions VirtualUnit::simulator_options(int rate_hz, sim::FilterCon
   options.temperature_c = options_.temperature_c;
   options.seed = options_.seed + 7919 * ++runs_;
   return options;
+}
+
+std::vector<std::unique_ptr<sim::Effect>> VirtualUnit::effects() const {
+  std::vector<sim::EffectSpec> specs;
+  const auto add = [&specs](std::string_view name, const PerAxis<double>& vector_deg) {
+    const auto kind = sim::find_effect(name);
+    if (vector_deg == PerAxis<double>{} || !kind) {
+      return;
+    }
+    if (auto values = sim::complete_parameters(
+            **kind, {{"rotation_vector_deg", {vector_deg.begin(), vector_deg.end()}}})) {
+      specs.push_back({*kind, std::move(*values)});
+    }
+  };
+  add("tilt", options_.jig_tilt_deg);
+  add("misalignment", options_.misalignment_deg);
+  return sim::make_effects(specs, options_.seed);
 }
 
 std::optional<nanoseconds> VirtualUnit::next_due() const {
@@ -210,7 +227,8 @@ void VirtualUnit::finish_recording(nanoseconds now) {
       std::min(lasted_s, room > kArchiveOverhead ? (room - kArchiveOverhead) / bytes_per_s : 0);
 
   sim::Simulator simulator(options_.truth,
-                           simulator_options(run.rate_hz, recording_filter(), run.start), *poses_);
+                           simulator_options(run.rate_hz, recording_filter(), run.start), *poses_,
+                           effects());
   Bytes log = sim::log_preamble(options_.truth, run.start_time, run.rate_hz);
   sim::SimulatedBlock block;
   std::optional<gt3x::Counts> frozen;

@@ -39,6 +39,10 @@ struct VirtualUnitOptions {
   double gravity_g = 1;
   // Seating scatter of every placement, standard deviation per axis: a careful person, a good jig.
   double seating_deg = 0.01;
+  // The jig's base out of level, and the sensor's axes rotated in the case: rotation vectors of the
+  // effects `tilt` and `misalignment` (docs/scenario.md).
+  PerAxis<double> jig_tilt_deg{};
+  PerAxis<double> misalignment_deg{};
   // Flash for recordings. A recording that does not fit ends where the flash is full.
   std::uint64_t flash_bytes = 64ULL << 20U;
 };
@@ -56,8 +60,10 @@ class VirtualUnit {
   // When the next report comes without a request; none where there is no stream.
   std::optional<nanoseconds> next_due() const;
 
-  // A person or a jig turns it in `duration_s`; `tilt_deg` is the error of the final pose.
-  void turn_to(const Eigen::Vector3d& up, nanoseconds now, double duration_s, double tilt_deg = 0);
+  // A person or a jig turns it in `duration_s`; `tilt_deg` is the error of the final pose;
+  // `half_turned` as in PoseHistory.
+  void turn_to(const Eigen::Vector3d& up, nanoseconds now, double duration_s, double tilt_deg = 0,
+               bool half_turned = false);
   bool is_turning(nanoseconds now) const;
   void stop_turning(nanoseconds now);  // it stays as it is at that moment
 
@@ -122,6 +128,7 @@ class VirtualUnit {
   void answer_other_version(std::span<const std::uint8_t> report);
   sim::SimulatorOptions simulator_options(int rate_hz, sim::FilterConfiguration filter,
                                           nanoseconds start);
+  std::vector<std::unique_ptr<sim::Effect>> effects() const;
   void finish_recording(nanoseconds now);
   void keep(Bytes image, UtcTime start);
   void load_page();

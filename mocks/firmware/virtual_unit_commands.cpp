@@ -180,7 +180,7 @@ struct VirtualUnit::Commands {
         exchange.now, rate_hz,
         std::make_unique<sim::Simulator>(
             unit.options_.truth, unit.simulator_options(rate_hz, unit.stream_filter_, exchange.now),
-            *unit.poses_)};
+            *unit.poses_, unit.effects())};
     return ReplyCode::ok;
   }
 

@@ -18,20 +18,21 @@ Eigen::Vector3d up_of(device::Pose pose) {
   return {up[0], up[1], up[2]};
 }
 
-void turn_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, double tilt_deg) {
-  plugged.unit.turn_to(up, plugged.clock->elapsed(), kTurnByHand_s, tilt_deg);
+void turn_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, double tilt_deg,
+                  bool half_turned) {
+  plugged.unit.turn_to(up, plugged.clock->elapsed(), kTurnByHand_s, tilt_deg, half_turned);
 }
 
-void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up) {
+void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, bool half_turned) {
   const nanoseconds now = plugged.clock->elapsed();
-  plugged.unit.turn_to(up, now, kKnock_s, kKnock_deg);
-  plugged.unit.turn_to(up, now + from_seconds(kKnock_s), kKnock_s);
+  plugged.unit.turn_to(up, now, kKnock_s, kKnock_deg, half_turned);
+  plugged.unit.turn_to(up, now + from_seconds(kKnock_s), kKnock_s, 0, half_turned);
 }
 
 Result<std::string> VirtualHands::obey(std::string_view word) {
   const std::lock_guard lock(plugged_->mutex);
   if (word == "knock") {
-    knock_by_hand(*plugged_, up_of(pose_));
+    knock_by_hand(*plugged_, up_of(pose_), half_turned_);
     return std::string("the unit was knocked");
   }
   if (word == "swap") {
@@ -40,14 +41,19 @@ Result<std::string> VirtualHands::obey(std::string_view word) {
     plugged_->faults = FaultInjector(std::move(plan), plugged_->clock->elapsed());
     return std::string("the unit is pulled out; in a second another one is plugged in");
   }
-  const auto pose = device::parse_pose(word);
+  constexpr std::string_view kTurned = " turned";
+  const bool turned = word.ends_with(kTurned);
+  const auto pose =
+      device::parse_pose(turned ? word.substr(0, word.size() - kTurned.size()) : word);
   if (!pose) {
     return fail(ErrorCode::usage, fmt::format("'{}' is no word for the hands", printable(word, 40)),
-                {}, "+x -x +y -y +z -z turn the unit; knock; swap");
+                {}, "+x -x +y -y +z -z turn the unit; +x turned; knock; swap");
   }
   pose_ = *pose;
-  turn_by_hand(*plugged_, up_of(pose_));
-  return fmt::format("the unit is turned to {}", device::to_string(pose_));
+  half_turned_ = turned;
+  turn_by_hand(*plugged_, up_of(pose_), 0, half_turned_);
+  return fmt::format("the unit is turned to {}{}", device::to_string(pose_),
+                     half_turned_ ? ", half a turn about the vertical" : "");
 }
 
 }  // namespace sixpoint::mocks

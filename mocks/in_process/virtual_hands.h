@@ -6,6 +6,7 @@
 // | word              | what the hands do                                                        |
 // |-------------------|--------------------------------------------------------------------------|
 // | +x -x +y -y +z -z | turn the unit, that axis up (+) or down (-)                              |
+// | +x turned         | the same, half a turn about the vertical from how +x alone lays it       |
 // | knock             | move it a little, and back                                               |
 // | swap              | pull it out, and plug another one in after a second                      |
 //
@@ -24,8 +25,9 @@ namespace sixpoint::mocks {
 
 // What hands do to a unit whose mutex the caller holds; `up`: the direction that points up then.
 Eigen::Vector3d up_of(device::Pose pose);
-void turn_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, double tilt_deg = 0);
-void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up);
+void turn_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, double tilt_deg = 0,
+                  bool half_turned = false);
+void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, bool half_turned = false);
 
 class VirtualHands {
  public:
@@ -37,6 +39,7 @@ class VirtualHands {
  private:
   std::shared_ptr<PluggedUnit> plugged_;
   device::Pose pose_ = device::Pose::plus_z;
+  bool half_turned_ = false;
 };
 
 }  // namespace sixpoint::mocks

@@ -10,7 +10,7 @@ constexpr double kTurnByMotor_s = 1.5;
 
 }  // namespace
 
-Status VirtualJig::go_to(device::Pose pose) {
+Status VirtualJig::turn(device::Pose pose, bool half_turned) {
   const auto up = device::direction_of(pose);
   const std::lock_guard lock(plugged_->mutex);
   if (plugged_->motor.stopped) {
@@ -19,7 +19,7 @@ Status VirtualJig::go_to(device::Pose pose) {
   }
   plugged_->motor.begin_movement();
   plugged_->unit.turn_to({up[0], up[1], up[2]}, plugged_->clock->elapsed(), kTurnByMotor_s,
-                         std::exchange(tilt_next_deg_, 0.0));
+                         std::exchange(tilt_next_deg_, 0.0), half_turned);
   pose_ = pose;
   return {};
 }

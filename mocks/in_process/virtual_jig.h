@@ -18,7 +18,10 @@ class VirtualJig final : public device::Jig {
 
   std::string name() const override { return "virtual"; }
   bool turns_by_itself() const override { return true; }
-  Status go_to(device::Pose pose) override;
+  Status go_to(device::Pose pose) override { return turn(pose, false); }
+  // As no motorised jig that is known does: so that the whole of `production+` can be tested.
+  bool can_half_turn() const override { return true; }
+  Status go_to_half_turned(device::Pose pose) override { return turn(pose, true); }
   Result<device::JigPosition> position() override;
   Status stop() override;
   Status release() override;
@@ -29,6 +32,8 @@ class VirtualJig final : public device::Jig {
   void tilt_next(double tilt_deg) { tilt_next_deg_ = tilt_deg; }
 
  private:
+  Status turn(device::Pose pose, bool half_turned);
+
   std::shared_ptr<PluggedUnit> plugged_;
   std::optional<device::Pose> pose_;
   double tilt_next_deg_ = 0;

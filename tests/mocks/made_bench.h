@@ -16,8 +16,7 @@
 namespace sixpoint::mocks {
 
 struct Bench {
-  explicit Bench(const char* firmware = "1.5.0") {
-    VirtualUnitOptions options;
+  explicit Bench(const char* firmware = "1.5.0", VirtualUnitOptions options = {}) {
     sim::GivenProperties given;
     given.firmware = firmware;
     options.truth = sim::draw_unit(7, given);

@@ -43,5 +43,24 @@ TEST(PoseHistory, AStoppedTurnStaysWhereItIs) {
   EXPECT_LT(stopped[2], 0.99);
 }
 
+// The axes that lay level point the other way, seen from the laboratory; the one that points up
+// does not.
+TEST(PoseHistory, AHalfTurnIsAboutTheVertical) {
+  for (const Eigen::Vector3d& up :
+       {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(0, 0, 1)}) {
+    PoseHistory poses(1, 0, 7);
+    sim::MotionState plain;
+    sim::MotionState turned;
+    poses.turn_to(up, 0, 1, 0);
+    poses.at(5, plain);
+    poses.turn_to(up, 10, 1, 0, true);
+    poses.at(15, turned);
+    EXPECT_LT((turned.rotation.col(0) + plain.rotation.col(0)).norm(), 1e-9);
+    EXPECT_LT((turned.rotation.col(1) + plain.rotation.col(1)).norm(), 1e-9);
+    EXPECT_LT((turned.rotation.col(2) - up).norm(), 1e-9);
+    EXPECT_NEAR(turned.rotation.determinant(), 1, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::mocks

@@ -109,5 +109,17 @@ TEST(VirtualSettings, AUnitOfFilesAloneIsNotOpened) {
   EXPECT_NE(refused.error().hint.find("drive:FOLDER"), std::string::npos);
 }
 
+TEST(VirtualSettings, ReadsHowTheJigTiltsAndTheSensorIsTurned) {
+  const auto settings =
+      parse_virtual_settings("jig_tilt_deg=0.1/-0.2/0,misalignment_deg=1/2/-3", 1);
+  ASSERT_OK(settings);
+  EXPECT_EQ(settings->unit.jig_tilt_deg, (PerAxis<double>{0.1, -0.2, 0}));
+  EXPECT_EQ(settings->unit.misalignment_deg, (PerAxis<double>{1, 2, -3}));
+  for (const char* text :
+       {"jig_tilt_deg=0.1/0.2", "jig_tilt_deg=11/0/0", "misalignment_deg=a/0/0"}) {
+    EXPECT_FAILS(parse_virtual_settings(text, 1), ErrorCode::usage);
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::mocks

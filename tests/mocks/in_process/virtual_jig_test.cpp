@@ -91,5 +91,33 @@ TEST(VirtualJig, OnlyTheNextPoseIsTilted) {
   EXPECT_NEAR(reading_g(bench)[2], 1, 0.005);
 }
 
+// Oracle: closed form. A base that is tilted by t about a level axis shows its sine on a level axis
+// of the unit, with the other sign after half a turn; what is turned in the case shows alike in
+// both.
+TEST(VirtualJig, AHalfTurnChangesTheSignOfTheTiltAndNotOfTheMisalignment) {
+  constexpr double kRad = 3.14159265358979323846 / 180;
+  VirtualUnitOptions options;
+  options.seating_deg = 0;
+  options.jig_tilt_deg = {2, 0, 0};        // about "to the right": "up" leans away by -2 degrees
+  options.misalignment_deg = {0, 1.5, 0};  // about the unit's y
+  Bench bench("1.5.0", options);
+  ASSERT_OK(bench.unit->set_filter(FilterConfiguration::current));
+  ASSERT_TRUE(bench.jig->can_half_turn());
+  PerAxis<double> at[2];
+  for (const bool turned : {false, true}) {
+    ASSERT_OK(turned ? bench.jig->go_to_half_turned(Pose::plus_z) : bench.jig->go_to(Pose::plus_z));
+    bench.clock->sleep(std::chrono::seconds(2));
+    at[turned ? 1 : 0] = reading_g(bench);
+  }
+  // The force leans by 2 degrees against y as it lies at first; y points the other way after a half
+  // turn. The case's y axis is not moved by a rotation about y; x gets the sine of 1.5 degrees.
+  const double tilt_g = std::sin(2 * kRad);
+  const double misalignment_g = std::sin(1.5 * kRad) * std::cos(2 * kRad);
+  EXPECT_NEAR(at[0][1], -tilt_g, 4e-4);
+  EXPECT_NEAR(at[1][1], tilt_g, 4e-4);
+  EXPECT_NEAR(at[0][0], misalignment_g, 4e-4);
+  EXPECT_NEAR(at[1][0], misalignment_g, 4e-4);
+}
+
 }  // namespace
 }  // namespace sixpoint::mocks
