@@ -40,6 +40,7 @@ struct JigCommandOptions : JigOptions {
   std::string pin_file;
   std::string station;
   std::string filter = "current";
+  std::string protocol = "production";
   std::string limits;
   std::string study;
   std::string certificate;
@@ -198,14 +199,15 @@ std::string run_folder(const Context& context, const JigCommandOptions& options,
 
 station::UnfinishedRun unfinished_run(const JigCommandOptions& options,
                                       const device::Identity& identity,
-                                      calib::FilterConfiguration filter) {
+                                      const station::JigSessionOptions& session) {
   return {.device = options.device,
           .serial = identity.serial,
           .firmware = identity.firmware,
           .operator_name = options.operator_name,
           .station = options.station,
           .write = options.write,
-          .filter = filter};
+          .filter = session.filter,
+          .protocol = session.run.protocol};
 }
 
 Result<station::JigSessionOptions> session_options(Context& context,
@@ -217,6 +219,7 @@ Result<station::JigSessionOptions> session_options(Context& context,
   session.gravity = gravity.value_or(session.gravity);
   session.run.write = options.write;
   session.run.dwell_s = options.dwell_s;
+  SIXPOINT_ASSIGN(session.run.protocol, station::parse_jig_protocol(options.protocol));
   session.keep_interrupted = true;
   SIXPOINT_ASSIGN(const station::JigDue jig_due, due_of(options));
   SIXPOINT_CHECK(station::check_jig_due(jig_due, context.env.clock.now()));
@@ -300,7 +303,7 @@ Result<station::JigReport> run_and_store(
   const std::string path = run_folder(context, options, *opened.jig, identity.serial);
   station::RunFolder folder(context.env, path);
   station::RunSaver saver(
-      folder, unfinished_run(options, identity, session.filter),
+      folder, unfinished_run(options, identity, session),
       [&context](const std::string& warning) { context.log().warn("{}", warning); });
   std::optional<station::JigResume> left;
   if (!path.empty()) {
@@ -314,12 +317,9 @@ Result<station::JigReport> run_and_store(
     };
   }
   if (left) {
-    const station::JigProgress& had = left->progress;
     context.people << fmt::format(
                           "the run of {} goes on; it has {} placements (--anew begins anew)\n",
-                          local_time(left->started),
-                          had.faces.size() + had.reversed.size() + had.reseat.size() +
-                              had.recheck.size())
+                          local_time(left->started), left->progress.placements())
                    << std::flush;
   }
   SIXPOINT_ASSIGN(auto report,
@@ -343,6 +343,7 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
   if (!opened.jig->turns_by_itself()) {
     stop.reset();
   }
+  SIXPOINT_CHECK(station::check_protocol(session.run.protocol, *opened.jig));
   const device::Unit& unit = *opened.unit;
   const device::Identity& identity = unit.identity();
   if (!unit.abilities().streams || !unit.abilities().holds_constants) {
@@ -514,6 +515,12 @@ void add_jig(CLI::App& app, Context& context) {
     command.add_option(option.name, options.*option.text, option.about);
   }
   command.add_option("--filter", options.filter, "filter configuration: current or legacy")
+      ->capture_default_str();
+  command
+      .add_option("--protocol", options.protocol,
+                  "production, or production+: then three sides once more, turned by half a turn "
+                  "about the vertical, so that 'gap diagnose' tells the jig's tilt from the unit's "
+                  "(docs/gap.md); by hand")
       ->capture_default_str();
   command.add_option("--dwell", options.dwell_s, "seconds that each pose is measured for")
       ->check(CLI::Range(0.5, 600.0))

@@ -55,7 +55,8 @@ Json Lanes::Lane::live() const {
 
 Json Lanes::Lane::run_json() const {
   const JigProgress& progress = run_->progress;
-  const JigRunOptions& options = shared_.options.session.run;
+  JigRunOptions options = shared_.options.session.run;
+  options.write = write_;
   Json json;
   json["phase"] = station::to_string(progress.phase);
   json["wanted"] = name_or_null(run_->wanted);
@@ -77,8 +78,7 @@ Json Lanes::Lane::run_json() const {
                                {"tilt_deg", rounded(reading.tilt_deg, 10)}});
     }
   }
-  json["of"] = device::kPoses.size() + options.verification.size() + options.reseat.size() +
-               (write_ ? options.recheck.size() : 0);
+  json["of"] = placements_of(options);
   json["refusals"] = progress.refusals;
   json["last_refusal"] = run_->last_refusal;
   json["waiting_since_ms"] = waiting_since_ms_;

@@ -72,6 +72,7 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   SIXPOINT_ASSIGN(run.resume.as_found, parse_page(json.at("as_found")));
   SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
   // Folders of earlier versions do not have these.
+  SIXPOINT_ASSIGN(run.protocol, parse_jig_protocol(json.value("protocol", "production")));
   run.resume.write_begun = json.value("write_begun", false);
   if (json.contains("stream")) {
     run.resume.stream = parse_stream(json["stream"]);
@@ -171,6 +172,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
                      {"client", run.client},
                      {"write", run.write},
                      {"filter", calib::to_string(run.filter)},
+                     {"protocol", to_string(run.protocol)},
                      {"started", to_iso8601(run.resume.started)},
                      {"as_found", page_to_json(run.resume.as_found)},
                      {"written", page_to_json(run.resume.written)},
@@ -284,7 +286,8 @@ std::optional<JigResume> RunSaver::take_left_over(bool begin_again) {
   if (!*left) {
     return std::nullopt;
   }
-  if ((*left)->serial != state_.serial || (*left)->filter != state_.filter || begin_again) {
+  if ((*left)->serial != state_.serial || (*left)->filter != state_.filter ||
+      (*left)->protocol != state_.protocol || begin_again) {
     check(folder_.clear());
     return std::nullopt;
   }

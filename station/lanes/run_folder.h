@@ -34,6 +34,7 @@ struct UnfinishedRun {
   std::string client = {};
   bool write = false;
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
+  JigProtocol protocol = JigProtocol::production;
   JigResume resume = {};
 };
 
@@ -84,8 +85,8 @@ class RunSaver {
       : folder_(folder), state_(std::move(state)), warn_(std::move(warn)) {}
 
   const UnfinishedRun& state() const { return state_; }
-  // What an earlier program left of this unit's run under this filter. All else is removed; what
-  // cannot be read is set aside, with a warning.
+  // What an earlier program left of this unit's run under this filter and protocol. All else is
+  // removed; what cannot be read is set aside, with a warning.
   std::optional<JigResume> take_left_over(bool begin_again);
   void add_rows(std::string_view rows) { check(folder_.append(rows)); }  // for JigHooks::raw
   void save(const JigReport& report, const JigRun& run);                 // for JigHooks::progress

@@ -21,14 +21,20 @@ using Json = nlohmann::json;
 constexpr const char* kDamaged = "'sixpoint audit verify' says whether the store was changed";
 constexpr std::size_t kMostSamples = 2'000'000;  // five hours at 100 Hz
 
-// A rotation that brings "up" onto the axis of the pose. The report does not hold the yaw.
-Eigen::Matrix3d rotation_of(device::Pose pose) {
-  const PerAxis<double> up = device::direction_of(pose);
+// A rotation that brings "up" onto the axis of the pose, the unit lying about the vertical as the
+// table of station/run/jig_run.h says. A report of the protocol `production` does not hold how it
+// lay: then the same is assumed.
+Eigen::Matrix3d rotation_of(const StoredReading& reading) {
+  const PerAxis<double> up = device::direction_of(reading.pose);
   const Eigen::Vector3d direction(up[0], up[1], up[2]);
-  if (direction.z() < -0.5) {
-    return Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  Eigen::Matrix3d rotation =
+      direction.z() < -0.5 ? Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix()
+                           : Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction)
+                                 .toRotationMatrix();
+  if (reading.half_turned) {
+    rotation.leftCols<2>() *= -1;
   }
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction).toRotationMatrix();
+  return rotation;
 }
 
 struct Samples {
@@ -81,7 +87,7 @@ Result<Samples> read_samples(std::string_view csv) {
 
 // A reading and where its samples are.
 struct Reading {
-  std::string round;  // "faces" or "reseat"
+  std::string round;  // "faces", "reseat" or "half_turn"
   StoredReading stored;
   std::array<std::int64_t, 3> sum{};
   std::size_t first_sample = 0;
@@ -105,6 +111,9 @@ Result<std::vector<Reading>> readings_of(const Json& report) {
   if (report.contains("verification") && report["verification"].is_object() &&
       report["verification"].contains("poses")) {
     SIXPOINT_CHECK(add_readings(report["verification"]["poses"], "reseat", readings));
+  }
+  if (report.contains("half_turn")) {
+    SIXPOINT_CHECK(add_readings(report["half_turn"], "half_turn", readings));
   }
   return readings;
 }
@@ -166,11 +175,12 @@ void add_segments(gap::Bundle& bundle, const Samples& samples,
     segment.first_sample = bundle.samples.size();
     segment.samples = reading.stored.samples;
     segment.host_start_s = samples.device_time_s[first] - samples.device_time_s.front();
-    segment.rotation = rotation_of(reading.stored.pose);
+    segment.rotation = rotation_of(reading.stored);
     segment.temperature_start_c = samples.temperature_c[first];
     segment.temperature_end_c = segment.temperature_start_c;
     segment.settled = true;
-    segment.pose = static_cast<int>(reading.stored.pose);
+    segment.pose = static_cast<int>(reading.stored.pose) +
+                   (reading.stored.half_turned ? static_cast<int>(device::kPoses.size()) : 0);
     segment.placement = static_cast<int>(bundle.segments.size());
     segment.approach_g = Eigen::Vector3d::Zero();
     if (!bundle.segments.empty()) {
@@ -265,6 +275,7 @@ Result<std::vector<StoredReading>> stored_readings(const Json& list) {
       SIXPOINT_ASSIGN(reading.pose, device::parse_pose(item.at("pose").get<std::string>()));
       reading.mean_lsb = item.at("mean_lsb").get<PerAxis<double>>();
       reading.samples = item.at("samples").get<std::size_t>();
+      reading.half_turned = item.value("turned_deg", 0) == 180;
     } catch (const Json::exception&) {
       reading.samples = kMostSamples + 1;
     }

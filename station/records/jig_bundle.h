@@ -44,8 +44,9 @@ struct StoredReading {
   device::Pose pose = device::Pose::plus_z;
   PerAxis<double> mean_lsb{};
   std::size_t samples = 0;
+  bool half_turned = false;  // about the vertical (the table of station/run/jig_run.h)
 };
-// `list`: "poses" of a report. bad_data where an entry is incomplete.
+// `list`: "poses" of a report, or another of its lists. bad_data where an entry is incomplete.
 Result<std::vector<StoredReading>> stored_readings(const nlohmann::json& list);
 
 // bad_data where report or samples are not those of a jig run, or do not belong together.

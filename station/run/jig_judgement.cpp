@@ -36,6 +36,7 @@ Result<calib::SixPoseReport> solve_faces(const std::vector<PoseReading>& faces,
 
 Result<bool> judge_readings(JigReport& report, const JigRun& run) {
   report.faces = run.faces();
+  report.half_turn = run.half_turn();
   if (report.faces.size() < device::kPoses.size()) {
     return false;
   }

@@ -363,6 +363,7 @@ PoseReading JigRun::read_dwell() const {
   reading.samples = static_cast<int>(dwell_.size());
   reading.start_s = dwell_.front().time_s;
   reading.from = came_from_;
+  reading.turned_deg = turned_deg();
   const auto n = static_cast<double>(dwell_.size());
   for (const Sample& sample : dwell_) {
     reading.temperature_c += sample.temperature_c / n;

@@ -18,6 +18,9 @@ PoseReading parse_reading(const nlohmann::ordered_json& json) {
   if (!json.at("from").is_null()) {
     reading.from = device::parse_pose(json.at("from").get<std::string>()).value();
   }
+  if (json.contains("turned_deg")) {
+    reading.turned_deg = json.at("turned_deg").get<int>();
+  }
   return reading;
 }
 
@@ -33,6 +36,9 @@ nlohmann::ordered_json to_json(const PoseReading& reading) {
   json["tilt_deg"] = reading.tilt_deg;
   json["from"] = reading.from ? nlohmann::ordered_json(device::to_string(*reading.from))
                               : nlohmann::ordered_json(nullptr);
+  if (reading.turned_deg) {
+    json["turned_deg"] = *reading.turned_deg;
+  }
   return json;
 }
 
@@ -49,6 +55,7 @@ nlohmann::ordered_json to_json(const JigProgress& progress) {
   list("faces", progress.faces);
   list("reversed", progress.reversed);
   list("reseat", progress.reseat);
+  list("half_turn", progress.half_turn);
   list("recheck", progress.recheck);
   return json;
 }
@@ -67,6 +74,9 @@ Result<JigProgress> parse_jig_progress(const nlohmann::ordered_json& json) {
     list("faces", progress.faces);
     list("reversed", progress.reversed);
     list("reseat", progress.reseat);
+    if (json.contains("half_turn")) {  // states of earlier versions do not have it
+      list("half_turn", progress.half_turn);
+    }
     list("recheck", progress.recheck);
     return progress;
   } catch (const std::exception& error) {

@@ -113,6 +113,7 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["firmware"] = firmware;
   json["jig"] = jig;
   json["filter"] = calib::to_string(filter);
+  json["protocol"] = to_string(protocol);
   json["verdict"] = to_string(verdict);
   json["codes"] = codes;
   json["reasons"] = reasons;
@@ -124,6 +125,12 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["poses"] = nlohmann::ordered_json::array();
   for (const PoseReading& face : faces) {
     json["poses"].push_back(station::to_json(face));
+  }
+  if (protocol == JigProtocol::production_plus) {
+    json["half_turn"] = nlohmann::ordered_json::array();
+    for (const PoseReading& face : half_turn) {
+      json["half_turn"].push_back(station::to_json(face));
+    }
   }
   json["constants"] = six ? calib::to_json(six->best().calibration, six->best().stored)
                           : nlohmann::ordered_json(nullptr);

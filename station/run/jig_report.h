@@ -51,6 +51,7 @@ struct JigReport {
   std::string firmware;
   std::string jig;
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
+  JigProtocol protocol = JigProtocol::production;
   UtcTime started{};
   UtcTime ended{};
   JigVerdict verdict = JigVerdict::inconclusive;
@@ -63,6 +64,9 @@ struct JigReport {
   calib::LocalGravity gravity;
 
   std::vector<PoseReading> faces;
+  // With production+: three faces turned by half a turn. For the diagnosis alone: neither constants
+  // nor verdict use them.
+  std::vector<PoseReading> half_turn;
   // The three solutions, the choice among them by unused readings, and the verdict on it.
   std::optional<calib::SixPoseReport> six;
   std::string method;  // "six_pose_letter" (Eq. 1-6 to the letter), "six_pose_pair" ...

@@ -10,8 +10,9 @@ namespace sixpoint::station {
 namespace {
 
 // In the order of the enumerators.
-constexpr std::array<std::string_view, 6> kPhases = {"measuring", "verifying",  "reseating",
-                                                     "writing",   "rechecking", "finished"};
+constexpr std::array<std::string_view, 7> kPhases = {
+    "measuring", "verifying", "reseating", "turning", "writing", "rechecking", "finished"};
+constexpr std::array<std::string_view, 2> kProtocols = {"production", "production+"};
 constexpr std::array<std::string_view, 4> kStillness = {"moving", "settling", "dwelling",
                                                         "leaving"};
 constexpr std::array<std::string_view, 7> kOutcomes = {"running",           "complete", "timed_out",
@@ -25,6 +26,14 @@ constexpr double kTurned_mg = 300;
 std::string describe(Pose pose) {
   return fmt::format("{}: its {} axis points {}", device::to_string(pose),
                      kAxisNames[device::axis_of(pose)], device::sign_of(pose) > 0 ? "up" : "down");
+}
+
+// The table of jig_run.h, in words for the person.
+std::string describe_turned(Pose pose, int turned_deg) {
+  if (device::axis_of(pose) == 0) {
+    return turned_deg == 0 ? "its y axis away from you" : "its y axis towards you";
+  }
+  return turned_deg == 0 ? "its x axis to the right" : "its x axis to the left";
 }
 
 }  // namespace
@@ -46,10 +55,29 @@ Result<JigPhase> parse_jig_phase(std::string_view text) {
   return static_cast<JigPhase>(found - kPhases.begin());
 }
 
+std::string_view to_string(JigProtocol protocol) {
+  return kProtocols[static_cast<std::size_t>(protocol)];
+}
+
+Result<JigProtocol> parse_jig_protocol(std::string_view text) {
+  const auto found = std::find(kProtocols.begin(), kProtocols.end(), text);
+  if (found == kProtocols.end()) {
+    return fail(ErrorCode::usage,
+                fmt::format("'{}' is no protocol of a jig run", printable(text, 40)), "--protocol",
+                "production or production+");
+  }
+  return static_cast<JigProtocol>(found - kProtocols.begin());
+}
+
+std::size_t placements_of(const JigRunOptions& options) {
+  return device::kPoses.size() + options.verification.size() + options.reseat.size() +
+         (options.protocol == JigProtocol::production_plus ? options.half_turn.size() : 0) +
+         (options.write ? options.recheck.size() : 0);
+}
+
 double dwell_budget_s(const JigRunOptions& options) {
-  const std::size_t poses = device::kPoses.size() + options.verification.size() +
-                            options.reseat.size() + (options.write ? options.recheck.size() : 0);
-  return static_cast<double>(poses) * (options.window_s + options.settle_s + options.dwell_s);
+  return static_cast<double>(placements_of(options)) *
+         (options.window_s + options.settle_s + options.dwell_s);
 }
 
 JigRun::JigRun(JigRunOptions options, const calib::Calibration& approximation)
@@ -61,11 +89,16 @@ JigRun::JigRun(JigRunOptions options, const calib::Calibration& approximation)
 void JigRun::resume(const JigProgress& progress) {
   progress_ = progress;
   if (progress_.phase == JigPhase::finished) {
-    progress_.phase = JigPhase::reseating;
+    progress_.phase =
+        options_.protocol == JigProtocol::production_plus ? JigPhase::turning : JigPhase::reseating;
   }
   open_ = wanted_in(progress_.phase);
   for (const PoseReading& reading : readings()) {
     std::erase(open_, reading.pose);
+  }
+  if (progress_.phase == JigPhase::turning) {
+    const auto& last = progress_.half_turn.empty() ? progress_.reseat : progress_.half_turn;
+    read_lsb_ = last.empty() ? read_lsb_ : last.back().mean_lsb;
   }
 }
 
@@ -104,6 +137,7 @@ std::vector<PoseReading>& JigRun::readings() {
   return progress_.phase == JigPhase::measuring   ? progress_.faces
          : progress_.phase == JigPhase::verifying ? progress_.reversed
          : progress_.phase == JigPhase::reseating ? progress_.reseat
+         : progress_.phase == JigPhase::turning   ? progress_.half_turn
                                                   : progress_.recheck;
 }
 
@@ -113,6 +147,7 @@ const std::vector<Pose>& JigRun::wanted_in(JigPhase phase) const {
   return phase == JigPhase::measuring    ? kAll
          : phase == JigPhase::verifying  ? options_.verification
          : phase == JigPhase::reseating  ? options_.reseat
+         : phase == JigPhase::turning    ? options_.half_turn
          : phase == JigPhase::rechecking ? options_.recheck
                                          : kNone;
 }
@@ -156,12 +191,27 @@ void JigRun::ask_next() {
   if (progress_.phase == JigPhase::verifying && last_face_ && ask_detour()) {
     return;
   }
-  actions_.push_back({JigAction::Kind::place, open_.front(),
-                      fmt::format("{} {}",
-                                  progress_.phase == JigPhase::reseating
-                                      ? "take the unit off, put it back and turn it to"
-                                      : "turn the unit to",
-                                  describe(open_.front()))});
+  if (progress_.phase == JigPhase::turning && last_face_ == open_.front()) {
+    std::rotate(open_.begin(), open_.begin() + 1, open_.end());  // it must be tipped in between
+  }
+  const Pose pose = open_.front();
+  std::string text = progress_.phase == JigPhase::reseating
+                         ? "take the unit off, put it back and turn it to"
+                     : progress_.phase == JigPhase::turning
+                         ? "lay the unit, turned by half a turn about the vertical, on"
+                         : "turn the unit to";
+  text += ' ' + describe(pose);
+  if (const auto turned = turned_deg()) {
+    text += ", " + describe_turned(pose, *turned);
+  }
+  actions_.push_back({JigAction::Kind::place, pose, std::move(text)});
+}
+
+std::optional<int> JigRun::turned_deg() const {
+  if (options_.protocol == JigProtocol::production) {
+    return std::nullopt;
+  }
+  return progress_.phase == JigPhase::turning ? 180 : 0;
 }
 
 void JigRun::ask_next_or_end_phase() {
@@ -182,12 +232,14 @@ void JigRun::next_phase() {
       progress_.phase = JigPhase::reseating;
       break;
     case JigPhase::reseating:
-      if (options_.write) {
-        progress_.phase = JigPhase::writing;
-        actions_.push_back({JigAction::Kind::write, Pose::plus_z, "writing the constants"});
+      if (options_.protocol == JigProtocol::production) {
+        write_or_finish();
         return;
       }
-      finish(JigOutcome::complete, "the run is complete");
+      progress_.phase = JigPhase::turning;
+      break;
+    case JigPhase::turning:
+      write_or_finish();
       return;
     case JigPhase::writing:
       progress_.phase = JigPhase::rechecking;
@@ -199,6 +251,15 @@ void JigRun::next_phase() {
   }
   open_ = wanted_in(progress_.phase);
   ask_next_or_end_phase();
+}
+
+void JigRun::write_or_finish() {
+  if (options_.write) {
+    progress_.phase = JigPhase::writing;
+    actions_.push_back({JigAction::Kind::write, Pose::plus_z, "writing the constants"});
+  } else {
+    finish(JigOutcome::complete, "the run is complete");
+  }
 }
 
 void JigRun::finish(JigOutcome outcome, std::string text) {
@@ -223,6 +284,12 @@ std::string JigRun::why_not_wanted(Pose pose) const {
     return fmt::format("{} was reached from {} in the first round too; come from another face",
                        device::to_string(pose), device::to_string(*came_from_));
   }
+  if (progress_.phase == JigPhase::turning && !tipped_) {
+    return fmt::format(
+        "not turned: it lies on {} as at the last reading, and was not tipped since; lift it, lay "
+        "it on another side, then on {} turned by half a turn",
+        device::to_string(pose), device::to_string(pose));
+  }
   return {};
 }
 
@@ -235,6 +302,8 @@ void JigRun::accept(const PoseReading& reading) {
   last_progress_s_ = now_s_;
   std::erase(open_, reading.pose);
   readings().push_back(reading);
+  read_lsb_ = reading.mean_lsb;
+  tipped_ = false;
   actions_.push_back({JigAction::Kind::accepted, reading.pose,
                       fmt::format("{} is taken", device::to_string(reading.pose))});
   leave();
@@ -272,6 +341,9 @@ std::vector<JigAction> JigRun::on_sample(const Sample& sample) {
   const bool full = window_.add(sample.counts);
   if (is_stuck(sample.counts) || !full) {
     return answer();
+  }
+  if (progress_.phase == JigPhase::turning && !tipped_) {
+    tipped_ = !read_lsb_ || has_moved(*read_lsb_, kTurned_mg);
   }
   if (!is_still()) {
     if (stillness_ == JigStillness::dwelling) {
@@ -345,9 +417,11 @@ std::vector<JigAction> JigRun::on_operator(OperatorCommand command) {
   }
   // The last reading of the phase before can be taken back too; what was written stays written.
   if (readings().empty() &&
-      (progress_.phase == JigPhase::verifying || progress_.phase == JigPhase::reseating)) {
-    progress_.phase =
-        progress_.phase == JigPhase::verifying ? JigPhase::measuring : JigPhase::verifying;
+      (progress_.phase == JigPhase::verifying || progress_.phase == JigPhase::reseating ||
+       progress_.phase == JigPhase::turning)) {
+    progress_.phase = progress_.phase == JigPhase::verifying   ? JigPhase::measuring
+                      : progress_.phase == JigPhase::reseating ? JigPhase::verifying
+                                                               : JigPhase::reseating;
     open_.clear();
   }
   if (!readings().empty()) {

@@ -14,12 +14,26 @@
 // |------------|-----------------------------------|-------------------------------------------|
 // | measuring  | the six, in any order             | action `fit`, -> verifying                |
 // | verifying  | the six, each from another side   | -> reseating                              |
-// | reseating  | two; the unit is taken off before | with `write`: action `write`, -> writing; |
-// |            |                                   | else -> finished (complete)               |
+// | reseating  | two; the unit is taken off before | production+: -> turning; else the next    |
+// | turning    | three, turned by half a turn      | with `write`: action `write`, -> writing; |
+// |            | about the vertical                | else -> finished (complete)               |
 // | writing    | none                              | on_written() -> rechecking                |
 // | rechecking | two, with the unit's constants    | -> finished (complete)                    |
 //
-// The fit has the first six readings only; the eight others judge it.
+// The fit has the first six readings only; the eight others judge it. Those of `turning` do
+// neither: they tell the jig's tilt from the unit's own for the diagnosis (docs/gap.md,
+// "production+"). They come after the eight, which are then those of a production run, and before a
+// write, so that a unit whose constants are not written has them too.
+//
+// How a face lies about the vertical, seen by a person in front of the jig (`production` does not
+// ask for it, and its readings do not say it):
+//
+//     face          turned_deg 0             turned_deg 180
+//     +x -x         y axis away from him     y axis towards him
+//     +y -y +z -z   x axis to the right      x axis to the left
+//
+// Gravity does not show it. A reading of `turning` is refused unless the unit was tipped since the
+// last reading, so that a unit which was left as it lay, or was knocked, is never taken for turned.
 //
 // | event        | in a phase that asks for poses            | writing             | finished |
 // |--------------|-------------------------------------------|---------------------|----------|
@@ -72,7 +86,13 @@ namespace sixpoint::station {
 
 using device::Pose;
 
+// production: 14 placements. production+: and three, half a turn about the vertical.
+enum class JigProtocol { production, production_plus };
+std::string_view to_string(JigProtocol protocol);
+Result<JigProtocol> parse_jig_protocol(std::string_view text);  // usage when it is none
+
 struct JigRunOptions {
+  JigProtocol protocol = JigProtocol::production;
   int rate_hz = 100;
   // In the mean of 6 s, noise of 5.5 mg falls to 0.2 mg; 0.01 degree of seating are 0.17 mg.
   // Sixteen placements then take two of the three minutes that production allows.
@@ -93,6 +113,8 @@ struct JigRunOptions {
   std::vector<Pose> verification = {Pose::plus_y,  Pose::minus_x, Pose::plus_x,
                                     Pose::minus_z, Pose::plus_z,  Pose::minus_y};
   std::vector<Pose> reseat = {Pose::plus_z, Pose::minus_x};
+  // With production+: those of the segment `half_turn` (docs/gap.md); one face of each axis.
+  std::vector<Pose> half_turn = {Pose::plus_x, Pose::plus_y, Pose::plus_z};
   std::vector<Pose> recheck = {Pose::minus_z, Pose::plus_x};  // after a write
   bool write = false;
   // An axis that repeats one count for so long is stuck: a working one has noise of one count.
@@ -114,9 +136,10 @@ struct PoseReading {
   double start_s = 0;
   double tilt_deg = 0;            // by the level axes, against what was known when it was taken
   std::optional<Pose> from = {};  // the face it lay on before, where that is known
+  std::optional<int> turned_deg = {};  // about the vertical, as it was asked for: 0, 180, or not
 };
 
-enum class JigPhase { measuring, verifying, reseating, writing, rechecking, finished };
+enum class JigPhase { measuring, verifying, reseating, turning, writing, rechecking, finished };
 enum class JigOutcome {
   running,
   complete,
@@ -164,6 +187,11 @@ struct JigProgress {
   std::vector<PoseReading> reseat;
   std::vector<PoseReading> recheck;
   int refusals = 0;
+  std::vector<PoseReading> half_turn = {};
+
+  std::size_t placements() const {
+    return faces.size() + reversed.size() + reseat.size() + half_turn.size() + recheck.size();
+  }
 };
 
 // For the page: where the unit lies now.
@@ -210,6 +238,7 @@ class JigRun {
   const std::vector<Pose>& open_poses() const { return open_; }
   const std::vector<PoseReading>& faces() const { return progress_.faces; }
   std::vector<PoseReading> verification() const;  // both sides of approach, then the reseated
+  const std::vector<PoseReading>& half_turn() const { return progress_.half_turn; }
   const std::vector<PoseReading>& recheck() const { return progress_.recheck; }
   int refusals() const { return progress_.refusals; }
   JigLive live() const;
@@ -226,6 +255,8 @@ class JigRun {
   bool ask_detour();
   void ask_next_or_end_phase();
   void next_phase();
+  void write_or_finish();
+  std::optional<int> turned_deg() const;  // as the phase asks for
   void accept(const PoseReading& reading);
   void refuse(Pose pose, std::string reason);
   void leave();
@@ -263,6 +294,8 @@ class JigRun {
   std::optional<Pose> came_from_;  // and before that
   std::optional<PoseReading> last_refused_;
   std::optional<PerAxis<double>> between_faces_lsb_;  // the last placement refused for that
+  std::optional<PerAxis<double>> read_lsb_;           // mean of the last reading
+  bool tipped_ = false;                               // since then; known in `turning` only
   int refusals_in_row_ = 0;
 
   JigStillness stillness_ = JigStillness::moving;
@@ -277,7 +310,8 @@ class JigRun {
   std::vector<JigAction> actions_;
 };
 
-// Seconds of dwell that a whole run takes when nothing is refused.
+// Placements of a whole run, and the seconds of dwell that they take when nothing is refused.
+std::size_t placements_of(const JigRunOptions& options);
 double dwell_budget_s(const JigRunOptions& options);
 
 }  // namespace sixpoint::station

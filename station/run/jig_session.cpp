@@ -91,6 +91,7 @@ Status Session::prepare(const std::optional<JigResume>& resume) {
   report_.firmware = unit_->identity().firmware;
   report_.jig = jig_->name();
   report_.filter = options_.filter;
+  report_.protocol = options_.run.protocol;
   report_.gravity = options_.gravity;
   report_.limits = options_.limits;
   report_.reasons = options_.notes;
@@ -195,7 +196,8 @@ Status Session::come_back(JigRun& run, const Error& error) {
     SIXPOINT_CHECK(obey(run, command));
   }
   // After a power cut the jig does not know where the unit lies.
-  return run.open_poses().empty() ? Status{} : JigWatch::place(*jig_, run.open_poses().front());
+  return run.open_poses().empty() ? Status{}
+                                  : JigWatch::place(*jig_, run.open_poses().front(), run.phase());
 }
 
 // The unit did not come back, or the wait was ended.
@@ -250,6 +252,7 @@ void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.ended = env_.clock.now();
   report_.refusals = run.refusals();
   report_.faces = run.faces();
+  report_.half_turn = run.half_turn();
   report_.stream = stream_.statistics(unit_);
   report_.settle_as_left();
   report_.verdict = JigVerdict::inconclusive;
@@ -368,7 +371,7 @@ Status Session::handle(JigRun& run, const std::vector<JigAction>& actions) {
     report_.stream = stream_.statistics(unit_);
     hooks_.progress(report_, run);
   }
-  return wanted ? JigWatch::place(*jig_, *wanted) : Status{};
+  return wanted ? JigWatch::place(*jig_, *wanted, run.phase()) : Status{};
 }
 
 Status Session::write_constants(JigRun& run) {
@@ -494,12 +497,23 @@ Result<JigReport> Session::run(const std::optional<JigResume>& resume) {
 
 }  // namespace
 
+Status check_protocol(JigProtocol protocol, const device::Jig& jig) {
+  if (protocol == JigProtocol::production_plus && !jig.can_half_turn()) {
+    return fail(
+        ErrorCode::usage,
+        "production+ lays three faces turned about the vertical, and this jig cannot do that",
+        jig.name(), "leave out --protocol, or turn the unit by hand (--jig manual)");
+  }
+  return {};
+}
+
 Result<JigReport> run_jig(UnitOnJig on_jig, Env& env, const JigSessionOptions& options,
                           const JigHooks& hooks, const std::optional<JigResume>& resume) {
   if (options.run.write && options.filter != FilterConfiguration::current) {
     return fail(ErrorCode::usage, "only constants of the filter 'current' are written into units",
                 {}, "leave out --write or --filter");
   }
+  SIXPOINT_CHECK(check_protocol(options.run.protocol, *on_jig.jig));
   return Session(on_jig, env, options, hooks).run(resume);
 }
 

@@ -90,7 +90,11 @@ struct JigHooks {
   std::function<Result<UnitOnJig>(const Error&, const Look& look)> reopen;
 };
 
-// usage where constants of this filter do not help this unit; device_unavailable when it is
+// usage where the protocol turns a unit about the vertical and the jig cannot: then nothing has
+// moved.
+Status check_protocol(JigProtocol protocol, const device::Jig& jig);
+
+// usage also where constants of this filter do not help this unit; device_unavailable when it is
 // unplugged; otherwise a report with any verdict.
 Result<JigReport> run_jig(UnitOnJig on_jig, Env& env, const JigSessionOptions& options,
                           const JigHooks& hooks, const std::optional<JigResume>& resume = {});

@@ -6,11 +6,11 @@
 
 namespace sixpoint::station {
 
-Status JigWatch::place(device::Jig& jig, device::Pose pose) {
+Status JigWatch::place(device::Jig& jig, device::Pose pose, JigPhase phase) {
   if (jig.turns_by_itself()) {
     SIXPOINT_CHECK(device::check_jig(jig));
   }
-  return jig.go_to(pose);
+  return phase == JigPhase::turning ? jig.go_to_half_turned(pose) : jig.go_to(pose);
 }
 
 Status JigWatch::ask(device::Jig& jig, double now_s) {

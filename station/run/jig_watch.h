@@ -1,7 +1,7 @@
 // What is asked of the jig while a run goes on: turn, look for faults, agree with the unit.
 //
 //   JigWatch watch({0.25, 3});
-//   SIXPOINT_CHECK(watch.place(jig, device::Pose::plus_x));
+//   SIXPOINT_CHECK(watch.place(jig, device::Pose::plus_x, JigPhase::measuring));
 //   SIXPOINT_CHECK(watch.ask(jig, 12.5));  // a stop or a fault of the jig is an error
 //
 // A jig that a person turns is asked nothing: every answer is success. The jig is not owned, and
@@ -26,8 +26,8 @@ class JigWatch {
  public:
   explicit JigWatch(const JigWatchOptions& options) : options_(options) {}
 
-  // Turns the jig, where a look at it permits that.
-  static Status place(device::Jig& jig, device::Pose pose);
+  // Turns the jig, where a look at it permits that; in the phase `turning` half-turned.
+  static Status place(device::Jig& jig, device::Pose pose, JigPhase phase);
 
   // Its stop or fault; at most every poll_s. It ends the run: no placement after it is certain.
   Status ask(device::Jig& jig, double now_s);

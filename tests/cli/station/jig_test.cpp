@@ -167,5 +167,81 @@ TEST_F(CommandTest, AnOverdueJigMeasuresNothingWithoutASignedException) {
   EXPECT_THAT(measured.out, HasSubstr("Eve signed: no other jig"));
 }
 
+// Every reader of a stored run sees the six poses and the eight that judge them.
+TEST_F(CommandTest, ProductionPlusFromRunToDiagnosis) {
+  const auto measured = [&](const std::string& protocol, const std::string& noise) {
+    const auto answer =
+        run({"jig", "--device", std::string(kDevice) + ",noise=" + noise, "--jig", "virtual",
+             "--store", path("s.db"), "--protocol", protocol, "--certificate",
+             path("c" + noise + ".json"), "--operator", "A", "--json"});
+    EXPECT_EQ(answer.exit_code, 0) << answer.people;
+    return answer;
+  };
+  const auto plus = measured("production+", "1");
+  const nlohmann::json json = nlohmann::json::parse(plus.out);
+  EXPECT_EQ(json["protocol"], "production+");
+  EXPECT_EQ(json["poses"].size(), 6U);
+  EXPECT_EQ(json["half_turn"].size(), 3U);
+  EXPECT_THAT(plus.people, HasSubstr("half a turn about the vertical, on +x"));
+  const nlohmann::json plain = nlohmann::json::parse(measured("production", "2").out);
+  EXPECT_EQ(plain["protocol"], "production");
+  for (const char* which : {"c1.json", "c2.json"}) {
+    const auto certificate = nlohmann::json::parse(said_in(path(which)), nullptr, false);
+    EXPECT_EQ(certificate["poses"].size(), 6U) << which;
+  }
+  const auto diagnosed = run({"gap", "diagnose", "--run", json["run"].get<std::string>(), "--store",
+                              path("s.db"), "--json"});
+  EXPECT_EQ(diagnosed.exit_code, 0) << diagnosed.people;
+  EXPECT_EQ(nlohmann::json::parse(diagnosed.out)["verdict"], "no_gap");
+  const auto trends = run({"gap", "trends", "--store", path("s.db"), "--json"});
+  EXPECT_EQ(nlohmann::json::parse(trends.out)["left_out"], 0);
+  EXPECT_EQ(run({"audit", "verify", "--store", path("s.db")}).exit_code, 0);
+}
+
+TEST_F(CommandTest, ProductionPlusNeedsAJigThatTurnsAboutTheVertical) {
+  const auto answer = run({"jig", "--device", kDevice, "--jig", "virtual:serial=J600001", "--store",
+                           path("s.db"), "--protocol", "production+"});
+  EXPECT_EQ(answer.exit_code, 64);
+  EXPECT_THAT(answer.people, HasSubstr("--jig manual"));
+  EXPECT_EQ(answer.people.find("turn the unit"), std::string::npos) << "nothing was asked for";
+  EXPECT_EQ(run({"jig", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"),
+                 "--protocol", "engineering"})
+                .exit_code,
+            64);
+}
+
+// A power cut between two half-turned readings.
+TEST_F(CommandTest, ProductionPlusGoesOnAfterACrash) {
+  const std::string device = "virtual:seed=7,jig=auto";
+  const std::string rest =
+      " --protocol production+ --store " + path("s.db") + " --state " + path("state");
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const std::string script = "exec " + std::string(SIXPOINT_PROGRAM) + " jig --device " + device +
+                               ",pace=50" + rest + " > " + path("o") + " 2> " + path("e");
+    ::execl("/bin/sh", "sh", "-c", script.c_str(), nullptr);
+    ::_exit(127);
+  }
+  for (int i = 0; i < 6000 && said_in(path("e")).find("vertical, on +y") == std::string::npos;
+       ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  ASSERT_EQ(::kill(child, SIGKILL), 0);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status)) << said_in(path("e"));
+  std::istringstream more(rest);
+  std::vector<std::string> words = {"jig", "--device", device, "--json"};
+  for (std::string word; more >> word;) {
+    words.push_back(word);
+  }
+  const auto answer = run(words);
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  EXPECT_THAT(answer.people, testing::ContainsRegex("goes on; it has 1[56] placements"));
+  EXPECT_EQ(answer.people.find("turn the unit to"), std::string::npos) << "only what was left";
+  EXPECT_EQ(answer.json()["half_turn"].size(), 3U);
+}
+
 }  // namespace
 }  // namespace sixpoint::cli

@@ -156,5 +156,20 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   EXPECT_FALSE(lane.load_capture()->has_value());
 }
 
+// The readings of `production` do not say how the unit lay: they are no part of a production+ run.
+TEST(RunFolder, ARunOfAnotherProtocolIsNotGoneOnWith) {
+  for (const JigProtocol protocol : {JigProtocol::production, JigProtocol::production_plus}) {
+    const tests::TemporaryFolder place;
+    RunFolder folder(posix_env(), place / "run");
+    UnfinishedRun run = a_run();
+    run.protocol = JigProtocol::production_plus;
+    ASSERT_OK(folder.save(run));
+    EXPECT_EQ((*folder.load())->protocol, JigProtocol::production_plus);
+    run.protocol = protocol;
+    RunSaver saver(folder, run, [](const std::string& warning) { ADD_FAILURE() << warning; });
+    EXPECT_EQ(saver.take_left_over(false).has_value(), protocol == JigProtocol::production_plus);
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::station

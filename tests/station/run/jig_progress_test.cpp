@@ -18,7 +18,10 @@ JigProgress progress() {
   face.tilt_deg = 0.25;
   PoseReading again = face;
   again.from = Pose::plus_z;
-  return {JigPhase::verifying, {face}, {again}, {}, {}, 3};
+  again.turned_deg = 0;
+  PoseReading turned = face;
+  turned.turned_deg = 180;
+  return {JigPhase::verifying, {face}, {again}, {}, {}, 3, {turned}};
 }
 
 TEST(JigProgress, IsReadAsItWasWritten) {
@@ -33,7 +36,20 @@ TEST(JigProgress, IsReadAsItWasWritten) {
   ASSERT_EQ(read->reversed.size(), 1U);
   EXPECT_EQ(read->reversed[0].from, Pose::plus_z);
   EXPECT_EQ(read->reversed[0].mean_lsb[0], -230.5);
+  ASSERT_EQ(read->half_turn.size(), 1U);
+  EXPECT_EQ(read->half_turn[0].turned_deg, 180);
+  EXPECT_EQ(read->reversed[0].turned_deg, 0);
+  EXPECT_FALSE(read->faces[0].turned_deg.has_value());
+  EXPECT_FALSE(json["faces"][0].contains("turned_deg")) << "as it was before production+";
   EXPECT_EQ(to_json(*read), json);
+}
+
+TEST(JigProgress, AStateOfAnEarlierVersionIsRead) {
+  auto earlier = to_json(progress());
+  earlier.erase("half_turn");
+  const auto read = parse_jig_progress(earlier);
+  ASSERT_OK(read);
+  EXPECT_TRUE(read->half_turn.empty());
 }
 
 TEST(JigProgress, AnotherDocumentIsRefused) {

@@ -513,5 +513,98 @@ TEST(JigSession, AUnitThatWasLeftStreamingIsMeasuredAllTheSame) {
   EXPECT_EQ(report->verdict, JigVerdict::pass) << report->brief();
 }
 
+JigSessionOptions with_half_turns() {
+  JigSessionOptions options;
+  options.run.protocol = JigProtocol::production_plus;
+  options.keep_interrupted = true;
+  return options;
+}
+
+// Oracle: the same unit by the protocol `production`, to the last digit.
+TEST(JigSession, TheHalfTurnsChangeNeitherConstantsNorVerdict) {
+  VirtualBench plain;
+  VirtualBench bench;
+  const auto production = plain.run();
+  const auto plus = bench.run(with_half_turns());
+  ASSERT_OK(production);
+  ASSERT_OK(plus);
+  ASSERT_EQ(plus->half_turn.size(), 3U);
+  EXPECT_EQ(bench.plugged->motor.movements, plain.plugged->motor.movements + 3);
+  EXPECT_EQ(plus->six->best().calibration.zero_lsb, production->six->best().calibration.zero_lsb);
+  EXPECT_EQ(plus->six->best().calibration.sensitivity_g_per_lsb,
+            production->six->best().calibration.sensitivity_g_per_lsb);
+  EXPECT_EQ(plus->verification.worst_mg, production->verification.worst_mg);
+  EXPECT_EQ(plus->verdict, production->verdict);
+  // The report of a production run is what it was, and says its protocol.
+  auto json = production->to_json();
+  EXPECT_EQ(json["protocol"], "production");
+  EXPECT_FALSE(json.contains("half_turn"));
+  EXPECT_FALSE(json["poses"][0].contains("turned_deg"));
+  json = plus->to_json();
+  EXPECT_EQ(json["protocol"], "production+");
+  EXPECT_EQ(json["poses"].size(), 6U);
+  EXPECT_EQ(json["poses"][0]["turned_deg"], 0);
+  EXPECT_EQ(json["verification"]["poses"].size(), 8U);
+  EXPECT_EQ(json["half_turn"].size(), 3U);
+  EXPECT_EQ(json["half_turn"][0]["turned_deg"], 180);
+}
+
+TEST(JigSession, HalfTurnsComeBeforeAWrite) {
+  VirtualBench bench;
+  JigSessionOptions options = with_half_turns();
+  options.run.write = true;
+  const auto report = bench.run(options);
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->written);
+  EXPECT_EQ(report->recheck.poses.size(), 2U);
+  ASSERT_EQ(report->half_turn.size(), 3U);
+  ASSERT_FALSE(report->recheck.poses.empty());
+  EXPECT_LT(report->half_turn.back().start_s, report->recheck.poses.front().reading.start_s);
+}
+
+TEST(JigSession, AJigThatCannotTurnAboutTheVerticalIsRefusedBeforeItMoves) {
+  VirtualBench bench;
+  mocks::InertJig motor;
+  const auto report = run_jig({bench.unit.get(), &motor}, bench.env.env, with_half_turns(), {});
+  EXPECT_FAILS(report, ErrorCode::usage);
+  EXPECT_TRUE(motor.poses.empty());
+}
+
+// In the first reading of a half-turned face: unplugged and back, or the jig's stop.
+TEST(JigSession, AHalfTurnThatIsInterrupted) {
+  for (const bool stops : {false, true}) {
+    VirtualBench bench;
+    int accepted = 0;
+    JigHooks hooks;
+    hooks.on_action = [&](const JigAction& action) {
+      accepted += action.kind == JigAction::Kind::accepted ? 1 : 0;
+    };
+    bool done = false;
+    hooks.samples = [&](const device::SampleBlock&, const JigRun& run) {
+      if (!done && accepted == 15 && run.live().dwell_fraction > 0.5) {
+        done = true;
+        if (stops) {
+          EXPECT_OK(bench.jig->stop());
+        } else {
+          bench.plugged->unplugged = true;
+        }
+      }
+    };
+    hooks.reopen = [&](const Error&, const JigHooks::Look&) -> Result<UnitOnJig> {
+      bench.plugged->unplugged = false;
+      bench.unit = *device::WireUnit::open(mocks::link_to(bench.plugged, false));
+      return bench.on_jig();
+    };
+    const auto report = run_jig(bench.on_jig(), bench.env.env, with_half_turns(), hooks);
+    ASSERT_OK(report);
+    EXPECT_TRUE(done);
+    EXPECT_EQ(report->verdict, stops ? JigVerdict::inconclusive : JigVerdict::pass)
+        << report->brief();
+    EXPECT_EQ(report->half_turn.size(), stops ? 1U : 3U);
+    EXPECT_EQ(report->faces.size(), 6U);
+    EXPECT_EQ(bench.plugged->motor.movements_after_stop, 0);
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::station

@@ -33,7 +33,7 @@ TEST(JigWatch, AJigThatAPersonTurnsIsAskedNothing) {
   JigWatch watch({});
   EXPECT_OK(watch.ask(jig, 0));
   EXPECT_OK(watch.compare(jig, judged(JigAction::Kind::accepted, Pose::plus_x)));
-  EXPECT_OK(JigWatch::place(jig, Pose::plus_x));
+  EXPECT_OK(JigWatch::place(jig, Pose::plus_x, JigPhase::measuring));
   EXPECT_THAT(jig.poses, ElementsAre(Pose::plus_x));
 }
 
@@ -44,7 +44,15 @@ TEST(JigWatch, AsksForFaultsAtMostOnceAPeriodAndTurnsNothingAfterOne) {
   jig.next_position->fault = "the door is open";
   EXPECT_OK(watch.ask(jig, 10.2));
   EXPECT_FAILS(watch.ask(jig, 10.25), ErrorCode::device_unavailable);
-  EXPECT_FAILS(JigWatch::place(jig, Pose::plus_x), ErrorCode::device_unavailable);
+  EXPECT_FAILS(JigWatch::place(jig, Pose::plus_x, JigPhase::measuring),
+               ErrorCode::device_unavailable);
+  EXPECT_TRUE(jig.poses.empty());
+}
+
+TEST(JigWatch, AJigThatCannotTurnAboutTheVerticalIsNotMovedForIt) {
+  mocks::InertJig jig;
+  EXPECT_FALSE(jig.can_half_turn());
+  EXPECT_FAILS(JigWatch::place(jig, Pose::plus_x, JigPhase::turning), ErrorCode::usage);
   EXPECT_TRUE(jig.poses.empty());
 }
 
