@@ -4,7 +4,7 @@
 //   const auto temperature = unit_temperature(segments, 100);
 //
 // production: six faces, the same in reverse order, and six placements after the unit was taken
-// off; 10 s each, three minutes. production+: that, and three faces once more after the jig was
+// off; 10 s each, three minutes. production+: that, and three faces once more with the unit
 // turned by half a turn about the vertical; 48 s more. engineering: that, and yaws, oblique poses,
 // the shaker, twenty still minutes, temperature ramps and soaks; 75 minutes of recording in about
 // three hours.
