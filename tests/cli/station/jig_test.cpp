@@ -1,5 +1,6 @@
 // sixpoint jig by its contract, on the real disk.
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <thread>
@@ -203,7 +204,7 @@ TEST_F(CommandTest, ProductionPlusNeedsAJigThatTurnsAboutTheVertical) {
                            path("s.db"), "--protocol", "production+"});
   EXPECT_EQ(answer.exit_code, 64);
   EXPECT_THAT(answer.people, HasSubstr("--jig manual"));
-  EXPECT_EQ(answer.people.find("turn the unit"), std::string::npos) << "nothing was asked for";
+  EXPECT_EQ(answer.people.find("turn the unit to"), std::string::npos) << "nothing was asked for";
   EXPECT_EQ(run({"jig", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"),
                  "--protocol", "engineering"})
                 .exit_code,
@@ -223,8 +224,17 @@ TEST_F(CommandTest, ProductionPlusGoesOnAfterACrash) {
     ::execl("/bin/sh", "sh", "-c", script.c_str(), nullptr);
     ::_exit(127);
   }
-  for (int i = 0; i < 6000 && said_in(path("e")).find("vertical, on +y") == std::string::npos;
-       ++i) {
+  const auto saved_half_turn = [&] {
+    std::error_code none;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(path("state"), none)) {
+      if (entry.path().filename() == "run.json" &&
+          said_in(entry.path()).find("\"turned_deg\": 180") != std::string::npos) {
+        return true;
+      }
+    }
+    return false;
+  };
+  for (int i = 0; i < 6000 && !saved_half_turn(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   ASSERT_EQ(::kill(child, SIGKILL), 0);
