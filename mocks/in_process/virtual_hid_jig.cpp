@@ -44,6 +44,12 @@ bool read_number(std::string_view text, Number low, Number high, Number& number)
          number <= high;
 }
 
+bool read_pose(std::string_view text, std::optional<device::Pose>& pose) {
+  const auto parsed = device::parse_pose(text);
+  pose = parsed ? std::optional(*parsed) : std::nullopt;
+  return parsed.has_value();
+}
+
 bool read_setting(std::string_view key, std::string_view value, VirtualHidJigOptions& options) {
   if (key == "serial") {
     options.serial = std::string(value);
@@ -54,6 +60,9 @@ bool read_setting(std::string_view key, std::string_view value, VirtualHidJigOpt
          (key == "wrong_pose_at" && read_number(value, 1, 1000, options.wrong_pose_at)) ||
          (key == "stop_at" && read_number(value, 1, 1000, options.stop_at)) ||
          (key == "stopped" && (options.stopped = value == "1")) ||
+         (key == "lean_deg" && read_number(value, -10.0, 10.0, options.lean_deg)) ||
+         (key == "worn" && read_pose(value, options.worn)) ||
+         (key == "worn_deg" && read_number(value, -10.0, 10.0, options.worn_deg)) ||
          (key == "lie_deg" && read_number(value, 0.0, 90.0, options.lie_deg)) ||
          (key == "uncertainty_deg" && read_number(value, 0.0, 60.0, options.uncertainty_deg));
 }
@@ -109,6 +118,11 @@ VirtualHidJig::VirtualHidJig(VirtualHidJigOptions options, VirtualJig* physics)
     : options_(std::move(options)), physics_(physics) {
   if (options_.stopped) {
     press_stop();
+  }
+  for (const device::Pose pose : device::kPoses) {
+    if (physics_ != nullptr) {
+      physics_->set_lean(pose, options_.lean_deg + (options_.worn == pose ? options_.worn_deg : 0));
+    }
   }
 }
 

@@ -10,7 +10,9 @@
 //   serial, fault (a code of the page, such as obstructed), fault_at (the turn at which it comes,
 //   from 1; 3), lie_deg (it ends so far off and does not report it), wrong_pose_at (at this turn it
 //   goes to another pose and reports the one that was asked for), uncertainty_deg, stop_at (at this
-//   turn its red button is pressed), stopped (1: the button was pressed before).
+//   turn its red button is pressed), stopped (1: the button was pressed before), lean_deg (its base
+//   is not level: all poses lean so far towards the unit's next axis), worn (a pose that leans
+//   worn_deg more; 0.3). The encoder sees neither.
 #pragma once
 
 #include <memory>
@@ -31,6 +33,9 @@ struct VirtualHidJigOptions {
   double uncertainty_deg = 0.05;
   int stop_at = 0;
   bool stopped = false;
+  double lean_deg = 0;
+  std::optional<device::Pose> worn = {};
+  double worn_deg = 0.3;
 };
 Result<VirtualHidJigOptions> parse_virtual_hid_jig(std::string_view text);  // usage
 

@@ -1,5 +1,7 @@
 #include "mocks/in_process/virtual_jig.h"
 
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace sixpoint::mocks {
@@ -11,7 +13,10 @@ constexpr double kTurnByMotor_s = 1.5;
 }  // namespace
 
 Status VirtualJig::turn(device::Pose pose, bool half_turned) {
-  const auto up = device::direction_of(pose);
+  auto up = device::direction_of(pose);
+  // The jig leans where it leans: a unit that lies the other way round leans the other way.
+  up[(device::axis_of(pose) + 1) % kAxes] =
+      (half_turned ? -1 : 1) * std::tan(lean_deg_[pose] * std::numbers::pi / 180);
   const std::lock_guard lock(plugged_->mutex);
   if (plugged_->motor.stopped) {
     return fail(ErrorCode::device_unavailable, "the jig stopped: emergency stop", name(),

@@ -5,6 +5,7 @@
 //   Status turning = jig.go_to(device::Pose::plus_x);
 #pragma once
 
+#include <map>
 #include <memory>
 
 #include "device/jig.h"
@@ -30,6 +31,9 @@ class VirtualJig final : public device::Jig {
   const std::shared_ptr<PluggedUnit>& plugged() const { return plugged_; }
   // The next placement ends this far off, in a random direction.
   void tilt_next(double tilt_deg) { tilt_next_deg_ = tilt_deg; }
+  // From now on every placement in this pose leans so far towards the next axis (x, y, z, x): a
+  // base that is not level, or a worn face.
+  void set_lean(device::Pose pose, double lean_deg) { lean_deg_[pose] = lean_deg; }
 
  private:
   Status turn(device::Pose pose, bool half_turned);
@@ -37,6 +41,7 @@ class VirtualJig final : public device::Jig {
   std::shared_ptr<PluggedUnit> plugged_;
   std::optional<device::Pose> pose_;
   double tilt_next_deg_ = 0;
+  std::map<device::Pose, double> lean_deg_;
 };
 
 }  // namespace sixpoint::mocks

@@ -16,7 +16,7 @@ using std::chrono::seconds;
 TEST(VirtualHidJig, SettingsAreRead) {
   const auto options = parse_virtual_hid_jig(
       "serial=J7,fault=obstructed,fault_at=2,lie_deg=3,wrong_pose_at=4,uncertainty_deg=0.2,"
-      "stop_at=5,stopped=1");
+      "stop_at=5,stopped=1,lean_deg=-0.2,worn=-y,worn_deg=0.7");
   ASSERT_OK(options);
   EXPECT_EQ(options->serial, "J7");
   EXPECT_EQ(options->fault, JigFault::obstructed);
@@ -26,12 +26,16 @@ TEST(VirtualHidJig, SettingsAreRead) {
   EXPECT_EQ(options->uncertainty_deg, 0.2);
   EXPECT_EQ(options->stop_at, 5);
   EXPECT_TRUE(options->stopped);
+  EXPECT_EQ(options->lean_deg, -0.2);
+  EXPECT_EQ(options->worn, device::Pose::minus_y);
+  EXPECT_EQ(options->worn_deg, 0.7);
   EXPECT_EQ(parse_virtual_hid_jig("fault=overcurrent")->fault, JigFault::overcurrent);
   EXPECT_EQ(parse_virtual_hid_jig("fault=supply_low")->fault, JigFault::supply_low);
   EXPECT_EQ(parse_virtual_hid_jig("")->serial, "J600001");
   for (const char* text :
        {"x=1", "serial", "serial=", "serial=a b", "serial=12345678901234567", "fault=none",
-        "fault=", "fault_at=0", "fault_at=x", "lie_deg=91", "lie_deg=nan", "uncertainty_deg=-1"}) {
+        "fault=", "fault_at=0", "fault_at=x", "lie_deg=91", "lie_deg=nan", "uncertainty_deg=-1",
+        "lean_deg=11", "worn=", "worn=up", "worn_deg=nan"}) {
     EXPECT_FAILS(parse_virtual_hid_jig(text), ErrorCode::usage);
   }
 }
