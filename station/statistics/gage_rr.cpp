@@ -5,11 +5,11 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/text/csv_columns.h"
 #include "station/statistics/distributions.h"
 
 namespace sixpoint::station {
@@ -264,50 +264,19 @@ Json GageReport::to_json() const {
 }
 
 Result<std::vector<GageReading>> parse_gage_csv(std::string_view csv, const std::string& where) {
+  constexpr std::array<std::string_view, 3> kNames = {"part", "operator", "value"};
+  SIXPOINT_ASSIGN(const auto rows, csv_columns(csv, kNames, where));
   std::vector<GageReading> readings;
-  std::array<std::size_t, 3> column{};  // part, operator, value
-  std::size_t line_number = 0;
-  const auto wrong = [&](std::string what) {
-    return fail(ErrorCode::bad_data, std::move(what), fmt::format("{}:{}", where, line_number),
-                "the first line is 'part,operator,value', and every line below has the three");
-  };
-  std::istringstream lines{std::string(csv)};
-  for (std::string line; std::getline(lines, line);) {
-    ++line_number;
-    line.erase(line.find_last_not_of("\r ") + 1);
-    std::erase(line, '"');
-    if (line.empty()) {
-      continue;
-    }
-    std::vector<std::string> fields;
-    std::istringstream cells(line + ",");
-    for (std::string cell; std::getline(cells, cell, ',');) {
-      fields.push_back(std::move(cell));
-    }
-    if (line_number == 1) {
-      constexpr std::array<std::string_view, 3> kNames = {"part", "operator", "value"};
-      for (std::size_t i = 0; i < kNames.size(); ++i) {
-        const auto found = std::find(fields.begin(), fields.end(), kNames[i]);
-        if (found == fields.end()) {
-          return wrong(fmt::format("no column '{}'", kNames[i]));
-        }
-        column[i] = static_cast<std::size_t>(found - fields.begin());
-      }
-      continue;
-    }
-    if (fields.size() <= *std::max_element(column.begin(), column.end())) {
-      return wrong("a line is too short");
-    }
-    const std::string& text = fields[column[2]];
+  for (const CsvRow& row : rows) {
+    const std::string& text = row.fields[2];
     double value = 0;
     const auto [stop, status] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (status != std::errc() || stop != text.data() + text.size() || !std::isfinite(value)) {
-      return wrong(fmt::format("'{}' is no number", printable(text, 60)));
+      return fail(ErrorCode::bad_data, fmt::format("'{}' is no number", printable(text, 60)),
+                  fmt::format("{}:{}", where, row.line),
+                  "the values are numbers with a decimal point");
     }
-    readings.push_back({fields[column[0]], fields[column[1]], value});
-  }
-  if (readings.empty()) {
-    return wrong("no readings");
+    readings.push_back({row.fields[0], row.fields[1], value});
   }
   return readings;
 }

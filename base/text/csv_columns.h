@@ -1,0 +1,32 @@
+// Columns of a small CSV file, by the names in its first line.
+//
+//   constexpr std::array<std::string_view, 2> kNames = {"serial", "lot"};
+//   SIXPOINT_ASSIGN(const auto rows, csv_columns("lot,serial\nA,MOS1\n", kNames, "lots.csv"));
+//   rows[0].fields;  // "MOS1", "A"
+//
+// For what people keep in a spreadsheet: any order of the columns, further columns, empty lines,
+// line ends of any system; quotes are dropped, so that a field cannot hold a comma. Pure function;
+// any thread.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+
+namespace sixpoint {
+
+struct CsvRow {
+  std::size_t line = 0;             // in the file, from 1
+  std::vector<std::string> fields;  // in the order of the names that were asked for
+};
+
+// bad_data where a name is not in the first line, a line is too short, or there is no row; `where`
+// names the file.
+Result<std::vector<CsvRow>> csv_columns(std::string_view csv,
+                                        std::span<const std::string_view> names,
+                                        const std::string& where);
+
+}  // namespace sixpoint

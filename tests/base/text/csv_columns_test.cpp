@@ -1,0 +1,32 @@
+#include "base/text/csv_columns.h"
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+#include "expect_result.h"
+
+namespace sixpoint {
+namespace {
+
+constexpr std::array<std::string_view, 2> kNames = {"serial", "lot"};
+
+// RFC 4180 leaves the order of the columns to the header.
+TEST(CsvColumns, AnyOrderAndFurtherColumns) {
+  const auto rows = csv_columns("lot,note,\"serial\"\r\nA,x,1\r\n\r\n\"B\",,2\n", kNames, "f");
+  ASSERT_OK(rows);
+  ASSERT_EQ(rows->size(), 2U);
+  EXPECT_EQ((*rows)[0].fields, (std::vector<std::string>{"1", "A"}));
+  EXPECT_EQ((*rows)[1].fields, (std::vector<std::string>{"2", "B"}));
+  EXPECT_EQ((*rows)[1].line, 4U);
+}
+
+TEST(CsvColumns, WhatIsNoTableIsRefusedWithItsLine) {
+  for (const char* bad : {"", "serial,lot\n", "serial\n1\n", "\nserial,lot\n1,A\n", "\x80\n"}) {
+    EXPECT_FAILS(csv_columns(bad, kNames, "f"), ErrorCode::bad_data);
+  }
+  EXPECT_EQ(csv_columns("serial,lot\n1,A\n2\n", kNames, "f.csv").error().where, "f.csv:3");
+}
+
+}  // namespace
+}  // namespace sixpoint
