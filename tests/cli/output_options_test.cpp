@@ -192,6 +192,7 @@ const std::map<std::string, Role>& own_roles() {
       {"gap answers --output", Role::output},
       {"gap adopt --output", Role::output},
       {"gap report --output", Role::output},
+      {"gap trends --lots", Role::input},
   };
   return kRoles;
 }

@@ -44,7 +44,8 @@ TEST(JigBundle, AStoredRunIsDiagnosed) {
 }
 
 TEST(JigBundle, WhatDoesNotBelongTogetherIsRefused) {
-  const StoredRun run = made_run("A", "j", {0, 0, 0}, {0, 0});
+  Random random(1, 1);
+  const StoredRun run = made_run({.serial = "A"}, {}, {}, random);
   EXPECT_FAILS(bundle_of_run(run, "t,x,y,z,c\n0,1,2,3,25\n"), ErrorCode::bad_data);
   EXPECT_FAILS(bundle_of_run(run, "t,x,y,z,c\n0,1,nan,3,25\n"), ErrorCode::bad_data);
   EXPECT_FAILS(bundle_of_run(run, ""), ErrorCode::bad_data);
