@@ -300,10 +300,11 @@ std::vector<GroupTrend> group_trends(const Bench& bench, const SharedEffects& ef
   return out;
 }
 
-// Whether a lot says what this jig would say.
-bool lot_explains(const SharedEffects& effects, const GapTrends& trends, std::size_t jig) {
+// Whether a lot says what this jig says (`is_blamed`), or would say.
+bool lot_explains(const SharedEffects& effects, const GapTrends& trends, std::size_t jig,
+                  bool is_blamed) {
   for (const Rival& rival : effects.skew.jigs[jig].rivals) {
-    if (rival.level == SharedLevel::lot) {
+    if (is_blamed && rival.level == SharedLevel::lot) {
       return true;
     }
   }
@@ -347,7 +348,9 @@ JigTrend trend_of(const Bench& bench, const SharedEffects& effects, const GapTre
     evidence.face = evidence.face || face.is_off;
     evidence.face_scatters = evidence.face_scatters || face.does_not_repeat;
   }
-  evidence.lot_explains = lot_explains(effects, trends, number);
+  // A worn face matters by itself, however little it is over all six.
+  evidence.jig = evidence.jig || evidence.tilt || evidence.face;
+  evidence.lot_explains = lot_explains(effects, trends, number, evidence.jig);
   for (const ModelRun& run : bench.runs) {
     evidence.station =
         evidence.station || (run.jig == number && trends.stations[run.station].skew.is_named);
