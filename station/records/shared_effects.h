@@ -72,8 +72,8 @@ struct SharedEffectOptions {
   ScatterPrior even_deg{{0.02, 0.01}};
   ScatterPrior zero_mg{{35, 1}};               // data sheet: 35 mg typical, x and y
   ScatterPrior sensitivity_percent{{3, 0.1}};  // data sheet: 10 % at most
-  // Sizes that an effect may have, each component; the sheet of a workshop's level, a tenth of a
-  // millimetre under a 40 mm nest, a jig that fell.
+  // Sizes that an effect may have, each component: what a workshop's level still shows, a tenth of
+  // a millimetre under a nest of 40 mm, a jig that fell.
   std::array<double, 3> skew_sizes_deg{0.04, 0.14, 0.5};
   std::array<double, 3> zero_sizes_mg{3, 10, 35};
   std::array<double, 3> sensitivity_sizes_percent{0.2, 0.7, 2.5};

@@ -111,7 +111,7 @@ inline StoredRun made_run(const MadeUnit& unit, const MadeJig& jig, const MadeSc
           report.dump()};
 }
 
-// What units of one maker scatter, drawn for the tests: half a degree of turn.
+// What units of one maker scatter, drawn for the tests.
 inline MadeUnit made_unit(const std::string& serial, Random& random, double turn_deg = 0.3,
                           double shear_deg = 0.1) {
   MadeUnit unit;
