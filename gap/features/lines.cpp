@@ -127,6 +127,36 @@ double log_bessel(double x) {
   return x - 0.5 * std::log(2 * M_PI * x) + std::log1p(1 / (8 * x));
 }
 
+// Its derivative, I1 / I0: the mean cosine of a phase that is known that well.
+double mean_cosine(double x) {
+  constexpr double kLarge = 50;  // Abramowitz and Stegun 9.7.1 from there on
+  return x < kLarge ? std::cyl_bessel_i(1, x) / std::cyl_bessel_i(0, x)
+                    : 1 - 1 / (2 * x) - 1 / (8 * x * x);
+}
+
+// The vector of the highest likelihood averaged over the dwells' phases (EM; Dempster et al. 1977).
+// fit_vector() takes the likeliest phase of each: then noise adds to a small vector, since it is
+// turned into its direction everywhere (too many parameters; Neyman and Scott 1948).
+Vector3c without_phases(const std::vector<Phasor>& phasors, Vector3c vector, bool in_lab) {
+  constexpr int kRounds = 50;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+    Vector3c b = Vector3c::Zero();
+    for (const Phasor& p : phasors) {
+      const Eigen::Matrix3d r = to_sensor(p, in_lab);
+      const Eigen::Matrix3d rw = r.transpose() * p.weight.asDiagonal();
+      const Complex overlap = overlap_of(r.cast<Complex>() * vector, p).overlap;
+      const double known = std::abs(overlap);
+      a += rw * r;
+      if (known > 0) {
+        b += rw.cast<Complex>() * (p.amplitude * (mean_cosine(known) / known * std::conj(overlap)));
+      }
+    }
+    vector = a.inverse().cast<Complex>() * b;
+  }
+  return vector;
+}
+
 // Each half of the poses predicted from the vector of the other.
 double held_out_line_nats(const std::vector<Phasor>& phasors, bool in_lab) {
   std::array<std::vector<Phasor>, 2> half;
@@ -318,13 +348,15 @@ class LineFinder {
     const auto phasors = phasors_at(rate_hz_, all_, noise_, f);
     VectorFit lab = fit_vector(phasors, true);
     VectorFit sensor = fit_vector(phasors, false);
+    bool keeps_phase = false;
     if (kind == Kind::in_step) {
       const VectorFit lab_in_step = fit_in_step(rate_hz_, all_, noise_, f, true);
       const VectorFit sensor_in_step = fit_in_step(rate_hz_, all_, noise_, f, false);
       // A line that keeps its phase: the sum decides on the frame. Free phases fit a nat better
       // each.
-      if (std::max(lab_in_step.nats, sensor_in_step.nats) >
-          std::max(lab.nats, sensor.nats) - static_cast<double>(phasors.size())) {
+      keeps_phase = std::max(lab_in_step.nats, sensor_in_step.nats) >
+                    std::max(lab.nats, sensor.nats) - static_cast<double>(phasors.size());
+      if (keeps_phase) {
         lab = {lab_in_step.vector, lab_in_step.nats, lab.chi};
         sensor = {sensor_in_step.vector, sensor_in_step.nats, sensor.chi};
       }
@@ -334,19 +366,21 @@ class LineFinder {
     const VectorFit& chosen = line.in_lab ? lab : sensor;
     line.gain_nats = chosen.nats;
     line.held_out_nats = held_out_line_nats(phasors, line.in_lab);
+    const Vector3c vector =
+        keeps_phase ? chosen.vector : without_phases(phasors, chosen.vector, line.in_lab);
     // Turn the common phase so that the vector is as real as can be.
-    Complex square = 0;
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      square += chosen.vector[k] * chosen.vector[k];
-    }
-    line.vector_mg = (chosen.vector * std::polar(1.0, -0.5 * std::arg(square))).real();
+    const Complex square = (vector.transpose() * vector).value();
+    line.vector_mg = (vector * std::polar(1.0, -0.5 * std::arg(square))).real();
     double weight = 0;
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Phasor& p : phasors) {
-      weight += p.weight.mean();
+      // Information of a dwell on the size, where its phase is free: all of it from a few standard
+      // deviations on, and nothing of what drowns in noise.
+      const double signal = p.weight.mean() * vector.squaredNorm();
+      weight += p.weight.mean() * (keeps_phase ? 1 : signal / (1 + signal));
       spread += (p.rotation - phasors.front().rotation).cwiseAbs();
     }
-    line.sd_mg = 1 / std::sqrt(weight);
+    line.sd_mg = 1 / std::sqrt(std::max(1e-12, weight));
     const double freedom = static_cast<double>(phasors.size()) * 5 - 5;
     line.misfit_sd = (chosen.chi - freedom) / std::sqrt(2 * std::max(1.0, freedom));
     line.decidable =

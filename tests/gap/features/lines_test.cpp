@@ -29,5 +29,27 @@ TEST(Lines, FrameIsTold) {
   EXPECT_TRUE(find_lines(none, clean, noise_spectrum(none, clean)).empty());
 }
 
+// A line whose phase is another in each dwell, about twice a dwell's noise. Taking the likeliest
+// phase of each dwell makes it a tenth larger.
+TEST(Lines, NoiseDoesNotMakeASmallLineLarger) {
+  const Eigen::Vector3d v(0.45e-3, -0.3e-3, 0.4e-3);
+  double sum = 0;
+  double square_sd = 0;
+  constexpr int kSeeds = 12;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    const Bundle bundle = tests::made_production(
+        {.seed = static_cast<unsigned>(seed)}, [&](const Segment& s, double t) {
+          const double phase = 2.4 * s.placement * s.placement;
+          return Eigen::Vector3d(s.rotation.col(2) + std::cos(2 * M_PI * 17.3 * t + phase) * v);
+        });
+    const CleanSamples clean = clean_samples(bundle);
+    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+    ASSERT_EQ(lines.size(), 1U) << seed;
+    sum += lines[0].vector_mg.norm() / (1000 * v.norm());
+    square_sd += std::pow(lines[0].sd_mg / (1000 * v.norm()), 2);
+  }
+  EXPECT_NEAR(sum / kSeeds, 1, 3 * std::sqrt(square_sd) / kSeeds);
+}
+
 }  // namespace
 }  // namespace sixpoint::gap
