@@ -168,7 +168,7 @@ double held_out_line_nats(const std::vector<Phasor>& phasors, bool in_lab) {
   }
   double nats = 0;
   for (std::size_t k = 0; k < 2; ++k) {
-    const Vector3c vector = fit_vector(half[k], in_lab).vector;
+    const Vector3c vector = without_phases(half[k], fit_vector(half[k], in_lab).vector, in_lab);
     for (const Phasor& p : half[1 - k]) {
       const Overlap sums = overlap_of(to_sensor(p, in_lab).cast<Complex>() * vector, p);
       nats += log_bessel(std::abs(sums.overlap)) - 0.5 * sums.square;
@@ -368,6 +368,10 @@ class LineFinder {
     line.held_out_nats = held_out_line_nats(phasors, line.in_lab);
     const Vector3c vector =
         keeps_phase ? chosen.vector : without_phases(phasors, chosen.vector, line.in_lab);
+    for (const Phasor& p : phasors) {
+      const Overlap sums = overlap_of(to_sensor(p, line.in_lab).cast<Complex>() * vector, p);
+      line.averaged_nats += log_bessel(std::abs(sums.overlap)) - 0.5 * sums.square;
+    }
     // Turn the common phase so that the vector is as real as can be.
     const Complex square = (vector.transpose() * vector).value();
     line.vector_mg = (vector * std::polar(1.0, -0.5 * std::arg(square))).real();

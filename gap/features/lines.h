@@ -20,6 +20,7 @@ namespace sixpoint::gap {
 struct SpectralLine {
   double frequency_hz = 0;
   double gain_nats = 0;             // log likelihood over no line, the better hypothesis
+  double averaged_nats = 0;         // the same, averaged over the phases of the dwells
   double lab_over_sensor_nats = 0;  // positive: fixed in the laboratory
   bool in_lab = true;
   bool decidable = false;  // the poses differ, and the data prefer one frame clearly

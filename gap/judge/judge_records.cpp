@@ -99,8 +99,21 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
   // A line was found at a threshold of its own: it counts as accepted by this much at least.
   constexpr double kLineCost_nats = 15, kFoundLine_nats = kAccept_nats + 0.5;
   constexpr double kLineFrequencySd_hz = 0.002;
+  constexpr double kContradicts_nats = -5;
+  constexpr double kCertainLine_nats = 25;  // noise reached 20 in 120 recordings
   Lines lines;
   lines.list = find_lines(request.bundle, clean, noise);
+  // The poses of one half contradict those of the other: a line that only some poses have, or noise
+  // that differs from dwell to dwell (truncated, it is smaller where a mean lies near zero).
+  std::erase_if(lines.list, [&](const SpectralLine& line) {
+    const bool contradicts = line.held_out_nats < kContradicts_nats;
+    if (contradicts && line.averaged_nats > kCertainLine_nats) {
+      lines.found.alarm(
+          nats_to_sd(line.averaged_nats),
+          fmt::format("spectrum: a line at {:.2f} Hz in some poses only", line.frequency_hz));
+    }
+    return contradicts;
+  });
   if (codes.spread_sd > kUnsteady_sd) {
     std::erase_if(lines.list, [](const SpectralLine& line) {
       return line.gain_nats < kStrongLine_nats && line.misfit_sd > kMisfit_sd;

@@ -52,6 +52,7 @@ inline gap::Bundle made_production(const MadeUnit& unit, const MadeForce& force 
     segment.rotation = up_along(order[i] / 2, order[i] % 2 == 0 ? 1 : -1, order[i] % 4);
     segment.temperature_start_c = segment.temperature_end_c = 23;
     segment.placement = static_cast<int>(i);
+    segment.pose = order[i];
     const Eigen::Vector3d pose = segment.rotation.col(2);
     segment.approach_g =
         i == 0 ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(pose - before);

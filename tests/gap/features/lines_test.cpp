@@ -46,6 +46,7 @@ TEST(Lines, NoiseDoesNotMakeASmallLineLarger) {
     const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
     ASSERT_EQ(lines.size(), 1U) << seed;
     sum += lines[0].vector_mg.norm() / (1000 * v.norm());
+    EXPECT_GT(lines[0].held_out_nats, 0) << "each half of the poses predicts the other: " << seed;
     square_sd += std::pow(lines[0].sd_mg / (1000 * v.norm()), 2);
   }
   EXPECT_NEAR(sum / kSeeds, 1, 3 * std::sqrt(square_sd) / kSeeds);

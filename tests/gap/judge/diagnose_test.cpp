@@ -36,6 +36,20 @@ TEST(Diagnose, NothingMissingNoAlarm) {
   }
 }
 
+// What each half of the poses predicts of the other: a line that only half of them have is none of
+// the catalogue's, and is not passed over.
+TEST(Diagnose, ALineInHalfOfThePosesIsUnknown) {
+  for (const double mg : {1.0, 3.0}) {
+    const auto d = diagnose(tests::made_production({}, [&](const Segment& s, double t) {
+      const double line_g = s.pose % 2 == 0 ? 1e-3 * mg * std::cos(2 * M_PI * 17.3 * t) : 0;
+      return Eigen::Vector3d(s.rotation.col(2) + line_g * Eigen::Vector3d(0.6, 0, 0.8));
+    }));
+    ASSERT_OK(d);
+    EXPECT_TRUE(d->effects.empty()) << mg << ": " << d->brief();
+    EXPECT_TRUE(d->unknown.present) << mg << ": " << d->brief();
+  }
+}
+
 TEST(Diagnose, MisalignmentIsNamedAndMeasured) {
   const Eigen::Vector3d turn_deg(0.3, -0.2, 0.4);
   const auto bundle = tests::made_production({}, [&](const Segment& s, double) {
