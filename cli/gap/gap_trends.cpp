@@ -158,6 +158,7 @@ void print_line(Context& context, const JigTrend& trend) {
 
 std::string others_of(const std::vector<std::string>& names) {
   std::vector<std::string> shown;
+  shown.reserve(names.size());
   for (const std::string& name : names) {
     shown.push_back(printable(name, 60));
   }

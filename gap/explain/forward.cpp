@@ -225,7 +225,8 @@ void set_ripples(std::vector<Block>& blocks) {
   for (Block& block : blocks) {
     const double turns = span_s > 0 ? (block.middle_s - start_s) / span_s : 0;
     for (int k = 0; k < kRipples; ++k) {
-      const double angle = 2 * M_PI * (k / 2 + 1) * turns;
+      const int periods = k / 2 + 1;
+      const double angle = 2 * M_PI * periods * turns;
       block.ripple_h[k] = span_s / 3600 * (k % 2 == 0 ? std::sin(angle) : std::cos(angle));
     }
   }
