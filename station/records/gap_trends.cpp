@@ -177,6 +177,7 @@ std::vector<BadlySeated> set_aside(std::vector<UsableRun>& runs, const TrendOpti
 
 std::vector<std::string> names_of(const std::vector<Rival>& rivals, const Bench& bench) {
   std::vector<std::string> out;
+  out.reserve(rivals.size());
   for (const Rival& rival : rivals) {
     out.push_back(rival.level == SharedLevel::jig ? "jig " + bench.jigs.names()[rival.index]
                   : rival.level == SharedLevel::station
