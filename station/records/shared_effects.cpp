@@ -656,6 +656,7 @@ std::optional<double> scatter_of_placements(const std::vector<ModelRun>& runs) {
 QuantityFindings skew_findings(const std::vector<ModelRun>& runs, const ModelSizes& sizes,
                                const SharedEffectOptions& options) {
   std::vector<Eigen::VectorXd> readings;
+  readings.reserve(runs.size());
   for (const ModelRun& run : runs) {
     readings.emplace_back(basis() * Eigen::Map<const Vector12>(run.readings.skew_deg.data()));
   }
