@@ -17,11 +17,7 @@ constexpr std::array<double, 3> kGainSizes = {5e-4, 2e-3, 8e-3};
 constexpr std::array<double, 3> kZeroSizes_mg = {0.5, 2, 8};
 constexpr std::array<double, 3> kAngleSizes_deg = {0.02, 0.1, 0.4};
 constexpr std::array<double, 2> kEffectShares = {0.15, 0.6};
-// Real effects bend from their plain equations by this share, and slow ones by the second over
-// time (gap.md: forms are bent by up to a tenth).
-constexpr double kFormShareInSize = 0.1;
-constexpr double kFormShareInTime = 0.1;
-// A change begins at this many times what the form may be bent.
+// A change begins at this many times what the form may be bent (kBend).
 constexpr double kBeyondForm = 2;
 
 // A parameter that may change, with the columns of its derivative.
@@ -76,7 +72,7 @@ std::vector<Term> terms_of(const EvidenceModel& model, const Fit& fit,
         size = std::max(size, std::abs(parameter(fit.state, group.first + i)));
       }
       term.sizes = scaled(kEffectShares, size);
-      term.form = kFormShareInSize * size;
+      term.form = kBend * size;
       term.slow = group.effect == "drift" || group.effect == "warm_up";
       if (term.slow) {
         slow_mg += size * (group.effect == "drift" ? hours : 1);
@@ -84,7 +80,7 @@ std::vector<Term> terms_of(const EvidenceModel& model, const Fit& fit,
     }
     terms.push_back(std::move(term));
   }
-  terms[1].form_in_time = kFormShareInTime * slow_mg;
+  terms[1].form_in_time = kBend * slow_mg;
   Term lab{"the jig's level", Eigen::MatrixXd(model.rows(), 3), scaled(kAngleSizes_deg)};
   Term seat{"the seat", Eigen::MatrixXd(model.rows(), 3), scaled(kAngleSizes_deg)};
   Eigen::Index row = 0;

@@ -157,6 +157,16 @@ Vector3c without_phases(const std::vector<Phasor>& phasors, Vector3c vector, boo
   return vector;
 }
 
+// Log likelihood of the vector over no line, averaged over the dwells' phases.
+double averaged_nats(const std::vector<Phasor>& phasors, const Vector3c& vector, bool in_lab) {
+  double nats = 0;
+  for (const Phasor& p : phasors) {
+    const Overlap sums = overlap_of(to_sensor(p, in_lab).cast<Complex>() * vector, p);
+    nats += log_bessel(std::abs(sums.overlap)) - 0.5 * sums.square;
+  }
+  return nats;
+}
+
 // Each half of the poses predicted from the vector of the other.
 double held_out_line_nats(const std::vector<Phasor>& phasors, bool in_lab) {
   std::array<std::vector<Phasor>, 2> half;
@@ -169,10 +179,7 @@ double held_out_line_nats(const std::vector<Phasor>& phasors, bool in_lab) {
   double nats = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const Vector3c vector = without_phases(half[k], fit_vector(half[k], in_lab).vector, in_lab);
-    for (const Phasor& p : half[1 - k]) {
-      const Overlap sums = overlap_of(to_sensor(p, in_lab).cast<Complex>() * vector, p);
-      nats += log_bessel(std::abs(sums.overlap)) - 0.5 * sums.square;
-    }
+    nats += averaged_nats(half[1 - k], vector, in_lab);
   }
   return nats;
 }
@@ -368,10 +375,7 @@ class LineFinder {
     line.held_out_nats = held_out_line_nats(phasors, line.in_lab);
     const Vector3c vector =
         keeps_phase ? chosen.vector : without_phases(phasors, chosen.vector, line.in_lab);
-    for (const Phasor& p : phasors) {
-      const Overlap sums = overlap_of(to_sensor(p, line.in_lab).cast<Complex>() * vector, p);
-      line.averaged_nats += log_bessel(std::abs(sums.overlap)) - 0.5 * sums.square;
-    }
+    line.averaged_nats = averaged_nats(phasors, vector, line.in_lab);
     // Turn the common phase so that the vector is as real as can be.
     const Complex square = (vector.transpose() * vector).value();
     line.vector_mg = (vector * std::polar(1.0, -0.5 * std::arg(square))).real();

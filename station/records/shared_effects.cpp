@@ -280,7 +280,7 @@ class Search {
     for (std::size_t step = 0; step <= 2 * problem_.candidates.size(); ++step) {
       learn();
       const auto estimates = estimates_of(held_);
-      std::vector<std::size_t> strong;
+      std::optional<std::size_t> strongest;
       double best = 0;
       double worst = 0;
       std::size_t weakest = 0;
@@ -292,7 +292,7 @@ class Search {
           weakest = c;
         } else if (!held_.contains(c) && !taken_out.contains(c) && odds[c] > best) {
           best = odds[c];
-          strong = {c};
+          strongest = c;
         }
       }
       if (worst < 0) {
@@ -300,11 +300,11 @@ class Search {
         taken_out.insert(weakest);
         continue;
       }
-      if (strong.empty()) {
+      if (!strongest) {
         return;
       }
-      held_.insert(strong.front());
-      add_other_jigs(odds, strong.front(), taken_out);
+      held_.insert(*strongest);
+      add_other_jigs(odds, *strongest, taken_out);
     }
     learn();
   }
