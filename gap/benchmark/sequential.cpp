@@ -75,7 +75,7 @@ void per_axis(const Row& row, double* out) {
 
 double second(const Row& row) { return row.gravity * row.gravity; }
 double third(const Row& row) { return row.gravity * row.gravity * row.gravity; }
-double side(const Row& row) { return row.segment->held_sign[row.axis]; }
+double side(const Row& row) { return row.segment->held_sign(row.axis, kUsualStep); }
 double warmth(const Row& row) { return row.warmer_c; }
 double warm_gravity(const Row& row) { return row.warmer_c * row.gravity; }
 double hours(const Row& row) { return row.time_s / 3600; }

@@ -129,7 +129,7 @@ Eigen::Vector3d slow_zero_mg(const ForwardState& s, const Block& block) {
     slow_mg[a] +=
         s.hysteresis_mg[a] * (s.hysteresis_shape == 0   ? 0.5 * block.approach_g[a]
                               : s.hysteresis_shape == 1 ? sign_of_step(block.approach_g[a])
-                                                        : block.held_sign[a]);
+                                                        : block.held_sign(a, s.hysteresis_shape - 2));
   }
   return slow_mg;
 }
@@ -186,7 +186,8 @@ std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& lear
       {"local_gravity", 68, 1, 0.0015, 0, 0, 0.0027, 0.0005},
       {"truncation", 69, 1, 0.05, 1, 0, 0.35},
   };
-  for (const int shape : {1, 0, 2}) {
+  static_assert(kLeastSteps_g.size() == 4);  // shapes 2 to 5
+  for (const int shape : {1, 0, 2, 3, 4, 5}) {
     groups.push_back({"hysteresis", 20, 3, 1, 0, 0, 2, 0.2, 0, shape});
   }
   for (const double tau_s : {75.0, 120.0, 180.0, 270.0, 400.0, 600.0}) {
@@ -245,12 +246,21 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
       Eigen::Vector3d::Ones() + 0.01 * warm * s.sensitivity_percent_per_c +
       0.01 * warm * warm * s.sensitivity_curve_percent_per_c2 +
       0.01 * warm * warm * warm * s.sensitivity_cubic_percent_per_c3;
-  // What axis a shows at the specific force v, in a noise of sigma.
-  const auto stored_mg = [&](Eigen::Index a, double v, double sigma) {
-    double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
-                   sensitivity[a] +
-               slow_mg[a];
-    y = y * s.gain[a] + s.offset_mg[a];
+  // What axis a makes of the specific force v.
+  const auto sensed_mg = [&](Eigen::Index a, double v) {
+    const double y = (1000 * v + s.second_mg_per_g2[a] * v * v + s.third_mg_per_g3[a] * v * v * v) *
+                         sensitivity[a] +
+                     slow_mg[a];
+    return y * s.gain[a] + s.offset_mg[a];
+  };
+  // The mean of that over a swing.
+  const auto mean_mg = [&](Eigen::Index a) {
+    const double curved_mg =
+        (0.5 * s.second_mg_per_g2[a] + 1.5 * s.third_mg_per_g3[a] * rest[a]) * swing[a] * swing[a];
+    return sensed_mg(a, rest[a]) + curved_mg * sensitivity[a] * s.gain[a];
+  };
+  // What is stored of it in a noise of sigma.
+  const auto stored_mg = [&](double y, double sigma) {
     return s.truncation == 0 ? y
                              : y - s.truncation * 0.5 * lsb_mg * quick_erf(y / (sigma * M_SQRT2));
   };
@@ -259,16 +269,20 @@ Eigen::VectorXd predict(const ForwardState& s, const Block& block, double lsb_mg
   for (Eigen::Index a = 0; a < 3; ++a) {
     const double sigma = std::max(kLeastNoise_lsb * lsb_mg, block.noise_mg[a]);
     if (!block.tone) {
-      out[a] = stored_mg(a, rest[a], sigma);
+      out[a] = stored_mg(sensed_mg(a, rest[a]), sigma);
       continue;
     }
-    const int phases = s.truncation == 0 ? kPhases : phases_of(1000 * s.gain[a] * swing[a] / sigma);
+    const double filter = block.filter_gain;
+    const double level_mg = mean_mg(a);
+    const int phases =
+        s.truncation == 0 ? kPhases : phases_of(1000 * filter * s.gain[a] * swing[a] / sigma);
     const auto stride = static_cast<std::size_t>(kPhasesTruncated / phases);
     // The second half of a period is the first, mirrored.
     for (int k = 0; k <= phases / 2; ++k) {
       const std::array<double, 3>& cosine = cosines()[static_cast<std::size_t>(k) * stride];
       const double share = (k == 0 || 2 * k == phases ? 1.0 : 2.0) / phases;
-      const double y = stored_mg(a, rest[a] + cosine[0] * swing[a], sigma);
+      const double sensed = sensed_mg(a, rest[a] + cosine[0] * swing[a]);
+      const double y = stored_mg(level_mg + filter * (sensed - level_mg), sigma);
       out[a] += y * share;
       out[kToneAmplitude + a] += 2 * y * cosine[0] * share;
       if (block.harmonics && a == block.axis) {
@@ -296,7 +310,7 @@ Eigen::MatrixXd seating_lever(const Block& block) {
     const Eigen::Vector3d axis = Eigen::Vector3d::Unit(k) * (1000 * kRadPerDeg);
     lever.block<3, 1>(0, k) = axis.cross(rest);
     if (block.tone) {
-      lever.block<3, 1>(3, k) = sign * axis.cross(swing);
+      lever.block<3, 1>(3, k) = sign * block.filter_gain * axis.cross(swing);
     }
   }
   return lever;
@@ -307,7 +321,8 @@ Eigen::VectorXd seating_loss(const Block& block) {
   loss.head<3>() = 500 * block.rotation * block.gravity_lab_g;
   if (block.tone) {
     const Eigen::Vector3d swing = block.rotation * block.vibration_lab_g;
-    loss.segment<3>(kToneAmplitude) = std::copysign(500.0, swing[block.axis]) * swing;
+    loss.segment<3>(kToneAmplitude) =
+        std::copysign(500.0 * block.filter_gain, swing[block.axis]) * swing;
   }
   return loss;
 }

@@ -56,7 +56,9 @@ struct ForwardState {
   double truncation = 0;  // 1: toward zero instead of nearest
   // Shape of effects that are not linear in their parameters.
   double warm_up_tau_s = 300;
-  int hysteresis_shape = 1;  // 0: in proportion to the step; 1: its sign; 2: of the axis' last step
+  // 0: in proportion to the step; 1: its sign; from 2 on: that of the axis' last step, by the columns
+  // of HeldSigns.
+  int hysteresis_shape = 1;
 };
 
 // Groups of parameters that come and go together: an effect, or a nuisance.
@@ -119,8 +121,9 @@ struct Block {
   Eigen::Vector3d gravity_lab_g = Eigen::Vector3d::UnitZ();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
-  Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();        // of each axis' last step
-  Eigen::Vector3d vibration_lab_g = Eigen::Vector3d::Zero();  // amplitude, response included
+  HeldSigns held_sign = HeldSigns::Zero();
+  Eigen::Vector3d vibration_lab_g = Eigen::Vector3d::Zero();  // amplitude, with the mount's gain
+  double filter_gain = 1;                                     // of the low-pass behind the sensor
   bool harmonics = false;                                     // 8 features instead of 6
   Eigen::Vector3d noise_mg = Eigen::Vector3d::Zero();         // of one sample, for truncation
 

@@ -167,21 +167,27 @@ double averaged_nats(const std::vector<Phasor>& phasors, const Vector3c& vector,
   return nats;
 }
 
-// Each half of the poses predicted from the vector of the other.
-double held_out_line_nats(const std::vector<Phasor>& phasors, bool in_lab) {
+// The poses in two halves, each with a vector of its own.
+struct Halves {
+  double held_out_nats = 0;  // each predicted from the vector of the other
+  double own_nats = 0;       // each by its own
+};
+
+std::optional<Halves> halves_of(const std::vector<Phasor>& phasors, bool in_lab) {
   std::array<std::vector<Phasor>, 2> half;
   for (const Phasor& p : phasors) {
     half[static_cast<std::size_t>(p.pose % 2)].push_back(p);
   }
   if (half[0].empty() || half[1].empty()) {
-    return 0;
+    return std::nullopt;
   }
-  double nats = 0;
+  Halves halves;
   for (std::size_t k = 0; k < 2; ++k) {
     const Vector3c vector = without_phases(half[k], fit_vector(half[k], in_lab).vector, in_lab);
-    nats += averaged_nats(half[1 - k], vector, in_lab);
+    halves.held_out_nats += averaged_nats(half[1 - k], vector, in_lab);
+    halves.own_nats += averaged_nats(half[k], vector, in_lab);
   }
-  return nats;
+  return halves;
 }
 
 std::vector<Phasor> phasors_at(double rate_hz, const std::vector<Stretch>& all,
@@ -372,10 +378,13 @@ class LineFinder {
     line.in_lab = line.lab_over_sensor_nats > 0;
     const VectorFit& chosen = line.in_lab ? lab : sensor;
     line.gain_nats = chosen.nats;
-    line.held_out_nats = held_out_line_nats(phasors, line.in_lab);
     const Vector3c vector =
         keeps_phase ? chosen.vector : without_phases(phasors, chosen.vector, line.in_lab);
     line.averaged_nats = averaged_nats(phasors, vector, line.in_lab);
+    if (const auto halves = halves_of(phasors, line.in_lab)) {
+      line.held_out_nats = halves->held_out_nats;
+      line.apart_nats = halves->own_nats - line.averaged_nats;
+    }
     // Turn the common phase so that the vector is as real as can be.
     const Complex square = (vector.transpose() * vector).value();
     line.vector_mg = (vector * std::polar(1.0, -0.5 * std::arg(square))).real();

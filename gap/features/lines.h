@@ -31,6 +31,8 @@ struct SpectralLine {
   double misfit_sd = 0;
   // Log predictive likelihood over no line: each half of the poses from the vector of the other.
   double held_out_nats = 0;
+  // How much likelier a vector of its own for each half of the poses is than one for both.
+  double apart_nats = 0;
 };
 
 // Strongest first, at most eight. What a strong line spreads about itself is none.

@@ -34,10 +34,16 @@ struct Response {
   double tone_form_share = 0;
   std::array<double, 3> white_mg{};  // of one sample before rounding and filter
 
-  // |H| of a tone and of noise by what is significant; 1 where nothing is.
+  // |H| of a tone and of noise by what is significant; 1 where nothing is. The mount stands before
+  // the sensor, the filter behind it: what is curved in the sensor sees a tone that is not filtered.
+  double mount_gain(double frequency_hz) const {
+    return resonance_significant ? resonance_gain(frequency_hz, resonance) : 1;
+  }
+  double filter_gain(double frequency_hz, double rate_hz) const {
+    return low_pass_significant ? low_pass.tone_gain(frequency_hz, rate_hz) : 1;
+  }
   double tone_gain(double frequency_hz, double rate_hz) const {
-    return (low_pass_significant ? low_pass.tone_gain(frequency_hz, rate_hz) : 1) *
-           (resonance_significant ? resonance_gain(frequency_hz, resonance) : 1);
+    return filter_gain(frequency_hz, rate_hz) * mount_gain(frequency_hz);
   }
   double noise_gain(double frequency_hz, double rate_hz) const {
     return low_pass_significant ? low_pass.noise_gain(frequency_hz, rate_hz) : 1;

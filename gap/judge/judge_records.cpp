@@ -101,13 +101,18 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
   constexpr double kLineFrequencySd_hz = 0.002;
   constexpr double kContradicts_nats = -5;
   constexpr double kCertainLine_nats = 25;  // noise reached 20 in 120 recordings
+  constexpr double kApart_nats = 7;         // lines reached 4, what is none began at 10
   Lines lines;
   lines.list = find_lines(request.bundle, clean, noise);
   // The poses of one half contradict those of the other: a line that only some poses have, or noise
-  // that differs from dwell to dwell (truncated, it is smaller where a mean lies near zero).
+  // that differs from dwell to dwell (truncated, it is smaller where a mean lies near zero). What
+  // one long record shows of a small line predicts nothing for a half that hardly shows it, so that
+  // a line that is certain has to be another in each half.
   std::erase_if(lines.list, [&](const SpectralLine& line) {
-    const bool contradicts = line.held_out_nats < kContradicts_nats;
-    if (contradicts && line.averaged_nats > kCertainLine_nats) {
+    const bool certain = line.averaged_nats > kCertainLine_nats;
+    const bool contradicts =
+        line.held_out_nats < kContradicts_nats && !(certain && line.apart_nats < kApart_nats);
+    if (contradicts && certain) {
       lines.found.alarm(
           nats_to_sd(line.averaged_nats),
           fmt::format("spectrum: a line at {:.2f} Hz in some poses only", line.frequency_hz));

@@ -16,7 +16,6 @@ constexpr double kLeastNats = 0.01;  // a question of which a segment says less 
 constexpr double kCertain = 0.99;    // a name that is this likely is no question any more
 constexpr double kEvenOdds = 0.5;
 constexpr double kBeyondDoubt_nats = 1e9;
-constexpr double kStep_g = 0.05;  // as the forward model's
 
 // `axis` up (or down), turned about the vertical.
 Eigen::Matrix3d planned_face(int axis, double sign, double yaw_rad = 0) {
@@ -126,11 +125,7 @@ std::vector<Block> blocks_of(const std::vector<PlannedPiece>& pieces,
     if (piece.placed) {
       ++block.placement;
       block.approach_g = piece.rotation.col(2) - block.rotation.col(2);
-      for (Eigen::Index a = 0; a < 3; ++a) {
-        if (std::abs(block.approach_g[a]) > kStep_g) {
-          block.held_sign[a] = std::copysign(1.0, block.approach_g[a]);
-        }
-      }
+      hold_step(block.held_sign, block.approach_g);
     }
     block.rotation = piece.rotation;
     block.seconds = piece.seconds;

@@ -83,6 +83,16 @@ Status read_recording(FileSystem& files, const std::string& path, Bundle& bundle
 
 }  // namespace
 
+void hold_step(HeldSigns& held, const Eigen::Vector3d& step_g) {
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    for (std::size_t k = 0; k < kLeastSteps_g.size(); ++k) {
+      if (std::abs(step_g[a]) > kLeastSteps_g[k]) {
+        held(a, static_cast<Eigen::Index>(k)) = std::copysign(1.0, step_g[a]);
+      }
+    }
+  }
+}
+
 double Bundle::temperature_at(double host_time_s) const {
   if (!temperature.empty()) {
     const auto& t = temperature.host_time_s;

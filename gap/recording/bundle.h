@@ -12,6 +12,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -30,6 +31,13 @@ struct Vibration {
   double frequency_hz = 0;
   double amplitude_g = 0;
 };
+
+// Per axis the sign of its last step, 0 before the first. Smaller steps do not change the sign;
+// which are too small is not known of a unit, so that each of kLeastSteps_g has a column.
+inline constexpr std::array<double, 4> kLeastSteps_g = {0.02, 0.05, 0.1, 0.2};
+inline constexpr Eigen::Index kUsualStep = 1;  // column for those who take one
+using HeldSigns = Eigen::Matrix<double, 3, kLeastSteps_g.size()>;
+void hold_step(HeldSigns& held, const Eigen::Vector3d& step_g);
 
 struct Segment {
   enum class Kind { still, vibration, ramp, soak };
@@ -59,9 +67,7 @@ struct Segment {
   }
   // Specific force now less that of the pose before, sensor's frame, g: how it was approached.
   Eigen::Vector3d approach_g = Eigen::Vector3d::Zero();
-  // Per axis the sign of its last step, 0 before the first. A step that does not move an axis does
-  // not change its sign.
-  Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();
+  HeldSigns held_sign = HeldSigns::Zero();
 };
 
 struct TemperatureLog {

@@ -242,7 +242,10 @@ ToneGuess guess_tone(const DrivenAxis& driven, const CleanSamples& clean, std::s
 void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
   constexpr double kNearFullScale = 0.75 * kFullScaleHigh;
   constexpr std::size_t kPiece = 50;  // short enough that a slip of the clock spoils few pieces
-  constexpr double kKnown_lsb = 250;  // a sixteenth of a turn: nothing is taken for a wrap
+  // How far off a piece may be: a sixteenth of a turn. A unit that clips has samples at its limit;
+  // where there are none, times that scatter may bring a tone this far off (2 ms at 19 Hz and 11 g).
+  constexpr double kKnown_lsb = 250, kJitters_lsb = 600;
+  constexpr std::ptrdiff_t kClips = 3;
   for (const DrivenAxis& driven : driven_axes(bundle)) {
     if (driven.peak_lsb() < kNearFullScale) {
       continue;
@@ -250,7 +253,13 @@ void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
     const std::size_t n = driven.segment->samples;
     for (std::size_t first = 0; first + kPiece <= n; first += kPiece) {
       const ToneGuess tone = guess_tone(driven, clean, first, first + kPiece);
-      if (tone.rms_lsb > kKnown_lsb) {
+      const auto begin = clean.samples.begin() +
+                         static_cast<std::ptrdiff_t>(driven.segment->first_sample + first);
+      const bool clips =
+          std::count_if(begin, begin + kPiece, [&](const gt3x::Counts& counts) {
+            return std::abs(counts[driven.axis]) >= kFullScaleHigh;
+          }) >= kClips;
+      if (tone.rms_lsb > (clips ? kKnown_lsb : kJitters_lsb)) {
         continue;
       }
       const std::size_t last = first + 2 * kPiece > n ? n : first + kPiece;

@@ -205,9 +205,8 @@ bool stays(const Segment& last, const Segment& now, double rate_hz) {
 }
 
 void number_placements(Bundle& bundle) {
-  constexpr double kStep_g = 0.05;  // convention: a smaller change has no direction
   Eigen::Vector3d gravity_before = bundle.gravity_in_sensor(bundle.segments.front());
-  Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();
+  HeldSigns held_sign = HeldSigns::Zero();
   std::vector<Eigen::Matrix3d> poses;
   int placement = -1;
   for (std::size_t i = 0; i < bundle.segments.size(); ++i) {
@@ -224,11 +223,7 @@ void number_placements(Bundle& bundle) {
       ++placement;
       const Eigen::Vector3d gravity = bundle.gravity_in_sensor(now);
       now.approach_g = gravity - gravity_before;
-      for (Eigen::Index a = 0; a < 3; ++a) {
-        if (std::abs(now.approach_g[a]) > kStep_g) {
-          held_sign[a] = std::copysign(1.0, now.approach_g[a]);
-        }
-      }
+      hold_step(held_sign, now.approach_g);
       gravity_before = gravity;
     } else {
       now.approach_g = bundle.segments[i - 1].approach_g;

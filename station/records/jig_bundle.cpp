@@ -165,9 +165,8 @@ std::array<std::int16_t, 3> middle_of_axes(const std::vector<Reading>& readings)
 
 void add_segments(gap::Bundle& bundle, const Samples& samples,
                   const std::vector<Reading>& readings) {
-  constexpr double kMoved_g = 0.05;  // a change of the pose moves an axis by 1 g
   const std::array<std::int16_t, 3> middle = middle_of_axes(readings);
-  Eigen::Vector3d held_sign = Eigen::Vector3d::Zero();
+  gap::HeldSigns held_sign = gap::HeldSigns::Zero();
   for (const Reading& reading : readings) {
     const std::size_t first = reading.first_sample;
     gap::Segment segment;
@@ -186,11 +185,7 @@ void add_segments(gap::Bundle& bundle, const Samples& samples,
     if (!bundle.segments.empty()) {
       segment.approach_g = segment.rotation.col(2) - bundle.segments.back().rotation.col(2);
     }
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      if (std::abs(segment.approach_g[a]) > kMoved_g) {
-        held_sign[a] = std::copysign(1.0, segment.approach_g[a]);
-      }
-    }
+    gap::hold_step(held_sign, segment.approach_g);
     segment.held_sign = held_sign;
     for (std::size_t i = first; i < first + reading.stored.samples; ++i) {
       gt3x::Counts counts = samples.counts[i];
