@@ -85,12 +85,11 @@ Block tone_block(Block block, const Bundle& bundle, const NoiseSpectrum& noise, 
   const double f = segment.vibration->frequency_hz;
   block.tone = true;
   block.axis = tone.axis;
-  block.vibration_lab_g = response.mount_gain(f) * segment.vibration->amplitude_g *
-                          segment.vibration->direction_lab;
+  block.vibration_lab_g =
+      response.mount_gain(f) * segment.vibration->amplitude_g * segment.vibration->direction_lab;
   block.filter_gain = response.filter_gain(f, bundle.rate_hz);
   // A filter's gain at a harmonic depends on whether it stands before the sampling.
-  block.harmonics =
-      !response.low_pass_significant && block.vibration_lab_g.norm() > kHarmonics_g;
+  block.harmonics = !response.low_pass_significant && block.vibration_lab_g.norm() > kHarmonics_g;
   block.value_mg.resize(block.harmonics ? 8 : 6);
   block.value_mg.head<3>() = tone.level_mg;
   block.value_mg.segment<3>(kToneAmplitude) = tone.in_phase_mg;
@@ -98,8 +97,8 @@ Block tone_block(Block block, const Bundle& bundle, const NoiseSpectrum& noise, 
     block.value_mg[kSecondHarmonic] = tone.second_mg;
     block.value_mg[kThirdHarmonic] = tone.third_mg;
   }
-  block.white_mg2 = tone_covariance(block, tone, noise, response, f,
-                                    response.tone_gain(f, bundle.rate_hz));
+  block.white_mg2 =
+      tone_covariance(block, tone, noise, response, f, response.tone_gain(f, bundle.rate_hz));
   block.seconds = static_cast<double>(segment.samples) / bundle.rate_hz;
   block.middle_s = segment.host_start_s + block.seconds / 2;
   block.temperature_c = bundle.temperature_at(block.middle_s);

@@ -84,7 +84,8 @@ void add_orientation(const std::vector<Block>& blocks, std::vector<Factor>& fact
     const Eigen::Vector3d u = block.rotation.col(2);
     pose.value.row(i) << u[0], u[1], u[2], u[0] * u[0] - u[2] * u[2], u[1] * u[1] - u[2] * u[2],
         u[0] * u[1], u[1] * u[2], u[0] * u[2];
-    approach.value.row(i) << block.approach_g.transpose() / 2, block.held_sign.col(kUsualStep).transpose();
+    approach.value.row(i) << block.approach_g.transpose() / 2,
+        block.held_sign.col(kUsualStep).transpose();
     room.value.row(i) << block.rotation.col(0).transpose(), block.rotation.col(1).transpose();
   }
   factors.push_back(std::move(room));

@@ -126,10 +126,10 @@ Eigen::Vector3d slow_zero_mg(const ForwardState& s, const Block& block) {
     slow_mg += s.drift_ripple_mg_per_h * block.ripple_h;
   }
   for (Eigen::Index a = 0; a < 3; ++a) {
-    slow_mg[a] +=
-        s.hysteresis_mg[a] * (s.hysteresis_shape == 0   ? 0.5 * block.approach_g[a]
-                              : s.hysteresis_shape == 1 ? sign_of_step(block.approach_g[a])
-                                                        : block.held_sign(a, s.hysteresis_shape - 2));
+    slow_mg[a] += s.hysteresis_mg[a] * (s.hysteresis_shape == 0 ? 0.5 * block.approach_g[a]
+                                        : s.hysteresis_shape == 1
+                                            ? sign_of_step(block.approach_g[a])
+                                            : block.held_sign(a, s.hysteresis_shape - 2));
   }
   return slow_mg;
 }

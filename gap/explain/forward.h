@@ -56,8 +56,8 @@ struct ForwardState {
   double truncation = 0;  // 1: toward zero instead of nearest
   // Shape of effects that are not linear in their parameters.
   double warm_up_tau_s = 300;
-  // 0: in proportion to the step; 1: its sign; from 2 on: that of the axis' last step, by the columns
-  // of HeldSigns.
+  // 0: in proportion to the step; 1: its sign; from 2 on: that of the axis' last step, by the
+  // columns of HeldSigns.
   int hysteresis_shape = 1;
 };
 

@@ -30,6 +30,52 @@ std::vector<std::size_t> block_starts(const Bundle& bundle, const CleanSamples& 
   return starts;
 }
 
+struct Moments {
+  double mean_mg = 0;
+  double variance_mg2 = 0;
+};
+
+Moments moments_of(const CleanSamples& clean, std::size_t first, std::size_t samples,
+                   std::size_t axis) {
+  const auto n = static_cast<double>(samples);
+  double sum = 0;
+  double squares = 0;
+  for (std::size_t i = first; i < first + samples; ++i) {
+    const double x = clean.value_mg(i, axis);
+    sum += x;
+    squares += x * x;
+  }
+  return {sum / n, squares / n - sum * sum / (n * n)};
+}
+
+// The blocks that show an axis' noise as it is: all, or, where those about zero have clearly less,
+// the others. (Numbers that are truncated toward zero are zero over two counts.)
+std::vector<std::size_t> blocks_of_axis(const CleanSamples& clean,
+                                        const std::vector<std::size_t>& starts, std::size_t length,
+                                        std::size_t axis) {
+  constexpr double kAway_lsb = 5;  // of noise of one
+  constexpr double kLess = 0.8;    // five blocks know their variance to 5 %
+  constexpr std::size_t kLeast = 5;
+  const double away_mg = kAway_lsb * 1000 / clean.accel_scale_lsb_per_g;
+  std::vector<std::size_t> away;
+  double far_mg2 = 0;
+  double near_mg2 = 0;
+  for (const std::size_t start : starts) {
+    const Moments m = moments_of(clean, start, length, axis);
+    if (std::abs(m.mean_mg) > away_mg) {
+      away.push_back(start);
+      far_mg2 += m.variance_mg2;
+    } else {
+      near_mg2 += m.variance_mg2;
+    }
+  }
+  const std::size_t near = starts.size() - away.size();
+  const bool less =
+      away.size() >= kLeast && near >= kLeast &&
+      near_mg2 / static_cast<double>(near) < kLess * far_mg2 / static_cast<double>(away.size());
+  return less ? away : starts;
+}
+
 // Median of the variance where the unit's noise is white: below its filter, above its slow noise.
 double white_level(const NoiseSpectrum& spectrum, std::size_t axis, double rate_hz) {
   std::vector<double> lowest;
@@ -73,20 +119,23 @@ NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean) {
                                      static_cast<double>(length));
     power += window[i] * window[i];
   }
-  const std::vector<std::size_t> starts = block_starts(bundle, clean, length);
-  const std::size_t stride =
-      std::max<std::size_t>(1, (starts.size() + kMaxBlocks - 1) / kMaxBlocks);
+  const std::vector<std::size_t> all = block_starts(bundle, clean, length);
   const std::size_t high = length / 2;
   for (std::size_t k = kLow; k < high; ++k) {
     spectrum.frequency_hz.push_back(static_cast<double>(k) * spectrum.step_hz);
   }
-  spectrum.blocks = (starts.size() + stride - 1) / stride;
+  spectrum.blocks = kMaxBlocks;  // of the axis that has fewest
   Eigen::FFT<double> fft;
   std::vector<double> x(length);
   std::vector<std::complex<double>> out;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::vector<double>& variance = spectrum.variance_mg2[axis];
     variance.assign(high - kLow, 0);
+    const std::vector<std::size_t> starts = blocks_of_axis(clean, all, length, axis);
+    const std::size_t stride =
+        std::max<std::size_t>(1, (starts.size() + kMaxBlocks - 1) / kMaxBlocks);
+    const std::size_t blocks = (starts.size() + stride - 1) / stride;
+    spectrum.blocks = std::min(spectrum.blocks, blocks);
     for (std::size_t b = 0; b < starts.size(); b += stride) {
       double mean = 0;
       for (std::size_t i = 0; i < length; ++i) {
@@ -102,9 +151,9 @@ NoiseSpectrum noise_spectrum(const Bundle& bundle, const CleanSamples& clean) {
         variance[k - kLow] += std::norm(out[k]) / power;
       }
     }
-    if (spectrum.blocks > 0) {
+    if (blocks > 0) {
       for (double& v : variance) {
-        v /= static_cast<double>(spectrum.blocks);
+        v /= static_cast<double>(blocks);
       }
       spectrum.white_mg[axis] = white_level(spectrum, axis, bundle.rate_hz);
     }

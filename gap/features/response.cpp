@@ -159,28 +159,14 @@ class Search {
     flat_chi_ = chi_of(flat_);
   }
 
-  // On a grid of corners, orders and forms, without and with 1/f noise; then finer corners.
+  // Without and with 1/f noise.
   void find_low_pass() {
-    double best = 0;
-    search_low_pass(best);
+    search_low_pass();
     if (flat_pink_.mg > 0) {
-      const double without = best;
+      const double without = nats_of(out_.low_pass);
       pink_ = flat_pink_;
-      search_low_pass(best);
-      pink_ = best > without ? flat_pink_ : Pink{};
-    }
-    double step = 0.048;
-    for (int halving = 0; halving < 15 && out_.low_pass.corner_hz > 0; ++halving) {
-      step /= 2;
-      const double centre = out_.low_pass.corner_hz;
-      for (const double k : {-1.0, 1.0}) {
-        const double corner = centre * (1 + k * step);
-        if (corner < kHighestOfRate * rate_hz_) {
-          LowPass near = out_.low_pass;
-          near.corner_hz = corner;
-          try_low_pass(near, best);
-        }
-      }
+      search_low_pass();
+      pink_ = nats_of(out_.low_pass) > without ? flat_pink_ : Pink{};
     }
     out_.low_pass_significant =
         options_.allow_low_pass &&
@@ -188,30 +174,52 @@ class Search {
         out_.low_pass.noise_nats > kNoiseAgrees_nats;
   }
 
-  void search_low_pass(double& best) {
+  static double nats_of(const LowPass& low_pass) {
+    return low_pass.noise_nats + low_pass.tone_nats;
+  }
+
+  // On a grid of orders, forms and corners. The corner is refined for each form and order: a tone
+  // at the corner tells it to a thousandth, and on the grid a wrong form may be nearer.
+  void search_low_pass() {
     const auto corners =
         static_cast<int>(std::log(0.492 * rate_hz_ / kLowestCorner_hz) / std::log(1.05));
     for (const LowPassForm form :
          {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue}) {
+      if (ratios_.empty() && form == LowPassForm::mixed) {
+        continue;  // without tones it is the sampled filter
+      }
       for (const int order : {4, 2, 1, 3, 6, 8}) {
+        LowPass best;
         for (int k = 0; k <= corners; ++k) {
           try_low_pass({kLowestCorner_hz * std::pow(1.05, k), 0, order, 0, 0, form}, best);
+        }
+        refine_corner(best);
+        if (nats_of(best) > nats_of(out_.low_pass)) {
+          out_.low_pass = best;
         }
       }
     }
   }
 
-  void try_low_pass(const LowPass& low_pass, double& best) {
-    if (ratios_.empty() && low_pass.form == LowPassForm::mixed) {
-      return;  // without tones it is the sampled filter
+  void refine_corner(LowPass& best) const {
+    double step = 0.048;
+    for (int halving = 0; halving < 15 && best.corner_hz > 0; ++halving) {
+      step /= 2;
+      LowPass near = best;
+      for (const double k : {-1.0, 1.0}) {
+        near.corner_hz = best.corner_hz * (1 + k * step);
+        if (near.corner_hz < kHighestOfRate * rate_hz_) {
+          try_low_pass(near, best);
+        }
+      }
     }
-    const double noise = fit_noise(low_pass).nats - flat_nats_;
-    const double tone = 0.5 * (flat_chi_ - chi_of(logs_of(low_pass)));
-    if (noise + tone > best) {
-      best = noise + tone;
-      out_.low_pass = low_pass;
-      out_.low_pass.noise_nats = noise;
-      out_.low_pass.tone_nats = tone;
+  }
+
+  void try_low_pass(LowPass low_pass, LowPass& best) const {
+    low_pass.noise_nats = fit_noise(low_pass).nats - flat_nats_;
+    low_pass.tone_nats = 0.5 * (flat_chi_ - chi_of(logs_of(low_pass)));
+    if (nats_of(low_pass) > nats_of(best)) {
+      best = low_pass;
     }
   }
 
@@ -233,35 +241,50 @@ class Search {
     out_.low_pass.corner_sd_hz = curvature > 0 ? 1 / std::sqrt(curvature) : out_.low_pass.corner_hz;
   }
 
-  // The likeliest resonance on top of the low-pass; its chi-square.
+  // The likeliest resonance on top of the low-pass; its chi-square. Refined for each form: on the
+  // grid a wrong one may be nearer.
   double find_resonance(const std::vector<double>& low_pass_log, double base_chi) {
     double chi = base_chi;
-    const auto try_one = [&](const Resonance& resonance) {
-      const double c = ratios_.empty() ? chi : chi_of(logs_of(resonance, low_pass_log));
-      if (c < chi) {
+    if (ratios_.empty()) {
+      return chi;
+    }
+    for (const ResonanceForm form :
+         {ResonanceForm::base_excited, ResonanceForm::second_order, ResonanceForm::peak}) {
+      Resonance best;
+      const double own = find_resonance_of(form, low_pass_log, base_chi, best);
+      if (own < chi) {
+        chi = own;
+        out_.resonance = best;
+        out_.resonance.tone_nats = 0.5 * (base_chi - chi);
+      }
+    }
+    return chi;
+  }
+
+  double find_resonance_of(ResonanceForm form, const std::vector<double>& low_pass_log,
+                           double base_chi, Resonance& best) const {
+    double chi = base_chi;
+    const auto try_one = [&](double frequency_hz, double q) {
+      const Resonance resonance = {frequency_hz, q, form};
+      if (const double c = chi_of(logs_of(resonance, low_pass_log)); c < chi) {
         chi = c;
-        out_.resonance = resonance;
-        out_.resonance.tone_nats = 0.5 * (base_chi - c);
+        best = resonance;
       }
     };
     const auto frequencies =
         static_cast<int>(std::log(0.5 * rate_hz_ / kLowestCorner_hz) / std::log(1.02));
-    for (const ResonanceForm form :
-         {ResonanceForm::base_excited, ResonanceForm::second_order, ResonanceForm::peak}) {
-      for (int i = 0; i < frequencies; ++i) {
-        for (int k = 0; k < 35; ++k) {
-          try_one({kLowestCorner_hz * std::pow(1.02, i), 0.7 * std::pow(1.08, k), form, 0});
-        }
+    for (int i = 0; i < frequencies; ++i) {
+      for (int k = 0; k < 35; ++k) {
+        try_one(kLowestCorner_hz * std::pow(1.02, i), 0.7 * std::pow(1.08, k));
       }
     }
     double step_f = 0.01, step_q = 0.04;
-    for (int round = 0; round < 400 && step_f > 1e-8 && out_.resonance.frequency_hz > 0; ++round) {
-      const Resonance centre = out_.resonance;
+    for (int round = 0; round < 400 && step_f > 1e-8 && best.frequency_hz > 0; ++round) {
+      const Resonance centre = best;
       const double before = chi;
       for (int i = -1; i <= 1; ++i) {
         for (int k = -1; k <= 1; ++k) {
-          try_one(
-              {centre.frequency_hz * (1 + i * step_f), centre.q * (1 + k * step_q), centre.form});
+          try_one(centre.frequency_hz * (1 + i * step_f), centre.q * (1 + k * step_q));
         }
       }
       if (chi >= before) {

@@ -35,7 +35,8 @@ struct Response {
   std::array<double, 3> white_mg{};  // of one sample before rounding and filter
 
   // |H| of a tone and of noise by what is significant; 1 where nothing is. The mount stands before
-  // the sensor, the filter behind it: what is curved in the sensor sees a tone that is not filtered.
+  // the sensor, the filter behind it: what is curved in the sensor sees a tone that is not
+  // filtered.
   double mount_gain(double frequency_hz) const {
     return resonance_significant ? resonance_gain(frequency_hz, resonance) : 1;
   }

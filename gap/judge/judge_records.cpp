@@ -25,12 +25,24 @@ double tone_gap_mg2(const Request& request, const Segment& segment, double h) {
          request.segments();
 }
 
-// Tones without slips know their amplitude best; if most have slips, all count.
+// Tones without slips know their amplitude best. If most have slips, those count that leave little:
+// the amplitude of a tone whose slips were not all found is wrong. If most leave much, all count.
 std::vector<ToneFit> whole_tones(const std::vector<ToneFit>& tones) {
-  std::vector<ToneFit> whole;
-  std::copy_if(tones.begin(), tones.end(), std::back_inserter(whole),
-               [](const ToneFit& tone) { return tone.slips.empty(); });
-  return 2 * whole.size() < tones.size() ? tones : whole;
+  constexpr double kMissedSlip = 0.15;  // of the amplitude: a slip a sample off leaves 5 %
+  const auto without_slips = [](const ToneFit& tone) { return tone.slips.empty(); };
+  const auto leaves_little = [](const ToneFit& tone) {
+    return tone.residual_mg < kMissedSlip * tone.in_phase_mg[tone.axis];
+  };
+  const auto most_that = [&](const auto& is_good) {
+    std::vector<ToneFit> good;
+    std::ranges::copy_if(tones, std::back_inserter(good), is_good);
+    return 2 * good.size() < tones.size() ? std::vector<ToneFit>{} : good;
+  };
+  if (auto whole = most_that(without_slips); !whole.empty()) {
+    return whole;
+  }
+  auto found = most_that(leaves_little);
+  return found.empty() ? tones : found;
 }
 
 void judge_low_pass(const Request& request, const Response& response,

@@ -243,7 +243,8 @@ void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
   constexpr double kNearFullScale = 0.75 * kFullScaleHigh;
   constexpr std::size_t kPiece = 50;  // short enough that a slip of the clock spoils few pieces
   // How far off a piece may be: a sixteenth of a turn. A unit that clips has samples at its limit;
-  // where there are none, times that scatter may bring a tone this far off (2 ms at 19 Hz and 11 g).
+  // where there are none, times that scatter may bring a tone this far off (2 ms at 19 Hz and 11
+  // g).
   constexpr double kKnown_lsb = 250, kJitters_lsb = 600;
   constexpr std::ptrdiff_t kClips = 3;
   for (const DrivenAxis& driven : driven_axes(bundle)) {
@@ -253,12 +254,11 @@ void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
     const std::size_t n = driven.segment->samples;
     for (std::size_t first = 0; first + kPiece <= n; first += kPiece) {
       const ToneGuess tone = guess_tone(driven, clean, first, first + kPiece);
-      const auto begin = clean.samples.begin() +
-                         static_cast<std::ptrdiff_t>(driven.segment->first_sample + first);
-      const bool clips =
-          std::count_if(begin, begin + kPiece, [&](const gt3x::Counts& counts) {
-            return std::abs(counts[driven.axis]) >= kFullScaleHigh;
-          }) >= kClips;
+      const auto begin =
+          clean.samples.begin() + static_cast<std::ptrdiff_t>(driven.segment->first_sample + first);
+      const bool clips = std::count_if(begin, begin + kPiece, [&](const gt3x::Counts& counts) {
+                           return std::abs(counts[driven.axis]) >= kFullScaleHigh;
+                         }) >= kClips;
       if (tone.rms_lsb > (clips ? kKnown_lsb : kJitters_lsb)) {
         continue;
       }
