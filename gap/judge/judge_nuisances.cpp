@@ -43,9 +43,9 @@ struct WrongMode {
 };
 
 WrongMode wrong_mode(const ForwardState& s) {
-  // A common gain anywhere in 0.78 to 0.97, with the unit's own 2 % about it.
-  constexpr double kLeastCommonGain = 0.78, kCommonGainSpan = 0.19;
-  constexpr int kCommonGains = 96;
+  // A common gain anywhere in 0.73 to 0.97, with the unit's own 2 % about it.
+  constexpr double kLeastCommonGain = 0.73, kCommonGainSpan = 0.24;
+  constexpr int kCommonGains = 120;
   WrongMode mode;
   double best = kNoEvidence_nats;
   for (int k = 0; k < kCommonGains; ++k) {
@@ -135,10 +135,10 @@ Nuisances judge_nuisances(const Request& request, const ForwardState& s, bool ju
   // A protocol that takes a unit of 256 LSB/g for one of 341 reads alike: then the gains lie about
   // that ratio as closely as they should about 1, and the offsets where they should.
   const double ratio = kCoarse_lsb_per_g / request.bundle.accel_scale_lsb_per_g;
-  if (ratio < kSameScale) {
-    f.other_nats = unit_nats(s, ratio) - mode.nats;
-  }
-  if (significant && f.other_nats > 0) {
+  const double scale_nats =
+      ratio < kSameScale ? unit_nats(s, ratio) - mode.nats : kNoEvidence_nats;
+  f.other_nats = std::max(f.other_nats, scale_nats);
+  if (significant && scale_nats > 0) {
     out.found.alarm(
         z, fmt::format("scale: the gains are those of a unit of {:g} LSB/g, the protocol says {:g}",
                        kCoarse_lsb_per_g, request.bundle.accel_scale_lsb_per_g));
