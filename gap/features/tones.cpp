@@ -1,6 +1,7 @@
 #include "gap/features/tones.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -45,6 +46,21 @@ struct PieceFit {
   double amplitude() const { return std::hypot(x[1], x[2]); }
 };
 
+Eigen::Matrix3d normal_matrix(const ToneSums& d) {
+  Eigen::Matrix3d a;
+  a << d.n, d.c, d.s, d.c, d.cc, d.cs, d.s, d.cs, d.ss;
+  return a;
+}
+
+// Level, cosine and sine can be told apart. Where a tone of a fifth of the rate is clipped, one or
+// two of its five phases are left, and any amplitude fits them.
+bool determines(const ToneSums& d) {
+  constexpr double kLeast = 1e-3;  // with all phases the smallest eigenvalue is n / 2
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(normal_matrix(d) / d.n,
+                                                              Eigen::EigenvaluesOnly);
+  return solver.eigenvalues()[0] > kLeast;
+}
+
 PieceFit fit_piece(const ToneSums& d) {
   PieceFit fit;
   fit.n = d.n;
@@ -52,8 +68,7 @@ PieceFit fit_piece(const ToneSums& d) {
     fit.squares = d.yy;
     return fit;
   }
-  Eigen::Matrix3d a;
-  a << d.n, d.c, d.s, d.c, d.cc, d.cs, d.s, d.cs, d.ss;
+  Eigen::Matrix3d a = normal_matrix(d);
   a.diagonal().array() += 1e-9 * d.n;
   const Eigen::Vector3d b(d.y, d.yc, d.ys);
   fit.x = a.inverse() * b;
@@ -304,6 +319,7 @@ class ToneAnalysis {
       const PieceFit first = fit_piece(total);
       phase0 = first.phase();
       if (round == 0) {
+        determined_ = determines(total);  // a frequency fitted to nothing would turn the phases
         refine_frequency(phase0, first.amplitude());
       }
     }
@@ -373,7 +389,7 @@ class ToneAnalysis {
     fit_.frequency_sd_ppm *= std::max(1.0, fit_.residual_mg / std::sqrt(noise2_));
     fit_.on_slope_mg2 = slope / std::max(1.0, slope_weight);
     fit_.on_crest_mg2 = crest / std::max(1.0, crest_weight);
-    fit_.usable = fit_.in_phase_mg[fit_.axis] > 0 && std::isfinite(fit_.residual_mg);
+    fit_.usable = determined_ && fit_.in_phase_mg[fit_.axis] > 0 && std::isfinite(fit_.residual_mg);
   }
 
   // Gauss-Newton on the frequency: the sine's amplitude grows with n where it is off.
@@ -418,6 +434,7 @@ class ToneAnalysis {
   double noise2_ = 16;
   double w_ = 0;
   double even_cost_ = 0;
+  bool determined_ = false;
 };
 
 }  // namespace

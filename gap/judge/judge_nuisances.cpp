@@ -135,8 +135,7 @@ Nuisances judge_nuisances(const Request& request, const ForwardState& s, bool ju
   // A protocol that takes a unit of 256 LSB/g for one of 341 reads alike: then the gains lie about
   // that ratio as closely as they should about 1, and the offsets where they should.
   const double ratio = kCoarse_lsb_per_g / request.bundle.accel_scale_lsb_per_g;
-  const double scale_nats =
-      ratio < kSameScale ? unit_nats(s, ratio) - mode.nats : kNoEvidence_nats;
+  const double scale_nats = ratio < kSameScale ? unit_nats(s, ratio) - mode.nats : kNoEvidence_nats;
   f.other_nats = std::max(f.other_nats, scale_nats);
   if (significant && scale_nats > 0) {
     out.found.alarm(

@@ -44,12 +44,10 @@ bool shows_clock(const ToneFit& tone) {
 }
 
 ToneClock tone_clock(const std::vector<ToneFit>& tones) {
-  // A mount lifts a tone so far that one sample of five is left in range: its phase is not known.
-  constexpr double kMostlyClipped = 0.6;
   ToneClock clock;
   double weight = 0, sum = 0;
   for (const ToneFit& tone : tones) {
-    if (!tone.usable || tone.clipped_share > kMostlyClipped) {
+    if (!tone.usable) {
       continue;
     }
     clock.samples += tone.samples;

@@ -69,6 +69,21 @@ TEST(Forward, SquareRectifies) {
   EXPECT_NEAR(y[6], 0.4 * 2, 1e-6);               // K A^2 / 2
 }
 
+// The filter stands behind the sensor: it takes from the tone that the curve has changed, and not
+// from what the curve rectifies.
+TEST(Forward, AFilterTakesFromTheToneOnly) {
+  ForwardState s;
+  s.second_mg_per_g2 = {0, 0, 0.4};
+  s.third_mg_per_g3 = {0, 0, 0.08};
+  Block block = tone(2);
+  block.filter_gain = 0.6;
+  const Eigen::VectorXd y = predict(s, block, kLsb_mg);
+  EXPECT_NEAR(y[2], 1000 + 0.4 * (1 + 2) + 0.08 * (1 + 1.5 * 4), 1e-6);  // as without
+  EXPECT_NEAR(y[5], 0.6 * (2000 + 2 * 0.4 * 2 + 0.08 * (3 * 2 + 0.75 * 8)), 1e-6);
+  EXPECT_NEAR(seating_lever(block)(3, 1), 0.6 * 2000 * M_PI / 180, 1e-9);
+  EXPECT_NEAR(seating_loss(block)[5], 0.6 * 500 * 2, 1e-9);
+}
+
 TEST(Forward, TruncationFollowsTheErrorFunction) {
   ForwardState s;
   s.truncation = 1;

@@ -39,6 +39,37 @@ Bundle counts_about(double mean, const std::function<int(int)>& stored, double s
   return bundle;
 }
 
+// Truncated toward zero, a dwell about zero has less noise than there is; it does not count where
+// others tell.
+TEST(Noise, DwellsAboutZeroDoNotHideTheNoiseOfTruncatedNumbers) {
+  const auto truncated = [](double mean, unsigned seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal(mean, 1);
+    std::vector<gt3x::Counts> samples(6000);
+    for (gt3x::Counts& counts : samples) {
+      for (std::int16_t& x : counts) {
+        x = static_cast<std::int16_t>(normal(random));
+      }
+    }
+    return samples;
+  };
+  Bundle bundle;
+  for (const double mean : {0.0, 0.2, 100.3}) {
+    Segment segment;
+    segment.settled = true;
+    segment.first_sample = bundle.samples.size();
+    for (const gt3x::Counts& counts : truncated(mean, 5)) {
+      bundle.samples.push_back(counts);
+    }
+    segment.samples = bundle.samples.size() - segment.first_sample;
+    segment.pose = static_cast<int>(bundle.segments.size());
+    bundle.segments.push_back(segment);
+  }
+  const NoiseSpectrum noise = noise_spectrum(bundle, clean_samples(bundle));
+  ASSERT_TRUE(noise.usable());
+  EXPECT_NEAR(noise.white_mg[1], std::hypot(1, std::sqrt(1 / 12.0)) * 1000 / 256, 0.25);
+}
+
 TEST(Noise, OddAndEvenCodesAreAlikeUnlessABitIsStuck) {
   const Bundle plain = counts_about(100.3, [](int x) { return x; });
   const CodeStatistics codes = code_statistics(plain, clean_samples(plain));

@@ -1,11 +1,15 @@
 #include "gap/judge/diagnose.h"
 
+#include <set>
+#include <string>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "expect_result.h"
 #include "gap/explain/catalogue.h"
 #include "gap/made_bundle.h"
+#include "gap/simulated_bundle.h"
 #include "sanitized.h"
 
 namespace sixpoint::gap {
@@ -207,6 +211,58 @@ TEST(Diagnose, OneAxisGoneAstrayIsNoFilterMismatch) {
   EXPECT_FALSE(names(*d, "filter_mismatch")) << d->brief();
   EXPECT_TRUE(d->unknown.present) << d->brief();
 }
+
+struct EffectsCase {
+  const char* effects;
+  unsigned seed;
+};
+
+class SimulatedUnit : public ::testing::TestWithParam<EffectsCase> {};
+
+// All that is there is named, and nothing else: effects that bear on one another. Oracle: sim/.
+TEST_P(SimulatedUnit, IsNamedWholly) {
+  const auto effects = nlohmann::ordered_json::parse(GetParam().effects);
+  const auto bundle = tests::simulated({{"schema", "sixpoint/scenario/1"},
+                                        {"seed", GetParam().seed},
+                                        {"protocol", "engineering"},
+                                        {"effects", effects}});
+  ASSERT_OK(bundle);
+  const auto d = diagnose(*bundle);
+  ASSERT_OK(d);
+  std::set<std::string> there;
+  for (const auto& effect : effects) {
+    there.insert(effect["name"]);
+  }
+  std::set<std::string> named;
+  for (const EffectFinding& effect : d->effects) {
+    named.insert(effect.name);
+  }
+  EXPECT_EQ(named, there) << d->brief();
+  EXPECT_FALSE(d->unknown.present) << d->brief();
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Effects, SimulatedUnit,
+    ::testing::Values(
+        // A tone at the corner: of the grid's corners a wrong form is nearer.
+        EffectsCase{R"([{"name": "bandwidth", "parameters": {"corner_hz": 40, "order": 6}}])", 5},
+        // The tone of 6 g is clipped to one sample of five, or two.
+        EffectsCase{R"([{"name": "soft_mount", "parameters": {"frequency_hz": 22.33, "q": 3.3}}])",
+                    13},
+        EffectsCase{R"([{"name": "saturation", "parameters": {"level_g": 4}}])", 13},
+        // Of the oblique poses some are reached by a step too small to turn it.
+        EffectsCase{R"([{"name": "hysteresis", "parameters": {"mg": [-1, -1.1, 1.84]}}])", 2},
+        EffectsCase{R"([{"name": "hysteresis", "parameters": {"mg": [-1, -1.1, 1.84]}}])", 3},
+        // The curve is before the filter.
+        EffectsCase{R"([{"name": "third_order", "parameters": {"mg_per_g3": [0.03, -0.02, 0.01]}},
+                        {"name": "bandwidth", "parameters": {"corner_hz": 18, "order": 2}}])",
+                    3},
+        EffectsCase{R"([{"name": "second_order", "parameters": {"mg_per_g2": [0.3, -0.2, 0.25]}},
+                        {"name": "bandwidth", "parameters": {"corner_hz": 18, "order": 2}}])",
+                    4},
+        // Times that scatter bring the tone of 11 g off by 350 counts.
+        EffectsCase{R"([{"name": "wrap"}, {"name": "jitter", "parameters": {"rms_ms": 1.45}}])",
+                    7}));
 
 }  // namespace
 }  // namespace sixpoint::gap

@@ -38,6 +38,27 @@ TEST(JudgeNuisances, ACommonGainIsTheWrongMode) {
   EXPECT_TRUE(estimated.found.candidates.empty()) << "not judged";
 }
 
+// A quarter too low is what a unit of 256 LSB/g reads where the protocol says 341; here it says
+// 256.
+TEST(JudgeNuisances, AQuarterTooLowIsTheWrongModeWhereTheScaleIsRight) {
+  const Made made(tests::made_production({}));
+  const Nuisances n =
+      judge_nuisances(made.request, unit({0.74, 0.75, 0.735}, {-130, -67, -102}), true);
+  EXPECT_NE(effect(n.found, "filter_mismatch"), nullptr);
+  EXPECT_TRUE(n.found.alarms.empty());
+}
+
+// One axis is astray: that is no wrong mode, and nothing is said of a scale that is right.
+TEST(JudgeNuisances, OneGainAstrayIsNoScale) {
+  const Made made(tests::made_production({}));
+  const Nuisances n = judge_nuisances(made.request, unit({0.8, 1.01, 0.99}, {5, -9, 4}), true);
+  EXPECT_EQ(effect(n.found, "filter_mismatch"), nullptr);
+  ASSERT_FALSE(n.found.alarms.empty());
+  for (const auto& alarm : n.found.alarms) {
+    EXPECT_EQ(alarm.where.find("scale"), std::string::npos) << alarm.where;
+  }
+}
+
 TEST(JudgeNuisances, TheScaleOfAnotherUnitIsSaid) {
   Bundle bundle = tests::made_production({});
   bundle.accel_scale_lsb_per_g = 341;

@@ -4,19 +4,17 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "base/atomic_file.h"
-#include "base/memory_env.h"
 #include "expect_result.h"
 #include "gap/explain/blocks.h"
 #include "gap/judge/diagnose.h"
+#include "gap/simulated_bundle.h"
 #include "sanitized.h"
-#include "sim/bundle_writer.h"
-#include "sim/scenario.h"
 
 namespace sixpoint::gap {
 namespace {
 
 using Json = nlohmann::ordered_json;
+using tests::simulated;
 
 // Means of dwells and amplitudes in phase of small tones, and the variance that noise gives them.
 struct Features {
@@ -42,18 +40,6 @@ Features features_of(const Bundle& bundle) {
     }
   }
   return features;
-}
-
-// `protocol`: where its protocol.json goes.
-Result<Bundle> simulated(const Json& scenario, Json* protocol = nullptr) {
-  MemoryEnv memory;
-  SIXPOINT_ASSIGN(const sim::Scenario parsed, sim::parse_scenario(scenario.dump()));
-  SIXPOINT_CHECK(sim::write_bundle(memory.files, "b", parsed));
-  if (protocol != nullptr) {
-    SIXPOINT_ASSIGN(const Bytes text, read_file(memory.files, "b/protocol.json"));
-    *protocol = Json::parse(text.begin(), text.end());
-  }
-  return read_bundle(memory.files, "b");
 }
 
 // Rms between a recording and a simulation, the simulation's own noise taken off.
