@@ -45,7 +45,7 @@ Eigen::MatrixXd covariance_of(const Block& a, const Block& b, Scatter scatter, d
     v.topLeftCorner<3, 3>().diagonal().array() += c;
   }
   if (&a == &b && scatter == Scatter::by_placement && a.tone) {
-    const double sd = size * a.vibration_lab_g.norm();
+    const double sd = size * a.filter_gain * a.vibration_lab_g.norm();
     v.diagonal().tail(a.size() - 3).array() += sd * sd;
   }
   return v;
