@@ -374,13 +374,18 @@ class LineFinder {
         sensor = {sensor_in_step.vector, sensor_in_step.nats, sensor.chi};
       }
     }
-    line.lab_over_sensor_nats = lab.nats - sensor.nats;
+    const Vector3c in_lab = keeps_phase ? lab.vector : without_phases(phasors, lab.vector, true);
+    const Vector3c in_sensor =
+        keeps_phase ? sensor.vector : without_phases(phasors, sensor.vector, false);
+    const double lab_nats = averaged_nats(phasors, in_lab, true);
+    const double sensor_nats = averaged_nats(phasors, in_sensor, false);
+    // Of a small line a free phase fits the noise of most dwells, in either frame by chance.
+    line.lab_over_sensor_nats = keeps_phase ? lab.nats - sensor.nats : lab_nats - sensor_nats;
     line.in_lab = line.lab_over_sensor_nats > 0;
     const VectorFit& chosen = line.in_lab ? lab : sensor;
+    const Vector3c& vector = line.in_lab ? in_lab : in_sensor;
     line.gain_nats = chosen.nats;
-    const Vector3c vector =
-        keeps_phase ? chosen.vector : without_phases(phasors, chosen.vector, line.in_lab);
-    line.averaged_nats = averaged_nats(phasors, vector, line.in_lab);
+    line.averaged_nats = line.in_lab ? lab_nats : sensor_nats;
     if (const auto halves = halves_of(phasors, line.in_lab)) {
       line.held_out_nats = halves->held_out_nats;
       line.apart_nats = halves->own_nats - line.averaged_nats;

@@ -162,6 +162,9 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
         .name = own ? name : other,
         .nats = std::max(line.gain_nats - kLineCost_nats + kLogPriorEffect, kFoundLine_nats),
         .held_out_gain_nats = line.held_out_nats};
+    if (request.allowed(other) && own) {
+      f.other_nats = -std::abs(line.lab_over_sensor_nats);
+    }
     f.parameters = {{"vector_mg",
                      {line.vector_mg[0], line.vector_mg[1], line.vector_mg[2]},
                      {size_sd(0), size_sd(1), size_sd(2)}},

@@ -212,6 +212,25 @@ TEST(Diagnose, OneAxisGoneAstrayIsNoFilterMismatch) {
   EXPECT_TRUE(d->unknown.present) << d->brief();
 }
 
+// One long record shows a small line and not its frame: it is no line of some poses only, and its
+// name is not sure.
+TEST(SimulatedLine, ThatOneLongRecordShowsIsNamedWithADoubt) {
+  const auto bundle = tests::simulated(
+      {{"schema", "sixpoint/scenario/1"},
+       {"seed", 4},
+       {"protocol", "engineering"},
+       {"effects",
+        {{{"name", "floor_vibration"},
+          {"parameters", {{"vector_mg", {0.085, -0.1, 0.08}}, {"frequency_hz", 23.9}}}}}}});
+  ASSERT_OK(bundle);
+  const auto d = diagnose(*bundle);
+  ASSERT_OK(d);
+  EXPECT_FALSE(d->unknown.present) << d->brief();
+  ASSERT_EQ(d->effects.size(), 1U) << d->brief();
+  EXPECT_LT(d->effects[0].probability, 0.9);
+  EXPECT_EQ(d->effects[0].confounded_with.size(), 1U);
+}
+
 struct EffectsCase {
   const char* effects;
   unsigned seed;
