@@ -280,7 +280,8 @@ class LineFinder {
     }
   }
 
-  std::optional<SpectralLine> next() {
+  // `found`: the lines so far, which are stronger.
+  std::optional<SpectralLine> next(const std::vector<SpectralLine>& found) {
     std::optional<Peak> best;
     const std::pair<Kind, LineScan>* from = nullptr;
     for (const auto& scan : scans_) {
@@ -296,7 +297,7 @@ class LineFinder {
     const double f = refined(best->frequency_hz, from->first, from->second.step_hz);
     taken_hz_.push_back(f);
     taken_hz_.push_back(rate_hz_ / 2 - std::abs(rate_hz_ / 2 - f));
-    return line_at(f, from->first);
+    return line_at(f, from->first, harmonic_nats(f, found));
   }
 
  private:
@@ -354,7 +355,24 @@ class LineFinder {
     return sum;
   }
 
-  SpectralLine line_at(double f, Kind kind) const {
+  // What a stronger line says of the frame (laboratory over sensor) of its second or third
+  // harmonic: one motor, or one supply, makes both.
+  double harmonic_nats(double f, const std::vector<SpectralLine>& found) const {
+    constexpr double kSameSource_nats = 5;  // convention: chance puts a line there once in 150
+    constexpr double kSame_hz = 0.02;
+    for (const SpectralLine& line : found) {
+      for (const int order : {2, 3}) {
+        const double harmonic_hz = order * line.frequency_hz;
+        const double folded_hz = std::abs(std::remainder(harmonic_hz, rate_hz_));
+        if (std::abs(folded_hz - f) < kSame_hz) {
+          return line.in_lab ? kSameSource_nats : -kSameSource_nats;
+        }
+      }
+    }
+    return 0;
+  }
+
+  SpectralLine line_at(double f, Kind kind, double harmonic_nats) const {
     constexpr double kOneFrame_nats = 3;  // one in twenty: convention
     SpectralLine line;
     line.frequency_hz = f;
@@ -380,7 +398,8 @@ class LineFinder {
     const double lab_nats = averaged_nats(phasors, in_lab, true);
     const double sensor_nats = averaged_nats(phasors, in_sensor, false);
     // Of a small line a free phase fits the noise of most dwells, in either frame by chance.
-    line.lab_over_sensor_nats = keeps_phase ? lab.nats - sensor.nats : lab_nats - sensor_nats;
+    line.lab_over_sensor_nats =
+        harmonic_nats + (keeps_phase ? lab.nats - sensor.nats : lab_nats - sensor_nats);
     line.in_lab = line.lab_over_sensor_nats > 0;
     const VectorFit& chosen = line.in_lab ? lab : sensor;
     const Vector3c& vector = line.in_lab ? in_lab : in_sensor;
@@ -437,7 +456,7 @@ std::vector<SpectralLine> find_lines(const Bundle& bundle, const CleanSamples& c
            line.vector_mg.norm() < kShare * strong.vector_mg.norm();
   };
   for (int tried = 0; tried < kMostTried && lines.size() < kMost; ++tried) {
-    const auto line = finder.next();
+    const auto line = finder.next(lines);
     if (!line) {
       break;
     }

@@ -279,6 +279,12 @@ INSTANTIATE_TEST_SUITE_P(
         EffectsCase{R"([{"name": "second_order", "parameters": {"mg_per_g2": [0.3, -0.2, 0.25]}},
                         {"name": "bandwidth", "parameters": {"corner_hz": 18, "order": 2}}])",
                     4},
+        // One long record shows the harmonic: its frame is that of the line it belongs to.
+        EffectsCase{R"([{"name": "floor_vibration",
+                         "parameters": {"vector_mg": [0.4, -0.3, 0.45], "frequency_hz": 11.7}},
+                        {"name": "floor_vibration",
+                         "parameters": {"vector_mg": [0.08, -0.06, 0.09], "frequency_hz": 23.4}}])",
+                    3},
         // Times that scatter bring the tone of 11 g off by 350 counts.
         EffectsCase{R"([{"name": "wrap"}, {"name": "jitter", "parameters": {"rms_ms": 1.45}}])",
                     7}));
