@@ -5,7 +5,8 @@
 // A line that turns with the unit (a vector fixed in the sensor's frame) is electrical; one whose
 // direction stays in the room is vibration of the floor. Each dwell has a phase of its own, so that
 // only vectors are compared, never phases; both hypotheses have the same number of unknowns, and
-// their likelihoods are compared directly.
+// their likelihoods, averaged over the phases, are compared directly. A second or third harmonic
+// goes with the stronger line that it belongs to.
 #pragma once
 
 #include <Eigen/Core>

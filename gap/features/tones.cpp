@@ -55,7 +55,7 @@ Eigen::Matrix3d normal_matrix(const ToneSums& d) {
 // Level, cosine and sine can be told apart. Where a tone of a fifth of the rate is clipped, one or
 // two of its five phases are left, and any amplitude fits them.
 bool determines(const ToneSums& d) {
-  constexpr double kLeast = 1e-3;  // with all phases the smallest eigenvalue is n / 2
+  constexpr double kLeast = 1e-3;  // with all phases the smallest eigenvalue is a half
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(normal_matrix(d) / d.n,
                                                               Eigen::EigenvaluesOnly);
   return solver.eigenvalues()[0] > kLeast;
