@@ -33,7 +33,9 @@ done
 Rscript "$source_folder/tests/r/package_test.R"
 # Ctrl-C ends a call: the loop is left by nothing else.
 for call in scan_16cpan03 read_gt3x_sixpoint; do
-  Rscript -e "library(sixpoint); cat('begins\n'); tryCatch(repeat $call('day1.gt3x'), interrupt = function(i) cat('interrupted\n'))" >out.txt &
+  # Made empty here and not by the program that starts: the loop below could read what the last one wrote.
+  : >out.txt
+  Rscript -e "library(sixpoint); tryCatch({ cat('begins\n'); repeat $call('day1.gt3x') }, interrupt = function(i) cat('interrupted\n'))" >>out.txt &
   child=$!
   until grep -q begins out.txt; do sleep 0.1; done
   sleep 0.3
