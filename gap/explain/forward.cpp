@@ -85,9 +85,6 @@ constexpr double kSmallShare = 0.2;
 // Of one that is far beyond the catalogue's sizes.
 constexpr double kLargeShare = 4;
 
-// Tempcos bend by kBend over this range of temperature.
-constexpr double kBend_c = 20;
-
 // Gains and offsets are free, truncation is there or not, and gravity is known within one range.
 bool varies_in_size(const ParameterGroup& group) {
   return group.effect != "gain" && group.effect != "offset" && group.effect != "truncation" &&

@@ -23,6 +23,8 @@ namespace sixpoint::gap {
 
 // Real effects bend from their plain laws by up to this share.
 inline constexpr double kBend = 0.1;
+// Tempcos bend by that over this range of temperature.
+inline constexpr double kBend_c = 20;
 // Functions of time by which a drift ripples: sine and cosine of one, two and three periods in the
 // recording.
 inline constexpr int kRipples = 6;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -38,24 +39,37 @@ constexpr double kSeveralAlike_sd = 2;
 // An alarm for another cause that has won: above any test of the residuals.
 double other_wins_sd(double nats) { return nats_to_sd(nats) + kAlarm_sd; }
 
-// Whether the zero's curve over temperature is significantly more than belongs to its slope: a zero
-// bends by one per cent of its slope per degree.
-bool zero_bends(const Fit& fit) {
-  constexpr double kShare = 0.01;
-  constexpr double kLeast_mg_per_c2 = 0.001;
-  constexpr double kBeyond = 4;  // standard deviations of that
+// Up to where an effect bends from its slope over temperature, as a square: twice kBend, a zero
+// more.
+struct Bend {
+  const char* effect;
+  const char* what;
+  double curve_share;  // of the slope, per degree
+  double least_curve;  // in the effect's unit per degree
+};
+constexpr std::array kBends = {Bend{"offset_tempco", "zero", 0.04, 0.004},
+                               Bend{"sensitivity_tempco", "gain", 2 * kBend / kBend_c, 2e-4}};
+constexpr double kCubicShare = 2 * kBend / (kBend_c * kBend_c);
+
+// Whether the effect bends over temperature by significantly more than that.
+bool bends_beyond(const Fit& fit, const Bend& bend) {
+  constexpr double kPrior_sd = 4;
   constexpr double kSurely_sd = 3;
-  const double slope = fit.state.tempco_mg_per_c.cwiseAbs().maxCoeff();
   Eigen::Index at = kNuisanceParameters;
   for (const ParameterGroup& group : fit.groups) {
-    for (int i = 0; i < group.count; ++i, ++at) {
-      if (group.effect == "offset_tempco" && i >= 3 && i < 6 &&
-          std::abs(fit.posterior.mean[at]) -
-                  kSurely_sd * std::sqrt(fit.posterior.covariance(at, at)) >
-              kBeyond * std::min(group.curve_sd, std::max(kLeast_mg_per_c2, kShare * slope))) {
-        return true;
+    if (group.effect == bend.effect) {
+      const double slope = fit.posterior.mean.segment<3>(at).cwiseAbs().maxCoeff();
+      const double curve = std::max(bend.least_curve, bend.curve_share * slope);
+      const double cubic = std::max(bend.least_curve / kBend_c, kCubicShare * slope);
+      for (int i = 3; i < group.count; ++i) {
+        const double most = std::min(kPrior_sd * group.sd_of(i), i < 6 ? curve : cubic);
+        const double sd = std::sqrt(fit.posterior.covariance(at + i, at + i));
+        if (std::abs(fit.posterior.mean[at + i]) - kSurely_sd * sd > most) {
+          return true;
+        }
       }
     }
+    at += group.count;
   }
   return false;
 }
@@ -213,10 +227,13 @@ double other_causes(const Explanation& explanation, const EffectFinding& f, doub
     }
     other = std::max(other, grows);
   }
-  if (f.name == "offset_tempco" && zero_bends(explanation.best())) {
-    found.alarm(2 * kAlarm_sd,
-                "mean: the zero bends over temperature more than a zero's drift does");
-    other = kUnknownWins_nats;
+  for (const Bend& bend : kBends) {
+    if (f.name == bend.effect && bends_beyond(explanation.best(), bend)) {
+      found.alarm(
+          2 * kAlarm_sd,
+          fmt::format("mean: the {0} bends over temperature more than its drift does", bend.what));
+      other = kUnknownWins_nats;
+    }
   }
   if (f.name == "drift" && drift_ripples(explanation.best())) {
     found.alarm(2 * kAlarm_sd, "mean: the zero wanders with time more than a drift does");

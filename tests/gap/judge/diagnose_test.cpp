@@ -212,6 +212,25 @@ TEST(Diagnose, OneAxisGoneAstrayIsNoFilterMismatch) {
   EXPECT_TRUE(d->unknown.present) << d->brief();
 }
 
+// A gain that jumps once while the temperature changes bends over it more than a tempco does.
+TEST(Diagnose, AGainThatJumpsIsUnknown) {
+  for (const std::size_t axis : {0U, 2U}) {
+    auto bundle = tests::simulated(
+        {{"schema", "sixpoint/scenario/1"}, {"seed", 5}, {"protocol", "engineering"}});
+    ASSERT_OK(bundle);
+    for (std::size_t i = bundle->samples.size() * 2 / 5; i < bundle->samples.size(); ++i) {
+      std::int16_t& count = bundle->samples[i][axis];
+      count = static_cast<std::int16_t>(count + std::lround(count / 256.0));
+    }
+    const auto d = diagnose(*bundle);
+    ASSERT_OK(d);
+    EXPECT_TRUE(d->unknown.present) << d->brief();
+    for (const EffectFinding& effect : d->effects) {
+      EXPECT_LT(effect.probability, 0.5) << d->brief();
+    }
+  }
+}
+
 // One long record shows a small line and not its frame: it is no line of some poses only, and its
 // name is not sure.
 TEST(SimulatedLine, ThatOneLongRecordShowsIsNamedWithADoubt) {
