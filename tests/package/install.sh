@@ -67,13 +67,14 @@ serve() {
   # shellcheck source=/dev/null
   source "$root/etc/default/sixpoint-station"
   local command station port
+  : >"$scratch/station"  # here, not by the service as it starts: the loop below could read what the last one wrote
   command=$(sed -n 's/^ExecStart=//p' "$unit" | sed 's#%S#/var/lib#g')
   command=${command/\$SIXPOINT_STATION_OPTIONS/${SIXPOINT_STATION_OPTIONS/--port 6020/--port 0}}
   mkdir -p "$root/var/lib/sixpoint"
   chown 64000:64000 "$root/var/lib/sixpoint"
   # shellcheck disable=SC2086  # word splitting as systemd does it
   "${inside[@]}" setpriv --reuid=64000 --regid=64000 --clear-groups --no-new-privs --inh-caps=-all env XDG_DATA_HOME=/var/lib \
-    XDG_CACHE_HOME=/var/cache HOME=/ $command >"$scratch/station" 2>&1 &
+    XDG_CACHE_HOME=/var/cache HOME=/ $command >>"$scratch/station" 2>&1 &
   station=$!
   for _ in $(seq 100); do
     grep -q 'http://127.0.0.1:' "$scratch/station" && break

@@ -111,9 +111,17 @@ class BadInput(InFolder):
 class Interrupt(InFolder):
     """A call that is repeated for ever ends with KeyboardInterrupt, and nothing else ends it."""
 
-    def interrupted(self, code, *arguments):
+    def interrupted(self, call, *arguments):
         # The package loads its parts when they are first named; an interrupt in numpy's import is lost there.
-        code = "import sys, sixpoint\nsixpoint.read, sixpoint.scan, sixpoint.repair\nprint('begins', flush=True)\n" + code
+        code = (
+            "import sys, sixpoint\n"
+            "sixpoint.read, sixpoint.scan, sixpoint.repair\n"
+            "try:\n"
+            "    print('begins', flush=True)\n"
+            f"    while True: {call}\n"
+            "except KeyboardInterrupt:\n"
+            "    print('interrupted')\n"
+        )
         child = subprocess.Popen(
             [sys.executable, "-c", code, *map(str, arguments)], stdout=subprocess.PIPE, text=True
         )
@@ -128,34 +136,19 @@ class Interrupt(InFolder):
         return small(self.folder, seconds=(0, 390 * 86_400))
 
     def test_read(self):
-        code = (
-            "try:\n"
-            "    while True:\n"
-            "        sixpoint.read(sys.argv[1], unit='lsb', fill_limit_s=400 * 86400)\n"
-            "except KeyboardInterrupt:\n"
-            "    print('interrupted')\n"
+        self.interrupted(
+            "sixpoint.read(sys.argv[1], unit='lsb', fill_limit_s=400 * 86400)", self.long_recording()
         )
-        self.interrupted(code, self.long_recording())
 
     def test_scan_and_repair(self):
         for call in ("sixpoint.scan(sys.argv[1:])", "sixpoint.repair(sys.argv[1:], 'o', scan=True, dry_run=True)"):
-            code = (
-                "try:\n"
-                f"    while True: {call}\n"
-                "except KeyboardInterrupt:\n"
-                "    print('interrupted')\n"
-            )
-            self.interrupted(code, simulated(), simulated())
+            self.interrupted(call, simulated(), simulated())
 
     def test_repair_leaves_nothing_half_written(self):
-        code = (
-            "try:\n"
-            "    while True: sixpoint.repair(sys.argv[1], sys.argv[2], scan=True, redo_outdated=True, wide=True)\n"
-            "except KeyboardInterrupt:\n"
-            "    print('interrupted')\n"
-        )
         out = self.folder / "out"
-        self.interrupted(code, simulated(), out)
+        self.interrupted(
+            "sixpoint.repair(sys.argv[1], sys.argv[2], scan=True, redo_outdated=True, wide=True)", simulated(), out
+        )
         for left in out.glob("*"):
             self.assertEqual(left.suffix, ".gt3x", left)
             sixpoint.read(left)
