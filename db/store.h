@@ -109,8 +109,7 @@ class Store final : public RecordWriter {
   Result<std::string> head_of_run(const std::string& id);
   // Reads everything, as it is at this moment, while others go on writing. With the hex hash of an
   // earlier head, also whether that is still a row of the chain: this alone shows a history that
-  // was written anew from its beginning. An error where a question gets no answer: that is no
-  // finding about the rows.
+  // was written anew from its beginning.
   Result<AuditReport> audit(const std::string& earlier_head = {});
 
  private:
