@@ -104,6 +104,52 @@ TEST(Verdict, NoNumberIsNoVerdict) {
   }
 }
 
+TEST(Verdict, SaysWhyNothingCanBeSaid) {
+  const auto reason = [](const Measured& measured) {
+    return judge_quantities({measured}, default_limits()).reasons.at(0);
+  };
+  EXPECT_EQ(reason({"zero_offset_mg", "x", std::nan(""), 5}), "Zero offset, x: no number");
+  EXPECT_EQ(reason({"zero_offset_mg", "x", 0, std::nan("")}), "Zero offset, x: no number");
+  EXPECT_EQ(reason({"zero_uncertainty_mg", "", std::nan(""), 0}),
+            "Expanded uncertainty of zero offset: no number");
+  EXPECT_EQ(
+      judge_quantities({{"zero_offset_mg", "x", 0, 600}}, default_limits()).brief(),
+      "inconclusive; Zero offset, x: the expanded uncertainty of 1200 mg leaves nothing inside "
+      "-700 mg to 700 mg; measured too coarsely to judge the unit");
+}
+
+// What a run of another day, or a hand, may have left in a store: only what is a quantity is taken,
+// and nothing in it passes that does not say so.
+TEST(Verdict, QuantitiesAreReadBackFromWhatIsStored) {
+  const Limits limits = default_limits();
+  auto stored = nlohmann::ordered_json::array();
+  const std::vector<JudgedQuantity> judged = {
+      judge_quantity({"zero_offset_mg", "x", 12, 1}, limits),
+      judge_quantity({"noise_mg", "y", 20, 0.1}, limits),
+      judge_quantity({"noise_mg", "z", std::nan(""), 0.1}, limits)};
+  for (const JudgedQuantity& quantity : judged) {
+    stored.push_back(to_json(quantity));
+  }
+  const auto back = quantities_from_json(stored);
+  ASSERT_EQ(back.size(), judged.size());
+  for (std::size_t i = 0; i < back.size(); ++i) {
+    EXPECT_EQ(to_json(back[i]), to_json(judged[i])) << i;
+  }
+  EXPECT_EQ(back[1].low, std::nullopt);
+  EXPECT_TRUE(std::isnan(back[2].value));
+
+  EXPECT_TRUE(quantities_from_json(nlohmann::ordered_json::object()).empty());
+  const auto odd = quantities_from_json(nlohmann::ordered_json::parse(
+      R"(["noise_mg", {}, {"name": 7}, {"name": "weight_kg"},
+          {"name": "noise_mg", "axis": 1, "value": "4", "low": true, "verdict": "passed", "code": []}])"));
+  ASSERT_EQ(odd.size(), 1U);
+  EXPECT_EQ(odd[0].axis, "");
+  EXPECT_TRUE(std::isnan(odd[0].value));
+  EXPECT_EQ(odd[0].low, std::nullopt);
+  EXPECT_EQ(odd[0].verdict, JigVerdict::inconclusive);
+  EXPECT_EQ(odd[0].code, "");
+}
+
 TEST(Verdict, TheWorstIsTheWhole) {
   const Limits limits = default_limits();
   const Measured good{"noise_mg", "x", 4, 0.1};
