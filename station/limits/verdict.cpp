@@ -49,20 +49,21 @@ std::string sentence(const JudgedQuantity& judged) {
     case JigVerdict::pass:
       return {};
     case JigVerdict::inconclusive:
-      if (!is_uncertainty(judged.name) && std::isfinite(judged.expanded_uncertainty)) {
-        return fmt::format(
-            "{}{}: the expanded uncertainty of {} leaves nothing inside {}; measured too coarsely "
-            "to judge the unit",
-            info.title, axis, shown(judged.expanded_uncertainty, info.unit),
-            judged.low && judged.high ? fmt::format("{} to {}", shown(*judged.low, info.unit),
-                                                    shown(*judged.high, info.unit))
-                                      : shown(limit, info.unit));
+      if (!std::isfinite(judged.value) || !std::isfinite(judged.expanded_uncertainty)) {
+        return fmt::format("{}{}: no number", info.title, axis);
       }
-      return is_uncertainty(judged.name) && std::isfinite(judged.value)
-                 ? fmt::format("{}{}: {} is more than {}; measured too coarsely to judge the unit",
-                               info.title, axis, shown(judged.value, info.unit),
-                               shown(limit, info.unit))
-                 : fmt::format("{}{}: no number", info.title, axis);
+      if (is_uncertainty(judged.name)) {
+        return fmt::format("{}{}: {} is more than {}; measured too coarsely to judge the unit",
+                           info.title, axis, shown(judged.value, info.unit),
+                           shown(limit, info.unit));
+      }
+      return fmt::format(
+          "{}{}: the expanded uncertainty of {} leaves nothing inside {}; measured too coarsely "
+          "to judge the unit",
+          info.title, axis, shown(judged.expanded_uncertainty, info.unit),
+          judged.low && judged.high ? fmt::format("{} to {}", shown(*judged.low, info.unit),
+                                                  shown(*judged.high, info.unit))
+                                    : shown(limit, info.unit));
     case JigVerdict::conditional_pass:
       return fmt::format("{}{}: {} is within {} by less than the guard band of {}", info.title,
                          axis, shown(judged.value, info.unit), shown(limit, info.unit),
