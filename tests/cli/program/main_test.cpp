@@ -1,5 +1,6 @@
 // The program as a process: arguments, both streams, exit code. Oracle: the contract's exit codes
 // (sysexits.h, and 0 to 3), and the version that CMake was given.
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -73,7 +74,17 @@ TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) {
     ::execl("/bin/sh", "sh", "-c", script.c_str(), nullptr);
     ::_exit(127);
   }
-  std::this_thread::sleep_for(std::chrono::seconds(1));
+  // At work once its file is begun; before it minds the signal, the signal would just end it.
+  const auto begun = [&] {
+    const std::filesystem::directory_iterator all(folder_.path());
+    return std::any_of(begin(all), end(all), [](const auto& entry) {
+      return entry.path().filename().string().starts_with(".out.gt3x");
+    });
+  };
+  for (int tenths = 0; tenths < 600 && !begun(); ++tenths) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  EXPECT_TRUE(begun());
   ASSERT_EQ(::kill(child, SIGINT), 0);
   int status = 0;
   ASSERT_EQ(::waitpid(child, &status, 0), child);
