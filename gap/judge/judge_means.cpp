@@ -231,7 +231,7 @@ double other_causes(const Explanation& explanation, const EffectFinding& f, doub
     if (f.name == bend.effect && bends_beyond(explanation.best(), bend)) {
       found.alarm(
           2 * kAlarm_sd,
-          fmt::format("mean: the {0} bends over temperature more than its drift does", bend.what));
+          fmt::format("mean: the {} bends over temperature more than its drift does", bend.what));
       other = kUnknownWins_nats;
     }
   }
