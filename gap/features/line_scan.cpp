@@ -96,8 +96,8 @@ SumCovariance sum_covariance(const std::vector<const Stretch*>& set,
   const Eigen::Matrix3d white = weight.asDiagonal();
   for (const Stretch* s : set) {
     const Eigen::Matrix3d& r = s->rotation;
-    sum.sensor += static_cast<double>(s->samples) * white;
-    sum.lab += static_cast<double>(s->samples) * (r.transpose() * white * r);
+    sum.sensor += static_cast<double>(s->known) * white;
+    sum.lab += static_cast<double>(s->known) * (r.transpose() * white * r);
   }
   return {sum.lab.inverse(), sum.sensor.inverse()};
 }
@@ -124,7 +124,7 @@ LineScan scan_powers(double rate_hz, const std::vector<const Stretch*>& set,
   std::vector<Eigen::Matrix3cd> sensor(one ? 0 : half, Eigen::Matrix3cd::Zero());
   for (const Stretch* s : set) {
     spectra.transform(*s);
-    const double scale = 1 / std::sqrt(static_cast<double>(s->samples));
+    const double scale = 1 / std::sqrt(static_cast<double>(s->known));
     const Eigen::Matrix3cd back = s->rotation.transpose().cast<Complex>();
     for (std::size_t k = 0; k < half; ++k) {
       Vector3c z = spectra.at(k, scale / level[k].array());

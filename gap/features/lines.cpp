@@ -33,13 +33,31 @@ Vector3c amplitude_at(const Stretch& stretch, double w) {
       phase /= std::abs(phase);
     }
   }
-  return sum * (2.0 / static_cast<double>(stretch.samples));
+  return sum * (2.0 / static_cast<double>(stretch.known));
+}
+
+// Least squares, twice: what is masked makes sine and cosine depend on each other a little.
+void take_off(Stretch& stretch, double w) {
+  for (int round = 0; round < 2; ++round) {
+    const Vector3c amplitude = amplitude_at(stretch, w);
+    const Complex turn = std::polar(1.0, w);
+    Complex phase = 1;
+    for (std::size_t i = 0; i < stretch.samples; ++i) {
+      for (std::size_t axis = 0; axis < 3 && stretch.is_known[i]; ++axis) {
+        stretch.x[axis][i] -= (amplitude[static_cast<Eigen::Index>(axis)] * phase).real();
+      }
+      phase *= turn;
+      if ((i & 1023U) == 1023U) {
+        phase /= std::abs(phase);
+      }
+    }
+  }
 }
 
 // 1 / variance of the real part of a stretch's amplitude, per axis.
 Eigen::Vector3d weights_at(const Stretch& stretch, const NoiseSpectrum& noise,
                            double frequency_hz) {
-  return static_cast<double>(stretch.samples) / (2 * noise.variances_at(frequency_hz).array());
+  return static_cast<double>(stretch.known) / (2 * noise.variances_at(frequency_hz).array());
 }
 
 // One dwell's complex amplitude, its weights and its pose.
@@ -241,23 +259,63 @@ std::vector<Stretch> pieces(const std::vector<Stretch>& all, double least, doubl
         const auto first = s.x[a].begin() + static_cast<std::ptrdiff_t>(k * length);
         piece.x[a].assign(first, first + static_cast<std::ptrdiff_t>(length));
       }
-      cut.push_back(std::move(piece));
+      const auto first = s.is_known.begin() + static_cast<std::ptrdiff_t>(k * length);
+      piece.is_known.assign(first, first + static_cast<std::ptrdiff_t>(length));
+      piece.known =
+          static_cast<std::size_t>(std::count(piece.is_known.begin(), piece.is_known.end(), true));
+      if (piece.known > 0) {
+        cut.push_back(std::move(piece));
+      }
     }
   }
   return cut;
 }
 
-// Finds one line after the other, the strongest first.
+// Finds one line after the other, the strongest first, and takes it off before it seeks the next:
+// what is masked spreads a strong line over its neighbourhood.
 class LineFinder {
  public:
   LineFinder(double rate_hz, const NoiseSpectrum& noise, std::vector<Stretch> all)
       : rate_hz_(rate_hz), noise_(noise), all_(std::move(all)) {
-    constexpr double kLong_s = 60;
-    constexpr double kDwell_s = 30;
-    constexpr double kPiece_s = 420;  // of long records: what the scan takes in one transform
     longest_ = &*std::max_element(all_.begin(), all_.end(), [](const Stretch& a, const Stretch& b) {
       return a.samples < b.samples;
     });
+  }
+
+  // `found`: the lines so far, which are stronger.
+  std::optional<SpectralLine> next(const std::vector<SpectralLine>& found) {
+    std::optional<Peak> best;
+    Kind kind = Kind::in_step;
+    double step_hz = 0;
+    for (const auto& [of, scan] : scans()) {
+      const auto peak = best_peak(scan);
+      if (peak && (!best || peak->nats > best->nats)) {
+        best = peak;
+        kind = of;
+        step_hz = scan.step_hz;
+      }
+    }
+    if (!best) {
+      return std::nullopt;
+    }
+    const double f = refined(best->frequency_hz, kind, step_hz);
+    taken_hz_.push_back(f);
+    taken_hz_.push_back(rate_hz_ / 2 - std::abs(rate_hz_ / 2 - f));
+    const SpectralLine line = line_at(f, kind, harmonic_nats(f, found));
+    for (Stretch& stretch : all_) {
+      take_off(stretch, 2 * M_PI * f / rate_hz_);
+    }
+    return line;
+  }
+
+ private:
+  enum class Kind { of_long, of_dwells, in_step };
+
+  std::vector<std::pair<Kind, LineScan>> scans() const {
+    constexpr double kLong_s = 60;
+    constexpr double kDwell_s = 30;
+    constexpr double kPiece_s = 420;  // of long records: what the scan takes in one transform
+    std::vector<std::pair<Kind, LineScan>> scans;
     std::vector<const Stretch*> dwells;
     for (const Stretch& s : all_) {
       if (static_cast<double>(s.samples) <= kDwell_s * rate_hz_) {
@@ -271,37 +329,15 @@ class LineFinder {
       for (const Stretch& piece : cut) {
         set.push_back(&piece);
       }
-      scans_.emplace_back(Kind::of_long, scan_powers(rate_hz_, set, noise));
+      scans.emplace_back(Kind::of_long, scan_powers(rate_hz_, set, noise_));
     } else {
-      scans_.emplace_back(Kind::in_step, scan_in_step(rate_hz_, all_, noise));
+      scans.emplace_back(Kind::in_step, scan_in_step(rate_hz_, all_, noise_));
     }
     if (!dwells.empty()) {
-      scans_.emplace_back(Kind::of_dwells, scan_powers(rate_hz_, dwells, noise));
+      scans.emplace_back(Kind::of_dwells, scan_powers(rate_hz_, dwells, noise_));
     }
+    return scans;
   }
-
-  // `found`: the lines so far, which are stronger.
-  std::optional<SpectralLine> next(const std::vector<SpectralLine>& found) {
-    std::optional<Peak> best;
-    const std::pair<Kind, LineScan>* from = nullptr;
-    for (const auto& scan : scans_) {
-      const auto peak = best_peak(scan.second);
-      if (peak && (!best || peak->nats > best->nats)) {
-        best = peak;
-        from = &scan;
-      }
-    }
-    if (!best) {
-      return std::nullopt;
-    }
-    const double f = refined(best->frequency_hz, from->first, from->second.step_hz);
-    taken_hz_.push_back(f);
-    taken_hz_.push_back(rate_hz_ / 2 - std::abs(rate_hz_ / 2 - f));
-    return line_at(f, from->first, harmonic_nats(f, found));
-  }
-
- private:
-  enum class Kind { of_long, of_dwells, in_step };
 
   std::optional<Peak> best_peak(const LineScan& scan) const {
     constexpr double kGuard_hz = 0.6;  // convention: wider than a line in a dwell of 7 s
@@ -349,7 +385,7 @@ class LineFinder {
     const double w = 2 * M_PI * f / rate_hz_;
     for (const Stretch& s : all_) {
       if (kind == Kind::of_dwells || &s == longest_) {
-        sum += amplitude_at(s, w).squaredNorm() * static_cast<double>(s.samples);
+        sum += amplitude_at(s, w).squaredNorm() * static_cast<double>(s.known);
       }
     }
     return sum;
@@ -433,7 +469,6 @@ class LineFinder {
   const NoiseSpectrum& noise_;
   std::vector<Stretch> all_;
   const Stretch* longest_ = nullptr;
-  std::vector<std::pair<Kind, LineScan>> scans_;
   std::vector<double> taken_hz_;
 };
 

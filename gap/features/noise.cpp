@@ -14,20 +14,29 @@
 namespace sixpoint::gap {
 namespace {
 
-constexpr std::size_t kMaxBlocks = 1200;  // the level is then known to 0.1 %
+constexpr std::size_t kEnoughBlocks = 30;  // their level is known to 2 %
+constexpr std::size_t kMaxBlocks = 1200;   // the level is then known to 0.1 %
 
-// First samples of undisturbed blocks.
+// First samples of undisturbed blocks; of those in which the clock doesn't slip, if they are
+// enough: a slip spreads a line over the spectrum.
 std::vector<std::size_t> block_starts(const Bundle& bundle, const CleanSamples& clean,
                                       std::size_t length) {
   std::vector<std::size_t> starts;
+  std::vector<std::size_t> in_step;
   for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
     for (const RestPiece& piece : rest_pieces(bundle, s, length)) {
-      if (clean.count_usable(piece.first, piece.samples) == length) {
-        starts.push_back(piece.first);
+      if (clean.count_usable(piece.first, piece.samples) != length) {
+        continue;
+      }
+      starts.push_back(piece.first);
+      const auto from = clean.flags.begin() + static_cast<std::ptrdiff_t>(piece.first);
+      if (std::none_of(from, from + static_cast<std::ptrdiff_t>(length),
+                       [](std::uint8_t flag) { return (flag & kSampleSlipped) != 0; })) {
+        in_step.push_back(piece.first);
       }
     }
   }
-  return starts;
+  return in_step.size() >= kEnoughBlocks ? in_step : starts;
 }
 
 struct Moments {

@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 
+#include "gap/recording/at_rest.h"
+
 namespace sixpoint::gap {
 
 double StepResponse::Mode::at(double t_s) const {
@@ -44,19 +46,22 @@ class Deviation {
     if (std::abs(step_mg) < kAxisStep_mg || !(variance > 0)) {
       return;
     }
-    const std::size_t from = segment.first_sample + length_;
-    const std::size_t samples = std::min(segment.samples, 4 * length_) - length_;
-    if (clean.count_usable(from, samples) < kLeast) {
+    std::vector<Reading> ringing, resting;
+    const Places places = places_by_clock(clean, segment, std::min(segment.samples, 4 * length_));
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i]) {
+        (*places[i] < length_ ? ringing : resting)
+            .push_back({*places[i], clean.value_mg(segment.first_sample + i, axis)});
+      }
+    }
+    if (resting.size() < kLeast) {
       return;
     }
-    const std::vector<double> rest = rest_of(clean, segment.first_sample, samples, axis, lines_hz);
+    const std::vector<double> rest = rest_of(resting, lines_hz);
     ++steps_;
-    for (std::size_t i = 0; i < length_; ++i) {
-      if (clean.usable(segment.first_sample + i)) {
-        share_[i] +=
-            step_mg * (clean.value_mg(segment.first_sample + i, axis) - rest[i]) / variance;
-        weight_[i] += step_mg * step_mg / variance;
-      }
+    for (const auto& [at, x_mg] : ringing) {
+      share_[at] += step_mg * (x_mg - rest[at]) / variance;
+      weight_[at] += step_mg * step_mg / variance;
     }
   }
 
@@ -147,11 +152,21 @@ class Deviation {
  private:
   double at_s(std::size_t i) const { return static_cast<double>(i) / rate_hz_; }
 
-  // Level and lines at each of the first samples, by least squares from `samples` behind them.
-  std::vector<double> rest_of(const CleanSamples& clean, std::size_t first, std::size_t samples,
-                              std::size_t axis, const std::vector<double>& lines_hz) const {
+  struct Reading {
+    std::size_t place;
+    double x_mg;
+  };
+
+  // Level and lines at each of the first places, by least squares from what rests behind them.
+  std::vector<double> rest_of(const std::vector<Reading>& resting,
+                              const std::vector<double>& lines_hz) const {
+    double level_mg = 0;
+    for (const Reading& reading : resting) {
+      level_mg += reading.x_mg;
+    }
+    level_mg /= static_cast<double>(resting.size());
     if (lines_hz.empty()) {
-      return std::vector<double>(length_, clean.mean_mg(first + length_, samples, axis));
+      return std::vector<double>(length_, level_mg);
     }
     constexpr double kRegular = 1e-6;  // lines of nearly one frequency
     const auto columns = static_cast<Eigen::Index>(1 + 2 * lines_hz.size());
@@ -164,16 +179,13 @@ class Deviation {
       }
       return row;
     };
-    Eigen::MatrixXd a =
-        kRegular * static_cast<double>(samples) * Eigen::MatrixXd::Identity(columns, columns);
+    Eigen::MatrixXd a = kRegular * static_cast<double>(resting.size()) *
+                        Eigen::MatrixXd::Identity(columns, columns);
     Eigen::VectorXd b = Eigen::VectorXd::Zero(columns);
-    const double level_mg = clean.mean_mg(first + length_, samples, axis);
-    for (std::size_t i = length_; i < length_ + samples; ++i) {
-      if (clean.usable(first + i)) {
-        const Eigen::VectorXd row = row_of(i);
-        a.selfadjointView<Eigen::Lower>().rankUpdate(row);
-        b += row * (clean.value_mg(first + i, axis) - level_mg);
-      }
+    for (const Reading& reading : resting) {
+      const Eigen::VectorXd row = row_of(reading.place);
+      a.selfadjointView<Eigen::Lower>().rankUpdate(row);
+      b += row * (reading.x_mg - level_mg);
     }
     const Eigen::VectorXd x = a.selfadjointView<Eigen::Lower>().ldlt().solve(b);
     std::vector<double> rest(length_);

@@ -12,6 +12,7 @@ namespace {
 constexpr double kUniformSd_s = kHostStamp_s / std::numbers::sqrt3;
 
 struct Stamp {
+  std::size_t sample;
   double nominal_s;   // since the segment's start, by the nominal rate
   double residual_s;  // host's less nominal
 };
@@ -29,8 +30,8 @@ std::vector<Stamps> stamps_by_segment(const Bundle& bundle) {
     for (; at < index.size() && index[at] < segment.first_sample + segment.samples; ++at) {
       const double nominal_s =
           static_cast<double>(index[at] - segment.first_sample) / bundle.rate_hz;
-      stamps.push_back(
-          {nominal_s, bundle.host_clock.host_time_s[at] - segment.host_start_s - nominal_s});
+      stamps.push_back({index[at], nominal_s,
+                        bundle.host_clock.host_time_s[at] - segment.host_start_s - nominal_s});
     }
     if (stamps.size() >= 3) {
       all.push_back(std::move(stamps));
@@ -152,6 +153,7 @@ double count_slips(const std::vector<Stamps>& segments, const CoarseRate& rate, 
 }
 
 void take_out_slips(std::vector<Stamps>& segments, double interval_s, HostTiming& timing) {
+  constexpr double kMostSlip = 1e6;         // more than any second holds: stamps may say anything
   constexpr double kLargestError = 0.0065;  // of a clock: beyond the catalogue's 5000 ppm
   CoarseRate rate = rate_on_circle(segments, interval_s);
   // Near half an interval a second the circle is ambiguous: the fewer slips the better.
@@ -169,6 +171,10 @@ void take_out_slips(std::vector<Stamps>& segments, double interval_s, HostTiming
       stamps[i].residual_s -= shift_s;
       (slips[i] > 0 ? timing.lost : timing.repeated) +=
           static_cast<std::size_t>(std::abs(slips[i]));
+      if (slips[i] != 0) {
+        timing.slips.push_back({stamps[i - 1].sample, stamps[i].sample,
+                                static_cast<int>(std::clamp(slips[i], -kMostSlip, kMostSlip))});
+      }
     }
   }
 }
@@ -251,6 +257,16 @@ HostTiming host_timing(const Bundle& bundle) {
   timing.clock_sd_ppm =
       all.xx > 0 ? 1e6 * std::max(kUniformSd_s, timing.scatter_ms / 1e3) / std::sqrt(all.xx) : 1e6;
   return timing;
+}
+
+void mark_slips(const HostTiming& timing, CleanSamples& clean) {
+  clean.slips = timing.slips;
+  for (const ClockSlip& slip : clean.slips) {
+    for (std::size_t i = slip.first; i < slip.last; ++i) {
+      clean.wrapped_samples -= (clean.flags[i] & kSampleWrapped) != 0 ? 1 : 0;
+      clean.flags[i] |= kSampleSlipped;
+    }
+  }
 }
 
 }  // namespace sixpoint::gap

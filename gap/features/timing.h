@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "gap/recording/bundle.h"
+#include "gap/recording/clean.h"
 
 namespace sixpoint::gap {
 
@@ -28,11 +29,16 @@ struct HostTiming {
   double clock_held_out_nats = 0;  // each half of the segments predicted from the rate of the other
   std::size_t lost = 0;            // samples, summed over packets that miss some
   std::size_t repeated = 0;
-  std::size_t packets = 0;  // pairs of stamps looked at
-  std::size_t samples = 0;  // between them
-  double scatter_ms = 0;    // rms of the stamps about the line, slips taken out
+  std::vector<ClockSlip> slips;  // where, ascending
+  std::size_t packets = 0;       // pairs of stamps looked at
+  std::size_t samples = 0;       // between them
+  double scatter_ms = 0;         // rms of the stamps about the line, slips taken out
 };
 
 HostTiming host_timing(const Bundle& bundle);
+
+// Tells `clean` where samples are lost or repeated, so that what needs their times knows them.
+// Wraps there are not counted: without its time a tone doesn't say where a sample should be. Once.
+void mark_slips(const HostTiming& timing, CleanSamples& clean);
 
 }  // namespace sixpoint::gap

@@ -80,6 +80,7 @@ Diagnosis diagnose(const Request& request) {
   const ProtocolKind kind = protocol_kind(bundle);
   Diagnosis out = header_of(request, kind);
   CleanSamples clean = clean_samples(bundle);
+  mark_slips(host_timing(bundle), clean);
   Findings found = judge_marks(request, clean);
   PoseCheck poses = judge_poses(bundle, clean);
   if (poses.moving) {

@@ -4,6 +4,40 @@
 
 namespace sixpoint::gap {
 
+namespace {
+
+Places places_as_stored(const CleanSamples& clean, const Segment& segment, std::size_t count) {
+  Places places(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (clean.usable(segment.first_sample + i)) {
+      places[i] = i;
+    }
+  }
+  return places;
+}
+
+}  // namespace
+
+Places places_by_clock(const CleanSamples& clean, const Segment& segment, std::size_t count) {
+  Places places(count);
+  const auto samples = static_cast<std::ptrdiff_t>(count);
+  auto slip = std::ranges::lower_bound(clean.slips, segment.first_sample, {}, &ClockSlip::first);
+  std::ptrdiff_t lost = 0;
+  bool possible = true;  // a second can't repeat more samples than it holds
+  for (std::size_t i = 0; i < count && possible; ++i) {
+    const std::size_t sample = segment.first_sample + i;
+    for (; slip != clean.slips.end() && slip->last <= sample; ++slip) {
+      lost += slip->lost;
+      possible = possible && slip->lost > -static_cast<std::ptrdiff_t>(slip->last - slip->first) &&
+                 lost <= samples;
+    }
+    if (clean.in_step(sample)) {
+      places[i] = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(i) + lost);
+    }
+  }
+  return possible ? places : places_as_stored(clean, segment, count);
+}
+
 std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) {
   constexpr double kShortest_s = 4;
   constexpr std::size_t kLongest = 1U << 17;  // 22 minutes at 100 Hz
@@ -14,20 +48,40 @@ std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) 
         segment.samples < skip + static_cast<std::size_t>(kShortest_s * bundle.rate_hz)) {
       continue;
     }
-    Stretch stretch;
-    stretch.samples = std::min(segment.samples - skip, kLongest);
-    stretch.start_s = segment.host_start_s + static_cast<double>(skip) / bundle.rate_hz;
-    stretch.rotation = segment.rotation;
-    stretch.pose = segment.pose;
-    const std::size_t first = segment.first_sample + skip;
-    if (clean.count_usable(first, stretch.samples) * 10 < stretch.samples * 9) {
+    const std::size_t stored = std::min(segment.samples - skip, kLongest);
+    if (clean.count_usable(segment.first_sample + skip, stored) * 10 < stored * 9) {
       continue;
     }
+    const Places places = places_by_clock(clean, segment, skip + stored);
+    Stretch stretch;
+    stretch.rotation = segment.rotation;
+    stretch.pose = segment.pose;
+    std::optional<std::size_t> start;
+    std::array<double, 3> sum_mg{};
+    for (std::size_t i = skip; i < places.size(); ++i) {
+      if (!places[i]) {
+        continue;
+      }
+      start = start.value_or(*places[i]);
+      stretch.is_known.resize(*places[i] - *start, false);
+      stretch.is_known.push_back(true);
+      ++stretch.known;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double x_mg = clean.value_mg(segment.first_sample + i, axis);
+        stretch.x[axis].resize(*places[i] - *start, 0);
+        stretch.x[axis].push_back(x_mg);
+        sum_mg[axis] += x_mg;
+      }
+    }
+    if (2 * stretch.known < stored) {
+      continue;
+    }
+    stretch.start_s = segment.host_start_s + static_cast<double>(*start) / bundle.rate_hz;
+    stretch.samples = stretch.is_known.size();
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double mean_mg = clean.mean_mg(first, stretch.samples, axis);
       for (std::size_t i = 0; i < stretch.samples; ++i) {
-        stretch.x[axis].push_back(
-            clean.usable(first + i) ? clean.value_mg(first + i, axis) - mean_mg : 0);
+        stretch.x[axis][i] -=
+            stretch.is_known[i] ? sum_mg[axis] / static_cast<double>(stretch.known) : 0;
       }
     }
     all.push_back(std::move(stretch));

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "gap/recording/bundle.h"
@@ -17,15 +18,24 @@
 
 namespace sixpoint::gap {
 
-// A stretch at rest in one pose, mean removed, masked samples zero, in mg.
+// Of the first `count` samples of a segment: their places since its start by the unit's clock. None
+// of masked samples, and of those in a second in which the clock slips. A clock that would repeat
+// or lose more than there is says nothing: then all have the places at which they are stored.
+using Places = std::vector<std::optional<std::size_t>>;
+Places places_by_clock(const CleanSamples& clean, const Segment& segment, std::size_t count);
+
+// A stretch at rest in one pose, mean removed, in mg. Each sample stands at its place; places
+// without one are zero.
 struct Stretch {
-  std::size_t samples = 0;
-  double start_s = 0;  // by the host's clock
+  std::size_t samples = 0;  // places
+  std::size_t known = 0;    // of them that have a sample
+  double start_s = 0;       // by the host's clock
   Eigen::Matrix3d rotation;
   int pose = 0;
   std::array<std::vector<double>, 3> x;
+  std::vector<bool> is_known;
 };
-// Of four seconds and more, nine tenths of them unmasked.
+// Of four seconds and more, nine tenths of them unmasked, and half of them without slips.
 std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean);
 
 // Samples [first, first + samples) of the recording, of one segment at rest.

@@ -22,10 +22,18 @@ namespace sixpoint::gap {
 
 enum SampleFlag : std::uint8_t {
   kSampleGood = 0,
-  kSampleZero = 1,     // within a run of zeros on all axes
-  kSampleHeld = 2,     // within a run that repeats one value exactly
-  kSampleClipped = 4,  // an axis at the end of its range, or on the plateau of a saturation
-  kSampleWrapped = 8,  // an axis came back by 4096 LSB; undone in the samples
+  kSampleZero = 1,      // within a run of zeros on all axes
+  kSampleHeld = 2,      // within a run that repeats one value exactly
+  kSampleClipped = 4,   // an axis at the end of its range, or on the plateau of a saturation
+  kSampleWrapped = 8,   // an axis came back by 4096 LSB; undone in the samples
+  kSampleSlipped = 16,  // within a second that lacks samples or has some twice
+};
+
+// Samples are missing, or are there twice, somewhere in [first, last).
+struct ClockSlip {
+  std::size_t first = 0;
+  std::size_t last = 0;
+  int lost = 0;  // negative: there twice
 };
 
 struct RunTally {
@@ -42,6 +50,8 @@ struct CleanSamples {
   bool usable(std::size_t i) const {
     return (flags[i] & (kSampleZero | kSampleHeld | kSampleClipped)) == 0;
   }
+  // Usable, and at its place by the clock of `slips`.
+  bool in_step(std::size_t i) const { return usable(i) && (flags[i] & kSampleSlipped) == 0; }
   double value_mg(std::size_t i, std::size_t axis) const {
     return 1000.0 * samples[i][axis] / accel_scale_lsb_per_g;
   }
@@ -68,6 +78,8 @@ struct CleanSamples {
   std::array<std::array<double, 2>, 3> plateau_lsb{};  // per axis low, high; 0 where none
   std::size_t plateau_samples = 0;
   std::size_t full_scale_samples = 0;  // at the record's own limits: nothing wrong
+
+  std::vector<ClockSlip> slips;  // ascending; set by mark_slips() (gap/features/timing.h)
 };
 
 CleanSamples clean_samples(const Bundle& bundle);

@@ -36,6 +36,7 @@ Stretch stretch(double start_s, std::size_t samples, const Value& value,
                 const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity()) {
   Stretch made;
   made.samples = samples;
+  made.known = samples;
   made.start_s = start_s;
   made.rotation = rotation;
   for (std::size_t i = 0; i < samples; ++i) {

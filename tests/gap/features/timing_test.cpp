@@ -30,6 +30,32 @@ TEST(HostTiming, ReadsRateAndSlipsExactly) {
   EXPECT_NEAR(timing.clock_ppm, 3000, 5 * timing.clock_sd_ppm);
   EXPECT_EQ(timing.lost, 2U);
   EXPECT_EQ(timing.repeated, 1U);
+  ASSERT_EQ(timing.slips.size(), 2U);
+  EXPECT_EQ(timing.slips[0].first, 4200U);
+  EXPECT_EQ(timing.slips[0].last, 4300U);
+  EXPECT_EQ(timing.slips[0].lost, 2);
+  EXPECT_EQ(timing.slips[1].first, 9600U);
+  EXPECT_EQ(timing.slips[1].lost, -1);
+
+  CleanSamples clean = clean_samples(bundle);
+  clean.flags[4250] = clean.flags[4300] = kSampleWrapped;
+  clean.wrapped_samples = 2;
+  mark_slips(timing, clean);
+  EXPECT_TRUE(clean.in_step(4199) && clean.in_step(4300));
+  EXPECT_FALSE(clean.in_step(4200) || clean.in_step(4299));
+  EXPECT_TRUE(clean.usable(4200)) << "its value is right";
+  EXPECT_EQ(clean.wrapped_samples, 1U);
+}
+
+// A host's clock that is set by a year loses no 3e9 samples.
+TEST(HostTiming, AClockThatIsSetIsBounded) {
+  Bundle bundle = tests::made_production({});
+  for (std::size_t i = 5; i < 10; ++i) {
+    bundle.host_clock.host_time_s[i] += 3e7;
+  }
+  const HostTiming timing = host_timing(bundle);
+  ASSERT_EQ(timing.slips.size(), 1U);
+  EXPECT_EQ(timing.slips[0].lost, 1'000'000);
 }
 
 TEST(HostTiming, NothingWithoutStamps) {

@@ -82,6 +82,47 @@ TEST(AtRest, StretchWithMoreThanATenthMaskedIsLeftOut) {
   EXPECT_TRUE(stretches(made.bundle, made.clean).empty());
 }
 
+// Two samples are lost in [100, 200), three are there twice in [400, 500).
+TEST(AtRest, PlacesFollowTheClock) {
+  MadeSegments made = gap::made(
+      {segment(Segment::Kind::still, 50, false), segment(Segment::Kind::still, 600, false)});
+  made.clean.slips = {{150, 250, 2}, {450, 550, -3}};
+  for (const ClockSlip& slip : made.clean.slips) {
+    std::fill(made.clean.flags.begin() + static_cast<std::ptrdiff_t>(slip.first),
+              made.clean.flags.begin() + static_cast<std::ptrdiff_t>(slip.last), kSampleSlipped);
+  }
+  made.clean.flags[60] = kSampleHeld;
+  const Segment& second = made.bundle.segments[1];
+  const Places places = places_by_clock(made.clean, second, 600);
+  EXPECT_EQ(places[0], 0U);
+  EXPECT_FALSE(places[10]) << "held";
+  EXPECT_EQ(places[99], 99U);
+  EXPECT_FALSE(places[100]);
+  EXPECT_FALSE(places[199]);
+  EXPECT_EQ(places[200], 202U);
+  EXPECT_EQ(places[399], 401U);
+  EXPECT_EQ(places[500], 499U);
+
+  const auto found = stretches(made.bundle, made.clean);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].samples, 599U);
+  EXPECT_EQ(found[0].known, 399U);
+  EXPECT_EQ(found[0].x[0][150], 0);
+  EXPECT_FALSE(found[0].is_known[150]);
+  EXPECT_TRUE(found[0].is_known[202]);
+
+  // More than a second holds: the clock was set, and says nothing of places.
+  made.clean.slips[1].lost = -100;
+  EXPECT_EQ(places_by_clock(made.clean, second, 600)[500], 500U);
+  made.clean.slips[1].lost = 1'000'000;
+  EXPECT_EQ(places_by_clock(made.clean, second, 600)[500], 500U);
+
+  // Slips in more than half of its seconds.
+  made.clean.slips[1].lost = -3;
+  std::fill_n(made.clean.flags.begin() + 50, 320, kSampleSlipped);
+  EXPECT_TRUE(stretches(made.bundle, made.clean).empty());
+}
+
 // By hand: 300 samples ring after the move, 1700 are left; the segment begins at sample 100.
 TEST(AtRest, PiecesFollowOneAnotherFromWhereRingingIsOver) {
   using Kind = Segment::Kind;
