@@ -185,14 +185,11 @@ export async function shot(page, name) {
 }
 
 // The technician: looks at what the page wants in the biggest words and turns the (virtual) unit there.
+const wantedFace = async (page) => ((await page.locator('.prompt').textContent()) ?? '').match(/([+−][XYZ]) side up/)?.[1];
+const turn = (page, face) => page.locator('.hand').getByRole('button', { name: face, exact: true }).click();
 export async function turnAsAsked(page) {
-  const prompt = page.locator('.prompt');
-  const text = await until('a wanted side', async () => {
-    const now = (await prompt.textContent()) ?? '';
-    return /[+−][XYZ] side up/.test(now) ? now : null;
-  });
-  const face = text.match(/[+−][XYZ]/)[0];
-  await page.locator('.hand').getByRole('button', { name: face, exact: true }).click();
+  const face = await until('a wanted side', () => wantedFace(page));
+  await turn(page, face);
   return face;
 }
 
@@ -201,13 +198,17 @@ export async function taken(page) {
   return page.locator('.placements li.taken').count();
 }
 export async function place(page, count) {
-  while (await taken(page) < count) {
+  const hasResult = async () => (await page.locator('.result').count()) > 0;
+  for (let turns = 0; await taken(page) < count; ++turns) {
     const before = await taken(page);
     const asked = await page.locator('.prompt').textContent();
-    await turnAsAsked(page);
+    // A result that is there before the first turn is of the run before; later on, the run ended behind the count.
+    const face = await until('a wanted side', async () => (await wantedFace(page)) ?? (turns > 0 && (await hasResult()) && 'none'));
+    if (face === 'none') return;
+    await turn(page, face);
     await until('the pose is taken', async () =>
-      (await taken(page)) > before || (await page.locator('.result').count()) > 0 || (await page.locator('.prompt').textContent()) !== asked);
-    if (await page.locator('.result').count()) return;
+      (await taken(page)) > before || (await hasResult()) || (await page.locator('.prompt').textContent()) !== asked);
+    if (await hasResult()) return;
     // The prompt may be a moment ahead of the count: who turns once too often has one placement too many.
     await until('the count', async () => (await taken(page)) > before, 1).catch(() => {});
   }
