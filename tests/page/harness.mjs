@@ -193,6 +193,18 @@ export async function turnAsAsked(page) {
   return face;
 }
 
+// The same until the page shows that a side is being read, which lasts a second: a busy browser may miss one, and gets the next.
+export async function turnUntilDwelling(page) {
+  let turned;
+  await until('a side that is being read', async () => {
+    if (turned && await page.locator('.still-dwelling').count()) return true;
+    const face = await wantedFace(page);
+    if (face && face !== turned) await turn(page, face);
+    turned = face ?? turned;
+    return false;
+  });
+}
+
 // Placements, as many as the page counts.
 export async function taken(page) {
   return page.locator('.placements li.taken').count();

@@ -41,8 +41,7 @@ const scenarios = {
     await page.getByLabel('Your name').fill('Ada');
     await start(page);
     await h.place(page, 3);
-    await h.turnAsAsked(page);
-    await page.locator('.still-dwelling').waitFor();
+    await h.turnUntilDwelling(page);
     await h.shot(page, 'whole-2-measuring');
     await h.place(page, 14);
     await page.locator('.result').waitFor();
@@ -261,8 +260,7 @@ const scenarios = {
     // Knocked while it is measured. On a busy machine the knock may come when the pose is taken: then again.
     await until('a knock in mid-reading', async () => {
       const before = await h.taken(page);
-      await h.turnAsAsked(page);
-      await page.locator('.still-dwelling').waitFor();
+      await h.turnUntilDwelling(page);
       await hand('Knock');
       await until('it is decided', async () => (await h.taken(page)) > before || (await page.locator('.refusal', { hasText: 'moved during' }).isVisible()));
       return (await h.taken(page)) === before;
@@ -747,8 +745,7 @@ const scenarios = {
         if (placements === 0) await start(page);
         else await button(page, 'Take this lane over').click();
         await h.place(page, placements += 2);
-        await h.turnAsAsked(page);
-        await page.locator('.still-dwelling').waitFor();
+        await h.turnUntilDwelling(page);
         await page.evaluate(() => scrollTo(0, 0));
         await readable(page, name, '.prompt', 36);
         await readable(page, name, '.still span', 26);
