@@ -14,8 +14,9 @@
 
 namespace sixpoint::gap {
 
-// Mean periodogram (Hann window, blocks of 2 s, mean removed) over everything that lies still, as
-// equivalent white variance: white noise of variance s^2 has the value s^2 in every bin.
+// Mean periodogram (Hann window, blocks of 2 s, mean removed) over everything that lies still,
+// without blocks in which the clock slips where others are enough, as equivalent white variance:
+// white noise of variance s^2 has the value s^2 in every bin.
 struct NoiseSpectrum {
   double step_hz = 0.5;
   std::size_t blocks = 0;

@@ -169,11 +169,10 @@ void take_out_slips(std::vector<Stamps>& segments, double interval_s, HostTiming
     for (std::size_t i = 1; i < stamps.size(); ++i) {
       shift_s += slips[i] * interval_s;
       stamps[i].residual_s -= shift_s;
-      (slips[i] > 0 ? timing.lost : timing.repeated) +=
-          static_cast<std::size_t>(std::abs(slips[i]));
-      if (slips[i] != 0) {
-        timing.slips.push_back({stamps[i - 1].sample, stamps[i].sample,
-                                static_cast<int>(std::clamp(slips[i], -kMostSlip, kMostSlip))});
+      const int lost = static_cast<int>(std::clamp(slips[i], -kMostSlip, kMostSlip));
+      (lost > 0 ? timing.lost : timing.repeated) += static_cast<std::size_t>(std::abs(lost));
+      if (lost != 0) {
+        timing.slips.push_back({stamps[i - 1].sample, stamps[i].sample, lost});
       }
     }
   }
