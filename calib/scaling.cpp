@@ -49,6 +49,18 @@ Status check_scale(double accel_scale) {
 // How many counts 16 bits can say; the count 0 stands in the middle.
 constexpr int kAnyCount = 65536;
 
+// One loop over all counts, which the compiler makes one over many at a time.
+bool none_clipped(const Reversal& reversal, std::span<const StoredCounts> samples) {
+  const std::int16_t* const counts = samples.empty() ? nullptr : samples.front().data();
+  std::int16_t low = 0;
+  std::int16_t high = 0;
+  for (std::size_t i = 0; i < kAxes * samples.size(); ++i) {
+    low = std::min(low, counts[i]);
+    high = std::max(high, counts[i]);
+  }
+  return !reversal.clipped(low) && !reversal.clipped(high);
+}
+
 }  // namespace
 
 int round_half_away(double value) {
@@ -156,6 +168,11 @@ RawCandidates Reversal::candidates(std::size_t axis, int stored_count) const {
 // Runs over every count of every recording, so without a branch.
 void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
            PlausibilityTally& counts) {
+  // Half of all units have constants that leave no count out, and few samples are at the limit.
+  if (!reversal.some_impossible_ && none_clipped(reversal, samples)) {
+    counts.counts += kAxes * samples.size();
+    return;
+  }
   // Of the count 0.
   const PerAxis<const std::uint8_t*> kind = {reversal.kind_[0].data() + kAnyCount / 2,
                                              reversal.kind_[1].data() + kAnyCount / 2,
@@ -182,6 +199,7 @@ void Reversal::sort_counts() {
     std::transform(
         number_[a].begin() + 1, number_[a].end() - 1, first + 1,
         [](std::uint16_t number) { return number == 0 ? kImpossible : std::uint8_t{0}; });
+    some_impossible_ = some_impossible_ || std::ranges::count(kind_[a], kImpossible) > 0;
   }
 }
 
@@ -204,10 +222,8 @@ Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh
   const int out_high = highest_count(options.output);
   const bool widens = out_high > high;
   for (std::size_t a = 0; a < kAxes; ++a) {
-    auto& table = rescale.count_[a];
-    auto& flags = rescale.flags_[a];
-    table.reserve(table_size(reversal.width()));
-    flags.reserve(table_size(reversal.width()));
+    auto& entries = rescale.entries_[a];
+    entries.reserve(table_size(reversal.width()));
     const double scale = fresh.sensitivity_g_per_lsb[a] * reversal.accel_scale_lsb_per_g();
     for (int count = low; count <= high; ++count) {
       const RawCandidates candidates = reversal.candidates(a, count);
@@ -233,8 +249,7 @@ Result<Rescale> Rescale::make(const Reversal& reversal, const Calibration& fresh
       if (affine && !at_limit) {
         flag |= kAffine;
       }
-      table.push_back(static_cast<std::int16_t>(std::clamp(fresh_count, out_low, out_high)));
-      flags.push_back(flag);
+      entries.push_back(entry_of(std::clamp(fresh_count, out_low, out_high), flag));
     }
   }
   return rescale;
@@ -245,7 +260,7 @@ StoredCounts Rescale::with_terms(const StoredCounts& in, PerAxis<std::uint8_t>& 
   for (std::size_t a = 0; a < kAxes; ++a) {
     const std::size_t slot = index(in[a]);
     u[a] = level_[a][slot];
-    flags[a] = static_cast<std::uint8_t>(flags_[a][slot] & (kClippedBefore | kAffine));
+    flags[a] = flags_of(entries_[a][slot]) & (kClippedBefore | kAffine);
   }
   const auto& [xy, xz, yz] = cross_axis_;
   const PerAxis<double> q = {u[0] + xy * u[1] + xz * u[2], u[1] + xy * u[0] + yz * u[2],
@@ -257,7 +272,7 @@ StoredCounts Rescale::with_terms(const StoredCounts& in, PerAxis<std::uint8_t>& 
   for (std::size_t a = 0; a < kAxes; ++a) {
     const bool at_limit = (flags[a] & kClippedBefore) != 0;
     if (at_limit && !widens) {
-      out[a] = count_[a][index(in[a])];
+      out[a] = count_of(entry(a, in[a]));
       continue;
     }
     const int count = round_half_away(q[a]);
@@ -292,22 +307,31 @@ void Rescale::apply(std::span<const StoredCounts> in, std::span<StoredCounts> ou
   // a flag. `in` may be `out`: a chunk is written when its flags were counted.
   constexpr std::size_t kChunk = 256;
   std::array<StoredCounts, kChunk> fresh;
-  const PerAxis<const std::int16_t*> tables = {count_[0].data(), count_[1].data(),
-                                               count_[2].data()};
-  const PerAxis<const std::uint8_t*> flags = {flags_[0].data(), flags_[1].data(), flags_[2].data()};
+  const auto low = static_cast<std::int16_t>(lowest_count(input_));
+  const auto high = static_cast<std::int16_t>(highest_count(input_));
+  // Of the count 0.
+  const PerAxis<const Entry*> tables = {&entries_[0][index(0)], &entries_[1][index(0)],
+                                        &entries_[2][index(0)]};
   for (std::size_t begin = 0; begin < size; begin += kChunk) {
     const auto chunk = in.subspan(begin, std::min(kChunk, size - begin));
-    unsigned any = 0;
+    // On its own, because it is done for many counts at once.
+    const std::int16_t* const counts_in = chunk.front().data();
+    std::int16_t* const inside = fresh.front().data();
+    for (std::size_t i = 0; i < kAxes * chunk.size(); ++i) {
+      inside[i] = std::clamp(counts_in[i], low, high);
+    }
+    Entry any = 0;
     for (std::size_t i = 0; i < chunk.size(); ++i) {
       for (std::size_t a = 0; a < kAxes; ++a) {
-        const std::size_t slot = index(chunk[i][a]);
-        fresh[i][a] = tables[a][slot];
-        any |= flags[a][slot];
+        const Entry found = tables[a][fresh[i][a]];
+        fresh[i][a] = count_of(found);
+        any |= found;
       }
     }
-    if (any != 0) {
+    if (flags_of(any) != 0) {
       for (const StoredCounts& sample : chunk) {
-        count({flags[0][index(sample[0])], flags[1][index(sample[1])], flags[2][index(sample[2])]});
+        count({flags_of(entry(0, sample[0])), flags_of(entry(1, sample[1])),
+               flags_of(entry(2, sample[2]))});
       }
     }
     std::copy_n(fresh.begin(), chunk.size(), out.begin() + static_cast<std::ptrdiff_t>(begin));

@@ -100,6 +100,7 @@ class Reversal {
   static constexpr std::uint8_t kClipped = 1;
   static constexpr std::uint8_t kImpossible = 2;
   PerAxis<std::vector<std::uint8_t>> kind_;
+  bool some_impossible_ = false;
   void sort_counts();
 
   friend void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
@@ -156,7 +157,7 @@ class Rescale {
 
   // Without cross-axis terms, which need all three counts of a sample.
   std::int16_t operator()(std::size_t axis, std::int16_t stored_count) const {
-    return count_[axis][index(stored_count)];
+    return count_of(entry(axis, stored_count));
   }
   // In place allowed (in == out); the spans have the same length.
   void apply(std::span<const StoredCounts> in, std::span<StoredCounts> out,
@@ -172,6 +173,17 @@ class Rescale {
     return static_cast<std::size_t>(inside - low);
   }
 
+  // The new count in the lower half and the flags above it: one look-up finds both.
+  using Entry = std::uint32_t;
+  static Entry entry_of(int count, std::uint8_t flags) {
+    return static_cast<std::uint16_t>(count) | Entry{flags} << 16U;
+  }
+  static std::int16_t count_of(Entry entry) { return static_cast<std::int16_t>(entry); }
+  static std::uint8_t flags_of(Entry entry) { return static_cast<std::uint8_t>(entry >> 16U); }
+  Entry entry(std::size_t axis, int stored_count) const {
+    return entries_[axis][index(stored_count)];
+  }
+
   StoredCounts with_terms(const StoredCounts& in, PerAxis<std::uint8_t>& flags) const;
 
   RecordWidth input_ = RecordWidth::bits12;
@@ -180,8 +192,7 @@ class Rescale {
   bool has_terms_ = false;
   PerAxis<double> cross_axis_{};
   PerAxis<std::vector<double>> level_;  // unrounded counts by `fresh`; with cross-axis terms only
-  PerAxis<std::vector<std::int16_t>> count_;
-  PerAxis<std::vector<std::uint8_t>> flags_;
+  PerAxis<std::vector<Entry>> entries_;
 };
 
 }  // namespace sixpoint::calib

@@ -261,14 +261,17 @@ void StillBlockFinder::find_noise(Window& window) const {
 
 StillBlock StillBlockFinder::measure(const Window& window) const {
   StillBlock block;
-  for (std::size_t a = 0; a < kAxes; ++a) {
-    double sum_raw = 0;
-    for (const std::int16_t count : window.values[a]) {
-      sum_raw += reversal_->raw_lsb(a, count);
+  // The axes side by side: each sum waits for its own last addition alone.
+  PerAxis<double> sums_raw{};
+  for (std::size_t i = 0; i < centred_.size(); ++i) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      sums_raw[a] += reversal_->raw_lsb(a, window.values[a][i]);
     }
+  }
+  for (std::size_t a = 0; a < kAxes; ++a) {
     const double raw_per_count = g_per_count_ / reversal_->calibration().sensitivity_g_per_lsb[a];
     block.mean_g[a] = window.lines[a].mean * g_per_count_;
-    block.mean_lsb[a] = sum_raw / block_samples_;
+    block.mean_lsb[a] = sums_raw[a] / block_samples_;
     block.sd_lsb[a] = window.sd[a] * raw_per_count;
     const double slope_lsb = window.lines[a].slope * raw_per_count;
     block.ramp_variance_lsb2[a] = slope_lsb * slope_lsb * sum_square_index_ / block_samples_;
