@@ -121,14 +121,17 @@ struct SampleReader::State {
     return damaged ? GapKind::damaged : GapKind::unexplained;
   }
 
-  // Of the next sample record.
+  // Of the next sample record. Where it has samples, its counts are still those of another one, for
+  // the caller to write over: unpacking into memory that was emptied would set it to zero first.
   Second begin_second(std::uint32_t unix_time, bool usb) {
     Second second;
     second.unix_time = unix_time;
     second.missing_before = reason();
     second.parameters = parameters;
     second.counts = std::move(spare);
-    second.counts.clear();
+    if (usb) {
+      second.counts.clear();
+    }
     asleep = false;
     damaged = false;
     after_usb = usb;
