@@ -51,7 +51,10 @@ constexpr int kAnyCount = 65536;
 
 // One loop over all counts, which the compiler makes one over many at a time.
 bool none_clipped(const Reversal& reversal, std::span<const StoredCounts> samples) {
-  const std::int16_t* const counts = samples.empty() ? nullptr : samples.front().data();
+  if (samples.empty()) {
+    return true;
+  }
+  const std::int16_t* const counts = samples.front().data();
   std::int16_t low = 0;
   std::int16_t high = 0;
   for (std::size_t i = 0; i < kAxes * samples.size(); ++i) {
