@@ -99,6 +99,22 @@ TEST(Reversal, KnowsWhatCannotHaveBeen) {
   EXPECT_EQ(good.counts, samples.size() * 3);
 }
 
+TEST(Reversal, ClippedCountsAreNotLookedAt) {
+  const auto reversal = Reversal::make(affected(), 256, RecordWidth::bits12);
+  ASSERT_OK(reversal);
+  PlausibilityTally counts;
+  tally(*reversal, {}, counts);
+  EXPECT_EQ(counts.counts, 0U);
+  const std::vector<StoredCounts> inside = {{2046, -2047, 0}, {0, 0, 0}};
+  tally(*reversal, inside, counts);
+  EXPECT_EQ(counts.counts, 6U);
+  // At the limits, and beyond them as only wider records can be.
+  const std::vector<StoredCounts> some_clipped = {{2047, 0, 0}, {0, -2048, 5}, {30000, -30000, 1}};
+  tally(*reversal, some_clipped, counts);
+  EXPECT_EQ(counts.counts, 6U + 5U);
+  EXPECT_EQ(counts.impossible, 0U);
+}
+
 TEST(Reversal, AcceptsEitherSideOfAnExactHalf) {
   // 2 * 768 / 1024 = 1.5 stored counts per raw count, so that every odd raw count is a half.
   const StoredConstants stored{{512, 256, 256}, {-512, -256, -256}, {0, 0, 0}};
@@ -282,6 +298,35 @@ TEST(Rescale, ClippedStaysAtTheLimitAndIsCounted) {
   EXPECT_LT(out[1][1], -2200);
   EXPECT_EQ(wide.clipped_before, (PerAxis<std::uint64_t>{1, 1, 0}));
   EXPECT_EQ(wide.clipped_after, (PerAxis<std::uint64_t>{0, 0, 0}));
+}
+
+// Counts beyond 12 bits count as the limit; `in` may be `out`.
+TEST(Rescale, CountsBeyondTheRecordAreItsLimit) {
+  const auto reversal = Reversal::make(affected(), 256, RecordWidth::bits12);
+  Calibration fresh = *calibration_from(affected());
+  fresh.zero_lsb[0] += 12;
+  fresh.sensitivity_g_per_lsb[1] *= 1.01;
+  const auto rescale = Rescale::make(*reversal, fresh, {});
+  ASSERT_OK(rescale);
+  std::vector<StoredCounts> samples;
+  for (int count = -32768; count <= 32767; ++count) {
+    const auto value = static_cast<std::int16_t>(count);
+    samples.push_back({value, static_cast<std::int16_t>(-(count + 1)), 7});
+  }
+  const std::vector<StoredCounts> in = samples;
+  RescaleTally counts;
+  rescale->apply(samples, samples, counts);
+  constexpr std::uint64_t kAtLimit = 65536 - 4094;
+  EXPECT_EQ(counts.clipped_before, (PerAxis<std::uint64_t>{kAtLimit, kAtLimit, 0}));
+  for (std::size_t i = 0; i < in.size(); ++i) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const std::int16_t was = in[i][a];
+      const std::int16_t wanted = was <= -2048  ? std::int16_t{-2048}
+                                  : was >= 2047 ? std::int16_t{2047}
+                                                : (*rescale)(a, was);
+      ASSERT_EQ(samples[i][a], wanted) << "count " << was << " axis " << a;
+    }
+  }
 }
 
 TEST(Scaling, HostileConstants) {
