@@ -171,7 +171,8 @@ RawCandidates Reversal::candidates(std::size_t axis, int stored_count) const {
 // Runs over every count of every recording, so without a branch.
 void tally(const Reversal& reversal, std::span<const StoredCounts> samples,
            PlausibilityTally& counts) {
-  // Half of all units have constants that leave no count out, and few samples are at the limit.
+  // Where positive - negative is 2 accel_scale and more no count is left out, and few samples are
+  // at the limit.
   if (!reversal.some_impossible_ && none_clipped(reversal, samples)) {
     counts.counts += kAxes * samples.size();
     return;
