@@ -1,5 +1,6 @@
 #include "gap/explain/factors.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -72,8 +73,28 @@ Factor history(const Eigen::VectorXd& time_s, const Eigen::VectorXd& temperature
   return factor;
 }
 
+// The axis about which the unit was last turned, in the sensor; none for half a turn, which may
+// have gone about any axis.
+Factor last_turn(const std::vector<Block>& blocks) {
+  constexpr double kTurned_rad = 0.05;
+  constexpr double kHalfTurn_rad = 3;
+  Factor factor = even("the turn before", std::ssize(blocks), 3);
+  Eigen::Matrix3d before = blocks.front().rotation;
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();
+  for (Eigen::Index i = 0; i < factor.value.rows(); ++i) {
+    const Eigen::Matrix3d& now = blocks[static_cast<std::size_t>(i)].rotation;
+    const Eigen::AngleAxisd turn(now * before.transpose());
+    if (turn.angle() > kTurned_rad) {
+      axis = turn.angle() < kHalfTurn_rad ? turn.axis() : Eigen::Vector3d::Zero();
+      before = now;
+    }
+    factor.value.row(i) = axis.transpose();
+  }
+  return factor;
+}
+
 // Direction of the room's horizontal axes in the sensor; of gravity, to second order; the step
-// before the dwell.
+// before the dwell, and the turn that made it.
 void add_orientation(const std::vector<Block>& blocks, std::vector<Factor>& factors) {
   const Eigen::Index n = std::ssize(blocks);
   Factor room = even("direction in the room", n, 6);
@@ -92,6 +113,9 @@ void add_orientation(const std::vector<Block>& blocks, std::vector<Factor>& fact
   factors.push_back(std::move(pose));
   if (approach.value.squaredNorm() > 0) {
     factors.push_back(std::move(approach));
+  }
+  if (Factor turn = last_turn(blocks); turn.value.squaredNorm() > 0) {
+    factors.push_back(std::move(turn));
   }
 }
 

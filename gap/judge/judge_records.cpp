@@ -114,6 +114,7 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
   constexpr double kContradicts_nats = -5;
   constexpr double kCertainLine_nats = 25;  // noise reached 20 in 120 recordings
   constexpr double kApart_nats = 7;         // lines reached 4, what is none began at 10
+  constexpr double kLineForm = 0.1;         // a line's size may change by this share
   Lines lines;
   lines.list = find_lines(request.bundle, clean, noise);
   // The poses of one half contradict those of the other: a line that only some poses have, or noise
@@ -135,6 +136,13 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
     std::erase_if(lines.list, [](const SpectralLine& line) {
       return line.gain_nats < kStrongLine_nats && line.misfit_sd > kMisfit_sd;
     });
+  }
+  for (const SpectralLine& line : lines.list) {
+    const double form = kLineForm * kLineForm * line.gain_nats;
+    lines.found.test(
+        line.misfit_sd - form,
+        fmt::format("spectrum: the line at {:.2f} Hz comes and goes", line.frequency_hz),
+        noise_places(request));
   }
   std::map<std::string, EffectFinding> by_name;  // the strongest line of each
   for (const SpectralLine& line : lines.list) {

@@ -27,6 +27,9 @@ constexpr double kNoSlip_nats = -9;
 constexpr double kSlipAlarm_sd = 30;
 constexpr double kPhaseStepAlarm_sd = 20;
 constexpr double kOddStepAlarm_sd = 15;
+// Samples are lost one by one or a few together; runs that are longer have another cause.
+constexpr double kLongRun = 6;
+constexpr double kLongRunAlarm_sd = 15;
 constexpr std::size_t kEnoughSamples = 5000;
 
 // What the tones say of the clock.
@@ -153,6 +156,20 @@ void judge_clock(const Request& request, const HostTiming& host, const std::vect
   }
 }
 
+// How many samples are lost (or repeated) together, each sample counted once: the mean square of a
+// packet's number over its mean, less what meets in one packet by chance. One by one: 1.
+double run_length(const HostTiming& host, bool missing) {
+  double sum = 0;
+  double squares = 0;
+  for (const ClockSlip& slip : host.slips) {
+    if ((slip.lost > 0) == missing) {
+      sum += std::abs(slip.lost);
+      squares += static_cast<double>(slip.lost) * slip.lost;
+    }
+  }
+  return sum > 0 ? squares / sum - sum / static_cast<double>(host.packets) : 0;
+}
+
 // Lost and repeated samples: exact by the host's clock where it shows them, else by the tones.
 void judge_slips(const Request& request, const HostTiming& host, const ToneClock& by_tones,
                  Findings& found) {
@@ -160,7 +177,9 @@ void judge_slips(const Request& request, const HostTiming& host, const ToneClock
   const std::size_t samples = by_host ? host.samples : by_tones.samples;
   const std::size_t lost = by_host ? host.lost : by_tones.lost;
   const std::size_t repeated = by_host ? host.repeated : by_tones.repeated;
-  const auto judge = [&](const char* name, std::size_t count, const char* words) {
+  const auto judge = [&](const char* name, bool missing) {
+    const std::size_t count = missing ? lost : repeated;
+    const char* words = missing ? "are missing" : "are there twice";
     const double rate = share_of(count, samples);
     const double nats = count == 0 ? (by_host ? kNoSlip_nats : kLogPriorEffect - 1)
                                    : kPerSlip_nats * static_cast<double>(count) + kLogPriorEffect;
@@ -177,9 +196,14 @@ void judge_slips(const Request& request, const HostTiming& host, const ToneClock
                           .held_out_gain_nats = nats,
                           .gap_mg2 = gap_mg2});
     }
+    const double together = by_host ? run_length(host, missing) : 0;
+    if (together > kLongRun) {
+      found.alarm(kLongRunAlarm_sd,
+                  fmt::format("timing: samples {}, about {:.0f} together", words, together));
+    }
   };
-  judge("dropped_samples", lost, "are missing");
-  judge("duplicated_samples", repeated, "are there twice");
+  judge("dropped_samples", true);
+  judge("duplicated_samples", false);
   if (by_host && by_tones.samples > kEnoughSamples && lost + repeated == 0 &&
       by_tones.lost + by_tones.repeated > 0) {
     found.alarm(kPhaseStepAlarm_sd,

@@ -1,5 +1,7 @@
 #include "gap/explain/factors.h"
 
+#include <Eigen/Geometry>
+
 #include <gtest/gtest.h>
 
 #include "gap/explain/made_blocks.h"
@@ -58,6 +60,29 @@ TEST(Factors, HistoryLagsBehindTheTemperature) {
   EXPECT_NEAR(history->value(1, 0), 2 * std::exp(-0.2), 1e-12);
   EXPECT_NEAR(history->value(2, 0), 2 * std::exp(-0.4), 1e-12);
   EXPECT_NEAR(history->value(2, 1), 2 * std::exp(-120 / 1500.0), 1e-12);
+}
+
+// A quarter turn about X, another seat in the same pose, a quarter turn back, and half a turn.
+TEST(Factors, TheTurnBeforeIsAnAxis) {
+  auto blocks = tests::made_dwells();
+  blocks.resize(5);
+  const Eigen::Matrix3d quarter =
+      Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  blocks[0].rotation.setIdentity();
+  blocks[1].rotation = quarter;
+  blocks[2].rotation = quarter;
+  blocks[3].rotation.setIdentity();
+  blocks[4].rotation = quarter * quarter;
+  const auto factors = factors_of(blocks);
+  const Factor* turn = factor(factors, "the turn before");
+  ASSERT_NE(turn, nullptr);
+  Eigen::Matrix<double, 5, 3> expected;
+  expected << 0, 0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0;
+  EXPECT_LT((turn->value - expected).cwiseAbs().maxCoeff(), 1e-12);
+  for (Block& block : blocks) {
+    block.rotation.setIdentity();
+  }
+  EXPECT_EQ(factor(factors_of(blocks), "the turn before"), nullptr);
 }
 
 TEST(Factors, SessionsAreIndicators) {

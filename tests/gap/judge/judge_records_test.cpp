@@ -1,3 +1,5 @@
+#include <functional>
+
 #include <gtest/gtest.h>
 
 #include "gap/judge/made_step.h"
@@ -23,6 +25,34 @@ TEST(JudgeRecords, ALineOfTheSensorIsElectrical) {
   ASSERT_EQ(lines.list.size(), 1U);
   EXPECT_NEAR(lines.power_mg2, 4.5, 0.8) << "half of the square of 3 mg";
   EXPECT_NEAR(lines.found.outside_means_mg2.at(0), lines.power_mg2 / 3, 1e-9);
+}
+
+// Findings on a vibration of the floor whose amplitude differs between dwells, 3 mg times a share.
+Findings line_with(const std::function<double(std::size_t dwell)>& share) {
+  const Made made(tests::made_production({}, [&](const Segment& s, double t) {
+    const double phase = static_cast<double>(s.first_sample);
+    const Eigen::Vector3d lab(0, 0.6, 0.8);
+    return Eigen::Vector3d(s.rotation.col(2) + 0.003 * share(s.first_sample / 1000) *
+                                                   std::sin(2 * M_PI * 12 * t + phase) *
+                                                   (s.rotation * lab));
+  }));
+  return judge_lines(made.request, made.clean, made.noise, code_statistics(made.bundle, made.clean))
+      .found;
+}
+
+TEST(JudgeRecords, ALineThatComesAndGoesIsUnknown) {
+  const Findings steady = line_with([](std::size_t) { return 1; });
+  EXPECT_NE(effect(steady, "floor_vibration"), nullptr);
+  EXPECT_TRUE(steady.alarms.empty());
+  // A real line is not quite steady.
+  const Findings bent = line_with(
+      [](std::size_t dwell) { return 1 + 0.1 * std::sin(2.0 * static_cast<double>(dwell)); });
+  EXPECT_TRUE(bent.alarms.empty()) << bent.worst_sd;
+  const Findings blower = line_with([](std::size_t dwell) { return dwell % 3 == 0 ? 0.2 : 1; });
+  EXPECT_NE(effect(blower, "floor_vibration"), nullptr);
+  ASSERT_EQ(blower.alarms.size(), 1);
+  EXPECT_EQ(blower.alarms[0].where, "spectrum: the line at 12.00 Hz comes and goes");
+  EXPECT_FALSE(blower.alarms[0].places.empty());
 }
 
 TEST(JudgeRecords, RingingAfterMovesIsSettling) {

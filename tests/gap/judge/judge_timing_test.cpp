@@ -47,5 +47,32 @@ TEST(JudgeTiming, LostSamplesAreCounted) {
   EXPECT_NEAR(lost->parameters[0].value[0], 2.0 / static_cast<double>(timing.host.samples), 1e-12);
 }
 
+// Slips of these sizes (samples), each in a segment of its own.
+Findings found_with(const std::vector<int>& slips) {
+  Bundle bundle = tests::made_production({});
+  for (std::size_t k = 0; k < slips.size(); ++k) {
+    for (std::size_t packet = 5; packet < 10; ++packet) {
+      bundle.host_clock.host_time_s[10 * k + packet] += 0.01 * slips[k];  // at 100 Hz
+    }
+  }
+  const Made made(std::move(bundle));
+  return judge_timing(made.request, made.clean, made.noise).found;
+}
+
+TEST(JudgeTiming, SamplesThatAreLostInRunsHaveAnotherCause) {
+  // What two independent generators make of the catalogue's effect: up to four together.
+  for (const std::vector<int>& few : {std::vector{1, 1}, {1, 2, 1}, {4}, {4, 1, 2}, {-1, -3}}) {
+    EXPECT_TRUE(found_with(few).alarms.empty()) << few.size();
+  }
+  const Findings burst = found_with({27, 9});
+  ASSERT_EQ(burst.alarms.size(), 1);
+  // (27 * 27 + 9 * 9) / 36, less 36 in 162 packets.
+  EXPECT_EQ(burst.alarms[0].where, "timing: samples are missing, about 22 together");
+  EXPECT_NE(effect(burst, "dropped_samples"), nullptr);  // they are lost all the same
+  const Findings twice = found_with({-30, 1});
+  ASSERT_EQ(twice.alarms.size(), 1);
+  EXPECT_EQ(twice.alarms[0].where, "timing: samples are there twice, about 30 together");
+}
+
 }  // namespace
 }  // namespace sixpoint::gap
