@@ -1,5 +1,6 @@
 #include "gap/features/texture.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -59,39 +60,97 @@ double normal_of(double chi, double freedom) {
   return (std::cbrt(chi / freedom) - (1 - s)) / std::sqrt(s);
 }
 
-// Sum of the second stretch less that of the first, per axis; nothing where a sample is masked.
-std::optional<std::array<int, 3>> difference_at(const CleanSamples& clean, std::size_t at,
-                                                std::size_t stretch) {
-  std::array<int, 3> difference{};
-  for (std::size_t k = 0; k < 2 * stretch; ++k) {
-    if (!clean.usable(at + k)) {
+// One dwell, or ten seconds of a long record, in LSB.
+struct Run {
+  RestPiece piece;
+  std::array<std::vector<double>, 3> counts;
+  std::vector<bool> usable;
+};
+
+// Takes lines off by least squares: sine and cosine of each, and a mean that stays.
+void take_off(const std::vector<double>& lines_hz, double rate_hz, Run& run) {
+  const auto n = static_cast<Eigen::Index>(run.piece.samples);
+  const Eigen::Index lines = std::ssize(lines_hz);
+  Eigen::MatrixXd columns(n, 2 * lines + 1);
+  columns.col(2 * lines).setOnes();
+  for (Eigen::Index k = 0; k < lines; ++k) {
+    const double w = 2 * M_PI * lines_hz[static_cast<std::size_t>(k)] / rate_hz;
+    const Eigen::ArrayXd angle = w * Eigen::ArrayXd::LinSpaced(n, 0, static_cast<double>(n - 1));
+    columns.col(2 * k) = angle.sin();
+    columns.col(2 * k + 1) = angle.cos();
+  }
+  Eigen::MatrixXd known = columns;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!run.usable[static_cast<std::size_t>(i)]) {
+      known.row(i).setZero();
+    }
+  }
+  const Eigen::LDLT<Eigen::MatrixXd> normal(known.transpose() * known);
+  for (std::vector<double>& counts : run.counts) {
+    Eigen::Map<Eigen::VectorXd> values(counts.data(), n);
+    const Eigen::VectorXd fit = normal.solve(known.transpose() * values);
+    values -= columns.leftCols(2 * lines) * fit.head(2 * lines);
+  }
+}
+
+// Nothing where lines have to be taken off and a slip in the run breaks their phase.
+std::optional<Run> run_of(const Bundle& bundle, const CleanSamples& clean, const RestPiece& piece,
+                          const std::vector<double>& lines_hz) {
+  Run run{piece, {}, std::vector<bool>(piece.samples)};
+  std::size_t usable = 0;
+  for (std::size_t i = 0; i < piece.samples; ++i) {
+    const std::size_t at = piece.first + i;
+    run.usable[i] = clean.usable(at);
+    usable += run.usable[i] ? 1 : 0;
+    if (!lines_hz.empty() && run.usable[i] && !clean.in_step(at)) {
       return std::nullopt;
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      difference[axis] += k < stretch ? -clean.samples[at + k][axis] : clean.samples[at + k][axis];
+      run.counts[axis].push_back(clean.samples[at][axis]);
+    }
+  }
+  // Sines that fit noise take little of it only where there are many samples for each.
+  constexpr std::size_t kSamplesPerLine = 50;
+  if (usable < kSamplesPerLine * lines_hz.size()) {
+    return std::nullopt;
+  }
+  if (!lines_hz.empty()) {
+    take_off(lines_hz, bundle.rate_hz, run);
+  }
+  return run;
+}
+
+// Sum of the second stretch less that of the first, per axis; nothing where a sample is masked.
+std::optional<std::array<double, 3>> difference_at(const Run& run, std::size_t at,
+                                                   std::size_t stretch) {
+  std::array<double, 3> difference{};
+  for (std::size_t k = 0; k < 2 * stretch; ++k) {
+    if (!run.usable[at + k]) {
+      return std::nullopt;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      difference[axis] += k < stretch ? -run.counts[axis][at + k] : run.counts[axis][at + k];
     }
   }
   return difference;
 }
 
-// `run`: one dwell, or ten seconds of a long record.
-void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretch,
-             TextureSums& sums) {
+void add_run(const Run& run, std::size_t stretch, TextureSums& sums) {
   constexpr double kFewest = 4;  // differences of a piece
   const double scale = std::sqrt(static_cast<double>(stretch) / 2);
   std::array<Piece, 3> pieces;
   std::array<std::array<double, kLags>, 3> before{};
   std::size_t known = 0;  // of `before`
   std::size_t moment = static_cast<std::size_t>(-1);
-  for (std::size_t i = 0; i + 2 * stretch <= run.samples; i += 2 * stretch) {
-    const auto difference = difference_at(clean, run.first + i, stretch);
+  for (std::size_t i = 0; i + 2 * stretch <= run.piece.samples; i += 2 * stretch) {
+    const auto difference = difference_at(run, i, stretch);
     if (!difference) {
       known = 0;
       continue;
     }
     if (i / kMoment != moment) {
       moment = i / kMoment;
-      sums.moments.push_back({run.segment, run.first + moment * kMoment, {}, {}});
+      sums.moments.push_back({run.piece.segment, run.piece.first + moment * kMoment, {}, {}});
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double d = (*difference)[axis] * scale / static_cast<double>(stretch);
@@ -119,15 +178,21 @@ void add_run(const CleanSamples& clean, const RestPiece& run, std::size_t stretc
   }
 }
 
-TextureSums sums_at(const Bundle& bundle, const CleanSamples& clean, std::size_t stretch) {
+// One for each of kStretches.
+std::vector<TextureSums> sums_of(const Bundle& bundle, const CleanSamples& clean,
+                                 const std::vector<double>& lines_hz) {
   const std::size_t most = 10 * static_cast<std::size_t>(bundle.rate_hz);
-  TextureSums sums;
+  std::vector<TextureSums> all(kStretches.size());
   for (std::size_t s = 0; s < bundle.segments.size(); ++s) {
-    for (const RestPiece& run : rest_pieces(bundle, s, most)) {
-      add_run(clean, run, stretch, sums);
+    for (const RestPiece& piece : rest_pieces(bundle, s, most)) {
+      if (const auto run = run_of(bundle, clean, piece, lines_hz)) {
+        for (std::size_t k = 0; k < kStretches.size(); ++k) {
+          add_run(*run, kStretches[k], all[k]);
+        }
+      }
     }
   }
-  return sums;
+  return all;
 }
 
 double tails(const TextureSums& sums) {
@@ -227,16 +292,13 @@ void moments(const std::vector<const TextureSums*>& scales, Texture::Scale& foun
 
 }  // namespace
 
-Texture noise_texture(const Bundle& bundle, const CleanSamples& clean) {
+Texture noise_texture(const Bundle& bundle, const CleanSamples& clean,
+                      const std::vector<double>& lines_hz) {
   Texture texture;
   if (bundle.rate_hz < 10) {
     return texture;
   }
-  std::vector<TextureSums> all;
-  all.reserve(kStretches.size());
-  for (const std::size_t stretch : kStretches) {
-    all.push_back(sums_at(bundle, clean, stretch));
-  }
+  const std::vector<TextureSums> all = sums_of(bundle, clean, lines_hz);
   std::vector<const TextureSums*> fine;
   texture.scales.reserve(all.size() + 1);
   for (std::size_t i = 0; i < all.size(); ++i) {

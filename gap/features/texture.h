@@ -34,7 +34,10 @@ struct Texture {
   std::vector<Scale> scales;
 };
 
-// Scales at which rounding to whole counts would show are left out.
-Texture noise_texture(const Bundle& bundle, const CleanSamples& clean);
+// Scales at which rounding to whole counts would show are left out. Lines at these frequencies are
+// taken off first, from each dwell by its own amplitude and phase, and dwells in which the clock
+// slips are left out then.
+Texture noise_texture(const Bundle& bundle, const CleanSamples& clean,
+                      const std::vector<double>& lines_hz = {});
 
 }  // namespace sixpoint::gap

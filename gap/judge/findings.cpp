@@ -17,12 +17,12 @@ constexpr double kMost_nats = 9;
 // Of something unknown, without and with much evidence, and how fast it grows between: fitted on
 // realistic units and outside kinds (docs/gap.md, Conventions).
 constexpr double kQuietProbability = 0.03;
-constexpr double kAlarmProbability = 0.87;
+constexpr double kAlarmProbability = 0.95;
 constexpr double kUnknownWidth_sd = 0.6;
 // Share of names that are right beside something that the catalogue lacks, which often looks like
-// what is named. Convention, near what was measured (docs/gap.md): of first names 12 of 45 were of
+// what is named. Convention, near what was measured (docs/gap.md): of first names 46 of 92 were of
 // the right family beside one outside kind, 23 of 32 where the true effects were withheld.
-constexpr double kRightBesideUnknown = 0.4;
+constexpr double kRightBesideUnknown = 0.5;
 
 bool contains(const std::vector<EffectFinding>& list, const std::string& name) {
   return std::any_of(list.begin(), list.end(),

@@ -94,6 +94,8 @@ void judge_resonance(const Request& request, const Response& response,
        .gap_mg2 = gap_mg2});
 }
 
+}  // namespace
+
 std::vector<double> frequencies_of(const Lines& lines) {
   std::vector<double> frequencies_hz;
   for (const SpectralLine& line : lines.list) {
@@ -101,8 +103,6 @@ std::vector<double> frequencies_of(const Lines& lines) {
   }
   return frequencies_hz;
 }
-
-}  // namespace
 
 Lines judge_lines(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise,
                   const CodeStatistics& codes) {

@@ -121,28 +121,35 @@ Findings judge_marks(const Request& request, const CleanSamples& clean) {
 
 Findings judge_texture(const Request& request, const Records& records, const Findings& before) {
   Findings found;
-  // A line is no noise, and truncation changes noise about zero.
-  if (!records.lines.list.empty() || before.accepted("truncation")) {
+  // Truncation changes noise about zero. What a strong line leaves where its frequency wanders is
+  // neither noise nor another cause.
+  constexpr double kStrongLines = 0.1;  // share of the noise's variance
+  const double white_mg =
+      *std::min_element(records.noise.white_mg.begin(), records.noise.white_mg.end());
+  if (before.accepted("truncation") ||
+      records.lines.power_mg2 > kStrongLines * white_mg * white_mg) {
     return found;
   }
   // The distribution of these is known by theory: thirty tests that alarm at 4.5 sd do so by chance
   // once in ten thousand bundles.
   constexpr double kExactAlarm_sd = 4.5;
-  constexpr double kExact = kAlarm_sd - kExactAlarm_sd;
+  // Beside a line, of which something may be left, they count as any other test.
+  const double exact = records.lines.list.empty() ? kAlarm_sd - kExactAlarm_sd : 0;
   const std::vector<UnknownPlace> everywhere = noise_places(request);
-  for (const Texture::Scale& scale : noise_texture(request.bundle, records.clean).scales) {
+  for (const Texture::Scale& scale :
+       noise_texture(request.bundle, records.clean, frequencies_of(records.lines)).scales) {
     const std::string noise =
         scale.samples == 0
             ? "the fast noise"
             : fmt::format("the noise within {:.2g} s",
                           2 * static_cast<double>(scale.samples) / request.bundle.rate_hz);
-    found.test(std::abs(scale.tails_sd) + kExact, fmt::format("codes: {} is not Gaussian", noise),
+    found.test(std::abs(scale.tails_sd) + exact, fmt::format("codes: {} is not Gaussian", noise),
                everywhere);
-    found.test(scale.dwells_sd + kExact,
-               fmt::format("codes: {} changes from dwell to dwell", noise), everywhere);
-    found.test(scale.moments_sd + kExact, fmt::format("codes: {} comes and goes", noise),
+    found.test(scale.dwells_sd + exact, fmt::format("codes: {} changes from dwell to dwell", noise),
                everywhere);
-    found.test(scale.loudest_sd + kExact,
+    found.test(scale.moments_sd + exact, fmt::format("codes: {} comes and goes", noise),
+               everywhere);
+    found.test(scale.loudest_sd + exact,
                fmt::format("codes: {} is loud for a moment (segment {})", noise,
                            request.bundle.segments[scale.loudest_segment].name));
   }

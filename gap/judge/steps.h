@@ -51,6 +51,7 @@ struct Lines {
   double power_mg2 = 0;  // mean square of all, summed over the axes
   Findings found;
 };
+std::vector<double> frequencies_of(const Lines& lines);
 Lines judge_lines(const Request& request, const CleanSamples& clean, const NoiseSpectrum& noise,
                   const CodeStatistics& codes);
 

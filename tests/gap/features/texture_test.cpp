@@ -57,6 +57,43 @@ TEST(Texture, WhiteAndFilteredGaussianNoiseArePlain) {
   }));
 }
 
+// Two lines are no noise once they are taken off; a spell of louder noise beside them still is one.
+TEST(Texture, LinesAreTakenOff) {
+  const auto with_lines = [](double louder, const std::vector<double>& lines_hz) {
+    MadeNoise noise;
+    tests::MadeUnit unit;
+    unit.noise_g.setConstant(1e-6);
+    const Bundle bundle = tests::made_production(unit, [&](const Segment& s, double t) {
+      const double phase = static_cast<double>(s.first_sample);
+      const double up = 0.006 * std::sin(2 * M_PI * 11.3 * t + phase) +
+                        0.003 * std::sin(2 * M_PI * 22.6 * t + 2 * phase);
+      const double share = s.first_sample >= 4000 && s.first_sample < 8000 ? louder : 1;
+      return Eigen::Vector3d((1 + up) * s.rotation.col(2) + share * noise());
+    });
+    return noise_texture(bundle, clean_samples(bundle), lines_hz);
+  };
+  EXPECT_GT(worst_of(with_lines(1, {})).dwells, 10);
+  EXPECT_GT(worst_of(with_lines(1, {11.3})).dwells, 4.5);
+  expect_plain(with_lines(1, {11.3, 22.6}));
+  EXPECT_GT(worst_of(with_lines(1.25, {11.3, 22.6})).dwells, 8);
+}
+
+// A dwell in which the clock slips breaks the phase of a line: it is left out.
+TEST(Texture, ASlipBesideALineSaysNothing) {
+  MadeNoise noise;
+  tests::MadeUnit unit;
+  unit.noise_g.setConstant(1e-6);
+  const Bundle bundle = tests::made_production(unit, [&](const Segment& s, double t) {
+    const double turned = s.first_sample == 3000 && t > 5 ? M_PI : 0;
+    return Eigen::Vector3d(
+        (1 + 0.006 * std::sin(2 * M_PI * 11.3 * t + turned)) * s.rotation.col(2) + noise());
+  });
+  CleanSamples clean = clean_samples(bundle);
+  EXPECT_GT(worst_of(noise_texture(bundle, clean, {11.3})).loudest, 4.5);
+  clean.flags[3550] |= kSampleSlipped;
+  expect_plain(noise_texture(bundle, clean, {11.3}));
+}
+
 // Noise that passes a mechanism with play: it follows only what goes beyond the play.
 Texture texture_with_play(double noise_sd_g, double play_g) {
   MadeNoise noise(noise_sd_g);

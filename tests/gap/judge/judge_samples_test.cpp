@@ -1,3 +1,5 @@
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include "gap/judge/made_step.h"
@@ -37,6 +39,36 @@ TEST(JudgeMarks, WhatIsNotInTheCatalogueAlarms) {
   EXPECT_TRUE(found.effects.empty());
   ASSERT_EQ(found.alarms.size(), 2U);
   EXPECT_EQ(found.alarms[1].where, "codes: one value repeated for a second and more (300 samples)");
+}
+
+// Alarms about noise that is louder by this share in every third dwell, beside a vibration of the
+// floor of this size.
+std::size_t texture_alarms(double louder, double line_mg) {
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise_g(0, 0.0039);
+  const Made made(tests::made_production({}, [&](const Segment& s, double t) {
+    const double up = 1e-3 * line_mg * std::sin(2 * M_PI * 12 * t);
+    const double size = s.first_sample / 1000 % 3 == 0 ? louder : 0;
+    return Eigen::Vector3d((1 + up) * s.rotation.col(2) + size * Eigen::Vector3d(noise_g(random),
+                                                                                 noise_g(random),
+                                                                                 noise_g(random)));
+  }));
+  Records records;
+  records.clean = made.clean;
+  records.noise = made.noise;
+  if (line_mg > 0) {
+    records.lines.list.emplace_back().frequency_hz = 12;
+    records.lines.power_mg2 = line_mg * line_mg / 2;
+  }
+  return judge_texture(made.request, records, {}).alarms.size();
+}
+
+TEST(JudgeTexture, NoiseIsJudgedBesideASmallLineButNotBesideAStrongOne) {
+  EXPECT_EQ(texture_alarms(0, 0), 0U);
+  EXPECT_EQ(texture_alarms(0, 1), 0U);
+  EXPECT_GT(texture_alarms(1, 0), 0U);
+  EXPECT_GT(texture_alarms(1, 1), 0U);
+  EXPECT_EQ(texture_alarms(1, 6), 0U);
 }
 
 }  // namespace
