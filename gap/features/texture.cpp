@@ -68,7 +68,7 @@ struct Run {
 };
 
 // Takes lines off by least squares: sine and cosine of each, and a mean that stays.
-void take_off(const std::vector<double>& lines_hz, double rate_hz, Run& run) {
+void take_lines_off(const std::vector<double>& lines_hz, double rate_hz, Run& run) {
   const auto n = static_cast<Eigen::Index>(run.piece.samples);
   const Eigen::Index lines = std::ssize(lines_hz);
   Eigen::MatrixXd columns(n, 2 * lines + 1);
@@ -115,7 +115,7 @@ std::optional<Run> run_of(const Bundle& bundle, const CleanSamples& clean, const
     return std::nullopt;
   }
   if (!lines_hz.empty()) {
-    take_off(lines_hz, bundle.rate_hz, run);
+    take_lines_off(lines_hz, bundle.rate_hz, run);
   }
   return run;
 }
