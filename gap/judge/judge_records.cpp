@@ -138,6 +138,8 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
     });
   }
   for (const SpectralLine& line : lines.list) {
+    // Such a change adds this share, squared, of the line's chi-square to the misfit's; a standard
+    // deviation of that is more than two.
     const double form = kLineForm * kLineForm * line.gain_nats;
     lines.found.test(
         line.misfit_sd - form,
