@@ -22,9 +22,9 @@ bool by_placement_only(Scatter scatter) {
 }
 
 // Covariance of two blocks for one kind of scatter of the given size; of a block with itself the
-// noise included.
+// noise included. `first`: the recording's first block.
 Eigen::MatrixXd covariance_of(const Block& a, const Block& b, Scatter scatter, double size,
-                              double start_s) {
+                              const Block& first) {
   Eigen::MatrixXd v =
       &a == &b ? a.white_mg2 : Eigen::MatrixXd(Eigen::MatrixXd::Zero(a.size(), b.size()));
   const bool one_placement = a.placement == b.placement;
@@ -40,7 +40,11 @@ Eigen::MatrixXd covariance_of(const Block& a, const Block& b, Scatter scatter, d
     const double loss = 8 * std::pow(sd_deg * M_PI / 180, 4);
     v += loss * seating_loss(a) * seating_loss(b).transpose();
   }
-  if (scatter != Scatter::nominal && scatter != Scatter::seating) {
+  if (scatter == Scatter::seat_walks) {
+    const int steps = 1 + std::min(a.placement, b.placement) - first.placement;
+    v += size * size * steps * seating_lever(a) * seating_lever(b).transpose();
+  } else if (scatter != Scatter::nominal && scatter != Scatter::seating) {
+    const double start_s = first.middle_s - first.seconds / 2;
     const double c = size * size * scatter_kernel(scatter, a, b, start_s);
     v.topLeftCorner<3, 3>().diagonal().array() += c;
   }
@@ -110,7 +114,6 @@ Eigen::MatrixXd EvidenceModel::linearise(const ForwardState& at) const {
 Eigen::Index EvidenceModel::whiten_blocks(std::size_t first, std::size_t last, Scatter scatter,
                                           double size, Eigen::Index first_row, double& half_log_det,
                                           Eigen::MatrixXd& rows) const {
-  const double start_s = blocks_.front().middle_s - blocks_.front().seconds / 2;
   Eigen::Index count = 0;
   for (std::size_t b = first; b < last; ++b) {
     count += blocks_[b].size();
@@ -122,7 +125,7 @@ Eigen::Index EvidenceModel::whiten_blocks(std::size_t first, std::size_t last, S
     Eigen::Index rj = ri;
     for (std::size_t j = i; j < last; ++j) {
       const Block& bj = blocks_[j];
-      const Eigen::MatrixXd c = covariance_of(bi, bj, scatter, size, start_s);
+      const Eigen::MatrixXd c = covariance_of(bi, bj, scatter, size, blocks_.front());
       v.block(ri, rj, bi.size(), bj.size()) = c;
       if (i != j) {
         v.block(rj, ri, bj.size(), bi.size()) = c.transpose();

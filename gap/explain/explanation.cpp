@@ -184,8 +184,8 @@ Explanation::Explanation(const std::vector<Block>& blocks, EvidenceOptions optio
     Whitened unknown_data;
     for (const Scatter scatter :
          {Scatter::seating, Scatter::random_walk, Scatter::flicker, Scatter::by_pose,
-          Scatter::by_placement, Scatter::by_session, Scatter::by_temperature, Scatter::by_time,
-          Scatter::by_time_fast}) {
+          Scatter::by_placement, Scatter::by_session, Scatter::seat_walks, Scatter::by_temperature,
+          Scatter::by_time, Scatter::by_time_fast}) {
       if (!in_catalogue(scatter) || model_.allowed(std::string(to_string(scatter)))) {
         compete(scatter, explain_by(scatter, linear), unknown_data);
       }

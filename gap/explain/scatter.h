@@ -21,6 +21,7 @@ enum class Scatter {
   by_pose,  // from here on the catalogue does not have them
   by_placement,
   by_session,  // a session: a run of segments of one name
+  seat_walks,  // each seat begins where the one before was
   by_temperature,
   by_time,
   by_time_fast,
@@ -32,7 +33,8 @@ bool in_catalogue(Scatter scatter);
 // Scatter of the nominal simulator's seating: new at every placement.
 inline constexpr double kNominalSeating_deg = 0.01;
 
-// Sizes to be tried, log-uniform: deg for seating, mg/sqrt(s) for random_walk, else mg.
+// Sizes to be tried, log-uniform: deg for seating, deg per placement for seat_walks, mg/sqrt(s) for
+// random_walk, else mg.
 std::vector<double> sizes_of(Scatter scatter);
 // Log prior of one of these sizes.
 double scatter_log_prior(Scatter scatter);
@@ -42,8 +44,8 @@ double nominal_variance_mg2(const Block& block, Eigen::Index feature);
 
 bool same_pose(const Block& a, const Block& b);
 
-// Covariance of two blocks' means on one axis for size one; 0 for nominal and seating, which are
-// rotations (seating_lever). `start_s`: host time at which the first block begins.
+// Covariance of two blocks' means on one axis for size one; 0 for nominal, seating and seat_walks,
+// which are rotations (seating_lever). `start_s`: host time at which the first block begins.
 double scatter_kernel(Scatter scatter, const Block& a, const Block& b, double start_s);
 
 }  // namespace sixpoint::gap

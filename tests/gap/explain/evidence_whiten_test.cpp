@@ -47,19 +47,21 @@ TEST(EvidenceWhiten, WhiteningGivesUnitVariance) {
 
 // A matrix L with V = L L' takes the unit matrix to its inverse: R V R' is the unit matrix, and
 // half the logarithm of det V is known from V itself. V by hand: noise, seating of the
-// placement, and the kernel of the scatter on each axis, which scatter_test.cpp checks.
+// placement, and the kernel of the scatter on each axis, which scatter_test.cpp checks. A seat that
+// walks has taken i + 1 independent steps at placement i.
 TEST(EvidenceWhiten, RowsAreDividedByTheRootOfTheCovariance) {
   const auto blocks = tests::made_dwells();
   const EvidenceModel model(blocks, {});
   const double start_s = blocks.front().middle_s - blocks.front().seconds / 2;
   const Eigen::Index n = model.rows();
-  for (const Scatter scatter :
-       {Scatter::nominal, Scatter::seating, Scatter::random_walk, Scatter::flicker,
-        Scatter::by_placement, Scatter::by_session, Scatter::by_temperature, Scatter::by_time}) {
+  for (const Scatter scatter : {Scatter::nominal, Scatter::seating, Scatter::random_walk,
+                                Scatter::flicker, Scatter::by_placement, Scatter::by_session,
+                                Scatter::seat_walks, Scatter::by_temperature, Scatter::by_time}) {
     constexpr double kSize = 0.3;
     const bool seats = scatter == Scatter::seating;
+    const bool walks = scatter == Scatter::seat_walks;
     const double seat_deg = seats ? std::hypot(kNominalSeating_deg, kSize) : kNominalSeating_deg;
-    const bool zeros = scatter != Scatter::nominal && !seats;
+    const bool zeros = scatter != Scatter::nominal && !seats && !walks;
     Eigen::MatrixXd v = Eigen::MatrixXd::Zero(n, n);
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       const auto ri = static_cast<Eigen::Index>(3 * i);
@@ -73,6 +75,11 @@ TEST(EvidenceWhiten, RowsAreDividedByTheRootOfTheCovariance) {
         const auto rj = static_cast<Eigen::Index>(3 * j);
         v.block<3, 3>(ri, rj).diagonal().array() +=
             kSize * kSize * scatter_kernel(scatter, blocks[i], blocks[j], start_s);
+      }
+      for (std::size_t j = 0; j < blocks.size() && walks; ++j) {
+        const auto steps = static_cast<double>(std::min(i, j) + 1);
+        v.block<3, 3>(ri, static_cast<Eigen::Index>(3 * j)) +=
+            kSize * kSize * steps * seating_lever(blocks[i]) * seating_lever(blocks[j]).transpose();
       }
     }
     Eigen::MatrixXd root = Eigen::MatrixXd::Identity(n, n);

@@ -51,6 +51,23 @@ TEST(Explanation, SeatingOfItsSize) {
   EXPECT_LT(fit.scatter_size, 0.16);
 }
 
+// Each seat begins where the one before was. Seats of the same size that are new each time are
+// `seating` (above).
+TEST(Explanation, ASeatThatWalksIsUnknown) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  Eigen::Vector3d seat_rad = Eigen::Vector3d::Zero();
+  const auto blocks = tests::made_dwells([&](const Block& b) -> Eigen::Vector3d {
+    constexpr double kStep_rad = 0.04 * M_PI / 180;
+    seat_rad += kStep_rad * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    return seat_rad.cross(1000 * b.rotation.col(2));
+  });
+  const Explanation explanation(blocks, {});
+  EXPECT_TRUE(explanation.unknown_wins());
+  EXPECT_EQ(explanation.best().scatter, Scatter::seat_walks);
+  EXPECT_GT(explanation.unknown_nats(), kUnknownWins_nats);
+}
+
 TEST(Explanation, ScatterThatIsNoRotationIsUnknown) {
   const auto blocks = tests::made_dwells([](const Block& b) -> Eigen::Vector3d {
     return 5 * std::sin(11.0 * b.placement) * b.rotation.col(2);  // along gravity

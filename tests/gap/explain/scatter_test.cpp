@@ -10,6 +10,7 @@ namespace {
 TEST(Scatter, NamesAndMembership) {
   EXPECT_EQ(to_string(Scatter::random_walk), "random_walk");
   EXPECT_EQ(to_string(Scatter::by_session), "session");
+  EXPECT_EQ(to_string(Scatter::seat_walks), "a seat that walks");
   EXPECT_EQ(to_string(Scatter::step), "a step of the zero");
   EXPECT_TRUE(in_catalogue(Scatter::flicker));
   EXPECT_FALSE(in_catalogue(Scatter::by_pose));
@@ -17,11 +18,11 @@ TEST(Scatter, NamesAndMembership) {
 
 TEST(Scatter, SizesAscendAndShareThePrior) {
   for (const Scatter scatter : {Scatter::seating, Scatter::random_walk, Scatter::flicker,
-                                Scatter::by_pose, Scatter::by_time_fast}) {
+                                Scatter::by_pose, Scatter::seat_walks, Scatter::by_time_fast}) {
     const std::vector<double> sizes = sizes_of(scatter);
     EXPECT_TRUE(std::is_sorted(sizes.begin(), sizes.end()));
-    EXPECT_NEAR(scatter_log_prior(scatter),
-                (in_catalogue(scatter) ? -3.5 : -4.5) - std::log(static_cast<double>(sizes.size())),
+    const double all = in_catalogue(scatter) ? -3.5 : scatter == Scatter::seat_walks ? -11.5 : -4.5;
+    EXPECT_NEAR(scatter_log_prior(scatter), all - std::log(static_cast<double>(sizes.size())),
                 1e-12);
   }
 }
