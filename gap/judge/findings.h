@@ -63,7 +63,7 @@ struct Findings {
   // | accepted effects, `before` and here | a candidate is accepted above  |
   // |-------------------------------------|--------------------------------|
   // | up to three                         | kAccept_nats, 9 to 1           |
-  // | kManyEffects, four, and more        | kAcceptAmongMany_nats, 7 to 3  |
+  // | kManyEffects, four, and more        | kAcceptAmongMany_nats, even    |
   void accept_among_many(std::size_t before);
 };
 

@@ -68,8 +68,8 @@ TEST(Findings, AmongManyEffectsWeakerOnesAreAccepted) {
     double nats;
     bool accepted;
   };
-  for (const Case& c : {Case{0, 1, false}, Case{1, 1, false}, Case{2, 1, true}, Case{2, 0.8, false},
-                        Case{9, 2.1, true}, Case{0, 2.3, true}}) {
+  for (const Case& c : {Case{0, 1, false}, Case{1, 1, false}, Case{2, 0.1, true},
+                        Case{2, -0.1, false}, Case{9, 2.1, true}, Case{0, 2.3, true}}) {
     Findings found;
     found.add(asked.request, {.name = "drift", .nats = 9});
     found.add(asked.request, {.name = "tilt", .nats = 8});
