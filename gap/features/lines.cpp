@@ -19,6 +19,7 @@ constexpr double kLowest_hz = 3;  // below it is slow noise; vibration of floors
 // Chance of one false line in a whole recording. One false alarm in a hundred recordings is what
 // the whole diagnosis is allowed; some ten kinds of decision share it evenly.
 constexpr double kFalseLines = 1e-3;
+constexpr double kDwell_s = 30;  // longer ones are records of their own
 
 Vector3c amplitude_at(const Stretch& stretch, double w) {
   Vector3c sum = Vector3c::Zero();
@@ -66,6 +67,8 @@ struct Phasor {
   Eigen::Vector3d weight;  // 1 / variance of the real part
   Eigen::Matrix3d rotation;
   int pose = 0;
+  double start_s = 0;  // by the host's clock; the amplitude's phase is that of this moment
+  double seconds = 0;
 };
 
 // Turns a vector of the frame in question into the frame of a dwell, a Phasor or a Stretch.
@@ -152,60 +155,124 @@ double mean_cosine(double x) {
                     : 1 - 1 / (2 * x) - 1 / (8 * x * x);
 }
 
-// The vector of the highest likelihood averaged over the dwells' phases (EM; Dempster et al. 1977).
-// fit_vector() takes the likeliest phase of each: then noise adds to a small vector, since it is
-// turned into its direction everywhere (too many parameters; Neyman and Scott 1948).
-Vector3c without_phases(const std::vector<Phasor>& phasors, Vector3c vector, bool in_lab) {
+// What dwells whose phases are known to each other say of a vector v: with one phase in common, the
+// log likelihood over no line is |v'b| - v'Av / 2 where that phase is the likeliest.
+struct Sums {
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Vector3c b = Vector3c::Zero();
+
+  void add(const Phasor& p, bool in_lab, Complex turn) {
+    const Eigen::Matrix3d r = to_sensor(p, in_lab);
+    const Eigen::Matrix3d back = r.transpose() * p.weight.asDiagonal();
+    a += back * r;
+    b += turn * (back.cast<Complex>() * p.amplitude);
+  }
+  double square(const Vector3c& v) const { return v.dot(a.cast<Complex>() * v).real(); }
+};
+
+// Each dwell has a phase of its own.
+std::vector<Sums> each_alone(const std::vector<Phasor>& phasors, bool in_lab) {
+  std::vector<Sums> all(phasors.size());
+  for (std::size_t i = 0; i < phasors.size(); ++i) {
+    all[i].add(phasors[i], in_lab, 1);
+  }
+  return all;
+}
+
+// Dwells within some minutes keep the phase by the host's clock. Long records stand alone: a unit's
+// clock is not that good.
+std::vector<Sums> in_step(const std::vector<Phasor>& phasors, double host_hz, bool in_lab) {
+  constexpr double kLongest_s = 900;
+  std::vector<Sums> all;
+  std::optional<double> since_s;
+  for (const Phasor& p : phasors) {
+    const bool is_dwell = p.seconds <= kDwell_s;
+    if (!since_s || !is_dwell || p.start_s - *since_s > kLongest_s) {
+      all.emplace_back();
+      since_s = p.start_s;
+    }
+    all.back().add(p, in_lab, std::polar(1.0, -2 * M_PI * host_hz * (p.start_s - *since_s)));
+    if (!is_dwell) {
+      since_s.reset();
+    }
+  }
+  return all;
+}
+
+// Maximum likelihood of a vector of its own for each of the sums.
+struct OwnVectors {
+  double nats = 0;
+  Vector3c strongest = Vector3c::Zero();  // of the one that says most
+};
+
+OwnVectors own_vectors(const std::vector<Sums>& all) {
+  OwnVectors out;
+  double most = -1;
+  for (const Sums& sums : all) {
+    const Vector3c vector = sums.a.inverse().cast<Complex>() * sums.b;
+    const double own = 0.5 * sums.b.dot(vector).real();
+    out.nats += own;
+    if (own > most) {
+      most = own;
+      out.strongest = vector;
+    }
+  }
+  return out;
+}
+
+struct HostFrequency {
+  double hz = 0;
+  double search_nats = 0;  // what the search for it costs
+};
+
+// The frequency near `found_hz` at which the dwells in step agree best: that was found by the
+// unit's clock, which goes wrong by some 1e-4.
+HostFrequency host_frequency(const std::vector<Phasor>& phasors, double found_hz, bool in_lab) {
+  constexpr double kClock = 2e-4, kStep_hz = 3e-4;  // the step is a quarter of a turn in 900 s
+  const int steps = static_cast<int>(std::ceil(kClock * found_hz / kStep_hz));
+  HostFrequency best{found_hz, std::log(2.0 * steps + 1)};
+  double most = -1;
+  for (int k = -steps; k <= steps; ++k) {
+    const double hz = found_hz + k * kStep_hz;
+    if (const double nats = own_vectors(in_step(phasors, hz, in_lab)).nats; nats > most) {
+      most = nats;
+      best.hz = hz;
+    }
+  }
+  return best;
+}
+
+// The vector of the highest likelihood averaged over the phases (EM; Dempster et al. 1977), from a
+// guess. fit_vector() takes the likeliest phase of each: then noise adds to a small vector, since
+// it is turned into its direction everywhere (too many parameters; Neyman and Scott 1948).
+Vector3c without_phases(const std::vector<Sums>& all, Vector3c vector) {
   constexpr int kRounds = 50;
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  for (const Sums& sums : all) {
+    a += sums.a;
+  }
+  const Eigen::Matrix3cd inverse = a.inverse().cast<Complex>();
   for (int round = 0; round < kRounds; ++round) {
-    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
     Vector3c b = Vector3c::Zero();
-    for (const Phasor& p : phasors) {
-      const Eigen::Matrix3d r = to_sensor(p, in_lab);
-      const Eigen::Matrix3d rw = r.transpose() * p.weight.asDiagonal();
-      const Complex overlap = overlap_of(r.cast<Complex>() * vector, p).overlap;
+    for (const Sums& sums : all) {
+      const Complex overlap = vector.dot(sums.b);
       const double known = std::abs(overlap);
-      a += rw * r;
       if (known > 0) {
-        b += rw.cast<Complex>() * (p.amplitude * (mean_cosine(known) / known * std::conj(overlap)));
+        b += sums.b * (mean_cosine(known) / known * std::conj(overlap));
       }
     }
-    vector = a.inverse().cast<Complex>() * b;
+    vector = inverse * b;
   }
   return vector;
 }
 
-// Log likelihood of the vector over no line, averaged over the dwells' phases.
-double averaged_nats(const std::vector<Phasor>& phasors, const Vector3c& vector, bool in_lab) {
+// Log likelihood of the vector over no line, averaged over the phases.
+double averaged_nats(const std::vector<Sums>& all, const Vector3c& vector) {
   double nats = 0;
-  for (const Phasor& p : phasors) {
-    const Overlap sums = overlap_of(to_sensor(p, in_lab).cast<Complex>() * vector, p);
-    nats += log_bessel(std::abs(sums.overlap)) - 0.5 * sums.square;
+  for (const Sums& sums : all) {
+    nats += log_bessel(std::abs(vector.dot(sums.b))) - 0.5 * sums.square(vector);
   }
   return nats;
-}
-
-// The poses in two halves, each with a vector of its own.
-struct Halves {
-  double held_out_nats = 0;  // each predicted from the vector of the other
-  double own_nats = 0;       // each by its own
-};
-
-std::optional<Halves> halves_of(const std::vector<Phasor>& phasors, bool in_lab) {
-  std::array<std::vector<Phasor>, 2> half;
-  for (const Phasor& p : phasors) {
-    half[static_cast<std::size_t>(p.pose % 2)].push_back(p);
-  }
-  if (half[0].empty() || half[1].empty()) {
-    return std::nullopt;
-  }
-  Halves halves;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Vector3c vector = without_phases(half[k], fit_vector(half[k], in_lab).vector, in_lab);
-    halves.held_out_nats += averaged_nats(half[1 - k], vector, in_lab);
-    halves.own_nats += averaged_nats(half[k], vector, in_lab);
-  }
-  return halves;
 }
 
 std::vector<Phasor> phasors_at(double rate_hz, const std::vector<Stretch>& all,
@@ -214,7 +281,8 @@ std::vector<Phasor> phasors_at(double rate_hz, const std::vector<Stretch>& all,
   phasors.reserve(all.size());
   for (const Stretch& s : all) {
     phasors.push_back({amplitude_at(s, 2 * M_PI * frequency_hz / rate_hz),
-                       weights_at(s, noise, frequency_hz), s.rotation, s.pose});
+                       weights_at(s, noise, frequency_hz), s.rotation, s.pose, s.start_s,
+                       static_cast<double>(s.samples) / rate_hz});
   }
   return phasors;
 }
@@ -236,6 +304,75 @@ VectorFit fit_in_step(double rate_hz, const std::vector<Stretch>& all, const Noi
   fit.vector = a.inverse().cast<Complex>() * b;
   fit.nats = 0.5 * (fit.vector.dot(b)).real();
   return fit;
+}
+
+// A line in one frame, whether it keeps its phase or not.
+struct OneFrame {
+  bool in_lab = true;
+  bool keeps_phase = false;  // by the host's clock, from dwell to dwell
+  double host_hz = 0;        // if so
+  Vector3c vector = Vector3c::Zero();
+  double averaged_nats = 0;   // log likelihood over no line, averaged over the phases that are free
+  double likeliest_nats = 0;  // the same, less what the search for host_hz costs
+  double gain_nats = 0;       // with the likeliest phases
+  double chi = 0;             // of the dwells, each with its likeliest phase
+};
+
+OneFrame in_frame(const std::vector<Phasor>& phasors, double found_hz, bool in_lab) {
+  const VectorFit fit = fit_vector(phasors, in_lab);
+  const std::vector<Sums> alone = each_alone(phasors, in_lab);
+  OneFrame out{.in_lab = in_lab, .gain_nats = fit.nats, .chi = fit.chi};
+  out.vector = without_phases(alone, fit.vector);
+  out.averaged_nats = averaged_nats(alone, out.vector);
+  out.likeliest_nats = out.averaged_nats;
+  // A small line drowns in each dwell, and fits noise there by its free phase: only the sum of
+  // dwells that keep its phase shows the frame.
+  const HostFrequency host = host_frequency(phasors, found_hz, in_lab);
+  const std::vector<Sums> together = in_step(phasors, host.hz, in_lab);
+  const Vector3c vector = without_phases(together, own_vectors(together).strongest);
+  const double nats = averaged_nats(together, vector);
+  if (nats - host.search_nats > out.likeliest_nats) {
+    out.keeps_phase = true;
+    out.host_hz = host.hz;
+    out.vector = vector;
+    out.averaged_nats = nats;
+    out.likeliest_nats = nats - host.search_nats;
+    out.gain_nats = 0;
+    for (const Sums& sums : together) {
+      out.gain_nats += std::abs(vector.dot(sums.b)) - 0.5 * sums.square(vector);
+    }
+  }
+  return out;
+}
+
+// The poses in two halves, each with a vector of its own.
+struct Halves {
+  double held_out_nats = 0;  // each predicted from the vector of the other
+  double own_nats = 0;       // each by its own
+};
+
+std::optional<Halves> halves_of(const std::vector<Phasor>& phasors, const OneFrame& line) {
+  std::array<std::vector<Sums>, 2> half;
+  std::array<Vector3c, 2> vector;
+  for (std::size_t k = 0; k < 2; ++k) {
+    std::vector<Phasor> own;
+    std::ranges::copy_if(phasors, std::back_inserter(own), [&](const Phasor& p) {
+      return static_cast<std::size_t>(p.pose % 2) == k;
+    });
+    if (own.empty()) {
+      return std::nullopt;
+    }
+    half[k] =
+        line.keeps_phase ? in_step(own, line.host_hz, line.in_lab) : each_alone(own, line.in_lab);
+    vector[k] = without_phases(half[k], line.keeps_phase ? own_vectors(half[k]).strongest
+                                                         : fit_vector(own, line.in_lab).vector);
+  }
+  Halves halves;
+  for (std::size_t k = 0; k < 2; ++k) {
+    halves.held_out_nats += averaged_nats(half[1 - k], vector[k]);
+    halves.own_nats += averaged_nats(half[k], vector[k]);
+  }
+  return halves;
 }
 
 struct Peak {
@@ -301,7 +438,7 @@ class LineFinder {
     const double f = refined(best->frequency_hz, kind, step_hz);
     taken_hz_.push_back(f);
     taken_hz_.push_back(rate_hz_ / 2 - std::abs(rate_hz_ / 2 - f));
-    const SpectralLine line = line_at(f, kind, harmonic_nats(f, found));
+    const SpectralLine line = line_at(f, harmonic_nats(f, found));
     for (Stretch& stretch : all_) {
       take_off(stretch, 2 * M_PI * f / rate_hz_);
     }
@@ -313,8 +450,7 @@ class LineFinder {
 
   std::vector<std::pair<Kind, LineScan>> scans() const {
     constexpr double kLong_s = 60;
-    constexpr double kDwell_s = 30;
-    constexpr double kPiece_s = 420;  // of long records: what the scan takes in one transform
+    constexpr double kPiece_s = 327;  // of long records: 2^15 samples at 100 Hz in one transform
     std::vector<std::pair<Kind, LineScan>> scans;
     std::vector<const Stretch*> dwells;
     for (const Stretch& s : all_) {
@@ -408,42 +544,22 @@ class LineFinder {
     return 0;
   }
 
-  SpectralLine line_at(double f, Kind kind, double harmonic_nats) const {
+  SpectralLine line_at(double f, double harmonic_nats) const {
     constexpr double kOneFrame_nats = 3;  // one in twenty: convention
     SpectralLine line;
     line.frequency_hz = f;
     const auto phasors = phasors_at(rate_hz_, all_, noise_, f);
-    VectorFit lab = fit_vector(phasors, true);
-    VectorFit sensor = fit_vector(phasors, false);
-    bool keeps_phase = false;
-    if (kind == Kind::in_step) {
-      const VectorFit lab_in_step = fit_in_step(rate_hz_, all_, noise_, f, true);
-      const VectorFit sensor_in_step = fit_in_step(rate_hz_, all_, noise_, f, false);
-      // A line that keeps its phase: the sum decides on the frame. Free phases fit a nat better
-      // each.
-      keeps_phase = std::max(lab_in_step.nats, sensor_in_step.nats) >
-                    std::max(lab.nats, sensor.nats) - static_cast<double>(phasors.size());
-      if (keeps_phase) {
-        lab = {lab_in_step.vector, lab_in_step.nats, lab.chi};
-        sensor = {sensor_in_step.vector, sensor_in_step.nats, sensor.chi};
-      }
-    }
-    const Vector3c in_lab = keeps_phase ? lab.vector : without_phases(phasors, lab.vector, true);
-    const Vector3c in_sensor =
-        keeps_phase ? sensor.vector : without_phases(phasors, sensor.vector, false);
-    const double lab_nats = averaged_nats(phasors, in_lab, true);
-    const double sensor_nats = averaged_nats(phasors, in_sensor, false);
-    // Of a small line a free phase fits the noise of most dwells, in either frame by chance.
-    line.lab_over_sensor_nats =
-        harmonic_nats + (keeps_phase ? lab.nats - sensor.nats : lab_nats - sensor_nats);
+    const OneFrame lab = in_frame(phasors, f, true);
+    const OneFrame sensor = in_frame(phasors, f, false);
+    line.lab_over_sensor_nats = harmonic_nats + lab.likeliest_nats - sensor.likeliest_nats;
     line.in_lab = line.lab_over_sensor_nats > 0;
-    const VectorFit& chosen = line.in_lab ? lab : sensor;
-    const Vector3c& vector = line.in_lab ? in_lab : in_sensor;
-    line.gain_nats = chosen.nats;
-    line.averaged_nats = line.in_lab ? lab_nats : sensor_nats;
-    if (const auto halves = halves_of(phasors, line.in_lab)) {
+    const OneFrame& chosen = line.in_lab ? lab : sensor;
+    const Vector3c& vector = chosen.vector;
+    line.gain_nats = chosen.gain_nats;
+    line.averaged_nats = chosen.likeliest_nats;
+    if (const auto halves = halves_of(phasors, chosen)) {
       line.held_out_nats = halves->held_out_nats;
-      line.apart_nats = halves->own_nats - line.averaged_nats;
+      line.apart_nats = halves->own_nats - chosen.averaged_nats;
     }
     // Turn the common phase so that the vector is as real as can be.
     const Complex square = (vector.transpose() * vector).value();
@@ -454,7 +570,7 @@ class LineFinder {
       // Information of a dwell on the size, where its phase is free: all of it from a few standard
       // deviations on, and nothing of what drowns in noise.
       const double signal = p.weight.mean() * vector.squaredNorm();
-      weight += p.weight.mean() * (keeps_phase ? 1 : signal / (1 + signal));
+      weight += p.weight.mean() * (chosen.keeps_phase ? 1 : signal / (1 + signal));
       spread += (p.rotation - phasors.front().rotation).cwiseAbs();
     }
     line.sd_mg = 1 / std::sqrt(std::max(1e-12, weight));

@@ -3,8 +3,9 @@
 //   const auto lines = gap::find_lines(bundle, clean, gap::noise_spectrum(bundle, clean));
 //
 // A line that turns with the unit (a vector fixed in the sensor's frame) is electrical; one whose
-// direction stays in the room is vibration of the floor. Each dwell has a phase of its own, so that
-// only vectors are compared, never phases; both hypotheses have the same number of unknowns, and
+// direction stays in the room is vibration of the floor. Two cases are tried in each frame: every
+// dwell has a phase of its own, or the dwells of some minutes keep it by the host's clock, which
+// shows the frame of a line that drowns in each dwell. All have the same number of unknowns, and
 // their likelihoods, averaged over the phases, are compared directly. A second or third harmonic
 // goes with the stronger line that it belongs to.
 #pragma once
@@ -21,7 +22,7 @@ namespace sixpoint::gap {
 struct SpectralLine {
   double frequency_hz = 0;
   double gain_nats = 0;             // log likelihood over no line, the better hypothesis
-  double averaged_nats = 0;         // the same, averaged over the phases of the dwells
+  double averaged_nats = 0;         // the same, averaged over the phases that are free
   double lab_over_sensor_nats = 0;  // positive: fixed in the laboratory
   bool in_lab = true;
   bool decidable = false;  // the poses differ, and the data prefer one frame clearly

@@ -16,6 +16,31 @@ Places places_as_stored(const CleanSamples& clean, const Segment& segment, std::
   return places;
 }
 
+// Takes the line through its samples off each axis: the zero follows the temperature of a ramp.
+void take_trend_off(Stretch& stretch) {
+  const auto n = static_cast<double>(stretch.known);
+  double sum_t = 0;
+  double squares_t = 0;
+  for (std::size_t i = 0; i < stretch.samples; ++i) {
+    const double t = stretch.is_known[i] ? static_cast<double>(i) : 0;
+    sum_t += t;
+    squares_t += t * t;
+  }
+  const double middle = sum_t / n;
+  for (std::vector<double>& x : stretch.x) {
+    double sum = 0;
+    double moment = 0;
+    for (std::size_t i = 0; i < stretch.samples; ++i) {  // unknown ones are zero
+      sum += x[i];
+      moment += (static_cast<double>(i) - middle) * x[i];
+    }
+    const double slope = moment / std::max(1.0, squares_t - n * middle * middle);
+    for (std::size_t i = 0; i < stretch.samples; ++i) {
+      x[i] -= stretch.is_known[i] ? sum / n + slope * (static_cast<double>(i) - middle) : 0;
+    }
+  }
+}
+
 }  // namespace
 
 Places places_by_clock(const CleanSamples& clean, const Segment& segment, std::size_t count) {
@@ -44,7 +69,7 @@ std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) 
   std::vector<Stretch> all;
   for (const Segment& segment : bundle.segments) {
     const std::size_t skip = segment.quiet_start(bundle.rate_hz);
-    if (!segment.at_rest() || segment.kind == Segment::Kind::ramp ||
+    if (!segment.at_rest() ||
         segment.samples < skip + static_cast<std::size_t>(kShortest_s * bundle.rate_hz)) {
       continue;
     }
@@ -57,7 +82,6 @@ std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) 
     stretch.rotation = segment.rotation;
     stretch.pose = segment.pose;
     std::optional<std::size_t> start;
-    std::array<double, 3> sum_mg{};
     for (std::size_t i = skip; i < places.size(); ++i) {
       if (!places[i]) {
         continue;
@@ -70,7 +94,6 @@ std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) 
         const double x_mg = clean.value_mg(segment.first_sample + i, axis);
         stretch.x[axis].resize(*places[i] - *start, 0);
         stretch.x[axis].push_back(x_mg);
-        sum_mg[axis] += x_mg;
       }
     }
     if (2 * stretch.known < stored) {
@@ -78,12 +101,7 @@ std::vector<Stretch> stretches(const Bundle& bundle, const CleanSamples& clean) 
     }
     stretch.start_s = segment.host_start_s + static_cast<double>(*start) / bundle.rate_hz;
     stretch.samples = stretch.is_known.size();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < stretch.samples; ++i) {
-        stretch.x[axis][i] -=
-            stretch.is_known[i] ? sum_mg[axis] / static_cast<double>(stretch.known) : 0;
-      }
-    }
+    take_trend_off(stretch);
     all.push_back(std::move(stretch));
   }
   return all;

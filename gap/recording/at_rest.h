@@ -1,7 +1,7 @@
 // What lies still: whole stretches of a pose in mg, and pieces of one length.
 //
 //   for (const Stretch& stretch : stretches(bundle, clean)) {
-//     const std::vector<double>& x_mg = stretch.x[0];  // about its mean
+//     const std::vector<double>& x_mg = stretch.x[0];  // about its trend
 //   }
 //
 // A dwell begins where its ringing is over (Segment::quiet_start).
@@ -24,7 +24,7 @@ namespace sixpoint::gap {
 using Places = std::vector<std::optional<std::size_t>>;
 Places places_by_clock(const CleanSamples& clean, const Segment& segment, std::size_t count);
 
-// A stretch at rest in one pose, mean removed, in mg. Each sample stands at its place; places
+// A stretch at rest in one pose, the line through its samples taken off, in mg. Each sample stands at its place; places
 // without one are zero.
 struct Stretch {
   std::size_t samples = 0;  // places

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <random>
+#include <vector>
 
 #include "gap/recording/bundle.h"
 
@@ -17,6 +19,8 @@ struct MadeUnit {
   Eigen::Vector3d noise_g = {0.0039, 0.0039, 0.0055};
   double seating_deg = 0.01;
   unsigned seed = 1;
+  int rounds = 1;                // how often the eighteen dwells are made
+  std::size_t long_samples = 0;  // of one more record in the last pose, if not 0
 };
 
 // Specific force in the sensor's frame for a segment, at `t` seconds from its start.
@@ -37,7 +41,15 @@ inline gap::Bundle made_production(const MadeUnit& unit, const MadeForce& force 
   gap::Bundle bundle;
   bundle.path = "made";
   bundle.header.serial = bundle.protocol_serial = "MOS2E00000001";
-  const std::array<int, 18> order = {0, 1, 2, 3, 4, 5, 5, 4, 3, 2, 1, 0, 3, 0, 5, 2, 4, 1};
+  const std::array<int, 18> round = {0, 1, 2, 3, 4, 5, 5, 4, 3, 2, 1, 0, 3, 0, 5, 2, 4, 1};
+  std::vector<int> order;
+  for (int k = 0; k < unit.rounds; ++k) {
+    order.insert(order.end(), round.begin(), round.end());
+  }
+  const std::size_t dwells = order.size();
+  if (unit.long_samples > 0) {
+    order.push_back(order.back());
+  }
   std::mt19937_64 random(unit.seed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> stamp(-0.002, 0.002);
@@ -45,9 +57,12 @@ inline gap::Bundle made_production(const MadeUnit& unit, const MadeForce& force 
   Eigen::Vector3d before = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < order.size(); ++i) {
     gap::Segment segment;
-    segment.name = i < 6 ? "faces" : i < 12 ? "faces_reversed" : "reseat";
+    segment.name = i >= dwells   ? "still"
+                   : i % 18 < 6  ? "faces"
+                   : i % 18 < 12 ? "faces_reversed"
+                                 : "reseat";
     segment.first_sample = bundle.samples.size();
-    segment.samples = 1000;
+    segment.samples = i < dwells ? 1000 : unit.long_samples;
     segment.host_start_s = host_s;
     segment.rotation = up_along(order[i] / 2, order[i] % 2 == 0 ? 1 : -1, order[i] % 4);
     segment.temperature_start_c = segment.temperature_end_c = 23;
@@ -78,7 +93,7 @@ inline gap::Bundle made_production(const MadeUnit& unit, const MadeForce& force 
       }
     }
     bundle.segments.push_back(segment);
-    host_s += 16;
+    host_s += static_cast<double>(segment.samples) / 100 + 6;
   }
   for (double t = 0; t < host_s; t += 1) {
     bundle.temperature.host_time_s.push_back(t);

@@ -83,6 +83,30 @@ TEST(Lines, LostSamplesDoNotSpreadALine) {
   EXPECT_LT(ringing_nats(lines[0]), 12) << "as without slips";
 }
 
+// A long record shows a line that drowns in each dwell (about one standard deviation there). What
+// the dwells sum to in step with the host's clock shows its frame, also where the unit's clock is
+// off by 1e-4.
+TEST(Lines, PhaseByTheHostsClockShowsTheFrameOfASmallLine) {
+  const Eigen::Vector3d v(0.15e-3, -0.08e-3, 0.12e-3);
+  constexpr double kHost_hz = 17.3, kUnitClock = 1e-4;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const bool lab = seed % 2 == 0;
+    const Bundle bundle = tests::made_production(
+        {.seed = seed, .rounds = 3, .long_samples = 80'000}, [&](const Segment& s, double t) {
+          const double host_s = s.host_start_s + t * (1 + kUnitClock);
+          const Eigen::Vector3d line = std::cos(2 * M_PI * kHost_hz * host_s) * v;
+          return Eigen::Vector3d(s.rotation.col(2) +
+                                 (lab ? Eigen::Vector3d(s.rotation * line) : line));
+        });
+    const CleanSamples clean = clean_samples(bundle);
+    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+    ASSERT_EQ(lines.size(), 1U) << seed;
+    EXPECT_EQ(lines[0].in_lab, lab) << seed;
+    EXPECT_NEAR(lines[0].frequency_hz, kHost_hz * (1 + kUnitClock), 2e-3) << seed;
+    EXPECT_NEAR(lines[0].vector_mg.norm(), 1000 * v.norm(), 6 * lines[0].sd_mg) << seed;
+  }
+}
+
 // A line whose phase is another in each dwell, about twice a dwell's noise. Taking the likeliest
 // phase of each dwell makes it a tenth larger.
 TEST(Lines, NoiseDoesNotMakeASmallLineLarger) {

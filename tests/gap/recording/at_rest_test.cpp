@@ -15,13 +15,14 @@ struct MadeSegments {
   CleanSamples clean;
 };
 
-// Segments of Z = 256 LSB and a little, one behind the other.
+// Segments of Z = 256 LSB, one behind the other. X goes up and down by a count so that four samples
+// have neither a mean nor a slope.
 MadeSegments made(const std::vector<Segment>& segments) {
   MadeSegments made;
   for (Segment segment : segments) {
     segment.first_sample = made.clean.samples.size();
     for (std::size_t i = 0; i < segment.samples; ++i) {
-      const int sign = i % 2 == 0 ? 1 : -1;
+      const int sign = i % 4 == 0 || i % 4 == 3 ? 1 : -1;
       made.clean.samples.push_back({static_cast<std::int16_t>(5 + sign), 0, 256});
     }
     made.bundle.segments.push_back(segment);
@@ -48,10 +49,10 @@ TEST(AtRest, StretchesAreFourQuietSecondsAndMoreAtRest) {
                  segment(Kind::soak, 2000, true), segment(Kind::ramp, 2000, true),
                  segment(Kind::vibration, 2000, true)});
   const auto found = stretches(made.bundle, made.clean);
-  ASSERT_EQ(found.size(), 3U);
-  const std::size_t samples[] = {400, 400, 1700};
-  const double start_s[] = {53, 50, 53};
-  for (std::size_t i = 0; i < 3; ++i) {
+  ASSERT_EQ(found.size(), 4U);
+  const std::size_t samples[] = {400, 400, 1700, 1700};
+  const double start_s[] = {53, 50, 53, 53};
+  for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(found[i].samples, samples[i]);
     EXPECT_EQ(found[i].x[0].size(), samples[i]);
     EXPECT_NEAR(found[i].start_s, start_s[i], 1e-9);
@@ -61,16 +62,34 @@ TEST(AtRest, StretchesAreFourQuietSecondsAndMoreAtRest) {
 // One LSB is 3.90625 mg.
 TEST(AtRest, StretchesAreInMgAboutTheirMeanWithMaskedSamplesZero) {
   MadeSegments made = gap::made({segment(Segment::Kind::still, 400, false)});
-  for (std::size_t i = 100; i < 110; ++i) {
+  for (std::size_t i = 100; i < 108; ++i) {
     made.clean.samples[i] = {2000, 2000, 2000};
     made.clean.flags[i] = kSampleClipped;
   }
   const auto found = stretches(made.bundle, made.clean);
   ASSERT_EQ(found.size(), 1U);
   for (std::size_t i = 0; i < 400; ++i) {
-    const bool masked = i >= 100 && i < 110;
-    EXPECT_NEAR(found[0].x[0][i], masked ? 0 : i % 2 == 0 ? 3.90625 : -3.90625, 1e-9) << i;
+    const bool masked = i >= 100 && i < 108;
+    const bool up = i % 4 == 0 || i % 4 == 3;
+    EXPECT_NEAR(found[0].x[0][i], masked ? 0 : up ? 3.90625 : -3.90625, 1e-9) << i;
     EXPECT_NEAR(found[0].x[2][i], 0, 1e-9) << i;
+  }
+}
+
+// A zero that follows the temperature of a ramp, a count a sample, leaves nothing.
+TEST(AtRest, StretchesHaveNoTrend) {
+  MadeSegments made = gap::made({segment(Segment::Kind::ramp, 400, false)});
+  for (std::size_t i = 0; i < 400; ++i) {
+    made.clean.samples[i][1] = static_cast<std::int16_t>(static_cast<int>(i) - 150);
+  }
+  for (std::size_t i = 100; i < 110; ++i) {
+    made.clean.samples[i] = {2000, 2000, 2000};
+    made.clean.flags[i] = kSampleClipped;
+  }
+  const auto found = stretches(made.bundle, made.clean);
+  ASSERT_EQ(found.size(), 1U);
+  for (const double y_mg : found[0].x[1]) {
+    EXPECT_NEAR(y_mg, 0, 1e-9);
   }
 }
 
