@@ -24,8 +24,8 @@ namespace sixpoint::gap {
 using Places = std::vector<std::optional<std::size_t>>;
 Places places_by_clock(const CleanSamples& clean, const Segment& segment, std::size_t count);
 
-// A stretch at rest in one pose, the line through its samples taken off, in mg. Each sample stands at its place; places
-// without one are zero.
+// A stretch at rest in one pose, in mg, the line through its samples taken off. Each sample stands
+// at its place; places without one are zero.
 struct Stretch {
   std::size_t samples = 0;  // places
   std::size_t known = 0;    // of them that have a sample
