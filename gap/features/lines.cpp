@@ -287,25 +287,6 @@ std::vector<Phasor> phasors_at(double rate_hz, const std::vector<Stretch>& all,
   return phasors;
 }
 
-// The likeliest vector of a line that keeps its phase by the host's clock; chi is not set.
-VectorFit fit_in_step(double rate_hz, const std::vector<Stretch>& all, const NoiseSpectrum& noise,
-                      double frequency_hz, bool in_lab) {
-  const double w = 2 * M_PI * frequency_hz;
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-  Vector3c b = Vector3c::Zero();
-  for (const Stretch& s : all) {
-    const double t = s.start_s - all.front().start_s;
-    const Eigen::Matrix3d r = to_sensor(s, in_lab);
-    const Eigen::Matrix3d back = r.transpose() * weights_at(s, noise, frequency_hz).asDiagonal();
-    a += back * r;
-    b += back.cast<Complex>() * (amplitude_at(s, w / rate_hz) * std::polar(1.0, -w * t));
-  }
-  VectorFit fit;
-  fit.vector = a.inverse().cast<Complex>() * b;
-  fit.nats = 0.5 * (fit.vector.dot(b)).real();
-  return fit;
-}
-
 // A line in one frame, whether it keeps its phase or not.
 struct OneFrame {
   bool in_lab = true;
@@ -514,8 +495,9 @@ class LineFinder {
 
   double power_at(double f, Kind kind) const {
     if (kind == Kind::in_step) {
-      return std::max(fit_in_step(rate_hz_, all_, noise_, f, true).nats,
-                      fit_in_step(rate_hz_, all_, noise_, f, false).nats);
+      const auto phasors = phasors_at(rate_hz_, all_, noise_, f);
+      return std::max(own_vectors(in_step(phasors, f, true)).nats,
+                      own_vectors(in_step(phasors, f, false)).nats);
     }
     double sum = 0;
     const double w = 2 * M_PI * f / rate_hz_;
