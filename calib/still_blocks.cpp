@@ -212,6 +212,14 @@ bool StillBlockFinder::cannot_be_still(const Window& window, std::size_t axis,
   return g_per_count_ * ((spread - rise) / 2 - 1) >= widest_g;
 }
 
+// Values within this spread have no larger residual from their line. A tenth of a count more, for
+// the rounding of the residuals themselves (single precision).
+double StillBlockFinder::most_residual_g(const Window& window, std::size_t axis) const {
+  const Line& line = window.lines[axis];
+  const double farthest = std::max(window.high[axis] - line.mean, line.mean - window.low[axis]);
+  return g_per_count_ * (farthest + std::abs(line.slope) * (block_samples_ - 1) / 2 + 0.1);
+}
+
 // Criteria 1 and 2. False where the window cannot be a block, noisy or not.
 bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
   for (std::size_t a = 0; a < kAxes; ++a) {
@@ -234,10 +242,13 @@ bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
     }
   }
   for (std::size_t a = 0; a < kAxes; ++a) {
-    const double largest_g =
-        g_per_count_ * static_cast<double>(largest_residual(
-                           window.values[a], centred_, static_cast<float>(window.lines[a].mean),
-                           static_cast<float>(window.lines[a].slope)));
+    double largest_g = most_residual_g(window, a);
+    if (largest_g >= options_.max_residual_g) {
+      largest_g = g_per_count_ * static_cast<double>(largest_residual(
+                                     window.values[a], centred_,
+                                     static_cast<float>(window.lines[a].mean),
+                                     static_cast<float>(window.lines[a].slope)));
+    }
     window.largest_g[a] = largest_g;
     window.within_paper = window.within_paper && largest_g < options_.max_residual_g;
     if (!window.within_paper && (options_.noisy_sd_g <= 0 || largest_g >= widest)) {
@@ -259,19 +270,35 @@ void StillBlockFinder::find_noise(Window& window) const {
   }
 }
 
+// Of the recovered raw counts. Where those of neighbouring counts are equally far apart, as they are
+// nearly everywhere, the sum of the counts says it; both ways are exact for halves of a count.
+double StillBlockFinder::raw_sum(const Window& window, std::size_t axis) const {
+  const std::int16_t low = window.low[axis];
+  const auto raw = [&](int count) {
+    return reversal_->raw_lsb(axis, static_cast<std::int16_t>(count));
+  };
+  const double step = low < window.high[axis] ? raw(low + 1) - raw(low) : 0;
+  bool even = true;
+  for (int count = low; count < window.high[axis] && even; ++count) {
+    even = raw(count + 1) - raw(count) == step;
+  }
+  if (even) {
+    const std::int64_t above = window.sums[axis] - std::int64_t{block_samples_} * low;
+    return block_samples_ * raw(low) + step * static_cast<double>(above);
+  }
+  double sum = 0;
+  for (const std::int16_t count : window.values[axis]) {
+    sum += raw(count);
+  }
+  return sum;
+}
+
 StillBlock StillBlockFinder::measure(const Window& window) const {
   StillBlock block;
-  // The axes side by side: each sum waits for its own last addition alone.
-  PerAxis<double> sums_raw{};
-  for (std::size_t i = 0; i < centred_.size(); ++i) {
-    for (std::size_t a = 0; a < kAxes; ++a) {
-      sums_raw[a] += reversal_->raw_lsb(a, window.values[a][i]);
-    }
-  }
   for (std::size_t a = 0; a < kAxes; ++a) {
     const double raw_per_count = g_per_count_ / reversal_->calibration().sensitivity_g_per_lsb[a];
     block.mean_g[a] = window.lines[a].mean * g_per_count_;
-    block.mean_lsb[a] = sums_raw[a] / block_samples_;
+    block.mean_lsb[a] = raw_sum(window, a) / block_samples_;
     block.sd_lsb[a] = window.sd[a] * raw_per_count;
     const double slope_lsb = window.lines[a].slope * raw_per_count;
     block.ramp_variance_lsb2[a] = slope_lsb * slope_lsb * sum_square_index_ / block_samples_;

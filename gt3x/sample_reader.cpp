@@ -83,7 +83,7 @@ struct SampleReader::State {
     }
   }
 
-  SampleItem by_clock_item(OrderedSecond ordered) {
+  SampleItem by_clock_item(OrderedSecond&& ordered) {
     if (ordered.missing > 0) {
       SampleItem gap;
       gap.kind = SampleItem::Kind::gap;
@@ -96,7 +96,7 @@ struct SampleReader::State {
     return item_of(std::move(ordered.second), ordered.jumped_back);
   }
 
-  SampleItem item_of(Second second, bool broke_order) {
+  SampleItem item_of(Second&& second, bool broke_order) {
     current = std::move(second);
     last_time = current.unix_time;
     SampleItem item;

@@ -220,10 +220,14 @@ std::vector<Sample> mixed_recording(unsigned seed, double rate_hz) {
 }
 
 TEST(StillBlocks, AreThoseOfThePapersLetter) {
-  const Reversal reversal = reversal_of({});
   std::size_t found = 0;
   for (const double rate_hz :
        {25.0, 30.0, 100.0}) {  // at 25 Hz a block is no whole number of steps
+    // Neighbouring counts that are unevenly many raw counts apart, and some that none leads to.
+    SyntheticUnit unit;
+    unit.positive[0] = unit.positive[0] * 11 / 10;
+    unit.positive[1] = unit.positive[1] * 9 / 10;
+    const Reversal reversal = reversal_of(unit);
     const int block = static_cast<int>(4 * rate_hz);
     const int step = static_cast<int>(std::lround(0.5 * rate_hz));
     for (unsigned seed = 1; seed <= 6; ++seed) {
@@ -238,6 +242,13 @@ TEST(StillBlocks, AreThoseOfThePapersLetter) {
       for (std::size_t i = 0; i < starts.size(); ++i) {
         EXPECT_NEAR(finder.blocks()[i].start_time_s * rate_hz, static_cast<double>(starts[i]),
                     1e-6);
+        for (std::size_t a = 0; a < kAxes; ++a) {
+          double sum = 0;
+          for (int k = 0; k < block; ++k) {
+            sum += reversal.raw_lsb(a, samples[starts[i] + static_cast<std::size_t>(k)][a]);
+          }
+          EXPECT_NEAR(finder.blocks()[i].mean_lsb[a], sum / block, 1e-9);
+        }
       }
       found += starts.size();
     }
