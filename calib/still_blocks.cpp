@@ -244,10 +244,10 @@ bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
   for (std::size_t a = 0; a < kAxes; ++a) {
     double largest_g = most_residual_g(window, a);
     if (largest_g >= options_.max_residual_g) {
-      largest_g = g_per_count_ * static_cast<double>(largest_residual(
-                                     window.values[a], centred_,
-                                     static_cast<float>(window.lines[a].mean),
-                                     static_cast<float>(window.lines[a].slope)));
+      largest_g = g_per_count_ *
+                  static_cast<double>(largest_residual(window.values[a], centred_,
+                                                       static_cast<float>(window.lines[a].mean),
+                                                       static_cast<float>(window.lines[a].slope)));
     }
     window.largest_g[a] = largest_g;
     window.within_paper = window.within_paper && largest_g < options_.max_residual_g;
@@ -270,8 +270,8 @@ void StillBlockFinder::find_noise(Window& window) const {
   }
 }
 
-// Of the recovered raw counts. Where those of neighbouring counts are equally far apart, as they are
-// nearly everywhere, the sum of the counts says it; both ways are exact for halves of a count.
+// Of the recovered raw counts. Where those of neighbouring counts are equally far apart, as they
+// are nearly everywhere, the sum of the counts says it; both ways are exact for halves of a count.
 double StillBlockFinder::raw_sum(const Window& window, std::size_t axis) const {
   const std::int16_t low = window.low[axis];
   const auto raw = [&](int count) {

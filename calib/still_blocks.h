@@ -128,7 +128,7 @@ class StillBlockFinder {
     PerAxis<Line> lines;
     // Residual; where it is within the paper's limit for certain, no more than this.
     PerAxis<double> largest_g{};
-    PerAxis<double> sd{};         // about the line, counts; by find_noise()
+    PerAxis<double> sd{};  // about the line, counts; by find_noise()
     bool within_paper = true;
   };
   StillBlockFinder(const Reversal& reversal, double rate_hz, const StillBlockOptions& options);

@@ -173,12 +173,12 @@ void Findings::append(Findings later) {
 
 bool Findings::accepted(const std::string& effect) const { return contains(effects, effect); }
 
-void Findings::accept_among_many(std::size_t before) {
-  if (before + effects.size() < kManyEffects) {
+void Findings::accept_likely(std::size_t before, bool unnamed) {
+  if (!unnamed && before + effects.size() < kManyEffects) {
     return;
   }
   for (const EffectFinding& f : candidates) {
-    if (f.nats > kAcceptAmongMany_nats && !accepted(f.name)) {
+    if (f.nats > kAcceptLikely_nats && !accepted(f.name)) {
       effects.push_back(f);
     }
   }

@@ -57,14 +57,16 @@ struct Findings {
   void suspect(double nats);
   void append(Findings later);
   bool accepted(const std::string& effect) const;
-  // Accepts weaker candidates where the unit shows that it has a little of everything. `before`:
-  // how many effects other findings hold.
+  // Accepts weaker candidates where the unit shows that it has a little of everything, or where
+  // something is there for certain (`unnamed`: the means show much, and nothing of it is accepted)
+  // and only its name is in doubt. `before`: how many effects other findings hold.
   //
-  // | accepted effects, `before` and here | a candidate is accepted above  |
-  // |-------------------------------------|--------------------------------|
-  // | up to three                         | kAccept_nats, 9 to 1           |
-  // | kManyEffects, four, and more        | kAcceptAmongMany_nats, even    |
-  void accept_among_many(std::size_t before);
+  // | accepted effects, `before` and here | unnamed | a candidate is accepted above |
+  // |-------------------------------------|---------|-------------------------------|
+  // | up to three                         | no      | kAccept_nats, 9 to 1          |
+  // | up to three                         | yes     | kAcceptLikely_nats, even      |
+  // | kManyEffects, four, and more        | either  | kAcceptLikely_nats, even      |
+  void accept_likely(std::size_t before, bool unnamed);
 };
 
 // All that lies still, of one axis or of all (-1): where the noise is measured.

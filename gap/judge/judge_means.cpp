@@ -362,22 +362,25 @@ Findings judge_means(const Request& request, const Explanation& explanation, con
   // Nothing separates it from an offset of half an LSB: what is known is the prior.
   found.add(request,
             {.name = "rounding_floor", .nats = kLogPriorEffect, .confounded_with = {"offset"}});
-  found.accept_among_many(before.effects.size());
+  // What explains much, but so do others, is there all the same.
+  const double much = fit.nats - explanation.nominal().nats;
+  const bool quiet = before.alarms.empty() && found.alarms.empty();
+  const auto unnamed = [&] {
+    return quiet && much > kMuch_nats &&
+           std::none_of(found.effects.begin(), found.effects.end(), [&](const EffectFinding& e) {
+             return e.name == to_string(fit.scatter) || fit.contains(e.name);
+           });
+  };
+  found.accept_likely(before.effects.size(), unnamed());
+  if (unnamed()) {
+    found.alarm(nats_to_sd(much) + kSeveralAlike_sd, "mean: several explanations do alike");
+  }
   const std::map<std::string, double> gap_mg2 = explanation.gap_mg2();
   for (auto* list : {&found.effects, &found.candidates}) {
     for (EffectFinding& f : *list) {
       const auto own = gap_mg2.find(f.name);
       f.gap_mg2 = own == gap_mg2.end() ? 0 : own->second;
     }
-  }
-  // What explains much, but so do others, is a gap all the same.
-  const bool named =
-      std::any_of(found.effects.begin(), found.effects.end(), [&](const EffectFinding& e) {
-        return e.name == to_string(fit.scatter) || fit.contains(e.name);
-      });
-  const double much = fit.nats - explanation.nominal().nats;
-  if (!named && before.alarms.empty() && found.alarms.empty() && much > kMuch_nats) {
-    found.alarm(nats_to_sd(much) + kSeveralAlike_sd, "mean: several explanations do alike");
   }
   return found;
 }

@@ -161,6 +161,23 @@ bool names(const Diagnosis& d, const std::string& effect) {
                      [&](const EffectFinding& e) { return e.name == effect; });
 }
 
+// A zero that wanders off: three minutes show that it does, and hardly whether it drifts on or
+// warms up. The likelier one is named with the other beside it, and nothing is unknown.
+TEST(Diagnose, OfTwoThatLookAlikeTheLikelierIsNamed) {
+  constexpr double kDrift_mg_per_h = 12;
+  const auto d = diagnose(tests::made_production({}, [](const Segment& segment, double t) {
+    const double hours = (segment.host_start_s + t) / 3600;
+    return Eigen::Vector3d(segment.rotation.col(2) +
+                           Eigen::Vector3d(0.6, -0.5, 0.62) * (kDrift_mg_per_h / 1000 * hours));
+  }));
+  ASSERT_OK(d);
+  EXPECT_FALSE(d->unknown.present) << d->brief();
+  ASSERT_EQ(d->effects.size(), 1U) << d->brief();
+  EXPECT_EQ(d->effects[0].name, "drift");
+  EXPECT_EQ(d->effects[0].confounded_with, std::vector<std::string>{"warm_up"});
+  EXPECT_LT(d->effects[0].probability, 0.9);
+}
+
 // A parameter that does not hold throughout is no effect of the catalogue: the same skew is named
 // while it stands still.
 TEST(Diagnose, ATiltThatGrowsIsNotATilt) {

@@ -61,21 +61,25 @@ TEST(Findings, NineToOneIsAccepted) {
 }
 
 // The table of findings.h.
-TEST(Findings, AmongManyEffectsWeakerOnesAreAccepted) {
+TEST(Findings, LikelyOnesAreAcceptedAmongManyAndWhereOnlyTheNameIsInDoubt) {
   const Asked asked;
   struct Case {
     std::size_t before;
+    bool unnamed;
     double nats;
     bool accepted;
   };
-  for (const Case& c : {Case{0, 1, false}, Case{1, 1, false}, Case{2, 0.1, true},
-                        Case{2, -0.1, false}, Case{9, 2.1, true}, Case{0, 2.3, true}}) {
+  for (const Case& c :
+       {Case{0, false, 1, false}, Case{1, false, 1, false}, Case{0, false, 2.3, true},
+        Case{0, true, 0.1, true}, Case{0, true, -0.1, false}, Case{2, false, 0.1, true},
+        Case{2, false, -0.1, false}, Case{2, true, 0.1, true}, Case{9, false, 2.1, true}}) {
     Findings found;
     found.add(asked.request, {.name = "drift", .nats = 9});
     found.add(asked.request, {.name = "tilt", .nats = 8});
     found.add(asked.request, {.name = "second_order", .nats = c.nats});
-    found.accept_among_many(c.before);
-    EXPECT_EQ(found.accepted("second_order"), c.accepted) << c.before << " " << c.nats;
+    found.accept_likely(c.before, c.unnamed);
+    EXPECT_EQ(found.accepted("second_order"), c.accepted)
+        << c.before << " " << c.unnamed << " " << c.nats;
     EXPECT_TRUE(found.accepted("drift"));
     EXPECT_EQ(found.effects.size(), c.accepted ? 3U : 2U);
   }
