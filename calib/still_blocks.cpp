@@ -14,6 +14,30 @@ namespace {
 
 constexpr double kNoiseSigmas = 5;  // see StillBlockOptions::noisy_sd_g
 
+// The sum of the raw counts behind `values`, which lie from `low` to `high` and whose sum is `sum`.
+// Where those of neighbouring counts are equally far apart, as they are nearly everywhere, the sum
+// of the counts says it; both ways are exact for halves of a count.
+double raw_sum(const Reversal& reversal, std::size_t axis, std::span<const std::int16_t> values,
+               std::int64_t sum, std::int16_t low, std::int16_t high) {
+  const auto raw = [&](int count) {
+    return reversal.raw_lsb(axis, static_cast<std::int16_t>(count));
+  };
+  const double step = low < high ? raw(low + 1) - raw(low) : 0;
+  bool even = true;
+  for (int count = low; count < high && even; ++count) {
+    even = raw(count + 1) - raw(count) == step;
+  }
+  const auto number = static_cast<std::int64_t>(values.size());
+  if (even) {
+    return static_cast<double>(number) * raw(low) + step * static_cast<double>(sum - number * low);
+  }
+  double one_by_one = 0;
+  for (const std::int16_t count : values) {
+    one_by_one += raw(count);
+  }
+  return one_by_one;
+}
+
 }  // namespace
 
 Result<StillBlockFinder> StillBlockFinder::make(const Reversal& reversal, double rate_hz,
@@ -212,14 +236,6 @@ bool StillBlockFinder::cannot_be_still(const Window& window, std::size_t axis,
   return g_per_count_ * ((spread - rise) / 2 - 1) >= widest_g;
 }
 
-// Values within this spread have no larger residual from their line. A tenth of a count more, for
-// the rounding of the residuals themselves (single precision).
-double StillBlockFinder::most_residual_g(const Window& window, std::size_t axis) const {
-  const Line& line = window.lines[axis];
-  const double farthest = std::max(window.high[axis] - line.mean, line.mean - window.low[axis]);
-  return g_per_count_ * (farthest + std::abs(line.slope) * (block_samples_ - 1) / 2 + 0.1);
-}
-
 // Criteria 1 and 2. False where the window cannot be a block, noisy or not.
 bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
   for (std::size_t a = 0; a < kAxes; ++a) {
@@ -242,12 +258,16 @@ bool StillBlockFinder::fit_lines(std::size_t begin, Window& window) const {
     }
   }
   for (std::size_t a = 0; a < kAxes; ++a) {
-    double largest_g = most_residual_g(window, a);
+    // Values within this spread have no larger residual from their line. A tenth of a count more,
+    // for the rounding of the residuals themselves (single precision).
+    const Line& line = window.lines[a];
+    const double farthest = std::max(window.high[a] - line.mean, line.mean - window.low[a]);
+    const double rise = std::abs(line.slope) * (block_samples_ - 1);
+    double largest_g = g_per_count_ * (farthest + rise / 2 + 0.1);
     if (largest_g >= options_.max_residual_g) {
-      largest_g = g_per_count_ *
-                  static_cast<double>(largest_residual(window.values[a], centred_,
-                                                       static_cast<float>(window.lines[a].mean),
-                                                       static_cast<float>(window.lines[a].slope)));
+      largest_g = g_per_count_ * static_cast<double>(largest_residual(
+                                     window.values[a], centred_, static_cast<float>(line.mean),
+                                     static_cast<float>(line.slope)));
     }
     window.largest_g[a] = largest_g;
     window.within_paper = window.within_paper && largest_g < options_.max_residual_g;
@@ -270,35 +290,14 @@ void StillBlockFinder::find_noise(Window& window) const {
   }
 }
 
-// Of the recovered raw counts. Where those of neighbouring counts are equally far apart, as they
-// are nearly everywhere, the sum of the counts says it; both ways are exact for halves of a count.
-double StillBlockFinder::raw_sum(const Window& window, std::size_t axis) const {
-  const std::int16_t low = window.low[axis];
-  const auto raw = [&](int count) {
-    return reversal_->raw_lsb(axis, static_cast<std::int16_t>(count));
-  };
-  const double step = low < window.high[axis] ? raw(low + 1) - raw(low) : 0;
-  bool even = true;
-  for (int count = low; count < window.high[axis] && even; ++count) {
-    even = raw(count + 1) - raw(count) == step;
-  }
-  if (even) {
-    const std::int64_t above = window.sums[axis] - std::int64_t{block_samples_} * low;
-    return block_samples_ * raw(low) + step * static_cast<double>(above);
-  }
-  double sum = 0;
-  for (const std::int16_t count : window.values[axis]) {
-    sum += raw(count);
-  }
-  return sum;
-}
-
 StillBlock StillBlockFinder::measure(const Window& window) const {
   StillBlock block;
   for (std::size_t a = 0; a < kAxes; ++a) {
     const double raw_per_count = g_per_count_ / reversal_->calibration().sensitivity_g_per_lsb[a];
     block.mean_g[a] = window.lines[a].mean * g_per_count_;
-    block.mean_lsb[a] = raw_sum(window, a) / block_samples_;
+    block.mean_lsb[a] =
+        raw_sum(*reversal_, a, window.values[a], window.sums[a], window.low[a], window.high[a]) /
+        block_samples_;
     block.sd_lsb[a] = window.sd[a] * raw_per_count;
     const double slope_lsb = window.lines[a].slope * raw_per_count;
     block.ramp_variance_lsb2[a] = slope_lsb * slope_lsb * sum_square_index_ / block_samples_;

@@ -126,9 +126,8 @@ class StillBlockFinder {
     PerAxis<std::int16_t> low{};
     PerAxis<std::int16_t> high{};
     PerAxis<Line> lines;
-    // Residual; where it is within the paper's limit for certain, no more than this.
-    PerAxis<double> largest_g{};
-    PerAxis<double> sd{};  // about the line, counts; by find_noise()
+    PerAxis<double> largest_g{};  // residual
+    PerAxis<double> sd{};         // about the line, counts; by find_noise()
     bool within_paper = true;
   };
   StillBlockFinder(const Reversal& reversal, double rate_hz, const StillBlockOptions& options);
@@ -138,11 +137,9 @@ class StillBlockFinder {
   bool cannot_be_still(const Window& window, std::size_t axis, double widest_g) const;
   void search();
   bool take_block(std::size_t begin);
-  double most_residual_g(const Window& window, std::size_t axis) const;
   bool fit_lines(std::size_t begin, Window& window) const;
   void find_noise(Window& window) const;
   bool is_noise(const Window& window) const;
-  double raw_sum(const Window& window, std::size_t axis) const;
   StillBlock measure(const Window& window) const;
   bool has_zeros(const Window& window) const;
   bool has_clipped(const Window& window) const;

@@ -119,7 +119,7 @@ bool SecondOrder::begins_run(const Second& second) const {
   return time < first - static_cast<std::int64_t>(kLeap_s);
 }
 
-void SecondOrder::put(Second&& second) {
+void SecondOrder::put(Second second) {
   const auto place = std::ranges::upper_bound(waiting_, second.unix_time, {}, &Second::unix_time);
   if (place != waiting_.end()) {
     say(IrregularKind::out_of_order, second);
@@ -128,7 +128,7 @@ void SecondOrder::put(Second&& second) {
   waiting_.insert(place, std::move(second));
 }
 
-void SecondOrder::push(Second&& second) {
+void SecondOrder::push(Second second) {
   if (rate_ > 0 && !second.counts.empty() && second.counts.size() != rate_) {
     say(IrregularKind::odd_size, second, static_cast<std::int64_t>(second.counts.size()));
   }
@@ -197,7 +197,7 @@ void SecondOrder::release(bool all) {
   }
 }
 
-void SecondOrder::give(Second&& second) {
+void SecondOrder::give(Second second) {
   mark_written(second.unix_time, second.unix_time);
   last_ = second.unix_time;
   run_begins_ = false;

@@ -142,7 +142,7 @@ class SecondOrder {
   // `rate` samples are a whole second; 0: any number is.
   explicit SecondOrder(std::size_t rate, std::uint64_t fill_limit_s = kUsualFillLimit_s);
 
-  void push(Second&& second);
+  void push(Second second);
   void end();  // no more will be pushed
 
   // What is certain by now; nothing where more must be pushed, or at the end.
@@ -154,9 +154,9 @@ class SecondOrder {
   void say(IrregularKind kind, const Second& second, std::int64_t value = 0);
   bool take_repetition(Second& second);
   bool begins_run(const Second& second) const;
-  void put(Second&& second);
+  void put(Second second);
   void release(bool all);
-  void give(Second&& second);
+  void give(Second second);
   bool written(std::uint32_t unix_time) const;
   bool was_missing(std::uint32_t unix_time) const;
   void mark_written(std::uint32_t from, std::uint32_t to);

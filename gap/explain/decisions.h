@@ -21,9 +21,8 @@ inline constexpr double kLogPriorUnknown = -4.5;
 // An effect is accepted from nine to one on: log 9.
 inline constexpr double kAccept_nats = 2.2;
 // Beside kManyEffects others the unit is a real one that has a little of everything: then what is
-// likelier than not, which leaves 0.97 and more of all names right (docs/gap.md). The same where
-// something is there and only its name is in doubt.
-inline constexpr double kAcceptLikely_nats = 0;
+// likelier than not, which leaves 0.97 and more of all names right (docs/gap.md).
+inline constexpr double kAcceptAmongMany_nats = 0;
 inline constexpr std::size_t kManyEffects = 4;
 // An unknown cause takes the place of a named one from twenty to one on: log 20.
 inline constexpr double kUnknownWins_nats = 3;

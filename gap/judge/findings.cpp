@@ -178,7 +178,7 @@ void Findings::accept_likely(std::size_t before, bool unnamed) {
     return;
   }
   for (const EffectFinding& f : candidates) {
-    if (f.nats > kAcceptLikely_nats && !accepted(f.name)) {
+    if (f.nats > kAcceptAmongMany_nats && !accepted(f.name)) {
       effects.push_back(f);
     }
   }

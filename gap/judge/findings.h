@@ -61,11 +61,11 @@ struct Findings {
   // something is there for certain (`unnamed`: the means show much, and nothing of it is accepted)
   // and only its name is in doubt. `before`: how many effects other findings hold.
   //
-  // | accepted effects, `before` and here | unnamed | a candidate is accepted above |
-  // |-------------------------------------|---------|-------------------------------|
-  // | up to three                         | no      | kAccept_nats, 9 to 1          |
-  // | up to three                         | yes     | kAcceptLikely_nats, even      |
-  // | kManyEffects, four, and more        | either  | kAcceptLikely_nats, even      |
+  // | accepted effects, `before` and here | unnamed | a candidate is accepted above  |
+  // |-------------------------------------|---------|--------------------------------|
+  // | up to three                         | no      | kAccept_nats, 9 to 1           |
+  // | up to three                         | yes     | kAcceptAmongMany_nats, even    |
+  // | kManyEffects, four, and more        | either  | kAcceptAmongMany_nats, even    |
   void accept_likely(std::size_t before, bool unnamed);
 };
 
