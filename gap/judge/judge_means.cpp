@@ -32,7 +32,7 @@ constexpr double kScatterSizeShare = 0.12;  // and of a scatter's size
 // much itself.
 constexpr double kStandIn_nats = -3;
 constexpr double kConfoundable_nats = 12;
-// An explanation whose parts are all below the threshold is an alarm from this gain on.
+// From this gain on something is there, also where no part of the explanation is accepted.
 constexpr double kMuch_nats = 6;
 constexpr double kSeveralAlike_sd = 2;
 
