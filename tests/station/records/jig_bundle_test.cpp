@@ -74,6 +74,7 @@ TEST(JigBundle, HalfTurnsTellTheJigsTiltFromTheUnits) {
       "virtual:seed=104,jig=auto,jig_tilt_deg={}/{}/0,misalignment_deg={}/{}/{}", truth_deg[0][0],
       truth_deg[0][1], truth_deg[1][0], truth_deg[1][1], truth_deg[1][2]);
   const nlohmann::json production = diagnosed(device, "production");
+  ASSERT_FALSE(production["effects"].empty()) << production["brief"];
   for (const nlohmann::json& effect : production["effects"]) {
     EXPECT_LT(effect["probability"].get<double>(), 0.9) << production["brief"];
     EXPECT_FALSE(effect["confounded_with"].empty()) << production["brief"];
