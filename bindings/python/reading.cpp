@@ -3,8 +3,6 @@
 #include <memory>
 #include <utility>
 
-#include <unistd.h>
-
 #include "bindings/python/failures.h"
 #include "repair/batch/answers.h"
 #include "repair/batch/reading.h"
@@ -38,16 +36,6 @@ py::array array_of(gt3x::RowArray rows, gt3x::RowValue value) {
   return {dtype_of(value), shape, memory, owner};
 }
 
-// Half of the machine's memory: what is more than there is would not be refused by the system, but
-// end the process.
-std::uint64_t most_bytes() {
-  const long pages = sysconf(_SC_PHYS_PAGES);
-  const long page = sysconf(_SC_PAGESIZE);
-  return pages > 0 && page > 0
-             ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page) / 2
-             : UINT64_MAX;
-}
-
 template <class Row>
 Result<std::size_t> read_rows(gt3x::SampleStream& stream, void* memory, std::size_t most) {
   return stream.read(std::span(static_cast<Row*>(memory), most));
@@ -66,7 +54,7 @@ Reading::Reading(const std::string& path, const ReadingOptions& options)
 py::array Reading::read_all() {
   bool signalled = false;
   gt3x::RowArrayOptions how;
-  how.most_bytes = most_bytes();
+  how.most_bytes = repair::half_of_memory();
   how.go_on = [&]() -> Status {
     const py::gil_scoped_acquire acquired;
     signalled = PyErr_CheckSignals() != 0;
@@ -128,7 +116,9 @@ std::string Reading::facts() {
   const repair::Inspection found =
       value_or_throw(repair::reading_of(*recording_, *stream_, options_.salvage));
   gaps_ = found.gaps;
-  return repair::inspection_to_json(found, path_).dump();
+  // info.txt may hold bytes that are no UTF-8.
+  return repair::inspection_to_json(found, path_)
+      .dump(-1, ' ', false, repair::Json::error_handler_t::replace);
 }
 
 py::list Reading::gaps() const {

@@ -1,6 +1,7 @@
 #include "bindings/r/calls.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -8,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -150,6 +152,9 @@ char* sixpoint_reading_open(const char* path, int fill, sixpoint_stop stop,
     }
     bool stopping = false;
     gt3x::RowArrayOptions how;
+    // R gets four columns of doubles beside the three counts of a row.
+    how.most_bytes = repair::half_of_memory() / (4 * sizeof(double) + 3 * sizeof(std::int16_t)) *
+                     (3 * sizeof(std::int16_t));
     how.go_on = [&]() -> Status {
       stopping = stop() != 0;
       return stopping ? Status(sixpoint::fail(ErrorCode::io, "it was stopped")) : Status();
@@ -175,9 +180,13 @@ double sixpoint_reading_rows(const sixpoint_reading* reading) {
 void sixpoint_reading_columns(const sixpoint_reading* reading, double* x_g, double* y_g,
                               double* z_g, double* times_s) {
   const PerAxis<double*> axes = {x_g, y_g, z_g};
-  std::vector<std::jthread> threads;
+  std::array<std::jthread, 3> threads;
   for (std::size_t axis = 0; axis < axes.size(); ++axis) {
-    threads.emplace_back([&, axis] { fill_axis(*reading, axis, axes[axis]); });
+    try {
+      threads[axis] = std::jthread([&, axis] { fill_axis(*reading, axis, axes[axis]); });
+    } catch (const std::system_error&) {  // the system has no thread for it
+      fill_axis(*reading, axis, axes[axis]);
+    }
   }
   fill_times(*reading, times_s);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "base/bytes.h"
 #include "gt3x/container/byte_source.h"
@@ -11,6 +12,15 @@
 #include "repair/triage/survey.h"
 
 namespace sixpoint::repair {
+
+std::uint64_t half_of_memory() {
+  const long pages = sysconf(_SC_PHYS_PAGES);
+  const long page = sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0
+             ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page) / 2
+             : UINT64_MAX;
+}
+
 namespace {
 
 // What stands beside the raw counts of an .agdc; nothing where it cannot be read.

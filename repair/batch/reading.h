@@ -7,11 +7,17 @@
 //   stream)); inspection_to_json(found, path)["gaps"];
 #pragma once
 
+#include <cstdint>
+
 #include "gt3x/recording.h"
 #include "gt3x/rows/sample_stream.h"
 #include "repair/triage/inspection.h"
 
 namespace sixpoint::repair {
+
+// Bytes: half of the machine's memory, for RowArrayOptions::most_bytes. What is more than there is
+// would not be refused by the system, but end the process.
+std::uint64_t half_of_memory();
 
 // As inspect() says it, but for what only a look at every sample tells: no still periods, no
 // clipped samples. `stream` was read to its end. Without filling, the recording is read once more

@@ -27,6 +27,13 @@ class Small(InFolder):
         np.testing.assert_array_equal(g.acceleration, expected / 256)
         self.assertEqual(sixpoint.read(path, dtype="float32").acceleration.dtype, np.float32)
 
+    def test_reads_beside_a_name_that_is_no_utf8(self):
+        info = (INFO + "Subject Name: Andr\xe9\r\n").encode("latin-1")
+        log = record(0, START, packed(samples_of(0)))
+        recording = sixpoint.read(write_recording(self.folder / "latin.gt3x", log, info))
+        self.assertEqual(len(recording), 30)
+        self.assertTrue(recording.info["Subject Name"].startswith("Andr"))
+
     def test_tells_the_time_of_each_sample(self):
         recording = sixpoint.read(small(self.folder))
         self.assertEqual(len(recording), 7 * 30)
