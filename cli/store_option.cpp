@@ -1,7 +1,10 @@
 #include "cli/store_option.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
+#include <string_view>
 
 #include <pwd.h>
 #include <unistd.h>
@@ -47,20 +50,34 @@ std::string place_of(const std::string& location) {
 
 bool is_on_server(const std::string& place) { return place.find("://") != std::string::npos; }
 
-// One name per store, also where it is named from another folder.
-std::string journal_name(const std::string& location) {
-  const std::string place = place_of(location);
-  std::string name;
-  if (is_on_server(place)) {
-    // Without user and password: a changed password must find the same journal.
-    const std::size_t at = place.rfind('@');
-    name = at == std::string::npos ? place.substr(place.find("://") + 3) : place.substr(at + 1);
-  } else {
-    std::error_code error;
-    const auto whole = std::filesystem::weakly_canonical(place, error);
-    name = error ? place : whole.string();
+// host:port/database, and what the settings behind '?' say of these. Without user and password: a
+// changed password must find the same journal.
+std::string place_on_server(const std::string& address) {
+  const std::size_t begin = address.find("://") + 3;
+  const std::size_t settings = std::min(address.find('?', begin), address.size());
+  const std::string place = address.substr(begin, settings - begin);
+  std::string name = place.substr(place.rfind('@') + 1);  // npos + 1 is 0
+  std::istringstream rest(address.substr(settings));
+  for (std::string setting; std::getline(rest, setting, '&');) {
+    setting.erase(0, setting.starts_with('?') ? 1 : 0);
+    for (const std::string_view key : {"host=", "hostaddr=", "port=", "dbname="}) {
+      if (setting.starts_with(key)) {
+        name += "&" + setting;
+      }
+    }
   }
-  return text_sha256(name).substr(0, 16);
+  return name;
+}
+
+// One name per store, also where it is named from another folder.
+std::string store_name(const std::string& location) {
+  const std::string place = place_of(location);
+  if (is_on_server(place)) {
+    return text_sha256(place_on_server(place)).substr(0, 16);
+  }
+  std::error_code error;
+  const auto whole = std::filesystem::weakly_canonical(place, error);
+  return text_sha256(error ? place : whole.string()).substr(0, 16);
 }
 
 }  // namespace
@@ -71,15 +88,15 @@ std::string store_file(const std::string& location) {
 }
 
 std::string run_folder_name(const std::string& location, const std::string& who) {
-  return text_sha256(place_of(location) + "\n" + who).substr(0, 12);
+  return text_sha256(store_name(location) + "\n" + who).substr(0, 12);
 }
 
 std::string guard_folder(const std::string& location) {
-  return data_folder() + "/station/memory-" + journal_name(location);
+  return data_folder() + "/station/memory-" + store_name(location);
 }
 
 std::string journal_folder(const std::string& location) {
-  return data_folder() + "/journal/" + journal_name(location);
+  return data_folder() + "/journal/" + store_name(location);
 }
 
 Result<db::Saved> keep_records(Context& context, const std::string& location,
@@ -87,7 +104,7 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
                                const std::function<Status(db::RecordWriter&)>& work) {
   db::SavePlaces places;
   places.journal = journal_folder(location);
-  const std::string name = "/sixpoint-journal-" + journal_name(location);
+  const std::string name = "/sixpoint-journal-" + store_name(location);
   places.last_resorts.push_back("." + name);
   std::error_code error;
   if (const auto folder = std::filesystem::temp_directory_path(error); !error) {
@@ -209,6 +226,7 @@ Result<db::Store> open_existing_store(Context& context, const std::string& locat
   }
   // It may not be written: what only reads it goes on, and a write says so.
   auto to_read = db::Store::open_to_read(context.env, path);
-  return to_read ? std::move(to_read) : std::move(store);
+  const bool says_more = to_read || to_read.error().code == ErrorCode::configuration;
+  return says_more ? std::move(to_read) : std::move(store);
 }
 }  // namespace sixpoint::cli

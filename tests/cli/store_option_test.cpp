@@ -31,6 +31,32 @@ TEST_F(StoreTest, OneStoreHasOneJournalHoweverItIsNamed) {
   EXPECT_EQ(cli::journal_folder(server).find("secret"), std::string::npos);
 }
 
+TEST_F(StoreTest, AStoreOnAServerIsItsPlaceAndNotWhoAsks) {
+  const std::string place = "postgresql://127.0.0.1:5433/units";
+  for (const char* same : {"?user=ada&password=a", "?password=a@b&user=bo", "?sslmode=require"}) {
+    EXPECT_EQ(cli::journal_folder(place + same), cli::journal_folder(place)) << same;
+  }
+  for (const char* other : {"?dbname=lab", "?password=a&host=plant.example", "?port=5434"}) {
+    EXPECT_NE(cli::journal_folder(place + other), cli::journal_folder(place)) << other;
+  }
+}
+
+// A run under way must not go on into another store of the same name in another folder.
+TEST_F(StoreTest, ARunUnderWayBelongsToOneStoreHoweverItIsNamed) {
+  const std::string here = cli::run_folder_name(path("bench.db"), "MOS2A1");
+  EXPECT_EQ(here, cli::run_folder_name(path("./sub/../bench.db"), "MOS2A1"));
+  EXPECT_NE(here, cli::run_folder_name(path("bench.db"), "MOS2A2"));
+  const auto before = std::filesystem::current_path();
+  std::filesystem::create_directory(path("other"));
+  std::filesystem::current_path(path("."));
+  const std::string from_here = cli::run_folder_name("bench.db", "MOS2A1");
+  std::filesystem::current_path(path("other"));
+  const std::string from_there = cli::run_folder_name("bench.db", "MOS2A1");
+  std::filesystem::current_path(before);
+  EXPECT_EQ(from_here, here);
+  EXPECT_NE(from_there, here);
+}
+
 TEST_F(StoreTest, TheDefaultStoreIsThatOfTheEnvironment) {
   ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
   ::setenv("SIXPOINT_STORE", path("chosen.db").c_str(), 1);
