@@ -122,22 +122,28 @@ std::string line_that_goes_on(const RepairCommandOptions& options) {
   return line + " --resume";
 }
 
-// What the run leaves in its folder, and how it goes on where it was stopped.
-Status conclude(const RepairCommandOptions& options, const std::vector<RepairReport>& reports,
-                const std::vector<repair::UnitNeeds>& units, std::size_t files, Context& context) {
-  const bool stopped = reports.size() < files;
-  if (stopped) {
+Status leave_in_folder(const RepairCommandOptions& options,
+                       const std::vector<RepairReport>& reports,
+                       const std::vector<repair::UnitNeeds>& units, Context& context) {
+  FileSystem& disk = context.env.files;
+  if (options.repair.dry_run || !disk.info(options.folder)) {
+    return {};
+  }
+  SIXPOINT_CHECK(write_manifest(disk, options.folder, reports, context.env.clock.now()));
+  SIXPOINT_CHECK(write_units(disk, options.folder, units));
+  return options.report ? write_study_report(context, disk, options.folder + "/report.html",
+                                             "Repair into " + options.folder, reports)
+                        : Status();
+}
+
+// The command that comes next, or that goes on where this run was stopped.
+void say_what_is_next(const RepairCommandOptions& options, const std::vector<RepairReport>& reports,
+                      std::size_t files, Context& context) {
+  if (reports.size() < files) {
     context.worsen(kExitStopped);
-  }
-  if (!options.repair.dry_run && context.env.files.info(options.folder)) {
-    SIXPOINT_CHECK(
-        write_manifest(context.env.files, options.folder, reports, context.env.clock.now()));
-    SIXPOINT_CHECK(write_units(context.env.files, options.folder, units));
-  }
-  if (stopped) {
     context.people << fmt::format("stopped: {} of {} files are done; to go on:\n  {}\n",
                                   reports.size(), files, line_that_goes_on(options));
-    return {};
+    return;
   }
   const auto asked = context.env.files.info(options.paths.front());
   if (options.paths.size() == 1 && asked && asked->is_folder && !options.repair.dry_run &&
@@ -145,7 +151,6 @@ Status conclude(const RepairCommandOptions& options, const std::vector<RepairRep
                           [](const RepairReport& report) { return !report.output.empty(); })) {
     next_step(context, options.json, {"impact", options.paths.front(), options.folder});
   }
-  return {};
 }
 
 // One run at a time in an output folder. Nothing where its file system has no locks.
@@ -208,11 +213,12 @@ Status run_repair(const RepairCommandOptions& options, Context& context) {
     print_units(context, units);
     context.people << tally.brief(options.repair.dry_run);
   }
-  if (options.report && !options.repair.dry_run) {
-    SIXPOINT_CHECK(write_study_report(context, context.env.files, options.folder + "/report.html",
-                                      "Repair into " + options.folder, reports));
+  // The answer is printed: what goes wrong now must not become a second document.
+  if (const auto status = leave_in_folder(options, reports, units, context); !status) {
+    report_error(context, status.error());
   }
-  return conclude(options, reports, units, files.size(), context);
+  say_what_is_next(options, reports, files.size(), context);
+  return {};
 }
 
 }  // namespace

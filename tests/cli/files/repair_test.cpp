@@ -274,6 +274,19 @@ TEST_F(RepairCommand, AnOutputThatWouldNotBeWrittenNowIsOutdated) {
   EXPECT_EQ(repair({"--redo-outdated"})["status"], "outdated") << "there is nothing to put there";
 }
 
+TEST_F(RepairCommand, AManifestThatCannotBeWrittenIsSaidBesideTheOneDocument) {
+  const std::vector<std::string> words = {"repair",   archive_,      "-o",
+                                          out_,       "--constants", folder_ / "constants.json",
+                                          "--resume", "--json"};
+  ASSERT_EQ(run(words).exit_code, 0);
+  std::filesystem::remove(out_ + "/manifest.csv");
+  std::filesystem::create_directory(out_ + "/manifest.csv");
+  const auto again = run(words);
+  EXPECT_EQ(again.json()["files"].size(), 2U) << "one document, whole";
+  EXPECT_THAT(again.people, HasSubstr("manifest.csv"));
+  EXPECT_GE(again.exit_code, 64);
+}
+
 TEST_F(RepairCommand, PeopleSeeTheSourceTheErrorsAndTheReasons) {
   const auto answer =
       run({"repair", archive_, "-o", out_, "--constants", folder_ / "constants.json"});
