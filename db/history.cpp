@@ -7,7 +7,7 @@
 namespace sixpoint::db {
 
 Result<Head> read_head(Database& database) {
-  SIXPOINT_ASSIGN(auto rows, database.query("SELECT rows, hash FROM head"));
+  SIXPOINT_ASSIGN(auto rows, database.query("SELECT rows, hash FROM head WHERE one = 1"));
   auto* hash = rows.size() == 1 ? std::get_if<Bytes>(&rows[0][1]) : nullptr;
   if (hash == nullptr || hash->size() != 32) {
     return fail(ErrorCode::bad_data, "the head of the history is missing", database.location(),
@@ -71,6 +71,17 @@ Status HistoryWriter::insert(const Table& table, std::span<const Value> columns,
   }
   SIXPOINT_CHECK(database_->execute(
       fmt::format("INSERT INTO {} ({}) VALUES ({})", table.name, column_list(table), places), row));
+  // A trigger that is not ours can swallow a row without an error.
+  SIXPOINT_ASSIGN(const auto there,
+                  database_->query(fmt::format("SELECT 1 FROM {} WHERE seq = $1", table.name),
+                                   std::span<const Value>(row).first(1)));
+  if (there.empty()) {
+    return fail(ErrorCode::bad_data,
+                fmt::format("the table '{}' does not keep what is written into it: another program "
+                            "changed the store",
+                            table.name),
+                database_->location(), "keep this file, and restore the last backup");
+  }
   ++head_.rows;
   head_.hash.assign(hash.begin(), hash.end());
   return {};

@@ -254,7 +254,17 @@ Status migrate(Database& database) {
   // Another process may have done it while this one waited for the lock.
   SIXPOINT_ASSIGN(const auto version, database.schema_version());
   for (std::int64_t next = version + 1; next <= kSchemaVersion; ++next) {
-    SIXPOINT_CHECK(bring_to(next, database));
+    if (auto status = bring_to(next, database); !status) {
+      if (status.error().code != ErrorCode::internal) {
+        return status;
+      }
+      return fail(
+          ErrorCode::bad_data,
+          fmt::format("the store says that it has version {}, and its tables are others: {}",
+                      version, status.error().what),
+          database.location(),
+          "another program changed it: keep this file, and restore the last backup");
+    }
   }
   return transaction.commit();
 }

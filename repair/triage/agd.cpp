@@ -7,9 +7,10 @@
 namespace sixpoint::repair {
 namespace {
 
-// A path as part of an SQLite URI: '?', '#' and '%' would end or change it.
+// A path as part of an SQLite URI: '?', '#' and '%' would end or change it, and what follows two
+// slashes is a host.
 std::string uri_of(const std::string& path) {
-  std::string uri = "file:";
+  std::string uri = path.starts_with('/') ? "file://" : "file:";
   for (const char c : path) {
     if (c == '?' || c == '#' || c == '%') {
       uri += fmt::format("%{:02X}", static_cast<unsigned char>(c));

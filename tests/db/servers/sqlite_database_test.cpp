@@ -50,6 +50,51 @@ class SqliteStoreTest : public testing::Test {
   MemoryEnv memory_;
 };
 
+// What another program may do to a store: nothing is acknowledged then that is not kept.
+TEST_F(SqliteStoreTest, AStoreWithTablesOfAnotherProgramTakesNothing) {
+  for (const char* change :
+       {"UPDATE head SET one = 2",
+        "CREATE TRIGGER t BEFORE INSERT ON constants BEGIN SELECT RAISE(IGNORE); END"}) {
+    std::filesystem::remove(path());
+    {
+      auto store = open();
+      ASSERT_OK(store);
+      ASSERT_OK(store->add_constants(constants(1), "w"));
+    }
+    run_sql(change);
+    auto store = open();
+    ASSERT_OK(store);
+    EXPECT_FAILS(store->add_constants(constants(2), "w"), ErrorCode::bad_data) << change;
+  }
+}
+
+TEST_F(SqliteStoreTest, AVersionThatItsTablesContradictIsBadData) {
+  ASSERT_OK(open());
+  for (const char* version : {"0", "1", "2"}) {
+    run_sql(std::string("PRAGMA user_version=") + version);
+    EXPECT_FAILS(open(), ErrorCode::bad_data) << version;
+  }
+}
+
+TEST_F(SqliteStoreTest, ABackupIsItsOwnersAlone) {
+  auto store = open();
+  ASSERT_OK(store);
+  const mode_t before = ::umask(0);
+  const auto made = backup(*store, memory_.env, folder_ / "copy.db");
+  ::umask(before);
+  ASSERT_OK(made);
+  struct stat status {};
+  ASSERT_EQ(::stat((folder_ / "copy.db").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777U, 0600U);
+}
+
+// In an address the word behind two slashes would be a host.
+TEST_F(SqliteStoreTest, APathMayBeginWithTwoSlashes) {
+  ASSERT_OK(Store::open(memory_.env, "/" + path()));
+  EXPECT_TRUE(std::filesystem::exists(path()));
+  ASSERT_OK(Store::open(memory_.env, "/" + path())) << "once more, now that it is there";
+}
+
 // A station opens its store from several threads, and two stations may begin at the same moment.
 TEST_F(SqliteStoreTest, ThoseThatMakeAStoreAtOnceAllHaveIt) {
   for (int round = 0; round < 25; ++round) {

@@ -26,6 +26,13 @@ TEST(Agd, ReadsSerialAndFirmware) {
   EXPECT_FALSE(facts->calibration_time) << "an .agd does not say it";
 }
 
+// In an address the word behind two slashes would be a host.
+TEST(Agd, APathMayBeginWithTwoSlashes) {
+  const tests::TemporaryFolder folder;
+  tests::make_agd(folder / "a.agd", "MOS2A1", "1.5.0");
+  ASSERT_OK(read_agd_facts("/" + (folder / "a.agd")));
+}
+
 TEST(Agd, RefusesOtherFiles) {
   const tests::TemporaryFolder folder;
   EXPECT_FAILS(read_agd_facts(folder / "none.agd"), ErrorCode::no_input);
