@@ -25,6 +25,9 @@ GateRow row_of(const GateEvidence& evidence) {
       evidence.after_mg > evidence.before_mg - kLeastGain_mg) {
     return GateRow::no_better;
   }
+  if (evidence.written_mg && *evidence.written_mg >= evidence.before_mg) {
+    return GateRow::rounded_away;
+  }
   if (evidence.after_mg > most_left_mg(evidence)) {
     return GateRow::too_much_left;
   }
@@ -37,8 +40,8 @@ GateRow row_of(const GateEvidence& evidence) {
 }
 
 bool is_refused(GateRow row) {
-  return row == GateRow::worse || row == GateRow::no_better || row == GateRow::too_much_left ||
-         row == GateRow::ambiguous;
+  return row == GateRow::worse || row == GateRow::no_better || row == GateRow::rounded_away ||
+         row == GateRow::too_much_left || row == GateRow::ambiguous;
 }
 
 // By constants with a slope above 1 some stored counts have no raw count behind them; a hundredth
@@ -73,6 +76,11 @@ std::string reason_of(GateRow row, const GateEvidence& evidence) {
       return both(
           "the file is within 64 mg as it is, perhaps corrected before, and the repair does not "
           "improve it: still error {before:.1f} mg before, {after:.1f} mg after");
+    case GateRow::rounded_away:
+      return fmt::format(
+          "what the repair would gain is lost when samples are rounded to counts: still error "
+          "{:.1f} mg before, {:.1f} mg after",
+          evidence.before_mg, evidence.written_mg.value_or(0));
     case GateRow::too_much_left:
       return both(
                  "the constants do not fit the file: still error {before:.1f} mg before, "

@@ -14,6 +14,8 @@
 // | 0          | -                                            | not_checked   | yes          |
 // | 1 or more  | after > before                               | worse         | with `force` |
 // | 1 or more  | before <= 64 mg, and after > before - 1 mg   | no_better     | with `force` |
+// | 1 or more  | as written, with counts rounded: not below   | rounded_away  | with `force` |
+// |            | before (asked again before it is kept)       |               |              |
 // | 1 to 3     | after > 20 mg                                | too_much_left | with `force` |
 // | 4 or more  | after > 32 mg                                | too_much_left | with `force` |
 // | 1 to 3     | before <= 32 mg, the counts may come from    | ambiguous     | with `force` |
@@ -29,6 +31,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -48,16 +51,27 @@ inline constexpr int kLeastDirections = 4;
 struct GateEvidence {
   int directions = 0;  // in which the file has still blocks (calib/direction_cells.h)
   double before_mg = 0;
-  double after_mg = 0;
+  double after_mg = 0;  // before counts are rounded
   // Only the unit's own constants make such counts: other software leaves counts that no integer
   // leads to. False where that cannot be told (calib/scaling.h, PlausibilityTally).
   bool counts_are_the_units_own = false;
+  // After, of the samples that were written; nothing as long as they are not.
+  std::optional<double> written_mg = std::nullopt;
 };
 // `cross_axis`: the terms xy, xz, yz that are applied with the constants; all zero for none.
 GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh,
                            const PerAxis<double>& cross_axis = {});
 
-enum class GateRow { not_checked, worse, no_better, too_much_left, ambiguous, weak, helps };
+enum class GateRow {
+  not_checked,
+  worse,
+  no_better,
+  rounded_away,
+  too_much_left,
+  ambiguous,
+  weak,
+  helps
+};
 struct GateAnswer {
   GateRow row = GateRow::not_checked;
   bool write = true;

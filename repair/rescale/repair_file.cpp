@@ -114,8 +114,7 @@ class Repair {
       }
       SIXPOINT_CHECK(choose());
       if (!chosen_.has_value() || !may_write()) {
-        report_.status = RepairStatus::not_repairable;
-        return look_for_earlier_output();
+        return not_repairable();
       }
     }
     return write();
@@ -257,10 +256,10 @@ class Repair {
     if (!map_->why.empty()) {
       report_.reasons.push_back(map_->why);
     }
-    const GateEvidence evidence = gate_evidence(survey_, map_->calibration, map_->cross_axis);
-    const GateAnswer answer = gate(evidence, options_.force);
-    if (evidence.directions > 0) {
-      report_.still_error_after_mg = evidence.after_mg;
+    evidence_ = gate_evidence(survey_, map_->calibration, map_->cross_axis);
+    const GateAnswer answer = gate(*evidence_, options_.force);
+    if (evidence_->directions > 0) {
+      report_.still_error_after_mg = evidence_->after_mg;
     }
     if (!answer.reason.empty()) {
       report_.reasons.push_back(answer.reason);
@@ -281,6 +280,30 @@ class Repair {
     }
     state_map();
     return true;
+  }
+
+  // The gate once more, with what was written. Without constants there was no gate.
+  bool may_be_kept(RescaledLog& log, std::span<const StillWindow> windows) {
+    if (!evidence_) {
+      return true;
+    }
+    evidence_->written_mg = log.still_error_mg(windows);
+    const GateAnswer answer = gate(*evidence_, options_.force);
+    if (answer.row != GateRow::rounded_away) {
+      return true;
+    }
+    report_.still_error_after_mg = evidence_->written_mg;
+    report_.reasons.push_back(answer.reason);
+    report_.forced = answer.forced;
+    if (answer.forced) {
+      report_.reasons.emplace_back("--force: repaired all the same");
+    }
+    return answer.write;
+  }
+
+  Status not_repairable() {
+    report_.status = RepairStatus::not_repairable;
+    return look_for_earlier_output();
   }
 
   // What is wrong with constants from elsewhere by the file's own still periods, where these have a
@@ -369,6 +392,9 @@ class Repair {
       log->expect_still(windows);
       if (options_.dry_run) {
         SIXPOINT_CHECK(read_through(*log));
+        if (!may_be_kept(*log, windows)) {
+          return not_repairable();
+        }
         finish(recording, *log, windows);
         return {};
       }
@@ -383,6 +409,10 @@ class Repair {
       SIXPOINT_CHECK(write_entries(recording, *log, writer));
       written_.emplace(WrittenLog{std::move(recording), how, std::move(log), std::move(writer),
                                   report_.input_sha256});
+    }
+    if (!may_be_kept(*written_->log, windows)) {
+      written_.reset();
+      return not_repairable();
     }
     SIXPOINT_CHECK(commit(written_->writer));
     finish(written_->recording, *written_->log, windows);
@@ -567,6 +597,7 @@ class Repair {
   Survey survey_;
   std::optional<ChosenConstants> chosen_;
   std::optional<AppliedMap> map_;  // of chosen_
+  std::optional<GateEvidence> evidence_;
   // The new file up to its mark, in the temporary file.
   struct WrittenLog {
     gt3x::Recording recording;

@@ -20,7 +20,9 @@ void expect_refused(const GateEvidence& evidence, GateRow row) {
   EXPECT_FALSE(answer.write);
   EXPECT_FALSE(answer.forced);
   EXPECT_THAT(answer.reason, HasSubstr(fmt::format("{:.1f} mg before", evidence.before_mg)));
-  EXPECT_THAT(answer.reason, HasSubstr(fmt::format("{:.1f} mg after", evidence.after_mg)));
+  EXPECT_THAT(
+      answer.reason,
+      HasSubstr(fmt::format("{:.1f} mg after", evidence.written_mg.value_or(evidence.after_mg))));
   const GateAnswer forced = gate(evidence, true);
   EXPECT_TRUE(forced.write);
   EXPECT_TRUE(forced.forced);
@@ -47,6 +49,10 @@ TEST(Gate, WhatWasRightAndGetsNoBetterIsNotWritten) {
   expect_refused({9, 12.25, 12.25}, GateRow::no_better);
   expect_refused({9, 12.25, 11.75}, GateRow::no_better);
   expect_refused({9, 64.00, 63.25}, GateRow::no_better);
+  expect_refused({9, 1.96, 0.5, true, 1.96}, GateRow::rounded_away);
+  expect_refused({9, 1.96, 0.5, true, 2.49}, GateRow::rounded_away);
+  expect_refused({9, 70.25, 1.0, true, 70.25}, GateRow::rounded_away);
+  EXPECT_EQ(gate({9, 1.96, 0.5, true, 1.95}, false).row, GateRow::helps);
   EXPECT_EQ(gate({9, 12.25, 11.25}, false).row, GateRow::helps) << "1 mg is enough";
 }
 
