@@ -59,9 +59,25 @@ namespace {
 
 constexpr double kHum_g = 0.04;  // standard deviation under a climate chamber's fan
 
-void take_parameters(const gt3x::Parameters& parameters, FileFacts& facts) {
+// A unit is calibrated before it records: a date behind the recording says nothing, whichever of
+// the two clocks was wrong. A day is for zones of time.
+std::optional<UtcTime> possible_date(std::optional<UtcTime> calibrated, const gt3x::Info& info,
+                                     std::vector<std::string>& notes) {
+  const auto start = info.start();
+  if (!calibrated || !start || *start < first_possible_calibration() ||
+      *calibrated <= *start + std::chrono::hours(24)) {
+    return calibrated;
+  }
+  notes.push_back(
+      fmt::format("the file gives {} as the date of calibration, which is after it was recorded",
+                  to_iso8601(*calibrated)));
+  return std::nullopt;
+}
+
+void take_parameters(const gt3x::Parameters& parameters, const gt3x::Info& info, FileFacts& facts,
+                     std::vector<std::string>& notes) {
   if (!facts.calibration_time.has_value()) {
-    facts.calibration_time = parameters.calibration_time;
+    facts.calibration_time = possible_date(parameters.calibration_time, info, notes);
   }
   if (facts.firmware.empty()) {
     facts.firmware = parameters.firmware.value_or("");
@@ -168,7 +184,8 @@ Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOption
   SIXPOINT_ASSIGN(auto still,
                   StillScan::make(result.rate_hz, result.accel_scale_lsb_per_g, options));
   if (const auto memory = unit_memory(recording)) {
-    result.facts.calibration_time = memory->calibration_time;
+    result.facts.calibration_time =
+        possible_date(memory->calibration_time, recording.info(), result.notes);
     if (result.facts.firmware.empty()) {
       result.facts.firmware = memory->firmware;
     } else if (!memory->firmware.empty() &&
@@ -210,14 +227,15 @@ Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOption
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
   FileFacts facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
+  std::vector<std::string> notes;
   if (!recording.has_log()) {
     if (const auto memory = unit_memory(recording)) {
-      facts.calibration_time = memory->calibration_time;
+      facts.calibration_time = possible_date(memory->calibration_time, recording.info(), notes);
     }
   } else {
     SIXPOINT_ASSIGN(const auto first, first_parameters(recording));
     if (first) {
-      take_parameters(*first, facts);
+      take_parameters(*first, recording.info(), facts, notes);
     }
   }
   return facts;
@@ -263,7 +281,7 @@ class LogSurvey::Pass {
     SIXPOINT_ASSIGN(const auto first, first_parameters(recording_));
     take_scale(first);
     if (first.has_value()) {
-      take_parameters(*first, result_.facts);
+      take_parameters(*first, recording_.info(), result_.facts, result_.notes);
     }
     scale_lsb_per_g_ = result_.header_scale_lsb_per_g;
     rotated_ = triage(result_.facts).axes_rotated && !result_.already_repaired;

@@ -20,8 +20,9 @@
 // | MOS...        | not said           | one of the five                 | cannot_tell  |
 // | MOS...        | any                | two, which lead to two answers  | cannot_tell  |
 //
-// A date before 2012 is none: the family was not made then, so a clock had not been set. Two
-// firmware versions: info.txt names one and the PARAMETERS record another.
+// A date before 2012 is none: the family was not made then, so a clock had not been set. Nor is one
+// behind the recording: whoever fills FileFacts from a file leaves it out (survey.h). Two firmware
+// versions: info.txt names one and the PARAMETERS record another.
 #pragma once
 
 #include <optional>

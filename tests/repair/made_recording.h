@@ -28,7 +28,8 @@ struct MadeRecording {
   std::int64_t calibrated = 1'384'266'733;  // 2013-11-12
   StoredConstants constants = kStored;
   unsigned rate_hz = 30;
-  std::uint32_t start = 1'428'588'240;
+  std::uint32_t start = 1'428'588'240;  // 2015-04-09
+  bool info_says_start = false;
   bool activity2 = false;
   // Raw counts of the sensor, one entry per sample.
   std::vector<PerAxis<int>> raw;
@@ -103,6 +104,9 @@ struct MadeRecording {
     info.set("Serial Number", serial);
     info.set("Firmware", firmware);
     info.set("Sample Rate", std::to_string(rate_hz));
+    if (info_says_start) {  // ticks of 100 ns since the year 1
+      info.set("Start Date", std::to_string((std::int64_t{start} + 62'135'596'800) * 10'000'000));
+    }
     SIXPOINT_ASSIGN(auto writer, gt3x::RecordingWriter::create(files, path));
     SIXPOINT_CHECK(writer.add("log.bin", std::move(log_bytes)));
     SIXPOINT_CHECK(writer.add("info.txt", info.serialise()));

@@ -12,6 +12,32 @@
 namespace sixpoint::repair {
 namespace {
 
+// A unit is calibrated before it records.
+TEST(Survey, ADateOfCalibrationBehindTheRecordingIsNone) {
+  tests::MadeRecording made = tests::six_sides();
+  made.info_says_start = true;
+  const auto facts_with = [&](std::int64_t calibrated) {
+    MemoryFiles files;
+    made.calibrated = calibrated;
+    EXPECT_TRUE(made.write(files, "in.gt3x"));
+    const auto found = survey(files, "in.gt3x");
+    const auto facts = facts_of(files, "in.gt3x");
+    EXPECT_TRUE(found && facts);
+    EXPECT_EQ(facts->calibration_time, found->facts.calibration_time);
+    return found->facts;
+  };
+  constexpr std::int64_t kDay_s = 86'400;
+  const std::int64_t start = made.start;
+  EXPECT_EQ(facts_with(start + kDay_s).calibration_time, from_unix_seconds(start + kDay_s));
+  for (const std::int64_t impossible : {start + kDay_s + 1, std::int64_t{0xFFFFFFFF}}) {
+    const FileFacts facts = facts_with(impossible);
+    EXPECT_FALSE(facts.calibration_time) << impossible;
+    EXPECT_EQ(triage(facts).verdict, Verdict::cannot_tell);
+  }
+  made.start = 0;  // a clock that was never set says nothing about the other
+  EXPECT_EQ(facts_with(1'395'619'200).calibration_time, from_unix_seconds(1'395'619'200));
+}
+
 TEST(Survey, SaysWhatTheFileHolds) {
   MemoryFiles files;
   const tests::MadeRecording made = tests::six_sides();
