@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "repair/archive/archive_scripts.h"
+
 namespace sixpoint::cli {
 
 namespace {
@@ -22,20 +24,6 @@ std::size_t width_of(const std::string& text) {
 bool are_three(const Json& json, const char* key) {
   return json.is_object() && json.contains(key) && json[key].is_array() && json[key].size() == 3 &&
          json[key][0].is_number() && json[key][1].is_number() && json[key][2].is_number();
-}
-
-// As a shell takes it for one word.
-std::string quoted(const std::string& word) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./@%";
-  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) {
-    return word;
-  }
-  std::string out = "'";
-  for (const char c : word) {
-    out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  }
-  return out + "'";
 }
 
 }  // namespace
@@ -102,7 +90,7 @@ void next_step(Context& context, bool as_json, const std::vector<std::string>& w
   }
   std::string line = "next: sixpoint";
   for (const std::string& word : words) {
-    line.append(1, ' ').append(quoted(printable(word)));
+    line.append(1, ' ').append(repair::shell_word(printable(word)));
   }
   context.people << line << '\n';
 }

@@ -15,7 +15,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kStandardGravity_m_per_s2 = 9.80665;
 constexpr const char* kAcceleration = R"(\metre\second\tothe{-2})";
 constexpr const char* kOne = R"(\one)";
 
