@@ -135,7 +135,7 @@ Status watch(const DevicesCommandOptions& options, Context& context) {
         json["device"]["accessible"] = false;
         json["device"]["hint"] = nullptr;
       }
-      context.out << json.dump() << '\n';
+      context.out << json.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
     } else if (arrived) {
       context.out << "arrived  ";
       print_devices(context, one);

@@ -104,6 +104,11 @@ Json content_of(const DocumentEvidence& evidence) {
   return json;
 }
 
+// A document is itself also where a name in it is no UTF-8, as those of folders may be.
+std::string digest_of(const DocumentEvidence& evidence) {
+  return text_sha256(content_of(evidence).dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
 DocumentEvidence parse(const Json& json) {
   DocumentEvidence out;
   out.serial = json.at("serial").get<std::string>();
@@ -131,7 +136,7 @@ DocumentEvidence parse(const Json& json) {
   for (const Json& entry : json.at("not_observable")) {
     out.not_observable.push_back(entry.at("name").get<std::string>());
   }
-  out.id = text_sha256(content_of(out).dump());
+  out.id = digest_of(out);
   return out;
 }
 
@@ -202,7 +207,7 @@ Result<DocumentEvidence> evidence_from_scenario(const Json& json) {
       out.effects.push_back(std::move(effect));
     }
     SIXPOINT_CHECK(check(out, where));
-    if (text_sha256(content_of(out).dump()) != out.id) {
+    if (digest_of(out) != out.id) {
       return bad(where, fmt::format("the document of unit {} was changed by hand", out.serial));
     }
     return out;

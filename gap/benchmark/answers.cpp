@@ -172,7 +172,8 @@ std::string answer_line(const Answer& answer) {
     }
   }
   json["candidates"] = list(answer.candidates);
-  return json.dump();
+  // A folder's name may hold bytes that are no UTF-8.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace sixpoint::gap
