@@ -241,6 +241,79 @@ Status export_trials(const GapChallengeCommandOptions& options, sim::StandardPro
   return export_challenge(how, context);
 }
 
+// Where the bundles are made; a temporary folder goes with it.
+class TrialFolder {
+ public:
+  TrialFolder() = default;
+  TrialFolder(const TrialFolder&) = delete;
+  TrialFolder& operator=(const TrialFolder&) = delete;
+  ~TrialFolder() {
+    std::error_code ignored;
+    if (is_temporary_) {
+      std::filesystem::remove_all(path_, ignored);
+    }
+  }
+
+  Status make(const std::string& keep, Outputs& outputs) {
+    path_ = keep;
+    if (!keep.empty()) {
+      SIXPOINT_CHECK(outputs.folder("--keep", path_));
+      return outputs.files().make_folders(path_);
+    }
+    std::error_code error;
+    path_ = (std::filesystem::temp_directory_path(error) / "sixpoint-challenge-XXXXXX").string();
+    is_temporary_ = mkdtemp(path_.data()) != nullptr;
+    return is_temporary_ ? Status()
+                         : fail(ErrorCode::cannot_create, "no temporary folder can be made", path_,
+                                "name one with --keep");
+  }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  bool is_temporary_ = false;
+};
+
+Result<std::vector<Followed>> run_trials(Env& env, const GapChallengeCommandOptions& options,
+                                         sim::StandardProtocol protocol, const std::string& folder,
+                                         Context& context) {
+  std::vector<Result<Followed>> results(options.trials, Result<Followed>(Followed{}));
+  {
+    Progress progress(context, "trials", options.trials);
+    for_each_job(
+        options.trials, options.jobs,
+        [&](std::size_t i) { results[i] = run_trial(env, options, protocol, folder, i); },
+        [&](std::size_t done) { progress.at(done); });
+  }
+  std::vector<Followed> trials;
+  for (Result<Followed>& result : results) {
+    SIXPOINT_ASSIGN(Followed trial, std::move(result));
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+void print_scores(const GapChallengeCommandOptions& options, const Scores& scores,
+                  const std::vector<Outcome>& outcomes, const std::vector<Followed>& trials,
+                  Context& context) {
+  if (options.json) {
+    Json json = scores_json(options, scores, outcomes);
+    if (options.follow) {
+      json["followed"] = gain_json(gap::gain_of(trials));
+    }
+    print_json(context, json);
+    return;
+  }
+  auto lines = scores_lines(scores);
+  if (options.follow) {
+    const auto more = gain_lines(gap::gain_of(trials));
+    lines.insert(lines.end(), more.begin(), more.end());
+  }
+  for (const auto& [what, value] : lines) {
+    context.text() << fmt::format("{:<42} {}\n", what, value);
+  }
+}
+
 Status challenge(GapChallengeCommandOptions options, Context& context) {
   const auto protocol = sim::parse_standard_protocol(options.protocol);
   if (!protocol) {
@@ -265,71 +338,28 @@ Status challenge(GapChallengeCommandOptions options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(options.recording));
   SIXPOINT_CHECK(outputs.file("--html", options.html));
-  std::error_code error;
-  const bool temporary = options.keep.empty();
-  std::string folder = options.keep;
-  if (temporary) {
-    std::string pattern =
-        (std::filesystem::temp_directory_path(error) / "sixpoint-challenge-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-      return fail(ErrorCode::cannot_create, "no temporary folder can be made", pattern,
-                  "name one with --keep");
-    }
-    folder = pattern;
-  } else {
-    SIXPOINT_CHECK(outputs.folder("--keep", folder));
-    SIXPOINT_CHECK(context.env.files.make_folders(folder));
-  }
+  TrialFolder folder;
+  SIXPOINT_CHECK(folder.make(options.keep, outputs));
   Env env = outputs.env();
   if (!options.recording.empty()) {
-    SIXPOINT_CHECK(learn_own(env, options, folder));
+    SIXPOINT_CHECK(learn_own(env, options, folder.path()));
     if (std::all_of(options.only.begin(), options.only.end(),
                     [&](const std::string& name) { return options.own_effects.contains(name); })) {
       return fail(ErrorCode::bad_data, "the recording has of its own all that could be added to it",
                   options.recording, "give the recording of a unit that reads right");
     }
   }
-  std::vector<Result<Followed>> results(options.trials, Result<Followed>(Followed{}));
-  {
-    Progress progress(context, "trials", options.trials);
-    for_each_job(
-        options.trials, options.jobs,
-        [&](std::size_t i) { results[i] = run_trial(env, options, *protocol, folder, i); },
-        [&](std::size_t done) { progress.at(done); });
-  }
-  if (temporary) {
-    std::filesystem::remove_all(folder, error);
-  }
-  std::vector<Followed> trials;
+  SIXPOINT_ASSIGN(const auto trials, run_trials(env, options, *protocol, folder.path(), context));
   std::vector<Outcome> outcomes;
-  for (Result<Followed>& result : results) {
-    if (!result) {
-      return tl::unexpected(result.error());
-    }
-    outcomes.push_back(result->before);
-    trials.push_back(std::move(*result));
+  for (const Followed& trial : trials) {
+    outcomes.push_back(trial.before);
   }
   const Scores scores = gap::score(outcomes, options.strip);
   if (!options.html.empty()) {
     SIXPOINT_CHECK(
         write_file(outputs.files(), options.html, scores_page(options, scores, outcomes)));
   }
-  if (options.json) {
-    Json json = scores_json(options, scores, outcomes);
-    if (options.follow) {
-      json["followed"] = gain_json(gap::gain_of(trials));
-    }
-    print_json(context, json);
-  } else {
-    auto lines = scores_lines(scores);
-    if (options.follow) {
-      const auto more = gain_lines(gap::gain_of(trials));
-      lines.insert(lines.end(), more.begin(), more.end());
-    }
-    for (const auto& [what, value] : lines) {
-      context.text() << fmt::format("{:<42} {}\n", what, value);
-    }
-  }
+  print_scores(options, scores, outcomes, trials, context);
   if (scores.failures.right > 0) {
     context.worsen(kExitFailed);
   }
