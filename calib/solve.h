@@ -103,7 +103,16 @@ struct SolveReport {
 nlohmann::ordered_json to_json(const SolveReport& report);
 
 // `file_constants` are those that the blocks' mean_g were made with. Fails on data that are not
-// finite and impossible constants; everything else is a report.
+// finite and impossible constants; everything else is a report. Which blocks it uses:
+//
+// | those that meet the paper's criteria           | noisy ones | used                            |
+// |------------------------------------------------|------------|---------------------------------|
+// | give verified constants                        | any        | the paper's                     |
+// | do not suffice: a side is missing, or has too  | none       | the paper's; what is missing is |
+// | few blocks                                     |            | said                            |
+// | do not suffice                                 | some       | all; noisy_points and a note    |
+// |                                                |            | say how many of them are noisy  |
+// | contradict the constants, or drift             | any        | the paper's: more are no remedy |
 Result<SolveReport> solve_from_still_blocks(std::span<const StillBlock> blocks,
                                             const Calibration& file_constants,
                                             const SolveOptions& options = {});

@@ -8,13 +8,15 @@
 // Six directions determine six constants exactly, so a six-sided calibration file has next to no
 // residual, right or wrong. What can be tested depends on the data:
 //
-//     the data                                   | tested by                      | verdict
-//     a side is missing                          | -                              | incomplete
-//     three directions or more beyond six        | each direction, by a fit       | verified
-//                                                | without it (held out)          |
-//     six sides, three blocks or more on each    | the halves of the file agree;  | verified_by_
-//                                                | noise; a real sensor's range   |   repeatability
-//     anything else, or a limit is exceeded      | -                              | not_verified
+// | the data                              | tested by                | verdict                   |
+// |---------------------------------------|--------------------------|---------------------------|
+// | a side is missing                     | -                        | incomplete                |
+// | three directions or more beyond six   | each direction, by a fit | verified                  |
+// |                                       | without it (held out)    |                           |
+// | six sides of three blocks or more     | the halves of the file   | verified_by_repeatability |
+// |                                       | agree; noise; the range  |                           |
+// |                                       | of a real sensor         |                           |
+// | anything else, or a limit is exceeded | -                        | not_verified              |
 //
 // Each still side is a valid equation whatever its exact angle, so six sides are enough to use the
 // constants. The weaker verdict says what they rest on. Magnitudes are in mg. Pure functions.

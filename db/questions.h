@@ -27,7 +27,7 @@ struct UnitHistory {
   bool empty() const;
   // Do these constants apply no more? The last correction decides:
   //
-  // | corrections of the set, oldest first (others do not count)| withdrawn |
+  // | corrections of the set, oldest first (others do not count) | withdrawn |
   // |------------------------------------------------------------|-----------|
   // | none                                                       | no        |
   // | ..., withdraw                                              | yes       |

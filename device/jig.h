@@ -11,10 +11,9 @@
 //     stop(), or the jig's own button  device_unavailable, nothing moves   release()
 //     a fault of the jig               device_unavailable, nothing moves   the fault is gone, and
 //                                                                          release()
-//     the unit or the jig was unplugged and is back: as before; that is no word of the operator
 //
-// No program calls release() by itself: it is the operator's word that he saw the jig and that no
-// hand is in it.
+// That the unit or the jig was unplugged and is back changes nothing of this. No program calls
+// release() by itself: it is the operator's word that he saw the jig and that no hand is in it.
 //
 // A pose is named by the axis that points up and reads +1 g, or that points down and reads -1 g.
 // Angles are in degrees. Errors: device_unavailable when the jig is gone or faulty.

@@ -23,10 +23,11 @@
 //     written just now, or still waiting, with       the record with more samples    repeated, or
 //       samples in both                              is written, of equal ones the   repeated_
 //                                                    first                           otherwise
-//     ... one of the two is a one-byte record        the samples are written usb_and_samples
+//     ... one of the two is a one-byte record        the samples are written         usb_and_samples
 //     missing so far, still waiting                  put in its place                out_of_order
 //     before the first by at most an hour, and       put in its place                out_of_order
 //       the first still waits
+//     ... the first is written                       not written                     late
 //     written long ago                               not written                     repeated
 //     filled by now, or left out                     not written                     late
 //     earlier by more than an hour, never written    goes on there                   jump

@@ -2,14 +2,20 @@
 # The main job from beginning to end, without hardware: a virtual unit of 2013 is measured on the jig, and
 # its archive is scanned and repaired. The results are in build/demo. It takes a few seconds after the
 # build.
+#   demo.sh                            builds, and does all of it
+#   demo.sh --archive PROGRAM FOLDER   makes the archive alone, in FOLDER/archive
 set -euo pipefail
-cd "$(dirname "$0")/.."
-scripts/build.sh
-
-sixpoint=$PWD/build/sixpoint
+if [ "${1:-}" = --archive ]; then
+  sixpoint=$2
+  out=$3
+else
+  cd "$(dirname "$0")/.."
+  scripts/build.sh
+  sixpoint=$PWD/build/sixpoint
+  out=$PWD/build/demo
+  rm -rf "$out"
+fi
 shared=${SIXPOINT_SHARED:-$PWD/../shared}
-out=$PWD/build/demo
-rm -rf "$out"
 mkdir -p "$out/scenarios" "$out/archive" "$out/truth"
 store=$out/store.db
 
@@ -66,6 +72,7 @@ for name in day1 day2 day3 before after; do
   "$sixpoint" simulate --scenario "$out/scenarios/$name.json" -o "$out/archive/$name.gt3x" \
     --truth "$out/truth/$name.csv"
 done
+if [ "${1:-}" = --archive ]; then exit; fi
 # A good unit that was moved together with it on day1, for the pictures (paper, Figures 4-6).
 sed -e "s/$serial/MOS2C01150042/; s/2013-11-12/2015-01-12/; /\"constants\"/d; /\"sensor\"/d" \
   -e 's/"unit": {/"unit": { "seed": 42,/' \

@@ -23,11 +23,11 @@ std::optional<std::string> unknown_word(const CLI::App& app,
 
 // Which of `known` a person meant who typed `typed`:
 //
-// | typed                                                             | answer       |
-// |-------------------------------------------------------------------|--------------|
-// | the beginning of exactly one of them                              | that one     |
+// | typed                                                              | answer      |
+// |--------------------------------------------------------------------|-------------|
+// | the beginning of exactly one of them                               | that one    |
 // | one or more steps from the nearest, a third of its letters at most | the nearest |
-// | otherwise, or two are as near                                     | nothing      |
+// | otherwise, or two are as near                                      | nothing     |
 //
 // A step is a letter too many, too few, another one, or two neighbours the other way round (optimal
 // string alignment distance; Damerau 1964).

@@ -21,12 +21,12 @@ Status sign_off(Context& context, const std::string& name);
 // of `pin_file`, or asked for at the terminal, without echo; permission where it is wrong. Without
 // operators: the name as it was given, and not authenticated.
 //
-// | operators | --operator | PIN                        | answer                             |
-// |-----------|------------|----------------------------|------------------------------------|
-// | none      | any        | not asked                  | the name, not authenticated        |
-// | some      | one of them | right                     | the name, authenticated            |
-// | some      | one of them | wrong, or none was given  | permission                         |
-// | some      | not one of them, or empty | any        | permission                         |
+// | operators | --operator                | PIN                      | answer                      |
+// |-----------|---------------------------|--------------------------|-----------------------------|
+// | none      | any                       | not asked                | the name, not authenticated |
+// | some      | one of them               | right                    | the name, authenticated     |
+// | some      | one of them               | wrong, or none was given | permission                  |
+// | some      | not one of them, or empty | any                      | permission                  |
 Result<station::SignedName> who_measures(Context& context, const std::string& name,
                                          const std::string& pin_file);
 

@@ -3,8 +3,8 @@
 //
 //   SIXPOINT_ASSIGN(const ReadingsTable table, read_readings_table(files, "free_living.csv"));
 //   SIXPOINT_ASSIGN(const RestingGap nominal, resting_gap(table.rests, {}));
-//   SIXPOINT_ASSIGN(const RestingGap learnt, resting_gap(table.rests,
-//   sim::mean_effects(population)));
+//   SIXPOINT_ASSIGN(const RestingGap learnt,
+//                   resting_gap(table.rests, sim::mean_effects(population)));
 //
 // Each reading's direction is put through the simulator's sensor with the effects on; what they do
 // to it is taken off the reading, gain and zero of each axis are fitted, and the gap is the root

@@ -25,15 +25,15 @@ struct LearntSize {
 // Prior log odds that the next unit has the effect with such a size. Even at the most: what the
 // recording itself does not show is never named, however many units had it.
 //
-// | of the earlier units             | nats                                                |
-// |----------------------------------|-----------------------------------------------------|
-// | all had it                       | 0                                                   |
-// | k of n had it                    | log((k + 1/2) / (n - k + 1/2)) (Jeffreys' prior of a |
-// |                                  | share), at most 0                                   |
-// | next to none had it              | no less than kLogPriorEffect, as for an effect that |
-// |                                  | nothing is known of                                 |
-// | none stands behind it: a person  | 0                                                   |
-// | wrote what is expected           |                                                     |
+// | of the earlier units            | nats                                                 |
+// |---------------------------------|------------------------------------------------------|
+// | all had it                      | 0                                                    |
+// | k of n had it                   | log((k + 1/2) / (n - k + 1/2)) (Jeffreys' prior of a |
+// |                                 | share), at most 0                                    |
+// | next to none had it             | no less than kLogPriorEffect, as for an effect that  |
+// |                                 | nothing is known of                                  |
+// | none stands behind it: a person | 0                                                    |
+// | wrote what is expected          |                                                      |
 double learnt_log_prior(const LearntSize& learnt);
 
 }  // namespace sixpoint::gap

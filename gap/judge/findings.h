@@ -86,8 +86,22 @@ inline double nats_to_sd(double nats) { return std::sqrt(2 * nats); }
 // The contract's name of the parameters that the forward model estimates; empty for other effects.
 std::string parameter_name(const std::string& effect);
 
-// Completes the answer: candidates for the whole catalogue, order, unknown, verdict. What is named
-// is less probable the more evidence there is for something unknown.
+// Completes the answer. Candidates for the whole catalogue, strongest evidence first; effects by
+// what they close of the gap, largest first: evidence says only how sure they are. What is named is
+// less probable the more evidence there is for something unknown:
+//
+// | strongest evidence for something unknown | its probability | a name's probability, times |
+// |------------------------------------------|-----------------|-----------------------------|
+// | far below kAlarm_sd                      | 0.03            | 1                           |
+// | kAlarm_sd                                | 0.49            | 0.75                        |
+// | far above                                | 0.95            | 0.5                         |
+//
+// | alarms | effects | verdict          |
+// |--------|---------|------------------|
+// | none   | none    | no_gap           |
+// | none   | some    | explained        |
+// | some   | some    | partly_explained |
+// | some   | none    | unexplained      |
 void finish(const Request& request, Findings found, Diagnosis& out);
 // The answer where the recording does not allow a diagnosis. Names no effect.
 Diagnosis inconclusive(const Request& request, Findings found, const std::string& why,

@@ -177,7 +177,7 @@ Result<Segment> read_segment(const Json& json, const std::string& where) {
   return segment;
 }
 
-// The order of the segments, and tones that the rate can hold.
+// The segments follow each other, in samples and in time.
 Status check_segment(const Bundle& bundle, const Segment& segment, const std::string& where) {
   if (!bundle.segments.empty()) {
     const Segment& last = bundle.segments.back();

@@ -10,17 +10,20 @@
 // offset apart. Both write it as Unix time. The first row that fits holds (the vendor's public
 // description of METADATA, and what readers of its files found):
 //
-//     evidence                                                   clock     offset of local time
-//     METADATA LocalTimeLog, "UsedUtc": true                     utc       SubjectTimeLog, or what
-//                                                                          else names one
-//     METADATA LocalTimeLog, "UsedUtc": false                    local     LocalTimeLog, or
-//     TimeZone CentrePoint or Study Admin named (METADATA InitOwner, or   utc       SubjectTimeLog,
-//     or what
-//       a line of info.txt with the software)                              else names one
-//     METADATA LocalTimeLog, or ActiLife named                   local     LocalTimeLog, or
-//     TimeZone raw counts (ACTIVITY3), as CentrePoint's .agdc hold        utc       TimeZone the
-//     old form: the clock of the computer that set it        local     TimeZone UTC_OFFSET in
-//     PARAMETERS that is not 0                     utc       UTC_OFFSET nothing of these unknown -
+// | evidence                                              | clock   | offset of local time      |
+// |-------------------------------------------------------|---------|---------------------------|
+// | METADATA LocalTimeLog, "UsedUtc": true                | utc     | SubjectTimeLog, or what   |
+// |                                                       |         | else names one            |
+// | METADATA LocalTimeLog, "UsedUtc": false               | local   | LocalTimeLog, or TimeZone |
+// | CentrePoint or Study Admin named (METADATA InitOwner, | utc     | SubjectTimeLog, or what   |
+// | or a line of info.txt with the software)              |         | else names one            |
+// | ActiLife named (likewise), or METADATA LocalTimeLog   | local   | LocalTimeLog, or TimeZone |
+// | raw counts (ACTIVITY3), as CentrePoint's .agdc hold   | utc     | SubjectTimeLog, or what   |
+// |                                                       |         | else names one            |
+// | old form: the clock of the computer that set it       | local   | TimeZone                  |
+// | UTC_OFFSET in PARAMETERS that is not 0                | utc     | SubjectTimeLog, or what   |
+// |                                                       |         | else names one            |
+// | nothing of these                                      | unknown | -                         |
 //
 // "What else names one": LocalTimeLog, the TimeZone line of info.txt, UTC_OFFSET, in this order.
 // The offset is that of the day on which the unit was set; a change to or from summer time later

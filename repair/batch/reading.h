@@ -2,9 +2,10 @@
 //
 //   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(env.files, path));
 //   SIXPOINT_ASSIGN(auto stream, gt3x::SampleStream::open(recording, {}));
-//   SIXPOINT_ASSIGN(const gt3x::RowArray rows, gt3x::read_all_rows(stream,
-//   gt3x::RowValue::g_float64)); SIXPOINT_ASSIGN(const Inspection found, reading_of(recording,
-//   stream)); inspection_to_json(found, path)["gaps"];
+//   SIXPOINT_ASSIGN(const gt3x::RowArray rows,
+//                   gt3x::read_all_rows(stream, gt3x::RowValue::g_float64));
+//   SIXPOINT_ASSIGN(const Inspection found, reading_of(recording, stream));
+//   inspection_to_json(found, path)["gaps"];
 #pragma once
 
 #include <cstdint>

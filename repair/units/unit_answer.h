@@ -27,13 +27,13 @@
 // Files that only help (may_help(): not affected, but recorded under the same filter configuration,
 // `current`, by a unit that was calibrated again later) are asked last, and can take nothing away:
 //
-// | the affected files by themselves    | with those that only help | answer                 |
-// |--------------------------------------|---------------------------|------------------------|
-// | have verified constants of their own | not looked at             | of the affected files  |
-// | are pooled                           | not looked at             | of the affected files  |
-// | contradict one another               | not looked at             | of the affected files  |
-// | one, or missing                      | pooled                    | pooled, of all         |
-// | one, or missing                      | otherwise                 | of the affected files  |
+// | the affected files by themselves     | with those that only help | answer                |
+// |--------------------------------------|---------------------------|-----------------------|
+// | have verified constants of their own | not looked at             | of the affected files |
+// | are pooled                           | not looked at             | of the affected files |
+// | contradict one another               | not looked at             | of the affected files |
+// | one, or missing                      | pooled                    | pooled, of all        |
+// | one, or missing                      | otherwise                 | of the affected files |
 //
 // Own constants agree as calib/application/agreement.h has it. A file's distance is the root mean
 // square over its directions of |magnitude - 1 g|. A file that is there twice, under whatever name,

@@ -11,15 +11,17 @@
 //
 // Whose name stands in a record (who):
 //
-// | operators in the file | signed in there, used within kIdle | asked for  | answer |
+// | operators in the file | signed in there, used within kIdle | asked for  | answer               |
 // |-----------------------|------------------------------------|------------|----------------------|
-// | none                  | -                                  | either     | the name as typed, |
-// |                       |                                    |            | not authenticated |
-// | some                  | no one, or idle for longer         | either     | permission error | |
-// some                  | a technician                       | technician | that operator's name |
-// | some                  | a technician                       | engineer   | permission error | |
-// some                  | an engineer                        | either     | that operator's name |
-// | cannot be read        | any                                | either     | the file's error |
+// | none                  | -                                  | either     | the name as typed,   |
+// |                       |                                    |            | not authenticated    |
+// | some                  | no one, or idle for longer         | either     | permission error     |
+// | some                  | one who is not in the file now, or | either     | permission error     |
+// |                       | has another role there             |            |                      |
+// | some                  | a technician                       | technician | that operator's name |
+// | some                  | a technician                       | engineer   | permission error     |
+// | some                  | an engineer                        | either     | that operator's name |
+// | cannot be read        | any                                | either     | the file's error     |
 //
 // Whether a PIN is taken (sign_in):
 //

@@ -19,12 +19,12 @@
 //
 // Whether a session holds:
 //
-// | the session                                      | answer                              |
-// |--------------------------------------------------|-------------------------------------|
-// | made with this token, up to kSessionLife ago     | it holds, after a restart too       |
-// | made longer ago, or over 10 minutes in the future | it does not                        |
-// | made with another token                          | it does not: a new token ends all   |
-// | changed in any character                         | it does not                         |
+// | the session                                       | answer                            |
+// |---------------------------------------------------|-----------------------------------|
+// | made with this token, up to kSessionLife ago      | it holds, after a restart too     |
+// | made longer ago, or over 10 minutes in the future | it does not                       |
+// | made with another token                           | it does not: a new token ends all |
+// | changed in any character                          | it does not                       |
 //
 // A session is its time, 128 random bits, and the keyed hash of both: the server keeps no list.
 // Small letters and missing dashes of a code are forgiven. May be called from any thread.

@@ -3,14 +3,14 @@
 //
 //   const std::vector<device::Pose> again = sides_to_repeat(solved, /*times_asked_again=*/0, 2);
 //
-// | the recording                                   | times asked again | answer |
-// |-------------------------------------------------|-------------------|----------------------------|
-// | gives verified constants                        | any               | none | | lacks still
-// readings of some sides: moved, too  | below the limit   | these sides, in the order  | | short,
-// another side, clipped                    |                   | of device::kPoses          | |
-// lacks them                                      | the limit         | none: it is judged as it is
-// | | has all six sides, and its constants are not    | any               | none: another try gives
-// | | verified                                        |                   | nothing else |
+// | the recording                                  | times asked again | answer                      |
+// |------------------------------------------------|-------------------|-----------------------------|
+// | gives verified constants                       | any               | none                        |
+// | lacks still readings of some sides: moved, too | below the limit   | these sides, in the order   |
+// | short, another side, clipped                   |                   | of device::kPoses           |
+// | lacks them                                     | the limit         | none: it is judged as it is |
+// | has all six sides, and its constants are not   | any               | none: another try gives     |
+// | verified                                       |                   | nothing else                |
 //
 // A unit that records sends no live samples: the sides are judged when the recording is there. A
 // pure function.

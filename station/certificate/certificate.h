@@ -91,8 +91,15 @@ Result<Certificate> certificate_of(const db::RunRecord& run);
 Result<Bytes> certificate_pdf(const Certificate& certificate);
 // usage where the file's name ends in neither .pdf nor .json nor .dcc.xml.
 Status check_certificate_name(const std::string& path);
-// What can be asked for about a stored run: report.json always; certificate.pdf, certificate.json
-// and certificate.dcc.xml where certificate_of() makes one, label.zpl where label_zpl() does.
+// What can be asked for about a stored run:
+//
+// | the run                                                   | documents                         |
+// |-----------------------------------------------------------|-----------------------------------|
+// | any                                                       | report.json                       |
+// | certificate_of() makes one: measured on the jig, or       | ... and certificate.pdf,          |
+// | written afterwards, neither stopped nor inconclusive      | certificate.json and .dcc.xml     |
+// | label_zpl() makes one: it also passed, was written, and   | ... and label.zpl                 |
+// | returned what was written                                 |                                   |
 std::vector<std::string> documents_of(const db::RunRecord& run);
 // By the ending of `path`.
 Status write_certificate(FileSystem& files, const std::string& path, const db::RunRecord& run);

@@ -51,6 +51,17 @@ class Lanes::Lane {
 
   const std::string& device() const { return device_; }
 
+  // A run, a capture, or "write now" (StartOrder::last_run). Beside what forbids any start, for the
+  // last of these:
+  //
+  // | the lane's last run                          | since then               | "write now"       |
+  // |----------------------------------------------|--------------------------|-------------------|
+  // | passed, and began no write                   | nothing, or its unit was | written, read     |
+  // |                                              | pulled out and is back   | back and measured |
+  // | passed, and began no write                   | another unit was here, a | conflict          |
+  // |                                              | start, or a restart      |                   |
+  // | began a write                                | any                      | conflict          |
+  // | did not pass, or there is none               | any                      | conflict          |
   LaneAnswer<void> start(const StartOrder& order, bool capture);
   LaneAnswer<void> command(const std::string& client, OperatorCommand command);
   LaneAnswer<void> confirm_side(const std::string& client);

@@ -1,9 +1,10 @@
 // The labels of a station on their way to its printer: on the disk first, then to the printer,
 // again and again until it took them, also after a restart of the program.
 //
-//   SIXPOINT_ASSIGN(const auto printer, LabelPrinter::open(env, "/dev/usb/lp0", "state/labels",
-//   send)); SIXPOINT_CHECK(printer->add({"0123abcd", "MOS2A45130007", "^XA^XZ\n"})); std::cout <<
-//   printer->to_json();
+//   SIXPOINT_ASSIGN(const auto printer,
+//                   LabelPrinter::open(env, "/dev/usb/lp0", "state/labels", send));
+//   SIXPOINT_CHECK(printer->add({"0123abcd", "MOS2A45130007", "^XA^XZ\n"}));
+//   std::cout << printer->to_json();
 //
 // add() answers when the label is on the disk, and waits for no printer: a thread of its own sends,
 // the oldest first, one at a time. After a failure it waits retry_pause_s(). A label is sent at

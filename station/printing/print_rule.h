@@ -4,14 +4,14 @@
 //     std::cout << "no label: " << why_not;
 //   }
 //
-// | verdict                 | the unit answered       | in the store | printed |
-// |-------------------------|-------------------------|--------------|--------------------------------|
-// | pass, conditional_pass  | what was written        | yes          | yes | | pass,
-// conditional_pass  | what was written        | not yet      | no: its number may not be found | |
-// pass, conditional_pass  | something else, nothing | any          | no | | pass, conditional_pass
-// | nothing was written     | any          | no                             | | fail,
-// conditional_fail  | any                     | any          | no                             | |
-// stopped, inconclusive   | any                     | any          | no |
+// | verdict                 | the unit answered       | in the store | printed                         |
+// |-------------------------|-------------------------|--------------|---------------------------------|
+// | pass, conditional_pass  | what was written        | yes          | yes                             |
+// | pass, conditional_pass  | what was written        | not yet      | no: its number may not be found |
+// | pass, conditional_pass  | something else, nothing | any          | no                              |
+// | pass, conditional_pass  | nothing was written     | any          | no                              |
+// | fail, conditional_fail  | any                     | any          | no                              |
+// | stopped, inconclusive   | any                     | any          | no                              |
 //
 // A label says that the unit holds what was measured; who reads it trusts that. The same holds for
 // "Print label again". A pure function.

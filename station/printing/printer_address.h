@@ -3,14 +3,13 @@
 //   SIXPOINT_ASSIGN(const PrinterAddress printer, parse_printer("tcp://label-printer:9100"));
 //   std::cout << printer.text();
 //
-// | text                         | printer |
-// |------------------------------|------------------------------------------------------------------|
-// | /dev/usb/lp0                 | a device of characters, or a pipe that another program reads |
-// | tcp://HOST:PORT              | raw data over TCP, 9100 on most; HOST is a name or IPv4 | |
-// tcp://[ADDRESS]:PORT         | likewise, IPv6                                                   |
-// | any other                    | usage: relative paths, "..", control characters, users,
-// passwords, | |                              | paths or queries after the port, port 0 or above
-// 65535           |
+// | text                 | printer                                                            |
+// |----------------------|--------------------------------------------------------------------|
+// | /dev/usb/lp0         | a device of characters, or a pipe that another program reads       |
+// | tcp://HOST:PORT      | raw data over TCP, 9100 on most; HOST is a name or IPv4            |
+// | tcp://[ADDRESS]:PORT | likewise, IPv6                                                     |
+// | any other            | usage: relative paths, "..", control characters, users, passwords, |
+// |                      | paths or queries after the port, port 0 or above 65535             |
 //
 // Pure functions, but check_printer().
 #pragma once

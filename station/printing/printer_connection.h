@@ -2,14 +2,15 @@
 //
 //   const Result<Sent> sent = send_label(printer, "^XA^FDhello^FS^XZ\n", stop, 15);
 //
-// | printer                                                  | answer                             |
-// |----------------------------------------------------------|------------------------------------|
-// | network: closes the connection after the last byte       | taken                              |
-// | network: has all bytes, and does not close in time       | unconfirmed: it may be out of paper
-// | | network: closes or resets before the last byte           | an error: to be sent again | |
-// network: refuses, does not answer, does not read in time | an error                           |
-// | device: took all bytes, and is ready for more            | taken                              |
-// | device: is not there, goes away, is not ready in time    | an error                           |
+// | printer                                                  | answer                              |
+// |----------------------------------------------------------|-------------------------------------|
+// | network: closes the connection after the last byte       | taken                               |
+// | network: has all bytes, and does not close in time       | unconfirmed: it may be out of paper |
+// | network: closes or resets before the last byte           | an error: to be sent again          |
+// | network: refuses, does not answer, does not read in time | an error                            |
+// | device: took all bytes, and is ready for more            | taken                               |
+// | device: is not there, goes away, is not ready in time    | an error                            |
+// | device: is a file, a folder or a disk                    | an error                            |
 //
 // Uses sockets and devices. May be called from any thread, which then has SIGPIPE blocked.
 #pragma once

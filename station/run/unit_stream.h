@@ -31,7 +31,16 @@ class UnitStream {
   // Whether this stream lost samples, or its clock jumped, since this was asked before. A reading
   // does not go across either.
   bool lost_since_asked(const device::Unit& unit);
-  // Of the whole run; `unit` may be null where there is none any more.
+  // Of the whole run; `unit` may be null where there is none any more. Lost samples are judged by
+  // these numbers:
+  //
+  // | the run so far                         | its numbers                                       |
+  // |----------------------------------------|---------------------------------------------------|
+  // | one stream                             | those of the stream                               |
+  // | plugged in again, or after a write     | the sums over its streams, and the one under way  |
+  // | continued after a restart of the       | likewise: `before` holds those of the earlier     |
+  // | program                                | program                                           |
+  // | no sample came yet                     | 0 samples: the share of lost ones is no number    |
   device::StreamStatistics statistics(const device::Unit* unit) const;
 
  private:

@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Runs every command that a ```sh block of README.md, docs/*.md, docs/tutorials/*.md or docs/devices/*.md prints, in a
-# scratch folder for each document that looks as the reader's would: build/sixpoint and an archive. A command ends with
-# 0 unless the line says "# exits with N". Commands of scripts/ have tests of their own (demo) or are what runs this (test).
+# scratch folder for each document that looks as the reader's would: build/sixpoint, and in build/demo what scripts/demo.sh
+# leaves. README.md and the tutorials begin with that alone; behind README.md's "Try it", as readers of the other
+# documents are, there is `archive`, too. A command ends with 0 unless the line says "# exits with N". Commands of scripts/
+# have tests of their own (demo) or are what runs this (test).
 #   run_commands.sh SOURCE_FOLDER SIXPOINT_PROGRAM
 set -euo pipefail
 source_folder=$1
@@ -11,21 +13,20 @@ trap 'rm -rf "$scratch"' EXIT
 export SIXPOINT_SHARED=${SIXPOINT_SHARED:-$source_folder/../shared}
 failures=0
 run=0
+"$source_folder/scripts/demo.sh" --archive "$program" "$scratch/demo" >/dev/null 2>&1
 
 for document in "$source_folder"/README.md "$source_folder"/docs/*.md "$source_folder"/docs/devices/*.md \
   "$source_folder"/docs/tutorials/*.md; do
   name=${document#"$source_folder"/}
   folder=$scratch/${name//\//_}
-  mkdir -p "$folder/build" "$folder/archive" "$folder/home"
+  mkdir -p "$folder/build" "$folder/home"
   export HOME=$folder/home  # a default store of its own
   ln -s "$program" "$folder/build/sixpoint"
-  cp "$source_folder/tests/docs/scenario.json" "$folder/S.json"
-  echo '{"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production"}' >"$folder/bundle.json"
-  for day in 1 2; do
-    sed "s/\"seed\": 1/\"seed\": $day/" "$folder/S.json" >"$folder/day$day.json"
-    "$program" simulate --scenario "$folder/day$day.json" -o "$folder/archive/day$day.gt3x" \
-      >/dev/null 2>&1
-  done
+  ln -s "$scratch/demo" "$folder/build/demo"
+  case $name in
+    README.md | docs/tutorial*) ;;
+    *) cp -r "$scratch/demo/archive" "$folder" ;;
+  esac
   # The lines of all sh blocks, continued lines joined.
   mapfile -t commands < <(awk '/^```sh$/ { inside = 1; next } /^```/ { inside = 0 } inside' "$document" |
     sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | grep -vE '^ *(#|$)' || true)
