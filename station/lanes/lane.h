@@ -150,8 +150,10 @@ class Lanes::Lane {
   void end_interrupted(const UnfinishedRun& left, const std::string& reason);
   // The verdict is shown at once; store_result() follows.
   void show_result(const JigReport& report, const RunLabels& labels);
-  // Stores the last run. Until that succeeds, the run stays on the disk of this station.
+  // Stores the last run. Until that succeeds, the run stays on the disk of this station. One that no
+  // store takes is set aside there, and the lane is free.
   void store_result(const std::stop_token& stop);
+  void set_aside_result(const Error& why);
 
   // A calibration file (lane_capture.cpp).
   void capture(const std::stop_token& stop, const StartOrder& order,

@@ -1,6 +1,8 @@
 // A jig run in a lane, and how it continues after a restart of the program.
 #include <array>
 
+#include <fmt/format.h>
+
 #include "station/lanes/lane.h"
 
 namespace sixpoint::station {
@@ -274,6 +276,9 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
     const std::lock_guard lock(shared_.store_mutex);
     return shared_.store_run(unstored_->report, unstored_->labels);
   }();
+  if (!stored && stored.error().code == ErrorCode::bad_data) {
+    return set_aside_result(stored.error());  // to try again makes it no better
+  }
   const Status cleared = stored ? folder_.clear() : Status();
   {
     const std::lock_guard lock(mutex_);
@@ -305,6 +310,26 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
   }
   if (!stored) {
     pause(stop, kStoreRetry_s);
+  }
+}
+
+void Lanes::Lane::set_aside_result(const Error& why) {
+  const auto kept = folder_.set_aside_ended_run(
+      unstored_->report.to_json().dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  const std::lock_guard lock(mutex_);
+  const std::string problem =
+      kept ? fmt::format("not stored, and no store takes it: {}; it is kept in {}, its samples beside",
+                         why.brief(), *kept)
+           : fmt::format("not stored yet: {}; {}", why.brief(), kept.error().brief());
+  if (result_.is_object() && result_["serial"] == unstored_->report.serial) {
+    result_["problem"] = problem;
+    result_.erase("can_write");
+  }
+  add_log("problem", problem);
+  is_unstored_ = !kept;
+  if (kept) {
+    unstored_.reset();
+    unwritten_serial_.clear();  // constants of which there is no record
   }
 }
 

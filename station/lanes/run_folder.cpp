@@ -257,6 +257,17 @@ Status RunFolder::set_aside_run() {
   return set_aside(names);
 }
 
+Result<std::string> RunFolder::set_aside_ended_run(std::string_view report) {
+  SIXPOINT_CHECK(close());
+  SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
+  std::string path =
+      fmt::format("{}/report.json.{}.bad", folder_, to_unix_seconds(env_.clock.now()));
+  SIXPOINT_CHECK(write_file(env_.files, path, report));
+  SIXPOINT_CHECK(set_aside_run());
+  SIXPOINT_CHECK(env_.files.sync_folder(folder_));
+  return path;
+}
+
 Status RunFolder::set_aside_capture() { return set_aside({kCapture + 1}); }
 
 Status RunFolder::set_aside(const std::vector<std::string>& names) {

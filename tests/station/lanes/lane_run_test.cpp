@@ -244,5 +244,39 @@ TEST(LaneRun, AStoreThatFailsIsTriedAgain) {
   EXPECT_EQ(station.reports.size(), 1U);
 }
 
+// To try again would help nothing, and no second run could be made.
+TEST(LaneRun, ARunThatNoStoreTakesIsKeptInAFileAndTheLaneIsFree) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.store_refuses = true;
+  station.start("/api/run");
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("problem");
+  });
+  EXPECT_EQ(lane["result"]["stored"], false);
+  EXPECT_FALSE(lane["result"].contains("can_write"));
+  const std::string problem = lane["result"]["problem"];
+  EXPECT_THAT(problem, HasSubstr("cannot be stored as a text"));
+  const std::string before = "it is kept in ";
+  const std::size_t begin = problem.find(before) + before.size();
+  const std::string path = problem.substr(begin, problem.find(", its samples") - begin);
+  const auto report = read_file(posix_env().files, path, 10'000'000);
+  ASSERT_OK(report);
+  EXPECT_EQ(Json::parse(*report)["verdict"], "pass");
+  const auto names = posix_env().files.list(folder_of(path));
+  ASSERT_OK(names);
+  EXPECT_THAT(*names, testing::Contains(testing::MatchesRegex("samples-1.csv.*bad")));
+  EXPECT_THAT(*names, testing::Not(testing::Contains("run.json"))) << "a later program is free too";
+  {
+    const std::lock_guard lock(station.mutex);
+    station.store_refuses = false;
+  }
+  EXPECT_EQ(station.post("/api/run", {{"last_run", true}}), 409) << "there is no record of it";
+  EXPECT_EQ(station.post("/api/run", Json::object()), 202);
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+}
+
 }  // namespace
 }  // namespace sixpoint::station

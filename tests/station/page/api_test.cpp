@@ -24,6 +24,7 @@ TEST(Api, WrongRequestsAreRefused) {
   EXPECT_EQ(
       post("/api/run", R"({"operator": )" + std::string("\"") + std::string(500, 'x') + "\"}"),
       400);
+  EXPECT_EQ(post("/api/run", R"({"operator": "A\u0000da"})"), 400) << "no store takes a NUL";
   EXPECT_EQ(post("/api/run", std::string(40'000, '[')), 400) << "deep";
   EXPECT_EQ(post("/api/run", std::string(1'000'000, ' ')), 413);
   EXPECT_EQ(post("/api/nothing", "{}"), 404);

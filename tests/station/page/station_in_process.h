@@ -50,6 +50,9 @@ class Station {
           if (store_is_away) {
             return fail(ErrorCode::io, "the disk is full");
           }
+          if (store_refuses) {
+            return fail(ErrorCode::bad_data, "this cannot be stored as a text");
+          }
           reports.push_back(report);
           operators.push_back(labels.operator_name);
           authenticated.push_back(labels.is_authenticated);
@@ -136,6 +139,7 @@ class Station {
   std::vector<std::string> kinds;
   std::vector<bool> authenticated;
   bool store_is_away = false;  // and the journal with it
+  bool store_refuses = false;  // the record itself
   bool is_kept_here = false;   // the journal has it
 
  private:
