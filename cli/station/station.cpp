@@ -18,6 +18,7 @@
 #include "cli/station/operator.h"
 #include "cli/station/practice_bench.h"
 #include "cli/store_option.h"
+#include "db/records.h"
 #include "station/access/operators.h"
 #include "station/access/sign_in.h"
 #include "station/certificate/certificate.h"
@@ -204,8 +205,17 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
               "ask for report.json, certificate.pdf, .json or .dcc.xml, or label.zpl");
 }
 
+// A text that stands in every record of the station, refused before anything is measured.
+Status check_name_option(const char* option, const std::string& text) {
+  const Status taken = db::check_name(text);
+  return taken ? Status()
+               : fail(ErrorCode::usage, taken.error().what, option, taken.error().hint);
+}
+
 Result<station::LanesOptions> lanes_options(Context& context,
                                             const StationCommandOptions& options) {
+  SIXPOINT_CHECK(check_name_option("--station", options.station));
+  SIXPOINT_CHECK(check_name_option("--jig-id", options.jig_id));
   station::LanesOptions lanes;
   lanes.devices = options.devices;
   lanes.state_folder = state_folder(options);

@@ -56,6 +56,14 @@ TEST_F(StationCommand, RefusesWhatItCannotServe) {
   EXPECT_EQ(refused({}).exit_code, 64) << "no unit";
   EXPECT_EQ(with({"--port", "65536"}).exit_code, 64);
   EXPECT_EQ(with({"--side-seconds", "9"}).exit_code, 64);
+  for (const char* option : {"--station", "--jig-id"}) {
+    for (const std::string& name : {std::string("bench \xff"), std::string(201, 'x')}) {
+      const auto answer = run({"station", "--store", path("s.db"), "--state", path("state"),
+                               "--device", "virtual:seed=7", option, name});
+      EXPECT_EQ(answer.exit_code, 64) << option;
+      EXPECT_THAT(answer.people, HasSubstr("cannot be stored as a text"));
+    }
+  }
   EXPECT_EQ(with({"--limits", path("none.toml")}).exit_code, 66);
   EXPECT_EQ(with({"--gravity", "98"}).exit_code, 64) << "no place on Earth";
   std::vector<std::string> seventeen;
