@@ -112,6 +112,8 @@ class Lanes::Lane {
 
   // The thread's loop (lane_unit.cpp).
   void work(const std::stop_token& stop);
+  void work_once(const std::stop_token& stop);
+  void end_by_defect(const std::string& what);
   void continue_unfinished(const std::stop_token& stop);
   // The order that waits, where it still holds (order_rule.h).
   std::optional<Order> next_order();
@@ -163,6 +165,7 @@ class Lanes::Lane {
   SideAnswer ask_side(const std::stop_token& stop, device::Pose side, std::size_t number);
   void continue_capture(const std::stop_token& stop, const UnfinishedCapture& left);
   void end_capture(nlohmann::ordered_json result);
+  void end_capture_by(const Error& error, const std::string& serial);
 
   bool stop_requested() const {
     const std::lock_guard lock(mutex_);

@@ -170,6 +170,10 @@ void Lanes::Lane::end_capture(Json result) {
   set_done(std::move(result), "");
 }
 
+void Lanes::Lane::end_capture_by(const Error& error, const std::string& serial) {
+  end_capture(result_of(error, serial, stop_requested()));
+}
+
 // Its unit recorded on, or holds what it recorded until then.
 void Lanes::Lane::continue_capture(const std::stop_token& stop, const UnfinishedCapture& left) {
   const StartOrder order = {left.operator_name, false, left.client, left.serial};
@@ -182,7 +186,7 @@ void Lanes::Lane::continue_capture(const std::stop_token& stop, const Unfinished
     return;
   }
   if (!unit) {
-    return end_capture(result_of(unit.error(), left.serial, stop_requested()));
+    return end_capture_by(unit.error(), left.serial);
   }
   capture(stop, order, left);
 }

@@ -272,9 +272,13 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
   if (!unstored_) {
     return;
   }
-  const auto stored = [this] {
+  const auto stored = [this]() -> Result<RunInStore> {
     const std::lock_guard lock(shared_.store_mutex);
-    return shared_.store_run(unstored_->report, unstored_->labels);
+    try {
+      return shared_.store_run(unstored_->report, unstored_->labels);
+    } catch (const std::exception& defect) {  // as in end_by_defect()
+      return fail(ErrorCode::bad_data, fmt::format("a defect of the program: {}", defect.what()));
+    }
   }();
   if (!stored && stored.error().code == ErrorCode::bad_data) {
     return set_aside_result(stored.error());  // to try again makes it no better

@@ -15,32 +15,71 @@ constexpr double kMostShown_mg = 32000;  // of a reading, far above the sensor's
 // A virtual unit whose time runs this much faster than the machine's needs a pause.
 constexpr int kFastClock = 10;
 constexpr double kFastClockPause_s = 0.06;
+constexpr double kDefectPause_s = 2;
 
 }  // namespace
 
 void Lanes::Lane::work(const std::stop_token& stop) {
-  continue_unfinished(stop);
+  const auto guarded = [this, &stop](auto step) {
+    try {
+      step();
+    } catch (const std::exception& defect) {
+      end_by_defect(defect.what());
+      pause(stop, kDefectPause_s);
+    }
+  };
+  guarded([&] { continue_unfinished(stop); });
   while (!stop.stop_requested()) {
-    store_result(stop);
-    if (!unit_ && !open_unit()) {
-      pause(stop, shared_.options.retry_s);
-      continue;
-    }
-    look_at_jig();
-    const std::optional<Order> order = next_order();
-    if (!order) {
-      preview(stop);
-      continue;
-    }
-    if (order->start.last_run) {
-      write_last(stop, order->start);
-    } else if (order->capture) {
-      capture(stop, order->start, {});
-    } else {
-      run(stop, order->start, {});
-    }
+    guarded([&] { work_once(stop); });
   }
   static_cast<void>(folder_.close());
+}
+
+void Lanes::Lane::work_once(const std::stop_token& stop) {
+  store_result(stop);
+  if (!unit_ && !open_unit()) {
+    pause(stop, shared_.options.retry_s);
+    return;
+  }
+  look_at_jig();
+  const std::optional<Order> order = next_order();
+  if (!order) {
+    preview(stop);
+  } else if (order->start.last_run) {
+    write_last(stop, order->start);
+  } else if (order->capture) {
+    capture(stop, order->start, {});
+  } else {
+    run(stop, order->start, {});
+  }
+}
+
+// The libraries return errors as values: an exception is a defect of this program. It ends what this
+// lane was doing, and nothing of the others.
+void Lanes::Lane::end_by_defect(const std::string& what) {
+  const Error error{ErrorCode::internal,
+                    fmt::format("a defect of the program ended this lane's work: {}", printable(what)),
+                    {},
+                    "please report it; the other lanes go on"};
+  if (unit_ && unit_->jig() != nullptr && unit_->jig()->turns_by_itself()) {
+    static_cast<void>(unit_->jig()->stop());
+  }
+  bool was_busy = false;
+  bool was_capture = false;
+  std::string serial;
+  {
+    const std::lock_guard lock(mutex_);
+    add_log("problem", error.brief());
+    was_busy = is_busy();
+    was_capture = capture_.has_value();
+    serial = identity_.serial;
+  }
+  if (was_capture) {
+    end_capture_by(error, serial);
+  } else if (was_busy) {
+    end_without_report(serial, error);
+  }
+  close_unit();
 }
 
 // What an earlier program left on the disk.

@@ -278,5 +278,39 @@ TEST(LaneRun, ARunThatNoStoreTakesIsKeptInAFileAndTheLaneIsFree) {
   });
 }
 
+// A defect ends the work of its lane, with a word, and not the program with all the others.
+TEST(LaneRun, AnExceptionEndsTheWorkOfItsLaneAlone) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto",
+                   "virtual:seed=8,serial=MOS2A45130008,jig=auto"},
+                  folder.path());
+  {
+    const std::lock_guard lock(station.mutex);
+    station.defect_at = "MOS2A45130007";
+  }
+  station.wait_state(2, "idle");
+  station.start("/api/run");
+  EXPECT_EQ(station.post("/api/run", {{"lane", 2}}), 202);
+  const Json failed = station.wait_state(1, "done");
+  EXPECT_EQ(failed["result"]["verdict"], "inconclusive");
+  EXPECT_THAT(failed["result"]["reasons"].dump(), HasSubstr("no such key"));
+  const auto stored = [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  };
+  EXPECT_EQ(station.wait(2, stored)["result"]["verdict"], "pass");
+}
+
+TEST(LaneRun, AnExceptionOfTheStoreTakesNothingThatWasMeasured) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.has_defect = true;
+  station.start("/api/run");
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("problem");
+  });
+  EXPECT_THAT(lane["result"]["problem"].get<std::string>(), HasSubstr("no such key"));
+  EXPECT_THAT(lane["result"]["problem"].get<std::string>(), HasSubstr("it is kept in"));
+}
+
 }  // namespace
 }  // namespace sixpoint::station

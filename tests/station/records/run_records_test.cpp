@@ -36,6 +36,14 @@ TEST(RunRecords, ARunIsCompletedFromItsReport) {
   EXPECT_EQ(nlohmann::json::parse(run.document)["study"], "spring");
 }
 
+// A file's name may hold any bytes.
+TEST(RunRecords, LimitsOfAFileWithAnyNameAreStored) {
+  JigSessionOptions session;
+  session.limits.source = "/limits-\xff.toml";
+  const db::RunRecord run = run_record_before(session, "MOS2A45130007", "J1");
+  EXPECT_EQ(nlohmann::json::parse(run.limits)["source"], "/limits-\xEF\xBF\xBD.toml");
+}
+
 TEST(RunRecords, AFailedRunIsStoredWithItsSamplesAndWithoutConstants) {
   const tests::TemporaryFolder folder;
   auto store = db::Store::open(posix_env(), folder / "s.db");
