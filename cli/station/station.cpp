@@ -170,7 +170,8 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
     run.id = stored.ids.run_id;
     print_label(run);
   }
-  if (const Status noted = guard_.note_verdict(report.serial, report.verdict); !noted) {
+  if (const Status noted = guard_.note_verdict(report.serial, report.verdict, run.kind);
+      !noted) {
     context_.log().warn("{}", noted.error().brief());
   }
   return stored;

@@ -88,7 +88,7 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
                           allowed.error().brief());
   }
   session.retest = *allowed;
-  if (order.last_run) {
+  if (state.kind == kWriteKind) {
     session.notes.emplace_back(
         "written after the run: the readings that judge the constants are those of the run");
   }
@@ -113,7 +113,7 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
     return end_without_report(state.serial, report.error());
   }
   show_result(*report, {state.operator_name, state.is_authenticated, state.station,
-                        session.retest.retest_of, order.last_run ? kWriteKind : "jig"});
+                        session.retest.retest_of, state.kind});
   const std::lock_guard lock(mutex_);
   if (report->usable() && !report->written && !report->write_begun && run_) {
     UnfinishedRun& last = unwritten_.emplace(state);
@@ -136,6 +136,7 @@ void Lanes::Lane::write_last(const std::stop_token& stop, const StartOrder& orde
   left.is_authenticated = order.is_authenticated;
   left.client = order.client;
   left.write = true;
+  left.kind = kWriteKind;
   StartOrder writing = order;
   writing.write = true;
   {
@@ -362,7 +363,7 @@ void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& 
     report.verdict = JigVerdict::stopped;
     report.codes = {"stopped"};
   }
-  show_result(report, {left.operator_name, left.is_authenticated, left.station, {}});
+  show_result(report, {left.operator_name, left.is_authenticated, left.station, {}, left.kind});
 }
 
 }  // namespace sixpoint::station

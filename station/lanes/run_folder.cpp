@@ -73,6 +73,7 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
   // Folders of earlier versions do not have these.
   SIXPOINT_ASSIGN(run.protocol, parse_jig_protocol(json.value("protocol", "production")));
+  run.kind = json.value("kind", run.kind);
   run.resume.write_begun = json.value("write_begun", false);
   if (json.contains("stream")) {
     run.resume.stream = parse_stream(json["stream"]);
@@ -171,6 +172,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
                      {"station", run.station},
                      {"client", run.client},
                      {"write", run.write},
+                     {"kind", run.kind},
                      {"filter", calib::to_string(run.filter)},
                      {"protocol", to_string(run.protocol)},
                      {"started", to_iso8601(run.resume.started)},

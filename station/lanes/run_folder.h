@@ -33,6 +33,7 @@ struct UnfinishedRun {
   std::string station;
   std::string client = {};
   bool write = false;
+  std::string kind = "jig";  // or kWriteKind (run_records.h)
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   JigProtocol protocol = JigProtocol::production;
   JigResume resume = {};

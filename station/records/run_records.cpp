@@ -87,15 +87,17 @@ Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report
   SIXPOINT_ASSIGN(
       done.run_id,
       writer.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
-  if (report.written) {
+  if (report.written && report.as_left) {
     db::UnitWrite write;
     write.run_id = done.run_id;
     write.serial = report.serial;
     write.written = report.ended;
     write.as_found =
         report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
-    write.as_left = calib::to_json(report.six->best().stored).dump();
     write.read_back = calib::to_json(report.as_left->constants).dump();
+    // A run that ended with its program has no solution any more; "written" is a page read back equal.
+    write.as_left =
+        report.six ? calib::to_json(report.six->best().stored).dump() : write.read_back;
     SIXPOINT_CHECK(writer.add_unit_write(write));
   }
   if (report.usable() && run.kind != kStudyKind) {

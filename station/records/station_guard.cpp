@@ -165,7 +165,11 @@ Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
   return unit->second;
 }
 
-Status StationGuard::note_verdict(const std::string& serial, JigVerdict verdict) {
+Status StationGuard::note_verdict(const std::string& serial, JigVerdict verdict,
+                                  std::string_view kind) {
+  if (kind != "jig") {
+    return {};
+  }
   SIXPOINT_ASSIGN(StationMemory known, memory());
   const auto found = known.units.find(serial);
   RetestState state = found == known.units.end() ? RetestState{} : found->second;

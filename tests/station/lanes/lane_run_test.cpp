@@ -64,6 +64,43 @@ TEST(LaneRun, ARunThatPassedIsWrittenAfterwards) {
   EXPECT_EQ(station.post("/api/run", now), 409) << "once";
 }
 
+// It is no second run either where the program ended in between: the next one goes on with a write.
+TEST(LaneRun, AWriteAfterwardsStaysOneAfterARestart) {
+  const std::string device = "virtual:seed=7,serial=MOS2A45130007,pace=50";
+  const auto stored = [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  };
+  for (const bool comes_back : {true, false}) {
+    const tests::TemporaryFolder folder;
+    const auto bench = std::make_shared<mocks::VirtualBench>();
+    {
+      Station station({device}, folder.path(), 24, bench);
+      station.start("/api/run");
+      place_unit(station, 1, 40);
+      station.wait(1, stored);
+      ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+      station.wait(1, [](const Json& json) {
+        return json["run"].is_object() && json["run"]["phase"] == "rechecking";
+      });
+    }
+    Station station({device}, folder.path(), 24, bench);
+    station.wait_state(1, "running");
+    if (comes_back) {
+      place_unit(station, 1, 40);
+    } else {
+      ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
+      station.wait_state(1, "unit_away");
+      ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+    }
+    const Json done = station.wait(1, stored);
+    EXPECT_EQ(station.kinds, std::vector<std::string>{kWriteKind}) << done.dump(1);
+    if (comes_back) {
+      EXPECT_EQ(done["result"]["verdict"], "pass") << done.dump(1);
+      EXPECT_THAT(done["result"]["reasons"].dump(), HasSubstr("written after the run"));
+    }
+  }
+}
+
 // What was measured on one unit is never written into another one.
 TEST(LaneRun, ConstantsOfTheLastRunAreForItsOwnUnitAlone) {
   const tests::TemporaryFolder folder;
@@ -206,6 +243,7 @@ TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
     left.serial = "MOS2A45139999";  // another unit than the one in the lane now
     left.client = "me";
     left.write = true;
+    left.kind = begun ? kWriteKind : "jig";
     left.resume.started = *parse_iso8601("2026-01-02T03:04:05");
     left.resume.as_found = device::CalibrationPage{};
     left.resume.write_begun = begun;
@@ -219,6 +257,7 @@ TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
       return json["result"].is_object() && json["result"]["stored"] == true;
     });
     ASSERT_EQ(station.reports.size(), 1U);
+    EXPECT_EQ(station.kinds.front(), left.kind);
     EXPECT_EQ(station.reports.front().as_left.has_value(), !begun);
     EXPECT_EQ(station.reports.front().verdict, JigVerdict::stopped);
   }

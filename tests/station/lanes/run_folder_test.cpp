@@ -64,7 +64,7 @@ TEST(RunFolder, ABadRunSetsAsideItselfAndItsSamplesAlone) {
   EXPECT_FALSE((*lane.load_capture()).has_value());
 }
 
-// A folder of the version before has no `stream` and no `write_begun`.
+// A folder of an earlier version has no `stream`, no `write_begun` and no `kind`.
 TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   const tests::TemporaryFolder folder;
   RunFolder lane(posix_env(), folder / "lane");
@@ -72,10 +72,12 @@ TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   auto json = nlohmann::ordered_json::parse(text_of_file(folder / "lane/run.json"));
   json.erase("stream");
   json.erase("write_begun");
+  json.erase("kind");
   std::ofstream(folder / "lane/run.json") << json.dump();
   const auto left = lane.load();
   ASSERT_OK(left);
   EXPECT_FALSE((*left)->resume.write_begun);
+  EXPECT_EQ((*left)->kind, "jig");
   EXPECT_EQ((*left)->resume.stream.samples, 0U);
 }
 

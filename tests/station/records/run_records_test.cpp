@@ -59,5 +59,24 @@ TEST(RunRecords, AFailedRunIsStoredWithItsSamplesAndWithoutConstants) {
   EXPECT_EQ(stored->software.substr(0, 9), "sixpoint ");
 }
 
+// The program ended after the write, and the unit did not come back.
+TEST(RunRecords, AnInterruptedRunThatHasWrittenIsStoredWithItsWrite) {
+  const tests::TemporaryFolder folder;
+  auto store = db::Store::open(posix_env(), folder / "s.db");
+  ASSERT_OK(store);
+  JigReport report = a_report();
+  report.verdict = JigVerdict::inconclusive;
+  report.as_found = report.as_left = device::CalibrationPage{};
+  report.as_left->constants.zero_lsb = {1, 2, 3};
+  report.written = true;
+  db::RunRecord run = run_record_before({}, "MOS2A45130007", "J1");
+  complete_run_record(run, report);
+  ASSERT_OK(add_run_records(*store, report, run));
+  const auto history = store->unit_history("MOS2A45130007");
+  ASSERT_OK(history);
+  ASSERT_EQ(history->writes.size(), 1U);
+  EXPECT_EQ(history->writes[0].as_left, history->writes[0].read_back);
+}
+
 }  // namespace
 }  // namespace sixpoint::station
