@@ -151,8 +151,8 @@ struct NewRows {
   std::vector<std::pair<std::string, Bytes>> attachments = {};  // by the SHA-256 of their bytes
 };
 
-// What the columns of names take (operator, station, jig ...): up to 200 bytes of UTF-8 without NUL.
-// bad_data otherwise; to be asked before the work whose record has the name.
+// What the columns of names take (operator, station, jig ...): up to 200 bytes of UTF-8 without
+// NUL. bad_data otherwise; to be asked before the work whose record has the name.
 Status check_name(std::string_view name);
 
 // bad_data for a serial number that is empty, unprintable or above 200 bytes, an unknown filter, a

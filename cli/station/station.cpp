@@ -170,8 +170,7 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
     run.id = stored.ids.run_id;
     print_label(run);
   }
-  if (const Status noted = guard_.note_verdict(report.serial, report.verdict, run.kind);
-      !noted) {
+  if (const Status noted = guard_.note_verdict(report.serial, report.verdict, run.kind); !noted) {
     context_.log().warn("{}", noted.error().brief());
   }
   return stored;
@@ -209,8 +208,7 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
 // A text that stands in every record of the station, refused before anything is measured.
 Status check_name_option(const char* option, const std::string& text) {
   const Status taken = db::check_name(text);
-  return taken ? Status()
-               : fail(ErrorCode::usage, taken.error().what, option, taken.error().hint);
+  return taken ? Status() : fail(ErrorCode::usage, taken.error().what, option, taken.error().hint);
 }
 
 Result<station::LanesOptions> lanes_options(Context& context,

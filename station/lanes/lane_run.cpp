@@ -323,8 +323,9 @@ void Lanes::Lane::set_aside_result(const Error& why) {
       unstored_->report.to_json().dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   const std::lock_guard lock(mutex_);
   const std::string problem =
-      kept ? fmt::format("not stored, and no store takes it: {}; it is kept in {}, its samples beside",
-                         why.brief(), *kept)
+      kept ? fmt::format(
+                 "not stored, and no store takes it: {}; it is kept in {}, its samples beside",
+                 why.brief(), *kept)
            : fmt::format("not stored yet: {}; {}", why.brief(), kept.error().brief());
   if (result_.is_object() && result_["serial"] == unstored_->report.serial) {
     result_["problem"] = problem;

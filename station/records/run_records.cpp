@@ -95,9 +95,9 @@ Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report
     write.as_found =
         report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
     write.read_back = calib::to_json(report.as_left->constants).dump();
-    // A run that ended with its program has no solution any more; "written" is a page read back equal.
-    write.as_left =
-        report.six ? calib::to_json(report.six->best().stored).dump() : write.read_back;
+    // A run that ended with its program has no solution any more; "written" is a page read back
+    // equal.
+    write.as_left = report.six ? calib::to_json(report.six->best().stored).dump() : write.read_back;
     SIXPOINT_CHECK(writer.add_unit_write(write));
   }
   if (report.usable() && run.kind != kStudyKind) {

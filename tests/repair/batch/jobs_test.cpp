@@ -11,7 +11,8 @@ namespace {
 
 TEST(Jobs, EachIsDoneOnce) {
   std::vector<std::atomic<int>> times(200);
-  for_each_job(times.size(), 4, [&](std::size_t i) { ++times[i]; }, [](std::size_t) {});
+  for_each_job(
+      times.size(), 4, [&](std::size_t i) { ++times[i]; }, [](std::size_t) {});
   for (const auto& count : times) {
     EXPECT_EQ(count, 1);
   }

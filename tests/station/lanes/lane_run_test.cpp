@@ -323,13 +323,11 @@ TEST(LaneRun, AnExceptionEndsTheWorkOfItsLaneAlone) {
   Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto",
                    "virtual:seed=8,serial=MOS2A45130008,jig=auto"},
                   folder.path());
-  {
-    const std::lock_guard lock(station.mutex);
-    station.defect_at = "MOS2A45130007";
-  }
   station.wait_state(2, "idle");
-  station.start("/api/run");
   EXPECT_EQ(station.post("/api/run", {{"lane", 2}}), 202);
+  station.wait(2, [](const Json& json) { return json["run"]["taken"].size() > 0; });
+  station.start_has_defect = true;
+  station.start("/api/run");
   const Json failed = station.wait_state(1, "done");
   EXPECT_EQ(failed["result"]["verdict"], "inconclusive");
   EXPECT_THAT(failed["result"]["reasons"].dump(), HasSubstr("no such key"));

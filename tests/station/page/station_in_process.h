@@ -6,6 +6,7 @@
 //   station.post("/api/run", {{"lane", 1}});
 #pragma once
 
+#include <atomic>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -44,9 +45,8 @@ class Station {
     options.capture_folder = folder;
     options.station = "bench-1";
     options.retry_s = 0.02;
-    options.may_start = [this](const std::string& serial) -> Result<RetestState> {
-      const std::lock_guard lock(mutex);
-      if (serial == defect_at) {
+    options.may_start = [this](const std::string&) -> Result<RetestState> {
+      if (start_has_defect) {
         throw std::runtime_error("no such key");
       }
       return RetestState{};
@@ -152,8 +152,8 @@ class Station {
   bool store_is_away = false;  // and the journal with it
   bool store_refuses = false;  // the record itself
   bool has_defect = false;     // to store throws
-  std::string defect_at;       // serial number of the unit whose start throws
-  bool is_kept_here = false;   // the journal has it
+  std::atomic<bool> start_has_defect{false};
+  bool is_kept_here = false;  // the journal has it
 
  private:
   std::shared_ptr<mocks::VirtualBench> bench_;

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "station/records/made_station.h"
+#include "station/records/run_records.h"
 
 namespace sixpoint::station {
 namespace {
