@@ -3,6 +3,7 @@
 
 #include "device/wire/wire_unit.h"
 #include "station/lanes/lane.h"
+#include "station/lanes/order_rule.h"
 
 namespace sixpoint::station {
 
@@ -54,13 +55,14 @@ void Lanes::Lane::work_once(const std::stop_token& stop) {
   }
 }
 
-// The libraries return errors as values: an exception is a defect of this program. It ends what this
-// lane was doing, and nothing of the others.
+// The libraries return errors as values: an exception is a defect of this program. It ends what
+// this lane was doing, and nothing of the others.
 void Lanes::Lane::end_by_defect(const std::string& what) {
-  const Error error{ErrorCode::internal,
-                    fmt::format("a defect of the program ended this lane's work: {}", printable(what)),
-                    {},
-                    "please report it; the other lanes go on"};
+  const Error error{
+      ErrorCode::internal,
+      fmt::format("a defect of the program ended this lane's work: {}", printable(what)),
+      {},
+      "please report it; the other lanes go on"};
   if (unit_ && unit_->jig() != nullptr && unit_->jig()->turns_by_itself()) {
     static_cast<void>(unit_->jig()->stop());
   }
@@ -154,19 +156,31 @@ void Lanes::Lane::look_at_jig() {
   if (jig == nullptr || !jig->turns_by_itself()) {
     return;
   }
-  bool release = false;
+  const auto fault_of = [jig] {
+    const auto position = jig->position();
+    return position ? position->fault : position.error().brief();
+  };
+  std::string fault = fault_of();
+  std::optional<Release> release;
   {
     const std::lock_guard lock(mutex_);
-    release = std::exchange(release_jig_, false);
+    release = std::exchange(release_, std::nullopt);
   }
-  const Status released = release ? jig->release() : Status{};
-  const auto position = jig->position();
-  const std::string fault = position ? position->fault : position.error().brief();
+  std::optional<std::string> problem;
+  if (release) {
+    problem = why_release_is_dead({release->fault, age_s(release->given), fault});
+    if (!problem) {
+      if (const Status released = jig->release(); !released) {
+        problem = released.error().brief();
+      }
+      fault = fault_of();
+    }
+  }
   const std::lock_guard lock(mutex_);
   if (release) {
-    add_log(released ? "jig" : "problem",
-            released ? fmt::format("{} says that the jig is free", printable(operator_name_, 60))
-                     : released.error().brief());
+    add_log(problem ? "problem" : "jig",
+            problem.value_or(
+                fmt::format("{} says that the jig is free", printable(operator_name_, 60))));
   }
   if (fault != jig_fault_) {
     jig_fault_ = fault;
@@ -189,7 +203,7 @@ bool Lanes::Lane::open_unit() {
     if (!is_busy()) {
       set_state(LaneState::absent, opened.error().brief());
     }
-    drop_order({});
+    drop_what_waits();
     return false;
   }
   std::unique_ptr<device::Unit> unit = *std::move(opened);
@@ -230,7 +244,7 @@ void Lanes::Lane::close_unit() {
   const std::lock_guard lock(mutex_);
   unit_.reset();
   live_ = {};
-  drop_order({});
+  drop_what_waits();
 }
 
 void Lanes::Lane::add_readings(const device::SampleBlock& block, const JigLive* live) {
