@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
 #include "cli/devices/stop_signals.h"
@@ -324,6 +325,24 @@ Result<station::ServerOptions> server_options(Context& context,
   return server;
 }
 
+// One station at a time in a state folder: two would go on with the same runs and print the same
+// labels. Nothing where its file system has no locks.
+Result<std::unique_ptr<FileLock>> lock_of_station(const std::string& folder, Context& context) {
+  SIXPOINT_CHECK(make_private_folders(context.env.files, folder));
+  auto lock = context.env.files.lock(folder + "/station.lock");
+  if (!lock) {
+    context.log().warn("{}: no lock: {}; let no other station use this folder", printable(folder),
+                       lock.error().what);
+    return nullptr;
+  }
+  if (*lock == nullptr) {
+    return fail(ErrorCode::cannot_create, "another station is running in this folder of --state",
+                folder,
+                "end that one, or give this one a --station NAME or --state FOLDER of its own");
+  }
+  return lock;
+}
+
 Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto listening, server_options(context, options));
   SIXPOINT_ASSIGN(const auto printer_at, printer_address(context, options));
@@ -333,6 +352,7 @@ Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(
       const station::JigDue jig_due,
       station::parse_jig_due(options.jig_due, options.jig_exception, options.jig_exception_by));
+  SIXPOINT_ASSIGN(const auto lock, lock_of_station(state_folder(options), context));
   // A store that cannot be used is refused before anything is measured.
   if (const auto store = open_store(context, options.store);
       !store && store.error().code == ErrorCode::usage) {

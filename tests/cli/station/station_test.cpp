@@ -153,6 +153,24 @@ TEST_F(StationCommand, ServesHttps) {
             65);
 }
 
+// Two would go on with the same runs and print the same labels.
+TEST_F(StationCommand, OneStationAtATimeInAStateFolder) {
+  const std::vector<std::string> words = arguments({"--port", "0", "--device", "virtual:seed=7"});
+  {
+    Child first(words);
+    ASSERT_THAT(first.line(), StartsWith("http://"));
+    Child second(words);
+    EXPECT_EQ(second.wait(), 73);
+    const auto refused = run(words);
+    EXPECT_EQ(refused.exit_code, 73);
+    EXPECT_THAT(refused.people, HasSubstr("another station is running"));
+    EXPECT_THAT(refused.people, HasSubstr("--state"));
+    EXPECT_EQ(first.stop(SIGKILL), -1);
+  }
+  Child next(words);
+  EXPECT_THAT(next.line(), StartsWith("http://")) << "a killed one holds nothing";
+}
+
 // The token is in a file of its owner alone; what is printed is a code for one browser.
 TEST_F(StationCommand, TheTokenIsInAFileAndACodeIsPrinted) {
   const auto text_of = [](const std::string& file) {
