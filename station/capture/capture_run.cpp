@@ -232,12 +232,13 @@ class CaptureRun {
   }
 
   Status begin_recording() {
-    piece_began_ = unit().clock().now();
-    auto begun = unit().start_recording(options_.rate_hz, piece_began_);
+    const UtcTime began = unit().clock().now();
+    piece_began_ = unit().clock().elapsed();
+    auto begun = unit().start_recording(options_.rate_hz, began);
     if (!begun && begun.error().code == ErrorCode::io) {
       // A program that was killed may have left it streaming.
       SIXPOINT_CHECK(unit().stop_stream());
-      begun = unit().start_recording(options_.rate_hz, piece_began_);
+      begun = unit().start_recording(options_.rate_hz, began);
     }
     SIXPOINT_ASSIGN(recording_, begun);
     save();
@@ -424,7 +425,7 @@ class CaptureRun {
   Status end_recording() {
     SIXPOINT_CHECK(retry([&] { return unit().identify(); }));
     const auto stopped = retry([&] { return unit().stop_recording(); });
-    wanted_s_ = std::chrono::duration<double>(unit().clock().now() - piece_began_).count();
+    wanted_s_ = std::chrono::duration<double>(unit().clock().elapsed() - piece_began_).count();
     if (!stopped) {
       if (stopped.error().code != ErrorCode::io) {
         return fail(stopped.error());
@@ -491,8 +492,8 @@ class CaptureRun {
   const CaptureHooks& hooks_;
   CaptureReport report_;
   CaptureResume progress_;
-  std::uint16_t recording_ = 0;  // under way
-  UtcTime piece_began_{};
+  std::uint16_t recording_ = 0;              // under way
+  std::chrono::nanoseconds piece_began_{0};  // by the clock that no one sets
   double wanted_s_ = 0;
   bool pieces_ = false;  // the unit was away, or an earlier program began this
   Error away_;           // why the unit is away

@@ -111,6 +111,7 @@ class Lanes::Lane {
     std::optional<Pose> side;  // that the operator is asked for
     std::size_t number = 0;    // of this side, from 1
     bool placed = false;
+    std::chrono::nanoseconds asked{0};  // by the clock that no one sets
     double until_ms = 0;  // Unix time at which the unit has rested long enough on this side
     std::vector<Pose> again = {};  // sides that are asked for once more
   };

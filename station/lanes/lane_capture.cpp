@@ -45,7 +45,8 @@ SideAnswer Lanes::Lane::ask_side(const std::stop_token& stop, device::Pose side,
                                  std::size_t number) {
   std::unique_lock lock(mutex_);
   if (capture_->side != side) {
-    capture_ = CaptureView{side, number, turns_by_itself_, 0, std::move(capture_->again)};
+    capture_ = CaptureView{
+        side, number, turns_by_itself_, env_.clock.elapsed(), 0, std::move(capture_->again)};
     waiting_since_ms_ = unix_ms(env_.clock.now());
     changed();
   }
@@ -64,8 +65,8 @@ SideAnswer Lanes::Lane::ask_side(const std::stop_token& stop, device::Pose side,
     return SideAnswer::placed;
   }
   // A unit that waits for hours must not record until its battery is empty.
-  const double waited_s = (unix_ms(env_.clock.now()) - waiting_since_ms_) / 1000;
-  return waited_s > shared_.options.unit_wait_s ? SideAnswer::stop : SideAnswer::waiting;
+  return age_s(capture_->asked) > shared_.options.unit_wait_s ? SideAnswer::stop
+                                                              : SideAnswer::waiting;
 }
 
 UnfinishedCapture Lanes::Lane::new_capture(const StartOrder& order) const {

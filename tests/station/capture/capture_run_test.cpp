@@ -191,6 +191,24 @@ TEST(CaptureRun, AUnitThatWasLeftStreamingRecords) {
   EXPECT_TRUE(report->usable());
 }
 
+// A host that gets the right time in the middle: how long the unit recorded is what it was.
+TEST(CaptureRun, ACalendarThatIsSetChangesNoDuration) {
+  VirtualBench bench;
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  CaptureHooks hooks;
+  hooks.ask = [&](device::Pose, std::size_t number, std::size_t) {
+    if (number == 3) {
+      bench.clock->set(bench.clock->now() + std::chrono::hours(2));
+    }
+    return SideAnswer::placed;
+  };
+  const auto report = run_capture(bench.on_jig(), bench.env.env, options, hooks);
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->usable()) << report->solved->brief();
+  EXPECT_THAT(report->notes, testing::Not(Contains(HasSubstr("the recording holds"))));
+}
+
 TEST(CaptureRun, DoesNotWriteOverAFile) {
   VirtualBench bench;
   ASSERT_OK(bench.env.files.create("c.gt3x"));
