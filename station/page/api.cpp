@@ -152,7 +152,7 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
   const std::string port = fmt::format(":{}", port_.load());
   if (name.ends_with(port)) {
     name.remove_suffix(port.size());
-  } else if (port_ != 80) {
+  } else if (port_ != (options_.tls ? 443 : 80)) {
     name = {};
   }
   const bool local = is_loopback(options_.bind);
