@@ -112,7 +112,7 @@ Result<std::optional<Unfinished>> read_state(FileSystem& files, const std::strin
 
 Status write_state(FileSystem& files, const std::string& folder, const char* name,
                    const Json& json) {
-  SIXPOINT_CHECK(files.make_folders(folder));
+  SIXPOINT_CHECK(make_synced_folders(files, folder));
   return write_file(files, folder + name,
                     json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
@@ -186,7 +186,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
 
 Status RunFolder::append(std::string_view rows) {
   if (!file_) {
-    SIXPOINT_CHECK(env_.files.make_folders(folder_));
+    SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
     SIXPOINT_ASSIGN(const auto names, sample_files());
     const int next = names.empty() ? 1 : number_of(names.back()) + 1;
     SIXPOINT_ASSIGN(file_, env_.files.create(fmt::format("{}/{}{}.csv", folder_, kSamples, next)));
