@@ -63,18 +63,19 @@ void Lanes::Lane::end_by_defect(const std::string& what) {
       fmt::format("a defect of the program ended this lane's work: {}", printable(what)),
       {},
       "please report it; the other lanes go on"};
-  if (unit_ && unit_->jig() != nullptr && unit_->jig()->turns_by_itself()) {
-    static_cast<void>(unit_->jig()->stop());
-  }
   bool was_busy = false;
   bool was_capture = false;
   std::string serial;
   {
     const std::lock_guard lock(mutex_);
     add_log("problem", error.brief());
+    opening_ = nullptr;
     was_busy = is_busy();
     was_capture = capture_.has_value();
     serial = identity_.serial;
+  }
+  if (was_busy && unit_ && unit_->jig() != nullptr && unit_->jig()->turns_by_itself()) {
+    static_cast<void>(unit_->jig()->stop());  // no one watches it any more
   }
   if (was_capture) {
     end_capture_by(error, serial);
