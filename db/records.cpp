@@ -9,6 +9,7 @@
 
 #include "base/sha256.h"
 #include "db/chain.h"
+#include "db/name_rule.h"
 
 namespace sixpoint::db {
 namespace {

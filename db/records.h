@@ -14,7 +14,6 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -150,10 +149,6 @@ struct NewRows {
   std::vector<std::pair<const Table*, Row>> rows = {};
   std::vector<std::pair<std::string, Bytes>> attachments = {};  // by the SHA-256 of their bytes
 };
-
-// What the columns of names take (operator, station, jig ...): up to 200 bytes of UTF-8 without
-// NUL. bad_data otherwise; to be asked before the work whose record has the name.
-Status check_name(std::string_view name);
 
 // bad_data for a serial number that is empty, unprintable or above 200 bytes, an unknown filter, a
 // document that is no JSON, a text that is no UTF-8 or too long, a capture above 100 MiB.

@@ -19,7 +19,7 @@
 #include "cli/station/operator.h"
 #include "cli/station/practice_bench.h"
 #include "cli/store_option.h"
-#include "db/records.h"
+#include "db/name_rule.h"
 #include "station/access/operators.h"
 #include "station/access/sign_in.h"
 #include "station/certificate/certificate.h"

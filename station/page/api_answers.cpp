@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "db/records.h"
+#include "db/name_rule.h"
 
 namespace sixpoint::station {
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/sha256.h"
+#include "db/name_rule.h"
 #include "expect_result.h"
 #include "store_fixture.h"
 
