@@ -325,7 +325,7 @@ TEST(LaneRun, AnExceptionEndsTheWorkOfItsLaneAlone) {
                   folder.path());
   station.wait_state(2, "idle");
   EXPECT_EQ(station.post("/api/run", {{"lane", 2}}), 202);
-  station.wait(2, [](const Json& json) { return json["run"]["taken"].size() > 0; });
+  station.wait_state(2, "running");
   station.start_has_defect = true;
   station.start("/api/run");
   const Json failed = station.wait_state(1, "done");
