@@ -9,6 +9,7 @@
 
 #include "base/sha256.h"
 #include "db/chain.h"
+#include "db/name_rule.h"
 
 namespace sixpoint::db {
 namespace {
@@ -59,10 +60,16 @@ Status check_text(std::string_view text, std::size_t limit) {
   return {};
 }
 
+}  // namespace
+
+Status check_name(std::string_view name) { return check_text(name, kLongestName); }
+
+namespace {
+
 Status check_content(Content content, const std::string& text) {
   switch (content) {
     case Content::name:
-      return check_text(text, kLongestName);
+      return check_name(text);
     case Content::reason:
       return check_text(text, kLongestReason);
     case Content::text:

@@ -378,10 +378,9 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
     return done.kept ? Status{} : fail(done.kept.error());
   };
   SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, stop, store_run));
-  if (options.study.empty()) {
-    if (const Status noted = guard.note_verdict(identity.serial, done.report.verdict); !noted) {
-      context.log().warn("{}", noted.error().brief());
-    }
+  if (const Status noted = guard.note_verdict(identity.serial, done.report.verdict, record.kind);
+      !noted) {
+    context.log().warn("{}", noted.error().brief());
   }
   if (done.kept) {
     if (done.kept->in_store() && store) {

@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
 #include "cli/devices/stop_signals.h"
@@ -18,6 +19,7 @@
 #include "cli/station/operator.h"
 #include "cli/station/practice_bench.h"
 #include "cli/store_option.h"
+#include "db/name_rule.h"
 #include "station/access/operators.h"
 #include "station/access/sign_in.h"
 #include "station/certificate/certificate.h"
@@ -169,7 +171,7 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
     run.id = stored.ids.run_id;
     print_label(run);
   }
-  if (const Status noted = guard_.note_verdict(report.serial, report.verdict); !noted) {
+  if (const Status noted = guard_.note_verdict(report.serial, report.verdict, run.kind); !noted) {
     context_.log().warn("{}", noted.error().brief());
   }
   return stored;
@@ -204,8 +206,16 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
               "ask for report.json, certificate.pdf, .json or .dcc.xml, or label.zpl");
 }
 
+// A text that stands in every record of the station, refused before anything is measured.
+Status check_name_option(const char* option, const std::string& text) {
+  const Status taken = db::check_name(text);
+  return taken ? Status() : fail(ErrorCode::usage, taken.error().what, option, taken.error().hint);
+}
+
 Result<station::LanesOptions> lanes_options(Context& context,
                                             const StationCommandOptions& options) {
+  SIXPOINT_CHECK(check_name_option("--station", options.station));
+  SIXPOINT_CHECK(check_name_option("--jig-id", options.jig_id));
   station::LanesOptions lanes;
   lanes.devices = options.devices;
   lanes.state_folder = state_folder(options);
@@ -315,6 +325,24 @@ Result<station::ServerOptions> server_options(Context& context,
   return server;
 }
 
+// One station at a time in a state folder: two would go on with the same runs and print the same
+// labels. Nothing where its file system has no locks.
+Result<std::unique_ptr<FileLock>> lock_of_station(const std::string& folder, Context& context) {
+  SIXPOINT_CHECK(make_private_folders(context.env.files, folder));
+  auto lock = context.env.files.lock(folder + "/station.lock");
+  if (!lock) {
+    context.log().warn("{}: no lock: {}; let no other station use this folder", printable(folder),
+                       lock.error().what);
+    return nullptr;
+  }
+  if (*lock == nullptr) {
+    return fail(ErrorCode::cannot_create, "another station is running in this folder of --state",
+                folder,
+                "end that one, or give this one a --station NAME or --state FOLDER of its own");
+  }
+  return lock;
+}
+
 Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto listening, server_options(context, options));
   SIXPOINT_ASSIGN(const auto printer_at, printer_address(context, options));
@@ -324,6 +352,7 @@ Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(
       const station::JigDue jig_due,
       station::parse_jig_due(options.jig_due, options.jig_exception, options.jig_exception_by));
+  SIXPOINT_ASSIGN(const auto lock, lock_of_station(state_folder(options), context));
   // A store that cannot be used is refused before anything is measured.
   if (const auto store = open_store(context, options.store);
       !store && store.error().code == ErrorCode::usage) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -17,11 +19,19 @@ void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std
   std::atomic<std::size_t> next{0};
   std::atomic<std::size_t> done{0};
   std::atomic<std::size_t> ended{0};  // threads
+  std::mutex mutex;
+  std::exception_ptr defect;  // guarded by mutex
   const auto stopped = [stop] { return stop != nullptr && *stop; };
   const auto run = [&] {
-    for (std::size_t i = next++; i < count && !stopped(); i = next++) {
-      work(i);
-      ++done;
+    try {
+      for (std::size_t i = next++; i < count && !stopped(); i = next++) {
+        work(i);
+        ++done;
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      defect = std::current_exception();
+      next = count;
     }
     ++ended;
   };
@@ -32,6 +42,10 @@ void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std
   while (ended < threads.size()) {
     watch(done);
     std::this_thread::sleep_for(std::chrono::milliseconds(count - done < jobs ? 2 : 20));
+  }
+  threads.clear();
+  if (defect) {
+    std::rethrow_exception(defect);
   }
 }
 

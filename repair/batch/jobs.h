@@ -16,7 +16,8 @@ unsigned threads_of(unsigned jobs);
 
 // Calls work(i) for every i below `count`, on up to `jobs` threads (0: one per core). Meanwhile
 // `watch(done)` is called on the calling thread, some fifty times a second. `work` must be safe to
-// call from several threads for different i. Once `stop` is set no further i is begun.
+// call from several threads for different i. Once `stop` is set no further i is begun. An exception
+// of `work`, a defect, begins no further i and goes to the caller once all threads have ended.
 void for_each_job(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& work,
                   const std::function<void(std::size_t)>& watch,
                   const std::atomic<bool>* stop = nullptr);

@@ -93,13 +93,13 @@ Result<bool> note_oddities(FileSystem& files, const std::string& path, CaptureRe
   return std::abs(oddities.jumped_s) > kShort_s;
 }
 
-Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<double> wanted_s,
-                       CaptureReport& report) {
-  SIXPOINT_ASSIGN(repair::Survey survey, repair::survey(env.files, options.output));
+Status check_and_solve(Env& env, const CaptureOptions& options, const std::string& path,
+                       std::optional<double> wanted_s, CaptureReport& report) {
+  SIXPOINT_ASSIGN(repair::Survey survey, repair::survey(env.files, path));
   if (survey.facts.serial != report.serial) {
     return fail(ErrorCode::bad_data,
-                fmt::format("the recording is of {}", printable(survey.facts.serial, 40)),
-                options.output, "another unit was plugged in; begin anew");
+                fmt::format("the recording is of {}", printable(survey.facts.serial, 40)), path,
+                "another unit was plugged in; begin anew");
   }
   if (wanted_s && survey.duration_s < *wanted_s - kShort_s) {
     report.notes.push_back(
@@ -108,13 +108,13 @@ Status check_and_solve(Env& env, const CaptureOptions& options, std::optional<do
                     survey.duration_s, *wanted_s));
   }
   if (report.pieces.empty()) {
-    SIXPOINT_ASSIGN(const bool jumped, note_oddities(env.files, options.output, report));
+    SIXPOINT_ASSIGN(const bool jumped, note_oddities(env.files, path, report));
     if (jumped && wanted_s) {
       undo_jumps(survey.blocks, options.side_s + options.turn_s);
     }
   }
   const auto begin = env.clock.elapsed();
-  SIXPOINT_ASSIGN(report.solved, repair::solve_survey(options.output, survey, options.solve));
+  SIXPOINT_ASSIGN(report.solved, repair::solve_survey(path, survey, options.solve));
   report.solved->seconds = std::chrono::duration<double>(env.clock.elapsed() - begin).count();
   return {};
 }
@@ -139,7 +139,7 @@ Result<CaptureReport> run_file_capture(device::Unit& unit, Env& env,
   report.recording_filter = filter.value_or(report.recording_filter);
   report.refusal = why_recording_cannot_help({report.serial, report.firmware, filter, true});
   if (report.refusal.empty()) {
-    SIXPOINT_CHECK(check_and_solve(env, options, std::nullopt, report));
+    SIXPOINT_CHECK(check_and_solve(env, options, options.output, std::nullopt, report));
   }
   return report;
 }
@@ -186,7 +186,11 @@ class CaptureRun {
         report_.stopped = true;
         return report_;
       }
-      SIXPOINT_CHECK(fetch_anew(repeats));
+      const Status fetched = repeats == 0 ? fetch(options_.output) : fetch_anew();
+      if (!fetched && repeats > 0 && fetched.error().code != ErrorCode::internal) {
+        return judged_as_it_is(fetched.error().brief());
+      }
+      SIXPOINT_CHECK(fetched);
       const auto sides = hooks_.again && may_make_pieces()
                              ? sides_to_repeat(*report_.solved, repeats, options_.most_repeats)
                              : std::vector<device::Pose>();
@@ -232,12 +236,13 @@ class CaptureRun {
   }
 
   Status begin_recording() {
-    piece_began_ = unit().clock().now();
-    auto begun = unit().start_recording(options_.rate_hz, piece_began_);
+    const UtcTime began = unit().clock().now();
+    piece_began_ = unit().clock().elapsed();
+    auto begun = unit().start_recording(options_.rate_hz, began);
     if (!begun && begun.error().code == ErrorCode::io) {
       // A program that was killed may have left it streaming.
       SIXPOINT_CHECK(unit().stop_stream());
-      begun = unit().start_recording(options_.rate_hz, piece_began_);
+      begun = unit().start_recording(options_.rate_hz, began);
     }
     SIXPOINT_ASSIGN(recording_, begun);
     save();
@@ -289,28 +294,70 @@ class CaptureRun {
 
   // The pieces that a repeated side makes have names of their own, and replace no file.
   bool may_make_pieces() {
-    for (std::size_t number = 1; number <= device::kPoses.size(); ++number) {
-      const std::string name = piece_name(options_.output, number);
+    const auto is_free = [this](const std::string& name) {
       const auto& own = report_.pieces;
       if (std::find(own.begin(), own.end(), name) == own.end() && env_.files.info(name)) {
         report_.notes.push_back("no side is asked for again: there is a file " + name);
         return false;
       }
+      return true;
+    };
+    const std::string beside = beside_name();
+    bool are_free = is_free(beside);
+    for (std::size_t number = 1; are_free && number <= device::kPoses.size(); ++number) {
+      are_free =
+          is_free(piece_name(options_.output, number)) && is_free(piece_name(beside, number));
     }
-    return true;
+    return are_free;
   }
 
-  // After a side was repeated: the file of before is one that this capture made.
-  Status fetch_anew(int repeats) {
-    if (repeats > 0) {
-      report_.pieces.push_back(options_.output);
-      for (const std::string& made : report_.pieces) {
-        SIXPOINT_CHECK(env_.files.remove(made));
-      }
-      report_.pieces.clear();
-      report_.solved.reset();
+  // "c.gt3x" is "c-new.gt3x" until it is whole.
+  std::string beside_name() const {
+    const std::size_t dot = piece_name(options_.output, 0).rfind("-0");
+    return options_.output.substr(0, dot) + "-new" + options_.output.substr(dot);
+  }
+
+  // After a side was repeated: all is downloaded and judged beside what this capture made before,
+  // and then takes its place. Where that fails, file and judgement of before stay.
+  Status fetch_anew() {
+    const CaptureReport before = report_;
+    report_.pieces.clear();
+    report_.solved.reset();
+    const std::string beside = beside_name();
+    Status done = fetch(beside);
+    if (done) {
+      done = take_place(beside, before.pieces);
     }
-    return fetch();
+    if (!done) {
+      report_.pieces.push_back(beside);
+      for (const std::string& name : report_.pieces) {
+        static_cast<void>(env_.files.remove(name));
+      }
+      auto notes = std::move(report_.notes);
+      report_ = before;
+      report_.notes = std::move(notes);
+    }
+    return done;
+  }
+
+  Status take_place(const std::string& beside, const std::vector<std::string>& before) {
+    SIXPOINT_CHECK(env_.files.rename(beside, options_.output));
+    // The new file holds from here on. A piece that cannot be renamed keeps its name.
+    report_.file = options_.output;
+    auto& pieces = report_.pieces;
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      std::string name = piece_name(options_.output, i + 1);
+      if (env_.files.rename(pieces[i], name)) {
+        pieces[i] = std::move(name);
+      }
+    }
+    for (const std::string& name : before) {
+      if (std::find(pieces.begin(), pieces.end(), name) == pieces.end()) {
+        static_cast<void>(env_.files.remove(name));
+      }
+    }
+    static_cast<void>(env_.files.sync_folder(folder_of(options_.output)));
+    return {};
   }
 
   void save() {
@@ -424,7 +471,7 @@ class CaptureRun {
   Status end_recording() {
     SIXPOINT_CHECK(retry([&] { return unit().identify(); }));
     const auto stopped = retry([&] { return unit().stop_recording(); });
-    wanted_s_ = std::chrono::duration<double>(unit().clock().now() - piece_began_).count();
+    wanted_s_ = std::chrono::duration<double>(unit().clock().elapsed() - piece_began_).count();
     if (!stopped) {
       if (stopped.error().code != ErrorCode::io) {
         return fail(stopped.error());
@@ -455,23 +502,23 @@ class CaptureRun {
     return made;
   }
 
-  Status fetch() {
+  Status fetch(const std::string& path) {
     SIXPOINT_ASSIGN(const auto made, list_recordings());
-    report_.file = options_.output;
+    report_.file = path;
     if (made.size() == 1) {
-      SIXPOINT_CHECK(download(made.front(), options_.output));
+      SIXPOINT_CHECK(download(made.front(), path));
       report_.file_sha256 = to_hex(made.front().sha256);
-      return check_and_solve(env_, options_, pieces_ ? std::nullopt : std::optional(wanted_s_),
-                             report_);
+      return check_and_solve(env_, options_, path,
+                             pieces_ ? std::nullopt : std::optional(wanted_s_), report_);
     }
     for (std::size_t i = 0; i < made.size(); ++i) {
-      report_.pieces.push_back(piece_name(options_.output, i + 1));
+      report_.pieces.push_back(piece_name(path, i + 1));
       SIXPOINT_CHECK(download(made[i], report_.pieces.back()));
       SIXPOINT_CHECK(note_oddities(env_.files, report_.pieces.back(), report_));
     }
-    SIXPOINT_CHECK(join_recordings(env_.files, report_.pieces, options_.output));
-    SIXPOINT_ASSIGN(report_.file_sha256, file_sha256(env_.files, options_.output));
-    return check_and_solve(env_, options_, std::nullopt, report_);
+    SIXPOINT_CHECK(join_recordings(env_.files, report_.pieces, path));
+    SIXPOINT_ASSIGN(report_.file_sha256, file_sha256(env_.files, path));
+    return check_and_solve(env_, options_, path, std::nullopt, report_);
   }
 
   // What an earlier program downloaded already is not downloaded again.
@@ -491,8 +538,8 @@ class CaptureRun {
   const CaptureHooks& hooks_;
   CaptureReport report_;
   CaptureResume progress_;
-  std::uint16_t recording_ = 0;  // under way
-  UtcTime piece_began_{};
+  std::uint16_t recording_ = 0;              // under way
+  std::chrono::nanoseconds piece_began_{0};  // by the clock that no one sets
   double wanted_s_ = 0;
   bool pieces_ = false;  // the unit was away, or an earlier program began this
   Error away_;           // why the unit is away

@@ -119,11 +119,15 @@ LaneAnswer<void> Lanes::Lane::release_jig(const std::string& client) {
   if (auto checked = check_client(client); !checked) {
     return checked;
   }
+  if (state_ == LaneState::absent || (!is_busy() && !unit_)) {
+    return lane_conflict("no unit is plugged in here, so the jig cannot be asked",
+                         "plug it in, look at the jig, then say that it is free");
+  }
   if (is_busy() || jig_fault_.empty()) {
     return lane_conflict(is_busy() ? "a run is under way in this lane" : "the jig is free",
                          "a jig is released after it was stopped, when no run is under way");
   }
-  release_jig_ = true;
+  release_ = Release{jig_fault_, env_.clock.elapsed()};
   wake_.notify_all();
   return {};
 }
@@ -188,10 +192,16 @@ void Lanes::Lane::drop_order(const std::optional<std::string>& present) {
   if (!order_) {
     return;
   }
-  const double age_s = std::chrono::duration<double>(env_.clock.elapsed() - order_->given).count();
-  if (const auto dead = why_order_is_dead({order_->serial, age_s, present})) {
+  if (const auto dead = why_order_is_dead({order_->serial, age_s(order_->given), present})) {
     order_.reset();
     add_log("problem", *dead);
+  }
+}
+
+void Lanes::Lane::drop_what_waits() {
+  drop_order({});
+  if (std::exchange(release_, std::nullopt)) {
+    add_log("problem", "not released: the unit with its jig left; look at the jig again");
   }
 }
 

@@ -97,6 +97,11 @@ class Lanes::Lane {
     std::string serial;  // of the unit that it is for
     std::chrono::nanoseconds given{0};
   };
+  // The operator's word that the jig is free.
+  struct Release {
+    std::string fault;  // that the operator saw
+    std::chrono::nanoseconds given{0};
+  };
   struct LogLine {
     std::uint64_t id;
     std::string kind;
@@ -117,12 +122,15 @@ class Lanes::Lane {
     std::optional<Pose> side;  // that the operator is asked for
     std::size_t number = 0;    // of this side, from 1
     bool placed = false;
+    std::chrono::nanoseconds asked{0};  // by the clock that no one sets
     double until_ms = 0;  // Unix time at which the unit has rested long enough on this side
     std::vector<Pose> again = {};  // sides that are asked for once more
   };
 
   // The thread's loop (lane_unit.cpp).
   void work(const std::stop_token& stop);
+  void work_once(const std::stop_token& stop);
+  void end_by_defect(const std::string& what);
   void continue_unfinished(const std::stop_token& stop);
   // The order that waits, where it still holds (order_rule.h).
   std::optional<Order> next_order();
@@ -161,8 +169,10 @@ class Lanes::Lane {
   void end_interrupted(const UnfinishedRun& left, const std::string& reason);
   // The verdict is shown at once; store_result() follows.
   void show_result(const JigReport& report, const RunLabels& labels);
-  // Stores the last run. Until that succeeds, the run stays on the disk of this station.
+  // Stores the last run. Until that succeeds, the run stays on the disk of this station. One that
+  // no store takes is set aside there, and the lane is free.
   void store_result(const std::stop_token& stop);
+  void set_aside_result(const Error& why);
 
   // A calibration file (lane_capture.cpp).
   void capture(const std::stop_token& stop, const StartOrder& order,
@@ -172,6 +182,7 @@ class Lanes::Lane {
   SideAnswer ask_side(const std::stop_token& stop, device::Pose side, std::size_t number);
   void continue_capture(const std::stop_token& stop, const UnfinishedCapture& left);
   void end_capture(nlohmann::ordered_json result);
+  void end_capture_by(const Error& error, const std::string& serial);
 
   bool stop_requested() const {
     const std::lock_guard lock(mutex_);
@@ -193,8 +204,13 @@ class Lanes::Lane {
   // Nothing runs, or this client may command it.
   LaneAnswer<void> check_client(const std::string& client) const;
   LaneAnswer<void> check_scanned(const std::string& serial) const;
-  // The unit leaves: an order that waits is dropped.
+  double age_s(std::chrono::nanoseconds given) const {
+    return std::chrono::duration<double>(env_.clock.elapsed() - given).count();
+  }
+  // An order that waits is dropped where it does not hold for what is present.
   void drop_order(const std::optional<std::string>& present);
+  // The unit leaves: what waits for it is dropped.
+  void drop_what_waits();
   void add_log(std::string kind, std::string text);
   void set_state(LaneState state, std::string message);
   void set_done(nlohmann::ordered_json result, std::string message);
@@ -228,8 +244,8 @@ class Lanes::Lane {
   device::Identity identity_;
   calib::Calibration approximation_;
   bool turns_by_itself_ = false;
-  std::string jig_fault_;     // why the jig holds still; empty where it is free
-  bool release_jig_ = false;  // the operator says that it is free
+  std::string jig_fault_;           // why the jig holds still; empty where it is free
+  std::optional<Release> release_;  // the operator says that it is free
   LaneState state_ = LaneState::absent;
   std::string message_;
   std::string scanned_;

@@ -45,7 +45,8 @@ SideAnswer Lanes::Lane::ask_side(const std::stop_token& stop, device::Pose side,
                                  std::size_t number) {
   std::unique_lock lock(mutex_);
   if (capture_->side != side) {
-    capture_ = CaptureView{side, number, turns_by_itself_, 0, std::move(capture_->again)};
+    capture_ = CaptureView{
+        side, number, turns_by_itself_, env_.clock.elapsed(), 0, std::move(capture_->again)};
     waiting_since_ms_ = unix_ms(env_.clock.now());
     changed();
   }
@@ -64,8 +65,8 @@ SideAnswer Lanes::Lane::ask_side(const std::stop_token& stop, device::Pose side,
     return SideAnswer::placed;
   }
   // A unit that waits for hours must not record until its battery is empty.
-  const double waited_s = (unix_ms(env_.clock.now()) - waiting_since_ms_) / 1000;
-  return waited_s > shared_.options.unit_wait_s ? SideAnswer::stop : SideAnswer::waiting;
+  return age_s(capture_->asked) > shared_.options.unit_wait_s ? SideAnswer::stop
+                                                              : SideAnswer::waiting;
 }
 
 UnfinishedCapture Lanes::Lane::new_capture(const StartOrder& order) const {
@@ -170,6 +171,10 @@ void Lanes::Lane::end_capture(Json result) {
   set_done(std::move(result), "");
 }
 
+void Lanes::Lane::end_capture_by(const Error& error, const std::string& serial) {
+  end_capture(result_of(error, serial, stop_requested()));
+}
+
 // Its unit recorded on, or holds what it recorded until then.
 void Lanes::Lane::continue_capture(const std::stop_token& stop, const UnfinishedCapture& left) {
   const StartOrder order = {left.operator_name, false, left.client, left.serial};
@@ -182,7 +187,7 @@ void Lanes::Lane::continue_capture(const std::stop_token& stop, const Unfinished
     return;
   }
   if (!unit) {
-    return end_capture(result_of(unit.error(), left.serial, stop_requested()));
+    return end_capture_by(unit.error(), left.serial);
   }
   capture(stop, order, left);
 }

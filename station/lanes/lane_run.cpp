@@ -1,6 +1,8 @@
 // A jig run in a lane, and how it continues after a restart of the program.
 #include <array>
 
+#include <fmt/format.h>
+
 #include "station/lanes/lane.h"
 
 namespace sixpoint::station {
@@ -86,7 +88,7 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
                           allowed.error().brief());
   }
   session.retest = *allowed;
-  if (order.last_run) {
+  if (state.kind == kWriteKind) {
     session.notes.emplace_back(
         "written after the run: the readings that judge the constants are those of the run");
   }
@@ -111,7 +113,7 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
     return end_without_report(state.serial, report.error());
   }
   show_result(*report, {state.operator_name, state.is_authenticated, state.station,
-                        session.retest.retest_of, order.last_run ? kWriteKind : "jig"});
+                        session.retest.retest_of, state.kind});
   const std::lock_guard lock(mutex_);
   if (report->usable() && !report->written && !report->write_begun && run_) {
     UnfinishedRun& last = unwritten_.emplace(state);
@@ -134,6 +136,7 @@ void Lanes::Lane::write_last(const std::stop_token& stop, const StartOrder& orde
   left.is_authenticated = order.is_authenticated;
   left.client = order.client;
   left.write = true;
+  left.kind = kWriteKind;
   StartOrder writing = order;
   writing.write = true;
   {
@@ -270,10 +273,17 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
   if (!unstored_) {
     return;
   }
-  const auto stored = [this] {
+  const auto stored = [this]() -> Result<RunInStore> {
     const std::lock_guard lock(shared_.store_mutex);
-    return shared_.store_run(unstored_->report, unstored_->labels);
+    try {
+      return shared_.store_run(unstored_->report, unstored_->labels);
+    } catch (const std::exception& defect) {  // as in end_by_defect()
+      return fail(ErrorCode::bad_data, fmt::format("a defect of the program: {}", defect.what()));
+    }
   }();
+  if (!stored && stored.error().code == ErrorCode::bad_data) {
+    return set_aside_result(stored.error());  // to try again makes it no better
+  }
   const Status cleared = stored ? folder_.clear() : Status();
   {
     const std::lock_guard lock(mutex_);
@@ -308,6 +318,27 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
   }
 }
 
+void Lanes::Lane::set_aside_result(const Error& why) {
+  const auto kept = folder_.set_aside_ended_run(
+      unstored_->report.to_json().dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  const std::lock_guard lock(mutex_);
+  const std::string problem =
+      kept ? fmt::format(
+                 "not stored, and no store takes it: {}; it is kept in {}, its samples beside",
+                 why.brief(), *kept)
+           : fmt::format("not stored yet: {}; {}", why.brief(), kept.error().brief());
+  if (result_.is_object() && result_["serial"] == unstored_->report.serial) {
+    result_["problem"] = problem;
+    result_.erase("can_write");
+  }
+  add_log("problem", problem);
+  is_unstored_ = !kept;
+  if (kept) {
+    unstored_.reset();
+    unwritten_serial_.clear();  // constants of which there is no record
+  }
+}
+
 void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun& left) {
   const StartOrder order = {left.operator_name, left.is_authenticated, left.client, left.serial,
                             left.write};
@@ -333,7 +364,7 @@ void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& 
     report.verdict = JigVerdict::stopped;
     report.codes = {"stopped"};
   }
-  show_result(report, {left.operator_name, left.is_authenticated, left.station, {}});
+  show_result(report, {left.operator_name, left.is_authenticated, left.station, {}, left.kind});
 }
 
 }  // namespace sixpoint::station

@@ -3,6 +3,7 @@
 
 #include "device/wire/wire_unit.h"
 #include "station/lanes/lane.h"
+#include "station/lanes/order_rule.h"
 
 namespace sixpoint::station {
 
@@ -15,32 +16,73 @@ constexpr double kMostShown_mg = 32000;  // of a reading, far above the sensor's
 // A virtual unit whose time runs this much faster than the machine's needs a pause.
 constexpr int kFastClock = 10;
 constexpr double kFastClockPause_s = 0.06;
+constexpr double kDefectPause_s = 2;
 
 }  // namespace
 
 void Lanes::Lane::work(const std::stop_token& stop) {
-  continue_unfinished(stop);
+  const auto guarded = [this, &stop](auto step) {
+    try {
+      step();
+    } catch (const std::exception& defect) {
+      end_by_defect(defect.what());
+      pause(stop, kDefectPause_s);
+    }
+  };
+  guarded([&] { continue_unfinished(stop); });
   while (!stop.stop_requested()) {
-    store_result(stop);
-    if (!unit_ && !open_unit()) {
-      pause(stop, shared_.options.retry_s);
-      continue;
-    }
-    look_at_jig();
-    const std::optional<Order> order = next_order();
-    if (!order) {
-      preview(stop);
-      continue;
-    }
-    if (order->start.last_run) {
-      write_last(stop, order->start);
-    } else if (order->capture) {
-      capture(stop, order->start, {});
-    } else {
-      run(stop, order->start, {});
-    }
+    guarded([&] { work_once(stop); });
   }
   static_cast<void>(folder_.close());
+}
+
+void Lanes::Lane::work_once(const std::stop_token& stop) {
+  store_result(stop);
+  if (!unit_ && !open_unit()) {
+    pause(stop, shared_.options.retry_s);
+    return;
+  }
+  look_at_jig();
+  const std::optional<Order> order = next_order();
+  if (!order) {
+    preview(stop);
+  } else if (order->start.last_run) {
+    write_last(stop, order->start);
+  } else if (order->capture) {
+    capture(stop, order->start, {});
+  } else {
+    run(stop, order->start, {});
+  }
+}
+
+// The libraries return errors as values: an exception is a defect of this program. It ends what
+// this lane was doing, and nothing of the others.
+void Lanes::Lane::end_by_defect(const std::string& what) {
+  const Error error{
+      ErrorCode::internal,
+      fmt::format("a defect of the program ended this lane's work: {}", printable(what)),
+      {},
+      "please report it; the other lanes go on"};
+  bool was_busy = false;
+  bool was_capture = false;
+  std::string serial;
+  {
+    const std::lock_guard lock(mutex_);
+    add_log("problem", error.brief());
+    opening_ = nullptr;
+    was_busy = is_busy();
+    was_capture = capture_.has_value();
+    serial = identity_.serial;
+  }
+  if (was_busy && unit_ && unit_->jig() != nullptr && unit_->jig()->turns_by_itself()) {
+    static_cast<void>(unit_->jig()->stop());  // no one watches it any more
+  }
+  if (was_capture) {
+    end_capture_by(error, serial);
+  } else if (was_busy) {
+    end_without_report(serial, error);
+  }
+  close_unit();
 }
 
 // What an earlier program left on the disk.
@@ -115,19 +157,31 @@ void Lanes::Lane::look_at_jig() {
   if (jig == nullptr || !jig->turns_by_itself()) {
     return;
   }
-  bool release = false;
+  const auto fault_of = [jig] {
+    const auto position = jig->position();
+    return position ? position->fault : position.error().brief();
+  };
+  std::string fault = fault_of();
+  std::optional<Release> release;
   {
     const std::lock_guard lock(mutex_);
-    release = std::exchange(release_jig_, false);
+    release = std::exchange(release_, std::nullopt);
   }
-  const Status released = release ? jig->release() : Status{};
-  const auto position = jig->position();
-  const std::string fault = position ? position->fault : position.error().brief();
+  std::optional<std::string> problem;
+  if (release) {
+    problem = why_release_is_dead({release->fault, age_s(release->given), fault});
+    if (!problem) {
+      if (const Status released = jig->release(); !released) {
+        problem = released.error().brief();
+      }
+      fault = fault_of();
+    }
+  }
   const std::lock_guard lock(mutex_);
   if (release) {
-    add_log(released ? "jig" : "problem",
-            released ? fmt::format("{} says that the jig is free", printable(operator_name_, 60))
-                     : released.error().brief());
+    add_log(problem ? "problem" : "jig",
+            problem.value_or(
+                fmt::format("{} says that the jig is free", printable(operator_name_, 60))));
   }
   if (fault != jig_fault_) {
     jig_fault_ = fault;
@@ -150,7 +204,7 @@ bool Lanes::Lane::open_unit() {
     if (!is_busy()) {
       set_state(LaneState::absent, opened.error().brief());
     }
-    drop_order({});
+    drop_what_waits();
     return false;
   }
   std::unique_ptr<device::Unit> unit = *std::move(opened);
@@ -191,7 +245,7 @@ void Lanes::Lane::close_unit() {
   const std::lock_guard lock(mutex_);
   unit_.reset();
   live_ = {};
-  drop_order({});
+  drop_what_waits();
 }
 
 void Lanes::Lane::add_readings(const device::SampleBlock& block, const JigLive* live) {

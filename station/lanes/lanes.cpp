@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "base/atomic_file.h"
 #include "station/lanes/lane.h"
 
 namespace sixpoint::station {
@@ -33,7 +34,7 @@ Result<std::unique_ptr<Lanes>> Lanes::open(Env& env, const device::TransportRegi
         fmt::format("a station has 1 to {} lanes, not {}", kMostLanes, options.devices.size()), {},
         "name each unit's device with --device");
   }
-  SIXPOINT_CHECK(env.files.make_folders(options.state_folder));
+  SIXPOINT_CHECK(make_synced_folders(env.files, options.state_folder));
   std::unique_ptr<Lanes> lanes(new Lanes);
   lanes->shared_.reset(new Shared{
       env, devices, std::move(options), std::move(store_run), std::move(store_constants), {}, {}});

@@ -21,4 +21,19 @@ std::optional<std::string> why_order_is_dead(const OrderAndUnit& order) {
   return std::nullopt;
 }
 
+std::optional<std::string> why_release_is_dead(const ReleaseAndJig& release) {
+  if (release.fault_now.empty()) {
+    return "not released: the jig is free already";
+  }
+  if (release.fault_now != release.fault_then) {
+    return fmt::format("not released: the jig shows another fault now: {}",
+                       printable(release.fault_now, 100));
+  }
+  if (release.age_s > kOrderLife_s) {
+    return fmt::format("not released: the jig was called free {:.0f} s ago; look at it again",
+                       release.age_s);
+  }
+  return std::nullopt;
+}
+
 }  // namespace sixpoint::station

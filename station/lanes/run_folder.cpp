@@ -73,6 +73,7 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
   // Folders of earlier versions do not have these.
   SIXPOINT_ASSIGN(run.protocol, parse_jig_protocol(json.value("protocol", "production")));
+  run.kind = json.value("kind", run.kind);
   run.resume.write_begun = json.value("write_begun", false);
   if (json.contains("stream")) {
     run.resume.stream = parse_stream(json["stream"]);
@@ -111,7 +112,7 @@ Result<std::optional<Unfinished>> read_state(FileSystem& files, const std::strin
 
 Status write_state(FileSystem& files, const std::string& folder, const char* name,
                    const Json& json) {
-  SIXPOINT_CHECK(files.make_folders(folder));
+  SIXPOINT_CHECK(make_synced_folders(files, folder));
   return write_file(files, folder + name,
                     json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
@@ -171,6 +172,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
                      {"station", run.station},
                      {"client", run.client},
                      {"write", run.write},
+                     {"kind", run.kind},
                      {"filter", calib::to_string(run.filter)},
                      {"protocol", to_string(run.protocol)},
                      {"started", to_iso8601(run.resume.started)},
@@ -184,7 +186,7 @@ Status RunFolder::save(const UnfinishedRun& run) {
 
 Status RunFolder::append(std::string_view rows) {
   if (!file_) {
-    SIXPOINT_CHECK(env_.files.make_folders(folder_));
+    SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
     SIXPOINT_ASSIGN(const auto names, sample_files());
     const int next = names.empty() ? 1 : number_of(names.back()) + 1;
     SIXPOINT_ASSIGN(file_, env_.files.create(fmt::format("{}/{}{}.csv", folder_, kSamples, next)));
@@ -255,6 +257,17 @@ Status RunFolder::set_aside_run() {
   SIXPOINT_ASSIGN(auto names, sample_files());
   names.emplace_back(kRun + 1);
   return set_aside(names);
+}
+
+Result<std::string> RunFolder::set_aside_ended_run(std::string_view report) {
+  SIXPOINT_CHECK(close());
+  SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
+  std::string path =
+      fmt::format("{}/report.json.{}.bad", folder_, to_unix_seconds(env_.clock.now()));
+  SIXPOINT_CHECK(write_file(env_.files, path, report));
+  SIXPOINT_CHECK(set_aside_run());
+  SIXPOINT_CHECK(env_.files.sync_folder(folder_));
+  return path;
 }
 
 Status RunFolder::set_aside_capture() { return set_aside({kCapture + 1}); }

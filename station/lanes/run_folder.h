@@ -33,6 +33,7 @@ struct UnfinishedRun {
   std::string station;
   std::string client = {};
   bool write = false;
+  std::string kind = "jig";  // or kWriteKind (run_records.h)
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   JigProtocol protocol = JigProtocol::production;
   JigResume resume = {};
@@ -64,6 +65,9 @@ class RunFolder {
   // Renames what load() cannot read, the state and its samples, or what load_capture() cannot read,
   // to names that end in `.bad`. Nothing else is touched.
   Status set_aside_run();
+  // A run that has ended and that no store takes: `report` is written into the folder, and the
+  // run's state and samples are set aside with it. Answers with the path of the report.
+  Result<std::string> set_aside_ended_run(std::string_view report);
   Status set_aside_capture();
 
  private:

@@ -152,7 +152,7 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
   const std::string port = fmt::format(":{}", port_.load());
   if (name.ends_with(port)) {
     name.remove_suffix(port.size());
-  } else if (port_ != 80) {
+  } else if (port_ != (options_.tls ? 443 : 80)) {
     name = {};
   }
   const bool local = is_loopback(options_.bind);
@@ -216,7 +216,7 @@ ApiAnswer Api::sign_in_operator(const ApiRequest& request, const Json& body) con
   const auto name = text_of(body, "name");
   const auto pin = text_of(body, "pin");
   if (parts_.operators == nullptr || !name || !pin) {
-    return bad_field(name ? "pin" : "name", "a text of at most 200 bytes");
+    return bad_field(name ? "pin" : "name", kNameWanted);
   }
   if (name->empty()) {
     parts_.operators->sign_out(place_of(request));
@@ -385,7 +385,7 @@ ApiAnswer Api::start_run(const ApiRequest& request, const Json& body) {
   const auto operator_name = text_of(body, "operator");
   const auto serial = text_of(body, "serial");
   if (!operator_name || !serial) {
-    return bad_field(operator_name ? "serial" : "operator", "a text of at most 200 bytes");
+    return bad_field(operator_name ? "serial" : "operator", kNameWanted);
   }
   for (const char* key : {"write", "last_run"}) {
     if (body.contains(key) && !body[key].is_boolean()) {
@@ -424,7 +424,7 @@ ApiAnswer Api::command_lane(std::size_t lane, const std::string& command, const 
   } else if (command == "take") {
     const auto operator_name = text_of(body, "operator");
     if (!operator_name) {
-      return bad_field("operator", "a text of at most 200 bytes");
+      return bad_field("operator", kNameWanted);
     }
     const auto who = signer(request, *operator_name, OperatorRole::technician);
     if (!who) {

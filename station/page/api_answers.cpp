@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "db/name_rule.h"
+
 namespace sixpoint::station {
 
 namespace {
@@ -63,10 +65,12 @@ std::optional<std::string> text_of(const Json& body, const char* key) {
   if (!body.contains(key) || body[key].is_null()) {
     return std::string();
   }
-  if (!body[key].is_string() || body[key].get_ref<const std::string&>().size() > kMostText) {
+  if (!body[key].is_string()) {
     return std::nullopt;
   }
-  return body[key].get<std::string>();
+  auto text = body[key].get<std::string>();
+  return text.size() <= kMostText && db::check_name(text) ? std::optional(std::move(text))
+                                                          : std::nullopt;
 }
 
 }  // namespace sixpoint::station

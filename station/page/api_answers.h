@@ -19,6 +19,7 @@
 namespace sixpoint::station {
 
 inline constexpr std::size_t kMostText = 200;  // bytes of a name or serial number in a request
+inline constexpr std::string_view kNameWanted = "a text of at most 200 bytes, without NUL";
 
 std::string dump(const nlohmann::ordered_json& json);
 ApiAnswer answer(int status, const nlohmann::ordered_json& json);
@@ -28,8 +29,8 @@ ApiAnswer refusal(int status, std::string_view code, std::string_view what,
 ApiAnswer refusal(const Error& error);
 ApiAnswer bad_field(std::string_view key, std::string_view wanted);
 ApiAnswer unknown_route();
-// A text field of a JSON body; empty where it is missing. Nothing where it is no text or longer
-// than kMostText.
+// A text field of a JSON body; empty where it is missing. Nothing where it is no text, longer than
+// kMostText, or none that the store takes (db::check_name()).
 std::optional<std::string> text_of(const nlohmann::ordered_json& body, const char* key);
 
 }  // namespace sixpoint::station

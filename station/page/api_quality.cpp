@@ -74,7 +74,7 @@ std::optional<ApiAnswer> Api::post_decision(const ApiRequest& request, const std
   const auto operator_name = text_of(body, "operator");
   const auto reason = text_of(body, "reason");
   if (!operator_name || !reason) {
-    return bad_field(operator_name ? "reason" : "operator", "a text of at most 200 bytes");
+    return bad_field(operator_name ? "reason" : "operator", kNameWanted);
   }
   db::StationEvent decision;
   const auto who = signer(request, *operator_name, OperatorRole::engineer);

@@ -12,6 +12,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+// Names of files and texts of the unit may hold any bytes; the run is stored all the same.
+std::string dumped(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 // All limits that the verdict used: without them a verdict cannot be checked later.
 Json limits_of(const JigSessionOptions& session) {
   Json json = to_json(session.limits);
@@ -37,7 +42,7 @@ db::RunRecord run_record_before(const JigSessionOptions& session, const std::str
   run.jig = jig;
   run.software = software_name();
   run.build = software_build();
-  run.limits = limits_of(session).dump();
+  run.limits = dumped(limits_of(session));
   run.gravity_m_per_s2 = session.gravity.m_per_s2;
   run.document = "{}";
   return run;
@@ -48,7 +53,6 @@ void complete_run_record(db::RunRecord& run, const JigReport& report, const std:
   run.started = report.started;
   run.ended = report.ended;
   run.verdict = to_string(report.verdict);
-  // Texts of the unit may hold any bytes; the run is stored all the same.
   Json document = report.to_json();
   if (!study.empty()) {
     document["study"] = study;
@@ -56,7 +60,7 @@ void complete_run_record(db::RunRecord& run, const JigReport& report, const std:
   if (is_authenticated) {
     document["operator_authenticated"] = true;
   }
-  run.document = document.dump(-1, ' ', false, Json::error_handler_t::replace);
+  run.document = dumped(document);
   run.codes = report.codes;
   if (!report.faces.empty()) {
     double sum_c = 0;
@@ -73,7 +77,7 @@ db::ConstantsRecord constants_row(const calib::ConstantsRecord& record) {
   row.serial = record.serial;
   row.filter = calib::to_string(record.filter);
   row.method = record.method;
-  row.document = calib::to_json(record).dump();
+  row.document = dumped(calib::to_json(record));
   return row;
 }
 
@@ -83,15 +87,17 @@ Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report
   SIXPOINT_ASSIGN(
       done.run_id,
       writer.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
-  if (report.written) {
+  if (report.written && report.as_left) {
     db::UnitWrite write;
     write.run_id = done.run_id;
     write.serial = report.serial;
     write.written = report.ended;
     write.as_found =
         report.as_found ? calib::to_json(report.as_found->constants).dump() : std::string("null");
-    write.as_left = calib::to_json(report.six->best().stored).dump();
     write.read_back = calib::to_json(report.as_left->constants).dump();
+    // A run that ended with its program has no solution any more; "written" is a page read back
+    // equal.
+    write.as_left = report.six ? calib::to_json(report.six->best().stored).dump() : write.read_back;
     SIXPOINT_CHECK(writer.add_unit_write(write));
   }
   if (report.usable() && run.kind != kStudyKind) {

@@ -97,7 +97,7 @@ Status StationGuard::remember(StationMemory memory) const {
   if (memory.id.empty()) {
     memory.id = text_sha256(folder_ + to_iso8601(env_.clock.now())).substr(0, 16);
   }
-  SIXPOINT_CHECK(env_.files.make_folders(folder_));
+  SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
   return write_file(env_.files, folder_ + kName,
                     to_json(memory).dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
@@ -165,7 +165,11 @@ Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
   return unit->second;
 }
 
-Status StationGuard::note_verdict(const std::string& serial, JigVerdict verdict) {
+Status StationGuard::note_verdict(const std::string& serial, JigVerdict verdict,
+                                  std::string_view kind) {
+  if (kind != "jig") {
+    return {};
+  }
   SIXPOINT_ASSIGN(StationMemory known, memory());
   const auto found = known.units.find(serial);
   RetestState state = found == known.units.end() ? RetestState{} : found->second;

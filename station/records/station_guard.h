@@ -3,7 +3,7 @@
 //
 //   StationGuard guard(env, "data/station/3f2a", limits);
 //   SIXPOINT_ASSIGN(const RetestState state, guard.may_start(opened, "MOS2A45130007", "bench-1"));
-//   SIXPOINT_CHECK(guard.note_verdict("MOS2A45130007", JigVerdict::fail));  // after the run
+//   SIXPOINT_CHECK(guard.note_verdict("MOS2A45130007", JigVerdict::fail, "jig"));  // after it
 //
 // The station has an identity of its own: the folder beside its state, one for each store. Its file
 // memory.json holds an identifier that is made once, the names that the station went by, and what
@@ -29,6 +29,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/env.h"
@@ -57,8 +58,8 @@ class StationGuard {
   // `store`: the store, or why it does not answer.
   Result<RetestState> may_start(Result<db::Store>& store, const std::string& serial,
                                 const std::string& name);
-  // After a run, whether it was stored or not.
-  Status note_verdict(const std::string& serial, JigVerdict verdict);
+  // After a run, whether it was stored or not. Only those of kind "jig" count, as in the store.
+  Status note_verdict(const std::string& serial, JigVerdict verdict, std::string_view kind);
 
   Result<StationMemory> memory() const;  // empty where nothing was remembered
 

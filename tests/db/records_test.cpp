@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/sha256.h"
+#include "db/name_rule.h"
 #include "expect_result.h"
 #include "store_fixture.h"
 
@@ -105,6 +106,18 @@ TEST(Records, RefusesWhatAColumnMayNotHold) {
   RunRecord longest = run();
   longest.serial = std::string(200, 'M');
   EXPECT_OK(rows_of(longest, {}));
+}
+
+// Oracle: what the row itself takes.
+TEST(Records, ANameIsCheckedBeforehandByTheRuleOfTheRow) {
+  for (const std::string& name :
+       {std::string(), std::string("Zo\xc3\xab"), std::string(200, 'x'), std::string(201, 'x'),
+        std::string("A\0da", 4), std::string("A\xff")}) {
+    RunRecord named = run();
+    named.operator_name = name;
+    EXPECT_EQ(check_name(name).has_value(), rows_of(named, {}).has_value()) << printable(name);
+  }
+  EXPECT_FAILS(check_name(std::string("A\0da", 4)), ErrorCode::bad_data);
 }
 
 // The first and the last characters of each length, and the bytes beside them (RFC 3629, 4).

@@ -56,6 +56,14 @@ TEST_F(StationCommand, RefusesWhatItCannotServe) {
   EXPECT_EQ(refused({}).exit_code, 64) << "no unit";
   EXPECT_EQ(with({"--port", "65536"}).exit_code, 64);
   EXPECT_EQ(with({"--side-seconds", "9"}).exit_code, 64);
+  for (const char* option : {"--station", "--jig-id"}) {
+    for (const std::string& name : {std::string("bench \xff"), std::string(201, 'x')}) {
+      const auto answer = run({"station", "--store", path("s.db"), "--state", path("state"),
+                               "--device", "virtual:seed=7", option, name});
+      EXPECT_EQ(answer.exit_code, 64) << option;
+      EXPECT_THAT(answer.people, HasSubstr("cannot be stored as a text"));
+    }
+  }
   EXPECT_EQ(with({"--limits", path("none.toml")}).exit_code, 66);
   EXPECT_EQ(with({"--gravity", "98"}).exit_code, 64) << "no place on Earth";
   std::vector<std::string> seventeen;
@@ -143,6 +151,24 @@ TEST_F(StationCommand, ServesHttps) {
                      path("other.pem")})
                 .exit_code,
             65);
+}
+
+// Two would go on with the same runs and print the same labels.
+TEST_F(StationCommand, OneStationAtATimeInAStateFolder) {
+  const std::vector<std::string> words = arguments({"--port", "0", "--device", "virtual:seed=7"});
+  {
+    Child first(words);
+    ASSERT_THAT(first.line(), StartsWith("http://"));
+    Child second(words);
+    EXPECT_EQ(second.wait(), 73);
+    const auto refused = run(words);
+    EXPECT_EQ(refused.exit_code, 73);
+    EXPECT_THAT(refused.people, HasSubstr("another station is running"));
+    EXPECT_THAT(refused.people, HasSubstr("--state"));
+    EXPECT_EQ(first.stop(SIGKILL), -1);
+  }
+  Child next(words);
+  EXPECT_THAT(next.line(), StartsWith("http://")) << "a killed one holds nothing";
 }
 
 // The token is in a file of its owner alone; what is printed is a code for one browser.

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
+#include "base/sha256.h"
 #include "expect_result.h"
 #include "mocks/inert/inert.h"
 #include "station/virtual_bench.h"
@@ -154,6 +155,43 @@ TEST(CaptureRun, WhoStopsAtARepeatedSideGetsTheJudgementOfTheFile) {
   ASSERT_OK(bench.unit->start_stream(100));  // not left recording
 }
 
+// The disk fails at each step of the second download: what was recorded before is there, and
+// judged.
+TEST(CaptureRun, AFileThatIsNotFetchedAnewLeavesTheOneOfBefore) {
+  for (std::size_t step = 0; step < 2000; step += 1 + step / 8) {
+    VirtualBench bench;
+    Person person(bench);
+    std::string before;
+    const auto again = person.hooks.again;
+    person.hooks.again = [&](const std::vector<device::Pose>& sides) {
+      again(sides);
+      before = *file_sha256(bench.env.files, "c.gt3x");
+      bench.env.files.fail_after(step);
+    };
+    const auto report = person.capture();
+    bench.env.files.stop_failing();
+    ASSERT_OK(report);
+    EXPECT_EQ(report->file, "c.gt3x");
+    ASSERT_TRUE(bench.env.files.info("c.gt3x")) << "step " << step;
+    const std::string now = *file_sha256(bench.env.files, "c.gt3x");
+    if (report->usable()) {
+      EXPECT_EQ(now, report->file_sha256);
+      EXPECT_NE(now, before);
+      EXPECT_FALSE(bench.env.files.info("c-new.gt3x"));
+      for (const std::string& piece : report->pieces) {
+        EXPECT_TRUE(bench.env.files.info(piece)) << piece;
+      }
+      if (!bench.env.files.info("c-new-1.gt3x")) {
+        EXPECT_GT(step, 4U);
+        break;
+      }
+      continue;
+    }
+    EXPECT_THAT(report->notes, Contains(HasSubstr("the recording of before is judged")));
+    EXPECT_EQ(report->file_sha256, before);
+  }
+}
+
 // No file of another capture is replaced.
 TEST(CaptureRun, NoSideIsAskedForAgainWhereAPieceWouldReplaceAFile) {
   VirtualBench bench;
@@ -189,6 +227,24 @@ TEST(CaptureRun, AUnitThatWasLeftStreamingRecords) {
   const auto report = run_capture(bench.on_jig(), bench.env.env, options, kAlwaysPlaced);
   ASSERT_OK(report);
   EXPECT_TRUE(report->usable());
+}
+
+// A host that gets the right time in the middle: how long the unit recorded is what it was.
+TEST(CaptureRun, ACalendarThatIsSetChangesNoDuration) {
+  VirtualBench bench;
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  CaptureHooks hooks;
+  hooks.ask = [&](device::Pose, std::size_t number, std::size_t) {
+    if (number == 3) {
+      bench.clock->set(bench.clock->now() + std::chrono::hours(2));
+    }
+    return SideAnswer::placed;
+  };
+  const auto report = run_capture(bench.on_jig(), bench.env.env, options, hooks);
+  ASSERT_OK(report);
+  EXPECT_TRUE(report->usable()) << report->solved->brief();
+  EXPECT_THAT(report->notes, testing::Not(Contains(HasSubstr("the recording holds"))));
 }
 
 TEST(CaptureRun, DoesNotWriteOverAFile) {

@@ -114,6 +114,42 @@ TEST(LaneCapture, ACaptureStartsAgainWhenTheUnitHasLostItsRecording) {
   EXPECT_THAT(lane["result"]["notes"].dump(), HasSubstr("lost its recording; 2 sides are"));
 }
 
+struct JumpingClock : Clock {
+  UtcTime now() override { return posix_env().clock.now() + std::chrono::hours(hours); }
+  std::chrono::nanoseconds elapsed() override { return posix_env().clock.elapsed(); }
+  void sleep(std::chrono::nanoseconds duration) override { posix_env().clock.sleep(duration); }
+  std::atomic<int> hours{0};
+};
+
+// A machine that gets the right time while a side is asked for: no one waited for hours.
+TEST(LaneCapture, ACalendarThatIsSetEndsNoCapture) {
+  const tests::TemporaryFolder folder;
+  JumpingClock clock;
+  Env env{clock, posix_env().files};
+  const auto bench = std::make_shared<mocks::VirtualBench>();
+  device::TransportRegistry registry = known_devices();
+  bench->register_in(registry);
+  LanesOptions options;
+  options.devices = {kCaptured};
+  options.state_folder = folder / "state";
+  options.capture_folder = folder.path();
+  const auto lanes = Lanes::open(env, registry, options, {}, {});
+  ASSERT_OK(lanes);
+  const auto wait = [&](auto ready) {
+    for (int i = 0; i < 3000 && !ready((*lanes)->to_json(1)); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  };
+  wait([](const Json& json) { return json["state"] == "idle"; });
+  ASSERT_TRUE((*lanes)->start_capture(1, {}).has_value());
+  wait([](const Json& json) {
+    return json["capture"].is_object() && json["capture"]["side"].is_string();
+  });
+  clock.hours = 2;
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));  // three looks at the time
+  EXPECT_EQ((*lanes)->state(1), LaneState::capturing);
+}
+
 TEST(LaneCapture, AUnitOfTheWrongFilterIsRefused) {
   const tests::TemporaryFolder folder;
   Station station({"virtual:seed=7,jig=auto,firmware=1.8.0"}, folder.path());

@@ -64,6 +64,43 @@ TEST(LaneRun, ARunThatPassedIsWrittenAfterwards) {
   EXPECT_EQ(station.post("/api/run", now), 409) << "once";
 }
 
+// It is no second run either where the program ended in between: the next one goes on with a write.
+TEST(LaneRun, AWriteAfterwardsStaysOneAfterARestart) {
+  const std::string device = "virtual:seed=7,serial=MOS2A45130007,pace=50";
+  const auto stored = [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  };
+  for (const bool comes_back : {true, false}) {
+    const tests::TemporaryFolder folder;
+    const auto bench = std::make_shared<mocks::VirtualBench>();
+    {
+      Station station({device}, folder.path(), 24, bench);
+      station.start("/api/run");
+      place_unit(station, 1, 40);
+      station.wait(1, stored);
+      ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+      station.wait(1, [](const Json& json) {
+        return json["run"].is_object() && json["run"]["phase"] == "rechecking";
+      });
+    }
+    Station station({device}, folder.path(), 24, bench);
+    station.wait_state(1, "running");
+    if (comes_back) {
+      place_unit(station, 1, 40);
+    } else {
+      ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
+      station.wait_state(1, "unit_away");
+      ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+    }
+    const Json done = station.wait(1, stored);
+    EXPECT_EQ(station.kinds, std::vector<std::string>{kWriteKind}) << done.dump(1);
+    if (comes_back) {
+      EXPECT_EQ(done["result"]["verdict"], "pass") << done.dump(1);
+      EXPECT_THAT(done["result"]["reasons"].dump(), HasSubstr("written after the run"));
+    }
+  }
+}
+
 // What was measured on one unit is never written into another one.
 TEST(LaneRun, ConstantsOfTheLastRunAreForItsOwnUnitAlone) {
   const tests::TemporaryFolder folder;
@@ -206,6 +243,7 @@ TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
     left.serial = "MOS2A45139999";  // another unit than the one in the lane now
     left.client = "me";
     left.write = true;
+    left.kind = begun ? kWriteKind : "jig";
     left.resume.started = *parse_iso8601("2026-01-02T03:04:05");
     left.resume.as_found = device::CalibrationPage{};
     left.resume.write_begun = begun;
@@ -219,6 +257,7 @@ TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
       return json["result"].is_object() && json["result"]["stored"] == true;
     });
     ASSERT_EQ(station.reports.size(), 1U);
+    EXPECT_EQ(station.kinds.front(), left.kind);
     EXPECT_EQ(station.reports.front().as_left.has_value(), !begun);
     EXPECT_EQ(station.reports.front().verdict, JigVerdict::stopped);
   }
@@ -242,6 +281,72 @@ TEST(LaneRun, AStoreThatFailsIsTriedAgain) {
   }
   station.wait(1, [](const Json& json) { return json["result"]["stored"] == true; });
   EXPECT_EQ(station.reports.size(), 1U);
+}
+
+// To try again would help nothing, and no second run could be made.
+TEST(LaneRun, ARunThatNoStoreTakesIsKeptInAFileAndTheLaneIsFree) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.store_refuses = true;
+  station.start("/api/run");
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("problem");
+  });
+  EXPECT_EQ(lane["result"]["stored"], false);
+  EXPECT_FALSE(lane["result"].contains("can_write"));
+  const std::string problem = lane["result"]["problem"];
+  EXPECT_THAT(problem, HasSubstr("cannot be stored as a text"));
+  const std::string before = "it is kept in ";
+  const std::size_t begin = problem.find(before) + before.size();
+  const std::string path = problem.substr(begin, problem.find(", its samples") - begin);
+  const auto report = read_file(posix_env().files, path, 10'000'000);
+  ASSERT_OK(report);
+  EXPECT_EQ(Json::parse(*report)["verdict"], "pass");
+  const auto names = posix_env().files.list(folder_of(path));
+  ASSERT_OK(names);
+  EXPECT_THAT(*names, testing::Contains(testing::MatchesRegex("samples-1.csv.*bad")));
+  EXPECT_THAT(*names, testing::Not(testing::Contains("run.json"))) << "a later program is free too";
+  {
+    const std::lock_guard lock(station.mutex);
+    station.store_refuses = false;
+  }
+  EXPECT_EQ(station.post("/api/run", {{"last_run", true}}), 409) << "there is no record of it";
+  EXPECT_EQ(station.post("/api/run", Json::object()), 202);
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+}
+
+// A defect ends the work of its lane, with a word, and not the program with all the others.
+TEST(LaneRun, AnExceptionEndsTheWorkOfItsLaneAlone) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto",
+                   "virtual:seed=8,serial=MOS2A45130008,jig=auto"},
+                  folder.path());
+  station.wait_state(2, "idle");
+  EXPECT_EQ(station.post("/api/run", {{"lane", 2}}), 202);
+  station.wait_state(2, "running");
+  station.start_has_defect = true;
+  station.start("/api/run");
+  const Json failed = station.wait_state(1, "done");
+  EXPECT_EQ(failed["result"]["verdict"], "inconclusive");
+  EXPECT_THAT(failed["result"]["reasons"].dump(), HasSubstr("no such key"));
+  const auto stored = [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  };
+  EXPECT_EQ(station.wait(2, stored)["result"]["verdict"], "pass");
+}
+
+TEST(LaneRun, AnExceptionOfTheStoreTakesNothingThatWasMeasured) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,jig=auto"}, folder.path());
+  station.has_defect = true;
+  station.start("/api/run");
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"].contains("problem");
+  });
+  EXPECT_THAT(lane["result"]["problem"].get<std::string>(), HasSubstr("no such key"));
+  EXPECT_THAT(lane["result"]["problem"].get<std::string>(), HasSubstr("it is kept in"));
 }
 
 }  // namespace

@@ -96,6 +96,8 @@ TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
   EXPECT_EQ(station.post("/api/run", Json::object()), 409);
   ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
   station.wait_state(1, "absent");
+  EXPECT_EQ(station.post("/api/lanes/1/jig-free", Json::object()), 409)
+      << "it would be carried out when no one looks";
   ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "plug"}}), 200);
   station.wait_state(1, "idle");
   station.wait(1, [](const Json& json) { return json["jig_fault"] == "emergency stop"; });
@@ -108,6 +110,29 @@ TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
   ASSERT_EQ(station.post("/api/run", Json::object()), 202);
   station.wait(1, [&](const Json&) { return bench->motor(device)->movements > before; });
   EXPECT_EQ(bench->motor(device)->movements_after_stop, 0);
+}
+
+// The lane's thread is held in the store while the word is given and the unit is pulled out.
+TEST(Lane, TheWordThatAJigIsFreeDiesWithItsUnit) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,jig=auto,pace=4";
+  const auto bench = std::make_shared<mocks::VirtualBench>();
+  Station station({device}, folder.path(), 24, bench);
+  station.start("/api/run");
+  station.wait(1, [&](const Json&) { return bench->motor(device)->movements > 1; });
+  {
+    const std::unique_lock held(station.mutex);
+    ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+    station.wait_state(1, "done");
+    ASSERT_OK(bench->hands_out(device));
+    ASSERT_TRUE(station.lanes->release_jig(1, "me").has_value());
+    ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "unplug"}}), 200);
+  }
+  station.wait_state(1, "absent");
+  ASSERT_EQ(station.post("/api/lanes/1/hand", {{"do", "plug"}}), 200);
+  const Json lane = station.wait_state(1, "idle");
+  EXPECT_EQ(lane["jig_fault"], "emergency stop") << "no one looked at it since";
+  EXPECT_THAT(lane["log"].dump(), testing::HasSubstr("not released"));
 }
 
 // An order names the unit that was scanned: another one is not measured.

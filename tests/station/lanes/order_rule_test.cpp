@@ -16,5 +16,14 @@ TEST(OrderRule, FollowsTheTable) {
   EXPECT_THAT(*why_order_is_dead({"MOS2A1", 0, std::nullopt}), testing::HasSubstr("left"));
 }
 
+TEST(OrderRule, TheWordAboutTheJigFollowsItsTable) {
+  const std::string stop = "emergency stop";
+  EXPECT_FALSE(why_release_is_dead({stop, 0, stop}));
+  EXPECT_FALSE(why_release_is_dead({stop, kOrderLife_s, stop}));
+  EXPECT_THAT(*why_release_is_dead({stop, 6, stop}), testing::HasSubstr("6 s ago"));
+  EXPECT_THAT(*why_release_is_dead({stop, 0, "motor is hot"}), testing::HasSubstr("motor is hot"));
+  EXPECT_THAT(*why_release_is_dead({stop, 0, ""}), testing::HasSubstr("free already"));
+}
+
 }  // namespace
 }  // namespace sixpoint::station

@@ -1,11 +1,14 @@
 #include "station/lanes/run_folder.h"
 
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "base/forwarding_files.h"
+#include "base/memory_env.h"
 #include "expect_result.h"
 #include "temporary_folder.h"
 
@@ -64,7 +67,7 @@ TEST(RunFolder, ABadRunSetsAsideItselfAndItsSamplesAlone) {
   EXPECT_FALSE((*lane.load_capture()).has_value());
 }
 
-// A folder of the version before has no `stream` and no `write_begun`.
+// A folder of an earlier version has no `stream`, no `write_begun` and no `kind`.
 TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   const tests::TemporaryFolder folder;
   RunFolder lane(posix_env(), folder / "lane");
@@ -72,10 +75,12 @@ TEST(RunFolder, AFolderOfAnEarlierVersionIsRead) {
   auto json = nlohmann::ordered_json::parse(text_of_file(folder / "lane/run.json"));
   json.erase("stream");
   json.erase("write_begun");
+  json.erase("kind");
   std::ofstream(folder / "lane/run.json") << json.dump();
   const auto left = lane.load();
   ASSERT_OK(left);
   EXPECT_FALSE((*left)->resume.write_begun);
+  EXPECT_EQ((*left)->kind, "jig");
   EXPECT_EQ((*left)->resume.stream.samples, 0U);
 }
 
@@ -112,6 +117,31 @@ TEST(RunFolder, AnotherProgramFindsTheRunWithItsSamples) {
   EXPECT_EQ(run.resume.raw_csv, "t,x,y,z,c\n1,2,3,4,25\n2,2,3,4,25\n");
   ASSERT_OK(third.clear());
   EXPECT_FALSE(third.load()->has_value());
+}
+
+class WatchedFiles final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Status sync_folder(const std::string& path) override {
+    synced.insert(path);
+    return ForwardingFiles::sync_folder(path);
+  }
+  std::set<std::string> synced;
+};
+
+// After a power cut the folder of the run has its name, too.
+TEST(RunFolder, TheNamesOfItsFoldersAreOnTheMedium) {
+  const auto expect_synced = [](auto work) {
+    MemoryEnv memory;
+    WatchedFiles files(memory.files);
+    Env env{memory.clock, files};
+    RunFolder lane(env, "state/lane");
+    ASSERT_OK(work(lane));
+    EXPECT_TRUE(files.synced.contains(".")) << "the name of state";
+    EXPECT_TRUE(files.synced.contains("state")) << "the name of lane";
+  };
+  expect_synced([](RunFolder& lane) { return lane.save(a_run()); });
+  expect_synced([](RunFolder& lane) { return lane.append("t,x,y,z,c\n"); });
 }
 
 TEST(RunFolder, AnIncompleteLastRowIsLeftOut) {

@@ -27,6 +27,7 @@ TEST(ApiAnswers, TextFieldsAreTextsOfAtMost200Bytes) {
   EXPECT_EQ(text_of(Json{{"name", std::string(200, 'x')}}, "name"), std::string(200, 'x'));
   EXPECT_FALSE(text_of(Json{{"name", std::string(201, 'x')}}, "name"));
   EXPECT_FALSE(text_of(Json{{"name", 7}}, "name"));
+  EXPECT_FALSE(text_of(Json{{"name", std::string("A\0da", 4)}}, "name")) << "no store takes a NUL";
 }
 
 // JSON has no bytes that are not UTF-8: they become the replacement character.

@@ -24,6 +24,7 @@ TEST(Api, WrongRequestsAreRefused) {
   EXPECT_EQ(
       post("/api/run", R"({"operator": )" + std::string("\"") + std::string(500, 'x') + "\"}"),
       400);
+  EXPECT_EQ(post("/api/run", R"({"operator": "A\u0000da"})"), 400) << "no store takes a NUL";
   EXPECT_EQ(post("/api/run", std::string(40'000, '[')), 400) << "deep";
   EXPECT_EQ(post("/api/run", std::string(1'000'000, ' ')), 413);
   EXPECT_EQ(post("/api/nothing", "{}"), 404);
@@ -68,6 +69,26 @@ TEST(Api, OtherPagesInTheBrowserMayNotCommandIt) {
   EXPECT_EQ(client.Get("/api/state", {{"Host", "evil.example"}})->status, 421);
   EXPECT_EQ(station.lane(1)["state"], "idle") << "none of them started anything";
   EXPECT_EQ(ask({{"Origin", "http://" + own}, {"Sec-Fetch-Site", "same-origin"}}), 202);
+}
+
+// Oracle: a browser leaves out the port that its scheme has anyway (RFC 9110, 4.2).
+TEST(Api, TheHostMayLeaveOutThePortOfItsScheme) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  for (const bool tls : {false, true}) {
+    ApiOptions options;
+    options.tls = tls;
+    Api api(options, {posix_env(), *station.lanes, *station.repairs, station.sign_in});
+    ApiRequest request;
+    request.method = "GET";
+    request.path = "/";
+    request.host = "127.0.0.1";
+    for (const int port : {80, 443, 6020}) {
+      api.set_port(port);
+      EXPECT_EQ(api.handle(request).status, port == (tls ? 443 : 80) ? 200 : 421)
+          << port << (tls ? " https" : " http");
+    }
+  }
 }
 
 // The page itself is given to everybody: it asks for the code. Nothing else is.

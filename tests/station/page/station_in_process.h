@@ -6,6 +6,8 @@
 //   station.post("/api/run", {{"lane", 1}});
 #pragma once
 
+#include <atomic>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -43,12 +45,24 @@ class Station {
     options.capture_folder = folder;
     options.station = "bench-1";
     options.retry_s = 0.02;
+    options.may_start = [this](const std::string&) -> Result<RetestState> {
+      if (start_has_defect) {
+        throw std::runtime_error("no such key");
+      }
+      return RetestState{};
+    };
     auto opened = Lanes::open(
         posix_env(), registry_, options,
         [this](const JigReport& report, const RunLabels& labels) -> Result<RunInStore> {
           const std::lock_guard lock(mutex);
           if (store_is_away) {
             return fail(ErrorCode::io, "the disk is full");
+          }
+          if (has_defect) {
+            throw std::runtime_error("no such key");
+          }
+          if (store_refuses) {
+            return fail(ErrorCode::bad_data, "this cannot be stored as a text");
           }
           reports.push_back(report);
           operators.push_back(labels.operator_name);
@@ -136,7 +150,10 @@ class Station {
   std::vector<std::string> kinds;
   std::vector<bool> authenticated;
   bool store_is_away = false;  // and the journal with it
-  bool is_kept_here = false;   // the journal has it
+  bool store_refuses = false;  // the record itself
+  bool has_defect = false;     // to store throws
+  std::atomic<bool> start_has_defect{false};
+  bool is_kept_here = false;  // the journal has it
 
  private:
   std::shared_ptr<mocks::VirtualBench> bench_;

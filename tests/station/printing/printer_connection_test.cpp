@@ -121,6 +121,13 @@ TEST(PrinterConnection, ADeviceTakesTheBytes) {
   EXPECT_FAILS(send(pipe, std::string(2'000'000, 'x')), ErrorCode::device_unavailable);
 }
 
+// The system's event queue refuses a device that is always ready.
+TEST(PrinterConnection, ADeviceThatIsAlwaysReadyTakesTheBytes) {
+  const auto sent = send("/dev/null");
+  ASSERT_OK(sent);
+  EXPECT_EQ(*sent, Sent::taken);
+}
+
 // The path was free when the station started, and a file is there now.
 TEST(PrinterConnection, NothingIsWrittenIntoAFile) {
   const tests::TemporaryFolder folder;

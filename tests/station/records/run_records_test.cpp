@@ -36,6 +36,14 @@ TEST(RunRecords, ARunIsCompletedFromItsReport) {
   EXPECT_EQ(nlohmann::json::parse(run.document)["study"], "spring");
 }
 
+// A file's name may hold any bytes.
+TEST(RunRecords, LimitsOfAFileWithAnyNameAreStored) {
+  JigSessionOptions session;
+  session.limits.source = "/limits-\xff.toml";
+  const db::RunRecord run = run_record_before(session, "MOS2A45130007", "J1");
+  EXPECT_EQ(nlohmann::json::parse(run.limits)["source"], "/limits-\xEF\xBF\xBD.toml");
+}
+
 TEST(RunRecords, AFailedRunIsStoredWithItsSamplesAndWithoutConstants) {
   const tests::TemporaryFolder folder;
   auto store = db::Store::open(posix_env(), folder / "s.db");
@@ -49,6 +57,25 @@ TEST(RunRecords, AFailedRunIsStoredWithItsSamplesAndWithoutConstants) {
   ASSERT_OK(stored);
   EXPECT_EQ(stored->jig, "J1");
   EXPECT_EQ(stored->software.substr(0, 9), "sixpoint ");
+}
+
+// The program ended after the write, and the unit did not come back.
+TEST(RunRecords, AnInterruptedRunThatHasWrittenIsStoredWithItsWrite) {
+  const tests::TemporaryFolder folder;
+  auto store = db::Store::open(posix_env(), folder / "s.db");
+  ASSERT_OK(store);
+  JigReport report = a_report();
+  report.verdict = JigVerdict::inconclusive;
+  report.as_found = report.as_left = device::CalibrationPage{};
+  report.as_left->constants.zero_lsb = {1, 2, 3};
+  report.written = true;
+  db::RunRecord run = run_record_before({}, "MOS2A45130007", "J1");
+  complete_run_record(run, report);
+  ASSERT_OK(add_run_records(*store, report, run));
+  const auto history = store->unit_history("MOS2A45130007");
+  ASSERT_OK(history);
+  ASSERT_EQ(history->writes.size(), 1U);
+  EXPECT_EQ(history->writes[0].as_left, history->writes[0].read_back);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "station/records/made_station.h"
+#include "station/records/run_records.h"
 
 namespace sixpoint::station {
 namespace {
@@ -32,7 +33,7 @@ class StationGuards : public tests::StationRecords {
 
 TEST_F(StationGuards, WhereNothingIsToBeRememberedNothingIsWritten) {
   EXPECT_OK(ask("MOS2A1"));
-  EXPECT_OK(guard_.note_verdict("MOS2A1", JigVerdict::pass));
+  EXPECT_OK(guard_.note_verdict("MOS2A1", JigVerdict::pass, "jig"));
   EXPECT_FALSE(posix_env().files.info(folder_ / "memory"));
   EXPECT_OK(ask_without_store("MOS2A1"));
 }
@@ -78,18 +79,22 @@ TEST_F(StationGuards, TheLimitOnFailuresHoldsWhileTheStoreIsAway) {
   EXPECT_OK(ask("MOS2A1"));
   for (int failures = 2; failures <= default_limits().retest.most_failures; ++failures) {
     EXPECT_OK(ask_without_store("MOS2A1"));
-    ASSERT_OK(guard_.note_verdict("MOS2A1", JigVerdict::fail));
+    ASSERT_OK(guard_.note_verdict("MOS2A1", JigVerdict::fail, "jig"));
   }
   const auto refused = ask_without_store("MOS2A1");
   EXPECT_FAILS(refused, ErrorCode::configuration);
   EXPECT_THAT(refused.error().hint, HasSubstr("retest MOS2A1 --release"));
   EXPECT_OK(ask_without_store("MOS2A2"));
   // Passes that are needed after a failure count down.
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::fail));
+  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::fail, "jig"));
   EXPECT_EQ(ask_without_store("MOS2A3")->passes_needed, 2);
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass));
+  // A write after the run, and a gage study, are no second run.
+  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass, kWriteKind));
+  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::fail, kStudyKind));
+  EXPECT_EQ(ask_without_store("MOS2A3")->passes_needed, 2);
+  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass, "jig"));
   EXPECT_EQ(ask_without_store("MOS2A3")->passes_needed, 1);
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass));
+  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass, "jig"));
   EXPECT_FALSE(guard_.memory()->units.contains("MOS2A3"));
 }
 
