@@ -16,7 +16,9 @@ namespace {
 
 constexpr double kBlock_s = 60;
 constexpr std::size_t kMaxBlocks = 60;
-constexpr double kFineReach_s = 2;        // about the lag found to the second
+constexpr double kFineReach_s = 2;      // about the lag found to the second
+constexpr double kNearBest = 0.6;       // of the best correlation: lags to the second worth a look
+constexpr std::size_t kMostCoarse = 8;  // of these
 constexpr double kGoodCorrelation = 0.5;  // below, a minute does not fit at all
 constexpr double kRivalFactor = 0.85;     // peaks this close to a minute's best are rivals
 constexpr std::size_t kMaxRivals = 12;
@@ -71,10 +73,10 @@ std::vector<float> motion_of(const Trace& trace, double hop_s) {
   return motion;
 }
 
-// The lag at which the motions fit best, in steps of hop_s about `about_s`. Nothing where the best
-// is no fit.
-std::optional<double> motion_lag(const Trace& a, const Trace& b, double hop_s, double about_s,
-                                 double reach_s) {
+// The lags about `about_s`, in steps of hop_s, at which the motions fit, the best first; of the
+// others those that come near it. None where the best is no fit.
+std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, double about_s,
+                                double reach_s) {
   const std::vector<float> motion_a = motion_of(a, hop_s);
   const std::vector<float> motion_b = motion_of(b, hop_s);
   const auto offset = static_cast<std::ptrdiff_t>(
@@ -94,26 +96,36 @@ std::optional<double> motion_lag(const Trace& a, const Trace& b, double hop_s, d
     values.push_back(static_cast<double>(correlation.count()) * hop_s >= 10 ? correlation.value()
                                                                             : 0);
   }
-  const auto best = std::ranges::max_element(values);
-  if (*best < 0.2) {
-    return std::nullopt;
+  const double best = std::ranges::max(values);
+  if (best < 0.2) {
+    return {};
   }
-  double at = static_cast<double>(best - values.begin());
-  if (best != values.begin() && best + 1 != values.end()) {
-    const double bend = *(best - 1) - 2 * *best + *(best + 1);
-    at += bend < 0 ? 0.5 * (*(best - 1) - *(best + 1)) / bend : 0;
+  std::vector<std::pair<double, double>> peaks;  // value, lag
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double left = i == 0 ? -1 : values[i - 1];
+    const double right = i + 1 == values.size() ? -1 : values[i + 1];
+    if (values[i] < kNearBest * best || values[i] <= left || values[i] < right) {
+      continue;
+    }
+    double at = static_cast<double>(i);
+    if (i != 0 && i + 1 != values.size()) {
+      const double bend = left - 2 * values[i] + right;
+      at += bend < 0 ? 0.5 * (left - right) / bend : 0;
+    }
+    peaks.emplace_back(values[i], about_s + (at - static_cast<double>(reach)) * hop_s);
   }
-  return about_s + (at - static_cast<double>(reach)) * hop_s;
+  std::ranges::sort(peaks, std::greater<>());
+  std::vector<double> lags;
+  for (std::size_t i = 0; i < std::min(peaks.size(), kMostCoarse); ++i) {
+    lags.push_back(peaks[i].second);
+  }
+  return lags;
 }
 
-// By how the motion swells and fades, which no period can mislead: to some tenths of a second.
-std::optional<double> coarse_lag(const Trace& a, const Trace& b, double max_lag_s) {
-  const auto second = motion_lag(a, b, 1, 0, std::floor(max_lag_s));
-  if (!second) {
-    return std::nullopt;
-  }
-  const auto tenth = motion_lag(a, b, 0.1, std::round(*second), kFineReach_s);
-  return tenth ? tenth : second;
+// To some tenths of a second, about a lag that is known to a second.
+double tenths_of(const Trace& a, const Trace& b, double second_s) {
+  const auto tenth = motion_lags(a, b, 0.1, std::round(second_s), kFineReach_s);
+  return tenth.empty() ? second_s : tenth.front();
 }
 
 struct Block {
@@ -350,16 +362,29 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
     result.remarks.emplace_back("nothing moved, so the clocks cannot be aligned; lag taken as 0");
     return line;
   }
-  const auto coarse = coarse_lag(a, b, options.max_lag_s);
-  if (!coarse && blocks.size() > 1) {
+  // By how the motion swells and fades, which the period of a tone cannot mislead.
+  const auto seconds = motion_lags(a, b, 1, 0, std::floor(options.max_lag_s));
+  if (seconds.empty() && blocks.size() > 1) {
     result.remarks.push_back(fmt::format(
         "the motions do not fit at any lag up to {:.0f} s: were the units moved together?",
         options.max_lag_s));
     return line;
   }
   std::vector<Candidate> candidates;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    add_candidates(a, b, blocks[i], i, coarse.value_or(0), candidates);
+  const auto look_about = [&](double about_s) {
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      add_candidates(a, b, blocks[i], i, about_s, candidates);
+    }
+  };
+  // Motion that goes on and off by a period swells alike at several lags: where it is its own
+  // repetition in nothing else, its minutes fit at one of them.
+  std::optional<double> coarse;
+  for (std::size_t i = 0; i < seconds.size() && candidates.empty(); ++i) {
+    coarse = tenths_of(a, b, seconds[i]);
+    look_about(*coarse);
+  }
+  if (!coarse) {
+    look_about(0);
   }
   if (candidates.empty()) {
     result.remarks.emplace_back("no lively minute fits: were the units moved together?");

@@ -39,5 +39,32 @@ TEST(Align, FindsAWholeLag) {
   EXPECT_NEAR(line.at(1150), 7, 0.01);
 }
 
+// A shaker that goes on and off: by swelling and fading alone, each multiple of its period is a lag.
+TEST(Align, MotionThatGoesOnAndOffByAPeriodHasOneLag) {
+  const auto moved = [](double t) {
+    double sum = 0;
+    for (int k = 0; k < 40; ++k) {  // never the same again
+      const double hz = 0.3 + 4 * std::fmod(0.618034 * (k + 1), 1.0);
+      sum += 0.04 * std::sin(2 * M_PI * hz * t + k * k);
+    }
+    return 1 + (std::fmod(t + 4100, 41) < 20.5 ? sum : 0);
+  };
+  // Two clocks: at one moment the second one shows lag_s more.
+  const auto recorded = [&](double lag_s) {
+    std::vector<float> values;
+    for (int i = 0; i < 9000; ++i) {
+      values.push_back(static_cast<float>(moved(i / 30.0 - lag_s)));
+    }
+    return Trace::from_magnitudes("x", 1000, 30, std::move(values));
+  };
+  const Trace first = recorded(0);
+  for (const double lag_s : {-6.1, -4.37, -2.2, -0.4, 0.4, 1.63, 3.9, 6.1}) {
+    PairComparison result;
+    const Line line = align(first, recorded(lag_s), {}, result);
+    EXPECT_TRUE(result.aligned) << lag_s;
+    EXPECT_NEAR(line.at(1150), lag_s, 0.01);
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::repair
