@@ -35,12 +35,13 @@ def read_rooms(folder, rooms):
     """Rooms in the order in which CMake adds them; CMake adds a folder's own room where it stands."""
     text = re.sub(r"#.*", "", (project / folder / "CMakeLists.txt").read_text())
     step = re.compile(r"sixpoint_room\((?P<room>[\w/]+)(?P<arguments>[^)]*)\)"
-                      r"|foreach\(\w+ (?P<list>[^)]*)\)\s*add_subdirectory", re.MULTILINE)
+                      r"|foreach\(\w+ (?P<list>[^)]*)\)\s*add_subdirectory"
+                      r"|add_subdirectory\((?P<one>\w+)\)", re.MULTILINE)
     for found in step.finditer(text):
         if found.group("room"):
             rooms.append(Room(found.group("room"), found.group("arguments")))
         else:
-            for below in found.group("list").split():
+            for below in (found.group("list") or found.group("one")).split():
                 read_rooms(f"{folder}/{below}" if folder else below, rooms)
     return rooms
 
