@@ -46,8 +46,11 @@ class Walk {
   // Folder by folder: what is in a folder comes before what its name continues into.
   static int rank(char c) { return c == '/' ? 0 : 1 + static_cast<unsigned char>(c); }
 
-  bool wanted(const std::string& name) const {
-    return std::any_of(options_.endings.begin(), options_.endings.end(),
+  // "._day1.gt3x" beside "day1.gt3x" holds what macOS notes about it on other systems' disks.
+  bool wanted(const std::string& path) const {
+    const std::string name = file_name_of(path);
+    return !name.starts_with("._") &&
+           std::any_of(options_.endings.begin(), options_.endings.end(),
                        [&](const std::string& ending) { return has_ending(name, ending); });
   }
 

@@ -45,7 +45,8 @@ struct FileTree {
 };
 
 // A file that is named is taken with any name; of a folder, everything below it whose name ends
-// in one of the endings. no_input where `path` is not there.
+// in one of the endings, but for "._NAME", which macOS writes beside NAME. no_input where `path` is
+// not there.
 Result<FileTree> find_files(FileSystem& files, const std::string& path,
                             const FileTreeOptions& options);
 

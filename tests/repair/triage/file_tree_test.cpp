@@ -53,6 +53,7 @@ class Tree : public testing::Test {
 
 TEST_F(Tree, ListsFolderByFolder) {
   std::ofstream(root_ + "/a.gt3x") << "x";
+  std::ofstream(root_ + "/a/._one.gt3x") << "of macOS";
   EXPECT_THAT(names(), ElementsAre("a/deep/two.GT3X", "a/one.gt3x", "a.gt3x", "b/three.gt3x"));
 }
 
