@@ -42,6 +42,9 @@ double residual_of_row(const Whitened& w, int row, const Posterior& posterior) {
 }
 
 // Mean squares of predictions, with nuisances alone and with the explanation.
+// A standard deviation far above those of means and tones, which are tenths of a mg.
+constexpr double kBadlyKnown_mg = 2;
+
 struct Squares {
   double before = 0;
   double after = 0;
@@ -142,9 +145,9 @@ Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) c
       const int feature = model_.feature_of_row(row);
       const double r0 = residual_of_row(w, row, nothing);
       const double r1 = residual_of_row(w, row, accepted);
-      // Harmonics of tones that fold back are known too badly to count in mg.
-      if (feature < kSecondHarmonic) {
-        const double scale2 = nominal_variance_mg2(model_.block_of_row(row), feature);
+      // Known too badly to count in mg are harmonics of tones that fold back, and what they fold on.
+      const double scale2 = nominal_variance_mg2(model_.block_of_row(row), feature);
+      if (feature < kSecondHarmonic && scale2 <= kBadlyKnown_mg * kBadlyKnown_mg) {
         in_mg.add(r0, r1, scale2);
         floor2_mg2 += scale2;
       }

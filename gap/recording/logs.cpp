@@ -88,15 +88,27 @@ void read_temperature(FileSystem& files, const std::string& path, Bundle& bundle
         "of temperature are told from effects of time less well");
     return;
   }
-  // A running mean over +-15 rows: the log has 0.1 C of noise, the unit follows in minutes.
-  constexpr std::size_t kHalf = 15;
+  // A running mean over +-15 s, as many rows before as behind: the log has 0.1 C of noise, the unit
+  // follows in minutes. A log may pause while nothing is recorded, and may be sparse.
+  constexpr double kReach_s = 15.5;  // of a row a second: 15 rows, whatever their times end in
   const std::size_t rows = table.rows.size();
   std::vector<double> sum(rows + 1, 0);
   for (std::size_t i = 0; i < rows; ++i) {
     sum[i + 1] = sum[i] + table.rows[i].second;
   }
+  const auto apart_s = [&](std::size_t early, std::size_t late) {
+    return table.rows[late].first - table.rows[early].first;
+  };
+  std::size_t first = 0;
+  std::size_t last = 0;
   for (std::size_t i = 0; i < rows; ++i) {
-    const std::size_t half = std::min({kHalf, i, rows - 1 - i});
+    while (apart_s(first, i) > kReach_s) {
+      ++first;
+    }
+    while (last + 1 < rows && apart_s(i, last + 1) <= kReach_s) {
+      ++last;
+    }
+    const std::size_t half = std::min(i - first, last - i);
     bundle.temperature.host_time_s.push_back(table.rows[i].first);
     bundle.temperature.temperature_c.push_back((sum[i + half + 1] - sum[i - half]) /
                                                static_cast<double>(2 * half + 1));

@@ -104,6 +104,22 @@ TEST(Logs, LineBreaksOfBothKindsAndALastLineWithoutOneAreRead) {
   EXPECT_TRUE(bundle.losses.empty());
 }
 
+// The mean is over seconds, not over rows: a log that pauses between two temperatures does not mix them.
+TEST(Logs, AMeanOfReadingsEndsAtAPause) {
+  std::string rows;
+  for (int t = 0; t < 40; ++t) {
+    rows += fmt::format("{},{}\n{},{}\n", t, 12 + (t % 2 == 0 ? 0.1 : -0.1), t + 100, 40);
+  }
+  const Bundle bundle = with_temperature(rows);
+  ASSERT_EQ(bundle.temperature.temperature_c.size(), 80U);
+  for (std::size_t i = 0; i < 80; ++i) {
+    EXPECT_NEAR(bundle.temperature.temperature_c[i], i < 40 ? 12 : 40, 0.11) << i;
+  }
+  EXPECT_NEAR(bundle.temperature.temperature_c[20], 12, 0.1 / 31 + 1e-9) << "of 31 rows";
+  const Bundle sparse = with_temperature("0,10\n60,20\n120,15\n180,15\n");
+  EXPECT_EQ(sparse.temperature.temperature_c, (std::vector<double>{10, 20, 15, 15}));
+}
+
 TEST(Logs, LinesWithoutNumbersAreCountedAndLeftOut) {
   const Bundle bundle = with_temperature("1,20\nabc\n2,\n3;20\nnan,20\n4,inf\n5,20\n");
   EXPECT_EQ(bundle.temperature.host_time_s, (std::vector<double>{1, 5}));
