@@ -312,7 +312,8 @@ Status Session::stream(JigRun& run) {
     }
     if (run.phase() !=
         JigPhase::finished) {  // else the operator's stop would be a fault of the jig
-      SIXPOINT_CHECK(watch_.ask(*jig_, now_s));
+      SIXPOINT_ASSIGN(const std::optional<Pose> stands, watch_.ask(*jig_, now_s));
+      run.set_jig_pose(stands);
     }
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }

@@ -42,6 +42,70 @@ TEST(JigSession, FindsTheSensorUnderCurrent) {
   }
 }
 
+// The page knows nothing of the zeros. Oracle: the truth against docs/limits.md.
+TEST(JigSession, AZeroFarFromNominalIsMeasuredAndJudged) {
+  struct Row {
+    PerAxis<double> lsb_per_g;
+    PerAxis<double> zero_lsb;
+    JigVerdict verdict;
+    const char* code;
+  };
+  for (const Row& row :
+       {Row{{250, 250, 250}, {-80, -80, -80}, JigVerdict::pass, ""},
+        Row{{250, 250, 250}, {-130, 0, 0}, JigVerdict::pass, ""},
+        Row{{250, 250, 250}, {150, 150, -100}, JigVerdict::pass, ""},
+        Row{{250, 250, 250}, {-200, 0, 0}, JigVerdict::fail, "zero_low"},
+        Row{{250, 250, 250}, {0, 0, -300}, JigVerdict::fail, "zero_low"},
+        Row{{250, 250, 250}, {220, 0, 0}, JigVerdict::fail, "zero_high"},
+        Row{{100, 250, 250}, {20, 20, 20}, JigVerdict::fail, "sensitivity_high"},
+        Row{{250, 250, 100}, {20, 20, 20}, JigVerdict::fail, "sensitivity_high"}}) {
+    sim::GivenProperties given;
+    given.current_sensitivity_lsb_per_g = row.lsb_per_g;
+    given.current_zero_lsb = row.zero_lsb;
+    for (const bool without_zero : {false, true}) {
+      given.zero_lsb = without_zero ? std::optional(PerAxis<int>{0, 0, 0}) : std::nullopt;
+      VirtualBench bench(7, given);
+      const auto report = bench.run();
+      ASSERT_OK(report) << row.zero_lsb[0] << ' ' << row.zero_lsb[2];
+      EXPECT_EQ(report->verdict, row.verdict) << report->brief();
+      if (row.verdict == JigVerdict::fail) {
+        EXPECT_THAT(report->codes, Contains(row.code)) << report->brief();
+      }
+    }
+  }
+}
+
+// The unit lies in the jig as no one thinks. The jig is asked, and is not believed.
+TEST(JigSession, AUnitThatWasPutInAskewIsFoundByTheSecondPlacement) {
+  class AskewJig final : public device::Jig {
+   public:
+    explicit AskewJig(device::Jig& jig) : jig_(jig) {}
+    std::string name() const override { return jig_.name(); }
+    bool turns_by_itself() const override { return true; }
+    Status go_to(Pose pose) override {
+      said_ = pose;
+      return jig_.go_to(
+          device::pose_of((device::axis_of(pose) + 1) % kAxes, device::sign_of(pose)));
+    }
+    Result<device::JigPosition> position() override {
+      SIXPOINT_ASSIGN(device::JigPosition position, jig_.position());
+      position.pose = position.pose ? std::optional(said_) : std::nullopt;
+      return position;
+    }
+    Status stop() override { return jig_.stop(); }
+    Status release() override { return jig_.release(); }
+
+   private:
+    device::Jig& jig_;
+    Pose said_ = Pose::plus_z;
+  };
+  VirtualBench bench;
+  AskewJig askew(*bench.jig);
+  const auto report = run_jig({bench.unit.get(), &askew}, bench.env.env, {}, {});
+  EXPECT_FAILS(report, ErrorCode::bad_data);
+  EXPECT_THAT(report.error().what, HasSubstr("stands at -z and the unit reads -x"));
+}
+
 TEST(JigSession, MeasuresUnderItsFilterWhateverTheUnitHad) {
   VirtualBench bench;
   ASSERT_OK(bench.unit->set_filter(FilterConfiguration::legacy));
