@@ -91,7 +91,7 @@ TEST(JigVerdict, NoWrongPassAtTheLimits) {
   int conditional = 0;
   for (int i = 0; i < kUnits; ++i) {
     const double sensitivity = random.uniform(215, 260);
-    const double beyond_mg = random.uniform(-2, 2);
+    const double beyond_mg = random.uniform(-3, 3);
     sim::GivenProperties given;
     given.current_sensitivity_lsb_per_g = {sensitivity, sensitivity, sensitivity};
     const double zero_lsb = (700 + beyond_mg) / kMgPerG * sensitivity;
