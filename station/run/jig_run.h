@@ -42,7 +42,7 @@
 // | undo         | the last reading is asked for again       | -                   | -        |
 // | stop         | -> finished (stopped)                     | -> finished         | -        |
 // | on_time      | -> finished (timed_out) when no reading   | -> finished         | -        |
-// |              | was accepted for pose_time_out_s          |                     |          |
+// |              | was accepted in pose_time_out_s + dwell_s |                     |          |
 // | on_unit_back | time-out and stillness begin again        | the time-out, too   | -        |
 // | on_unit_gone | -> finished (unit_gone)                   | -> finished         | -        |
 // | on_written   | -                                         | -> rechecking       | -        |
@@ -128,7 +128,7 @@ struct JigRunOptions {
   // without any tilt; a tilt of 4 degrees moves the face's own reading by 2.4 mg (1 - cos).
   double tilt_limit_deg = 4;
   double between_faces_deg = 30;  // further from every face than this: lies on none
-  double pose_time_out_s = 180;   // without any accepted pose
+  double pose_time_out_s = 180;   // without any accepted pose, beside the dwell itself
   int refusals_in_row = 8;        // this many in a row, or five times as many in all, end the run
   // In this order every face is reached from another one than in the first round.
   std::vector<Pose> verification = {Pose::plus_y,  Pose::minus_x, Pose::plus_x,
