@@ -408,6 +408,13 @@ Status Session::write_constants(JigRun& run) {
     }
     holds = unit_->read_calibration();
   }
+  if (!written && !holds && holds.error().code == ErrorCode::bad_data && !report_.as_found) {
+    // Unreadable as found, and as it was: the unit refused the write.
+    ended_ = true;
+    report_.write_begun = false;
+    report_.reasons.push_back(written.error().what);
+    return {};
+  }
   SIXPOINT_ASSIGN(report_.as_left, holds);
   report_.write_begun = false;
   if (!written && *holds != page) {

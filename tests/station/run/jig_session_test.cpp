@@ -170,6 +170,29 @@ TEST(JigSession, AWriteThatTheUnitRefusesIsAFailWithTheOldConstants) {
   EXPECT_EQ(bench.unit->read_calibration()->constants, report->as_found->constants);
 }
 
+// Its page is damaged as it was found: what it holds was read, and is as it was.
+TEST(JigSession, ARefusedWriteIntoADamagedPageIsAFail) {
+  VirtualBench bench;
+  bench.plugged->unit.spoil_page();
+  JigSessionOptions options;
+  options.run.write = true;
+  options.keep_interrupted = true;
+  bench.on_action = [&](const JigAction& action) {
+    if (action.kind == JigAction::Kind::write) {
+      bench.plugged->unit.set_battery_mv(3000);
+    }
+  };
+  const auto report = bench.run(options);
+  ASSERT_OK(report);
+  EXPECT_EQ(report->verdict, JigVerdict::fail) << report->brief();
+  EXPECT_THAT(report->codes, testing::ElementsAre("write_refused"));
+  EXPECT_FALSE(report->written);
+  EXPECT_FALSE(report->write_begun);
+  EXPECT_FALSE(report->as_left);
+  EXPECT_THAT(report->reasons, Contains(HasSubstr("battery low")));
+  EXPECT_THAT(report->reasons, testing::Not(Contains(HasSubstr("was not read"))));
+}
+
 // The sensor's second order is beyond six constants; the verdict must notice a unit that is bad.
 TEST(JigSession, AnImpossibleFilterIsRefused) {
   VirtualBench bench;
