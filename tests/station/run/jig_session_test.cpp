@@ -204,8 +204,23 @@ TEST(JigSession, AnImpossibleFilterIsRefused) {
   options.filter = FilterConfiguration::legacy;
   EXPECT_FAILS(bench.run(options), ErrorCode::usage);
 
-  // A unit of 2018 has one configuration only; asking for the other is the operator's business.
+  options.run.write = false;
   sim::GivenProperties given;
+  for (const char* two : {"2014-03-23", "1970-01-01"}) {  // a clock that was never set
+    given.calibrated = *parse_iso8601(two);
+    EXPECT_FAILS(VirtualBench(7, given).run(options), ErrorCode::usage);
+  }
+  VirtualBench unreadable;
+  unreadable.plugged->unit.spoil_page();
+  EXPECT_FAILS(unreadable.run(options), ErrorCode::usage);
+  given.calibrated = *parse_iso8601("2014-03-24");
+  EXPECT_OK(VirtualBench(7, given).run(options));
+  given.serial = "NEO1A45130007";
+  given.calibrated = *parse_iso8601("2013-11-12");
+  EXPECT_OK(VirtualBench(7, given).run(options));
+
+  // A unit of 2018 has one configuration only; asking for the other is the operator's business.
+  given.serial = std::nullopt;
   given.calibrated = *parse_iso8601("2018-05-01");
   VirtualBench later(7, given);
   const auto report = later.run();
