@@ -99,9 +99,6 @@ sim::GivenProperties at_the_limit(Random& random, const station::Limits& limits,
   }
   given.current_sensitivity_lsb_per_g = sensitivity;
   given.current_zero_lsb = zeros;
-  // The page knows about it, or the faces would not be recognised.
-  given.legacy_sensitivity_lsb_per_g = sensitivity;
-  given.legacy_zero_lsb = zeros;
   return given;
 }
 

@@ -1,12 +1,18 @@
 #include "station/records/jig_due.h"
 
+#include <chrono>
+
 #include <fmt/format.h>
 
 namespace sixpoint::station {
 
 namespace {
 
-bool is_over(const JigDue& jig, UtcTime now) { return jig.due && *jig.due < now; }
+// The whole day counts.
+bool is_over(const JigDue& jig, UtcTime now) {
+  return jig.due && std::chrono::floor<std::chrono::days>(*jig.due) <
+                        std::chrono::floor<std::chrono::days>(now);
+}
 
 }  // namespace
 

@@ -5,11 +5,13 @@
 // | due date         | exception | signed by | answer                                           |
 // |------------------|-----------|-----------|--------------------------------------------------|
 // | not known        | any       | any       | the unit may be measured                         |
-// | not over         | any       | any       | the unit may be measured                         |
-// | over             | none      | any       | configuration error: nothing is measured         |
-// | over             | a reason  | no one    | usage error: an exception has a name             |
-// | over             | a reason  | a name    | the unit may be measured; jig_due_note() goes    |
+// | that day, before | any       | any       | the unit may be measured                         |
+// | a day before     | none      | any       | configuration error: nothing is measured         |
+// | a day before     | a reason  | no one    | usage error: an exception has a name             |
+// | a day before     | a reason  | a name    | the unit may be measured; jig_due_note() goes    |
 // |                  |           |           | into the run's record                            |
+//
+// The due date is a day in UTC, and counts to its end.
 //
 // Pure functions.
 #pragma once

@@ -133,22 +133,29 @@ std::vector<Measured> measured_quantities(const JigReport& report) {
   add_axes(
       "sensitivity_deviation_percent", [&](std::size_t axis) { return 100 * (ratio(axis) - 1); },
       [&](std::size_t axis) { return 100 * ratio(axis) * combined.sensitivity_relative[axis]; });
-  const auto zero_u_mg = [&](std::size_t axis) { return combined.zero_mg[axis]; };
-  add_axes(
-      "zero_offset_mg",
-      [&](std::size_t axis) { return kMgPerG * best.calibration.zero_lsb[axis] * g_per_lsb[axis]; },
-      zero_u_mg);
+  const auto zero_mg = [&](std::size_t axis) {
+    return kMgPerG * best.calibration.zero_lsb[axis] * g_per_lsb[axis];
+  };
+  // A value in mg is counts times sensitivity. What the constants leave on unused poses is in both,
+  // and may be one error.
+  const auto zero_u_mg = [&](std::size_t axis) {
+    const double value_mg = std::abs(zero_mg(axis));
+    const double both_mg2 = 2 * value_mg / kMgPerG * square(report.verification.rms_mg);
+    return std::sqrt(square(combined.zero_mg[axis]) +
+                     square(value_mg * combined.sensitivity_relative[axis]) + both_mg2);
+  };
+  add_axes("zero_offset_mg", zero_mg, zero_u_mg);
   // A mean of two readings, in which tilt counts in second order, minus a mean of four.
   const double level_mg = level_scatter_mg(report, g_per_lsb);
   const double midpoint_u_mg =
       std::hypot(mean_mg / std::sqrt(2.0),
                  std::hypot(kStudent3 * level_mg, kMgPerG * kSeating_rad, mean_mg) / 2);
-  add_axes(
-      "midpoint_minus_zero_mg",
-      [&](std::size_t axis) {
-        return kMgPerG * report.six->midpoint_minus_zero_lsb[axis] * g_per_lsb[axis];
-      },
-      [&](std::size_t /*axis*/) { return midpoint_u_mg; });
+  const auto midpoint_mg = [&](std::size_t axis) {
+    return kMgPerG * report.six->midpoint_minus_zero_lsb[axis] * g_per_lsb[axis];
+  };
+  add_axes("midpoint_minus_zero_mg", midpoint_mg, [&](std::size_t axis) {
+    return std::hypot(midpoint_u_mg, midpoint_mg(axis) * combined.sensitivity_relative[axis]);
+  });
   const auto noise_mg = [&](std::size_t axis) { return readings.noise_mg[axis]; };
   add_axes("noise_mg", noise_mg, [&](std::size_t axis) {
     return noise_mg(axis) / std::sqrt(2 * std::max(1.0, readings.samples - count));

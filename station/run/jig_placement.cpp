@@ -16,8 +16,8 @@ constexpr double kDegPerRad = 180 / std::numbers::pi;
 // The ends of the ADXL362's 12 bits: a reading there is clipped.
 constexpr int kRawMin = -2048;
 constexpr int kRawMax = 2047;
-// Half a count: below it rounding hides the noise of a quiet sensor.
-constexpr double kLeastNoise_mg = 2;
+// Below half a count rounding hides the noise of a quiet sensor.
+constexpr double kLeastNoise_lsb = 0.5;
 constexpr double kSamePlacement_g =
     0.01;  // 0.6 degree: a person does not repeat a placement so well
 // What a working ADXL362 can have (datasheet, and the effect of the two filter configurations).
@@ -27,6 +27,12 @@ constexpr double kMostZero_g = 0.75;
 // The mean of the units whose constants are known.
 constexpr double kNominal_lsb_per_g = 256;
 constexpr double kNominalZero_lsb = 40;
+// The table of jig_run.h. A face that is exchanged for another moves two axes by 1 g, or one by
+// 2 g: wide bounds tell it, and let a sensor in that is far outside of the limits.
+constexpr double kLeastChange_lsb_per_g = kNominal_lsb_per_g / 4;
+constexpr double kMostChange_lsb_per_g = kNominal_lsb_per_g * 2;
+constexpr double kMostLevelChange_lsb = kNominal_lsb_per_g / 2;
+constexpr double kMostFirstZero_g = 1.2;
 
 bool is_possible(const calib::Calibration& calibration) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -82,10 +88,9 @@ bool JigRun::is_still() const {
   const double factor =
       stillness_ == JigStillness::moving ? options_.still_factor : options_.moved_factor;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const double own_mg = own_noise_mg_[axis];
-    const double limit_mg =
-        own_mg > 0 ? factor * std::max(own_mg, kLeastNoise_mg) : options_.first_noise_limit_mg;
-    if (to_mg(sd_lsb[axis], axis) > std::min(limit_mg, options_.first_noise_limit_mg)) {
+    const double own_lsb = own_noise_lsb_[axis];
+    if (to_mg(sd_lsb[axis], axis) > options_.first_noise_limit_mg ||
+        (own_lsb > 0 && sd_lsb[axis] > factor * std::max(own_lsb, kLeastNoise_lsb))) {
       return false;
     }
   }
@@ -144,7 +149,56 @@ std::optional<calib::Calibration> JigRun::constants_of_faces() const {
   return constants;
 }
 
+std::optional<Pose> JigRun::asked_face() const {
+  if (detour_ || open_.empty()) {
+    return detour_;
+  }
+  return open_.front();
+}
+
+// True where the changes from all accepted faces to this reading are those of `pose`, whatever the
+// zeros are.
+bool JigRun::changes_fit(Pose pose, const PerAxis<double>& mean_lsb) const {
+  const PerAxis<double> at_g = device::direction_of(pose);
+  for (const PoseReading& face : progress_.faces) {
+    const PerAxis<double> from_g = device::direction_of(face.pose);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const double turned_g = at_g[axis] - from_g[axis];
+      const double change_lsb = mean_lsb[axis] - face.mean_lsb[axis];
+      if (turned_g == 0 ? std::abs(change_lsb) > kMostLevelChange_lsb
+                        : change_lsb / turned_g < kLeastChange_lsb_per_g ||
+                              change_lsb / turned_g > kMostChange_lsb_per_g) {
+        return false;
+      }
+    }
+  }
+  return !progress_.faces.empty();
+}
+
+// The table of jig_run.h.
 NearestFace JigRun::recognise(const PerAxis<double>& mean_lsb) const {
+  const std::optional<Pose> asked = asked_face();
+  if (progress_.faces.empty() && jig_pose_) {
+    return {*jig_pose_, 0};
+  }
+  if (const auto expected = jig_pose_ ? jig_pose_ : asked;
+      expected && changes_fit(*expected, mean_lsb)) {
+    return {*expected, tilt_of({*expected, mean_lsb})};
+  }
+  NearestFace nearest = nearest_by_constants(mean_lsb);
+  if (progress_.faces.empty() && asked && nearest.angle_deg > options_.between_faces_deg) {
+    double square_g2 = 0;
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      const double zero_g =
+          mean_lsb[axis] / kNominal_lsb_per_g - device::direction_of(*asked)[axis];
+      square_g2 += zero_g * zero_g;
+    }
+    nearest.pose = std::sqrt(square_g2) <= kMostFirstZero_g ? *asked : nearest.pose;
+  }
+  return nearest;
+}
+
+NearestFace JigRun::nearest_by_constants(const PerAxis<double>& mean_lsb) const {
   std::optional<NearestFace> by_faces;
   if (const auto constants = constants_of_faces()) {
     by_faces = nearest_face(constants->to_g(mean_lsb));
@@ -160,7 +214,7 @@ NearestFace JigRun::recognise(const PerAxis<double>& mean_lsb) const {
   const bool nominal_near = nominal.angle_deg <= options_.between_faces_deg;
   if (own_near && nominal_near && own.pose != nominal.pose) {
     // Most likely the unit lies as it was asked for.
-    return !open_.empty() && nominal.pose == detour_.value_or(open_.front()) ? nominal : own;
+    return nominal.pose == asked_face() ? nominal : own;
   }
   if (own_near || nominal_near) {
     return own_near ? own : nominal;
@@ -327,9 +381,8 @@ void JigRun::on_settled() {
   const PerAxis<double> mean_lsb = window_.mean_lsb();
   const PerAxis<double> sd_lsb = window_.sd_lsb();
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const double sd_mg = to_mg(sd_lsb[axis], axis);
-    double& own_mg = own_noise_mg_[axis];
-    own_mg = own_mg > 0 ? std::min(own_mg, sd_mg) : sd_mg;
+    double& own_lsb = own_noise_lsb_[axis];
+    own_lsb = own_lsb > 0 ? std::min(own_lsb, sd_lsb[axis]) : sd_lsb[axis];
   }
   const NearestFace face = recognise(mean_lsb);
   const bool between = face.angle_deg > options_.between_faces_deg;

@@ -439,10 +439,9 @@ std::vector<JigAction> JigRun::on_operator(OperatorCommand command) {
 
 std::vector<JigAction> JigRun::on_time(double now_s) {
   now_s_ = now_s;
-  if (progress_.phase != JigPhase::finished &&
-      now_s - last_progress_s_ > options_.pose_time_out_s) {
-    finish(JigOutcome::timed_out,
-           fmt::format("nothing was accepted for {:.0f} s", options_.pose_time_out_s));
+  const double time_out_s = options_.pose_time_out_s + options_.dwell_s;
+  if (progress_.phase != JigPhase::finished && now_s - last_progress_s_ > time_out_s) {
+    finish(JigOutcome::timed_out, fmt::format("nothing was accepted for {:.0f} s", time_out_s));
   }
   return answer();
 }

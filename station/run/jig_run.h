@@ -42,7 +42,7 @@
 // | undo         | the last reading is asked for again       | -                   | -        |
 // | stop         | -> finished (stopped)                     | -> finished         | -        |
 // | on_time      | -> finished (timed_out) when no reading   | -> finished         | -        |
-// |              | was accepted for pose_time_out_s          |                     |          |
+// |              | was accepted in pose_time_out_s + dwell_s |                     |          |
 // | on_unit_back | time-out and stillness begin again        | the time-out, too   | -        |
 // | on_unit_gone | -> finished (unit_gone)                   | -> finished         | -        |
 // | on_written   | -                                         | -> rechecking       | -        |
@@ -58,14 +58,35 @@
 //
 // How a placement is judged (jig_placement.cpp):
 //  - Still: by the unit's own noise, with hysteresis.
-//  - Face: by the faces that were accepted, by the unit's own constants (which may be wrong by 20 %
-//    and 0.2 g), or by nominal ones.
-//  - Between two faces by all of these: refused. When the same placement comes again, to half a
-//    degree, it is taken: a person would not repeat it, a jig does, so the constants are wrong (the
-//    zero of an ADXL362 may be 0.45 g off).
+//  - Face: see the table below.
+//  - Between two faces: refused. When the same placement comes again (to half a degree) it is
+//    taken: a person would not repeat it, a jig does, so the constants are wrong.
 //  - Tilt: an axis reads its zero in all four poses in which it lies level, so a tilted placement
 //    disagrees with the others. Where one disagrees with one, the newer is asked for again; when it
 //    repeats itself, the older is dropped.
+//
+// On which face a unit lies. The expected face is where a jig that turns by itself says it stands;
+// else the one that is asked for. The zero of a unit may be 1 g off, and that of its constants too;
+// the changes from one placement to another do not depend on it.
+//
+// | accepted faces | what else                                        | the face is              |
+// |----------------|--------------------------------------------------|--------------------------|
+// | none           | the jig says where it stands                     | that; the next placement |
+// |                |                                                  | confirms it              |
+// | none           | within 30 degrees of a face by the unit's own    | that face; where the two |
+// |                | constants or by nominal ones                     | differ, the asked one    |
+// | none           | of none by both, asked: a zero within 1.2 g      | between faces; when it   |
+// |                | explains the asked face                          | comes again: the asked   |
+// | none           | of none by both, and no such zero                | between faces; when it   |
+// |                |                                                  | comes again: the nearest |
+// | some           | the changes from all of them fit the expected    | the expected face        |
+// |                | face: an axis that turns by 1 g or 2 g changes   |                          |
+// |                | by 64 to 512 LSB/g, one that does not by less    |                          |
+// |                | than half a g                                    |                          |
+// | some           | they do not fit it                               | the nearest, by the      |
+// |                |                                                  | zeros of the accepted    |
+// |                |                                                  | faces; with a single one |
+// |                |                                                  | also by the constants    |
 #pragma once
 
 #include <cstdint>
@@ -107,7 +128,7 @@ struct JigRunOptions {
   // without any tilt; a tilt of 4 degrees moves the face's own reading by 2.4 mg (1 - cos).
   double tilt_limit_deg = 4;
   double between_faces_deg = 30;  // further from every face than this: lies on none
-  double pose_time_out_s = 180;   // without any accepted pose
+  double pose_time_out_s = 180;   // without any accepted pose, beside the dwell itself
   int refusals_in_row = 8;        // this many in a row, or five times as many in all, end the run
   // In this order every face is reached from another one than in the first round.
   std::vector<Pose> verification = {Pose::plus_y,  Pose::minus_x, Pose::plus_x,
@@ -230,6 +251,10 @@ class JigRun {
   // Constants from the six faces: tilt is judged by them from here on.
   void set_approximation(const calib::Calibration& calibration) { approximation_ = calibration; }
 
+  // Where a jig that turns by itself says it stands, from here on; none where it does not know, and
+  // where a person turns the unit.
+  void set_jig_pose(std::optional<Pose> pose) { jig_pose_ = pose; }
+
   // The best constants so far, for a picture of how the unit lies.
   calib::Calibration approximation() const { return constants_of_faces().value_or(approximation_); }
 
@@ -269,6 +294,9 @@ class JigRun {
   bool is_still() const;
   bool has_moved(const PerAxis<double>& from_lsb, double limit_mg) const;
   NearestFace recognise(const PerAxis<double>& mean_lsb) const;
+  NearestFace nearest_by_constants(const PerAxis<double>& mean_lsb) const;
+  std::optional<Pose> asked_face() const;
+  bool changes_fit(Pose pose, const PerAxis<double>& mean_lsb) const;
   std::optional<calib::Calibration> constants_of_faces() const;  // none before the first
   void on_settled();
   void finish_dwell();
@@ -290,6 +318,7 @@ class JigRun {
   JigOutcome outcome_ = JigOutcome::running;
   std::vector<Pose> open_;
   std::optional<Pose> detour_;     // asked for only to come from there
+  std::optional<Pose> jig_pose_;   // where the jig says it stands
   std::optional<Pose> last_face_;  // where it lay still last
   std::optional<Pose> came_from_;  // and before that
   std::optional<PoseReading> last_refused_;
@@ -300,7 +329,7 @@ class JigRun {
 
   JigStillness stillness_ = JigStillness::moving;
   SampleWindow window_;
-  PerAxis<double> own_noise_mg_{};  // the least so far; 0: not known yet
+  PerAxis<double> own_noise_lsb_{};  // the least so far; 0: not known yet
   int still_samples_ = 0;
   std::vector<Sample> dwell_;
   PerAxis<double> dwell_start_lsb_{};

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "repair/triage/triage.h"
 #include "station/run/jig_judgement.h"
 #include "station/run/jig_watch.h"
 #include "station/run/unit_stream.h"
@@ -25,12 +26,13 @@ double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
-// A returned unit of 2013-14: the firmware knows two configurations for it.
+// A returned unit of 2013-14: the firmware knows two configurations for it. Without a date, or with
+// one that cannot be, it is taken for one.
 bool has_two_filters(const std::string& serial,
                      const std::optional<device::CalibrationPage>& page) {
-  constexpr std::int64_t kFilterChange_unix_s = 1'395'619'200;  // 2014-03-24
-  return serial.starts_with("MOS") &&
-         (!page || page->calibrated < from_unix_seconds(kFilterChange_unix_s));
+  const UtcTime first = repair::first_possible_calibration();
+  const UtcTime calibrated = page ? std::max<UtcTime>(page->calibrated, first) : first;
+  return repair::filter_of_constants({serial, {}, calibrated}) == FilterConfiguration::legacy;
 }
 
 class Session {
@@ -312,7 +314,8 @@ Status Session::stream(JigRun& run) {
     }
     if (run.phase() !=
         JigPhase::finished) {  // else the operator's stop would be a fault of the jig
-      SIXPOINT_CHECK(watch_.ask(*jig_, now_s));
+      SIXPOINT_ASSIGN(const std::optional<Pose> stands, watch_.ask(*jig_, now_s));
+      run.set_jig_pose(stands);
     }
     SIXPOINT_CHECK(handle(run, run.on_time(now_s)));
   }
@@ -406,6 +409,13 @@ Status Session::write_constants(JigRun& run) {
       return {};
     }
     holds = unit_->read_calibration();
+  }
+  if (!written && !holds && holds.error().code == ErrorCode::bad_data && !report_.as_found) {
+    // Unreadable as found, and as it was: the unit refused the write.
+    ended_ = true;
+    report_.write_begun = false;
+    report_.reasons.push_back(written.error().what);
+    return {};
   }
   SIXPOINT_ASSIGN(report_.as_left, holds);
   report_.write_begun = false;

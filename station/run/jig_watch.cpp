@@ -13,12 +13,20 @@ Status JigWatch::place(device::Jig& jig, device::Pose pose, JigPhase phase) {
   return phase == JigPhase::turning ? jig.go_to_half_turned(pose) : jig.go_to(pose);
 }
 
-Status JigWatch::ask(device::Jig& jig, double now_s) {
-  if (!jig.turns_by_itself() || (asked_s_ && now_s - *asked_s_ < options_.poll_s)) {
-    return {};
+Result<std::optional<device::Pose>> JigWatch::ask(device::Jig& jig, double now_s) {
+  if (!jig.turns_by_itself()) {
+    return std::nullopt;
+  }
+  if (asked_s_ && now_s - *asked_s_ < options_.poll_s) {
+    return stands_;
   }
   asked_s_ = now_s;
-  return device::check_jig(jig);
+  SIXPOINT_ASSIGN(const device::JigPosition position, jig.position());
+  if (!position.fault.empty()) {
+    SIXPOINT_CHECK(device::check_jig(jig));
+  }
+  stands_ = position.pose;
+  return stands_;
 }
 
 Status JigWatch::compare(device::Jig& jig, const JigAction& action) {

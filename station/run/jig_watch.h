@@ -2,15 +2,16 @@
 //
 //   JigWatch watch({0.25, 3});
 //   SIXPOINT_CHECK(watch.place(jig, device::Pose::plus_x, JigPhase::measuring));
-//   SIXPOINT_CHECK(watch.ask(jig, 12.5));  // a stop or a fault of the jig is an error
+//   SIXPOINT_ASSIGN(const auto stands, watch.ask(jig, 12.5));  // a stop or a fault is an error
 //
-// A jig that a person turns is asked nothing: every answer is success. The jig is not owned, and
-// may be another one at each call, when the unit was plugged in again. One object belongs to one
-// thread.
+// A jig that a person turns is asked nothing: every answer is success, and no pose. The jig is not
+// owned, and may be another one at each call, when the unit was plugged in again. One object
+// belongs to one thread.
 #pragma once
 
 #include <optional>
 
+#include "base/result.h"
 #include "device/jig.h"
 #include "station/run/jig_run.h"
 
@@ -29,8 +30,9 @@ class JigWatch {
   // Turns the jig, where a look at it permits that; in the phase `turning` half-turned.
   static Status place(device::Jig& jig, device::Pose pose, JigPhase phase);
 
-  // Its stop or fault; at most every poll_s. It ends the run: no placement after it is certain.
-  Status ask(device::Jig& jig, double now_s);
+  // Where it stands; none while it turns, or where it does not know. At most every poll_s, else its
+  // last answer. Its stop or fault is an error that ends the run: no placement after it is certain.
+  Result<std::optional<device::Pose>> ask(device::Jig& jig, double now_s);
 
   // The jig's own position against a placement that the unit's readings have judged:
   //
@@ -47,6 +49,7 @@ class JigWatch {
  private:
   JigWatchOptions options_;
   std::optional<double> asked_s_;
+  std::optional<device::Pose> stands_;  // its last answer
   int disagreements_ = 0;
 };
 

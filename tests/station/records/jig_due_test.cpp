@@ -14,7 +14,11 @@ TEST(JigDueRule, FollowsTheTable) {
   const UtcTime later = *parse_iso8601("2027-04-02");
   EXPECT_OK(check_jig_due({}, now));
   EXPECT_OK(check_jig_due({later, "", ""}, now));
-  EXPECT_OK(check_jig_due({now, "", ""}, now));  // at that moment itself
+  // The day itself, to its end.
+  EXPECT_OK(check_jig_due({now, "", ""}, now));
+  EXPECT_OK(check_jig_due({over, "", ""}, *parse_iso8601("2027-03-31T23:59:59")));
+  EXPECT_OK(check_jig_due({*parse_iso8601("2027-03-31T08:00:00"), "", ""},
+                          *parse_iso8601("2027-03-31T23:59:59")));
   const auto refused = check_jig_due({over, "", "Eve"}, now);
   EXPECT_FAILS(refused, ErrorCode::configuration);
   EXPECT_THAT(refused.error().what, testing::HasSubstr("2027-03-31"));

@@ -64,6 +64,36 @@ std::vector<Measured> midpoints(const Standing& standing) {
   return measured_as(six_poses_of(standing), "midpoint_minus_zero_mg");
 }
 
+// Oracle: the same readings with local gravity at each end of its stated range (k = 2) are another
+// number of mg, and the U that is stated without it covers that.
+TEST(Budget, TheUncertaintyOfAZeroCoversLocalGravity) {
+  JigReport report = six_poses_of({});
+  const double zero_lsb = 0.699 * 250;
+  report.six->per_axis.calibration.zero_lsb.fill(zero_lsb);
+  report.six->chosen = calib::SixPoseMethod::per_axis;
+  const double sd_relative = 0.0015;
+  report.combined.sensitivity_relative.fill(sd_relative);
+  report.combined.zero_mg.fill(0.3);
+  report.six->midpoint_minus_zero_lsb.fill(10);
+  const auto of = [&](std::string_view name) {
+    return judge_quantity(measured_as(report, name).at(0), default_limits());
+  };
+  for (const char* name : {"zero_offset_mg", "midpoint_minus_zero_mg"}) {
+    const JudgedQuantity stated = of(name);
+    for (const double end : {1 - 2 * sd_relative, 1 + 2 * sd_relative}) {
+      EXPECT_LE(std::abs(stated.value * end - stated.value), stated.expanded_uncertainty) << name;
+    }
+  }
+  EXPECT_NEAR(of("zero_offset_mg").expanded_uncertainty, 2 * std::hypot(0.3, 699 * sd_relative),
+              1e-6);
+  EXPECT_EQ(of("zero_offset_mg").verdict, JigVerdict::conditional_pass) << "0.3 mg would be a pass";
+  // What the constants leave is in zero and scale alike: 0.4 * (1 + 0.699).
+  report.verification.rms_mg = 0.4;
+  report.combined.zero_mg.fill(0.4);
+  report.combined.sensitivity_relative.fill(0.0004);
+  EXPECT_NEAR(of("zero_offset_mg").expanded_uncertainty, 2 * 0.4 * 1.699, 1e-6);
+}
+
 // 0 / 0 is no rate of 0 %; 30 of 1000 are 3 %.
 TEST(Budget, ARunWithoutSamplesHasNoRateOfLosses) {
   JigReport report = six_poses_of({});

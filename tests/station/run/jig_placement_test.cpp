@@ -233,6 +233,103 @@ TEST(JigPlacement, LeaningIsTakenAtFirstOnlyWhereItRepeatsItself) {
   }
 }
 
+calib::Calibration nominal() { return first_approximation(std::nullopt).calibration; }
+
+calib::Calibration sensor_of(const PerAxis<double>& lsb_per_g, const PerAxis<double>& zero_lsb) {
+  calib::Calibration sensor;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    sensor.sensitivity_g_per_lsb[axis] = 1 / lsb_per_g[axis];
+  }
+  sensor.zero_lsb = zero_lsb;
+  return sensor;
+}
+
+// The table of jig_run.h, a row each. Oracle: the face that the unit was laid on.
+TEST(JigPlacementTable, RowTheJigSaysWhereItStands) {
+  Placer placer({}, 1, nominal(), sensor_of({250, 250, 250}, {0, 0, -300}));  // reads -z
+  placer.run.set_jig_pose(Pose::plus_z);
+  placer.place(Pose::plus_z);
+  ASSERT_EQ(placer.run.faces().size(), 1U) << placer.last_refusal();
+  EXPECT_EQ(placer.run.faces()[0].pose, Pose::plus_z);
+
+  // The unit is turned by a quarter in the jig: the first placement cannot show it, the next does.
+  Placer askew({}, 1, nominal(), nominal());
+  askew.run.set_jig_pose(Pose::plus_z);
+  askew.place(Pose::plus_x);
+  askew.run.set_jig_pose(Pose::minus_z);
+  askew.place(Pose::minus_x);
+  EXPECT_EQ(askew.last.pose, Pose::minus_x) << "the jig is at -z, and is not believed";
+}
+
+TEST(JigPlacementTable, RowNearAFaceByTheConstants) {
+  Placer placer({}, 1, nominal(), nominal());
+  placer.place(Pose::plus_x);  // +z was asked for
+  ASSERT_EQ(placer.run.faces().size(), 1U) << placer.last_refusal();
+  EXPECT_EQ(placer.run.faces()[0].pose, Pose::plus_x);
+  // By its own constants it lies on +x.
+  Placer differ({}, 1, sensor_of({256, 256, 256}, {40 - 300, 40, 40 + 256}), nominal());
+  differ.place(Pose::plus_z);
+  ASSERT_EQ(differ.run.faces().size(), 1U) << differ.last_refusal();
+  EXPECT_EQ(differ.run.faces()[0].pose, Pose::plus_z);
+}
+
+TEST(JigPlacementTable, RowAZeroExplainsTheAskedFace) {
+  Placer placer({}, 1, nominal(), sensor_of({256, 256, 256}, {-200, 0, 0}));
+  placer.place(Pose::plus_z);
+  EXPECT_THAT(placer.last_refusal(), HasSubstr("none of its six faces"));
+  EXPECT_TRUE(placer.run.faces().empty());
+  placer.place(Pose::plus_z);
+  ASSERT_EQ(placer.run.faces().size(), 1U) << placer.last_refusal();
+  EXPECT_EQ(placer.run.faces()[0].pose, Pose::plus_z);
+}
+
+TEST(JigPlacementTable, RowNoSuchZero) {
+  Placer placer({}, 1, nominal(), nominal());
+  for (int i = 0; i < 2; ++i) {
+    placer.shake(1.5);
+    placer.rest({0.72, 0.69, 0}, 9);  // +z was asked for
+  }
+  ASSERT_EQ(placer.run.faces().size(), 1U) << placer.last_refusal();
+  EXPECT_EQ(placer.run.faces()[0].pose, Pose::plus_x);
+}
+
+TEST(JigPlacementTable, RowTheChangesFitTheExpectedFace) {
+  for (const double lsb_per_g : {100.0, 250.0, 400.0}) {
+    for (const double zero_lsb : {-250.0, 0.0, 250.0}) {
+      Placer placer({}, 1, nominal(),
+                    sensor_of({250, 250, lsb_per_g}, {zero_lsb, -zero_lsb, zero_lsb}));
+      for (int i = 0; i < 6 && placer.run.phase() == JigPhase::measuring; ++i) {
+        placer.run.set_jig_pose(placer.wanted);
+        placer.place(placer.wanted);
+      }
+      EXPECT_EQ(placer.run.phase(), JigPhase::verifying)
+          << lsb_per_g << ' ' << zero_lsb << ": " << placer.last_refusal();
+      EXPECT_EQ(placer.run.refusals(), 0);
+    }
+  }
+}
+
+TEST(JigPlacementTable, RowTheChangesDoNotFitIt) {
+  Random random(1);
+  for (int i = 0; i < 40; ++i) {
+    PerAxis<double> lsb_per_g{};
+    PerAxis<double> zero_lsb{};
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      lsb_per_g[axis] = random.uniform(150, 350);
+      zero_lsb[axis] = random.uniform(-1, 1) * lsb_per_g[axis];
+    }
+    for (const Pose laid : {Pose::plus_z, Pose::plus_x, Pose::minus_y}) {
+      Placer placer({}, 1, nominal(), sensor_of(lsb_per_g, zero_lsb));
+      placer.run.set_jig_pose(Pose::plus_z);
+      placer.place(Pose::plus_z);
+      ASSERT_EQ(placer.run.faces().size(), 1U);
+      placer.run.set_jig_pose(Pose::minus_z);
+      placer.place(laid);
+      EXPECT_EQ(placer.last.pose, laid) << i << ": the jig says -z";
+    }
+  }
+}
+
 TEST(JigPlacement, ConstantsThatNoSensorHasAreNotUsed) {
   const StoredConstants good = {{311, 310, 287}, {-204, -216, -234}, {54, 47, 26}};
   EXPECT_FALSE(first_approximation(good).is_nominal);

@@ -110,6 +110,20 @@ TEST(JigRun, EveryStateHasAWayOut) {
   EXPECT_EQ(hopeless.run.outcome(), JigOutcome::too_many_refusals);
 }
 
+// The longest dwell of the command line.
+TEST(JigRun, TheTimeOutLeavesTimeForALongDwell) {
+  JigRunOptions options;
+  options.dwell_s = 600;
+  Placer placer(options);
+  placer.shake(1.5);
+  placer.rest({0, 0, 1}, 605);
+  EXPECT_EQ(placer.run.faces().size(), 1U);
+  EXPECT_EQ(placer.run.outcome(), JigOutcome::running);
+  placer.rest({0, 0, 1}, 785);  // and then nothing comes
+  EXPECT_EQ(placer.run.outcome(), JigOutcome::timed_out);
+  EXPECT_EQ(placer.last.text, "nothing was accepted for 780 s");
+}
+
 TEST(JigRun, WriteAndRecheck) {
   JigRunOptions options;
   options.write = true;

@@ -42,6 +42,70 @@ TEST(JigSession, FindsTheSensorUnderCurrent) {
   }
 }
 
+// The page knows nothing of the zeros. Oracle: the truth against docs/limits.md.
+TEST(JigSession, AZeroFarFromNominalIsMeasuredAndJudged) {
+  struct Row {
+    PerAxis<double> lsb_per_g;
+    PerAxis<double> zero_lsb;
+    JigVerdict verdict;
+    const char* code;
+  };
+  for (const Row& row :
+       {Row{{250, 250, 250}, {-80, -80, -80}, JigVerdict::pass, ""},
+        Row{{250, 250, 250}, {-130, 0, 0}, JigVerdict::pass, ""},
+        Row{{250, 250, 250}, {150, 150, -100}, JigVerdict::pass, ""},
+        Row{{250, 250, 250}, {-200, 0, 0}, JigVerdict::fail, "zero_low"},
+        Row{{250, 250, 250}, {0, 0, -300}, JigVerdict::fail, "zero_low"},
+        Row{{250, 250, 250}, {220, 0, 0}, JigVerdict::fail, "zero_high"},
+        Row{{100, 250, 250}, {20, 20, 20}, JigVerdict::fail, "sensitivity_high"},
+        Row{{250, 250, 100}, {20, 20, 20}, JigVerdict::fail, "sensitivity_high"}}) {
+    sim::GivenProperties given;
+    given.current_sensitivity_lsb_per_g = row.lsb_per_g;
+    given.current_zero_lsb = row.zero_lsb;
+    for (const bool without_zero : {false, true}) {
+      given.zero_lsb = without_zero ? std::optional(PerAxis<int>{0, 0, 0}) : std::nullopt;
+      VirtualBench bench(7, given);
+      const auto report = bench.run();
+      ASSERT_OK(report) << row.zero_lsb[0] << ' ' << row.zero_lsb[2];
+      EXPECT_EQ(report->verdict, row.verdict) << report->brief();
+      if (row.verdict == JigVerdict::fail) {
+        EXPECT_THAT(report->codes, Contains(row.code)) << report->brief();
+      }
+    }
+  }
+}
+
+// The unit lies in the jig as no one thinks. The jig is asked, and is not believed.
+TEST(JigSession, AUnitThatWasPutInAskewIsFoundByTheSecondPlacement) {
+  class AskewJig final : public device::Jig {
+   public:
+    explicit AskewJig(device::Jig& jig) : jig_(jig) {}
+    std::string name() const override { return jig_.name(); }
+    bool turns_by_itself() const override { return true; }
+    Status go_to(Pose pose) override {
+      said_ = pose;
+      return jig_.go_to(
+          device::pose_of((device::axis_of(pose) + 1) % kAxes, device::sign_of(pose)));
+    }
+    Result<device::JigPosition> position() override {
+      SIXPOINT_ASSIGN(device::JigPosition position, jig_.position());
+      position.pose = position.pose ? std::optional(said_) : std::nullopt;
+      return position;
+    }
+    Status stop() override { return jig_.stop(); }
+    Status release() override { return jig_.release(); }
+
+   private:
+    device::Jig& jig_;
+    Pose said_ = Pose::plus_z;
+  };
+  VirtualBench bench;
+  AskewJig askew(*bench.jig);
+  const auto report = run_jig({bench.unit.get(), &askew}, bench.env.env, {}, {});
+  EXPECT_FAILS(report, ErrorCode::bad_data);
+  EXPECT_THAT(report.error().what, HasSubstr("stands at -z and the unit reads -x"));
+}
+
 TEST(JigSession, MeasuresUnderItsFilterWhateverTheUnitHad) {
   VirtualBench bench;
   ASSERT_OK(bench.unit->set_filter(FilterConfiguration::legacy));
@@ -106,6 +170,29 @@ TEST(JigSession, AWriteThatTheUnitRefusesIsAFailWithTheOldConstants) {
   EXPECT_EQ(bench.unit->read_calibration()->constants, report->as_found->constants);
 }
 
+// Its page is damaged as it was found: what it holds was read, and is as it was.
+TEST(JigSession, ARefusedWriteIntoADamagedPageIsAFail) {
+  VirtualBench bench;
+  bench.plugged->unit.spoil_page();
+  JigSessionOptions options;
+  options.run.write = true;
+  options.keep_interrupted = true;
+  bench.on_action = [&](const JigAction& action) {
+    if (action.kind == JigAction::Kind::write) {
+      bench.plugged->unit.set_battery_mv(3000);
+    }
+  };
+  const auto report = bench.run(options);
+  ASSERT_OK(report);
+  EXPECT_EQ(report->verdict, JigVerdict::fail) << report->brief();
+  EXPECT_THAT(report->codes, testing::ElementsAre("write_refused"));
+  EXPECT_FALSE(report->written);
+  EXPECT_FALSE(report->write_begun);
+  EXPECT_FALSE(report->as_left);
+  EXPECT_THAT(report->reasons, Contains(HasSubstr("battery low")));
+  EXPECT_THAT(report->reasons, testing::Not(Contains(HasSubstr("was not read"))));
+}
+
 // The sensor's second order is beyond six constants; the verdict must notice a unit that is bad.
 TEST(JigSession, AnImpossibleFilterIsRefused) {
   VirtualBench bench;
@@ -117,8 +204,23 @@ TEST(JigSession, AnImpossibleFilterIsRefused) {
   options.filter = FilterConfiguration::legacy;
   EXPECT_FAILS(bench.run(options), ErrorCode::usage);
 
-  // A unit of 2018 has one configuration only; asking for the other is the operator's business.
+  options.run.write = false;
   sim::GivenProperties given;
+  for (const char* two : {"2014-03-23", "1970-01-01"}) {  // a clock that was never set
+    given.calibrated = *parse_iso8601(two);
+    EXPECT_FAILS(VirtualBench(7, given).run(options), ErrorCode::usage);
+  }
+  VirtualBench unreadable;
+  unreadable.plugged->unit.spoil_page();
+  EXPECT_FAILS(unreadable.run(options), ErrorCode::usage);
+  given.calibrated = *parse_iso8601("2014-03-24");
+  EXPECT_OK(VirtualBench(7, given).run(options));
+  given.serial = "NEO1A45130007";
+  given.calibrated = *parse_iso8601("2013-11-12");
+  EXPECT_OK(VirtualBench(7, given).run(options));
+
+  // A unit of 2018 has one configuration only; asking for the other is the operator's business.
+  given.serial = std::nullopt;
   given.calibrated = *parse_iso8601("2018-05-01");
   VirtualBench later(7, given);
   const auto report = later.run();

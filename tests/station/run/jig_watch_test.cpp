@@ -49,6 +49,17 @@ TEST(JigWatch, AsksForFaultsAtMostOnceAPeriodAndTurnsNothingAfterOne) {
   EXPECT_TRUE(jig.poses.empty());
 }
 
+TEST(JigWatch, SaysWhereTheJigStands) {
+  mocks::InertJig jig;
+  JigWatch watch({0.25, 3});
+  EXPECT_EQ(*watch.ask(jig, 10), std::nullopt);
+  jig.next_position = standing_at(Pose::minus_y);
+  EXPECT_EQ(*watch.ask(jig, 10.2), std::nullopt) << "its last answer";
+  EXPECT_EQ(*watch.ask(jig, 10.3), Pose::minus_y);
+  jig.by_itself = false;
+  EXPECT_EQ(*watch.ask(jig, 11), std::nullopt) << "a person turns it";
+}
+
 TEST(JigWatch, AJigThatCannotTurnAboutTheVerticalIsNotMovedForIt) {
   mocks::InertJig jig;
   EXPECT_FALSE(jig.can_half_turn());
