@@ -156,7 +156,8 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
     name = {};
   }
   const bool local = is_loopback(options_.bind);
-  const bool ours = is_loopback(name) || (!local && (is_address(name) || name == options_.bind));
+  const bool ours = is_loopback(name) || std::ranges::find(names_, name) != names_.end() ||
+                    (!local && (is_address(name) || name == options_.bind));
   if (!ours) {
     return with_headers(refusal(421, "wrong_host", "this station does not answer to that name",
                                 "open it by the address that it printed"));

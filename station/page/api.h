@@ -113,6 +113,9 @@ class Api {
   // Known once the server listens: the Host header must name it.
   void set_port(int port) { port_ = port; }
 
+  // Names that the Host header may have too, in small letters: those of the certificate. Before the
+  // first request.
+  void set_names(std::vector<std::string> names) { names_ = std::move(names); }
   // The answer that refuses the request, or nothing where it is permitted. Needs no body: to be
   // called before the body is read.
   std::optional<ApiAnswer> guard(const ApiRequest& request) const;
@@ -157,6 +160,7 @@ class Api {
   ApiParts parts_;
   std::atomic<int> port_{0};
   std::atomic<int> streams_{0};
+  std::vector<std::string> names_;
 };
 
 // Server-sent events for one page. One thread.

@@ -183,10 +183,10 @@ const scenarios = {
     const home = h.folder();
     const [cert, key] = ['cert.pem', 'key.pem'].map((name) => join(home, name));
     execFileSync('openssl', ['req', '-x509', '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes', '-days', '2',
-      '-subj', '/CN=bench', '-addext', 'subjectAltName=IP:127.0.0.1', '-keyout', key, '-out', cert], { stdio: 'ignore' });
+      '-subj', '/CN=bench', '-addext', 'subjectAltName=DNS:bench-3,IP:127.0.0.1', '-keyout', key, '-out', cert], { stdio: 'ignore' });
     const station = await h.station(['virtual:seed=7,pace=10'], { home, more: ['--tls-cert', cert, '--tls-key', key] });
     check(station.printed.startsWith('https://'), station.printed);
-    const page = await h.open(station.printed);
+    const page = await h.open(station.printed.replace('127.0.0.1', 'bench-3'));
     await start(page);
     await h.place(page, 2);
     const cookies = await page.context().cookies();
