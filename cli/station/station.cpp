@@ -371,7 +371,7 @@ Status serve(const StationCommandOptions& options, Context& context) {
   api_options.tls = !listening.tls_certificate.empty();
   api_options.files_folder = options.files;
   api_options.write_default = options.write;
-  api_options.jig_due = jig_due.due;
+  api_options.jig = jig_due;
   station::Api api(
       api_options,
       {context.env, *lanes, repairs, sign_in, &practice_bench, store_constants,

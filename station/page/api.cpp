@@ -232,7 +232,13 @@ Json Api::state() const {
   json["schema"] = "sixpoint/station/1";
   json["station"] = options_.station;
   json["version"] = options_.version;
-  json["jig_due"] = options_.jig_due ? Json(to_iso8601(*options_.jig_due)) : Json(nullptr);
+  const JigDue& jig = options_.jig;
+  json["jig_due"] = jig.due ? Json(to_iso8601(*jig.due)) : Json(nullptr);
+  json["jig_over"] = !check_jig_due({jig.due, {}, {}}, parts_.env.clock.now());
+  json["jig_exception"] = jig.exception.empty() || jig.signed_by.empty()
+                              ? Json(nullptr)
+                              : Json{{"reason", printable(jig.exception, 200)},
+                                     {"signed_by", printable(jig.signed_by, 60)}};
   json["write_default"] = options_.write_default;
   json["time_ms"] =
       std::chrono::duration<double, std::milli>(parts_.env.clock.now().time_since_epoch()).count();

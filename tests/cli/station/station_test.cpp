@@ -274,7 +274,12 @@ TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
     for (int i = 0; i < 600 && lane().value("state", "") != "idle"; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    EXPECT_THAT(get(port, "/api/state", head), HasSubstr("\"jig_due\":\"2001-01-01"));
+    const std::string state = get(port, "/api/state", head);
+    EXPECT_THAT(state, HasSubstr("\"jig_due\":\"2001-01-01"));
+    EXPECT_THAT(state, HasSubstr("\"jig_over\":true"));
+    EXPECT_THAT(state,
+                HasSubstr(more.size() > 2 ? "{\"reason\":\"lab closed\",\"signed_by\":\"Eve\"}"
+                                          : "\"jig_exception\":null"));
     EXPECT_THAT(get(port, "/api/run", head, "POST"), StartsWith("HTTP/1.1 202"));
     nlohmann::json result;
     for (int i = 0; i < 600 && !(result = lane()["result"]).is_object(); ++i) {
