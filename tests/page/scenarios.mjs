@@ -897,7 +897,7 @@ const scenarios = {
     const second = await side(2);
     await capture.locator('.hand').getByRole('button', { name: 'Unplug', exact: true }).click();
     await page.getByText('The unit is unplugged: plug it in again').waitFor();
-    await page.getByText('What was recorded stays').waitFor();
+    await page.getByText('What was recorded is kept').waitFor();
     await h.shot(page, 'capture-1-unplugged');
     await capture.locator('.hand').getByRole('button', { name: 'Plug in', exact: true }).click();
     await button(page, 'It lies there').waitFor();
