@@ -249,7 +249,7 @@ Result<station::RetestState> retest_state(Context& context, const JigCommandOpti
 void show(Context& context, const station::JigAction& action) {
   switch (action.kind) {
     case station::JigAction::Kind::refused:
-      context.people << fmt::format("  refused: {}; once more\n", action.text);
+      context.people << fmt::format("  refused: {}\n", action.text);
       break;
     case station::JigAction::Kind::place:
       context.people << action.text << '\n';
@@ -408,9 +408,23 @@ Json to_json(const JigCommandOptions& options, const JigDone& done) {
   return json;
 }
 
+// What the unit holds, where it was written and the verdict says nothing of the unit. A write that
+// was broken off stands in the reasons (JigReport::settle_as_left).
+std::string what_it_holds(const station::JigReport& report) {
+  const bool is_unjudged = report.verdict == station::JigVerdict::inconclusive ||
+                           report.verdict == station::JigVerdict::stopped;
+  return is_unjudged && report.written
+             ? "THE UNIT NOW HOLDS THE NEW CONSTANTS, and they were not checked: measure it again "
+               "with --write"
+             : std::string();
+}
+
 void print_jig(Context& context, const JigCommandOptions& options, const JigDone& done) {
   const station::JigReport& report = done.report;
   context.text() << report.brief() << '\n';
+  if (const std::string holds = what_it_holds(report); !holds.empty()) {
+    context.text() << "  " << holds << '\n';
+  }
   if (!report.usable()) {
     for (const std::string& action : station::next_actions(report.codes)) {
       context.text() << "  what to do: " << action << '\n';

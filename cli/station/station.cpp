@@ -400,7 +400,7 @@ Status serve(const StationCommandOptions& options, Context& context) {
   api_options.tls = !listening.tls_certificate.empty();
   api_options.files_folder = options.files;
   api_options.write_default = options.write;
-  api_options.jig_due = jig_due.due;
+  api_options.jig = jig_due;
   station::Api api(
       api_options,
       {context.env, *lanes, repairs, sign_in, &practice_bench, store_constants,
@@ -410,7 +410,7 @@ Status serve(const StationCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto server, station::Server::open(context.env, api, listening));
   // A browser keeps what stands behind # for itself; the page takes it out of the address at once.
   context.out << fmt::format("{}://{}:{}/#code={}\n", api_options.tls ? "https" : "http",
-                             options.bind, server->port(), sign_in.first_code())
+                             server->host(), server->port(), sign_in.first_code())
               << std::flush;
   context.people << fmt::format(
                         "{} lane{}; Ctrl-C ends the station, runs go on at the next start\n",
@@ -432,7 +432,10 @@ void add_station(CLI::App& app, Context& context) {
       .add_option("--device", options.devices, "a lane's unit (docs/virtual.md); repeatable, to 16")
       ->required();
   add_store_option(command, options.store);
-  command.add_option("--bind", options.bind, "address to listen on; another one needs TLS")
+  command
+      .add_option("--bind", options.bind,
+                  "address to listen on; another one needs TLS, and is opened by an address "
+                  "or by a name that the certificate has (subjectAltName)")
       ->capture_default_str();
   command.add_option("--tls-cert", options.tls_certificate, "PEM file: serves https");
   command.add_option("--tls-key", options.tls_key, "PEM file with the key of --tls-cert");

@@ -18,6 +18,13 @@ std::string folder_of_lane(const std::string& state_folder, std::size_t number,
   return fmt::format("{}/lane-{}-{}", state_folder, number, text_sha256(device).substr(0, 8));
 }
 
+// Whose run it is, where it has a name.
+std::string at_work(const std::string& operator_name) {
+  return operator_name.empty()
+             ? "this lane is at work already"
+             : fmt::format("this lane is at work for {}", printable(operator_name, 60));
+}
+
 tl::unexpected<LaneRefusal> nothing_runs() {
   return lane_conflict("nothing runs in this lane", "start a run first");
 }
@@ -57,8 +64,7 @@ LaneAnswer<void> Lanes::Lane::start(const StartOrder& order, bool capture) {
     return lane_conflict("no unit is plugged in here", "plug one in");
   }
   if (is_busy() || order_) {
-    return lane_conflict(fmt::format("this lane is at work for {}", printable(operator_name_, 60)),
-                         "wait for its end, or take the lane over");
+    return lane_conflict(at_work(operator_name_), "wait for its end, or take the lane over");
   }
   if (is_unstored_) {
     return lane_conflict("the last run is not stored yet, and a second one could take its place",
@@ -173,8 +179,7 @@ Lanes::Lane::Wait Lanes::Lane::wait() const {
 
 LaneAnswer<void> Lanes::Lane::check_client(const std::string& client) const {
   if (is_busy() && client != client_) {
-    return lane_conflict(fmt::format("this lane is at work for {}", printable(operator_name_, 60)),
-                         "take the lane over first");
+    return lane_conflict(at_work(operator_name_), "take the lane over first");
   }
   return {};
 }

@@ -29,7 +29,9 @@ Json json_of(const JigReport& report) {
   json["as_found_residual_mg"] =
       report.as_found ? Json(report.as_found_residual_mg) : Json(nullptr);
   json["written"] = report.written;
+  json["write_begun"] = report.write_begun;
   json["refusals"] = report.refusals;
+  json["coverage_factor"] = report.limits.decision.coverage_factor;
   json["quantities"] = Json::array();
   for (const JudgedQuantity& quantity : report.quantities) {
     json["quantities"].push_back(to_json(quantity));

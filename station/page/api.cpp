@@ -156,7 +156,8 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
     name = {};
   }
   const bool local = is_loopback(options_.bind);
-  const bool ours = is_loopback(name) || (!local && (is_address(name) || name == options_.bind));
+  const bool ours = is_loopback(name) || std::ranges::find(names_, name) != names_.end() ||
+                    (!local && (is_address(name) || name == options_.bind));
   if (!ours) {
     return with_headers(refusal(421, "wrong_host", "this station does not answer to that name",
                                 "open it by the address that it printed"));
@@ -231,7 +232,13 @@ Json Api::state() const {
   json["schema"] = "sixpoint/station/1";
   json["station"] = options_.station;
   json["version"] = options_.version;
-  json["jig_due"] = options_.jig_due ? Json(to_iso8601(*options_.jig_due)) : Json(nullptr);
+  const JigDue& jig = options_.jig;
+  json["jig_due"] = jig.due ? Json(to_iso8601(*jig.due)) : Json(nullptr);
+  json["jig_over"] = !check_jig_due({jig.due, {}, {}}, parts_.env.clock.now());
+  json["jig_exception"] = jig.exception.empty() || jig.signed_by.empty()
+                              ? Json(nullptr)
+                              : Json{{"reason", printable(jig.exception, 200)},
+                                     {"signed_by", printable(jig.signed_by, 60)}};
   json["write_default"] = options_.write_default;
   json["time_ms"] =
       std::chrono::duration<double, std::milli>(parts_.env.clock.now().time_since_epoch()).count();

@@ -30,6 +30,7 @@
 #include "station/page/practice_bench.h"
 #include "station/page/repair_job.h"
 #include "station/printing/label_printer.h"
+#include "station/records/jig_due.h"
 
 namespace sixpoint::station {
 
@@ -69,8 +70,8 @@ struct ApiOptions {
   // Files are listed, checked and repaired below this folder, and nowhere else.
   std::string files_folder = ".";
   int most_streams = 24;
-  std::optional<UtcTime> jig_due;  // when the jig itself is due
-  bool write_default = false;      // the page's runs write, unless a person says no
+  JigDue jig;                  // when the jig itself is due, and who signed for it
+  bool write_default = false;  // the page's runs write, unless a person says no
 };
 
 // A document of a stored run: kind is report.json, certificate.pdf, certificate.json or label.zpl.
@@ -112,6 +113,9 @@ class Api {
 
   // Known once the server listens: the Host header must name it.
   void set_port(int port) { port_ = port; }
+  // Names that the Host header may have too, in small letters: those of the certificate. Before the
+  // first request.
+  void set_names(std::vector<std::string> names) { names_ = std::move(names); }
 
   // The answer that refuses the request, or nothing where it is permitted. Needs no body: to be
   // called before the body is read.
@@ -156,6 +160,7 @@ class Api {
   ApiOptions options_;
   ApiParts parts_;
   std::atomic<int> port_{0};
+  std::vector<std::string> names_;
   std::atomic<int> streams_{0};
 };
 

@@ -1,6 +1,7 @@
 // The one file that uses Boost.Asio, Boost.Beast and TLS.
 #include "station/page/server.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <charconv>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/udp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -19,6 +21,7 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/ssl.hpp>
 #include <fmt/format.h>
+#include <openssl/x509v3.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -56,6 +59,44 @@ std::string decoded(std::string_view text, bool plus_is_blank) {
     }
   }
   return out;
+}
+
+std::string_view bytes_of(const ASN1_STRING* text) {
+  return {reinterpret_cast<const char*>(ASN1_STRING_get0_data(text)),
+          static_cast<std::size_t>(ASN1_STRING_length(text))};
+}
+
+// The addresses and the names of one machine in the certificate's subjectAltName, in its order.
+std::vector<std::string> names_in(const X509* certificate) {
+  std::vector<std::string> names;
+  const std::unique_ptr<GENERAL_NAMES, decltype(&GENERAL_NAMES_free)> all(
+      static_cast<GENERAL_NAMES*>(
+          X509_get_ext_d2i(certificate, NID_subject_alt_name, nullptr, nullptr)),
+      GENERAL_NAMES_free);
+  for (int i = 0; i < sk_GENERAL_NAME_num(all.get()); ++i) {
+    const GENERAL_NAME* const each = sk_GENERAL_NAME_value(all.get(), i);
+    if (each->type == GEN_DNS) {
+      std::string name(bytes_of(each->d.dNSName));
+      std::ranges::transform(name, name.begin(), [](char c) {
+        return 'A' <= c && c <= 'Z' ? static_cast<char>(c + 32) : c;
+      });
+      if (!name.starts_with('*')) {
+        names.push_back(std::move(name));
+      }
+    } else if (each->type == GEN_IPADD) {
+      const std::string_view bytes = bytes_of(each->d.iPAddress);
+      asio::ip::address_v4::bytes_type v4{};
+      asio::ip::address_v6::bytes_type v6{};
+      if (bytes.size() == v4.size()) {
+        std::ranges::copy(bytes, v4.begin());
+        names.push_back(asio::ip::address_v4(v4).to_string());
+      } else if (bytes.size() == v6.size()) {
+        std::ranges::copy(bytes, v6.begin());
+        names.push_back(asio::ip::address_v6(v6).to_string());
+      }
+    }
+  }
+  return names;
 }
 
 ApiRequest request_of(const http::request_header<>& head) {
@@ -124,6 +165,7 @@ struct Server::Impl {
   std::map<std::uint64_t, std::weak_ptr<Idle>> idle;
   std::atomic<std::uint64_t> arrivals = 0;
   std::optional<asio::ssl::context> tls;  // where it serves https
+  std::vector<std::string> names;         // in its certificate
   asio::io_context io;  // its destructor ends the connections, which use the members above
   tcp::acceptor acceptor{io};
   stream_protocol::acceptor local_acceptor{io};
@@ -446,6 +488,8 @@ Status Server::Impl::use_tls() {
     return fail(ErrorCode::bad_data, "this certificate and this key do not go together", {},
                 "give PEM files: the certificate with its chain, and its key without a password");
   }
+  names = names_in(SSL_CTX_get0_certificate(tls->native_handle()));
+  api.set_names(names);
   return {};
 }
 
@@ -465,6 +509,23 @@ Result<std::unique_ptr<Server>> Server::open(Env& env, Api& api, const ServerOpt
   std::unique_ptr<Server> server(new Server(std::move(impl)));
   api.set_port(server->port());
   return server;
+}
+
+std::string Server::host() const {
+  std::string host = impl_->options.bind;
+  NetworkError error;
+  if (const auto bind = asio::ip::make_address(host, error); !error && bind.is_unspecified()) {
+    if (const auto name = std::ranges::find_if_not(impl_->names, is_loopback);
+        name != impl_->names.end()) {
+      host = printable(*name, 255);
+    } else {
+      // Connecting sends nothing: the system chooses the address by which it would send.
+      asio::ip::udp::socket socket(impl_->io, asio::ip::udp::v4());
+      socket.connect({asio::ip::make_address("192.0.2.1"), 9}, error);  // of no one (RFC 5737)
+      host = error ? host : socket.local_endpoint(error).address().to_string();
+    }
+  }
+  return host.find(':') == std::string::npos ? host : '[' + host + ']';
 }
 
 int Server::port() const { return impl_->acceptor.local_endpoint().port(); }

@@ -41,7 +41,8 @@ struct ServerOptions {
   // 0600, and other users are refused by their number too. Empty: none. One that a killed station
   // left is replaced; anything else of that name is not.
   std::string unix_socket = {};
-  // PEM; both empty: plain HTTP.
+  // PEM; both empty: plain HTTP. The names in the certificate are names of the station
+  // (Api::set_names); one with a * is not, because it is a name of other machines too.
   std::string tls_certificate = {};
   std::string tls_key = {};
 };
@@ -57,6 +58,11 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   int port() const;
+  // The host of the page's address: `bind`. 0.0.0.0 and :: stand for all addresses of this machine
+  // and open nothing elsewhere: for them the first name or address of the certificate
+  // (subjectAltName) that is not this machine's for itself (127.0.0.1), else an address of this
+  // machine.
+  std::string host() const;
   void serve();  // until stop()
   void stop();   // from any thread
 

@@ -112,7 +112,7 @@ async function launch() {
       executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
       args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
         '--disable-background-networking', '--disable-component-update', '--disable-sync',
-        '--host-resolver-rules=MAP rebound.example 127.0.0.1'],
+        '--host-resolver-rules=MAP rebound.example 127.0.0.1, MAP bench-3 127.0.0.1'],
     });
     cleanups.push(() => browser.close());
   }

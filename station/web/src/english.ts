@@ -13,17 +13,16 @@ export const EN = {
   language: 'Language',
   sounds: 'Sounds',
   connection: {
-    live: 'Connected',
-    crowded: 'Too many pages of this station are open: this one shows how it was a moment ago, without readings. Close others.',
+    crowded: 'Too many pages of this station are open. This one is a moment late and shows no readings. Close other ones.',
     lost: 'The station does not answer. Is the program still running? Trying again …',
   },
   entry: {
     title: 'Sign this browser in',
-    text: 'Open the address that the station printed when it started, or type the code at its end. A page that is signed in gives new codes.',
+    text: 'Open the address that the station printed when it started, or type the code at the end of it. A browser that is signed in shows a new code: "Let another browser in".',
     code: 'Code',
     submit: 'Sign in',
     another: 'Let another browser in',
-    next: 'Good for one browser, for ten minutes:',
+    next: 'This address works in one browser, for ten minutes:',
   },
   operator: 'Your name',
   pin: {
@@ -49,14 +48,14 @@ export const EN = {
   nowFace: (pose: Pose, angle: number) =>
     // With the unit's old constants an angle may be wrong by 20 degrees: the text gives only the side.
     angle > 30 ? 'on none of its sides' : `${faceName(pose)} side up`,
-  nowUnknown: 'unknown yet',
+  nowUnknown: 'not known yet',
 
   stillness: {
-    moving: 'Moving. Let it rest.',
-    settling: 'Settling …',
+    moving: 'It moves. Let it lie still.',
+    settling: 'Coming to rest …',
     dwelling: 'Measuring: do not touch',
     leaving: 'Taken. Turn it.',
-    refused: 'Turn it.',
+    refused: 'Not taken.',
   } as Record<string, string>,
 
   // What to do next, in the largest letters of the page.
@@ -68,7 +67,7 @@ export const EN = {
       case 'unit_away': return 'The unit is unplugged: plug it in again';
       case 'wrong_unit': return 'Another unit is plugged in';
       case 'capturing': return lane.capture?.side
-        ? (lane.capture.placed ? `Let it rest on ${faceName(lane.capture.side)} side up` : `Lay it down: ${faceName(lane.capture.side)} side up`)
+        ? (lane.capture.placed ? `Let it lie still: ${faceName(lane.capture.side)} side up` : `Lay it down: ${faceName(lane.capture.side)} side up`)
         : 'Recording';
       case 'done': return lane.result?.kind === 'capture' ? 'The calibration file is done' : 'This unit is done';
       case 'running':
@@ -79,7 +78,7 @@ export const EN = {
   },
   phase: {
     measuring: 'First round: each of the six sides',
-    verifying: 'Second round: from the other side',
+    verifying: 'Second round: each side, reached from another side than before',
     reseating: 'Taken off and put back',
     writing: 'Writing the constants',
     rechecking: 'Checking what was written',
@@ -87,23 +86,22 @@ export const EN = {
   } as Record<string, string>,
   placements: (done: number, of: number) => `${done} of ${of} placements`,
   done: (done: number, of: number) => `${done} of ${of}`,
-  elapsed: (elapsed: string, left: string) => `${elapsed} gone${left ? `, about ${left} left` : ''}`,
+  elapsed: (elapsed: string, left: string) => `${elapsed} so far${left ? `, about ${left} left` : ''}`,
   minutes: (s: number) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')} min`,
   rounds: { faces: 'first round', faces_reversed: 'second round', reseat: 'put back', recheck: 'after writing' } as Record<string, string>,
-  refused: (text: string) => `Not taken: ${text}. Once more, please.`,
+  refused: (text: string, wanted: Pose | null) => `Not taken: ${text}.${wanted ? ` Now: ${faceName(wanted)} side up.` : ''}`,
   takenPoses: 'Taken so far',
 
   start: 'Start the measurement',
   again: 'Measure this unit again',
   write: 'Write the constants into the unit',
-  undo: 'Undo the last one',
-  undoKey: 'Undo the last one (Backspace)',
+  undoKey: 'Undo the last placement (Backspace)',
   stop: 'Stop this run',
   stopSure: 'Really stop? What was measured is stored.',
   stopYes: 'Yes, stop',
   stopNo: 'No, go on',
-  jigStopped: (why: string) => `The jig stopped: ${why}. Look at it: is the unit seated, is no hand in it?`,
-  jigFree: 'The jig is free. Go on',
+  jigStopped: (why: string) => `The jig stopped: ${why}. Look at it: does the unit sit right, and is no hand in the jig?`,
+  jigFree: 'The jig is free: it may turn again',
   held: (who: string) => `${who || 'Someone else'} is at work on this lane.`,
   takeOver: 'Take this lane over',
   scanned: (serial: string, ok: boolean) => ok ? `Label ${serial}: matches` : `Label ${serial}: does not match this unit`,
@@ -128,10 +126,22 @@ export const EN = {
         const word = `${r.verdict === 'pass' ? 'PASS' : 'CONDITIONAL PASS'} - ${r.written ? 'WRITTEN' : 'NOT WRITTEN'}`;
         return { word, act: r.written ? 'Take it out. Next unit.' : 'The unit still holds its old constants.' };
       }
-      case 'conditional_fail': return { word: 'CONDITIONAL FAIL', act: 'Aside: red tray.' };
-      case 'fail': return { word: 'FAIL', act: 'Aside: red tray.' };
-      case 'inconclusive': return { word: 'NO VERDICT', act: 'Again, after ten minutes.' };
-      case 'stopped': return { word: 'STOPPED', act: 'It was not measured to its end.' };
+      case 'conditional_fail':
+      case 'fail': return {
+        word: r.verdict === 'fail' ? 'FAIL' : 'CONDITIONAL FAIL',
+        act: `${r.written ? 'The constants were written into it. ' : ''}Put it into the red tray.`,
+      };
+      case 'inconclusive':
+      case 'stopped': {
+        const word = r.verdict === 'stopped' ? 'STOPPED' : 'NO VERDICT';
+        if (r.written) {
+          return { word: `${word} - WRITTEN, NOT CHECKED`, act: 'The unit now holds the new constants, and they were not checked. Measure it again, and write again.' };
+        }
+        if (r.write_begun) {
+          return { word: `${word} - PERHAPS WRITTEN`, act: 'The unit holds its old constants or the new ones: nobody knows which. Measure it again, and write again.' };
+        }
+        return { word, act: r.verdict === 'stopped' ? 'It was not measured to its end.' : r.next_actions?.length ? 'Do what is written below, then measure it again.' : 'Read why, below.' };
+      }
       default: return { word: 'NOT MEASURED', act: 'Read why, below.' };
     }
   },
@@ -140,12 +150,11 @@ export const EN = {
   lastUnit: (r: Result) => `Last unit: ${r.serial}, ${EN.pane(r).word}`,
   table: {
     title: 'Measured values and limits',
-    quantity: 'Quantity', axis: 'Axis', value: 'Value', limits: 'Limits', uncertainty: 'U (k = 2)', margin: 'Margin',
+    quantity: 'Quantity', axis: 'Axis', value: 'Value', limits: 'Limits', uncertainty: (k: number) => `U (k = ${k})`, margin: 'Margin',
     limit: (low: string, high: string) => (low && high ? `${low} to ${high}` : low ? `from ${low}` : high ? `up to ${high}` : 'none'),
   },
   residual: (after: number, before: number | null) =>
-    before === null ? `${after.toFixed(1)} mg off on sides that were not fitted`
-      : `${after.toFixed(1)} mg off on sides that were not fitted (as found: ${before.toFixed(0)} mg)`,
+    `Error of the new constants, on readings that they were not made from: ${after.toFixed(1)} mg${before === null ? '' : ` (of those that the unit had: ${before.toFixed(0)} mg)`}`,
   stored: (r: Result) => r.stored ? `Stored as run ${(r.run ?? '').slice(0, 12)}`
     : r.kept_here ? `Kept here as run ${(r.run ?? '').slice(0, 12)}; it will be sent when the store answers` : r.problem ?? 'Storing …',
   todo: 'What to do',
@@ -157,7 +166,6 @@ export const EN = {
     print: 'Print the label', again: 'Print label again',
   },
   unit: (serial: string, firmware: string) => `${serial}, firmware ${firmware}`,
-  low: (mv: number) => `Battery ${(mv / 1000).toFixed(2)} V`,
 
   today: {
     title: 'Runs of this station today',
@@ -168,7 +176,9 @@ export const EN = {
     units: (n: number, passed: number) => `${n} ${n === 1 ? 'unit' : 'units'} today, ${passed} passed`,
     table: { time: 'Time', serial: 'Unit', verdict: 'Verdict', operator: 'Operator', papers: 'Papers' },
   },
-  jigDue: (date: string, over: boolean) => (over ? `The jig was due on ${date}: an engineer signed for it` : `Jig due ${date}`),
+  jigDue: (date: string, over: boolean, signedBy: string) => (!over ? `Jig due for calibration on ${date}`
+    : signedBy ? `The jig was due for calibration on ${date}: ${signedBy} signed that it is used all the same`
+      : `The jig was due for calibration on ${date}: nothing is measured until it is calibrated, or an engineer signs (--jig-exception)`),
   lock: {
     title: 'Station locked',
     text: 'A check unit is out of control. Until an engineer signs, only check units are measured here.',
@@ -178,7 +188,7 @@ export const EN = {
     signTitle: 'Engineer\'s signature',
     name: 'Engineer\'s name',
     reason: 'What was found and done',
-    newBaseline: 'The jig was changed: begin the charts anew',
+    newBaseline: 'The jig was changed: begin new charts',
     submit: 'Sign: the station may go on',
     cancel: 'Not now',
     prompt: 'Station locked: check units only',
@@ -187,17 +197,17 @@ export const EN = {
   },
   check: {
     title: 'Check units of this station',
-    text: (runs: number) => `A check unit stays at the station and is measured as any unit. After ${runs} runs its charts are in force; a point out of control locks the station.`,
+    text: (runs: number) => `A check unit stays at the station and is measured like any other unit. After ${runs} runs its charts count: from then on a point out of control locks the station.`,
     open: 'In control: the station is open',
     none: 'This station has no check unit yet.',
     noRuns: 'No check unit was measured at this station yet.',
-    signed: (s: Signature) => `Last signature: ${s.operator}, ${s.made_at.slice(0, 16).replace('T', ' ')}: ${s.reason}${s.new_baseline ? ' (charts begun anew)' : ''}`,
-    change: 'Name a check unit, or release one',
+    signed: (s: Signature) => `Last signature: ${s.operator}, ${s.made_at.slice(0, 16).replace('T', ' ')}: ${s.reason}${s.new_baseline ? ' (new charts begun)' : ''}`,
+    change: 'Add a check unit, or remove one',
     serial: 'Serial number',
     name: 'Who decides',
     reason: 'Why',
     add: 'This is a check unit',
-    remove: 'It is one no more',
+    remove: 'It is no longer a check unit',
     done: 'Recorded.',
     chart: (title: string, serial: string) => `${title}: check unit ${serial}`,
     label: (title: string, serial: string, points: number, last: string, limits: string, signals: number) =>
@@ -212,7 +222,7 @@ export const EN = {
       `Point ${point} (${time.slice(0, 16).replace('T', ' ')}), rule ${rule}: ${meaning}`,
     charts: 'Control charts',
     upper: '+3σ', lower: '−3σ', mean: 'mean', range: 'moving range', rangeLimit: 'limit', baseline: 'baseline',
-    legend: 'Squares with a number: points that break that one of Nelson\'s rules.',
+    legend: 'A square with a number: the point breaks the one of Nelson\'s rules that has this number.',
   },
   statistics: {
     title: 'Statistics',
@@ -260,10 +270,10 @@ export const EN = {
     captureStart: 'Start recording',
     captureNone: 'No unit is plugged in.',
     captureStop: 'Stop recording',
-    kept: 'What was recorded stays; the side that was under way is asked for again.',
+    kept: 'What was recorded is kept. The side that was just being recorded is asked for again.',
     placed: 'It lies there',
     sideOf: (n: number, of: number) => `Side ${n} of ${of}`,
-    rest: (s: number) => `Leave it alone for ${s} s`,
+    rest: (s: number) => `Do not touch it for ${s} s`,
     next: 'Turning the unit …',
     checkTitle: '2. Or check a file that you have',
     checkText: 'A calibration file that was recorded without this program: is every side in it?',
@@ -272,7 +282,7 @@ export const EN = {
     saved: (file: string) => `Constants saved in ${file} and in the store.`,
     usable: 'This file can be used: every side is in it.',
     notUsable: 'This file cannot be used yet.',
-    again: (sides: Pose[]) => `Too few still readings of ${sides.map(faceName).join(', ')}: it moved, or lay on another side. Only ${sides.length === 1 ? 'this side is' : 'these sides are'} asked for again; the others are kept.`,
+    again: (sides: Pose[]) => `The unit did not lie still for long enough on ${sides.map(faceName).join(', ')}: it moved, or lay on another side. Only ${sides.length === 1 ? 'this side is' : 'these sides are'} asked for again; the others are kept.`,
     repeat: (sides: string[]) => `Repeat ${sides.length === 1 ? 'this side' : 'these sides'}: ${sides.join(', ')}`,
     sideOk: 'recorded', sideMissing: 'repeat',
     cannotHelp: 'A recording of this unit cannot help.',

@@ -15,10 +15,22 @@ const pane = (r: Result): { word: string; act: string } => {
       const word = `${r.verdict === 'pass' ? 'BESTANDEN' : 'BEDINGT BESTANDEN'} - ${r.written ? 'GESCHRIEBEN' : 'NICHT GESCHRIEBEN'}`;
       return { word, act: r.written ? 'Herausnehmen. Nächstes Gerät.' : 'Das Gerät hat noch seine alten Konstanten.' };
     }
-    case 'conditional_fail': return { word: 'BEDINGT NICHT BESTANDEN', act: 'Beiseite: rote Schale.' };
-    case 'fail': return { word: 'NICHT BESTANDEN', act: 'Beiseite: rote Schale.' };
-    case 'inconclusive': return { word: 'KEIN URTEIL', act: 'Noch einmal, nach zehn Minuten.' };
-    case 'stopped': return { word: 'ANGEHALTEN', act: 'Die Messung kam nicht zum Ende.' };
+    case 'conditional_fail':
+    case 'fail': return {
+      word: r.verdict === 'fail' ? 'NICHT BESTANDEN' : 'BEDINGT NICHT BESTANDEN',
+      act: `${r.written ? 'Die Konstanten wurden in das Gerät geschrieben. ' : ''}In die rote Schale legen.`,
+    };
+    case 'inconclusive':
+    case 'stopped': {
+      const word = r.verdict === 'stopped' ? 'ANGEHALTEN' : 'KEIN URTEIL';
+      if (r.written) {
+        return { word: `${word} - GESCHRIEBEN, NICHT GEPRÜFT`, act: 'Das Gerät hat jetzt die neuen Konstanten, und sie wurden nicht geprüft. Noch einmal messen und schreiben.' };
+      }
+      if (r.write_begun) {
+        return { word: `${word} - VIELLEICHT GESCHRIEBEN`, act: 'Das Gerät hat seine alten Konstanten oder die neuen: Niemand weiß, welche. Noch einmal messen und schreiben.' };
+      }
+      return { word, act: r.verdict === 'stopped' ? 'Die Messung kam nicht zum Ende.' : r.next_actions?.length ? 'Tun, was unten steht, dann noch einmal messen.' : 'Der Grund steht unten.' };
+    }
     default: return { word: 'NICHT GEMESSEN', act: 'Der Grund steht unten.' };
   }
 };
@@ -29,17 +41,16 @@ export const DE: Strings = {
   language: 'Sprache',
   sounds: 'Töne',
   connection: {
-    live: 'Verbunden',
-    crowded: 'Zu viele Seiten dieses Messplatzes sind offen: Diese zeigt den Stand von eben, ohne Messwerte. Bitte andere schließen.',
+    crowded: 'Zu viele Seiten dieses Messplatzes sind offen: Diese ist etwas verspätet und zeigt keine Messwerte. Bitte andere schließen.',
     lost: 'Der Messplatz antwortet nicht. Läuft das Programm noch? Neuer Versuch …',
   },
   entry: {
     title: 'Diesen Browser anmelden',
-    text: 'Öffnen Sie die Adresse, die das Programm beim Start ausgab, oder geben Sie den Code an ihrem Ende ein. Eine angemeldete Seite gibt neue Codes.',
+    text: 'Öffnen Sie die Adresse, die das Programm beim Start ausgab, oder geben Sie den Code an ihrem Ende ein. Ein angemeldeter Browser zeigt einen neuen Code: „Anderen Browser zulassen“.',
     code: 'Code',
     submit: 'Anmelden',
     another: 'Anderen Browser zulassen',
-    next: 'Gilt für einen Browser, zehn Minuten lang:',
+    next: 'Diese Adresse gilt für einen Browser, zehn Minuten lang:',
   },
   operator: 'Ihr Name',
   pin: {
@@ -70,7 +81,7 @@ export const DE: Strings = {
     settling: 'Kommt zur Ruhe …',
     dwelling: 'Messung: nicht berühren',
     leaving: 'Genommen. Bitte drehen.',
-    refused: 'Bitte drehen.',
+    refused: 'Nicht genommen.',
   },
 
   prompt(lane: Lane): string {
@@ -92,7 +103,7 @@ export const DE: Strings = {
   },
   phase: {
     measuring: 'Erste Runde: jede der sechs Seiten',
-    verifying: 'Zweite Runde: von der anderen Seite',
+    verifying: 'Zweite Runde: jede Seite, von einer anderen aus als zuvor',
     reseating: 'Abgehoben und wieder aufgelegt',
     writing: 'Konstanten werden geschrieben',
     rechecking: 'Das Geschriebene wird geprüft',
@@ -103,20 +114,19 @@ export const DE: Strings = {
   elapsed: (elapsed, left) => `${elapsed} vergangen${left ? `, noch etwa ${left}` : ''}`,
   minutes: (s) => `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')} min`,
   rounds: { faces: 'erste Runde', faces_reversed: 'zweite Runde', reseat: 'wieder aufgelegt', recheck: 'nach dem Schreiben' },
-  refused: (text) => `Nicht genommen: ${text}. Bitte noch einmal.`,
+  refused: (text, wanted) => `Nicht genommen: ${text}.${wanted ? ` Jetzt: Seite ${faceName(wanted)} nach oben.` : ''}`,
   takenPoses: 'Bisher genommen',
 
   start: 'Messung beginnen',
   again: 'Dieses Gerät noch einmal messen',
   write: 'Konstanten in das Gerät schreiben',
-  undo: 'Letzte zurücknehmen',
-  undoKey: 'Letzte zurücknehmen (Rücktaste)',
+  undoKey: 'Letzte Lage zurücknehmen (Rücktaste)',
   stop: 'Messung anhalten',
   stopSure: 'Wirklich anhalten? Was gemessen wurde, bleibt gespeichert.',
   stopYes: 'Ja, anhalten',
   stopNo: 'Nein, weiter',
-  jigStopped: (why) => `Die Vorrichtung steht: ${why}. Bitte hinsehen: Sitzt das Gerät, ist keine Hand darin?`,
-  jigFree: 'Die Vorrichtung ist frei. Weiter',
+  jigStopped: (why) => `Die Vorrichtung steht: ${why}. Bitte hinsehen: Sitzt das Gerät richtig, und ist keine Hand in der Vorrichtung?`,
+  jigFree: 'Die Vorrichtung ist frei: Sie darf wieder drehen',
   held: (who) => `${who || 'Jemand anderes'} arbeitet an diesem Platz.`,
   takeOver: 'Diesen Platz übernehmen',
   scanned: (serial, ok) => (ok ? `Etikett ${serial}: passt` : `Etikett ${serial}: passt nicht zu diesem Gerät`),
@@ -136,12 +146,11 @@ export const DE: Strings = {
   lastUnit: (r) => `Letztes Gerät: ${r.serial}, ${pane(r).word}`,
   table: {
     title: 'Messwerte und Grenzen',
-    quantity: 'Größe', axis: 'Achse', value: 'Wert', limits: 'Grenzen', uncertainty: 'U (k = 2)', margin: 'Abstand',
+    quantity: 'Größe', axis: 'Achse', value: 'Wert', limits: 'Grenzen', uncertainty: (k) => `U (k = ${String(k).replace('.', ',')})`, margin: 'Abstand',
     limit: (low, high) => (low && high ? `${low} bis ${high}` : low ? `ab ${low}` : high ? `bis ${high}` : 'keine'),
   },
   residual: (after, before) =>
-    before === null ? `${decimal(after, 1)} mg Abweichung auf Seiten, die nicht angepasst wurden`
-      : `${decimal(after, 1)} mg Abweichung auf Seiten, die nicht angepasst wurden (vorgefunden: ${decimal(before, 0)} mg)`,
+    `Fehler der neuen Konstanten bei Messwerten, aus denen sie nicht bestimmt wurden: ${decimal(after, 1)} mg${before === null ? '' : ` (der vorgefundenen: ${decimal(before, 0)} mg)`}`,
   stored: (r) => (r.stored ? `Gespeichert als Messung ${(r.run ?? '').slice(0, 12)}`
     : r.kept_here ? `Hier aufbewahrt als Messung ${(r.run ?? '').slice(0, 12)}; sie wird gesendet, sobald der Speicher antwortet` : r.problem ?? 'Wird gespeichert …'),
   todo: 'Was zu tun ist',
@@ -153,7 +162,6 @@ export const DE: Strings = {
     print: 'Etikett drucken', again: 'Etikett noch einmal drucken',
   },
   unit: (serial, firmware) => `${serial}, Firmware ${firmware}`,
-  low: (mv) => `Batterie ${decimal(mv / 1000, 2)} V`,
 
   today: {
     title: 'Heutige Messungen dieses Messplatzes',
@@ -164,7 +172,9 @@ export const DE: Strings = {
     units: (n, passed) => `${n} ${n === 1 ? 'Gerät' : 'Geräte'} heute, ${passed} bestanden`,
     table: { time: 'Zeit', serial: 'Gerät', verdict: 'Urteil', operator: 'Wer', papers: 'Papiere' },
   },
-  jigDue: (date, over) => (over ? `Die Vorrichtung war am ${date} fällig: Ein Ingenieur hat dafür unterschrieben` : `Vorrichtung fällig am ${date}`),
+  jigDue: (date, over, signedBy) => (!over ? `Kalibrierung der Vorrichtung fällig am ${date}`
+    : signedBy ? `Die Kalibrierung der Vorrichtung war am ${date} fällig: ${signedBy} hat unterschrieben, dass sie trotzdem benutzt wird`
+      : `Die Kalibrierung der Vorrichtung war am ${date} fällig: Gemessen wird erst, wenn sie kalibriert ist oder ein Ingenieur unterschreibt (--jig-exception)`),
   lock: {
     title: 'Messplatz gesperrt',
     text: 'Ein Kontrollgerät ist außer Kontrolle. Bis ein Ingenieur unterschreibt, werden hier nur Kontrollgeräte gemessen.',
@@ -174,7 +184,7 @@ export const DE: Strings = {
     signTitle: 'Unterschrift des Ingenieurs',
     name: 'Name des Ingenieurs',
     reason: 'Was gefunden und getan wurde',
-    newBaseline: 'Die Vorrichtung wurde geändert: Karten neu beginnen',
+    newBaseline: 'Die Vorrichtung wurde geändert: neue Karten beginnen',
     submit: 'Unterschreiben: Der Messplatz darf weiterarbeiten',
     cancel: 'Jetzt nicht',
     prompt: 'Messplatz gesperrt: nur Kontrollgeräte',
@@ -183,17 +193,17 @@ export const DE: Strings = {
   },
   check: {
     title: 'Kontrollgeräte dieses Messplatzes',
-    text: (runs) => `Ein Kontrollgerät bleibt am Messplatz und wird wie jedes andere gemessen. Nach ${runs} Messungen gelten seine Karten; ein Punkt außer Kontrolle sperrt den Messplatz.`,
+    text: (runs) => `Ein Kontrollgerät bleibt am Messplatz und wird wie jedes andere gemessen. Nach ${runs} Messungen gelten seine Karten: Von da an sperrt ein Punkt außer Kontrolle den Messplatz.`,
     open: 'Unter Kontrolle: Der Messplatz ist offen',
     none: 'Dieser Messplatz hat noch kein Kontrollgerät.',
     noRuns: 'An diesem Messplatz wurde noch kein Kontrollgerät gemessen.',
     signed: (s: Signature) => `Letzte Unterschrift: ${s.operator}, ${s.made_at.slice(0, 16).replace('T', ' ')}: ${s.reason}${s.new_baseline ? ' (Karten neu begonnen)' : ''}`,
-    change: 'Ein Kontrollgerät benennen oder freigeben',
+    change: 'Ein Kontrollgerät hinzufügen oder entfernen',
     serial: 'Seriennummer',
     name: 'Wer entscheidet',
     reason: 'Warum',
     add: 'Das ist ein Kontrollgerät',
-    remove: 'Es ist keines mehr',
+    remove: 'Das ist kein Kontrollgerät mehr',
     done: 'Aufgezeichnet.',
     chart: (title, serial) => `${title}: Kontrollgerät ${serial}`,
     label: (title, serial, points, last, limits, signals) =>
@@ -207,7 +217,7 @@ export const DE: Strings = {
     signal: (point, time, rule, meaning) => `Punkt ${point} (${time.slice(0, 16).replace('T', ' ')}), Regel ${rule}: ${meaning}`,
     charts: 'Regelkarten',
     upper: '+3σ', lower: '−3σ', mean: 'Mittel', range: 'gleitende Spannweite', rangeLimit: 'Grenze', baseline: 'Vorlauf',
-    legend: 'Quadrate mit einer Zahl: Punkte, die diese von Nelsons Regeln verletzen.',
+    legend: 'Ein Quadrat mit einer Zahl: Der Punkt verletzt die von Nelsons Regeln, die diese Zahl hat.',
   },
   statistics: {
     title: 'Statistik',
@@ -258,7 +268,7 @@ export const DE: Strings = {
     kept: 'Was aufgezeichnet ist, bleibt; die unterbrochene Seite wird noch einmal verlangt.',
     placed: 'Es liegt so',
     sideOf: (n, of) => `Seite ${n} von ${of}`,
-    rest: (s) => `${s} s liegen lassen`,
+    rest: (s) => `${s} s lang nicht berühren`,
     next: 'Das Gerät wird gedreht …',
     checkTitle: '2. Oder eine vorhandene Datei prüfen',
     checkText: 'Eine Kalibrierdatei, die ohne dieses Programm aufgezeichnet wurde: Ist jede Seite darin?',
@@ -267,7 +277,7 @@ export const DE: Strings = {
     saved: (file) => `Konstanten gespeichert in ${file} und im Speicher.`,
     usable: 'Diese Datei ist brauchbar: Jede Seite ist darin.',
     notUsable: 'Diese Datei ist noch nicht brauchbar.',
-    again: (sides) => `Zu wenige ruhige Messwerte von ${sides.map(faceName).join(', ')}: es hat sich bewegt oder lag auf einer anderen Seite. Nur ${sides.length === 1 ? 'diese Seite wird' : 'diese Seiten werden'} noch einmal verlangt; die anderen bleiben.`,
+    again: (sides) => `Das Gerät lag nicht lange genug still auf ${sides.map(faceName).join(', ')}: Es hat sich bewegt oder lag auf einer anderen Seite. Nur ${sides.length === 1 ? 'diese Seite wird' : 'diese Seiten werden'} noch einmal verlangt; die anderen bleiben.`,
     repeat: (sides) => `${sides.length === 1 ? 'Diese Seite' : 'Diese Seiten'} wiederholen: ${sides.join(', ')}`,
     sideOk: 'aufgezeichnet', sideMissing: 'wiederholen',
     cannotHelp: 'Eine Aufzeichnung dieses Geräts kann nicht helfen.',

@@ -136,7 +136,7 @@ export function LaneView({ lane, live, operator, virtual, lock, printer, writeDe
       )}
       {lane.log.length > 0 && lane.log[lane.log.length - 1].kind === 'problem' && <p class="notice bad" role="alert"><b aria-hidden="true">⚠ </b>{S.problemLog(lane.log[lane.log.length - 1].text)}</p>}
       {lane.scan && <p class={lane.scan.matches ? 'notice good' : 'notice bad'}><b aria-hidden="true">{lane.scan.matches ? '✔ ' : '✖ '}</b>{S.scanned(lane.scan.serial, lane.scan.matches)}</p>}
-      <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal)}</p>
+      <p class="notice bad refusal" role="alert" hidden={!refusal}><b aria-hidden="true">✖ </b>{refusal && S.refused(refusal, wanted)}</p>
 
       {result && (others ? <p class={`last word-${tone(result.verdict)}`}>{S.lastUnit(result)}</p> : <ResultBox result={result} writeNow={writeNow} printer={printer} setProblem={setProblem} />)}
       {lane.state === 'running' && lane.run && (

@@ -102,7 +102,7 @@ function Page() {
         <label>{S.language} <select value={language} onChange={(event) => chooseLanguage(event.currentTarget.value)}>
           {Object.entries(LANGUAGES).map(([name, text]) => <option value={name} lang={name}>{text}</option>)}
         </select></label>
-        <span>{state?.version}</span>{state?.jig_due && <b>{S.jigDue(state.jig_due.slice(0, 10), Date.parse(state.jig_due) < Date.now())}</b>}</footer>
+        <span>{state?.version}</span>{state?.jig_due && <b>{S.jigDue(state.jig_due.slice(0, 10), state.jig_over, state.jig_exception?.signed_by ?? '')}</b>}</footer>
     </>
   );
 }

@@ -42,7 +42,7 @@ export function PrintedLabel({ run, documents, printer, setProblem }: {
 
 const shown = (value: number) => (Math.abs(value) >= 100 ? value.toFixed(0) : Math.abs(value) >= 1 ? value.toFixed(2) : value.toFixed(3));
 
-function Values({ quantities, open }: { quantities: Quantity[]; open: boolean }) {
+function Values({ quantities, coverage, open }: { quantities: Quantity[]; coverage: number; open: boolean }) {
   const T = S.table;
   const [shows, setShows] = useState(open);
   return (
@@ -50,7 +50,7 @@ function Values({ quantities, open }: { quantities: Quantity[]; open: boolean })
       <summary>{T.title}</summary>
       {shows && <div class="table" tabIndex={0} role="region" aria-label={T.title}>
         <table>
-          <thead><tr><th scope="col">{T.quantity}</th><th scope="col">{T.axis}</th><th scope="col">{T.value}</th><th scope="col">{T.limits}</th><th scope="col">{T.uncertainty}</th><th scope="col">{T.margin}</th></tr></thead>
+          <thead><tr><th scope="col">{T.quantity}</th><th scope="col">{T.axis}</th><th scope="col">{T.value}</th><th scope="col">{T.limits}</th><th scope="col">{T.uncertainty(coverage)}</th><th scope="col">{T.margin}</th></tr></thead>
           <tbody>{quantities.map((q) => {
             const to = [q.low === null ? Infinity : q.value - q.low, q.high === null ? Infinity : q.high - q.value];
             const margin = Math.min(...to);
@@ -90,7 +90,7 @@ export function ResultBox({ result, writeNow, printer = null, setProblem }: {
       {result.kind === 'capture' && result.stored && <p>{S.files.saved(`${result.file}.constants.json`)}</p>}
       {result.run && <Papers run={result.run} documents={result.documents ?? []} />}
       {result.run && setProblem && <PrintedLabel run={result.run} documents={result.documents ?? []} printer={printer} setProblem={setProblem} />}
-      {result.quantities && result.quantities.length > 0 && <Values quantities={result.quantities} open={kind === 'bad'} />}
+      {result.quantities && result.quantities.length > 0 && <Values quantities={result.quantities} coverage={result.coverage_factor ?? 2} open={kind === 'bad'} />}
     </section>
   );
 }

@@ -11,7 +11,8 @@ export interface Result {
   kind: 'jig' | 'capture'; serial: string; verdict: string; reasons: string[]; stored: boolean;
   residual_mg?: number | null; as_found_residual_mg?: number | null; run?: string; constants_id?: string | null;
   kept_here?: boolean; documents?: string[]; can_write?: boolean; quantities?: Quantity[];
-  problem?: string; file?: string; repeat_sides?: string[]; written?: boolean; next_actions?: string[];
+  problem?: string; file?: string; repeat_sides?: string[]; written?: boolean; write_begun?: boolean; next_actions?: string[];
+  coverage_factor?: number;
 }
 export interface Me { operators: string[]; operator: { name: string; role: string } | null }
 export interface Quantity {
@@ -40,7 +41,7 @@ export interface Lock { locked: boolean; reasons: string[]; check_units: string[
 export interface Label { run: string; serial: string; state: 'waiting' | 'printed' | 'unconfirmed'; problem: string; failures: number }
 export interface Printer { printer: string; labels: Label[] }
 export interface State {
-  station: string; version: string; write_default: boolean; jig_due: string | null; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job; lock: Lock | null; printer: Printer | null;
+  station: string; version: string; write_default: boolean; jig_due: string | null; jig_over: boolean; jig_exception: { reason: string; signed_by: string } | null; lanes: Lane[]; queue: number[]; virtual_hands: number[]; job: Job; lock: Lock | null; printer: Printer | null;
 }
 
 export interface Title { name: string; title: string; unit: string; axis?: string }

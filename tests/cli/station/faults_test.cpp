@@ -144,6 +144,16 @@ const std::vector<Row>& jig_rows() {
   return kRows;
 }
 
+// Pulled out behind the write, for good: whether the unit holds what was measured is said plainly.
+TEST_F(JigFaults, AUnitThatWasWrittenAndNotCheckedIsSaidToBe) {
+  const auto answer = tests::run_command(
+      posix_env(), {"jig", "--device", device(R"({"fault": "unplug", "at_s": 138})"), "--store",
+                    path("s.db"), "--patience", "0", "--write"});
+  EXPECT_EQ(answer.exit_code, 69) << answer.people << answer.out;
+  EXPECT_THAT(answer.out, HasSubstr("THE UNIT NOW HOLDS THE NEW CONSTANTS"));
+  EXPECT_THAT(answer.out, HasSubstr("measure it again with --write"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Table, JigFaults, testing::ValuesIn(jig_rows()),
                          [](const auto& row) { return std::string(row.param.name); });
 

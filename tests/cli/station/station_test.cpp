@@ -171,6 +171,36 @@ TEST_F(StationCommand, OneStationAtATimeInAStateFolder) {
   EXPECT_THAT(next.line(), StartsWith("http://")) << "a killed one holds nothing";
 }
 
+// 0.0.0.0 opens nothing on another machine: the address has the name of the certificate, and the
+// station answers to it. Oracle: as above.
+TEST_F(StationCommand, OnAllAddressesItIsOpenedByTheNameInItsCertificate) {
+  const auto command = [](const std::string& line) { return std::system(line.c_str()); };
+  ASSERT_EQ(command("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes "
+                    "-days 2 -subj /CN=other -addext "
+                    "'subjectAltName=DNS:*.example,IP:127.0.0.1,DNS:Bench-3' -keyout " +
+                    path("key.pem") + " -out " + path("cert.pem") + " 2>/dev/null"),
+            0);
+  Child station(arguments({"--port", "0", "--device", "virtual:seed=7", "--bind", "0.0.0.0",
+                           "--tls-cert", path("cert.pem"), "--tls-key", path("key.pem")}));
+  const std::string address = station.line();
+  const std::string_view before = "https://bench-3:";
+  ASSERT_THAT(address, StartsWith(std::string(before)));
+  const std::string port = std::to_string(std::atoi(address.c_str() + before.size()));
+  const auto answers_to = [&](const std::string& name) {
+    return command(
+               "python3 -c 'import ssl, sys, urllib.request as u; sys.exit(u.urlopen(u.Request("
+               "\"https://127.0.0.1:" +
+               port + "/\", headers={\"Host\": \"" + name + ":" + port +
+               "\"}), context=ssl.create_default_context(cafile=\"" + path("cert.pem") +
+               "\")).status != 200)' 2>/dev/null") == 0;
+  };
+  EXPECT_TRUE(answers_to("bench-3"));
+  EXPECT_TRUE(answers_to("127.0.0.1"));
+  EXPECT_FALSE(answers_to("other")) << "the subject is no name";
+  EXPECT_FALSE(answers_to("evil.example")) << "names with a * are other machines' too";
+  EXPECT_FALSE(answers_to("*.example"));
+}
+
 // The token is in a file of its owner alone; what is printed is a code for one browser.
 TEST_F(StationCommand, TheTokenIsInAFileAndACodeIsPrinted) {
   const auto text_of = [](const std::string& file) {
@@ -270,7 +300,12 @@ TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
     for (int i = 0; i < 600 && lane().value("state", "") != "idle"; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    EXPECT_THAT(get(port, "/api/state", head), HasSubstr("\"jig_due\":\"2001-01-01"));
+    const std::string state = get(port, "/api/state", head);
+    EXPECT_THAT(state, HasSubstr("\"jig_due\":\"2001-01-01"));
+    EXPECT_THAT(state, HasSubstr("\"jig_over\":true"));
+    EXPECT_THAT(state,
+                HasSubstr(more.size() > 2 ? "{\"reason\":\"lab closed\",\"signed_by\":\"Eve\"}"
+                                          : "\"jig_exception\":null"));
     EXPECT_THAT(get(port, "/api/run", head, "POST"), StartsWith("HTTP/1.1 202"));
     nlohmann::json result;
     for (int i = 0; i < 600 && !(result = lane()["result"]).is_object(); ++i) {

@@ -22,6 +22,7 @@ TEST(LaneRun, MeasuresAUnitAndStoresTheRunWithItsSamples) {
   EXPECT_EQ(lane["result"]["documents"], Json({"report.json"}));
   const Json quantities = lane["result"]["quantities"];
   ASSERT_GT(quantities.size(), 10U);
+  EXPECT_EQ(lane["result"]["coverage_factor"], 2) << "of their expanded uncertainty";
   EXPECT_EQ(quantities[0]["title"], find_quantity(quantities[0]["name"].get<std::string>())->title);
   EXPECT_EQ(lane["run"]["taken"].size(), 14U);
   ASSERT_EQ(station.reports.size(), 1U);

@@ -79,6 +79,21 @@ TEST(Lane, OneRunAtATimeAndNoOtherLabelDuringIt) {
   EXPECT_FALSE(lanes.confirm_side(1, "page-a").has_value()) << "a jig run asks for no side";
 }
 
+// A run without a name is no one's in words, either.
+TEST(Lane, ABusyLaneIsSaidInAWholeSentenceWithoutAName) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007"}, folder.path());
+  station.wait_state(1, "idle");
+  Lanes& lanes = *station.lanes;
+  StartOrder order = order_of("page-a");
+  order.operator_name = {};
+  ASSERT_TRUE(lanes.start(1, order).has_value());
+  EXPECT_EQ(lanes.start(1, order).error().what, "this lane is at work already");
+  station.wait_state(1, "running");
+  EXPECT_EQ(lanes.command(1, "page-b", OperatorCommand::stop).error().what,
+            "this lane is at work already");
+}
+
 // A stop of a motorised jig holds over a replug and over the next start, until a person says that
 // the jig is free.
 TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
