@@ -58,6 +58,11 @@ TEST_F(StationCommand, RefusesWhatItCannotServe) {
   EXPECT_EQ(with({"--side-seconds", "9"}).exit_code, 64);
   EXPECT_EQ(with({"--limits", path("none.toml")}).exit_code, 66);
   EXPECT_EQ(with({"--gravity", "98"}).exit_code, 64) << "no place on Earth";
+  for (const char* device :
+       {"nonsense", "serial:1", "virtual:foo=1", "virtual:seed=-1", "replay:a.zip,match=so"}) {
+    EXPECT_EQ(with({"--device", device}).exit_code, 64) << device;
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("state"))) << "nothing is made before";
   std::vector<std::string> seventeen;
   for (int i = 0; i < 17; ++i) {
     seventeen.insert(seventeen.end(), {"--device", "virtual:seed=" + std::to_string(i)});
