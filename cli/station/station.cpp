@@ -383,8 +383,10 @@ Status serve(const StationCommandOptions& options, Context& context) {
        [&](const std::string& run) { return store.print_again(run); }});
   SIXPOINT_ASSIGN(const auto server, station::Server::open(context.env, api, listening));
   // A browser keeps what stands behind # for itself; the page takes it out of the address at once.
-  context.out << fmt::format("{}://{}:{}/#code={}\n", api_options.tls ? "https" : "http",
-                             options.bind, server->port(), sign_in.first_code())
+  const bool is_ipv6 = options.bind.find(':') != std::string::npos;
+  const std::string host = is_ipv6 ? "[" + options.bind + "]" : options.bind;
+  context.out << fmt::format("{}://{}:{}/#code={}\n", api_options.tls ? "https" : "http", host,
+                             server->port(), sign_in.first_code())
               << std::flush;
   context.people << fmt::format(
                         "{} lane{}; Ctrl-C ends the station, runs go on at the next start\n",

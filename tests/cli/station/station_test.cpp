@@ -120,6 +120,21 @@ TEST_F(StationCommand, ServesItsPageUntilItIsStopped) {
   }
 }
 
+// Oracle: the address of Python's client. RFC 3986 puts an IPv6 address into brackets.
+TEST_F(StationCommand, AnIpv6AddressCanBeOpenedAsItIsPrinted) {
+  Child station(arguments({"--port", "0", "--bind", "::1", "--device", "virtual:seed=7"}));
+  const std::string address = station.line();
+  if (address.empty()) {
+    GTEST_SKIP() << "no IPv6 on this machine";
+  }
+  ASSERT_THAT(address, StartsWith("http://[::1]:"));
+  const std::string fetch =
+      "python3 -c 'import sys, urllib.request; "
+      "sys.exit(urllib.request.build_opener(urllib.request.ProxyHandler({})).open(\"" +
+      address.substr(0, address.find('#')) + "\").status != 200)'";
+  EXPECT_EQ(std::system(fetch.c_str()), 0);
+}
+
 // Oracle: the TLS of Python, which checks the certificate and the name. Plain HTTP is not answered.
 TEST_F(StationCommand, ServesHttps) {
   const auto command = [](const std::string& line) { return std::system(line.c_str()); };
