@@ -49,6 +49,7 @@ TEST_F(StoreTest, DoctorFailsForAStoreThatTakesNothing) {
   fill("a.db");
   fs::create_directory(path("locked"));
   fs::create_directory(path("free"));
+  fs::permissions(folder_.path(), fs::perms(0755));
   fs::permissions(path("free"), fs::perms::all);
   fs::permissions(path("a.db"), fs::perms(0444));
   const auto doctor = [&](const std::string& store) {

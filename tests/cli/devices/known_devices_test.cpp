@@ -38,7 +38,8 @@ TEST(KnownDevices, AnAddressIsCheckedWithoutItsUnit) {
   }
   for (const char* device : {"nonsense", "", "serial:1", "drive:media/UNIT", "virtual:foo=1",
                              "virtual:seed=-1", "virtual:interfaces=storage"}) {
-    EXPECT_FAILS(check_address(device, memory.env), ErrorCode::usage) << device;
+    SCOPED_TRACE(device);
+    EXPECT_FAILS(check_address(device, memory.env), ErrorCode::usage);
   }
 }
 
