@@ -169,6 +169,21 @@ std::string address_of(const std::string& path, std::string_view setting) {
   return address + "?" + std::string(setting);
 }
 
+Status make_private_file(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  // Another process may have made it meanwhile.
+  if (file >= 0) {
+    ::close(file);
+    return {};
+  }
+  if (errno == EEXIST && ::access(path.c_str(), F_OK) == 0) {
+    return {};
+  }
+  return fail(errno == EACCES || errno == EROFS ? ErrorCode::permission : ErrorCode::cannot_create,
+              fmt::format("the store cannot be made: {}", std::strerror(errno)), path,
+              "check that the folder exists and is writable");
+}
+
 class SqliteDatabase final : public Database {
  public:
   // A file, whatever its name is.
@@ -299,6 +314,7 @@ class SqliteDatabase final : public Database {
   }
 
   Result<bool> copy_to_file(const std::string& path) override {
+    SIXPOINT_CHECK(make_private_file(path));
     return answered(path, [&]() -> Result<bool> {
       SQLite::Database copy(address_of(path, "mode=rwc"),
                             SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_URI,
@@ -436,21 +452,6 @@ Result<Found> look_at(const std::string& path) {
                 path, "name a file with --store");
   }
   return status.st_size == 0 ? Found::empty : look_at_database(path);
-}
-
-Status make_private_file(const std::string& path) {
-  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  // Another process may have made it meanwhile.
-  if (file >= 0) {
-    ::close(file);
-    return {};
-  }
-  if (errno == EEXIST && ::access(path.c_str(), F_OK) == 0) {
-    return {};
-  }
-  return fail(errno == EACCES || errno == EROFS ? ErrorCode::permission : ErrorCode::cannot_create,
-              fmt::format("the store cannot be made: {}", std::strerror(errno)), path,
-              "check that the folder exists and is writable");
 }
 
 // A store that no one has open stands whole in its file, and is read as it stands: SQLite would
