@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "base/temporaries.h"
+
 namespace sixpoint {
 
 // A device or a pipe: bytes go through as they come, or, once the writer seeks, all of them at the
@@ -59,6 +61,7 @@ AtomicFile::~AtomicFile() {
     file_.reset();
     // Nothing can be done about a failure here: the name says that the file is temporary.
     static_cast<void>(files_->remove(temporary_));
+    forget_temporary(temporary_);
   }
 }
 
@@ -68,6 +71,25 @@ constexpr int kMostAttempts = 100;
 
 std::string temporary_name(const std::string& path, int attempt) {
   return fmt::format("{}/.{}.{}.tmp", folder_of(path), file_name_of(path), attempt);
+}
+
+// Removes what processes that are gone left for this target: a file that is being written is noted
+// by this process, and locked by another one until it has its name (posix_env.cpp). Where the file
+// system has no locks, nothing is known and everything stays.
+void remove_abandoned(FileSystem& files, const std::string& path) {
+  for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+    const std::string temporary = temporary_name(path, attempt);
+    const auto info = files.link_info(temporary);
+    if (!info) {
+      return;
+    }
+    if (info->is_link || info->kind != FileKind::file || is_noted_temporary(temporary)) {
+      continue;
+    }
+    if (const auto lock = files.lock(temporary); lock && *lock != nullptr) {
+      static_cast<void>(files.remove(temporary));
+    }
+  }
 }
 
 }  // namespace
@@ -95,12 +117,13 @@ Result<AtomicFile> AtomicFile::create(FileSystem& files, const std::string& path
 }
 
 Result<AtomicFile> AtomicFile::create_temporary(FileSystem& files, const std::string& path) {
-  // The first free name: one that a killed process left behind must not stop the next run, and two
-  // processes that write the same target must not share a temporary file.
+  remove_abandoned(files, path);
+  // The first free name: two processes that write the same target must not share a temporary file.
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const std::string temporary = temporary_name(path, attempt);
     auto file = files.create(temporary);
     if (file) {
+      note_temporary(temporary);
       return AtomicFile(files, path, temporary, *std::move(file));
     }
     if (!files.info(temporary)) {
@@ -132,11 +155,16 @@ Status AtomicFile::append(std::string_view text) { return append(as_bytes(text))
 
 Status AtomicFile::commit() {
   SIXPOINT_CHECK(file_->sync());
-  SIXPOINT_CHECK(file_->close());
-  if (!temporary_.empty()) {
-    SIXPOINT_CHECK(put_in_place(*files_, temporary_, path_));
+  if (temporary_.empty()) {
+    SIXPOINT_CHECK(file_->close());
+    file_.reset();
+    return {};
   }
+  // Closing it gives the lock back, so it has its name before: no other process takes it for one
+  // that was left behind. It is on the medium already; closing adds nothing.
+  SIXPOINT_CHECK(put_in_place(*files_, temporary_, path_));
   file_.reset();
+  forget_temporary(temporary_);
   return {};
 }
 

@@ -163,6 +163,23 @@ class PosixThroughFile final : public WritableFile {
   std::string path_;
 };
 
+// 0, or an errno: EWOULDBLOCK where another holds it.
+int try_lock(int fd) {
+  while (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EINTR) {
+      return errno;
+    }
+  }
+  return 0;
+}
+
+bool is_named(int fd, const std::string& path) {
+  struct stat opened {};
+  struct stat named {};
+  return ::fstat(fd, &opened) == 0 && ::stat(path.c_str(), &named) == 0 &&
+         opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+}
+
 class PosixLock final : public FileLock {
  public:
   explicit PosixLock(int fd) : fd_(fd) {}
@@ -188,12 +205,23 @@ class PosixFileSystem final : public FileSystem {
                                                path);
   }
 
+  // Locked as by lock() until it is closed, so that other processes see that it is being written
+  // (atomic_file.cpp). One that looks at just this moment may take it for abandoned and remove it:
+  // then once more.
   Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
-    const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd < 0) {
-      return system_failure(errno, ErrorCode::cannot_create, "cannot create", path);
+    constexpr int kMostTries = 10;
+    for (int tries = 1;; ++tries) {
+      const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      if (fd < 0) {
+        return system_failure(errno, ErrorCode::cannot_create, "cannot create", path);
+      }
+      auto file = std::make_unique<PosixWritableFile>(fd, path);
+      const int error = try_lock(fd);
+      const bool has_no_locks = error != 0 && error != EWOULDBLOCK;
+      if (has_no_locks || (error == 0 && is_named(fd, path)) || tries == kMostTries) {
+        return file;
+      }
     }
-    return std::make_unique<PosixWritableFile>(fd, path);
   }
 
   Result<FileInfo> info(const std::string& path) override { return info_by(::stat, path); }
@@ -216,17 +244,14 @@ class PosixFileSystem final : public FileSystem {
       return system_failure(errno, ErrorCode::cannot_create, "cannot make the lock", path);
     }
     std::unique_ptr<FileLock> held = std::make_unique<PosixLock>(fd);
-    int result = 0;
-    do {
-      result = ::flock(fd, LOCK_EX | LOCK_NB);
-    } while (result != 0 && errno == EINTR);
-    if (result == 0) {
+    const int error = try_lock(fd);
+    if (error == 0) {
       return held;
     }
-    if (errno == EWOULDBLOCK) {
+    if (error == EWOULDBLOCK) {
       return nullptr;
     }
-    return system_failure(errno, ErrorCode::io, "cannot lock", path);
+    return system_failure(error, ErrorCode::io, "cannot lock", path);
   }
 
   Result<std::vector<std::string>> list(const std::string& folder) override {

@@ -55,6 +55,15 @@ Result<PerAxis<T>> read_axes(const Json& parent, const char* key) {
   return out;
 }
 
+Result<PerAxis<double>> read_uncertainties(const Json& parent, const char* key) {
+  SIXPOINT_ASSIGN(const auto values, read_axes<double>(parent, key));
+  if (std::ranges::any_of(values, [](double value) { return value < 0; })) {
+    return fail(ErrorCode::bad_data, "an uncertainty is below 0",
+                fmt::format("constants.json, {}", key), "write the file with sixpoint");
+  }
+  return values;
+}
+
 std::string read_text(const Json& json, const char* key) {
   const auto found = json.find(key);
   return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -107,13 +116,13 @@ Result<CrossAxisMap> read_cross_axis(const Json& json) {
   }
   CrossAxisMap map;
   SIXPOINT_ASSIGN(map.cross_axis, read_axes<double>(json, "xy_xz_yz"));
-  SIXPOINT_ASSIGN(map.cross_axis_sd, read_axes<double>(json, "standard_uncertainty"));
+  SIXPOINT_ASSIGN(map.cross_axis_sd, read_uncertainties(json, "standard_uncertainty"));
   SIXPOINT_ASSIGN(map.calibration.sensitivity_g_per_lsb,
                   read_axes<double>(json, "sensitivity_g_per_lsb"));
   SIXPOINT_ASSIGN(map.calibration.zero_lsb, read_axes<double>(json, "zero_lsb"));
   SIXPOINT_ASSIGN(map.uncertainty.sensitivity_relative,
-                  read_axes<double>(json, "sensitivity_relative_uncertainty"));
-  SIXPOINT_ASSIGN(map.uncertainty.zero_mg, read_axes<double>(json, "zero_mg_uncertainty"));
+                  read_uncertainties(json, "sensitivity_relative_uncertainty"));
+  SIXPOINT_ASSIGN(map.uncertainty.zero_mg, read_uncertainties(json, "zero_mg_uncertainty"));
   SIXPOINT_ASSIGN(map.unseen_mg, read_number((*evidence)["matrix"], where));
   SIXPOINT_ASSIGN(map.six_unseen_mg, read_number((*evidence)["six"], where));
   SIXPOINT_ASSIGN(const double directions, read_number((*evidence)["directions"], where));
@@ -324,8 +333,8 @@ Result<ConstantsRecord> constants_record_from_json(const Json& json) {
   if (const auto found = json.find("standard_uncertainty");
       found != json.end() && found->is_object()) {
     SIXPOINT_ASSIGN(record.uncertainty.sensitivity_relative,
-                    read_axes<double>(*found, "sensitivity_relative"));
-    SIXPOINT_ASSIGN(record.uncertainty.zero_mg, read_axes<double>(*found, "zero_mg"));
+                    read_uncertainties(*found, "sensitivity_relative"));
+    SIXPOINT_ASSIGN(record.uncertainty.zero_mg, read_uncertainties(*found, "zero_mg"));
   }
   record.method = read_text(json, "method");
   if (const std::string made_at = read_text(json, "made_at"); !made_at.empty()) {

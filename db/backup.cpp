@@ -1,8 +1,10 @@
+#include <array>
 #include <functional>
 
 #include <fmt/format.h>
 
 #include "base/atomic_file.h"
+#include "base/temporaries.h"
 #include "db/exchange.h"
 #include "db/history.h"
 
@@ -14,23 +16,30 @@ Result<ExchangeReport> make_store_file(
     Env& env, const std::string& path,
     const std::function<Result<ExchangeReport>(const std::string& temporary)>& fill) {
   const std::string temporary = fmt::format("{}/.{}.tmp", folder_of(path), file_name_of(path));
+  constexpr std::array kSuffixes = {"", "-journal", "-wal", "-shm"};
   const auto remove = [&] {
-    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+    for (const char* suffix : kSuffixes) {
       if (env.files.info(temporary + suffix)) {
         static_cast<void>(env.files.remove(temporary + suffix));
       }
     }
   };
   remove();
+  for (const char* suffix : kSuffixes) {
+    note_temporary(temporary + suffix);
+  }
   // Afterwards the store is closed: SQLite has synced it and removed its own files beside it.
   auto report = fill(temporary);
+  if (report) {
+    if (Status placed = put_in_place(env.files, temporary, path); !placed) {
+      report = fail(std::move(placed).error());
+    }
+  }
   if (!report) {
     remove();
-    return report;
   }
-  if (Status placed = put_in_place(env.files, temporary, path); !placed) {
-    remove();
-    return fail(std::move(placed).error());
+  for (const char* suffix : kSuffixes) {
+    forget_temporary(temporary + suffix);
   }
   return report;
 }

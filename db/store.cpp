@@ -1,5 +1,7 @@
 #include "db/store.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "db/history.h"
@@ -14,6 +16,14 @@ Result<bool> has_row(Database& database, const Table& table, const Value& key) {
                                                               table.name, table.columns[0].name),
                                                   parameters));
   return !rows.empty();
+}
+
+// Of hexadecimal digits: an id is kept with small letters.
+std::string in_small_letters(std::string text) {
+  std::ranges::transform(text, text.begin(), [](char letter) {
+    return letter >= 'A' && letter <= 'F' ? static_cast<char>(letter - 'A' + 'a') : letter;
+  });
+  return text;
 }
 
 bool may_be_beginning_of_id(const std::string& text) {
@@ -117,18 +127,20 @@ Result<std::string> Store::correct(const Correction& correction) {
 
 Result<std::string> Store::whole_key(std::string_view table_name, const std::string& given) {
   const Table& table = db::table(table_name);
-  SIXPOINT_ASSIGN(const bool known, has_row(*database_, table, given));
+  // A serial number is no id: the beginning of one may be another unit's.
+  const bool by_id = table.columns[0].name == "id";
+  const std::string key = by_id ? in_small_letters(given) : given;
+  SIXPOINT_ASSIGN(const bool known, has_row(*database_, table, key));
   if (known) {
-    return given;
+    return key;
   }
   std::vector<Row> rows;
-  // A serial number is no id: the beginning of one may be another unit's.
-  if (table.columns[0].name == "id" && may_be_beginning_of_id(given)) {
+  if (by_id && may_be_beginning_of_id(key)) {
     // 'g' stands after every digit.
     SIXPOINT_ASSIGN(rows, database_->query(
                               fmt::format("SELECT {0} FROM {1} WHERE {0} > $1 AND {0} < $2 LIMIT 2",
                                           table.columns[0].name, table.name),
-                              std::vector<Value>{given, given + "g"}));
+                              std::vector<Value>{key, key + "g"}));
   }
   if (rows.size() == 1) {
     return text_of(rows[0][0]);

@@ -48,7 +48,7 @@ class Store final : public RecordWriter {
   // Adds the rows that the store does not have yet, in one transaction.
   Result<std::string> add(NewRows rows) override;
 
-  // The key of the row of `table` (a name in schema.h) that a person names by `given`:
+  // The key of the row of `table` (schema.h) that a person names by `given`, an id in any letters:
   //
   // | `given`                              | rows whose key begins so | answer                   |
   // |--------------------------------------|--------------------------|--------------------------|

@@ -1,7 +1,13 @@
 // sixpoint doctor: is this machine ready?
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/magic.h>
+#include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include "cli/command.h"
@@ -28,13 +34,47 @@ struct Check {
   std::string hint;
 };
 
+// Why no file can be made in this folder; empty where one can. A file without a name is made where
+// the disk has such files, and goes at once.
+std::string why_no_file_in(const std::string& folder) {
+  if (const int file = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, S_IRUSR | S_IWUSR);
+      file >= 0) {
+    ::close(file);
+    return {};
+  }
+  if (errno != EOPNOTSUPP && errno != EISDIR) {
+    return std::strerror(errno);
+  }
+  struct statfs disk {};
+  const bool is_of_kernel = ::statfs(folder.c_str(), &disk) == 0 &&
+                            (disk.f_type == PROC_SUPER_MAGIC || disk.f_type == SYSFS_MAGIC);
+  return is_of_kernel                                 ? "it holds no files of users"
+         : ::access(folder.c_str(), W_OK | X_OK) == 0 ? std::string()
+                                                      : std::strerror(errno);
+}
+
+// Of a store that is not there yet. The folders of the default store are made with it.
+Check check_place_of_store(const DoctorCommandOptions& options, Context& context) {
+  const std::string path = options.store.empty() ? default_store() : options.store;
+  std::string folder = folder_of(path);
+  while (options.store.empty() && !context.env.files.info(folder) && folder != folder_of(folder)) {
+    folder = folder_of(folder);
+  }
+  const bool leads_nowhere = context.env.files.link_info(path).has_value();
+  const std::string why =
+      leads_nowhere ? "it is a link that leads nowhere" : why_no_file_in(folder);
+  return why.empty() ? Check{"store", true, fmt::format("{} is made at the first run", path)}
+                     : Check{"store", false,
+                             fmt::format("{} cannot be made: {}; name another place with --store",
+                                         path, why)};
+}
+
 Check check_store(const DoctorCommandOptions& options, Context& context) {
   if (!store_exists(context, options.store)) {
-    return {"store", true,
-            fmt::format("{} is made at the first run",
-                        options.store.empty() ? default_store() : options.store)};
+    return check_place_of_store(options, context);
   }
-  auto store = open_existing_store(context, options.store);
+  // To write: one that can only be read takes no measurement.
+  auto store = open_store(context, options.store);
   if (!store) {
     return {"store", false, store.error().brief()};
   }

@@ -7,6 +7,7 @@
 #include "device/session/session_replay.h"
 #include "device/usb/discovery.h"
 #include "device/wire/wire_unit.h"
+#include "mocks/firmware/virtual_settings.h"
 #include "mocks/in_process/in_process.h"
 #include "mocks/in_process/virtual_hid_jig.h"
 
@@ -25,6 +26,19 @@ device::UnitRegistry known_units() {
       known_devices(), [](device::Link link) { return device::WireUnit::open(std::move(link)); });
   device::register_drive(registry);
   return registry;
+}
+
+Status check_address(std::string_view device, Env& env) {
+  constexpr std::string_view kVirtual = "virtual:";
+  if (device.starts_with(kVirtual)) {
+    const auto settings = mocks::parse_openable_settings(device.substr(kVirtual.size()), env.seed);
+    return settings ? Status() : Status(fail(settings.error()));
+  }
+  if (device.starts_with("hid:") || device.starts_with("usb:")) {
+    return {};  // whatever follows may be plugged in later
+  }
+  const auto link = known_devices().open(device, env);
+  return link || link.error().code != ErrorCode::usage ? Status() : Status(fail(link.error()));
 }
 
 Result<device::Jig*> choose_jig(std::string_view name, device::Unit& unit, Env& env,

@@ -24,6 +24,10 @@ device::TransportRegistry known_devices();
 // The same, and mounted drives, which have no wire protocol.
 device::UnitRegistry known_units();
 
+// usage where no unit can ever be opened by this address: an unknown scheme or setting. A unit that
+// is not plugged in, or a file that is not there, is none of its business.
+Status check_address(std::string_view device, Env& env);
+
 // The jig by its name:
 //
 //   name                        jig

@@ -46,6 +46,10 @@ Result<std::vector<repair::CutPoint>> cut_points(const ImpactCommandOptions& opt
   std::vector<repair::CutPoint> cuts;
   for (const std::string& text : options.cuts) {
     SIXPOINT_ASSIGN(auto cut, repair::parse_cut_point(text));
+    if (std::ranges::find(cuts, cut.name, &repair::CutPoint::name) != cuts.end()) {
+      return fail(ErrorCode::usage, "two cut points have this name", printable(cut.name, 40),
+                  "give each --cut a name of its own: the answer names it so");
+    }
     cuts.push_back(std::move(cut));
   }
   return cuts;

@@ -4,13 +4,14 @@
 
 #include <unistd.h>
 
+#include "base/temporaries.h"
 #include "cli/context.h"
 #include "repair/archive/archive_scripts.h"
 
 namespace sixpoint::cli {
 namespace {
 
-// Ready before the handler is set, which may do nothing but write and end.
+// Ready before the handler is set, which may do nothing but write, unlink and end.
 std::string& stopped_text() {
   static std::string text;
   return text;
@@ -18,6 +19,7 @@ std::string& stopped_text() {
 
 extern "C" void end_as_stopped(int /*signal*/) {
   const std::string& text = stopped_text();
+  remove_noted_temporaries();
   static_cast<void>(!::write(STDERR_FILENO, text.data(), text.size()));
   ::_exit(kExitStopped);
 }
@@ -31,11 +33,13 @@ void take_interrupts(const std::vector<std::string>& arguments) {
     text.append(" ").append(repair::shell_word(argument));
   }
   text += "\n";
-  struct sigaction before {};
-  if (::sigaction(SIGINT, nullptr, &before) == 0 && before.sa_handler == SIG_DFL) {
-    struct sigaction action {};
-    action.sa_handler = end_as_stopped;
-    ::sigaction(SIGINT, &action, nullptr);
+  for (const int signal : {SIGINT, SIGTERM}) {
+    struct sigaction before {};
+    if (::sigaction(signal, nullptr, &before) == 0 && before.sa_handler == SIG_DFL) {
+      struct sigaction action {};
+      action.sa_handler = end_as_stopped;
+      ::sigaction(signal, &action, nullptr);
+    }
   }
 }
 

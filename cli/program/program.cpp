@@ -7,6 +7,7 @@
 #include <spdlog/logger.h>
 
 #include "cli/program/examples.h"
+#include "cli/program/option_values.h"
 #include "cli/program/suggestion.h"
 #include "station/records/software.h"
 
@@ -35,6 +36,7 @@ void declare_commands(CLI::App& app, Context& context) {
     command_of(app, of.command)
         .footer(fmt::format("Examples:\n  {}\n", fmt::join(of.lines, "\n  ")));
   }
+  refuse_unusable_values(app);
 }
 
 namespace {

@@ -209,7 +209,9 @@ void add_capture(CLI::App& app, Context& context) {
                                                const char* about) {
     command.add_option(name, value, about)->check(CLI::Range(least, most))->capture_default_str();
   };
-  add_number("--rate", options.rate_hz, 30, 100, "sample rate in Hz");
+  command.add_option("--rate", options.rate_hz, "sample rate in Hz")
+      ->check(CLI::IsMember({30, 40, 50, 60, 70, 80, 90, 100}))  // docs/protocol.md
+      ->capture_default_str();
   add_number("--side-seconds", options.side_s, 1.0, 3600.0, "how long the unit rests on a side");
   add_number("--turn-seconds", options.turn_s, 0.0, 60.0, "and before that, to let go of it");
   add_number("--patience", options.patience_s, 0, 3600,

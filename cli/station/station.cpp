@@ -344,6 +344,9 @@ Result<std::unique_ptr<FileLock>> lock_of_station(const std::string& folder, Con
 }
 
 Status serve(const StationCommandOptions& options, Context& context) {
+  for (const std::string& device : options.devices) {
+    SIXPOINT_CHECK(station::check_address(device, context.env));
+  }
   SIXPOINT_ASSIGN(const auto listening, server_options(context, options));
   SIXPOINT_ASSIGN(const auto printer_at, printer_address(context, options));
   Outputs outputs(context, {}, /*json=*/false);

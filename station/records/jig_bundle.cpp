@@ -231,17 +231,9 @@ Result<std::vector<StoredRun>> stored_jig_runs(db::Store& store) {
 }
 
 Result<StoredRun> stored_run(db::Store& store, const std::string& id) {
-  // Bounds of the prefix: what follows a run's hex digits sorts before 'g'.
-  const std::array<db::Value, 2> bounds = {db::Value(id), db::Value(id + "g")};
-  SIXPOINT_ASSIGN(const auto rows,
-                  store.database().query(
-                      fmt::format("{} WHERE id >= $1 AND id < $2 ORDER BY id", kColumns), bounds));
-  if (rows.size() != 1 || id.empty()) {
-    return fail(ErrorCode::no_input,
-                rows.empty() ? "the store holds no run of this id"
-                             : "more than one run begins with this id",
-                printable(id, 80), "'sixpoint gap trends' lists the jig runs by unit");
-  }
+  SIXPOINT_ASSIGN(const std::string key, store.whole_key("runs", id));
+  SIXPOINT_ASSIGN(const auto rows, store.database().query(fmt::format("{} WHERE id = $1", kColumns),
+                                                          std::vector<db::Value>{key}));
   return run_of(rows.front());
 }
 

@@ -3,10 +3,11 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "base/forwarding_files.h"
 #include "base/memory_env.h"
+#include "base/temporaries.h"
 #include "expect_result.h"
 #include "temporary_folder.h"
 #include "text_of.h"
@@ -49,11 +50,52 @@ TEST(AtomicFile, SurvivesAPowerCutAtEveryOperation) {
   }
 }
 
-TEST(AtomicFile, StepsAsideForALeftoverTemporaryFile) {
+TEST(AtomicFile, TakesOverWhatAProcessThatIsGoneLeft) {
   MemoryEnv memory;
   ASSERT_OK(memory.files.create("./.f.0.tmp"));
   ASSERT_OK(write_file(memory.files, "f", "text"));
   EXPECT_EQ(text_of(memory.files, "f"), "text");
+  EXPECT_EQ(memory.files.list(".")->size(), 1U);
+  // On the real disk, as many as earlier versions could pile up.
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_OK(files.create(folder / (".f." + std::to_string(i) + ".tmp")));
+  }
+  ASSERT_OK(write_file(files, folder / "f", "text"));
+  EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre("f"));
+}
+
+TEST(AtomicFile, LeavesWhatIsBeingWritten) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  auto here = AtomicFile::create(files, folder / "f");
+  ASSERT_OK(here);
+  ASSERT_OK(here->append("first"));
+  // As another process makes it, whose temporary files this one does not know.
+  auto elsewhere = files.create(folder / ".f.1.tmp");
+  ASSERT_OK(elsewhere);
+  ASSERT_OK(write_file(files, folder / "f", "second"));
+  EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre(".f.0.tmp", ".f.1.tmp", "f"));
+  ASSERT_OK(here->commit());
+  EXPECT_EQ(text_of(files, folder / "f"), "first");
+  elsewhere->reset();  // it ended without giving it its name
+  ASSERT_OK(write_file(files, folder / "f", "third"));
+  // .f.0.tmp is free, so nobody looks further: the next that needs a second name takes it over.
+  EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre(".f.1.tmp", "f"));
+}
+
+TEST(Temporaries, AreRemovedAsTheyAreNoted) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  auto begun = AtomicFile::create(files, folder / "f");
+  ASSERT_OK(begun);
+  ASSERT_OK(write_file(files, folder / "done", "text"));
+  EXPECT_TRUE(is_noted_temporary(folder / ".f.0.tmp"));
+  EXPECT_FALSE(is_noted_temporary(folder / ".done.0.tmp"));
+  remove_noted_temporaries();
+  EXPECT_FALSE(is_noted_temporary(folder / ".f.0.tmp"));
+  EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre("done"));
 }
 
 // A disk whose rule is `how` for every file, with a pipe that takes everything.

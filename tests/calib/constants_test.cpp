@@ -105,6 +105,25 @@ TEST(Constants, HalfACrossAxisMapIsRefused) {
   EXPECT_FAILS(constants_record_from_json(absurd), ErrorCode::bad_data);
 }
 
+TEST(Constants, AnUncertaintyBelowZeroIsRefused) {
+  ConstantsRecord record = example();
+  record.cross_axis = example_map();
+  const nlohmann::ordered_json whole = to_json(record);
+  ASSERT_OK(constants_record_from_json(whole));
+  const auto expect_refused = [&](const char* part, const char* key) {
+    auto wrong = whole;
+    wrong[part][key][1] = -1;
+    const auto read = constants_record_from_json(wrong);
+    EXPECT_FAILS(read, ErrorCode::bad_data);
+    EXPECT_NE(read.error().brief().find(key), std::string::npos) << read.error().brief();
+  };
+  expect_refused("standard_uncertainty", "zero_mg");
+  expect_refused("standard_uncertainty", "sensitivity_relative");
+  expect_refused("cross_axis", "zero_mg_uncertainty");
+  expect_refused("cross_axis", "sensitivity_relative_uncertainty");
+  expect_refused("cross_axis", "standard_uncertainty");
+}
+
 TEST(Constants, TheNineIntegersAloneAreEnough) {
   const auto record = parse_constants_record(
       R"({"serial":"MOS2A45130450","filter":"legacy","constants":)"

@@ -60,6 +60,12 @@ TEST_F(StoreTest, ARowIsNamedByTheFirstDigitsOfItsId) {
   EXPECT_EQ(store.whole_key("constants", id).value(), id);
   EXPECT_EQ(store.whole_key("constants", shown_id(id)).value(), id);
   EXPECT_EQ(store.whole_key("constants", id.substr(0, 8)).value(), id);
+  std::string capital = id;
+  std::ranges::transform(capital, capital.begin(), [](unsigned char c) { return std::toupper(c); });
+  ASSERT_NE(capital, id);
+  EXPECT_EQ(store.whole_key("constants", capital).value(), id);
+  EXPECT_EQ(store.whole_key("constants", capital.substr(0, 12)).value(), id);
+  EXPECT_FAILS(store.whole_key("units", "0123456789AB"), ErrorCode::no_input);
   EXPECT_FAILS(store.whole_key("constants", id.substr(0, 7)), ErrorCode::no_input);
   EXPECT_FAILS(store.whole_key("constants", id + "0"), ErrorCode::no_input);
   EXPECT_FAILS(store.whole_key("runs", id), ErrorCode::no_input);

@@ -1,4 +1,5 @@
 // sixpoint doctor by its contract; store_option_test.cpp has a journal with a damaged entry.
+#include <filesystem>
 #include <map>
 
 #include "cli/command_fixture.h"
@@ -26,11 +27,39 @@ TEST_F(StoreTest, DoctorAnswersEveryCheckAndFailsForAStoreThatWasChanged) {
     EXPECT_TRUE(fresh.at(name)) << name;
   }
   EXPECT_TRUE(fresh.contains("disk") && fresh.contains("usb") && fresh.contains("udev"));
+  // What could not be made, and nothing of it is made by asking.
+  std::filesystem::create_symlink(path("nowhere/a.db"), path("link.db"));
+  for (const std::string& place :
+       {path("nodir/x.db"), std::string("/proc/x.db"), path("link.db"), path(".")}) {
+    EXPECT_FALSE(checks_of(place).at("store")) << place;
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("nodir")));
+  EXPECT_FALSE(std::filesystem::exists(path("none.db")));
   fill("a.db");
+  EXPECT_TRUE(checks_of(path("a.db")).at("store"));
   statements("a.db", "DROP TRIGGER constants_no_update; UPDATE constants SET method = 'other'");
   EXPECT_FALSE(checks_of(path("a.db")).at("store"));
   EXPECT_EQ(run({"doctor", "--store", path("a.db")}).exit_code, 1);
   ::unsetenv("XDG_DATA_HOME");
+}
+
+// As a user who has no rights there: root has all.
+TEST_F(StoreTest, DoctorFailsForAStoreThatTakesNothing) {
+  namespace fs = std::filesystem;
+  fill("a.db");
+  fs::create_directory(path("locked"));
+  fs::create_directory(path("free"));
+  fs::permissions(folder_.path(), fs::perms(0755));
+  fs::permissions(path("free"), fs::perms::all);
+  fs::permissions(path("a.db"), fs::perms(0444));
+  const auto doctor = [&](const std::string& store) {
+    return tests::exit_code_as_other_user({"doctor", "--store", path(store)}, path("free"));
+  };
+  if (::geteuid() != 0 || doctor("free/x.db") != 0) {
+    GTEST_SKIP() << "needs root, to become a user for whom this machine is ready";
+  }
+  EXPECT_EQ(doctor("a.db"), 1) << "it can only be read";
+  EXPECT_EQ(doctor("locked/x.db"), 1);
 }
 
 }  // namespace

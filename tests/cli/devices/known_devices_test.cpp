@@ -30,6 +30,19 @@ TEST(KnownDevices, EverySchemeOfTheManualIsThere) {
   EXPECT_FAILS(known_units().open("replay:none.zip", memory.env), ErrorCode::no_input);
 }
 
+TEST(KnownDevices, AnAddressIsCheckedWithoutItsUnit) {
+  MemoryEnv memory;
+  for (const char* device : {"virtual:seed=7,jig=auto", "virtual:", "hid:MOS2A1", "usb:MOS2A1",
+                             "hid:", "replay:none.zip"}) {
+    EXPECT_OK(check_address(device, memory.env)) << device;
+  }
+  for (const char* device : {"nonsense", "", "serial:1", "drive:media/UNIT", "virtual:foo=1",
+                             "virtual:seed=-1", "virtual:interfaces=storage"}) {
+    SCOPED_TRACE(device);
+    EXPECT_FAILS(check_address(device, memory.env), ErrorCode::usage);
+  }
+}
+
 // The table above choose_jig(); the name of a motorised jig is docs/devices/motorised-jig.md's.
 TEST(KnownDevices, AJigIsChosenByItsName) {
   MemoryEnv memory;

@@ -103,6 +103,10 @@ TEST_F(ImpactCommand, OneRecordingWritesItsFiles) {
 
 TEST_F(ImpactCommand, WhatIsWrongIsSaid) {
   EXPECT_EQ(run({"in.gt3x", "--cut", "much=enmo:100"}).exit_code, 64);
+  const auto twice = run({"in.gt3x", "--cut", "a=5", "--cut", "b=5", "--cut", "a=10"});
+  EXPECT_EQ(twice.exit_code, 64) << "one of them would be lost";
+  EXPECT_THAT(twice.people, HasSubstr("a: two cut points"));
+  EXPECT_EQ(run({"in.gt3x", "--cut", "a=5", "--cut", "b=10"}).exit_code, 0);
   EXPECT_EQ(run({"in.gt3x", "--epoch", "0"}).exit_code, 64);
   EXPECT_EQ(run({"in.gt3x", "--epoch", "3000"}).exit_code, 65);
   EXPECT_EQ(run({"none.gt3x"}).exit_code, 66);

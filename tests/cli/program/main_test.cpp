@@ -33,6 +33,7 @@ class Main : public testing::Test {
   std::string to(const std::string& out, const std::string& people) const {
     return " >" + (folder_ / out) + " 2>" + (folder_ / people);
   }
+  void expect_ended_by(int signal);
   tests::TemporaryFolder folder_;
 };
 
@@ -56,15 +57,15 @@ TEST_F(Main, AnOutputThatTakesNothingIsAnError) {
   EXPECT_THAT(text("e"), HasSubstr("standard output"));
 }
 
-// Ctrl-C in a command that has nothing to end in order: here one that would work for a long time.
-TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) {
+// In a command that has nothing to end in order: here one that would work for a long time.
+void Main::expect_ended_by(int signal) {
   std::ofstream(folder_ / "s.json") << R"({"schema": "sixpoint/scenario/1", "seed": 1, "unit": {},
     "motions": [{"kind": "free_living", "duration_s": 8640000}]})";
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
     // This process may ignore or block it, and so would its child.
-    ::signal(SIGINT, SIG_DFL);
+    ::signal(signal, SIG_DFL);
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -85,14 +86,20 @@ TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   EXPECT_TRUE(begun());
-  ASSERT_EQ(::kill(child, SIGINT), 0);
+  ASSERT_EQ(::kill(child, signal), 0);
   int status = 0;
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 3) << text("e");
   EXPECT_THAT(text("e"), HasSubstr("sixpoint simulate --scenario"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out.gt3x"));
+  EXPECT_FALSE(begun()) << "a temporary file stays";
 }
+
+TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) { expect_ended_by(SIGINT); }
+
+// As a batch system and `kill` send it.
+TEST_F(Main, SigtermDoesTheSame) { expect_ended_by(SIGTERM); }
 
 // A bar is for a terminal, and a file is none.
 TEST_F(Main, NoProgressIsDrawnIntoAFile) {

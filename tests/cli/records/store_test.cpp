@@ -158,6 +158,8 @@ TEST_F(StoreTest, AFileOrFolderThatMayNotBeWrittenIsSaidSo) {
     words.push_back(path(name));
     EXPECT_EQ(as_other_user(words), 77) << name;
   }
+  EXPECT_EQ(as_other_user({"store", "backup", "--store", path("a.db"), "-o", path("locked/b.db")}),
+            77);
   EXPECT_EQ(as_other_user({"store", "import", path("none"), "--store", path("locked/b.db")}), 66);
   std::filesystem::permissions(folder_.path(), std::filesystem::perms(0755));
   std::filesystem::permissions(path("locked"), std::filesystem::perms(0755));

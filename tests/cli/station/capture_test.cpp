@@ -33,6 +33,25 @@ TEST_F(CommandTest, CaptureMakesACalibrationFile) {
                                    "-o", "repaired"));
 }
 
+// Before the unit is asked: the rates of docs/protocol.md.
+TEST_F(CommandTest, CaptureRefusesARateThatNoUnitHas) {
+  for (const char* rate : {"29", "33", "45", "99", "110", "30.5", ""}) {
+    EXPECT_EQ(run({"capture", "--device", "virtual:foo=1", "-o", path("c.gt3x"), "--rate", rate})
+                  .people.find("foo"),
+              std::string::npos)
+        << rate;
+    EXPECT_EQ(run({"capture", "--device", kDevice, "-o", path("c.gt3x"), "--rate", rate}).exit_code,
+              64)
+        << rate;
+  }
+  for (const char* rate : {"30", "40", "100"}) {
+    EXPECT_THAT(
+        run({"capture", "--device", "virtual:foo=1", "-o", path("c.gt3x"), "--rate", rate}).people,
+        HasSubstr("foo"))
+        << rate;
+  }
+}
+
 TEST_F(CommandTest, CaptureRefusesAFirmwareWhoseFileCannotHelp) {
   const auto answer = run({"capture", "--device", "virtual:seed=7,firmware=1.8.0,jig=auto", "-o",
                            path("c.gt3x"), "--store", path("s.db"), "--json"});

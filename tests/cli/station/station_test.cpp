@@ -66,6 +66,11 @@ TEST_F(StationCommand, RefusesWhatItCannotServe) {
   }
   EXPECT_EQ(with({"--limits", path("none.toml")}).exit_code, 66);
   EXPECT_EQ(with({"--gravity", "98"}).exit_code, 64) << "no place on Earth";
+  for (const char* device :
+       {"nonsense", "serial:1", "virtual:foo=1", "virtual:seed=-1", "replay:a.zip,match=so"}) {
+    EXPECT_EQ(with({"--device", device}).exit_code, 64) << device;
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("state"))) << "nothing is made before";
   std::vector<std::string> seventeen;
   for (int i = 0; i < 17; ++i) {
     seventeen.insert(seventeen.end(), {"--device", "virtual:seed=" + std::to_string(i)});
@@ -121,6 +126,21 @@ TEST_F(StationCommand, ServesItsPageUntilItIsStopped) {
     EXPECT_EQ(station.stop(signal), signal == SIGINT ? 3 : 0);
     EXPECT_EQ(get(port, "/"), "") << "no one listens any more";
   }
+}
+
+// Oracle: the address of Python's client. RFC 3986 puts an IPv6 address into brackets.
+TEST_F(StationCommand, AnIpv6AddressCanBeOpenedAsItIsPrinted) {
+  Child station(arguments({"--port", "0", "--bind", "::1", "--device", "virtual:seed=7"}));
+  const std::string address = station.line();
+  if (address.empty()) {
+    GTEST_SKIP() << "no IPv6 on this machine";
+  }
+  ASSERT_THAT(address, StartsWith("http://[::1]:"));
+  const std::string fetch =
+      "python3 -c 'import sys, urllib.request; "
+      "sys.exit(urllib.request.build_opener(urllib.request.ProxyHandler({})).open(\"" +
+      address.substr(0, address.find('#')) + "\").status != 200)'";
+  EXPECT_EQ(std::system(fetch.c_str()), 0);
 }
 
 // Oracle: the TLS of Python, which checks the certificate and the name. Plain HTTP is not answered.
