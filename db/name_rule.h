@@ -1,6 +1,6 @@
 // Which texts the store takes as names: of an operator, a station, a jig.
 //
-//   SIXPOINT_CHECK(db::check_name(operator_name));  // before the run whose record has it
+//   SIXPOINT_CHECK(check_name("Ada"));  // before the run whose record has it
 //
 // A record with another text is refused when it is added, and then the work is done.
 #pragma once

@@ -13,7 +13,7 @@
 //
 // Likewise the operator's word that a motorised jig is free: it is about what the operator saw.
 //
-//   const auto dead = why_release_is_dead({"emergency stop", 0.1, "emergency stop"});
+//   const auto why = why_release_is_dead({"emergency stop", 0.1, "emergency stop"});
 //
 // | fault that the jig shows now | since the word     | answer                                |
 // |------------------------------|--------------------|---------------------------------------|
