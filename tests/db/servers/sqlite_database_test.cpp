@@ -17,6 +17,7 @@
 
 #include "base/memory_env.h"
 #include "base/random.h"
+#include "db/exchange.h"
 #include "db/schema.h"
 #include "db/store.h"
 #include "expect_result.h"
@@ -64,7 +65,8 @@ TEST_F(SqliteStoreTest, AStoreWithTablesOfAnotherProgramTakesNothing) {
     run_sql(change);
     auto store = open();
     ASSERT_OK(store);
-    EXPECT_FAILS(store->add_constants(constants(2), "w"), ErrorCode::bad_data) << change;
+    SCOPED_TRACE(change);
+    EXPECT_FAILS(store->add_constants(constants(2), "w"), ErrorCode::bad_data);
   }
 }
 
@@ -72,7 +74,8 @@ TEST_F(SqliteStoreTest, AVersionThatItsTablesContradictIsBadData) {
   ASSERT_OK(open());
   for (const char* version : {"0", "1", "2"}) {
     run_sql(std::string("PRAGMA user_version=") + version);
-    EXPECT_FAILS(open(), ErrorCode::bad_data) << version;
+    SCOPED_TRACE(version);
+    EXPECT_FAILS(open(), ErrorCode::bad_data);
   }
 }
 
