@@ -19,6 +19,7 @@ constexpr std::size_t kMaxBlocks = 60;
 constexpr double kFineReach_s = 2;      // about the lag found to the second
 constexpr double kNearBest = 0.6;       // of the best correlation: lags to the second worth a look
 constexpr std::size_t kMostCoarse = 8;  // of these
+constexpr double kSureFit = 0.8;  // mean correlation of the minutes: no other lag is looked at
 constexpr double kGoodCorrelation = 0.5;  // below, a minute does not fit at all
 constexpr double kRivalFactor = 0.85;     // peaks this close to a minute's best are rivals
 constexpr std::size_t kMaxRivals = 12;
@@ -180,9 +181,10 @@ double block_correlation(const Trace& a, const Trace& b, const Block& block, dou
   return 2 * correlation.count() > block.end - block.begin ? correlation.value() : 0;
 }
 
-// Every lag at which this block fits about as well as it ever does.
-void add_candidates(const Trace& a, const Trace& b, const Block& block, std::size_t index,
-                    double about_s, std::vector<Candidate>& candidates) {
+// Adds every lag at which this block fits about as well as it ever does there, and says how well
+// that is: 0 where it does not fit.
+double add_candidates(const Trace& a, const Trace& b, const Block& block, std::size_t index,
+                      double about_s, std::vector<Candidate>& candidates) {
   const double step_s = 1 / std::max(a.rate_hz(), b.rate_hz());
   const auto reach = static_cast<int>(kFineReach_s / step_s);
   std::vector<double> values;
@@ -191,7 +193,7 @@ void add_candidates(const Trace& a, const Trace& b, const Block& block, std::siz
   }
   const double best = *std::ranges::max_element(values);
   if (best < kGoodCorrelation) {
-    return;
+    return 0;
   }
   std::vector<Candidate> found;
   for (std::size_t k = 1; k + 1 < values.size(); ++k) {
@@ -208,6 +210,7 @@ void add_candidates(const Trace& a, const Trace& b, const Block& block, std::siz
   std::ranges::sort(found, std::greater<>(), &Candidate::correlation);
   found.resize(std::min(found.size(), kMaxRivals));
   candidates.insert(candidates.end(), found.begin(), found.end());
+  return best;
 }
 
 // The line that most blocks agree on: for every drift, lags corrected for it fall into bins; bins
@@ -370,21 +373,23 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
         options.max_lag_s));
     return line;
   }
+  // Motion that goes on and off by a period swells alike at several lags: its minutes fit best at the
+  // right one.
   std::vector<Candidate> candidates;
-  const auto look_about = [&](double about_s) {
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      add_candidates(a, b, blocks[i], i, about_s, candidates);
-    }
-  };
-  // Motion that goes on and off by a period swells alike at several lags: where it is its own
-  // repetition in nothing else, its minutes fit at one of them.
   std::optional<double> coarse;
-  for (std::size_t i = 0; i < seconds.size() && candidates.empty(); ++i) {
-    coarse = tenths_of(a, b, seconds[i]);
-    look_about(*coarse);
-  }
-  if (!coarse) {
-    look_about(0);
+  double best = 0;
+  for (std::size_t i = 0; i < std::max<std::size_t>(seconds.size(), 1) && best < kSureFit; ++i) {
+    const double about_s = seconds.empty() ? 0 : tenths_of(a, b, seconds[i]);
+    std::vector<Candidate> here;
+    double fit = 0;
+    for (std::size_t n = 0; n < blocks.size(); ++n) {
+      fit += add_candidates(a, b, blocks[n], n, about_s, here) / static_cast<double>(blocks.size());
+    }
+    if (fit > best) {
+      best = fit;
+      candidates = std::move(here);
+      coarse = seconds.empty() ? std::nullopt : std::optional(about_s);
+    }
   }
   if (candidates.empty()) {
     result.remarks.emplace_back("no lively minute fits: were the units moved together?");
