@@ -76,7 +76,8 @@ std::string store_name(const std::string& location) {
     return text_sha256(place_on_server(place)).substr(0, 16);
   }
   std::error_code error;
-  const auto whole = std::filesystem::weakly_canonical(place, error);
+  const auto whole =
+      std::filesystem::weakly_canonical(std::filesystem::absolute(place, error), error);
   return text_sha256(error ? place : whole.string()).substr(0, 16);
 }
 

@@ -167,8 +167,8 @@ TEST_F(StationCommand, ServesHttps) {
   EXPECT_THAT(get(std::atoi(page.c_str() + std::string_view("https://127.0.0.1:").size()), "/"),
               testing::Not(HasSubstr("HTTP/1.1 200")));
   std::ofstream(path("other.pem")) << "no key";
-  EXPECT_EQ(refused({"--device", "virtual:seed=7", "--tls-cert", path("cert.pem"), "--tls-key",
-                     path("other.pem")})
+  EXPECT_EQ(run({"station", "--store", path("s.db"), "--state", path("other state"), "--device",
+                 "virtual:seed=7", "--tls-cert", path("cert.pem"), "--tls-key", path("other.pem")})
                 .exit_code,
             65);
 }
