@@ -351,6 +351,7 @@ Status challenge(GapChallengeCommandOptions options, Context& context) {
   }
   SIXPOINT_ASSIGN(const auto trials, run_trials(env, options, *protocol, folder.path(), context));
   std::vector<Outcome> outcomes;
+  outcomes.reserve(trials.size());
   for (const Followed& trial : trials) {
     outcomes.push_back(trial.before);
   }
