@@ -128,12 +128,26 @@ TEST_F(StationCommand, ServesItsPageUntilItIsStopped) {
   }
 }
 
-// Oracle: the address of Python's client. RFC 3986 puts an IPv6 address into brackets.
+bool machine_has_ipv6() {
+  const int socket = ::socket(AF_INET6, SOCK_STREAM, 0);
+  sockaddr_in6 address{};
+  address.sin6_family = AF_INET6;
+  address.sin6_addr = in6addr_loopback;
+  const bool has = socket >= 0 &&
+                   ::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  ::close(socket);
+  return has;
+}
+
+// Oracle: the address of Python's client. RFC 3986 puts an IPv6 address into brackets. A machine
+// without IPv6 has no such address, and the station says so.
 TEST_F(StationCommand, AnIpv6AddressCanBeOpenedAsItIsPrinted) {
   Child station(arguments({"--port", "0", "--bind", "::1", "--device", "virtual:seed=7"}));
   const std::string address = station.line();
-  if (address.empty()) {
-    GTEST_SKIP() << "no IPv6 on this machine";
+  if (!machine_has_ipv6()) {
+    EXPECT_EQ(address, "");
+    EXPECT_NE(station.wait(), 0);
+    return;
   }
   ASSERT_THAT(address, StartsWith("http://[::1]:"));
   const std::string fetch =
