@@ -6,6 +6,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "calib/efficiency.h"
 #include "cli/command.h"
 #include "cli/gravity_option.h"
 #include "cli/output.h"
@@ -99,6 +100,17 @@ Result<Outcome> solve_one(const std::string& path, const SolveCommandOptions& op
   return outcome;
 }
 
+// Which directions the unit lay in, beside the best that there are.
+std::string efficiency_text(const calib::BlockFit& fit) {
+  const calib::DesignEfficiency six = calib::efficiency_of(fit, 6);
+  const calib::DesignEfficiency nine = calib::efficiency_of(fit, 9);
+  std::string text = fmt::format(
+      "{} directions; efficiency (D, G; 1 is the best) for six parameters {:.2f}, {:.2f}",
+      fit.directions, six.d, six.g);
+  return text + (nine.d > 0 ? fmt::format("; with cross-axis terms {:.2f}, {:.2f}", nine.d, nine.g)
+                            : "; too few for cross-axis terms");
+}
+
 void print_solve(const std::string& path, const SolveCommandOptions& options,
                  const Outcome& outcome, Context& context) {
   const calib::SolveReport& report = outcome.report;
@@ -126,6 +138,9 @@ void print_solve(const std::string& path, const SolveCommandOptions& options,
           100 * report.partial->sensitivity_relative[a],
           report.partial->sensitivity_determined[a] ? "determined" : "not determined");
     }
+  }
+  if (report.fit) {
+    context.text() << "  " << efficiency_text(*report.fit) << '\n';
   }
   for (const std::string& note : report.notes) {
     context.text() << "  note: " << printable(note, 1000) << '\n';

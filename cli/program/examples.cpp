@@ -36,7 +36,7 @@ constexpr CommandExamples kExamples[] = {
         "sixpoint jig --device virtual:seed=8,jig=auto --operator Ada --write --certificate certificate.pdf --record session.zip"}},
     {"capture", {
         "sixpoint capture --device virtual:seed=7,jig=auto -o calibration.gt3x",
-        "sixpoint capture --device virtual:seed=8,jig=auto -o calibration-8.gt3x --constants-out constants.json"}},
+        "sixpoint capture --device virtual:seed=8,jig=auto --sides corners -o calibration-8.gt3x --constants-out constants.json"}},
     {"limits print", {
         "sixpoint limits print > limits.toml",
         "sixpoint limits print limits.toml --json"}},

@@ -21,6 +21,7 @@ struct CaptureCommandOptions : JigOptions {
   std::string constants_out;
   std::string station;
   std::string limits;
+  std::string sides = "faces";
   int rate_hz = 30;
   double side_s = 40;
   double turn_s = 5;
@@ -36,6 +37,7 @@ Result<station::CaptureOptions> capture_options(Context& context,
                                                 const CaptureCommandOptions& options,
                                                 const std::string& serial) {
   station::CaptureOptions capture;
+  capture.corners = options.sides == "corners";
   capture.rate_hz = options.rate_hz;
   capture.side_s = options.side_s;
   capture.turn_s = options.turn_s;
@@ -53,14 +55,24 @@ Result<station::CaptureOptions> capture_options(Context& context,
   return capture;
 }
 
-// Asks the person to lay the unit on a side; a jig that turns by itself needs no answer.
-station::SideAnswer ask_side(Context& context, double side_s, bool by_itself, device::Pose side,
-                             std::size_t number, std::size_t of) {
+std::string in_words(device::Pose side) {
+  return fmt::format("{} - its {} axis points {}", device::to_string(side),
+                     kAxisNames[device::axis_of(side)], device::sign_of(side) > 0 ? "up" : "down");
+}
+
+std::string in_words(const device::Corner& corner) {
+  PerAxis<std::string_view> ways;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    ways[a] = corner.signs[a] > 0 ? "up" : "down";
+  }
+  return fmt::format("{} - stood on a corner, in a mug for example, its x axis {}, y {}, z {}",
+                     device::to_string(corner), ways[0], ways[1], ways[2]);
+}
+
+// Asks the person to turn the unit; a jig that turns by itself needs no answer.
+station::SideAnswer ask(Context& context, double side_s, bool by_itself, const std::string& what) {
   context.people << fmt::format(
-                        "side {} of {}: {} - its {} axis points {}; then leave it alone for "
-                        "{:.0f} s{}\n",
-                        number, of, device::to_string(side), kAxisNames[device::axis_of(side)],
-                        device::sign_of(side) > 0 ? "up" : "down", side_s,
+                        "{}; then leave it alone for {:.0f} s{}\n", what, side_s,
                         by_itself ? "" : ". Lay it down, then press Enter (q and Enter: stop)")
                  << std::flush;
   std::string line;
@@ -93,7 +105,12 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
   if (unit.abilities().records_on_command) {
     station::CaptureHooks hooks;
     hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
-      return ask_side(context, options.side_s, opened.jig->turns_by_itself(), side, number, of);
+      return ask(context, options.side_s, opened.jig->turns_by_itself(),
+                 fmt::format("side {} of {}: {}", number, of, in_words(side)));
+    };
+    hooks.ask_corner = [&](const device::Corner& corner, std::size_t number, std::size_t of) {
+      return ask(context, options.side_s, opened.jig->turns_by_itself(),
+                 fmt::format("corner {} of {}: {}", number, of, in_words(corner)));
     };
     if (!opened.jig->turns_by_itself()) {  // a jig would lay it the same way again
       hooks.again = [&](const std::vector<device::Pose>& /*sides*/) {
@@ -197,6 +214,12 @@ void add_capture(CLI::App& app, Context& context) {
       app, context, "capture",
       "make a calibration file: the unit records on its six sides, and is solved", run_capture);
   add_jig_options(command, options);
+  command
+      .add_option("--sides", options.sides,
+                  "'faces': the six sides; 'corners': and then the eight corners, which show the "
+                  "cross-axis terms")
+      ->check(CLI::IsMember({"faces", "corners"}))
+      ->capture_default_str();
   command.add_option("-o,--output", options.output,
                      "the .gt3x to make (default: SERIAL-calibration-DAY.gt3x)");
   command.add_option("--constants-out", options.constants_out,

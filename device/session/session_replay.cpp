@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/memory_env.h"
+#include "device/corner.h"
 #include "device/wire/protocol.h"
 
 namespace sixpoint::device {
@@ -320,13 +321,14 @@ class ReplayedTransport final : public Transport {
 };
 
 // The unit was turned during the recording: no person is asked again.
-class ReplayedJig final : public Jig {
+class ReplayedJig final : public Jig, public CornerJig {
  public:
   std::string name() const override { return "replayed session"; }
   bool turns_by_itself() const override { return true; }
   Status go_to(Pose /*pose*/) override { return {}; }
   bool can_half_turn() const override { return true; }
   Status go_to_half_turned(Pose /*pose*/) override { return {}; }
+  Status go_to_corner(const Corner& /*corner*/) override { return {}; }
   Result<JigPosition> position() override { return JigPosition{}; }
   Status stop() override { return {}; }
   Status release() override { return {}; }

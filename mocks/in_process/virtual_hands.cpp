@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "device/corner.h"
+
 namespace sixpoint::mocks {
 
 namespace {
@@ -32,7 +34,7 @@ void knock_by_hand(PluggedUnit& plugged, const Eigen::Vector3d& up, bool half_tu
 Result<std::string> VirtualHands::obey(std::string_view word) {
   const std::lock_guard lock(plugged_->mutex);
   if (word == "knock") {
-    knock_by_hand(*plugged_, up_of(pose_), half_turned_);
+    knock_by_hand(*plugged_, up_, half_turned_);
     return std::string("the unit was knocked");
   }
   if (word == "swap") {
@@ -43,16 +45,18 @@ Result<std::string> VirtualHands::obey(std::string_view word) {
   }
   constexpr std::string_view kTurned = " turned";
   const bool turned = word.ends_with(kTurned);
-  const auto pose =
-      device::parse_pose(turned ? word.substr(0, word.size() - kTurned.size()) : word);
-  if (!pose) {
+  const std::string_view name = turned ? word.substr(0, word.size() - kTurned.size()) : word;
+  const auto pose = device::parse_pose(name);
+  const auto corner = device::parse_corner(name);
+  if (!pose && (!corner || turned)) {
     return fail(ErrorCode::usage, fmt::format("'{}' is no word for the hands", printable(word, 40)),
-                {}, "+x -x +y -y +z -z turn the unit; +x turned; knock; swap");
+                {}, "+x -x +y -y +z -z and +x+y+z to -x-y-z turn the unit; +x turned; knock; swap");
   }
-  pose_ = *pose;
+  const auto up = pose ? device::direction_of(*pose) : device::direction_of(*corner);
+  up_ = {up[0], up[1], up[2]};
   half_turned_ = turned;
-  turn_by_hand(*plugged_, up_of(pose_), 0, half_turned_);
-  return fmt::format("the unit is turned to {}{}", device::to_string(pose_),
+  turn_by_hand(*plugged_, up_, 0, half_turned_);
+  return fmt::format("the unit is turned to {}{}", name,
                      half_turned_ ? ", half a turn about the vertical" : "");
 }
 

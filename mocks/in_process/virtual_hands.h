@@ -6,7 +6,8 @@
 // | word              | what the hands do                                                        |
 // |-------------------|--------------------------------------------------------------------------|
 // | +x -x +y -y +z -z | turn the unit, that axis up (+) or down (-)                              |
-// | +x turned         | the same, half a turn about the vertical from how +x alone lays it       |
+// | +x+y-z            | stand it on a corner: x and y up, z down (any signs)                     |
+// | +x turned         | as +x, half a turn about the vertical from how +x alone lays it          |
 // | knock             | move it a little, and back                                               |
 // | swap              | pull it out, and plug another one in after a second                      |
 //
@@ -38,7 +39,7 @@ class VirtualHands {
 
  private:
   std::shared_ptr<PluggedUnit> plugged_;
-  device::Pose pose_ = device::Pose::plus_z;
+  Eigen::Vector3d up_ = up_of(device::Pose::plus_z);
   bool half_turned_ = false;
 };
 

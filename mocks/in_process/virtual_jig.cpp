@@ -17,6 +17,18 @@ Status VirtualJig::turn(device::Pose pose, bool half_turned) {
   // The jig leans where it leans: a unit that lies the other way round leans the other way.
   up[(device::axis_of(pose) + 1) % kAxes] =
       (half_turned ? -1 : 1) * std::tan(lean_deg_[pose] * std::numbers::pi / 180);
+  SIXPOINT_CHECK(turn_to(up, half_turned));
+  pose_ = pose;
+  return {};
+}
+
+Status VirtualJig::go_to_corner(const device::Corner& corner) {
+  SIXPOINT_CHECK(turn_to(device::direction_of(corner), false));
+  pose_.reset();
+  return {};
+}
+
+Status VirtualJig::turn_to(const PerAxis<double>& up, bool half_turned) {
   const std::lock_guard lock(plugged_->mutex);
   if (plugged_->motor.stopped) {
     return fail(ErrorCode::device_unavailable, "the jig stopped: emergency stop", name(),
@@ -25,7 +37,6 @@ Status VirtualJig::turn(device::Pose pose, bool half_turned) {
   plugged_->motor.begin_movement();
   plugged_->unit.turn_to({up[0], up[1], up[2]}, plugged_->clock->elapsed(), kTurnByMotor_s,
                          std::exchange(tilt_next_deg_, 0.0), half_turned);
-  pose_ = pose;
   return {};
 }
 

@@ -8,12 +8,13 @@
 #include <map>
 #include <memory>
 
+#include "device/corner.h"
 #include "device/jig.h"
 #include "mocks/in_process/in_process.h"
 
 namespace sixpoint::mocks {
 
-class VirtualJig final : public device::Jig {
+class VirtualJig final : public device::Jig, public device::CornerJig {
  public:
   explicit VirtualJig(std::shared_ptr<PluggedUnit> plugged) : plugged_(std::move(plugged)) {}
 
@@ -23,6 +24,7 @@ class VirtualJig final : public device::Jig {
   // As no motorised jig that is known does: so that the whole of `production+` can be tested.
   bool can_half_turn() const override { return true; }
   Status go_to_half_turned(device::Pose pose) override { return turn(pose, true); }
+  Status go_to_corner(const device::Corner& corner) override;
   Result<device::JigPosition> position() override;
   Status stop() override;
   Status release() override;
@@ -37,6 +39,7 @@ class VirtualJig final : public device::Jig {
 
  private:
   Status turn(device::Pose pose, bool half_turned);
+  Status turn_to(const PerAxis<double>& up, bool half_turned);
 
   std::shared_ptr<PluggedUnit> plugged_;
   std::optional<device::Pose> pose_;

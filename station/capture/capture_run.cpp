@@ -149,9 +149,22 @@ namespace {
 class CaptureRun {
  public:
   CaptureRun(UnitOnJig on_jig, Env& env, const CaptureOptions& options, const CaptureHooks& hooks)
-      : on_jig_(on_jig), env_(env), options_(options), hooks_(hooks) {}
+      : on_jig_(on_jig),
+        env_(env),
+        options_(options),
+        hooks_(hooks),
+        poses_(device::kPoses.begin(), device::kPoses.end()) {
+    if (options.corners) {
+      poses_.insert(poses_.end(), device::kCorners.begin(), device::kCorners.end());
+    }
+  }
 
   Result<CaptureReport> run(const std::optional<CaptureResume>& resume) {
+    if (options_.corners && on_jig_.jig->turns_by_itself() && corner_jig() == nullptr) {
+      return fail(ErrorCode::usage, "this jig lays a unit on its six sides only",
+                  on_jig_.jig->name(),
+                  "leave out '--sides corners', or turn it by hand (--jig manual)");
+    }
     report_.serial = unit().identity().serial;
     report_.firmware = unit().identity().firmware;
     SIXPOINT_ASSIGN(const device::FilterState filter, unit().filter());
@@ -207,6 +220,8 @@ class CaptureRun {
   enum class Step { done, stopped, away };
 
   device::Unit& unit() { return *on_jig_.unit; }
+  // Null where the jig cannot.
+  device::CornerJig* corner_jig() { return dynamic_cast<device::CornerJig*>(on_jig_.jig); }
 
   // Repeats `step` while it fails because the unit is away; waits for the unit in between.
   template <class Action>
@@ -283,7 +298,8 @@ class CaptureRun {
     for (const device::Pose side : sides) {
       names += names.empty() ? "" : ", ";
       names += device::to_string(side);
-      std::erase_if(progress_.done, [side](const auto& one) { return one.pose == side; });
+      std::erase_if(progress_.done,
+                    [side](const auto& one) { return one.pose == CapturePose(side); });
     }
     report_.notes.push_back(
         fmt::format("too few still readings with {} up: asked for again", names));
@@ -304,7 +320,7 @@ class CaptureRun {
     };
     const std::string beside = beside_name();
     bool are_free = is_free(beside);
-    for (std::size_t number = 1; are_free && number <= device::kPoses.size(); ++number) {
+    for (std::size_t number = 1; are_free && number <= poses_.size(); ++number) {
       are_free =
           is_free(piece_name(options_.output, number)) && is_free(piece_name(beside, number));
     }
@@ -380,9 +396,16 @@ class CaptureRun {
     return true;
   }
 
-  Result<Step> place(device::Pose side, std::size_t number) {
+  SideAnswer ask(const CapturePose& pose, std::size_t number) {
+    const auto* const side = std::get_if<device::Pose>(&pose);
+    return side != nullptr
+               ? hooks_.ask(*side, number, poses_.size())
+               : hooks_.ask_corner(std::get<device::Corner>(pose), number, poses_.size());
+  }
+
+  Result<Step> place(const CapturePose& pose, std::size_t number) {
     for (;;) {
-      switch (hooks_.ask(side, number, device::kPoses.size())) {
+      switch (ask(pose, number)) {
         case SideAnswer::placed:
           return Step::done;
         case SideAnswer::stop:
@@ -421,13 +444,22 @@ class CaptureRun {
     return is_away() ? Step::away : Step::done;
   }
 
-  Result<Step> record_side(device::Pose side, std::size_t number) {
-    SIXPOINT_ASSIGN(const Step placed, place(side, number));
+  Status turn_to(const CapturePose& pose) {
+    if (const auto* const side = std::get_if<device::Pose>(&pose); side != nullptr) {
+      return on_jig_.jig->go_to(*side);
+    }
+    // Without a jig a person has stood it there.
+    return corner_jig() != nullptr ? corner_jig()->go_to_corner(std::get<device::Corner>(pose))
+                                   : Status{};
+  }
+
+  Result<Step> record_side(const CapturePose& pose, std::size_t number) {
+    SIXPOINT_ASSIGN(const Step placed, place(pose, number));
     if (placed != Step::done) {
       return placed;
     }
     SIXPOINT_CHECK(look_at_jig());
-    SIXPOINT_CHECK(on_jig_.jig->go_to(side));
+    SIXPOINT_CHECK(turn_to(pose));
     auto rested = rest();
     SIXPOINT_CHECK(look_at_jig());
     return rested;
@@ -438,20 +470,20 @@ class CaptureRun {
     return on_jig_.jig->turns_by_itself() ? device::check_jig(*on_jig_.jig) : Status{};
   }
 
-  bool is_done(device::Pose side) const {
+  bool is_done(const CapturePose& pose) const {
     return std::any_of(progress_.done.begin(), progress_.done.end(),
-                       [side](const CaptureResume::Side& one) { return one.pose == side; });
+                       [&pose](const CaptureResume::Side& one) { return one.pose == pose; });
   }
 
   // True when all sides are recorded, false when the person stopped.
   Result<bool> record_sides() {
-    for (std::size_t number = 1; number <= device::kPoses.size();) {
-      const device::Pose side = device::kPoses[number - 1];
-      if (is_done(side)) {
+    for (std::size_t number = 1; number <= poses_.size();) {
+      const CapturePose& pose = poses_[number - 1];
+      if (is_done(pose)) {
         ++number;
         continue;
       }
-      SIXPOINT_ASSIGN(const Step step, record_side(side, number));
+      SIXPOINT_ASSIGN(const Step step, record_side(pose, number));
       if (step == Step::stopped) {
         return false;
       }
@@ -461,7 +493,7 @@ class CaptureRun {
         number = 1;
         continue;
       }
-      progress_.done.push_back({side, recording_});
+      progress_.done.push_back({pose, recording_});
       save();
     }
     return true;
@@ -536,6 +568,7 @@ class CaptureRun {
   Env& env_;
   const CaptureOptions& options_;
   const CaptureHooks& hooks_;
+  std::vector<CapturePose> poses_;  // in the order in which they are asked for
   CaptureReport report_;
   CaptureResume progress_;
   std::uint16_t recording_ = 0;              // under way

@@ -1,5 +1,6 @@
 // The customer's calibration file (the paper's second method): the unit records while it lies on
-// each of its six sides; the file is downloaded, checked and solved.
+// each of its six sides, and if asked stands on its eight corners; the file is downloaded, checked
+// and solved.
 //
 //   CaptureOptions options;
 //   options.output = "side.gt3x";
@@ -23,9 +24,11 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "calib/solve.h"
+#include "device/corner.h"
 #include "device/unit.h"
 #include "station/run/jig_session.h"
 
@@ -34,6 +37,10 @@ namespace sixpoint::station {
 struct CaptureOptions {
   std::string output;  // the .gt3x to make
   int rate_hz = 30;    // what the customers' own recordings have
+  // The eight corners after the six sides: they show the cross-axis terms, which six sides cannot
+  // (calib/efficiency.h), and directions to test the constants with. Only where asked for, since it
+  // takes more than twice as long. usage where the jig turns by itself and is no CornerJig.
+  bool corners = false;
   // A side needs three still blocks of 4 s, and at 30 Hz a noisy z axis loses half of them to the
   // paper's second criterion.
   double side_s = 40;
@@ -44,10 +51,13 @@ struct CaptureOptions {
   int most_repeats = 2;           // a side that fails three times fails for another reason
 };
 
+// How the unit rests: on a side, or on a corner.
+using CapturePose = std::variant<device::Pose, device::Corner>;
+
 // What an earlier program had of this capture.
 struct CaptureResume {
   struct Side {
-    device::Pose pose = device::Pose::plus_z;
+    CapturePose pose = device::Pose::plus_z;
     std::uint16_t recording = 0;  // that holds it
   };
   UtcTime started{};
@@ -61,11 +71,15 @@ enum class SideAnswer {
   leave     // the program ends: the unit records on, and a later program goes on with the capture
 };
 
-// What the capture asks of its driver. All but `ask` may be empty.
+// What the capture asks of its driver. All but `ask` may be empty; `ask_corner` where
+// CaptureOptions::corners is false.
 struct CaptureHooks {
   // Does the unit lie on this side? `number` counts from 1. A jig that turns by itself is sent
   // there afterwards.
   std::function<SideAnswer(device::Pose side, std::size_t number, std::size_t of)> ask;
+  // The same for a corner; `number` and `of` count sides and corners.
+  std::function<SideAnswer(const device::Corner& corner, std::size_t number, std::size_t of)>
+      ask_corner = nullptr;
   // Asked several times a second while the unit rests; `stop` and `leave` end the rest.
   std::function<SideAnswer()> next_answer = nullptr;
   // After every side: save this to go on after a restart.

@@ -240,7 +240,9 @@ Status RunFolder::save_capture(const UnfinishedCapture& capture) {
                {"started", to_iso8601(capture.resume.started)}};
   json["done"] = Json::array();
   for (const CaptureResume::Side& side : capture.resume.done) {
-    json["done"].push_back({{"pose", device::to_string(side.pose)}, {"recording", side.recording}});
+    // The station asks for the six sides alone.
+    json["done"].push_back({{"pose", device::to_string(std::get<device::Pose>(side.pose))},
+                            {"recording", side.recording}});
   }
   return write_state(env_.files, folder_, kCapture, json);
 }

@@ -33,6 +33,27 @@ TEST_F(CommandTest, CaptureMakesACalibrationFile) {
                                    "-o", "repaired"));
 }
 
+TEST_F(CommandTest, CaptureOfCornersStatesItsEfficiency) {
+  const auto capture = [&](const char* sides, const char* name) {
+    return run({"capture", "--device", kDevice, "--jig", "virtual", "--store", path("s.db"), "-o",
+                path(name), "--sides", sides, "--json"});
+  };
+  const auto corners = capture("corners", "c.gt3x");
+  EXPECT_EQ(corners.exit_code, 0) << corners.people;
+  EXPECT_THAT(corners.people, HasSubstr("side 6 of 14: -y - its y axis points down"));
+  EXPECT_THAT(corners.people, HasSubstr("corner 14 of 14: +x+y-z"));
+  EXPECT_EQ(corners.json()["verdict"], "verified");
+  EXPECT_GT(corners.json()["efficiency"]["nine"]["d"], 0.97);
+  EXPECT_GT(corners.json()["efficiency"]["nine"]["g"], 0.9);
+  const auto faces = capture("faces", "f.gt3x");
+  EXPECT_EQ(faces.json()["efficiency"]["parameters"], 6);
+  EXPECT_GT(faces.json()["efficiency"]["six"]["d"], 0.98);
+  EXPECT_EQ(faces.json()["efficiency"]["nine"]["d"], 0);
+  EXPECT_THAT(run({"solve", path("f.gt3x")}).out, HasSubstr("too few for cross-axis terms"));
+  EXPECT_THAT(run({"solve", path("c.gt3x")}).out, HasSubstr("14 directions; efficiency"));
+  EXPECT_EQ(capture("edges", "e.gt3x").exit_code, 64);
+}
+
 // Before the unit is asked: the rates of docs/protocol.md.
 TEST_F(CommandTest, CaptureRefusesARateThatNoUnitHas) {
   for (const char* rate : {"29", "33", "45", "99", "110", "30.5", ""}) {

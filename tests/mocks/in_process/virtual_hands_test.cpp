@@ -16,13 +16,14 @@ TEST(VirtualHands, ObeyTheirWords) {
   options.truth = sim::draw_unit(7);
   const auto plugged = std::make_shared<PluggedUnit>(options, clock);
   VirtualHands hands(plugged);
-  for (const char* word : {"-x", "knock", "+x turned", "knock"}) {
+  for (const char* word : {"-x", "knock", "+x turned", "knock", "+x-y-z", "knock"}) {
     EXPECT_FALSE(plugged->unit.is_turning(clock->elapsed())) << word;
     EXPECT_OK(hands.obey(word));
     EXPECT_TRUE(plugged->unit.is_turning(clock->elapsed())) << word;
     clock->sleep(std::chrono::seconds(3));
   }
-  for (const char* word : {"", "x", "+w", "swop", " turned", "+w turned", "+x  turned"}) {
+  for (const char* word :
+       {"", "x", "+w", "swop", " turned", "+w turned", "+x  turned", "+x+y", "+x+y+z turned"}) {
     EXPECT_FAILS(hands.obey(word), ErrorCode::usage);
   }
   const auto serial = [&] {

@@ -119,5 +119,25 @@ TEST(VirtualJig, AHalfTurnChangesTheSignOfTheTiltAndNotOfTheMisalignment) {
   EXPECT_NEAR(at[1][0], misalignment_g, 4e-4);
 }
 
+// Oracle: the directions themselves; the sensor's truth undoes its own scale and zero.
+TEST(VirtualJig, StandsAUnitOnItsCorners) {
+  VirtualUnitOptions options;
+  options.seating_deg = 0;
+  Bench bench("1.5.0", options);
+  ASSERT_OK(bench.unit->set_filter(FilterConfiguration::current));
+  for (const device::Corner& corner : device::kCorners) {
+    SCOPED_TRACE(device::to_string(corner));
+    ASSERT_OK(bench.jig->go_to_corner(corner));
+    bench.clock->sleep(std::chrono::seconds(2));
+    EXPECT_FALSE(bench.jig->position()->pose) << "it stands on none of the six sides";
+    const PerAxis<double> at = reading_g(bench);
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      EXPECT_NEAR(at[a], corner.signs[a] * 0.57735, 1e-3);
+    }
+  }
+  ASSERT_OK(bench.jig->stop());
+  EXPECT_FAILS(bench.jig->go_to_corner(device::kCorners[0]), ErrorCode::device_unavailable);
+}
+
 }  // namespace
 }  // namespace sixpoint::mocks

@@ -4,6 +4,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "calib/efficiency.h"
 #include "expect_result.h"
 #include "mocks/inert/inert.h"
 #include "station/virtual_bench.h"
@@ -38,6 +39,82 @@ TEST(CaptureRun, RecordsDownloadsAndSolves) {
     }
     EXPECT_TRUE(bench.env.files.info("c.gt3x"));
   }
+}
+
+// Six sides leave nothing to test the constants with; with the corners, directions that the fit has
+// not seen do. Oracle: the virtual unit's truth, to a third of what the sides alone are held to.
+TEST(CaptureRun, CornersComeAfterTheSidesAndTestTheConstants) {
+  VirtualBench bench;
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  options.corners = true;
+  std::vector<std::string> asked;
+  CaptureHooks hooks;
+  hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
+    asked.emplace_back(device::to_string(side));
+    EXPECT_EQ(number, asked.size());
+    EXPECT_EQ(of, 14U);
+    return SideAnswer::placed;
+  };
+  hooks.ask_corner = [&](const device::Corner& corner, std::size_t number, std::size_t of) {
+    asked.push_back(device::to_string(corner));
+    EXPECT_EQ(number, asked.size());
+    EXPECT_EQ(of, 14U);
+    return SideAnswer::placed;
+  };
+  std::vector<CaptureResume::Side> done;
+  hooks.progress = [&](const CaptureResume& resume) { done = resume.done; };
+  const auto report = run_capture(bench.on_jig(), bench.env.env, options, hooks);
+  ASSERT_OK(report);
+  EXPECT_THAT(asked,
+              testing::ElementsAre("+z", "-z", "+x", "-x", "+y", "-y", "+x+y+z", "-x+y+z", "-x-y+z",
+                                   "+x-y+z", "+x-y-z", "-x-y-z", "-x+y-z", "+x+y-z"));
+  EXPECT_EQ(done.size(), 14U);
+  ASSERT_TRUE(report->solved);
+  EXPECT_EQ(report->solved->verification.verdict, calib::Verdict::verified)
+      << report->solved->brief();
+  EXPECT_EQ(report->solved->fit->directions, 14);
+  EXPECT_GT(calib::efficiency_of(*report->solved->fit, 9).d, 0.97);
+  const sim::SensorTruth& truth = bench.plugged->unit.truth().current;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    EXPECT_NEAR(report->solved->calibration->sensitivity_g_per_lsb[axis] *
+                    truth.sensitivity_lsb_per_g[axis],
+                1, 1e-3);
+    EXPECT_NEAR(report->solved->calibration->zero_lsb[axis], truth.zero_lsb[axis], 0.3);
+  }
+}
+
+// A person stands it there; a motor that knows six sides does not begin.
+TEST(CaptureRun, CornersByHandAndNotByAMotorOfSixSides) {
+  VirtualBench bench;
+  device::ManualJig hands;
+  CaptureOptions options;
+  options.output = "c.gt3x";
+  options.corners = true;
+  CaptureHooks hooks;
+  hooks.ask = [&](device::Pose side, std::size_t, std::size_t) {
+    return bench.jig->go_to(side) ? SideAnswer::placed : SideAnswer::stop;
+  };
+  hooks.ask_corner = [&](const device::Corner& corner, std::size_t, std::size_t) {
+    return bench.jig->go_to_corner(corner) ? SideAnswer::placed : SideAnswer::stop;
+  };
+  const auto report = run_capture({bench.unit.get(), &hands}, bench.env.env, options, hooks);
+  ASSERT_OK(report);
+  EXPECT_EQ(report->solved->fit->directions, 14);
+
+  struct Motor final : device::Jig {
+    std::string name() const override { return "motor"; }
+    bool turns_by_itself() const override { return true; }
+    Status go_to(device::Pose) override { return {}; }
+    Result<device::JigPosition> position() override { return device::JigPosition{}; }
+    Status stop() override { return {}; }
+    Status release() override { return {}; }
+  } motor;
+  options.output = "d.gt3x";
+  const std::size_t recordings = bench.unit->recordings()->size();
+  EXPECT_FAILS(run_capture({bench.unit.get(), &motor}, bench.env.env, options, hooks),
+               ErrorCode::usage);
+  EXPECT_EQ(bench.unit->recordings()->size(), recordings) << "nothing was begun";
 }
 
 TEST(CaptureRun, RefusesAUnitWhoseRecordingCannotHelp) {

@@ -180,7 +180,7 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   ASSERT_OK(left);
   ASSERT_TRUE(left->has_value());
   ASSERT_EQ((*left)->resume.done.size(), 2U);
-  EXPECT_EQ((*left)->resume.done[1].pose, device::Pose::minus_x);
+  EXPECT_EQ((*left)->resume.done[1].pose, CapturePose(device::Pose::minus_x));
   EXPECT_EQ((*left)->resume.done[1].recording, 4);
   ASSERT_OK(lane.clear_capture());
   EXPECT_FALSE(lane.load_capture()->has_value());
