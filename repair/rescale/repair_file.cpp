@@ -307,14 +307,18 @@ class Repair {
   }
 
   // What is wrong with constants from elsewhere by the file's own still periods, where these have a
-  // verified solution. No one asks the survey's blocks after this: it leaves a part of them.
+  // verified solution.
   std::optional<std::string> own_still_periods_contradict() {
     // A thousand blocks, evenly taken, say the same as ten thousand and cost a tenth.
     constexpr std::size_t kEnoughBlocks = 1000;
     const std::size_t stride = 1 + survey_.blocks.size() / kEnoughBlocks;
-    std::erase_if(survey_.blocks,
-                  [&, at = std::size_t{0}](const auto&) mutable { return at++ % stride != 0; });
+    std::vector<calib::StillBlock> all = std::move(survey_.blocks);
+    survey_.blocks.clear();
+    for (std::size_t at = 0; at < all.size(); at += stride) {
+      survey_.blocks.push_back(all[at]);
+    }
     const auto own = solve_survey(report_.input, survey_, {});
+    survey_.blocks = std::move(all);  // the gate is asked once more, of all of them
     if (!own || !own->usable()) {
       return std::nullopt;
     }
@@ -403,6 +407,12 @@ class Repair {
           judge_earlier_output(found_output(mark), report_.input_sha256, recipe());
       if (earlier != EarlierOutput::none &&
           !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
+        if (earlier == EarlierOutput::done && options_.resume) {
+          SIXPOINT_CHECK(read_through(*log));  // its samples are those of the output
+          if (!may_be_kept(*log, windows)) {
+            return not_repairable();
+          }
+        }
         return take_earlier_output(earlier, mark.value_or(Json()));
       }
       SIXPOINT_ASSIGN(auto writer, begin_output());

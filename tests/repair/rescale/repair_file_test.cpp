@@ -1,9 +1,11 @@
 #include "repair/rescale/repair_file.h"
 
+#include <array>
+#include <cmath>
 #include <limits>
 #include <map>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
@@ -93,6 +95,91 @@ class RepairFile : public testing::Test {
   MemoryEnv memory_;
   FixedConstants source_;
 };
+
+// Mean distance from 1 g of what a unit without noise stores in these poses.
+double distance_mg(const std::array<PerAxis<int>, 4>& poses, const calib::Calibration& constants,
+                   bool in_counts) {
+  double sum = 0;
+  for (const PerAxis<int>& raw : poses) {
+    double square = 0;
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const double g = constants.to_g(a, raw[a]);
+      square += std::pow(in_counts ? std::round(256 * g) / 256 : g, 2);
+    }
+    sum += 1000 * std::abs(std::sqrt(square) - 1) / 4;
+  }
+  return sum;
+}
+
+// Writes in.gt3x and returns constants that gain a mg and more, which rounding takes away again.
+// Nothing where none are found.
+std::optional<calib::Calibration> gain_that_rounding_takes_away(FileSystem& files) {
+  const calib::Calibration stored = calib::calibration_from(tests::kStored).value();
+  Random random(11);
+  for (int trial = 0; trial < 1'000'000; ++trial) {
+    calib::Calibration sensors = stored;
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      sensors.sensitivity_g_per_lsb[a] *= 1 + 0.002 * random.normal();
+      sensors.zero_lsb[a] += 0.4 * random.normal();
+    }
+    std::array<PerAxis<int>, 4> poses{};
+    for (PerAxis<int>& raw : poses) {
+      const PerAxis<double> up = {random.normal(), random.normal(), random.normal()};
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        const double g = up[a] / std::hypot(up[0], up[1], up[2]);
+        raw[a] = static_cast<int>(
+            std::lround(g / sensors.sensitivity_g_per_lsb[a] + sensors.zero_lsb[a]));
+      }
+    }
+    const double before_mg = distance_mg(poses, stored, true);
+    if (distance_mg(poses, sensors, false) < before_mg - 1.1 &&
+        distance_mg(poses, sensors, true) > before_mg + 0.4) {
+      MadeRecording made;
+      for (const PerAxis<int>& raw : poses) {
+        made.raw.insert(made.raw.end(), 300, raw);
+      }
+      EXPECT_OK(made.write(files, "in.gt3x"));
+      return sensors;
+    }
+  }
+  return std::nullopt;
+}
+
+// Each way to an output asks: in two passes, in one, a dry run, one that goes on, with and without
+// force.
+TEST_F(RepairFile, WhatRoundingTakesAwayAgainIsNotKept) {
+  const auto sensors = gain_that_rounding_takes_away(memory_.files);
+  ASSERT_TRUE(sensors);
+  source_ = FixedConstants(*sensors);
+  const auto with = [](std::initializer_list<bool RepairOptions::*> given) {
+    RepairOptions options;
+    for (const auto option : given) {
+      options.*option = true;
+    }
+    return options;
+  };
+  const auto expect_refused = [&](const RepairOptions& options, RepairStatus status) {
+    const auto before = output();
+    const RepairReport report = repair(options);
+    EXPECT_EQ(report.status, status) << report.to_json().dump(1);
+    EXPECT_THAT(report.reasons, testing::Contains(testing::HasSubstr("rounded to counts")));
+    EXPECT_GT(report.still_error_after_mg, report.still_error_before_mg);
+    EXPECT_TRUE(output() == before);
+  };
+  expect_refused({}, RepairStatus::not_repairable);
+  expect_refused(with({&RepairOptions::dry_run}), RepairStatus::not_repairable);
+  const RepairReport forced = repair(with({&RepairOptions::force}));
+  EXPECT_EQ(forced.status, RepairStatus::repaired);
+  EXPECT_TRUE(forced.forced);
+  ASSERT_TRUE(output());
+  expect_refused(with({&RepairOptions::resume}), RepairStatus::outdated);
+  expect_refused(with({&RepairOptions::resume, &RepairOptions::redo_outdated}),
+                 RepairStatus::outdated);
+  const RepairReport again = repair(with({&RepairOptions::resume, &RepairOptions::force}));
+  EXPECT_EQ(again.status, RepairStatus::repaired);
+  EXPECT_TRUE(again.resumed);
+  EXPECT_TRUE(again.forced);
+}
 
 TEST_F(RepairFile, EverySampleIsWhatTheRightConstantsWouldHaveStored) {
   const MadeRecording made = six_sides();
