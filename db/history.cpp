@@ -60,6 +60,19 @@ Result<HistoryWriter> HistoryWriter::open(Database& database) {
   return HistoryWriter(database, std::move(head));
 }
 
+namespace {
+
+// A trigger that is not ours can swallow a row, or its change, without an error.
+Status keeps_nothing(Database& database, std::string_view table) {
+  return fail(ErrorCode::bad_data,
+              fmt::format("the table '{}' does not keep what is written into it: another program "
+                          "changed the store",
+                          table),
+              database.location(), "keep this file, and restore the last backup");
+}
+
+}  // namespace
+
 Status HistoryWriter::insert(const Table& table, std::span<const Value> columns,
                              const Sha256Digest& hash) {
   Row row = {Value(head_.rows + 1)};
@@ -71,16 +84,11 @@ Status HistoryWriter::insert(const Table& table, std::span<const Value> columns,
   }
   SIXPOINT_CHECK(database_->execute(
       fmt::format("INSERT INTO {} ({}) VALUES ({})", table.name, column_list(table), places), row));
-  // A trigger that is not ours can swallow a row without an error.
   SIXPOINT_ASSIGN(const auto there,
                   database_->query(fmt::format("SELECT 1 FROM {} WHERE seq = $1", table.name),
                                    std::span<const Value>(row).first(1)));
   if (there.empty()) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("the table '{}' does not keep what is written into it: another program "
-                            "changed the store",
-                            table.name),
-                database_->location(), "keep this file, and restore the last backup");
+    return keeps_nothing(*database_, table.name);
   }
   ++head_.rows;
   head_.hash.assign(hash.begin(), hash.end());
@@ -128,7 +136,10 @@ Status HistoryWriter::add_attachment(const std::string& sha256, Bytes bytes) {
 
 Status HistoryWriter::finish() {
   const std::vector<Value> head = {head_.rows, head_.hash};
-  return database_->execute("UPDATE head SET rows = $1, hash = $2 WHERE one = 1", head);
+  SIXPOINT_CHECK(database_->execute("UPDATE head SET rows = $1, hash = $2 WHERE one = 1", head));
+  SIXPOINT_ASSIGN(const Head kept, read_head(*database_));
+  return kept.rows == head_.rows && kept.hash == head_.hash ? Status()
+                                                            : keeps_nothing(*database_, "head");
 }
 
 std::string name_of(const HistoryRow& row) {

@@ -55,6 +55,7 @@ class SqliteStoreTest : public testing::Test {
 TEST_F(SqliteStoreTest, AStoreWithTablesOfAnotherProgramTakesNothing) {
   for (const char* change :
        {"PRAGMA ignore_check_constraints=ON; UPDATE head SET one = 2",
+        "CREATE TRIGGER t BEFORE UPDATE ON head BEGIN SELECT RAISE(IGNORE); END",
         "CREATE TRIGGER t BEFORE INSERT ON constants BEGIN SELECT RAISE(IGNORE); END"}) {
     std::filesystem::remove(path());
     {
@@ -67,6 +68,7 @@ TEST_F(SqliteStoreTest, AStoreWithTablesOfAnotherProgramTakesNothing) {
     ASSERT_OK(store);
     SCOPED_TRACE(change);
     EXPECT_FAILS(store->add_constants(constants(2), "w"), ErrorCode::bad_data);
+    EXPECT_EQ(store->history("MOS2A1")->size(), 1U) << "nothing of it is there";
   }
 }
 
