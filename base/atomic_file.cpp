@@ -75,7 +75,8 @@ std::string temporary_name(const std::string& path, int attempt) {
 
 // Removes what processes that are gone left for this target: a file that is being written is noted
 // by this process, and locked by another one until it has its name (posix_env.cpp). Where the file
-// system has no locks, nothing is known and everything stays.
+// system has no locks, nothing is known and everything stays. Locks that one machine keeps to itself
+// (NFS mounted with local_lock, Lustre with localflock) do not show what another one is writing.
 void remove_abandoned(FileSystem& files, const std::string& path) {
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const std::string temporary = temporary_name(path, attempt);

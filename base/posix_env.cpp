@@ -1,6 +1,7 @@
 // The real clock and disk behind Env.
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <thread>
@@ -207,11 +208,15 @@ class PosixFileSystem final : public FileSystem {
 
   // Locked as by lock() until it is closed, so that other processes see that it is being written
   // (atomic_file.cpp). One that looks at just this moment may take it for abandoned and remove it:
-  // then once more.
+  // then once more, when it is gone.
   Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
     constexpr int kMostTries = 10;
     for (int tries = 1;; ++tries) {
       const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      if (fd < 0 && errno == EEXIST && tries > 1 && tries < kMostTries) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        continue;
+      }
       if (fd < 0) {
         return system_failure(errno, ErrorCode::cannot_create, "cannot create", path);
       }
@@ -239,19 +244,26 @@ class PosixFileSystem final : public FileSystem {
   // flock() belongs to the open file: it also keeps two threads of one process apart, and Linux
   // takes it as a byte-range lock to the server of an NFS folder.
   Result<std::unique_ptr<FileLock>> lock(const std::string& path) override {
-    const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd < 0) {
-      return system_failure(errno, ErrorCode::cannot_create, "cannot make the lock", path);
+    constexpr int kMostOpenings = 100;
+    for (int tries = 0; tries < kMostOpenings; ++tries) {
+      const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+      if (fd < 0) {
+        return system_failure(errno, ErrorCode::cannot_create, "cannot make the lock", path);
+      }
+      std::unique_ptr<FileLock> held = std::make_unique<PosixLock>(fd);
+      const int error = try_lock(fd);
+      if (error == EWOULDBLOCK) {
+        return nullptr;
+      }
+      if (error != 0) {
+        return system_failure(error, ErrorCode::io, "cannot lock", path);
+      }
+      // Between open() and here the file may have lost its name, and another one may have it.
+      if (is_named(fd, path)) {
+        return held;
+      }
     }
-    std::unique_ptr<FileLock> held = std::make_unique<PosixLock>(fd);
-    const int error = try_lock(fd);
-    if (error == 0) {
-      return held;
-    }
-    if (error == EWOULDBLOCK) {
-      return nullptr;
-    }
-    return system_failure(error, ErrorCode::io, "cannot lock", path);
+    return nullptr;  // others have it, one after the other
   }
 
   Result<std::vector<std::string>> list(const std::string& folder) override {
