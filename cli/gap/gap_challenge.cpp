@@ -3,8 +3,10 @@
 // Each trial is a bundle in a temporary folder; `gap diagnose` runs as a process of its own that
 // gets nothing but that folder, and with --strip a catalogue without the true effects.
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <set>
 
@@ -21,6 +23,7 @@
 #include "cli/gap/gap_commands.h"
 #include "cli/gap/gap_export.h"
 #include "cli/output.h"
+#include "cli/stop_request.h"
 #include "cli/workers.h"
 #include "gap/challenge/outside.h"
 #include "gap/challenge/recorded.h"
@@ -54,9 +57,12 @@ struct GapChallengeCommandOptions : ChallengeSetting {
   bool json = false;
 };
 
+// Was the command told to stop? Asked by those that wait for a diagnosis.
+using Stopped = std::function<bool()>;
+
 // Runs `arguments` with standard output in a file, at most `limit_s` seconds; the exit code.
 Result<int> run_process(const std::vector<std::string>& arguments, const std::string& output,
-                        double limit_s, Clock& clock) {
+                        double limit_s, Clock& clock, const Stopped& stopped) {
   const auto failed = [&](const char* what) {
     return fail(ErrorCode::internal, what, arguments.front(), "name the program with --program");
   };
@@ -79,10 +85,11 @@ Result<int> run_process(const std::vector<std::string>& arguments, const std::st
     if (ended < 0) {
       return failed("the program got lost");
     }
-    if (std::chrono::duration<double>(clock.elapsed() - start).count() > limit_s) {
+    const bool too_long = std::chrono::duration<double>(clock.elapsed() - start).count() > limit_s;
+    if (too_long || stopped()) {
       kill(*process, SIGKILL);
       waitpid(*process, &status, 0);
-      return failed("the program took too long");
+      return failed(too_long ? "the program took too long" : "stopped");
     }
     clock.sleep(std::chrono::milliseconds(2));
   }
@@ -95,10 +102,11 @@ Result<int> run_process(const std::vector<std::string>& arguments, const std::st
 // Runs a diagnosis as a process and reads its answer; exit codes of errors and answers of another
 // form are the outcome's failure.
 Status diagnose(Env& env, const std::vector<std::string>& arguments, const std::string& answer,
-                Outcome& outcome) {
+                const Stopped& stopped, Outcome& outcome) {
   constexpr double kLimit_s = 120;
   constexpr int kFirstError = 64;  // smaller exit codes are verdicts
-  SIXPOINT_ASSIGN(const int exit_code, run_process(arguments, answer, kLimit_s, env.clock));
+  SIXPOINT_ASSIGN(const int exit_code,
+                  run_process(arguments, answer, kLimit_s, env.clock, stopped));
   if (exit_code >= kFirstError) {
     outcome.failure = fmt::format("exit code {}", exit_code);
     return {};
@@ -115,7 +123,8 @@ bool is_plain(const std::string& recording) {
 
 // Writes the trial and diagnoses it.
 Result<Outcome> answer_trial(Env& env, const GapChallengeCommandOptions& options,
-                             const GapTrial& trial, const std::string& name) {
+                             const GapTrial& trial, const std::string& name,
+                             const Stopped& stopped) {
   Outcome outcome = gap::outcome_of(trial);
   const bool plain = is_plain(options.recording);
   const std::string bundle = name + (plain ? ".gt3x" : "");
@@ -139,7 +148,7 @@ Result<Outcome> answer_trial(Env& env, const GapChallengeCommandOptions& options
   }
   const std::string answer = bundle + ".answer.json";
   const auto start = env.clock.elapsed();
-  if (const Status done = diagnose(env, arguments, answer, outcome); !done) {
+  if (const Status done = diagnose(env, arguments, answer, stopped, outcome); !done) {
     outcome.failure = done.error().what;
   }
   outcome.seconds = std::chrono::duration<double>(env.clock.elapsed() - start).count();
@@ -158,24 +167,25 @@ Result<Outcome> answer_trial(Env& env, const GapChallengeCommandOptions& options
 // One trial; with --follow-suggestion twice: as it is, and with the segment that it suggests.
 Result<Followed> run_trial(Env& env, const GapChallengeCommandOptions& options,
                            sim::StandardProtocol protocol, const std::string& folder,
-                           std::size_t index) {
+                           std::size_t index, const Stopped& stopped) {
   SIXPOINT_ASSIGN(GapTrial trial,
                   gap::draw_trial(options.seed, index, protocol, options.shares, options.only));
   const std::string name = fmt::format("{}/{:06}", folder, index);
   Followed followed;
-  SIXPOINT_ASSIGN(followed.before, answer_trial(env, options, trial, name));
+  SIXPOINT_ASSIGN(followed.before, answer_trial(env, options, trial, name, stopped));
   if (options.follow && !followed.before.suggestions.empty()) {
     SIXPOINT_CHECK(gap::follow(trial.scenario, followed.before.suggestions.front().segment));
-    SIXPOINT_ASSIGN(followed.after, answer_trial(env, options, trial, name + "-followed"));
+    SIXPOINT_ASSIGN(followed.after, answer_trial(env, options, trial, name + "-followed", stopped));
   }
   return followed;
 }
 
 // Diagnoses the recording to which effects will be added, as it is.
-Status learn_own(Env& env, GapChallengeCommandOptions& options, const std::string& folder) {
+Status learn_own(Env& env, GapChallengeCommandOptions& options, const std::string& folder,
+                 const Stopped& stopped) {
   Outcome own;
   SIXPOINT_CHECK(diagnose(env, {options.program, "gap", "diagnose", options.recording, "--json"},
-                          folder + "/own.answer.json", own));
+                          folder + "/own.answer.json", stopped, own));
   if (!own.failure.empty()) {
     return fail(ErrorCode::bad_data, "the recording can't be diagnosed", options.recording,
                 "sixpoint gap diagnose says why");
@@ -274,16 +284,26 @@ class TrialFolder {
   bool is_temporary_ = false;
 };
 
+// Empty where the command was told to stop.
 Result<std::vector<Followed>> run_trials(Env& env, const GapChallengeCommandOptions& options,
                                          sim::StandardProtocol protocol, const std::string& folder,
-                                         Context& context) {
+                                         StopRequest& stop, Context& context) {
   std::vector<Result<Followed>> results(options.trials, Result<Followed>(Followed{}));
+  std::atomic<bool> stopping{false};
   {
     Progress progress(context, "trials", options.trials);
+    const Stopped stopped = [&stopping] { return stopping.load(); };
     for_each_job(
         options.trials, options.jobs,
-        [&](std::size_t i) { results[i] = run_trial(env, options, protocol, folder, i); },
-        [&](std::size_t done) { progress.at(done); });
+        [&](std::size_t i) { results[i] = run_trial(env, options, protocol, folder, i, stopped); },
+        [&](std::size_t done) {
+          progress.at(done);
+          stopping = stop.requested();
+        },
+        &stopping);
+  }
+  if (stopping) {
+    return std::vector<Followed>();
   }
   std::vector<Followed> trials;
   for (Result<Followed>& result : results) {
@@ -314,6 +334,12 @@ void print_scores(const GapChallengeCommandOptions& options, const Scores& score
   }
 }
 
+Status end_stopped(Context& context) {
+  context.people << "stopped; nothing is scored\n";
+  context.worsen(kExitStopped);
+  return {};
+}
+
 Status challenge(GapChallengeCommandOptions options, Context& context) {
   const auto protocol = sim::parse_standard_protocol(options.protocol);
   if (!protocol) {
@@ -338,18 +364,28 @@ Status challenge(GapChallengeCommandOptions options, Context& context) {
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(outputs.input(options.recording));
   SIXPOINT_CHECK(outputs.file("--html", options.html));
+  StopRequest stop;  // Ctrl-C ends the diagnoses under way, and leaves no folder
   TrialFolder folder;
   SIXPOINT_CHECK(folder.make(options.keep, outputs));
   Env env = outputs.env();
   if (!options.recording.empty()) {
-    SIXPOINT_CHECK(learn_own(env, options, folder.path()));
+    const Status learnt =
+        learn_own(env, options, folder.path(), [&stop] { return stop.requested(); });
+    if (stop.requested()) {
+      return end_stopped(context);
+    }
+    SIXPOINT_CHECK(learnt);
     if (std::all_of(options.only.begin(), options.only.end(),
                     [&](const std::string& name) { return options.own_effects.contains(name); })) {
       return fail(ErrorCode::bad_data, "the recording has of its own all that could be added to it",
                   options.recording, "give the recording of a unit that reads right");
     }
   }
-  SIXPOINT_ASSIGN(const auto trials, run_trials(env, options, *protocol, folder.path(), context));
+  SIXPOINT_ASSIGN(const auto trials,
+                  run_trials(env, options, *protocol, folder.path(), stop, context));
+  if (stop.requested()) {
+    return end_stopped(context);
+  }
   std::vector<Outcome> outcomes;
   outcomes.reserve(trials.size());
   for (const Followed& trial : trials) {

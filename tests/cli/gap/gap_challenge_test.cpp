@@ -1,9 +1,15 @@
 // gap challenge: trials, and scores of a diagnosis of which everything is known.
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "run_command.h"
 #include "sanitized.h"
@@ -47,6 +53,40 @@ TEST_F(GapChallenge, ScoresAnAnswerThatIsAlwaysTilt) {
       challenge({"--program", path, "--trials", "5", "--none", "0", "--outside", "1"});
   EXPECT_EQ(outside.json()["scores"]["withheld_confidently_wrong"]["right"], 5);
   EXPECT_EQ(outside.json()["scores"]["withheld_honest"]["right"], 0);
+}
+
+// A diagnosis that never ends; `ready` is there once it runs.
+TEST_F(GapChallenge, StoppedItLeavesNoProcessAndNoFolder) {
+  const std::string path = program("echo $$ >" + (folder_ / "pid") + "\nmv " + (folder_ / "pid") +
+                                   " " + (folder_ / "ready") + "\nexec sleep 1000\n");
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const std::string temporary = folder_ / "temporary";
+    std::filesystem::create_directory(temporary);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      ::setenv("TMPDIR", temporary.c_str(), 1);
+      ::execl(SIXPOINT_PROGRAM, "sixpoint", "gap", "challenge", "--protocol", "production",
+              "--trials", "4", "--program", path.c_str(), nullptr);
+      ::_exit(127);
+    }
+    while (!std::filesystem::exists(folder_ / "ready")) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_FALSE(std::filesystem::is_empty(temporary));
+    ASSERT_EQ(::kill(child, signal), 0);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 3);
+    EXPECT_TRUE(std::filesystem::is_empty(temporary));
+    pid_t diagnosis = 0;
+    std::ifstream(folder_ / "ready") >> diagnosis;
+    ASSERT_GT(diagnosis, 0);
+    EXPECT_EQ(::kill(diagnosis, 0), -1) << "it works on";
+    std::filesystem::remove(folder_ / "ready");
+    std::filesystem::remove(temporary);
+  }
 }
 
 TEST_F(GapChallenge, StripTakesTheTruthAwayAndTheBundleKeepsIt) {
