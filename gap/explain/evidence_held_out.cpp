@@ -41,10 +41,10 @@ double residual_of_row(const Whitened& w, int row, const Posterior& posterior) {
   return residual;
 }
 
-// Mean squares of predictions, with nuisances alone and with the explanation.
 // A standard deviation far above those of means and tones, which are tenths of a mg.
 constexpr double kBadlyKnown_mg = 2;
 
+// Mean squares of predictions, with nuisances alone and with the explanation.
 struct Squares {
   double before = 0;
   double after = 0;
