@@ -30,6 +30,12 @@ struct RecordingWriter::Archive {
       return fail(ErrorCode::usage, "an entry cannot be named '" + printable(name, 60) + "'", path,
                   "use a name inside the archive");
     }
+    if (names.size() == ArchiveLimits{}.entries) {
+      return fail(ErrorCode::bad_data,
+                  "one entry more than the " + std::to_string(ArchiveLimits{}.entries) +
+                      " that a recording may have",
+                  path, "take out of the original, or a copy, what does not belong to it");
+    }
     if (!names.insert(name).second) {
       return fail(ErrorCode::usage, "an entry named " + printable(name, 60) + " was added already",
                   path, "add each entry once");

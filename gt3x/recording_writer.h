@@ -44,8 +44,9 @@ class RecordingWriter {
   RecordingWriter& operator=(RecordingWriter&&) noexcept;
   ~RecordingWriter();
 
-  // A name may be added once and must stay inside (entry_rule.h); `usage` otherwise. Errors of a
-  // source come back as they are.
+  // A name may be added once and must stay inside (entry_rule.h); `usage` otherwise. bad_data for
+  // one more than a recording may have (ArchiveLimits), as it would be refused when it is read.
+  // Errors of a source come back as they are.
   Status add(const std::string& name, ByteSource& source);
   Status add(const std::string& name, Bytes bytes);
   Status add(const std::string& name, std::string_view text);

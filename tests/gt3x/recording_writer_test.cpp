@@ -43,6 +43,23 @@ class FailingSource final : public ByteSource {
   }
 };
 
+// What is written can be read again.
+TEST(RecordingWriter, RefusesOneEntryMoreThanIsRead) {
+  MemoryEnv memory;
+  auto out = RecordingWriter::create(memory.files, "a.gt3x");
+  ASSERT_OK(out);
+  ASSERT_OK(out->add("log.bin", std::string_view()));
+  ASSERT_OK(out->add("info.txt", std::string_view("Serial Number: MOS2A45130450")));
+  for (std::uint64_t i = 2; i < ArchiveLimits{}.entries; ++i) {
+    ASSERT_OK(out->add("entry " + std::to_string(i), std::string_view("text")));
+  }
+  EXPECT_FAILS(out->add("one more", std::string_view("text")), ErrorCode::bad_data);
+  ASSERT_OK(out->commit());
+  const auto back = Recording::open(memory.files, "a.gt3x");
+  ASSERT_OK(back);
+  EXPECT_EQ(back->entries().size(), ArchiveLimits{}.entries);
+}
+
 TEST(RecordingWriter, ASourceThatFailsLeavesNoFile) {
   MemoryEnv memory;
   {
