@@ -337,7 +337,13 @@ void Lanes::Lane::set_aside_result(const Error& why) {
   is_unstored_ = !kept;
   if (kept) {
     unstored_.reset();
-    unwritten_serial_.clear();  // constants of which there is no record
+    // Constants of which there is no record are not written, also where that was asked for meanwhile.
+    unwritten_.reset();
+    unwritten_serial_.clear();
+    if (order_ && order_->start.last_run) {
+      order_.reset();
+      add_log("problem", "not started: there is no record of the run whose constants wait");
+    }
   }
 }
 

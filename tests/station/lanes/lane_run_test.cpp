@@ -318,6 +318,27 @@ TEST(LaneRun, ARunThatNoStoreTakesIsKeptInAFileAndTheLaneIsFree) {
   });
 }
 
+// The lane's thread is held in the store while "write now" is given.
+TEST(LaneRun, AWriteThatWasOrderedBeforeItsRunWasSetAsideIsNotCarriedOut) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  {
+    const std::unique_lock held(station.mutex);
+    station.store_refuses = true;
+    station.start("/api/run");
+    station.wait(1, [](const Json& json) {
+      return json["result"].is_object() && json["result"].value("can_write", false);
+    });
+    ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+  }
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["log"].dump().find("not started: there is no record") != std::string::npos;
+  });
+  EXPECT_EQ(lane["state"], "done");
+  EXPECT_EQ(lane["result"]["written"], false) << lane["result"].dump(1);
+  EXPECT_EQ(station.post("/api/run", {{"last_run", true}}), 409);
+}
+
 // A defect ends the work of its lane, with a word, and not the program with all the others.
 TEST(LaneRun, AnExceptionEndsTheWorkOfItsLaneAlone) {
   const tests::TemporaryFolder folder;
