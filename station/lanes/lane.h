@@ -66,7 +66,7 @@ class Lanes::Lane {
   LaneAnswer<void> command(const std::string& client, OperatorCommand command);
   LaneAnswer<void> confirm_side(const std::string& client);
   LaneAnswer<void> scan(const std::string& serial);
-  LaneAnswer<void> release_jig(const std::string& client);
+  LaneAnswer<void> release_jig(const std::string& client, const std::string& name);
   LaneAnswer<void> take_over(const std::string& client, const std::string& operator_name);
 
   bool holds(const std::string& serial) const {
@@ -100,6 +100,7 @@ class Lanes::Lane {
   // The operator's word that the jig is free.
   struct Release {
     std::string fault;  // that the operator saw
+    std::string name;   // of the operator; may be empty
     std::chrono::nanoseconds given{0};
   };
   struct LogLine {

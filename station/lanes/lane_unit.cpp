@@ -181,7 +181,8 @@ void Lanes::Lane::look_at_jig() {
   if (release) {
     add_log(problem ? "problem" : "jig",
             problem.value_or(
-                fmt::format("{} says that the jig is free", printable(operator_name_, 60))));
+                fmt::format("{} says that the jig is free",
+                            release->name.empty() ? "someone" : printable(release->name, 60))));
   }
   if (fault != jig_fault_) {
     jig_fault_ = fault;

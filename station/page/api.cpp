@@ -424,10 +424,11 @@ ApiAnswer Api::command_lane(std::size_t lane, const std::string& command, const 
   } else if (command == "placed") {
     done = parts_.lanes.confirm_side(lane, client);
   } else if (command == "jig-free") {
-    if (const auto who = signer(request, {}, OperatorRole::technician); !who) {
+    const auto who = signer(request, {}, OperatorRole::technician);
+    if (!who) {
       return who.error();
     }
-    done = parts_.lanes.release_jig(lane, client);
+    done = parts_.lanes.release_jig(lane, client, who->name);
   } else if (command == "take") {
     const auto operator_name = text_of(body, "operator");
     if (!operator_name) {
