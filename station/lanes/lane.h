@@ -171,9 +171,10 @@ class Lanes::Lane {
   // The verdict is shown at once; store_result() follows.
   void show_result(const JigReport& report, const RunLabels& labels);
   // Stores the last run. Until that succeeds, the run stays on the disk of this station. One that
-  // no store takes is set aside there, and the lane is free.
+  // no store takes is set aside there, and the lane is free; so is one whose storing ended by a
+  // defect of the program, which may have come after the store took it.
   void store_result(const std::stop_token& stop);
-  void set_aside_result(const Error& why);
+  bool set_aside_result();  // false where that failed
 
   // A calibration file (lane_capture.cpp).
   void capture(const std::stop_token& stop, const StartOrder& order,
@@ -231,6 +232,8 @@ class Lanes::Lane {
   struct Unstored {
     JigReport report;
     RunLabels labels;
+    // Why it is set aside and the store is not asked again, for people; empty: it is asked.
+    std::string never_again = {};
   };
   std::optional<Unstored> unstored_;
   // The last run, where it passed and nothing was written, for write_last().

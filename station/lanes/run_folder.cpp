@@ -212,6 +212,7 @@ Status RunFolder::close() {
 }
 
 Status RunFolder::clear() {
+  ended_report_.clear();
   SIXPOINT_CHECK(close());
   if (!env_.files.info(folder_)) {
     return {};
@@ -264,12 +265,14 @@ Status RunFolder::set_aside_run() {
 Result<std::string> RunFolder::set_aside_ended_run(std::string_view report) {
   SIXPOINT_CHECK(close());
   SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
-  std::string path =
-      fmt::format("{}/report.json.{}.bad", folder_, to_unix_seconds(env_.clock.now()));
-  SIXPOINT_CHECK(write_file(env_.files, path, report));
+  if (ended_report_.empty()) {
+    ended_report_ =
+        fmt::format("{}/report.json.{}.bad", folder_, to_unix_seconds(env_.clock.now()));
+  }
+  SIXPOINT_CHECK(write_file(env_.files, ended_report_, report));
   SIXPOINT_CHECK(set_aside_run());
   SIXPOINT_CHECK(env_.files.sync_folder(folder_));
-  return path;
+  return std::exchange(ended_report_, {});
 }
 
 Status RunFolder::set_aside_capture() { return set_aside({kCapture + 1}); }
