@@ -77,6 +77,9 @@ void Lanes::Lane::end_by_defect(const std::string& what) {
   if (was_busy && unit_ && unit_->jig() != nullptr && unit_->jig()->turns_by_itself()) {
     static_cast<void>(unit_->jig()->stop());  // no one watches it any more
   }
+  if (was_capture && unit_) {
+    static_cast<void>(unit_->stop_recording());  // it would empty its battery
+  }
   if (was_capture) {
     end_capture_by(error, serial);
   } else if (was_busy) {

@@ -1,4 +1,5 @@
 // Calibration files recorded in a lane.
+#include "base/forwarding_files.h"
 #include "station/page/station_in_process.h"
 
 namespace sixpoint::station {
@@ -112,6 +113,53 @@ TEST(LaneCapture, ACaptureStartsAgainWhenTheUnitHasLostItsRecording) {
   const Json lane = station.wait_state(1, "done");
   EXPECT_EQ(lane["result"]["verdict"], "pass") << lane["result"].dump(1);
   EXPECT_THAT(lane["result"]["notes"].dump(), HasSubstr("lost its recording; 2 sides are"));
+}
+
+class FilesWithDefect final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Status rename(const std::string& from, const std::string& to) override {
+    if (to.ends_with("/capture.json") && ++saved == 3) {
+      throw std::runtime_error("no such key");
+    }
+    return ForwardingFiles::rename(from, to);
+  }
+  std::atomic<int> saved{0};
+};
+
+// Oracle: a unit that records sends no live readings.
+TEST(LaneCapture, ADefectDoesNotLeaveTheUnitRecording) {
+  const tests::TemporaryFolder folder;
+  FilesWithDefect files(posix_env().files);
+  Env env{posix_env().clock, files};
+  mocks::VirtualBench bench;
+  device::TransportRegistry registry = known_devices();
+  bench.register_in(registry);
+  LanesOptions options;
+  options.devices = {"virtual:seed=7,jig=auto"};
+  options.state_folder = folder / "state";
+  options.capture_folder = folder.path();
+  options.silence_s = 0.2;
+  const auto lanes = Lanes::open(env, registry, options, {}, {});
+  ASSERT_OK(lanes);
+  const auto wait = [&](auto ready) {
+    for (int i = 0; i < 1000; ++i) {
+      if (ready((*lanes)->to_json(1))) {
+        return true;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  };
+  ASSERT_TRUE(wait([](const Json& json) { return json["state"] == "idle"; }));
+  ASSERT_TRUE((*lanes)->start_capture(1, {}).has_value());
+  ASSERT_TRUE(wait([](const Json& json) {
+    return json["result"].is_object() && json["result"]["verdict"] == "inconclusive";
+  }));
+  EXPECT_EQ(files.saved, 3) << "two sides were begun";
+  const std::uint64_t seen = (*lanes)->trace(1, ~std::uint64_t{0}).first;
+  EXPECT_TRUE(
+      wait([&](const Json&) { return (*lanes)->trace(1, ~std::uint64_t{0}).first > seen; }));
 }
 
 struct JumpingClock : Clock {
