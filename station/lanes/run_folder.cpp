@@ -86,6 +86,7 @@ Result<UnfinishedCapture> parse_capture(const Json& json) {
   UnfinishedCapture capture;
   SIXPOINT_CHECK(parse_common(json, capture));
   json.at("output").get_to(capture.output);
+  capture.resume.asked_again = json.value("asked_again", false);  // not in earlier versions
   for (const Json& side : json.at("done")) {
     SIXPOINT_ASSIGN(const auto pose, device::parse_pose(side.at("pose").get<std::string>()));
     capture.resume.done.push_back({pose, side.at("recording").get<std::uint16_t>()});
@@ -238,6 +239,7 @@ Status RunFolder::save_capture(const UnfinishedCapture& capture) {
                {"operator", capture.operator_name},
                {"client", capture.client},
                {"output", capture.output},
+               {"asked_again", capture.resume.asked_again},
                {"started", to_iso8601(capture.resume.started)}};
   json["done"] = Json::array();
   for (const CaptureResume::Side& side : capture.resume.done) {

@@ -216,6 +216,7 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   capture.serial = "MOS2A45130007";
   capture.output = "out.gt3x";
   capture.resume.done = {{device::Pose::plus_z, 3}, {device::Pose::minus_x, 4}};
+  capture.resume.asked_again = true;
   ASSERT_OK(lane.save_capture(capture));
   const std::string json = text_of_file(folder / "lane/capture.json");
   EXPECT_NE(json.find("\"-x\""), std::string::npos) << json;
@@ -225,6 +226,12 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   ASSERT_EQ((*left)->resume.done.size(), 2U);
   EXPECT_EQ((*left)->resume.done[1].pose, CapturePose(device::Pose::minus_x));
   EXPECT_EQ((*left)->resume.done[1].recording, 4);
+  EXPECT_TRUE((*left)->resume.asked_again);
+  // An earlier version did not write it.
+  auto old = nlohmann::ordered_json::parse(json);
+  old.erase("asked_again");
+  std::ofstream(folder / "lane/capture.json") << old;
+  EXPECT_FALSE((*lane.load_capture())->resume.asked_again);
   ASSERT_OK(lane.clear_capture());
   EXPECT_FALSE(lane.load_capture()->has_value());
 }
