@@ -193,6 +193,8 @@ TEST(LaneCapture, ACalendarThatIsSetEndsNoCapture) {
   wait([](const Json& json) {
     return json["capture"].is_object() && json["capture"]["side"].is_string();
   });
+  ASSERT_TRUE((*lanes)->to_json(1)["capture"].is_object());
+  ASSERT_TRUE((*lanes)->to_json(1)["capture"]["side"].is_string());
   clock.hours = 2;
   std::this_thread::sleep_for(std::chrono::milliseconds(1500));  // three looks at the time
   EXPECT_EQ((*lanes)->state(1), LaneState::capturing);
