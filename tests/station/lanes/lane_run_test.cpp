@@ -383,7 +383,7 @@ class FilesWithoutNewNames final : public ForwardingFiles {
       return ForwardingFiles::rename(from, to);
     }
     ++attempts;
-    return fail(ErrorCode::io, "the disk fails", to);
+    return fail(ErrorCode::io, "the disk fails", to, "see to the disk");
   }
   std::atomic<bool> fails{true};
   std::atomic<int> attempts{0};

@@ -169,8 +169,9 @@ class NoNewNames final : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;
   Status rename(const std::string& from, const std::string& to) override {
-    return fails && from.ends_with("run.json") ? fail(ErrorCode::io, "the disk fails", to)
-                                               : ForwardingFiles::rename(from, to);
+    return fails && from.ends_with("run.json")
+               ? fail(ErrorCode::io, "the disk fails", to, "see to the disk")
+               : ForwardingFiles::rename(from, to);
   }
   bool fails = true;
 };
