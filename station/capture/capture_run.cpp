@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -176,6 +177,9 @@ class CaptureRun {
     }
     if (resume) {
       progress_ = *resume;
+      if (std::exchange(progress_.asked_again, false)) {
+        remove_beside();
+      }
       SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
     } else {
       SIXPOINT_CHECK(refuse_existing(env_.files, options_.output));
@@ -303,6 +307,7 @@ class CaptureRun {
     }
     report_.notes.push_back(
         fmt::format("too few still readings with {} up: asked for again", names));
+    progress_.asked_again = true;
     SIXPOINT_CHECK(retry([&] { return begin_anew(); }));
     hooks_.again(sides);
     return {};
@@ -333,6 +338,43 @@ class CaptureRun {
     return options_.output.substr(0, dot) + "-new" + options_.output.substr(dot);
   }
 
+  // Whether the second download makes a file of this name: the whole, a piece, or the part of one
+  // that a download leaves where it breaks off ("c-new-1.gt3x.0123456789ab.part", WireUnit).
+  bool is_beside(std::string_view name) const {
+    constexpr std::string_view kBefore = ".before";
+    constexpr std::string_view kPart = ".part";
+    constexpr std::size_t kDigits = 12;
+    if (name.ends_with(std::string(kPart).append(kBefore))) {
+      name.remove_suffix(kBefore.size());
+    }
+    if (name.ends_with(kPart)) {
+      name.remove_suffix(kPart.size());
+      const std::size_t end = name.find_last_not_of("0123456789abcdef");
+      if (end == std::string_view::npos || name[end] != '.' || name.size() - end - 1 != kDigits) {
+        return false;
+      }
+      name = name.substr(0, end);
+    }
+    const std::string beside = beside_name();
+    bool found = name == beside;
+    for (std::size_t number = 1; !found && number <= poses_.size(); ++number) {
+      found = name == piece_name(beside, number);
+    }
+    return found;
+  }
+
+  // Only after may_make_pieces(): then no other file has such a name.
+  void remove_beside() {
+    const std::string prefix = options_.output.substr(0, options_.output.rfind('/') + 1);
+    const auto names = env_.files.list(folder_of(options_.output));
+    for (const std::string& name : names ? *names : std::vector<std::string>()) {
+      if (is_beside(prefix + name)) {
+        static_cast<void>(env_.files.remove(prefix + name));
+      }
+    }
+    AtomicFile::remove_left_over(env_.files, beside_name());
+  }
+
   // After a side was repeated: all is downloaded and judged beside what this capture made before,
   // and then takes its place. Where that fails, file and judgement of before stay.
   Status fetch_anew() {
@@ -345,10 +387,7 @@ class CaptureRun {
       done = take_place(beside, before.pieces);
     }
     if (!done) {
-      report_.pieces.push_back(beside);
-      for (const std::string& name : report_.pieces) {
-        static_cast<void>(env_.files.remove(name));
-      }
+      remove_beside();
       auto notes = std::move(report_.notes);
       report_ = before;
       report_.notes = std::move(notes);

@@ -62,6 +62,9 @@ struct CaptureResume {
   };
   UtcTime started{};
   std::vector<Side> done;
+  // Sides were asked for again: no file had the names of the second download then ("c-new.gt3x",
+  // "c-new-1.gt3x" ... for "c.gt3x"), so those that have them now are this capture's.
+  bool asked_again = false;
 };
 
 enum class SideAnswer {

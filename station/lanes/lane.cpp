@@ -120,7 +120,7 @@ LaneAnswer<void> Lanes::Lane::confirm_side(const std::string& client) {
   return {};
 }
 
-LaneAnswer<void> Lanes::Lane::release_jig(const std::string& client) {
+LaneAnswer<void> Lanes::Lane::release_jig(const std::string& client, const std::string& name) {
   const std::lock_guard lock(mutex_);
   if (auto checked = check_client(client); !checked) {
     return checked;
@@ -133,7 +133,7 @@ LaneAnswer<void> Lanes::Lane::release_jig(const std::string& client) {
     return lane_conflict(is_busy() ? "a run is under way in this lane" : "the jig is free",
                          "a jig is released after it was stopped, when no run is under way");
   }
-  release_ = Release{jig_fault_, env_.clock.elapsed()};
+  release_ = Release{jig_fault_, name, env_.clock.elapsed()};
   wake_.notify_all();
   return {};
 }

@@ -66,7 +66,7 @@ class Lanes::Lane {
   LaneAnswer<void> command(const std::string& client, OperatorCommand command);
   LaneAnswer<void> confirm_side(const std::string& client);
   LaneAnswer<void> scan(const std::string& serial);
-  LaneAnswer<void> release_jig(const std::string& client);
+  LaneAnswer<void> release_jig(const std::string& client, const std::string& name);
   LaneAnswer<void> take_over(const std::string& client, const std::string& operator_name);
 
   bool holds(const std::string& serial) const {
@@ -100,6 +100,7 @@ class Lanes::Lane {
   // The operator's word that the jig is free.
   struct Release {
     std::string fault;  // that the operator saw
+    std::string name;   // of the operator; may be empty
     std::chrono::nanoseconds given{0};
   };
   struct LogLine {
@@ -170,9 +171,10 @@ class Lanes::Lane {
   // The verdict is shown at once; store_result() follows.
   void show_result(const JigReport& report, const RunLabels& labels);
   // Stores the last run. Until that succeeds, the run stays on the disk of this station. One that
-  // no store takes is set aside there, and the lane is free.
+  // no store takes is set aside there, and the lane is free; so is one whose storing ended by a
+  // defect of the program, which may have come after the store took it.
   void store_result(const std::stop_token& stop);
-  void set_aside_result(const Error& why);
+  bool set_aside_result();  // false where that failed
 
   // A calibration file (lane_capture.cpp).
   void capture(const std::stop_token& stop, const StartOrder& order,
@@ -230,6 +232,8 @@ class Lanes::Lane {
   struct Unstored {
     JigReport report;
     RunLabels labels;
+    // Why it is set aside and the store is not asked again, for people; empty: it is asked.
+    std::string never_again = {};
   };
   std::optional<Unstored> unstored_;
   // The last run, where it passed and nothing was written, for write_last().

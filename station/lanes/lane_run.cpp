@@ -275,16 +275,29 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
   if (!unstored_) {
     return;
   }
-  const auto stored = [this]() -> Result<RunInStore> {
+  const auto stored = [&]() -> Result<RunInStore> {
+    if (!unstored_->never_again.empty()) {
+      return fail(ErrorCode::bad_data, unstored_->never_again);
+    }
     const std::lock_guard lock(shared_.store_mutex);
     try {
       return shared_.store_run(unstored_->report, unstored_->labels);
     } catch (const std::exception& defect) {  // as in end_by_defect()
-      return fail(ErrorCode::bad_data, fmt::format("a defect of the program: {}", defect.what()));
+      unstored_->never_again = fmt::format(
+          "a defect of the program ended the storing: {}; it is not known whether the store has "
+          "the run",
+          printable(defect.what()));
+      return fail(ErrorCode::bad_data, unstored_->never_again);
     }
   }();
   if (!stored && stored.error().code == ErrorCode::bad_data) {
-    return set_aside_result(stored.error());  // to try again makes it no better
+    if (unstored_->never_again.empty()) {
+      unstored_->never_again = "not stored, and no store takes it: " + stored.error().brief();
+    }
+    if (!set_aside_result()) {
+      pause(stop, kStoreRetry_s);
+    }
+    return;
   }
   const Status cleared = stored ? folder_.clear() : Status();
   {
@@ -320,15 +333,14 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
   }
 }
 
-void Lanes::Lane::set_aside_result(const Error& why) {
+bool Lanes::Lane::set_aside_result() {
+  const std::string& why = unstored_->never_again;
   const auto kept = folder_.set_aside_ended_run(
       unstored_->report.to_json().dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   const std::lock_guard lock(mutex_);
   const std::string problem =
-      kept ? fmt::format(
-                 "not stored, and no store takes it: {}; it is kept in {}, its samples beside",
-                 why.brief(), *kept)
-           : fmt::format("not stored yet: {}; {}", why.brief(), kept.error().brief());
+      kept ? fmt::format("{}; it is kept in {}, its samples beside", why, *kept)
+           : fmt::format("{}; it is not set aside yet: {}", why, kept.error().brief());
   if (result_.is_object() && result_["serial"] == unstored_->report.serial) {
     result_["problem"] = problem;
     result_.erase("can_write");
@@ -337,8 +349,15 @@ void Lanes::Lane::set_aside_result(const Error& why) {
   is_unstored_ = !kept;
   if (kept) {
     unstored_.reset();
-    unwritten_serial_.clear();  // constants of which there is no record
+    // Constants of which there is no record are not written, also where that was asked for meanwhile.
+    unwritten_.reset();
+    unwritten_serial_.clear();
+    if (order_ && order_->start.last_run) {
+      order_.reset();
+      add_log("problem", "not started: there is no record of the run whose constants wait");
+    }
   }
+  return kept.has_value();
 }
 
 void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun& left) {

@@ -77,6 +77,9 @@ void Lanes::Lane::end_by_defect(const std::string& what) {
   if (was_busy && unit_ && unit_->jig() != nullptr && unit_->jig()->turns_by_itself()) {
     static_cast<void>(unit_->jig()->stop());  // no one watches it any more
   }
+  if (was_capture && unit_) {
+    static_cast<void>(unit_->stop_recording());  // it would empty its battery
+  }
   if (was_capture) {
     end_capture_by(error, serial);
   } else if (was_busy) {
@@ -181,7 +184,8 @@ void Lanes::Lane::look_at_jig() {
   if (release) {
     add_log(problem ? "problem" : "jig",
             problem.value_or(
-                fmt::format("{} says that the jig is free", printable(operator_name_, 60))));
+                fmt::format("{} says that the jig is free",
+                            release->name.empty() ? "someone" : printable(release->name, 60))));
   }
   if (fault != jig_fault_) {
     jig_fault_ = fault;

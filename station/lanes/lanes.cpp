@@ -94,8 +94,9 @@ LaneAnswer<void> Lanes::confirm_side(std::size_t number, const std::string& clie
   return lane(number).and_then([&](Lane* chosen) { return chosen->confirm_side(client); });
 }
 
-LaneAnswer<void> Lanes::release_jig(std::size_t number, const std::string& client) {
-  return lane(number).and_then([&](Lane* chosen) { return chosen->release_jig(client); });
+LaneAnswer<void> Lanes::release_jig(std::size_t number, const std::string& client,
+                                    const std::string& name) {
+  return lane(number).and_then([&](Lane* chosen) { return chosen->release_jig(client, name); });
 }
 
 void Lanes::dismiss_scan(const std::string& client) {

@@ -141,8 +141,9 @@ class Lanes {
   // The unit lies on the side that the capture asked for.
   LaneAnswer<void> confirm_side(std::size_t number, const std::string& client);
   // The operator saw the lane's motorised jig, which was stopped or had a fault, and says that it
-  // is free. Only when no run is under way.
-  LaneAnswer<void> release_jig(std::size_t number, const std::string& client);
+  // is free. Only when no run is under way. `name`: of this operator, for the log; may be empty.
+  LaneAnswer<void> release_jig(std::size_t number, const std::string& client,
+                               const std::string& name);
   // A scanned serial number for this lane, or (number 0) for the lane that holds this unit. Answers
   // with the lane. A serial of another unit is `conflict`, until the right one is scanned. Where no
   // lane holds the unit, this client's next start is refused, until one does or dismiss_scan().

@@ -86,6 +86,7 @@ Result<UnfinishedCapture> parse_capture(const Json& json) {
   UnfinishedCapture capture;
   SIXPOINT_CHECK(parse_common(json, capture));
   json.at("output").get_to(capture.output);
+  capture.resume.asked_again = json.value("asked_again", false);  // not in earlier versions
   for (const Json& side : json.at("done")) {
     SIXPOINT_ASSIGN(const auto pose, device::parse_pose(side.at("pose").get<std::string>()));
     capture.resume.done.push_back({pose, side.at("recording").get<std::uint16_t>()});
@@ -212,6 +213,7 @@ Status RunFolder::close() {
 }
 
 Status RunFolder::clear() {
+  ended_report_.clear();
   SIXPOINT_CHECK(close());
   if (!env_.files.info(folder_)) {
     return {};
@@ -237,6 +239,7 @@ Status RunFolder::save_capture(const UnfinishedCapture& capture) {
                {"operator", capture.operator_name},
                {"client", capture.client},
                {"output", capture.output},
+               {"asked_again", capture.resume.asked_again},
                {"started", to_iso8601(capture.resume.started)}};
   json["done"] = Json::array();
   for (const CaptureResume::Side& side : capture.resume.done) {
@@ -264,12 +267,14 @@ Status RunFolder::set_aside_run() {
 Result<std::string> RunFolder::set_aside_ended_run(std::string_view report) {
   SIXPOINT_CHECK(close());
   SIXPOINT_CHECK(make_synced_folders(env_.files, folder_));
-  std::string path =
-      fmt::format("{}/report.json.{}.bad", folder_, to_unix_seconds(env_.clock.now()));
-  SIXPOINT_CHECK(write_file(env_.files, path, report));
+  if (ended_report_.empty()) {
+    ended_report_ =
+        fmt::format("{}/report.json.{}.bad", folder_, to_unix_seconds(env_.clock.now()));
+  }
+  SIXPOINT_CHECK(write_file(env_.files, ended_report_, report));
   SIXPOINT_CHECK(set_aside_run());
   SIXPOINT_CHECK(env_.files.sync_folder(folder_));
-  return path;
+  return std::exchange(ended_report_, {});
 }
 
 Status RunFolder::set_aside_capture() { return set_aside({kCapture + 1}); }

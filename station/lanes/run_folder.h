@@ -66,7 +66,8 @@ class RunFolder {
   // to names that end in `.bad`. Nothing else is touched.
   Status set_aside_run();
   // A run that has ended and that no store takes: `report` is written into the folder, and the
-  // run's state and samples are set aside with it. Answers with the path of the report.
+  // run's state and samples are set aside with it. Answers with the path of the report. After an
+  // error to be called again: it replaces the report that it wrote before.
   Result<std::string> set_aside_ended_run(std::string_view report);
   Status set_aside_capture();
 
@@ -79,6 +80,7 @@ class RunFolder {
   std::unique_ptr<WritableFile> file_;
   std::uint64_t size_ = 0;
   std::chrono::nanoseconds synced_{0};
+  std::string ended_report_;  // of the run that is not set aside yet; empty where none was tried
 };
 
 // Saves a run in a folder while it is under way, so that the next program can go on with it. Where

@@ -51,6 +51,14 @@ bool is_address(std::string_view name) {
   return !name.empty() && name.find_first_not_of("0123456789.") == std::string_view::npos;
 }
 
+std::string in_small_letters(std::string_view text) {
+  std::string small(text);
+  std::ranges::transform(small, small.begin(), [](char c) {
+    return 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return small;
+}
+
 std::optional<std::size_t> number_of(std::string_view text) {
   std::size_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -148,16 +156,17 @@ std::optional<ApiAnswer> Api::guard(const ApiRequest& request) const {
                           // nothing
   }
   // Host: another name may have been made to point here (DNS rebinding).
-  std::string_view name = request.host;
+  // Large and small letters are the same in it (RFC 9110, 4.2.3).
+  std::string name = in_small_letters(request.host);
   const std::string port = fmt::format(":{}", port_.load());
   if (name.ends_with(port)) {
-    name.remove_suffix(port.size());
+    name.resize(name.size() - port.size());
   } else if (port_ != (options_.tls ? 443 : 80)) {
-    name = {};
+    name.clear();
   }
   const bool local = is_loopback(options_.bind);
   const bool ours = is_loopback(name) || std::ranges::find(names_, name) != names_.end() ||
-                    (!local && (is_address(name) || name == options_.bind));
+                    (!local && (is_address(name) || name == in_small_letters(options_.bind)));
   if (!ours) {
     return with_headers(refusal(421, "wrong_host", "this station does not answer to that name",
                                 "open it by the address that it printed"));
@@ -424,10 +433,11 @@ ApiAnswer Api::command_lane(std::size_t lane, const std::string& command, const 
   } else if (command == "placed") {
     done = parts_.lanes.confirm_side(lane, client);
   } else if (command == "jig-free") {
-    if (const auto who = signer(request, {}, OperatorRole::technician); !who) {
+    const auto who = signer(request, {}, OperatorRole::technician);
+    if (!who) {
       return who.error();
     }
-    done = parts_.lanes.release_jig(lane, client);
+    done = parts_.lanes.release_jig(lane, client, who->name);
   } else if (command == "take") {
     const auto operator_name = text_of(body, "operator");
     if (!operator_name) {

@@ -69,8 +69,7 @@ std::optional<std::string> text_of(const Json& body, const char* key) {
     return std::nullopt;
   }
   auto text = body[key].get<std::string>();
-  return text.size() <= kMostText && db::check_name(text) ? std::optional(std::move(text))
-                                                          : std::nullopt;
+  return db::check_name(text) ? std::optional(std::move(text)) : std::nullopt;
 }
 
 }  // namespace sixpoint::station

@@ -26,6 +26,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "station/page/own_address.h"
+
 namespace sixpoint::station {
 
 namespace {
@@ -520,9 +522,16 @@ std::string Server::host() const {
       host = printable(*name, 255);
     } else {
       // Connecting sends nothing: the system chooses the address by which it would send.
-      asio::ip::udp::socket socket(impl_->io, asio::ip::udp::v4());
-      socket.connect({asio::ip::make_address("192.0.2.1"), 9}, error);  // of no one (RFC 5737)
-      host = error ? host : socket.local_endpoint(error).address().to_string();
+      asio::ip::udp::socket socket(impl_->io);
+      asio::ip::udp::endpoint local;
+      if (!socket.open(asio::ip::udp::v4(), error) &&
+          !socket.connect({asio::ip::make_address("192.0.2.1"), 9}, error)) {  // RFC 5737: no one's
+        local = socket.local_endpoint(error);
+      }
+      // Without a default route it chooses none.
+      host = error || local.address().is_unspecified()
+                 ? choose_address(addresses_of_machine(), bind.is_v6())
+                 : local.address().to_string();
     }
   }
   return host.find(':') == std::string::npos ? host : '[' + host + ']';

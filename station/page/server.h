@@ -61,7 +61,7 @@ class Server {
   // The host of the page's address: `bind`. 0.0.0.0 and :: stand for all addresses of this machine
   // and open nothing elsewhere: for them the first name or address of the certificate
   // (subjectAltName) that is not this machine's for itself (127.0.0.1), else an address of this
-  // machine.
+  // machine (own_address.h).
   std::string host() const;
   void serve();  // until stop()
   void stop();   // from any thread

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/sha256.h"
 #include "calib/efficiency.h"
 #include "expect_result.h"
@@ -235,6 +236,7 @@ TEST(CaptureRun, WhoStopsAtARepeatedSideGetsTheJudgementOfTheFile) {
 // The disk fails at each step of the second download: what was recorded before is there, and
 // judged.
 TEST(CaptureRun, AFileThatIsNotFetchedAnewLeavesTheOneOfBefore) {
+  bool is_undisturbed = false;
   for (std::size_t step = 0; step < 2000; step += 1 + step / 8) {
     VirtualBench bench;
     Person person(bench);
@@ -260,6 +262,7 @@ TEST(CaptureRun, AFileThatIsNotFetchedAnewLeavesTheOneOfBefore) {
       }
       if (!bench.env.files.info("c-new-1.gt3x")) {
         EXPECT_GT(step, 4U);
+        is_undisturbed = true;
         break;
       }
       continue;
@@ -267,6 +270,102 @@ TEST(CaptureRun, AFileThatIsNotFetchedAnewLeavesTheOneOfBefore) {
     EXPECT_THAT(report->notes, Contains(HasSubstr("the recording of before is judged")));
     EXPECT_EQ(report->file_sha256, before);
   }
+  EXPECT_TRUE(is_undisturbed) << "the last case is one in which nothing failed";
+}
+
+// Names of files in `bench` that begin so.
+std::vector<std::string> files_from(VirtualBench& bench, const std::string& begin) {
+  auto names = *bench.env.files.list(".");
+  std::erase_if(names, [&](const std::string& name) { return !name.starts_with(begin); });
+  return names;
+}
+
+// The program is killed at each step of the second download; the next one goes on and asks for a
+// side again where one fails.
+TEST(CaptureRun, WhatAKilledProgramFetchedAnewIsRemovedByTheNextOne) {
+  std::size_t left_over = 0;
+  for (std::size_t step = 0; step < 60; step += 1 + step / 8) {
+    VirtualBench bench;
+    Person person(bench);
+    person.errors = 2;  // so that there is a side to ask for again after the restart
+    CaptureResume last;
+    person.hooks.progress = [&](const CaptureResume& resume) { last = resume; };
+    const auto again = person.hooks.again;
+    person.hooks.again = [&](const std::vector<device::Pose>& sides) {
+      again(sides);
+      bench.env.files.fail_after(step);  // from here on it changes nothing, as a killed program
+    };
+    ASSERT_OK(person.capture());
+    bench.env.files.stop_failing();
+    if (person.repeated.size() > 1) {
+      break;  // the second download was done
+    }
+    ASSERT_TRUE(last.asked_again);
+    left_over += files_from(bench, "c-new").size();
+    // Names that this capture does not make.
+    const std::vector<std::string> others = {
+        "c-new-0.gt3x",     "c-new-9.gt3x", "c-new-1.gt3x.part",
+        "c-new-1.gt3x.old", "c-newer.gt3x", "c-new-1.gt3x.0123456789abc.part"};
+    for (const std::string& name : others) {
+      ASSERT_OK(write_file(bench.env.files, name, "another's"));
+    }
+    person.hooks.again = again;
+    person.repeated.clear();
+    const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
+                                    person.hooks, last);
+    ASSERT_OK(report);
+    EXPECT_TRUE(report->usable()) << "step " << step << ": "
+                                  << testing::PrintToString(report->notes);
+    EXPECT_EQ(person.repeated.size(), 1U) << "step " << step;
+    EXPECT_THAT(files_from(bench, "c-new"), testing::UnorderedElementsAreArray(others));
+  }
+  EXPECT_GT(left_over, 5U) << "the program was killed while there was something";
+}
+
+class FilesThatUnplug final : public ForwardingFiles {
+ public:
+  FilesThatUnplug(VirtualBench& bench, std::string name)
+      : ForwardingFiles(bench.env.files), bench_(bench), name_(std::move(name)) {}
+  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
+    if (path.starts_with(name_)) {
+      const std::lock_guard lock(bench_.plugged->mutex);
+      bench_.plugged->unplugged = true;
+    }
+    return ForwardingFiles::create(path);
+  }
+
+ private:
+  VirtualBench& bench_;
+  std::string name_;
+};
+
+// The unit goes away in the second download and does not come back.
+TEST(CaptureRun, ThePartOfASecondDownloadThatBrokeOffIsRemoved) {
+  VirtualBench bench;
+  Person person(bench);
+  FilesThatUnplug files(bench, "c-new-2.gt3x.");
+  Env env{bench.env.clock, files};
+  const auto report =
+      run_capture({bench.unit.get(), &person.lazy}, env, person.options, person.hooks);
+  ASSERT_OK(report);
+  EXPECT_THAT(report->notes, Contains(HasSubstr("the recording of before is judged")));
+  EXPECT_TRUE(bench.plugged->unplugged);
+  EXPECT_THAT(files_from(bench, "c-new"), testing::IsEmpty());
+  EXPECT_TRUE(bench.env.files.info("c.gt3x"));
+}
+
+// Without the word of the earlier program that the names were free, nothing is removed.
+TEST(CaptureRun, AFileOfAnotherStaysWhereNoSideWasAskedForAgain) {
+  VirtualBench bench;
+  Person person(bench);
+  ASSERT_OK(write_file(bench.env.files, "c-new-1.gt3x", "another's"));
+  CaptureResume resume;
+  person.hooks.progress = [&](const CaptureResume& now) { EXPECT_FALSE(now.asked_again); };
+  const auto report = run_capture({bench.unit.get(), &person.lazy}, bench.env.env, person.options,
+                                  person.hooks, resume);
+  ASSERT_OK(report);
+  EXPECT_THAT(report->notes, Contains(HasSubstr("there is a file c-new-1.gt3x")));
+  EXPECT_EQ(bench.env.files.info("c-new-1.gt3x")->size, 9U);
 }
 
 // No file of another capture is replaced.

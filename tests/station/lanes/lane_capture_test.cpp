@@ -1,4 +1,5 @@
 // Calibration files recorded in a lane.
+#include "base/forwarding_files.h"
 #include "station/page/station_in_process.h"
 
 namespace sixpoint::station {
@@ -114,6 +115,53 @@ TEST(LaneCapture, ACaptureStartsAgainWhenTheUnitHasLostItsRecording) {
   EXPECT_THAT(lane["result"]["notes"].dump(), HasSubstr("lost its recording; 2 sides are"));
 }
 
+class FilesWithDefect final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Status rename(const std::string& from, const std::string& to) override {
+    if (to.ends_with("/capture.json") && ++saved == 3) {
+      throw std::runtime_error("no such key");
+    }
+    return ForwardingFiles::rename(from, to);
+  }
+  std::atomic<int> saved{0};
+};
+
+// Oracle: a unit that records sends no live readings.
+TEST(LaneCapture, ADefectDoesNotLeaveTheUnitRecording) {
+  const tests::TemporaryFolder folder;
+  FilesWithDefect files(posix_env().files);
+  Env env{posix_env().clock, files};
+  mocks::VirtualBench bench;
+  device::TransportRegistry registry = known_devices();
+  bench.register_in(registry);
+  LanesOptions options;
+  options.devices = {"virtual:seed=7,jig=auto"};
+  options.state_folder = folder / "state";
+  options.capture_folder = folder.path();
+  options.silence_s = 0.2;
+  const auto lanes = Lanes::open(env, registry, options, {}, {});
+  ASSERT_OK(lanes);
+  const auto wait = [&](auto ready) {
+    for (int i = 0; i < 1000; ++i) {
+      if (ready((*lanes)->to_json(1))) {
+        return true;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  };
+  ASSERT_TRUE(wait([](const Json& json) { return json["state"] == "idle"; }));
+  ASSERT_TRUE((*lanes)->start_capture(1, {}).has_value());
+  ASSERT_TRUE(wait([](const Json& json) {
+    return json["result"].is_object() && json["result"]["verdict"] == "inconclusive";
+  }));
+  EXPECT_EQ(files.saved, 3) << "two sides were begun";
+  const std::uint64_t seen = (*lanes)->trace(1, ~std::uint64_t{0}).first;
+  EXPECT_TRUE(
+      wait([&](const Json&) { return (*lanes)->trace(1, ~std::uint64_t{0}).first > seen; }));
+}
+
 struct JumpingClock : Clock {
   UtcTime now() override { return posix_env().clock.now() + std::chrono::hours(hours); }
   std::chrono::nanoseconds elapsed() override { return posix_env().clock.elapsed(); }
@@ -145,6 +193,8 @@ TEST(LaneCapture, ACalendarThatIsSetEndsNoCapture) {
   wait([](const Json& json) {
     return json["capture"].is_object() && json["capture"]["side"].is_string();
   });
+  ASSERT_TRUE((*lanes)->to_json(1)["capture"].is_object());
+  ASSERT_TRUE((*lanes)->to_json(1)["capture"]["side"].is_string());
   clock.hours = 2;
   std::this_thread::sleep_for(std::chrono::milliseconds(1500));  // three looks at the time
   EXPECT_EQ((*lanes)->state(1), LaneState::capturing);

@@ -1,6 +1,7 @@
 // Jig runs in a lane: they survive a replug and a restart of the program, and are stored.
 #include <algorithm>
 
+#include "base/forwarding_files.h"
 #include "base/sha256.h"
 #include "station/lanes/run_folder.h"
 #include "station/page/station_in_process.h"
@@ -318,6 +319,27 @@ TEST(LaneRun, ARunThatNoStoreTakesIsKeptInAFileAndTheLaneIsFree) {
   });
 }
 
+// The lane's thread is held in the store while "write now" is given.
+TEST(LaneRun, AWriteThatWasOrderedBeforeItsRunWasSetAsideIsNotCarriedOut) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  {
+    const std::unique_lock held(station.mutex);
+    station.store_refuses = true;
+    station.start("/api/run");
+    station.wait(1, [](const Json& json) {
+      return json["result"].is_object() && json["result"].value("can_write", false);
+    });
+    ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+  }
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["log"].dump().find("not started: there is no record") != std::string::npos;
+  });
+  EXPECT_EQ(lane["state"], "done");
+  EXPECT_EQ(lane["result"]["written"], false) << lane["result"].dump(1);
+  EXPECT_EQ(station.post("/api/run", {{"last_run", true}}), 409);
+}
+
 // A defect ends the work of its lane, with a word, and not the program with all the others.
 TEST(LaneRun, AnExceptionEndsTheWorkOfItsLaneAlone) {
   const tests::TemporaryFolder folder;
@@ -346,8 +368,71 @@ TEST(LaneRun, AnExceptionOfTheStoreTakesNothingThatWasMeasured) {
   const Json lane = station.wait(1, [](const Json& json) {
     return json["result"].is_object() && json["result"].contains("problem");
   });
-  EXPECT_THAT(lane["result"]["problem"].get<std::string>(), HasSubstr("no such key"));
-  EXPECT_THAT(lane["result"]["problem"].get<std::string>(), HasSubstr("it is kept in"));
+  const std::string problem = lane["result"]["problem"];
+  EXPECT_THAT(problem, HasSubstr("no such key"));
+  EXPECT_THAT(problem, HasSubstr("it is kept in"));
+  EXPECT_THAT(problem, HasSubstr("not known whether the store has the run"));
+  EXPECT_THAT(problem, testing::Not(HasSubstr("no store takes it"))) << "it may have taken it";
+}
+
+class FilesWithoutNewNames final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Status rename(const std::string& from, const std::string& to) override {
+    if (!fails || !from.ends_with("/run.json")) {
+      return ForwardingFiles::rename(from, to);
+    }
+    ++attempts;
+    return fail(ErrorCode::io, "the disk fails", to, "see to the disk");
+  }
+  std::atomic<bool> fails{true};
+  std::atomic<int> attempts{0};
+};
+
+// The lane waits between two attempts. The number of attempts is bound by the time that went by.
+TEST(LaneRun, ASetAsideThatFailsIsTriedAgainAfterAPause) {
+  const tests::TemporaryFolder folder;
+  FilesWithoutNewNames files(posix_env().files);
+  Env env{posix_env().clock, files};
+  mocks::VirtualBench bench;
+  device::TransportRegistry registry = known_devices();
+  bench.register_in(registry);
+  LanesOptions options;
+  options.devices = {"virtual:seed=7,jig=auto"};
+  options.state_folder = folder / "state";
+  std::atomic<int> asked{0};
+  const auto lanes =
+      Lanes::open(env, registry, options,
+                  [&](const JigReport&, const RunLabels&) -> Result<RunInStore> {
+                    ++asked;
+                    return fail(ErrorCode::bad_data, "this cannot be stored as a text");
+                  },
+                  {});
+  ASSERT_OK(lanes);
+  const auto wait = [&](auto ready) {
+    for (int i = 0; i < 3000 && !ready((*lanes)->to_json(1)); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return (*lanes)->to_json(1);
+  };
+  const auto problem_has = [](const std::string& text) {
+    return [text](const Json& json) {
+      return json["result"].is_object() &&
+             json["result"].value("problem", "").find(text) != std::string::npos;
+    };
+  };
+  wait([](const Json& json) { return json["state"] == "idle"; });
+  ASSERT_TRUE((*lanes)->start(1, {}).has_value());
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(problem_has("not set aside yet")(wait(problem_has("not set aside yet"))));
+  EXPECT_FALSE((*lanes)->start(1, {}).has_value()) << "it would take the place of the first";
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  const int tried = files.attempts;
+  const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
+  EXPECT_LE(tried, 1 + passed.count() / 1.9) << "two seconds lie between two attempts";
+  files.fails = false;
+  EXPECT_TRUE(problem_has("it is kept in")(wait(problem_has("it is kept in"))));
+  EXPECT_EQ(asked, 1) << "the store is not asked again";
 }
 
 }  // namespace

@@ -104,7 +104,7 @@ TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
   Station station({device}, folder.path(), 24, bench);
   station.start("/api/run");
   station.wait(1, [&](const Json&) { return bench->motor(device)->movements > 1; });
-  EXPECT_FALSE(station.lanes->release_jig(1, "me").has_value()) << "not while it works";
+  EXPECT_FALSE(station.lanes->release_jig(1, "me", "Ada").has_value()) << "not while it works";
   ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
   const Json done = station.wait_state(1, "done");
   EXPECT_EQ(done["result"]["verdict"], "stopped") << done.dump(1);
@@ -128,6 +128,40 @@ TEST(Lane, AStoppedJigMovesOnlyAfterTheOperatorsWord) {
   EXPECT_EQ(bench->motor(device)->movements_after_stop, 0);
 }
 
+// The log says who looked at the jig, not whose run was stopped.
+TEST(Lane, TheWordAboutTheJigHasTheNameOfWhoGaveIt) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,jig=auto,pace=4";
+  const auto bench = std::make_shared<mocks::VirtualBench>();
+  Station station({device}, folder.path(), 24, bench);
+  Operators operators(posix_env(), folder / "operators.json");
+  for (const char* signs : {"", "Eve"}) {
+    ASSERT_TRUE(station
+                    .wait(1,
+                          [](const Json& json) {
+                            return json["state"] == "idle" || json["state"] == "done";
+                          })
+                    .is_object());
+    const int before = bench->motor(device)->movements;
+    ASSERT_TRUE(station.lanes->start(1, order_of("me")).has_value());
+    station.wait(1, [&](const Json&) { return bench->motor(device)->movements > before + 1; });
+    ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
+    station.wait(1, [](const Json& json) {
+      return json["state"] == "done" && json["jig_fault"] == "emergency stop";
+    });
+    if (*signs != '\0') {
+      ASSERT_OK(operators.add(signs, OperatorRole::technician, "471100"));
+      ASSERT_EQ(station.post("/api/operator", {{"name", signs}, {"pin", "471100"}}), 200);
+    }
+    ASSERT_OK(bench->hands_out(device));
+    ASSERT_EQ(station.post("/api/lanes/1/jig-free", Json::object()), 200);
+    const Json lane = station.wait(1, [](const Json& json) { return json["jig_fault"].is_null(); });
+    EXPECT_EQ(lane["operator"], "Ada") << "of the run";
+    EXPECT_EQ(lane["log"].back()["text"],
+              std::string(*signs != '\0' ? signs : "someone") + " says that the jig is free");
+  }
+}
+
 // The lane's thread is held in the store while the word is given, longer than a word holds.
 TEST(Lane, AnOldWordThatAJigIsFreeIsNotCarriedOut) {
   const tests::TemporaryFolder folder;
@@ -141,7 +175,7 @@ TEST(Lane, AnOldWordThatAJigIsFreeIsNotCarriedOut) {
     ASSERT_EQ(station.post("/api/lanes/1/stop", Json::object()), 200);
     station.wait_state(1, "done");
     ASSERT_OK(bench->hands_out(device));
-    ASSERT_TRUE(station.lanes->release_jig(1, "me").has_value());
+    ASSERT_TRUE(station.lanes->release_jig(1, "me", "Ada").has_value());
     std::this_thread::sleep_for(from_seconds(kOrderLife_s + 0.2));
   }
   const Json lane = station.wait(1, [](const Json& json) {

@@ -165,6 +165,50 @@ TEST(RunFolder, ADamagedStateIsRefusedAndSetAside) {
   EXPECT_FALSE(left->has_value());
 }
 
+class NoNewNames final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Status rename(const std::string& from, const std::string& to) override {
+    return fails && from.ends_with("run.json")
+               ? fail(ErrorCode::io, "the disk fails", to, "see to the disk")
+               : ForwardingFiles::rename(from, to);
+  }
+  bool fails = true;
+};
+
+// A folder in which nothing can be renamed is not filled with reports of one run.
+TEST(RunFolder, ARunThatCannotBeSetAsideHasOneReport) {
+  MemoryEnv memory;
+  NoNewNames files(memory.files);
+  Env env{memory.clock, files};
+  RunFolder lane(env, "lane");
+  const auto reports = [&] {
+    auto names = *memory.files.list("lane");
+    std::erase_if(names, [](const std::string& name) { return !name.starts_with("report"); });
+    return names;
+  };
+  ASSERT_OK(lane.save(a_run()));
+  for (const char* text : {"first", "second"}) {
+    EXPECT_FAILS(lane.set_aside_ended_run(text), ErrorCode::io);
+    EXPECT_EQ(reports().size(), 1U);
+    memory.clock.sleep(std::chrono::seconds(2));
+  }
+  files.fails = false;
+  const auto path = lane.set_aside_ended_run("third");
+  ASSERT_OK(path);
+  EXPECT_EQ(reports().size(), 1U);
+  const auto kept = read_file(files, *path, 100);
+  ASSERT_OK(kept);
+  EXPECT_EQ(std::string(kept->begin(), kept->end()), "third");
+  EXPECT_FALSE(lane.load()->has_value());
+  // The next run has a report of its own.
+  ASSERT_OK(lane.save(a_run()));
+  const auto next = lane.set_aside_ended_run("next");
+  ASSERT_OK(next);
+  EXPECT_NE(*next, *path);
+  EXPECT_EQ(reports().size(), 2U);
+}
+
 TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   const tests::TemporaryFolder folder;
   RunFolder lane(posix_env(), folder / "lane");
@@ -173,6 +217,7 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   capture.serial = "MOS2A45130007";
   capture.output = "out.gt3x";
   capture.resume.done = {{device::Pose::plus_z, 3}, {device::Pose::minus_x, 4}};
+  capture.resume.asked_again = true;
   ASSERT_OK(lane.save_capture(capture));
   const std::string json = text_of_file(folder / "lane/capture.json");
   EXPECT_NE(json.find("\"-x\""), std::string::npos) << json;
@@ -182,6 +227,12 @@ TEST(RunFolder, ACaptureIsFoundWithTheSidesThatAreDone) {
   ASSERT_EQ((*left)->resume.done.size(), 2U);
   EXPECT_EQ((*left)->resume.done[1].pose, CapturePose(device::Pose::minus_x));
   EXPECT_EQ((*left)->resume.done[1].recording, 4);
+  EXPECT_TRUE((*left)->resume.asked_again);
+  // An earlier version did not write it.
+  auto old = nlohmann::ordered_json::parse(json);
+  old.erase("asked_again");
+  std::ofstream(folder / "lane/capture.json") << old;
+  EXPECT_FALSE((*lane.load_capture())->resume.asked_again);
   ASSERT_OK(lane.clear_capture());
   EXPECT_FALSE(lane.load_capture()->has_value());
 }

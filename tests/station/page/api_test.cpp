@@ -91,6 +91,32 @@ TEST(Api, TheHostMayLeaveOutThePortOfItsScheme) {
   }
 }
 
+// Oracle: RFC 9110, 4.2.3.
+TEST(Api, LettersOfAHostMayBeLargeOrSmall) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7"}, folder.path());
+  ApiOptions options;
+  options.tls = true;
+  options.bind = "Bench-4.Example";
+  Api api(options, {posix_env(), *station.lanes, *station.repairs, station.sign_in});
+  api.set_names({"bench-3"});
+  api.set_port(6020);
+  const auto status_of = [&](const std::string& host) {
+    ApiRequest request;
+    request.method = "GET";
+    request.path = "/";
+    request.host = host;
+    return api.handle(request).status;
+  };
+  for (const char* host : {"bench-3:6020", "Bench-3:6020", "BENCH-3:6020", "bench-4.example:6020",
+                           "Bench-4.Example:6020", "LocalHost:6020"}) {
+    EXPECT_EQ(status_of(host), 200) << host;
+  }
+  for (const char* host : {"Bench-5:6020", "Bench-3:6021", "Bench-3", "Bench-3.example:6020"}) {
+    EXPECT_EQ(status_of(host), 421) << host;
+  }
+}
+
 // The page itself is given to everybody: it asks for the code. Nothing else is.
 TEST(Api, EveryRequestNeedsTheTokenOrASession) {
   const tests::TemporaryFolder folder;

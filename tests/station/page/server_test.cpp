@@ -41,6 +41,22 @@ TEST(Server, ARequestWithoutABodyIsAnswered) {
   station.wait_state(1, "running");
 }
 
+// 0.0.0.0 opens nothing: an address of this machine stands for it, whatever routes there are.
+TEST(Server, AllAddressesArePrintedAsOneOfThem) {
+  const tests::TemporaryFolder folder;
+  for (const char* bind : {"0.0.0.0", "::"}) {
+    ServerOptions options;
+    options.bind = bind;
+    Station station({"virtual:seed=7"}, folder.path(), 24, {}, options);
+    const std::string host = station.server->host();
+    EXPECT_THAT(host, testing::AnyOf(testing::MatchesRegex("[0-9]+(\\.[0-9]+){3}"),
+                                     testing::StartsWith("[")))
+        << bind;
+    EXPECT_NE(host, "0.0.0.0");
+    EXPECT_NE(host, "[::]");
+  }
+}
+
 // Refused by what its head announces: no thread and no memory waits for the body.
 TEST(Server, ABodyThatIsAnnouncedTooLongIsRefusedFromTheHead) {
   const tests::TemporaryFolder folder;

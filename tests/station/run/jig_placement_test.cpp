@@ -309,6 +309,25 @@ TEST(JigPlacementTable, RowTheChangesFitTheExpectedFace) {
   }
 }
 
+// Without a jig that says where it stands, the expected face is the one that is asked for. By the
+// constants, which say 256 LSB/g, the zero of z lies at 100 - 256: a unit on -z would lie on +z.
+TEST(JigPlacementTable, RowTheChangesFitTheAskedFace) {
+  Placer placer({}, 1, nominal(), sensor_of({250, 250, 100}, {0, 0, 0}));
+  placer.run.set_jig_pose(Pose::plus_z);
+  placer.place(Pose::plus_z);
+  ASSERT_EQ(placer.run.faces().size(), 1U) << placer.last_refusal();
+  placer.run.set_jig_pose({});
+  ASSERT_EQ(placer.wanted, Pose::minus_z);
+  placer.place(Pose::minus_z);
+  ASSERT_EQ(placer.run.faces().size(), 2U) << placer.last_refusal();
+  EXPECT_EQ(placer.run.faces()[1].pose, Pose::minus_z);
+  for (int i = 0; i < 4; ++i) {
+    placer.place(placer.wanted);
+  }
+  EXPECT_EQ(placer.run.phase(), JigPhase::verifying) << placer.last_refusal();
+  EXPECT_EQ(placer.run.refusals(), 0);
+}
+
 TEST(JigPlacementTable, RowTheChangesDoNotFitIt) {
   Random random(1);
   for (int i = 0; i < 40; ++i) {
