@@ -1,6 +1,6 @@
 // How good a set of still directions is for the fit, beside the best that there is.
 //
-//   const DesignEfficiency six = efficiency_of(*report.fit, 6);
+//   const DesignEfficiency six = efficiency_of(fit, 6);
 //   six.d;  // 1 for the six sides
 //
 // A still reading of direction u (a unit vector) differs from gravity by r(u)' p, to first order in

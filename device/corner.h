@@ -1,8 +1,9 @@
 // The eight corners of a unit's case, between three sides each. Stood on a corner, in a mug for
 // example, a unit shows its cross-axis sensitivities, which the six sides do not.
 //
-//   if (auto* jig = dynamic_cast<CornerJig*>(&any_jig)) {
-//     SIXPOINT_CHECK(jig->go_to_corner({{1, 1, -1}}));  // +x+y-z
+//   Status stand(CornerJig& jig) {
+//     SIXPOINT_ASSIGN(const Corner corner, parse_corner("+x+y-z"));
+//     return jig.go_to_corner(corner);
 //   }
 //
 // A corner is named as poses are (jig.h): "+x+y-z" has its x and y axes up and its z axis down, each
@@ -37,8 +38,8 @@ std::string to_string(const Corner& corner);         // "+x+y-z"
 Result<Corner> parse_corner(std::string_view text);  // usage when it is none
 PerAxis<double> direction_of(const Corner& corner);  // specific force at rest, in g
 
-// What a jig offers besides (jig.h) that also stands a unit on its corners. Threads and errors as
-// for Jig::go_to().
+// What a jig (jig.h) that also stands a unit on its corners offers besides: found by a dynamic_cast.
+// Threads and errors as for Jig::go_to().
 class CornerJig {
  public:
   virtual ~CornerJig() = default;

@@ -349,7 +349,7 @@ bool Lanes::Lane::set_aside_result() {
   is_unstored_ = !kept;
   if (kept) {
     unstored_.reset();
-    // Constants of which there is no record are not written, also where that was asked for meanwhile.
+    // Constants of which there is no record are not written, also where it was asked meanwhile.
     unwritten_.reset();
     unwritten_serial_.clear();
     if (order_ && order_->start.last_run) {
