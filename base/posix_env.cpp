@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <thread>
@@ -318,7 +319,7 @@ class PosixFileSystem final : public FileSystem {
   }
 
   Status remove(const std::string& path) override {
-    return done_unless(::unlink(path.c_str()), ErrorCode::io, "cannot remove", path);
+    return done_unless(std::remove(path.c_str()), ErrorCode::io, "cannot remove", path);
   }
 
   Status restrict_to_owner(const std::string& path) override {

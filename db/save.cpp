@@ -45,7 +45,12 @@ Result<Saved> save(FileSystem& files, Result<Store>& store, const SavePlaces& pl
     return fail(journalled.error());  // the record itself: no folder makes it better
   }
   for (const std::string& folder : places.last_resorts) {
-    if (save_in_folder(files, folder, work)) {
+    const bool was_there = files.info(folder).has_value();
+    const Status kept = save_in_folder(files, folder, work);
+    if (!kept && !was_there) {
+      static_cast<void>(files.remove(folder));  // made for nothing; it stays where it holds a file
+    }
+    if (kept) {
       saved.folder = folder;
       saved.last_resort = true;
       saved.refusal->what += fmt::format("; nor does the journal, {}: {}", journalled.error().where,

@@ -211,6 +211,8 @@ TEST_F(RefusingStore, CaptureAndSolveKeepTheirConstantsInTheJournal) {
 }
 
 TEST_F(RefusingStore, WithoutAnyFolderTheReportIsStillPrinted) {
+  const std::string last_resort =
+      "/" + ("sixpoint-journal-" + file_name_of(cli::journal_folder(path("a.db"))));
   const pid_t child = ::fork();
   if (child == 0) {
     // No file of this process may have a byte: neither store nor journal nor last resort.
@@ -227,6 +229,9 @@ TEST_F(RefusingStore, WithoutAnyFolderTheReportIsStillPrinted) {
   int status = 0;
   ::waitpid(child, &status, 0);
   EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_FALSE(std::filesystem::exists("." + last_resort)) << "an empty folder stays";
+  EXPECT_FALSE(
+      std::filesystem::exists(std::filesystem::temp_directory_path().string() + last_resort));
 }
 
 TEST_F(RefusingStore, WithoutAJournalsFolderTheWorkingFolderTakesIt) {
