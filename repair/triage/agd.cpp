@@ -7,16 +7,15 @@
 namespace sixpoint::repair {
 namespace {
 
-// A path as part of an SQLite URI: '?', '#' and '%' would end or change it, and what follows two
-// slashes is a host.
+// A path as part of an SQLite URI, whatever bytes it has; a file also where it is ":memory:". Two
+// slashes say that no host follows, for a path may begin with two itself. As of the store's
+// (db/servers/sqlite_database.cpp), which this room does not see.
 std::string uri_of(const std::string& path) {
-  std::string uri = path.starts_with('/') ? "file://" : "file:";
+  std::string uri = path.starts_with('/') ? "file://" : "file:./";
   for (const char c : path) {
-    if (c == '?' || c == '#' || c == '%') {
-      uri += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-    } else {
-      uri += c;
-    }
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '/' || c == '.' || c == '-' || c == '_';
+    uri += plain ? std::string(1, c) : fmt::format("%{:02x}", static_cast<unsigned char>(c));
   }
   // immutable: SQLite takes no lock, replays no journal and writes nothing.
   return uri + "?mode=ro&immutable=1";

@@ -17,7 +17,7 @@ using tests::make_database;
 TEST(Agd, ReadsSerialAndFirmware) {
   const tests::TemporaryFolder folder;
   // Characters that would end an SQLite URI.
-  const std::string path = folder / "a?b#c%41.agd";
+  const std::string path = folder / "a?b#c%41 &=\xe9.agd";
   tests::make_agd(path, "MOS2A1", "1.5.0");
   const auto facts = read_agd_facts(path);
   ASSERT_OK(facts);
