@@ -1,7 +1,9 @@
 #include "repair/batch/jobs.h"
 
 #include <atomic>
+#include <chrono>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -25,6 +27,9 @@ TEST(Jobs, AnExceptionGoesToTheCaller) {
     ++begun;
     if (i == 3) {
       throw std::runtime_error("a defect");
+    }
+    if (i > 3) {  // so that the others do not come to the end before the thread of 3 goes on
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   };
   EXPECT_THROW(for_each_job(100'000'000, 4, work, [](std::size_t) {}), std::runtime_error);
