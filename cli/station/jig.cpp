@@ -13,6 +13,7 @@
 #include "cli/devices/known_devices.h"
 #include "cli/people_text.h"
 #include "cli/station/jig_options.h"
+#include "cli/station/name_option.h"
 #include "cli/station/operator.h"
 #include "cli/station/record_option.h"
 #include "cli/stop_request.h"
@@ -332,6 +333,8 @@ Result<station::JigReport> run_and_store(
 
 Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outputs& outputs,
                         device::SessionRecorder& recorder) {
+  SIXPOINT_CHECK(check_name_option("--station", options.station));
+  SIXPOINT_CHECK(check_name_option("--jig-id", options.jig_id));
   SIXPOINT_CHECK(check_outputs(options, outputs));
   SIXPOINT_ASSIGN(auto session, session_options(context, options));
   SIXPOINT_ASSIGN(const station::SignedName who,

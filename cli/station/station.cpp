@@ -16,10 +16,10 @@
 #include "cli/devices/stop_signals.h"
 #include "cli/gravity_option.h"
 #include "cli/output.h"
+#include "cli/station/name_option.h"
 #include "cli/station/operator.h"
 #include "cli/station/practice_bench.h"
 #include "cli/store_option.h"
-#include "db/name_rule.h"
 #include "station/access/operators.h"
 #include "station/access/sign_in.h"
 #include "station/certificate/certificate.h"
@@ -204,12 +204,6 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
   }
   return fail(ErrorCode::no_input, "a run has no such document", printable(kind, 40),
               "ask for report.json, certificate.pdf, .json or .dcc.xml, or label.zpl");
-}
-
-// A text that stands in every record of the station, refused before anything is measured.
-Status check_name_option(const char* option, const std::string& text) {
-  const Status taken = db::check_name(text);
-  return taken ? Status() : fail(ErrorCode::usage, taken.error().what, option, taken.error().hint);
 }
 
 Result<station::LanesOptions> lanes_options(Context& context,

@@ -70,6 +70,11 @@ TEST_F(CommandTest, JigRefusesByTheContractsCodes) {
   EXPECT_EQ(code_of({"--device", kDevice, "--jig", "manual"}), 2)
       << "the unit is never turned: inconclusive";
   EXPECT_EQ(code_of({}), 64);
+  for (const char* option : {"--station", "--jig-id"}) {
+    for (const std::string& name : {std::string("bench \xff"), std::string(201, 'x')}) {
+      EXPECT_EQ(code_of({"--device", kDevice, "--jig", "virtual", option, name}), 64) << option;
+    }
+  }
 }
 
 // Ctrl-C in a run by a jig: the motor stops, the run is stored as stopped, exit 3.

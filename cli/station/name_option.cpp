@@ -1,0 +1,12 @@
+#include "cli/station/name_option.h"
+
+#include "db/name_rule.h"
+
+namespace sixpoint::cli {
+
+Status check_name_option(const char* option, const std::string& text) {
+  const Status taken = db::check_name(text);
+  return taken ? Status() : fail(ErrorCode::usage, taken.error().what, option, taken.error().hint);
+}
+
+}  // namespace sixpoint::cli
