@@ -75,8 +75,10 @@ std::string temporary_name(const std::string& path, int attempt) {
 
 // Removes what processes that are gone left for this target: a file that is being written is noted
 // by this process, and locked by another one until it has its name (posix_env.cpp). Where the file
-// system has no locks, nothing is known and everything stays. Locks that one machine keeps to itself
-// (NFS mounted with local_lock, Lustre with localflock) do not show what another one is writing.
+// system has no locks, nothing is known and everything stays. Where its locks hold on one machine
+// only (NFS with nolock or local_lock, Lustre with localflock), a file that another machine is
+// writing looks abandoned. Its age would not tell: what is left after a kill is as young when the
+// same command is run again, and no later run looks at this target.
 void remove_abandoned(FileSystem& files, const std::string& path) {
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const std::string temporary = temporary_name(path, attempt);
@@ -123,6 +125,9 @@ Result<AtomicFile> AtomicFile::create_temporary(FileSystem& files, const std::st
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const std::string temporary = temporary_name(path, attempt);
     auto file = files.create(temporary);
+    if (!file && !files.info(temporary)) {
+      file = files.create(temporary);  // what was in the way may have been removed just now
+    }
     if (file) {
       note_temporary(temporary);
       return AtomicFile(files, path, temporary, *std::move(file));

@@ -1,7 +1,6 @@
 // The real clock and disk behind Env.
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -209,13 +208,13 @@ class PosixFileSystem final : public FileSystem {
 
   // Locked as by lock() until it is closed, so that other processes see that it is being written
   // (atomic_file.cpp). One that looks at just this moment may take it for abandoned and remove it:
-  // then once more, when it is gone.
+  // then once more, and again while it holds the lock and has not removed the name yet.
   Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
     constexpr int kMostTries = 10;
     for (int tries = 1;; ++tries) {
       const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
       if (fd < 0 && errno == EEXIST && tries > 1 && tries < kMostTries) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        std::this_thread::sleep_for(std::chrono::milliseconds(tries));
         continue;
       }
       if (fd < 0) {
@@ -243,10 +242,11 @@ class PosixFileSystem final : public FileSystem {
   }
 
   // flock() belongs to the open file: it also keeps two threads of one process apart, and Linux
-  // takes it as a byte-range lock to the server of an NFS folder.
+  // takes it as a byte-range lock to the server of an NFS folder. A file that lost its name between
+  // open() and flock() says nothing about the one that has the name now: then once more.
   Result<std::unique_ptr<FileLock>> lock(const std::string& path) override {
-    constexpr int kMostOpenings = 100;
-    for (int tries = 0; tries < kMostOpenings; ++tries) {
+    constexpr int kMostTries = 100;
+    for (int tries = 1; tries <= kMostTries; ++tries) {
       const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
       if (fd < 0) {
         return system_failure(errno, ErrorCode::cannot_create, "cannot make the lock", path);
@@ -259,12 +259,11 @@ class PosixFileSystem final : public FileSystem {
       if (error != 0) {
         return system_failure(error, ErrorCode::io, "cannot lock", path);
       }
-      // Between open() and here the file may have lost its name, and another one may have it.
       if (is_named(fd, path)) {
         return held;
       }
     }
-    return nullptr;  // others have it, one after the other
+    return nullptr;  // others are at it all the time
   }
 
   Result<std::vector<std::string>> list(const std::string& folder) override {

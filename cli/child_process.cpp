@@ -1,5 +1,7 @@
 #include "cli/child_process.h"
 
+#include <csignal>
+
 #include <fcntl.h>
 #include <spawn.h>
 #include <unistd.h>
@@ -22,8 +24,17 @@ tl::expected<pid_t, int> start_child(const std::vector<std::string>& words, int 
   if (errors == ChildErrors::dropped) {
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   }
+  // Signals that this program holds back (stop_request.h) come to the child as usual.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none;
+  sigemptyset(&none);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
   pid_t process = 0;
-  const int error = posix_spawnp(&process, list.front(), &actions, nullptr, list.data(), environ);
+  const int error =
+      posix_spawnp(&process, list.front(), &actions, &attributes, list.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) {
     return tl::unexpected(error);

@@ -1,5 +1,7 @@
+#include <atomic>
 #include <cstdlib>
 #include <filesystem>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -7,6 +9,7 @@
 #include "base/env.h"
 #include "base/memory_env.h"
 #include "expect_result.h"
+#include "temporary_folder.h"
 #include "text_of.h"
 
 namespace sixpoint {
@@ -26,6 +29,35 @@ TEST(PosixFiles, WritesReadsListsAndRefuses) {
   EXPECT_FAILS(files.create(folder + "/x/y/f"), ErrorCode::cannot_create);
   EXPECT_FAILS(read_file(files, folder + "/x/y/f", 4), ErrorCode::bad_data);
   std::filesystem::remove_all(folder);
+}
+
+// Whoever has the lock of a name has that of the file that bears it, also where another one, which
+// had the lock before, gave its file another name meanwhile. With the lock of the old file, this
+// fails within some hundred rounds.
+TEST(PosixFiles, ALockIsThatOfTheFileThatHasTheNameNow) {
+  const tests::TemporaryFolder folder;
+  FileSystem& files = posix_env().files;
+  const std::string name = folder / "locked";
+  std::atomic<bool> done{false};
+  std::thread renaming([&] {
+    while (!done) {
+      const auto held = files.lock(name);
+      if (held && *held != nullptr) {
+        static_cast<void>(files.rename(name, folder / "renamed"));
+      }
+    }
+  });
+  int held_twice = 0;
+  for (int round = 0; round < 20'000; ++round) {
+    const auto first = files.lock(name);
+    if (first && *first != nullptr) {
+      const auto second = files.lock(name);
+      held_twice += second && *second != nullptr ? 1 : 0;
+    }
+  }
+  done = true;
+  renaming.join();
+  EXPECT_EQ(held_twice, 0);
 }
 
 }  // namespace
