@@ -93,8 +93,7 @@ class FileSystem {
  public:
   virtual ~FileSystem() = default;
   virtual Result<std::unique_ptr<ReadableFile>> open(const std::string& path) = 0;
-  // Makes a new file; cannot_create where one of that name exists. On a disk it is locked as by
-  // lock() until it is closed, so lock() of its name is null meanwhile.
+  // Makes a new file; cannot_create where one of that name exists.
   virtual Result<std::unique_ptr<WritableFile>> create(const std::string& path) = 0;
   virtual Result<FileInfo> info(const std::string& path) = 0;  // no_input where there is none
   virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;  // names, sorted
@@ -102,7 +101,7 @@ class FileSystem {
   virtual Status rename(const std::string& from, const std::string& to) = 0;     // replaces `to`
   // cannot_create where `to` exists, which stays as it is. The default looks and then renames.
   virtual Status rename_new(const std::string& from, const std::string& to);
-  virtual Status remove(const std::string& path) = 0;  // a file; on a disk, also an empty folder
+  virtual Status remove(const std::string& path) = 0;
   virtual Status sync_folder(const std::string& path) = 0;  // makes renames in it durable
   // How AtomicFile puts a file at `path`. A program that writes where its user said so has rules of
   // its own (cli/output.h); an error says why nothing may be written there.
