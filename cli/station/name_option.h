@@ -1,6 +1,6 @@
 // Options whose text stands in every record of a run, refused before anything is measured.
 //
-//   SIXPOINT_CHECK(check_name_option("--station", options.station));
+//   SIXPOINT_CHECK(check_name_option("--station", "bench 3"));
 #pragma once
 
 #include <string>
