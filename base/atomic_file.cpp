@@ -125,9 +125,6 @@ Result<AtomicFile> AtomicFile::create_temporary(FileSystem& files, const std::st
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const std::string temporary = temporary_name(path, attempt);
     auto file = files.create(temporary);
-    if (!file && !files.info(temporary)) {
-      file = files.create(temporary);  // what was in the way may have been removed just now
-    }
     if (file) {
       note_temporary(temporary);
       return AtomicFile(files, path, temporary, *std::move(file));

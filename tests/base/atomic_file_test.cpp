@@ -86,31 +86,6 @@ TEST(AtomicFile, LeavesWhatIsBeingWritten) {
   EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre(".f.1.tmp", "f"));
 }
 
-// The name was taken, and is free by the time when someone looks.
-class TakenForAMoment final : public ForwardingFiles {
- public:
-  explicit TakenForAMoment(FileSystem& files, int refusals)
-      : ForwardingFiles(files), refusals_(refusals) {}
-  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
-    if (refusals_-- > 0) {
-      return fail(ErrorCode::cannot_create, "File exists", path, "choose another name");
-    }
-    return ForwardingFiles::create(path);
-  }
-
- private:
-  int refusals_;
-};
-
-TEST(AtomicFile, ANameThatIsFreeAgainIsTaken) {
-  MemoryEnv memory;
-  TakenForAMoment once(memory.files, 1);
-  EXPECT_OK(write_file(once, "a.txt", "text"));
-  EXPECT_TRUE(memory.files.info("a.txt"));
-  TakenForAMoment always(memory.files, 1'000'000);
-  EXPECT_FAILS(write_file(always, "b.txt", "text"), ErrorCode::cannot_create);
-}
-
 TEST(Temporaries, AreRemovedAsTheyAreNoted) {
   const tests::TemporaryFolder folder;
   FileSystem& files = posix_env().files;
