@@ -104,6 +104,7 @@ const std::map<std::string, Role>& common_roles() {
                              "--retest-of",
                              "--study",
                              "--side-seconds",
+                             "--sides",
                              "--turn-seconds",
                              "--method",
                              "--prior",

@@ -28,7 +28,7 @@ TEST_F(StoreTest, AJigRunIsStoredWithWhatItWasJudgedBy) {
   EXPECT_EQ(jig({"--jig-due", "soon"}).exit_code, 64);
   EXPECT_EQ(jig({"--retest-of", "no such run"}).exit_code, 66);
   EXPECT_EQ(jig({"--operator", std::string(300, 'x')}).exit_code, 64) << "given twice";
-  EXPECT_EQ(jig({"--station", std::string(300, 'x')}).exit_code, 65)
+  EXPECT_EQ(jig({"--station", std::string(300, 'x')}).exit_code, 64)
       << "refused before anything is measured";
 
   const auto history = run({"history", "MOS2A45130007", "--store", path("a.db"), "--json"}).json();
