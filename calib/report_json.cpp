@@ -1,7 +1,6 @@
 // The JSON of the report of solve_from_still_blocks().
 #include <nlohmann/json.hpp>
 
-#include "calib/efficiency.h"
 #include "calib/solve.h"
 
 namespace sixpoint::calib {
@@ -48,11 +47,6 @@ void add_fit(Json& json, const BlockFit& fit) {
                            {"blocks_left_out", fit.blocks_left_out},
                            {"block_sd_mg", fit.block_sd_mg},
                            {"structural_mg", fit.structural_mg}};
-  json["efficiency"]["parameters"] = fit.best().model.cross_axis ? 9 : 6;
-  for (const auto& [name, parameters] : {std::pair{"six", 6}, std::pair{"nine", 9}}) {
-    const DesignEfficiency efficiency = efficiency_of(fit, parameters);
-    json["efficiency"][name] = {{"d", efficiency.d}, {"g", efficiency.g}};
-  }
   if (!fit.richer) {
     return;
   }

@@ -6,7 +6,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
-#include "calib/efficiency.h"
+#include "calib/poses/efficiency.h"
 #include "cli/command.h"
 #include "cli/gravity_option.h"
 #include "cli/output.h"
@@ -157,6 +157,9 @@ void print_solve(const std::string& path, const SolveCommandOptions& options,
 Json to_json(Json json, const std::string& path, const Outcome& outcome) {
   json["file"] = path;
   json.update(calib::to_json(outcome.report));
+  if (outcome.report.fit) {
+    json["efficiency"] = calib::efficiency_json(*outcome.report.fit);
+  }
   json["stored_id"] = outcome.saved ? Json(outcome.saved->id) : Json(nullptr);
   if (outcome.saved) {
     json["kept"] = kept_to_json(outcome.saved->place);

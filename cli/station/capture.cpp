@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "calib/poses/efficiency.h"
 #include "cli/command.h"
 #include "cli/people_text.h"
 #include "cli/station/jig_options.h"
@@ -135,6 +136,9 @@ Json to_json(const CaptureDone& done) {
   Json json = document("capture");
   if (done.report.solved) {
     json.update(calib::to_json(*done.report.solved));
+    if (done.report.solved->fit) {
+      json["efficiency"] = calib::efficiency_json(*done.report.solved->fit);
+    }
   } else {
     json["serial"] = done.report.serial;
     json["filter"] = calib::to_string(done.report.recording_filter);

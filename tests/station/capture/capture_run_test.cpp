@@ -5,7 +5,7 @@
 #include "base/atomic_file.h"
 #include "base/forwarding_files.h"
 #include "base/sha256.h"
-#include "calib/efficiency.h"
+#include "calib/poses/efficiency.h"
 #include "expect_result.h"
 #include "mocks/inert/inert.h"
 #include "station/virtual_bench.h"

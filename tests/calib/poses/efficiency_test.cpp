@@ -1,4 +1,4 @@
-#include "calib/efficiency.h"
+#include "calib/poses/efficiency.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,11 @@
-#include "calib/efficiency.h"
+#include "calib/poses/efficiency.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include <nlohmann/json.hpp>
 
 #include "calib/least_squares.h"
 
@@ -101,6 +104,15 @@ DesignEfficiency efficiency_of(const BlockFit& fit, int parameters) {
     return {};
   }
   return efficiency(information / weights);
+}
+
+nlohmann::ordered_json efficiency_json(const BlockFit& fit) {
+  nlohmann::ordered_json json = {{"parameters", fit.best().model.cross_axis ? 9 : 6}};
+  for (const auto& [name, parameters] : {std::pair{"six", 6}, std::pair{"nine", 9}}) {
+    const DesignEfficiency efficiency = efficiency_of(fit, parameters);
+    json[name] = {{"d", efficiency.d}, {"g", efficiency.g}};
+  }
+  return json;
 }
 
 }  // namespace sixpoint::calib

@@ -27,6 +27,8 @@
 // Pure functions.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "calib/block_fit.h"
 
 namespace sixpoint::calib {
@@ -38,5 +40,8 @@ struct DesignEfficiency {
 
 // `parameters`: 6 or 9.
 DesignEfficiency efficiency_of(const BlockFit& fit, int parameters);
+
+// "efficiency" of `sixpoint solve`: how many parameters were fitted, and both efficiencies.
+nlohmann::ordered_json efficiency_json(const BlockFit& fit);
 
 }  // namespace sixpoint::calib
