@@ -13,6 +13,7 @@
 #include "bindings/python/failures.h"
 #include "bindings/python/reading.h"
 #include "bindings/python/watched.h"
+#include "calib/poses/efficiency.h"
 #include "calib/solve.h"
 #include "repair/batch/answers.h"
 #include "repair/batch/requests.h"
@@ -107,7 +108,7 @@ std::string solve(const std::string& path, const std::string& method,
   });
   Json json;
   json["file"] = path;
-  json.update(calib::to_json(value_or_throw(std::move(report))));
+  json.update(calib::solve_json(value_or_throw(std::move(report))));
   return text_of(json);
 }
 

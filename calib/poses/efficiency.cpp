@@ -106,11 +106,16 @@ DesignEfficiency efficiency_of(const BlockFit& fit, int parameters) {
   return efficiency(information / weights);
 }
 
-nlohmann::ordered_json efficiency_json(const BlockFit& fit) {
-  nlohmann::ordered_json json = {{"parameters", fit.best().model.cross_axis ? 9 : 6}};
+nlohmann::ordered_json solve_json(const SolveReport& report) {
+  nlohmann::ordered_json json = to_json(report);
+  if (!report.fit) {
+    return json;
+  }
+  const BlockFit& fit = *report.fit;
+  json["efficiency"]["parameters"] = fit.best().model.cross_axis ? 9 : 6;
   for (const auto& [name, parameters] : {std::pair{"six", 6}, std::pair{"nine", 9}}) {
     const DesignEfficiency efficiency = efficiency_of(fit, parameters);
-    json[name] = {{"d", efficiency.d}, {"g", efficiency.g}};
+    json["efficiency"][name] = {{"d", efficiency.d}, {"g", efficiency.g}};
   }
   return json;
 }

@@ -30,6 +30,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "calib/block_fit.h"
+#include "calib/solve.h"
 
 namespace sixpoint::calib {
 
@@ -41,7 +42,8 @@ struct DesignEfficiency {
 // `parameters`: 6 or 9.
 DesignEfficiency efficiency_of(const BlockFit& fit, int parameters);
 
-// "efficiency" of `sixpoint solve`: how many parameters were fitted, and both efficiencies.
-nlohmann::ordered_json efficiency_json(const BlockFit& fit);
+// The answer of `sixpoint solve`, of `capture` and of the Python package: to_json(report) and, where
+// there is a fit, "efficiency": how many parameters were fitted, and both efficiencies.
+nlohmann::ordered_json solve_json(const SolveReport& report);
 
 }  // namespace sixpoint::calib

@@ -156,10 +156,7 @@ void print_solve(const std::string& path, const SolveCommandOptions& options,
 
 Json to_json(Json json, const std::string& path, const Outcome& outcome) {
   json["file"] = path;
-  json.update(calib::to_json(outcome.report));
-  if (outcome.report.fit) {
-    json["efficiency"] = calib::efficiency_json(*outcome.report.fit);
-  }
+  json.update(calib::solve_json(outcome.report));
   json["stored_id"] = outcome.saved ? Json(outcome.saved->id) : Json(nullptr);
   if (outcome.saved) {
     json["kept"] = kept_to_json(outcome.saved->place);

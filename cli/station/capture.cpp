@@ -135,10 +135,7 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
 Json to_json(const CaptureDone& done) {
   Json json = document("capture");
   if (done.report.solved) {
-    json.update(calib::to_json(*done.report.solved));
-    if (done.report.solved->fit) {
-      json["efficiency"] = calib::efficiency_json(*done.report.solved->fit);
-    }
+    json.update(calib::solve_json(*done.report.solved));
   } else {
     json["serial"] = done.report.serial;
     json["filter"] = calib::to_string(done.report.recording_filter);

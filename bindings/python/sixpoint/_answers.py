@@ -185,7 +185,7 @@ class SolveReport(_Answer):
 
     ``constants`` are in g/LSB and in the sensor's raw counts; None where the recording does not
     determine them, and then ``missing_directions`` says what it lacks. What only some recordings have
-    (``fit``, ``trust``, ``genetic``, ``temperature``, ``partial`` ...) is in ``document``.
+    (``least_squares``, ``efficiency``, ``trust``, ``temperature``, ``partial`` ...) is in ``document``.
     """
 
     file: str
