@@ -446,9 +446,16 @@ Result<ConstantsRecord> record_of(const SolveReport& report, UtcTime made_at,
     return fail(ErrorCode::bad_data, "the data did not determine constants", report.serial,
                 "see missing_directions and reasons of 'sixpoint solve'");
   }
-  if (report.serial.empty() || !report.filter) {
-    return fail(ErrorCode::bad_data, "the recording names no serial number or filter configuration",
-                report.serial, "constants belong to both and cannot be stored without");
+  if (report.serial.empty()) {
+    return fail(ErrorCode::bad_data, "the recording names no serial number", {},
+                "constants belong to a unit and cannot be stored without it");
+  }
+  if (!report.filter) {
+    return fail(ErrorCode::bad_data,
+                "it cannot be told under which filter configuration the recording was made",
+                report.serial,
+                "constants belong to a configuration and cannot be stored without; read them from "
+                "the answer");
   }
   ConstantsRecord record;
   record.serial = report.serial;

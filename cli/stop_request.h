@@ -1,18 +1,39 @@
-// Ctrl-C (SIGINT) and SIGTERM for commands that end in order: what is begun is finished, what is
-// done stays.
+// Signals that ask a command to end: Ctrl-C (SIGINT), SIGTERM, and SIGHUP, which comes when the
+// terminal is closed. A command that was started to outlive its terminal (nohup: SIGHUP is ignored)
+// does.
+//
+// For commands that end in order (what is begun is finished, what is done stays):
 //
 //   StopRequest stop;                // before threads are started: they inherit it
 //   while (!stop.requested()) {
 //     repair_the_next_file();
 //   }
 //   context.worsen(kExitStopped);
+//
+// For commands that run until they are told to end:
+//
+//   const sigset_t signals = block_stop_signals();
+//   int signal = 0;
+//   sigwait(&signals, &signal);  // until Ctrl-C
+//   take_stop(context, signal);
 #pragma once
 
 #include <csignal>
 
 namespace sixpoint::cli {
 
-// One at a time, on the thread that made it. The signals behave as before after it.
+struct Context;
+
+// From here on they wait for sigwait() or sigtimedwait() with the set that is returned. New threads
+// inherit that. `before`: where the mask that was in force goes.
+sigset_t block_stop_signals(sigset_t* before = nullptr);
+
+// The exit code of a command that was ended so: 3, as everywhere; 0 by SIGTERM, the word of what
+// supervises services.
+void take_stop(Context& context, int signal);
+
+// One at a time, on the thread that made it. The signals behave as before after it. A reader of the
+// output that goes away (SIGPIPE) asks for an end, too, where that thread writes.
 class StopRequest {
  public:
   StopRequest();

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "cli/command.h"
-#include "cli/devices/stop_signals.h"
+#include "cli/stop_request.h"
 #include "device/usb/discovery.h"
 #include "device/usb/hotplug.h"
 

@@ -8,7 +8,7 @@
 
 #include "base/memory_env.h"
 #include "cli/command.h"
-#include "cli/devices/stop_signals.h"
+#include "cli/stop_request.h"
 #include "mocks/firmware/virtual_drive.h"
 #include "mocks/firmware/virtual_settings.h"
 #include "mocks/in_process/scaled_clock.h"

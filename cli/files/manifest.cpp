@@ -1,6 +1,6 @@
 #include "cli/files/manifest.h"
 
-#include <set>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -74,6 +74,12 @@ std::string line_of(const Json& entry) {
   return line + "\n";
 }
 
+// Whether what an earlier run wrote is there as it was: this run was refused its name.
+bool left_alone(const repair::RepairReport& report, const Json& earlier) {
+  return report.error && report.error->code == ErrorCode::cannot_create &&
+         earlier.value("output", Json()).is_string();
+}
+
 }  // namespace
 
 Status check_manifest(FileSystem& files, const std::string& folder) {
@@ -90,20 +96,29 @@ Status check_manifest(FileSystem& files, const std::string& folder) {
 
 Status write_manifest(FileSystem& files, const std::string& folder,
                       const std::vector<repair::RepairReport>& reports, UtcTime now) {
-  Json entries = Json::array();
-  std::set<std::string> of_this_run;
+  std::map<std::string, const repair::RepairReport*> of_this_run;
   for (const repair::RepairReport& report : reports) {
-    of_this_run.insert(db::storable_path(report.input));
+    of_this_run.emplace(db::storable_path(report.input), &report);
   }
+  Json entries = Json::array();
   const Json earlier = manifest_in(files, folder);
   for (const Json& entry : earlier.value("files", Json::array())) {
     const Json input = entry.is_object() ? entry.value("input", Json()) : Json();
-    if (input.is_string() && !of_this_run.contains(input.get<std::string>())) {
+    if (!input.is_string()) {
+      continue;
+    }
+    const auto now_too = of_this_run.find(input.get<std::string>());
+    if (now_too != of_this_run.end() && left_alone(*now_too->second, entry)) {
+      of_this_run.erase(now_too);
+      entries.push_back(entry);
+    } else if (now_too == of_this_run.end()) {
       entries.push_back(entry);
     }
   }
   for (const repair::RepairReport& report : reports) {
-    entries.push_back(entry_of(report));
+    if (of_this_run.contains(db::storable_path(report.input))) {
+      entries.push_back(entry_of(report));
+    }
   }
   std::string csv(kColumns);
   for (const Json& entry : entries) {

@@ -149,7 +149,7 @@ void print_solve(const std::string& path, const SolveCommandOptions& options,
     context.text() << "  " << kept_as(outcome.saved->place, outcome.saved->id) << '\n';
   } else if (options.save && !report.usable()) {
     context.log().warn("nothing stored: only verified constants are kept");
-  } else if (report.usable()) {
+  } else if (report.usable() && report.filter && !report.serial.empty()) {  // record_of()
     next_step(context, options.json, {"solve", path, "--save"});
   }
 }

@@ -33,7 +33,7 @@ void take_interrupts(const std::vector<std::string>& arguments) {
     text.append(" ").append(repair::shell_word(argument));
   }
   text += "\n";
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
     if (::sigaction(signal, nullptr, &before) == 0 && before.sa_handler == SIG_DFL) {
       struct sigaction action {};

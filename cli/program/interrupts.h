@@ -1,4 +1,5 @@
-// Ctrl-C and SIGTERM in a command that does not take them itself (cli/stop_request.h): exit 3.
+// Ctrl-C, SIGTERM and SIGHUP in a command that does not take them itself (cli/stop_request.h):
+// exit 3.
 //
 //   take_interrupts({"scan", "archive"});  // prints "sixpoint scan archive" when it comes
 //

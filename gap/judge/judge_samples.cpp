@@ -186,6 +186,28 @@ void judge_single_codes(const Request& request, const CodeStatistics& codes, boo
   }
 }
 
+// How many sd more often a sample equals the one before than the one seven before, because slow
+// noise moved it further from that one. `slow_mg2`: its variance within seven seconds. Values whose
+// difference has the variance 2 v are equal with probability lsb / (2 sqrt(pi v)).
+double repeats_of_slow_noise_sd(const Request& request, const Records& records, double slow_mg2,
+                                bool flicker) {
+  constexpr double kFar = 7;  // samples, as CodeStatistics has it
+  constexpr double kSeconds = 7;
+  const double rate_hz = request.bundle.rate_hz;
+  // Half the mean square of the further change: F^2 ln 7 of a density of F^2 / f, whose variance is
+  // F^2 ln(seconds rate / 2); 6 / (2 rate) of a walk, whose variance is seconds / 6 (Allan 1966).
+  const double further_mg2 = flicker ? slow_mg2 * std::log(kFar) / std::log(kSeconds * rate_hz / 2)
+                                     : slow_mg2 * (kFar - 1) / (2 * rate_hz) * 6 / kSeconds;
+  double pairs = static_cast<double>(records.codes.samples);  // that are equal
+  double ratio = 1;                                           // of equal pairs, near over far
+  for (const double white_mg : records.noise.white_mg) {
+    const double near_mg2 = std::max(white_mg * white_mg, std::pow(request.lsb_mg(), 2) / 12);
+    pairs *= request.lsb_mg() / (2 * std::sqrt(M_PI * (near_mg2 + further_mg2)));
+    ratio *= std::sqrt(1 + further_mg2 / near_mg2);
+  }
+  return pairs * (ratio - 1) / std::sqrt(pairs * (ratio + 1) + 1);
+}
+
 }  // namespace
 
 Findings judge_codes(const Request& request, const Records& records, double slow_mg2,
@@ -229,7 +251,9 @@ Findings judge_codes(const Request& request, const Records& records, double slow
                "codes: the noise of two axes goes together", everywhere);
   }
   if (!coloured && !before.accepted("duplicated_samples") && !line) {
-    found.test(codes.repeats_excess_sd - kCodesChance_sd,
+    const double expected_sd =
+        repeats_of_slow_noise_sd(request, records, slow_mg2, before.accepted("flicker"));
+    found.test(codes.repeats_excess_sd - expected_sd - kCodesChance_sd,
                "codes: values repeat more often than chance", everywhere);
   }
   return found;

@@ -254,7 +254,7 @@ class ShardRun {
       return failed(input, std::move(error));
     }
     if (!is_as_planned(planned, input, *before)) {
-      return failed(input, changed(input, "since the plan was made"));
+      return failed(input, changed_since_plan(input));
     }
     const std::string output = options_.output_folder + "/" + planned.relative;
     if (!options_.dry_run) {
@@ -266,21 +266,17 @@ class ShardRun {
     options.redo_outdated = options_.redo_outdated;
     options.jobs = options_.threads;
     RepairReport report = repair_file(env_, input, output, *finder_, options);
-    const auto after = files_.info(input);
-    const bool same = after && after->size == before->size &&
-                      after->modified_ns == before->modified_ns && after->inode == before->inode;
     const bool same_hash = planned.sha256.empty() || report.input_sha256.empty() ||
                            report.input_sha256 == planned.sha256;
-    if (report.status == RepairStatus::failed || (same && same_hash)) {
+    if (report.status == RepairStatus::failed || same_hash) {
       link_unaffected(files_, options_.make_link, plan_.repair.link_unaffected, output, report);
       return report;
     }
-    // Half of it may be of the old file. What an earlier run made is not touched.
+    // What an earlier run made is not touched.
     if (!report.output.empty() && !report.resumed) {
       static_cast<void>(files_.remove(report.output));
     }
-    return failed(input,
-                  changed(input, same ? "since the plan was made" : "while it was repaired"));
+    return failed(input, changed_since_plan(input));
   }
 
   bool is_as_planned(const ArchiveFile& planned, const std::string& input, const FileInfo& info) {
@@ -295,8 +291,8 @@ class ShardRun {
     return !digest.empty() && digest == planned.sha256;
   }
 
-  static Error changed(const std::string& input, const std::string& when) {
-    return {ErrorCode::bad_data, "the file changed " + when, input,
+  static Error changed_since_plan(const std::string& input) {
+    return {ErrorCode::bad_data, "the file changed since the plan was made", input,
             "find out what changed it; a new plan takes it as it is now"};
   }
 

@@ -79,7 +79,7 @@ class Repair {
   }
 
   RepairReport run() {
-    if (Status status = work(); !status) {
+    if (Status status = work_on_one_file(); !status) {
       report_.status = RepairStatus::failed;
       report_.error = status.error();
       report_.reasons.push_back(status.error().brief());
@@ -89,6 +89,23 @@ class Repair {
   }
 
  private:
+  // The file is opened by its name several times: what is read must be one file.
+  Status work_on_one_file() {
+    SIXPOINT_ASSIGN(before_, env_.files.info(report_.input));
+    SIXPOINT_CHECK(work());
+    return report_.output.empty() || report_.resumed ? is_the_same_file() : Status();
+  }
+
+  Status is_the_same_file() const {
+    SIXPOINT_ASSIGN(const FileInfo now, env_.files.info(report_.input));
+    if (now.size != before_.size || now.modified_ns != before_.modified_ns ||
+        now.device != before_.device || now.inode != before_.inode) {
+      return fail(ErrorCode::bad_data, "the file changed while it was repaired", report_.input,
+                  "find out what writes to it, and repair it again");
+    }
+    return {};
+  }
+
   Status work() {
     if (!survey_and_write()) {
       SIXPOINT_ASSIGN(survey_,
@@ -505,6 +522,7 @@ class Repair {
                               mark_of(report_, chosen_, survey_, recipe(), *report_.repaired_at)
                                       .dump(2, ' ', false, Json::error_handler_t::replace) +
                                   "\n"));
+    SIXPOINT_CHECK(is_the_same_file());  // before it gets its name
     SIXPOINT_CHECK(writer.commit());
     report_.output = output_;
     report_.output_sha256 = writer.sha256();
@@ -604,6 +622,7 @@ class Repair {
   std::string output_;
   ConstantsSource& source_;
   RepairOptions options_;
+  FileInfo before_;  // the input, before it was read
   Survey survey_;
   std::optional<ChosenConstants> chosen_;
   std::optional<AppliedMap> map_;  // of chosen_

@@ -28,6 +28,7 @@
 // | ... output there, otherwise                             | failed: cannot_create              |
 // | not_repairable by now, an output of this input is there | outdated: it is never replaced     |
 // | cannot be read or written                               | failed, with the error             |
+// | changed or was replaced while it was read               | failed: bad_data, nothing written  |
 //
 // One pass or two: where the head of a large log, and constants that do not depend on the file
 // (ConstantsSource::foreseen), say what will be written, the log is surveyed and written to the

@@ -78,6 +78,24 @@ TEST_F(Manifest, KeepsTheFilesOfEarlierRuns) {
   EXPECT_EQ(json["files"][2]["input"], "c.gt3x");
 }
 
+TEST_F(Manifest, ARunThatWasRefusedLeavesTheEarlierLine) {
+  write({repaired("a.gt3x"), repaired("b.gt3x")});
+  const auto failed = [](const std::string& input, ErrorCode code) {
+    repair::RepairReport report;
+    report.input = input;
+    report.status = repair::RepairStatus::failed;
+    report.error = Error{code, "", "", ""};
+    return report;
+  };
+  write({failed("a.gt3x", ErrorCode::cannot_create), failed("b.gt3x", ErrorCode::bad_data),
+         failed("c.gt3x", ErrorCode::cannot_create)});
+  EXPECT_THAT(text("out/manifest.csv"),
+              testing::EndsWith("output_sha256\r\n"
+                                "a.gt3x,out/a.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+                                "b.gt3x,,failed,,,,,,\r\n"
+                                "c.gt3x,,failed,,,,,,\r\n"));
+}
+
 TEST_F(Manifest, LeavesAFileOfThatNameThatIsNotOursAlone) {
   ASSERT_OK(write_file(memory_.files, "out/manifest.csv", "mine"));
   EXPECT_FAILS(check_manifest(memory_.files, "out"), ErrorCode::cannot_create);

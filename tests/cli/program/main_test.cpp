@@ -101,6 +101,9 @@ TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) { expect_ended_by(SIGINT); }
 // As a batch system and `kill` send it.
 TEST_F(Main, SigtermDoesTheSame) { expect_ended_by(SIGTERM); }
 
+// As a terminal sends it that is closed.
+TEST_F(Main, SighupDoesTheSame) { expect_ended_by(SIGHUP); }
+
 // A bar is for a terminal, and a file is none.
 TEST_F(Main, NoProgressIsDrawnIntoAFile) {
   std::ofstream(folder_ / "x.gt3x") << "no recording";

@@ -138,6 +138,17 @@ TEST_F(CommandTest, CtrlCInAnAutomaticRunStoresItAsStopped) {
   EXPECT_THAT(history.out, HasSubstr("stopped"));
 }
 
+// As `| head` does it, and a terminal that is closed while its output goes through a pipe.
+TEST_F(CommandTest, AReaderThatGoesStopsAnAutomaticRunInOrder) {
+  const std::string line = std::string(SIXPOINT_PROGRAM) +
+                           " jig --device virtual:seed=7,jig=auto,pace=real --store " +
+                           path("s.db") + " 2>&1 | head -n 4 > " + path("o");
+  ASSERT_EQ(std::system(line.c_str()), 0);
+  EXPECT_FALSE(said_in(path("o")).empty());
+  EXPECT_THAT(run({"history", "MOS2A45130007", "--store", path("s.db"), "--json"}).out,
+              HasSubstr("stopped"));
+}
+
 // The first command that --help shows ends in a pass.
 TEST_F(CommandTest, TheFirstCommandOfHelpEndsInAPass) {
   const std::string help = run({"--help"}).out;

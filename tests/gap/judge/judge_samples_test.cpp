@@ -1,3 +1,4 @@
+#include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -39,6 +40,55 @@ TEST(JudgeMarks, WhatIsNotInTheCatalogueAlarms) {
   EXPECT_TRUE(found.effects.empty());
   ASSERT_EQ(found.alarms.size(), 2U);
   EXPECT_EQ(found.alarms[1].where, "codes: one value repeated for a second and more (300 samples)");
+}
+
+// What judge_codes() says of repeats beside 1/f noise of a density of 1 mg^2 / f, drawn here: pairs of
+// neighbours, and pairs whose further change has half the mean square ln 7 (mg^2).
+Findings judged_beside_flicker(bool accepted) {
+  constexpr std::size_t kPairs = 360'000;
+  const double lsb_mg = 1000.0 / 256;
+  const double white_lsb = 1;
+  const double further_lsb = std::sqrt(2 * std::log(7)) / lsb_mg;
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> anywhere(-0.5, 0.5);
+  double near = 0;
+  double far = 0;
+  for (std::size_t i = 0; i < kPairs; ++i) {
+    bool near_equal = true;
+    bool far_equal = true;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double mean = anywhere(random);
+      const double first = std::round(mean + white_lsb * normal(random));
+      near_equal &= first == std::round(mean + white_lsb * normal(random));
+      far_equal &=
+          first == std::round(mean + white_lsb * normal(random) + further_lsb * normal(random));
+    }
+    near += near_equal ? 1 : 0;
+    far += far_equal ? 1 : 0;
+  }
+  Made made(tests::made_production({}));
+  Records records;
+  records.codes.samples = kPairs;
+  records.codes.odd_share = {0.5, 0.5, 0.5};
+  records.codes.repeats_excess_sd = (near - far) / std::sqrt(near + far + 1);
+  records.noise.white_mg = {lsb_mg, lsb_mg, lsb_mg};
+  Findings before;
+  if (accepted) {
+    before.add(made.request, {.name = "flicker", .nats = 9});
+  }
+  const double slow_mg2 = accepted ? std::log(7 * 100.0 / 2) : 0;
+  return judge_codes(made.request, records, slow_mg2, before);
+}
+
+TEST(JudgeCodes, RepeatsThatSlowNoiseMakesAreExpected) {
+  const Findings alone = judged_beside_flicker(false);
+  ASSERT_EQ(alone.alarms.size(), 1U);
+  EXPECT_EQ(alone.alarms[0].where, "codes: values repeat more often than chance");
+  EXPECT_GT(alone.alarms[0].sd, 8);
+  const Findings beside = judged_beside_flicker(true);
+  EXPECT_TRUE(beside.alarms.empty());
+  EXPECT_LT(beside.worst_sd, 2.5);
 }
 
 // Alarms about noise that is louder by this share in every third dwell, beside a vibration of the

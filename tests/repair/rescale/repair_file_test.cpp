@@ -575,6 +575,46 @@ TEST_F(RepairFile, OnePassOpensTheInputOnceAndOnceForItsHash) {
   EXPECT_EQ(files.opened["in.gt3x"], 4) << "to see how large it is, survey, hash, write";
 }
 
+// Another file takes the input's name before it is opened for the time `before`.
+class SwappingFiles final : public ForwardingFiles {
+ public:
+  SwappingFiles(FileSystem& files, int before) : ForwardingFiles(files), before_(before) {}
+  Result<std::unique_ptr<ReadableFile>> open(const std::string& path) override {
+    if (path == "in.gt3x" && ++opened_ == before_) {
+      SIXPOINT_CHECK(disk().rename("other.gt3x", path));
+    }
+    return disk().open(path);
+  }
+  int opened() const { return opened_; }
+
+ private:
+  int before_;
+  int opened_ = 0;
+};
+
+// As a program that copies an archive replaces files: half of the output would be of each.
+TEST_F(RepairFile, AFileThatIsReplacedMeanwhileGivesNoOutput) {
+  MadeRecording other = six_sides();
+  other.start += 3600;
+  for (const std::uint64_t one_pass_from : {std::uint64_t{0}, std::uint64_t{1} << 20}) {
+    RepairOptions options;
+    options.one_pass_from_bytes = one_pass_from;
+    int most = 2;
+    for (int before = 2; before <= most; ++before) {
+      ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+      ASSERT_OK(other.write(memory_.files, "other.gt3x"));
+      SwappingFiles files(memory_.files, before);
+      Env env{memory_.clock, files};
+      const RepairReport report = repair_file(env, "in.gt3x", "out.gt3x", source_, options);
+      EXPECT_EQ(report.status, RepairStatus::failed) << before;
+      EXPECT_FALSE(exists("out.gt3x")) << before;
+      most = files.opened();
+      ASSERT_OK(memory_.files.remove("in.gt3x"));
+    }
+    EXPECT_EQ(most, one_pass_from == 0 ? 2 : 4);
+  }
+}
+
 // Where the rest of a file says something else than its first 100,000 samples, what was written
 // until then is dropped; the answer is that of two passes.
 TEST_F(RepairFile, WhatTheBeginningSaysNeedNotHold) {
