@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/sha256.h"
 #include "cli/command.h"
 #include "cli/files/archive_options.h"
 #include "cli/output.h"
@@ -55,9 +56,36 @@ Result<std::vector<repair::CutPoint>> cut_points(const ImpactCommandOptions& opt
   return cuts;
 }
 
+// Whether the two are a recording and its copy, as far as the marks of a repair say:
+//
+//   first one             copy                           answer
+//   has a mark            any                            bad_data: it is a repaired copy itself
+//   has none              its mark names another input   bad_data
+//   has none              its mark names the first one   yes
+//   has none              has none                       yes: other programs leave no mark
+Status check_pair(FileSystem& files, const std::string& before, const std::string& after) {
+  const auto first = repair::mark_in(files, before);
+  if (first && repair::text_in(*first, "method") != repair::kSalvageMethod) {
+    return fail(ErrorCode::bad_data, "this is a repaired copy", before,
+                "name the recording as it was first, then its copy");
+  }
+  const auto mark = repair::mark_in(files, after);
+  const std::string made_of = mark ? repair::text_in(*mark, "input_sha256") : "";
+  if (made_of.empty()) {
+    return {};
+  }
+  SIXPOINT_ASSIGN(const std::string sha256, file_sha256(files, before));
+  if (sha256 != made_of) {
+    return fail(ErrorCode::bad_data, "by its mark this copy was made of another recording", after,
+                "name the recording that it was made of: " + printable(before) + " is another");
+  }
+  return {};
+}
+
 // The repaired copy's epochs, and what its mark says of their uncertainty.
-Status read_copy(const ImpactCommandOptions& options, const std::string& path, Context& context,
-                 repair::Impact& impact) {
+Status read_copy(const ImpactCommandOptions& options, const std::string& before,
+                 const std::string& path, Context& context, repair::Impact& impact) {
+  SIXPOINT_CHECK(check_pair(context.env.files, before, path));
   SIXPOINT_ASSIGN(impact.after, series_of(options, path, context));
   if (const auto mark = repair::mark_in(context.env.files, path)) {
     impact.after_uncertainty_mg = repair::three_in(*mark, "sample_uncertainty_mg");
@@ -70,7 +98,7 @@ Status run_recording(const ImpactCommandOptions& options, const repair::Impact& 
   repair::Impact impact = asked;
   SIXPOINT_ASSIGN(impact.before, series_of(options, options.paths[0], context));
   if (options.paths.size() > 1) {
-    SIXPOINT_CHECK(read_copy(options, options.paths[1], context, impact));
+    SIXPOINT_CHECK(read_copy(options, options.paths[0], options.paths[1], context, impact));
   }
   SIXPOINT_CHECK(repair::check(impact));
   if (!options.csv.empty()) {
@@ -134,7 +162,7 @@ Status measure(const ImpactCommandOptions& options, Context& context,
   repair::Impact impact;
   impact.cuts = study.cuts;
   SIXPOINT_ASSIGN(impact.before, series_of(options, file.before, context));
-  SIXPOINT_CHECK(read_copy(options, file.after, context, impact));
+  SIXPOINT_CHECK(read_copy(options, file.before, file.after, context, impact));
   SIXPOINT_CHECK(repair::check(impact));
   file.was = repair::summary_of(*impact.before, std::nullopt, study.cuts);
   file.is = repair::summary_of(*impact.after, impact.after_uncertainty_mg, study.cuts);

@@ -401,11 +401,24 @@ class Repair {
     } else {
       SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
     }
-    const RescaledLogOptions how = log_options();  // with the mark, which holds the hash
+    RescaledLogOptions how = log_options();  // with the mark, which holds the hash
     const std::vector<StillWindow> windows = windows_of(survey_);
     survey_.blocks = {};  // all that they had to say was said by now
     if (!written_ || !(written_->how == how)) {
       written_.reset();
+      const auto mark = options_.dry_run ? std::nullopt : mark_in(env_.files, output_);
+      const EarlierOutput earlier =
+          options_.dry_run
+              ? EarlierOutput::none
+              : judge_earlier_output(found_output(mark), report_.input_sha256, recipe());
+      const bool is_done = earlier == EarlierOutput::done && options_.resume;
+      if (earlier != EarlierOutput::none && !is_done &&
+          !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
+        return leave_earlier_output(earlier);
+      }
+      if (is_done) {
+        how.mark.clear();  // the output has the one of its run
+      }
       SIXPOINT_ASSIGN(auto recording,
                       gt3x::Recording::open(env_.files, report_.input, {options_.salvage, {}}));
       SIXPOINT_ASSIGN(auto reader, recording.open_log());
@@ -413,24 +426,15 @@ class Repair {
       log->expect_still(windows);
       if (options_.dry_run) {
         SIXPOINT_CHECK(read_through(*log));
+      } else if (is_done) {
+        SIXPOINT_CHECK(compare_with_output(*log));
+      }
+      if (options_.dry_run || is_done) {
         if (!may_be_kept(*log, windows)) {
           return not_repairable();
         }
         finish(recording, *log, windows);
-        return {};
-      }
-      const auto mark = mark_in(env_.files, output_);
-      const EarlierOutput earlier =
-          judge_earlier_output(found_output(mark), report_.input_sha256, recipe());
-      if (earlier != EarlierOutput::none &&
-          !(earlier == EarlierOutput::outdated && options_.redo_outdated)) {
-        if (earlier == EarlierOutput::done && options_.resume) {
-          SIXPOINT_CHECK(read_through(*log));  // its samples are those of the output
-          if (!may_be_kept(*log, windows)) {
-            return not_repairable();
-          }
-        }
-        return take_earlier_output(earlier, mark.value_or(Json()));
+        return is_done ? take_earlier_output(mark.value_or(Json())) : Status();
       }
       SIXPOINT_ASSIGN(auto writer, begin_output());
       SIXPOINT_CHECK(write_entries(recording, *log, writer));
@@ -582,21 +586,61 @@ class Repair {
     return {};
   }
 
-  // What an earlier run made of this very input, with the constants that were used then.
-  Status take_earlier_output(EarlierOutput earlier, const Json& mark) {
+  // What is there is neither taken nor replaced.
+  Status leave_earlier_output(EarlierOutput earlier) {
     if (earlier == EarlierOutput::outdated) {
       report_.status = RepairStatus::outdated;
       report_.reasons.emplace_back(kMadeOtherwise);
       return {};
     }
-    if (earlier == EarlierOutput::foreign || !options_.resume) {
-      return fail(ErrorCode::cannot_create, "a file of that name is there already", output_,
-                  "choose another folder, or --resume to go on with an earlier run");
+    return fail(ErrorCode::cannot_create, "a file of that name is there already", output_,
+                options_.resume
+                    ? "it was not made of this recording, or cannot be read: look at it, and "
+                      "remove it or choose another folder"
+                    : "choose another folder, or --resume to go on with an earlier run");
+  }
+
+  // Whether the output of an earlier run holds what would be written now, but for the mark. `log`
+  // has none.
+  Status compare_with_output(RescaledLog& log) const {
+    const auto other =
+        fail(ErrorCode::cannot_create, "the output of an earlier run is not as that run wrote it",
+             output_, "it was changed, or is damaged: look at it, and remove it");
+    auto there = gt3x::Recording::open(env_.files, output_);
+    if (!there) {
+      return other;
     }
+    auto reader = there->open_log();
+    if (!reader) {
+      return other;
+    }
+    Bytes expected;
+    for (bool at_mark = true;;) {
+      const auto item = reader->next();
+      if (!item) {
+        return other;
+      }
+      if (!*item) {
+        break;
+      }
+      if (at_mark && (*item)->kind == gt3x::LogItem::Kind::record && (*item)->record.checksum_ok) {
+        at_mark = false;  // the first good record
+        continue;
+      }
+      expected.resize((*item)->raw.size());
+      SIXPOINT_ASSIGN(const std::size_t count, log.read(expected));
+      if (count < expected.size() || !std::ranges::equal(expected, (*item)->raw)) {
+        return other;
+      }
+    }
+    expected.resize(1);
+    SIXPOINT_ASSIGN(const std::size_t more, log.read(expected));
+    return more == 0 ? Status() : other;
+  }
+
+  // What an earlier run made of this very input, with the constants that were used then.
+  Status take_earlier_output(const Json& mark) {
     report_.reasons.emplace_back(kDoneBefore);
-    SIXPOINT_ASSIGN(const auto recording,
-                    gt3x::Recording::open(env_.files, report_.input, {options_.salvage, {}}));
-    name_what_was_not_repaired(recording, 0);
     report_.resumed = true;
     report_.method = text_in(mark, "method");
     report_.constants_id = text_in(mark, "constants_id");
@@ -608,13 +652,7 @@ class Repair {
       report_.repaired_at = *then;
     }
     report_.output = output_;
-    SIXPOINT_ASSIGN(const auto repaired, survey(env_.files, output_, options_.still));
-    if (repaired.magnitude.blocks > 0) {
-      report_.still_error_after_mg = repaired.magnitude.mean_mg;
-    }
-    report_.clipped_after = repaired.clipped_samples;
     SIXPOINT_ASSIGN(report_.output_sha256, file_sha256(env_.files, output_));
-    take_status_of_written();
     return {};
   }
 

@@ -23,6 +23,7 @@
 // | ... that do not help by the gate (gate.h)               | not_repairable, but with force     |
 // | affected, with constants, output not there              | repaired                           |
 // | ... output there, done (earlier_output.h), resume on    | repaired, `resumed`; nothing done  |
+// | ... ... but its log is not what would be written now    | failed: cannot_create              |
 // | ... output there, outdated                              | outdated; with redo_outdated       |
 // |                                                         | replaced: repaired                 |
 // | ... output there, otherwise                             | failed: cannot_create              |

@@ -40,8 +40,10 @@ std::string what_would_help(const UnitNeeds& unit) {
     if (!unit.sides_missing.empty()) {
       return fmt::format("{}{}: {}", wait, never, kHowTo);
     }
-    return fmt::format("{}all sides were up, and the still periods do not suffice: {}", wait,
-                       kHowTo);
+    return fmt::format(
+        "{}all sides were up: --or-scan uses the unit's own still periods; where these do not "
+        "suffice, {}",
+        wait, kHowTo);
   }
   if (unit.refused > 0) {
     return fmt::format("{} not written with the constants that there are: read the reasons",

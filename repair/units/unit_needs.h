@@ -15,9 +15,9 @@
 // | some have no constants, and its sets or files contradict    | the jig: a person must decide  |
 // | ... and a side was never up                                 | that side: the jig, or a       |
 // |                                                             | calibration file               |
-// | ... and all sides were up                                   | the still periods do not       |
-// |                                                             | verify: the jig, or a          |
-// |                                                             | calibration file               |
+// | ... and all sides were up                                   | --or-scan; where the still     |
+// |                                                             | periods do not verify: the     |
+// |                                                             | jig, or a calibration file     |
 // | all have constants that were not applied or are outdated    | their reasons                  |
 // | they were only scanned                                      | repair; and the sides, if any  |
 //

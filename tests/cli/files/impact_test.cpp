@@ -92,6 +92,26 @@ TEST_F(ImpactCommand, OfAStudy) {
   EXPECT_EQ(of_plan.json()["summary"]["enmo_mg"]["after"], one["enmo_mg"]["after"]);
 }
 
+TEST_F(ImpactCommand, TheTwoMustBelongTogether) {
+  ASSERT_OK(write_file(memory_.files, "c.json", R"({"serial": "MOS2A45130450", "filter": "current",
+    "constants": {"sensitivity_g_per_lsb": [0.00420698, 0.00397141, 0.00412712],
+                  "zero_lsb": [95.2, 52.3, 90.8]}})"));
+  ASSERT_EQ(run_command(memory_.env, {"repair", "in.gt3x", "-o", "out", "--constants", "c.json"})
+                .exit_code,
+            0);
+  tests::MadeRecording other = tests::six_sides();
+  other.raw.pop_back();
+  ASSERT_OK(other.write(memory_.files, "other.gt3x"));
+  EXPECT_EQ(run({"in.gt3x", "out/in.gt3x"}).exit_code, 0);
+  EXPECT_EQ(run({"in.gt3x", "other.gt3x"}).exit_code, 0) << "without a mark";
+  const auto mixed = run({"other.gt3x", "out/in.gt3x"});
+  EXPECT_EQ(mixed.exit_code, 65);
+  EXPECT_THAT(mixed.people, HasSubstr("made of another recording"));
+  const auto turned = run({"out/in.gt3x", "in.gt3x"});
+  EXPECT_EQ(turned.exit_code, 65);
+  EXPECT_THAT(turned.people, HasSubstr("as it was first"));
+}
+
 TEST_F(ImpactCommand, OneRecordingWritesItsFiles) {
   const auto answer = run({"in.gt3x", "--csv", "e.csv", "--html", "p.html"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;

@@ -45,7 +45,8 @@ TEST(UnitNeeds, ASideThatWasNeverUpIsNamed) {
 
 TEST(UnitNeeds, AllSidesUpAndStillNotEnough) {
   const UnitNeeds row = only_row({affected(RepairStatus::not_repairable, kAll)});
-  EXPECT_THAT(row.help, AllOf(HasSubstr("1 file waits"), HasSubstr("all sides were up")));
+  EXPECT_THAT(row.help, AllOf(HasSubstr("1 file waits"), HasSubstr("all sides were up: --or-scan"),
+                              HasSubstr("put the unit on the jig")));
 }
 
 TEST(UnitNeeds, AContradictionIsForAPerson) {
