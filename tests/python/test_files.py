@@ -2,8 +2,10 @@
 
 import dataclasses
 import hashlib
+import os
 import pathlib
 import pickle
+import shutil
 
 import sixpoint
 
@@ -53,6 +55,17 @@ class SameAnswers(InFolder):
         self.assertEqual(without_time(said), ours)
         self.assertLessEqual(fields_of(answer), set(answer.document))
         self.assertEqual(answer.verified, said["verified"])
+
+    def test_a_name_that_is_no_utf8(self):
+        path = os.fsencode(self.folder) + b"/bad\xff\xfe.gt3x"
+        shutil.copy(simulated(), path)
+        name = os.fsdecode(path)
+        self.assertEqual(sixpoint.inspect(name).serial, sixpoint.inspect(simulated()).serial)
+        self.assertEqual(sixpoint.scan([name]).files[0].verdict, "affected")
+        self.assertEqual(sixpoint.solve(name).constants, sixpoint.solve(simulated()).constants)
+        self.assertEqual(len(sixpoint.read(name)), len(sixpoint.read(simulated())))
+        answer = sixpoint.repair(name, self.folder / "fixed", scan=True)
+        self.assertEqual(answer.files[0].status, "repaired")
 
     def test_repair(self):
         before = hashlib.sha256(simulated().read_bytes()).hexdigest()

@@ -57,6 +57,8 @@ class Small(InFolder):
             self.assertEqual([(gap.seconds, gap.kind) for gap in recording.gaps], [(2, "unexplained")])
             self.assertEqual(recording.gaps_unix(), [(START + 3, 2, "unexplained")])
         self.assertEqual(len(sixpoint.read(path, fill_limit_s=1)), 5 * 30)
+        with self.assertRaises(sixpoint.UsageError):
+            sixpoint.read(path, fill_limit_s=-1)
 
     def test_outlives_its_file(self):
         path = small(self.folder)

@@ -13,10 +13,11 @@ from ._answers import Inspection, RepairResult, ScanResult, SolveReport
 Path = Union[str, "os.PathLike[str]"]
 
 
-def _paths(paths: Path | Iterable[Path]) -> list[str]:
+# Names go as bytes: of one that is no UTF-8, Python's text holds surrogates (PEP 383).
+def _paths(paths: Path | Iterable[Path]) -> list[bytes]:
     if isinstance(paths, (str, os.PathLike)):
-        return [os.fspath(paths)]
-    return [os.fspath(path) for path in paths]
+        return [os.fsencode(paths)]
+    return [os.fsencode(path) for path in paths]
 
 
 def _or_empty(path: Optional[Path]) -> str:
@@ -38,7 +39,7 @@ def inspect(path: Path, *, salvage: bool = False) -> Inspection:
     Inspection
         As ``sixpoint inspect --json``.
     """
-    return Inspection.from_json(json.loads(_core.inspect(os.fspath(path), salvage)))
+    return Inspection.from_json(json.loads(_core.inspect(os.fsencode(path), salvage)))
 
 
 def scan(
@@ -94,7 +95,7 @@ def solve(
     """
     return SolveReport.from_json(
         json.loads(
-            _core.solve(os.fspath(path), method, seed, strict_nonzero, prior == "population")
+            _core.solve(os.fsencode(path), method, seed, strict_nonzero, prior == "population")
         )
     )
 
@@ -177,5 +178,5 @@ def repair(
         "redo_outdated": redo_outdated,
         "jobs": jobs,
     }
-    answer = _core.repair(_paths(paths), os.fspath(output), json.dumps(options))
+    answer = _core.repair(_paths(paths), os.fsencode(output), json.dumps(options))
     return RepairResult.from_json(json.loads(answer))

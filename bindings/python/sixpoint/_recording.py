@@ -35,7 +35,9 @@ def _open(
     ):
         if value not in known:
             raise UsageError("usage", f"{name}={value!r} is not known", "", f"use one of {known}")
-    return _core.Reading(os.fspath(path), unit, dtype, fill == "vendor", fill_limit_s, salvage)
+    if fill_limit_s < 0:
+        raise UsageError("usage", f"fill_limit_s={fill_limit_s} is below 0", "", "give seconds")
+    return _core.Reading(os.fsencode(path), unit, dtype, fill == "vendor", fill_limit_s, salvage)
 
 
 def _text(value: bytes) -> str:
