@@ -260,18 +260,33 @@ class SqliteDatabase final : public Database {
     return {};
   }
 
-  Status begin_writing() override { return run("BEGIN IMMEDIATE"); }
+  Status begin_writing() override {
+    SIXPOINT_CHECK(has_its_name());
+    return run("BEGIN IMMEDIATE");
+  }
   Status begin_reading() override {
     SIXPOINT_CHECK(run("BEGIN"));
     // The snapshot is taken by the first reading statement, so read something now.
     SIXPOINT_CHECK(query("SELECT count(*) FROM sqlite_schema", {}));
     return {};
   }
-  Status commit() override { return run("COMMIT"); }
+  // What is written into a file without a name is lost, or in another place than people look.
+  Status commit() override {
+    SIXPOINT_CHECK(run("COMMIT"));
+    return has_its_name();
+  }
   void roll_back() override {
     if (sqlite3_get_autocommit(database_.getHandle()) == 0) {
       static_cast<void>(run("ROLLBACK"));
     }
+  }
+
+  Status has_its_name() {
+    int is_moved = 0;
+    sqlite3_file_control(database_.getHandle(), "main", SQLITE_FCNTL_HAS_MOVED, &is_moved);
+    return is_moved == 0 ? Status()
+                         : fail(ErrorCode::io, "the store's file was moved or removed meanwhile",
+                                path_, "put it back, then 'sixpoint store catch-up'");
   }
 
   Status execute(const std::string& sql, std::span<const Value> parameters) override {

@@ -582,6 +582,19 @@ TEST_F(SqliteStoreTest, WhereAnotherProgramWroteMeanwhileItSaysThatTheStoreIsBus
   EXPECT_EQ(reader->history("MOS2A1")->size(), 2U);
 }
 
+// What would be written into it is nowhere, or where nobody looks.
+TEST_F(SqliteStoreTest, AStoreWhoseFileLostItsNameTakesNothing) {
+  auto store = open();
+  ASSERT_OK(store);
+  ASSERT_OK(store->add_constants(constants(1), "w"));
+  std::filesystem::rename(path(), path() + ".old");
+  EXPECT_FAILS(store->add_constants(constants(2), "w"), ErrorCode::io);
+  std::filesystem::rename(path() + ".old", path());
+  ASSERT_OK(store->add_constants(constants(3), "w")) << "its name is back";
+  std::filesystem::remove(path());
+  EXPECT_FAILS(store->add_constants(constants(4), "w"), ErrorCode::io);
+}
+
 TEST_F(SqliteStoreTest, AStoreWhoseFileWasRemovedIsNotAuditedAsWhole) {
   auto store = open();
   ASSERT_OK(store);
