@@ -1,8 +1,11 @@
 // A jig run in a lane, and how it continues after a restart of the program.
 #include <array>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "db/name_rule.h"
 #include "station/lanes/lane.h"
 
 namespace sixpoint::station {
@@ -69,6 +72,13 @@ JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions&
   return report;
 }
 
+// Of a run that another person took over. Names that the store does not take together (db::check_name)
+// leave the one who ended it.
+std::string both_names(const std::string& began, const std::string& ended) {
+  std::string both = began.empty() ? ended : began + ", then " + ended;
+  return db::check_name(both) ? both : ended;
+}
+
 }  // namespace
 
 void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
@@ -114,7 +124,14 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   if (!report) {
     return end_without_report(state.serial, report.error());
   }
-  show_result(*report, {state.operator_name, state.is_authenticated, state.station,
+  std::string who = state.operator_name;
+  {
+    const std::lock_guard lock(mutex_);
+    if (operator_name_ != who) {
+      who = both_names(who, operator_name_);
+    }
+  }
+  show_result(*report, {std::move(who), state.is_authenticated, state.station,
                         session.retest.retest_of, state.kind});
   const std::lock_guard lock(mutex_);
   if (report->usable() && !report->written && !report->write_begun && run_) {

@@ -238,8 +238,13 @@ TEST(Lane, TakingOverChangesTheClientAndTheOperatorWhereOneIsNamed) {
   EXPECT_EQ(station.lane(1)["client"], public_name("page-b"));
   EXPECT_EQ(station.lane(1)["operator"], "Ada");
   EXPECT_FALSE(station.lanes->command(1, "page-a", OperatorCommand::stop).has_value());
+  ASSERT_TRUE(station.lanes->take_over(1, "page-b", "Bo").has_value());
+  EXPECT_EQ(station.lane(1)["operator"], "Bo");
   EXPECT_TRUE(station.lanes->command(1, "page-b", OperatorCommand::stop).has_value());
   station.wait_state(1, "done");
+  const std::lock_guard lock(station.mutex);
+  ASSERT_EQ(station.operators.size(), 1U);
+  EXPECT_EQ(station.operators[0], "Ada, then Bo") << "the record names both";
 }
 
 }  // namespace
