@@ -9,12 +9,14 @@
 #include "base/atomic_file.h"
 #include "base/sha256.h"
 #include "base/time.h"
+#include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/triage/survey.h"
 #include "station/capture/calibration_file.h"
 #include "station/capture/recording_pieces.h"
 #include "station/capture/sides_to_repeat.h"
+#include "station/run/jig_run.h"
 
 namespace sixpoint::station {
 
@@ -25,43 +27,57 @@ constexpr double kShort_s = 5;
 constexpr std::chrono::seconds kCheckUnitEvery{1};
 constexpr std::chrono::milliseconds kAskEvery{200};
 
-bool is_activity(const gt3x::LogItem& item) {
-  return item.kind == gt3x::LogItem::Kind::record && item.record.checksum_ok &&
-         (item.record.type == static_cast<std::uint8_t>(gt3x::RecordType::activity) ||
-          item.record.type == static_cast<std::uint8_t>(gt3x::RecordType::activity2));
+// The samples of a record that holds some.
+bool samples_of(const gt3x::LogItem& item, std::vector<gt3x::Counts>& samples) {
+  if (item.kind != gt3x::LogItem::Kind::record || !item.record.checksum_ok) {
+    return false;
+  }
+  if (item.record.is(gt3x::RecordType::activity)) {
+    gt3x::unpack_activity(item.record.payload, samples);
+    return true;
+  }
+  if (item.record.is(gt3x::RecordType::activity2)) {
+    gt3x::unpack_activity2(item.record.payload, samples);
+    return true;
+  }
+  return false;
 }
 
 // Traces that a clock or a sensor which failed leaves in a recording.
 struct Oddities {
-  double jumped_s = 0;  // sum of the steps between records, beyond one second each
-  int repeated_s = 0;   // the longest time with the same samples in every second
+  double jumped_s = 0;              // sum of the steps between records, beyond one second each
+  PerAxis<std::size_t> repeated{};  // samples: the longest run of one count
 };
 
 Result<Oddities> find_oddities(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(gt3x::Recording recording, gt3x::Recording::open(files, path));
   SIXPOINT_ASSIGN(gt3x::LogReader log, recording.open_log());
   Oddities oddities;
-  int repeated_s = 0;
-  Bytes before;
+  PerAxis<std::size_t> run{};
+  gt3x::Counts before{};
+  std::vector<gt3x::Counts> samples;
   std::optional<std::uint32_t> last;
   for (;;) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item) {
       return oddities;
     }
-    if (!is_activity(*item)) {
+    if (!samples_of(*item, samples)) {
       continue;
     }
     if (last) {
       oddities.jumped_s += static_cast<double>(item->record.unix_time) - *last - 1;
     }
     last = item->record.unix_time;
-    const auto payload = item->record.payload;
-    repeated_s = std::equal(payload.begin(), payload.end(), before.begin(), before.end())
-                     ? repeated_s + 1
-                     : 0;
-    oddities.repeated_s = std::max(oddities.repeated_s, repeated_s);
-    before.assign(payload.begin(), payload.end());
+    for (const gt3x::Counts& sample : samples) {
+      // A unit that charges stores zeros on all axes: no measurement.
+      const bool is_measured = (sample[0] | sample[1] | sample[2]) != 0;
+      for (std::size_t a = 0; a < kAxes; ++a) {
+        run[a] = is_measured ? (sample[a] == before[a] ? run[a] + 1 : 1) : 0;
+        oddities.repeated[a] = std::max(oddities.repeated[a], run[a]);
+      }
+      before = sample;
+    }
   }
 }
 
@@ -79,19 +95,20 @@ void undo_jumps(std::vector<calib::StillBlock>& blocks, double longest_s) {
   }
 }
 
-// True where the clock of the unit jumped.
-Result<bool> note_oddities(FileSystem& files, const std::string& path, CaptureReport& report) {
-  SIXPOINT_ASSIGN(const Oddities oddities, find_oddities(files, path));
-  if (std::abs(oddities.jumped_s) > kShort_s) {
-    report.notes.push_back(
-        fmt::format("the times in the recording jump by {:+.0f} s: the unit's clock was wrong",
-                    oddities.jumped_s));
+// Why the recording is no measurement: an axis that repeated itself for as long as the jig allows.
+// The longest of the real recordings is 1 s.
+std::vector<std::string> why_stuck(const Oddities& oddities, double rate_hz) {
+  std::vector<std::string> why;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    const double repeated_s = static_cast<double>(oddities.repeated[a]) / rate_hz;
+    if (repeated_s >= JigRunOptions{}.stuck_s) {
+      why.push_back(
+          fmt::format("axis {} repeated one reading for {:.0f} s: the sensor is frozen, "
+                      "or this axis is stuck; keep the unit back",
+                      kAxisNames[a], repeated_s));
+    }
   }
-  if (oddities.repeated_s > kShort_s) {
-    report.notes.push_back(fmt::format(
-        "the sensor repeated the same readings for {} s: it is frozen", oddities.repeated_s));
-  }
-  return std::abs(oddities.jumped_s) > kShort_s;
+  return why;
 }
 
 Status check_and_solve(Env& env, const CaptureOptions& options, const std::string& path,
@@ -108,11 +125,19 @@ Status check_and_solve(Env& env, const CaptureOptions& options, const std::strin
                     "battery empty?",
                     survey.duration_s, *wanted_s));
   }
-  if (report.pieces.empty()) {
-    SIXPOINT_ASSIGN(const bool jumped, note_oddities(env.files, path, report));
-    if (jumped && wanted_s) {
+  SIXPOINT_ASSIGN(const Oddities oddities, find_oddities(env.files, path));
+  if (report.pieces.empty() && std::abs(oddities.jumped_s) > kShort_s) {
+    report.notes.push_back(
+        fmt::format("the times in the recording jump by {:+.0f} s: the unit's clock was wrong",
+                    oddities.jumped_s));
+    if (wanted_s) {
       undo_jumps(survey.blocks, options.side_s + options.turn_s);
     }
+  }
+  report.refusal = why_stuck(oddities, survey.rate_hz);
+  if (!report.refusal.empty()) {
+    report.solved.reset();
+    return {};
   }
   const auto begin = env.clock.elapsed();
   SIXPOINT_ASSIGN(report.solved, repair::solve_survey(path, survey, options.solve));
@@ -208,6 +233,9 @@ class CaptureRun {
         return judged_as_it_is(fetched.error().brief());
       }
       SIXPOINT_CHECK(fetched);
+      if (!report_.refusal.empty()) {
+        return report_;
+      }
       const auto sides = hooks_.again && may_make_pieces()
                              ? sides_to_repeat(*report_.solved, repeats, options_.most_repeats)
                              : std::vector<device::Pose>();

@@ -204,7 +204,13 @@ const std::vector<Row>& capture_rows() {
       Row{"full_flash_before", R"({"fault": "full_flash", "at_s": 0})", 74, "storage full"},
       Row{"full_flash", R"({"fault": "full_flash", "at_s": 100})", 2, "memory full"},
       Row{"battery_low", R"({"fault": "battery_low", "at_s": 0})", 74, "charge the unit"},
-      Row{"frozen_sensor", R"({"fault": "frozen_sensor", "at_s": 100})", 2, "it is frozen"},
+      Row{"frozen_sensor", R"({"fault": "frozen_sensor", "at_s": 100})", 1,
+          "axis x repeated one reading"},
+      // Six sides are there all the same.
+      Row{"frozen_at_the_end", R"({"fault": "frozen_sensor", "at_s": 232})", 1,
+          "axis z repeated one reading"},
+      Row{"axis_stuck", R"({"fault": "axis_stuck", "axis": "y", "at_s": 231.5})", 1,
+          "axis y repeated one reading"},
       Row{"clock_jump", R"({"fault": "clock_jump", "at_s": 100, "seconds": 3600})", 0,
           "jump by +3600 s"}};
   return kRows;
