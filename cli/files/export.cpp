@@ -23,6 +23,9 @@
 namespace sixpoint::cli {
 namespace {
 
+// That may be asked for; a line of CSV is 20 bytes.
+constexpr std::int64_t kLongestFill_s = std::int64_t{400} * 86'400;
+
 struct ExportCommandOptions {
   std::vector<std::string> paths;
   std::string csv;
@@ -88,7 +91,9 @@ void add_time_warnings(const gt3x::RawCsvTally& tally, std::vector<std::string>&
         "not tell its time (--time does{})",
         leap.seconds < 0 ? "back by" : "forward over", std::abs(leap.seconds),
         clock(leap.unix_time),
-        leap.seconds < 0 ? "" : fmt::format("; --fill-limit {} fills it", leap.seconds)));
+        leap.seconds < 0 || leap.seconds > kLongestFill_s
+            ? ""
+            : fmt::format("; --fill-limit {} fills it", leap.seconds)));
   }
 }
 
@@ -267,7 +272,7 @@ void add_export(CLI::App& app, Context& context) {
           .add_option("--fill-limit", options.fill_limit_s,
                       "seconds that may be missing for no known reason and are still filled "
                       "(default: 3600)")
-          ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{400} * 86'400))
+          ->check(CLI::Range(std::int64_t{0}, kLongestFill_s))
           ->type_name("SECONDS");
   fill_limit->excludes(no_fill);
   // Alone: iso.

@@ -188,7 +188,7 @@ Status run_study(const ImpactCommandOptions& options, repair::StudyImpact study,
       [&](std::size_t done) { progress.at(done); });
   for (const repair::FileImpact& file : study.files) {
     if (file.error) {
-      context.worsen(kExitFailed);
+      context.worsen(file.error->code);
     }
   }
   if (!study.usable()) {

@@ -98,6 +98,9 @@ std::string StudyImpact::brief() const {
         file.was.mad_mg, file.is.mad_mg, printable(file.after));
   }
   const Summary sum = summary();
+  if (sum.files == 0) {
+    return text + "no recording could be compared with its copy\n";
+  }
   text +=
       fmt::format("{} files, {:.0f} minutes: ENMO {:.2f} -> {:.2f} mg, MAD {:.2f} -> {:.2f} mg\n",
                   sum.files, sum.recorded_minutes, sum.enmo_before_mg, sum.enmo_after_mg,
@@ -107,11 +110,9 @@ std::string StudyImpact::brief() const {
                         cuts[i].value, printable(cuts[i].name, 40), sum.minutes_before[i],
                         sum.minutes_after[i]);
   }
-  if (sum.files > 0) {
-    text +=
-        fmt::format("{} of them move by more than twice their uncertainty, most {:+.2f} mg ({})\n",
-                    sum.moved, sum.most_mg, printable(sum.most_file));
-  }
+  text +=
+      fmt::format("{} of them move by more than twice their uncertainty, most {:+.2f} mg ({})\n",
+                  sum.moved, sum.most_mg, printable(sum.most_file));
   if (sum.unknown > 0) {
     text += fmt::format("{} state no uncertainty\n", sum.unknown);
   }
@@ -127,6 +128,11 @@ Json StudyImpact::to_json() const {
     json["recordings"].push_back(file_json(file, cuts));
   }
   const Summary sum = summary();
+  // There is no mean of nothing.
+  const auto mean_pair = [&](double before, double after) {
+    return sum.files > 0 ? number_pair(before, after)
+                         : Json({{"before", nullptr}, {"after", nullptr}});
+  };
   Json minutes = Json::object();
   for (std::size_t i = 0; i < cuts.size(); ++i) {
     minutes[printable(cuts[i].name, 200)] =
@@ -137,8 +143,8 @@ Json StudyImpact::to_json() const {
       {"failed", sum.failed},
       {"without_copy", without_copy},
       {"recorded_minutes", sum.recorded_minutes},
-      {"enmo_mg", number_pair(sum.enmo_before_mg, sum.enmo_after_mg)},
-      {"mad_mg", number_pair(sum.mad_before_mg, sum.mad_after_mg)},
+      {"enmo_mg", mean_pair(sum.enmo_before_mg, sum.enmo_after_mg)},
+      {"mad_mg", mean_pair(sum.mad_before_mg, sum.mad_after_mg)},
       {"minutes_above", std::move(minutes)},
       {"moved", sum.moved},
       {"uncertainty_not_stated", sum.unknown},

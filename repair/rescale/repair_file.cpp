@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/forwarding_files.h"
 #include "base/sha256.h"
 #include "calib/application/agreement.h"
 #include "calib/coverage.h"
@@ -38,6 +39,9 @@ constexpr const char* kDoneBefore = "repaired by an earlier run";
 constexpr const char* kMadeOtherwise =
     "the output that is there was made with other constants, options or rules than would be used "
     "now; --redo-outdated replaces it";
+constexpr const char* kClipped =
+    "samples at the limit of their record, whose true value is unknown: {} before, {} after{}";
+constexpr const char* kWideHelps = " (--wide keeps those that were not at it before)";
 constexpr const char* kMappedByLine =
     "the counts cannot have come from whole raw counts by the file's constants (averaged, repaired "
     "before, or resampled): {} of them mapped by the straight line";
@@ -69,11 +73,22 @@ class Borrowed final : public gt3x::ByteSource {
   gt3x::ByteSource& source_;
 };
 
+// The output's place: what came there meanwhile stays, and an output that is replaced is one that was
+// judged (earlier_output.h).
+class OutputFiles final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Result<Placement> placement(const std::string& path) override {
+    return Placement{replaces ? Placing::replace : Placing::keep, path};
+  }
+  bool replaces = false;
+};
+
 class Repair {
  public:
   Repair(Env& env, const std::string& input, const std::string& output, ConstantsSource& source,
          const RepairOptions& options)
-      : env_(env), output_(output), source_(source), options_(options) {
+      : env_(env), output_files_(env.files), output_(output), source_(source), options_(options) {
     report_.input = input;
     report_.dry_run = options.dry_run;
   }
@@ -140,7 +155,7 @@ class Repair {
   // One pass (repair_file.h); where it was not tried or did not come to its end, two find out why.
   Status survey_and_write() {
     const auto another_way = fail(ErrorCode::internal, "not in one pass", report_.input);
-    if (options_.dry_run || options_.salvage || env_.files.info(output_)) {
+    if (options_.dry_run || options_.salvage || env_.files.link_info(output_)) {
       return another_way;
     }
     SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(env_.files, report_.input));
@@ -377,6 +392,11 @@ class Repair {
     if (const auto after_mg = log.still_error_mg(windows)) {
       report_.still_error_after_mg = after_mg;
     }
+    if (report_.clipped_after > 0) {
+      report_.reasons.push_back(fmt::format(
+          kClipped, report_.clipped_before, report_.clipped_after,
+          !options_.wide && report_.clipped_after > report_.clipped_before ? kWideHelps : ""));
+    }
     if (log.tally().affine_counts > 0) {
       report_.reasons.push_back(fmt::format(kMappedByLine, log.tally().affine_counts));
     }
@@ -436,6 +456,7 @@ class Repair {
         finish(recording, *log, windows);
         return is_done ? take_earlier_output(mark.value_or(Json())) : Status();
       }
+      output_files_.replaces = earlier == EarlierOutput::outdated;
       SIXPOINT_ASSIGN(auto writer, begin_output());
       SIXPOINT_CHECK(write_entries(recording, *log, writer));
       written_.emplace(WrittenLog{std::move(recording), how, std::move(log), std::move(writer),
@@ -495,7 +516,7 @@ class Repair {
     gt3x::WriterOptions how;
     how.packing = options_.store_only ? gt3x::Packing::store : gt3x::Packing::deflate;
     how.jobs = options_.jobs;
-    return gt3x::RecordingWriter::create(env_.files, output_, how);
+    return gt3x::RecordingWriter::create(output_files_, output_, how);
   }
 
   // All but the mark. A large log is read on a thread of its own: packing or writing it takes as
@@ -562,7 +583,7 @@ class Repair {
 
   // What lies where the output goes; nothing where nothing does.
   std::optional<FoundOutput> found_output(const std::optional<Json>& mark) {
-    if (!env_.files.info(output_)) {
+    if (!env_.files.link_info(output_)) {
       return std::nullopt;
     }
     return mark ? FoundOutput{text_in(*mark, "input_sha256"), text_in(*mark, "recipe")}
@@ -657,6 +678,7 @@ class Repair {
   }
 
   Env& env_;
+  OutputFiles output_files_;
   std::string output_;
   ConstantsSource& source_;
   RepairOptions options_;

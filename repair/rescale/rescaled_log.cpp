@@ -168,8 +168,10 @@ void RescaledLog::put_samples(const gt3x::Record& record) {
     keep_charging_zeros(samples_, fresh_samples_);
     compared = compare(samples_, fresh_samples_);
   }
-  tally_.clipped_before += count_at_limit(samples_, limit_before);
-  tally_.clipped_after += count_at_limit(fresh_samples_, limit_after);
+  const std::uint64_t clipped = count_at_limit(samples_, limit_before);
+  tally_.clipped_before += clipped;
+  // A wider record has room for what a clipped count is mapped to; its true value is as unknown.
+  tally_.clipped_after += std::max(count_at_limit(fresh_samples_, limit_after), clipped);
   tally_.changed_samples += compared.changed;
   tally_.samples += samples_.size();
   ++tally_.sample_records;

@@ -112,6 +112,17 @@ TEST_F(ImpactCommand, TheTwoMustBelongTogether) {
   EXPECT_THAT(turned.people, HasSubstr("as it was first"));
 }
 
+TEST_F(ImpactCommand, OfAStudyWithoutAReadableCopyThereIsNoMean) {
+  ASSERT_OK(memory_.files.make_folders("/a"));
+  ASSERT_OK(memory_.files.make_folders("/b"));
+  EXPECT_OK(tests::six_sides().write(memory_.files, "/a/x.gt3x"));
+  ASSERT_OK(write_file(memory_.files, "/b/x.gt3x", "cut"));
+  const auto answer = run({"/a", "/b", "--json"});
+  EXPECT_EQ(answer.exit_code, 65) << answer.people;
+  EXPECT_TRUE(answer.json()["summary"]["enmo_mg"]["before"].is_null()) << answer.out;
+  EXPECT_THAT(run({"/a", "/b"}).out, HasSubstr("no recording could be compared"));
+}
+
 TEST_F(ImpactCommand, OneRecordingWritesItsFiles) {
   const auto answer = run({"in.gt3x", "--csv", "e.csv", "--html", "p.html"});
   EXPECT_EQ(answer.exit_code, 0) << answer.people;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <map>
 
@@ -18,6 +19,7 @@
 #include "repair/rescale/repair_mark.h"
 #include "repair/six_sides.h"
 #include "shared_data.h"
+#include "temporary_folder.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -431,7 +433,7 @@ TEST_F(RepairFile, CountsClippedSamplesAndKeepsThemAtTheLimit) {
   options.wide = true;
   const auto wide = repair_file(memory_.env, "in.gt3x", "wide.gt3x", source_, options);
   ASSERT_EQ(wide.status, RepairStatus::repaired);
-  EXPECT_EQ(wide.clipped_after, 0U);
+  EXPECT_EQ(wide.clipped_after, 2U) << "their true value stays unknown";
   EXPECT_EQ(samples_of(memory_.files, "wide.gt3x")[5][0], std::lround(256 * kTrue.to_g(0, 2047)));
 }
 
@@ -654,6 +656,43 @@ TEST_F(RepairFile, AFileThatIsReplacedMeanwhileGivesNoOutput) {
     }
     EXPECT_EQ(most, one_pass_from == 0 ? 2 : 4);
   }
+}
+
+// Another program makes the output's name when the temporary file is there.
+class MakingFiles final : public ForwardingFiles {
+ public:
+  using ForwardingFiles::ForwardingFiles;
+  Result<std::unique_ptr<WritableFile>> create(const std::string& path) override {
+    SIXPOINT_CHECK(write_file(disk(), "out.gt3x", "theirs"));
+    return disk().create(path);
+  }
+};
+
+TEST_F(RepairFile, WhatCameToTheOutputsNameMeanwhileStays) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  for (const std::uint64_t one_pass_from : {std::uint64_t{0}, std::uint64_t{1} << 20}) {
+    MakingFiles files(memory_.files);
+    Env env{memory_.clock, files};
+    RepairOptions options;
+    options.one_pass_from_bytes = one_pass_from;
+    const RepairReport report = repair_file(env, "in.gt3x", "out.gt3x", source_, options);
+    EXPECT_EQ(report.status, RepairStatus::failed);
+    EXPECT_EQ(report.error.value_or(Error{}).code, ErrorCode::cannot_create);
+    EXPECT_EQ(as_text(read_file(memory_.files, "out.gt3x").value()), "theirs");
+    ASSERT_OK(memory_.files.remove("out.gt3x"));
+  }
+}
+
+// A disk that is not mounted, for example.
+TEST_F(RepairFile, ALinkThatLeadsNowhereIsNotReplaced) {
+  const sixpoint::tests::TemporaryFolder folder;
+  ASSERT_OK(six_sides().write(posix_env().files, folder / "in.gt3x"));
+  std::filesystem::create_symlink(folder / "away/out.gt3x", folder / "out.gt3x");
+  const RepairReport report =
+      repair_file(posix_env(), folder / "in.gt3x", folder / "out.gt3x", source_, {});
+  EXPECT_EQ(report.status, RepairStatus::failed);
+  EXPECT_EQ(report.error.value_or(Error{}).code, ErrorCode::cannot_create);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "out.gt3x"));
 }
 
 // Where the rest of a file says something else than its first 100,000 samples, what was written
