@@ -6,6 +6,7 @@
 
 #include "calib/poses/efficiency.h"
 #include "cli/command.h"
+#include "cli/devices/replay_rule.h"
 #include "cli/people_text.h"
 #include "cli/station/jig_options.h"
 #include "cli/station/record_option.h"
@@ -85,6 +86,9 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
                             Outputs& outputs, device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.input(options.limits));
+  if (!options.constants_out.empty()) {
+    SIXPOINT_CHECK(refuse_of_replay(options.device, "--constants-out"));
+  }
   SIXPOINT_CHECK(outputs.file("--constants-out", options.constants_out));
   SIXPOINT_CHECK(outputs.file_to_keep("--output", options.output));
   SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, outputs, recorder));
@@ -125,7 +129,9 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
     context.people << "this unit offers files only: the recording that it holds is taken\n";
     SIXPOINT_ASSIGN(done.report, station::run_file_capture(unit, env, how));
   }
-  if (done.report.usable()) {
+  if (is_replay(options.device)) {
+    done.report.notes.emplace_back("a replayed session is no measurement: no constants are stored");
+  } else if (done.report.usable()) {
     SIXPOINT_ASSIGN(done.saved,
                     save_capture(context, env, options.store, done.report, options.constants_out));
   }

@@ -11,6 +11,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
+#include "cli/devices/replay_rule.h"
 #include "cli/people_text.h"
 #include "cli/station/jig_options.h"
 #include "cli/station/name_option.h"
@@ -100,6 +101,8 @@ Result<db::RunRecord> record_before(const JigCommandOptions& options,
       station::run_record_before(session, serial, options.jig_id.empty() ? jig : options.jig_id);
   if (!options.study.empty()) {
     run.kind = station::kStudyKind;
+  } else if (is_replay(options.device)) {
+    run.kind = kReplayKind;
   }
   run.operator_name = options.operator_name;
   run.station = options.station;
@@ -124,7 +127,11 @@ Status check_outputs(const JigCommandOptions& options, Outputs& outputs) {
     SIXPOINT_CHECK(outputs.working_folder("--state", options.state));
   }
   if (!options.certificate.empty()) {
+    SIXPOINT_CHECK(refuse_of_replay(options.device, "--certificate"));
     SIXPOINT_CHECK(station::check_certificate_name(options.certificate));
+  }
+  if (!options.label.empty()) {
+    SIXPOINT_CHECK(refuse_of_replay(options.device, "--label"));
   }
   if (!options.label.empty() && !options.write) {
     return fail(ErrorCode::usage, "a label says that the unit holds what was measured", "--label",
@@ -236,7 +243,7 @@ Result<station::JigSessionOptions> session_options(Context& context,
 Result<station::RetestState> retest_state(Context& context, const JigCommandOptions& options,
                                           const std::string& serial, station::StationGuard& guard,
                                           Result<db::Store>& store) {
-  if (!options.study.empty()) {
+  if (!options.study.empty() || is_replay(options.device)) {
     return station::RetestState{};
   }
   if (!store) {
@@ -448,10 +455,14 @@ void print_jig(Context& context, const JigCommandOptions& options, const JigDone
     return;
   }
   context.text() << fmt::format("run {}\n", db::shown_id(done.run_id));
+  if (is_replay(options.device)) {
+    context.text() << "a replayed session is no measurement: no constants are stored\n";
+  }
   if (done.constants_id) {
     context.text() << "constants " << kept_as(*done.kept, *done.constants_id) << '\n';
   }
-  if (report.usable() && options.study.empty() && !done.certified && done.kept->in_store()) {
+  if (report.usable() && options.study.empty() && !is_replay(options.device) && !done.certified &&
+      done.kept->in_store()) {
     std::vector<std::string> next = {"certificate", db::shown_id(done.run_id), "-o",
                                      report.serial + ".pdf"};
     if (!options.store.empty()) {

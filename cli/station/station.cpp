@@ -13,6 +13,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/devices/known_devices.h"
+#include "cli/devices/replay_rule.h"
 #include "cli/gravity_option.h"
 #include "cli/output.h"
 #include "cli/station/name_option.h"
@@ -339,6 +340,7 @@ Result<std::unique_ptr<FileLock>> lock_of_station(const std::string& folder, Con
 
 Status serve(const StationCommandOptions& options, Context& context) {
   for (const std::string& device : options.devices) {
+    SIXPOINT_CHECK(refuse_of_replay(device, "--device " + printable(device)));
     SIXPOINT_CHECK(station::check_address(device, context.env));
   }
   SIXPOINT_ASSIGN(const auto listening, server_options(context, options));

@@ -87,6 +87,9 @@ Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report
   SIXPOINT_ASSIGN(
       done.run_id,
       writer.add_run(run, {{"samples.csv", Bytes(report.raw_csv.begin(), report.raw_csv.end())}}));
+  if (run.kind != "jig" && run.kind != kWriteKind) {
+    return done;  // a study or a replay says nothing new of the unit
+  }
   if (report.written && report.as_left) {
     db::UnitWrite write;
     write.run_id = done.run_id;
@@ -100,7 +103,7 @@ Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report
     write.as_left = report.six ? calib::to_json(report.six->best().stored).dump() : write.read_back;
     SIXPOINT_CHECK(writer.add_unit_write(write));
   }
-  if (report.usable() && run.kind != kStudyKind) {
+  if (report.usable()) {
     calib::ConstantsRecord constants = report.record();
     constants.made_from.station = run.station;
     db::ConstantsRecord row = constants_row(constants);

@@ -136,7 +136,11 @@ void conclude_report(JigReport& report, const JigRun& run, const JigEnding& endi
     worse(JigVerdict::fail, "read_back_differs");
     judged.reasons.emplace_back("the unit does not hold what was written");
   } else if (!report.written && ending.write && judged.usable()) {
-    worse(JigVerdict::fail, "write_refused");
+    if (report.ended_by) {  // by this machine, before the unit was asked
+      worse(JigVerdict::inconclusive, "interrupted");
+    } else {
+      worse(JigVerdict::fail, "write_refused");
+    }
     judged.reasons.emplace_back("the constants were not written into the unit");
   }
   apply_retest(judged, ending.retest);

@@ -389,6 +389,7 @@ Status Session::write_constants(JigRun& run) {
       report_.write_begun = false;
       report_.reasons.push_back("not written: that a write begins could not be noted down: " +
                                 noted.error().brief());
+      report_.ended_by = noted.error();
       ended_ = true;
       return {};
     }

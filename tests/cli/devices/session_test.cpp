@@ -38,6 +38,29 @@ TEST_F(SessionCommand, AReplayedJigRunGivesTheSameConstants) {
       << "the recording ends before the write";
 }
 
+// Constants of another day would apply, with a certificate of today.
+TEST_F(SessionCommand, AReplayMeasuresNothing) {
+  const std::string file = path("r.zip");
+  ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--write", "--record", file}).exit_code, 0);
+  const auto again = jig("replay:" + file, {"--write", "--json"});
+  EXPECT_EQ(again.exit_code, 0) << again.people;
+  EXPECT_TRUE(again.json()["stored_id"].is_null());
+  const Json history = run({"history", "MOS2A45130007", "--store", path("s.db"), "--json"}).json();
+  std::map<std::string, int> kinds;
+  for (const Json& entry : history["runs"]) {
+    ++kinds[entry["kind"].get<std::string>()];
+  }
+  EXPECT_EQ(kinds, (std::map<std::string, int>{{"jig", 1}, {"replay", 1}}));
+  EXPECT_EQ(history["constants"].size(), 1U);
+  EXPECT_EQ(history["writes"].size(), 1U);
+  EXPECT_EQ(jig("replay:" + file, {"--certificate", path("c.pdf")}).exit_code, 64);
+  EXPECT_EQ(jig("replay:" + file, {"--write", "--label", path("l.zpl")}).exit_code, 64);
+  EXPECT_EQ(run({"station", "--device", "replay:" + file}).exit_code, 64);
+  EXPECT_EQ(
+      run({"capture", "--device", "replay:" + file, "--constants-out", path("c.json")}).exit_code,
+      64);
+}
+
 TEST_F(SessionCommand, AReplayedCaptureGivesTheSameFile) {
   const auto capture = [&](const std::string& device, const std::string& output,
                            const std::string& record) {

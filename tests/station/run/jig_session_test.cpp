@@ -599,7 +599,9 @@ TEST(JigSession, AWriteThatCannotBeNotedDownIsNotBegun) {
   options.run.write = true;
   const auto report = run_jig(bench.on_jig(), bench.env.env, options, hooks);
   ASSERT_OK(report);
-  EXPECT_FALSE(report->usable());
+  EXPECT_EQ(report->verdict, JigVerdict::inconclusive) << "it says nothing of the unit";
+  EXPECT_THAT(report->codes, Contains("interrupted"));
+  EXPECT_EQ(report->ended_by.value_or(Error{}).code, ErrorCode::io);
   EXPECT_THAT(report->reasons, Contains(HasSubstr("the disk is full")));
   EXPECT_EQ(report->as_left->constants, report->as_found->constants);
   EXPECT_EQ(bench.unit->read_calibration()->constants, report->as_found->constants);
