@@ -184,6 +184,7 @@ Status run_repair(const RepairCommandOptions& options, Context& context) {
 
   SIXPOINT_ASSIGN(const auto lock, lock_of(options, context));
   auto files = named_files(context, options.paths, {".gt3x"});
+  repair::leave_out_outputs(context.env.files, files, options.folder);
   repair::refuse_same_outputs(files, options.folder);
   const auto reports = repair_all(files, options, finder, pool, context);
   RepairTally tally;

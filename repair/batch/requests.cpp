@@ -166,6 +166,7 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   how.unit = request.no_pool ? nullptr : &pool;
   ConstantsFinder finder(env, std::move(how));
   auto named = named_files(env.files, request.paths, {".gt3x"}).files;
+  leave_out_outputs(env.files, named, request.folder);
   refuse_same_outputs(named, request.folder);
   RepairFilesOptions options;
   options.folder = request.folder;

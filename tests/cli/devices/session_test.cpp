@@ -42,7 +42,7 @@ TEST_F(SessionCommand, AReplayedJigRunGivesTheSameConstants) {
 TEST_F(SessionCommand, AReplayMeasuresNothing) {
   const std::string file = path("r.zip");
   ASSERT_EQ(jig("virtual:seed=7,jig=auto", {"--write", "--record", file}).exit_code, 0);
-  const auto again = jig("replay:" + file, {"--write", "--json"});
+  const auto again = jig("replay:" + file, {"--write"});
   EXPECT_EQ(again.exit_code, 0) << again.people;
   EXPECT_TRUE(again.json()["stored_id"].is_null());
   const Json history = run({"history", "MOS2A45130007", "--store", path("s.db"), "--json"}).json();

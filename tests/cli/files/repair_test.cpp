@@ -118,6 +118,16 @@ TEST_F(RepairCommand, RepairsATreeOnce) {
   EXPECT_EQ(run({"scan", out_}).exit_code, 0) << "a repaired file is not affected any more";
 }
 
+TEST_F(RepairCommand, OutputsInTheTreeAreNoInputs) {
+  for (int i = 0; i < 2; ++i) {
+    const auto answer = run({"repair", archive_, "-o", archive_ + "/out", "--constants",
+                             folder_ / "constants.json", "--resume", "--json"});
+    EXPECT_EQ(answer.exit_code, 0) << answer.people;
+    EXPECT_EQ(answer.json()["files"].size(), 2U);
+  }
+  EXPECT_FALSE(std::filesystem::exists(archive_ + "/out/out"));
+}
+
 TEST_F(RepairCommand, ScanOfTheFileItselfIsTheLastResort) {
   const Json json = run({"repair", archive_, "-o", out_, "--scan", "--json"}).json();
   EXPECT_EQ(json["files"][0]["status"], "repaired") << json.dump(1);
