@@ -32,19 +32,6 @@ NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,
   return named;
 }
 
-void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,
-                       const std::string& folder) {
-  const auto output = files.real_path(folder);
-  if (!output) {
-    return;  // it is not there yet
-  }
-  std::erase_if(named, [&](const NamedFile& file) {
-    const auto real = files.real_path(file.path);
-    // A file that was named itself is refused as its own output.
-    return real && is_inside(*real, *output) && *real != *output + "/" + file.relative;
-  });
-}
-
 void refuse_same_outputs(std::vector<NamedFile>& files, const std::string& folder) {
   std::map<std::string, std::string> input_of;  // by the name below the output folder
   for (NamedFile& file : files) {

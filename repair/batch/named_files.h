@@ -26,10 +26,6 @@ struct NamedFiles {
 NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,
                        const std::vector<std::string>& endings);
 
-// Files of a tree that lie in the output folder, which may lie in the tree: outputs of an earlier
-// run are no inputs.
-void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named, const std::string& folder);
-
 // Two inputs must not have one output: the second one gets an error.
 void refuse_same_outputs(std::vector<NamedFile>& files, const std::string& folder);
 

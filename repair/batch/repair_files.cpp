@@ -184,6 +184,19 @@ RepairReport failed_report(const std::string& input, const Error& error) {
   return report;
 }
 
+void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,
+                       const std::string& folder) {
+  const auto output = files.real_path(folder);
+  if (!output) {
+    return;  // it is not there yet
+  }
+  std::erase_if(named, [&](const NamedFile& file) {
+    const auto real = files.real_path(file.path);
+    // A file that was named itself is refused as its own output.
+    return real && is_inside(*real, *output) && *real != *output + "/" + file.relative;
+  });
+}
+
 std::vector<RepairReport> repair_files(Env& env, const std::vector<NamedFile>& files,
                                        const RepairFilesOptions& options, ConstantsSource& source,
                                        UnitPool& pool, const RepairWatch& watch,

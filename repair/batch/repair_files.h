@@ -1,6 +1,7 @@
 // Many files repaired into one folder.
 //
 //   auto named = named_files(env.files, {"archive"}, {".gt3x"});
+//   leave_out_outputs(env.files, named.files, "repaired");
 //   refuse_same_outputs(named.files, "repaired");
 //   UnitPool pool;
 //   ConstantsFinderOptions sources;
@@ -40,6 +41,10 @@ struct RepairWatch {
   std::function<void(const char* doing, std::size_t files)> begin;  // a pass over so many files
   std::function<void(const RepairProgress&)> at;                    // as jobs.h calls
 };
+
+// Files of a tree that lie in the output folder, which may lie in the tree: outputs of an earlier
+// run are no inputs.
+void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named, const std::string& folder);
 
 // Every file by itself, then those that wait for the other files of their unit, which `pool`
 // collected: the source asks it. A report for each file, in their order, but for those that were

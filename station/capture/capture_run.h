@@ -99,9 +99,8 @@ struct CaptureReport {
   std::string serial;
   std::string firmware;
   calib::FilterConfiguration recording_filter = calib::FilterConfiguration::current;
-  // Of why_recording_cannot_help(); then nothing was recorded. Or an axis repeated itself; then
-  // nothing is solved.
-  std::vector<std::string> refusal;
+  // Or an axis repeated itself; then nothing is solved.
+  std::vector<std::string> refusal;  // of why_recording_cannot_help(); then nothing was recorded
   bool stopped = false;  // by the person; the recording was stopped and left in the unit
   std::string file;
   std::string file_sha256;

@@ -20,7 +20,6 @@
 #include <memory>
 #include <stop_token>
 #include <string>
-#include <string_view>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -35,9 +34,6 @@ struct Label {
   std::string serial;
   std::string zpl;
 };
-
-// Whether it can be the id of a run: hexadecimal. Anything else could be a path.
-bool is_run_id(std::string_view run);
 
 // send_label() of one printer. Must answer soon after a stop was asked for.
 using LabelSender = std::function<Result<Sent>(std::string_view zpl, const std::stop_token& stop)>;
