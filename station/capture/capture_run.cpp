@@ -95,6 +95,17 @@ void undo_jumps(std::vector<calib::StillBlock>& blocks, double longest_s) {
   }
 }
 
+// True where the clock of the unit jumped.
+bool note_jump(const Oddities& oddities, CaptureReport& report) {
+  if (std::abs(oddities.jumped_s) <= kShort_s) {
+    return false;
+  }
+  report.notes.push_back(
+      fmt::format("the times in the recording jump by {:+.0f} s: the unit's clock was wrong",
+                  oddities.jumped_s));
+  return true;
+}
+
 // Why the recording is no measurement: an axis that repeated itself for as long as the jig allows.
 // The longest of the real recordings is 1 s.
 std::vector<std::string> why_stuck(const Oddities& oddities, double rate_hz) {
@@ -126,13 +137,8 @@ Status check_and_solve(Env& env, const CaptureOptions& options, const std::strin
                     survey.duration_s, *wanted_s));
   }
   SIXPOINT_ASSIGN(const Oddities oddities, find_oddities(env.files, path));
-  if (report.pieces.empty() && std::abs(oddities.jumped_s) > kShort_s) {
-    report.notes.push_back(
-        fmt::format("the times in the recording jump by {:+.0f} s: the unit's clock was wrong",
-                    oddities.jumped_s));
-    if (wanted_s) {
-      undo_jumps(survey.blocks, options.side_s + options.turn_s);
-    }
+  if (report.pieces.empty() && note_jump(oddities, report) && wanted_s) {
+    undo_jumps(survey.blocks, options.side_s + options.turn_s);
   }
   report.refusal = why_stuck(oddities, survey.rate_hz);
   if (!report.refusal.empty()) {
@@ -613,7 +619,8 @@ class CaptureRun {
     for (std::size_t i = 0; i < made.size(); ++i) {
       report_.pieces.push_back(piece_name(path, i + 1));
       SIXPOINT_CHECK(download(made[i], report_.pieces.back()));
-      SIXPOINT_CHECK(note_oddities(env_.files, report_.pieces.back(), report_));
+      SIXPOINT_ASSIGN(const Oddities oddities, find_oddities(env_.files, report_.pieces.back()));
+      note_jump(oddities, report_);
     }
     SIXPOINT_CHECK(join_recordings(env_.files, report_.pieces, path));
     SIXPOINT_ASSIGN(report_.file_sha256, file_sha256(env_.files, path));
