@@ -578,7 +578,7 @@ TEST_F(RepairFile, OnePassOpensTheInputOnceAndOnceForItsHash) {
 }
 
 // out.gt3x packed anew, with two bits of its samples turned that leave the record's checksum right.
-void change_two_counts(MemoryFileSystem& files) {
+void change_two_counts(FileSystem& files) {
   auto recording = gt3x::Recording::open(files, "out.gt3x").value();
   Bytes log;
   auto reader = recording.open_log().value();
