@@ -31,7 +31,7 @@ sigset_t block_stop_signals(sigset_t* before) {
 }
 
 void take_stop(Context& context, int signal) {
-  if (signal != SIGTERM) {
+  if (signal == SIGINT || signal == SIGHUP) {
     context.worsen(kExitStopped);
   }
 }

@@ -29,7 +29,7 @@ struct Context;
 sigset_t block_stop_signals(sigset_t* before = nullptr);
 
 // The exit code of a command that was ended so: 3, as everywhere; 0 by SIGTERM, the word of what
-// supervises services.
+// supervises services. `signal` may be none (-1): the command ended by itself.
 void take_stop(Context& context, int signal);
 
 // One at a time, on the thread that made it. The signals behave as before after it. A reader of the

@@ -60,7 +60,8 @@ TEST(StopRequest, OnlySigtermEndsAServiceWithZero) {
   MemoryEnv memory;
   std::stringstream stream;
   for (const auto& [signal, code] :
-       {std::pair{SIGTERM, 0}, std::pair{SIGINT, kExitStopped}, std::pair{SIGHUP, kExitStopped}}) {
+       {std::pair{SIGTERM, 0}, std::pair{-1, 0}, std::pair{SIGINT, kExitStopped},
+        std::pair{SIGHUP, kExitStopped}}) {
     Context context{memory.env, stream, stream, stream};
     take_stop(context, signal);
     EXPECT_EQ(context.exit_code, code) << signal;
