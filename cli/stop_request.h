@@ -1,8 +1,6 @@
 // Signals that ask a command to end: Ctrl-C (SIGINT), SIGTERM, and SIGHUP, which comes when the
 // terminal is closed. A command that was started to outlive its terminal (nohup: SIGHUP is ignored)
-// does.
-//
-// For commands that end in order (what is begun is finished, what is done stays):
+// does. A command that ends in order finishes what is begun and keeps what is done:
 //
 //   StopRequest stop;                // before threads are started: they inherit it
 //   while (!stop.requested()) {
@@ -10,12 +8,8 @@
 //   }
 //   context.worsen(kExitStopped);
 //
-// For commands that run until they are told to end:
-//
-//   const sigset_t signals = block_stop_signals();
-//   int signal = 0;
-//   sigwait(&signals, &signal);  // until Ctrl-C
-//   take_stop(context, signal);
+// A command that runs until it is told to end waits for one of block_stop_signals(), then calls
+// take_stop().
 #pragma once
 
 #include <csignal>

@@ -1,5 +1,7 @@
-// What counts of a replayed session (docs/sessions.md). It gives the answers of another day, so it
-// measures nothing:
+// What counts of a replayed session (docs/sessions.md): nothing, for it gives the answers of another
+// day.
+//
+//   SIXPOINT_CHECK(refuse_of_replay("replay:session.zip", "--certificate"));  // usage
 //
 // | what is done                               | a unit, also a virtual one | replay:           |
 // |--------------------------------------------|----------------------------|-------------------|

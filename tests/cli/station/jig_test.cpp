@@ -141,7 +141,8 @@ TEST_F(CommandTest, CtrlCInAnAutomaticRunStoresItAsStopped) {
 // As `| head` does it, and a terminal that is closed while its output goes through a pipe.
 TEST_F(CommandTest, AReaderThatGoesStopsAnAutomaticRunInOrder) {
   const std::string line = std::string(SIXPOINT_PROGRAM) +
-                           " jig --device virtual:seed=7,jig=auto,pace=real --store " +
+                           " jig --device virtual:seed=7,serial=MOS2A45130007,jig=auto,pace=20"
+                           " --store " +
                            path("s.db") + " 2>&1 | head -n 4 > " + path("o");
   ASSERT_EQ(std::system(line.c_str()), 0);
   EXPECT_FALSE(said_in(path("o")).empty());
