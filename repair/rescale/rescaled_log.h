@@ -59,12 +59,12 @@ struct RescaledLogOptions {
   bool operator==(const RescaledLogOptions&) const = default;
 };
 
+// A sample that was clipped before is clipped after, too, however wide the record is.
 struct RescaledLogTally {
   std::uint64_t samples = 0;
   std::uint64_t sample_records = 0;
   std::uint64_t changed_samples = 0;
   std::uint64_t clipped_before = 0;  // samples with an axis at the limit of the record they came in
-  // One that was clipped before counts here, too, however wide the record is.
   std::uint64_t clipped_after = 0;   // ... of the record they went out in
   std::uint64_t affine_counts = 0;   // counts with no integer behind them, mapped by the line
   std::uint64_t epoch_records = 0;   // the unit's own epochs, which it computed from wrong samples
