@@ -192,8 +192,12 @@ void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,
   }
   std::erase_if(named, [&](const NamedFile& file) {
     const auto real = files.real_path(file.path);
-    // A file that was named itself is refused as its own output.
-    return real && is_inside(*real, *output) && *real != *output + "/" + file.relative;
+    const std::string below = "/" + file.relative;
+    if (!real || !real->ends_with(below)) {
+      return false;  // a link that leads out of the tree
+    }
+    const std::string tree = real->substr(0, real->size() - below.size());
+    return tree != *output && is_inside(*output, tree) && is_inside(*real, *output);
   });
 }
 

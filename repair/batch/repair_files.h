@@ -42,8 +42,7 @@ struct RepairWatch {
   std::function<void(const RepairProgress&)> at;                    // as jobs.h calls
 };
 
-// Files of a tree that lie in the output folder, which may lie in the tree: outputs of an earlier
-// run are no inputs.
+// An output folder that lies in a tree: what is in it is no input, but the outputs of earlier runs.
 void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named, const std::string& folder);
 
 // Every file by itself, then those that wait for the other files of their unit, which `pool`

@@ -99,20 +99,21 @@ std::string StudyImpact::brief() const {
   }
   const Summary sum = summary();
   if (sum.files == 0) {
-    return text + "no recording could be compared with its copy\n";
+    text += "no recording could be compared with its copy\n";
+  } else {
+    text +=
+        fmt::format("{} files, {:.0f} minutes: ENMO {:.2f} -> {:.2f} mg, MAD {:.2f} -> {:.2f} mg\n",
+                    sum.files, sum.recorded_minutes, sum.enmo_before_mg, sum.enmo_after_mg,
+                    sum.mad_before_mg, sum.mad_after_mg);
+    for (std::size_t i = 0; i < cuts.size(); ++i) {
+      text += fmt::format("minutes {} > {:g}, {}: {:.1f} -> {:.1f}\n", to_string(cuts[i].measure),
+                          cuts[i].value, printable(cuts[i].name, 40), sum.minutes_before[i],
+                          sum.minutes_after[i]);
+    }
+    text +=
+        fmt::format("{} of them move by more than twice their uncertainty, most {:+.2f} mg ({})\n",
+                    sum.moved, sum.most_mg, printable(sum.most_file));
   }
-  text +=
-      fmt::format("{} files, {:.0f} minutes: ENMO {:.2f} -> {:.2f} mg, MAD {:.2f} -> {:.2f} mg\n",
-                  sum.files, sum.recorded_minutes, sum.enmo_before_mg, sum.enmo_after_mg,
-                  sum.mad_before_mg, sum.mad_after_mg);
-  for (std::size_t i = 0; i < cuts.size(); ++i) {
-    text += fmt::format("minutes {} > {:g}, {}: {:.1f} -> {:.1f}\n", to_string(cuts[i].measure),
-                        cuts[i].value, printable(cuts[i].name, 40), sum.minutes_before[i],
-                        sum.minutes_after[i]);
-  }
-  text +=
-      fmt::format("{} of them move by more than twice their uncertainty, most {:+.2f} mg ({})\n",
-                  sum.moved, sum.most_mg, printable(sum.most_file));
   if (sum.unknown > 0) {
     text += fmt::format("{} state no uncertainty\n", sum.unknown);
   }

@@ -126,6 +126,13 @@ TEST_F(RepairCommand, OutputsInTheTreeAreNoInputs) {
     EXPECT_EQ(answer.json()["files"].size(), 2U);
   }
   EXPECT_FALSE(std::filesystem::exists(archive_ + "/out/out"));
+  // The other way round: inputs that lie in the output folder.
+  std::filesystem::create_directories(archive_ + "/raw");
+  std::filesystem::rename(archive_ + "/affected.gt3x", archive_ + "/raw/affected.gt3x");
+  const auto beside = run({"repair", archive_ + "/raw", "-o", archive_, "--constants",
+                           folder_ / "constants.json", "--json"});
+  EXPECT_EQ(beside.exit_code, 0) << beside.people;
+  EXPECT_EQ(beside.json()["files"].size(), 1U);
 }
 
 TEST_F(RepairCommand, ScanOfTheFileItselfIsTheLastResort) {
