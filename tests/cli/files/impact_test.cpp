@@ -21,17 +21,20 @@ class ImpactCommand : public testing::Test {
     arguments.insert(arguments.begin(), "impact");
     return run_command(memory_.env, arguments);
   }
+  // With what the sensor of the made recordings really is.
+  void repair(const std::string& input, const std::string& output) {
+    ASSERT_OK(write_file(memory_.files, "/c.json", R"({"serial": "MOS2A45130450",
+      "filter": "current", "constants": {"zero_lsb": [95.2, 52.3, 90.8],
+      "sensitivity_g_per_lsb": [0.00420698, 0.00397141, 0.00412712]}})"));
+    ASSERT_EQ(run_command(memory_.env, {"repair", input, "-o", output, "--constants", "/c.json"})
+                  .exit_code,
+              0);
+  }
   MemoryEnv memory_;
 };
 
 TEST_F(ImpactCommand, AtRestARepairTakesTheFalseActivityAway) {
-  // What the sensor of the made recording really is.
-  ASSERT_OK(write_file(memory_.files, "c.json", R"({"serial": "MOS2A45130450", "filter": "current",
-    "constants": {"sensitivity_g_per_lsb": [0.00420698, 0.00397141, 0.00412712],
-                  "zero_lsb": [95.2, 52.3, 90.8]}})"));
-  ASSERT_EQ(run_command(memory_.env, {"repair", "in.gt3x", "-o", "out", "--constants", "c.json"})
-                .exit_code,
-            0);
+  repair("in.gt3x", "out");
   const auto answer = run({"in.gt3x", "out/in.gt3x", "--cut", "more=20", "--json"});
   ASSERT_EQ(answer.exit_code, 0) << answer.people;
   const Json json = answer.json();
@@ -45,16 +48,10 @@ TEST_F(ImpactCommand, AtRestARepairTakesTheFalseActivityAway) {
 
 // A folder of two recordings, of which one was repaired; then the same as a plan.
 TEST_F(ImpactCommand, OfAStudy) {
-  ASSERT_OK(write_file(memory_.files, "/c.json", R"({"serial": "MOS2A45130450", "filter": "current",
-    "constants": {"sensitivity_g_per_lsb": [0.00420698, 0.00397141, 0.00412712],
-                  "zero_lsb": [95.2, 52.3, 90.8]}})"));
   ASSERT_OK(memory_.files.make_folders("/data/study/sub"));
   EXPECT_OK(tests::six_sides().write(memory_.files, "/data/study/sub/a.gt3x"));
   EXPECT_OK(tests::six_sides().write(memory_.files, "/data/study/b.gt3x"));
-  ASSERT_EQ(run_command(memory_.env,
-                        {"repair", "/data/study", "-o", "/data/out", "--constants", "/c.json"})
-                .exit_code,
-            0);
+  repair("/data/study", "/data/out");
   ASSERT_OK(memory_.files.remove("/data/out/b.gt3x"));
   const auto answer = run({"/data/study", "/data/out", "--cut", "more=20", "--csv", "study.csv",
                            "--jobs", "2", "--json"});
@@ -93,12 +90,7 @@ TEST_F(ImpactCommand, OfAStudy) {
 }
 
 TEST_F(ImpactCommand, TheTwoMustBelongTogether) {
-  ASSERT_OK(write_file(memory_.files, "c.json", R"({"serial": "MOS2A45130450", "filter": "current",
-    "constants": {"sensitivity_g_per_lsb": [0.00420698, 0.00397141, 0.00412712],
-                  "zero_lsb": [95.2, 52.3, 90.8]}})"));
-  ASSERT_EQ(run_command(memory_.env, {"repair", "in.gt3x", "-o", "out", "--constants", "c.json"})
-                .exit_code,
-            0);
+  repair("in.gt3x", "out");
   tests::MadeRecording other = tests::six_sides();
   other.raw.pop_back();
   ASSERT_OK(other.write(memory_.files, "other.gt3x"));
