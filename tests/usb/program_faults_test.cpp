@@ -231,7 +231,11 @@ const std::vector<ProgramFault>& capture_rows() {
       // How much is missing, it cannot see of a unit whose clock runs so fast.
       {"full_flash", R"({"fault": "full_flash", "at_s": 150})", {}, 2, "incomplete"},
       {"battery_low", R"({"fault": "battery_low", "at_s": 0})", {}, 74, "charge the unit"},
-      {"frozen_sensor", R"({"fault": "frozen_sensor", "at_s": 150})", {}, 1, "the sensor is frozen"},
+      {"frozen_sensor",
+       R"({"fault": "frozen_sensor", "at_s": 150})",
+       {},
+       1,
+       "the sensor is frozen"},
       {"clock_jump",
        R"({"fault": "clock_jump", "at_s": 150, "seconds": 3600})",
        {},
