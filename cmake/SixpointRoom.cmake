@@ -35,10 +35,10 @@ function(sixpoint_room FOLDER)
   # For the modules of other languages (bindings/). Calls within a room stay direct all the same.
   set_target_properties(sixpoint_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_compile_options(sixpoint_${name} PRIVATE -fno-semantic-interposition)
-  # Six tenths of the time of a compilation is reading headers and making code of the same templates: eight files are
+  # Six tenths of the time of a compilation is reading headers and making code of the same templates: twelve files are
   # compiled as one. So names in the anonymous namespaces of a room's files differ.
   set_target_properties(sixpoint_${name} PROPERTIES
-    UNITY_BUILD ${SIXPOINT_UNITY} UNITY_BUILD_BATCH_SIZE 8)
+    UNITY_BUILD ${SIXPOINT_UNITY} UNITY_BUILD_BATCH_SIZE 12)
   if(SIXPOINT_FUZZ)
     # The rooms tell the fuzzer which ways were taken; without it, it flies blind.
     target_compile_options(sixpoint_${name} PRIVATE -fsanitize=fuzzer-no-link)

@@ -20,7 +20,7 @@ using tests::SyntheticUnit;
 using tests::Vector;
 
 // A direction and how many blocks the unit lies in it.
-struct Rest {
+struct RestDirection {
   Vector up{};
   int blocks = 1;
 };
@@ -31,9 +31,9 @@ SyntheticUnit crossed_unit() {
   return unit;
 }
 
-std::vector<Rest> anywhere(int directions, int blocks, unsigned seed) {
+std::vector<RestDirection> anywhere(int directions, int blocks, unsigned seed) {
   std::mt19937_64 random(seed);
-  std::vector<Rest> rests;
+  std::vector<RestDirection> rests;
   for (int i = 0; i < directions; ++i) {
     rests.push_back({tests::random_direction(random), blocks});
   }
@@ -41,9 +41,9 @@ std::vector<Rest> anywhere(int directions, int blocks, unsigned seed) {
 }
 
 // A wrist: mostly where x and y have one sign, so that a term between them looks like sensitivity.
-std::vector<Rest> worn(int directions, unsigned seed, bool by_time) {
+std::vector<RestDirection> worn(int directions, unsigned seed, bool by_time) {
   std::mt19937_64 random(seed);
-  std::vector<Rest> rests;
+  std::vector<RestDirection> rests;
   while (static_cast<int>(rests.size()) < directions) {
     const Vector up = tests::random_direction(random);
     const bool often = up[0] * up[1] > 0.1;
@@ -56,11 +56,11 @@ std::vector<Rest> worn(int directions, unsigned seed, bool by_time) {
   return rests;
 }
 
-BlockFit fit_of(const SyntheticUnit& unit, const std::vector<Rest>& rests) {
+BlockFit fit_of(const SyntheticUnit& unit, const std::vector<RestDirection>& rests) {
   std::vector<StillBlock> blocks;
   std::mt19937_64 random(7);
   std::normal_distribution<double> noise(0, 0.0005);
-  for (const Rest& rest : rests) {
+  for (const RestDirection& rest : rests) {
     for (int i = 0; i < rest.blocks; ++i) {
       Vector g = rest.up;
       for (double& value : g) {
@@ -75,10 +75,11 @@ BlockFit fit_of(const SyntheticUnit& unit, const std::vector<Rest>& rests) {
 }
 
 // Root mean square error of the magnitude over the rests, by the generator's own readings.
-double error_mg(const SyntheticUnit& unit, const Calibration& six, const std::vector<Rest>& rests) {
+double error_mg(const SyntheticUnit& unit, const Calibration& six,
+                const std::vector<RestDirection>& rests) {
   double square = 0;
   double weights = 0;
-  for (const Rest& rest : rests) {
+  for (const RestDirection& rest : rests) {
     const StillBlock block = tests::exact_block(unit, rest.up);
     const double off = 1000 * (magnitude_g(six, block.mean_lsb, {}) - 1);
     square += rest.blocks * off * off;

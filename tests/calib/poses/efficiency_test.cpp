@@ -43,14 +43,14 @@ std::vector<PerAxis<double>> signs_of(const PerAxis<double>& one) {
   return all;
 }
 
-struct Row {
+struct DesignRow {
   const char* name;
   std::vector<PerAxis<double>> directions;
   DesignEfficiency six;
   DesignEfficiency nine;
 };
 
-std::vector<Row> rows() {
+std::vector<DesignRow> rows() {
   auto sides_and_corners = kSixDirections;
   for (const auto& corner : signs_of({1, 1, 1})) {
     sides_and_corners.push_back(corner);
@@ -83,7 +83,7 @@ std::vector<Row> rows() {
 // The table of the header. Ye and Su (2015): the icosahedron is optimal for nine; the design states
 // 0.999 and 0.973 for sides and corners.
 TEST(Efficiency, OfTheSetsWhoseValueIsKnown) {
-  for (const Row& row : rows()) {
+  for (const DesignRow& row : rows()) {
     SCOPED_TRACE(row.name);
     const BlockFit fit = fit_of(row.directions);
     const DesignEfficiency six = efficiency_of(fit, 6);
@@ -93,7 +93,7 @@ TEST(Efficiency, OfTheSetsWhoseValueIsKnown) {
     EXPECT_NEAR(nine.d, row.nine.d, 1e-9);
     EXPECT_NEAR(nine.g, row.nine.g, 1e-5);
   }
-  const Row corners = rows()[1];
+  const DesignRow corners = rows()[1];
   EXPECT_NEAR(corners.nine.d, 0.999, 5e-4);
   EXPECT_NEAR(corners.nine.g, 0.973, 5e-4);
 }

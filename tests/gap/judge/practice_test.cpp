@@ -14,7 +14,7 @@
 namespace sixpoint::gap {
 namespace {
 
-struct Case {
+struct PracticeCase {
   std::string name;
   std::vector<std::string> truth;
   Diagnosis diagnosis;
@@ -30,8 +30,8 @@ struct Case {
 };
 
 // Every `step`-th of them.
-std::vector<Case> run_all(const char* folder, std::size_t step) {
-  std::vector<Case> cases;
+std::vector<PracticeCase> run_all(const char* folder, std::size_t step) {
+  std::vector<PracticeCase> cases;
   std::size_t number = 0;
   std::ifstream file(tests::shared_file("gap/practice/labels.json"));
   const auto labels = nlohmann::json::parse(file, nullptr, false);
@@ -39,7 +39,7 @@ std::vector<Case> run_all(const char* folder, std::size_t step) {
     if (!name.starts_with(folder) || number++ % step != 0) {
       continue;
     }
-    Case one;
+    PracticeCase one;
     one.name = name;
     for (const auto& effect : label["effects"]) {
       one.truth.push_back(effect["name"]);
@@ -59,8 +59,8 @@ std::vector<Case> run_all(const char* folder, std::size_t step) {
   return cases;
 }
 
-void judge(const std::vector<Case>& cases, std::size_t& seen, std::size_t& right) {
-  for (const Case& c : cases) {
+void judge(const std::vector<PracticeCase>& cases, std::size_t& seen, std::size_t& right) {
+  for (const PracticeCase& c : cases) {
     const Diagnosis& d = c.diagnosis;
     if (c.truth.empty()) {
       EXPECT_EQ(d.verdict, Verdict::no_gap) << c.name << ": a false alarm: " << d.brief();
@@ -82,8 +82,8 @@ TEST(Practice, Engineering) {
   SIXPOINT_NEED_SHARED("gap/practice/labels.json");
   const auto cases = run_all("engineering", tests::kSanitized ? 12 : 1);
   ASSERT_EQ(cases.size(), tests::kSanitized ? 2U : 24U);
-  const auto singles =
-      std::count_if(cases.begin(), cases.end(), [](const Case& c) { return c.truth.size() == 1; });
+  const auto singles = std::count_if(cases.begin(), cases.end(),
+                                     [](const PracticeCase& c) { return c.truth.size() == 1; });
   EXPECT_GE(singles, tests::kSanitized ? 1 : 18);
   std::size_t seen = 0;
   std::size_t right = 0;
@@ -91,7 +91,7 @@ TEST(Practice, Engineering) {
   EXPECT_EQ(static_cast<std::ptrdiff_t>(seen), singles)
       << "every single effect shows with the whole protocol";
   EXPECT_GE(static_cast<double>(right), 0.95 * static_cast<double>(seen));
-  for (const Case& c : cases) {
+  for (const PracticeCase& c : cases) {
     for (const std::string& effect : c.truth) {
       EXPECT_TRUE(c.names(effect)) << c.name << " lacks " << effect << ": " << c.diagnosis.brief();
     }
@@ -111,7 +111,7 @@ TEST(Practice, Production) {
   judge(cases, seen, right);
   EXPECT_GE(seen, tests::kSanitized ? 1U : 13U);
   EXPECT_GE(static_cast<double>(right), 0.95 * static_cast<double>(seen));
-  for (const Case& c : cases) {
+  for (const PracticeCase& c : cases) {
     // What needs heat, hours or a shaker can't be seen in three minutes at one temperature.
     for (const std::string& effect : c.truth) {
       if (effect == "offset_tempco" || effect == "saturation" || effect == "drift") {

@@ -41,7 +41,7 @@ std::vector<std::vector<double>> rows_of(const std::string& path, int header) {
 // Oracles: the vendor's raw and calibrated CSV of the same recording.
 TEST(Agdc, RawCountsAndCalibratedValuesEqualTheVendors) {
   SIXPOINT_NEED_SHARED("data/agdc/WRIST_rawLSB_032Hz_test.agdc");
-  const std::string folder = tests::shared_file("data/agdc/");
+  const std::string folder = sixpoint::tests::shared_file("data/agdc/");
   auto recording = Recording::open(posix_env().files, folder + "WRIST_rawLSB_032Hz_test.agdc");
   ASSERT_OK(recording);
   const auto raw = rows_of(folder + "WRIST_rawLSB_032Hz.csv", 11);
@@ -80,7 +80,7 @@ TEST(Agdc, RawCountsAndCalibratedValuesEqualTheVendors) {
 // Oracles: the vendor's CSVs of the temperature readings and of the degrees made from them.
 TEST(Agdc, TemperaturesEqualTheVendors) {
   SIXPOINT_NEED_SHARED("data/agdc/CPW1C48210013_baseline.agdc");
-  const std::string folder = tests::shared_file("data/agdc/");
+  const std::string folder = sixpoint::tests::shared_file("data/agdc/");
   auto recording = Recording::open(posix_env().files, folder + "CPW1C48210013_baseline.agdc");
   ASSERT_OK(recording);
   const auto die_adc =

@@ -8,7 +8,7 @@
 namespace sixpoint::mocks {
 namespace {
 
-using Kind = CableEvent::Kind;
+using CableKind = CableEvent::Kind;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
@@ -25,12 +25,12 @@ struct FaultyBench {
   }
   CableEvent read() { return injector.read_report(unit, now); }
   CableEvent exchange() {
-    EXPECT_EQ(write(device::Command::identify).kind, Kind::data);
+    EXPECT_EQ(write(device::Command::identify).kind, CableKind::data);
     return read();
   }
   bool answers() {
     const CableEvent event = exchange();
-    return event.kind == Kind::data && device::decode(event.bytes).has_value();
+    return event.kind == CableKind::data && device::decode(event.bytes).has_value();
   }
 
   VirtualUnit unit{{.truth = sim::draw_unit(7)}};
@@ -44,7 +44,7 @@ TEST(FaultInjector, WithoutFaultsEverythingPasses) {
   for (int i = 0; i < 10; ++i) {
     EXPECT_TRUE(bench.answers());
   }
-  EXPECT_EQ(bench.read().kind, Kind::nothing);
+  EXPECT_EQ(bench.read().kind, CableKind::nothing);
   EXPECT_TRUE(bench.injector.plugged());
   EXPECT_EQ(bench.injector.enumeration(), 0U);
 }
@@ -74,7 +74,7 @@ TEST(FaultInjector, TransfersAreChangedAsTheKindDescribes) {
   FaultyBench twice(R"({"fault": "duplicate", "at_report": 1})");
   EXPECT_EQ(twice.exchange().bytes, whole);
   EXPECT_EQ(twice.read().bytes, whole);
-  EXPECT_EQ(twice.read().kind, Kind::nothing);
+  EXPECT_EQ(twice.read().kind, CableKind::nothing);
 
   FaultyBench crc(R"({"fault": "bad_crc", "at_report": 1})");
   EXPECT_FAILS(device::decode(crc.exchange().bytes), ErrorCode::bad_data);
@@ -87,16 +87,16 @@ TEST(FaultInjector, TransfersAreChangedAsTheKindDescribes) {
 
 TEST(FaultInjector, AStallKeepsTheDataAndADelayHoldsThem) {
   FaultyBench stall(R"({"fault": "stall", "at_report": 1})");
-  EXPECT_EQ(stall.exchange().kind, Kind::stalled);
-  EXPECT_EQ(stall.read().kind, Kind::data);
+  EXPECT_EQ(stall.exchange().kind, CableKind::stalled);
+  EXPECT_EQ(stall.read().kind, CableKind::data);
 
   FaultyBench delay(R"({"fault": "delay", "at_report": 1, "seconds": 0.5})");
-  EXPECT_EQ(delay.exchange().kind, Kind::nothing);
+  EXPECT_EQ(delay.exchange().kind, CableKind::nothing);
   EXPECT_EQ(delay.injector.next_due(delay.unit), nanoseconds(milliseconds(500)));
   delay.now = milliseconds(499);
-  EXPECT_EQ(delay.read().kind, Kind::nothing);
+  EXPECT_EQ(delay.read().kind, CableKind::nothing);
   delay.now = milliseconds(500);
-  EXPECT_EQ(delay.read().kind, Kind::data);
+  EXPECT_EQ(delay.read().kind, CableKind::data);
 }
 
 TEST(FaultInjector, AnUnpluggedUnitComesBackAsAnotherEnumeration) {
@@ -104,7 +104,7 @@ TEST(FaultInjector, AnUnpluggedUnitComesBackAsAnotherEnumeration) {
   EXPECT_TRUE(bench.answers());
   EXPECT_EQ(bench.injector.next_due(bench.unit), nanoseconds(seconds(20)));
   bench.now = seconds(21);
-  EXPECT_EQ(bench.read().kind, Kind::gone);
+  EXPECT_EQ(bench.read().kind, CableKind::gone);
   EXPECT_FALSE(bench.injector.plugged());
   bench.now = seconds(22);
   EXPECT_TRUE(bench.answers());
