@@ -1,5 +1,7 @@
 #include "cli/program/program.h"
 
+#include <algorithm>
+
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -50,6 +52,31 @@ std::string words_of_command(const CLI::App& app) {
   return words;
 }
 
+// A command line that is not understood; with --json also as the document of the command that was chosen.
+void report_usage(const CLI::App& app, const std::vector<std::string>& arguments,
+                  const CLI::ParseError& refused, Context& context) {
+  Error error{ErrorCode::usage, printable(refused.what()), "",
+              fmt::format("'{} --help' lists what there is", words_of_command(app))};
+  if (auto unknown = unknown_word(app, arguments)) {
+    error.what = *std::move(unknown);
+    error.hint.clear();
+  }
+  std::string schema;
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    // The documents of a group have its name, but for those of gap: gap-diagnose.
+    if (schema.empty()) {
+      schema = command->get_name();
+    } else if (schema == "gap") {
+      schema += "-" + command->get_name();
+    }
+  }
+  report_error(context, schema, error,
+               command->get_option_no_throw("--json") != nullptr &&
+                   std::ranges::find(arguments, "--json") != arguments.end());
+}
+
 }  // namespace
 
 int run_program(const std::vector<std::string>& arguments, Context& context) {
@@ -76,11 +103,8 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
     if (error.get_exit_code() == 0) {  // --help, --version
       return app.exit(error, context.out, context.people);
     }
-    context.log().error("{}",
-                        unknown_word(app, arguments)
-                            .value_or(fmt::format("{}; '{} --help' lists what there is",
-                                                  printable(error.what()), words_of_command(app))));
-    return static_cast<int>(ErrorCode::usage);
+    report_usage(app, arguments, error, context);
+    return context.exit_code;
   } catch (const std::exception& error) {
     // The libraries return errors as values: an exception is a defect of this program.
     context.log().critical("internal error: {}; please report it with the command line",

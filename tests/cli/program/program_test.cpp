@@ -34,6 +34,45 @@ TEST(ProgramRun, ACommandThatThereIsNotIsUsage) {
   EXPECT_EQ(run.people.str().find('\x1b'), std::string::npos) << "a terminal is not written to";
 }
 
+// With --json a script reads why from standard output, whatever was wrong.
+TEST(ProgramRun, ACommandLineThatIsNotUnderstoodIsADocumentToo) {
+  Program run;
+  const auto document = [&](const std::vector<std::string>& arguments) {
+    EXPECT_EQ(run(arguments), 64);
+    return Json::parse(run.out.str(), nullptr, /*allow_exceptions=*/false);
+  };
+  const Json no_device = document({"jig", "--json"});
+  ASSERT_TRUE(no_device.is_object()) << run.out.str();
+  EXPECT_EQ(no_device["schema"], "sixpoint/jig/1");
+  EXPECT_EQ(no_device["error"]["code"], "usage");
+  EXPECT_EQ(no_device["error"]["what"], "--device is required");
+  EXPECT_EQ(no_device["error"]["hint"], "'sixpoint jig --help' lists what there is");
+  EXPECT_THAT(run.people.str(),
+              HasSubstr("--device is required; 'sixpoint jig --help' lists what there is"));
+  EXPECT_THAT(document({"scan", "a.gt3x", "--hepl", "--json"})["error"]["what"].get<std::string>(),
+              HasSubstr("did you mean '--help'?"));
+  // The same names as a command's own errors have.
+  for (const auto& [command, wrong] :
+       std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>>{
+           {{"gap", "diagnose"}, {"none"}},
+           {{"gap", "score"}, {"none.jsonl", "--labels", "none.jsonl"}},
+           {{"archive", "status"}, {"none"}},
+           {{"limits", "check"}, {"none.toml"}}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--json", "--frobnicate"});
+    const Json of_usage = document(arguments);
+    arguments.pop_back();
+    arguments.insert(arguments.end(), wrong.begin(), wrong.end());
+    EXPECT_NE(run(arguments), 0);
+    const Json of_command = Json::parse(run.out.str(), nullptr, /*allow_exceptions=*/false);
+    ASSERT_TRUE(of_command.is_object()) << run.out.str() << run.people.str();
+    EXPECT_EQ(of_usage["schema"], of_command["schema"]);
+  }
+  // No command, no document.
+  EXPECT_EQ(run({"--json"}), 64);
+  EXPECT_EQ(run.out.str(), "");
+}
+
 TEST(ProgramRun, HelpListsEveryCommandInTheOrderOfTheList) {
   Program run;
   EXPECT_EQ(run({"--help"}), 0);
