@@ -105,11 +105,13 @@ Status retest(const CheckUnitCommandOptions& options, Context& context) {
   json["failures_in_row"] = state.failures_in_row;
   json["passes_needed"] = state.passes_needed;
   json["retest_of"] = text_or_null(state.retest_of);
-  return print_answer(
-      context, options.json, json,
-      fmt::format("{}: {}; {} pass{} in a row until it counts as passed\n",
-                  printable(options.serial), state.may_start ? "may be measured" : state.reason,
-                  state.passes_needed, state.passes_needed == 1 ? "" : "es"));
+  return print_answer(context, options.json, json,
+                      fmt::format("{}: {}; {}\n", printable(options.serial),
+                                  state.may_start ? "may be measured" : state.reason,
+                                  state.passes_needed == 1
+                                      ? std::string("one pass counts")
+                                      : fmt::format("it counts as passed after {} passes in a row",
+                                                    state.passes_needed)));
 }
 
 void add_decision_options(CLI::App& command, CheckUnitCommandOptions& options) {

@@ -418,9 +418,28 @@ Json to_json(const JigCommandOptions& options, const JigDone& done) {
   return json;
 }
 
-// What the unit holds, where it was written and the verdict says nothing of the unit. A write that
-// was broken off stands in the reasons (JigReport::settle_as_left).
-std::string what_it_holds(const station::JigReport& report) {
+// What the unit holds now, in the page's words (station/web/src/english.ts):
+//
+// | verdict                 | written | text                               |
+// |-------------------------|---------|------------------------------------|
+// | pass, conditional pass  | yes     | PASS - WRITTEN                     |
+// | pass, conditional pass  | no      | PASS - NOT WRITTEN                 |
+// | inconclusive, stopped   | yes     | THE UNIT NOW HOLDS ... NOT CHECKED |
+// | any other; a replay (*) | any     | nothing                            |
+//
+// (*) nothing was done to a unit. A write that was broken off stands in the reasons
+// (JigReport::settle_as_left).
+std::string what_it_holds(const station::JigReport& report, bool is_replay) {
+  if (is_replay) {
+    return {};
+  }
+  if (report.usable()) {
+    const char* verdict = report.verdict == station::JigVerdict::pass ? "PASS" : "CONDITIONAL PASS";
+    return report.written
+               ? fmt::format("{} - WRITTEN: the unit holds the new constants, as read back",
+                             verdict)
+               : fmt::format("{} - NOT WRITTEN: the unit holds its old constants", verdict);
+  }
   const bool is_unjudged = report.verdict == station::JigVerdict::inconclusive ||
                            report.verdict == station::JigVerdict::stopped;
   return is_unjudged && report.written
@@ -432,7 +451,7 @@ std::string what_it_holds(const station::JigReport& report) {
 void print_jig(Context& context, const JigCommandOptions& options, const JigDone& done) {
   const station::JigReport& report = done.report;
   context.text() << report.brief() << '\n';
-  if (const std::string holds = what_it_holds(report); !holds.empty()) {
+  if (const std::string holds = what_it_holds(report, is_replay(options.device)); !holds.empty()) {
     context.text() << "  " << holds << '\n';
   }
   if (!report.usable()) {
@@ -460,6 +479,12 @@ void print_jig(Context& context, const JigCommandOptions& options, const JigDone
   }
   if (done.constants_id) {
     context.text() << "constants " << kept_as(*done.kept, *done.constants_id) << '\n';
+  }
+  if (done.certified) {
+    context.text() << "certificate " << printable(options.certificate) << '\n';
+  }
+  if (done.labelled) {
+    context.text() << "label " << printable(options.label) << '\n';
   }
   if (report.usable() && options.study.empty() && !is_replay(options.device) && !done.certified &&
       done.kept->in_store()) {

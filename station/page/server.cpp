@@ -259,6 +259,9 @@ class Server::Impl::Connection : public Idle,
       return plain().close();
     }
     const auto& head = parser_.get();
+    if (head.count(http::field::host) > 1) {  // RFC 9112, 3.2
+      return respond(refused(400, "bad_request", "the request names more than one host"));
+    }
     request_ = request_of(head);
     request_.is_local_user = kIsLocal;
     // Before the body is read: a client without permission does not send a body either.

@@ -39,6 +39,31 @@ class StationCommand : public tests::CommandTest {
     return all;
   }
   tests::Answer refused(const std::vector<std::string>& more) { return run(arguments(more)); }
+  // The lines of a request that has the station's token.
+  std::string head() const {
+    std::ifstream in(path("state/token"));
+    std::string token;
+    std::getline(in, token);
+    return "Authorization: Bearer " + token + "\r\n";
+  }
+  nlohmann::json lane(int port) const {
+    const std::string answer = get(port, "/api/lanes/1", head());
+    return nlohmann::json::parse(answer.substr(answer.find("\r\n\r\n") + 4), nullptr, false);
+  }
+  void wait_until_idle(int port) const {
+    for (int i = 0; i < 600 && lane(port).value("state", "") != "idle"; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+  // Of a run of a unit that the jig turns.
+  nlohmann::json measured(int port) const {
+    EXPECT_THAT(get(port, "/api/run", head(), "POST"), StartsWith("HTTP/1.1 202"));
+    nlohmann::json result;
+    for (int i = 0; i < 600 && !(result = lane(port)["result"]).is_object(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return result;
+  }
   // "http://127.0.0.1:PORT/..."
   static int port_of(const std::string& address) {
     const std::string_view before = "http://127.0.0.1:";
@@ -123,6 +148,7 @@ TEST_F(StationCommand, ServesItsPageUntilItIsStopped) {
     EXPECT_THAT(page, StartsWith("HTTP/1.1 200"));
     EXPECT_THAT(page, HasSubstr("text/html"));
     EXPECT_THAT(get(port, "/no-such-page"), StartsWith("HTTP/1.1 401")) << "no session";
+    EXPECT_THAT(get(port, "/", "Host: elsewhere\r\n"), StartsWith("HTTP/1.1 400"));
     EXPECT_EQ(station.stop(signal), signal == SIGINT ? 3 : 0);
     EXPECT_EQ(get(port, "/"), "") << "no one listens any more";
   }
@@ -323,29 +349,14 @@ TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
     words.insert(words.end(), more.begin(), more.end());
     Child station(words);
     const int port = port_of(station.line());
-    std::ifstream in(path("state/token"));
-    std::string token;
-    std::getline(in, token);
-    const std::string head = "Authorization: Bearer " + token + "\r\n";
-    const auto lane = [&] {
-      const std::string answer = get(port, "/api/lanes/1", head);
-      return nlohmann::json::parse(answer.substr(answer.find("\r\n\r\n") + 4), nullptr, false);
-    };
-    for (int i = 0; i < 600 && lane().value("state", "") != "idle"; ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    const std::string state = get(port, "/api/state", head);
+    wait_until_idle(port);
+    const std::string state = get(port, "/api/state", head());
     EXPECT_THAT(state, HasSubstr("\"jig_due\":\"2001-01-01"));
     EXPECT_THAT(state, HasSubstr("\"jig_over\":true"));
     EXPECT_THAT(state,
                 HasSubstr(more.size() > 2 ? "{\"reason\":\"lab closed\",\"signed_by\":\"Eve\"}"
                                           : "\"jig_exception\":null"));
-    EXPECT_THAT(get(port, "/api/run", head, "POST"), StartsWith("HTTP/1.1 202"));
-    nlohmann::json result;
-    for (int i = 0; i < 600 && !(result = lane()["result"]).is_object(); ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    return result;
+    return measured(port);
   };
   const auto overdue = result_with({"--jig-due", "2001-01-01"});
   EXPECT_EQ(overdue["verdict"], "refused") << overdue;
@@ -353,6 +364,27 @@ TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
       {"--jig-due", "2001-01-01", "--jig-exception", "lab closed", "--jig-exception-by", "Eve"});
   EXPECT_EQ(signed_for["verdict"], "pass") << signed_for;
   EXPECT_EQ(refused({"--device", "virtual:seed=7", "--jig-due", "soon"}).exit_code, 64);
+}
+
+// A run that the store did not take is in the journal, and the page says so: no reason for the station to end with an error.
+TEST_F(StationCommand, ARunInTheJournalDoesNotChangeHowItEnds) {
+  ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
+  Child station(arguments({"--port", "0", "--device", "virtual:seed=7,jig=auto"}));
+  const int port = port_of(station.line());
+  wait_until_idle(port);
+  for (const char* ending : {"", "-wal", "-shm"}) {
+    std::filesystem::remove(path("s.db") + ending);
+  }
+  std::filesystem::create_directory(path("s.db"));
+  nlohmann::json result = measured(port);
+  EXPECT_EQ(result["verdict"], "pass") << result;
+  for (int i = 0; i < 600 && !result.contains("kept_here"); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    result = lane(port)["result"];
+  }
+  EXPECT_EQ(result.value("kept_here", false), true) << result;
+  EXPECT_EQ(station.stop(SIGTERM), 0);
+  ::unsetenv("XDG_DATA_HOME");
 }
 
 }  // namespace
