@@ -99,7 +99,7 @@ double Trace::at(double time_s) const {
 }
 
 Second second_at(const Trace& trace, double from_s) {
-  const double first = std::ceil((from_s - trace.start_s()) * trace.rate_hz() - 1e-6);
+  const double first = std::round((from_s - trace.start_s()) * trace.rate_hz());
   const auto count = static_cast<std::size_t>(std::lround(trace.rate_hz()));
   Second second;
   if (first < 0 || first + static_cast<double>(count) > static_cast<double>(trace.size())) {

@@ -33,6 +33,11 @@ TEST(Trace, ASecondHasItsExtremesAndItsDeviation) {
   EXPECT_EQ(first.smallest_g, 0.75F);
   EXPECT_EQ(first.largest_g, 1.25F);
   EXPECT_NEAR(first.sd_g, 0.25, 1e-6) << "half of the samples at either side of the mean";
+  for (const double step_s : {-0.02, -1e-5, 1e-5, 0.02}) {
+    EXPECT_EQ(second_at(trace, 1000.5 + step_s).smallest_g, second_at(trace, 1000.5).smallest_g);
+    EXPECT_EQ(second_at(trace, 1000.5 + step_s).sd_g, second_at(trace, 1000.5).sd_g)
+        << "the nearest sample begins it, whichever side of it the moment is";
+  }
   EXPECT_FALSE(std::isnan(second_at(trace, 1001).sd_g)) << "one of twenty is missing";
   EXPECT_TRUE(std::isnan(second_at(trace, 1001.5).sd_g)) << "beyond the end";
   for (std::size_t i = 20; i < 31; ++i) {
