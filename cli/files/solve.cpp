@@ -14,6 +14,7 @@
 #include "cli/store_option.h"
 #include "db/records.h"
 #include "repair/rescale/constants_finder.h"
+#include "repair/rescale/gate.h"
 #include "repair/triage/survey.h"
 
 namespace sixpoint::cli {
@@ -53,14 +54,17 @@ Result<calib::SolveOptions> solve_options(const SolveCommandOptions& options) {
 struct Outcome {
   calib::SolveReport report;
   std::optional<SavedConstants> saved;
+  std::optional<Error> not_kept = std::nullopt;  // why not, where it was asked for
+  bool is_lent = true;                           // why_not_lent() (repair/rescale/gate.h)
 };
 
 // Writes the constants to the file and the store that the options name:
 //
-//   constants          file        store
-//   verified           -o          --save
-//   rest on a prior    -o          never
-//   not verified       never       never
+//   constants                                     file        store
+//   not to be lent (repair/rescale/gate.h)        refused     refused
+//   verified                                      -o          --save
+//   rest on a prior                               -o          never
+//   not verified                                  never       never
 Status keep(const std::string& path, const SolveCommandOptions& options,
             const repair::Survey& survey, Outcome& outcome, Context& context, Outputs& outputs) {
   const bool to_file =
@@ -68,6 +72,11 @@ Status keep(const std::string& path, const SolveCommandOptions& options,
   const bool to_store = options.save && outcome.report.usable();
   if (!to_file && !to_store) {
     return {};
+  }
+  if (!outcome.is_lent) {
+    return fail(ErrorCode::bad_data,
+                "nothing is stored: the constants are for this recording alone", path,
+                "see the notes of the answer; name the original recording");
   }
   calib::ConstantsOrigin origin;
   SIXPOINT_ASSIGN(origin.sha256, file_sha256(context.env.files, path));
@@ -96,7 +105,13 @@ Result<Outcome> solve_one(const std::string& path, const SolveCommandOptions& op
   SIXPOINT_ASSIGN(outcome.report, repair::solve_survey(path, survey, solve));
   outcome.report.seconds =
       std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
-  SIXPOINT_CHECK(keep(path, options, survey, outcome, context, outputs));
+  if (std::string why = repair::why_not_lent(survey); !why.empty()) {
+    outcome.is_lent = false;
+    outcome.report.notes.push_back(std::move(why));
+  }
+  if (const Status kept = keep(path, options, survey, outcome, context, outputs); !kept) {
+    outcome.not_kept = kept.error();
+  }
   return outcome;
 }
 
@@ -149,7 +164,8 @@ void print_solve(const std::string& path, const SolveCommandOptions& options,
     context.text() << "  " << kept_as(outcome.saved->place, outcome.saved->id) << '\n';
   } else if (options.save && !report.usable()) {
     context.log().warn("nothing stored: only verified constants are kept");
-  } else if (report.usable() && report.filter && !report.serial.empty()) {  // record_of()
+  } else if (report.usable() && report.filter && !report.serial.empty() &&  // record_of()
+             outcome.is_lent && !outcome.not_kept) {
     next_step(context, options.json, {"solve", path, "--save"});
   }
 }
@@ -160,6 +176,9 @@ Json to_json(Json json, const std::string& path, const Outcome& outcome) {
   json["stored_id"] = outcome.saved ? Json(outcome.saved->id) : Json(nullptr);
   if (outcome.saved) {
     json["kept"] = kept_to_json(outcome.saved->place);
+  }
+  if (outcome.not_kept) {
+    json["error"] = error_to_json(*outcome.not_kept);
   }
   return json;
 }
@@ -194,6 +213,9 @@ Status run_solve(const SolveCommandOptions& options, Context& context) {
       continue;
     }
     context.worsen(outcome->report.usable() ? kExitPassed : kExitFailed);
+    if (outcome->not_kept) {
+      report_error(context, *outcome->not_kept);  // the answer below is then the only copy
+    }
     if (!options.json) {
       print_solve(path, options, *outcome, context);
     } else if (single) {

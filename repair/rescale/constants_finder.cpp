@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "db/records.h"
+#include "repair/rescale/gate.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -33,6 +34,11 @@ Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& s
         ErrorCode::bad_data,
         "the recording was repaired already; its counts no longer come from the unit's constants",
         path, "use the original recording");
+  }
+  if (!survey.raw_counts && !survey.accel_scale_known) {
+    return fail(ErrorCode::bad_data,
+                "the recording does not say how many counts are 1 g, and its model is not known",
+                path, "use a recording whose info.txt has the line 'Acceleration Scale'");
   }
   calib::Calibration file_constants;
   if (survey.raw_counts && survey.raw_calibration) {
@@ -127,6 +133,10 @@ ConstantsFinder::CalibrationFile ConstantsFinder::read_calibration_file(const st
                   "record one with firmware 1.4.0 to 1.7.0, or put the unit on the jig",
                   printable(surveyed->facts.firmware, 40))
             : "it cannot be told under which filter configuration it was recorded";
+    return result;
+  }
+  result.refusal = why_not_lent(*surveyed);
+  if (!result.refusal.empty()) {
     return result;
   }
   const auto report = solve_survey(path, *surveyed, options_.solve);

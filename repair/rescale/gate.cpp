@@ -119,6 +119,35 @@ GateEvidence gate_evidence(const Survey& survey, const calib::Calibration& fresh
           magnitude_error(after).mean_mg, counts_are_the_units_own(survey)};
 }
 
+std::string why_not_lent(const Survey& survey) {
+  FileFacts one = survey.facts;
+  one.other_firmware.clear();
+  FileFacts other = one;
+  other.firmware = survey.facts.other_firmware;
+  if (!other.firmware.empty() && triage(one).axes_rotated != triage(other).axes_rotated) {
+    return fmt::format(
+        "the recording names the firmware versions {} and {}, which lay the axes differently: its "
+        "constants are not used for other recordings",
+        printable(one.firmware, 40), printable(other.firmware, 40));
+  }
+  if (triage(survey.facts).verdict != Verdict::affected || survey.constants.empty()) {
+    return {};
+  }
+  const auto stored = calib::calibration_from(survey.constants.front());
+  if (!stored) {
+    return {};
+  }
+  const GateEvidence evidence = gate_evidence(survey, *stored);
+  if (evidence.directions < kLeastDirections || evidence.before_mg > kMostOfCorrected_mg ||
+      evidence.counts_are_the_units_own) {
+    return {};
+  }
+  return fmt::format(
+      "the recording is affected by its header, and within {:.0f} mg of 1 g as it is: other "
+      "software may have corrected it, so its constants are not used for other recordings",
+      kMostOfCorrected_mg);
+}
+
 GateAnswer gate(const GateEvidence& evidence, bool force) {
   GateAnswer answer;
   answer.row = row_of(evidence);

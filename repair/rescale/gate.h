@@ -28,6 +28,19 @@
 // were. 32 mg are left only by constants of another unit or another filter: uncertainty,
 // temperature and gravity together stay below 20 mg. In one to three directions wrong constants
 // look right by chance more often, so the limit is 20 mg there.
+//
+// May constants that are solved from a recording be used for other recordings? They undo the recording's own counts; these must
+// be the sensor's (why_not_lent()):
+//
+// | the recording                                                                       | lends |
+// |-------------------------------------------------------------------------------------|-------|
+// | names two firmware versions that lay the axes differently                           | no    |
+// | affected by its header, yet within 16 mg of 1 g by the constants stored in it, in 4 | no    |
+// | or more directions, and the counts may come from other software                     |       |
+// | any other                                                                           | yes   |
+//
+// 16 mg: what a corrected file is off at most, by temperature and by what six constants cannot tell
+// (kUnitTolerance_mg, repair/units/unit_answer.h). Affected units are off by 100 mg (paper).
 #pragma once
 
 #include <cstddef>
@@ -47,6 +60,8 @@ inline constexpr double kMostLeftInFewDirections_mg = 20;
 
 // Fewer directions than this do not see every constant.
 inline constexpr int kLeastDirections = 4;
+
+inline constexpr double kMostOfCorrected_mg = 16;
 
 struct GateEvidence {
   int directions = 0;  // in which the file has still blocks (calib/direction_cells.h)
@@ -79,5 +94,8 @@ struct GateAnswer {
   std::string reason;   // for people; with both numbers where they decide; empty where it helps
 };
 GateAnswer gate(const GateEvidence& evidence, bool force);
+
+// A sentence; empty where its constants may be lent. The survey is of the whole recording.
+std::string why_not_lent(const Survey& survey);
 
 }  // namespace sixpoint::repair

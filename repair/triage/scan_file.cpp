@@ -106,7 +106,10 @@ ScannedFile scan_recording(FileSystem& files, const std::string& path) {
   answer.facts = survey->facts;
   answer.reasons = survey->notes;
   answer.sides = calib::coverage_of(survey->blocks).covered_directions();
-  if (survey->magnitude.blocks > 0) {
+  if (!survey->raw_counts && !survey->accel_scale_known) {
+    answer.reasons.push_back(
+        "it does not say how many counts are 1 g, so the samples give no evidence");
+  } else if (survey->magnitude.blocks > 0) {
     answer.evidence_mg = survey->magnitude.p95_mg;
     if (survey->magnitude.p95_mg > kEvidenceLimit_mg) {
       answer.reasons.push_back(

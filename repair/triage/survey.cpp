@@ -87,21 +87,38 @@ void take_parameters(const gt3x::Parameters& parameters, const gt3x::Info& info,
   }
 }
 
-// The first PARAMETERS record of the log whose checksum holds; nothing when there is none.
+bool has_samples(const gt3x::Record& record) {
+  // A one-byte payload in place of samples is a USB event.
+  return record.payload.size() > 1 &&
+         (record.is(gt3x::RecordType::activity) || record.is(gt3x::RecordType::activity2) ||
+          record.is(gt3x::RecordType::activity3));
+}
+
+// The PARAMETERS record that holds for the first samples: the last before them, or else the first
+// behind them. Its checksum holds. Nothing when there is none.
 Result<std::optional<gt3x::Parameters>> first_parameters(gt3x::Recording& recording) {
   SIXPOINT_ASSIGN(auto log, recording.open_log_beginning());
-  while (true) {
+  std::optional<gt3x::Parameters> found;
+  bool sampled = false;
+  while (!(found && sampled)) {
     SIXPOINT_ASSIGN(const auto item, log.next());
     if (!item.has_value()) {
-      return std::nullopt;
+      break;
     }
-    if (item->kind == gt3x::LogItem::Kind::record && item->record.checksum_ok &&
-        item->record.is(gt3x::RecordType::parameters)) {
+    if (item->kind != gt3x::LogItem::Kind::record || !item->record.checksum_ok) {
+      continue;
+    }
+    if (item->record.is(gt3x::RecordType::parameters)) {
       if (auto parameters = gt3x::parse_parameters(item->record.payload)) {
-        return *std::move(parameters);
+        if (found && !parameters->firmware) {  // a later record need not repeat it
+          parameters->firmware = found->firmware;
+        }
+        found = *std::move(parameters);
       }
     }
+    sampled = sampled || has_samples(item->record);
   }
+  return found;
 }
 
 // A small entry of an .agdc file; empty where it is missing or too large.
@@ -382,22 +399,37 @@ class LogSurvey::Pass {
     scale_lsb_per_g_ = scale_lsb_per_g;
   }
 
+  // Two dates that lead to two answers: nothing is guessed from them.
+  void use_date(const gt3x::Parameters& parameters) {
+    std::vector<std::string> unused;
+    const auto date = possible_date(parameters.calibration_time, recording_.info(), unused);
+    FileFacts other = result_.facts;
+    other.calibration_time = date;
+    if (result_.samples == 0 || !date || !result_.facts.calibration_time ||
+        triage(other).verdict == triage(result_.facts).verdict) {
+      return;
+    }
+    result_.notes.push_back(
+        fmt::format("the recording gives two dates of calibration, {} and {}: one of them is wrong",
+                    to_iso8601(*result_.facts.calibration_time), to_iso8601(*date)));
+    result_.facts.calibration_time.reset();
+  }
+
   Status take_good(const gt3x::Record& record) {
-    // A one-byte payload in place of samples is a USB event.
-    const bool has_samples = record.payload.size() > 1;
     if (record.is(gt3x::RecordType::parameters)) {
       if (const auto parameters = gt3x::parse_parameters(record.payload)) {
         use_scale(*parameters);
         use_constants(*parameters);
+        use_date(*parameters);
       }
     } else if (record.is(gt3x::RecordType::activity) || record.is(gt3x::RecordType::activity2)) {
-      if (has_samples) {
+      if (has_samples(record)) {
         take_samples(record);
       } else {
         still_->break_run();
       }
     } else if (record.is(gt3x::RecordType::activity3)) {
-      if (has_samples) {
+      if (has_samples(record)) {
         return take_raw_samples(record);
       }
       break_raw_run();

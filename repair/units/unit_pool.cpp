@@ -6,6 +6,7 @@
 
 #include "calib/direction_cells.h"
 #include "repair/rescale/constants_finder.h"
+#include "repair/rescale/gate.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -177,7 +178,7 @@ std::set<std::string> UnitPool::units_that_lack() const {
 
 void UnitPool::keep(const std::string& path, const Survey& survey,
                     const calib::ConstantsRecord* record, bool only_helps) {
-  if (survey.constants.empty()) {
+  if (survey.constants.empty() || !why_not_lent(survey).empty()) {
     return;
   }
   const auto constants = calib::calibration_from(survey.constants.front());

@@ -4,6 +4,7 @@
 
 #include "base/sha256.h"
 #include "repair/rescale/constants_finder.h"
+#include "repair/rescale/gate.h"
 #include "repair/triage/survey.h"
 #include "repair/triage/triage.h"
 
@@ -39,6 +40,10 @@ Result<CalibrationFileCheck> check_calibration_file(Env& env, const std::string&
   check.refusal = why_recording_cannot_help(
       {check.serial, check.firmware, repair::filter_in_force(survey.facts)});
   if (check.refusal.empty()) {
+    if (std::string why = repair::why_not_lent(survey); !why.empty()) {
+      check.refusal = {std::move(why), "name the original recording"};
+      return check;
+    }
     SIXPOINT_ASSIGN(check.sha256, file_sha256(env.files, path));
     SIXPOINT_ASSIGN(check.solved, repair::solve_survey(path, survey, options));
   }

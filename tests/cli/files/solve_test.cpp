@@ -133,6 +133,67 @@ TEST_F(SolveCommand, MissingSidesAreNamedAndNothingIsStored) {
   EXPECT_EQ(with_prior.json()["verdict"], "rests_on_prior");
 }
 
+// Affected by its header, and right by the constants stored in it: other software leaves such a file, and what is solved from it
+// is not the sensor. Oracle: the sensor that the other file was made with.
+TEST_F(SolveCommand, ARecordingThatOtherSoftwareCorrectedLendsNoConstants) {
+  MadeRecording corrected = sides_recording({0, 1, 2, 3, 4, 5});
+  corrected.constants = {{326, 287, 321}, {-201, -268, -199}, {61, 4, 61}};
+  for (PerAxis<int>& raw : corrected.raw) {
+    for (std::size_t a = 0; a < kAxes; ++a) {
+      const double g = (raw[a] - kZero[a]) * kSensitivity[a];
+      const StoredConstants& stored = corrected.constants;
+      raw[a] = static_cast<int>(std::lround(
+          g * (stored.positive_lsb[a] - stored.negative_lsb[a]) / 2 + stored.zero_lsb[a]));
+    }
+  }
+  std::filesystem::create_directory(path("study"));
+  const std::string fixed = write(corrected, "study/fixed.gt3x");
+  const std::string store = path("s.db");
+  const auto answer = run({"solve", fixed, "--json", "--save", "--store", store});
+  EXPECT_EQ(answer.exit_code, 65);
+  const Json json = answer.json();
+  EXPECT_TRUE(json["stored_id"].is_null());
+  EXPECT_TRUE(json["constants"].is_object()) << "the answer is there all the same";
+  EXPECT_THAT(json["notes"].back().get<std::string>(), HasSubstr("other software"));
+  EXPECT_EQ(json["error"]["code"], "bad_data");
+  EXPECT_EQ(run({"solve", fixed}).exit_code, 0);
+  // Another file of the unit, whose own sides do not suffice.
+  MadeRecording worn = sides_recording({0, 2});
+  worn.constants = corrected.constants;
+  const std::string poor = write(worn, "study/worn.gt3x");
+  const auto by_file =
+      run({"repair", poor, "--calibration-file", fixed, "-o", path("a"), "--json"});
+  EXPECT_EQ(by_file.json()["files"][0]["status"], "not_repairable") << by_file.out;
+  EXPECT_THAT(by_file.out, HasSubstr("other software may have corrected it"));
+  const auto pooled = run({"repair", path("study"), "--scan", "-o", path("b"), "--json"});
+  for (const Json& file : pooled.json()["files"]) {
+    EXPECT_EQ(file["status"], "not_repairable") << file;
+  }
+}
+
+// Without a scale a count may be anything.
+TEST_F(SolveCommand, WithoutAScaleNothingIsSolved) {
+  const MadeRecording made = sides_recording({0, 1, 2, 3, 4, 5});
+  auto writer = gt3x::RecordingWriter::create(posix_env().files, path("x.gt3x")).value();
+  gt3x::ParameterValues values;
+  gt3x::set_constants(values, made.constants);
+  Bytes log;
+  gt3x::append_record(log, gt3x::RecordType::parameters, 7, gt3x::encode_parameters(values));
+  Bytes own;
+  gt3x::append_record(own, gt3x::RecordType::parameters, made.start - 1, made.parameters());
+  const Bytes rest = made.log();
+  log.insert(log.end(), rest.begin() + static_cast<std::ptrdiff_t>(own.size()), rest.end());
+  ASSERT_OK(writer.add("log.bin", log));
+  ASSERT_OK(
+      writer.add("info.txt", "Serial Number: XYZ1\r\nFirmware: 1.5.0\r\nSample Rate: 30\r\n"));
+  ASSERT_OK(writer.commit());
+  const auto solved = run({"solve", path("x.gt3x")});
+  EXPECT_EQ(solved.exit_code, 65);
+  EXPECT_THAT(solved.people, HasSubstr("Acceleration Scale"));
+  const auto scanned = run({"scan", path("x.gt3x"), "--json"}).json();
+  EXPECT_TRUE(scanned["files"][0]["evidence_mg"].is_null()) << scanned;
+}
+
 // Of constants that are not verified nothing is stored; so what is said of the store was said
 // before the work.
 TEST_F(SolveCommand, AStoreThatCannotBeMadeIsSaidBeforeTheWork) {

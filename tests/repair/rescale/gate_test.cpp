@@ -101,5 +101,67 @@ TEST(Gate, TheEvidenceIsOfTheFileAndOfWhatTheConstantsMakeOfIt) {
   EXPECT_TRUE(right.counts_are_the_units_own) << "positive - negative of z is 495, below 2 * 256";
 }
 
+// The table of why_not_lent(), a row each.
+TEST(WhyNotLent, FollowsTheTable) {
+  MemoryEnv memory;
+  const auto why_of = [&](const tests::MadeRecording& made, const char* firmware = "") {
+    Bytes log = made.log();
+    if (*firmware != '\0') {
+      gt3x::ParameterValues values = gt3x::parse_parameters(made.parameters())->values;
+      values[gt3x::kParameterFirmwareVersion] = *gt3x::encode_firmware(firmware);
+      Bytes first;
+      gt3x::append_record(first, gt3x::RecordType::parameters, made.start - 1,
+                          gt3x::encode_parameters(values));
+      // In the place of its own, which is as long as the record of PARAMETERS without firmware.
+      Bytes own;
+      gt3x::append_record(own, gt3x::RecordType::parameters, made.start - 1, made.parameters());
+      log.erase(log.begin(), log.begin() + static_cast<std::ptrdiff_t>(own.size()));
+      log.insert(log.begin(), first.begin(), first.end());
+    }
+    EXPECT_OK(made.write(memory.files, "in.gt3x", log));
+    return why_not_lent(survey(memory.files, "in.gt3x").value());
+  };
+  EXPECT_EQ(why_of(tests::six_sides()), "") << "affected, and 100 mg off";
+  EXPECT_EQ(why_of(tests::six_sides(), "1.7.0"), "") << "the axes lie alike under both";
+  EXPECT_THAT(why_of(tests::six_sides(), "1.6.0"), HasSubstr("1.5.0 and 1.6.0"));
+  // Counts that are right by the stored constants, as other software leaves them.
+  const auto corrected = [](std::size_t sides) {
+    tests::MadeRecording made;
+    made.constants = {{326, 287, 321}, {-201, -268, -199}, {61, 4, 61}};
+    for (std::size_t side = 0; side < sides; ++side) {
+      PerAxis<int> raw = made.constants.zero_lsb;
+      raw[side / 2] = side % 2 == 0 ? made.constants.positive_lsb[side / 2]
+                                    : made.constants.negative_lsb[side / 2];
+      for (int i = 0; i < 900; ++i) {
+        made.raw.push_back(raw);
+      }
+    }
+    return made;
+  };
+  EXPECT_THAT(why_of(corrected(6)), HasSubstr("other software may have corrected it"));
+  EXPECT_THAT(why_of(corrected(4)), HasSubstr("other software may have corrected it"));
+  EXPECT_EQ(why_of(corrected(3)), "") << "in few directions much looks right by chance";
+  tests::MadeRecording later = corrected(6);
+  later.calibrated = 1'400'000'000;  // 2014-05-13
+  EXPECT_EQ(why_of(later), "") << "not affected";
+  tests::MadeRecording own = corrected(6);
+  own.constants = tests::kStored;  // z has fewer than 512 counts between its sides
+  own.raw.clear();
+  for (std::size_t side = 0; side < 6; ++side) {
+    PerAxis<int> raw = own.constants.zero_lsb;
+    raw[side / 2] =
+        side % 2 == 0 ? own.constants.positive_lsb[side / 2] : own.constants.negative_lsb[side / 2];
+    Random random(side + 1);
+    for (int i = 0; i < 900; ++i) {
+      PerAxis<int> noisy = raw;
+      for (int& count : noisy) {
+        count += static_cast<int>(std::lround(random.normal()));
+      }
+      own.raw.push_back(noisy);
+    }
+  }
+  EXPECT_EQ(why_of(own), "") << "only this unit's sensor makes such counts";
+}
+
 }  // namespace
 }  // namespace sixpoint::repair

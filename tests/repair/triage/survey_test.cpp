@@ -136,6 +136,42 @@ TEST(Survey, TwoFirmwareVersionsAreBothKept) {
   EXPECT_EQ(found->facts.other_firmware, "");
 }
 
+// For the first samples the last PARAMETERS before them hold; another date behind them that leads to another answer leaves
+// none.
+TEST(Survey, OfTwoDatesOfCalibrationTheOneInForceHoldsOrNone) {
+  constexpr std::int64_t kLater = 1'400'000'000;  // 2014-05-13
+  const auto found_with = [](std::int64_t before, std::int64_t at_start, std::int64_t behind) {
+    tests::MadeRecording made = tests::six_sides();
+    auto record_of = [made](std::int64_t date) mutable {
+      made.calibrated = date;
+      Bytes bytes;
+      gt3x::append_record(bytes, gt3x::RecordType::parameters, 7, made.parameters());
+      return bytes;
+    };
+    made.calibrated = at_start;
+    made.between = [&](std::size_t second) { return second == 2 ? record_of(behind) : Bytes{}; };
+    Bytes log = record_of(before);
+    const Bytes rest = made.log();
+    log.insert(log.end(), rest.begin(), rest.end());
+    MemoryFiles files;
+    EXPECT_OK(made.write(files, "dates.gt3x", log));
+    const auto facts = facts_of(files, "dates.gt3x");
+    EXPECT_OK(facts);
+    EXPECT_EQ(facts->calibration_time, from_unix_seconds(at_start));
+    auto found = survey(files, "dates.gt3x");
+    EXPECT_OK(found);
+    return *std::move(found);
+  };
+  const std::int64_t early = tests::MadeRecording().calibrated;
+  EXPECT_EQ(triage(found_with(kLater, early, early).facts).verdict, Verdict::affected);
+  EXPECT_EQ(triage(found_with(early, kLater, kLater).facts).verdict, Verdict::not_affected);
+  EXPECT_EQ(triage(found_with(early, early, early + 86'400).facts).verdict, Verdict::affected);
+  const Survey two = found_with(kLater, kLater, early);
+  EXPECT_EQ(triage(two.facts).verdict, Verdict::cannot_tell);
+  ASSERT_EQ(two.notes.size(), 1U);
+  EXPECT_NE(two.notes[0].find("two dates of calibration"), std::string::npos) << two.notes[0];
+}
+
 TEST(Survey, AScaleThatCannotBeIsSaid) {
   MemoryFiles files;
   const tests::MadeRecording made = tests::six_sides();
