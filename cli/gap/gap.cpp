@@ -10,6 +10,7 @@
 #include "base/atomic_file.h"
 #include "cli/command.h"
 #include "cli/gap/gap_commands.h"
+#include "cli/gap/recorded_scenario.h"
 #include "cli/output.h"
 #include "cli/store_option.h"
 #include "gap/adopt/learnt_sizes.h"
@@ -50,8 +51,27 @@ int exit_code_of(const gap::Diagnosis& diagnosis) {
              : kExitFailed;
 }
 
-Result<gap::Diagnosis> diagnose_input(const GapCommandOptions& options, gap::DiagnoseOptions how,
-                                      Context& context) {
+struct Judged {
+  gap::Diagnosis diagnosis;
+  Json scenario;
+};
+
+Result<Judged> judged(Result<gap::Diagnosis> diagnosis) {
+  if (!diagnosis) {
+    return fail(diagnosis.error());
+  }
+  Json scenario = gap::augmented_scenario(*diagnosis);
+  return Judged{*std::move(diagnosis), std::move(scenario)};
+}
+
+Result<Judged> judged(const gap::Bundle& bundle, const gap::DiagnoseOptions& how) {
+  SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, gap::diagnose(bundle, how));
+  Json scenario = recorded_scenario(diagnosis, bundle);
+  return Judged{std::move(diagnosis), std::move(scenario)};
+}
+
+Result<Judged> diagnose_input(const GapCommandOptions& options, gap::DiagnoseOptions how,
+                              Context& context) {
   FileSystem& files = context.env.files;
   if (!options.run.empty()) {
     SIXPOINT_ASSIGN(db::Store store, open_existing_store(context, options.store));
@@ -59,22 +79,22 @@ Result<gap::Diagnosis> diagnose_input(const GapCommandOptions& options, gap::Dia
     SIXPOINT_ASSIGN(const std::string samples, station::samples_of_run(store, run.id));
     SIXPOINT_ASSIGN(const gap::Bundle bundle, station::bundle_of_run(run, samples));
     how.uncalibrated = true;
-    return gap::diagnose(bundle, how);
+    return judged(bundle, how);
   }
   SIXPOINT_ASSIGN(const FileInfo info, files.info(options.bundle));
   if (info.is_folder) {
     SIXPOINT_ASSIGN(const gap::Bundle bundle, gap::read_bundle(files, options.bundle));
-    return gap::diagnose(bundle, how);
+    return judged(bundle, how);
   }
   if (gap::is_readings_table(options.bundle)) {
     gap::ReadingsTableOptions table;
     table.rate_hz = options.rate_hz;
-    return gap::diagnose_table(files, options.bundle, how, table);
+    return judged(gap::diagnose_table(files, options.bundle, how, table));
   }
-  return gap::diagnose_plain(files, options.bundle, how);
+  return judged(gap::diagnose_plain(files, options.bundle, how));
 }
 
-Result<gap::Diagnosis> diagnose(const GapCommandOptions& options, Context& context) {
+Result<Judged> diagnose(const GapCommandOptions& options, Context& context) {
   const auto start = context.env.clock.elapsed();
   gap::DiagnoseOptions how;
   how.without = std::set<std::string>(options.without.begin(), options.without.end());
@@ -84,9 +104,10 @@ Result<gap::Diagnosis> diagnose(const GapCommandOptions& options, Context& conte
     SIXPOINT_ASSIGN(const Bytes scenario, read_file(context.env.files, options.population));
     SIXPOINT_ASSIGN(how.learnt, gap::learnt_sizes(as_text(scenario)));
   }
-  SIXPOINT_ASSIGN(gap::Diagnosis diagnosis, diagnose_input(options, std::move(how), context));
-  diagnosis.seconds = std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
-  return diagnosis;
+  SIXPOINT_ASSIGN(Judged answer, diagnose_input(options, std::move(how), context));
+  answer.diagnosis.seconds =
+      std::chrono::duration<double>(context.env.clock.elapsed() - start).count();
+  return answer;
 }
 
 void print_gap(const gap::Diagnosis& d, Context& context) {
@@ -121,8 +142,8 @@ Status take_outputs(const GapCommandOptions& options, Outputs& outputs) {
   return outputs.file("--scenario-out", options.scenario_out);
 }
 
-Status write_reports(const GapCommandOptions& options, const gap::Diagnosis& diagnosis,
-                     FileSystem& files) {
+Status write_reports(const GapCommandOptions& options, const Judged& answer, FileSystem& files) {
+  const gap::Diagnosis& diagnosis = answer.diagnosis;
   if (!options.html.empty()) {
     SIXPOINT_CHECK(write_file(files, options.html, gap::report_html(diagnosis)));
   }
@@ -135,8 +156,7 @@ Status write_reports(const GapCommandOptions& options, const gap::Diagnosis& dia
     SIXPOINT_CHECK(write_file(files, options.pdf, as_text(pdf)));
   }
   if (!options.scenario_out.empty()) {
-    SIXPOINT_CHECK(
-        write_file(files, options.scenario_out, gap::augmented_scenario(diagnosis).dump(2) + "\n"));
+    SIXPOINT_CHECK(write_file(files, options.scenario_out, answer.scenario.dump(2) + "\n"));
   }
   return {};
 }
@@ -147,15 +167,16 @@ Status run_gap(const GapCommandOptions& options, Context& context) {
   }
   Outputs outputs(context, options.outputs, options.json);
   SIXPOINT_CHECK(take_outputs(options, outputs));
-  SIXPOINT_ASSIGN(const gap::Diagnosis diagnosis, diagnose(options, context));
-  context.worsen(exit_code_of(diagnosis));
-  SIXPOINT_CHECK(write_reports(options, diagnosis, outputs.files()));
+  SIXPOINT_ASSIGN(const Judged answer, diagnose(options, context));
+  context.worsen(exit_code_of(answer.diagnosis));
+  SIXPOINT_CHECK(write_reports(options, answer, outputs.files()));
   if (!options.json) {
-    print_gap(diagnosis, context);
+    print_gap(answer.diagnosis, context);
     return {};
   }
   Json json = document("gap-diagnose");
-  json.update(diagnosis.to_json());
+  json.update(answer.diagnosis.to_json());
+  json["augmented_scenario"] = answer.scenario;
   return print_json(context, json);
 }
 

@@ -430,7 +430,10 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
       ->check(CLI::Range(0.0, 1.0));
   command
       .add_option("--realistic", options.shares.realistic,
-                  "share of trials with many small effects and one that dominates")
+                  "share of trials with many small effects and one that dominates (0 without the "
+                  "option)")
+      ->expected(0, 1)
+      ->default_str("1")  // where no number follows
       ->check(CLI::Range(0.0, 1.0));
   command.add_flag("--rates", options.shares.any_rate, "draw sample rates from 20 to 100 Hz");
   command.add_flag("--follow-suggestion", options.follow,

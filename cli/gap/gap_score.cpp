@@ -91,7 +91,7 @@ void add_gap_score(CLI::App& gap_command, Context& context) {
       gap_command, context, "gap-score", "score",
       "scores any program's answers to an exported challenge", run_gap_score);
   command
-      .add_option("ANSWERS", options.answers,
+      .add_option("ANSWERS,--answers", options.answers,
                   "a JSON Lines file, or a folder with NAME.json for each bundle NAME")
       ->required();
   command.add_option("--labels", options.labels, "the labels that gap challenge --export wrote")

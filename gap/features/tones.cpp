@@ -12,8 +12,10 @@ namespace {
 constexpr std::size_t kShortestPiece = 10;  // three unknowns and some to test them
 // In squared residuals over their variance. Of white residuals the best cut gains about 25.
 constexpr double kCut = 60;
-constexpr double kPiece = 8;       // a cut and three unknowns
-constexpr double kEvenDrift = 12;  // a frequency, found on a grid of hundreds
+constexpr double kPiece = 8;  // a cut and three unknowns
+// A row of steps has to be better than an even drift by this: the best of hundreds of places for a cut gains about 25 by chance,
+// and a true slip, hundreds.
+constexpr double kClearlySteps = 24;
 
 // ToneSums over samples up to an index: enough to fit 1, cos, sin on any stretch.
 struct ToneSums {
@@ -162,10 +164,13 @@ class ToneAnalysis {
     std::vector<std::size_t> cuts = {0, y_.size()};
     split(sums, 0, y_.size(), cuts, 0);
     steps_.assign(y_.size(), 0);
+    if (cuts.size() == 2) {
+      return;
+    }
     // A tone off its frequency drifts evenly; cut into pieces it would look like a row of slips.
     const double cost_cut = cost(sums, cuts);
     const double even = best_even_drift();
-    if (cuts.size() > 2 && even_cost_ + kEvenDrift * noise2_ < cost_cut) {
+    if (even_cost_ < cost_cut + kClearlySteps * noise2_) {
       w_ *= 1 + even;
       return;
     }
@@ -237,7 +242,8 @@ class ToneAnalysis {
     }
   }
 
-  // The clock's error relative to the protocol that makes one unbroken tone fit best.
+  // The clock's error relative to the protocol that makes one unbroken tone fit best. The last grid is so fine that what it
+  // leaves of a tone of 1 g is below the noise.
   double best_even_drift() {
     const auto n = static_cast<double>(y_.size());
     const double reach = 0.006;                      // beyond any clock of the catalogue
@@ -245,7 +251,7 @@ class ToneAnalysis {
     const auto half = static_cast<int>(std::ceil(reach / step));
     double best = 0;
     even_cost_ = fit_piece(prefix_sums(y_, good_, w_).back()).squares;
-    for (int round = 0; round < 3; ++round) {
+    for (int round = 0; round < 6; ++round) {
       const double centre = best;
       const double grid = step / std::pow(8.0, round);
       for (int k = -(round == 0 ? half : 8); k <= (round == 0 ? half : 8); ++k) {

@@ -112,8 +112,9 @@ Diagnosis diagnose(const Request& request) {
   }
   const std::size_t pose_count = poses_of(blocks);
   if (pose_count < kLeastPoses) {
-    out.losses.push_back(fmt::format(
-        "{} poses only: gains and offsets of the unit can't be told from effects", pose_count));
+    out.losses.push_back(
+        fmt::format("{} pose{} only: gains and offsets of the unit can't be told from effects",
+                    pose_count, pose_count == 1 ? "" : "s"));
   }
 
   const Explanation explanation = explain(request, blocks, records.slow);
@@ -137,6 +138,8 @@ Diagnosis diagnose(const Request& request) {
     out.unknown.where = locate_unknown(request, records, explanation, found);
   }
   finish(request, std::move(found), out);
+  // Two poses fit any gains and offsets, and what else is there.
+  out.inconclusive = out.verdict == Verdict::no_gap && pose_count < kLeastPoses;
   return out;
 }
 

@@ -107,6 +107,12 @@ std::string Diagnosis::brief() const {
       return fmt::format("{} explain{} the gap: {:.2f} mg -> {:.2f} mg (floor {:.2f} mg){}", names,
                          plural ? "" : "s", gap.before_mg, gap.after_mg, gap.floor_mg, advice);
     case Verdict::partly_explained:
+      if (gap.after_mg >= gap.before_mg) {
+        return fmt::format(
+            "{} {} there and {} not explain the gap ({:.2f} mg): something unknown is left: {}",
+            names, plural ? "are" : "is", plural ? "do" : "does", gap.before_mg,
+            unknown.why.empty() ? "" : unknown.why.front());
+      }
       return fmt::format(
           "{} explain{} a part of the gap ({:.2f} mg -> {:.2f} mg), and something unknown is left: "
           "{}",
@@ -134,9 +140,8 @@ Json augmented_scenario(const Diagnosis& diagnosis) {
     entry["name"] = effect.name;
     entry["parameters"] = Json::object();
     for (const NamedValue& parameter : effect.parameters) {
-      const bool derived =
-          (effect.name == "tilt" && parameter.name == "angle_deg") || parameter.name == "order";
-      if (!derived) {
+      const bool is_derived = effect.name == "tilt" && parameter.name == "angle_deg";
+      if (!is_derived) {
         entry["parameters"][parameter.name] = values(parameter.value);
       }
     }

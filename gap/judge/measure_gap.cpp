@@ -99,8 +99,8 @@ GapSize measure_gap(const Records& records, const Explanation& explanation, cons
   for (const EffectFinding& e : found.effects) {
     explained_nats += e.nats;
   }
-  // What is not explained stays: an alarm without any effect closes nothing.
-  const bool open = !found.alarms.empty() && explained_nats == 0;
+  // What is not explained stays: without any effect nothing is closed.
+  const bool open = explained_nats == 0;
   gap.after_mg = open ? gap.before_mg : held.after_mg;
   gap.after_sigma = open ? gap.before_sigma : held.after_sigma;
   // Three rows are one independent mean; relative uncertainty of a root mean square: 1 / sqrt(2 n).

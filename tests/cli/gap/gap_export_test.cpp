@@ -52,6 +52,22 @@ TEST_F(GapExport, TheSameSeedWritesTheSameBytes) {
   EXPECT_EQ(list["bundles"].size(), 6U);
 }
 
+// `--realistic` without a number is all of them (gap.md: `gap challenge --realistic --rates --export DIR`).
+TEST_F(GapExport, RealisticWithoutANumberIsAll) {
+  const auto made = [&](const std::vector<std::string>& share, const std::string& folder) {
+    std::vector<std::string> arguments = {"gap", "challenge", "--realistic"};
+    arguments.insert(arguments.end(), share.begin(), share.end());
+    arguments.insert(arguments.end(),
+                     {"--rates", "--export", path(folder), "--trials", "2", "--seed", "5",
+                      "--protocol", "production", "--none", "0", "--outside", "0", "--pairs", "0"});
+    return run(arguments).exit_code;
+  };
+  ASSERT_EQ(made({}, "a"), 0);
+  ASSERT_EQ(made({"1"}, "b"), 0);
+  EXPECT_EQ(files_of("a"), files_of("b"));
+  EXPECT_EQ(made({"1.5"}, "c"), 64);
+}
+
 TEST_F(GapExport, NothingButTheSamplesTellsWhatIsInABundle) {
   ASSERT_EQ(challenge("a", {"--labels", path("labels.jsonl")}).exit_code, 0);
   const auto files = files_of("a");

@@ -54,6 +54,11 @@ TEST_F(GapScore, APerfectAnswerIsPerfect) {
   answers.close();
   const auto scored = score("perfect.jsonl");
   ASSERT_EQ(scored.exit_code, 0) << scored.people;
+  EXPECT_EQ(run({"gap", "score", "--labels", path("l.jsonl"), "--answers", path("perfect.jsonl"),
+                 "--json"})
+                .out,
+            scored.out)
+      << "the contract's form";
   const auto json = scored.json();
   EXPECT_EQ(json["schema"], "sixpoint/gap-score/1");
   EXPECT_EQ(json["missing"], 0);

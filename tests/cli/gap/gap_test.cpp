@@ -27,6 +27,62 @@ TEST_F(CommandTest, DiagnosisOfASimulatedBundleFindsNoGap) {
             0);
 }
 
+// The scenario of a diagnosis makes the recording's own protocol again: its rate, poses and their order. Oracle: protocol.json.
+TEST_F(CommandTest, TheScenarioOfADiagnosisHasTheRecordingsOwnProtocol) {
+  std::ofstream(path("s.json"))
+      << R"({"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production",
+      "rate_hz": 30, "effects": [{"name": "misalignment", "parameters": {"rotation_vector_deg": [0.8, -0.6, 0.7]}}]})";
+  ASSERT_EQ(run({"simulate", "--scenario", path("s.json"), "-o", path("bundle")}).exit_code, 0);
+  const auto protocol_of = [&](const std::string& bundle) {
+    std::ifstream in(path(bundle + "/protocol.json"));
+    return nlohmann::json::parse(in);
+  };
+  // As a jig that does less, in its own order.
+  auto short_one = protocol_of("bundle");
+  auto& segments = short_one["segments"];
+  segments.erase(segments.begin() + 1);
+  segments.erase(segments.end() - 1);
+  std::ofstream(path("bundle/protocol.json")) << short_one;
+  const auto found =
+      run({"gap", "diagnose", path("bundle"), "--scenario-out", path("a.json"), "--json"});
+  EXPECT_EQ(found.exit_code, 0) << found.people;
+  std::ifstream written(path("a.json"));
+  EXPECT_EQ(nlohmann::json::parse(written), found.json()["augmented_scenario"]);
+  const auto made = run({"simulate", "--scenario", path("a.json"), "-o", path("again")});
+  ASSERT_EQ(made.exit_code, 0) << made.people;
+  const auto again = protocol_of("again");
+  EXPECT_EQ(again["sample_rate_hz"], 30);
+  ASSERT_EQ(again["segments"].size(), segments.size());
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    EXPECT_EQ(again["segments"][i]["name"], segments[i]["name"]);
+    EXPECT_EQ(again["segments"][i]["samples"], segments[i]["samples"]);
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
+        EXPECT_NEAR(again["segments"][i]["rotation"][row][column].get<double>(),
+                    segments[i]["rotation"][row][column].get<double>(), 1e-9);
+      }
+    }
+  }
+  EXPECT_EQ(run({"gap", "diagnose", path("again"), "--json"}).json()["effects"][0]["name"],
+            "misalignment");
+}
+
+// Two poses fit any gains and offsets.
+TEST_F(CommandTest, TooFewPosesAreNoAnswer) {
+  std::ofstream(path("s.json"))
+      << R"({"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production"})";
+  ASSERT_EQ(run({"simulate", "--scenario", path("s.json"), "-o", path("bundle")}).exit_code, 0);
+  std::ifstream in(path("bundle/protocol.json"));
+  auto protocol = nlohmann::json::parse(in);
+  auto& segments = protocol["segments"];
+  segments.erase(segments.begin() + 2, segments.end());
+  std::ofstream(path("bundle/protocol.json")) << protocol;
+  const auto found = run({"gap", "diagnose", path("bundle"), "--json"});
+  EXPECT_EQ(found.exit_code, 2) << found.out;
+  EXPECT_TRUE(found.json()["inconclusive"]);
+  EXPECT_EQ(found.json()["gap"]["before"]["rms_mg"], found.json()["gap"]["after"]["rms_mg"]);
+}
+
 TEST_F(CommandTest, GapRefusesWhatItCannotRead) {
   const auto neither = run({"gap", "diagnose", "--json"});
   EXPECT_EQ(neither.exit_code, 64) << "neither BUNDLE nor --run";

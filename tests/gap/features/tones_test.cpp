@@ -51,6 +51,26 @@ TEST(Tones, AmplitudeAndSlips) {
   }
 }
 
+// The host's clock may be known to some ppm only: what its error leaves is an even drift of the phase and no row of steps, even
+// where the tone is large. A sample that is lost is found beside it.
+TEST(Tones, AnEvenDriftIsNoRowOfSlips) {
+  for (const double ppm : {-200.0, -60.0, -17.0, -5.0, 7.0, 23.0, 90.0, 310.0}) {
+    for (const double amplitude_g : {0.6, 2.0}) {
+      SCOPED_TRACE(testing::Message() << ppm << " ppm, " << amplitude_g << " g");
+      const auto drifting = [&](std::size_t n) { return static_cast<double>(n) * ppm * 1e-6; };
+      const Bundle bundle = one_tone(40, amplitude_g, drifting);
+      const ToneFit fit = fit_tones(bundle, clean_samples(bundle), {}).front();
+      EXPECT_TRUE(fit.slips.empty());
+      EXPECT_NEAR(fit.frequency_ppm, ppm, 5 * fit.frequency_sd_ppm);
+    }
+  }
+  const Bundle slipped = one_tone(
+      16, 0.6, [](std::size_t n) { return static_cast<double>(n) * 10e-6 + (n >= 430 ? 1 : 0); });
+  const ToneFit fit = fit_tones(slipped, clean_samples(slipped), {}).front();
+  ASSERT_EQ(fit.slips.size(), 1U);
+  EXPECT_EQ(fit.slips[0].steps, 1);
+}
+
 // A line of A at a distance of d Hz adds A sinc(d T) to a tone of T seconds, in any phase.
 TEST(Tones, LinesNearbyMakeAmplitudesUncertain) {
   const Bundle bundle = one_tone(10, 0.6, [](std::size_t) { return 0; });
