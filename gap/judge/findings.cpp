@@ -211,10 +211,14 @@ void finish(const Request& request, Findings found, Diagnosis& out) {
   const double above_floor =
       out.gap.before_mg * out.gap.before_mg - out.gap.floor_mg * out.gap.floor_mg;
   for (auto* list : {&found.effects, &found.candidates}) {
-    double whole = above_floor;
+    // What is named together is the whole at most: its sizes are not of the readings that the gap is measured on.
+    double named_mg2 = 0;
+    double largest_mg2 = 0;
     for (const EffectFinding& f : *list) {
-      whole = std::max(whole, f.gap_mg2);
+      named_mg2 += std::max(0.0, f.gap_mg2);
+      largest_mg2 = std::max(largest_mg2, f.gap_mg2);
     }
+    const double whole = std::max(above_floor, list == &found.effects ? named_mg2 : largest_mg2);
     for (EffectFinding& f : *list) {
       f.share_of_gap = whole > 0 ? std::clamp(f.gap_mg2 / whole, 0.0, 1.0) : 0;
       f.probability_it_matters = probability_it_matters(f, request.options.matters_mg);

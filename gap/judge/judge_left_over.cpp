@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "base/measure.h"
 #include "gap/judge/steps.h"
 
 namespace sixpoint::gap {
@@ -64,8 +63,7 @@ bool is_below_rounding(const Request& request, const Response& response) {
   for (int i = 0; i < kSteps; ++i) {
     kept += std::pow(response.noise_gain((i + 0.5) / kSteps * rate_hz / 2, rate_hz), 2) / kSteps;
   }
-  const double least_mg =
-      kLeast_lsb * kMgPerG / request.bundle.accel_scale_lsb_per_g / std::sqrt(kept);
+  const double least_mg = 1e3 * kLeast_lsb / request.bundle.accel_scale_lsb_per_g / std::sqrt(kept);
   return std::ranges::any_of(response.white_mg, [&](double white) { return white < least_mg; });
 }
 

@@ -189,6 +189,7 @@ const std::map<std::string, Role>& own_roles() {
       {"archive submit --output", Role::working_folder},
       {"gap diagnose --scenario", Role::refused},
       {"gap challenge --labels", Role::output_to_keep},
+      {"gap score --answers", Role::input},
       {"gap score --labels", Role::input},
       {"gap answers --output", Role::output},
       {"gap adopt --output", Role::output},

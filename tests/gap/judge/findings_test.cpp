@@ -47,6 +47,13 @@ TEST(Findings, EffectsAreOrderedByTheirShareOfTheGap) {
   EXPECT_NEAR(out.effects[1].share_of_gap, 0.025, 1e-12);
   EXPECT_GT(out.effects[0].probability_it_matters, 0.99) << "3 +- 0.3 mg";
   EXPECT_LT(out.effects[1].probability_it_matters, 1e-6) << "0.5 +- 0.05 mg";
+  Findings larger;
+  larger.add(asked.request, {.name = "drift", .nats = 500, .gap_mg2 = 8});
+  larger.add(asked.request, {.name = "tilt", .nats = 9, .gap_mg2 = 12});
+  finish(asked.request, larger, out);
+  ASSERT_EQ(out.effects.size(), 2U);
+  EXPECT_NEAR(out.effects[0].share_of_gap, 0.6, 1e-12) << "of 20 mg^2, not of 10";
+  EXPECT_NEAR(out.effects[1].share_of_gap, 0.4, 1e-12);
 }
 
 TEST(Findings, NineToOneIsAccepted) {
