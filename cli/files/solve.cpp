@@ -61,7 +61,7 @@ struct Outcome {
 // Writes the constants to the file and the store that the options name:
 //
 //   constants                                     file        store
-//   not to be lent (repair/rescale/gate.h)        refused     refused
+//   not to be lent (repair/rescale/gate.h)        -o          refused
 //   verified                                      -o          --save
 //   rest on a prior                               -o          never
 //   not verified                                  never       never
@@ -73,17 +73,17 @@ Status keep(const std::string& path, const SolveCommandOptions& options,
   if (!to_file && !to_store) {
     return {};
   }
-  if (!outcome.is_lent) {
-    return fail(ErrorCode::bad_data,
-                "nothing is stored: the constants are for this recording alone", path,
-                "see the notes of the answer; name the original recording");
-  }
   calib::ConstantsOrigin origin;
   SIXPOINT_ASSIGN(origin.sha256, file_sha256(context.env.files, path));
   origin.file = db::storable_path(file_name_of(path));
   origin.kind = repair::recording_kind(survey);
   SIXPOINT_ASSIGN(const auto record, record_constants(outputs.env(), outcome.report, origin,
                                                       to_file ? options.output : ""));
+  if (to_store && !outcome.is_lent) {
+    return fail(ErrorCode::bad_data,
+                "nothing is stored: the constants are for this recording alone", path,
+                "see the notes of the answer; name the original recording");
+  }
   if (to_store) {
     SIXPOINT_ASSIGN(outcome.saved, save_constants(context, options.store, record, survey.model));
   }

@@ -156,7 +156,8 @@ TEST_F(SolveCommand, ARecordingThatOtherSoftwareCorrectedLendsNoConstants) {
   EXPECT_TRUE(json["constants"].is_object()) << "the answer is there all the same";
   EXPECT_THAT(json["notes"].back().get<std::string>(), HasSubstr("other software"));
   EXPECT_EQ(json["error"]["code"], "bad_data");
-  EXPECT_EQ(run({"solve", fixed}).exit_code, 0);
+  EXPECT_EQ(run({"solve", fixed, "-o", path("of_fixed.json")}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(path("of_fixed.json"))) << "for this file itself";
   // Another file of the unit, whose own sides do not suffice.
   MadeRecording worn = sides_recording({0, 2});
   worn.constants = corrected.constants;

@@ -47,7 +47,7 @@ TEST_F(CommandTest, TheScenarioOfADiagnosisHasTheRecordingsOwnProtocol) {
       run({"gap", "diagnose", path("bundle"), "--scenario-out", path("a.json"), "--json"});
   EXPECT_EQ(found.exit_code, 0) << found.people;
   std::ifstream written(path("a.json"));
-  EXPECT_EQ(nlohmann::json::parse(written), found.json()["augmented_scenario"]);
+  EXPECT_EQ(nlohmann::ordered_json::parse(written), found.json()["augmented_scenario"]);
   const auto made = run({"simulate", "--scenario", path("a.json"), "-o", path("again")});
   ASSERT_EQ(made.exit_code, 0) << made.people;
   const auto again = protocol_of("again");
