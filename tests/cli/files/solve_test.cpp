@@ -167,7 +167,9 @@ TEST_F(SolveCommand, ARecordingThatOtherSoftwareCorrectedLendsNoConstants) {
   EXPECT_EQ(by_file.json()["files"][0]["status"], "not_repairable") << by_file.out;
   EXPECT_THAT(by_file.out, HasSubstr("other software may have corrected it"));
   const auto pooled = run({"repair", path("study"), "--scan", "-o", path("b"), "--json"});
-  for (const Json& file : pooled.json()["files"]) {
+  const Json files = pooled.json()["files"];
+  EXPECT_EQ(files.size(), 2U);
+  for (const Json& file : files) {
     EXPECT_EQ(file["status"], "not_repairable") << file;
   }
 }
