@@ -9,7 +9,8 @@
 // |----------------------------------------------|----------------------------------------------|
 // | constants that the user named                | why_unfit() (sources.h) says nothing         |
 // | a calibration file (method 2)                | the same, it was recorded under `current`,   |
-// |                                              | and its solution is verified                 |
+// |                                              | its solution is verified, and it may lend    |
+// |                                              | its constants (gate.h, why_not_lent())       |
 // | the file's own still periods (method 1)      | their solution is verified                   |
 // | the store (method 3, the jig) or a snapshot  | it has a set of this unit under `current`    |
 // | the unit's other files in this run           | repair/units/unit_answer.h has some          |
@@ -56,7 +57,7 @@ struct ConstantsFinderOptions {
 std::vector<SourceKind> sources_in_order(const ConstantsFinderOptions& options);
 
 // Solves the still blocks of a surveyed recording; serial and filter of the report are filled in.
-// bad_data where the recording's constants cannot be undone or it was repaired already.
+// bad_data where the recording's constants cannot be undone, its scale is not known, or it was repaired already.
 Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,
                                         const calib::SolveOptions& options);
 
