@@ -15,7 +15,7 @@ build_packages=(
 )
 test_packages=(
   clang clang-format clang-tidy libclang-rt-14-dev
-  chromium tmux
+  chromium-headless-shell tmux
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 python3-pytest unzip zip
   libumockdev-dev umockdev
   busybox-static cpio dosfstools kmod mtools qemu-system-x86 udev usbip xz-utils

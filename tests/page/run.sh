@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs one scenario of the page in Debian's Chromium, or a check of its bundle.
+# Runs one scenario of the page in Debian's Chromium without its window, which takes two thirds of the processor time,
+# or a check of its bundle.
 #   run.sh SCENARIO SIXPOINT_PROGRAM SCREENSHOTS [USB_STATION]    bundle: dist/ is what the sources build to
 # Skipped (tests/skip.sh: in CI a failure) where there is no Node, npm or Chromium, or npm cannot fetch what the lock file
 # names.
@@ -9,7 +10,8 @@ source_folder=$(cd "$(dirname "$0")/../.." && pwd)
 web=$source_folder/station/web
 skip() { "$source_folder/tests/skip.sh" "$*"; exit $?; }
 command -v node >/dev/null && command -v npm >/dev/null || skip "node and npm are not installed (scripts/install_packages.sh test)"
-[ "$scenario" = bundle ] || [ -x "${CHROMIUM:-/usr/bin/chromium}" ] || skip "there is no Chromium at ${CHROMIUM:-/usr/bin/chromium}"
+chromium=${CHROMIUM:-/usr/bin/chromium-headless-shell}
+[ "$scenario" = bundle ] || [ -x "$chromium" ] || skip "there is no Chromium at $chromium (scripts/install_packages.sh test)"
 
 # What the lock file names, once; tests that start together wait for the first.
 exec 9>"$web/.install.lock"
@@ -38,4 +40,4 @@ if [ "$scenario" = bundle ]; then
   [ "$bytes" -lt 60000 ] || { echo "FAILED: more than 60 kB"; exit 1; }
   exit 0
 fi
-exec timeout 560 node "$source_folder/tests/page/scenarios.mjs" "$scenario" "$program" "$shots" ${4:+"$4"}
+exec env CHROMIUM="$chromium" timeout 560 node "$source_folder/tests/page/scenarios.mjs" "$scenario" "$program" "$shots" ${4:+"$4"}

@@ -829,6 +829,26 @@ const scenarios = {
     }
   },
 
+  // Four drawings a second at most where the person's system asks for less motion, more where not.
+  async motion() {
+    const station = await h.station(['virtual:seed=7']);
+    const inFourSeconds = async (reducedMotion) => {
+      const page = await h.open(station.url, { reducedMotion });
+      await page.locator('figcaption b', { hasText: /side up/ }).first().waitFor();
+      const drawn = () => page.evaluate(() => new Promise((done) => {
+        window.sixpointDelays.length = 0;
+        setTimeout(() => done(window.sixpointDelays.length), 4000);
+      }));
+      return { page, drawn };
+    };
+    const calm = await inFourSeconds('reduce');
+    const few = await calm.drawn();
+    check(few >= 1 && few <= 17, `${few} drawings in four seconds with less motion`);
+    await calm.page.close();
+    const usual = await inFourSeconds('no-preference');
+    await until('more drawings', async () => (await usual.drawn()) > 17);
+  },
+
   // Four screens, one to sixteen lanes: nothing is scrolled sideways, and what a hand needs next is on the first screen.
   async layout() {
     const screens = [['bench', 1280, 800], ['wall', 1920, 1080], ['tablet', 820, 1180], ['phone', 390, 844]];

@@ -1,7 +1,7 @@
 // The unit as a box, turned by CSS so that the side that is up is up.
 import { useEffect, useRef } from 'preact/hooks';
+import { follow } from './frames';
 import { S } from './strings';
-import { traces } from './station';
 import { POSES, type Pose } from './types';
 
 type Vector = [number, number, number];
@@ -40,19 +40,10 @@ export function PosePicture({ pose, small }: { pose: Pose; small?: boolean }) {
   );
 }
 
-// Follows the readings of a lane, at the screen's own rate.
+// Follows the readings of a lane.
 export function LiveBox({ lane, text }: { lane: number; text: string }) {
   const place = useRef<HTMLDivElement>(null);
-  useEffect(() => {
-    let frame = 0;
-    const draw = () => {
-      const trace = traces.get(lane);
-      if (place.current && trace?.end) place.current.style.transform = turn(trace.now());
-      frame = requestAnimationFrame(draw);
-    };
-    draw();
-    return () => cancelAnimationFrame(frame);
-  }, [lane]);
+  useEffect(() => follow(lane, (trace) => { if (place.current) place.current.style.transform = turn(trace.now()); }), [lane]);
   return (
     <div class="scene live" role="img" aria-label={S.boxLive(text)}>
       <div class="view" aria-hidden="true"><div class="case" ref={place}><Sides /></div></div>

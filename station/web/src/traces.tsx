@@ -2,8 +2,9 @@
 import { useEffect, useRef } from 'preact/hooks';
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
+import { follow } from './frames';
 import { S } from './strings';
-import { KEPT, traces, type Trace } from './station';
+import { KEPT, type Trace } from './station';
 
 // Told apart by dash as well as by colour.
 const AXES = [
@@ -38,28 +39,20 @@ export function TraceChart({ lane }: { lane: number }) {
     }, [x, ...lines] as unknown as uPlot.AlignedData, box);
     const resize = new ResizeObserver(() => plot.setSize({ width: Math.max(200, box.clientWidth), height: 190 }));
     resize.observe(box);
-    let frame = 0;
     let told = 0;
-    let seen = -1;
-    const draw = (time: number) => {
-      const trace = traces.get(lane);
-      if (trace && trace.end !== seen) {
-        seen = trace.end;
-        for (let axis = 0; axis < 3; ++axis)
-          for (let i = 0; i < KEPT; ++i) lines[axis][i] = trace.mg[axis][(trace.end + i) % KEPT] / 1000;
-        plot.setData([x, ...lines] as unknown as uPlot.AlignedData, false);
-        plot.redraw(true, false);
-        drawn(trace);
-        if (time - told > 250 && values.current) {
-          told = time;
-          const now = trace.now();
-          values.current.querySelectorAll('b').forEach((each, axis) => { each.textContent = now[axis].toFixed(3); });
-        }
+    const end = follow(lane, (trace) => {
+      for (let axis = 0; axis < 3; ++axis)
+        for (let i = 0; i < KEPT; ++i) lines[axis][i] = trace.mg[axis][(trace.end + i) % KEPT] / 1000;
+      plot.setData([x, ...lines] as unknown as uPlot.AlignedData, false);
+      plot.redraw(true, false);
+      drawn(trace);
+      if (Date.now() - told >= 250 && values.current) {
+        told = Date.now();
+        const now = trace.now();
+        values.current.querySelectorAll('b').forEach((each, axis) => { each.textContent = now[axis].toFixed(3); });
       }
-      frame = requestAnimationFrame(draw);
-    };
-    frame = requestAnimationFrame(draw);
-    return () => { cancelAnimationFrame(frame); resize.disconnect(); plot.destroy(); };
+    });
+    return () => { end(); resize.disconnect(); plot.destroy(); };
   }, [lane]);
   return (
     <figure class="traces">
@@ -80,33 +73,23 @@ export function TraceChart({ lane }: { lane: number }) {
 // A card's small picture of the same.
 export function Spark({ lane }: { lane: number }) {
   const place = useRef<HTMLCanvasElement>(null);
-  useEffect(() => {
-    let frame = 0;
-    let seen = -1;
-    const draw = () => {
-      const trace = traces.get(lane);
-      const canvas = place.current;
-      const pen = canvas?.getContext('2d');
-      if (canvas && pen && trace && trace.end !== seen) {
-        seen = trace.end;
-        const { width, height } = canvas;
-        pen.clearRect(0, 0, width, height);
-        AXES.forEach((axis, i) => {
-          pen.strokeStyle = axis.colour;
-          pen.setLineDash(axis.dash);
-          pen.beginPath();
-          for (let k = 0; k < KEPT; k += 6) {
-            const g = trace.mg[i][(trace.end + k) % KEPT] / 1000;
-            pen.lineTo((k / KEPT) * width, height * (0.5 - g / 2.7));
-          }
-          pen.stroke();
-        });
-        drawn(trace);
+  useEffect(() => follow(lane, (trace) => {
+    const canvas = place.current;
+    const pen = canvas?.getContext('2d');
+    if (!canvas || !pen) return;
+    const { width, height } = canvas;
+    pen.clearRect(0, 0, width, height);
+    AXES.forEach((axis, i) => {
+      pen.strokeStyle = axis.colour;
+      pen.setLineDash(axis.dash);
+      pen.beginPath();
+      for (let k = 0; k < KEPT; k += 6) {
+        const g = trace.mg[i][(trace.end + k) % KEPT] / 1000;
+        pen.lineTo((k / KEPT) * width, height * (0.5 - g / 2.7));
       }
-      frame = requestAnimationFrame(draw);
-    };
-    draw();
-    return () => cancelAnimationFrame(frame);
-  }, [lane]);
+      pen.stroke();
+    });
+    drawn(trace);
+  }), [lane]);
   return <canvas ref={place} width={150} height={44} aria-hidden="true" />;
 }
