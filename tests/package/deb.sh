@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# The Debian packages as their users get them: made by cpack, unpacked into a scratch root, and looked at.
-#   deb.sh CPACK BUILD_FOLDER SOURCE_FOLDER
+# The Debian packages (make.sh) as their users get them: unpacked into a scratch root, and looked at.
+#   deb.sh PACKAGES_FOLDER BUILD_FOLDER SOURCE_FOLDER
 set -euo pipefail
-cpack=$1 build_folder=$2 source_folder=$3
+packages=$1 build_folder=$2 source_folder=$3
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 failures=0
@@ -16,11 +16,9 @@ have() {
 }
 command -v dpkg-shlibdeps >/dev/null || { "$source_folder/tests/skip.sh" "the package needs dpkg-shlibdeps"; exit $?; }
 
-"$cpack" --config "$build_folder/CPackConfig.cmake" -B "$scratch/made" >"$scratch/log" 2>&1 ||
-  { cat "$scratch/log"; exit 1; }
 root=$scratch/root
 for name in sixpoint sixpoint-station libsixpoint-dev libsixpoint-mocks-dev; do
-  made=$(echo "$scratch/made/${name}"_*.deb)
+  made=$(echo "$packages/${name}"_*.deb)
   [ -f "$made" ] || { echo "FAILED: cpack made no $name"; exit 1; }
   [ "$(stat -c %s "$made")" -lt 12000000 ] || failed "$name is larger than 12 MB"
   dpkg-deb -x "$made" "$root"
@@ -28,7 +26,7 @@ for name in sixpoint sixpoint-station libsixpoint-dev libsixpoint-mocks-dev; do
   if (cd "$root" && md5sum --quiet -c "DEBIAN.$name/md5sums"); then :; else failed "md5sums of $name do not fit"; fi
   [ -f "$root/usr/share/doc/$name/copyright" ] || failed "$name has no copyright"
 done
-package=$(echo "$scratch"/made/sixpoint_*.deb)
+package=$(echo "$packages"/sixpoint_*.deb)
 
 # What it needs: every library that the program or a part of it loads belongs to a package that it names.
 parts=("$root"/usr/lib/sixpoint/libsixpoint-*.so)
@@ -101,16 +99,16 @@ mv "$scratch"/elsewhere/* "$root/usr/lib/sixpoint"
 page=$(gunzip -c "$root/usr/share/man/man1/sixpoint.1.gz" | sed 's/\\-/-/g; s/\\f[BIR]//g')
 # shellcheck source=/dev/null
 source "$root/usr/share/bash-completion/completions/sixpoint"
-offered() { # offered WORD...: what Tab gives after these words, the last one half-typed
+offered() { # offered WORD...: COMPREPLY is what Tab gives after these words, the last one half-typed
   COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMPREPLY=()
   _sixpoint
-  printf '%s\n' "${COMPREPLY[@]}"
 }
-# grep reads all of it (no -q): with pipefail, one that stops at the first hit makes the writer fail.
+# The shell compares by itself: there are two thousand words to try.
 offers() { # offers WORD WORD...: the first word is among what Tab gives after the others
   local wanted=$1
   shift
-  offered "$@" | grep -xF -- "$wanted" >/dev/null || failed "the shell does not offer $wanted after ${*:1:$#-1}"
+  offered "$@"
+  [[ " ${COMPREPLY[*]} " == *" $wanted "* ]] || failed "the shell does not offer $wanted after ${*:1:$#-1}"
 }
 commands_of() { "$program" "$@" --help | awk '/^Subcommands:/ { inside = 1; next } /^$/ { inside = 0 } inside && /^  [a-z]/ { print $1 }'; }
 options_of() { "$program" "$@" --help | grep -oE '^  (-[a-z],)?--[a-z0-9-]+' | grep -oE -- '--[a-z0-9-]+$'; }
@@ -121,7 +119,7 @@ check_command() {
   [ -n "$section" ] || failed "the manual page has no section 'sixpoint $*'"
   for option in $(options_of "$@"); do
     offers "$option" sixpoint "$@" "$option"
-    [ "$option" = --help ] || grep -qF -- "$option" <<<"$section" || failed "the manual page's section $* lacks $option"
+    [ "$option" = --help ] || [[ $section == *"$option"* ]] || failed "the manual page's section $* lacks $option"
   done
   checked=$((checked + 1))
   for sub in $(commands_of "$@"); do
@@ -134,7 +132,8 @@ for command in $(commands_of); do
   check_command "$command"
 done
 [ "$checked" -gt 40 ] || failed "only $checked commands were looked at"
-[ -z "$(offered sixpoint repair archive)" ] || failed "a folder's name was taken for a command"
+offered sixpoint repair archive
+[ ${#COMPREPLY[@]} -eq 0 ] || failed "a folder's name was taken for a command"
 if have groff "the manual page's form"; then
   words=$(gunzip -c "$root/usr/share/man/man1/sixpoint.1.gz" | groff -man -Tascii -ww -z 2>&1) || failed "groff: $words"
   [ -z "$words" ] || failed "groff: $words"
@@ -151,7 +150,7 @@ if have systemd-analyze "the unit's form"; then
     failed "the unit is exposed more than 2.0: $(tail -n 1 <<<"$words")"
 fi
 if have lintian "the package's form"; then
-  errors=$(lintian --allow-root --fail-on error "$scratch"/made/*.deb 2>&1) || failed "lintian: $errors"
+  errors=$(lintian --allow-root --fail-on error "$packages"/*.deb 2>&1) || failed "lintian: $errors"
 fi
 [ "$failures" -eq 0 ] && echo "the packages of $version are sound; $checked commands"
 exit "$failures"
