@@ -99,6 +99,16 @@ class BadInput(InFolder):
             sixpoint.solve(path, method="guess")
         with self.assertRaises(ValueError):
             sixpoint.stream(path, rows=0)
+        cut = f"{path}\0b"  # must not read what stands before the zero byte
+        for name, use in (
+            ("read", sixpoint.read),
+            ("inspect", sixpoint.inspect),
+            ("scan", lambda each: sixpoint.scan([each])),
+            ("solve", sixpoint.solve),
+            ("repair", lambda each: sixpoint.repair(path, each)),
+        ):
+            with self.subTest(name), self.assertRaises(ValueError):
+                use(cut)
 
     def test_an_output_that_is_there(self):
         out = self.folder / "out"

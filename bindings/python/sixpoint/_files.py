@@ -5,19 +5,17 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable
-from typing import Literal, Optional, Union
+from typing import Literal, Optional
 
 from . import _core
 from ._answers import Inspection, RepairResult, ScanResult, SolveReport
+from ._paths import Path, as_bytes
 
-Path = Union[str, "os.PathLike[str]"]
 
-
-# Names go as bytes: of one that is no UTF-8, Python's text holds surrogates (PEP 383).
 def _paths(paths: Path | Iterable[Path]) -> list[bytes]:
     if isinstance(paths, (str, os.PathLike)):
-        return [os.fsencode(paths)]
-    return [os.fsencode(path) for path in paths]
+        return [as_bytes(paths)]
+    return [as_bytes(path) for path in paths]
 
 
 def _or_empty(path: Optional[Path]) -> str:
@@ -39,7 +37,7 @@ def inspect(path: Path, *, salvage: bool = False) -> Inspection:
     Inspection
         As ``sixpoint inspect --json``.
     """
-    return Inspection.from_json(json.loads(_core.inspect(os.fsencode(path), salvage)))
+    return Inspection.from_json(json.loads(_core.inspect(as_bytes(path), salvage)))
 
 
 def scan(
@@ -95,7 +93,7 @@ def solve(
     """
     return SolveReport.from_json(
         json.loads(
-            _core.solve(os.fsencode(path), method, seed, strict_nonzero, prior == "population")
+            _core.solve(as_bytes(path), method, seed, strict_nonzero, prior == "population")
         )
     )
 
@@ -178,5 +176,5 @@ def repair(
         "redo_outdated": redo_outdated,
         "jobs": jobs,
     }
-    answer = _core.repair(_paths(paths), os.fsencode(output), json.dumps(options))
+    answer = _core.repair(_paths(paths), as_bytes(output), json.dumps(options))
     return RepairResult.from_json(json.loads(answer))

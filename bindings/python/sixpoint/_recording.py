@@ -6,13 +6,14 @@ import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from . import _core
 from ._answers import Clock, Constants, Gap, Inspection
 from ._errors import UsageError
+from ._paths import Path, as_bytes
 
 if TYPE_CHECKING:
     import pandas
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 Unit = Literal["g", "lsb"]
 Fill = Literal["vendor", "none"]
-Path = Union[str, "os.PathLike[str]"]
 
 _USUAL_FILL_LIMIT_S = 3600
 
@@ -37,7 +37,7 @@ def _open(
             raise UsageError("usage", f"{name}={value!r} is not known", "", f"use one of {known}")
     if fill_limit_s < 0:
         raise UsageError("usage", f"fill_limit_s={fill_limit_s} is below 0", "", "give seconds")
-    return _core.Reading(os.fsencode(path), unit, dtype, fill == "vendor", fill_limit_s, salvage)
+    return _core.Reading(as_bytes(path), unit, dtype, fill == "vendor", fill_limit_s, salvage)
 
 
 def _text(value: bytes) -> str:
