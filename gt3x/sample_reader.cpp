@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "gt3x/forms/model.h"
+#include "gt3x/forms/sample_rate.h"
 
 namespace sixpoint::gt3x {
 
@@ -277,11 +278,7 @@ struct SampleReader::State {
 
   // activity.bin knows no seconds: they are counted from Start Date at the rate of info.txt.
   Result<std::optional<Second>> next_of_activity() {
-    const double rate_hz = info.sample_rate_hz().value_or(0);
-    if (!(rate_hz >= 1)) {
-      return fail(ErrorCode::bad_data, "info.txt names no sample rate", {},
-                  "download the recording from the unit again");
-    }
+    SIXPOINT_ASSIGN(const double rate_hz, usable_sample_rate_hz(info, {}));
     const auto wanted = static_cast<std::size_t>(rate_hz);
     while (pending.size() < wanted && !activity_ended) {
       // 9 bytes are two samples; a whole number of them leaves no half sample between pieces.

@@ -7,6 +7,7 @@
 #include "gap/unguided/block_line.h"
 #include "gt3x/forms/agdc.h"
 #include "gt3x/forms/parameters.h"
+#include "gt3x/forms/sample_rate.h"
 #include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
 
@@ -206,11 +207,8 @@ class RestReader {
 
 Result<RecordingRests> read_rests(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
-  const double rate_hz = recording.info().sample_rate_hz().value_or(0);
-  if (!(rate_hz >= 1 && rate_hz <= 1000)) {
-    return fail(ErrorCode::bad_data, "info.txt gives no sample rate that can be", path,
-                "download the recording again");
-  }
+  SIXPOINT_ASSIGN(const double rate_hz,
+                  gt3x::usable_sample_rate_hz(recording.info(), path, 1000));
   RestReader reader(recording, rate_hz);
   SIXPOINT_CHECK(reader.read_calibrations(static_cast<int>(rate_hz)));
   return reader.read_log();

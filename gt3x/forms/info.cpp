@@ -57,6 +57,10 @@ Result<Info> Info::parse(std::string_view text) {
                 fmt::format("info.txt has {} bytes, more than it can need", text.size()), {},
                 "check that this is a recording; download it from the unit again");
   }
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    return fail(ErrorCode::bad_data, "info.txt is UTF-16, and the vendor's is UTF-8", {},
+                "another program has changed it; download the recording from the unit again");
+  }
   Info info;
   if (text.starts_with(kByteOrderMark)) {
     info.byte_order_mark_ = true;

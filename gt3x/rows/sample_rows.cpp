@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/forms/sample_rate.h"
 #include "gt3x/sample_reader.h"
 
 namespace sixpoint::gt3x {
@@ -180,11 +181,8 @@ class RowSource::Rows {
 };
 
 Result<RowSource> RowSource::open(Recording& recording, const RawCsvOptions& options) {
-  const double rate_hz = recording.info().sample_rate_hz().value_or(0);
-  if (!(rate_hz >= 1)) {
-    return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all",
-                recording.path(), "download the recording from the unit again");
-  }
+  SIXPOINT_ASSIGN(const double rate_hz,
+                  usable_sample_rate_hz(recording.info(), recording.path()));
   SIXPOINT_ASSIGN(const auto agdc, agdc_calibration_of(recording, rate_hz));
   return RowSource(std::make_unique<Rows>(recording, options, rate_hz, agdc));
 }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/forms/sample_rate.h"
 #include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
 
@@ -16,11 +17,7 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
   Trace trace;
   trace.name_ = path;
-  trace.rate_hz_ = recording.info().sample_rate_hz().value_or(0);
-  if (!(trace.rate_hz_ >= 1)) {
-    return fail(ErrorCode::bad_data, "the recording has a sample rate of 0 or none at all", path,
-                "download the recording from the unit again");
-  }
+  SIXPOINT_ASSIGN(trace.rate_hz_, gt3x::usable_sample_rate_hz(recording.info(), path));
   const auto rate = static_cast<std::uint64_t>(std::lround(trace.rate_hz_));
   std::optional<std::uint32_t> start;
   gt3x::SampleReader reader(recording);

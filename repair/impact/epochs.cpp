@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "gt3x/forms/sample_rate.h"
 #include "gt3x/sample_reader.h"
 
 namespace sixpoint::repair {
@@ -117,11 +118,7 @@ Result<EpochSeries> epochs_of(gt3x::Recording& recording, const EpochOptions& op
   EpochSeries series;
   series.path = path;
   series.epoch_s = options.epoch_s;
-  series.rate_hz = recording.info().sample_rate_hz().value_or(0);
-  if (!(series.rate_hz >= 1 && series.rate_hz <= 1000)) {
-    return bad("the recording has no sample rate that can be", path,
-               "download the recording from the unit again");
-  }
+  SIXPOINT_ASSIGN(series.rate_hz, gt3x::usable_sample_rate_hz(recording.info(), path, 1000));
   series.has_counts = ActivityCounts::knows(series.rate_hz);
   const auto rate = static_cast<std::size_t>(std::lround(series.rate_hz));
   std::optional<Run> run;

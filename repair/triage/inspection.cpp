@@ -6,6 +6,7 @@
 
 #include "base/time.h"
 #include "gt3x/forms/agdc.h"
+#include "gt3x/forms/sample_rate.h"
 #include "repair/triage/agd.h"
 #include "repair/triage/file_tree.h"
 #include "repair/triage/survey.h"
@@ -149,7 +150,7 @@ void add_time_warnings(Inspection& found) {
   warn(repeated, "records repeat a second");
   warn(repeated_otherwise, "records repeat a second with other samples");
   warn(out_of_order, "records stand behind later ones");
-  warn(late, "records come so late that their place is taken");
+  warn(late, "records come so late that they have no place and are left out");
   warn(odd_size, "records hold more or fewer samples than the rate");
   warn(jump, "times leap by more than an hour, and nothing in the file says why");
 }
@@ -249,15 +250,6 @@ void add_warnings(Inspection& found, const gt3x::SampleReader& reader) {
   add_time_warnings(found);
 }
 
-Error bad_recording(const std::string& path, const char* what, const char* hint) {
-  return {ErrorCode::bad_data, what, path, hint};
-}
-
-Error without_rate(const std::string& path) {
-  return bad_recording(path, "info.txt names no sample rate above 0",
-                       "download the recording from the unit again");
-}
-
 Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
                                      const gt3x::RecordingOptions& how) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path, how));
@@ -271,8 +263,9 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   found.entries = recording.entries();
   SIXPOINT_ASSIGN(found.already_repaired, carries_repair_mark(recording));
   found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, nullptr);
-  if (found.rate_hz.value_or(0) <= 0 && !recording.has_log()) {
-    return fail(without_rate(path));
+  const auto rate = gt3x::usable_sample_rate_hz(info, path);
+  if (!rate && !recording.has_log()) {
+    return tl::unexpected(rate.error());
   }
 
   std::optional<gt3x::AgdcCalibration> agdc;
@@ -291,6 +284,10 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
       found.facts.calibration_time = memory->calibration_time;
     } else {
       found.warnings.push_back("there are no constants: " + memory.error().what);
+    }
+    if (!info.start()) {
+      found.warnings.emplace_back(
+          "info.txt gives no Start Date, and activity.bin no times: they begin in 1970");
     }
   }
 
@@ -348,11 +345,11 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   if (how.salvage) {
     SIXPOINT_ASSIGN(found.losses, gt3x::salvage_losses(recording, found.log));
   }
-  if (found.rate_hz.value_or(0) <= 0) {
-    found.problem = without_rate(path);
+  if (!rate) {
+    found.problem = rate.error();
   } else if (found.samples == 0) {
-    found.problem = bad_recording(path, "the recording holds no samples",
-                                  "check that the unit was started, and download it again");
+    found.problem = Error{ErrorCode::bad_data, "the recording holds no samples", path,
+                          "check that the unit was started, and download it again"};
   }
   return found;
 }

@@ -10,6 +10,7 @@
 #include "gt3x/forms/clock.h"
 #include "gt3x/forms/model.h"
 #include "gt3x/forms/parameters.h"
+#include "gt3x/forms/sample_rate.h"
 #include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
 #include "gt3x/sample_reader.h"
@@ -266,11 +267,8 @@ Result<Survey> begin_survey(gt3x::Recording& recording) {
   result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
   result.model = gt3x::model_of(result.facts.serial);
   SIXPOINT_ASSIGN(result.already_repaired, carries_repair_mark(recording));
-  result.rate_hz = recording.info().sample_rate_hz().value_or(0);
-  if (result.rate_hz <= 0) {
-    return fail(ErrorCode::bad_data, "info.txt gives no sample rate above 0", recording.path(),
-                "download the recording from the unit again");
-  }
+  SIXPOINT_ASSIGN(result.rate_hz,
+                  gt3x::usable_sample_rate_hz(recording.info(), recording.path()));
   return result;
 }
 

@@ -45,6 +45,12 @@ TEST(Info, Refuses) {
   EXPECT_FAILS(Info::parse(""), ErrorCode::bad_data);
   EXPECT_FAILS(Info::parse("PK\x03\x04 nothing here"), ErrorCode::bad_data);
   EXPECT_FAILS(Info::parse(std::string(2 << 20, 'a')), ErrorCode::bad_data);
+  using namespace std::string_view_literals;
+  for (const auto text : {"\xFF\xFE" "A\0:\0 \0" "1\0"sv, "\xFE\xFF\0A\0:\0 \0" "1"sv}) {
+    const auto utf16 = Info::parse(text);
+    EXPECT_FAILS(utf16, ErrorCode::bad_data);
+    EXPECT_NE(utf16.error().what.find("UTF-16"), std::string::npos) << utf16.error().what;
+  }
   const auto odd = Info::parse(
       "Sample Rate: fast\nStart Date: 99999999999999999999\nStop Date: -1\n"
       "Acceleration Scale: nan\n: no key\n");
