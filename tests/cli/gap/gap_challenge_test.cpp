@@ -115,9 +115,8 @@ TEST_F(GapChallenge, StripTakesTheTruthAwayAndTheBundleKeepsIt) {
 // The real diagnosis on trials that it never saw. The bounds are far below what it reaches
 // (docs/gap.md): chance must not break the test.
 TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRun) {
-  const std::string trials = tests::kSanitized ? "12" : "60";
   const auto production =
-      challenge({"--program", SIXPOINT_BINARY_DIR "/sixpoint", "--trials", trials}).json();
+      challenge({"--program", SIXPOINT_BINARY_DIR "/sixpoint", "--trials", "30"}).json();
   const auto& scores = production["scores"];
   EXPECT_EQ(scores["failures"]["right"], 0);
   EXPECT_LE(scores["none_alarms"]["right"].get<int>(), 1);
@@ -126,11 +125,10 @@ TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRun) {
 }
 
 TEST_F(GapChallenge, TheRealDiagnosisStandsASmallRunOfTheWholeProtocol) {
-  const std::string trials = tests::kSanitized ? "3" : "12";
   const auto engineering =
       tests::run_command(posix_env(),
                          {"gap", "challenge", "--program", SIXPOINT_BINARY_DIR "/sixpoint",
-                          "--trials", trials, "--protocol", "engineering", "--seed", "5", "--json"})
+                          "--trials", "12", "--protocol", "engineering", "--seed", "5", "--json"})
           .json();
   EXPECT_EQ(engineering["scores"]["failures"]["right"], 0);
   EXPECT_LE(engineering["scores"]["withheld_confidently_wrong"]["right"].get<int>(), 1);
