@@ -207,8 +207,7 @@ class RestReader {
 
 Result<RecordingRests> read_rests(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
-  SIXPOINT_ASSIGN(const double rate_hz,
-                  gt3x::usable_sample_rate_hz(recording.info(), path, 1000));
+  SIXPOINT_ASSIGN(const double rate_hz, gt3x::usable_sample_rate_hz(recording.info(), path, 1000));
   RestReader reader(recording, rate_hz);
   SIXPOINT_CHECK(reader.read_calibrations(static_cast<int>(rate_hz)));
   return reader.read_log();

@@ -181,8 +181,7 @@ class RowSource::Rows {
 };
 
 Result<RowSource> RowSource::open(Recording& recording, const RawCsvOptions& options) {
-  SIXPOINT_ASSIGN(const double rate_hz,
-                  usable_sample_rate_hz(recording.info(), recording.path()));
+  SIXPOINT_ASSIGN(const double rate_hz, usable_sample_rate_hz(recording.info(), recording.path()));
   SIXPOINT_ASSIGN(const auto agdc, agdc_calibration_of(recording, rate_hz));
   return RowSource(std::make_unique<Rows>(recording, options, rate_hz, agdc));
 }

@@ -267,8 +267,7 @@ Result<Survey> begin_survey(gt3x::Recording& recording) {
   result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
   result.model = gt3x::model_of(result.facts.serial);
   SIXPOINT_ASSIGN(result.already_repaired, carries_repair_mark(recording));
-  SIXPOINT_ASSIGN(result.rate_hz,
-                  gt3x::usable_sample_rate_hz(recording.info(), recording.path()));
+  SIXPOINT_ASSIGN(result.rate_hz, gt3x::usable_sample_rate_hz(recording.info(), recording.path()));
   return result;
 }
 

@@ -46,7 +46,11 @@ TEST(Info, Refuses) {
   EXPECT_FAILS(Info::parse("PK\x03\x04 nothing here"), ErrorCode::bad_data);
   EXPECT_FAILS(Info::parse(std::string(2 << 20, 'a')), ErrorCode::bad_data);
   using namespace std::string_view_literals;
-  for (const auto text : {"\xFF\xFE" "A\0:\0 \0" "1\0"sv, "\xFE\xFF\0A\0:\0 \0" "1"sv}) {
+  for (const auto text : {"\xFF\xFE"
+                          "A\0:\0 \0"
+                          "1\0"sv,
+                          "\xFE\xFF\0A\0:\0 \0"
+                          "1"sv}) {
     const auto utf16 = Info::parse(text);
     EXPECT_FAILS(utf16, ErrorCode::bad_data);
     EXPECT_NE(utf16.error().what.find("UTF-16"), std::string::npos) << utf16.error().what;

@@ -9,10 +9,14 @@ namespace {
 
 TEST(UsableSampleRate, IsWhatInfoNamesOrSaysWhatStandsThere) {
   const auto rate = [](const std::string& line, double most_hz) {
-    return usable_sample_rate_hz(Info::parse("Serial Number: MOS2A45130450\n" + line).value(), "a.gt3x", most_hz);
+    return usable_sample_rate_hz(Info::parse("Serial Number: MOS2A45130450\n" + line).value(),
+                                 "a.gt3x", most_hz);
   };
-  for (const auto& [line, rate_hz] : std::vector<std::pair<std::string, double>>{
-           {"Sample Rate: 30", 30}, {"Sample Rate: 1", 1}, {"Sample Rate: 37,5", 37.5}, {"Sample Rate: 100", 100}}) {
+  for (const auto& [line, rate_hz] :
+       std::vector<std::pair<std::string, double>>{{"Sample Rate: 30", 30},
+                                                   {"Sample Rate: 1", 1},
+                                                   {"Sample Rate: 37,5", 37.5},
+                                                   {"Sample Rate: 100", 100}}) {
     const auto read = rate(line, 100);
     ASSERT_OK(read);
     EXPECT_EQ(*read, rate_hz) << line;
