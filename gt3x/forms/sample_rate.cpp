@@ -13,7 +13,7 @@ Result<double> usable_sample_rate_hz(const Info& info, const std::string& path, 
   std::string what = "info.txt names no sample rate";
   if (text) {
     what = fmt::format("info.txt gives a sample rate of '{}', which is not from 1 to {} Hz",
-                       text->substr(0, 40), most_hz);
+                       printable(*text, 40), most_hz);
   }
   return fail(ErrorCode::bad_data, std::move(what), path,
               "download the recording from the unit again");
