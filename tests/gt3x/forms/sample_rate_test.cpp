@@ -28,7 +28,8 @@ TEST(UsableSampleRate, IsWhatInfoNamesOrSaysWhatStandsThere) {
            {"Sample Rate: -30", "of '-30'"},
            {"Sample Rate: 101", "of '101'"},
            {"Sample Rate: fast", "of 'fast'"},
-           {"Sample Rate: nan", "of 'nan'"}}) {
+           {"Sample Rate: nan", "of 'nan'"},
+           {"Sample Rate: \x1b[2J", "of '\\x1b[2J'"}}) {
     const auto refused = rate(line, 100);
     EXPECT_FAILS(refused, ErrorCode::bad_data);
     EXPECT_NE(refused.error().what.find(what), std::string::npos) << refused.error().what;
