@@ -10,7 +10,7 @@ if [ "${1:-}" != --inside ]; then
   scratch=$(mktemp -d)
   trap 'rm -rf "$scratch"' EXIT
   mkdir "$scratch/made"
-  cp "$1"/*.deb "$scratch/made"
+  cp "$1"/*.deb "$scratch/made" || { "$3/tests/skip.sh" "there are no packages (make.sh)"; exit $?; }
   unshare --mount --propagation private true 2>/dev/null || cannot_mount "no namespace of mounts for this user"
   unshare --mount --propagation private "$0" --inside "$scratch" "$3"
   exit
