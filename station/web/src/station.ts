@@ -223,12 +223,14 @@ const before = (): Record<string, string> =>
 export interface Refusal { what: string; hint: string }
 export async function ask<T>(path: string, body?: unknown): Promise<{ ok: true; data: T } | { ok: false; error: Refusal }> {
   try {
-    const answer = await fetch(path, body === undefined ? { signal: AbortSignal.timeout(READ_MS) } : {
+    // A read that nobody answered in time is asked once more: what it should have shown would stay empty.
+    const read = () => fetch(path, { signal: AbortSignal.timeout(READ_MS) });
+    const answer = await (body === undefined ? read().catch(read) : fetch(path, {
       method: 'POST',
       headers: { 'Content-Type': 'application/json', 'X-Sixpoint-Client': secret, ...before() },
       body: JSON.stringify(body),
       signal: AbortSignal.timeout(COMMAND_MS),
-    });
+    }));
     const data = await answer.json();
     if (answer.status === 401 && path !== '/api/session') change({ entry: 'sign_in' });
     // Idle for too long, or signed out in another window: the page asks for the PIN again.
