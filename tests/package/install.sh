@@ -9,8 +9,9 @@ cannot_mount() { echo "SKIPPED, NOT PASSED: $1; dpkg was not tried"; exit 77; }
 if [ "${1:-}" != --inside ]; then
   scratch=$(mktemp -d)
   trap 'rm -rf "$scratch"' EXIT
+  compgen -G "$1/*.deb" >/dev/null || { "$3/tests/skip.sh" "there are no packages (make.sh)"; exit $?; }
   mkdir "$scratch/made"
-  cp "$1"/*.deb "$scratch/made" || { "$3/tests/skip.sh" "there are no packages (make.sh)"; exit $?; }
+  cp "$1"/*.deb "$scratch/made"
   unshare --mount --propagation private true 2>/dev/null || cannot_mount "no namespace of mounts for this user"
   unshare --mount --propagation private "$0" --inside "$scratch" "$3"
   exit

@@ -132,8 +132,8 @@ export async function bare(url) {
   return page;
 }
 
-// A new browser, signed in by a code of its own, unless `url` has one. Its person asks for less motion: drawing without a
-// graphics processor took a third of the time of all tests.
+// A new browser, signed in by a code of its own, unless `url` has one. Its person asks for less motion: drawing takes the
+// processor here, and the other tests wait for it.
 export async function open(url, { width = 1500, height = 1000, ...more } = {}) {
   await launch();
   const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, ignoreHTTPSErrors: true, locale: 'en-US', reducedMotion: 'reduce', ...more });

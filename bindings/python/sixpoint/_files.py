@@ -19,7 +19,7 @@ def _paths(paths: Path | Iterable[Path]) -> list[bytes]:
 
 
 def _or_empty(path: Optional[Path]) -> str:
-    return "" if path is None else os.fspath(path)
+    return "" if path is None else os.fsdecode(as_bytes(path))
 
 
 def inspect(path: Path, *, salvage: bool = False) -> Inspection:

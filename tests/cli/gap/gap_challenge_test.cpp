@@ -12,7 +12,6 @@
 #include <unistd.h>
 
 #include "run_command.h"
-#include "sanitized.h"
 #include "shared_data.h"
 #include "temporary_folder.h"
 
