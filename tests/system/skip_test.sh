@@ -69,6 +69,9 @@ fi
 expect "tmux" "tmux is not installed" env PATH="$(hidden_path tmux)" "$1/tests/page/terminal.sh" /bin/true
 expect "node" "node and npm are not installed" env PATH="$(hidden_path node)" "$1/tests/page/run.sh" whole /bin/true "$scratch"
 expect "dpkg-shlibdeps" "the package needs dpkg-shlibdeps" env PATH="$(hidden_path dpkg-shlibdeps)" \
-  "$1/tests/package/deb.sh" /bin/true "$scratch" "$1"
+  "$1/tests/package/make.sh" /bin/true "$scratch" "$1" "$scratch/packages"
+for test in deb install; do
+  expect "packages" "there are no packages" "$1/tests/package/$test.sh" "$scratch/none" "$scratch" "$1"
+done
 expect "anything" "no carrier; install one" "$1/tests/skip.sh" "no carrier; install one"
 exit $failures
