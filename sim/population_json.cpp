@@ -31,7 +31,9 @@ Result<ParameterSet> parse_numbers_of(const Section& effect, std::string_view ke
     }
   }
   SIXPOINT_ASSIGN(ParameterSet complete, complete_parameters(kind, given));
-  if (spread) {
+  if (!spread) {
+    SIXPOINT_CHECK(check_possible(kind, complete, effect.path(key)));
+  } else {
     for (auto& [name, numbers] : complete) {
       if (!given.contains(name)) {
         std::fill(numbers.begin(), numbers.end(), 0);

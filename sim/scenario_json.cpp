@@ -300,6 +300,7 @@ Result<EffectSpec> parse_effect(const Json& json, const std::string& path) {
     }
   }
   SIXPOINT_ASSIGN(spec.values, complete_parameters(*spec.kind, given));
+  SIXPOINT_CHECK(check_possible(*spec.kind, spec.values, effect.path("parameters")));
   return spec;
 }
 

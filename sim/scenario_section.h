@@ -101,10 +101,12 @@ class Section {
     if (spelled) {
       const auto parsed = parse_iso8601(*spelled);
       if (!parsed || *parsed < from_unix_seconds(0) ||
-          *parsed >= from_unix_seconds(std::int64_t{1} << 32U)) {
-        return wrong(path(key), "this must be a time such as 2015-04-09T14:00:00Z, 1970 to 2106");
+          *parsed >= from_unix_seconds(std::int64_t{1} << 32U) ||
+          *parsed != std::chrono::floor<std::chrono::seconds>(*parsed)) {
+        return wrong(path(key),
+                     "this must be a whole second such as 2015-04-09T14:00:00Z, 1970 to 2106");
       }
-      value = std::chrono::floor<std::chrono::seconds>(*parsed);
+      value = *parsed;
     }
     return {};
   }
@@ -160,6 +162,18 @@ inline Result<std::vector<double>> parse_numbers(const Json& json, const std::st
     }
   }
   return numbers;
+}
+
+// Of the parameters of an effect, which stand under `path`.
+inline Status check_possible(const EffectKind& kind, const ParameterSet& values,
+                             const std::string& path) {
+  for (const Parameter& parameter : kind.parameters) {
+    if (const auto must_be = impossible(parameter, values.at(parameter.name))) {
+      return wrong(fmt::format("{}/{}", path, parameter.name),
+                   fmt::format("each number must be {}", *must_be));
+    }
+  }
+  return {};
 }
 
 // population_json.cpp: /population of a scenario.

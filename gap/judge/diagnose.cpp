@@ -1,5 +1,6 @@
 #include "gap/judge/diagnose.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -63,6 +64,11 @@ std::size_t poses_of(const std::vector<Block>& blocks) {
   return poses.size();
 }
 
+std::ptrdiff_t flagged(const CleanSamples& clean, SampleFlag flag) {
+  return std::count_if(clean.flags.begin(), clean.flags.end(),
+                       [&](std::uint8_t flags) { return (flags & flag) != 0; });
+}
+
 Diagnosis header_of(const Request& request, const ProtocolKind& kind) {
   const Bundle& bundle = request.bundle;
   Diagnosis out;
@@ -95,7 +101,11 @@ Diagnosis diagnose(const Request& request) {
   if (!noise.usable()) {
     return inconclusive(
         request, std::move(found),
-        "too little of the recording lies still and unmasked to know even its noise",
+        fmt::format(
+            "too little of the recording lies still and unmasked to know even its noise: of "
+            "{} samples {} are zero on all axes, {} hold one value and {} are clipped",
+            clean.flags.size(), flagged(clean, kSampleZero), flagged(clean, kSampleHeld),
+            flagged(clean, kSampleClipped)),
         std::move(out));
   }
   const Records records = judge_records(request, std::move(clean), std::move(noise), found);

@@ -11,17 +11,17 @@ namespace {
 
 constexpr double kHighest_c = 200;  // a larger number is no temperature of a unit
 
-// Rows of two numbers under a header line; lines that hold none are counted.
-struct TwoColumns {
-  std::vector<std::pair<double, double>> rows;  // by the first number
-  std::size_t skipped = 0;
-};
+using Row = std::pair<double, double>;
 
-TwoColumns read_two_columns(FileSystem& files, const std::string& path) {
-  TwoColumns table;
+// The rows of two numbers under a header line that can be what the log says they are, by the first number.
+// How many others there are is a loss of the bundle.
+std::vector<Row> read_log(FileSystem& files, const std::string& path, const char* name,
+                          bool (*possible)(const Bundle&, const Row&), Bundle& bundle) {
+  std::vector<Row> rows;
+  std::size_t left_out = 0;
   const auto bytes = read_file(files, path);
   if (!bytes) {
-    return table;
+    return rows;
   }
   const char* at = reinterpret_cast<const char*>(bytes->data());
   const char* const end = at + bytes->size();
@@ -32,16 +32,30 @@ TwoColumns read_two_columns(FileSystem& files, const std::string& path) {
     const auto one = std::from_chars(at, line_end, a);
     const bool comma = one.ec == std::errc() && one.ptr < line_end && *one.ptr == ',';
     const auto two = comma ? std::from_chars(one.ptr + 1, line_end, b) : one;
-    if (comma && two.ec == std::errc() && std::isfinite(a) && std::isfinite(b)) {
-      table.rows.emplace_back(a, b);
+    if (comma && two.ec == std::errc() && std::isfinite(a) && std::isfinite(b) &&
+        possible(bundle, {a, b})) {
+      rows.emplace_back(a, b);
     } else if (!header && line_end > at + 1) {
-      ++table.skipped;
+      ++left_out;
     }
     at = line_end == end ? end : line_end + 1;
   }
-  std::stable_sort(table.rows.begin(), table.rows.end(),
+  if (left_out > 0) {
+    bundle.losses.push_back(fmt::format(
+        "{}: {} lines hold no reading of this recording and were left out", name, left_out));
+  }
+  std::stable_sort(rows.begin(), rows.end(),
                    [](const auto& x, const auto& y) { return x.first < y.first; });
-  return table;
+  return rows;
+}
+
+bool can_be_temperature(const Bundle& /*bundle*/, const Row& row) {
+  return std::abs(row.second) <= kHighest_c;
+}
+
+bool can_be_stamp(const Bundle& bundle, const Row& row) {
+  return row.first >= 0 && row.first < static_cast<double>(bundle.samples.size()) &&
+         row.first == std::floor(row.first);
 }
 
 // Stamps that are not of this recording's segments would make samples lost or repeated.
@@ -76,13 +90,9 @@ void drop_foreign_clock(Bundle& bundle) {
 }  // namespace
 
 void read_temperature(FileSystem& files, const std::string& path, Bundle& bundle) {
-  TwoColumns table = read_two_columns(files, path);
-  if (table.skipped > 0) {
-    bundle.losses.push_back(
-        fmt::format("temperature.csv: {} lines hold no numbers and were left out", table.skipped));
-  }
-  std::erase_if(table.rows, [](const auto& row) { return std::abs(row.second) > kHighest_c; });
-  if (table.rows.size() < 2 || !(table.rows.back().first > table.rows.front().first)) {
+  const std::vector<Row> rows =
+      read_log(files, path, "temperature.csv", can_be_temperature, bundle);
+  if (rows.size() < 2 || !(rows.back().first > rows.front().first)) {
     bundle.losses.emplace_back(
         "temperature.csv is missing or empty: the commanded temperatures are used instead, effects "
         "of temperature are told from effects of time less well");
@@ -91,43 +101,38 @@ void read_temperature(FileSystem& files, const std::string& path, Bundle& bundle
   // A running mean over +-15 s, as many rows before as behind: the log has 0.1 C of noise, the unit
   // follows in minutes. A log may pause while nothing is recorded, and may be sparse.
   constexpr double kReach_s = 15.5;  // of a row a second: 15 rows, whatever their times end in
-  const std::size_t rows = table.rows.size();
-  std::vector<double> sum(rows + 1, 0);
-  for (std::size_t i = 0; i < rows; ++i) {
-    sum[i + 1] = sum[i] + table.rows[i].second;
+  std::vector<double> sum(rows.size() + 1, 0);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    sum[i + 1] = sum[i] + rows[i].second;
   }
   const auto apart_s = [&](std::size_t early, std::size_t late) {
-    return table.rows[late].first - table.rows[early].first;
+    return rows[late].first - rows[early].first;
   };
   std::size_t first = 0;
   std::size_t last = 0;
-  for (std::size_t i = 0; i < rows; ++i) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
     while (apart_s(first, i) > kReach_s) {
       ++first;
     }
-    while (last + 1 < rows && apart_s(i, last + 1) <= kReach_s) {
+    while (last + 1 < rows.size() && apart_s(i, last + 1) <= kReach_s) {
       ++last;
     }
     const std::size_t half = std::min(i - first, last - i);
-    bundle.temperature.host_time_s.push_back(table.rows[i].first);
+    bundle.temperature.host_time_s.push_back(rows[i].first);
     bundle.temperature.temperature_c.push_back((sum[i + half + 1] - sum[i - half]) /
                                                static_cast<double>(2 * half + 1));
   }
 }
 
 void read_host_clock(FileSystem& files, const std::string& path, Bundle& bundle) {
-  TwoColumns table = read_two_columns(files, path);
-  std::erase_if(table.rows, [&](const auto& row) {
-    return row.first < 0 || row.first >= static_cast<double>(bundle.samples.size()) ||
-           row.first != std::floor(row.first);
-  });
-  if (table.rows.size() < 2) {
+  const std::vector<Row> rows = read_log(files, path, "host_clock.csv", can_be_stamp, bundle);
+  if (rows.size() < 2) {
     bundle.losses.emplace_back(
         "host_clock.csv is missing or empty: an error of the sample clock and lost or repeated "
         "samples show in shaker tones only");
     return;
   }
-  for (const auto& [index, time] : table.rows) {
+  for (const auto& [index, time] : rows) {
     bundle.host_clock.sample_index.push_back(static_cast<std::size_t>(index));
     bundle.host_clock.host_time_s.push_back(time);
   }

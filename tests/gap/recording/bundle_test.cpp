@@ -406,8 +406,13 @@ TEST_F(HeaderAndProtocol, LogsThatCoverHalfOrContradictAreLosses) {
 TEST_F(BundleTest, DeadDataNamesNothing) {
   const auto bundle = read();
   ASSERT_OK(bundle);
-  for (const gt3x::Counts value : {gt3x::Counts{17, 256, -3}, gt3x::Counts{0, 0, 0},
-                                   gt3x::Counts{2047, 2047, 2047}, gt3x::Counts{-2048, 2047, 0}}) {
+  const std::size_t all = bundle->samples.size();
+  const std::vector<std::pair<gt3x::Counts, std::string>> values = {
+      {{17, 256, -3}, fmt::format("0 are zero on all axes, {} hold one value", all)},
+      {{0, 0, 0}, fmt::format("of {0} samples {0} are zero on all axes, 0 hold", all)},
+      {{2047, 2047, 2047}, fmt::format("{} are clipped", all)},
+      {{-2048, 2047, 0}, fmt::format("{} are clipped", all)}};
+  for (const auto& [value, why] : values) {
     Bundle dead = *bundle;
     std::fill(dead.samples.begin(), dead.samples.end(), value);
     const auto diagnosis = diagnose(dead);
@@ -415,7 +420,8 @@ TEST_F(BundleTest, DeadDataNamesNothing) {
     EXPECT_TRUE(diagnosis->inconclusive) << value[0];
     EXPECT_TRUE(diagnosis->effects.empty()) << diagnosis->effects.front().name;
     EXPECT_TRUE(diagnosis->unknown.present);
-    EXPECT_FALSE(diagnosis->losses.empty());
+    ASSERT_FALSE(diagnosis->losses.empty());
+    EXPECT_NE(diagnosis->losses.back().find(why), std::string::npos) << diagnosis->losses.back();
   }
 }
 

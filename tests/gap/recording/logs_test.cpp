@@ -123,12 +123,20 @@ TEST(Logs, AMeanOfReadingsEndsAtAPause) {
 TEST(Logs, LinesWithoutNumbersAreCountedAndLeftOut) {
   const Bundle bundle = with_temperature("1,20\nabc\n2,\n3;20\nnan,20\n4,inf\n5,20\n");
   EXPECT_EQ(bundle.temperature.host_time_s, (std::vector<double>{1, 5}));
-  expect_one_loss(bundle, "temperature.csv: 5 lines hold no numbers");
+  expect_one_loss(bundle, "temperature.csv: 5 lines hold no reading of this recording");
 }
 
 TEST(Logs, NumbersThatAreNoTemperatureAreLeftOut) {
   const Bundle bundle = with_temperature("1,20\n2,201\n3,-9999\n4,200\n");
   EXPECT_EQ(bundle.temperature.host_time_s, (std::vector<double>{1, 4}));
+  expect_one_loss(bundle, "temperature.csv: 2 lines hold no reading of this recording");
+}
+
+// The recording has 3,000 samples.
+TEST(Logs, LinesThatStampNoSampleAreCountedAndLeftOut) {
+  const Bundle bundle = with_clock("0,100\n-1,101\n0.5,101\n3000,130\nabc\n2999,129\n");
+  EXPECT_EQ(bundle.host_clock.sample_index, (std::vector<std::size_t>{0, 2999}));
+  expect_one_loss(bundle, "host_clock.csv: 4 lines hold no reading of this recording");
 }
 
 TEST(Logs, RowsOutOfOrderAreSorted) {
