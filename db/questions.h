@@ -38,11 +38,13 @@ struct UnitHistory {
   const Correction* preference(const std::string& filter) const;
 };
 
-// A file that was repaired with constants that are withdrawn: repair it again.
+// A file that was repaired with constants that are withdrawn: repair it again, unless it was since.
 struct RecallEntry {
   RepairRecord repair;
   UtcTime withdrawn_at;
   std::string reason;
+  // The last later repair of the same file with constants that are not withdrawn.
+  std::optional<UtcTime> repaired_again_at;
 };
 
 // A unit that was on a jig.

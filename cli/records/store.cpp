@@ -171,20 +171,24 @@ Result<Answer> recall(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(const auto entries, store.recall_list(id));
   Answer answer;
   Json& files = answer.json["files"] = Json::array();
-  Columns table({"repaired", "unit", "why its constants were withdrawn", "file"});
+  Columns table({"repaired", "again", "unit", "why its constants were withdrawn", "file"});
   for (const auto& entry : entries) {
-    files.push_back({{"input", entry.repair.input},
-                     {"serial", entry.repair.serial},
-                     {"repaired_at", to_iso8601(entry.repair.made_at)},
-                     {"input_sha256", entry.repair.input_sha256},
-                     {"output_sha256", entry.repair.output_sha256},
-                     {"method", entry.repair.method},
-                     {"constants", entry.repair.constants_id},
-                     {"software", entry.repair.software},
-                     {"withdrawn_at", to_iso8601(entry.withdrawn_at)},
-                     {"reason", entry.reason}});
-    table.row({local_time(entry.repair.made_at), entry.repair.serial, printable(entry.reason),
-               printable(entry.repair.input)});
+    files.push_back(
+        {{"input", entry.repair.input},
+         {"serial", entry.repair.serial},
+         {"repaired_at", to_iso8601(entry.repair.made_at)},
+         {"input_sha256", entry.repair.input_sha256},
+         {"output_sha256", entry.repair.output_sha256},
+         {"method", entry.repair.method},
+         {"constants", entry.repair.constants_id},
+         {"software", entry.repair.software},
+         {"withdrawn_at", to_iso8601(entry.withdrawn_at)},
+         {"reason", entry.reason},
+         {"repaired_again_at",
+          entry.repaired_again_at ? Json(to_iso8601(*entry.repaired_again_at)) : Json(nullptr)}});
+    table.row({local_time(entry.repair.made_at),
+               entry.repaired_again_at ? local_time(*entry.repaired_again_at) : "no",
+               entry.repair.serial, printable(entry.reason), printable(entry.repair.input)});
   }
   answer.text = table.text();
   return answer;

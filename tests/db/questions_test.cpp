@@ -67,6 +67,19 @@ TEST_F(StoreTest, AnswersWhatPeopleAsk) {
   EXPECT_EQ((*recall)[1].reason, "jig out of level");
   EXPECT_EQ(store.recall_list(old_set)->size(), 2U);
   EXPECT_TRUE(store.recall_list(new_set)->empty());
+  // The same file again: with the set that is withdrawn, and later with the other one.
+  repair.input = "three, moved";
+  for (const auto& [time, id, again] : {std::tuple(5000, old_set, false), {6000, new_set, true}}) {
+    repair.input_sha256 = "3";
+    repair.constants_id = id;
+    repair.made_at = from_unix_seconds(time);
+    ASSERT_OK(store.add_repair(repair));
+    const auto last = store.recall_list()->back();
+    EXPECT_EQ(last.repair.input_sha256, "3");
+    EXPECT_EQ(last.repaired_again_at.has_value(), again) << time;
+  }
+  EXPECT_EQ(store.recall_list()->back().repaired_again_at, from_unix_seconds(6000));
+  EXPECT_EQ(recall->front().repaired_again_at, std::nullopt) << "two files of unknown hash";
 
   const auto trend = store.trend("A");
   ASSERT_EQ(trend->size(), 2U);

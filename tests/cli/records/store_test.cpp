@@ -50,6 +50,7 @@ TEST_F(StoreTest, WithdrawnConstantsRecallTheirFiles) {
   const auto recall = run({"store", "recall", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(recall["files"][0]["input"], "a.gt3x");
   EXPECT_EQ(recall["files"][0]["reason"], "out of level");
+  EXPECT_TRUE(recall["files"][0]["repaired_again_at"].is_null());
   const auto trend = run({"store", "trend", "MOS2A1", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(trend["points"][0]["withdrawn"], true);
   EXPECT_EQ(trend["points"][0]["constants"]["zero_lsb"][2], 3);
