@@ -14,7 +14,7 @@ build_packages=(
   libboost-dev libqrencode-dev libtomlplusplus-dev
 )
 test_packages=(
-  clang clang-format clang-tidy libclang-rt-14-dev
+  clang clang-format clang-tidy libclang-rt-14-dev lld
   chromium-headless-shell tmux
   libceres-dev libgmock-dev libgtest-dev librapidcheck-dev postgresql python3 python3-pytest unzip zip
   libumockdev-dev umockdev

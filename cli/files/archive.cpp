@@ -1,6 +1,8 @@
 // sixpoint archive plan|run|submit|merge|report|status: an archive on a cluster, shard by shard
 // (docs/archive.md).
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -158,57 +160,155 @@ void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& con
   }
 }
 
+// What became known of the archive, by the results of its shards.
+class Merge {
+ public:
+  Merge(Context& context, const ArchiveOptions& options, const ArchivePlan& plan)
+      : context_(context),
+        options_(options),
+        store_location_(options.sources.store.empty() ? plan.store : options.sources.store) {}
+
+  // The store that is named, else the one that the constants came from; and the output folder, which
+  // gets the manifest of the whole archive. Tasks that run at the same time leave none: each would
+  // write over those of the others.
+  Status open(const std::string& folder) {
+    if (!store_location_.empty() && !options_.dry_run) {
+      SIXPOINT_ASSIGN(auto opened, open_existing_store(context_, store_location_));
+      store_.emplace(std::move(opened));
+    }
+    if (!options_.dry_run) {
+      SIXPOINT_ASSIGN(manifest_folder_, repair::output_folder_of(context_.env.files, folder));
+    }
+    if (manifest_folder_) {
+      SIXPOINT_CHECK(check_manifest(context_.env.files, *manifest_folder_));
+      // Not there where no file had to be written.
+      SIXPOINT_CHECK(make_synced_folders(context_.env.files, *manifest_folder_));
+    }
+    files_.emplace(context_, options_.json);  // begins the JSON document
+    return {};
+  }
+
+  void add(const RepairReport& report) {
+    tally_.add(context_, report);
+    table_.add(report);
+    files_->add(report);
+    if (store_ && !report.constants_id.empty()) {
+      constants_.insert(report.constants_id);
+    }
+    if (manifest_folder_) {
+      reports_.push_back(report);
+    }
+  }
+
+  void add(const ShardResult& result) {
+    for (const RepairReport& report : result.files) {
+      add(report);
+    }
+    if (!store_) {
+      return;
+    }
+    Json kept_now =
+        keep_repairs(context_, store_location_, *store_, result.files,
+                     fmt::format("merge again (shard {})", result.shard), result.software);
+    // A shard that is not in the store is the more important one to report.
+    if (kept_.is_null() || (!kept_now.is_null() && kept_now["in"] != "store")) {
+      kept_ = std::move(kept_now);
+    }
+  }
+
+  void finish(const MergedArchive& merged) {
+    context_.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
+    const auto units = table_.rows();
+    if (manifest_folder_) {
+      report(write_manifest(context_.env.files, *manifest_folder_, reports_,
+                            context_.env.clock.now()));
+      report(write_units(context_.env.files, *manifest_folder_, units));
+    }
+    const Json withdrawn = withdrawn_since();
+    const Rerun rerun(context_.env.files, options_.plan);
+    files_->end({{"shards", shards_to_json(merged, rerun)},
+                 {"summary", tally_.to_json(false)},
+                 {"units", repair::units_json(units)},
+                 {"complete", merged.complete()},
+                 {"files_missing", merged.files_missing()},
+                 {"withdrawn", withdrawn},
+                 {"kept", kept_}});
+    if (options_.json) {
+      return;
+    }
+    print_units(context_, units);
+    context_.people << tally_.brief(false);
+    if (!merged.complete()) {
+      context_.people << fmt::format("not complete: nothing is known of {} files yet\n",
+                                     merged.files_missing());
+    }
+    print_missing(merged, rerun, context_);
+    if (merged.complete()) {
+      next_step(context_, options_.json, {"archive", "report", options_.plan, "-o", "report.html"});
+    }
+  }
+
+ private:
+  void report(const Status& status) {
+    if (!status) {
+      report_error(context_, status.error());
+    }
+  }
+
+  // The plan has the constants of the day on which it was made: those that were withdrawn since, with
+  // the files that were repaired with them and not again.
+  Json withdrawn_since() {
+    std::map<std::string, std::pair<std::size_t, std::string>> withdrawn;
+    if (store_ && *store_ && !constants_.empty()) {
+      const auto recall = (*store_)->recall_list();
+      report(recall ? Status() : Status(fail(recall.error())));
+      for (const db::RecallEntry& entry : recall.value_or(std::vector<db::RecallEntry>{})) {
+        if (constants_.contains(entry.repair.constants_id) && !entry.repaired_again_at) {
+          auto& [files, reason] = withdrawn[entry.repair.constants_id];
+          ++files;
+          reason = entry.reason;
+        }
+      }
+    }
+    Json list = Json::array();
+    for (const auto& [id, of] : withdrawn) {
+      const auto& [files, reason] = of;
+      list.push_back({{"constants", id}, {"files", files}, {"reason", reason}});
+      context_.log().warn(
+          "{} files were repaired with constants {}, which were withdrawn since the plan was made "
+          "({}): repair them by a new plan; 'sixpoint store recall {} --store {}' lists them",
+          files, db::shown_id(id), printable(reason), db::shown_id(id),
+          repair::shell_word(store_location_));
+    }
+    return list;
+  }
+
+  Context& context_;
+  const ArchiveOptions& options_;
+  const std::string store_location_;
+  std::optional<Result<db::Store>> store_;
+  std::optional<std::string> manifest_folder_;
+  RepairTally tally_;
+  repair::UnitTable table_;
+  std::vector<RepairReport> reports_;
+  std::set<std::string> constants_;  // of the store
+  std::optional<FileStream> files_;
+  Json kept_ = nullptr;
+};
+
 Status run_merge(const ArchiveOptions& options, Context& context) {
   const std::string folder = absolute(options.plan);
   SIXPOINT_ASSIGN(const auto plan, repair::read_plan(context.env.files, folder));
-  // The store that is named, else the one that the constants came from.
-  const std::string location = options.sources.store.empty() ? plan.store : options.sources.store;
-  std::optional<Result<db::Store>> store;
-  if (!location.empty() && !options.dry_run) {
-    SIXPOINT_ASSIGN(auto opened, open_existing_store(context, location));
-    store.emplace(std::move(opened));
-  }
-  // The manifest of the whole archive. Tasks that run at the same time leave none: each would
-  // write over those of the others.
-  std::optional<std::string> manifest_folder;
-  if (!options.dry_run) {
-    SIXPOINT_ASSIGN(manifest_folder, repair::output_folder_of(context.env.files, folder));
-  }
-  if (manifest_folder) {
-    SIXPOINT_CHECK(check_manifest(context.env.files, *manifest_folder));
-    // Not there where no file had to be written.
-    SIXPOINT_CHECK(make_synced_folders(context.env.files, *manifest_folder));
-  }
-  RepairTally tally;
-  repair::UnitTable table;
-  std::vector<RepairReport> reports;
-  FileStream files(context, options.json);
-  const auto add = [&](const RepairReport& report) {
-    tally.add(context, report);
-    table.add(report);
-    files.add(report);
-    if (manifest_folder) {
-      reports.push_back(report);
-    }
-  };
+  Merge merge(context, options, plan);
+  SIXPOINT_CHECK(merge.open(folder));
   for (const repair::RefusedPath& refused : plan.refused) {
-    add(failed_report(refused.path, refused.error));
+    merge.add(failed_report(refused.path, refused.error));
   }
-  Json kept(nullptr);
   std::optional<Progress> progress(std::in_place, context, "merging", plan.shards.size());
   repair::MergeOptions how;
   how.verify = options.verify;
   how.visit = [&](const ShardResult& result) -> Status {
-    std::for_each(result.files.begin(), result.files.end(), add);
-    if (store) {
-      Json kept_now =
-          keep_repairs(context, location, *store, result.files,
-                       fmt::format("merge again (shard {})", result.shard), result.software);
-      // A shard that is not in the store is the more important one to report.
-      if (kept.is_null() || (!kept_now.is_null() && kept_now["in"] != "store")) {
-        kept = std::move(kept_now);
-      }
-    }
+    merge.add(result);
     progress->at(result.shard);
     return {};
   };
@@ -218,39 +318,7 @@ Status run_merge(const ArchiveOptions& options, Context& context) {
     report_error(context, merged.error());
     return {};
   }
-  context.worsen(merged->complete() ? kExitPassed : kExitInconclusive);
-  if (manifest_folder) {
-    if (const auto status =
-            write_manifest(context.env.files, *manifest_folder, reports, context.env.clock.now());
-        !status) {
-      report_error(context, status.error());
-    }
-  }
-  const auto units = table.rows();
-  if (manifest_folder) {
-    if (const auto status = write_units(context.env.files, *manifest_folder, units); !status) {
-      report_error(context, status.error());
-    }
-  }
-  const Rerun rerun(context.env.files, options.plan);
-  files.end({{"shards", shards_to_json(*merged, rerun)},
-             {"summary", tally.to_json(false)},
-             {"units", repair::units_json(units)},
-             {"complete", merged->complete()},
-             {"files_missing", merged->files_missing()},
-             {"kept", kept}});
-  if (!options.json) {
-    print_units(context, units);
-    context.people << tally.brief(false);
-    if (!merged->complete()) {
-      context.people << fmt::format("not complete: nothing is known of {} files yet\n",
-                                    merged->files_missing());
-    }
-    print_missing(*merged, rerun, context);
-    if (merged->complete()) {
-      next_step(context, options.json, {"archive", "report", options.plan, "-o", "report.html"});
-    }
-  }
+  merge.finish(*merged);
   return {};
 }
 

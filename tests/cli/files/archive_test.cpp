@@ -237,6 +237,17 @@ TEST_F(ArchiveCommand, TheMergeAddsToTheStoreOnce) {
       EXPECT_EQ(document["status"], "repaired");
     }
   }
+  EXPECT_TRUE(merge().json()["withdrawn"].empty());
+  const Json history = run({"history", "MOS2A45130450", "--store", store, "--json"}).json();
+  const std::string id = history["constants"][0]["id"];
+  ASSERT_EQ(run({"store", "withdraw", id, "--why", "out of level", "--store", store}).exit_code, 0);
+  const Answer late = merge();
+  const Json withdrawn = late.json()["withdrawn"];
+  ASSERT_EQ(withdrawn.size(), 1U);
+  EXPECT_EQ(withdrawn[0]["constants"], id);
+  EXPECT_EQ(withdrawn[0]["files"], 5);
+  EXPECT_EQ(withdrawn[0]["reason"], "out of level");
+  EXPECT_THAT(late.people, HasSubstr("5 files were repaired with constants " + id.substr(0, 12)));
   // Another store may be told; constants that it does not have are not named.
   const std::string other = folder_ / "other.db";
   ASSERT_OK(db::Store::open(posix_env(), other));
