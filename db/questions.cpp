@@ -144,10 +144,12 @@ Result<std::vector<RecallEntry>> Store::recall_list(const std::string& constants
 
 Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
   const std::vector<Value> parameters = {jig};
-  SIXPOINT_ASSIGN(const auto rows,
-                  database_->query("SELECT serial, ended_ns, verdict FROM runs WHERE jig = $1 "
-                                   "ORDER BY started_ns, seq",
-                                   parameters));
+  SIXPOINT_ASSIGN(
+      const auto rows,
+      database_->query(
+          "SELECT serial, ended_ns, verdict FROM runs WHERE jig = $1 AND kind <> 'write' "
+          "ORDER BY started_ns, seq",
+          parameters));
   std::map<std::string, JigUnit> units;
   for (const Row& row : rows) {
     JigUnit& unit = units[text_of(row[0])];

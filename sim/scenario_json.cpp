@@ -321,6 +321,12 @@ Status parse_motions(const Section& top, Scenario& scenario) {
   if (total_s > kLongest_s) {
     return wrong("/motions", "together they last longer than 400 days");
   }
+  if (total_s - scenario.turn_s < 1) {
+    return wrong("/motions", "together they last less than a second, and seconds are recorded");
+  }
+  if (static_cast<double>(to_unix_seconds(scenario.start)) + total_s >= 4294967296.0) {
+    return wrong("/start", "the recording would end after the times that its records have (2106)");
+  }
   return {};
 }
 

@@ -96,6 +96,11 @@ class StationStore {
     auto store = open_store(context_, options_.store);
     return guard_.may_start(store, serial, options_.station);
   }
+  Status may_write(const std::string& serial, const std::string& constants_id) {
+    const std::lock_guard lock(mutex_);
+    SIXPOINT_ASSIGN(db::Store store, open_existing_store(context_, options_.store));
+    return station::may_write(store, serial, constants_id);
+  }
   Result<station::RunInStore> add_run(const station::JigReport& measured,
                                       const station::RunLabels& labels);
   // Constants of a calibration file: beside it as FILE.constants.json, and in the store.
@@ -379,6 +384,9 @@ Status serve(const StationCommandOptions& options, Context& context) {
   station::QualityControl quality(open, options.station, lanes_asked.session.limits,
                                   context.env.clock);
   lanes_asked.may_start = [&](const std::string& serial) { return store.may_start(serial); };
+  lanes_asked.may_write = [&](const std::string& serial, const std::string& constants_id) {
+    return store.may_write(serial, constants_id);
+  };
   const station::StoreConstants store_constants = [&](const station::CaptureReport& report) {
     return store.add_constants(report);
   };

@@ -60,10 +60,12 @@ void print_statistics(Context& context, const Answer& answer) {
     return part.of == 0 ? std::string("-") : fmt::format("{:.1f} %", 100 * part.value());
   };
   const auto line = [&](const station::GroupStatistics& group) {
-    context.text() << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>9.0f} s\n",
+    const double seconds = group.seconds_per_unit_median;
+    context.text() << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>11}\n",
                                   printable(group.name.empty() ? "(not stated)" : group.name, 24),
                                   group.runs, group.units, percent(group.yield),
-                                  percent(group.first_pass_yield), group.seconds_per_unit_median);
+                                  percent(group.first_pass_yield),
+                                  std::isfinite(seconds) ? fmt::format("{:.0f} s", seconds) : "-");
   };
   context.text() << answer.report.brief() << '\n';
   context.text() << fmt::format("  {:<24} {:>6} {:>6} {:>9} {:>11} {:>11}\n", "", "runs", "units",
@@ -133,6 +135,9 @@ Status gage_rr(const StatisticsCommandOptions& options, Context& context) {
   Json json = document("gage-rr");
   json.update(report.to_json());
   std::string text = report.brief() + "\n";
+  if (report.grr_percent_of_tolerance) {
+    text += fmt::format("gage R&R {:.2f} % of the tolerance\n", *report.grr_percent_of_tolerance);
+  }
   for (const station::AnovaRow& row : report.pooled ? report.anova_pooled : report.anova) {
     text += fmt::format("  {:<16} {:>5.0f} {:>12.5f} {:>12.5f}{}\n", row.source,
                         row.degrees_of_freedom, row.sum_of_squares, row.mean_square,

@@ -23,6 +23,18 @@ tl::unexpected<Error> wrong_pin() {
               "try again; an engineer sets a new PIN with 'sixpoint operator add'");
 }
 
+// Marks of direction and blanks without width: two names that differ by them look the same.
+bool has_hidden_characters(std::string_view name) {
+  for (std::size_t at = 0; at + 2 < name.size(); ++at) {
+    const std::string_view three = name.substr(at, 3);
+    if ((three >= "\u200b" && three <= "\u200f") || (three >= "\u2028" && three <= "\u202e") ||
+        (three >= "\u2060" && three <= "\u206f") || three == "\ufeff") {
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 std::string_view to_string(OperatorRole role) {
@@ -91,11 +103,14 @@ Result<std::vector<Operator>> Operators::list() const {
 }
 
 Status Operators::add(const std::string& name, OperatorRole role, const std::string& pin) {
-  if (name.find_first_not_of(" \t") == std::string::npos || name.size() > kMostNameBytes ||
-      printable(name) != name) {
-    return fail(ErrorCode::usage,
-                fmt::format("a name has 1 to {} bytes that can be printed", kMostNameBytes),
-                printable(name, 80), "give the name as it shall stand in the records");
+  if (name.empty() || name.size() > kMostNameBytes || printable(name) != name ||
+      name.front() == ' ' || name.back() == ' ' || has_hidden_characters(name)) {
+    return fail(
+        ErrorCode::usage,
+        fmt::format("a name has 1 to {} bytes that can be printed and seen, no blank at its "
+                    "beginning or end",
+                    kMostNameBytes),
+        printable(name, 80), "give the name as it shall stand in the records");
   }
   if (pin.size() < 4 || pin.size() > 12 ||
       pin.find_first_not_of("0123456789") != std::string::npos) {
@@ -161,11 +176,21 @@ void Operators::forget_idle() {
   std::erase_if(places_, [&](const auto& place) { return now - place.second.used > kIdle; });
 }
 
+// Who was removed from the list, or has another role now, signs in anew.
+bool Operators::is_listed(const std::vector<Entry>& entries, const Operator& who) {
+  return std::ranges::any_of(entries, [&](const Entry& entry) {
+    return entry.is.name == who.name && entry.is.role == who.role;
+  });
+}
+
 std::optional<Operator> Operators::at(const std::string& where) {
+  const auto entries = read();
   const std::lock_guard lock(mutex_);
   forget_idle();
   const auto place = places_.find(where);
-  return place == places_.end() ? std::nullopt : std::optional(place->second.who);
+  return entries && place != places_.end() && is_listed(*entries, place->second.who)
+             ? std::optional(place->second.who)
+             : std::nullopt;
 }
 
 Result<SignedName> Operators::who(const std::string& where, const std::string& typed,
@@ -177,12 +202,7 @@ Result<SignedName> Operators::who(const std::string& where, const std::string& t
   const std::lock_guard lock(mutex_);
   forget_idle();
   const auto place = places_.find(where);
-  // Who was removed from the list, or has another role now, signs in anew.
-  const bool is_listed =
-      place != places_.end() && std::ranges::any_of(entries, [&](const Entry& entry) {
-        return entry.is.name == place->second.who.name && entry.is.role == place->second.who.role;
-      });
-  if (!is_listed) {
+  if (place == places_.end() || !is_listed(entries, place->second.who)) {
     return fail(ErrorCode::permission, "no operator is signed in here", {},
                 "sign in with your PIN");
   }

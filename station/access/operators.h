@@ -70,8 +70,9 @@ class Operators {
   Operators(Env& env, std::string path) : env_(env), path_(std::move(path)) {}
 
   Result<std::vector<Operator>> list() const;  // empty where there is no file
-  // A new operator, or a new role and PIN for this name. usage where the name is empty or over 60
-  // bytes, or the PIN is not 4 to 12 digits.
+  // A new operator, or a new role and PIN for this name. usage where the name is empty, over 60 bytes
+  // or looks like another one (blanks at its ends, characters that are not seen), or the PIN is not
+  // 4 to 12 digits.
   Status add(const std::string& name, OperatorRole role, const std::string& pin);
   Status disable(const std::string& name);  // no_input where there is none
 
@@ -80,7 +81,7 @@ class Operators {
                            const std::string& pin);
   void sign_out(const std::string& where);
   Result<SignedName> who(const std::string& where, const std::string& typed, OperatorRole needed);
-  // Signed in there and not idle; does not count as use.
+  // Signed in there, not idle, and still in the file; does not count as use.
   std::optional<Operator> at(const std::string& where);
 
  private:
@@ -93,6 +94,7 @@ class Operators {
     Operator who;
     std::chrono::nanoseconds used{0};
   };
+  static bool is_listed(const std::vector<Entry>& entries, const Operator& who);
   Result<std::vector<Entry>> read() const;
   Status write(const std::vector<Entry>& entries) const;
   void forget_idle();  // with mutex_ held

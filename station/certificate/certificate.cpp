@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/measure.h"
 #include "gt3x/forms/model.h"
 #include "station/certificate/dcc.h"
 #include "station/run/jig_report.h"
@@ -100,6 +101,7 @@ std::vector<Certificate::Pose> read_poses(const Json* list) {
     pose.temperature_c = from.number("temperature_c");
     pose.tilt_deg = from.number("tilt_deg").value_or(0);
     pose.error_mg = from.number("error_mg");
+    pose.chose_solution = from.flag("chose_solution");
     poses.push_back(std::move(pose));
   }
   return poses;
@@ -139,6 +141,7 @@ Json poses_to_json(const std::vector<Certificate::Pose>& poses) {
                  {"tilt_deg", pose.tilt_deg}};
     if (pose.error_mg) {
       item["error_mg"] = *pose.error_mg;
+      item["chose_solution"] = pose.chose_solution;
     }
     json.push_back(std::move(item));
   }
@@ -165,10 +168,14 @@ Result<Certificate> certificate_of(const db::RunRecord& run) {
   const auto verdict = parse_jig_verdict(run.verdict);
   if ((run.kind != "jig" && run.kind != "write") || !verdict || *verdict == JigVerdict::stopped ||
       *verdict == JigVerdict::inconclusive || !document.in("constants").has("zero_lsb")) {
-    return fail(ErrorCode::bad_data,
-                fmt::format("run {} ended as '{}' and has no result to certify",
-                            printable(run.id, 60), printable(run.verdict, 40)),
-                {}, "measure the unit again with 'sixpoint jig'");
+    return fail(
+        ErrorCode::bad_data,
+        fmt::format("run {} ended as '{}' and has no result to certify", printable(run.id, 60),
+                    printable(run.verdict, 40)),
+        {},
+        verdict == JigVerdict::fail
+            ? "the unit failed before its six sides were measured; the run's report says why"
+            : "measure the unit again with 'sixpoint jig'");
   }
   Certificate out;
   out.run = run.id;
@@ -245,7 +252,7 @@ Json Certificate::to_json() const {
   json["results"] = {{"sensitivity_g_per_lsb", sensitivity_g_per_lsb},
                      {"sensitivity_expanded_uncertainty_percent", sensitivity_expanded_percent},
                      {"zero_lsb", zero_lsb},
-                     {"zero_expanded_uncertainty_mg", zero_expanded_mg},
+                     {"zero_expanded_uncertainty_lsb", zero_expanded_lsb()},
                      {"coverage_factor", decision.coverage_factor}};
   json["verdict"] = to_string(verdict);
   json["codes"] = codes;
@@ -265,6 +272,14 @@ Json Certificate::to_json() const {
   json["head"] = head.empty() ? Json(nullptr) : Json(head);
   json["accredited"] = false;
   return json;
+}
+
+PerAxis<double> Certificate::zero_expanded_lsb() const {
+  PerAxis<double> lsb{};
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    lsb[axis] = zero_expanded_mg[axis] / kMgPerG / std::abs(sensitivity_g_per_lsb[axis]);
+  }
+  return lsb;
 }
 
 std::vector<std::string> documents_of(const db::RunRecord& run) {

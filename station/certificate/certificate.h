@@ -63,8 +63,8 @@ struct Certificate {
   PerAxis<double> sensitivity_g_per_lsb{};
   PerAxis<double> zero_lsb{};
   PerAxis<double> sensitivity_expanded_percent{};
-  PerAxis<double> zero_expanded_mg{};
-  StoredConstants measured;  // the nine integers
+  PerAxis<double> zero_expanded_mg{};  // of the reading in counts, without that of the scale
+  StoredConstants measured;            // the nine integers
 
   struct Pose {
     std::string pose;
@@ -74,6 +74,7 @@ struct Certificate {
     std::optional<double> temperature_c;
     double tilt_deg = 0;
     std::optional<double> error_mg;  // of verification poses
+    bool chose_solution = false;  // one of those that chose among the solutions and judge nothing
   };
   std::vector<Pose> poses;
   std::vector<Pose> verification;
@@ -81,6 +82,7 @@ struct Certificate {
   double gravity_m_per_s2 = 0;
   double gravity_standard_uncertainty_m_per_s2 = 0;
 
+  PerAxis<double> zero_expanded_lsb() const;
   nlohmann::ordered_json to_json() const;  // "sixpoint/certificate/1"
 };
 

@@ -67,8 +67,8 @@ std::string_view meaning_of(JigVerdict verdict) {
     case JigVerdict::conditional_fail:
       return "At least one quantity lies beyond its limit, by less than the guard band.";
     case JigVerdict::fail:
-      return "At least one quantity lies beyond its limit by the guard band or more, or readings "
-             "contradict each other.";
+      return "At least one quantity lies beyond its limit by the guard band or more, readings "
+             "contradict each other, or the unit did not take its constants.";
     case JigVerdict::inconclusive:
     case JigVerdict::stopped:
       break;
@@ -179,20 +179,20 @@ class Sheet : PageFlow {
       const double u_lsb = lsb_per_g * certificate_.sensitivity_expanded_percent[axis] / 100;
       const double zero_lsb = certificate_.zero_lsb[axis];
       const double zero_mg = kMgPerG * zero_lsb * certificate_.sensitivity_g_per_lsb[axis];
-      const double u_mg = certificate_.zero_expanded_mg[axis];
+      // In counts: in mg the scale's own uncertainty counts too, and stands beside the limits.
+      const double zero_u_lsb = certificate_.zero_expanded_lsb()[axis];
       const int places = decimals_for(u_lsb);
-      const int zero_places = decimals_for(u_mg);
+      const int zero_places = decimals_for(zero_u_lsb);
       rows.push_back({std::string(1, "XYZ"[axis]), fixed(lsb_per_g, places),
-                      plus_minus(u_lsb, places), fixed(zero_mg, zero_places),
-                      plus_minus(u_mg, zero_places),
-                      fixed(zero_lsb, decimals_for(u_mg * lsb_per_g / kMgPerG))});
+                      plus_minus(u_lsb, places), fixed(zero_lsb, zero_places),
+                      plus_minus(zero_u_lsb, zero_places), fixed(zero_mg, 1)});
     }
     table({{"Axis", 16, Align::left},
            {"Sensitivity, LSB/g", 34},
            {"expanded uncertainty", 34},
-           {"Zero offset, mg", 30},
+           {"Zero offset, LSB", 30},
            {"expanded uncertainty", 34},
-           {"Zero, LSB", 22}},
+           {"in mg", 22}},
           rows);
     const double k = certificate_.decision.coverage_factor;
     paragraph(
@@ -330,7 +330,9 @@ class Sheet : PageFlow {
     for (const auto* list : {&certificate_.poses, &certificate_.verification}) {
       for (const Certificate::Pose& pose : *list) {
         rows.push_back({pose.pose.empty() ? "" : with_dash(upper(pose.pose)) + " up",
-                        list == &certificate_.poses ? "result" : "verification",
+                        list == &certificate_.poses ? "result"
+                        : pose.chose_solution       ? "choice"
+                                                    : "verification",
                         fixed(pose.mean_lsb[0], 2), fixed(pose.mean_lsb[1], 2),
                         fixed(pose.mean_lsb[2], 2), fmt::format("{}", pose.samples),
                         pose.temperature_c ? fixed(*pose.temperature_c, 1) : std::string(kDash),

@@ -250,8 +250,7 @@ void results(Xml& xml, const Certificate& c) {
            [&] {
              xml.element("dcc:quantity", [&] {
                real(xml, c.zero_lsb[axis], kOne,
-                    Uncertainty{c.zero_expanded_mg[axis] / kMgPerG / std::abs(g_per_lsb),
-                                c.decision.coverage_factor});
+                    Uncertainty{c.zero_expanded_lsb()[axis], c.decision.coverage_factor});
              });
            });
   }

@@ -163,11 +163,12 @@ class Lanes::Lane {
   Result<RetestState> check_start(const std::string& serial, bool is_continued);
   JigHooks run_hooks(const std::stop_token& stop, RunSaver& saver);
   void on_action(const JigAction& action);
+  Status check_write(const std::string& serial);
   void end_without_report(const std::string& serial, const Error& error);
   void end_unmeasured(const std::string& serial, const char* verdict,
                       std::vector<std::string> reasons, std::string message);
   void continue_run(const std::stop_token& stop, const UnfinishedRun& left);
-  void end_interrupted(const UnfinishedRun& left, const std::string& reason);
+  void end_interrupted(const UnfinishedRun& left, const std::string& reason, ErrorCode code);
   // The verdict is shown at once; store_result() follows.
   void show_result(const JigReport& report, const RunLabels& labels);
   // Stores the last run. Until that succeeds, the run stays on the disk of this station. One that
@@ -238,6 +239,7 @@ class Lanes::Lane {
   std::optional<Unstored> unstored_;
   // The last run, where it passed and nothing was written, for write_last().
   std::optional<UnfinishedRun> unwritten_;
+  std::string unwritten_id_;  // its constants in the store; empty as long as the store has none
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable_any wake_;

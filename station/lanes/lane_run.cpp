@@ -48,10 +48,10 @@ Json json_of(const JigReport& report) {
 
 // The inconclusive report of a run that ended with its program and whose unit did not come back.
 JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions& options,
-                             UtcTime ended, const std::string& reason) {
+                             UtcTime ended, const std::string& reason, ErrorCode code) {
   const JigResume& resume = left.resume;
   JigReport report;
-  report.codes = {"unit_gone"};
+  report.codes = {interruption(code)};
   report.reasons.push_back(reason);
   report.serial = left.serial;
   report.firmware = left.firmware;
@@ -72,9 +72,12 @@ JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions&
   return report;
 }
 
-// Of a run that another person took over. Names that the store does not take together (db::check_name)
-// leave the one who ended it.
+// Of a run that another person took over, or whose constants another person wrote. Names that the store
+// does not take together (db::check_name) leave the one who ended it.
 std::string both_names(const std::string& began, const std::string& ended) {
+  if (began == ended || began.ends_with(", then " + ended)) {
+    return began;
+  }
   std::string both = began.empty() ? ended : began + ", then " + ended;
   return db::check_name(both) ? both : ended;
 }
@@ -99,7 +102,9 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
     return end_unmeasured(state.serial, "refused", {allowed.error().what, allowed.error().hint},
                           allowed.error().brief());
   }
-  session.retest = *allowed;
+  // "Write now" is no second run: what its readings had to show, they had to show when they were taken.
+  session.retest = left && left->retest ? *left->retest : *allowed;
+  saver.set_retest(session.retest);
   if (state.kind == kWriteKind) {
     session.notes.emplace_back(
         "written after the run: the readings that judge the constants are those of the run");
@@ -127,15 +132,14 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
   std::string who = state.operator_name;
   {
     const std::lock_guard lock(mutex_);
-    if (operator_name_ != who) {
-      who = both_names(who, operator_name_);
-    }
+    who = both_names(who, operator_name_);
   }
   show_result(*report, {std::move(who), state.is_authenticated, state.station,
                         session.retest.retest_of, state.kind});
   const std::lock_guard lock(mutex_);
   if (report->usable() && !report->written && !report->write_begun && run_) {
     UnfinishedRun& last = unwritten_.emplace(state);
+    unwritten_id_.clear();
     last.resume = {run_->progress, report->started, report->as_found, {},
                    false,          report->stream,  report->raw_csv};
     unwritten_serial_ = state.serial;
@@ -151,8 +155,12 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
 
 void Lanes::Lane::write_last(const std::stop_token& stop, const StartOrder& order) {
   UnfinishedRun left = *std::exchange(unwritten_, std::nullopt);
-  left.operator_name = order.operator_name;
-  left.is_authenticated = order.is_authenticated;
+  if (const Status good = check_write(left.serial); !good) {
+    return end_unmeasured(left.serial, "refused", {good.error().what, good.error().hint},
+                          good.error().brief());
+  }
+  left.operator_name = both_names(left.operator_name, order.operator_name);
+  left.is_authenticated = left.is_authenticated && order.is_authenticated;
   left.client = order.client;
   left.write = true;
   left.kind = kWriteKind;
@@ -180,6 +188,16 @@ UnfinishedRun Lanes::Lane::new_run(const StartOrder& order, calib::FilterConfigu
   run.write = order.write;
   run.filter = filter;
   return run;
+}
+
+// An error where the constants that wait were withdrawn, or the store cannot say so. What only the
+// journal has, nobody can have withdrawn.
+Status Lanes::Lane::check_write(const std::string& serial) {
+  if (!shared_.options.may_write || unwritten_id_.empty()) {
+    return {};
+  }
+  const std::lock_guard lock(shared_.store_mutex);
+  return shared_.options.may_write(serial, unwritten_id_);
 }
 
 // An error where the station is locked or the unit failed too often: an engineer decides. A run
@@ -255,7 +273,7 @@ void Lanes::Lane::on_action(const JigAction& action) {
 void Lanes::Lane::end_without_report(const std::string& serial, const Error& error) {
   static_cast<void>(folder_.close());
   if (const auto saved = folder_.load(); saved && *saved) {
-    end_interrupted(**saved, error.brief());
+    end_interrupted(**saved, error.brief(), error.code);
   } else {
     end_unmeasured(serial, "inconclusive", {error.brief()}, error.brief());
   }
@@ -340,6 +358,9 @@ void Lanes::Lane::store_result(const std::stop_token& stop) {
             stored->ids.constants_id ? Json(*stored->ids.constants_id) : Json(nullptr);
         result_.erase("problem");
       }
+      if (unwritten_ && !stored->is_kept_here && unstored_->labels.kind != kWriteKind) {
+        unwritten_id_ = stored->ids.constants_id.value_or("");
+      }
       unstored_.reset();
       is_unstored_ = false;
       changed();
@@ -391,13 +412,15 @@ void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun&
     return;
   }
   if (!unit) {
-    return end_interrupted(left, "interrupted: " + unit.error().what);
+    return end_interrupted(left, "interrupted: " + unit.error().what, unit.error().code);
   }
   run(stop, order, left);
 }
 
-void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& reason) {
-  JigReport report = interrupted_report(left, shared_.options.session, env_.clock.now(), reason);
+void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& reason,
+                                  ErrorCode code) {
+  JigReport report =
+      interrupted_report(left, shared_.options.session, env_.clock.now(), reason, code);
   if (stop_requested()) {
     report.verdict = JigVerdict::stopped;
     report.codes = {"stopped"};

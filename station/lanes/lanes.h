@@ -61,6 +61,10 @@ using StoreRun = std::function<Result<RunInStore>(const JigReport&, const RunLab
 // Before a run or a capture: may this unit be measured now, and what do its earlier runs demand? On
 // an error nothing is measured, and the operator reads why. May be empty.
 using StartCheck = std::function<Result<RetestState>(const std::string& serial)>;
+// Before the constants of a stored run are written: are they still good? On an error nothing is
+// written, and the operator reads why. May be empty.
+using WriteCheck =
+    std::function<Status(const std::string& serial, const std::string& constants_id)>;
 // Stores the constants of a calibration file; answers with their id in the store.
 using StoreConstants = std::function<Result<std::string>(const CaptureReport&)>;
 
@@ -70,6 +74,7 @@ struct LanesOptions {
   std::string station;               // its name, for the record
   JigSessionOptions session;
   StartCheck may_start;
+  WriteCheck may_write;
   CaptureOptions capture;  // of a calibration file: rate, seconds per side
   std::string capture_folder = ".";
   double unit_wait_s = 600;       // a run waits so long for its unit: time to fetch a spare cable

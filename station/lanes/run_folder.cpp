@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/sha256.h"
 #include "station/run/jig_progress.h"
 
 namespace sixpoint::station {
@@ -46,6 +47,24 @@ Status parse_common(const Json& json, Unfinished& work) {
   return {};
 }
 
+Json retest_to_json(const std::optional<RetestState>& state) {
+  return state ? Json{{"failures_in_row", state->failures_in_row},
+                      {"passes_needed", state->passes_needed},
+                      {"retest_of", state->retest_of}}
+               : Json(nullptr);
+}
+
+std::optional<RetestState> parse_retest(const Json& json) {
+  if (json.is_null()) {
+    return std::nullopt;
+  }
+  RetestState state;  // of a run that was begun: it may start
+  json.at("failures_in_row").get_to(state.failures_in_row);
+  json.at("passes_needed").get_to(state.passes_needed);
+  json.at("retest_of").get_to(state.retest_of);
+  return state;
+}
+
 Json stream_to_json(const device::StreamStatistics& stream) {
   Json json;
   device::for_each_count([&](const char* name, auto member) { json[name] = stream.*member; });
@@ -74,6 +93,9 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   // Folders of earlier versions do not have these.
   SIXPOINT_ASSIGN(run.protocol, parse_jig_protocol(json.value("protocol", "production")));
   run.kind = json.value("kind", run.kind);
+  run.retest = parse_retest(json.value("retest", Json(nullptr)));
+  run.rows_bytes = json.value("rows_bytes", run.rows_bytes);
+  run.rows_sha256 = json.value("rows_sha256", run.rows_sha256);
   run.resume.write_begun = json.value("write_begun", false);
   if (json.contains("stream")) {
     run.resume.stream = parse_stream(json["stream"]);
@@ -160,10 +182,21 @@ Result<std::optional<UnfinishedRun>> RunFolder::load() {
     const auto end = std::find(rows.rbegin(), rows.rend(), std::uint8_t{'\n'}).base();
     run->resume.raw_csv.append(rows.begin(), end);
   }
+  const std::string_view rows = run->resume.raw_csv;
+  if (!run->rows_sha256.empty() &&
+      text_sha256(rows.substr(0, run->rows_bytes)) != run->rows_sha256) {
+    return fail(
+        ErrorCode::bad_data,
+        "the samples of this run are not as they were measured: some are missing or damaged",
+        folder_, "measure the unit again");
+  }
   return run;
 }
 
 Status RunFolder::save(const UnfinishedRun& run) {
+  if (file_) {
+    SIXPOINT_CHECK(file_->sync());  // the rows that the state is about come first
+  }
   const Json json = {{"schema", "sixpoint/unfinished-run/1"},
                      {"device", run.device},
                      {"serial", run.serial},
@@ -174,6 +207,9 @@ Status RunFolder::save(const UnfinishedRun& run) {
                      {"client", run.client},
                      {"write", run.write},
                      {"kind", run.kind},
+                     {"retest", retest_to_json(run.retest)},
+                     {"rows_bytes", run.rows_bytes},
+                     {"rows_sha256", run.rows_sha256},
                      {"filter", calib::to_string(run.filter)},
                      {"protocol", to_string(run.protocol)},
                      {"started", to_iso8601(run.resume.started)},
@@ -315,6 +351,8 @@ std::optional<JigResume> RunSaver::take_left_over(bool begin_again) {
 }
 
 Status RunSaver::save_now(const JigReport& report, const JigRun& run) {
+  state_.rows_bytes = report.raw_csv.size();
+  state_.rows_sha256 = report.raw_sha256();
   state_.resume.started = report.started;
   state_.resume.as_found = report.as_found;
   state_.resume.written = report.written ? report.as_left : std::nullopt;

@@ -5,7 +5,8 @@
 //   SIXPOINT_CHECK(folder.append("1,2,3,4,25\n"));  // rows of samples
 //   SIXPOINT_ASSIGN(const auto left, folder.load());  // in a later program
 //
-//     FOLDER/run.json       who, which unit, which poses are taken; written anew at each step
+//     FOLDER/run.json       who, which unit, which poses are taken, and the hash of the rows so far;
+//                           written anew at each step, behind the rows
 //     FOLDER/samples-1.csv  rows since the first sample; -2 and so on after each restart
 //     FOLDER/capture.json   a calibration file under way: which sides are done, in which recordings
 //
@@ -36,6 +37,12 @@ struct UnfinishedRun {
   std::string kind = "jig";  // or kWriteKind (run_records.h)
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   JigProtocol protocol = JigProtocol::production;
+  // What the unit's earlier runs demanded when it was measured; nothing where that was not noted.
+  std::optional<RetestState> retest = {};
+  // Of the rows of samples when this was saved: a run whose placements were measured on rows that are
+  // lost is not gone on with.
+  std::size_t rows_bytes = 0;
+  std::string rows_sha256 = {};  // empty: of an earlier version, which did not note it
   JigResume resume = {};
 };
 
@@ -52,7 +59,8 @@ class RunFolder {
  public:
   RunFolder(Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
 
-  // Nothing where there is no unfinished run. bad_data where the state is damaged; the files stay.
+  // Nothing where there is no unfinished run. bad_data where the state or the rows that it was saved
+  // with are damaged; the files stay.
   Result<std::optional<UnfinishedRun>> load();
   Status save(const UnfinishedRun& run);  // all but resume.raw_csv
   Status append(std::string_view rows);   // synced once a second
@@ -91,6 +99,7 @@ class RunSaver {
       : folder_(folder), state_(std::move(state)), warn_(std::move(warn)) {}
 
   const UnfinishedRun& state() const { return state_; }
+  void set_retest(const RetestState& retest) { state_.retest = retest; }
   // What an earlier program left of this unit's run under this filter and protocol. All else is
   // removed; what cannot be read is set aside, with a warning.
   std::optional<JigResume> take_left_over(bool begin_again);

@@ -103,7 +103,7 @@ Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report
     write.as_left = report.six ? calib::to_json(report.six->best().stored).dump() : write.read_back;
     SIXPOINT_CHECK(writer.add_unit_write(write));
   }
-  if (report.usable()) {
+  if (report.usable() && run.kind != kWriteKind) {
     calib::ConstantsRecord constants = report.record();
     constants.made_from.station = run.station;
     db::ConstantsRecord row = constants_row(constants);

@@ -415,6 +415,31 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
   return state;
 }
 
+Result<std::set<std::string>> check_units(db::Store& store) {
+  return store.station_events().map(check_units_of);
+}
+
+Status may_write(db::Store& store, const std::string& serial, const std::string& constants_id) {
+  SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(serial));
+  if (std::ranges::find(history.constants, constants_id, &db::ConstantsRecord::id) ==
+      history.constants.end()) {
+    return fail(ErrorCode::no_input, "the store does not hold these constants",
+                db::shown_id(constants_id), "measure the unit again");
+  }
+  if (!history.is_withdrawn(constants_id)) {
+    return {};
+  }
+  std::string why;
+  for (const db::Correction& correction : history.corrections) {
+    if (correction.row_id == constants_id && correction.action == "withdraw") {
+      why = correction.reason;
+    }
+  }
+  return fail(ErrorCode::configuration,
+              fmt::format("these constants were withdrawn: {}", printable(why, 200)),
+              db::shown_id(constants_id), "measure the unit again");
+}
+
 Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::string& study,
                                                const std::string& quantity,
                                                const std::string& axis) {

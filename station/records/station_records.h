@@ -14,6 +14,7 @@
 
 #include <chrono>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,9 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
                                    const CheckUnitPolicy& policy,
                                    const std::optional<UtcTime>& now = {});
 
+// The check units of all stations.
+Result<std::set<std::string>> check_units(db::Store& store);
+
 // What a unit's earlier jig runs and releases demand of the next one.
 Result<RetestState> unit_retest_state(db::Store& store, const std::string& serial,
                                       const RetestPolicy& policy);
@@ -92,6 +96,14 @@ Result<RetestState> unit_retest_state(db::Store& store, const std::string& seria
 //   any other                   open      yes, with what its earlier runs demand of this one
 Result<RetestState> may_start(db::Store& store, const std::string& serial,
                               const std::string& station, const Limits& limits);
+
+// May constants that a run put into the store be written into their unit now ("write now")?
+//
+//   constants                                  answer
+//   of the store, and not withdrawn            yes
+//   withdrawn (db::UnitHistory::is_withdrawn)  configuration error, with the reason of who did it
+//   not of this store                          no_input error
+Status may_write(db::Store& store, const std::string& serial, const std::string& constants_id);
 
 // The two configuration errors, with what lifts them.
 Error station_is_locked(const std::string& why, const std::string& station);

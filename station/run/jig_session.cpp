@@ -258,7 +258,7 @@ void Session::keep_interrupted(const JigRun& run, const Error& error) {
   report_.stream = stream_.statistics(unit_);
   report_.settle_as_left();
   report_.verdict = JigVerdict::inconclusive;
-  report_.codes = {error.code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted"};
+  report_.codes = {interruption(error.code)};
   report_.reasons.push_back(error.what);
   report_.ended_by = error;
 }
@@ -516,6 +516,10 @@ Status check_protocol(JigProtocol protocol, const device::Jig& jig) {
         jig.name(), "leave out --protocol, or turn the unit by hand (--jig manual)");
   }
   return {};
+}
+
+std::string interruption(ErrorCode code) {
+  return code == ErrorCode::device_unavailable ? "unit_gone" : "interrupted";
 }
 
 Result<JigReport> run_jig(UnitOnJig on_jig, Env& env, const JigSessionOptions& options,

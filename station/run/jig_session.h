@@ -90,6 +90,9 @@ struct JigHooks {
   std::function<Result<UnitOnJig>(const Error&, const Look& look)> reopen;
 };
 
+// The code (verdict.h) of a run that ended on an error: `unit_gone` only where the unit went away.
+std::string interruption(ErrorCode code);
+
 // usage where the protocol turns a unit about the vertical and the jig cannot: then nothing has
 // moved.
 Status check_protocol(JigProtocol protocol, const device::Jig& jig);

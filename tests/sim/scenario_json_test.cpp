@@ -125,6 +125,8 @@ TEST(ScenarioJson, AnErrorNamesThePathOfItsKey) {
            "motions": [{"kind": "still"}]})",
        "/population/effects/0/mean/sd_deg"},
       {R"({"start": "2015-04-09T14:04:00.5Z", "motions": [{"kind": "still"}]})", "/start"},
+      {R"({"start": "2106-02-07T06:28:00Z", "motions": [{"kind": "still"}]})", "/start"},
+      {R"({"motions": [{"kind": "still", "duration_s": 0.5}]})", "/motions"},
       {R"({"protocol": [{"first_sample": 0, "samples": 100}, {"first_sample": 50, "samples": 9}]})",
        "/protocol/1/first_sample"},
       {R"({"protocol": "production", "motions": []})", "/motions"},

@@ -18,6 +18,10 @@ TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
   ASSERT_EQ(run({"check-unit", "add", "MOS2A00000001", "--operator", "Eve", "--reason", "watch"})
                 .exit_code,
             0);
+  EXPECT_EQ(run({"check-unit", "remove", "MOS2A0000000", "--operator", "Eve", "--reason", "typo"})
+                .exit_code,
+            66)
+      << "a digit is missing";
   write("l.toml", "[check_unit]\nbaseline_runs = 4\n");
   for (int i = 0; i < 4; ++i) {
     EXPECT_EQ(measure(check + std::to_string(i + 1)).exit_code, 0);

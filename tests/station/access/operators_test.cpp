@@ -130,6 +130,24 @@ TEST_F(OperatorsTest, TheFileHoldsNoPin) {
   EXPECT_EQ(operators_.sign_in("a", "Ada", "471100")->role, OperatorRole::engineer);
 }
 
+TEST_F(OperatorsTest, NamesThatLookAlikeAreNotTaken) {
+  add_both();
+  for (const char* name : {" Ada", "Ada ", "Ada\u200b", "\u202eadA", "A\u2060da", "\ufeffAda"}) {
+    EXPECT_FAILS(operators_.add(name, OperatorRole::technician, "471100"), ErrorCode::usage);
+  }
+  for (const char* name : {"Ada L", "Łukasz", "Zoë", "\u5f20", "a\u2019b"}) {
+    EXPECT_OK(operators_.add(name, OperatorRole::technician, "471100"));
+  }
+}
+
+TEST_F(OperatorsTest, WhoIsNotListedAnyMoreIsNotSignedIn) {
+  add_both();
+  ASSERT_OK(operators_.sign_in("a", "Ada", "471100"));
+  EXPECT_EQ(operators_.at("a")->name, "Ada");
+  ASSERT_OK(operators_.disable("Ada"));
+  EXPECT_FALSE(operators_.at("a").has_value());
+}
+
 TEST_F(OperatorsTest, WrongNamesAndPinsAreRefused) {
   for (const std::string& name : {std::string(), std::string("  "), std::string(61, 'A'),
                                   std::string("A\nda"), std::string("A\x1b[2J")}) {

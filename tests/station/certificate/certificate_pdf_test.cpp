@@ -65,7 +65,11 @@ TEST_F(CertificatePdf, SaysWhatACalibrationCertificateSays) {
       std::regex("\n *X +([0-9.]+) +\u00b1 ([0-9.]+) +((?:\u2013)?[0-9.]+) +\u00b1 ([0-9.]+)")))
       << text;
   EXPECT_NEAR(std::stod(row[1]), 1 / certificate->sensitivity_g_per_lsb[0], 0.006);
-  EXPECT_NEAR(std::stod(row[4]), certificate->zero_expanded_mg[0], 0.006);
+  // Two digits of the uncertainty; in counts, of 1 g / sensitivity.
+  const double zero_expanded_lsb =
+      certificate->zero_expanded_mg[0] / 1000 / certificate->sensitivity_g_per_lsb[0];
+  EXPECT_NEAR(std::stod(row[4]), zero_expanded_lsb, 0.06 * zero_expanded_lsb);
+  EXPECT_THAT(text, HasSubstr(" choice "));
 }
 
 // Oracle: zbar reads the QR code off the page as a scanner would.

@@ -54,7 +54,8 @@ TEST(LaneRun, ARunThatPassedIsWrittenAfterwards) {
   EXPECT_FALSE(written["result"].contains("can_write"));
   ASSERT_EQ(station.reports.size(), 2U);
   EXPECT_EQ(station.kinds, (std::vector<std::string>{"jig", kWriteKind}));
-  EXPECT_EQ(station.operators.back(), "Bo");
+  EXPECT_EQ(station.operators.back(), "Ada, then Bo") << "Ada measured, Bo wrote";
+  EXPECT_EQ(station.asked_to_write, std::vector<std::string>{"MOS2A45130007 def456"});
   const JigReport& first = station.reports.front();
   const JigReport& second = station.reports.back();
   EXPECT_EQ(second.recheck.poses.size(), 2U) << "measured again with what the unit holds";
@@ -64,6 +65,49 @@ TEST(LaneRun, ARunThatPassedIsWrittenAfterwards) {
   EXPECT_GT(second.raw_csv.size(), first.raw_csv.size()) << "the samples of both";
   EXPECT_TRUE(second.raw_csv.starts_with(first.raw_csv));
   EXPECT_EQ(station.post("/api/run", now), 409) << "once";
+}
+
+// The second pass after a fail would do; the write is none.
+TEST(LaneRun, AConditionalPassStaysOneWhenItIsWrittenAfterwards) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  const auto stored = [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  };
+  station.retest = {1, 2, true, "the run that failed", {}};
+  station.start("/api/run");
+  const Json measured = station.wait(1, stored);
+  ASSERT_EQ(measured["result"]["verdict"], "conditional_pass") << measured.dump(1);
+  {
+    const std::lock_guard lock(station.mutex);
+    station.retest = {
+        0, 1, true, "the run that passed", {}};  // what a run after this one would see
+  }
+  ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+  const Json written = station.wait(
+      1, [&](const Json& json) { return stored(json) && json["result"]["written"] == true; });
+  EXPECT_EQ(written["result"]["verdict"], "conditional_pass") << written.dump(1);
+  EXPECT_EQ(station.reports.back().codes, std::vector<std::string>{"retest"});
+}
+
+TEST(LaneRun, ConstantsThatWereWithdrawnAreNotWrittenAfterwards) {
+  const tests::TemporaryFolder folder;
+  Station station({"virtual:seed=7,serial=MOS2A45130007,jig=auto"}, folder.path());
+  station.start("/api/run");
+  station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  {
+    const std::lock_guard lock(station.mutex);
+    station.is_withdrawn = true;
+  }
+  ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);
+  const Json refused = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["verdict"] == "refused";
+  });
+  EXPECT_THAT(refused["result"]["reasons"].dump(), HasSubstr("were withdrawn"));
+  EXPECT_EQ(station.reports.size(), 1U);
+  EXPECT_EQ(station.post("/api/run", {{"last_run", true}}), 409) << "measured again first";
 }
 
 // It is no second run either where the program ended in between: the next one goes on with a write.

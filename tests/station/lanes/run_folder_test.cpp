@@ -9,6 +9,7 @@
 
 #include "base/forwarding_files.h"
 #include "base/memory_env.h"
+#include "base/sha256.h"
 #include "expect_result.h"
 #include "temporary_folder.h"
 
@@ -151,6 +152,39 @@ TEST(RunFolder, AnIncompleteLastRowIsLeftOut) {
   ASSERT_OK(lane.append("t,x,y,z,c\n1,2,3,4,25\n2,2,"));
   ASSERT_OK(lane.close());
   EXPECT_EQ((**lane.load()).resume.raw_csv, "t,x,y,z,c\n1,2,3,4,25\n");
+}
+
+// What the state says was measured on rows; without them the run is not gone on with. Rows that came
+// behind the state may be lost.
+TEST(RunFolder, ARunWhoseRowsAreNotAsTheyWereIsRefused) {
+  const std::string rows = "t,x,y,z,c\n1,2,3,4,25\n";
+  UnfinishedRun run = a_run();
+  run.rows_bytes = rows.size();
+  run.rows_sha256 = text_sha256(rows);
+  run.retest = RetestState{1, 2, true, "a run", {}};
+  struct Row {
+    std::string on_disk;
+    bool good;
+  };
+  for (const Row& row :
+       {Row{rows, true}, Row{rows + "2,2,3,4,25\n", true}, Row{rows + "2,2,", true},
+        Row{"t,x,y,z,c\n", false}, Row{"", false}, Row{"t,x,y,z,c\n1,2,9,4,25\n", false},
+        Row{"t,x,y,z,c\n" + std::string(11, '\0') + "\n", false}}) {
+    SCOPED_TRACE(row.on_disk);
+    const tests::TemporaryFolder folder;
+    RunFolder lane(posix_env(), folder / "lane");
+    ASSERT_OK(lane.append(row.on_disk));
+    ASSERT_OK(lane.save(run));
+    ASSERT_OK(lane.close());
+    const auto left = lane.load();
+    if (row.good) {
+      ASSERT_OK(left);
+      EXPECT_EQ((*left)->retest->passes_needed, 2);
+      EXPECT_EQ((*left)->retest->retest_of, "a run");
+    } else {
+      EXPECT_FAILS(left, ErrorCode::bad_data);
+    }
+  }
 }
 
 TEST(RunFolder, ADamagedStateIsRefusedAndSetAside) {

@@ -49,7 +49,14 @@ class Station {
       if (start_has_defect) {
         throw std::runtime_error("no such key");
       }
-      return RetestState{};
+      const std::lock_guard lock(mutex);
+      return retest;
+    };
+    options.may_write = [this](const std::string& serial, const std::string& id) -> Status {
+      const std::lock_guard lock(mutex);
+      asked_to_write.push_back(serial + " " + id);
+      return is_withdrawn ? Status(fail(ErrorCode::configuration, "these constants were withdrawn"))
+                          : Status();
     };
     auto opened = Lanes::open(
         posix_env(), registry_, options,
@@ -149,9 +156,12 @@ class Station {
   std::vector<std::string> operators;
   std::vector<std::string> kinds;
   std::vector<bool> authenticated;
-  bool store_is_away = false;  // and the journal with it
-  bool store_refuses = false;  // the record itself
-  bool has_defect = false;     // to store throws
+  RetestState retest;                       // what the unit's earlier runs demand
+  bool is_withdrawn = false;                // the constants that "write now" would write
+  std::vector<std::string> asked_to_write;  // serial and constants
+  bool store_is_away = false;               // and the journal with it
+  bool store_refuses = false;               // the record itself
+  bool has_defect = false;                  // to store throws
   std::atomic<bool> start_has_defect{false};
   bool is_kept_here = false;  // the journal has it
 

@@ -119,6 +119,24 @@ TEST_F(StationRecords, TheRetestPolicyHoldsOverTheStoresRuns) {
   EXPECT_OK(start("MOS2A1"));
 }
 
+// The rows of may_write()'s table.
+TEST_F(StationRecords, OnlyConstantsThatApplyAreWrittenAfterwards) {
+  db::ConstantsRecord constants;
+  constants.serial = "MOS2A1";
+  constants.filter = "current";
+  constants.method = "jig";
+  constants.document = "{}";
+  constants.made_at = from_unix_seconds(100);
+  const auto id = store_.add_constants(constants, "wGT3X-BT");
+  ASSERT_OK(id);
+  EXPECT_OK(may_write(store_, "MOS2A1", *id));
+  EXPECT_FAILS(may_write(store_, "MOS2A1", std::string(32, 'a')), ErrorCode::no_input);
+  ASSERT_OK(store_.withdraw_constants(*id, "Ada", "jig out of level"));
+  const Status refused = may_write(store_, "MOS2A1", *id);
+  EXPECT_FAILS(refused, ErrorCode::configuration);
+  EXPECT_THAT(refused.error().what, HasSubstr("jig out of level"));
+}
+
 TEST_F(StationRecords, CheckUnitsAndStudiesAreNoStatistics) {
   decide("check_unit", "CHECK1");
   baseline();

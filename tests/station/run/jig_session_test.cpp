@@ -20,6 +20,11 @@ using testing::HasSubstr;
 
 // Oracle: the virtual unit's truth. 0.1 % of sensitivity is 1 mg, 0.3 LSB of zero too: noise of a
 // dwell is 0.2 mg, seating 0.17.
+TEST(JigSession, OnlyAUnitThatWentAwayIsGone) {
+  EXPECT_EQ(interruption(ErrorCode::device_unavailable), "unit_gone");
+  EXPECT_EQ(interruption(ErrorCode::bad_data), "interrupted");
+}
+
 TEST(JigSession, FindsTheSensorUnderCurrent) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     VirtualBench bench(seed);
