@@ -79,7 +79,7 @@ TEST(LaneRun, AConditionalPassStaysOneWhenItIsWrittenAfterwards) {
   const Json measured = station.wait(1, stored);
   ASSERT_EQ(measured["result"]["verdict"], "conditional_pass") << measured.dump(1);
   {
-    const std::lock_guard lock(station.mutex);
+    const std::lock_guard lock(station.start_mutex);
     station.retest = {
         0, 1, true, "the run that passed", {}};  // what a run after this one would see
   }
@@ -98,7 +98,7 @@ TEST(LaneRun, ConstantsThatWereWithdrawnAreNotWrittenAfterwards) {
     return json["result"].is_object() && json["result"]["stored"] == true;
   });
   {
-    const std::lock_guard lock(station.mutex);
+    const std::lock_guard lock(station.start_mutex);
     station.is_withdrawn = true;
   }
   ASSERT_EQ(station.post("/api/run", {{"last_run", true}}), 202);

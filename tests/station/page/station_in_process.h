@@ -49,11 +49,11 @@ class Station {
       if (start_has_defect) {
         throw std::runtime_error("no such key");
       }
-      const std::lock_guard lock(mutex);
+      const std::lock_guard lock(start_mutex);
       return retest;
     };
     options.may_write = [this](const std::string& serial, const std::string& id) -> Status {
-      const std::lock_guard lock(mutex);
+      const std::lock_guard lock(start_mutex);
       asked_to_write.push_back(serial + " " + id);
       return is_withdrawn ? Status(fail(ErrorCode::configuration, "these constants were withdrawn"))
                           : Status();
@@ -156,6 +156,7 @@ class Station {
   std::vector<std::string> operators;
   std::vector<std::string> kinds;
   std::vector<bool> authenticated;
+  std::mutex start_mutex;                   // guards the three that follow
   RetestState retest;                       // what the unit's earlier runs demand
   bool is_withdrawn = false;                // the constants that "write now" would write
   std::vector<std::string> asked_to_write;  // serial and constants
