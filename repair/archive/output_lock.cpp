@@ -38,7 +38,7 @@ bool a_shard_is_at_work(FileSystem& files, const std::string& folder) {
     if (!name.starts_with(kShardPrefix) || !name.ends_with(kShardEnding)) {
       continue;
     }
-    const std::string path = folder + "/" + name;
+    const std::string path = fmt::format("{}/{}", folder, name);
     auto lock = files.lock(path);
     if (lock && *lock == nullptr) {
       return true;
