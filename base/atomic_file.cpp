@@ -68,6 +68,8 @@ AtomicFile::~AtomicFile() {
 namespace {
 
 constexpr int kMostAttempts = 100;
+constexpr std::size_t kLongestName_bytes = 255;    // of Linux's file systems
+constexpr std::size_t kLongestTarget_bytes = 248;  // of NAME in .NAME.0.tmp
 
 std::string temporary_name(const std::string& path, int attempt) {
   return fmt::format("{}/.{}.{}.tmp", folder_of(path), file_name_of(path), attempt);
@@ -128,6 +130,13 @@ Result<AtomicFile> AtomicFile::create_temporary(FileSystem& files, const std::st
     if (file) {
       note_temporary(temporary);
       return AtomicFile(files, path, temporary, *std::move(file));
+    }
+    if (file_name_of(temporary).size() > kLongestName_bytes) {
+      return fail(
+          ErrorCode::cannot_create,
+          "the name is too long: until the file is whole, it has a temporary name beside it, "
+          "which is longer",
+          path, fmt::format("choose a name of at most {} bytes", kLongestTarget_bytes));
     }
     if (!files.info(temporary)) {
       return fail(std::move(file).error());

@@ -200,7 +200,9 @@ Status MemoryFiles::rename_unless(const std::string& from, const std::string& to
 Status MemoryFiles::remove(const std::string& path) {
   SIXPOINT_CHECK(may_change(path));
   const std::lock_guard lock(mutex_);
-  if (seen_.erase(path) == 0) {
+  const bool holds_files = std::ranges::any_of(
+      seen_, [&](const auto& item) { return item.first.starts_with(path + "/"); });
+  if (seen_.erase(path) == 0 && (holds_files || folders_.erase(path) == 0)) {
     return fail(ErrorCode::io, "no such file to remove", path, "check the path");
   }
   return {};

@@ -22,6 +22,7 @@
 #include "repair/archive/archive_run.h"
 #include "repair/archive/archive_scripts.h"
 #include "repair/archive/plan_folder.h"
+#include "repair/rescale/constants_finder.h"
 #include "station/records/software.h"
 
 namespace sixpoint::cli {
@@ -160,13 +161,21 @@ void print_missing(const MergedArchive& merged, const Rerun& rerun, Context& con
   }
 }
 
+// The sources of constants that the plan's shards ask.
+std::vector<repair::SourceKind> asked_by(const ArchivePlan& plan) {
+  const repair::ConstantsSnapshot any;  // that there is one decides
+  return repair::sources_in_order(
+      repair::finder_options(plan.repair, plan.store.empty() ? nullptr : &any));
+}
+
 // What became known of the archive, by the results of its shards.
 class Merge {
  public:
   Merge(Context& context, const ArchiveOptions& options, const ArchivePlan& plan)
       : context_(context),
         options_(options),
-        store_location_(options.sources.store.empty() ? plan.store : options.sources.store) {}
+        store_location_(options.sources.store.empty() ? plan.store : options.sources.store),
+        table_(asked_by(plan)) {}
 
   // The store that is named, else the one that the constants came from; and the output folder, which
   // gets the manifest of the whole archive. Tasks that run at the same time leave none: each would
@@ -343,7 +352,7 @@ Status run_report(const ArchiveOptions& options, Context& context) {
   context.worsen(merged.complete() ? kExitPassed : kExitInconclusive);
   SIXPOINT_CHECK(write_study_report(context, outputs.files(), options.output,
                                     "Archive of the plan " + options.plan, reports));
-  repair::UnitTable table;
+  repair::UnitTable table(asked_by(plan));
   for (const RepairReport& report : reports) {
     table.add(report);
   }

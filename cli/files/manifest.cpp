@@ -1,6 +1,7 @@
 #include "cli/files/manifest.h"
 
 #include <map>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -80,10 +81,31 @@ bool left_alone(const repair::RepairReport& report, const Json& earlier) {
          earlier.value("output", Json()).is_string();
 }
 
+// What is known of an output that is outdated, and is there as an earlier run wrote it: that run's
+// line, under this run's status. Nothing where that run wrote none.
+std::optional<Json> outdated_entry(const repair::RepairReport& report, const Json& earlier) {
+  if (report.status != repair::RepairStatus::outdated ||
+      !earlier.value("output", Json()).is_string()) {
+    return std::nullopt;
+  }
+  Json entry = earlier;
+  entry["status"] = repair::to_string(report.status);
+  return entry;
+}
+
 }  // namespace
 
 Status check_manifest(FileSystem& files, const std::string& folder) {
   const bool ours = !manifest_in(files, folder).empty();
+  if (!files.link_info(json_of(folder))) {
+    const auto csv = read_file(files, csv_of(folder), kLargestManifest);
+    if (csv && as_text(*csv).starts_with(kColumns)) {
+      return fail(
+          ErrorCode::cannot_create, "manifest.json, which belongs to this file, is missing",
+          csv_of(folder),
+          "put manifest.json back, or choose another output folder, or move this file away");
+    }
+  }
   for (const std::string& path :
        {json_of(folder), csv_of(folder), units_of(folder), folder + "/report.html"}) {
     if (!ours && files.info(path)) {
@@ -111,6 +133,11 @@ Status write_manifest(FileSystem& files, const std::string& folder,
     if (now_too != of_this_run.end() && left_alone(*now_too->second, entry)) {
       of_this_run.erase(now_too);
       entries.push_back(entry);
+    } else if (auto outdated = now_too == of_this_run.end()
+                                   ? std::nullopt
+                                   : outdated_entry(*now_too->second, entry)) {
+      of_this_run.erase(now_too);
+      entries.push_back(*std::move(outdated));
     } else if (now_too == of_this_run.end()) {
       entries.push_back(entry);
     }

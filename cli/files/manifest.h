@@ -8,7 +8,8 @@
 // units.csv beside them has a line per unit of the run (repair/units/unit_needs.h).
 //
 // Files of earlier runs into the same folder stay in it, unless this run met them again; where it
-// was refused because their output is there (cannot_create), they stay, too. Names that are no
+// was refused because their output is there (cannot_create), they stay, too; where that output is
+// `outdated`, they stay with this status. Names that are no
 // UTF-8 are escaped (\xNN); the CSV is quoted as RFC 4180 has it.
 #pragma once
 

@@ -15,6 +15,7 @@
 #include "cli/store_option.h"
 #include "cli/workers.h"
 #include "repair/archive/archive_scripts.h"
+#include "repair/archive/output_lock.h"
 #include "repair/batch/repair_files.h"
 #include "repair/rescale/constants_finder.h"
 #include "repair/rescale/repair_file.h"
@@ -153,14 +154,13 @@ void say_what_is_next(const RepairCommandOptions& options, const std::vector<Rep
   }
 }
 
-// One run at a time in an output folder. Nothing where its file system has no locks.
+// One run at a time in an output folder (repair/archive/output_lock.h). Nothing where its file system has no locks.
 Result<std::unique_ptr<FileLock>> lock_of(const RepairCommandOptions& options, Context& context) {
   if (options.repair.dry_run) {
     return nullptr;
   }
   SIXPOINT_CHECK(make_synced_folders(context.env.files, options.folder));
-  const std::string path = options.folder + "/.sixpoint-repair.lock";
-  auto lock = context.env.files.lock(path);
+  auto lock = repair::lock_for_repair(context.env.files, options.folder);
   if (!lock) {
     context.log().warn("{}: no lock: {}; let no other run write here", printable(options.folder),
                        lock.error().what);
@@ -188,7 +188,7 @@ Status run_repair(const RepairCommandOptions& options, Context& context) {
   repair::refuse_same_outputs(files, options.folder);
   const auto reports = repair_all(files, options, finder, pool, context);
   RepairTally tally;
-  repair::UnitTable table;
+  repair::UnitTable table(order_of(options.sources, store.has_value()));
   Json json = document("repair");
   Json& list = json["files"] = Json::array();
   for (const RepairReport& report : reports) {

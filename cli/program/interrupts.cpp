@@ -1,6 +1,8 @@
 #include "cli/program/interrupts.h"
 
+#include <algorithm>
 #include <csignal>
+#include <initializer_list>
 
 #include <unistd.h>
 
@@ -24,15 +26,31 @@ extern "C" void end_as_stopped(int /*signal*/) {
   ::_exit(kExitStopped);
 }
 
+bool begins_with(const std::vector<std::string>& arguments,
+                 std::initializer_list<const char*> words) {
+  return arguments.size() >= words.size() &&
+         std::equal(words.begin(), words.end(), arguments.begin());
+}
+
 }  // namespace
 
-void take_interrupts(const std::vector<std::string>& arguments) {
-  std::string& text = stopped_text();
-  text = "\nsixpoint: stopped; what is done stays, and this line goes on:\n  sixpoint";
+std::string text_when_stopped(const std::vector<std::string>& arguments) {
+  if (begins_with(arguments, {"archive", "plan"})) {
+    return "\nsixpoint: stopped; no plan was made\n";
+  }
+  if (begins_with(arguments, {"scan"}) || begins_with(arguments, {"inspect"}) ||
+      begins_with(arguments, {"simulate"})) {
+    return "\nsixpoint: stopped; nothing was written\n";
+  }
+  std::string text = "\nsixpoint: stopped; what is done stays, and this line goes on:\n  sixpoint";
   for (const std::string& argument : arguments) {
     text.append(" ").append(repair::shell_word(argument));
   }
-  text += "\n";
+  return text + "\n";
+}
+
+void take_interrupts(const std::vector<std::string>& arguments) {
+  stopped_text() = text_when_stopped(arguments);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before {};
     if (::sigaction(signal, nullptr, &before) == 0 && before.sa_handler == SIG_DFL) {

@@ -1,16 +1,25 @@
 // Ctrl-C, SIGTERM and SIGHUP in a command that does not take them itself (cli/stop_request.h):
 // exit 3.
 //
-//   take_interrupts({"scan", "archive"});  // prints "sixpoint scan archive" when it comes
+//   take_interrupts({"export", "archive"});  // prints "sixpoint export archive" when it comes
 //
-// Results appear whole or not at all, so what is done stays, temporary files are removed, and the
-// same line goes on. In the background of a script, where the signal is ignored, it stays so.
+// Results appear whole or not at all, and temporary files are removed:
+//
+// | command                 | says                                                |
+// |-------------------------|-----------------------------------------------------|
+// | archive plan            | no plan was made                                    |
+// | scan, inspect, simulate | nothing was written: they write at their end        |
+// | others                  | what is done stays, and this line goes on: the line |
+//
+// In the background of a script, where the signal is ignored, it stays so.
 #pragma once
 
 #include <string>
 #include <vector>
 
 namespace sixpoint::cli {
+
+std::string text_when_stopped(const std::vector<std::string>& arguments);
 
 // Once, before threads are started.
 void take_interrupts(const std::vector<std::string>& arguments);

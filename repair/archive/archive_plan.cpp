@@ -46,8 +46,7 @@ class Planner {
       SIXPOINT_CHECK(add(path));
     }
     if (made_.files.empty()) {
-      return fail(ErrorCode::no_input, "there is no .gt3x file to repair", draft_.paths.front(),
-                  "name the folder with your recordings");
+      return nothing_to_repair();
     }
     if (draft_.hash) {
       SIXPOINT_CHECK(hash());
@@ -57,6 +56,22 @@ class Planner {
   }
 
  private:
+  tl::unexpected<Error> nothing_to_repair() const {
+    const auto& links = made_.not_followed;
+    if (links.empty()) {
+      return fail(ErrorCode::no_input, "there is no .gt3x file to repair", draft_.paths.front(),
+                  "name the folder with your recordings");
+    }
+    return fail(
+        ErrorCode::no_input,
+        fmt::format("there is no .gt3x file to repair; {}{} leads out of the tree and is not "
+                    "followed",
+                    printable(links.front()),
+                    links.size() == 1 ? std::string()
+                                      : fmt::format(" (and {} links more)", links.size() - 1)),
+        draft_.paths.front(), "name the folder to which the link leads");
+  }
+
   Status add(const std::string& path) {
     SIXPOINT_ASSIGN(const auto info, env_.files.info(path));
     SIXPOINT_ASSIGN(auto tree, find_files(env_.files, path, {{".gt3x"}, /*follow_out=*/false}));

@@ -11,30 +11,16 @@
 #include "base/sha256.h"
 #include "repair/archive/archive_json.h"
 #include "repair/archive/archive_scripts.h"
+#include "repair/archive/output_lock.h"
 #include "repair/rescale/constants_finder.h"
+#include "repair/rescale/output_place.h"
 
 namespace sixpoint::repair {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-// 'status' holds a shard's lock for a moment to find out whether a run does.
-constexpr int kLockAttempts = 40;
-constexpr std::chrono::milliseconds kLockPause{50};
-
 std::string results_of(const std::string& folder) { return folder + "/results"; }
-
-// The part of `path` that is there, without links, and the rest as it is written.
-std::string real_place(FileSystem& files, const std::string& path) {
-  if (auto real = files.real_path(path)) {
-    return *std::move(real);
-  }
-  const std::string parent = folder_of(path);
-  if (parent == path || parent == ".") {
-    return path;
-  }
-  return real_place(files, parent) + "/" + file_name_of(path);
-}
 
 RepairReport failed(const std::string& input, Error error) {
   RepairReport report;
@@ -54,14 +40,16 @@ class ShardRun {
     SIXPOINT_ASSIGN(const auto shard, ShardFolder::open(files_, folder_, plan_, options_.shard));
     SIXPOINT_CHECK(check_output_folder());
     std::unique_ptr<FileLock> lock;
+    std::unique_ptr<FileLock> output_lock;
     if (!options_.dry_run) {
       SIXPOINT_CHECK(claim_output_folder());
-      SIXPOINT_ASSIGN(lock, wait_for_lock(shard.lock_path()));
+      SIXPOINT_ASSIGN(lock, wait_for_lock(env_, shard.lock_path()));
       if (lock == nullptr) {
         return fail(ErrorCode::cannot_create,
                     fmt::format("shard {} is being repaired by another run", options_.shard),
                     folder_, "wait for it; 'sixpoint archive status' says how far it is");
       }
+      SIXPOINT_ASSIGN(output_lock, lock_output_folder());
     }
     SIXPOINT_CHECK(prepare_constants());
     ShardResult result;
@@ -73,17 +61,6 @@ class ShardRun {
   }
 
  private:
-  // Waits a little: 'status' holds a lock for the moment in which it tests it.
-  Result<std::unique_ptr<FileLock>> wait_for_lock(const std::string& path) {
-    for (int attempt = 0;; ++attempt) {
-      SIXPOINT_ASSIGN(auto lock, files_.lock(path));
-      if (lock != nullptr || attempt == kLockAttempts) {
-        return lock;
-      }
-      env_.clock.sleep(kLockPause);
-    }
-  }
-
   Status check_output_folder() {
     const std::string output = real_place(files_, options_.output_folder);
     for (const ArchiveRoot& root : plan_.roots) {
@@ -102,7 +79,7 @@ class ShardRun {
   Status claim_output_folder() {
     SIXPOINT_ASSIGN(auto known, output_folder_of(files_, folder_));
     if (!known) {
-      SIXPOINT_ASSIGN(const auto lock, wait_for_lock(results_of(folder_) + "/output.lock"));
+      SIXPOINT_ASSIGN(const auto lock, wait_for_lock(env_, results_of(folder_) + "/output.lock"));
       SIXPOINT_ASSIGN(known, output_folder_of(files_, folder_));
       if (!known) {
         const Json json = {{"schema", "sixpoint/archive-output/1"},
@@ -119,6 +96,19 @@ class ShardRun {
           fmt::format("use -o {}, or make another plan", shell_word(*known)));
     }
     return {};
+  }
+
+  // Null where its file system has no locks, or it cannot be written: the files say so then.
+  Result<std::unique_ptr<FileLock>> lock_output_folder() {
+    auto lock = lock_for_shard(env_, options_.output_folder, plan_.id, options_.shard);
+    if (!lock) {
+      return nullptr;
+    }
+    if (*lock == nullptr) {
+      return fail(ErrorCode::cannot_create, "'sixpoint repair' is at work in the output folder",
+                  options_.output_folder, "wait for it, then run the shard again");
+    }
+    return lock;
   }
 
   Status prepare_constants() {
@@ -228,7 +218,13 @@ class ShardRun {
     for (const std::string& part : parts) {
       SIXPOINT_CHECK(files_.remove(part));
     }
-    return parts.empty() ? Status() : files_.sync_folder(shard.parts_folder());
+    if (!parts.empty()) {
+      SIXPOINT_CHECK(files_.sync_folder(shard.parts_folder()));
+    }
+    if (files_.info(shard.parts_folder())) {
+      static_cast<void>(files_.remove(shard.parts_folder()));  // empty: that it stays harms no one
+    }
+    return {};
   }
 
   static std::size_t number_after(const std::vector<std::string>& parts) {
@@ -257,6 +253,9 @@ class ShardRun {
       return failed(input, changed_since_plan(input));
     }
     const std::string output = options_.output_folder + "/" + planned.relative;
+    if (const auto status = check_output_place(files_, options_.output_folder, output); !status) {
+      return failed(input, status.error());
+    }
     if (!options_.dry_run) {
       AtomicFile::remove_left_over(files_, output);
     }

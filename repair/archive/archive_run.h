@@ -9,7 +9,8 @@
 // is not done again. At regular intervals, and at the end, what was done is written into the plan's
 // results/ (shard_results.h; written beside, synced, renamed, folder synced), the outputs appear
 // whole or not at all, and an output that is there without a result is known by its mark. Two runs
-// of one shard at a time are refused by a lock. Files that failed are tried again by the next run.
+// of one shard at a time are refused by a lock, and so is a shard whose output folder `repair` is at
+// work in (output_lock.h). Files that failed are tried again by the next run.
 // results/output.json names the output folder, the same for all shards.
 #pragma once
 
@@ -49,7 +50,7 @@ struct ShardRunOptions {
       [](const RepairProgress&, auto) {};
 };
 
-// cannot_create where another run holds the shard; usage where the output folder is another one
+// cannot_create where another run holds the shard, or `repair` the output folder; usage where the output folder is another one
 // than before, or where it and the archive lie in one another; configuration where the calibration
 // file is not the one of the plan; io where results cannot be written. What becomes of single files
 // stands in their reports: bad_data for one that changed since the plan was made.

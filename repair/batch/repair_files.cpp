@@ -3,12 +3,19 @@
 #include <algorithm>
 #include <numeric>
 #include <optional>
+#include <set>
+
+#include <nlohmann/json.hpp>
 
 #include "base/bytes.h"
 #include "repair/batch/jobs.h"
+#include "repair/rescale/output_place.h"
+#include "repair/rescale/repair_mark.h"
 
 namespace sixpoint::repair {
 namespace {
+
+constexpr std::uint64_t kNoFile = 0;  // as FileInfo has it where a file system has no inodes
 
 class Run {
  public:
@@ -50,6 +57,10 @@ class Run {
       return failed_report(file.path, *file.error);
     }
     const std::string output = options_.folder + "/" + file.relative;
+    if (const auto status = check_output_place(env_.files, options_.folder, output); !status) {
+      ++failed_;
+      return failed_report(file.path, status.error());
+    }
     RepairReport report = repair_file(env_, file.path, output, source_, how);
     link_unaffected(env_.files, options_.make_link, options_.link, output, report);
     if (const auto info = env_.files.info(file.path)) {
@@ -190,15 +201,42 @@ void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named,
   if (!output) {
     return;  // it is not there yet
   }
-  std::erase_if(named, [&](const NamedFile& file) {
-    const auto real = files.real_path(file.path);
+  const auto lies_in_output = [&](const NamedFile& file) {
+    const auto in = files.real_path(folder_of(file.path));
+    const std::string real = in ? *in + "/" + file_name_of(file.path) : std::string();
     const std::string below = "/" + file.relative;
-    if (!real || !real->ends_with(below)) {
-      return false;  // a link that leads out of the tree
+    if (file.error || !real.ends_with(below)) {
+      return false;  // it, or a folder above it, is a link that leads out of the tree
     }
-    const std::string tree = real->substr(0, real->size() - below.size());
-    return tree != *output && is_inside(*output, tree) && is_inside(*real, *output);
-  });
+    const std::string tree = real.substr(0, real.size() - below.size());
+    return tree != *output && is_inside(*output, tree) && is_inside(real, *output);
+  };
+  const auto which = [&](const NamedFile& file) {
+    const auto info = files.info(file.path);
+    return info ? std::pair(info->device, info->inode) : std::pair(kNoFile, kNoFile);
+  };
+  std::vector<bool> inside;
+  std::set<std::pair<std::uint64_t, std::uint64_t>> inputs;  // device and inode
+  for (const NamedFile& file : named) {
+    inside.push_back(lies_in_output(file));
+    if (!inside.back()) {
+      inputs.insert(which(file));
+    }
+  }
+  inputs.erase({kNoFile, kNoFile});
+  std::vector<NamedFile> kept;
+  for (std::size_t i = 0; i < named.size(); ++i) {
+    NamedFile& file = named[i];
+    if (inside[i] && (inputs.contains(which(file)) || mark_in(files, file.path))) {
+      continue;
+    }
+    if (inside[i]) {
+      file.error = Error{ErrorCode::cannot_create, "this recording lies in the output folder",
+                         file.path, "choose an output folder that holds no recordings"};
+    }
+    kept.push_back(std::move(file));
+  }
+  named = std::move(kept);
 }
 
 std::vector<RepairReport> repair_files(Env& env, const std::vector<NamedFile>& files,

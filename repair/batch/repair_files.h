@@ -42,7 +42,15 @@ struct RepairWatch {
   std::function<void(const RepairProgress&)> at;                    // as jobs.h calls
 };
 
-// An output folder that lies in a tree: what is in it is no input, but the outputs of earlier runs.
+// An output folder that lies in a tree that was named. What was found in it is no input:
+//
+// | recording in the output folder                         | becomes of it                       |
+// |--------------------------------------------------------|-------------------------------------|
+// | has the mark of a repair or of a salvage               | left out: an earlier run wrote it   |
+// | another name of an input that lies elsewhere           | left out: a link (--link-unaffected)|
+// | otherwise                                              | refused: it gets an error           |
+//
+// Where the output folder does not lie in the tree, or is the tree, all files stay inputs.
 void leave_out_outputs(FileSystem& files, std::vector<NamedFile>& named, const std::string& folder);
 
 // Every file by itself, then those that wait for the other files of their unit, which `pool`

@@ -164,6 +164,7 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   }
   UnitPool pool;
   how.unit = request.no_pool ? nullptr : &pool;
+  UnitTable table(sources_in_order(how));
   ConstantsFinder finder(env, std::move(how));
   auto named = named_files(env.files, request.paths, {".gt3x"}).files;
   leave_out_outputs(env.files, named, request.folder);
@@ -175,7 +176,6 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   const auto reports = repair_files(
       env, named, options, finder, pool,
       {{}, [&](const RepairProgress& done) { watching.watch(done.files); }}, watching.stop);
-  UnitTable table;
   Json json;
   json["files"] = Json::array();
   for (const RepairReport& report : reports) {

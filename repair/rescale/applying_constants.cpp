@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "calib/application/agreement.h"
+#include "db/records.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -86,6 +87,29 @@ std::optional<std::string> conflict_with(const Candidate& best, const std::vecto
   return std::nullopt;
 }
 
+// "5c0f91aa on 2026-11-22 (wrong jig)", the latest ones first; empty where there are none.
+std::string withdrawn_sets(const db::UnitHistory& history, const std::string& filter) {
+  constexpr std::size_t kMostSets = 3;
+  constexpr std::size_t kDate = 10;
+  std::vector<std::string> sets;
+  for (const db::ConstantsRecord& row : history.constants) {
+    if (row.filter != filter || !history.is_withdrawn(row.id)) {
+      continue;
+    }
+    const auto last = std::ranges::find_if(
+        history.corrections.rbegin(), history.corrections.rend(), [&](const db::Correction& one) {
+          return one.row_id == row.id && one.action == "withdraw";
+        });
+    sets.insert(sets.begin(), fmt::format("{} on {} ({})", db::shown_id(row.id),
+                                          to_iso8601(last->made_at).substr(0, kDate),
+                                          printable(last->reason, 200)));
+  }
+  const std::size_t more = sets.size() - std::min(sets.size(), kMostSets);
+  sets.resize(sets.size() - more);
+  return fmt::format("{}{}", fmt::join(sets, ", "),
+                     more > 0 ? fmt::format(" and {} more", more) : std::string());
+}
+
 }  // namespace
 
 ConstantsKind kind_of(const db::ConstantsRecord& record) {
@@ -116,6 +140,7 @@ Applying applying_constants(const db::UnitHistory& history, calib::FilterConfigu
   }
   if (all.empty()) {
     answer.why = "the store holds no constants of this unit that apply";
+    answer.withdrawn = withdrawn_sets(history, wanted);
     return answer;
   }
   const db::Correction* preference = history.preference(wanted);

@@ -43,6 +43,8 @@ struct Applying {
   std::optional<std::size_t> index;  // into UnitHistory::constants
   std::string why;                   // it applies, or why nothing does
   bool conflict = false;             // a person must decide ('sixpoint store prefer')
+  // Where nothing applies: the sets of this configuration that were withdrawn, when and why.
+  std::string withdrawn;
   // Of every set of the history: why it applies or does not.
   std::vector<std::string> about;
 };

@@ -101,9 +101,10 @@ Status ConstantsFinder::ask_store(const Survey& survey, ConstantsChoice& choice)
   } else {
     SIXPOINT_ASSIGN(found, ConstantsSnapshot::of_unit(*options_.store, survey.facts.serial));
   }
-  if (!found.has_value()) {
+  if (!found.has_value() || !found->withdrawn.empty()) {
     choice.reasons.push_back(fmt::format(
-        "the store holds no constants of {} under the current configuration", survey.facts.serial));
+        "the store holds no constants of {} under the current configuration{}", survey.facts.serial,
+        found ? fmt::format(" that apply; withdrawn: {}", found->withdrawn) : ""));
     return {};
   }
   if (!found->conflict.empty()) {

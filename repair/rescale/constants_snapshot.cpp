@@ -20,6 +20,9 @@ Result<std::optional<ConstantsSnapshot::Entry>> ConstantsSnapshot::of_unit(
   if (applying.conflict) {
     return std::optional(Entry{"", "", applying.why});
   }
+  if (!applying.index && !applying.withdrawn.empty()) {
+    return std::optional(Entry{"", "", "", applying.withdrawn});
+  }
   if (!applying.index) {
     return std::optional<Entry>();
   }
@@ -45,7 +48,8 @@ std::string ConstantsSnapshot::to_json_lines() const {
     text += Json{{"serial", serial},
                  {"id", entry.id},
                  {"document", entry.document},
-                 {"conflict", entry.conflict}}
+                 {"conflict", entry.conflict},
+                 {"withdrawn", entry.withdrawn}}
                 .dump(-1, ' ', false, Json::error_handler_t::replace);
     text += '\n';
   }
@@ -63,9 +67,10 @@ Result<ConstantsSnapshot> ConstantsSnapshot::parse(std::string_view text) {
       return fail(ErrorCode::bad_data, "a line of the constants is damaged", {},
                   "make the plan anew");
     }
-    snapshot.entries_[json["serial"].get<std::string>()] = {json["id"].get<std::string>(),
-                                                            json["document"].get<std::string>(),
-                                                            json["conflict"].get<std::string>()};
+    snapshot.entries_[json["serial"].get<std::string>()] = {
+        json["id"].get<std::string>(), json["document"].get<std::string>(),
+        json["conflict"].get<std::string>(),
+        is_text("withdrawn") ? json["withdrawn"].get<std::string>() : ""};
   }
   return snapshot;
 }

@@ -21,11 +21,13 @@ class ConstantsSnapshot {
     std::string id;        // in the store
     std::string document;  // JSON in the form of constants.json
     std::string conflict;  // instead of both: why a person must decide (applying_constants.h)
+    // Instead of all three: none apply, because these were withdrawn (applying_constants.h).
+    std::string withdrawn = {};
   };
 
-  // The constants under `current` that apply, of every unit of the store.
+  // The constants under `current` that apply or were withdrawn, of every unit of the store.
   static Result<ConstantsSnapshot> of_store(db::Store& store);
-  // Of one unit; nothing where no constants apply.
+  // Of one unit; nothing where there are none.
   static Result<std::optional<Entry>> of_unit(db::Store& store, const std::string& serial);
   // What to_json_lines() wrote; bad_data otherwise.
   static Result<ConstantsSnapshot> parse(std::string_view text);

@@ -35,6 +35,9 @@ constexpr std::uint64_t kOnThreadsFrom = std::uint64_t{4} << 20;
 
 constexpr const char* kNotDecided =
     "what cannot be told affected is not repaired: find out what is missing first";
+constexpr const char* kNotUndone =
+    "the file's own constants cannot be undone, so no other constants help: without them its "
+    "samples cannot be put right";
 constexpr const char* kDoneBefore = "repaired by an earlier run";
 constexpr const char* kMadeOtherwise =
     "the output that is there was made with other constants, options or rules than would be used "
@@ -99,6 +102,7 @@ class Repair {
       report_.error = status.error();
       report_.reasons.push_back(status.error().brief());
       report_.output.clear();
+      report_.still_error_after_mg.reset();  // of nothing
     }
     return std::move(report_);
   }
@@ -142,7 +146,9 @@ class Repair {
     }
     if (report_.method.empty()) {
       if (survey_.constants_problem.has_value()) {
-        return fail(*survey_.constants_problem);
+        Error error = *survey_.constants_problem;
+        error.hint = kNotUndone;
+        return fail(std::move(error));
       }
       SIXPOINT_CHECK(choose());
       if (!chosen_.has_value() || !may_write()) {
@@ -314,17 +320,21 @@ class Repair {
     return true;
   }
 
-  // The gate once more, with what was written. Without constants there was no gate.
+  // The gate once more, with what was written, which report and mark state from here on. Without
+  // constants there was no gate.
   bool may_be_kept(RescaledLog& log, std::span<const StillWindow> windows) {
+    const auto written_mg = log.still_error_mg(windows);
+    if (written_mg) {
+      report_.still_error_after_mg = written_mg;
+    }
     if (!evidence_) {
       return true;
     }
-    evidence_->written_mg = log.still_error_mg(windows);
+    evidence_->written_mg = written_mg;
     const GateAnswer answer = gate(*evidence_, options_.force);
     if (answer.row != GateRow::rounded_away) {
       return true;
     }
-    report_.still_error_after_mg = evidence_->written_mg;
     report_.reasons.push_back(answer.reason);
     report_.forced = answer.forced;
     if (answer.forced) {
@@ -386,12 +396,9 @@ class Repair {
     return options;
   }
 
-  void take(RescaledLog& log, std::span<const StillWindow> windows) {
+  void take(const RescaledLog& log) {
     report_.clipped_before = log.tally().clipped_before;
     report_.clipped_after = log.tally().clipped_after;
-    if (const auto after_mg = log.still_error_mg(windows)) {
-      report_.still_error_after_mg = after_mg;
-    }
     if (report_.clipped_after > 0) {
       report_.reasons.push_back(fmt::format(
           kClipped, report_.clipped_before, report_.clipped_after,
@@ -453,7 +460,7 @@ class Repair {
         if (!may_be_kept(*log, windows)) {
           return not_repairable();
         }
-        finish(recording, *log, windows);
+        finish(recording, *log);
         return is_done ? take_earlier_output(mark.value_or(Json())) : Status();
       }
       output_files_.replaces = earlier == EarlierOutput::outdated;
@@ -467,13 +474,12 @@ class Repair {
       return not_repairable();
     }
     SIXPOINT_CHECK(commit(written_->writer));
-    finish(written_->recording, *written_->log, windows);
+    finish(written_->recording, *written_->log);
     return {};
   }
 
-  void finish(const gt3x::Recording& recording, RescaledLog& log,
-              std::span<const StillWindow> windows) {
-    take(log, windows);
+  void finish(const gt3x::Recording& recording, const RescaledLog& log) {
+    take(log);
     name_what_was_not_repaired(recording, log.tally().epoch_records);
     take_status_of_written();
   }
@@ -598,7 +604,7 @@ class Repair {
     }
     SIXPOINT_ASSIGN(report_.input_sha256, file_sha256(env_.files, report_.input));
     if (text_in(*mark, "input_sha256") == report_.input_sha256) {
-      report_.status = RepairStatus::outdated;
+      call_outdated();
       report_.reasons.push_back(
           fmt::format("an earlier run wrote {}, which would not be written now: look at the two, "
                       "and remove it",
@@ -607,10 +613,16 @@ class Repair {
     return {};
   }
 
+  // The output that is there stays: nothing was made that a still error could be stated of.
+  void call_outdated() {
+    report_.status = RepairStatus::outdated;
+    report_.still_error_after_mg.reset();
+  }
+
   // What is there is neither taken nor replaced.
   Status leave_earlier_output(EarlierOutput earlier) {
     if (earlier == EarlierOutput::outdated) {
-      report_.status = RepairStatus::outdated;
+      call_outdated();
       report_.reasons.emplace_back(kMadeOtherwise);
       return {};
     }

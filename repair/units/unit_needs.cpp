@@ -40,6 +40,10 @@ std::string what_would_help(const UnitNeeds& unit) {
     if (!unit.sides_missing.empty()) {
       return fmt::format("{}{}: {}", wait, never, kHowTo);
     }
+    if (unit.own_asked) {
+      return fmt::format("{}all sides were up, but the still periods do not suffice: {}", wait,
+                         kHowTo);
+    }
     return fmt::format(
         "{}all sides were up: --or-scan uses the unit's own still periods; where these do not "
         "suffice, {}",
@@ -57,10 +61,14 @@ std::string what_would_help(const UnitNeeds& unit) {
   return "";
 }
 
+UnitTable::UnitTable(const std::vector<SourceKind>& asked)
+    : own_asked_(std::ranges::find(asked, SourceKind::scan) != asked.end()) {}
+
 void UnitTable::add(const RepairReport& report) {
   Unit& unit = units_[report.serial];
   UnitNeeds& needs = unit.needs;
   needs.serial = report.serial;
+  needs.own_asked = own_asked_;
   ++needs.files;
   if (report.status == RepairStatus::failed) {
     ++needs.failed;
@@ -107,6 +115,7 @@ void UnitTable::add(const std::string& serial, const UnitAnswer& answer) {
   Unit& unit = units_[serial];
   UnitNeeds& needs = unit.needs;
   needs.serial = serial;
+  needs.own_asked = true;
   needs.files += answer.files;
   needs.affected += answer.files;
   const bool helped = answer.record || answer.own_suffices;

@@ -1,7 +1,7 @@
 // What is missing, per unit: how many of its files are affected and repaired, which sides were up
 // in their still periods, and what would help the rest.
 //
-//   UnitTable table;
+//   UnitTable table({SourceKind::store, SourceKind::scan});
 //   table.add(report);                     // of every file
 //   for (const UnitNeeds& unit : table.rows()) {
 //     unit.help;   // "3 files wait for constants; -z was never up: put the unit on the jig, ..."
@@ -15,9 +15,11 @@
 // | some have no constants, and its sets or files contradict    | the jig: a person must decide  |
 // | ... and a side was never up                                 | that side: the jig, or a       |
 // |                                                             | calibration file               |
-// | ... and all sides were up                                   | --or-scan; where the still     |
-// |                                                             | periods do not verify: the     |
-// |                                                             | jig, or a calibration file     |
+// | ... and all sides were up, the still periods were asked     | they do not suffice: the jig,  |
+// |                                                             | or a calibration file          |
+// | ... and all sides were up, they were not asked              | --or-scan; where they do not   |
+// |                                                             | suffice: the jig, or a         |
+// |                                                             | calibration file               |
 // | all have constants that were not applied or are outdated    | their reasons                  |
 // | they were only scanned                                      | repair; and the sides, if any  |
 //
@@ -32,6 +34,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "repair/rescale/repair_file.h"
+#include "repair/rescale/sources.h"
 #include "repair/triage/scan_file.h"
 #include "repair/units/unit_answer.h"
 
@@ -48,6 +51,7 @@ struct UnitNeeds {
   std::size_t cannot_tell = 0;  // whether they are affected
   std::size_t failed = 0;       // could not be read or written
   bool contradiction = false;
+  bool own_asked = false;                  // the files' own still periods were asked for constants
   std::vector<std::string> sides_covered;  // by the affected files together
   std::vector<std::string> sides_missing;
   std::string help;
@@ -56,6 +60,9 @@ std::string what_would_help(const UnitNeeds& unit);
 
 class UnitTable {
  public:
+  // `asked`: the sources of constants of the run whose reports are added (repair/rescale/sources.h).
+  explicit UnitTable(const std::vector<SourceKind>& asked = {});
+
   void add(const RepairReport& report);
   void add(const ScannedFile& file);
   // Of a plan: its affected files are those that were asked for their still periods.
@@ -69,6 +76,7 @@ class UnitTable {
     UnitNeeds needs;
     std::set<std::string> sides;
   };
+  bool own_asked_;
   std::map<std::string, Unit> units_;
 };
 

@@ -67,6 +67,17 @@ TEST(AtomicFile, TakesOverWhatAProcessThatIsGoneLeft) {
   EXPECT_THAT(*files.list(folder.path()), testing::ElementsAre("f"));
 }
 
+TEST(AtomicFile, SaysThatANameIsTooLongForTheTemporaryOne) {
+  const tests::TemporaryFolder folder;
+  ASSERT_OK(write_file(posix_env().files, folder / std::string(248, 'a'), "x"));
+  const std::string path = folder / std::string(249, 'a');
+  const Status status = write_file(posix_env().files, path, "x");
+  EXPECT_FAILS(status, ErrorCode::cannot_create);
+  EXPECT_EQ(status.error().where, path);
+  EXPECT_THAT(status.error().what, testing::HasSubstr("too long"));
+  EXPECT_THAT(status.error().hint, testing::HasSubstr("248 bytes"));
+}
+
 TEST(AtomicFile, LeavesWhatIsBeingWritten) {
   const tests::TemporaryFolder folder;
   FileSystem& files = posix_env().files;

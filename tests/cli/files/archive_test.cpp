@@ -274,6 +274,27 @@ TEST_F(ArchiveCommand, TwoInputsOfOneNameAndLinksOut) {
   EXPECT_EQ(merged.json()["summary"]["repaired"], 6);
 }
 
+TEST_F(ArchiveCommand, ALinkThatIsNotFollowedIsNamedAlsoWhereNoFileIsLeft) {
+  std::filesystem::create_directories(folder_ / "second");
+  EXPECT_OK(some_minutes(2, 300).write(files_, folder_ / "second/other.gt3x"));
+  std::filesystem::create_symlink(folder_ / "second", archive_ + "/sub/link");
+  const Answer planned = plan();
+  EXPECT_EQ(planned.exit_code, 66);
+  EXPECT_THAT(planned.people, HasSubstr("sub/link leads out of the tree"));
+}
+
+TEST_F(ArchiveCommand, ALinkInTheOutputFolderLeadsNoFileOut) {
+  std::filesystem::create_directories(archive_ + "/b");
+  EXPECT_OK(some_minutes(2, 300).write(files_, archive_ + "/b/a.gt3x"));
+  std::filesystem::create_directories(out_);
+  std::filesystem::create_symlink(archive_ + "/sub", out_ + "/b");
+  ASSERT_EQ(plan().exit_code, 0);
+  const Answer ran = run_shard(0);
+  EXPECT_EQ(ran.exit_code, 73) << ran.people;
+  EXPECT_THAT(ran.out, HasSubstr("leads out of it"));
+  EXPECT_TRUE(std::filesystem::is_empty(archive_ + "/sub"));
+}
+
 TEST_F(ArchiveCommand, WrongCommandsHaveTheirExitCodes) {
   fill();
   EXPECT_EQ(run({"archive"}).exit_code, 64);

@@ -78,6 +78,35 @@ TEST_F(Manifest, KeepsTheFilesOfEarlierRuns) {
   EXPECT_EQ(json["files"][2]["input"], "c.gt3x");
 }
 
+TEST_F(Manifest, AnOutputThatIsOutdatedKeepsWhatIsKnownOfIt) {
+  write({repaired("a.gt3x"), repaired("b.gt3x")});
+  const auto outdated = [](const std::string& input) {
+    repair::RepairReport report;
+    report.input = input;
+    report.status = repair::RepairStatus::outdated;
+    report.still_error_before_mg = 112.34567;
+    report.input_sha256 = "aa";
+    return report;
+  };
+  for (int i = 0; i < 2; ++i) {
+    write({outdated("a.gt3x"), repaired("b.gt3x"), outdated("c.gt3x")});
+    EXPECT_THAT(text("out/manifest.csv"),
+                testing::EndsWith("output_sha256\r\n"
+                                  "a.gt3x,out/a.gt3x,outdated,store,0123,112.346,0.800,aa,bb\r\n"
+                                  "b.gt3x,out/b.gt3x,repaired,store,0123,112.346,0.800,aa,bb\r\n"
+                                  "c.gt3x,,outdated,,,112.346,,aa,\r\n"));
+  }
+}
+
+TEST_F(Manifest, WithoutItsJsonTheCsvIsSaidToBeHalf) {
+  write({repaired("a.gt3x")});
+  ASSERT_OK(memory_.files.remove("out/manifest.json"));
+  const auto half = check_manifest(memory_.files, "out");
+  EXPECT_FAILS(half, ErrorCode::cannot_create);
+  EXPECT_THAT(half.error().what, HasSubstr("manifest.json"));
+  EXPECT_THAT(half.error().what, HasSubstr("missing"));
+}
+
 TEST_F(Manifest, ARunThatWasRefusedLeavesTheEarlierLine) {
   write({repaired("a.gt3x"), repaired("b.gt3x")});
   const auto failed = [](const std::string& input, ErrorCode code) {

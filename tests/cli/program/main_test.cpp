@@ -10,6 +10,7 @@
 
 #include <gmock/gmock.h>
 
+#include "cli/program/interrupts.h"
 #include "cli/run_child.h"
 #include "temporary_folder.h"
 
@@ -91,12 +92,24 @@ void Main::expect_ended_by(int signal) {
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 3) << text("e");
-  EXPECT_THAT(text("e"), HasSubstr("sixpoint simulate --scenario"));
+  EXPECT_EQ(text("e"), "\nsixpoint: stopped; nothing was written\n");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out.gt3x"));
   EXPECT_FALSE(begun()) << "a temporary file stays";
 }
 
-TEST_F(Main, CtrlCEndsWithThreeAndSaysTheLine) { expect_ended_by(SIGINT); }
+TEST(StoppedText, FollowsTheTable) {
+  const auto says = [](const std::vector<std::string>& line) { return text_when_stopped(line); };
+  EXPECT_EQ(says({"archive", "plan", "a", "-o", "p"}), "\nsixpoint: stopped; no plan was made\n");
+  for (const char* command : {"scan", "inspect", "simulate"}) {
+    EXPECT_EQ(says({command, "a"}), "\nsixpoint: stopped; nothing was written\n");
+  }
+  EXPECT_EQ(says({"export", "a b", "-o", "o"}),
+            "\nsixpoint: stopped; what is done stays, and this line goes on:\n"
+            "  sixpoint export 'a b' -o o\n");
+  EXPECT_THAT(says({}), HasSubstr("this line goes on"));
+}
+
+TEST_F(Main, CtrlCEndsWithThreeAndSaysSo) { expect_ended_by(SIGINT); }
 
 // As a batch system and `kill` send it.
 TEST_F(Main, SigtermDoesTheSame) { expect_ended_by(SIGTERM); }

@@ -3,6 +3,7 @@
 #include "repair/archive/archive_run.h"
 
 #include "repair/archive/archive_fixture.h"
+#include "repair/archive/output_lock.h"
 
 namespace sixpoint::repair {
 namespace {
@@ -94,7 +95,7 @@ TEST_F(Archive, APowerCutAtEveryStepOfAShardLosesAndDoublesNothing) {
       }
     }
     // Nothing half-written is left over, neither beside the outputs nor beside the results.
-    EXPECT_TRUE(memory.files.list("/plan/results/00000.parts").value().empty()) << stop;
+    EXPECT_FALSE(memory.files.info("/plan/results/00000.parts")) << stop;
     for (const std::string folder : {"/repaired", "/plan/results"}) {
       const auto names = memory.files.list(folder).value();
       for (const std::string& name : names) {
@@ -163,6 +164,24 @@ TEST_F(Archive, TwoRunsOfOneShardAtATimeAreRefused) {
   };
   EXPECT_OK(run_shard(memory.env, "/plan", planned->plan, options));
   EXPECT_EQ(refused, 1U);
+}
+
+TEST_F(Archive, WhereRepairIsAtWorkNoShardBegins) {
+  MemoryEnv memory;
+  fill(memory.files, 6, 4);
+  const auto planned = plan(memory, draft(1));
+  ASSERT_OK(planned);
+  auto at_work = lock_for_repair(memory.files, "/repaired").value();
+  EXPECT_FAILS(run_shard(memory.env, "/plan", planned->plan, shard(0)), ErrorCode::cannot_create);
+  at_work.reset();
+  ShardRunOptions options = shard(0);
+  std::size_t refused = 0;
+  options.progress = [&](const RepairProgress&, std::size_t) {
+    refused += lock_for_repair(memory.files, "/repaired").value() == nullptr ? 1 : 0;
+  };
+  EXPECT_OK(run_shard(memory.env, "/plan", planned->plan, options));
+  EXPECT_EQ(refused, 5U) << "before each file and at the end";
+  EXPECT_NE(lock_for_repair(memory.files, "/repaired").value(), nullptr);
 }
 
 TEST_F(Archive, AFileThatChangedSinceThePlanIsReportedAndNotRepaired) {

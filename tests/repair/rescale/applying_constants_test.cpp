@@ -71,6 +71,26 @@ TEST(ApplyingConstants, WithdrawnAndOtherFiltersNever) {
   EXPECT_EQ(sets.applying(), withdrawn);
 }
 
+TEST(ApplyingConstants, WhatWasWithdrawnIsNamedWhereNothingApplies) {
+  const auto withdrawn = [](const Sets& sets) {
+    return applying_constants(sets.history, FilterConfiguration::current).withdrawn;
+  };
+  Sets sets;
+  EXPECT_EQ(withdrawn(sets), "");
+  sets.correct(sets.add("jig", 1, 1, 0, FilterConfiguration::legacy), "withdraw");
+  EXPECT_EQ(withdrawn(sets), "") << "of another configuration";
+  sets.correct(sets.add("jig", 2, 1), "withdraw");
+  EXPECT_EQ(withdrawn(sets), "set 1 on 1970-01-01 (because)");
+  for (int day = 3; day < 6; ++day) {
+    sets.correct(sets.add("jig", day, 1), "withdraw");
+  }
+  EXPECT_EQ(withdrawn(sets),
+            "set 4 on 1970-01-01 (because), set 3 on 1970-01-01 (because), set 2 on 1970-01-01 "
+            "(because) and 1 more");
+  sets.add("file_scan", 1, 9);
+  EXPECT_EQ(withdrawn(sets), "") << "one applies";
+}
+
 TEST(ApplyingConstants, TheMethodComesFirst) {
   Sets sets;
   const auto scan = sets.add("file_scan", 3, 0.5);

@@ -83,6 +83,20 @@ TEST_F(Finder, ANamedSourceThatDoesNotFitStopsUnlessOrScan) {
       << "why the named one was not used is said all the same";
 }
 
+TEST_F(Finder, ConstantsThatWereWithdrawnAreNamed) {
+  ASSERT_OK(store_.withdraw_constants(id_, "A. Tester", "wrong jig"));
+  ConstantsFinderOptions options;
+  options.store = &store_;
+  options.store_named = true;
+  expect_none(options, "withdrawn: ");
+  expect_none(options, "(wrong jig)");
+  const auto taken = ConstantsSnapshot::of_store(store_).value();
+  const auto snapshot = ConstantsSnapshot::parse(taken.to_json_lines()).value();
+  options.store = nullptr;
+  options.snapshot = &snapshot;
+  expect_none(options, "(wrong jig)");
+}
+
 TEST_F(Finder, TheDefaultStoreGoesOnToTheFileWhereItHasNothing) {
   ConstantsFinderOptions options;
   options.store = &empty_;

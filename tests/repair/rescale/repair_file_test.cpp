@@ -165,7 +165,10 @@ TEST_F(RepairFile, WhatRoundingTakesAwayAgainIsNotKept) {
     const RepairReport report = repair(options);
     EXPECT_EQ(report.status, status) << report.to_json().dump(1);
     EXPECT_THAT(report.reasons, testing::Contains(testing::HasSubstr("rounded to counts")));
-    EXPECT_GT(report.still_error_after_mg, report.still_error_before_mg);
+    EXPECT_EQ(report.still_error_after_mg.has_value(), status != RepairStatus::outdated);
+    if (report.still_error_after_mg) {
+      EXPECT_GT(report.still_error_after_mg, report.still_error_before_mg);
+    }
     EXPECT_TRUE(output() == before);
   };
   expect_refused({}, RepairStatus::not_repairable);
@@ -504,6 +507,7 @@ TEST_F(RepairFile, DividesByNoZero) {
   const Bytes broken = log_with(made, other.parameters());
   ASSERT_OK(made.write(memory_.files, "in.gt3x", broken));
   expect_bad_data();
+  EXPECT_THAT(repair().error.value_or(Error{}).hint, testing::HasSubstr("no other constants help"));
 }
 
 TEST_F(RepairFile, AffectedFileWithoutConstantsIsBadData) {
@@ -602,6 +606,36 @@ void change_two_counts(FileSystem& files) {
   }
   ASSERT_OK(writer.commit());
   ASSERT_OK(files.rename("changed.gt3x", "out.gt3x"));
+}
+
+TEST_F(RepairFile, TheMarkStatesTheStillErrorThatTheReportStates) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  for (const bool wide : {false, true}) {
+    RepairOptions options;
+    options.wide = wide;
+    const RepairReport report = repair(options);
+    ASSERT_TRUE(report.still_error_after_mg);
+    const auto mark = mark_in(memory_.files, "out.gt3x");
+    ASSERT_TRUE(mark);
+    EXPECT_EQ((*mark)["still_error_mg"], report.to_json()["still_error_mg"]);
+    ASSERT_OK(memory_.files.remove("out.gt3x"));
+  }
+}
+
+TEST_F(RepairFile, WhatIsNotThereHasNoStillError) {
+  ASSERT_OK(six_sides().write(memory_.files, "in.gt3x"));
+  ASSERT_EQ(repair().status, RepairStatus::repaired);
+  const RepairReport refused = repair();
+  EXPECT_EQ(refused.status, RepairStatus::failed);
+  EXPECT_TRUE(refused.still_error_before_mg);
+  EXPECT_FALSE(refused.still_error_after_mg);
+  RepairOptions otherwise;
+  otherwise.wide = true;
+  otherwise.resume = true;
+  const RepairReport outdated = repair(otherwise);
+  EXPECT_EQ(outdated.status, RepairStatus::outdated);
+  EXPECT_TRUE(outdated.still_error_before_mg);
+  EXPECT_FALSE(outdated.still_error_after_mg);
 }
 
 TEST_F(RepairFile, AnOutputThatWasChangedIsNotTakenForDone) {

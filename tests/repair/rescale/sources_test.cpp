@@ -26,7 +26,7 @@ TEST(Sources, TheOrderByItsTable) {
   EXPECT_THAT(sources_in_order({no, no, yes, yes, no, no}), ElementsAre(kScan));
   EXPECT_THAT(sources_in_order({no, no, no, yes, no, no}), ElementsAre(kStore));
   EXPECT_THAT(sources_in_order({no, no, no, no, no, yes}), ElementsAre(kStore, kScan));
-  EXPECT_THAT(sources_in_order({}), ElementsAre(kScan));
+  EXPECT_THAT(sources_in_order(NamedSources{}), ElementsAre(kScan));
   EXPECT_THAT(sources_in_order({yes, yes, yes, yes, yes, yes}), ElementsAre(kConstantsFile, kScan));
   EXPECT_THAT(sources_in_order({no, yes, no, no, yes, yes}), ElementsAre(kCalibrationFile, kScan));
   EXPECT_THAT(sources_in_order({no, no, no, yes, yes, no}), ElementsAre(kStore, kScan));

@@ -10,6 +10,7 @@ namespace {
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 RepairReport affected(RepairStatus status, std::vector<std::string> sides) {
   RepairReport report;
@@ -47,6 +48,23 @@ TEST(UnitNeeds, AllSidesUpAndStillNotEnough) {
   const UnitNeeds row = only_row({affected(RepairStatus::not_repairable, kAll)});
   EXPECT_THAT(row.help, AllOf(HasSubstr("1 file waits"), HasSubstr("all sides were up: --or-scan"),
                               HasSubstr("put the unit on the jig")));
+}
+
+TEST(UnitNeeds, WhatWasTriedIsNotAdvised) {
+  UnitTable table({SourceKind::store, SourceKind::scan, SourceKind::unit_files});
+  table.add(affected(RepairStatus::not_repairable, kAll));
+  EXPECT_THAT(table.rows().at(0).help,
+              AllOf(HasSubstr("all sides were up"), HasSubstr("do not suffice"),
+                    HasSubstr("put the unit on the jig"), Not(HasSubstr("--or-scan"))));
+  UnitTable named({SourceKind::calibration_file});
+  named.add(affected(RepairStatus::not_repairable, kAll));
+  EXPECT_THAT(named.rows().at(0).help, HasSubstr("--or-scan"));
+  UnitAnswer together;
+  together.row = UnitRow::missing;
+  together.files = 2;
+  UnitTable planned;
+  planned.add("MOS2A1", together);
+  EXPECT_THAT(planned.rows().at(0).help, Not(HasSubstr("--or-scan"))) << "a plan asked them";
 }
 
 TEST(UnitNeeds, AContradictionIsForAPerson) {

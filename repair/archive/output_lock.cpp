@@ -1,0 +1,94 @@
+#include "repair/archive/output_lock.h"
+
+#include <fmt/format.h>
+
+#include "base/atomic_file.h"
+
+namespace sixpoint::repair {
+namespace {
+
+constexpr int kLockAttempts = 40;
+constexpr std::chrono::milliseconds kLockPause{50};
+
+constexpr std::string_view kShardPrefix = ".sixpoint-shard-";
+constexpr std::string_view kShardEnding = ".lock";
+constexpr std::size_t kPlanDigits = 16;
+
+std::string repair_lock_in(const std::string& folder) { return folder + "/.sixpoint-repair.lock"; }
+
+// Its file goes with it.
+class ShardsLock final : public FileLock {
+ public:
+  ShardsLock(FileSystem& files, std::string path, std::unique_ptr<FileLock> held)
+      : files_(files), path_(std::move(path)), held_(std::move(held)) {}
+  ShardsLock(const ShardsLock&) = delete;
+  ShardsLock& operator=(const ShardsLock&) = delete;
+  // Removed while it is held, so that no other run's file is.
+  ~ShardsLock() override { static_cast<void>(files_.remove(path_)); }
+
+ private:
+  FileSystem& files_;
+  std::string path_;
+  std::unique_ptr<FileLock> held_;
+};
+
+// Removes what killed shards left.
+bool a_shard_is_at_work(FileSystem& files, const std::string& folder) {
+  for (const std::string& name : files.list(folder).value_or(std::vector<std::string>{})) {
+    if (!name.starts_with(kShardPrefix) || !name.ends_with(kShardEnding)) {
+      continue;
+    }
+    const std::string path = fmt::format("{}/{}", folder, name);
+    auto lock = files.lock(path);
+    if (lock && *lock == nullptr) {
+      return true;
+    }
+    if (lock) {
+      const ShardsLock left_over(files, path, *std::move(lock));
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder) {
+  SIXPOINT_CHECK(make_synced_folders(files, folder));
+  SIXPOINT_ASSIGN(auto lock, files.lock(repair_lock_in(folder)));
+  if (lock != nullptr && a_shard_is_at_work(files, folder)) {
+    lock.reset();
+  }
+  return lock;
+}
+
+Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& folder,
+                                                 const std::string& plan_id, std::size_t shard) {
+  SIXPOINT_CHECK(make_synced_folders(env.files, folder));
+  const std::string path = fmt::format("{}/{}{}-{:05}{}", folder, kShardPrefix,
+                                       plan_id.substr(0, kPlanDigits), shard, kShardEnding);
+  SIXPOINT_ASSIGN(auto held, wait_for_lock(env, path));
+  if (held == nullptr) {
+    return nullptr;
+  }
+  std::unique_ptr<FileLock> own = std::make_unique<ShardsLock>(env.files, path, std::move(held));
+  const std::string of_repair = repair_lock_in(folder);
+  if (env.files.info(of_repair)) {
+    SIXPOINT_ASSIGN(const auto free, wait_for_lock(env, of_repair));
+    if (free == nullptr) {
+      own.reset();
+    }
+  }
+  return own;
+}
+
+Result<std::unique_ptr<FileLock>> wait_for_lock(Env& env, const std::string& path) {
+  for (int attempt = 0;; ++attempt) {
+    SIXPOINT_ASSIGN(auto lock, env.files.lock(path));
+    if (lock != nullptr || attempt == kLockAttempts) {
+      return lock;
+    }
+    env.clock.sleep(kLockPause);
+  }
+}
+
+}  // namespace sixpoint::repair

@@ -1,0 +1,38 @@
+// Who writes into an output folder at a time: one `repair`, or the shards of plans.
+//
+//   SIXPOINT_ASSIGN(const auto lock, lock_for_repair(files, "repaired"));
+//   if (lock == nullptr) {
+//     return fail(ErrorCode::cannot_create, "another run is repairing into this folder", "repaired");
+//   }
+//
+// | who begins     | `repair` is at work there | a shard is at work there | no one, or killed ones |
+// |----------------|---------------------------|--------------------------|------------------------|
+// | `repair`       | is refused                | is refused               | begins                 |
+// | a shard        | is refused                | begins                   | begins                 |
+//
+// A shard has a lock of its own in the folder, .sixpoint-shard-PLAN-NUMBER.lock, which it removes at
+// its end; `repair` has .sixpoint-repair.lock. Each takes its own one first and then looks at those
+// of the others, so of two that begin at once at least one sees the other. Two runs of one shard are
+// kept apart by the plan (archive_run.h).
+//
+// Answers as FileSystem::lock() does: null where another one is at work, an error where there are no
+// locks.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "base/env.h"
+
+namespace sixpoint::repair {
+
+// Both make the folder where it is not there.
+Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder);
+Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& folder,
+                                                 const std::string& plan_id, std::size_t shard);
+
+// As FileSystem::lock(), tried again for two seconds: others hold a lock for a moment to find out
+// whether a run does.
+Result<std::unique_ptr<FileLock>> wait_for_lock(Env& env, const std::string& path);
+
+}  // namespace sixpoint::repair
