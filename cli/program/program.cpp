@@ -113,7 +113,8 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
   }
   context.out.flush();
   if (!context.out) {
-    context.log().error("standard output could not be written; see that it is open and that its disk has space");
+    context.log().error(
+        "standard output could not be written; see that it is open and that its disk has space");
     return static_cast<int>(ErrorCode::io);
   }
   return context.exit_code;
