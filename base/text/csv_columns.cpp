@@ -19,6 +19,10 @@ Result<std::vector<CsvRow>> csv_columns(std::string_view csv,
                 fmt::format("the first line is '{}', and every line below has all of them",
                             fmt::join(names, ",")));
   };
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets begin with it
+  if (csv.starts_with(kByteOrderMark)) {
+    csv.remove_prefix(kByteOrderMark.size());
+  }
   std::istringstream lines{std::string(csv)};
   for (std::string line; std::getline(lines, line);) {
     ++line_number;

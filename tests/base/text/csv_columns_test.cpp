@@ -21,6 +21,12 @@ TEST(CsvColumns, AnyOrderAndFurtherColumns) {
   EXPECT_EQ((*rows)[1].line, 4U);
 }
 
+TEST(CsvColumns, AByteOrderMarkIsNoPartOfTheFirstName) {
+  const auto rows = csv_columns("\xEF\xBB\xBFserial,lot\n1,A\n", kNames, "f");
+  ASSERT_OK(rows);
+  EXPECT_EQ((*rows)[0].fields, (std::vector<std::string>{"1", "A"}));
+}
+
 TEST(CsvColumns, WhatIsNoTableIsRefusedWithItsLine) {
   for (const char* bad : {"", "serial,lot\n", "serial\n1\n", "\nserial,lot\n1,A\n", "\x80\n"}) {
     EXPECT_FAILS(csv_columns(bad, kNames, "f"), ErrorCode::bad_data);

@@ -5,6 +5,7 @@
 #include "base/sha256.h"
 #include "station/lanes/run_folder.h"
 #include "station/page/station_in_process.h"
+#include "station/records/run_records.h"
 
 namespace sixpoint::station {
 namespace {
@@ -65,6 +66,22 @@ TEST(LaneRun, ARunThatPassedIsWrittenAfterwards) {
   EXPECT_GT(second.raw_csv.size(), first.raw_csv.size()) << "the samples of both";
   EXPECT_TRUE(second.raw_csv.starts_with(first.raw_csv));
   EXPECT_EQ(station.post("/api/run", now), 409) << "once";
+
+  // In the store: one set of constants, which can be withdrawn, and one write.
+  auto store = db::Store::open(posix_env(), folder / "records.db");
+  ASSERT_OK(store);
+  for (const auto& [report, kind] : {std::pair(first, "jig"), {second, kWriteKind}}) {
+    db::RunRecord run = run_record_before({}, "MOS2A45130007", "J1");
+    run.kind = kind;
+    complete_run_record(run, report);
+    const auto ids = add_run_records(*store, report, run);
+    ASSERT_OK(ids);
+    EXPECT_EQ(ids->constants_id.has_value(), run.kind == "jig");
+  }
+  const auto history = store->unit_history("MOS2A45130007");
+  ASSERT_OK(history);
+  EXPECT_EQ(history->constants.size(), 1U);
+  EXPECT_EQ(history->writes.size(), 1U);
 }
 
 // The second pass after a fail would do; the write is none.
