@@ -115,16 +115,15 @@ Result<std::vector<RecallEntry>> Store::recall_list(const std::string& constants
   SIXPOINT_ASSIGN(
       const auto rows,
       database_->query(
-          fmt::format(
-              "SELECT {0}, w.made_at_ns, w.reason, (SELECT max(again.made_at_ns) FROM repairs "
-              "again "
-              "WHERE again.input_sha256 = repairs.input_sha256 AND again.input_sha256 <> '' "
-              "AND again.seq > repairs.seq AND NOT EXISTS (SELECT 1 FROM corrections w "
-              "WHERE w.about_id = again.constants_id AND {1})) FROM corrections w "
-              "JOIN repairs ON repairs.constants_id = w.about_id "
-              "WHERE {1}{2} ORDER BY repairs.seq, w.seq",
-              record_columns(repairs), kStillWithdrawn,
-              constants_id.empty() ? "" : " AND w.about_id = $1"),
+          fmt::format("SELECT {0}, w.made_at_ns, w.reason, "
+                      "(SELECT max(again.made_at_ns) FROM repairs again WHERE again.input_sha256 = "
+                      "repairs.input_sha256 AND again.input_sha256 <> '' "
+                      "AND again.seq > repairs.seq AND NOT EXISTS (SELECT 1 FROM corrections w "
+                      "WHERE w.about_id = again.constants_id AND {1})) FROM corrections w "
+                      "JOIN repairs ON repairs.constants_id = w.about_id "
+                      "WHERE {1}{2} ORDER BY repairs.seq, w.seq",
+                      record_columns(repairs), kStillWithdrawn,
+                      constants_id.empty() ? "" : " AND w.about_id = $1"),
           parameters));
   std::vector<RecallEntry> entries;
   for (const Row& row : rows) {
