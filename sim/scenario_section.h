@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -162,6 +163,42 @@ inline Result<std::vector<double>> parse_numbers(const Json& json, const std::st
     }
   }
   return numbers;
+}
+
+// What the numbers of an effect's parameter must be ("from 0 to 50"), where these are not possible:
+//
+// | parameter                                                     | possible numbers                   |
+// |---------------------------------------------------------------|------------------------------------|
+// | unit 1, between whole numbers (`order`, `matrix`)             | whole numbers of the range         |
+// | range above 0 (`corner_hz`)                                   | above 0, up to a hundred times its |
+// |                                                               | end                                |
+// | range from 0 on (`sd_deg`)                                    | from 0, up to a hundred times it   |
+// | range with negative numbers (`ppm`)                           | up to a hundred times the larger   |
+// |                                                               | end, of either sign                |
+// | of these three, unit 1 and a range within -1 to 1 (`rate`)    | at most 1: a share                 |
+inline std::optional<std::string> impossible(const Parameter& parameter,
+                                             const std::vector<double>& numbers) {
+  constexpr double kBeyond = 100;
+  const auto is_whole = [](double x) { return x == std::round(x); };
+  const bool share_or_count = parameter.unit == "1";
+  const bool whole =
+      share_or_count && parameter.low != 0 && is_whole(parameter.low) && is_whole(parameter.high);
+  const bool above = parameter.low > 0 && !whole;  // 0 itself is none
+  const double end = std::max(std::abs(parameter.low), parameter.high);
+  double most = share_or_count && end <= 1 ? 1 : kBeyond * end;
+  double least = parameter.low < 0 ? -most : 0;
+  if (whole) {
+    least = parameter.low;
+    most = parameter.high;
+  }
+  const bool possible = std::ranges::all_of(numbers, [&](double x) {
+    return (above ? x > least : x >= least) && x <= most && (!whole || is_whole(x));
+  });
+  if (possible) {
+    return std::nullopt;
+  }
+  return above ? fmt::format("above 0 and at most {:g}", most)
+               : fmt::format("{}from {:g} to {:g}", whole ? "whole, " : "", least, most);
 }
 
 // Of the parameters of an effect, which stand under `path`.

@@ -91,7 +91,7 @@ EffectKind bandwidth_kind() {
       {parameter(
            "corner_hz", "Hz", {25}, 5, 50,
            "ADXL362 datasheet: half or a quarter of the output data rate, 12.5 to 50 Hz at 100 Hz"),
-       whole_parameter("order", {4}, 1, 8, "steepness")});
+       parameter("order", "1", {4}, 1, 8, "steepness; whole number")});
 }
 
 }  // namespace sixpoint::sim

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -91,28 +90,6 @@ Result<ParameterSet> complete_parameters(const EffectKind& kind, const Parameter
     value->second = numbers;
   }
   return values;
-}
-
-std::optional<std::string> impossible(const Parameter& parameter,
-                                      const std::vector<double>& numbers) {
-  constexpr double kBeyond = 100;
-  const double end = std::max(std::abs(parameter.low), parameter.high);
-  double most = parameter.unit == "1" && end <= 1 ? 1 : kBeyond * end;
-  double least = parameter.low < 0 ? -most : 0;
-  if (parameter.whole) {
-    least = parameter.low;
-    most = parameter.high;
-  }
-  const bool above = parameter.low > 0 && !parameter.whole;  // 0 itself is none
-  const bool possible = std::ranges::all_of(numbers, [&](double x) {
-    return (above ? x > least : x >= least) && x <= most &&
-           (!parameter.whole || x == std::round(x));
-  });
-  if (possible) {
-    return std::nullopt;
-  }
-  return above ? fmt::format("above 0 and at most {:g}", most)
-               : fmt::format("{}from {:g} to {:g}", parameter.whole ? "whole, " : "", least, most);
 }
 
 std::vector<std::unique_ptr<Effect>> make_effects(const std::vector<EffectSpec>& specs,

@@ -30,7 +30,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -138,7 +137,6 @@ struct Parameter {
   double low = 0;                     // plausible range of each number
   double high = 0;
   std::string source;  // where default and range come from
-  bool whole = false;  // whole numbers of the range, and no others
 };
 
 // Values by parameter name, complete and checked: as many numbers as the parameter has.
@@ -178,18 +176,6 @@ Result<const EffectKind*> find_effect(std::string_view name);
 // Defaults for what `given` leaves out. configuration on an unknown name, a wrong count, or a
 // number that is not finite; a number outside the plausible range is allowed (tests need it).
 Result<ParameterSet> complete_parameters(const EffectKind& kind, const ParameterSet& given);
-
-// What the numbers of a scenario must be ("from 0 to 50"), where these are not possible:
-//
-// | parameter | possible numbers |
-// |---|---|
-// | whole numbers (`order`, `matrix`) | those of the plausible range |
-// | range above 0 (`corner_hz`) | above 0, up to a hundred times the end of the range |
-// | range from 0 on (`sd_deg`) | from 0, up to a hundred times the end |
-// | range with negative numbers (`ppm`) | up to a hundred times the larger end, of either sign |
-// | of these, ranges of unit 1 within -1 to 1 (`rate`) | at most 1: a share |
-std::optional<std::string> impossible(const Parameter& parameter,
-                                      const std::vector<double>& numbers);
 
 // An effect with its parameters, as a scenario or a protocol run has it.
 struct EffectSpec {

@@ -61,10 +61,6 @@ inline Parameter parameter(std::string name, std::string unit, std::vector<doubl
                            double low, double high, std::string source) {
   return {std::move(name), std::move(unit), std::move(default_value), low, high, std::move(source)};
 }
-inline Parameter whole_parameter(std::string name, std::vector<double> default_value, double low,
-                                 double high, std::string source) {
-  return {std::move(name), "1", std::move(default_value), low, high, std::move(source), true};
-}
 // A rotation about X by default, of at most `most_deg` about any axis (rotation_by_deg).
 inline Parameter rotation_parameter(double about_x_deg, double most_deg, std::string source) {
   return parameter("rotation_vector_deg", "deg", {about_x_deg, 0, 0}, -most_deg, most_deg,

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -9,6 +10,7 @@
 #include "expect_result.h"
 #include "sim/made_scenario.h"
 #include "sim/scenario.h"
+#include "sim/scenario_section.h"
 
 namespace sixpoint::sim {
 namespace {
@@ -140,6 +142,39 @@ TEST(ScenarioJson, AnErrorNamesThePathOfItsKey) {
     EXPECT_FAILS(scenario, ErrorCode::configuration);
     EXPECT_EQ(scenario.error().where, std::string("scenario: ") + row.path) << row.json;
     EXPECT_THAT(scenario.error().hint, HasSubstr("docs/scenario.md"));
+  }
+}
+
+// The rows of impossible()'s table, each with its limits.
+TEST(ScenarioJson, NumbersThatCannotBeAreTold) {
+  const auto parameter = [](const char* effect, std::string_view name) -> const Parameter& {
+    const auto& all = (*find_effect(effect))->parameters;
+    return *std::ranges::find(all, name, &Parameter::name);
+  };
+  struct Row {
+    const Parameter& parameter;
+    std::vector<double> possible;
+    std::vector<double> not_possible;
+    const char* words;
+  };
+  const std::vector<Row> rows = {
+      {parameter("bandwidth", "order"), {1, 2, 8}, {0, 9, 2.5, -1}, "whole, from 1 to 8"},
+      {parameter("axis_rotation", "matrix"), {-1, 0, 1}, {0.5, 2, -2}, "whole, from -1 to 1"},
+      {parameter("bandwidth", "corner_hz"),
+       {0.01, 5000},
+       {0, -5, 5001},
+       "above 0 and at most 5000"},
+      {parameter("seating", "sd_deg"), {0, 50}, {-0.1, 51}, "from 0 to 50"},
+      {parameter("clock_error", "ppm"), {-5e5, 5e5}, {-1e6, 1e6}, "from -500000 to 500000"},
+      {parameter("dropped_samples", "rate"), {0, 1}, {-0.1, 1.1}, "from 0 to 1"},
+      {parameter("non_orthogonality", "yz_xz_xy"), {-1, 1}, {-1.1, 1.1}, "from -1 to 1"},
+      {parameter("filter_mismatch", "gain"), {0.5, 2}, {0, -1}, "above 0 and at most 130"}};
+  for (const Row& row : rows) {
+    SCOPED_TRACE(row.parameter.name);
+    EXPECT_EQ(impossible(row.parameter, row.possible), std::nullopt);
+    for (const double x : row.not_possible) {
+      EXPECT_EQ(impossible(row.parameter, {row.possible[0], x}), row.words) << x;
+    }
   }
 }
 
