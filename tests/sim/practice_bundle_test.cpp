@@ -19,11 +19,9 @@
 namespace sixpoint::sim {
 namespace {
 
-using Json = nlohmann::json;
-
-Json read_json(const std::string& path) {
+nlohmann::json read_json(const std::string& path) {
   std::ifstream file(path);
-  return Json::parse(file);
+  return nlohmann::json::parse(file);
 }
 
 std::vector<std::vector<double>> read_csv(const std::string& path) {
@@ -43,18 +41,18 @@ std::vector<std::vector<double>> read_csv(const std::string& path) {
 }
 
 struct Practice {
-  Json protocol;
-  Json effects;  // as a scenario has them
+  nlohmann::json protocol;
+  nlohmann::json effects;  // as a scenario has them
   std::vector<gt3x::Counts> counts;
   std::vector<std::vector<double>> temperature;
   std::vector<std::vector<double>> clock;
 
   Scenario scenario(bool with_effects) const {
-    Json json;
+    nlohmann::json json;
     json["seed"] = 3;
     json["protocol"] = protocol["segments"];
     // The log's noise is not the unit's: smoothed over half a minute.
-    json["temperature"] = Json::array();
+    json["temperature"] = nlohmann::json::array();
     for (std::size_t i = 0; i < temperature.size(); i += 10) {
       const std::size_t low = i < 15 ? 0 : i - 15;
       const std::size_t high = std::min(temperature.size(), i + 16);
@@ -66,7 +64,7 @@ struct Practice {
     }
     json["unit"] = {{"gain", {1, 1, 1}}, {"offset_g", {0, 0, 0}}, {"noise_mg", {3.9, 3.9, 5.5}}};
     json["seating_sd_deg"] = 0;
-    json["effects"] = with_effects ? effects : Json::array();
+    json["effects"] = with_effects ? effects : nlohmann::json::array();
     auto parsed = parse_scenario(json.dump());
     EXPECT_TRUE(parsed) << parsed.error().what << " " << parsed.error().where;
     return parsed ? *parsed : Scenario{};
@@ -77,9 +75,9 @@ Practice read_practice(const std::string& name) {
   const std::string folder = tests::shared_file("gap/practice/" + name);
   Practice practice;
   practice.protocol = read_json(folder + "/protocol.json");
-  practice.effects = Json::array();
-  const Json labels = read_json(tests::shared_file("gap/practice/labels.json"));
-  for (const Json& effect : labels[name]["effects"]) {
+  practice.effects = nlohmann::json::array();
+  const nlohmann::json labels = read_json(tests::shared_file("gap/practice/labels.json"));
+  for (const nlohmann::json& effect : labels[name]["effects"]) {
     practice.effects.push_back({{"name", effect["name"]}, {"parameters", effect["parameters"]}});
   }
   practice.temperature = read_csv(folder + "/temperature.csv");
@@ -309,7 +307,7 @@ TEST(PracticeBundles, SettlingTakesMostOfTheRinging) {
   SIXPOINT_NEED_PRACTICE();
   for (const char* name : {"engineering/b0005", "production/b0012", "production/b0018"}) {
     Practice practice = read_practice(name);
-    for (Json& effect : practice.effects) {
+    for (nlohmann::json& effect : practice.effects) {
       if (effect["name"] == "settling") {
         effect["parameters"]["second_share"] = 0.27;
       }
