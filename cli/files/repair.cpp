@@ -154,21 +154,14 @@ void say_what_is_next(const RepairCommandOptions& options, const std::vector<Rep
   }
 }
 
-// One run at a time in an output folder (repair/archive/output_lock.h). Nothing where its file system has no locks.
 Result<std::unique_ptr<FileLock>> lock_of(const RepairCommandOptions& options, Context& context) {
   if (options.repair.dry_run) {
     return nullptr;
   }
-  SIXPOINT_CHECK(make_synced_folders(context.env.files, options.folder));
-  auto lock = repair::lock_for_repair(context.env.files, options.folder);
-  if (!lock) {
-    context.log().warn("{}: no lock: {}; let no other run write here", printable(options.folder),
-                       lock.error().what);
-    return nullptr;
-  }
-  if (*lock == nullptr) {
-    return fail(ErrorCode::cannot_create, "another run is repairing into this folder",
-                options.folder, "wait for it, or choose another folder");
+  SIXPOINT_ASSIGN(auto lock, repair::lock_for_repair(context.env.files, options.folder));
+  if (lock == nullptr) {
+    context.log().warn("{}: its file system has no locks; let no other run write here",
+                       printable(options.folder));
   }
   return lock;
 }

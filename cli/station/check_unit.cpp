@@ -37,20 +37,13 @@ Status decide(const CheckUnitCommandOptions& options, Context& context, const ch
   if (!options.expect.empty()) {
     SIXPOINT_ASSIGN(reason, station::reason_with_codes(options.expect, options.reason));
   }
-  if (action == "check_unit_end") {
-    SIXPOINT_ASSIGN(const auto units, station::check_units(store));
-    if (!units.contains(options.serial)) {
-      return fail(ErrorCode::no_input, "this is no check unit", printable(options.serial),
-                  "'sixpoint check-unit chart' names them");
-    }
-  }
   const db::StationEvent event{.station = options.station,
                                .serial = options.serial,
                                .action = action,
                                .operator_name = options.operator_name,
                                .reason = reason};
   Json json = document(command);
-  SIXPOINT_ASSIGN(json["stored_id"], store.add_station_event(event));
+  SIXPOINT_ASSIGN(json["stored_id"], station::add_decision(store, event));
   json["action"] = action;
   json["serial"] = options.serial;
   json["station"] = options.station;

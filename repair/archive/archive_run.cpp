@@ -49,7 +49,7 @@ class ShardRun {
                     fmt::format("shard {} is being repaired by another run", options_.shard),
                     folder_, "wait for it; 'sixpoint archive status' says how far it is");
       }
-      SIXPOINT_ASSIGN(output_lock, lock_output_folder());
+      SIXPOINT_ASSIGN(output_lock, lock_for_shard(env_, options_.output_folder, plan_.id, options_.shard));
     }
     SIXPOINT_CHECK(prepare_constants());
     ShardResult result;
@@ -96,19 +96,6 @@ class ShardRun {
           fmt::format("use -o {}, or make another plan", shell_word(*known)));
     }
     return {};
-  }
-
-  // Null where its file system has no locks, or it cannot be written: the files say so then.
-  Result<std::unique_ptr<FileLock>> lock_output_folder() {
-    auto lock = lock_for_shard(env_, options_.output_folder, plan_.id, options_.shard);
-    if (!lock) {
-      return nullptr;
-    }
-    if (*lock == nullptr) {
-      return fail(ErrorCode::cannot_create, "'sixpoint repair' is at work in the output folder",
-                  options_.output_folder, "wait for it, then run the shard again");
-    }
-    return lock;
   }
 
   Status prepare_constants() {

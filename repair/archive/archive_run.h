@@ -50,10 +50,11 @@ struct ShardRunOptions {
       [](const RepairProgress&, auto) {};
 };
 
-// cannot_create where another run holds the shard, or `repair` the output folder; usage where the output folder is another one
-// than before, or where it and the archive lie in one another; configuration where the calibration
-// file is not the one of the plan; io where results cannot be written. What becomes of single files
-// stands in their reports: bad_data for one that changed since the plan was made.
+// cannot_create where another run holds the shard, or `repair` the output folder; usage where the
+// output folder is another one than before, or where it and the archive lie in one another;
+// configuration where the calibration file is not the one of the plan; io where results cannot be
+// written. What becomes of single files stands in their reports: bad_data for one that changed
+// since the plan was made.
 Result<ShardResult> run_shard(Env& env, const std::string& folder, const ArchivePlan& plan,
                               const ShardRunOptions& options);
 

@@ -50,13 +50,21 @@ bool a_shard_is_at_work(FileSystem& files, const std::string& folder) {
   return false;
 }
 
+tl::unexpected<Error> refusal(const std::string& folder) {
+  return fail(ErrorCode::cannot_create, "another run is repairing into this folder", folder,
+              "wait for it, then run this again");
+}
+
 }  // namespace
 
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder) {
   SIXPOINT_CHECK(make_synced_folders(files, folder));
-  SIXPOINT_ASSIGN(auto lock, files.lock(repair_lock_in(folder)));
-  if (lock != nullptr && a_shard_is_at_work(files, folder)) {
-    lock.reset();
+  auto lock = files.lock(repair_lock_in(folder));
+  if (!lock) {
+    return nullptr;
+  }
+  if (*lock == nullptr || a_shard_is_at_work(files, folder)) {
+    return refusal(folder);
   }
   return lock;
 }
@@ -66,16 +74,19 @@ Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& fo
   SIXPOINT_CHECK(make_synced_folders(env.files, folder));
   const std::string path = fmt::format("{}/{}{}-{:05}{}", folder, kShardPrefix,
                                        plan_id.substr(0, kPlanDigits), shard, kShardEnding);
-  SIXPOINT_ASSIGN(auto held, wait_for_lock(env, path));
-  if (held == nullptr) {
+  auto held = wait_for_lock(env, path);
+  if (!held) {
     return nullptr;
   }
-  std::unique_ptr<FileLock> own = std::make_unique<ShardsLock>(env.files, path, std::move(held));
+  if (*held == nullptr) {
+    return refusal(folder);
+  }
+  auto own = std::make_unique<ShardsLock>(env.files, path, *std::move(held));
   const std::string of_repair = repair_lock_in(folder);
   if (env.files.info(of_repair)) {
     SIXPOINT_ASSIGN(const auto free, wait_for_lock(env, of_repair));
     if (free == nullptr) {
-      own.reset();
+      return refusal(folder);
     }
   }
   return own;

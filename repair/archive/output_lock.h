@@ -1,9 +1,6 @@
 // Who writes into an output folder at a time: one `repair`, or the shards of plans.
 //
-//   SIXPOINT_ASSIGN(const auto lock, lock_for_repair(files, "repaired"));
-//   if (lock == nullptr) {
-//     return fail(ErrorCode::cannot_create, "another run is repairing into this folder", "repaired");
-//   }
+//   SIXPOINT_ASSIGN(const auto lock, lock_for_repair(files, "repaired"));  // held while it lives
 //
 // | who begins     | `repair` is at work there | a shard is at work there | no one, or killed ones |
 // |----------------|---------------------------|--------------------------|------------------------|
@@ -14,9 +11,6 @@
 // its end; `repair` has .sixpoint-repair.lock. Each takes its own one first and then looks at those
 // of the others, so of two that begin at once at least one sees the other. Two runs of one shard are
 // kept apart by the plan (archive_run.h).
-//
-// Answers as FileSystem::lock() does: null where another one is at work, an error where there are no
-// locks.
 #pragma once
 
 #include <memory>
@@ -26,7 +20,8 @@
 
 namespace sixpoint::repair {
 
-// Both make the folder where it is not there.
+// Both make the folder where it is not there. cannot_create for "is refused"; null where the folder's
+// file system has no locks.
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder);
 Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& folder,
                                                  const std::string& plan_id, std::size_t shard);

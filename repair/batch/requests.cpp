@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "db/store.h"
+#include "repair/archive/output_lock.h"
 #include "repair/batch/jobs.h"
 #include "repair/batch/named_files.h"
 #include "repair/batch/repair_files.h"
@@ -166,6 +167,10 @@ Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& 
   how.unit = request.no_pool ? nullptr : &pool;
   UnitTable table(sources_in_order(how));
   ConstantsFinder finder(env, std::move(how));
+  std::unique_ptr<FileLock> lock;
+  if (!request.repair.dry_run) {
+    SIXPOINT_ASSIGN(lock, lock_for_repair(env.files, request.folder));
+  }
   auto named = named_files(env.files, request.paths, {".gt3x"}).files;
   leave_out_outputs(env.files, named, request.folder);
   refuse_same_outputs(named, request.folder);

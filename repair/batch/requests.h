@@ -58,7 +58,8 @@ struct Watching {
 };
 
 // {files, summary}. A file that cannot be read is an answer among the others; errors are those of
-// the store and of what the options name, and io for a scan that was stopped (a repair that was
+// of the store and of what the options name, cannot_create where another run is repairing into the
+// folder (repair/archive/output_lock.h), and io for a scan that was stopped (a repair that was
 // stopped answers for what it has done).
 Result<Json> run_scan(Env& env, const ScanRequest& request, const Watching& watching = {});
 Result<Json> run_repair(Env& env, const RepairRequest& request, const Watching& watching = {});

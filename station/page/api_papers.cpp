@@ -3,18 +3,9 @@
 #include <nlohmann/json.hpp>
 
 #include "station/page/api_answers.h"
+#include "station/printing/label_printer.h"
 
 namespace sixpoint::station {
-
-namespace {
-
-// The id of a run is hexadecimal; anything else could be a path.
-bool is_run_id(const std::string& run) {
-  return !run.empty() && run.size() <= 64 &&
-         run.find_first_not_of("0123456789abcdef") == std::string::npos;
-}
-
-}  // namespace
 
 ApiAnswer Api::get_document(const ApiRequest& request, const std::string& run,
                             const std::string& kind) const {

@@ -112,16 +112,9 @@ Result<Json> QualityControl::check_units() {
 }
 
 Result<std::string> QualityControl::decide(db::StationEvent decision) {
-  const auto is_blank = [](const std::string& text) {
-    return text.find_first_not_of(" \t") == std::string::npos;
-  };
-  if (is_blank(decision.operator_name) || is_blank(decision.reason)) {
-    return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
-                "both are stored with it");
-  }
   decision.station = station_;
   SIXPOINT_ASSIGN(auto store, open_store_());
-  SIXPOINT_ASSIGN(const std::string id, store.add_station_event(decision));
+  SIXPOINT_ASSIGN(const std::string id, add_decision(store, decision));
   refresh();
   return id;
 }

@@ -30,11 +30,6 @@ struct Entry {
   int failures = 0;
 };
 
-bool is_run_id(std::string_view run) {
-  return !run.empty() && run.size() <= 64 &&
-         run.find_first_not_of("0123456789abcdef") == std::string_view::npos;
-}
-
 std::string text_of(const Entry& entry) {
   const Json json = {{"schema", "sixpoint/label/1"}, {"run", entry.label.run},
                      {"serial", entry.label.serial}, {"state", entry.state},
@@ -60,6 +55,11 @@ Result<Entry> read_entry(FileSystem& files, const std::string& path) {
 }
 
 }  // namespace
+
+bool is_run_id(std::string_view run) {
+  return !run.empty() && run.size() <= 64 &&
+         run.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
 
 double retry_pause_s(int failures, const LabelPrinterOptions& options) {
   const double doubled = options.first_pause_s * std::pow(2.0, std::clamp(failures, 1, 60) - 1);

@@ -20,6 +20,7 @@
 #include <memory>
 #include <stop_token>
 #include <string>
+#include <string_view>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -29,8 +30,11 @@
 
 namespace sixpoint::station {
 
+// The id of a run is hexadecimal, with at most 64 digits; anything else could be a path.
+bool is_run_id(std::string_view run);
+
 struct Label {
-  std::string run;  // id, hexadecimal
+  std::string run;  // id
   std::string serial;
   std::string zpl;
 };

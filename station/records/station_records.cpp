@@ -415,8 +415,22 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
   return state;
 }
 
-Result<std::set<std::string>> check_units(db::Store& store) {
-  return store.station_events().map(check_units_of);
+Result<std::string> add_decision(db::Store& store, const db::StationEvent& decision) {
+  const auto is_blank = [](const std::string& text) {
+    return text.find_first_not_of(" \t") == std::string::npos;
+  };
+  if (is_blank(decision.operator_name) || is_blank(decision.reason)) {
+    return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
+                "both are stored with it");
+  }
+  if (decision.action == "check_unit_end") {
+    SIXPOINT_ASSIGN(const auto events, store.station_events());
+    if (!check_units_of(events).contains(decision.serial)) {
+      return fail(ErrorCode::no_input, "this is no check unit", printable(decision.serial),
+                  "'sixpoint check-unit chart' names them");
+    }
+  }
+  return store.add_station_event(decision);
 }
 
 Status may_write(db::Store& store, const std::string& serial, const std::string& constants_id) {

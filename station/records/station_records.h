@@ -14,7 +14,6 @@
 
 #include <chrono>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -80,8 +79,13 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
                                    const CheckUnitPolicy& policy,
                                    const std::optional<UtcTime>& now = {});
 
-// The check units of all stations.
-Result<std::set<std::string>> check_units(db::Store& store);
+// Adds an engineer's decision about a station or a unit to the store, and gives its id.
+//
+//   decision                                          answer
+//   without a name or without a reason (blanks only)  usage error
+//   check_unit_end of a unit that is no check unit    no_input error: a mistyped serial
+//   any other                                         added
+Result<std::string> add_decision(db::Store& store, const db::StationEvent& decision);
 
 // What a unit's earlier jig runs and releases demand of the next one.
 Result<RetestState> unit_retest_state(db::Store& store, const std::string& serial,

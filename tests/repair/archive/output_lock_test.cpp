@@ -14,9 +14,18 @@ constexpr const char* kOtherPlanId = "fedcba98765432100123";
 
 class OutputLock : public testing::Test {
  protected:
-  std::unique_ptr<FileLock> of_repair() { return lock_for_repair(memory_.files, "out").value(); }
+  // Null: refused. There are locks here.
+  static std::unique_ptr<FileLock> answer(Result<std::unique_ptr<FileLock>> lock) {
+    if (!lock) {
+      EXPECT_FAILS(lock, ErrorCode::cannot_create);
+      return nullptr;
+    }
+    EXPECT_NE(*lock, nullptr);
+    return *std::move(lock);
+  }
+  std::unique_ptr<FileLock> of_repair() { return answer(lock_for_repair(memory_.files, "out")); }
   std::unique_ptr<FileLock> of_shard(std::size_t shard, const char* plan = kPlanId) {
-    return lock_for_shard(memory_.env, "out", plan, shard).value();
+    return answer(lock_for_shard(memory_.env, "out", plan, shard));
   }
 
   MemoryEnv memory_;

@@ -5,6 +5,7 @@
 #include "base/memory_env.h"
 #include "expect_result.h"
 #include "gt3x_made_log.h"
+#include "repair/archive/output_lock.h"
 #include "repair/batch/reading.h"
 #include "repair/batch/stoppable_files.h"
 
@@ -52,6 +53,20 @@ TEST(Requests, OfARepairNameTheConstantsThatAreMissing) {
   ASSERT_OK(answer);
   EXPECT_EQ((*answer)["files"][0]["status"], "failed");
   EXPECT_EQ((*answer)["summary"]["failed"], 1);
+}
+
+TEST(Requests, OfARepairAreRefusedWhereAnotherRunIsAtWork) {
+  MemoryEnv memory;
+  ASSERT_OK(gt3x::tests::put_recording(memory.files, "a.gt3x", gt3x::tests::made_log(3)));
+  RepairRequest request;
+  request.paths = {"a.gt3x"};
+  request.folder = "out";
+  request.scan = true;
+  const auto at_work = lock_for_repair(memory.files, "out");
+  ASSERT_OK(at_work);
+  EXPECT_FAILS(run_repair(memory.env, request), ErrorCode::cannot_create);
+  request.repair.dry_run = true;
+  EXPECT_OK(run_repair(memory.env, request)) << "it writes nothing";
 }
 
 TEST(Requests, ThatAreStoppedReadNothingMore) {

@@ -104,6 +104,8 @@ TEST(LabelPrinter, PrintsEachRunOnceAndAgainWhenAsked) {
   EXPECT_EQ(sender.all().back(), "one");
   EXPECT_FAILS(printer->add({"../x", "MOS2A1", "three"}), ErrorCode::usage);
   EXPECT_FAILS(printer->add({"", "MOS2A1", "three"}), ErrorCode::usage);
+  EXPECT_FAILS(printer->add({"0123ABCD", "MOS2A1", "three"}), ErrorCode::usage);
+  EXPECT_FAILS(printer->add({std::string(65, 'a'), "MOS2A1", "three"}), ErrorCode::usage);
 }
 
 // The printer is away: the label is on the disk, is tried again and again, and says why; the next

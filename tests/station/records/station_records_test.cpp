@@ -39,6 +39,33 @@ TEST_F(StationRecords, ACheckUnitOutOfControlLocksItsStationUntilAnEngineerSigns
   EXPECT_FAILS(start("MOS2A1"), ErrorCode::configuration);
 }
 
+// The table of add_decision, row by row.
+TEST_F(StationRecords, ADecisionIsSignedAndRemovesOnlyACheckUnit) {
+  db::StationEvent decision;
+  decision.serial = "CHECK1";
+  decision.action = "check_unit";
+  decision.reason = "stays here";
+  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::usage);
+  decision.operator_name = "Eve";
+  decision.reason = " \t";
+  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::usage);
+  decision.reason = "stays here";
+  decision.action = "check_unit_end";
+  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input);
+  decision.action = "check_unit";
+  ASSERT_OK(add_decision(store_, decision));
+  decision.action = "check_unit_end";
+  decision.serial = "CHECK2";
+  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input);
+  decision.serial = "CHECK1";
+  const auto id = add_decision(store_, decision);
+  ASSERT_OK(id);
+  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input) << "it is none any more";
+  const auto events = store_.station_events();
+  ASSERT_OK(events);
+  EXPECT_EQ(events->size(), 2U);
+}
+
 // The table of the header, row by row.
 TEST_F(StationRecords, AKnownBadUnitMustFailAsItIsKnownTo) {
   const auto locked = [&](const std::string& station = "A") {
