@@ -165,11 +165,26 @@ inline Result<std::vector<double>> parse_numbers(const Json& json, const std::st
   return numbers;
 }
 
+inline bool names_each_axis_once(const std::vector<double>& matrix) {
+  const auto there = [&](std::size_t row, std::size_t column) {
+    return matrix[kAxes * row + column] != 0 ? 1 : 0;
+  };
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    if (there(i, 0) + there(i, 1) + there(i, 2) != 1 ||
+        there(0, i) + there(1, i) + there(2, i) != 1) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // What the numbers of an effect's parameter must be ("from 0 to 50"), where these are not possible:
 //
 // | parameter                                                     | possible numbers                   |
 // |---------------------------------------------------------------|------------------------------------|
-// | unit 1, between whole numbers (`order`, `matrix`)             | whole numbers of the range         |
+// | unit 1, between whole numbers (`order`, `matrix`)             | whole numbers of the range; of     |
+// |                                                               | nine, one of each row and column   |
+// |                                                               | is not 0: axes, each once          |
 // | range above 0 (`corner_hz`)                                   | above 0, up to a hundred times its |
 // |                                                               | end                                |
 // | range from 0 on (`sd_deg`)                                    | from 0, up to a hundred times it   |
@@ -194,6 +209,9 @@ inline std::optional<std::string> impossible(const Parameter& parameter,
   const bool possible = std::ranges::all_of(numbers, [&](double x) {
     return (above ? x > least : x >= least) && x <= most && (!whole || is_whole(x));
   });
+  if (possible && whole && numbers.size() == kAxes * kAxes && !names_each_axis_once(numbers)) {
+    return "0 but for one of each row and column";
+  }
   if (possible) {
     return std::nullopt;
   }

@@ -176,6 +176,13 @@ TEST(ScenarioJson, NumbersThatCannotBeAreTold) {
       EXPECT_EQ(impossible(row.parameter, {row.possible[0], x}), row.words) << x;
     }
   }
+  const Parameter& matrix = parameter("axis_rotation", "matrix");
+  EXPECT_EQ(impossible(matrix, {0, 0, -1, 1, 0, 0, 0, 1, 0}), std::nullopt);
+  for (const std::vector<double>& axes : {std::vector<double>(9, 0.0),
+                                          {1, 0, 0, 1, 0, 0, 0, 0, 1},
+                                          {1, 1, 0, 0, 1, 0, 0, 0, 1}}) {
+    EXPECT_EQ(impossible(matrix, axes), "0 but for one of each row and column");
+  }
 }
 
 // Oracle: the keys of a bundle's protocol.json, each with a value of its own.
