@@ -6,8 +6,8 @@
 //     return jig.go_to_corner(corner);
 //   }
 //
-// A corner is named as poses are (jig.h): "+x+y-z" has its x and y axes up and its z axis down, each
-// by 35 degrees from level.
+// A corner is named as poses are (jig.h): "+x+y-z" has its x and y axes up and its z axis down,
+// each by 35 degrees from level.
 #pragma once
 
 #include <array>
@@ -38,8 +38,8 @@ std::string to_string(const Corner& corner);         // "+x+y-z"
 Result<Corner> parse_corner(std::string_view text);  // usage when it is none
 PerAxis<double> direction_of(const Corner& corner);  // specific force at rest, in g
 
-// What a jig (jig.h) that also stands a unit on its corners offers besides: found by a dynamic_cast.
-// Threads and errors as for Jig::go_to().
+// What a jig (jig.h) that also stands a unit on its corners offers besides: found by a
+// dynamic_cast. Threads and errors as for Jig::go_to().
 class CornerJig {
  public:
   virtual ~CornerJig() = default;

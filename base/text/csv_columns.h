@@ -5,8 +5,8 @@
 //   rows[0].fields;  // "MOS1", "A"
 //
 // For what people keep in a spreadsheet: any order of the columns, further columns, empty lines,
-// line ends of any system, a byte-order mark; quotes are dropped, so that a field cannot hold a comma. Pure function;
-// any thread.
+// line ends of any system, a byte-order mark; quotes are dropped, so that a field cannot hold a
+// comma. Pure function; any thread.
 #pragma once
 
 #include <span>

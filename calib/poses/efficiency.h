@@ -42,8 +42,8 @@ struct DesignEfficiency {
 // `parameters`: 6 or 9.
 DesignEfficiency efficiency_of(const BlockFit& fit, int parameters);
 
-// The answer of `sixpoint solve`, of `capture` and of the Python package: to_json(report) and, where
-// there is a fit, "efficiency": how many parameters were fitted, and both efficiencies.
+// The answer of `sixpoint solve`, of `capture` and of the Python package: to_json(report) and,
+// where there is a fit, "efficiency": how many parameters were fitted, and both efficiencies.
 nlohmann::ordered_json solve_json(const SolveReport& report);
 
 }  // namespace sixpoint::calib

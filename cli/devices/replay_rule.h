@@ -1,5 +1,5 @@
-// What counts of a replayed session (docs/sessions.md): nothing, for it gives the answers of another
-// day.
+// What counts of a replayed session (docs/sessions.md): nothing, for it gives the answers of
+// another day.
 //
 //   SIXPOINT_CHECK(refuse_of_replay("replay:session.zip", "--certificate"));  // usage
 //

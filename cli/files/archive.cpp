@@ -177,9 +177,9 @@ class Merge {
         store_location_(options.sources.store.empty() ? plan.store : options.sources.store),
         table_(asked_by(plan)) {}
 
-  // The store that is named, else the one that the constants came from; and the output folder, which
-  // gets the manifest of the whole archive. Tasks that run at the same time leave none: each would
-  // write over those of the others.
+  // The store that is named, else the one that the constants came from; and the output folder,
+  // which gets the manifest of the whole archive. Tasks that run at the same time leave none: each
+  // would write over those of the others.
   Status open(const std::string& folder) {
     if (!store_location_.empty() && !options_.dry_run) {
       SIXPOINT_ASSIGN(auto opened, open_existing_store(context_, store_location_));
@@ -264,8 +264,8 @@ class Merge {
     }
   }
 
-  // The plan has the constants of the day on which it was made: those that were withdrawn since, with
-  // the files that were repaired with them and not again.
+  // The plan has the constants of the day on which it was made: those that were withdrawn since,
+  // with the files that were repaired with them and not again.
   Json withdrawn_since() {
     std::map<std::string, std::pair<std::size_t, std::string>> withdrawn;
     if (store_ && *store_ && !constants_.empty()) {

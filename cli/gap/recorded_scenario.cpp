@@ -32,7 +32,8 @@ Json segment_of(const gap::Segment& segment, std::uint64_t first_sample) {
   return json;
 }
 
-// Below 0.6 counts rounding hides how large the noise is, to some 12 %: what is as near to the simulator's is the simulator's.
+// Below 0.6 counts rounding hides how large the noise is, to some 12 %: what is as near to the
+// simulator's is the simulator's.
 double noise_of(double measured_mg, double nominal_mg, double accel_scale_lsb_per_g) {
   constexpr double kLeast_lsb = 0.6;
   constexpr double kHidden = 0.15;

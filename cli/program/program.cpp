@@ -52,7 +52,8 @@ std::string words_of_command(const CLI::App& app) {
   return words;
 }
 
-// A command line that is not understood; with --json also as the document of the command that was chosen.
+// A command line that is not understood; with --json also as the document of the command that was
+// chosen.
 void report_usage(const CLI::App& app, const std::vector<std::string>& arguments,
                   const CLI::ParseError& refused, Context& context) {
   Error error{ErrorCode::usage, printable(refused.what()), "",

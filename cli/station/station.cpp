@@ -72,8 +72,9 @@ std::string state_folder(const StationCommandOptions& options) {
 }
 
 // What the threads of the station ask of the command: the store, one thread at a time, because the
-// command's streams belong to one thread. The context is a copy, so that the command's exit code is not touched: the page
-// told of a run that went to the journal, and the station ends as it was told to.
+// command's streams belong to one thread. The context is a copy, so that the command's exit code is
+// not touched: the page told of a run that went to the journal, and the station ends as it was told
+// to.
 class StationStore {
  public:
   StationStore(Context& context, const StationCommandOptions& options,

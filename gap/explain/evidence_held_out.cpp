@@ -145,7 +145,8 @@ Explanation::HeldOut Explanation::held_out(const std::set<std::string>& named) c
       const int feature = model_.feature_of_row(row);
       const double r0 = residual_of_row(w, row, nothing);
       const double r1 = residual_of_row(w, row, accepted);
-      // Known too badly to count in mg are harmonics of tones that fold back, and what they fold on.
+      // Known too badly to count in mg are harmonics of tones that fold back, and what they fold
+      // on.
       const double scale2 = nominal_variance_mg2(model_.block_of_row(row), feature);
       if (feature < kSecondHarmonic && scale2 <= kBadlyKnown_mg * kBadlyKnown_mg) {
         in_mg.add(r0, r1, scale2);

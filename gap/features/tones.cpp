@@ -13,8 +13,8 @@ constexpr std::size_t kShortestPiece = 10;  // three unknowns and some to test t
 // In squared residuals over their variance. Of white residuals the best cut gains about 25.
 constexpr double kCut = 60;
 constexpr double kPiece = 8;  // a cut and three unknowns
-// A row of steps has to be better than an even drift by this: the best of hundreds of places for a cut gains about 25 by chance,
-// and a true slip, hundreds.
+// A row of steps has to be better than an even drift by this: the best of hundreds of places for a
+// cut gains about 25 by chance, and a true slip, hundreds.
 constexpr double kClearlySteps = 24;
 
 // ToneSums over samples up to an index: enough to fit 1, cos, sin on any stretch.
@@ -242,8 +242,8 @@ class ToneAnalysis {
     }
   }
 
-  // The clock's error relative to the protocol that makes one unbroken tone fit best. The last grid is so fine that what it
-  // leaves of a tone of 1 g is below the noise.
+  // The clock's error relative to the protocol that makes one unbroken tone fit best. The last grid
+  // is so fine that what it leaves of a tone of 1 g is below the noise.
   double best_even_drift() {
     const auto n = static_cast<double>(y_.size());
     const double reach = 0.006;                      // beyond any clock of the catalogue

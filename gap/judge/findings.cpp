@@ -211,7 +211,8 @@ void finish(const Request& request, Findings found, Diagnosis& out) {
   const double above_floor =
       out.gap.before_mg * out.gap.before_mg - out.gap.floor_mg * out.gap.floor_mg;
   for (auto* list : {&found.effects, &found.candidates}) {
-    // What is named together is the whole at most: its sizes are not of the readings that the gap is measured on.
+    // What is named together is the whole at most: its sizes are not of the readings that the gap
+    // is measured on.
     double named_mg2 = 0;
     double largest_mg2 = 0;
     for (const EffectFinding& f : *list) {

@@ -53,8 +53,9 @@ void test_means(const Request& request, const Explanation& explanation, bool tru
   }
 }
 
-// Noise behind a low corner may be so small that rounding is no noise of its own any more: it follows the signal, and its
-// spectrum is not flat. Above 0.6 counts rms it nearly is (Widrow and Kollar, Quantization Noise, 2008, ch. 4).
+// Noise behind a low corner may be so small that rounding is no noise of its own any more: it
+// follows the signal, and its spectrum is not flat. Above 0.6 counts rms it nearly is (Widrow and
+// Kollar, Quantization Noise, 2008, ch. 4).
 bool is_below_rounding(const Request& request, const Response& response) {
   constexpr double kLeast_lsb = 0.6;
   constexpr int kSteps = 64;

@@ -13,8 +13,8 @@ constexpr double kHighest_c = 200;  // a larger number is no temperature of a un
 
 using Row = std::pair<double, double>;
 
-// The rows of two numbers under a header line that can be what the log says they are, by the first number.
-// How many others there are is a loss of the bundle.
+// The rows of two numbers under a header line that can be what the log says they are, by the first
+// number. How many others there are is a loss of the bundle.
 std::vector<Row> read_log(FileSystem& files, const std::string& path, const char* name,
                           bool (*possible)(const Bundle&, const Row&), Bundle& bundle) {
   std::vector<Row> rows;

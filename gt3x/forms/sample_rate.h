@@ -11,8 +11,8 @@
 
 namespace sixpoint::gt3x {
 
-// The "Sample Rate" of info.txt. bad_data, with `path` as the place, where there is none, where it is no number, and
-// outside 1 to `most_hz`: the message holds what stands there.
+// The "Sample Rate" of info.txt. bad_data, with `path` as the place, where there is none, where it
+// is no number, and outside 1 to `most_hz`: the message holds what stands there.
 Result<double> usable_sample_rate_hz(const Info& info, const std::string& path,
                                      double most_hz = 10'000);
 

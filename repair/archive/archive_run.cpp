@@ -49,7 +49,8 @@ class ShardRun {
                     fmt::format("shard {} is being repaired by another run", options_.shard),
                     folder_, "wait for it; 'sixpoint archive status' says how far it is");
       }
-      SIXPOINT_ASSIGN(output_lock, lock_for_shard(env_, options_.output_folder, plan_.id, options_.shard));
+      SIXPOINT_ASSIGN(output_lock,
+                      lock_for_shard(env_, options_.output_folder, plan_.id, options_.shard));
     }
     SIXPOINT_CHECK(prepare_constants());
     ShardResult result;

@@ -9,8 +9,8 @@
 // is not done again. At regular intervals, and at the end, what was done is written into the plan's
 // results/ (shard_results.h; written beside, synced, renamed, folder synced), the outputs appear
 // whole or not at all, and an output that is there without a result is known by its mark. Two runs
-// of one shard at a time are refused by a lock, and so is a shard whose output folder `repair` is at
-// work in (output_lock.h). Files that failed are tried again by the next run.
+// of one shard at a time are refused by a lock, and so is a shard whose output folder `repair` is
+// at work in (output_lock.h). Files that failed are tried again by the next run.
 // results/output.json names the output folder, the same for all shards.
 #pragma once
 

@@ -7,10 +7,10 @@
 // | `repair`       | is refused                | is refused               | begins                 |
 // | a shard        | is refused                | begins                   | begins                 |
 //
-// A shard has a lock of its own in the folder, .sixpoint-shard-PLAN-NUMBER.lock, which it removes at
-// its end; `repair` has .sixpoint-repair.lock. Each takes its own one first and then looks at those
-// of the others, so of two that begin at once at least one sees the other. Two runs of one shard are
-// kept apart by the plan (archive_run.h).
+// A shard has a lock of its own in the folder, .sixpoint-shard-PLAN-NUMBER.lock, which it removes
+// at its end; `repair` has .sixpoint-repair.lock. Each takes its own one first and then looks at
+// those of the others, so of two that begin at once at least one sees the other. Two runs of one
+// shard are kept apart by the plan (archive_run.h).
 #pragma once
 
 #include <memory>
@@ -20,8 +20,8 @@
 
 namespace sixpoint::repair {
 
-// Both make the folder where it is not there. cannot_create for "is refused"; null where the folder's
-// file system has no locks.
+// Both make the folder where it is not there. cannot_create for "is refused"; null where the
+// folder's file system has no locks.
 Result<std::unique_ptr<FileLock>> lock_for_repair(FileSystem& files, const std::string& folder);
 Result<std::unique_ptr<FileLock>> lock_for_shard(Env& env, const std::string& folder,
                                                  const std::string& plan_id, std::size_t shard);

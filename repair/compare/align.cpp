@@ -373,8 +373,8 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
         options.max_lag_s));
     return line;
   }
-  // Motion that goes on and off by a period swells alike at several lags: its minutes fit best at the
-  // right one.
+  // Motion that goes on and off by a period swells alike at several lags: its minutes fit best at
+  // the right one.
   std::vector<Candidate> candidates;
   std::optional<double> coarse;
   double best = 0;

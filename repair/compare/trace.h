@@ -74,7 +74,8 @@ struct Second {
   float sd_g = std::numeric_limits<float>::quiet_NaN();
 };
 
-// Of the samples of a second whose first is the one nearest to from_s, Unix time; NaN where fewer than half are there.
+// Of the samples of a second whose first is the one nearest to from_s, Unix time; NaN where fewer
+// than half are there.
 Second second_at(const Trace& trace, double from_s);
 
 }  // namespace sixpoint::repair

@@ -57,7 +57,8 @@ struct ConstantsFinderOptions {
 std::vector<SourceKind> sources_in_order(const ConstantsFinderOptions& options);
 
 // Solves the still blocks of a surveyed recording; serial and filter of the report are filled in.
-// bad_data where the recording's constants cannot be undone, its scale is not known, or it was repaired already.
+// bad_data where the recording's constants cannot be undone, its scale is not known, or it was
+// repaired already.
 Result<calib::SolveReport> solve_survey(const std::string& path, const Survey& survey,
                                         const calib::SolveOptions& options);
 

@@ -29,8 +29,8 @@
 // temperature and gravity together stay below 20 mg. In one to three directions wrong constants
 // look right by chance more often, so the limit is 20 mg there.
 //
-// May constants that are solved from a recording be used for other recordings? They undo the recording's own counts; these must
-// be the sensor's (why_not_lent()):
+// May constants that are solved from a recording be used for other recordings? They undo the
+// recording's own counts; these must be the sensor's (why_not_lent()):
 //
 // | the recording                                                                       | lends |
 // |-------------------------------------------------------------------------------------|-------|

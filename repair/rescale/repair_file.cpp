@@ -76,8 +76,8 @@ class Borrowed final : public gt3x::ByteSource {
   gt3x::ByteSource& source_;
 };
 
-// The output's place: what came there meanwhile stays, and an output that is replaced is one that was
-// judged (earlier_output.h).
+// The output's place: what came there meanwhile stays, and an output that is replaced is one that
+// was judged (earlier_output.h).
 class OutputFiles final : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;

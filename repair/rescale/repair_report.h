@@ -57,9 +57,9 @@ struct RepairReport {
   std::string verdict;  // of triage(); empty for a file that was not judged
   // Which sides were up in its still periods, by the file's own constants: out of "+x" ... "-z".
   std::vector<std::string> sides;
-  // Mean of |magnitude - 1 g| over still blocks. `after` is that of the samples as they were written,
-  // as the mark has it; of `not_repairable` what the constants would have made of them; absent of
-  // `outdated` and `failed`.
+  // Mean of |magnitude - 1 g| over still blocks. `after` is that of the samples as they were
+  // written, as the mark has it; of `not_repairable` what the constants would have made of them;
+  // absent of `outdated` and `failed`.
   std::optional<double> still_error_before_mg;
   std::optional<double> still_error_after_mg;
   bool rotation_undone = false;

@@ -60,7 +60,8 @@ std::string what_would_help(const UnitNeeds& unit);
 
 class UnitTable {
  public:
-  // `asked`: the sources of constants of the run whose reports are added (repair/rescale/sources.h).
+  // `asked`: the sources of constants of the run whose reports are added
+  // (repair/rescale/sources.h).
   explicit UnitTable(const std::vector<SourceKind>& asked = {});
 
   void add(const RepairReport& report);

@@ -13,8 +13,9 @@
 //   }
 //
 // Of each file up to kBlocksPerDirection blocks in each direction are kept, evenly taken, 56 bytes
-// each; of a file that may not lend its constants (repair/rescale/gate.h) none. Some 15 KB per file, so that 10,000 affected files take 150 MB. Solving takes a second or
-// so per unit. add() and ask() may be called from several threads, close() by one and once.
+// each; of a file that may not lend its constants (repair/rescale/gate.h) none. Some 15 KB per
+// file, so that 10,000 affected files take 150 MB. Solving takes a second or so per unit. add() and
+// ask() may be called from several threads, close() by one and once.
 #pragma once
 
 #include <map>

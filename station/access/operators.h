@@ -70,9 +70,9 @@ class Operators {
   Operators(Env& env, std::string path) : env_(env), path_(std::move(path)) {}
 
   Result<std::vector<Operator>> list() const;  // empty where there is no file
-  // A new operator, or a new role and PIN for this name. usage where the name is empty, over 60 bytes
-  // or looks like another one (blanks at its ends, characters that are not seen), or the PIN is not
-  // 4 to 12 digits.
+  // A new operator, or a new role and PIN for this name. usage where the name is empty, over 60
+  // bytes or looks like another one (blanks at its ends, characters that are not seen), or the PIN
+  // is not 4 to 12 digits.
   Status add(const std::string& name, OperatorRole role, const std::string& pin);
   Status disable(const std::string& name);  // no_input where there is none
 

@@ -30,8 +30,8 @@ struct CalibrationFileCheck {
   bool usable() const { return refusal.empty() && solved && solved->usable(); }
 };
 
-// A recording that may not lend its constants (repair/rescale/gate.h) is refused as well, and not solved.
-// no_input, bad_data for what is no recording or was repaired already.
+// A recording that may not lend its constants (repair/rescale/gate.h) is refused as well, and not
+// solved. no_input, bad_data for what is no recording or was repaired already.
 Result<CalibrationFileCheck> check_calibration_file(Env& env, const std::string& path,
                                                     const calib::SolveOptions& options = {});
 

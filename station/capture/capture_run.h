@@ -38,8 +38,9 @@ struct CaptureOptions {
   std::string output;  // the .gt3x to make
   int rate_hz = 30;    // what the customers' own recordings have
   // The eight corners after the six sides: they show the cross-axis terms, which six sides cannot
-  // (calib/poses/efficiency.h), and directions to test the constants with. Only where asked for, since it
-  // takes more than twice as long. usage where the jig turns by itself and is no CornerJig.
+  // (calib/poses/efficiency.h), and directions to test the constants with. Only where asked for,
+  // since it takes more than twice as long. usage where the jig turns by itself and is no
+  // CornerJig.
   bool corners = false;
   // A side needs three still blocks of 4 s, and at 30 Hz a noisy z axis loses half of them to the
   // paper's second criterion.

@@ -72,8 +72,8 @@ JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions&
   return report;
 }
 
-// Of a run that another person took over, or whose constants another person wrote. Names that the store
-// does not take together (db::check_name) leave the one who ended it.
+// Of a run that another person took over, or whose constants another person wrote. Names that the
+// store does not take together (db::check_name) leave the one who ended it.
 std::string both_names(const std::string& began, const std::string& ended) {
   if (began == ended || began.ends_with(", then " + ended)) {
     return began;
@@ -102,7 +102,8 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
     return end_unmeasured(state.serial, "refused", {allowed.error().what, allowed.error().hint},
                           allowed.error().brief());
   }
-  // "Write now" is no second run: what its readings had to show, they had to show when they were taken.
+  // "Write now" is no second run: what its readings had to show, they had to show when they were
+  // taken.
   session.retest = left && left->retest ? *left->retest : *allowed;
   saver.set_retest(session.retest);
   if (state.kind == kWriteKind) {

@@ -39,8 +39,8 @@ struct UnfinishedRun {
   JigProtocol protocol = JigProtocol::production;
   // What the unit's earlier runs demanded when it was measured; nothing where that was not noted.
   std::optional<RetestState> retest = {};
-  // Of the rows of samples when this was saved: a run whose placements were measured on rows that are
-  // lost is not gone on with.
+  // Of the rows of samples when this was saved: a run whose placements were measured on rows that
+  // are lost is not gone on with.
   std::size_t rows_bytes = 0;
   std::string rows_sha256 = {};  // empty: of an earlier version, which did not note it
   JigResume resume = {};
@@ -59,8 +59,8 @@ class RunFolder {
  public:
   RunFolder(Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
 
-  // Nothing where there is no unfinished run. bad_data where the state or the rows that it was saved
-  // with are damaged; the files stay.
+  // Nothing where there is no unfinished run. bad_data where the state or the rows that it was
+  // saved with are damaged; the files stay.
   Result<std::optional<UnfinishedRun>> load();
   Status save(const UnfinishedRun& run);  // all but resume.raw_csv
   Status append(std::string_view rows);   // synced once a second

@@ -35,8 +35,8 @@ struct RunIds {
   std::string run_id;
   std::optional<std::string> constants_id;  // of a usable report that is no study
 };
-// The run with its samples. Of a run of kind "jig" or "write" also what was written into the unit; of
-// kind "jig" the constants: those of a write are the constants of the run before it.
+// The run with its samples. Of a run of kind "jig" or "write" also what was written into the unit;
+// of kind "jig" the constants: those of a write are the constants of the run before it.
 Result<RunIds> add_run_records(db::RecordWriter& writer, const JigReport& report,
                                const db::RunRecord& run);
 

@@ -178,9 +178,8 @@ TEST(ScenarioJson, NumbersThatCannotBeAreTold) {
   }
   const Parameter& matrix = parameter("axis_rotation", "matrix");
   EXPECT_EQ(impossible(matrix, {0, 0, -1, 1, 0, 0, 0, 1, 0}), std::nullopt);
-  for (const std::vector<double>& axes : {std::vector<double>(9, 0.0),
-                                          {1, 0, 0, 1, 0, 0, 0, 0, 1},
-                                          {1, 1, 0, 0, 1, 0, 0, 0, 1}}) {
+  for (const std::vector<double>& axes :
+       {std::vector<double>(9, 0.0), {1, 0, 0, 1, 0, 0, 0, 0, 1}, {1, 1, 0, 0, 1, 0, 0, 0, 1}}) {
     EXPECT_EQ(impossible(matrix, axes), "0 but for one of each row and column");
   }
 }

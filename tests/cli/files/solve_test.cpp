@@ -133,8 +133,9 @@ TEST_F(SolveCommand, MissingSidesAreNamedAndNothingIsStored) {
   EXPECT_EQ(with_prior.json()["verdict"], "rests_on_prior");
 }
 
-// Affected by its header, and right by the constants stored in it: other software leaves such a file, and what is solved from it
-// is not the sensor. Oracle: the sensor that the other file was made with.
+// Affected by its header, and right by the constants stored in it: other software leaves such a
+// file, and what is solved from it is not the sensor. Oracle: the sensor that the other file was
+// made with.
 TEST_F(SolveCommand, ARecordingThatOtherSoftwareCorrectedLendsNoConstants) {
   MadeRecording corrected = sides_recording({0, 1, 2, 3, 4, 5});
   corrected.constants = {{326, 287, 321}, {-201, -268, -199}, {61, 4, 61}};

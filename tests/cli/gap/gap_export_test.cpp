@@ -52,7 +52,8 @@ TEST_F(GapExport, TheSameSeedWritesTheSameBytes) {
   EXPECT_EQ(list["bundles"].size(), 6U);
 }
 
-// `--realistic` without a number is all of them (gap.md: `gap challenge --realistic --rates --export DIR`).
+// `--realistic` without a number is all of them (gap.md: `gap challenge --realistic --rates
+// --export DIR`).
 TEST_F(GapExport, RealisticWithoutANumberIsAll) {
   const auto made = [&](const std::vector<std::string>& share, const std::string& folder) {
     std::vector<std::string> arguments = {"gap", "challenge", "--realistic"};

@@ -27,7 +27,8 @@ TEST_F(CommandTest, DiagnosisOfASimulatedBundleFindsNoGap) {
             0);
 }
 
-// The scenario of a diagnosis makes the recording's own protocol again: its rate, poses and their order. Oracle: protocol.json.
+// The scenario of a diagnosis makes the recording's own protocol again: its rate, poses and their
+// order. Oracle: protocol.json.
 TEST_F(CommandTest, TheScenarioOfADiagnosisHasTheRecordingsOwnProtocol) {
   std::ofstream(path("s.json"))
       << R"({"schema": "sixpoint/scenario/1", "seed": 3, "protocol": "production",

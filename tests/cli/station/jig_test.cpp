@@ -171,7 +171,8 @@ TEST_F(CommandTest, TheFirstCommandOfHelpEndsInAPass) {
   EXPECT_EQ(run(next).exit_code, 0);
 }
 
-// The table of what_it_holds() in cli/station/jig.cpp; its row of a run that was stopped behind a write is in faults_test.cpp.
+// The table of what_it_holds() in cli/station/jig.cpp; its row of a run that was stopped behind a
+// write is in faults_test.cpp.
 TEST_F(CommandTest, APassSaysWhetherTheUnitHoldsIt) {
   const std::string device = "virtual:seed=7,jig=auto";
   const auto written =

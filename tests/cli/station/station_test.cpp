@@ -366,7 +366,8 @@ TEST_F(StationCommand, AnOverdueJigMeasuresNothingOnThePageEither) {
   EXPECT_EQ(refused({"--device", "virtual:seed=7", "--jig-due", "soon"}).exit_code, 64);
 }
 
-// A run that the store did not take is in the journal, and the page says so: no reason for the station to end with an error.
+// A run that the store did not take is in the journal, and the page says so: no reason for the
+// station to end with an error.
 TEST_F(StationCommand, ARunInTheJournalDoesNotChangeHowItEnds) {
   ::setenv("XDG_DATA_HOME", path("data").c_str(), 1);
   Child station(arguments({"--port", "0", "--device", "virtual:seed=7,jig=auto"}));

@@ -51,8 +51,9 @@ TEST(Tones, AmplitudeAndSlips) {
   }
 }
 
-// The host's clock may be known to some ppm only: what its error leaves is an even drift of the phase and no row of steps, even
-// where the tone is large. A sample that is lost is found beside it.
+// The host's clock may be known to some ppm only: what its error leaves is an even drift of the
+// phase and no row of steps, even where the tone is large. A sample that is lost is found beside
+// it.
 TEST(Tones, AnEvenDriftIsNoRowOfSlips) {
   for (const double ppm : {-200.0, -60.0, -17.0, -5.0, 7.0, 23.0, 90.0, 310.0}) {
     for (const double amplitude_g : {0.6, 2.0}) {

@@ -42,8 +42,8 @@ TEST(JudgeMarks, WhatIsNotInTheCatalogueAlarms) {
   EXPECT_EQ(found.alarms[1].where, "codes: one value repeated for a second and more (300 samples)");
 }
 
-// What judge_codes() says of repeats beside 1/f noise of a density of 1 mg^2 / f, drawn here: pairs of
-// neighbours, and pairs whose further change has half the mean square ln 7 (mg^2).
+// What judge_codes() says of repeats beside 1/f noise of a density of 1 mg^2 / f, drawn here: pairs
+// of neighbours, and pairs whose further change has half the mean square ln 7 (mg^2).
 Findings judged_beside_flicker(bool accepted) {
   constexpr std::size_t kPairs = 360'000;
   const double lsb_mg = 1000.0 / 256;

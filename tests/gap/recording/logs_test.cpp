@@ -104,7 +104,8 @@ TEST(Logs, LineBreaksOfBothKindsAndALastLineWithoutOneAreRead) {
   EXPECT_TRUE(bundle.losses.empty());
 }
 
-// The mean is over seconds, not over rows: a log that pauses between two temperatures does not mix them.
+// The mean is over seconds, not over rows: a log that pauses between two temperatures does not mix
+// them.
 TEST(Logs, AMeanOfReadingsEndsAtAPause) {
   std::string rows;
   for (int t = 0; t < 40; ++t) {

@@ -39,7 +39,8 @@ TEST(Align, FindsAWholeLag) {
   EXPECT_NEAR(line.at(1150), 7, 0.01);
 }
 
-// A shaker that goes on and off: by swelling and fading alone, each multiple of its period is a lag.
+// A shaker that goes on and off: by swelling and fading alone, each multiple of its period is a
+// lag.
 TEST(Align, MotionThatGoesOnAndOffByAPeriodHasOneLag) {
   const auto moved = [](double t) {
     double sum = 0;

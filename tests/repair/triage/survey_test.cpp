@@ -136,8 +136,8 @@ TEST(Survey, TwoFirmwareVersionsAreBothKept) {
   EXPECT_EQ(found->facts.other_firmware, "");
 }
 
-// For the first samples the last PARAMETERS before them hold; another date behind them that leads to another answer leaves
-// none.
+// For the first samples the last PARAMETERS before them hold; another date behind them that leads
+// to another answer leaves none.
 TEST(Survey, OfTwoDatesOfCalibrationTheOneInForceHoldsOrNone) {
   constexpr std::int64_t kLater = 1'400'000'000;  // 2014-05-13
   const auto found_with = [](std::int64_t before, std::int64_t at_start, std::int64_t behind) {

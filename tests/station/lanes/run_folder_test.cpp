@@ -154,8 +154,8 @@ TEST(RunFolder, AnIncompleteLastRowIsLeftOut) {
   EXPECT_EQ((**lane.load()).resume.raw_csv, "t,x,y,z,c\n1,2,3,4,25\n");
 }
 
-// What the state says was measured on rows; without them the run is not gone on with. Rows that came
-// behind the state may be lost.
+// What the state says was measured on rows; without them the run is not gone on with. Rows that
+// came behind the state may be lost.
 TEST(RunFolder, ARunWhoseRowsAreNotAsTheyWereIsRefused) {
   const std::string rows = "t,x,y,z,c\n1,2,3,4,25\n";
   UnfinishedRun run = a_run();
