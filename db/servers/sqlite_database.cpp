@@ -35,6 +35,8 @@ Error to_error(const SQLite::Exception& exception, const std::string& path) {
       return {ErrorCode::permission, what, path,
               "make the file and its folder writable for this user"};
     case SQLITE_NOTADB:
+      return {ErrorCode::bad_data, what, path,
+              "name a store; if this was one, keep the file and restore the last backup"};
     case SQLITE_CORRUPT:
       return {ErrorCode::bad_data, what, path,
               "restore the last backup; keep the damaged file, 'audit verify' can say how far it "

@@ -123,7 +123,9 @@ TEST_F(SqliteStoreTest, ThoseThatMakeAStoreAtOnceAllHaveIt) {
 TEST_F(SqliteStoreTest, OpensOnlyStores) {
   std::ofstream(path()) << "this is a text file, long enough to be looked at as a database header "
                            "of one hundred bytes and more";
-  EXPECT_FAILS(open(), ErrorCode::bad_data);
+  const auto text_file = open();
+  EXPECT_FAILS(text_file, ErrorCode::bad_data);
+  EXPECT_THAT(text_file.error().hint, testing::HasSubstr("name a store"));
   EXPECT_FAILS(Store::open(memory_.env, folder_ / "none/store.db"), ErrorCode::cannot_create);
   const std::string other = folder_ / "other.db";
   sqlite3* handle = nullptr;

@@ -60,7 +60,7 @@ TEST_F(StationRecords, ADecisionIsSignedAndRemovesOnlyACheckUnit) {
   decision.serial = "CHECK1";
   const auto id = add_decision(store_, decision);
   ASSERT_OK(id);
-  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input) << "it is none any more";
+  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input);  // it is none any more
   const auto events = store_.station_events();
   ASSERT_OK(events);
   EXPECT_EQ(events->size(), 2U);
