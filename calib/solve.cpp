@@ -451,11 +451,11 @@ Result<ConstantsRecord> record_of(const SolveReport& report, UtcTime made_at,
                 "constants belong to a unit and cannot be stored without it");
   }
   if (!report.filter) {
-    return fail(ErrorCode::bad_data,
-                "it cannot be told under which filter configuration the recording was made",
-                report.serial,
-                "constants belong to a configuration and cannot be stored without; read them from "
-                "the answer");
+    return fail(
+        ErrorCode::bad_data,
+        "it cannot be told under which filter configuration the recording was made", report.serial,
+        "constants belong to a configuration and cannot be stored without; 'sixpoint solve' "
+        "of the recording, without --save, prints them");
   }
   ConstantsRecord record;
   record.serial = report.serial;

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <filesystem>
 
 #include <CLI/App.hpp>
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "base/atomic_file.h"
 #include "base/forwarding_files.h"
@@ -327,6 +330,11 @@ Status Outputs::file(std::string_view option, const std::string& path) {
     return fail(ErrorCode::cannot_create, "there is no such folder", folder,
                 fmt::format("make it, or choose another name for {}", option));
   }
+  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) != 0 &&
+      (errno == EACCES || errno == EROFS)) {
+    return fail(ErrorCode::permission, "this user may not write into the folder", folder,
+                fmt::format("choose another folder for {}", option));
+  }
   return {};
 }
 
@@ -343,12 +351,25 @@ Status Outputs::file_to_keep(std::string_view option, const std::string& path) {
   return {};
 }
 
+namespace {
+
+Status refuse_standard_output(std::string_view option, const std::string& path) {
+  return is_standard_output(path)
+             ? Status(fail(ErrorCode::usage, "standard output takes no folder",
+                           fmt::format("{} {}", option, path), "name a folder (./- is one)"))
+             : Status();
+}
+
+}  // namespace
+
 Status Outputs::folder(std::string_view option, const std::string& path) {
+  SIXPOINT_CHECK(refuse_standard_output(option, path));
   SIXPOINT_CHECK(take(option, path));
   return allow_folder(look_at_folder(files_->disk(), path), files_->force(), path);
 }
 
 Status Outputs::working_folder(std::string_view option, const std::string& path) {
+  SIXPOINT_CHECK(refuse_standard_output(option, path));
   SIXPOINT_CHECK(take(option, path));
   const FolderTarget target = look_at_folder(files_->disk(), path);
   return target == FolderTarget::filled ? Status{} : allow_folder(target, false, path);

@@ -14,6 +14,7 @@
 #include "cli/command.h"
 #include "db/records.h"
 #include "gt3x/forms/model.h"
+#include "repair/archive/archive_scripts.h"
 #include "station/records/run_records.h"
 
 namespace sixpoint::cli {
@@ -100,6 +101,13 @@ std::string journal_folder(const std::string& location) {
   return data_folder() + "/journal/" + store_name(location);
 }
 
+std::string catch_up_line(const std::string& location) {
+  const std::string file = store_file(location);
+  return std::string("sixpoint store catch-up") +
+         (location.empty() ? ""
+                           : " --store " + (file.empty() ? "STORE" : repair::shell_word(location)));
+}
+
 Result<db::Saved> keep_records(Context& context, const std::string& location,
                                Result<db::Store>& store,
                                const std::function<Status(db::RecordWriter&)>& work) {
@@ -123,9 +131,9 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
   if (kept->last_resort) {
     context.worsen(ErrorCode::io);
     context.log().warn(
-        "nothing is lost: it is kept in {}; when there is space again, store it with 'sixpoint "
-        "store catch-up --journal {}'",
-        kept->folder, kept->folder);
+        "nothing is lost: it is kept in {}; when there is space again, store it with '{} --journal "
+        "{}'",
+        kept->folder, catch_up_line(location), repair::shell_word(kept->folder));
     return kept;
   }
   if (kept->refusal->code != ErrorCode::device_unavailable) {
@@ -133,8 +141,8 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
   }
   context.log().warn(
       "nothing is lost: it is kept in this station's journal {}, and goes into the store before "
-      "the next one, or with 'sixpoint store catch-up'",
-      kept->folder);
+      "the next one, or with '{}'",
+      kept->folder, catch_up_line(location));
   return kept;
 }
 
@@ -220,6 +228,17 @@ Result<db::Store> open_existing_store(Context& context, const std::string& locat
     return fail(
         ErrorCode::no_input, "there is no store", path,
         "name one with --store, or make one with 'sixpoint jig' or 'sixpoint solve --save'");
+  }
+  // Opening it would make a store of an empty file; a store that was just made may still be in its
+  // log alone.
+  FileSystem& files = context.env.files;
+  const auto is_empty = [&files](const std::string& name) {
+    const auto info = files.info(name);
+    return !info || (info->kind == FileKind::file && info->size == 0);
+  };
+  if (!is_on_server(path) && is_empty(path) && is_empty(path + "-wal")) {
+    return fail(ErrorCode::bad_data, "this file is empty: it is no store", path,
+                "if it was one, keep the file and restore the last backup");
   }
   auto store = db::Store::open(context.env, path);
   if (store || store.error().code != ErrorCode::permission) {

@@ -35,7 +35,8 @@ Result<db::Store> open_store(Context& context, const std::string& location);
 // same (keep_records()).
 void warn_without_store(Context& context, const Result<db::Store>& store);
 
-// To read: no_input where there is no store, so that a wrong name makes no empty one.
+// To read: no_input where there is no store, bad_data where the file is empty, so that a wrong name
+// makes no empty one.
 Result<db::Store> open_existing_store(Context& context, const std::string& location);
 
 // Is there a file? A store on a server always exists.
@@ -58,6 +59,10 @@ std::string guard_folder(const std::string& location);
 // The folder of the journal: it keeps what the store at `location` did not take. One folder per
 // store, in journal/ of data_folder().
 std::string journal_folder(const std::string& location);
+
+// The command that stores what waits in that journal. A server's address is left out: it may hold a
+// password.
+std::string catch_up_line(const std::string& location);
 
 // Calls `work` with the store, or with the journal where the store fails (db/save.h). `store` is
 // the result of open_store().

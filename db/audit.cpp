@@ -59,6 +59,16 @@ class Audit {
     });
   }
 
+  // What cannot be read is a finding; other errors say nothing about the history.
+  Status take_unreadable(const Status& read, const std::string& what) {
+    if (read || read.error().code != ErrorCode::bad_data) {
+      return read;
+    }
+    add(fmt::format("{} cannot be read: {}", what, read.error().what));
+    return {};
+  }
+  std::int64_t last_seq() const { return last_seq_; }
+
   Result<AuditReport> report() {
     const auto head = read_head(database_);
     if (!head && head.error().code != ErrorCode::bad_data) {
@@ -133,9 +143,10 @@ Result<AuditReport> Store::audit(const std::string& earlier_head) {
   Audit audit(*database_, *head);
   // Beside the chain, which takes about as long.
   auto indexes = std::async(std::launch::async, [this] { return database_->check_indexes(); });
-  SIXPOINT_CHECK(audit.check_attachments());
-  SIXPOINT_CHECK(audit.check_rows());
-  SIXPOINT_CHECK(audit.take_findings(indexes.get()));
+  SIXPOINT_CHECK(audit.take_unreadable(audit.check_attachments(), "what is attached"));
+  const Status rows = audit.check_rows();
+  SIXPOINT_CHECK(audit.take_unreadable(rows, fmt::format("what follows row {}", audit.last_seq())));
+  SIXPOINT_CHECK(audit.take_unreadable(audit.take_findings(indexes.get()), "an index"));
   return audit.report();
 }
 

@@ -26,6 +26,10 @@ std::string in_small_letters(std::string text) {
   return text;
 }
 
+bool is_blank(const std::string& text) {
+  return text.find_first_not_of(" \t") == std::string::npos;
+}
+
 bool may_be_beginning_of_id(const std::string& text) {
   constexpr std::size_t kFewest = 8;
   return text.size() >= kFewest && text.find_first_not_of("0123456789abcdef") == std::string::npos;
@@ -112,7 +116,7 @@ Result<std::string> Store::correct(const Correction& correction) {
         fmt::format("no correction '{}' of {}", printable(correction.action, 60), correction.table),
         {}, "constants are withdrawn, reinstated and preferred; any row can have a note");
   }
-  if (correction.reason.empty()) {
+  if (is_blank(correction.reason)) {
     return fail(ErrorCode::usage, "a correction needs a reason", {}, "say why");
   }
   Correction now = correction;
@@ -182,7 +186,7 @@ Result<std::string> Store::add_station_event(const StationEvent& event) {
   if (about_unit) {
     SIXPOINT_CHECK(new_row(table("units"), {event.serial, "", to_ns(UtcTime())}));
   }
-  if (event.operator_name.empty() || event.reason.empty()) {
+  if (is_blank(event.operator_name) || is_blank(event.reason)) {
     return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
                 "say who decides, and why");
   }

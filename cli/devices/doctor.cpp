@@ -98,8 +98,8 @@ Check check_journal(const DoctorCommandOptions& options, Context& context) {
   }
   return {"journal", *pending == 0,
           *pending == 0 ? std::string("nothing waits for the store")
-                        : fmt::format("{} entries wait in {}: run 'sixpoint store catch-up'",
-                                      *pending, folder)};
+                        : fmt::format("{} entries wait in {}: run '{}'", *pending, folder,
+                                      catch_up_line(options.store))};
 }
 
 Check check_disk(const std::string& folder) {

@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include "base/memory_env.h"
+#include "cli/devices/known_devices.h"
 #include "device/session/session_replay.h"
 #include "device/unit.h"
 #include "device/wire/wire_unit.h"
@@ -38,8 +39,10 @@ Result<std::string> work_on(Session session, SessionWork work) {
     case SessionWork::jig: {
       station::JigSessionOptions options;
       options.keep_interrupted = true;  // how far it came is a part of how it ended
+      station::JigHooks hooks;
+      hooks.reopen = station::wait_for_unit(*unit, jig, [](const std::string& /*text*/) {});
       SIXPOINT_ASSIGN(const station::JigReport report,
-                      station::run_jig({unit.get(), &jig}, memory.env, options, {}));
+                      station::run_jig({unit.get(), &jig}, memory.env, options, hooks));
       return fmt::format("{} {} after {} faces: {}", report.serial, to_string(report.verdict),
                          report.faces.size(),
                          report.ended_by ? brief_of(*report.ended_by)

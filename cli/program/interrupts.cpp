@@ -42,6 +42,10 @@ std::string text_when_stopped(const std::vector<std::string>& arguments) {
       begins_with(arguments, {"simulate"})) {
     return "\nsixpoint: stopped; nothing was written\n";
   }
+  if (begins_with(arguments, {"capture"})) {
+    return "\nsixpoint: stopped; the unit may still be recording: begin the capture again, with "
+           "another name if its file is there\n";
+  }
   std::string text = "\nsixpoint: stopped; what is done stays, and this line goes on:\n  sixpoint";
   for (const std::string& argument : arguments) {
     text.append(" ").append(repair::shell_word(argument));

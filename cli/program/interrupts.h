@@ -9,6 +9,7 @@
 // |-------------------------|-----------------------------------------------------|
 // | archive plan            | no plan was made                                    |
 // | scan, inspect, simulate | nothing was written: they write at their end        |
+// | capture                 | begin it again: the unit may still be recording     |
 // | others                  | what is done stays, and this line goes on: the line |
 //
 // In the background of a script, where the signal is ignored, it stays so.

@@ -94,9 +94,13 @@ Result<Answer> catch_up(const StoreCommandOptions& options, Context& context) {
   if (!options.journal.empty()) {
     SIXPOINT_CHECK(context.env.files.info(folder));
   }
-  SIXPOINT_ASSIGN(auto store, open_to_add(options, context));
+  // The journal may be all that there is of a store: the one that it waits for is made. Not where
+  // both are named, since one name may be wrong.
+  const bool waits = context.env.files.info(folder).has_value();
+  SIXPOINT_ASSIGN(auto store, waits&& options.journal.empty() ? open_store(context, options.store)
+                                                              : open_to_add(options, context));
   std::size_t taken = 0;
-  if (context.env.files.info(folder)) {
+  if (waits) {
     SIXPOINT_ASSIGN(auto journal, db::Journal::open(context.env.files, folder));
     SIXPOINT_ASSIGN(taken, journal.catch_up(store));
   }
@@ -197,6 +201,11 @@ Result<Answer> recall(const StoreCommandOptions& options, Context& context) {
 Result<Answer> jig_units(const StoreCommandOptions& options, Context& context) {
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto units, store.units_of_jig(options.id));
+  if (units.empty()) {
+    return fail(ErrorCode::no_input,
+                fmt::format("the store has no runs on a jig '{}'", printable(options.id, 60)), {},
+                "give its name as '--jig-id' had it, or its serial number");
+  }
   Answer answer;
   answer.json["jig"] = options.id;
   Json& list = answer.json["units"] = Json::array();

@@ -10,6 +10,7 @@
 #include "cli/people_text.h"
 #include "cli/station/jig_options.h"
 #include "cli/station/record_option.h"
+#include "cli/stop_request.h"
 #include "cli/store_option.h"
 #include "station/capture/capture_run.h"
 #include "station/records/station_guard.h"
@@ -71,8 +72,14 @@ std::string in_words(const device::Corner& corner) {
                      device::to_string(corner), ways[0], ways[1], ways[2]);
 }
 
-// Asks the person to turn the unit; a jig that turns by itself needs no answer.
-station::SideAnswer ask(Context& context, double side_s, bool by_itself, const std::string& what) {
+// Asks the person to turn the unit; a jig that turns by itself needs no answer. `stop` is there
+// with such a jig only.
+station::SideAnswer ask(Context& context, double side_s, std::optional<StopRequest>& stop,
+                        const std::string& what) {
+  if (stop && stop->requested()) {
+    return station::SideAnswer::stop;
+  }
+  const bool by_itself = stop.has_value();
   context.people << fmt::format(
                         "{}; then leave it alone for {:.0f} s{}\n", what, side_s,
                         by_itself ? "" : ". Lay it down, then press Enter (q and Enter: stop)")
@@ -86,12 +93,19 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
                             Outputs& outputs, device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.input(options.limits));
+  SIXPOINT_CHECK(read_for_device(options.device, outputs));
   if (!options.constants_out.empty()) {
     SIXPOINT_CHECK(refuse_of_replay(options.device, "--constants-out"));
   }
   SIXPOINT_CHECK(outputs.file("--constants-out", options.constants_out));
   SIXPOINT_CHECK(outputs.file_to_keep("--output", options.output));
+  // Ctrl-C ends the recording of a unit that a jig turns, in order. By hand it ends this program at
+  // once. Made before the threads of the device are.
+  std::optional<StopRequest> stop(std::in_place);
   SIXPOINT_ASSIGN(const JiggedUnit opened, open_unit(context, options, outputs, recorder));
+  if (!opened.jig->turns_by_itself()) {
+    stop.reset();
+  }
   device::Unit& unit = *opened.unit;
   SIXPOINT_ASSIGN(const auto how, capture_options(context, options, unit.identity().serial));
   if (options.output.empty()) {
@@ -110,12 +124,15 @@ Result<CaptureDone> capture(Context& context, const CaptureCommandOptions& optio
   if (unit.abilities().records_on_command) {
     station::CaptureHooks hooks;
     hooks.ask = [&](device::Pose side, std::size_t number, std::size_t of) {
-      return ask(context, options.side_s, opened.jig->turns_by_itself(),
+      return ask(context, options.side_s, stop,
                  fmt::format("side {} of {}: {}", number, of, in_words(side)));
     };
     hooks.ask_corner = [&](const device::Corner& corner, std::size_t number, std::size_t of) {
-      return ask(context, options.side_s, opened.jig->turns_by_itself(),
+      return ask(context, options.side_s, stop,
                  fmt::format("corner {} of {}: {}", number, of, in_words(corner)));
+    };
+    hooks.next_answer = [&stop] {
+      return stop && stop->requested() ? station::SideAnswer::stop : station::SideAnswer::waiting;
     };
     if (!opened.jig->turns_by_itself()) {  // a jig would lay it the same way again
       hooks.again = [&](const std::vector<device::Pose>& /*sides*/) {
@@ -173,12 +190,14 @@ void print_capture(Context& context, const CaptureDone& done) {
   context.text() << fmt::format("{}: {}\n", printable(report.file), report.solved->brief());
   const auto& missing = report.solved->verification.missing_directions;
   if (!missing.empty()) {
-    context.text() << fmt::format("repeat these sides: {}\n", fmt::join(missing, " "));
+    context.text() << fmt::format(
+        "repeat these sides: {}; the file is kept: give -o another name\n",
+        fmt::join(missing, " "));
   }
   if (done.saved) {
     context.text() << "constants " << kept_as(done.saved->place, done.saved->id) << '\n';
   }
-  if (report.usable()) {
+  if (report.usable() && !report.clock_jumped) {  // else 'repair' may refuse the file
     next_step(context, false,
               {"repair", "RECORDINGS", "--calibration-file", report.file, "-o", "repaired"});
   }

@@ -120,6 +120,7 @@ Result<db::RunRecord> record_before(const JigCommandOptions& options,
 Status check_outputs(const JigCommandOptions& options, Outputs& outputs) {
   SIXPOINT_CHECK(outputs.input(options.limits));
   SIXPOINT_CHECK(outputs.input(options.pin_file));
+  SIXPOINT_CHECK(read_for_device(options.device, outputs));
   SIXPOINT_CHECK(outputs.input(store_file(options.store)));
   SIXPOINT_CHECK(outputs.file("--certificate", options.certificate));
   SIXPOINT_CHECK(outputs.file("--label", options.label));

@@ -1,5 +1,7 @@
 #include "cli/station/jig_options.h"
 
+#include <algorithm>
+
 #include <unistd.h>
 
 #include "cli/command.h"
@@ -39,6 +41,25 @@ void add_jig_options(CLI::App& command, JigOptions& options) {
   add_record_option(command, options.record);
   add_output_options(command, options.outputs);
   add_gravity_options(command, options.gravity);
+}
+
+Status read_for_device(const std::string& device, Outputs& outputs) {
+  const std::string address = device.substr(std::min(device.find(':') + 1, device.size()));
+  std::vector<std::string> paths = {address};
+  for (std::size_t begin = 0; begin < address.size();) {
+    const std::size_t comma = std::min(address.find(',', begin), address.size());
+    const std::string setting = address.substr(begin, comma - begin);
+    paths.push_back(setting.substr(setting.find('=') + 1));
+    begin = comma + 1;
+  }
+  for (const std::string& path : paths) {
+    SIXPOINT_CHECK(outputs.input(path));
+    for (const std::string& name :
+         outputs.files().list(path).value_or(std::vector<std::string>{})) {
+      SIXPOINT_CHECK(outputs.input(path + "/" + name));
+    }
+  }
+  return {};
 }
 
 Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Outputs& outputs,

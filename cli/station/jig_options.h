@@ -45,6 +45,11 @@ struct JiggedUnit {
   device::Jig* jig = nullptr;
   station::UnitOnJig on_jig() const { return {unit.get(), jig}; }
 };
+// The files that the address of a device names are read, and never written over: those of
+// drive:FOLDER, faults=FILE of a virtual unit, replay:FILE. Before the command's outputs are looked
+// at.
+Status read_for_device(const std::string& device, Outputs& outputs);
+
 // Begins the session that `--record` names, and opens unit and jig. device_unavailable where a
 // motorised jig is stopped or faulty; with --jig-is-free, the operator's word, it is released.
 Result<JiggedUnit> open_unit(Context& context, const JigOptions& options, Outputs& outputs,

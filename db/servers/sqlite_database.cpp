@@ -38,9 +38,10 @@ Error to_error(const SQLite::Exception& exception, const std::string& path) {
       return {ErrorCode::bad_data, what, path,
               "name a store; if this was one, keep the file and restore the last backup"};
     case SQLITE_CORRUPT:
-      return {ErrorCode::bad_data, what, path,
-              "restore the last backup; keep the damaged file, 'audit verify' can say how far it "
-              "holds"};
+      return {
+          ErrorCode::bad_data, what, path,
+          "keep the damaged file and restore the last backup ('audit verify' on a copy says how "
+          "far it can be read)"};
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return {ErrorCode::io, what, path, "another program keeps the store busy; try again"};

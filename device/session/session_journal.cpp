@@ -102,6 +102,19 @@ Result<SessionHead> parse_first_line(std::string_view line, const std::string& j
   return head;
 }
 
+// Null where the disk has no locks. cannot_create where a program still writes this journal.
+Result<std::unique_ptr<FileLock>> lock_of_ended(FileSystem& files, const std::string& journal) {
+  auto lock = files.lock(journal);
+  if (!lock) {
+    return nullptr;
+  }
+  if (*lock == nullptr) {
+    return fail(ErrorCode::cannot_create, "this session is still being recorded", journal,
+                "wait for its end, or give another name");
+  }
+  return lock;
+}
+
 }  // namespace
 
 std::string journal_of(const std::string& target) { return target + ".journal"; }
@@ -113,11 +126,13 @@ Result<SessionJournal> SessionJournal::create(FileSystem& files, const std::stri
     if (!files.info(name)) {
       return fail(std::move(file).error());
     }
+    SIXPOINT_CHECK(lock_of_ended(files, name));
     return fail(
-        ErrorCode::cannot_create, "a recording of this session was broken off, or still runs", name,
+        ErrorCode::cannot_create, "a recording of this session was broken off", name,
         fmt::format("keep it with 'sixpoint session recover {}', or remove it", printable(target)));
   }
-  return SessionJournal(files, target, *std::move(file));
+  auto lock = files.lock(name);
+  return SessionJournal(files, target, *std::move(file), lock ? *std::move(lock) : nullptr);
 }
 
 Status SessionJournal::write(std::string_view text) {
@@ -178,6 +193,7 @@ Result<RecoveredSession> recover_session(FileSystem& files, const std::string& j
     error.hint = "a journal is there only after a recording that was broken off";
     return fail(std::move(error));
   }
+  SIXPOINT_ASSIGN(const auto lock, lock_of_ended(files, journal));
   SIXPOINT_CHECK(refuse_existing(files, target));
   const std::shared_ptr<ReadableFile> file = *std::move(opened);
   Lines lines(*file);

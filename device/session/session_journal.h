@@ -32,7 +32,7 @@ std::string journal_of(const std::string& target);
 class SessionJournal {
  public:
   // cannot_create where a journal of this name is there already, be it another program's or one
-  // that was broken off: it is not overwritten.
+  // that was broken off: it is not overwritten. Locked until finish(), where the disk has locks.
   static Result<SessionJournal> create(FileSystem& files, const std::string& target);
 
   // Once, before the first transfer.
@@ -44,13 +44,18 @@ class SessionJournal {
   Status finish(bool truncated);
 
  private:
-  SessionJournal(FileSystem& files, std::string target, std::unique_ptr<WritableFile> file)
-      : files_(&files), target_(std::move(target)), file_(std::move(file)) {}
+  SessionJournal(FileSystem& files, std::string target, std::unique_ptr<WritableFile> file,
+                 std::unique_ptr<FileLock> lock)
+      : files_(&files),
+        target_(std::move(target)),
+        file_(std::move(file)),
+        lock_(std::move(lock)) {}
   Status write(std::string_view text);
 
   FileSystem* files_;
   std::string target_;
   std::shared_ptr<WritableFile> file_;
+  std::shared_ptr<FileLock> lock_;
   SessionHead head_;
   Sha256 hash_;
   std::uint64_t lines_begin_ = 0;  // behind the first line; 0 before begin()
@@ -66,8 +71,7 @@ struct RecoveredSession {
 
 // Makes `target` of what a journal holds, up to the first line that is no transfer, and removes the
 // journal. The session says `truncated`. no_input where there is no journal, bad_data where it is
-// none, cannot_create where `target` exists (refuse_existing()). Not for a journal whose program
-// still runs.
+// none, cannot_create where `target` exists (refuse_existing()) or the journal's program still runs.
 Result<RecoveredSession> recover_session(FileSystem& files, const std::string& journal,
                                          const std::string& target);
 

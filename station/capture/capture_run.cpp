@@ -136,8 +136,15 @@ Status check_and_solve(Env& env, const CaptureOptions& options, const std::strin
                     "battery empty?",
                     survey.duration_s, *wanted_s));
   }
+  if (survey.log.damaged_bytes > 0) {
+    report.notes.push_back(fmt::format(
+        "{} bytes of the recording are damaged and left out; 'sixpoint inspect' says where",
+        survey.log.damaged_bytes));
+  }
   SIXPOINT_ASSIGN(const Oddities oddities, find_oddities(env.files, path));
-  if (report.pieces.empty() && note_jump(oddities, report) && wanted_s) {
+  // Only a unit that this program told to record, without a pause, has no other gaps.
+  if (wanted_s && report.pieces.empty() && note_jump(oddities, report)) {
+    report.clock_jumped = true;
     undo_jumps(survey.blocks, options.side_s + options.turn_s);
   }
   report.refusal = why_stuck(oddities, survey.rate_hz);

@@ -108,6 +108,9 @@ struct CaptureReport {
   std::vector<std::string> pieces;  // the recordings that `file` was joined from, if it was
   std::optional<calib::SolveReport> solved;
   std::vector<std::string> notes;  // trouble on the way, for people
+  // The unit's clock jumped in mid-run. The constants do not depend on it; who solves `file` alone
+  // sees a pause and may refuse it.
+  bool clock_jumped = false;
 
   bool usable() const { return solved && solved->usable(); }
 };

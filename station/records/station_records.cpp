@@ -416,19 +416,15 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
 }
 
 Result<std::string> add_decision(db::Store& store, const db::StationEvent& decision) {
-  const auto is_blank = [](const std::string& text) {
-    return text.find_first_not_of(" \t") == std::string::npos;
-  };
-  if (is_blank(decision.operator_name) || is_blank(decision.reason)) {
-    return fail(ErrorCode::usage, "a decision needs a name and a reason", {},
-                "both are stored with it");
-  }
   if (decision.action == "check_unit_end") {
     SIXPOINT_ASSIGN(const auto events, store.station_events());
     if (!check_units_of(events).contains(decision.serial)) {
       return fail(ErrorCode::no_input, "this is no check unit", printable(decision.serial),
                   "'sixpoint check-unit chart' names them");
     }
+  }
+  if (decision.action == "release") {
+    SIXPOINT_CHECK(store.unit_history(decision.serial));
   }
   return store.add_station_event(decision);
 }
@@ -480,6 +476,11 @@ Result<std::vector<GageReading>> gage_readings(db::Store& store, const std::stri
     return fail(ErrorCode::no_input,
                 fmt::format("the store has no runs of the study '{}'", printable(study, 60)), {},
                 "measure them with 'sixpoint jig --study NAME --operator WHO'");
+  }
+  if (readings.empty()) {
+    return fail(ErrorCode::usage,
+                fmt::format("the runs have no {} of axis '{}'", quantity, printable(axis, 20)), {},
+                "name one of its axes with --axis");
   }
   return readings;
 }

@@ -82,8 +82,9 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
 // Adds an engineer's decision about a station or a unit to the store, and gives its id.
 //
 //   decision                                          answer
-//   without a name or without a reason (blanks only)  usage error
 //   check_unit_end of a unit that is no check unit    no_input error: a mistyped serial
+//   release of a unit that the store does not know    no_input error: the same
+//   without a name or without a reason (blanks only)  usage error
 //   any other                                         added
 Result<std::string> add_decision(db::Store& store, const db::StationEvent& decision);
 

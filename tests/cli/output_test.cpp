@@ -248,6 +248,25 @@ TEST_F(OutputWriting, WhatIsReadAgainHasToBeAFile) {
   ASSERT_OK(outputs.file_to_keep("-o", path("f")));
 }
 
+TEST_F(OutputWriting, AFolderOfAnotherUserIsRefusedBeforeTheWork) {
+  constexpr uid_t kNobody = 65534;
+  std::filesystem::create_directory(path("theirs"));
+  ASSERT_EQ(::chmod(path("theirs").c_str(), ::geteuid() == 0 ? 0755 : 0555), 0);
+  const bool is_root = ::geteuid() == 0;
+  ASSERT_TRUE(!is_root || ::seteuid(kNobody) == 0);
+  Outputs outputs(context_, {}, /*json=*/false);
+  const Status refused = outputs.file("-o", path("theirs/f"));
+  ASSERT_TRUE(!is_root || ::seteuid(0) == 0);
+  EXPECT_FAILS(refused, ErrorCode::permission);
+  EXPECT_EQ(refused.error().where, path("theirs"));
+}
+
+TEST_F(OutputWriting, StandardOutputTakesNoFolder) {
+  Outputs outputs(context_, {}, /*json=*/false);
+  EXPECT_FAILS(outputs.folder("-o", "-"), ErrorCode::usage);
+  EXPECT_FAILS(outputs.working_folder("-o", "-"), ErrorCode::usage);
+}
+
 TEST_F(OutputWriting, AFolderThatIsGoneOnWithMayHoldFiles) {
   std::filesystem::create_directories(path("repaired"));
   write("repaired/day1.gt3x", "done");

@@ -87,6 +87,17 @@ TEST_F(SessionCommand, TheMinimiserKeepsHowAndWhereARunFailed) {
   }
 }
 
+// Oracle: the program's own run, which waits for a unit that is plugged in again.
+TEST_F(SessionCommand, TheMinimiserWaitsForAUnitAsARunDoes) {
+  std::ofstream(path("f.json")) << R"({"schema": "sixpoint/faults/1", "faults": [
+      {"fault": "unplug", "at_s": 25, "seconds": 8}]})";
+  const auto answer =
+      jig("virtual:seed=7,jig=auto,faults=" + path("f.json"), {"--record", path("r.zip")});
+  EXPECT_EQ(answer.json()["verdict"], "pass") << answer.people;
+  const auto whole = *device::read_session(posix_env().files, path("r.zip"));
+  EXPECT_THAT(outcome_of(whole, SessionWork::jig), testing::HasSubstr("pass after 6 faces"));
+}
+
 // Nothing is needed where nothing is done with a session that has nothing in it.
 TEST_F(SessionCommand, TheMinimiserMayLeaveNothing) {
   device::Session session;

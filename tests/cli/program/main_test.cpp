@@ -103,6 +103,7 @@ TEST(StoppedText, FollowsTheTable) {
   for (const char* command : {"scan", "inspect", "simulate"}) {
     EXPECT_EQ(says({command, "a"}), "\nsixpoint: stopped; nothing was written\n");
   }
+  EXPECT_THAT(says({"capture", "--device", "drive:d"}), HasSubstr("begin the capture again"));
   EXPECT_EQ(says({"export", "a b", "-o", "o"}),
             "\nsixpoint: stopped; what is done stays, and this line goes on:\n"
             "  sixpoint export 'a b' -o o\n");

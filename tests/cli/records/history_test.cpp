@@ -61,6 +61,7 @@ TEST_F(StoreTest, AJigRunIsStoredWithWhatItWasJudgedBy) {
   EXPECT_THAT(text, testing::Not(testing::ContainsRegex("[0-9]\\.[0-9]{6,}Z"))) << "no nanoseconds";
   const auto trend = run({"store", "trend", "MOS2A45130007", "--store", path("a.db")}).out;
   EXPECT_THAT(trend, HasSubstr(" LSB/g, zero "));
+  EXPECT_EQ(run({"store", "jig", "J-71", "--store", path("a.db")}).exit_code, 66);
   const auto of_jig = run({"store", "jig", "J-17", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(of_jig["units"][0]["runs"], 2);
   const auto yield = run({"store", "yield", "--store", path("a.db"), "--json"}).json();

@@ -54,6 +54,39 @@ TEST_F(CommandTest, CaptureOfCornersStatesItsEfficiency) {
   EXPECT_EQ(capture("edges", "e.gt3x").exit_code, 64);
 }
 
+// What the address of a device names is read: --force replaces none of it.
+TEST_F(CommandTest, CaptureWritesOverNothingThatItsDeviceReads) {
+  std::filesystem::create_directory(path("drive"));
+  const std::string log = path("drive/log.bin");
+  std::ofstream(log) << "a recording";
+  std::ofstream(path("f.json")) << R"({"schema": "sixpoint/faults/1", "faults": []})";
+  const auto capture = [&](const std::string& device, const std::string& constants) {
+    return run({"capture", "--device", device, "-o", path("c.gt3x"), "--constants-out", constants,
+                "--force"})
+        .exit_code;
+  };
+  EXPECT_EQ(capture("drive:" + path("drive"), log), 73);
+  EXPECT_EQ(std::filesystem::file_size(log), 11U);
+  EXPECT_EQ(capture("virtual:jig=auto,seed=7,faults=" + path("f.json"), path("f.json")), 73);
+  EXPECT_FALSE(std::filesystem::exists(path("c.gt3x")));
+  EXPECT_EQ(run({"jig", "--device", "virtual:jig=auto,seed=7,faults=" + path("f.json"), "--label",
+                 path("f.json"), "--force"})
+                .exit_code,
+            73);
+}
+
+// `repair` and `solve` of such a file see an hour's pause and refuse it.
+TEST_F(CommandTest, CaptureWithAClockThatJumpedRecommendsNoFile) {
+  std::ofstream(path("f.json")) << R"({"schema": "sixpoint/faults/1", "faults": [
+      {"fault": "clock_jump", "at_s": 100, "seconds": 3600}]})";
+  const auto answer =
+      run({"capture", "--device", "virtual:jig=auto,seed=7,faults=" + path("f.json"), "--store",
+           path("s.db"), "-o", path("c.gt3x")});
+  EXPECT_EQ(answer.exit_code, 0) << answer.people;
+  EXPECT_THAT(answer.people, HasSubstr("the unit's clock was wrong"));
+  EXPECT_THAT(answer.people, testing::Not(HasSubstr("--calibration-file")));
+}
+
 // Before the unit is asked: the rates of docs/protocol.md.
 TEST_F(CommandTest, CaptureRefusesARateThatNoUnitHas) {
   for (const char* rate : {"29", "33", "45", "99", "110", "30.5", ""}) {

@@ -112,27 +112,46 @@ TEST_F(CommandTest, JigAsksForThePinWhereThereAreOperators) {
   ::unsetenv("XDG_DATA_HOME");
 }
 
-TEST_F(CommandTest, CtrlCInAnAutomaticRunStoresItAsStopped) {
+// Starts the program with `words` in `folder`, sends SIGINT once it has said `sign`, and gives its
+// JSON.
+void stop_by_ctrl_c(const std::string& folder, const std::string& words, const std::string& sign,
+                    nlohmann::json& json) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    const std::string script = "exec " + std::string(SIXPOINT_PROGRAM) +
-                               " jig --device virtual:seed=7,jig=auto,pace=real --store " +
-                               path("s.db") + " --json > " + path("o") + " 2> " + path("e");
+    const std::string script = "cd " + folder + " && exec " + SIXPOINT_PROGRAM + " " + words +
+                               " --store s.db --json > o 2> e";
     ::execl("/bin/sh", "sh", "-c", script.c_str(), nullptr);
     ::_exit(127);
   }
-  for (int i = 0; i < 500 && said_in(path("e")).find("turn the unit") == std::string::npos; ++i) {
+  for (int i = 0; i < 500 && said_in(folder + "/e").find(sign) == std::string::npos; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   ASSERT_EQ(::kill(child, SIGINT), 0);
   int status = 0;
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 3) << said_in(path("e"));
-  const auto json = nlohmann::json::parse(said_in(path("o")), nullptr, false);
-  ASSERT_TRUE(json.is_object()) << said_in(path("o"));
+  EXPECT_EQ(WEXITSTATUS(status), 3) << said_in(folder + "/e");
+  json = nlohmann::json::parse(said_in(folder + "/o"), nullptr, false);
+  ASSERT_TRUE(json.is_object()) << said_in(folder + "/o");
   EXPECT_EQ(json["verdict"], "stopped");
+}
+
+TEST_F(CommandTest, CtrlCInAnAutomaticCaptureEndsItInOrder) {
+  nlohmann::json json;
+  stop_by_ctrl_c(path("."),
+                 "capture --device virtual:seed=7,jig=auto,pace=real -o c.gt3x --record s.zip",
+                 "side 1 of 6", json);
+  EXPECT_FALSE(std::filesystem::exists(path("c.gt3x")));
+  EXPECT_TRUE(std::filesystem::exists(path("s.zip"))) << "the session is whole";
+  EXPECT_FALSE(std::filesystem::exists(path("s.zip.journal")));
+}
+
+TEST_F(CommandTest, CtrlCInAnAutomaticRunStoresItAsStopped) {
+  nlohmann::json json;
+  stop_by_ctrl_c(path("."), "jig --device virtual:seed=7,jig=auto,pace=real", "turn the unit",
+                 json);
+  ASSERT_TRUE(json.is_object());
   const auto history =
       run({"history", json["serial"].get<std::string>(), "--store", path("s.db"), "--json"});
   EXPECT_THAT(history.out, HasSubstr("stopped"));

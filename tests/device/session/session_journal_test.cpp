@@ -60,12 +60,23 @@ TEST(SessionJournal, WhereNothingWasBegunNothingIsLeft) {
 
 TEST(SessionJournal, AnotherJournalIsNotOverwritten) {
   MemoryFiles files;
-  const auto first = SessionJournal::create(files, "s.zip");
-  ASSERT_OK(first);
+  {
+    auto first = SessionJournal::create(files, "s.zip");
+    ASSERT_OK(first);
+    ASSERT_OK(first->begin("virtual:", UtcTime{}));
+    SessionRecorder second;
+    const Status refused = second.begin(files, "s.zip");
+    EXPECT_FAILS(refused, ErrorCode::cannot_create);
+    EXPECT_THAT(refused.error().what, HasSubstr("still being recorded"));
+    EXPECT_FAILS(recover_session(files, "s.zip.journal", "s.zip"), ErrorCode::cannot_create);
+    EXPECT_FALSE(files.info("s.zip"));
+    ASSERT_TRUE(files.info("s.zip.journal"));
+  }  // as the end of a program that is killed
   SessionRecorder second;
   const Status refused = second.begin(files, "s.zip");
   EXPECT_FAILS(refused, ErrorCode::cannot_create);
   EXPECT_THAT(refused.error().hint, HasSubstr("sixpoint session recover s.zip"));
+  EXPECT_OK(recover_session(files, "s.zip.journal", "s.zip"));
   const tests::TemporaryFolder folder;
   EXPECT_FAILS(SessionJournal::create(posix_env().files, folder / "no/such/s.zip"),
                ErrorCode::cannot_create);
@@ -127,15 +138,17 @@ TEST(SessionJournal, APowerCutLosesNoMoreThanWasNotSynced) {
   }
   // Long enough for a sync.
   MemoryFiles files;
-  auto journal = *SessionJournal::create(files, "s.zip");
-  ASSERT_OK(journal.begin("virtual:", UtcTime{}));
   const SessionTransfer block{
       SessionTransfer::Kind::from_device, SessionChannel::bulk, {}, Bytes(1000, 7), {}};
   constexpr std::size_t kBlocks = 100;
-  for (std::size_t i = 0; i < kBlocks; ++i) {
-    ASSERT_OK(journal.append(block));
+  {
+    auto journal = *SessionJournal::create(files, "s.zip");
+    ASSERT_OK(journal.begin("virtual:", UtcTime{}));
+    for (std::size_t i = 0; i < kBlocks; ++i) {
+      ASSERT_OK(journal.append(block));
+    }
+    files.lose_power();
   }
-  files.lose_power();
   ASSERT_OK(recover_session(files, "s.zip.journal", "s.zip"));
   const auto session = read_session(files, "s.zip");
   ASSERT_OK(session);
@@ -345,16 +358,18 @@ TEST(SessionJournal, AFileThatBeginsOtherwiseIsNoJournal) {
 // Bytes of an older file may look like a transfer: one that was before the last is none of these.
 TEST(SessionJournal, ATransferThatGoesBackInTimeEndsIt) {
   MemoryFiles files;
-  auto journal = *SessionJournal::create(files, "s.zip");
-  ASSERT_OK(journal.begin("virtual:", UtcTime{}));
-  SessionTransfer transfer{SessionTransfer::Kind::from_device,
-                           SessionChannel::bulk,
-                           std::chrono::nanoseconds(5),
-                           Bytes{1},
-                           {}};
-  ASSERT_OK(journal.append(transfer));
-  transfer.time = std::chrono::nanoseconds(4);
-  ASSERT_OK(journal.append(transfer));
+  {
+    auto journal = *SessionJournal::create(files, "s.zip");
+    ASSERT_OK(journal.begin("virtual:", UtcTime{}));
+    SessionTransfer transfer{SessionTransfer::Kind::from_device,
+                             SessionChannel::bulk,
+                             std::chrono::nanoseconds(5),
+                             Bytes{1},
+                             {}};
+    ASSERT_OK(journal.append(transfer));
+    transfer.time = std::chrono::nanoseconds(4);
+    ASSERT_OK(journal.append(transfer));
+  }
   const auto recovered = recover_session(files, "s.zip.journal", "s.zip");
   ASSERT_OK(recovered);
   EXPECT_EQ(recovered->head.transfers, 1U);

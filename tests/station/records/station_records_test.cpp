@@ -61,9 +61,14 @@ TEST_F(StationRecords, ADecisionIsSignedAndRemovesOnlyACheckUnit) {
   const auto id = add_decision(store_, decision);
   ASSERT_OK(id);
   EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input);  // it is none any more
+  decision.action = "release";
+  decision.serial = "MISTYPED";
+  EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input);
+  decision.serial = "CHECK1";
+  EXPECT_OK(add_decision(store_, decision));
   const auto events = store_.station_events();
   ASSERT_OK(events);
-  EXPECT_EQ(events->size(), 2U);
+  EXPECT_EQ(events->size(), 3U);
 }
 
 // The table of the header, row by row.
