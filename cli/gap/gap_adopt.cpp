@@ -27,6 +27,30 @@ bool is_json_object(std::string_view text) {
   return json.is_object();
 }
 
+bool is_plain_file(FileSystem& files, const std::string& path) {
+  const auto info = files.info(path);
+  return info && info->kind == FileKind::file && !info->is_folder;
+}
+
+// The output is read, changed and replaced: no other adoption may do so meanwhile. Held on the file
+// itself, so that none stays beside it. Null where there is no file yet, where it has no locks, or
+// where it may not be written (a rename still replaces it).
+Result<std::unique_ptr<FileLock>> lock_output(const GapAdoptCommandOptions& options,
+                                              FileSystem& files) {
+  if (options.dry_run || !is_plain_file(files, options.output)) {
+    return nullptr;
+  }
+  auto lock = files.lock(options.output);
+  if (!lock) {
+    return nullptr;
+  }
+  if (*lock == nullptr) {
+    return fail(ErrorCode::cannot_create, "another command is writing this scenario",
+                options.output, "begin again when it has ended: nothing was changed");
+  }
+  return lock;
+}
+
 // The scenario that is extended: --scenario, or what the output's name has already. Empty: a new
 // one.
 Result<std::string> base_of(const GapAdoptCommandOptions& options, FileSystem& files) {
@@ -34,8 +58,7 @@ Result<std::string> base_of(const GapAdoptCommandOptions& options, FileSystem& f
     SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.scenario));
     return std::string(as_text(text));
   }
-  const auto info = files.info(options.output);
-  if (!info || info->kind != FileKind::file || info->is_folder) {
+  if (!is_plain_file(files, options.output)) {
     return std::string();
   }
   SIXPOINT_ASSIGN(const Bytes text, read_file(files, options.output));
@@ -129,12 +152,16 @@ Json learnt_json(const gap::AdoptedScenario& learnt, const GapAdoptCommandOption
 }
 
 Status run_gap_adopt(const GapAdoptCommandOptions& options, Context& context) {
-  Outputs outputs(context, options.outputs, options.json);
+  OutputOptions how = options.outputs;
+  // Where nothing has the name now, what comes to it meanwhile was not read: it stays.
+  how.force = how.force && context.env.files.link_info(options.output).has_value();
+  Outputs outputs(context, how, options.json);
   SIXPOINT_CHECK(guard_sources(outputs, options.sources));
   SIXPOINT_CHECK(outputs.input(options.scenario));
   if (!options.dry_run) {
     SIXPOINT_CHECK(outputs.file("--output", options.output));
   }
+  SIXPOINT_ASSIGN(const auto lock, lock_output(options, context.env.files));
   SIXPOINT_ASSIGN(const std::string base, base_of(options, context.env.files));
   SIXPOINT_ASSIGN(const auto sources, find_sources(context, options.sources));
   std::vector<gap::DocumentEvidence> documents;

@@ -73,6 +73,27 @@ TEST_F(GapAdopt, LearnsFromBundlesAndFromAnswers) {
   EXPECT_EQ(found["effects"][0]["name"], "non_orthogonality");
 }
 
+// Two adoptions at once: one of them would be lost. Oracle: the lock of another open file.
+TEST_F(GapAdopt, WhileAnotherWritesTheScenarioItIsRefused) {
+  simulate("a", 1);
+  simulate("b", 2);
+  std::filesystem::create_directory(path("out"));
+  const std::string scenario = path("out/S.json");
+  EXPECT_EQ(adopt({path("a"), "-o", scenario, "--force"}).exit_code, 0);
+  const std::string one = read("out/S.json");
+  auto other = posix_env().files.lock(scenario);
+  ASSERT_TRUE(other && *other != nullptr);
+  const auto refused = adopt({path("b"), "-o", scenario, "--force"});
+  EXPECT_EQ(refused.exit_code, 73);
+  EXPECT_THAT(refused.people, HasSubstr("another command is writing this scenario"));
+  EXPECT_EQ(read("out/S.json"), one);
+  EXPECT_EQ(adopt({path("b"), "-o", scenario, "--force", "--dry-run"}).exit_code, 0);
+  other->reset();
+  EXPECT_EQ(adopt({path("b"), "-o", scenario, "--force", "--json"}).json()["adoption"], 2);
+  const std::filesystem::directory_iterator files(path("out"));
+  EXPECT_EQ(std::distance(begin(files), end(files)), 1) << "no lock file stays";
+}
+
 TEST_F(GapAdopt, TheNextDiagnosisExpectsThePopulation) {
   simulate("unit", 4);
   write("P.json", R"({"protocol": "production", "population": {"effects": [
