@@ -73,7 +73,8 @@ Json numbers_json(const std::vector<gap::MeanAndSpread>& numbers) {
   for (const gap::MeanAndSpread& n : numbers) {
     json["mean"].push_back(number(n.mean));
     json["spread"].push_back(value_or_null(n.spread));
-    json["standard_uncertainty"].push_back(number(n.standard_uncertainty));
+    json["standard_uncertainty"].push_back(
+        n.standard_uncertainty > 0 ? number(n.standard_uncertainty) : Json(nullptr));
   }
   return json;
 }
@@ -110,10 +111,11 @@ void print_gap_adopt(const gap::AdoptedScenario& learnt, const GapAdoptCommandOp
                                   gap::to_string(effect.change), effect.decision.brief());
     for (const gap::AdoptedNumber& parameter : effect.decision.parameters) {
       for (const gap::MeanAndSpread& n : parameter.numbers) {
-        context.text() << fmt::format("  {:<22} {:>10.4g} +- {:<9.2g} spread {} ({} units)\n",
-                                      parameter.parameter, n.mean, n.standard_uncertainty,
-                                      n.spread ? fmt::format("{:.3g}", *n.spread) : "not known",
-                                      n.units);
+        const bool known = n.standard_uncertainty > 0;
+        context.text() << fmt::format(
+            "  {:<22} {:>10.4g} {:<12} spread {} ({} units)\n", parameter.parameter, n.mean,
+            known ? fmt::format("+- {:.2g}", n.standard_uncertainty) : "(not shown)",
+            n.spread ? fmt::format("{:.3g}", *n.spread) : "not known", n.units);
       }
     }
   }

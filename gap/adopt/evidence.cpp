@@ -40,6 +40,16 @@ std::vector<double> numbers_of(const Json& json) {
   return numbers;
 }
 
+// The same; 0 where a number has none (null).
+std::vector<double> uncertainties_of(Json json) {
+  for (Json& row : json) {
+    if (row.is_null()) {
+      row = 0;
+    }
+  }
+  return numbers_of(json);
+}
+
 // What follows from other parameters, and is no setting of the simulator.
 bool derived(std::string_view effect, std::string_view parameter) {
   return (effect == "tilt" && parameter == "angle_deg") || parameter == "order";
@@ -56,14 +66,19 @@ EffectEvidence effect_of(const Json& finding) {
   const Json none = Json::object();
   const Json& sd =
       finding.contains("standard_uncertainty") ? finding["standard_uncertainty"] : none;
+  const Json& form = finding.contains("form_uncertainty") ? finding["form_uncertainty"] : none;
   for (const auto& [name, value] : finding.at("parameters").items()) {
     NamedValue parameter{name, numbers_of(value), {}};
     if (parameter.value.empty() || derived(effect.name, name)) {
       continue;
     }
     if (sd.contains(name)) {
-      parameter.sd = numbers_of(sd[name]);
+      parameter.sd = uncertainties_of(sd[name]);
       parameter.sd.resize(parameter.value.size(), 0);
+    }
+    if (form.contains(name)) {
+      parameter.form_sd = uncertainties_of(form[name]);
+      parameter.form_sd.resize(parameter.value.size(), 0);
     }
     effect.parameters.push_back(std::move(parameter));
   }
@@ -97,6 +112,10 @@ Json content_of(const DocumentEvidence& evidence) {
       entry["parameters"][p.name] = number_list(p.value);
       if (!p.sd.empty()) {
         entry["standard_uncertainty"][p.name] = number_list(p.sd);
+      }
+      // Documents of earlier versions have none, and keep their digest.
+      if (!p.form_sd.empty()) {
+        entry["form_uncertainty"][p.name] = number_list(p.form_sd);
       }
     }
     json["effects"].push_back(std::move(entry));

@@ -66,7 +66,9 @@ MeanAndSpread mean_and_spread(std::span<const double> values,
   }
   const Weighted all = weighted(values, sd, spread2);
   out.mean = all.mean;
-  out.standard_uncertainty = 1 / std::sqrt(all.weight);
+  const bool without_any =
+      spread2 == 0 && std::ranges::all_of(standard_uncertainty, [](double x) { return x == 0; });
+  out.standard_uncertainty = without_any ? 0 : 1 / std::sqrt(all.weight);
   return out;
 }
 

@@ -24,7 +24,8 @@ struct MeanAndSpread {
   std::size_t units = 0;
 };
 
-// As many uncertainties as values, at least one. An uncertainty of 0 is taken for a very small one.
+// As many uncertainties as values, at least one. An uncertainty of 0 is taken for a very small one;
+// where all are 0 and the values do not differ, the mean's is 0: nothing is known of it.
 MeanAndSpread mean_and_spread(std::span<const double> values,
                               std::span<const double> standard_uncertainty);
 

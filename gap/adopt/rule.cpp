@@ -112,6 +112,15 @@ std::vector<std::vector<const NamedValue*>> values_of(
   return values;
 }
 
+// Of one number of a document: what scatters, without the part that all units share.
+double scatter_of(const NamedValue& p, std::size_t i) {
+  if (p.sd.empty()) {
+    return 0;
+  }
+  const double form = p.form_sd.empty() ? 0 : p.form_sd[i];
+  return std::sqrt(std::max(0.0, p.sd[i] * p.sd[i] - form * form));
+}
+
 AdoptedNumber pooled(const sim::Parameter& parameter,
                      const std::vector<std::vector<const NamedValue*>>& units) {
   const std::vector<double> longest = longest_of(units);
@@ -120,18 +129,26 @@ AdoptedNumber pooled(const sim::Parameter& parameter,
   for (std::size_t i = 0; i < parameter.default_value.size(); ++i) {
     std::vector<double> value;
     std::vector<double> sd;
+    // Mean over all documents, with the sign of the size: the effect differs from its law by one
+    // share in all of them, which no number of units averages out.
+    double form = 0;
+    double documents = 0;
     for (const auto& unit : units) {
       std::vector<double> own;
       std::vector<double> own_sd;
       for (const NamedValue* p : unit) {
         own.push_back(p->value[i] * (is_line ? side_of(*p, longest) : 1));
-        own_sd.push_back(p->sd.empty() ? 0 : std::abs(p->sd[i]));
+        own_sd.push_back(scatter_of(*p, i));
+        form += p->form_sd.empty() ? 0 : std::copysign(p->form_sd[i], own.back());
+        documents += 1;
       }
       const MeanAndSpread together = mean_and_spread(own, own_sd);
       value.push_back(together.mean);
       sd.push_back(together.standard_uncertainty);
     }
-    out.numbers.push_back(mean_and_spread(value, sd));
+    MeanAndSpread all = mean_and_spread(value, sd);
+    all.standard_uncertainty = std::hypot(all.standard_uncertainty, form / documents);
+    out.numbers.push_back(all);
   }
   return out;
 }

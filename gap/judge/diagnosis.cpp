@@ -41,10 +41,14 @@ Json finding_json(const EffectFinding& finding) {
   json["evidence_nats"] = finite(finding.nats);
   json["parameters"] = Json::object();
   json["standard_uncertainty"] = Json::object();
+  json["form_uncertainty"] = Json::object();
   for (const NamedValue& parameter : finding.parameters) {
     json["parameters"][parameter.name] = values(parameter.value);
     if (!parameter.sd.empty()) {
       json["standard_uncertainty"][parameter.name] = values(parameter.sd);
+    }
+    if (!parameter.form_sd.empty()) {
+      json["form_uncertainty"][parameter.name] = values(parameter.form_sd);
     }
   }
   json["held_out_gain_nats"] = finite(finding.held_out_gain_nats);

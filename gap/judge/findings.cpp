@@ -62,7 +62,7 @@ double relative_sd(const EffectFinding& f) {
       value2 += v * v;
     }
     for (const double sd : f.parameters.front().sd) {
-      sd2 += sd * sd;
+      sd2 += std::isnan(sd) ? 0 : sd * sd;
     }
   }
   return value2 > 0 && sd2 > 0 ? std::sqrt(sd2 / value2) : kUnknown;

@@ -180,16 +180,21 @@ std::vector<NamedValue> parameters_of(const std::string& name,
   if (name != "truncation") {
     std::vector<double> value = estimate.value;
     std::vector<double> sd = estimate.sd;
+    std::vector<double> form_sd(sd.size());
     for (std::size_t i = 0; i < sd.size(); ++i) {
-      sd[i] = std::hypot(sd[i], kFormShare * value[i]);
+      form_sd[i] = std::abs(kFormShare * value[i]);
+      sd[i] = std::hypot(sd[i], form_sd[i]);
       value[i] += absent_value(name);
     }
-    parameters.push_back({parameter_name(name), std::move(value), std::move(sd)});
+    parameters.push_back(
+        {parameter_name(name), std::move(value), std::move(sd), std::move(form_sd)});
   }
   if (name == "tilt") {
     const double angle = std::hypot(estimate.value[0], estimate.value[1]);
+    // A turn about the vertical: gravity does not show it, and motion was not asked.
     parameters[0].value.push_back(0);
-    parameters[0].sd.push_back(0);
+    parameters[0].sd.push_back(NAN);
+    parameters[0].form_sd.push_back(0);
     parameters.push_back({"angle_deg", {angle}, {std::max(estimate.sd[0], estimate.sd[1])}});
   }
   if (name == "warm_up") {

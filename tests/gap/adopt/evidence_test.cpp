@@ -89,6 +89,25 @@ TEST(Evidence, ComesBackFromAScenario) {
   EXPECT_FAILS(evidence_from_scenario(kept), ErrorCode::bad_data);
 }
 
+// What units share is kept apart; documents of earlier versions, which have no such key, stay as they
+// are. A number that nothing shows has no uncertainty.
+TEST(Evidence, KeepsWhatUnitsShare) {
+  const auto earlier = read_evidence(made_answer().dump(), "a.json");
+  ASSERT_OK(earlier);
+  EXPECT_FALSE(to_json(*earlier)["effects"][0].contains("form_uncertainty"));
+  Json answer = made_answer();
+  answer["effects"][0]["form_uncertainty"] = {{"rotation_vector_deg", {0.005, 0.01, 0}}};
+  answer["effects"][0]["standard_uncertainty"]["rotation_vector_deg"] = {0.01, 0.02, nullptr};
+  const auto read = read_evidence(answer.dump(), "a.json");
+  ASSERT_OK(read);
+  const NamedValue& turn = read->effects[0].parameters[0];
+  EXPECT_EQ(turn.form_sd, (std::vector<double>{0.005, 0.01, 0}));
+  EXPECT_EQ(turn.sd, (std::vector<double>{0.01, 0.02, 0}));
+  const auto again = evidence_from_scenario(to_json(*read));
+  ASSERT_OK(again);
+  EXPECT_EQ(again->effects[0].parameters[0].form_sd, turn.form_sd);
+}
+
 TEST(Evidence, RefusesWhatIsNoDiagnosis) {
   const auto refused = [](const Json& json) {
     EXPECT_FAILS(read_evidence(json.dump(), "x.json"), ErrorCode::bad_data);

@@ -56,6 +56,7 @@ TEST(MeanAndSpread, NumbersWithoutUncertaintyAreTakenAsTheyAre) {
   const MeanAndSpread zeros = mean_and_spread(std::vector<double>(3, 0), std::vector<double>(3, 0));
   EXPECT_EQ(zeros.mean, 0);
   EXPECT_EQ(zeros.spread, 0.0);
+  EXPECT_EQ(zeros.standard_uncertainty, 0) << "none, and not a tiny one";
   const std::vector<double> value = {1, 3};
   const MeanAndSpread two = mean_and_spread(value, std::vector<double>(2, 0));
   EXPECT_NEAR(two.mean, 2, 1e-9);

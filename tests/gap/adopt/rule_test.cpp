@@ -125,6 +125,38 @@ TEST(AdoptionRule, AnythingElseIsAdopted) {
   EXPECT_EQ(found.share_of_units, 1);
 }
 
+// By how much the effect differs from its law is common to all units: it is no scatter of theirs, and
+// they do not average it out. Closed form: the spread is sqrt(variance - scatter^2).
+TEST(AdoptionRule, WhatUnitsShareIsNoScatterBetweenThem) {
+  constexpr double kShare = 0.05;
+  constexpr double kScatter = 0.004;
+  std::vector<DocumentEvidence> shared;
+  std::vector<DocumentEvidence> earlier;  // of a version that does not state it apart
+  for (int i = 0; i < 5; ++i) {
+    const double size = 0.4 + 0.02 * (i - 2);  // a variance of 2.5 * 0.02^2
+    EffectEvidence effect = made_tempco({size, -size, 0});
+    effect.parameters[0].form_sd = {kShare * size, kShare * size, 0};
+    effect.parameters[0].sd = {std::hypot(kScatter, kShare * size),
+                               std::hypot(kScatter, kShare * size), kScatter};
+    shared.push_back(made_document(i, "U" + std::to_string(i), {effect}));
+    effect.parameters[0].form_sd.clear();
+    earlier.push_back(made_document(i, "U" + std::to_string(i), {effect}));
+  }
+  const double variance = 2.5 * 0.02 * 0.02;
+  const auto numbers = only(shared).parameters[0].numbers;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    EXPECT_NEAR(numbers[axis].spread.value_or(0), std::sqrt(variance - kScatter * kScatter), 1e-6);
+    EXPECT_NEAR(numbers[axis].standard_uncertainty,
+                std::hypot(std::sqrt(variance / 5), kShare * 0.4), 1e-6);
+  }
+  EXPECT_NEAR(numbers[2].standard_uncertainty, kScatter / std::sqrt(5), 1e-9);
+  EXPECT_NEAR(only(earlier).parameters[0].numbers[0].spread.value_or(0),
+              std::sqrt(variance - kScatter * kScatter - std::pow(kShare * 0.4, 2)), 1e-3);
+  EXPECT_NEAR(only({shared[0]}).parameters[0].numbers[0].standard_uncertainty,
+              std::hypot(kScatter, kShare * 0.36), 1e-9)
+      << "of one unit it is what the diagnosis states";
+}
+
 // Of an effect that every unit has some of, units that do not name it lower the mean.
 TEST(AdoptionRule, SizesThatWereNotNamedCountToo) {
   const AdoptionDecision all = only({made_document(1, "A", {made_tempco({.4, .4, .4})}),

@@ -29,7 +29,12 @@ TEST(JudgeMeans, ATiltHasItsAngle) {
   const Findings found = judge_means(made.request, explanation, slow, {});
   const EffectFinding* tilt = effect(found, "tilt");
   ASSERT_NE(tilt, nullptr);
-  EXPECT_EQ(tilt->parameters[0].value.size(), 3U) << "a rotation vector";
+  ASSERT_EQ(tilt->parameters[0].value.size(), 3U) << "a rotation vector";
+  EXPECT_EQ(tilt->parameters[0].value[2], 0);
+  EXPECT_TRUE(std::isnan(tilt->parameters[0].sd[2])) << "a turn about the vertical is not shown";
+  // Five parts in a hundred of the size are common to units.
+  EXPECT_NEAR(tilt->parameters[0].form_sd[0], 0.05 * std::abs(tilt->parameters[0].value[0]), 1e-12);
+  EXPECT_GE(tilt->parameters[0].sd[0], tilt->parameters[0].form_sd[0]);
   EXPECT_NEAR(tilt->parameters[1].value[0], 0.25, 0.02) << "hypot(0.2, 0.15)";
   EXPECT_GT(tilt->held_out_gain_nats, 10);
 }

@@ -55,7 +55,7 @@ def covered(effect, truth):
             if name == "vector_mg" and sum(v * r for v, r in zip(values, real_ones)) < 0:
                 values = [-v for v in values]  # of an oscillation, whose phase is free
             for value, sd, real in zip(values, sds, real_ones):
-                if sd > 0:
+                if sd is not None and sd > 0:
                     yield abs(value - real) <= 2 * sd, name
 
 
