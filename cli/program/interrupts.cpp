@@ -26,6 +26,20 @@ extern "C" void end_as_stopped(int /*signal*/) {
   ::_exit(kExitStopped);
 }
 
+// The folder of `gap challenge --export`: it must be empty when the command begins. Empty: none.
+std::string export_folder(const std::vector<std::string>& arguments) {
+  const std::string option = "--export";
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (arguments[i] == option && i + 1 < arguments.size()) {
+      return arguments[i + 1];
+    }
+    if (arguments[i].starts_with(option + "=")) {
+      return arguments[i].substr(option.size() + 1);
+    }
+  }
+  return {};
+}
+
 bool begins_with(const std::vector<std::string>& arguments,
                  std::initializer_list<const char*> words) {
   return arguments.size() >= words.size() &&
@@ -45,6 +59,10 @@ std::string text_when_stopped(const std::vector<std::string>& arguments) {
   if (begins_with(arguments, {"capture"})) {
     return "\nsixpoint: stopped; the unit may still be recording: begin the capture again, with "
            "another name if its file is there\n";
+  if (const std::string folder = export_folder(arguments);
+      begins_with(arguments, {"gap", "challenge"}) && !folder.empty()) {
+    return "\nsixpoint: stopped; remove the folder " + repair::shell_word(folder) +
+           " and begin again\n";
   }
   std::string text = "\nsixpoint: stopped; what is done stays, and this line goes on:\n  sixpoint";
   for (const std::string& argument : arguments) {

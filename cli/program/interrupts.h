@@ -10,6 +10,7 @@
 // | archive plan            | no plan was made                                    |
 // | scan, inspect, simulate | nothing was written: they write at their end        |
 // | capture                 | begin it again: the unit may still be recording     |
+// | gap challenge --export  | remove the folder and begin again: it must be empty |
 // | others                  | what is done stays, and this line goes on: the line |
 //
 // In the background of a script, where the signal is ignored, it stays so.

@@ -104,6 +104,10 @@ TEST(StoppedText, FollowsTheTable) {
     EXPECT_EQ(says({command, "a"}), "\nsixpoint: stopped; nothing was written\n");
   }
   EXPECT_THAT(says({"capture", "--device", "drive:d"}), HasSubstr("begin the capture again"));
+  const char* again = "\nsixpoint: stopped; remove the folder 'K 1' and begin again\n";
+  EXPECT_EQ(says({"gap", "challenge", "--trials", "9", "--export", "K 1"}), again);
+  EXPECT_EQ(says({"gap", "challenge", "--export=K 1", "--trials", "9"}), again);
+  EXPECT_THAT(says({"gap", "challenge", "--trials", "9"}), HasSubstr("this line goes on"));
   EXPECT_EQ(says({"export", "a b", "-o", "o"}),
             "\nsixpoint: stopped; what is done stays, and this line goes on:\n"
             "  sixpoint export 'a b' -o o\n");
