@@ -15,9 +15,13 @@ using Json = nlohmann::ordered_json;
 
 double square(double x) { return x * x; }
 
+// What is left below the floor is chance: no more than all is closed.
+double share_of_open(double closed_mg2, double open_mg2) {
+  return open_mg2 > 0 ? std::min(1.0, closed_mg2 / open_mg2) : 0;
+}
+
 double share_closed(double before_mg, double after_mg, double floor_mg) {
-  const double open = square(before_mg) - square(floor_mg);
-  return open > 0 ? (square(before_mg) - square(after_mg)) / open : 0;
+  return share_of_open(square(before_mg) - square(after_mg), square(before_mg) - square(floor_mg));
 }
 
 ProgressSum sum_of(const std::vector<const BundleProgress*>& bundles, std::size_t adoptions) {
@@ -123,7 +127,7 @@ GapProgress ProgressRecorder::finish() const {
     EffectProgress& effect = out.effects[i];
     effect.without_mg = std::sqrt(mean);
     const double open = square(out.all.before_mg) - square(out.all.floor_mg);
-    effect.closed_fraction = open > 0 ? (mean - square(out.all.after_mg.back())) / open : 0;
+    effect.closed_fraction = share_of_open(mean - square(out.all.after_mg.back()), open);
   }
   std::ranges::stable_sort(out.effects, std::greater<>(), &EffectProgress::closed_fraction);
   return out;

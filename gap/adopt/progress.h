@@ -38,7 +38,7 @@ struct ProgressSum {
   double before_mg = 0;
   std::vector<double> after_mg;
   double floor_mg = 0;
-  // Of the mean square above the floor, by the last adoption; negative where it does harm.
+  // Of the mean square above the floor, by the last adoption: 1 at most; negative where it does harm.
   double closed_fraction = 0;
 };
 
@@ -47,7 +47,8 @@ struct EffectProgress {
   bool scatter = false;  // it can't be predicted, and closes nothing
   // The gap with everything of the last adoption but this effect.
   double without_mg = 0;
-  // What it closes of the mean square before, above the floor; negative where it does harm.
+  // What it closes of the mean square before, above the floor: 1 at most; negative where it does
+  // harm.
   double closed_fraction = 0;
 };
 

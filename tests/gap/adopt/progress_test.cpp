@@ -53,6 +53,7 @@ TEST(GapProgressReport, SaysWhatEachAdoptionClosed) {
   EXPECT_NEAR(sum.after_mg[0], sum.before_mg / 2, 0.05 * sum.before_mg);
   EXPECT_LT(sum.after_mg[1], 1.5 * sum.floor_mg);
   EXPECT_GT(sum.closed_fraction, 0.97);
+  EXPECT_LE(sum.closed_fraction, 1) << "also where less than the floor is left";
   ASSERT_EQ(progress.effects.size(), 1U);
   EXPECT_NEAR(progress.effects[0].without_mg, progress.all.before_mg, 1e-9)
       << "without its only effect nothing was learnt";
