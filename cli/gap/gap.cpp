@@ -1,5 +1,6 @@
 // sixpoint gap diagnose BUNDLE: where simulator and recording differ, and which effect explains it.
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <set>
 #include <string>
@@ -113,10 +114,17 @@ Result<Judged> diagnose(const GapCommandOptions& options, Context& context) {
 void print_gap(const gap::Diagnosis& d, Context& context) {
   context.text() << fmt::format("{}: {}\n", printable(d.bundle), printable(d.brief(), 2000));
   for (const gap::EffectFinding& effect : d.effects) {
-    context.text() << fmt::format("  {:<20} p {:.3f}  held out {:+.1f} nats", effect.name,
-                                  effect.probability, effect.held_out_gain_nats);
+    context.text() << fmt::format("  {:<20} p {:.3f}  matters {:.3f}  held out {:+.1f} nats",
+                                  effect.name, effect.probability, effect.probability_it_matters,
+                                  effect.held_out_gain_nats);
     for (const gap::NamedValue& p : effect.parameters) {
       context.text() << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
+      if (!p.sd.empty()) {
+        context.text() << " +-";
+        for (const double sd : p.sd) {
+          context.text() << (std::isnan(sd) ? " -" : fmt::format(" {:.2g}", sd));
+        }
+      }
     }
     context.text() << (effect.outside_datasheet ? "  (outside the datasheet)\n" : "\n");
   }
