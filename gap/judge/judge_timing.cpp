@@ -217,11 +217,22 @@ void judge_slips(const Request& request, const HostTiming& host, const ToneClock
   }
 }
 
-// Variance of the sample times by weighted least squares over the tones: the residual's excess on
-// the slopes over that on the crests is (rate * jitter)^2 / 2.
+// Variance of the sample times by weighted least squares over the tones. A tone of amplitude A and
+// angular frequency w, sampled at times that scatter by s, is found with the amplitude B =
+// A exp(-(w s)^2 / 2). The residual's excess on the slopes over that on the crests is
+// B^2 / 2 (1 - exp(-(w s)^2)): for small ones (w B s)^2 / 2.
+struct JitterTone {
+  double w = 0;           // rad/s
+  double found_mg = 0;    // B
+  double excess_mg2 = 0;  // of the slopes over the crests
+  double white_mg2 = 0;
+  double residual_mg2 = 0;
+  double samples = 0;
+};
 struct JitterSums {
   double up = 0;    // per s^2
   double down = 0;  // per s^4
+  std::vector<JitterTone> tones = {};
 };
 
 JitterSums jitter_sums(const Request& request, const std::vector<ToneFit>& tones,
@@ -238,24 +249,64 @@ JitterSums jitter_sums(const Request& request, const std::vector<ToneFit>& tones
     const double level = std::max(white, tone.residual_mg * tone.residual_mg);
     const double sd = level * std::sqrt(4.0 / static_cast<double>(tone.samples));
     const double lever = 0.5 * rate * rate;
+    sums.tones.push_back({2 * M_PI * frequency_hz, tone.in_phase_mg[tone.axis],
+                          tone.on_slope_mg2 - tone.on_crest_mg2, white,
+                          tone.residual_mg * tone.residual_mg, static_cast<double>(tone.samples)});
     sums.up += lever * (tone.on_slope_mg2 - tone.on_crest_mg2) / (sd * sd);
     sums.down += lever * lever / (sd * sd);
   }
   return sums;
 }
 
+struct JitterFit {
+  double ms = 0;
+  double sd_ms = 0;
+};
+
+// The size, by the exact law. A tone's weight is that of the scatter which the size lets expect, and
+// not of its own residuals: what is large by chance would weigh less, and the size be too small by a
+// hundredth. A tone that has much more than that has another cause, too, and weighs less.
+JitterFit fit_jitter(const JitterSums& sums) {
+  constexpr int kRounds = 20;  // each takes the error down by (w s)^2 / 2 and more
+  constexpr double kMuchMore = 1.5;
+  constexpr double kNoJitterSd_ms = 0.05;
+  double variance_s2 = std::max(0.0, sums.up / sums.down);
+  double down = sums.down;
+  for (int round = 0; round < kRounds && variance_s2 > 0; ++round) {
+    double up = 0;
+    down = 0;
+    for (const JitterTone& tone : sums.tones) {
+      const double x = tone.w * tone.w * variance_s2;
+      const double half_mg2 = tone.found_mg * tone.found_mg / 2;
+      const double slope = half_mg2 * -std::expm1(-x) / variance_s2;  // mg^2/s^2
+      double added_mg2 = half_mg2 * std::expm1(x);                    // to the mean square
+      if (tone.residual_mg2 > kMuchMore * (tone.white_mg2 + added_mg2)) {
+        added_mg2 = tone.residual_mg2 - tone.white_mg2;
+      }
+      // (8 / n) times the mean over the phases p of cos^2 2p (white + 2 added sin^2 p)^2, of
+      // normal residuals: cos^2 2p has the mean 1/2, times sin^2 p 1/4, times sin^4 p 7/32.
+      const double level_mg2 = tone.white_mg2 + added_mg2;
+      const double variance =
+          (level_mg2 * level_mg2 + 0.75 * added_mg2 * added_mg2) * 4 / tone.samples;
+      up += slope * tone.excess_mg2 / variance;
+      down += slope * slope / variance;
+    }
+    variance_s2 = std::max(0.0, up / down);
+  }
+  JitterFit fit{.ms = 1e3 * std::sqrt(variance_s2)};
+  fit.sd_ms = fit.ms > 0 ? 1e6 / std::sqrt(down) / (2 * fit.ms) : kNoJitterSd_ms;
+  return fit;
+}
+
 // Adds accepted jitter to `timing`, and frees the tones' amplitudes of what it takes off.
 void judge_jitter(const Request& request, const NoiseSpectrum& noise, Timing& timing) {
   constexpr double kCost_nats = 4;  // convention: of its size, and of heavy tails
-  constexpr double kNoJitterSd_ms = 0.05;
   const JitterSums sums = jitter_sums(request, timing.tones, noise);
   if (sums.down == 0) {
     return;
   }
   const double z = sums.up / std::sqrt(sums.down);
-  const double jitter_ms = 1e3 * std::sqrt(std::max(0.0, sums.up / sums.down));
-  const double sd_ms =
-      jitter_ms > 0 ? 1e3 / std::sqrt(sums.down) / (2 * jitter_ms / 1e3) : kNoJitterSd_ms;
+  const auto [jitter_ms, sd_ms] = fit_jitter(sums);
   const double nats = (z > 0 ? 0.5 * z * z : 0) - kCost_nats + kLogPriorEffect;
   const bool there = nats > kAccept_nats;
   if (there && !request.allowed("jitter")) {

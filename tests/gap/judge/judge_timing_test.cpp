@@ -1,6 +1,10 @@
+#include <cmath>
+
 #include <gtest/gtest.h>
 
+#include "expect_result.h"
 #include "gap/judge/made_step.h"
+#include "gap/simulated_bundle.h"
 
 namespace sixpoint::gap {
 namespace {
@@ -30,6 +34,35 @@ TEST(JudgeTiming, AFastClockIsMeasured) {
   EXPECT_NEAR(clock->parameters[0].value[0], kPpm, 4 * clock->parameters[0].sd[0]);
   EXPECT_TRUE(clock->outside_datasheet);
   EXPECT_EQ(effect(timing.found, "dropped_samples"), nullptr);
+}
+
+// Oracle: the truth of simulated units. The size has no bias, and its uncertainty is what it says: of
+// eight within two standard uncertainties six at least (fewer once in 200).
+TEST(JudgeTiming, JitterHasNoBias) {
+  constexpr double kTrue_ms = 1.5;
+  constexpr int kUnits = 8;
+  double sum_ms = 0;
+  double variance = 0;
+  int within = 0;
+  for (int seed = 500; seed < 500 + kUnits; ++seed) {
+    auto bundle = tests::simulated(
+        {{"schema", "sixpoint/scenario/1"},
+         {"seed", seed},
+         {"protocol", "engineering"},
+         {"effects", {{{"name", "jitter"}, {"parameters", {{"rms_ms", kTrue_ms}}}}}}});
+    ASSERT_OK(bundle);
+    const Made made(*std::move(bundle));
+    const Timing timing = judge_timing(made.request, made.clean, made.noise);
+    const EffectFinding* jitter = effect(timing.found, "jitter");
+    ASSERT_NE(jitter, nullptr);
+    const double found_ms = jitter->parameters[0].value[0];
+    const double sd_ms = jitter->parameters[0].sd[0];
+    sum_ms += found_ms;
+    variance += sd_ms * sd_ms;
+    within += std::abs(found_ms - kTrue_ms) < 2 * sd_ms ? 1 : 0;
+  }
+  EXPECT_NEAR(sum_ms / kUnits, kTrue_ms, 2.5 * std::sqrt(variance) / kUnits);
+  EXPECT_GE(within, 6);
 }
 
 TEST(JudgeTiming, LostSamplesAreCounted) {
