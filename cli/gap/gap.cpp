@@ -1,6 +1,5 @@
 // sixpoint gap diagnose BUNDLE: where simulator and recording differ, and which effect explains it.
 #include <chrono>
-#include <cmath>
 #include <memory>
 #include <set>
 #include <string>
@@ -119,12 +118,9 @@ void print_gap(const gap::Diagnosis& d, Context& context) {
                                   effect.held_out_gain_nats);
     for (const gap::NamedValue& p : effect.parameters) {
       context.text() << fmt::format("  {} {:.4g}", p.name, fmt::join(p.value, " "));
-      if (!p.sd.empty()) {
-        context.text() << " +-";
-        for (const double sd : p.sd) {
-          context.text() << (std::isnan(sd) ? " -" : fmt::format(" {:.2g}", sd));
-        }
-      }
+      context.text() << (p.sd.empty()
+                             ? ""
+                             : fmt::format(" +- {}", fmt::join(gap::uncertainty_texts(p), " ")));
     }
     context.text() << (effect.outside_datasheet ? "  (outside the datasheet)\n" : "\n");
   }

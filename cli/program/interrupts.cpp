@@ -59,6 +59,7 @@ std::string text_when_stopped(const std::vector<std::string>& arguments) {
   if (begins_with(arguments, {"capture"})) {
     return "\nsixpoint: stopped; the unit may still be recording: begin the capture again, with "
            "another name if its file is there\n";
+  }
   if (const std::string folder = export_folder(arguments);
       begins_with(arguments, {"gap", "challenge"}) && !folder.empty()) {
     return "\nsixpoint: stopped; remove the folder " + repair::shell_word(folder) +

@@ -34,6 +34,18 @@ Json values(const std::vector<double>& list) {
   return json;
 }
 
+}  // namespace
+
+std::vector<std::string> uncertainty_texts(const NamedValue& parameter) {
+  std::vector<std::string> texts;
+  for (const double sd : parameter.sd) {
+    texts.push_back(std::isnan(sd) ? "-" : fmt::format("{:.2g}", sd));
+  }
+  return texts;
+}
+
+namespace {
+
 Json finding_json(const EffectFinding& finding) {
   Json json;
   json["name"] = finding.name;

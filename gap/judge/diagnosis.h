@@ -25,6 +25,9 @@ struct NamedValue {
   std::vector<double> form_sd = {};
 };
 
+// Its uncertainties for people: "0.012", and "-" for a number that nothing shows.
+std::vector<std::string> uncertainty_texts(const NamedValue& parameter);
+
 struct EffectFinding {
   std::string name;
   double probability = 0;

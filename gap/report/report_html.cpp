@@ -52,7 +52,9 @@ std::string effects_table(const std::vector<EffectFinding>& list, const char* ca
     std::string parameters;
     for (const NamedValue& p : e.parameters) {
       parameters += fmt::format("{} = {:.4g}", p.name, fmt::join(p.value, ", "));
-      parameters += p.sd.empty() ? "; " : fmt::format(" &plusmn; {:.2g}; ", fmt::join(p.sd, ", "));
+      parameters += p.sd.empty()
+                        ? "; "
+                        : fmt::format(" &plusmn; {}; ", fmt::join(uncertainty_texts(p), ", "));
     }
     out += fmt::format(
         "<tr><td>{}{}</td><td>{:.3f}</td><td>{:.1f}</td><td>{:.1f}</td><td>{}</td><td>{}</td></tr>",

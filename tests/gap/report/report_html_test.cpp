@@ -1,5 +1,6 @@
 #include "gap/report/report_html.h"
 
+#include <cmath>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -33,7 +34,7 @@ TEST(ReportHtml, TablesHoldTheNumbersOfTheDiagnosis) {
   tilt.probability = 0.9876;
   tilt.nats = 20;
   tilt.outside_datasheet = true;
-  tilt.parameters = {{"rotation_vector_deg", {0.25, -0.5, 0}, {0.01, 0.02, 0.03}}};
+  tilt.parameters = {{"rotation_vector_deg", {0.25, -0.5, 0}, {0.01, 0.02, NAN}}};
   tilt.confounded_with = {"misalignment", "seating"};
   d.effects = {tilt};
   d.where = {{1, "a<b", "pose", 2.345, 10}};
@@ -42,7 +43,7 @@ TEST(ReportHtml, TablesHoldTheNumbersOfTheDiagnosis) {
   d.losses = {"no <host> clock"};
   const std::string page = report_html(d);
   EXPECT_THAT(page, HasSubstr("tilt (outside the datasheet)</td><td>0.988</td><td>20.0</td>"));
-  EXPECT_THAT(page, HasSubstr("rotation_vector_deg = 0.25, -0.5, 0 &plusmn; 0.01, 0.02, 0.03; "));
+  EXPECT_THAT(page, HasSubstr("rotation_vector_deg = 0.25, -0.5, 0 &plusmn; 0.01, 0.02, -; "));
   EXPECT_THAT(page, HasSubstr("<td>misalignment, seating</td>"));
   EXPECT_THAT(page, HasSubstr("<td>Y</td><td>a&lt;b</td><td>pose</td><td>2.35</td>"));
   EXPECT_THAT(page, HasSubstr("rgba(181,68,46,0.40)\">10.0<"));
