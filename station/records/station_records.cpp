@@ -424,7 +424,11 @@ Result<std::string> add_decision(db::Store& store, const db::StationEvent& decis
     }
   }
   if (decision.action == "release") {
-    SIXPOINT_CHECK(store.unit_history(decision.serial));
+    SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(decision.serial));
+    if (history.empty()) {
+      return fail(ErrorCode::no_input, "the store knows no such unit", printable(decision.serial),
+                  "give its serial number; runs that wait in a journal: 'sixpoint store catch-up'");
+    }
   }
   return store.add_station_event(decision);
 }

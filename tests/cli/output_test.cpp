@@ -251,6 +251,7 @@ TEST_F(OutputWriting, WhatIsReadAgainHasToBeAFile) {
 TEST_F(OutputWriting, AFolderOfAnotherUserIsRefusedBeforeTheWork) {
   constexpr uid_t kNobody = 65534;
   std::filesystem::create_directory(path("theirs"));
+  ASSERT_EQ(::chmod(path(".").c_str(), 0755), 0);
   ASSERT_EQ(::chmod(path("theirs").c_str(), ::geteuid() == 0 ? 0755 : 0555), 0);
   const bool is_root = ::geteuid() == 0;
   ASSERT_TRUE(!is_root || ::seteuid(kNobody) == 0);

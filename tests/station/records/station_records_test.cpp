@@ -64,7 +64,8 @@ TEST_F(StationRecords, ADecisionIsSignedAndRemovesOnlyACheckUnit) {
   decision.action = "release";
   decision.serial = "MISTYPED";
   EXPECT_FAILS(add_decision(store_, decision), ErrorCode::no_input);
-  decision.serial = "CHECK1";
+  decision.serial = "MOS2A1";
+  add_run("MOS2A1", JigVerdict::fail);
   EXPECT_OK(add_decision(store_, decision));
   const auto events = store_.station_events();
   ASSERT_OK(events);
