@@ -15,6 +15,10 @@ namespace sixpoint::repair {
 namespace {
 
 constexpr double kBlock_s = 60;
+// Of a short recording a twentieth, so that it has parts enough to agree; in less than ten seconds
+// nearly everything fits somewhere.
+constexpr double kShortestBlock_s = 10;
+constexpr double kBlocksOfARecording = 20;
 constexpr std::size_t kMaxBlocks = 60;
 constexpr double kFineReach_s = 2;      // about the lag found to the second
 constexpr double kNearBest = 0.6;       // of the best correlation: lags to the second worth a look
@@ -27,7 +31,12 @@ constexpr double kInlier_s = 0.03;
 constexpr double kSwellTrust_s = 0.2;  // standard error of the lag found from swelling and fading
 constexpr double kRivalLine = 0.8;     // a line with so much of the best one's votes is a rival
 constexpr int kMaxDrift_ppm = 100;     // a cold watch crystal is off by 35
-constexpr double kLongEnoughForDrift_s = 600;
+constexpr double kLongEnoughForDrift_s = 240;  // beyond, a drifting clock moves by a sample
+constexpr std::size_t kFewestAgreeing = 3;     // a line goes through any two
+constexpr double kMostChance = 1e-4;
+constexpr double kSwellMemory_s = 120;  // how long motion may go on as before
+constexpr double kSurestSwell = 0.01;   // swelling alone is never an alignment
+constexpr double kSurestStep = 0.02;    // of a sample: what cubic interpolation cannot tell
 
 // Pearson's correlation of pairs given one by one; pairs with a missing value are left out.
 class Correlation {
@@ -75,9 +84,9 @@ std::vector<float> motion_of(const Trace& trace, double hop_s) {
 }
 
 // The lags about `about_s`, in steps of hop_s, at which the motions fit, the best first; of the
-// others those that come near it. None where the best is no fit.
+// others those that come near it; none beyond max_lag_s. None where the best is no fit.
 std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, double about_s,
-                                double reach_s) {
+                                double reach_s, double max_lag_s) {
   const std::vector<float> motion_a = motion_of(a, hop_s);
   const std::vector<float> motion_b = motion_of(b, hop_s);
   const auto offset = static_cast<std::ptrdiff_t>(
@@ -113,7 +122,10 @@ std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, do
       const double bend = left - 2 * values[i] + right;
       at += bend < 0 ? 0.5 * (left - right) / bend : 0;
     }
-    peaks.emplace_back(values[i], about_s + (at - static_cast<double>(reach)) * hop_s);
+    const double lag_s = about_s + (at - static_cast<double>(reach)) * hop_s;
+    if (std::abs(lag_s) <= max_lag_s + hop_s) {
+      peaks.emplace_back(values[i], std::clamp(lag_s, -max_lag_s, max_lag_s));
+    }
   }
   std::ranges::sort(peaks, std::greater<>());
   std::vector<double> lags;
@@ -124,9 +136,56 @@ std::vector<double> motion_lags(const Trace& a, const Trace& b, double hop_s, do
 }
 
 // To some tenths of a second, about a lag that is known to a second.
-double tenths_of(const Trace& a, const Trace& b, double second_s) {
-  const auto tenth = motion_lags(a, b, 0.1, std::round(second_s), kFineReach_s);
+double tenths_of(const Trace& a, const Trace& b, double second_s, double max_lag_s) {
+  const auto tenth = motion_lags(a, b, 0.1, std::round(second_s), kFineReach_s, max_lag_s);
   return tenth.empty() ? second_s : tenth.front();
+}
+
+// That unrelated motions swell and fade so much alike at any of the lags tried. Neighbouring
+// seconds are alike, so there are fewer to count than there are (Bartlett). 1 where they swell more
+// alike at another lag, two minutes beyond the limit included: what is related beyond the limit
+// swells a little alike within it too.
+double swell_chance(const Trace& a, const Trace& b, double lag_s, double limit_s) {
+  const std::vector<float> motion_a = motion_of(a, 1);
+  const std::vector<float> motion_b = motion_of(b, 1);
+  const auto correlation_of = [](const std::vector<float>& x, const std::vector<float>& y,
+                                 std::ptrdiff_t shift) {
+    Correlation correlation;
+    for (std::ptrdiff_t i = 0; i < std::ssize(x); ++i) {
+      if (i + shift >= 0 && i + shift < std::ssize(y)) {
+        correlation.add(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(i + shift)]);
+      }
+    }
+    return correlation;
+  };
+  const auto offset =
+      static_cast<std::ptrdiff_t>(std::floor(a.start_s()) - std::floor(b.start_s()));
+  const auto here_s = static_cast<std::ptrdiff_t>(std::llround(lag_s));
+  const Correlation both = correlation_of(motion_a, motion_b, offset + here_s);
+  const auto reach = static_cast<std::ptrdiff_t>(limit_s + kSwellMemory_s);
+  for (std::ptrdiff_t other_s = -reach; other_s <= reach; ++other_s) {
+    const bool beyond = std::abs(static_cast<double>(other_s)) > limit_s;
+    if (!beyond && std::abs(other_s - here_s) <= 1) {
+      continue;
+    }
+    const Correlation other = correlation_of(motion_a, motion_b, offset + other_s);
+    if (2 * other.count() > both.count() &&
+        (other.value() > both.value() || (beyond && other_s == here_s))) {
+      return 1;
+    }
+  }
+  double alike = 1;
+  for (std::ptrdiff_t shift = 1; shift <= static_cast<std::ptrdiff_t>(kSwellMemory_s); ++shift) {
+    alike += 2 * correlation_of(motion_a, motion_a, shift).value() *
+             correlation_of(motion_b, motion_b, shift).value();
+  }
+  const double seconds = static_cast<double>(both.count()) / std::max(1.0, alike);
+  if (seconds <= 4) {
+    return 1;
+  }
+  const double deviations = std::atanh(std::min(both.value(), 1 - 1e-9)) * std::sqrt(seconds - 3);
+  return std::min(
+      1.0, 0.5 * std::erfc(deviations / std::sqrt(2)) * (2 * static_cast<double>(reach) + 1));
 }
 
 struct Block {
@@ -136,9 +195,11 @@ struct Block {
   double motion_g = 0;
 };
 
-// The liveliest minutes of A, in order of time.
+// The liveliest minutes of A, in order of time; of a short recording, parts of it.
 std::vector<Block> lively_blocks(const Trace& a, const CompareOptions& options) {
-  const double length_s = std::min(kBlock_s, static_cast<double>(a.size()) / a.rate_hz());
+  const double all_s = static_cast<double>(a.size()) / a.rate_hz();
+  const double length_s =
+      std::min(all_s, std::clamp(all_s / kBlocksOfARecording, kShortestBlock_s, kBlock_s));
   const auto steps = std::max<std::size_t>(2, static_cast<std::size_t>(length_s * a.rate_hz()));
   std::vector<Block> blocks;
   for (std::size_t begin = 0; begin + steps <= a.size(); begin += steps) {
@@ -181,10 +242,10 @@ double block_correlation(const Trace& a, const Trace& b, const Block& block, dou
   return 2 * correlation.count() > block.end - block.begin ? correlation.value() : 0;
 }
 
-// Adds every lag at which this block fits about as well as it ever does there, and says how well
-// that is: 0 where it does not fit.
+// Adds every lag up to limit_s at which this block fits about as well as it ever does there, and
+// says how well that is: 0 where it does not fit.
 double add_candidates(const Trace& a, const Trace& b, const Block& block, std::size_t index,
-                      double about_s, std::vector<Candidate>& candidates) {
+                      double about_s, double limit_s, std::vector<Candidate>& candidates) {
   const double step_s = 1 / std::max(a.rate_hz(), b.rate_hz());
   const auto reach = static_cast<int>(kFineReach_s / step_s);
   std::vector<double> values;
@@ -205,12 +266,15 @@ double add_candidates(const Trace& a, const Trace& b, const Block& block, std::s
     }
     const double bend = left - 2 * here + right;
     const double shift = bend < 0 ? 0.5 * (left - right) / bend : 0;
-    found.push_back({index, about_s + (static_cast<double>(k) - reach + shift) * step_s, here});
+    const double lag_s = about_s + (static_cast<double>(k) - reach + shift) * step_s;
+    if (std::abs(lag_s) <= limit_s) {
+      found.push_back({index, lag_s, here});
+    }
   }
   std::ranges::sort(found, std::greater<>(), &Candidate::correlation);
   found.resize(std::min(found.size(), kMaxRivals));
   candidates.insert(candidates.end(), found.begin(), found.end());
-  return best;
+  return found.empty() ? 0 : best;
 }
 
 // The line that most blocks agree on: for every drift, lags corrected for it fall into bins; bins
@@ -313,50 +377,117 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+// How far an error of so many degrees of freedom reaches in 99 of 100 cases, in standard errors:
+// Student's t, by Fisher's expansion; within 2 % from three on.
+double t_99(double freedom) {
+  return 2.5758 + 4.917 / freedom + 8.83 / (freedom * freedom) +
+         12.1 / (freedom * freedom * freedom);
+}
+
+struct LineFit {
+  std::size_t agreeing = 0;
+  double half_width_s = 0;   // the agreeing are so near to the line
+  double uncertainty_s = 0;  // of the lag in its middle, 99 of 100
+};
+
 // A straight line through the blocks' lags; those far off (a block that fitted one period aside)
 // are left out.
-void fit_line(const std::vector<std::pair<double, double>>& points, bool with_drift, Line& line,
-              PairComparison& result) {
-  std::vector<double> distances;
-  distances.reserve(points.size());
-  for (const auto& [time_s, lag_s] : points) {
-    distances.push_back(lag_s - line.at(time_s));
-  }
-  const double centre = median(distances);
-  for (double& distance : distances) {
-    distance = std::abs(distance - centre);
-  }
-  // 1.4826: from the median of absolute deviations to a standard deviation, for normal scatter.
-  const double limit = std::max(1e-3, 4 * 1.4826 * median(distances));
-  // The lag is said for the middle of the minutes that it comes from, where it is known best.
-  double n = 0;
-  double time_sum = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (distances[i] <= limit) {
-      n += 1;
-      time_sum += points[i].first;
+LineFit fit_line(const std::vector<std::pair<double, double>>& points, bool with_drift,
+                 Line& line) {
+  LineFit fit;
+  // The voted line is known to a bin only: the second and third round measure from the fitted one.
+  for (int round = 0; round < 3; ++round) {
+    std::vector<double> distances;
+    distances.reserve(points.size());
+    for (const auto& [time_s, lag_s] : points) {
+      distances.push_back(lag_s - line.at(time_s));
     }
-  }
-  line.middle_s = time_sum / n;
-  double st = 0, sl = 0, stt = 0, stl = 0, sll = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (distances[i] > limit) {
-      continue;
+    const double centre = median(distances);
+    for (double& distance : distances) {
+      distance = std::abs(distance - centre);
     }
-    const double t = points[i].first - line.middle_s;
-    const double l = points[i].second;
-    st += t, sl += l, stt += t * t, stl += t * l, sll += l * l;
+    // 1.4826: from the median of absolute deviations to a standard deviation, for normal scatter.
+    const double limit = std::max(1e-3, 4 * 1.4826 * median(distances));
+    // The lag is said for the middle of the minutes that it comes from, where it is known best.
+    double n = 0;
+    double time_sum = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (distances[i] <= limit) {
+        n += 1;
+        time_sum += points[i].first;
+      }
+    }
+    line.middle_s = time_sum / n;
+    double st = 0, sl = 0, stt = 0, stl = 0, sll = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (distances[i] > limit) {
+        continue;
+      }
+      const double t = points[i].first - line.middle_s;
+      const double l = points[i].second;
+      st += t, sl += l, stt += t * t, stl += t * l, sll += l * l;
+    }
+    const double ctt = stt - st * st / n;
+    const double ctl = stl - st * sl / n;
+    const bool sloped = with_drift && n >= 4 && ctt > 0;
+    line.slope = sloped ? ctl / ctt : 0;
+    line.lag_s = (sl - line.slope * st) / n;
+    const double rest = std::max(0.0, sll - sl * sl / n - line.slope * ctl);
+    const double freedom = n - (sloped ? 2 : 1);
+    fit = {static_cast<std::size_t>(n), std::min(limit, 2 * kInlier_s),
+           freedom > 0 ? t_99(freedom) * std::sqrt(rest / freedom / n) : 0};
   }
-  const double ctt = stt - st * st / n;
-  const double ctl = stl - st * sl / n;
-  line.slope = with_drift && ctt > 0 ? ctl / ctt : 0;
-  line.lag_s = (sl - line.slope * st) / n;
-  const double rest = std::max(0.0, sll - sl * sl / n - line.slope * ctl);
-  result.minutes_used = static_cast<std::size_t>(n);
-  result.lag_uncertainty_s = n > 2 ? std::sqrt(rest / (n - 2) / n) : 0;
+  return fit;
+}
+
+// How likely it is that each block that fits somewhere has one of its good lags by the line, where
+// its lags are anywhere within reach_s.
+Agreement agreement_of(const std::vector<Candidate>& candidates, const std::vector<Block>& blocks,
+                       const LineFit& fit, std::size_t looked_at, double reach_s, bool with_drift) {
+  Agreement agreement;
+  agreement.agreeing = fit.agreeing;
+  std::map<std::size_t, std::size_t> lags_of;
+  for (const Candidate& candidate : candidates) {
+    ++lags_of[candidate.block];
+  }
+  for (const auto& [block, lags] : lags_of) {
+    agreement.chances.push_back(
+        std::min(1.0, static_cast<double>(lags) * fit.half_width_s / reach_s));
+  }
+  const double half_span_s = (blocks.back().middle_s - blocks.front().middle_s) / 2;
+  const double slopes = with_drift ? 1 + kMaxDrift_ppm * 1e-6 * half_span_s / fit.half_width_s : 1;
+  // The width of what agrees is taken from the parts themselves: of its halvings the k-th is worth
+  // one in (k + 1)(k + 2), which is 1 for all of them.
+  const double halvings = std::log2(2 * kInlier_s / fit.half_width_s);
+  // A line three standard errors from where swelling fits has no votes.
+  agreement.lines_tried = static_cast<double>(looked_at) *
+                          std::max(1.0, std::min(reach_s, 3 * kSwellTrust_s) / fit.half_width_s) *
+                          slopes * (halvings + 1) * (halvings + 2);
+  return agreement;
 }
 
 }  // namespace
+
+double Agreement::by_chance() const {
+  // The distribution of how many agree, one part after another.
+  std::vector<double> exactly = {1};
+  for (const double chance : chances) {
+    exactly.push_back(0);
+    for (std::size_t k = exactly.size(); k-- > 0;) {
+      exactly[k] = exactly[k] * (1 - chance) + (k > 0 ? exactly[k - 1] * chance : 0);
+    }
+  }
+  double tail = 0;
+  for (std::size_t k = agreeing; k < exactly.size(); ++k) {
+    tail += exactly[k];
+  }
+  return std::min(1.0, tail * lines_tried) * std::max(swelling, kSurestSwell);
+}
+
+bool is_alignment(const Agreement& agreement, double lag_s, double limit_s) {
+  return agreement.agreeing >= kFewestAgreeing && agreement.by_chance() < kMostChance &&
+         std::abs(lag_s) <= limit_s;
+}
 
 Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairComparison& result) {
   Line line{0, 0, a.start_s()};
@@ -366,7 +497,7 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
     return line;
   }
   // By how the motion swells and fades, which the period of a tone cannot mislead.
-  const auto seconds = motion_lags(a, b, 1, 0, std::floor(options.max_lag_s));
+  const auto seconds = motion_lags(a, b, 1, 0, std::ceil(options.max_lag_s), options.max_lag_s);
   if (seconds.empty() && blocks.size() > 1) {
     result.remarks.push_back(fmt::format(
         "the motions do not fit at any lag up to {:.0f} s: were the units moved together?",
@@ -378,12 +509,19 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
   std::vector<Candidate> candidates;
   std::optional<double> coarse;
   double best = 0;
+  std::size_t looked_at = 0;
+  const double half_span_s = (blocks.back().middle_s - blocks.front().middle_s) / 2;
+  const double limit_s = options.max_lag_s + 1 / std::min(a.rate_hz(), b.rate_hz());
+  // Away from the middle a clock may have drifted beyond the limit.
+  const double block_limit_s = limit_s + kMaxDrift_ppm * 1e-6 * half_span_s;
   for (std::size_t i = 0; i < std::max<std::size_t>(seconds.size(), 1) && best < kSureFit; ++i) {
-    const double about_s = seconds.empty() ? 0 : tenths_of(a, b, seconds[i]);
+    const double about_s = seconds.empty() ? 0 : tenths_of(a, b, seconds[i], options.max_lag_s);
+    ++looked_at;
     std::vector<Candidate> here;
     double fit = 0;
     for (std::size_t n = 0; n < blocks.size(); ++n) {
-      fit += add_candidates(a, b, blocks[n], n, about_s, here) / static_cast<double>(blocks.size());
+      fit += add_candidates(a, b, blocks[n], n, about_s, block_limit_s, here) /
+             static_cast<double>(blocks.size());
     }
     if (fit > best) {
       best = fit;
@@ -400,22 +538,45 @@ Line align(const Trace& a, const Trace& b, const CompareOptions& options, PairCo
   double rival_s = 0;
   line = vote(candidates, blocks, line.middle_s, with_drift, coarse, rival_s);
   std::vector<std::pair<double, double>> points;
-  for (const Block& block : blocks) {
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    // A part that fitted nowhere is no witness: it would agree without a chance of its own.
+    if (std::ranges::find(candidates, i, &Candidate::block) == candidates.end()) {
+      continue;
+    }
+    const Block& block = blocks[i];
     const auto lag = refined_lag(a, b, block, line.at(block.middle_s));
     if (lag && block_correlation(a, b, block, *lag) >= kGoodCorrelation) {
       points.emplace_back(block.middle_s, *lag);
     }
   }
+  LineFit fit;
+  Agreement agreement;
   if (!points.empty()) {
-    fit_line(points, with_drift && points.size() >= 4, line, result);
-    result.aligned = true;
-    if (rival_s > 0) {
-      result.lag_uncertainty_s = std::max(result.lag_uncertainty_s, rival_s);
-      result.remarks.push_back(fmt::format(
-          "the motion is periodic: the lag may be off by {:.2f} s, which the envelopes do not mind "
-          "but the RMS does",
-          rival_s));
-    }
+    fit = fit_line(points, with_drift, line);
+    // By the limit the lags may be closer together than the search reaches.
+    const double reach_s = std::min(kFineReach_s, block_limit_s);
+    agreement = agreement_of(candidates, blocks, fit, looked_at, reach_s, with_drift);
+    agreement.swelling = swell_chance(a, b, line.lag_s, limit_s);
+  }
+  if (!is_alignment(agreement, line.lag_s, limit_s)) {
+    result.remarks.push_back(fmt::format(
+        "{} of {} lively parts agree on a lag up to {:g} s, which chance does too: were the units "
+        "moved together?",
+        agreement.agreeing, blocks.size(), options.max_lag_s));
+    return {0, 0, a.start_s()};
+  }
+  result.aligned = true;
+  const double part_s =
+      static_cast<double>(blocks.front().end - blocks.front().begin) / a.rate_hz();
+  result.minutes_used = static_cast<std::size_t>(
+      std::max(1LL, std::llround(static_cast<double>(fit.agreeing) * part_s / 60)));
+  result.lag_uncertainty_s =
+      std::max(rival_s, std::hypot(fit.uncertainty_s, kSurestStep / a.rate_hz()));
+  if (rival_s > 0) {
+    result.remarks.push_back(fmt::format(
+        "the motion is periodic: the lag may be off by {:.2f} s, which the envelopes do not mind "
+        "but the RMS does",
+        rival_s));
   }
   return line;
 }

@@ -11,15 +11,21 @@
 //
 //  - Everything is done on the vector magnitude, which does not care how a unit lies.
 //  - Alignment in time: how the motion swells and fades (standard deviation within a second) is
-//    correlated first, to some tenths of a second; then up to 60 lively minutes are correlated to a
-//    fraction of a sample, each by itself; a straight line through their lags gives lag and drift.
+//    correlated first, to some tenths of a second; then up to 60 lively minutes (of less than
+//    twenty minutes, twentieths) are correlated to a fraction of a sample, each by itself; a
+//    straight line through their lags gives lag and drift.
 //    A minute of steady shaking fits at every period; therefore every good peak of every minute is
-//    a candidate, and the line wins that most of them agree on near the first lag.
+//    a candidate, and the line wins that most of them agree on near the first lag. It is believed
+//    where chance does not let so many agree (align.h has the rule as a table).
 //  - Envelopes: per second the largest and the smallest magnitude, of each unit's own samples.
 //    Their differences are the errors of the paper's histograms; they do not depend on where within
 //    a vibration the samples fall.
 //  - RMS of the difference of the magnitudes, B interpolated (cubic) at the times of A's samples.
 //    At high frequencies it also holds what interpolation and the remaining lag cost.
+//
+// Of 40 simulated pairs of units worn at once (10 and 20 minutes, lags of -60 to 60 s, clocks up to
+// 100 ppm off) 40 are aligned, each within its stated uncertainty; of 40 pairs of other motions
+// none (Compare.RelatedPairsAreAlignedAndUnrelatedOnesAreNot).
 //
 // Comparisons are of hours: a recording may hold up to kMaxTraceSamples samples, which are kept in
 // memory (4 bytes each).
@@ -38,7 +44,7 @@ namespace sixpoint::repair {
 
 struct CompareOptions {
   // Clocks are set by the same computer when units are prepared; more than this is no common
-  // recording.
+  // recording. No lag beyond it is found, but for one sample.
   double max_lag_s = 120;
   // A minute with less motion than this says nothing about time (twice the noise of two units).
   double min_motion_mg = 20;
@@ -66,12 +72,13 @@ struct PairComparison {
   double lag_s = 0;
   double lag_at_s = 0;
   double drift_ppm = 0;
-  // Standard error of lag_s; where the motion is periodic, the distance of the next lag that fits
-  // nearly as well. 0 where it was not found.
+  // The error of lag_s is smaller in 99 of 100 cases; where the motion is periodic, the distance of
+  // the next lag that fits nearly as well. 0 only where it is not aligned.
   double lag_uncertainty_s = 0;
-  bool aligned = false;  // false: nothing moved, or nothing fitted; then lag_s is 0
-  std::size_t minutes_used = 0;
-  double overlap_s = 0;  // seconds in which both have samples
+  // By the table in align.h. false: nothing moved, or what fitted fits by chance; then lag_s is 0.
+  bool aligned = false;
+  std::size_t minutes_used = 0;  // rounded, and at least 1 where it is aligned
+  double overlap_s = 0;          // seconds in which both have samples
   double rms_mg = 0;
   Envelopes envelope;
   Histogram histogram;
