@@ -90,8 +90,8 @@ std::vector<WornPair> worn_pairs() {
     const int late_s = static_cast<int>(std::floor(random.uniform() * 120)) - 60;
     const double ppm = std::round(random.uniform() * 200 - 100);
     pairs.push_back({worn(3000 + i, 700 + i, duration_s, 0, 0),
-                     worn(4000 + i, 700 + i, duration_s, late_s, ppm),
-                     static_cast<double>(late_s), ppm});
+                     worn(4000 + i, 700 + i, duration_s, late_s, ppm), static_cast<double>(late_s),
+                     ppm});
   }
   return pairs;
 }
@@ -107,8 +107,8 @@ TEST(Compare, RelatedPairsAreAlignedAndUnrelatedOnesAreNot) {
     const auto related = compare(pairs[i].a, pairs[i].b);
     ASSERT_OK(related);
     aligned += related->aligned ? 1 : 0;
-    const double lag_s = pairs[i].lag_s + pairs[i].drift_ppm * 1e-6 *
-                                              (related->lag_at_s - pairs[i].a.start_s());
+    const double lag_s =
+        pairs[i].lag_s + pairs[i].drift_ppm * 1e-6 * (related->lag_at_s - pairs[i].a.start_s());
     EXPECT_NEAR(related->lag_s, lag_s, 0.01) << i;
     EXPECT_GT(related->lag_uncertainty_s, 0) << i;
     within += std::abs(related->lag_s - lag_s) <= related->lag_uncertainty_s ? 1 : 0;
