@@ -135,7 +135,6 @@ Diagnosis diagnose(const Request& request) {
   out.unit.gain = nuisances.unit.gain;
   out.unit.offset_g = nuisances.unit.offset_g;
   found.append(std::move(nuisances.found));
-  free_saturation_of_unit(request, records.clean, out.unit, found);
   found.append(judge_left_over(request, records, explanation, found));
 
   list_not_observable(request, kind, records, explanation, found, out);

@@ -50,23 +50,16 @@ void judge_turned_axes(const Request& request, const CleanSamples& clean, Findin
   }
 }
 
-// Mean over the ends that pile up, of what is clipped: the unit's gain and offset come behind it.
-double plateau_level_g(const CleanSamples& clean, double lsb_per_g, const UnitEstimate& unit) {
-  double level_g = 0;
+double plateau_level_g(const CleanSamples& clean, double lsb_per_g) {
+  double level = 0;
   double count = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto& [low, high] = clean.plateau_lsb[a];
-    const double gain = unit.gain[a] > 0 ? unit.gain[a] : 1;
-    const auto clipped_g = [&](double lsb) {
-      return std::abs(lsb / lsb_per_g - unit.offset_g[a]) / gain;
-    };
+  for (const auto& [low, high] : clean.plateau_lsb) {
     if (low < 0 || high > 0) {
-      level_g += low < 0 && high > 0 ? (clipped_g(high) + clipped_g(low)) / 2
-                                     : clipped_g(high > 0 ? high : low);
+      level += (low < 0 && high > 0 ? (high - low) / 2 : std::max(-low, high)) / lsb_per_g;
       count += 1;
     }
   }
-  return level_g / std::max(1.0, count);
+  return level / std::max(1.0, count);
 }
 
 }  // namespace
@@ -118,24 +111,12 @@ Findings judge_marks(const Request& request, const CleanSamples& clean) {
          fmt::format("{} samples overflowed in the high shaker", clean.wrapped_samples));
   }
   if (clean.saturated) {
-    const double level_g = plateau_level_g(clean, bundle.accel_scale_lsb_per_g, {});
+    const double level_g = plateau_level_g(clean, bundle.accel_scale_lsb_per_g);
     mark({.name = "saturation", .parameters = {{"level_g", {level_g}, {kLevelSd_g}}}},
          clean.plateau_samples, kPerClip_nats, 1, kClip_mg2,
          "values pile up below full scale in the high shaker");
   }
   return found;
-}
-
-void free_saturation_of_unit(const Request& request, const CleanSamples& clean,
-                             const UnitEstimate& unit, Findings& found) {
-  const double level_g = plateau_level_g(clean, request.bundle.accel_scale_lsb_per_g, unit);
-  for (auto* list : {&found.effects, &found.candidates}) {
-    for (EffectFinding& f : *list) {
-      if (f.name == "saturation" && !f.parameters.empty()) {
-        f.parameters.front().value = {level_g};
-      }
-    }
-  }
 }
 
 Findings judge_texture(const Request& request, const Records& records, const Findings& before) {

@@ -36,10 +36,6 @@ ProtocolKind protocol_kind(const Bundle& bundle);
 // judge_samples.cpp: marks that noise cannot make (turned axes, zeros, held values, wraps,
 // plateaus).
 Findings judge_marks(const Request& request, const CleanSamples& clean);
-// States the level of a saturation as the simulator takes it: before the unit's gain and offset,
-// which judge_marks() does not know yet.
-void free_saturation_of_unit(const Request& request, const CleanSamples& clean,
-                             const UnitEstimate& unit, Findings& found);
 
 // judge_poses.cpp
 struct PoseCheck {

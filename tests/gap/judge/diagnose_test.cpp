@@ -268,22 +268,6 @@ TEST(SimulatedLine, ThatOneLongRecordShowsIsNamedByItsPhase) {
   EXPECT_TRUE(d->effects[0].confounded_with.empty());
 }
 
-// The simulator clips before it applies gain and offset: the scenario's own level comes back.
-TEST(Diagnose, SaturationHasTheScenariosLevel) {
-  const auto bundle = tests::simulated(
-      {{"schema", "sixpoint/scenario/1"},
-       {"seed", 5},
-       {"protocol", "engineering"},
-       {"unit", {{"gain", {1.03, 1.05, 1.04}}, {"offset_g", {0.05, -0.03, 0.02}}}},
-       {"effects", {{{"name", "saturation"}, {"parameters", {{"level_g", 5.5}}}}}}});
-  ASSERT_OK(bundle);
-  const auto d = diagnose(*bundle);
-  ASSERT_OK(d);
-  const NamedValue* level_g = parameter_of(*d, "saturation", "level_g");
-  ASSERT_NE(level_g, nullptr) << d->brief();
-  EXPECT_NEAR(level_g->value[0], 5.5, 0.01);
-}
-
 struct EffectsCase {
   const char* effects;
   unsigned seed;

@@ -31,24 +31,6 @@ TEST(JudgeMarks, EvidenceIsPerSample) {
   EXPECT_TRUE(found.alarms.empty());
 }
 
-// Closed form: what clips at 5.5 g is stored as gain * 5.5 + offset, at 256 counts a g.
-TEST(JudgeMarks, LevelIsBeforeGainAndOffset) {
-  const UnitEstimate unit{.gain = {1.03, 0.97, 1.05}, .offset_g = {0.05, -0.25, 0.1}};
-  Made made(tests::made_production({}));
-  made.clean.saturated = true;
-  made.clean.plateau_samples = 50;
-  const auto stored_lsb = [&](std::size_t a, double g) {
-    return 256 * (unit.gain[a] * g + unit.offset_g[a]);
-  };
-  made.clean.plateau_lsb = {{{stored_lsb(0, -5.5), stored_lsb(0, 5.5)},  // both ends
-                             {stored_lsb(1, -5.5), 0},                   // one
-                             {0, stored_lsb(2, 5.5)}}};
-  Findings found = judge_marks(made.request, made.clean);
-  free_saturation_of_unit(made.request, made.clean, unit, found);
-  ASSERT_NE(effect(found, "saturation"), nullptr);
-  EXPECT_NEAR(effect(found, "saturation")->parameters[0].value[0], 5.5, 1e-12);
-}
-
 TEST(JudgeMarks, WhatIsNotInTheCatalogueAlarms) {
   Made made(tests::made_production({}), {.without = {"idle_sleep", "axis_rotation"}});
   made.clean.held = {1, 300, {2}};

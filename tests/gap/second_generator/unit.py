@@ -125,9 +125,8 @@ def stored(unit, effects, segments, temperature, rate_hz, rng):
             walk, walked_until = path[-1], host[-1]
             a = a + 1e-3 * path
         a = a + 1e-3 * unit.noise_mg * rng.normal(size=(n, 3))
-        if "saturation" in by:  # noise is clipped, too; the unit's gain and offset come behind it (docs/scenario.md)
-            level = unit.gain * by["saturation"]["level_g"]
-            a = np.clip(a, unit.offset_g - level, unit.offset_g + level)
+        if "saturation" in by:  # the converter's range: noise is clipped, too
+            a = np.clip(a, -by["saturation"]["level_g"], by["saturation"]["level_g"])
         if "axis_rotation" in by:
             a = a @ np.array(by["axis_rotation"]["matrix"], float).reshape(3, 3).T
         a = a / LSB_G
