@@ -57,7 +57,10 @@ Json finding_json(const EffectFinding& finding) {
   for (const NamedValue& parameter : finding.parameters) {
     json["parameters"][parameter.name] = values(parameter.value);
     if (!parameter.sd.empty()) {
-      json["standard_uncertainty"][parameter.name] = values(parameter.sd);
+      std::vector<double> sd = parameter.sd;
+      std::ranges::replace_if(
+          sd, [](double x) { return std::isnan(x); }, 0.0);
+      json["standard_uncertainty"][parameter.name] = values(sd);
     }
     if (!parameter.form_sd.empty()) {
       json["form_uncertainty"][parameter.name] = values(parameter.form_sd);

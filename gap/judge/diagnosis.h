@@ -19,7 +19,8 @@ namespace sixpoint::gap {
 struct NamedValue {
   std::string name;
   std::vector<double> value;
-  std::vector<double> sd;  // empty where there is none; NaN of a number that nothing shows
+  // Empty where there is none; NaN of a number that nothing shows, which is 0 in JSON.
+  std::vector<double> sd;
   // The part of `sd` by which the effect may differ from its law. Units of one kind share it, so
   // that it is no scatter between them. Empty where there is none.
   std::vector<double> form_sd = {};
