@@ -160,6 +160,8 @@ class Interrupt(InFolder):
             "sixpoint.repair(sys.argv[1], sys.argv[2], scan=True, redo_outdated=True, wide=True)", simulated(), out
         )
         for left in out.glob("*"):
+            if left.name == ".sixpoint-repair.lock":  # of one run at a time (docs/repair.md)
+                continue
             self.assertEqual(left.suffix, ".gt3x", left)
             sixpoint.read(left)
 
