@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "cli/command.h"
@@ -56,7 +57,7 @@ Status read_for_device(const std::string& device, Outputs& outputs) {
     SIXPOINT_CHECK(outputs.input(path));
     for (const std::string& name :
          outputs.files().list(path).value_or(std::vector<std::string>{})) {
-      SIXPOINT_CHECK(outputs.input(path + "/" + name));
+      SIXPOINT_CHECK(outputs.input(fmt::format("{}/{}", path, name)));
     }
   }
   return {};
