@@ -21,22 +21,6 @@ using Json = nlohmann::json;
 constexpr const char* kDamaged = "'sixpoint audit verify' says whether the store was changed";
 constexpr std::size_t kMostSamples = 2'000'000;  // five hours at 100 Hz
 
-// A rotation that brings "up" onto the axis of the pose, the unit lying about the vertical as the
-// table of station/run/jig_run.h says. A report of the protocol `production` does not hold how it
-// lay: then the same is assumed.
-Eigen::Matrix3d rotation_of(const StoredReading& reading) {
-  const PerAxis<double> up = device::direction_of(reading.pose);
-  const Eigen::Vector3d direction(up[0], up[1], up[2]);
-  Eigen::Matrix3d rotation =
-      direction.z() < -0.5 ? Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix()
-                           : Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction)
-                                 .toRotationMatrix();
-  if (reading.half_turned) {
-    rotation.leftCols<2>() *= -1;
-  }
-  return rotation;
-}
-
 struct Samples {
   std::vector<double> device_time_s;
   std::vector<gt3x::Counts> counts;
@@ -174,7 +158,8 @@ void add_segments(gap::Bundle& bundle, const Samples& samples,
     segment.first_sample = bundle.samples.size();
     segment.samples = reading.stored.samples;
     segment.host_start_s = samples.device_time_s[first] - samples.device_time_s.front();
-    segment.rotation = rotation_of(reading.stored);
+    // A report of the protocol `production` does not hold how the unit lay: as in the others.
+    segment.rotation = rotation_on_jig(reading.stored.pose, reading.stored.half_turned);
     segment.temperature_start_c = samples.temperature_c[first];
     segment.temperature_end_c = segment.temperature_start_c;
     segment.settled = true;
@@ -273,6 +258,19 @@ Result<std::vector<StoredReading>> stored_readings(const Json& list) {
     readings.push_back(reading);
   }
   return readings;
+}
+
+Eigen::Matrix3d rotation_on_jig(device::Pose pose, bool half_turned) {
+  const PerAxis<double> up = device::direction_of(pose);
+  const Eigen::Vector3d direction(up[0], up[1], up[2]);
+  Eigen::Matrix3d rotation =
+      direction.z() < -0.5 ? Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix()
+                           : Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction)
+                                 .toRotationMatrix();
+  if (half_turned) {
+    rotation.leftCols<2>() *= -1;
+  }
+  return rotation;
 }
 
 Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples_csv) {

@@ -10,6 +10,7 @@
 // subtracted, and the gain stays in.
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -48,6 +49,10 @@ struct StoredReading {
 };
 // `list`: "poses" of a report, or another of its lists. bad_data where an entry is incomplete.
 Result<std::vector<StoredReading>> stored_readings(const nlohmann::json& list);
+
+// Of a unit that lies on `pose` as the table of station/run/jig_run.h says: the laboratory (z up, x to
+// the right of the person in front of the jig) to the sensor.
+Eigen::Matrix3d rotation_on_jig(device::Pose pose, bool half_turned = false);
 
 // bad_data where report or samples are not those of a jig run, or do not belong together.
 Result<gap::Bundle> bundle_of_run(const StoredRun& run, std::string_view samples_csv);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "device/jig.h"
+#include "station/records/jig_bundle.h"
 
 namespace sixpoint::station {
 
@@ -73,6 +74,26 @@ const Matrix12& basis() {
   return kBasis;
 }
 
+// What a base that leans by a degree along the laboratory's x and y does, in the groups' coordinates.
+Eigen::Matrix<double, 12, 2> make_base() {
+  Eigen::Matrix<double, 12, 2> skew;
+  Eigen::Index row = 0;
+  for (const device::Pose pose : device::kPoses) {
+    const Eigen::Matrix3d rotation = rotation_on_jig(pose);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      if (axis != device::axis_of(pose)) {
+        skew.row(row++) = rotation.row(static_cast<Eigen::Index>(axis)).head<2>();
+      }
+    }
+  }
+  return basis() * skew;
+}
+
+const Matrix12& base_matrix() {
+  static const Matrix12 kMatrix = make_base() * make_base().transpose();
+  return kMatrix;
+}
+
 // What is known of the sizes of a level's effects: the store teaches it.
 struct LevelPrior {
   double share = 0.1;
@@ -84,6 +105,7 @@ using LevelPriors = std::array<LevelPrior, 3>;  // by SharedLevel
 struct Hypothesis {
   double log_weight = 0;  // beforehand, then with the evidence
   Eigen::VectorXd tilt;   // variances beforehand, of the groups' coordinates
+  double base_variance = 0;
   std::array<std::size_t, 2> faces{kNoFace, kNoFace};
   double face_variance = 0;
   std::size_t size = 0;  // which of the level's
@@ -127,18 +149,19 @@ bool acts_in(const Problem& problem, SharedLevel level, std::size_t group) {
   return !(problem.is_skew && level == SharedLevel::lot && group == kEven);
 }
 
-// Which of turn, shear and even a tilt of this level moves.
-std::vector<std::array<bool, 3>> tilt_forms(const Problem& problem, SharedLevel level) {
+// Which of turn, shear and even a tilt of this level moves, or a base does.
+constexpr std::size_t kBase = 3;
+std::vector<std::array<bool, 4>> tilt_forms(const Problem& problem, SharedLevel level) {
   if (!problem.is_skew) {
-    return {{true, false, false}};
+    return {{true}};
   }
   if (level == SharedLevel::lot) {
-    return {{true, false, false}, {true, true, false}};
+    return {{true}, {true, true}};
   }
-  return {{true, false, false}, {false, false, true}, {true, true, true}};
+  return {{true}, {false, false, true}, {true, true, true}, {false, false, false, true}};
 }
 
-Eigen::VectorXd variances_of(const Problem& problem, const std::array<bool, 3>& form, double size) {
+Eigen::VectorXd variances_of(const Problem& problem, const std::array<bool, 4>& form, double size) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(problem.first_column.back());
   for (std::size_t g = 0; g < problem.groups.size(); ++g) {
     if (form[g]) {
@@ -155,8 +178,16 @@ Matrix12 face_matrix(std::size_t face) {
          basis().col(first + 1) * basis().col(first + 1).transpose();
 }
 
-Eigen::MatrixXd covariance_of(const Hypothesis& hypothesis) {
+Eigen::MatrixXd tilt_covariance_of(const Hypothesis& hypothesis) {
   Eigen::MatrixXd out = hypothesis.tilt.asDiagonal();
+  if (hypothesis.base_variance > 0) {
+    out += hypothesis.base_variance * base_matrix();
+  }
+  return out;
+}
+
+Eigen::MatrixXd covariance_of(const Hypothesis& hypothesis) {
+  Eigen::MatrixXd out = tilt_covariance_of(hypothesis);
   for (const std::size_t face : hypothesis.faces) {
     if (face != kNoFace) {
       out += hypothesis.face_variance * face_matrix(face);
@@ -172,7 +203,7 @@ double log_ratio(const Reading12& reading, const Hypothesis& hypothesis) {
     without +=
         std::log(reading.variance(i)) + shared_square(reading.value(i)) / reading.variance(i);
   }
-  if (hypothesis.faces[0] == kNoFace) {
+  if (hypothesis.faces[0] == kNoFace && hypothesis.base_variance == 0) {
     double with = 0;
     for (Eigen::Index i = 0; i < reading.value.size(); ++i) {
       const double variance = reading.variance(i) + hypothesis.tilt(i);
@@ -196,11 +227,12 @@ constexpr double kTwoFacesShare = 0.05;
 void add_tilts(const Problem& problem, SharedLevel level, const LevelPrior& prior, double share,
                std::vector<Hypothesis>& out) {
   const auto forms = tilt_forms(problem, level);
-  for (const std::array<bool, 3>& form : forms) {
+  for (const std::array<bool, 4>& form : forms) {
     for (std::size_t s = 0; s < problem.sizes.size(); ++s) {
       Hypothesis tilt;
       tilt.log_weight = std::log(share * prior.size_weight[s] / static_cast<double>(forms.size()));
       tilt.tilt = variances_of(problem, form, problem.sizes[s]);
+      tilt.base_variance = form[kBase] ? shared_square(problem.sizes[s]) : 0;
       tilt.size = s;
       tilt.has_tilt = true;
       out.push_back(std::move(tilt));
@@ -432,67 +464,89 @@ Part part_of(const Reading12& reading, const Eigen::MatrixXd& prior, const Eigen
   return {prior * factor.solve(reading.value), prior - prior * factor.solve(prior)};
 }
 
-// The length of a mean, and its uncertainty along it.
-void set_length(const Eigen::VectorXd& mean, const Eigen::MatrixXd& covariance, double divisor,
-                double& size, double& uncertainty) {
-  const double length = mean.norm();
-  const double along = length > 0 ? mean.dot(covariance * mean) / shared_square(length)
-                                  : covariance.trace() / static_cast<double>(mean.size());
-  size = length / divisor;
-  uncertainty = std::sqrt(std::max(0.0, along)) / divisor;
-}
+// The length of a part, over the forms that have it: root mean square, and uncertainty by the
+// variance of the square. For a normal vector of mean m and covariance C the square has the mean
+// m'm + tr C and the variance 4 m'Cm + 2 tr CC.
+class Length {
+ public:
+  void add(double weight, const Part& part) {
+    const double mean = part.mean.squaredNorm() + part.covariance.trace();
+    const double variance = 4 * part.mean.dot(part.covariance * part.mean) +
+                            2 * part.covariance.cwiseProduct(part.covariance).sum();
+    weight_ += weight;
+    square_ += weight * mean;
+    fourth_ += weight * (variance + mean * mean);
+  }
+  double size() const { return weight_ > 0 ? std::sqrt(square_ / weight_) : 0; }
+  double standard_uncertainty() const {
+    const double square = shared_square(size());
+    return square > 0 ? std::sqrt(std::max(0.0, fourth_ / weight_ - square * square)) / (2 * size())
+                      : 0;
+  }
+
+ private:
+  double weight_ = 0;
+  double square_ = 0;
+  double fourth_ = 0;
+};
 
 ElementFinding finding_of(const Problem& problem, const Reading12& reading,
                           const Evidence& evidence) {
+  constexpr double kNegligible_log = -14;
   ElementFinding out;
   out.probability = probability_of(evidence.log_odds);
-  const auto more_probable = [](const Hypothesis& a, const Hypothesis& b) {
-    return a.log_weight < b.log_weight;
-  };
+  const Eigen::Index count = reading.value.size();
+  double tilt_weight = 0;
+  Eigen::VectorXd tilt_sum = Eigen::VectorXd::Zero(count);
+  Eigen::MatrixXd tilt_squares = Eigen::MatrixXd::Zero(count, count);
+  Length tilt;
+  Length all;
+  std::array<Length, 6> faces;
   for (const Hypothesis& each : evidence.hypotheses) {
-    const double probability = out.probability * std::exp(each.log_weight);
-    out.tilt_probability += each.has_tilt ? probability : 0;
+    const double weight = std::exp(each.log_weight);
+    out.tilt_probability += each.has_tilt ? out.probability * weight : 0;
+    const bool counts = each.log_weight > kNegligible_log;
+    const Eigen::MatrixXd covariance = counts ? covariance_of(each) : Eigen::MatrixXd();
+    if (counts) {
+      all.add(weight, part_of(reading, covariance, covariance));
+    }
+    if (counts && each.has_tilt) {
+      const Part part = part_of(reading, tilt_covariance_of(each), covariance);
+      tilt.add(weight, part);
+      tilt_weight += weight;
+      tilt_sum += weight * part.mean;
+      tilt_squares += weight * (part.covariance + part.mean * part.mean.transpose());
+    }
     for (const std::size_t face : each.faces) {
       if (face != kNoFace) {
-        out.faces[face].probability += probability;
+        out.faces[face].probability += out.probability * weight;
+      }
+      if (face != kNoFace && counts) {
+        faces[face].add(weight,
+                        part_of(reading, each.face_variance * face_matrix(face), covariance));
       }
     }
   }
-  // Of the tilt: the most probable form with a tilt; of a face likewise.
-  const auto best_with = [&](const auto& has) {
-    const Hypothesis* best = nullptr;
-    for (const Hypothesis& each : evidence.hypotheses) {
-      best = has(each) && (best == nullptr || more_probable(*best, each)) ? &each : best;
-    }
-    return best;
-  };
-  const Hypothesis* tilt = best_with([](const Hypothesis& each) { return each.has_tilt; });
-  const Part of_tilt =
-      part_of(reading, Eigen::MatrixXd(tilt->tilt.asDiagonal()), covariance_of(*tilt));
+  const Eigen::VectorXd mean = tilt_sum / std::max(tilt_weight, 1e-300);
   if (!problem.is_skew) {
     Eigen::Index axis = 0;
-    of_tilt.mean.cwiseAbs().maxCoeff(&axis);
+    mean.cwiseAbs().maxCoeff(&axis);
     out.axis = static_cast<std::size_t>(axis);
-    out.size = of_tilt.mean(axis);
-    out.standard_uncertainty = std::sqrt(of_tilt.covariance(axis, axis));
-    out.value.assign(of_tilt.mean.begin(), of_tilt.mean.end());
+    out.size = mean(axis);
+    out.standard_uncertainty =
+        std::sqrt(tilt_squares(axis, axis) / tilt_weight - shared_square(mean(axis)));
+    out.value.assign(mean.begin(), mean.end());
     return out;
   }
-  const double faces = std::sqrt(6.0);
-  set_length(of_tilt.mean, of_tilt.covariance, faces, out.size, out.standard_uncertainty);
-  const Hypothesis& most = *best_with([](const Hypothesis&) { return true; });
-  out.all_size = part_of(reading, covariance_of(most), covariance_of(most)).mean.norm() / faces;
-  const Eigen::VectorXd pattern = basis().transpose() * of_tilt.mean;
+  const double root_of_faces = std::sqrt(6.0);
+  out.size = tilt.size() / root_of_faces;
+  out.standard_uncertainty = tilt.standard_uncertainty() / root_of_faces;
+  out.all_size = all.size() / root_of_faces;
+  const Eigen::VectorXd pattern = basis().transpose() * mean;
   out.value.assign(pattern.begin(), pattern.end());
-  for (std::size_t f = 0; f < out.faces.size(); ++f) {
-    const Hypothesis* best =
-        best_with([&](const Hypothesis& each) { return each.faces[0] == f || each.faces[1] == f; });
-    if (best != nullptr) {
-      const Part part =
-          part_of(reading, best->face_variance * face_matrix(f), covariance_of(*best));
-      set_length(part.mean, part.covariance, 1, out.faces[f].size,
-                 out.faces[f].standard_uncertainty);
-    }
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    out.faces[f].size = faces[f].size();
+    out.faces[f].standard_uncertainty = faces[f].standard_uncertainty();
   }
   return out;
 }

@@ -23,11 +23,15 @@
 //     shear (3)  the axes not at right angles: opposite sign on opposite faces
 //     even (6)   the same on opposite faces: no linear sensor does it, a tilted jig does
 //
-//     a tilted jig moves      turn alone (a nest that is turned), even alone (a base that is not
-//                             level), or all twelve
+//     a tilted jig moves      turn alone (a nest that is turned); even alone, or all twelve (nests that
+//                             lean); or what two angles say: a base that is not level under a unit
+//                             that lies as the table of station/run/jig_run.h has it
 //     a face of a jig moves   its own two readings
 //     a station moves         as a jig, on all its jigs
 //     a lot moves             turn alone, or turn and shear
+//
+// Sizes are averaged over the forms by their probabilities, and are root mean squares: a part that the
+// readings hardly show adds its variance, so that it makes the size uncertain, not small.
 //
 // Pure functions; any thread. Probabilities take the learnt scatter for known.
 #pragma once
@@ -106,7 +110,7 @@ struct ElementFinding {
   std::size_t axis = 0;       // of zero and sensitivity
   std::vector<double> value;  // skew: twelve, in the order of SkewPattern; else three
   // Skew of jigs: of `probability` the part that is a tilt (of that `size`), and each face; and the
-  // length of all together, in the form that is most probable.
+  // length of all together.
   double tilt_probability = 0;
   double all_size = 0;
   std::array<FaceFinding, 6> faces{};

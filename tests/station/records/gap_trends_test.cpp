@@ -71,7 +71,8 @@ TEST(GapTrends, ARareJigIsJudgedByTheUnitsOfTheOthers) {
   EXPECT_EQ(jig.units, 3U);
   EXPECT_FALSE(jig.has_chance) << "three units have four sign patterns";
   EXPECT_NEAR(jig.tilt_deg, std::hypot(0.3, 0.2), 3 * jig.standard_uncertainty_deg);
-  EXPECT_LT(jig.standard_uncertainty_deg, 0.02);
+  // How far its nests are turned, beside how far they lean, three units hardly say.
+  EXPECT_LT(jig.standard_uncertainty_deg, 0.05);
 }
 
 TEST(GapTrends, WhatAllJigsOfAStationShareIsTheStations) {

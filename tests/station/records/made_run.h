@@ -41,16 +41,33 @@ struct MadeUnit {
   }
 };
 
-// What it does to every unit: its base leans along the next two axes of whatever face is up, its
-// nest is turned, and single faces lean more and repeat worse.
+// What it does to every unit: its nests lean along the next two axes of whatever face is up, its
+// plate leans, its nest is turned, and single faces lean more and repeat worse.
 struct MadeJig {
   std::string name = "jig";
   std::string station = "bench 1";
   std::array<double, 2> base_deg{};
+  // Of the laboratory: its plate leans to the right and away from the person who lays the unit as the
+  // table of station/run/jig_run.h says.
+  std::array<double, 2> plate_deg{};
   Eigen::Vector3d nest_deg = Eigen::Vector3d::Zero();
   std::map<device::Pose, std::array<double, 2>> face_deg = {};
   std::map<device::Pose, double> face_scatter_deg = {};
 };
+
+// How the two axes that lie level read a plate that leans, by that table: (right, away) of the axis
+// behind the one that is up, then of the next.
+inline std::array<std::array<double, 2>, 2> made_level_axes(device::Pose pose) {
+  using Axes = std::array<std::array<double, 2>, 2>;
+  static const std::map<device::Pose, Axes> kTable = {
+      {device::Pose::plus_z, Axes{{{1, 0}, {0, 1}}}},    // x right, y away
+      {device::Pose::minus_z, Axes{{{1, 0}, {0, -1}}}},  // x right, y towards
+      {device::Pose::plus_x, Axes{{{0, 1}, {-1, 0}}}},   // y away, z left
+      {device::Pose::minus_x, Axes{{{0, 1}, {1, 0}}}},   // y away, z right
+      {device::Pose::plus_y, Axes{{{0, -1}, {1, 0}}}},   // z towards, x right
+      {device::Pose::minus_y, Axes{{{0, 1}, {1, 0}}}}};  // z away, x right
+  return kTable.at(pose);
+}
 
 // What one run adds. Twice six placements, as a jig run has them; `scatter_deg` for each.
 struct MadeScatter {
@@ -75,6 +92,10 @@ inline StoredRun made_run(const MadeUnit& unit, const MadeJig& jig, const MadeSc
         scatter.placement_deg + (wear == jig.face_scatter_deg.end() ? 0 : wear->second);
     std::array<double, 2> lean_deg = {jig.base_deg[0] + sd * random.normal(),
                                       jig.base_deg[1] + sd * random.normal()};
+    const auto level = made_level_axes(pose);
+    for (std::size_t k = 0; k < 2; ++k) {
+      lean_deg[k] += level[k][0] * jig.plate_deg[0] + level[k][1] * jig.plate_deg[1];
+    }
     if (const auto worn = jig.face_deg.find(pose); worn != jig.face_deg.end()) {
       lean_deg[0] += worn->second[0];
       lean_deg[1] += worn->second[1];

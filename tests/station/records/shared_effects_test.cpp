@@ -148,6 +148,43 @@ TEST(SharedEffects, AllCausesAtOnceAreFoundAndNothingElse) {
   EXPECT_LE(wrong, 0.05 * all + 1);
 }
 
+// A plate that is not level, by units whose axes are turned as much as it leans: opposite faces tell
+// the lean, so the size is neither too small nor too sure.
+TEST(SharedEffects, TheSizeOfALeanIsRightBesideTurnedUnits) {
+  constexpr double kLean_deg = 0.25;
+  double inside = 0;
+  double error_deg = 0;
+  double largest_uncertainty_deg = 0;
+  const std::size_t seeds = seeds_or(60);
+  for (std::size_t seed = 0; seed < seeds; ++seed) {
+    Random random(70'000 + seed, 1);
+    std::vector<MadeJig> jigs = made_jigs(5);
+    jigs[1].plate_deg = made_lean(kLean_deg, random);
+    std::vector<StoredRun> runs;
+    for (const MadeJig& jig : jigs) {
+      for (std::size_t u = 0; u < 4; ++u) {
+        const MadeUnit unit = made_unit("U" + std::to_string(runs.size()), random, 0.15, 0.01);
+        runs.push_back(made_run(unit, jig, {}, random, "run" + std::to_string(runs.size())));
+      }
+    }
+    for (const JigTrend& jig : find_trends(runs).jigs) {
+      EXPECT_EQ(is_blamed(jig.cause), jig.jig == "J1") << jig.jig << " of seed " << seed;
+      if (jig.jig == "J1") {
+        const double error = jig.tilt_deg - kLean_deg;
+        inside += std::abs(error) < 2 * jig.standard_uncertainty_deg ? 1 : 0;
+        error_deg += error / static_cast<double>(seeds);
+        largest_uncertainty_deg = std::max(largest_uncertainty_deg, jig.standard_uncertainty_deg);
+      }
+    }
+  }
+  std::cout << seeds << " benches: mean error " << error_deg << " degrees, " << inside
+            << " within two standard uncertainties, of " << largest_uncertainty_deg << " at most\n";
+  EXPECT_LT(std::abs(error_deg), 0.005);
+  EXPECT_LT(largest_uncertainty_deg, 0.02);
+  const auto all = static_cast<double>(seeds);
+  EXPECT_GE(inside, 0.95 * all - 2 * std::sqrt(0.05 * all) - 1);
+}
+
 // None of them, on benches of one jig to four, with lots and two stations.
 TEST(SharedEffects, WithoutCausesNothingIsNamed) {
   double wrong = 0;
