@@ -274,8 +274,8 @@ class Runner {
       for (std::size_t axis = 0; axis < kAxes; ++axis) {
         const double g = run_.gain[axis] * block_.sensed_g[i][static_cast<Eigen::Index>(axis)] +
                          run_.offset_g[axis];
-        block_.stored[i][axis] = static_cast<std::int16_t>(
-            format_.to_integer(g * run_.accel_scale_lsb_per_g, kLow12, kHigh12, clipped));
+        block_.stored[i][axis] = static_cast<std::int16_t>(format_.to_integer(
+            format_.limited(g) * run_.accel_scale_lsb_per_g, kLow12, kHigh12, clipped));
       }
     }
     for (const auto& effect : effects_) {

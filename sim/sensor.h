@@ -9,17 +9,19 @@
 #include <Eigen/Core>
 
 #include "base/random.h"
+#include "sim/effects/effect.h"
 #include "sim/unit_truth.h"
 
 namespace sixpoint::sim {
 
 // Noise is white and Gaussian, drawn at every sample, and felt before the front end does what it
 // does (Effect::on_analog); readings are rounded to the nearest count and clipped to the ADXL362's
-// 12 bits. One object belongs to one thread.
+// 12 bits, or below, at the format's limit. One object belongs to one thread.
 class Sensor {
  public:
-  Sensor(const UnitTruth& unit, FilterConfiguration filter, Random noise)
-      : truth_(unit.sensor(filter)), noise_(noise) {
+  Sensor(const UnitTruth& unit, FilterConfiguration filter, Random noise,
+         const NumberFormat& format = {})
+      : truth_(unit.sensor(filter)), noise_(noise), format_(format) {
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       noise_g_[axis] = unit.noise_mg[axis] / kMgPerG;
     }
@@ -35,6 +37,7 @@ class Sensor {
   SensorTruth truth_;
   PerAxis<double> noise_g_{};
   Random noise_;
+  NumberFormat format_;
 };
 
 }  // namespace sixpoint::sim

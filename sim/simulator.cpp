@@ -23,7 +23,8 @@ Simulator::Simulator(const UnitTruth& unit, const SimulatorOptions& options, Mot
     : options_(options),
       motion_(motion),
       effects_(std::move(effects)),
-      sensor_(unit, options.filter, Random(options.seed, kSensorNoiseStream)),
+      sensor_(unit, options.filter, Random(options.seed, kSensorNoiseStream),
+              format_under(effects_)),
       firmware_(unit, options.stored_bits, format_under(effects_)) {
   options_.plan.rate_hz = options_.rate_hz;
   for (const auto& effect : effects_) {

@@ -100,8 +100,8 @@ class Adding {
     bool clipped = false;
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t axis = 0; axis < kAxes; ++axis) {
-        const double lsb =
-            block_.sensed_g[i][static_cast<Eigen::Index>(axis)] * bundle_.accel_scale_lsb_per_g;
+        const double lsb = format_.limited(block_.sensed_g[i][static_cast<Eigen::Index>(axis)]) *
+                           bundle_.accel_scale_lsb_per_g;
         block_.stored[i][axis] =
             static_cast<std::int16_t>(format_.to_integer(lsb, kLowest_lsb, kHighest_lsb, clipped));
       }

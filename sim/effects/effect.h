@@ -11,7 +11,7 @@
 //
 // The simulator works block by block. Per block it fills sample times, motion and temperature, and
 // calls the hooks stage by stage, within a stage in the order of the scenario:
-//   once      on_digital:   changes rounding and limits
+//   once      on_digital:   changes rounding and limits: of the sensor, and of what is stored
 //             on_recording: learns how long it will be
 //   per pose  on_placement: learns from where the unit came, and whether it was taken off
 //             on_tone:      changes what the shaker does to the unit
@@ -25,9 +25,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -101,6 +103,10 @@ struct NumberFormat {
   enum class Rounding { half_away, toward_zero, down };
   Rounding rounding = Rounding::half_away;
   bool wraps = false;  // overflows modulo 4096 instead of clipping
+  // The sensor clips here, behind its gain and zero: a g is what a nominal sensor's counts of 1 g are.
+  double limit_g = std::numeric_limits<double>::infinity();
+
+  double limited(double value_g) const { return std::clamp(value_g, -limit_g, limit_g); }
 
   // Rounds, then clips to [low, high] and says so; or wraps into -2048 ... 2047.
   double to_integer(double value, double low, double high, bool& clipped) const {

@@ -1,4 +1,4 @@
-// The front end clips below full scale.
+// The sensor clips below full scale: behind its gain and zero, so that all units pile up at one count.
 #include <algorithm>
 #include <cmath>
 
@@ -10,13 +10,10 @@ EffectKind saturation_kind() {
   return effect_kind(
       "saturation", Stage::digital, "clips below full scale",
       [](const ParameterSet& values, Random) {
-        return sensed_effect(
-            [level_g = std::abs(values.at("level_g")[0])](Eigen::Vector3d& sensed) {
-              for (double& axis_g : sensed) {
-                axis_g = std::clamp(axis_g, -level_g, level_g);
-              }
-            },
-            &Parts::analog);
+        return acting_at(&Parts::digital,
+                         [level_g = std::abs(values.at("level_g")[0])](NumberFormat& format) {
+                           format.limit_g = std::min(format.limit_g, level_g);
+                         });
       },
       {parameter("level_g", "g", {6}, 1, 8, "a wrong range setting or a low supply: 5 to 8 g")});
 }

@@ -4,47 +4,53 @@
 #include <gtest/gtest.h>
 
 #include "sim/effects/made_effect.h"
+#include "sim/sensor.h"
 
 namespace sixpoint::sim {
 namespace {
 
-using tests::made_block;
 using tests::made_effect;
 
-// Oracle: clipping, by hand.
-TEST(Saturation, ClipsEachAxisOnBothSides) {
-  const auto effect = made_effect("saturation", {{"level_g", {6}}});
-  SimulatedBlock block = made_block(2);
-  block.sensed_g = {{7, -7, 5.9}, {-6.1, 6, 0}};
-  effect->on_analog(block);
-  EXPECT_EQ(block.sensed_g[0], Eigen::Vector3d(6, -6, 5.9));
-  EXPECT_EQ(block.sensed_g[1], Eigen::Vector3d(-6, 6, 0));
+NumberFormat format_with(const std::vector<double>& levels_g) {
+  NumberFormat format;
+  for (const double level_g : levels_g) {
+    made_effect("saturation", {{"level_g", {level_g}}})->on_digital(format);
+  }
+  return format;
 }
 
-// Noise is clipped with the signal: the effect acts behind it.
-TEST(Saturation, ActsOnTheNoiseToo) {
-  const auto effect = made_effect("saturation", {{"level_g", {6}}});
-  SimulatedBlock block = made_block(1);
-  block.sensed_g[0] = {7, 0, 0};
-  effect->on_sensor(block);
-  EXPECT_EQ(block.sensed_g[0].x(), 7) << "noise is added after this stage";
-  effect->on_analog(block);
-  EXPECT_EQ(block.sensed_g[0].x(), 6);
+// Oracle: clipping, by hand.
+TEST(Saturation, ClipsOnBothSides) {
+  const NumberFormat format = format_with({6});
+  EXPECT_EQ(format.limited(7), 6);
+  EXPECT_EQ(format.limited(-6.1), -6);
+  EXPECT_EQ(format.limited(5.9), 5.9);
+  EXPECT_EQ(format_with({7, 6, 6.5}).limited(9), 6) << "the lowest level counts";
+  EXPECT_EQ(format_with({}).limited(9), 9);
+}
+
+// Of two units with other gains and zeros both clip at the same count: 6 g of a nominal sensor.
+TEST(Saturation, ActsBehindGainAndZero) {
+  for (const std::uint64_t seed : {1, 2}) {
+    UnitTruth unit = draw_unit(seed);
+    Sensor sensor(unit, FilterConfiguration::current, Random(1, 1), format_with({6}));
+    const PerAxis<int> raw_lsb = sensor.read({7.9, -7.9, 1});
+    EXPECT_EQ(raw_lsb[0], 1500) << "unit " << seed;
+    EXPECT_EQ(raw_lsb[1], -1500) << "unit " << seed;
+    EXPECT_EQ(raw_lsb[2],
+              Sensor(unit, FilterConfiguration::current, Random(1, 1)).read({7.9, -7.9, 1})[2])
+        << "unit " << seed;
+  }
 }
 
 // Oracle: a sine of 11 g is above 6 g in 1 - (2 / pi) asin(6 / 11) = 63.3 % of its period.
 TEST(Saturation, TheShareOfAToneThatIsCut) {
   constexpr std::size_t kSamples = 100'000;
-  const auto effect = made_effect("saturation", {{"level_g", {6}}});
-  SimulatedBlock block = made_block(kSamples);
-  for (std::size_t i = 0; i < kSamples; ++i) {
-    block.sensed_g[i].x() =
-        11 * std::sin(2 * std::numbers::pi * (static_cast<double>(i) + 0.5) / kSamples);
-  }
-  effect->on_analog(block);
+  const NumberFormat format = format_with({6});
   double cut = 0;
-  for (const Eigen::Vector3d& sensed : block.sensed_g) {
-    cut += std::abs(sensed.x()) == 6 ? 1 : 0;
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    const double phase = 2 * std::numbers::pi * (static_cast<double>(i) + 0.5) / kSamples;
+    cut += std::abs(format.limited(11 * std::sin(phase))) == 6 ? 1 : 0;
   }
   EXPECT_NEAR(cut / kSamples, 1 - 2 / std::numbers::pi * std::asin(6.0 / 11), 1e-4);
 }
