@@ -34,7 +34,6 @@ struct AttachedDevice {
 
   // True when every node that this product needs is there.
   bool complete() const;
-  bool operator==(const AttachedDevice&) const = default;
 };
 
 struct DiscoveryFilter {

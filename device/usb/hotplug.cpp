@@ -30,6 +30,12 @@ struct HotplugWatch::Monitor {
   bool cancelled = false;
 };
 
+bool is_still(const AttachedDevice& known, const AttachedDevice& seen) {
+  return seen.port == known.port && seen.usb_node == known.usb_node &&
+         seen.hidraw_node == known.hidraw_node &&
+         (seen.serial == known.serial || seen.serial.empty());
+}
+
 HotplugWatch::HotplugWatch(DiscoveryFilter filter, std::unique_ptr<Monitor> monitor)
     : filter_(std::move(filter)), monitor_(std::move(monitor)) {}
 
@@ -56,20 +62,23 @@ Result<std::unique_ptr<HotplugWatch>> HotplugWatch::start(DiscoveryFilter filter
 Status HotplugWatch::scan() {
   SIXPOINT_ASSIGN(auto now, attached_devices(filter_));
   std::erase_if(now, [](const AttachedDevice& device) { return !device.complete(); });
-  const auto is_in = [](const std::vector<AttachedDevice>& list, const AttachedDevice& device) {
-    return std::find(list.begin(), list.end(), device) != list.end();
-  };
-  for (const AttachedDevice& device : known_) {
-    if (!is_in(now, device)) {
-      events_.push_back({HotplugEvent::Kind::left, device});
+  std::vector<AttachedDevice> stayed;
+  for (AttachedDevice& device : known_) {
+    if (std::any_of(now.begin(), now.end(),
+                    [&](const AttachedDevice& seen) { return is_still(device, seen); })) {
+      stayed.push_back(std::move(device));
+    } else {
+      events_.push_back({HotplugEvent::Kind::left, std::move(device)});
     }
   }
-  for (const AttachedDevice& device : now) {
-    if (!is_in(known_, device)) {
+  known_ = std::move(stayed);
+  for (AttachedDevice& device : now) {
+    if (std::none_of(known_.begin(), known_.end(),
+                     [&](const AttachedDevice& known) { return is_still(known, device); })) {
       events_.push_back({HotplugEvent::Kind::arrived, device});
+      known_.push_back(std::move(device));
     }
   }
-  known_ = std::move(now);
   return {};
 }
 

@@ -21,8 +21,18 @@ namespace sixpoint::device {
 struct HotplugEvent {
   enum class Kind { arrived, left };
   Kind kind = Kind::arrived;
-  AttachedDevice device;  // as it was found last
+  AttachedDevice device;  // as it was found at its arrival
 };
+
+// Whether what is seen now is the device that is known:
+//
+//     port and nodes     serial number            it is
+//     one is another     -                        another device
+//     the same           the same                 that device
+//     the same           none: the kernel takes   that device, which is about to leave
+//                        it away with the others
+//     the same           another                  another device
+bool is_still(const AttachedDevice& known, const AttachedDevice& seen);
 
 // One thread at a time, except cancel().
 class HotplugWatch {

@@ -15,6 +15,33 @@ namespace {
 
 using tests::OpenFilesLimit;
 
+// The rows of is_still(). A device that leaves was seen without its numbers while it left, and was
+// said to have come again.
+TEST(HotplugWatch, WhatIsLeftOfADeviceIsNoOther) {
+  AttachedDevice known;
+  known.serial = "MOS2A45130001";
+  known.port = "1-1";
+  known.bus = 1;
+  known.address = 4;
+  known.usb_node = "/dev/bus/usb/001/004";
+  known.hidraw_node = "/dev/hidraw3";
+  EXPECT_TRUE(is_still(known, known));
+  AttachedDevice seen = known;
+  seen.bus = 0;
+  seen.address = 0;
+  EXPECT_TRUE(is_still(known, seen));
+  seen.serial.clear();
+  EXPECT_TRUE(is_still(known, seen));
+  seen.serial = "MOS2A45130002";
+  EXPECT_FALSE(is_still(known, seen));
+  for (std::string AttachedDevice::*member :
+       {&AttachedDevice::port, &AttachedDevice::usb_node, &AttachedDevice::hidraw_node}) {
+    seen = known;
+    seen.*member += "1";
+    EXPECT_FALSE(is_still(known, seen));
+  }
+}
+
 TEST(HotplugWatch, AProgramWithTooManyOpenFilesIsToldSo) {
   SIXPOINT_SKIP_UNLESS(HotplugWatch::start().has_value(), "needs netlink sockets and /sys");
   int refused = 0;
