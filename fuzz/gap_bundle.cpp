@@ -38,7 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                 *read_file(prepared().files, kNames[1]),
                                 *read_file(prepared().files, kNames[2])};
   const std::size_t which = data[0] % 3;
-  const bool diagnosed = data[0] >= 0xFC;  // a second each: few, so that the readers get most
+  const bool diagnosed = data[0] >= 0xFC;  // seconds each: few, so that the readers get most
   MemoryFiles& files = prepared().files;
   const auto put = [&](std::string_view text) {
     (void)files.remove(kNames[which]);

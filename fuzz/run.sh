@@ -46,7 +46,7 @@ run_one() {
   local target=$1 log=build/fuzz/$1.log known=()
   mkdir -p "build/fuzz/corpus/$target" "build/fuzz/seeds/$target"
   [ -d "fuzz/corpus/$target" ] && known=("fuzz/corpus/$target")
-  if ! "build/sanitize/fuzz/$target" -max_total_time="$share" -timeout=10 -rss_limit_mb=1024 -max_len=30000 \
+  if ! "build/sanitize/fuzz/$target" -max_total_time="$share" -timeout=30 -rss_limit_mb=1024 -max_len=30000 \
       -artifact_prefix="build/fuzz/findings/$target-" -print_final_stats=1 "build/fuzz/corpus/$target" \
       "build/fuzz/seeds/$target" "${known[@]}" >"$log" 2>&1; then
     tail -n 40 "$log"
