@@ -39,7 +39,7 @@ Eigen::Vector3d white_mg2(const NoiseSpectrum& noise) {
 bool gives_block(const ToneFit& tone) {
   const bool odd_frequency =
       tone.frequency_sd_ppm > 0 && std::abs(tone.frequency_ppm) > kOddFrequency_ppm;
-  return tone.usable && tone.clipped_share == 0 && tone.slips.empty() && !odd_frequency;
+  return tone.usable && tone.slips.empty() && !odd_frequency;
 }
 
 // Covariance of a tone's features. `gain`: the response at its frequency.
@@ -47,11 +47,10 @@ Eigen::MatrixXd tone_covariance(const Block& block, const ToneFit& tone, const N
                                 const Response& response, double frequency_hz, double gain) {
   Eigen::MatrixXd v = Eigen::MatrixXd::Zero(block.size(), block.size());
   const Eigen::Vector3d white2 = white_mg2(noise);
-  const auto n = static_cast<double>(tone.samples);
   for (Eigen::Index a = 0; a < 3; ++a) {
-    v(a, a) = white2[a] / n;
+    v(a, a) = white2[a] * tone.cross_shape(0, 0);
     v(kToneAmplitude + a, kToneAmplitude + a) =
-        2 * noise.variance_at(static_cast<std::size_t>(a), frequency_hz) / n;
+        noise.variance_at(static_cast<std::size_t>(a), frequency_hz) * tone.cross_shape(1, 1);
   }
   const double own = noise.variance_at(static_cast<std::size_t>(tone.axis), frequency_hz);
   const double residual2 = tone.residual_mg * tone.residual_mg;

@@ -355,7 +355,8 @@ class ToneAnalysis {
     a(3, 3) += noise2_ / 2500;
     const Eigen::Matrix<double, 5, 5> inverse = a.inverse();
     const Eigen::Matrix<double, 5, 1> x = inverse * b;
-    const Eigen::Matrix3d x_cross = a_cross.inverse() * b_cross;
+    const Eigen::Matrix3d cross_inverse = a_cross.inverse();
+    const Eigen::Matrix3d x_cross = cross_inverse * b_cross;
     for (Eigen::Index k = 0; k < 3; ++k) {
       fit_.level_mg[k] = x_cross(0, k);
       fit_.in_phase_mg[k] = x_cross(1, k);
@@ -367,6 +368,7 @@ class ToneAnalysis {
     fit_.second_mg = x[2];
     fit_.third_mg = x[3];
     fit_.covariance_shape = inverse.topLeftCorner<4, 4>();
+    fit_.cross_shape = cross_inverse.topLeftCorner<2, 2>();
     measure_residuals(x, phase0);
   }
 

@@ -42,8 +42,9 @@ struct ToneFit {
   double second_mg = 0;                                     // cos 2p and cos 3p on `axis`
   double third_mg = 0;
   // (level, in_phase, second, third) on `axis`: inverse normal matrix, to be multiplied by the
-  // noise's variance. Other axes: 1/n and 2/n.
+  // noise's variance; and (level, in_phase) of the other axes.
   Eigen::Matrix4d covariance_shape = Eigen::Matrix4d::Zero();
+  Eigen::Matrix2d cross_shape = Eigen::Matrix2d::Zero();
   // Variance per axis that spectral lines add to what is found at the tone's frequency and at its
   // second and third harmonic: their phase is not known.
   std::array<Eigen::Vector3d, 3> line_mg2{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -95,9 +96,17 @@ Status StillScan::set_scale(double accel_scale_lsb_per_g) {
   return set_constants(*std::exchange(constants_, std::nullopt));
 }
 
+bool StillScan::goes_on(std::uint32_t unix_time) const {
+  const std::int64_t step = std::int64_t{unix_time} - std::int64_t{*last_time_};
+  return step == 1 || (std::abs(step) <= kNear_s && (step < 1 || since_disorder_ < kNear_s));
+}
+
 void StillScan::push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples) {
-  if (last_time_.has_value() && unix_time != *last_time_ + 1) {
-    break_run();
+  if (last_time_.has_value()) {
+    if (!goes_on(unix_time)) {
+      break_run();
+    }
+    since_disorder_ = last_time_ && unix_time <= *last_time_ ? 0 : since_disorder_ + 1;
   }
   last_time_ = unix_time;
   finder_->push(unix_time, samples);
@@ -122,6 +131,7 @@ void StillScan::tell_of_blocks() {
 void StillScan::break_run() {
   finder_->break_run();
   last_time_.reset();
+  since_disorder_ = kNear_s;
 }
 
 void StillScan::set_temperature(std::optional<double> celsius) {

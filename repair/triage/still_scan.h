@@ -51,8 +51,19 @@ class StillScan {
   // cannot be, and as set_constants().
   Status set_scale(double accel_scale_lsb_per_g);
 
-  // One record's samples in the firmware's order of axes, right way round; X Y Z.
+  // One record's samples in the firmware's order of axes, right way round; X Y Z. In a file that
+  // holds seconds twice or in a wrong order they lie still all the same, and what is still must be
+  // seen, or a repair could not be judged:
+  //
+  //     the record's second, after the one before          the run
+  //     the next one                                       goes on
+  //     the same, or up to kNear_s earlier                 goes on: repeated, or out of order
+  //     up to kNear_s later, and one of the last kNear_s   goes on
+  //       records was such a one
+  //     any other                                          ends: seconds are missing, or the clock
+  //                                                        leapt
   void push(std::uint32_t unix_time, std::span<const gt3x::Counts> samples);
+  static constexpr int kNear_s = 3;
   void break_run();
   // Holds for the blocks that end after it (.agdc).
   void set_temperature(std::optional<double> celsius);
@@ -77,6 +88,7 @@ class StillScan {
   StillScan(double rate_hz, double accel_scale, const calib::StillBlockOptions& options);
   Status start(const calib::Reversal& reversal);
   Status start_raw_counts();
+  bool goes_on(std::uint32_t unix_time) const;
   Result<const calib::Reversal*> reversal_of(const StoredConstants& constants);
   void close_finder();
   void tell_of_blocks();
@@ -96,6 +108,7 @@ class StillScan {
   OnBlock on_block_;
   std::uint64_t told_to_ = 0;  // blocks that begin before this sample were told of
   std::optional<std::uint32_t> last_time_;
+  int since_disorder_ = kNear_s;  // records since a second that was not later
   std::optional<double> temperature_c_;
   std::vector<calib::StillBlock> blocks_;
   // Which constants each block came by: those up to `end`, behind the ones before. Neighbours that

@@ -38,6 +38,39 @@ TEST(StillScan, MagnitudeErrorsByHand) {
   EXPECT_NEAR(error.worst_mg, 20, 1e-9);
 }
 
+// The rows of push(): seconds twice, in pairs that changed places, with others missing, leaping.
+// Oracle: a unit at rest for 40 seconds has ten windows of 4 s, whatever the order of its records.
+TEST(StillScan, SecondsThatAreTwiceOrOutOfOrderAreStillAllTheSame) {
+  const auto blocks_of = [](const std::vector<std::uint32_t>& times) {
+    StillScan scan = StillScan::make(30, 256).value();
+    std::vector<Counts> second(30, Counts{0, 0, 256});
+    for (std::size_t i = 0; i < second.size(); i += 2) {
+      second[i][2] = 257;
+    }
+    for (const std::uint32_t time : times) {
+      scan.push(time, second);
+    }
+    return scan.finish().size();
+  };
+  std::vector<std::uint32_t> in_order;
+  std::vector<std::uint32_t> twice;
+  std::vector<std::uint32_t> swapped;
+  std::vector<std::uint32_t> every_other;
+  std::vector<std::uint32_t> leaping;
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    in_order.push_back(1000 + i);
+    twice.insert(twice.end(), {1000 + i, 1000 + i});
+    swapped.push_back(1000 + (i ^ 1U));
+    every_other.push_back(1000 + 2 * i);
+    leaping.push_back(i % 2 == 0 ? 1000 + i : 9000 - i);
+  }
+  EXPECT_EQ(blocks_of(in_order), 10U);
+  EXPECT_EQ(blocks_of(twice), 20U);
+  EXPECT_EQ(blocks_of(swapped), 10U);
+  EXPECT_EQ(blocks_of(every_other), 0U) << "seconds are missing, and the unit may have moved";
+  EXPECT_EQ(blocks_of(leaping), 0U);
+}
+
 TEST(StillScan, RefusesWhatCannotBe) {
   EXPECT_FALSE(StillScan::make(0, 256));
   EXPECT_FALSE(StillScan::make(30, 0));
