@@ -83,10 +83,31 @@ Status show_state(const CheckUnitCommandOptions& options, Context& context, cons
   return print_answer(context, options.json, json, text);
 }
 
+// A signature opens what charts locked, and not what a known-bad unit did: the answer says which.
 Status sign(const CheckUnitCommandOptions& options, Context& context) {
-  return decide(options, context, "station-lock",
-                options.new_baseline ? "sign_new_baseline" : "sign",
-                "signed; the station may go on");
+  SIXPOINT_CHECK(sign_off(context, options.operator_name));
+  SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
+  SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
+  Json json = document("station-lock");
+  json["action"] = options.new_baseline ? "sign_new_baseline" : "sign";
+  db::StationEvent event;
+  event.station = options.station;
+  event.action = json["action"];
+  event.operator_name = options.operator_name;
+  event.reason = options.reason;
+  SIXPOINT_ASSIGN(json["stored_id"], station::add_decision(store, event));
+  SIXPOINT_ASSIGN(
+      const auto state,
+      station::station_state(store, options.station, limits.check_unit, context.env.clock.now()));
+  json.update(state.to_json());
+  std::string text = "signed; " + printable(state.brief(), 4000) + "\n";
+  if (state.check_units.empty() && state.known_bad.empty()) {
+    text +=
+        "the store has no check unit: where one is in use, is this its store, and its station?\n";
+  } else if (!state.locked && state.charts.empty() && state.known_bad.empty()) {
+    text += "no check unit was measured at this station: is its name right?\n";
+  }
+  return print_answer(context, options.json, json, text);
 }
 
 Status retest(const CheckUnitCommandOptions& options, Context& context) {

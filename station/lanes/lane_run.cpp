@@ -30,7 +30,7 @@ Json json_of(const JigReport& report) {
   json["residual_mg"] =
       report.verification.poses.empty() ? Json(nullptr) : Json(report.verification.worst_mg);
   json["as_found_residual_mg"] =
-      report.as_found ? Json(report.as_found_residual_mg) : Json(nullptr);
+      report.as_found_residual_mg ? Json(*report.as_found_residual_mg) : Json(nullptr);
   json["written"] = report.written;
   json["write_begun"] = report.write_begun;
   json["refusals"] = report.refusals;

@@ -385,7 +385,8 @@ Error station_is_locked(const std::string& why, const std::string& station) {
   return {ErrorCode::configuration,
           why,
           {},
-          fmt::format("measure a check unit again; then an engineer signs, on the page or by: "
+          fmt::format("measure a check unit again, and a known-bad unit, which must fail; where a "
+                      "check unit was out of control an engineer then signs, on the page or by: "
                       "sixpoint station-lock sign --station '{}' --operator NAME --reason WHY",
                       printable(station, 60))};
 }

@@ -15,10 +15,18 @@ namespace {
 
 using calib::Calibration;
 
+// What was not measured is no 0.
+nlohmann::ordered_json number_or_null(const std::optional<double>& number) {
+  return number ? nlohmann::ordered_json(*number) : nlohmann::ordered_json(nullptr);
+}
+
+std::optional<double> residual_of(const JudgedPoses& judged) {
+  return judged.poses.empty() ? std::nullopt : std::optional(judged.worst_mg);
+}
+
 nlohmann::ordered_json json_of(const JudgedPoses& judged) {
   nlohmann::ordered_json json;
-  json["residual_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
-                                             : nlohmann::ordered_json(judged.worst_mg);
+  json["residual_mg"] = number_or_null(residual_of(judged));
   json["rms_mg"] = judged.poses.empty() ? nlohmann::ordered_json(nullptr)
                                         : nlohmann::ordered_json(judged.rms_mg);
   json["poses"] = nlohmann::ordered_json::array();
@@ -137,16 +145,18 @@ nlohmann::ordered_json JigReport::to_json() const {
   json["method"] = method;
   json["as_found"] = page_to_json(as_found);
   if (as_found) {
-    json["as_found"]["residual_mg"] = as_found_residual_mg;
+    json["as_found"]["residual_mg"] = number_or_null(as_found_residual_mg);
   }
   json["as_left"] = page_to_json(as_left);
   if (as_left) {
     json["as_left"]["written"] = written;
-    json["as_left"]["residual_mg"] = written ? nlohmann::ordered_json(recheck.worst_mg)
-                                             : nlohmann::ordered_json(as_found_residual_mg);
+    json["as_left"]["residual_mg"] =
+        number_or_null(written ? residual_of(recheck) : as_found_residual_mg);
   }
   json["verification"] = json_of(verification);
-  json["verification"]["residual_rounded_mg"] = rounded_residual_mg;
+  json["verification"]["residual_rounded_mg"] = verification.poses.empty()
+                                                    ? nlohmann::ordered_json(nullptr)
+                                                    : nlohmann::ordered_json(rounded_residual_mg);
   json["recheck"] = written ? json_of(recheck) : nlohmann::ordered_json(nullptr);
   json["uncertainty"] = six ? uncertainty_to_json(*this) : nlohmann::ordered_json(nullptr);
   json["limits"] = station::to_json(limits);

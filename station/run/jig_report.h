@@ -77,7 +77,7 @@ struct JigReport {
   double rounded_residual_mg = 0;  // of the nine integers, on the same readings
 
   std::optional<device::CalibrationPage> as_found;
-  double as_found_residual_mg = 0;  // of the page's constants, on the faces
+  std::optional<double> as_found_residual_mg;  // of the page's constants, on the faces
   // As read back from the unit; as_found where no write was begun; none where no one knows.
   std::optional<device::CalibrationPage> as_left;
   bool write_begun = false;  // and what the unit held after it was not read

@@ -457,7 +457,8 @@ Status Session::conclude(const JigRun& run) {
   SIXPOINT_CHECK(judge_readings(report_, run));
   report_.settle_as_left();
   if (report_.as_found) {
-    if (const auto found = calib::calibration_from(report_.as_found->constants)) {
+    const auto found = calib::calibration_from(report_.as_found->constants);
+    if (found && !report_.faces.empty()) {
       report_.as_found_residual_mg = judge(report_.faces, *found, gravity_g_).worst_mg;
     }
   }

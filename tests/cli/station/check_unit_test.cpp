@@ -10,6 +10,7 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
   const std::string check =
@@ -49,10 +50,13 @@ TEST_F(StationCommands, JigRefusesToStartAtALockedStation) {
   EXPECT_EQ(status.exit_code, 1);
   EXPECT_TRUE(status.json()["locked"].get<bool>());
   EXPECT_EQ(run({"station-lock", "sign", "--station", "A"}).exit_code, 64) << "who, and why?";
-  EXPECT_EQ(run({"station-lock", "sign", "--station", "A", "--operator", "Eve", "--reason",
-                 "seat cleaned"})
-                .exit_code,
-            0);
+  const auto sign_at = [&](const char* station) {
+    return run({"station-lock", "sign", "--station", station, "--operator", "Eve", "--reason",
+                "seat cleaned"});
+  };
+  EXPECT_THAT(sign_at("B").out, HasSubstr("is its name right?"));
+  EXPECT_EQ(measure("seed=9", limits).exit_code, 78);
+  EXPECT_THAT(sign_at("A").out, StartsWith("signed; station A is open"));
   EXPECT_EQ(measure("seed=9", limits).exit_code, 0);
   const auto chart = run({"check-unit", "chart", "--station", "A", "--limits", folder_ / "l.toml",
                           "--html", folder_ / "c.html", "--json"});
@@ -73,6 +77,10 @@ TEST_F(StationCommands, AKnownBadUnitOpensTheStationByFailing) {
                  "--operator", "Eve", "--reason", "dropped"})
                 .exit_code,
             0);
+  EXPECT_THAT(
+      run({"station-lock", "sign", "--station", "A", "--operator", "Eve", "--reason", "x"}).out,
+      StartsWith("signed; station A is locked"))
+      << "a signature does not open this lock";
   EXPECT_EQ(run({"check-unit", "add", "MOS2A0BAD", "--expect", "zero_hihg", "--station", "A",
                  "--operator", "Eve", "--reason", "dropped"})
                 .exit_code,

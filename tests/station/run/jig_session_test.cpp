@@ -39,7 +39,8 @@ TEST(JigSession, FindsTheSensorUnderCurrent) {
       EXPECT_NEAR(found.zero_lsb[axis], truth.zero_lsb[axis], 0.3);
     }
     EXPECT_LT(report->verification.worst_mg, 2);
-    EXPECT_GT(report->as_found_residual_mg, 50) << "the constants of `legacy` do not fit";
+    EXPECT_GT(report->as_found_residual_mg.value_or(0), 50)
+        << "the constants of `legacy` do not fit";
     EXPECT_FALSE(report->written);
     EXPECT_EQ(report->as_left->constants, report->as_found->constants);
     EXPECT_EQ(report->record().filter, FilterConfiguration::current);
@@ -322,6 +323,9 @@ TEST(JigSession, TheOperatorsStopStopsTheMotorFirst) {
   ASSERT_OK(report);
   EXPECT_TRUE(asked);
   EXPECT_EQ(report->verdict, JigVerdict::stopped);
+  const auto json = report->to_json();
+  EXPECT_TRUE(json["verification"]["residual_rounded_mg"].is_null()) << "nothing was measured";
+  EXPECT_EQ(json["as_left"]["residual_mg"], json["as_found"]["residual_mg"]);
   EXPECT_FALSE(moved_after) << "it stands before the run says so";
   // The next run finds it held, and does not release it.
   JigSessionOptions options;
