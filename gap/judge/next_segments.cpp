@@ -336,7 +336,7 @@ const std::vector<Offer>& standard_offers() {
       {"yaw", kYaws | kRepeats | kBothWays, yaws()},
       {"oblique", 0, planned_obliques(18)},
       {"shaker", kShaker, shaker({2, 4, 7, 11, 16, 22, 30, 40}, 1)},
-      // Its second tone clips: its amplitude says nothing.
+      // Its second tone clips: what is left of it is not counted here.
       {"shaker_high", kHighShaker | kFullScale, shaker({20}, 6)},
       {"still", kLongRecord | kHours, still(120, 20)},
       {"ramp_up", kTemperature | kHours, still(1700, 17, 15.0, 40.0)},

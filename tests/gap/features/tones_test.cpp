@@ -72,6 +72,30 @@ TEST(Tones, AnEvenDriftIsNoRowOfSlips) {
   EXPECT_EQ(fit.slips[0].steps, 1);
 }
 
+// What is left of a tone of 11 g that is clipped at 8 g shows its curve: y = z + K3 z^3 at a level of
+// 1 g. Oracle: the harmonics of (1 + A cos p)^3 by hand.
+TEST(Tones, AClippedToneShowsThirdOrder) {
+  constexpr double kThird_mg_per_g3 = 0.2;
+  constexpr double kAmplitude_g = 11;
+  Bundle bundle = one_tone(19.3, kAmplitude_g, [](std::size_t) { return 0; });
+  for (gt3x::Counts& counts : bundle.samples) {
+    const double z = counts[2] / 256.0;
+    const double curved_lsb = 0.256 * kThird_mg_per_g3 * z * z * z;
+    counts[2] = static_cast<std::int16_t>(
+        std::clamp<long>(std::lround(counts[2] + curved_lsb), -2048, 2047));
+  }
+  const ToneFit fit = fit_tones(bundle, clean_samples(bundle), {}).front();
+  ASSERT_TRUE(fit.usable);
+  EXPECT_NEAR(fit.clipped_share, 0.48, 0.03) << "above 7 g and below -9 g";
+  constexpr double kCubic = kThird_mg_per_g3 * kAmplitude_g * kAmplitude_g * kAmplitude_g;
+  const auto sd_mg = [&](Eigen::Index i) { return 4.2 * std::sqrt(fit.covariance_shape(i, i)); };
+  EXPECT_NEAR(fit.third_mg, kCubic / 4, 4 * sd_mg(3));
+  EXPECT_LT(sd_mg(3), 3);
+  EXPECT_NEAR(fit.in_phase_mg[2],
+              1000 * kAmplitude_g + kThird_mg_per_g3 * 3 * kAmplitude_g + 0.75 * kCubic,
+              4 * sd_mg(1));
+}
+
 // A line of A at a distance of d Hz adds A sinc(d T) to a tone of T seconds, in any phase.
 TEST(Tones, LinesNearbyMakeAmplitudesUncertain) {
   const Bundle bundle = one_tone(10, 0.6, [](std::size_t) { return 0; });
