@@ -527,14 +527,14 @@ ElementFinding finding_of(const Problem& problem, const Reading12& reading,
       }
     }
   }
-  const Eigen::VectorXd mean = tilt_sum / std::max(tilt_weight, 1e-300);
+  const Eigen::VectorXd mean = tilt_sum / std::max(tilt_weight, 1e-300);  // 0 where no form is left
   if (!problem.is_skew) {
     Eigen::Index axis = 0;
     mean.cwiseAbs().maxCoeff(&axis);
     out.axis = static_cast<std::size_t>(axis);
     out.size = mean(axis);
-    out.standard_uncertainty =
-        std::sqrt(tilt_squares(axis, axis) / tilt_weight - shared_square(mean(axis)));
+    out.standard_uncertainty = std::sqrt(
+        std::max(0.0, tilt_squares(axis, axis) / tilt_weight - shared_square(mean(axis))));
     out.value.assign(mean.begin(), mean.end());
     return out;
   }
