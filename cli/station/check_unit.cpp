@@ -28,11 +28,15 @@ struct CheckUnitCommandOptions {
   bool json = false;
 };
 
-// Adds an engineer's decision to the store and answers `done`.
-Status decide(const CheckUnitCommandOptions& options, Context& context, const char* command,
-              const std::string& action, const std::string& done) {
+// The store, for who may decide.
+Result<db::Store> signed_store(const CheckUnitCommandOptions& options, Context& context) {
   SIXPOINT_CHECK(sign_off(context, options.operator_name));
-  SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
+  return open_store(context, options.store);
+}
+
+// Adds an engineer's decision to the store: what the answer says of it.
+Result<Json> record(const CheckUnitCommandOptions& options, db::Store& store, const char* command,
+                    const std::string& action) {
   std::string reason = options.reason;
   if (!options.expect.empty()) {
     SIXPOINT_ASSIGN(reason, station::reason_with_codes(options.expect, options.reason));
@@ -45,6 +49,14 @@ Status decide(const CheckUnitCommandOptions& options, Context& context, const ch
   Json json = document(command);
   SIXPOINT_ASSIGN(json["stored_id"], station::add_decision(store, event));
   json["action"] = action;
+  return json;
+}
+
+// An engineer's decision about a unit.
+Status decide(const CheckUnitCommandOptions& options, Context& context, const char* command,
+              const std::string& action, const std::string& done) {
+  SIXPOINT_ASSIGN(auto store, signed_store(options, context));
+  SIXPOINT_ASSIGN(Json json, record(options, store, command, action));
   json["serial"] = options.serial;
   json["station"] = options.station;
   return print_answer(context, options.json, json, done + "\n");
@@ -85,17 +97,10 @@ Status show_state(const CheckUnitCommandOptions& options, Context& context, cons
 
 // A signature opens what charts locked, and not what a known-bad unit did: the answer says which.
 Status sign(const CheckUnitCommandOptions& options, Context& context) {
-  SIXPOINT_CHECK(sign_off(context, options.operator_name));
-  SIXPOINT_ASSIGN(auto store, open_store(context, options.store));
+  SIXPOINT_ASSIGN(auto store, signed_store(options, context));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
-  Json json = document("station-lock");
-  json["action"] = options.new_baseline ? "sign_new_baseline" : "sign";
-  db::StationEvent event;
-  event.station = options.station;
-  event.action = json["action"];
-  event.operator_name = options.operator_name;
-  event.reason = options.reason;
-  SIXPOINT_ASSIGN(json["stored_id"], station::add_decision(store, event));
+  SIXPOINT_ASSIGN(Json json, record(options, store, "station-lock",
+                                    options.new_baseline ? "sign_new_baseline" : "sign"));
   SIXPOINT_ASSIGN(
       const auto state,
       station::station_state(store, options.station, limits.check_unit, context.env.clock.now()));

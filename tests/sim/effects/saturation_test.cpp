@@ -31,7 +31,7 @@ TEST(Saturation, ClipsOnBothSides) {
 
 // Of two units with other gains and zeros both clip at the same count: 6 g of a nominal sensor.
 TEST(Saturation, ActsBehindGainAndZero) {
-  for (const std::uint64_t seed : {1, 2}) {
+  for (const std::uint64_t seed : {1U, 2U}) {
     UnitTruth unit = draw_unit(seed);
     Sensor sensor(unit, FilterConfiguration::current, Random(1, 1), format_with({6}));
     const PerAxis<int> raw_lsb = sensor.read({7.9, -7.9, 1});
