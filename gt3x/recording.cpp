@@ -178,6 +178,10 @@ Status Recording::Archive::open_zip() {
     return bad(fmt::format("the archive is cut short or damaged ({})", reason),
                hint_about(Damage::no_directory));
   }
+  if (count == start.size() && start == std::array<std::uint8_t, 4>{'S', 'Q', 'L', 'i'}) {
+    return bad("a database, as an .agd is: it holds epochs, and no samples",
+               "name the .gt3x that it was made from");
+  }
   return bad("not a zip archive, so no .gt3x recording",
              "check that this is the file that the unit's software wrote");
 }

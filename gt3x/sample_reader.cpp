@@ -92,14 +92,16 @@ struct SampleReader::State {
       gap.seconds = ordered.missing;
       gap.gap = ordered.gap;
       gap.filled = ordered.filled;
+      gap.broke_order = ordered.leapt;
       return gap;
     }
-    return item_of(std::move(ordered.second), ordered.jumped_back);
+    return item_of(std::move(ordered.second), ordered.leapt);
   }
 
   SampleItem item_of(Second&& second, bool broke_order) {
     current = std::move(second);
     last_time = current.unix_time;
+    latest_time = std::max(latest_time, current.unix_time);
     SampleItem item;
     item.kind = current.counts.empty() ? SampleItem::Kind::usb : SampleItem::Kind::recorded;
     item.unix_time = current.unix_time;
@@ -261,9 +263,11 @@ struct SampleReader::State {
   }
 
   Result<std::optional<SampleItem>> final_gap() {
-    // Behind what was lost of a log no one knows what the unit did: that is no gap to be filled.
+    // Behind what was lost of a log no one knows what the unit did, and a clock that was set back is
+    // another than that of the Last Sample Time: these are no gaps to be filled.
     if (!by_clock || final_gap_given || !last_time || !last_sample_time ||
-        recording.is_damaged("log.bin") || *last_sample_time <= *last_time + std::uint64_t{1}) {
+        *last_time < latest_time || recording.is_damaged("log.bin") ||
+        *last_sample_time <= *last_time + std::uint64_t{1}) {
       return std::nullopt;
     }
     final_gap_given = true;
@@ -328,6 +332,7 @@ struct SampleReader::State {
   bool ended = false;
   bool final_gap_given = false;
   std::optional<std::uint32_t> last_time;
+  std::uint32_t latest_time = 0;
   std::optional<std::uint32_t> last_sample_time;
   bool asleep = false;
   bool damaged = false;

@@ -43,6 +43,8 @@ struct SampleItem {
   std::uint32_t seconds = 1;
   GapKind gap = GapKind::unexplained;
   bool filled = true;  // of gaps: fills_gap()
+  // It does not begin where the item before ended; in the order of the file, it is not later.
+  bool broke_order = false;
 
   // Of `recorded` only. Counts and parameters stay until the next call of next(). Counts are in the
   // units of the record: LSB at the file's scale, or raw sensor counts for ACTIVITY3.
@@ -51,7 +53,6 @@ struct SampleItem {
   std::int16_t limit_min = kMin12;  // a value at one of these was clipped, or may have been
   std::int16_t limit_max = kMax12;
   const Parameters* parameters = nullptr;  // in force; nullptr where none came before
-  bool broke_order = false;                // the time is not later than that of the item before
 
   // Whether any axis of a sample is at a limit of its record.
   bool clipped(const Counts& sample) const {
@@ -76,7 +77,8 @@ class SampleReader {
   ~SampleReader();
 
   // The next item; nothing at the end. Errors as of LogReader::next(). Behind the last record, a
-  // gap up to the file's Last Sample Time is handed out, where info.txt names one.
+  // gap up to the file's Last Sample Time is handed out, where info.txt names one and the clock was
+  // not set back.
   Result<std::optional<SampleItem>> next();
 
   // Of the records read so far (empty for the old form).

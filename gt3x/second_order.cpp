@@ -14,9 +14,51 @@ constexpr std::size_t kMostMissing = 10'000;
 
 bool explained(GapKind kind) { return kind == GapKind::idle_sleep || kind == GapKind::usb; }
 
-bool holds(const std::map<std::uint32_t, std::uint32_t>& ranges, std::uint32_t time) {
-  const auto behind = ranges.upper_bound(time);
-  return behind != ranges.begin() && std::prev(behind)->second >= time;
+using Ranges = std::map<std::uint32_t, std::uint32_t>;  // from, to; apart from each other
+
+// Whether all of `from` to `to` are there; of no seconds, they are.
+bool holds(const Ranges& ranges, std::uint64_t from, std::uint64_t to) {
+  if (from > to) {
+    return true;
+  }
+  const auto behind = ranges.upper_bound(static_cast<std::uint32_t>(from));
+  return behind != ranges.begin() && std::prev(behind)->second >= to;
+}
+
+// Mostly the latest range grows by one second.
+void mark(Ranges& ranges, std::uint32_t from, std::uint32_t to) {
+  auto range = ranges.upper_bound(from);
+  if (range != ranges.begin() && std::uint64_t{std::prev(range)->second} + 1 >= from) {
+    --range;
+    range->second = std::max(range->second, to);
+  } else {
+    range = ranges.emplace(from, to).first;
+  }
+  for (auto behind = std::next(range);
+       behind != ranges.end() && behind->first <= std::uint64_t{range->second} + 1;
+       behind = ranges.erase(behind)) {
+    range->second = std::max(range->second, behind->second);
+  }
+}
+
+// Hands on what the ranges do not hold of `from` to `to`, as from, to.
+template <class Take>
+void for_each_hole(const Ranges& ranges, std::uint64_t from, std::uint64_t to, Take take) {
+  auto range = ranges.upper_bound(static_cast<std::uint32_t>(from));
+  if (range != ranges.begin()) {
+    from = std::max(from, std::uint64_t{std::prev(range)->second} + 1);
+  }
+  for (; from <= to; ++range) {
+    const std::uint64_t hole_end = range == ranges.end() ? to + 1 : range->first;
+    if (from < std::min(hole_end, to + 1)) {
+      take(static_cast<std::uint32_t>(from),
+           static_cast<std::uint32_t>(std::min(hole_end - 1, to)));
+    }
+    if (range == ranges.end()) {
+      return;
+    }
+    from = std::uint64_t{range->second} + 1;
+  }
 }
 
 }  // namespace
@@ -56,23 +98,11 @@ void SecondOrder::say(IrregularKind kind, const Second& second, std::int64_t val
   }
 }
 
-bool SecondOrder::written(std::uint32_t unix_time) const { return holds(written_, unix_time); }
-bool SecondOrder::was_missing(std::uint32_t unix_time) const { return holds(missing_, unix_time); }
-
-// Mostly the latest range grows by one second.
-void SecondOrder::mark_written(std::uint32_t from, std::uint32_t to) {
-  auto range = written_.upper_bound(from);
-  if (range != written_.begin() && std::uint64_t{std::prev(range)->second} + 1 >= from) {
-    --range;
-    range->second = std::max(range->second, to);
-  } else {
-    range = written_.emplace(from, to).first;
-  }
-  for (auto behind = std::next(range);
-       behind != written_.end() && behind->first <= std::uint64_t{range->second} + 1;
-       behind = written_.erase(behind)) {
-    range->second = std::max(range->second, behind->second);
-  }
+bool SecondOrder::written(std::uint32_t unix_time) const {
+  return holds(written_, unix_time, unix_time);
+}
+bool SecondOrder::was_missing(std::uint32_t unix_time) const {
+  return holds(missing_, unix_time, unix_time);
 }
 
 // Whether the second is there already; the better of the two stays.
@@ -103,20 +133,29 @@ bool SecondOrder::take_repetition(Second& second) {
 
 // Whether the time leaps to this second from the others of the run.
 bool SecondOrder::begins_run(const Second& second) const {
-  const std::int64_t time = second.unix_time;
   const std::optional<std::uint32_t> newest =
       waiting_.empty() ? last_ : std::optional(waiting_.back().unix_time);
   if (!newest) {
     return false;
   }
-  const std::int64_t missing = time - std::int64_t{*newest} - 1;
-  if (missing > 0) {
-    return !explained(second.missing_before) &&
-           static_cast<std::uint64_t>(missing) > std::max(kLeap_s, fill_limit_s_);
+  const std::int64_t time = second.unix_time;
+  if (time > *newest) {
+    if (explained(second.missing_before)) {
+      return false;
+    }
+    std::uint64_t missing = 0;
+    if (written_.size() >= kMostRuns) {  // no clock does this, and counting costs time
+      missing = static_cast<std::uint64_t>(time - *newest - 1);
+    } else {
+      for_each_hole(written_, std::uint64_t{*newest} + 1, second.unix_time - std::uint64_t{1},
+                    [&](std::uint32_t from, std::uint32_t to) { missing += to - from + 1; });
+    }
+    return missing > std::max(kLeap_s, fill_limit_s_);
   }
-  // Within the run the caller finds a place for it.
-  const std::int64_t first = run_begins_ ? std::int64_t{waiting_.front().unix_time} : *last_;
-  return time < first - static_cast<std::int64_t>(kLeap_s);
+  if (!run_begins_) {
+    return time < *last_;  // of the seconds since the first all are written, or missing
+  }
+  return time < std::int64_t{waiting_.front().unix_time} - static_cast<std::int64_t>(kLeap_s);
 }
 
 void SecondOrder::put(Second second) {
@@ -145,20 +184,11 @@ void SecondOrder::push(Second second) {
       return;  // no clock does this; each run costs memory
     }
     release(true);
-    if (last_ && second.unix_time > *last_) {
-      OrderedSecond gap;
-      gap.unix_time = *last_ + 1;
-      gap.missing = second.unix_time - gap.unix_time;
-      gap.gap = second.missing_before;
-      gap.filled = false;
-      ready_.push_back(std::move(gap));
+    if (second.unix_time > *last_) {
+      give_missing(second, true);
     }
-    jumped_back_ = last_ && second.unix_time <= *last_;
     last_.reset();
     run_begins_ = true;
-  } else if (!run_begins_ && second.unix_time <= *last_) {
-    say(IrregularKind::late, second);
-    return;
   }
   put(std::move(second));
   release(false);
@@ -175,36 +205,52 @@ void SecondOrder::release(bool all) {
     }
     const bool full = waiting_.size() > kMostWaiting_s || waiting_samples_ > kMostWaitingSamples;
     if (!run_begins_ && first.unix_time > *last_ + std::uint64_t{1}) {
-      if (!all && !full) {
-        return;
+      if (!all && !full &&
+          !holds(written_, *last_ + std::uint64_t{1}, first.unix_time - std::uint64_t{1})) {
+        return;  // for what is missing
       }
-      OrderedSecond gap;
-      gap.unix_time = *last_ + 1;
-      gap.missing = first.unix_time - gap.unix_time;
-      gap.gap = first.missing_before;
-      gap.filled = fills_gap(gap.gap, gap.missing, fill_limit_s_);
-      // What is left out is done with as well.
-      mark_written(gap.unix_time, first.unix_time - 1);
-      missing_.emplace(gap.unix_time, first.unix_time - 1);
-      if (missing_.size() > kMostMissing) {
-        missing_.erase(missing_.begin());
-      }
-      ready_.push_back(std::move(gap));
+      give_missing(first, false);
     }
     waiting_samples_ -= first.counts.size();
-    give(std::move(waiting_.front()));
+    OrderedSecond ordered;
+    ordered.unix_time = first.unix_time;
+    ordered.second = std::move(waiting_.front());
     waiting_.pop_front();
+    last_ = ordered.unix_time;
+    run_begins_ = false;
+    mark(written_, ordered.unix_time, ordered.unix_time);
+    give(std::move(ordered));
   }
 }
 
-void SecondOrder::give(Second second) {
-  mark_written(second.unix_time, second.unix_time);
-  last_ = second.unix_time;
-  run_begins_ = false;
-  OrderedSecond& ordered = ready_.emplace_back();
-  ordered.unix_time = second.unix_time;
-  ordered.jumped_back = std::exchange(jumped_back_, false);
-  ordered.second = std::move(second);
+// The seconds between what was given last and `second` that are not there. Those that a jump leaves
+// out may still come.
+void SecondOrder::give_missing(const Second& second, bool jump) {
+  const std::uint64_t first = std::uint64_t{*last_} + 1;
+  for_each_hole(written_, first, second.unix_time - std::uint64_t{1},
+                [&](std::uint32_t from, std::uint32_t to) {
+                  OrderedSecond gap;
+                  gap.unix_time = from;
+                  gap.missing = to - from + 1;
+                  gap.gap = second.missing_before;
+                  gap.filled = !jump && fills_gap(gap.gap, gap.missing, fill_limit_s_);
+                  give(std::move(gap));
+                  if (!jump) {
+                    missing_.emplace(from, to);
+                  }
+                  if (missing_.size() > kMostMissing) {
+                    missing_.erase(missing_.begin());
+                  }
+                });
+  if (!jump && first < second.unix_time) {  // what is left out is done with as well
+    mark(written_, static_cast<std::uint32_t>(first), second.unix_time - 1);
+  }
+}
+
+void SecondOrder::give(OrderedSecond ordered) {
+  ordered.leapt = end_ && ordered.unix_time != *end_;
+  end_ = std::uint64_t{ordered.unix_time} + std::max(ordered.missing, 1U);
+  ready_.push_back(std::move(ordered));
 }
 
 std::optional<OrderedSecond> SecondOrder::next() {

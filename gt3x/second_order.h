@@ -16,7 +16,8 @@
 //
 //     the record's second                            what becomes of it              said as
 //     the first, or the next one                     written                         -
-//     later                                          seconds are missing before it   gap
+//     later                                          seconds that are not there yet  gap
+//                                                    are missing before it
 //     later by more than an hour, and nothing in     goes on there                   jump
 //       the file explains it (or by more than the
 //       fill limit, where that is longer)
@@ -27,13 +28,13 @@
 //     missing so far, still waiting                  put in its place                out_of_order
 //     before the first by at most an hour, and       put in its place                out_of_order
 //       the first still waits
-//     ... the first is written                       not written                     late
+//     before the first otherwise                     goes on there                   jump
 //     written long ago                               not written                     repeated
 //     filled by now, or left out                     not written                     late
-//     earlier by more than an hour, never written    goes on there                   jump
 //
-// Seconds that follow missing ones wait for those, up to kMostWaiting_s of them. Which missing
-// seconds are filled is fills_gap()'s to say.
+// The first is that of the run: of the seconds since the last jump. Seconds that follow missing
+// ones wait for those, up to kMostWaiting_s of them. Which missing seconds are filled is
+// fills_gap()'s to say. No second is called missing that was written before.
 #pragma once
 
 #include <array>
@@ -130,7 +131,8 @@ struct OrderedSecond {
   std::uint32_t missing = 0;
   GapKind gap = GapKind::unexplained;
   bool filled = true;  // of missing ones
-  bool jumped_back = false;
+  // It does not begin where the one before ended, and no missing seconds stand between them.
+  bool leapt = false;
   Second second;
 };
 
@@ -157,10 +159,10 @@ class SecondOrder {
   bool begins_run(const Second& second) const;
   void put(Second second);
   void release(bool all);
-  void give(Second second);
+  void give(OrderedSecond ordered);
+  void give_missing(const Second& second, bool jump);
   bool written(std::uint32_t unix_time) const;
   bool was_missing(std::uint32_t unix_time) const;
-  void mark_written(std::uint32_t from, std::uint32_t to);
 
   std::size_t rate_;
   std::uint64_t fill_limit_s_;
@@ -169,7 +171,7 @@ class SecondOrder {
   std::optional<std::uint32_t> newest_;  // of the record pushed last
   std::optional<std::uint32_t> last_;    // given out last in this run
   bool run_begins_ = true;               // nothing of this run was given out
-  bool jumped_back_ = false;             // by the run that begins
+  std::optional<std::uint64_t> end_;     // of what was given out last
   std::deque<OrderedSecond> ready_;
   std::map<std::uint32_t, std::uint32_t> written_;  // from, to: seconds that are done with
   std::map<std::uint32_t, std::uint32_t> missing_;  // the latest of those that were missing

@@ -70,7 +70,8 @@ void add_time_warnings(const gt3x::RawCsvTally& tally, std::vector<std::string>&
                                      clock(first->unix_time)));
     }
   };
-  counted(gt3x::IrregularKind::repeated, "records repeat a second: each second is written once");
+  counted(gt3x::IrregularKind::repeated,
+          "records repeat a second: each second is written once (--no-fill has them all)");
   counted(gt3x::IrregularKind::repeated_otherwise,
           "records repeat a second with other samples: the longer or first one is written");
   counted(gt3x::IrregularKind::out_of_order, "records came late: they are put in their place");
@@ -91,9 +92,10 @@ void add_time_warnings(const gt3x::RawCsvTally& tally, std::vector<std::string>&
         "not tell its time (--time does{})",
         leap.seconds < 0 ? "back by" : "forward over", std::abs(leap.seconds),
         clock(leap.unix_time),
-        leap.seconds < 0 || leap.seconds > kLongestFill_s
-            ? ""
-            : fmt::format("; --fill-limit {} fills it", leap.seconds)));
+        leap.seconds < 0                ? ""
+        : !leap.missing                 ? "; what lies between stands further up"
+        : leap.seconds > kLongestFill_s ? ""
+                                        : fmt::format("; --fill-limit {} fills it", leap.seconds)));
   }
 }
 

@@ -71,7 +71,8 @@ struct RawCsvTally {
   std::uint64_t surplus_samples = 0;  // of seconds with more than the rate; not written
   struct Leap {
     std::uint32_t unix_time = 0;  // of the first second behind it
-    std::int64_t seconds = 0;     // that are left out; below 0: so far back the time goes
+    std::int64_t seconds = 0;     // forward over so many; below 0: so far back the time goes
+    bool missing = false;         // they are, and are not filled; else they were written before
   };
   static constexpr std::size_t kMostLeaps = 100;
   std::vector<Leap> leaps;  // where a line's number no longer tells its time; the first ones

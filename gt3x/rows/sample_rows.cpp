@@ -79,6 +79,10 @@ class RowSource::Rows {
     if (options_.fill && short_by_ > 0) {
       SIXPOINT_CHECK(fill(std::exchange(short_by_, 0)));  // goes on in the second before
     }
+    if (options_.fill && item.broke_order) {
+      const std::int64_t step = std::int64_t{item.unix_time} - std::int64_t{last_second_};
+      note_leap(item.unix_time, step < 0 ? step : step - 1, false);
+    }
     out_->at(item.unix_time);
     return item.kind == SampleItem::Kind::recorded ? take_samples(item) : take_gap(item);
   }
@@ -89,9 +93,6 @@ class RowSource::Rows {
     if (options_.fill && counts.size() > rate_) {
       tally_.surplus_samples += counts.size() - rate_;
       counts = counts.first(static_cast<std::size_t>(rate_));
-    }
-    if (options_.fill && item.broke_order) {
-      note_leap(item.unix_time, std::int64_t{item.unix_time} - std::int64_t{last_second_});
     }
     last_second_ = item.unix_time;
     SIXPOINT_CHECK(out_->rows(counts));
@@ -129,10 +130,10 @@ class RowSource::Rows {
     return {};
   }
 
-  void note_leap(std::uint32_t unix_time, std::int64_t seconds) {
+  void note_leap(std::uint32_t unix_time, std::int64_t seconds, bool missing) {
     ++tally_.leap_count;
     if (tally_.leaps.size() < RawCsvTally::kMostLeaps) {
-      tally_.leaps.push_back({unix_time, seconds});
+      tally_.leaps.push_back({unix_time, seconds, missing});
     }
   }
 
@@ -144,7 +145,7 @@ class RowSource::Rows {
     }
     last_second_ = item.unix_time + (item.seconds - 1);
     if (!item.filled) {
-      note_leap(item.unix_time + item.seconds, item.seconds);
+      note_leap(item.unix_time + item.seconds, item.seconds, true);
       return {};
     }
     filled_s_ += item.seconds;

@@ -47,7 +47,7 @@ void take_constants(Inspection& found, gt3x::Recording& recording,
   if (!recording.has_log()) {
     if (const auto memory = unit_memory(recording)) {
       found.constants = memory->constants;
-      found.facts.calibration_time = memory->calibration_time;
+      add_facts(*memory, found.facts);
     }
     return;
   }
@@ -56,11 +56,8 @@ void take_constants(Inspection& found, gt3x::Recording& recording,
   }
   const gt3x::Parameters& first = reader.parameter_sets().front()->parameters;
   found.constants = first.constants;
-  found.facts.calibration_time = first.calibration_time;
+  add_facts(first, found.facts);
   found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(recording.info(), &first);
-  if (found.facts.firmware.empty()) {
-    found.facts.firmware = first.firmware.value_or("");
-  }
 }
 
 void take_gaps(Inspection& found, const gt3x::GapList& gaps) {
@@ -84,8 +81,7 @@ Result<Inspection> reading_of(gt3x::Recording& recording, const gt3x::SampleStre
   found.form = !recording.has_log()                               ? "gt3x_old"
                : found.log.count(gt3x::RecordType::activity3) > 0 ? "agdc"
                                                                   : "gt3x";
-  found.facts.serial = info.serial();
-  found.facts.firmware = info.firmware();
+  found.facts = header_facts(info);
   found.device_type = info.device_type();
   found.rate_hz = info.sample_rate_hz();
   found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, nullptr);

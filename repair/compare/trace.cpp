@@ -26,7 +26,7 @@ Result<Trace> Trace::load(FileSystem& files, const std::string& path) {
     if (!item) {
       break;
     }
-    if (item->kind != gt3x::SampleItem::Kind::recorded || item->broke_order) {
+    if (item->kind != gt3x::SampleItem::Kind::recorded) {
       continue;
     }
     if (item->type == gt3x::RecordType::activity3) {

@@ -105,10 +105,7 @@ void take_samples(Inspection& found, StillWatch& still, const gt3x::SampleItem& 
     found.accel_scale_lsb_per_g = gt3x::accel_scale_lsb_per_g(info, item.parameters);
     if (item.parameters != nullptr) {
       found.constants = item.parameters->constants;
-      found.facts.calibration_time = item.parameters->calibration_time;
-      if (found.facts.firmware.empty()) {
-        found.facts.firmware = item.parameters->firmware.value_or("");
-      }
+      add_facts(*item.parameters, found.facts);
     }
     if (raw_counts) {
       found.accel_scale_lsb_per_g.reset();  // the file says 1, which is no scale
@@ -152,7 +149,7 @@ void add_time_warnings(Inspection& found) {
   warn(out_of_order, "records stand behind later ones");
   warn(late, "records come so late that they have no place and are left out");
   warn(odd_size, "records hold more or fewer samples than the rate");
-  warn(jump, "times leap by more than an hour, and nothing in the file says why");
+  warn(jump, "times leap back, or forward by more than an hour, and nothing in the file says why");
 }
 
 // Where PARAMETERS and info.txt, or two PARAMETERS, say two things.
@@ -256,8 +253,7 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   const gt3x::Info& info = recording.info();
   Inspection found;
   found.form = recording.has_log() ? "gt3x" : "gt3x_old";
-  found.facts.serial = info.serial();
-  found.facts.firmware = info.firmware();
+  found.facts = header_facts(info);
   found.device_type = info.device_type();
   found.rate_hz = info.sample_rate_hz();
   found.entries = recording.entries();
@@ -281,7 +277,7 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   if (!recording.has_log()) {
     if (const auto memory = unit_memory(recording)) {
       found.constants = memory->constants;
-      found.facts.calibration_time = memory->calibration_time;
+      add_facts(*memory, found.facts);
     } else {
       found.warnings.push_back("there are no constants: " + memory.error().what);
     }
@@ -327,7 +323,7 @@ Result<Inspection> inspect_recording(FileSystem& files, const std::string& path,
   if (found.samples == 0 && !reader.parameter_sets().empty()) {
     const gt3x::Parameters& last = reader.parameter_sets().back()->parameters;
     found.constants = last.constants;
-    found.facts.calibration_time = last.calibration_time;
+    add_facts(last, found.facts);
   }
   if (found.form == "agdc") {
     found.constants = agdc ? agdc->constants : std::nullopt;
@@ -360,7 +356,7 @@ Result<Inspection> inspect_agd(const std::string& path) {
   found.form = "agd";
   found.facts = std::move(facts);
   found.warnings.emplace_back(
-      "an .agd holds epochs, no samples; make it again from its repaired recording");
+      "an .agd holds epochs, and no samples: those are in the .gt3x that it was made from");
   return found;
 }
 

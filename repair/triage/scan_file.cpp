@@ -65,6 +65,7 @@ void take_date_from_recording(FileSystem& files, ScannedFile& answer) {
     const auto facts = facts_of(files, path);
     if (facts && facts->serial == answer.facts.serial && facts->calibration_time) {
       answer.facts.calibration_time = facts->calibration_time;
+      answer.facts.recorded = facts->recorded;
       answer.reasons.push_back("the date of calibration is that of " + path);
       return;
     }
@@ -80,15 +81,18 @@ ScannedFile scan_agd(FileSystem& files, const std::string& path, const Calibrati
   answer.path = path;
   answer.facts = *facts;
   take_date_from_recording(files, answer);
-  if (!answer.facts.calibration_time && lookup) {
+  if (!date_of_constants(answer.facts) && lookup) {
     if (KnownDate known = lookup(answer.facts.serial); !known.why.empty()) {
       answer.facts.calibration_time = known.time;
       answer.reasons.push_back(std::move(known.why));
     }
   }
-  answer.reasons.push_back("an .agd cannot be repaired: make it again from the repaired raw data");
   judge(answer, false);
-  if (answer.verdict == to_string(Verdict::cannot_tell) && !answer.facts.calibration_time) {
+  if (answer.verdict != to_string(Verdict::not_affected)) {
+    answer.reasons.push_back(
+        "an .agd cannot be repaired: make it again from the repaired raw data");
+  }
+  if (answer.verdict == to_string(Verdict::cannot_tell) && !date_of_constants(answer.facts)) {
     answer.reasons.push_back(
         "put its recording (.gt3x, the same name) beside it, or name a store that knows the unit "
         "(--store): they say the date");

@@ -9,7 +9,6 @@
 #include "gt3x/forms/agdc.h"
 #include "gt3x/forms/clock.h"
 #include "gt3x/forms/model.h"
-#include "gt3x/forms/parameters.h"
 #include "gt3x/forms/sample_rate.h"
 #include "gt3x/log/samples.h"
 #include "gt3x/recording.h"
@@ -56,37 +55,39 @@ Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording) {
   return memory;
 }
 
+FileFacts header_facts(const gt3x::Info& info) {
+  FileFacts facts;
+  facts.serial = info.serial();
+  facts.firmware = info.firmware();
+  facts.recorded = info.start();
+  return facts;
+}
+
+namespace {
+
+void add_firmware(const std::string& firmware, FileFacts& facts) {
+  if (facts.firmware.empty()) {
+    facts.firmware = firmware;
+  } else if (!firmware.empty() && parse_firmware(firmware) != parse_firmware(facts.firmware)) {
+    facts.other_firmware = firmware;
+  }
+}
+
+}  // namespace
+
+void add_facts(const gt3x::Parameters& in_force, FileFacts& facts) {
+  facts.calibration_time = in_force.calibration_time;
+  add_firmware(in_force.firmware.value_or(""), facts);
+}
+
+void add_facts(const gt3x::UnitMemory& memory, FileFacts& facts) {
+  facts.calibration_time = memory.calibration_time;
+  add_firmware(memory.firmware, facts);
+}
+
 namespace {
 
 constexpr double kHum_g = 0.04;  // standard deviation under a climate chamber's fan
-
-// A unit is calibrated before it records: a date behind the recording says nothing, whichever of
-// the two clocks was wrong. A day is for zones of time.
-std::optional<UtcTime> possible_date(std::optional<UtcTime> calibrated, const gt3x::Info& info,
-                                     std::vector<std::string>& notes) {
-  const auto start = info.start();
-  if (!calibrated || !start || *start < first_possible_calibration() ||
-      *calibrated <= *start + std::chrono::hours(24)) {
-    return calibrated;
-  }
-  notes.push_back(
-      fmt::format("the file gives {} as the date of calibration, which is after it was recorded",
-                  to_iso8601(*calibrated)));
-  return std::nullopt;
-}
-
-void take_parameters(const gt3x::Parameters& parameters, const gt3x::Info& info, FileFacts& facts,
-                     std::vector<std::string>& notes) {
-  if (!facts.calibration_time.has_value()) {
-    facts.calibration_time = possible_date(parameters.calibration_time, info, notes);
-  }
-  if (facts.firmware.empty()) {
-    facts.firmware = parameters.firmware.value_or("");
-  } else if (parameters.firmware &&
-             parse_firmware(*parameters.firmware) != parse_firmware(facts.firmware)) {
-    facts.other_firmware = *parameters.firmware;
-  }
-}
 
 bool has_samples(const gt3x::Record& record) {
   // A one-byte payload in place of samples is a USB event.
@@ -202,14 +203,7 @@ Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOption
   SIXPOINT_ASSIGN(auto still,
                   StillScan::make(result.rate_hz, result.accel_scale_lsb_per_g, options));
   if (const auto memory = unit_memory(recording)) {
-    result.facts.calibration_time =
-        possible_date(memory->calibration_time, recording.info(), result.notes);
-    if (result.facts.firmware.empty()) {
-      result.facts.firmware = memory->firmware;
-    } else if (!memory->firmware.empty() &&
-               parse_firmware(memory->firmware) != parse_firmware(result.facts.firmware)) {
-      result.facts.other_firmware = memory->firmware;
-    }
+    add_facts(*memory, result.facts);
     if (auto status = still.set_constants(memory->constants); status) {
       result.constants.push_back(memory->constants);
     } else {
@@ -244,16 +238,15 @@ Status survey_old_form(gt3x::Recording& recording, const calib::StillBlockOption
 
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path) {
   SIXPOINT_ASSIGN(auto recording, gt3x::Recording::open(files, path));
-  FileFacts facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
-  std::vector<std::string> notes;
+  FileFacts facts = header_facts(recording.info());
   if (!recording.has_log()) {
     if (const auto memory = unit_memory(recording)) {
-      facts.calibration_time = possible_date(memory->calibration_time, recording.info(), notes);
+      add_facts(*memory, facts);
     }
   } else {
     SIXPOINT_ASSIGN(const auto first, first_parameters(recording));
     if (first) {
-      take_parameters(*first, recording.info(), facts, notes);
+      add_facts(*first, facts);
     }
   }
   return facts;
@@ -264,7 +257,7 @@ namespace {
 // What stands outside the samples.
 Result<Survey> begin_survey(gt3x::Recording& recording) {
   Survey result;
-  result.facts = {recording.info().serial(), recording.info().firmware(), std::nullopt};
+  result.facts = header_facts(recording.info());
   result.model = gt3x::model_of(result.facts.serial);
   SIXPOINT_ASSIGN(result.already_repaired, carries_repair_mark(recording));
   SIXPOINT_ASSIGN(result.rate_hz, gt3x::usable_sample_rate_hz(recording.info(), recording.path()));
@@ -295,7 +288,7 @@ class LogSurvey::Pass {
     SIXPOINT_ASSIGN(const auto first, first_parameters(recording_));
     take_scale(first);
     if (first.has_value()) {
-      take_parameters(*first, recording_.info(), result_.facts, result_.notes);
+      add_facts(*first, result_.facts);
     }
     scale_lsb_per_g_ = result_.header_scale_lsb_per_g;
     rotated_ = triage(result_.facts).axes_rotated && !result_.already_repaired;
@@ -396,20 +389,14 @@ class LogSurvey::Pass {
     scale_lsb_per_g_ = scale_lsb_per_g;
   }
 
-  // Two dates that lead to two answers: nothing is guessed from them.
+  // A date behind the first samples that leads to another answer.
   void use_date(const gt3x::Parameters& parameters) {
-    std::vector<std::string> unused;
-    const auto date = possible_date(parameters.calibration_time, recording_.info(), unused);
     FileFacts other = result_.facts;
-    other.calibration_time = date;
-    if (result_.samples == 0 || !date || !result_.facts.calibration_time ||
-        triage(other).verdict == triage(result_.facts).verdict) {
-      return;
+    other.calibration_time = parameters.calibration_time;
+    if (result_.samples > 0 && date_of_constants(other) && result_.facts.calibration_time &&
+        triage(other).verdict != triage(result_.facts).verdict) {
+      result_.facts.other_calibration_time = parameters.calibration_time;
     }
-    result_.notes.push_back(
-        fmt::format("the recording gives two dates of calibration, {} and {}: one of them is wrong",
-                    to_iso8601(*result_.facts.calibration_time), to_iso8601(*date)));
-    result_.facts.calibration_time.reset();
   }
 
   Status take_good(const gt3x::Record& record) {

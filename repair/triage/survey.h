@@ -21,6 +21,8 @@
 #include "base/stored_constants.h"
 #include "calib/still_blocks.h"
 #include "gt3x/forms/eeprom.h"
+#include "gt3x/forms/info.h"
+#include "gt3x/forms/parameters.h"
 #include "gt3x/log/log_reader.h"
 #include "gt3x/log/record.h"
 #include "gt3x/log/samples.h"
@@ -95,7 +97,11 @@ struct Survey {
 // unit's.
 Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording);
 
-// Only what the header and the first PARAMETERS record say; reads no further.
+// What the header says, and what the records in force at the first sample add.
+FileFacts header_facts(const gt3x::Info& info);
+void add_facts(const gt3x::Parameters& in_force, FileFacts& facts);
+void add_facts(const gt3x::UnitMemory& memory, FileFacts& facts);
+// Only that; reads no further than the first samples.
 Result<FileFacts> facts_of(FileSystem& files, const std::string& path);
 
 // no_input, bad_data (no zip, damaged entry ...), as gt3x::Recording and LogReader have it;

@@ -87,15 +87,25 @@ std::optional<FirmwareVersion> parse_firmware(std::string_view text) {
 
 namespace {
 
-// The date of the constants; nothing where the clock that it was taken from was not set.
+bool is_behind_recording(const FileFacts& facts) {
+  return facts.recorded && *facts.recorded >= first_possible_calibration() &&
+         *facts.calibration_time > *facts.recorded + std::chrono::hours(24);
+}
+
+}  // namespace
+
 std::optional<UtcTime> date_of_constants(const FileFacts& facts) {
-  return facts.calibration_time && *facts.calibration_time >= first_possible_calibration()
+  return facts.calibration_time && *facts.calibration_time >= first_possible_calibration() &&
+                 !is_behind_recording(facts)
              ? facts.calibration_time
              : std::nullopt;
 }
 
+namespace {
+
 // A MOS unit's file, as recorded by this firmware.
-Triage triage_by(const std::string& version, const FileFacts& facts) {
+Triage triage_by(const FileFacts& facts) {
+  const std::string& version = facts.firmware;
   Triage result;
   const auto decide = [&](Verdict verdict, std::string reason) {
     result.verdict = verdict;
@@ -127,9 +137,11 @@ Triage triage_by(const std::string& version, const FileFacts& facts) {
       decide(Verdict::cannot_tell, "the file does not say when the unit was calibrated");
     } else if (!calibrated) {
       decide(Verdict::cannot_tell,
-             fmt::format("the file says that the unit was calibrated on {}, before such units were "
-                         "made: a clock had not been set",
-                         to_iso8601(*facts.calibration_time)));
+             fmt::format("the file says that the unit was calibrated on {}, {}",
+                         to_iso8601(*facts.calibration_time),
+                         is_behind_recording(facts)
+                             ? "after it was recorded: a clock was wrong"
+                             : "before such units were made: a clock had not been set"));
     }
     if (version.empty()) {
       decide(Verdict::cannot_tell, "the file does not say which firmware recorded it");
@@ -144,6 +156,22 @@ Triage triage_by(const std::string& version, const FileFacts& facts) {
   return result;
 }
 
+// The facts with each of the firmware versions, and each of the dates, that they name.
+std::vector<FileFacts> readings_of(const FileFacts& facts) {
+  std::vector<FileFacts> readings = {facts};
+  if (!facts.other_firmware.empty()) {
+    readings.push_back(facts);
+    readings.back().firmware = facts.other_firmware;
+  }
+  if (facts.other_calibration_time) {
+    for (std::size_t i = readings.size(); i-- > 0;) {
+      readings.push_back(readings[i]);
+      readings.back().calibration_time = facts.other_calibration_time;
+    }
+  }
+  return readings;
+}
+
 }  // namespace
 
 Triage triage(const FileFacts& facts) {
@@ -155,57 +183,77 @@ Triage triage(const FileFacts& facts) {
             {fmt::format("serial number {}: only units whose number begins with MOS are affected",
                          printable(facts.serial, 60))}};
   }
-  Triage result = triage_by(facts.firmware, facts);
-  if (facts.other_firmware.empty()) {
-    return result;
+  std::vector<FileFacts> readings = readings_of(facts);
+  Triage result = triage_by(readings.front());
+  const bool one_answer = std::ranges::all_of(readings, [&](const FileFacts& reading) {
+    const Triage other = triage_by(reading);
+    return other.verdict == result.verdict && other.axes_rotated == result.axes_rotated;
+  });
+  if (!one_answer) {
+    result = {};
   }
-  std::string two = fmt::format("info.txt names firmware {}, the PARAMETERS record {}",
-                                printable(facts.firmware, 40), printable(facts.other_firmware, 40));
-  const Triage other = triage_by(facts.other_firmware, facts);
-  if (other.verdict == result.verdict && other.axes_rotated == result.axes_rotated) {
-    result.reasons.push_back(std::move(two));
-    return result;
+  if (!facts.other_firmware.empty()) {
+    result.reasons.push_back(fmt::format("info.txt names firmware {}, the PARAMETERS record {}",
+                                         printable(facts.firmware, 40),
+                                         printable(facts.other_firmware, 40)));
   }
-  return {Verdict::cannot_tell,
-          {two + ": they lead to different answers, and one of them is wrong"}};
+  if (facts.calibration_time && facts.other_calibration_time) {
+    result.reasons.push_back(fmt::format("the recording gives two dates of calibration, {} and {}",
+                                         to_iso8601(*facts.calibration_time),
+                                         to_iso8601(*facts.other_calibration_time)));
+  }
+  if (!one_answer) {
+    result.reasons.back() += ": they lead to different answers, and one of them is wrong";
+  }
+  return result;
 }
 
-std::optional<FilterConfiguration> filter_of_constants(const FileFacts& facts) {
-  const auto calibrated = date_of_constants(facts);
-  if (!is_mos(facts.serial) || !calibrated) {
+namespace {
+
+std::optional<FilterConfiguration> filter_of_constants_by(const FileFacts& reading) {
+  const auto calibrated = date_of_constants(reading);
+  if (!calibrated) {
     return std::nullopt;
   }
   return *calibrated < filter_change() ? FilterConfiguration::legacy : FilterConfiguration::current;
 }
 
-namespace {
-
-std::optional<FilterConfiguration> filter_set_by(const std::string& firmware,
-                                                 const FileFacts& facts) {
-  switch (filter_rule(parse_firmware(firmware))) {
+std::optional<FilterConfiguration> filter_set_by(const FileFacts& reading) {
+  const auto of_constants = filter_of_constants_by(reading);
+  switch (filter_rule(parse_firmware(reading.firmware))) {
     case FilterRule::always_current:
       return FilterConfiguration::current;
     case FilterRule::by_calibration_date:
-      return filter_of_constants(facts);
+      return of_constants;
     case FilterRule::unknown:
       // Late units are run under `current` by every firmware.
-      return filter_of_constants(facts) == FilterConfiguration::current
-                 ? std::optional(FilterConfiguration::current)
-                 : std::nullopt;
+      return of_constants == FilterConfiguration::current ? of_constants : std::nullopt;
   }
   return std::nullopt;
 }
 
-}  // namespace
-
-std::optional<FilterConfiguration> filter_in_force(const FileFacts& facts) {
+// What all readings of the facts say.
+template <class Answer>
+std::optional<FilterConfiguration> agreed(const FileFacts& facts, Answer answer) {
   if (!is_mos(facts.serial)) {
     return std::nullopt;
   }
-  const auto filter = filter_set_by(facts.firmware, facts);
-  return facts.other_firmware.empty() || filter_set_by(facts.other_firmware, facts) == filter
-             ? filter
+  const std::vector<FileFacts> readings = readings_of(facts);
+  const auto first = answer(readings.front());
+  return std::ranges::all_of(readings,
+                             [&](const FileFacts& reading) { return answer(reading) == first; })
+             ? first
              : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<FilterConfiguration> filter_of_constants(const FileFacts& facts) {
+  return agreed(facts, filter_of_constants_by);
+}
+
+std::optional<FilterConfiguration> filter_in_force(const FileFacts& facts) {
+  return agreed(facts, filter_set_by);
 }
 
 }  // namespace sixpoint::repair

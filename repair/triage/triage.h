@@ -19,10 +19,14 @@
 // |               |                    | not one of the five             |              |
 // | MOS...        | not said           | one of the five                 | cannot_tell  |
 // | MOS...        | any                | two, which lead to two answers  | cannot_tell  |
+// | MOS...        | two, which lead    | any                             | cannot_tell  |
+// |               | to two answers     |                                 |              |
 //
 // A date before 2012 is none: the family was not made then, so a clock had not been set. Nor is one
-// behind the recording: whoever fills FileFacts from a file leaves it out (survey.h). Two firmware
-// versions: info.txt names one and the PARAMETERS record another.
+// more than a day behind the start of the recording, where that is from 2012 on: a unit is
+// calibrated before it records, so one of the two clocks was wrong; the day is for zones of time.
+// Two firmware versions: info.txt names one and the PARAMETERS record another. Two dates: of two
+// PARAMETERS records.
 #pragma once
 
 #include <optional>
@@ -40,8 +44,13 @@ struct FileFacts {
   std::string serial;
   std::string firmware;
   std::optional<UtcTime> calibration_time;
-  std::string other_firmware = {};  // of the PARAMETERS record, where info.txt names another
+  std::string other_firmware = {};       // of the PARAMETERS record, where info.txt names another
+  std::optional<UtcTime> recorded = {};  // from then on, as the header says
+  std::optional<UtcTime> other_calibration_time = {};  // where a later record names another
 };
+
+// The date, where it can be one.
+std::optional<UtcTime> date_of_constants(const FileFacts& facts);
 
 enum class Verdict { affected, not_affected, cannot_tell };
 std::string_view to_string(Verdict verdict);

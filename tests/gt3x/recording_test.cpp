@@ -63,6 +63,8 @@ TEST(Recording, RefusesWhatIsNoRecording) {
   const auto text = Recording::open(memory.files, "text");
   EXPECT_FAILS(text, ErrorCode::bad_data);
   EXPECT_THAT(text.error().what, testing::HasSubstr("not a zip"));
+  ASSERT_OK(write_file(memory.files, "day.agd", "SQLite format 3, and its pages"));
+  EXPECT_THAT(Recording::open(memory.files, "day.agd").error().hint, testing::HasSubstr(".gt3x"));
 }
 
 TEST(Recording, RefusesAnArchiveWithoutLogOrInfo) {

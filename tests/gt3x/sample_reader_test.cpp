@@ -152,6 +152,24 @@ TEST(SampleReader, OfTheFileComesWhatWasRecordedAndTimeThatStepsBackIsMarked) {
   EXPECT_EQ(by_clock->items.size(), 5U) << "0, 1, 2, a gap, 9";
 }
 
+// A clock that was set back before the recording's start: all is read, and the Last Sample Time, by
+// the clock as it was, says nothing of what is missing behind it.
+TEST(SampleReader, BehindAClockThatWasSetBackNothingIsFilled) {
+  Bytes log = made_log(3);
+  for (std::uint32_t second = 0; second < 3; ++second) {
+    append_second(log, second - 300);
+  }
+  const auto result = run(log, made_info() + "Last Sample Time: 635641850650000000\r\n");
+  ASSERT_OK(result);
+  std::vector<std::uint32_t> times;
+  for (const auto& item : result->items) {
+    EXPECT_EQ(item.kind, Kind::recorded);
+    EXPECT_EQ(item.broke_order, item.time == kStart - 300);
+    times.push_back(item.time - kStart);
+  }
+  EXPECT_EQ(times, (std::vector<std::uint32_t>{0, 1, 2, 0U - 300, 0U - 299, 0U - 298}));
+}
+
 TEST(SampleReader, NoSamplesNoParameters) {
   EXPECT_TRUE(run(Bytes{})->items.empty());
   Bytes log;

@@ -22,7 +22,7 @@ Second record(std::uint32_t time, std::size_t samples = kSecondOf, std::int16_t 
   return second;
 }
 
-// What comes out: "5", "6 usb", "7+3 unexplained", "10+9000 unexplained left out", "3 back".
+// What comes out: "5", "6 usb", "7+3 unexplained", "10+9000 unexplained left out", "3 leapt".
 std::vector<std::string> given(SecondOrder& order) {
   std::vector<std::string> out;
   while (const auto ordered = order.next()) {
@@ -32,8 +32,8 @@ std::vector<std::string> given(SecondOrder& order) {
                           ordered->filled ? "" : " left out");
     } else {
       text += ordered->second.counts.empty() ? " usb" : "";
-      text += ordered->jumped_back ? " back" : "";
     }
+    text += ordered->leapt ? " leapt" : "";
     out.push_back(std::move(text));
   }
   return out;
@@ -190,21 +190,38 @@ TEST(SecondOrder, ALateRecordIsPutInItsPlaceAsLongAsTheOthersWait) {
   EXPECT_THAT(too_late.said, ElementsAre("late 10"));
 }
 
-TEST(SecondOrder, WhatComesBeforeTheFirstWhenThatIsGivenIsLate) {
-  const Answer answer = ordered({record(100), record(101), record(99), record(102)});
-  EXPECT_THAT(answer.given, ElementsAre("100", "101", "102"));
-  EXPECT_THAT(answer.said, ElementsAre("late 99"));
+// A clock that is set back, by little or much, loses nothing that is of a time of its own.
+TEST(SecondOrder, WhatComesBeforeTheFirstWhenThatIsGivenIsAJump) {
+  const Answer answer = ordered(
+      {record(100), record(101), record(98), record(99), record(100), record(101), record(102)});
+  EXPECT_THAT(answer.given, ElementsAre("100", "101", "98 leapt", "99", "102 leapt"));
+  EXPECT_THAT(answer.said, ElementsAre("jump 98 -3", "repeated 100", "repeated 101"));
+}
+
+// No second is missing that was written before the clock was set back, however far it then goes.
+TEST(SecondOrder, SecondsThatWereWrittenBeforeAreNoGap) {
+  for (const std::uint64_t limit_s :
+       {std::uint64_t{0}, kUsualFillLimit_s, std::uint64_t{100'000}}) {
+    const Answer answer = ordered({record(20'000), record(20'001), record(20'003), record(5000),
+                                   record(5001), record(20'000), record(20'003), record(20'004)},
+                                  limit_s);
+    const char* const between =
+        limit_s > 14'998 ? "5002+14998 unexplained" : "5002+14998 unexplained left out";
+    const char* const hole = limit_s > 0 ? "20002+1 unexplained" : "20002+1 unexplained left out";
+    EXPECT_THAT(answer.given, ElementsAre("20000", "20001", hole, "20003", "5000 leapt", "5001",
+                                          between, "20004 leapt"));
+  }
 }
 
 // A clock that was wrong for one record, ahead or back; the others go on as if it were not there.
 TEST(SecondOrder, OneWrongTimeIsTwoJumps) {
   const Answer ahead = ordered({record(5000), record(5001), record(264'201), record(5003)});
   EXPECT_THAT(ahead.given, ElementsAre("5000", "5001", "5002+259199 unexplained left out", "264201",
-                                       "5003 back"));
+                                       "5003 leapt"));
   EXPECT_THAT(ahead.said, ElementsAre("jump 264201 259200", "jump 5003 -259198"));
   const Answer back = ordered({record(5000), record(5001), record(7), record(5003)});
-  EXPECT_THAT(back.given,
-              ElementsAre("5000", "5001", "7 back", "8+4995 unexplained left out", "5003"));
+  EXPECT_THAT(back.given, ElementsAre("5000", "5001", "7 leapt", "8+4992 unexplained left out",
+                                      "5002+1 unexplained left out leapt", "5003"));
 }
 
 // A clock that was set back goes on, and no second is written twice.
@@ -222,6 +239,7 @@ TEST(SecondOrder, AClockThatIsSetBackWritesNoSecondTwice) {
   std::ranges::sort(sorted);
   EXPECT_EQ(std::ranges::adjacent_find(sorted), sorted.end());
   EXPECT_THAT(answer.said, ElementsAre("jump 5000 -5009", "repeated 10003", "jump 10010 7"));
+  EXPECT_THAT(answer.given, testing::Contains("5002+4998 unexplained left out"));
 }
 
 TEST(SecondOrder, SecondsOfAnotherSizeAreSaid) {

@@ -272,7 +272,7 @@ TEST(Inspection, SaysWhatIsIrregularAboutTheTimes) {
               ElementsAre("1 records repeat a second; the first at 2015-04-09T14:04:01",
                           "1 records stand behind later ones; the first at 2015-04-09T14:04:03",
                           HasSubstr("more or fewer samples than the rate"),
-                          HasSubstr("leap by more than an hour")));
+                          HasSubstr("times leap back, or forward")));
 }
 
 TEST(Inspection, SaysHowFarTheFirstSampleIsFromTheStart) {
@@ -297,6 +297,7 @@ TEST(Inspection, SaysWhereTheHeadersDisagree) {
                                     "2015-04-09T14:03:59 say 100; info.txt holds"),
                           HasSubstr("an acceleration scale of 256 LSB/g, PARAMETERS of"),
                           HasSubstr("firmware 1.5.0")));
+  EXPECT_EQ(inspected(log).facts.other_firmware, "1.6.0");
   values[gt3x::kParameterAccelScale] = gt3x::encode_float(256);
   append_record(log, RecordType::parameters, kStart + 1, gt3x::encode_parameters(values));
   append_second(log, 1);

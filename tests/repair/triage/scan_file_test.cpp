@@ -225,7 +225,7 @@ TEST(ScanFile, RealFiles) {
   const ScannedFile epochs = scan_file(disk, shared_file("data/agd/example1sec.agd"));
   EXPECT_EQ(epochs.facts.serial, "TAS1E31150129");
   EXPECT_EQ(epochs.verdict, "not_affected");
-  EXPECT_THAT(epochs.reasons, Contains(HasSubstr("an .agd cannot be repaired")));
+  EXPECT_THAT(epochs.reasons, Not(Contains(HasSubstr("cannot be repaired")))) << "no need to";
 }
 
 // The date of an .agd stands in the recording beside it, where that is of the same unit.

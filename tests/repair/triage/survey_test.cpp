@@ -28,14 +28,17 @@ TEST(Survey, ADateOfCalibrationBehindTheRecordingIsNone) {
   };
   constexpr std::int64_t kDay_s = 86'400;
   const std::int64_t start = made.start;
-  EXPECT_EQ(facts_with(start + kDay_s).calibration_time, from_unix_seconds(start + kDay_s));
+  EXPECT_EQ(date_of_constants(facts_with(start + kDay_s)), from_unix_seconds(start + kDay_s));
   for (const std::int64_t impossible : {start + kDay_s + 1, std::int64_t{0xFFFFFFFF}}) {
     const FileFacts facts = facts_with(impossible);
-    EXPECT_FALSE(facts.calibration_time) << impossible;
+    EXPECT_FALSE(date_of_constants(facts)) << impossible;
+    EXPECT_EQ(facts.calibration_time, from_unix_seconds(impossible)) << "as the file says it";
+    EXPECT_EQ(filter_of_constants(facts), std::nullopt);
     EXPECT_EQ(triage(facts).verdict, Verdict::cannot_tell);
+    EXPECT_NE(triage(facts).reasons[0].find("after it was recorded"), std::string::npos);
   }
   made.start = 0;  // a clock that was never set says nothing about the other
-  EXPECT_EQ(facts_with(1'395'619'200).calibration_time, from_unix_seconds(1'395'619'200));
+  EXPECT_EQ(date_of_constants(facts_with(1'395'619'200)), from_unix_seconds(1'395'619'200));
 }
 
 TEST(Survey, SaysWhatTheFileHolds) {
@@ -168,8 +171,9 @@ TEST(Survey, OfTwoDatesOfCalibrationTheOneInForceHoldsOrNone) {
   EXPECT_EQ(triage(found_with(early, early, early + 86'400).facts).verdict, Verdict::affected);
   const Survey two = found_with(kLater, kLater, early);
   EXPECT_EQ(triage(two.facts).verdict, Verdict::cannot_tell);
-  ASSERT_EQ(two.notes.size(), 1U);
-  EXPECT_NE(two.notes[0].find("two dates of calibration"), std::string::npos) << two.notes[0];
+  EXPECT_EQ(filter_of_constants(two.facts), std::nullopt);
+  const std::string reason = triage(two.facts).reasons.back();
+  EXPECT_NE(reason.find("two dates of calibration"), std::string::npos) << reason;
 }
 
 TEST(Survey, AScaleThatCannotBeIsSaid) {
