@@ -315,6 +315,27 @@ Status Outputs::take(std::string_view option, const std::string& path) {
   return {};
 }
 
+namespace {
+
+Status refuse_unwritable(std::string_view option, const std::string& folder) {
+  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) != 0 &&
+      (errno == EACCES || errno == EROFS)) {
+    return fail(ErrorCode::permission, "this user may not write into the folder", folder,
+                fmt::format("choose another folder for {}", option));
+  }
+  return {};
+}
+
+// Of a folder that is to be made, the one it is made in counts.
+Status refuse_unwritable_tree(FileSystem& disk, std::string_view option, std::string folder) {
+  while (!disk.info(folder) && folder_of(folder) != folder) {
+    folder = folder_of(folder);
+  }
+  return refuse_unwritable(option, folder);
+}
+
+}  // namespace
+
 Status Outputs::file(std::string_view option, const std::string& path) {
   if (path.empty()) {
     return {};
@@ -330,12 +351,7 @@ Status Outputs::file(std::string_view option, const std::string& path) {
     return fail(ErrorCode::cannot_create, "there is no such folder", folder,
                 fmt::format("make it, or choose another name for {}", option));
   }
-  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) != 0 &&
-      (errno == EACCES || errno == EROFS)) {
-    return fail(ErrorCode::permission, "this user may not write into the folder", folder,
-                fmt::format("choose another folder for {}", option));
-  }
-  return {};
+  return refuse_unwritable(option, folder);
 }
 
 Status Outputs::file_to_keep(std::string_view option, const std::string& path) {
@@ -365,14 +381,18 @@ Status refuse_standard_output(std::string_view option, const std::string& path) 
 Status Outputs::folder(std::string_view option, const std::string& path) {
   SIXPOINT_CHECK(refuse_standard_output(option, path));
   SIXPOINT_CHECK(take(option, path));
-  return allow_folder(look_at_folder(files_->disk(), path), files_->force(), path);
+  SIXPOINT_CHECK(allow_folder(look_at_folder(files_->disk(), path), files_->force(), path));
+  return refuse_unwritable_tree(files_->disk(), option, path);
 }
 
 Status Outputs::working_folder(std::string_view option, const std::string& path) {
   SIXPOINT_CHECK(refuse_standard_output(option, path));
   SIXPOINT_CHECK(take(option, path));
   const FolderTarget target = look_at_folder(files_->disk(), path);
-  return target == FolderTarget::filled ? Status{} : allow_folder(target, false, path);
+  if (target != FolderTarget::filled) {
+    SIXPOINT_CHECK(allow_folder(target, false, path));
+  }
+  return refuse_unwritable_tree(files_->disk(), option, path);
 }
 
 }  // namespace sixpoint::cli

@@ -84,21 +84,48 @@ std::string constants_text(const Json& constants) {
   return fmt::format("{} LSB/g, {} LSB", sensitivity, zero);
 }
 
+namespace {
+
+// What a terminal does not show stands as \xNN.
+std::string bash_word(const std::string& word) {
+  if (printable(word) == word) {
+    return repair::shell_word(word);
+  }
+  std::string quoted = "$'";
+  for (const char c : word) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte >= 0x7F) {
+      quoted += fmt::format("\\x{:02x}", byte);
+    } else {
+      quoted.append(c == '\'' || c == '\\' ? 1 : 0, '\\').append(1, c);
+    }
+  }
+  return quoted + "'";
+}
+
+}  // namespace
+
 void next_step(Context& context, bool as_json, const std::vector<std::string>& words) {
   if (as_json) {
     return;
   }
   std::string line = "next: sixpoint";
   for (const std::string& word : words) {
-    line.append(1, ' ').append(repair::shell_word(printable(word)));
+    line.append(1, ' ').append(bash_word(word));
   }
   context.people << line << '\n';
 }
 
+std::string path_word(const std::string& path) {
+  return path.starts_with('-') ? "./" + path : path;
+}
+
 std::vector<std::string> some_paths(const std::vector<std::string>& paths) {
   constexpr std::size_t kMost = 3;
-  std::vector<std::string> some(
-      paths.begin(), paths.begin() + static_cast<std::ptrdiff_t>(std::min(kMost, paths.size())));
+  std::vector<std::string> some;
+  for (std::size_t i = 0; i < std::min(kMost, paths.size()); ++i) {
+    some.push_back(path_word(paths[i]));
+  }
   if (paths.size() > kMost) {
     some.emplace_back("...");
   }

@@ -41,9 +41,12 @@ class Columns {
 std::string constants_text(const Json& constants);
 
 // The last line of a result: the command that people give next, on stderr. `words` are the command
-// and its arguments; a word with a blank or a quote is printed as a shell takes it, Nothing with
-// --json.
+// and its arguments; a word with a blank, a quote or a line feed is printed as bash takes it. Nothing
+// with --json.
 void next_step(Context& context, bool as_json, const std::vector<std::string>& words);
+
+// A path as an argument that is no option: "./-a" for "-a".
+std::string path_word(const std::string& path);
 
 // For next_step(): the paths that the user named, at most three of them.
 std::vector<std::string> some_paths(const std::vector<std::string>& paths);

@@ -164,10 +164,16 @@ Result<std::vector<JigUnit>> Store::units_of_jig(const std::string& jig) {
 
 Result<YieldReport> Store::yield(UtcTime from, UtcTime to) {
   const std::vector<Value> parameters = {to_ns(from), to_ns(to)};
+  // A check unit is measured every day: its runs say nothing of the units that come to the station.
   SIXPOINT_ASSIGN(
       const auto rows,
       database_->query("SELECT serial, verdict, retest_of FROM runs WHERE kind = 'jig' "
-                       "AND started_ns >= $1 AND started_ns < $2 ORDER BY started_ns, seq",
+                       "AND started_ns >= $1 AND started_ns < $2 "
+                       "AND NOT EXISTS (SELECT 1 FROM station_events e "
+                       "WHERE e.serial = runs.serial AND e.action = 'check_unit' "
+                       "AND NOT EXISTS (SELECT 1 FROM station_events later WHERE later.serial = "
+                       "e.serial AND later.action = 'check_unit_end' AND later.seq > e.seq)) "
+                       "ORDER BY started_ns, seq",
                        parameters));
   YieldReport report;
   std::map<std::string, bool> last_passed;  // of each unit

@@ -13,6 +13,7 @@
 #include "repair/archive/archive_scripts.h"
 #include "repair/archive/plan_folder.h"
 #include "repair/archive/shard_results.h"
+#include "repair/triage/file_tree.h"
 #include "station/records/software.h"
 
 namespace sixpoint::cli {
@@ -23,8 +24,7 @@ std::string absolute(const std::string& path) {
   if (error) {
     return path;
   }
-  const bool climbs = std::find(whole.begin(), whole.end(), "..") != whole.end();
-  std::string text = (climbs ? whole : whole.lexically_normal()).string();
+  std::string text = repair::plain_path(whole.string());
   while (text.size() > 1 && text.ends_with('/')) {
     text.pop_back();
   }

@@ -96,7 +96,7 @@ std::string line_that_goes_on(const RepairCommandOptions& options) {
     }
   };
   for (const std::string& path : options.paths) {
-    line += fmt::format(" {}", repair::shell_word(path));
+    line += fmt::format(" {}", repair::shell_word(path_word(path)));
   }
   add("-o", options.folder);
   add("--constants", options.sources.constants);
@@ -150,7 +150,7 @@ void say_what_is_next(const RepairCommandOptions& options, const std::vector<Rep
   if (options.paths.size() == 1 && asked && asked->is_folder && !options.repair.dry_run &&
       std::ranges::any_of(reports,
                           [](const RepairReport& report) { return !report.output.empty(); })) {
-    next_step(context, options.json, {"impact", options.paths.front(), options.folder});
+    next_step(context, options.json, {"impact", path_word(options.paths.front()), options.folder});
   }
 }
 

@@ -166,7 +166,7 @@ void print_solve(const std::string& path, const SolveCommandOptions& options,
     context.log().warn("nothing stored: only verified constants are kept");
   } else if (report.usable() && report.filter && !report.serial.empty() &&  // record_of()
              outcome.is_lent && !outcome.not_kept) {
-    next_step(context, options.json, {"solve", path, "--save"});
+    next_step(context, options.json, {"solve", path_word(path), "--save"});
   }
 }
 

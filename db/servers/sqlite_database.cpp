@@ -36,7 +36,9 @@ Error to_error(const SQLite::Exception& exception, const std::string& path) {
               "make the file and its folder writable for this user"};
     case SQLITE_NOTADB:
       return {ErrorCode::bad_data, what, path,
-              "name a store; if this was one, keep the file and restore the last backup"};
+              "name a store, or move the file away: what waits in the journal then goes into a new "
+              "one; if it was a "
+              "store, keep it and restore the last backup"};
     case SQLITE_CORRUPT:
       return {
           ErrorCode::bad_data, what, path,

@@ -81,6 +81,9 @@ class Planner {
     const std::size_t root = root_of({info.is_folder ? path : folder_of(path), info.is_folder});
     for (FoundFile& file : tree.files) {
       const auto [other, fresh] = taken_.emplace(file.relative, file.path);
+      if (!fresh && plain_path(other->second) == plain_path(file.path)) {
+        continue;  // named twice
+      }
       if (!fresh) {
         made_.plan.refused.push_back(
             {file.path,

@@ -1,6 +1,7 @@
 #include "repair/batch/named_files.h"
 
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -9,6 +10,7 @@ namespace sixpoint::repair {
 NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,
                        const std::vector<std::string>& endings) {
   NamedFiles named;
+  std::set<std::string> taken;
   const auto refuse = [&](const std::string& path, const Error& error) {
     named.files.emplace_back().path = path;
     named.files.back().error = error;
@@ -26,7 +28,9 @@ NamedFiles named_files(FileSystem& files, const std::vector<std::string>& paths,
       named.empty_folders.push_back(path);
     }
     for (const FoundFile& file : found->files) {
-      named.files.push_back({file, std::nullopt});
+      if (taken.insert(plain_path(file.path)).second) {
+        named.files.push_back({file, std::nullopt});
+      }
     }
   }
   return named;

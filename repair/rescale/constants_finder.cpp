@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "base/sha256.h"
 #include "db/records.h"
 #include "repair/rescale/gate.h"
 
@@ -152,6 +153,12 @@ ConstantsFinder::CalibrationFile ConstantsFinder::read_calibration_file(const st
   calib::ConstantsOrigin origin;
   origin.file = db::storable_path(path);
   origin.kind = "calibration_file";
+  auto hash = file_sha256(env_.files, path);
+  if (!hash) {
+    result.refusal = hash.error().brief();
+    return result;
+  }
+  origin.sha256 = *std::move(hash);
   auto record = calib::record_of(*report, env_.clock.now(), origin);
   if (!record) {
     result.refusal = record.error().brief();

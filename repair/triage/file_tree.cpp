@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <deque>
+#include <filesystem>
 #include <set>
 
 #include <fmt/format.h>
@@ -130,6 +131,12 @@ class Walk {
 };
 
 }  // namespace
+
+std::string plain_path(const std::string& path) {
+  const std::filesystem::path whole(path);
+  const bool climbs = std::ranges::find(whole, "..") != whole.end();
+  return climbs ? path : whole.lexically_normal().string();
+}
 
 bool has_ending(const std::string& path, const std::string& ending) {
   return path.size() >= ending.size() &&

@@ -50,6 +50,10 @@ struct FileTree {
 Result<FileTree> find_files(FileSystem& files, const std::string& path,
                             const FileTreeOptions& options);
 
+// The path without "." and doubled slashes. One that climbs ("..") stays: behind a link that leads
+// elsewhere than it looks.
+std::string plain_path(const std::string& path);
+
 bool has_ending(const std::string& path, const std::string& ending);
 
 // Does `path` lie in `folder`, or is it `folder`? Both as real_path() writes them.

@@ -256,10 +256,15 @@ TEST_F(OutputWriting, AFolderOfAnotherUserIsRefusedBeforeTheWork) {
   const bool is_root = ::geteuid() == 0;
   ASSERT_TRUE(!is_root || ::seteuid(kNobody) == 0);
   Outputs outputs(context_, {}, /*json=*/false);
-  const Status refused = outputs.file("-o", path("theirs/f"));
+  const std::vector<Status> all = {
+      outputs.file("-o", path("theirs/f")), outputs.folder("-o", path("theirs")),
+      outputs.folder("-o", path("theirs/new/newer")),
+      Outputs(context_, {}, /*json=*/false).working_folder("-o", path("theirs"))};
   ASSERT_TRUE(!is_root || ::seteuid(0) == 0);
-  EXPECT_FAILS(refused, ErrorCode::permission);
-  EXPECT_EQ(refused.error().where, path("theirs"));
+  for (const Status& refused : all) {
+    EXPECT_FAILS(refused, ErrorCode::permission);
+    EXPECT_EQ(refused.error().where, path("theirs"));
+  }
 }
 
 TEST_F(OutputWriting, StandardOutputTakesNoFolder) {

@@ -81,7 +81,11 @@ TEST(NextStep, IsOneLineThatAShellTakes) {
   EXPECT_EQ(people.str(), "") << "with --json nothing";
   next_step(context, false, {"repair", "a b.gt3x", "it's.gt3x", "-o", "repaired"});
   EXPECT_EQ(people.str(), "next: sixpoint repair 'a b.gt3x' 'it'\\''s.gt3x' -o repaired\n");
+  people.str("");
+  next_step(context, false, {"scan", "it's\n\xff\\.gt3x"});
+  EXPECT_EQ(people.str(), "next: sixpoint scan $'it\\'s\\x0a\\xff\\\\.gt3x'\n");
   EXPECT_EQ(out.str(), "");
+  EXPECT_THAT(some_paths({"-a", "./b"}), testing::ElementsAre("./-a", "./b"));
   EXPECT_THAT(some_paths({"a", "b", "c"}), testing::ElementsAre("a", "b", "c"));
   EXPECT_THAT(some_paths({"a", "b", "c", "d"}), testing::ElementsAre("a", "b", "c", "..."));
 }

@@ -28,14 +28,16 @@ TEST_F(Workers, NamedFilesKeepTheOrderInWhichTheyWereNamed) {
   for (const char* name : {"b.gt3x", "tree/a.GT3X", "tree/sub/c.gt3x", "tree/notes.txt"}) {
     ASSERT_OK(write_file(files, name, "x"));
   }
-  const auto found = named_files(context_, {"b.gt3x", "none", "tree", "empty"}, {".gt3x"});
+  const auto found = named_files(
+      context_, {"b.gt3x", "none", "tree", "b.gt3x", "tree/a.GT3X", "empty"}, {".gt3x"});
   std::vector<std::string> names;
   for (const NamedFile& file : found) {
     names.push_back(file.path + (file.error ? " refused" : " as " + file.relative));
   }
   EXPECT_EQ(names,
             (std::vector<std::string>{"b.gt3x as b.gt3x", "none refused", "tree/a.GT3X as a.GT3X",
-                                      "tree/sub/c.gt3x as sub/c.gt3x"}));
+                                      "tree/sub/c.gt3x as sub/c.gt3x"}))
+      << "a file that is named twice is taken once";
   EXPECT_EQ(found[1].error->code, ErrorCode::no_input);
   EXPECT_NE(people_.str().find("empty: no .gt3x file below this folder"), std::string::npos);
 }

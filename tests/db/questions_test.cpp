@@ -36,6 +36,18 @@ TEST_F(StoreTest, AnswersWhatPeopleAsk) {
   EXPECT_DOUBLE_EQ(yield->first_pass_yield(), 1.0 / 3);
   EXPECT_TRUE(std::isnan(store.yield(from_unix_seconds(0), from_unix_seconds(1))->yield()));
 
+  // A check unit does not count, as long as it is one.
+  StationEvent event;
+  event.serial = "C";
+  event.action = "check_unit";
+  event.operator_name = "Eve";
+  event.reason = "golden";
+  ASSERT_OK(store.add_station_event(event));
+  EXPECT_EQ(store.yield(from_unix_seconds(0), from_unix_seconds(5000))->units, 2U);
+  event.action = "check_unit_end";
+  ASSERT_OK(store.add_station_event(event));
+  EXPECT_EQ(store.yield(from_unix_seconds(0), from_unix_seconds(5000))->units, 3U);
+
   const auto of_jig = store.units_of_jig("J1");
   ASSERT_EQ(of_jig->size(), 3U);
   EXPECT_EQ((*of_jig)[1].serial, "B");

@@ -168,9 +168,12 @@ TEST(Export, SeveralRecordingsGoIntoAFolder) {
   EXPECT_EQ(run_command(memory.env, {"export", "in/a.gt3x", "-o", "out"}).exit_code, 73);
   EXPECT_EQ(run_command(memory.env, {"export", "in/a.gt3x"}).exit_code, 64);
   EXPECT_EQ(run_command(memory.env, {"export", "in", "in/a.gt3x", "--csv", "x.csv"}).exit_code, 64);
-  const auto same = run_command(memory.env, {"export", "in/a.gt3x", "in/a.gt3x", "-o", "twice"});
+  ASSERT_OK(put_recording(memory.files, "a.gt3x", made_log(3)));
+  const auto same = run_command(memory.env, {"export", "in/a.gt3x", "a.gt3x", "-o", "twice"});
   EXPECT_EQ(same.exit_code, 73);
   EXPECT_TRUE(memory.files.info("twice/a.csv"));
+  const auto one_twice = run_command(memory.env, {"export", "a.gt3x", "a.gt3x", "-o", "once"});
+  EXPECT_EQ(one_twice.exit_code, 0) << "a file that is named twice is taken once";
 }
 
 // Oracle: zlib.

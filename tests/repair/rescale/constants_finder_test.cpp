@@ -67,7 +67,9 @@ TEST_F(Finder, WhatIsNamedWinsOverTheStore) {
   options.store_named = true;
   EXPECT_EQ(choose(options).chosen->method, "scan") << "also over one that is named";
   options.calibration_file = "in.gt3x";
-  EXPECT_EQ(choose(options).chosen->method, "calibration_file");
+  const ConstantsChoice by_file = choose(options);
+  EXPECT_EQ(by_file.chosen->method, "calibration_file");
+  EXPECT_EQ(by_file.chosen->record.made_from.sha256.size(), 64U);
 }
 
 TEST_F(Finder, ANamedSourceThatDoesNotFitStopsUnlessOrScan) {
