@@ -101,11 +101,11 @@ int run_program(const std::vector<std::string>& arguments, Context& context) {
   try {
     app.parse(reversed);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {  // --help, --version
-      return app.exit(error, context.out, context.people);
+    if (error.get_exit_code() != 0) {
+      report_usage(app, arguments, error, context);
+      return context.exit_code;
     }
-    report_usage(app, arguments, error, context);
-    return context.exit_code;
+    app.exit(error, context.out, context.people);  // --help, --version
   } catch (const std::exception& error) {
     // The libraries return errors as values: an exception is a defect of this program.
     context.log().critical("internal error: {}; please report it with the command line",

@@ -191,7 +191,15 @@ Result<station::RunDocument> StationStore::document(const std::string& run_id,
   SIXPOINT_ASSIGN(db::Store store, open_existing_store(context_, options_.store));
   SIXPOINT_ASSIGN(const db::RunRecord run, store.run(run_id));
   if (kind == "report.json") {
-    return station::RunDocument{"application/json", run.document};
+    Json json = cli::document("jig");
+    json["run"] = run.id;
+    const Json report = Json::parse(run.document, nullptr, /*allow_exceptions=*/false);
+    if (!report.is_object()) {
+      return fail(ErrorCode::bad_data, "the stored report cannot be read", printable(run.id, 80),
+                  "see whether the store is damaged: 'sixpoint audit verify'");
+    }
+    json.update(report);
+    return station::RunDocument{"application/json", json.dump(2) + "\n"};
   }
   if (kind == "label.zpl") {
     SIXPOINT_ASSIGN(auto label, station::label_zpl(run));

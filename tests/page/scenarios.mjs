@@ -53,6 +53,7 @@ const scenarios = {
     check(lane.run.taken.length === 14, 'fourteen placements');
     check(lane.result.residual_mg < 3, `the constants fit unseen placements: ${lane.result.residual_mg} mg`);
     const report = (await station.api(`/api/runs/${lane.result.run}/report.json`)).json;
+    check(report.schema === 'sixpoint/jig/1' && report.run === lane.result.run, 'it says what it is');
     check(report.serial === lane.unit.serial && report.verification.poses.length === 8, 'the store has the whole report');
     // "Write now": the same readings, two more placements, and the unit holds it.
     await button(page, 'Write now').click();

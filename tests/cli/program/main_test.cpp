@@ -55,6 +55,7 @@ TEST_F(Main, ArgumentsOfTheProgramAreNotItsName) {
 
 TEST_F(Main, AnOutputThatTakesNothingIsAnError) {
   EXPECT_EQ(run("limits print >/dev/full 2>" + (folder_ / "e")), 74);
+  EXPECT_EQ(run("scan --help >/dev/full 2>" + (folder_ / "e")), 74);
   EXPECT_THAT(text("e"), HasSubstr("standard output"));
 }
 
