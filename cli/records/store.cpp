@@ -223,14 +223,16 @@ Result<Answer> jig_units(const StoreCommandOptions& options, Context& context) {
 }
 
 Result<Answer> yield(const StoreCommandOptions& options, Context& context) {
-  UtcTime from = UtcTime::min();
-  UtcTime to = UtcTime::max();
-  if (!options.from.empty()) {
-    SIXPOINT_ASSIGN(from, parse_iso8601(options.from));
-  }
-  if (!options.to.empty()) {
-    SIXPOINT_ASSIGN(to, parse_iso8601(options.to));
-  }
+  const auto time_of = [](const std::string& text, const char* option,
+                          UtcTime without) -> Result<UtcTime> {
+    auto time = text.empty() ? without : parse_iso8601(text);
+    if (!time) {
+      return fail(ErrorCode::usage, time.error().what, option, time.error().hint);
+    }
+    return time;
+  };
+  SIXPOINT_ASSIGN(const UtcTime from, time_of(options.from, "--from", UtcTime::min()));
+  SIXPOINT_ASSIGN(const UtcTime to, time_of(options.to, "--to", UtcTime::max()));
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto report, store.yield(from, to));
   Answer answer;

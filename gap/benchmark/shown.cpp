@@ -13,6 +13,17 @@ constexpr double kOffsetSd_mg = 35;
 constexpr double kHost_s = 0.002 / 1.7320508075688772;  // standard deviation of +-2 ms
 constexpr double kPlainCounts = 1.25;  // a steady change that is rounded scatters by less than 1
 
+// What differs by more than rounding, of one axis over some seconds: sums in noise^-2.
+struct Plain {
+  double difference2 = 0, product = 0, stimulus2 = 0;  // of differences in mg and stimuli in g
+  const std::string* segment = nullptr;
+
+  // Beyond what a gain makes of the stimulus.
+  double beyond(double gain_mg) const {
+    return difference2 - gain_mg * (2 * product - gain_mg * stimulus2);
+  }
+};
+
 // The mean difference of one axis over some seconds, or over a segment.
 struct Piece {
   double mean_mg = 0;
@@ -35,6 +46,7 @@ class Comparison {
   void of_axis(std::size_t axis) {
     const double noise_mg2 = std::pow(run_.noise_mg[axis], 2) + lsb_mg_ * lsb_mg_ / 12;
     std::vector<Piece> segments;
+    plain_.clear();
     for (const sim::ProtocolSegment& segment : run_.segments) {
       const auto length = static_cast<std::uint64_t>(kShownPiece_s * run_.rate_hz);
       std::vector<Piece> pieces;
@@ -46,9 +58,13 @@ class Comparison {
         segments.push_back(whole(segment, pieces, axis));
       }
     }
-    take_out_gain_and_offset(segments);
+    const double gain_mg = take_out_gain_and_offset(segments);
     for (const Piece& segment : segments) {
       add_mean(segment, static_cast<int>(axis));
+    }
+    for (const Plain& plain : plain_) {
+      shown_.samples += plain.beyond(gain_mg);
+      shown_.by_place[{static_cast<int>(axis), *plain.segment}] += plain.beyond(gain_mg);
     }
   }
 
@@ -70,28 +86,35 @@ class Comparison {
  private:
   Piece piece(const sim::ProtocolSegment& segment, std::uint64_t first, std::uint64_t count,
               std::size_t axis, double noise_mg2) {
+    const auto stimulus_mg = [&](std::uint64_t i) {
+      return lsb_mg_ * without_.counts[segment.first_sample + first + i][axis];
+    };
     const auto difference = [&](std::uint64_t i) {
-      const std::size_t at = segment.first_sample + first + i;
-      return lsb_mg_ * (with_.counts[at][axis] - without_.counts[at][axis]);
+      return lsb_mg_ * with_.counts[segment.first_sample + first + i][axis] - stimulus_mg(i);
     };
     const auto n = static_cast<double>(count);
-    double sum = 0, squares = 0;
+    double sum = 0, squares = 0, stimuli = 0;
     for (std::uint64_t i = 0; i < count; ++i) {
       sum += difference(i);
       squares += difference(i) * difference(i);
+      stimuli += stimulus_mg(i);
     }
     Piece made;
     made.mean_mg = sum / n;
     made.rounding_mg2 = std::max(0.0, squares / n - made.mean_mg * made.mean_mg) / n;
     made.noise_mg2 = noise_mg2 / n;
     made.segment = &segment.name;
-    double plain = 0;
+    Plain& plain = plain_.emplace_back();
+    plain.segment = &segment.name;
     for (std::uint64_t i = 0; i < count; ++i) {
       const double off = difference(i) - made.mean_mg;
-      plain += std::abs(off) > kPlainCounts * lsb_mg_ ? off * off / noise_mg2 : 0;
+      if (std::abs(off) > kPlainCounts * lsb_mg_) {
+        const double stimulus = (stimulus_mg(i) - stimuli / n) / kMgPerG;
+        plain.difference2 += off * off / noise_mg2;
+        plain.product += off * stimulus / noise_mg2;
+        plain.stimulus2 += stimulus * stimulus / noise_mg2;
+      }
     }
-    shown_.samples += plain;
-    shown_.by_place[{static_cast<int>(axis), segment.name}] += plain;
     return made;
   }
 
@@ -125,8 +148,9 @@ class Comparison {
     shown_.by_place[{axis, *piece.segment}] += square;
   }
 
-  // Weighted least squares with the priors of a unit; what they take is evidence, too.
-  void take_out_gain_and_offset(std::vector<Piece>& pieces) {
+  // Weighted least squares with the priors of a unit; what they take is evidence, too. Answers with
+  // the gain.
+  double take_out_gain_and_offset(std::vector<Piece>& pieces) {
     Eigen::Matrix2d normal;
     normal << 1 / (kOffsetSd_mg * kOffsetSd_mg), 0, 0, 1 / (kGainSd_mg * kGainSd_mg);
     const Eigen::Matrix2d prior = normal;
@@ -136,11 +160,16 @@ class Comparison {
       normal += row * row.transpose() / piece.noise_mg2;
       right += row * piece.mean_mg / piece.noise_mg2;
     }
+    for (const Plain& plain : plain_) {
+      normal(1, 1) += plain.stimulus2;
+      right[1] += plain.product;
+    }
     const Eigen::Vector2d fitted = normal.ldlt().solve(right);
     for (Piece& piece : pieces) {
       piece.mean_mg -= fitted[0] + fitted[1] * piece.gravity;
     }
     shown_.means += fitted.dot(prior * fitted);
+    return fitted[1];
   }
 
   const sim::ProtocolRun& run_;
@@ -148,6 +177,7 @@ class Comparison {
   const sim::ProtocolRecord& with_;
   Shown& shown_;
   double lsb_mg_;
+  std::vector<Plain> plain_;  // of this axis
 };
 
 }  // namespace

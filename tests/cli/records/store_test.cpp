@@ -60,6 +60,7 @@ TEST_F(StoreTest, WithdrawnConstantsRecallTheirFiles) {
   const auto yield = run({"store", "yield", "--store", path("a.db"), "--json"}).json();
   EXPECT_EQ(yield["units"], 0);
   EXPECT_TRUE(yield["yield"].is_null());
+  EXPECT_EQ(run({"store", "yield", "--from", "May", "--store", path("a.db")}).exit_code, 64);
   EXPECT_EQ(run({"store", "trend", "MOS2A2", "--store", path("a.db")}).exit_code, 66);
 }
 

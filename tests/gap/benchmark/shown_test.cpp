@@ -55,6 +55,37 @@ TEST(Shown, AnOffsetIsTheUnitsOwn) {
   EXPECT_NEAR(made.shown().means, kLsb_mg * kLsb_mg / (35 * 35), 1e-3);
 }
 
+// So is a gain, wherever it shows: ten counts in 1000 of what the shaker makes are half of its 2 %,
+// and as a signal would be 93 in each of 4000 samples.
+TEST(Shown, AGainIsTheUnitsOwnInSamplesToo) {
+  Made made;
+  for (std::size_t i = 0; i < made.without.counts.size(); ++i) {
+    made.without.counts[i][0] = static_cast<std::int16_t>(i % 2 == 0 ? 1000 : -1000);
+  }
+  made.change([](std::size_t i) { return i % 2 == 0 ? 1010 : -1010; });
+  EXPECT_NEAR(made.shown().samples, 0, 0.01);
+  EXPECT_LT(made.shown().index(), 0.5);
+}
+
+// The cube of a tone of known gain shows by all its samples, that of a unit whose gain no segment
+// shows by the harmonic alone: sin^3 = 3/4 sin - 1/4 sin 3p, a tenth of the square.
+TEST(Shown, OfACubeTheHarmonicIsBeyondTheGain) {
+  Made made;
+  const auto wave = [](std::size_t i, double cube) {
+    const double s = std::sin(0.61 * static_cast<double>(i));
+    return static_cast<std::int16_t>(std::lround(1500 * s + cube * s * s * s));
+  };
+  for (std::size_t i = 0; i < made.without.counts.size(); ++i) {
+    made.without.counts[i][0] = wave(i, 0);
+  }
+  constexpr double kCube_counts = 100;
+  made.change([&](std::size_t i) { return wave(i, kCube_counts); });
+  const double noise_mg2 = 3.9 * 3.9 + kLsb_mg * kLsb_mg / 12;
+  const double whole = 4000 * std::pow(kCube_counts * kLsb_mg, 2) * 5 / 16 / noise_mg2;
+  // About zero the samples do not differ by more than rounding does.
+  EXPECT_NEAR(made.shown().samples, whole / 10, 0.07 * whole / 10);
+}
+
 // A line of two counts, up and down: 61.035 / 16.4816 each sample, and no mean.
 TEST(Shown, SamplesByHand) {
   Made made;
