@@ -37,8 +37,7 @@ Error to_error(const SQLite::Exception& exception, const std::string& path) {
     case SQLITE_NOTADB:
       return {ErrorCode::bad_data, what, path,
               "name a store, or move the file away: what waits in the journal then goes into a new "
-              "one; if it was a "
-              "store, keep it and restore the last backup"};
+              "one; if it was a store, keep it and restore the last backup"};
     case SQLITE_CORRUPT:
       return {
           ErrorCode::bad_data, what, path,

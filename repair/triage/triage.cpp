@@ -103,7 +103,7 @@ std::optional<UtcTime> date_of_constants(const FileFacts& facts) {
 
 namespace {
 
-// A MOS unit's file, as recorded by this firmware.
+// A MOS unit's file by one of its readings: the first firmware and date of `facts` count.
 Triage triage_by(const FileFacts& facts) {
   const std::string& version = facts.firmware;
   Triage result;
