@@ -64,18 +64,12 @@ if [ -n "$label" ]; then
   exit
 fi
 
-# A third of the processors' time is idle while tests wait for browsers and devices: the next build takes it, and only it.
-step "Build with AddressSanitizer and UndefinedBehaviorSanitizer (clang++), beside the tests"
-configure sanitize
-nice -n 19 cmake --build build/sanitize -- --quiet >build/sanitize.log 2>&1 &
-sanitize=$!
-trap 'kill "$sanitize" 2>/dev/null || true' EXIT
-
 step "Tests"
 run_ctest build
 
-step "The rest of that build"
-wait "$sanitize" || { cat build/sanitize.log; exit 1; }
+step "Build with AddressSanitizer and UndefinedBehaviorSanitizer (clang++)"
+configure sanitize
+cmake --build build/sanitize -- --quiet
 step "Unit tests under the sanitizers"
 run_ctest build/sanitize -L '^unit$'
 
