@@ -435,6 +435,8 @@ void add_gap_challenge(CLI::App& gap_command, Context& context) {
       ->expected(0, 1)
       ->default_str("1")  // where no number follows
       ->check(CLI::Range(0.0, 1.0));
+  command.add_flag("--faint", options.shares.faint,
+                   "single effects and pairs near the size at which a recording shows them at all");
   command.add_flag("--rates", options.shares.any_rate, "draw sample rates from 20 to 100 Hz");
   command.add_flag("--follow-suggestion", options.follow,
                    "also record the segment that each answer suggests first, and show the gain");

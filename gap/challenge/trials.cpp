@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "base/random.h"
 #include "gap/challenge/outside.h"
@@ -28,7 +29,9 @@ class Drawing {
 
   Random& random() { return random_; }
 
-  double severity() { return log_uniform(0.3, 3); }
+  double severity(bool faint = false) {
+    return faint ? log_uniform(0.005, 0.3) : log_uniform(0.3, 3);
+  }
 
   double log_uniform(double low, double high) {
     return std::exp(random_.uniform(std::log(low), std::log(high)));
@@ -339,7 +342,10 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
 
   std::vector<std::string> names;
   for (const EffectKind& kind : sim::effect_catalogue()) {
-    if (only.empty() || std::find(only.begin(), only.end(), kind.name) != only.end()) {
+    const auto has = [&](const std::vector<std::string>& list) {
+      return std::find(list.begin(), list.end(), kind.name) != list.end();
+    };
+    if ((only.empty() || has(only)) && (!shares.faint || has(gradual_effects()))) {
       names.push_back(kind.name);
     }
   }
@@ -351,6 +357,10 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
     if (wanted) {
       outside.push_back(&kind);
     }
+  }
+  if (names.empty() && outside.empty()) {
+    return fail(ErrorCode::usage, "none of these effects is a gradual one", only.front(),
+                fmt::format("--faint draws {}", fmt::join(gradual_effects(), ", ")));
   }
   const double dice = random.uniform();
   std::vector<EffectSpec>& effects = trial.scenario.protocol->effects;
@@ -386,7 +396,7 @@ Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::Standa
                     [&](const TrialEffect& drawn) { return drawn.name == name; })) {
       continue;
     }
-    const double severity = drawing.severity();
+    const double severity = drawing.severity(shares.faint);
     SIXPOINT_ASSIGN(std::vector<EffectSpec> parts, drawing.effect(name, severity));
     effects.insert(effects.end(), parts.begin(), parts.end());
     trial.effects.push_back({name, severity, parts.size()});

@@ -49,10 +49,13 @@ struct TrialShares {
   double outside = 0.15;  // the rest is single
   double realistic = 0;
   bool any_rate = false;  // sample rates of 20 to 100 Hz instead of 100
+  // Singles and pairs of gradual effects only, log-uniform from 0.005 to 0.3 times a typical size:
+  // near what a recording shows at all.
+  bool faint = false;
 };
 
 // The same seed and index give the same trial. `only` restricts the effects drawn, of the catalogue
-// or outside it; empty: all that the protocol can show.
+// or outside it; empty: all that the protocol can show. usage where nothing is left to be drawn.
 Result<GapTrial> draw_trial(std::uint64_t seed, std::uint64_t index, sim::StandardProtocol protocol,
                             const TrialShares& shares, const std::vector<std::string>& only = {});
 

@@ -1,4 +1,5 @@
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -24,6 +25,50 @@ double scatter_mg2(const std::vector<Block>& blocks, const Fit& fit) {
     }
   }
   return std::max(0.0, own / n - shared / (n * n));
+}
+
+// The blocks' values of scatter of size one: columns that independent numbers of variance one add
+// up. Those of a thousandth of the largest variance add nothing that shows.
+Eigen::MatrixXd scatter_columns(const std::vector<Block>& blocks, Scatter kind) {
+  Eigen::Index rows = 0;
+  for (const Block& block : blocks) {
+    rows += block.size();
+  }
+  const auto n = static_cast<Eigen::Index>(blocks.size());
+  if (kind == Scatter::seating) {
+    const Eigen::Index seats = 1 + blocks.back().placement - blocks.front().placement;
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows, 3 * seats);
+    Eigen::Index row = 0;
+    for (const Block& block : blocks) {
+      const Eigen::Index seat = 3 * (block.placement - blocks.front().placement);
+      columns.block(row, seat, block.size(), 3) = seating_lever(block);
+      row += block.size();
+    }
+    return columns;
+  }
+  const double start_s = blocks.front().middle_s - blocks.front().seconds / 2;
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      covariance(i, j) = scatter_kernel(kind, blocks[static_cast<std::size_t>(i)],
+                                        blocks[static_cast<std::size_t>(j)], start_s);
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> own(covariance);
+  constexpr double kLeast = 1e-3;
+  const Eigen::VectorXd& variance = own.eigenvalues();  // ascending
+  const Eigen::Index kept = (variance.array() > kLeast * variance[n - 1]).count();
+  const Eigen::MatrixXd root =
+      own.eigenvectors().rightCols(kept) * variance.tail(kept).cwiseSqrt().asDiagonal();
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows, 3 * kept);
+  Eigen::Index row = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      columns.block(row + axis, axis * kept, 1, kept) = root.row(i);
+    }
+    row += blocks[static_cast<std::size_t>(i)].size();
+  }
+  return columns;
 }
 
 }  // namespace
@@ -148,6 +193,57 @@ std::optional<double> Explanation::bound(const std::string& effect) const {
     least = std::min(least.value_or(size), size);
   }
   return least;
+}
+
+std::optional<double> Explanation::bound(
+    Scatter kind, const std::function<double(double is_mg, double tried_mg)>& record_nats) const {
+  constexpr double kRange = 100;  // beyond the sizes that are tried
+  const std::vector<double> sizes = sizes_of(kind);
+  const std::vector<Block>& blocks = model_.blocks();
+  if (blocks.empty()) {
+    return std::nullopt;
+  }
+  Eigen::MatrixXd scatter = scatter_columns(blocks, kind);
+  model_.whiten_rows(Scatter::nominal, 0, scatter);
+  // What is left by the rest of the explanation, and a drift.
+  std::vector<int> others = best().subset.groups;
+  if (!best().contains("drift")) {
+    for (const int g : model_.groups_of("drift")) {
+      others = with_group(others, g);
+    }
+  }
+  const Whitened w = model_.whiten(linear_, Scatter::nominal, 0);
+  Posterior posterior;
+  model_.evidence(w, others, &posterior);
+  const Eigen::MatrixXd taken = used_columns(w.x, posterior).transpose() * scatter;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+      scatter.transpose() * scatter - taken.transpose() * posterior.covariance * taken,
+      Eigen::EigenvaluesOnly);
+  const Eigen::ArrayXd power = solver.eigenvalues().cwiseMax(0);
+  // The median of the log likelihood ratio of variances 1 + tried^2 power over 1 where they are 1 +
+  // size^2 power: of its sum of squares by Wilson and Hilferty (1931), for the freedom that it is
+  // worth.
+  const auto median_nats = [&](double size, double tried) {
+    const Eigen::ArrayXd ratio = tried * tried * power;
+    const Eigen::ArrayXd part = (1 + size * size * power) * ratio / (1 + ratio);
+    const double sum = std::max(1e-300, part.sum());
+    const double shift = 2 * part.square().sum() / (9 * sum * sum);
+    return 0.5 * (sum * std::pow(1 - shift, 3) - ratio.log1p().sum()) + record_nats(size, tried) +
+           scatter_log_prior(kind);
+  };
+  const auto shows = [&](double size) {
+    return std::ranges::any_of(
+        sizes, [&](double tried) { return median_nats(size, tried) > kAccept_nats; });
+  };
+  double low = sizes.front() / kRange, high = sizes.back() * kRange;
+  if (!shows(high)) {
+    return std::nullopt;
+  }
+  for (int halving = 0; halving < 25; ++halving) {
+    const double middle = std::sqrt(low * high);
+    (shows(middle) ? high : low) = middle;
+  }
+  return high;
 }
 
 std::vector<double> Explanation::row_freedom() const {

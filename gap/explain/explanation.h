@@ -15,6 +15,7 @@
 // The object refers to `blocks`, which must outlive it. It is constant after construction.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -73,6 +74,11 @@ class Explanation {
   // kAccept_nats. Of one axis, the others a uniform share of it. None for effects that the means do
   // not show.
   std::optional<double> bound(const std::string& effect) const;
+  // The same of a scatter of the catalogue, in the unit of sizes_of(), beside a drift, too: most of
+  // what a walk adds is one. `record_nats`: evidence for a size that is tried which the records are
+  // expected to have where another size is there.
+  std::optional<double> bound(
+      Scatter kind, const std::function<double(double is_mg, double tried_mg)>& record_nats) const;
   // Log evidence that an effect of the best explanation (or "gain") changes in proportion to time,
   // over the best explanation, in which it is constant.
   double changing_nats(const std::string& effect) const;

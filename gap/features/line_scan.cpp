@@ -120,9 +120,11 @@ LineScan scan_powers(double rate_hz, const std::vector<const Stretch*>& set,
   const std::vector<Eigen::Vector3d> level = noise_sd(noise, rate_hz, half);
   Spectra spectra(length);
   const bool one = set.size() == 1;
+  out.stretches = set.size();
   std::vector<Eigen::Matrix3cd> lab(one ? 0 : half, Eigen::Matrix3cd::Zero());
   std::vector<Eigen::Matrix3cd> sensor(one ? 0 : half, Eigen::Matrix3cd::Zero());
   for (const Stretch* s : set) {
+    out.samples += static_cast<double>(s->known);
     spectra.transform(*s);
     const double scale = 1 / std::sqrt(static_cast<double>(s->known));
     const Eigen::Matrix3cd back = s->rotation.transpose().cast<Complex>();
@@ -179,7 +181,9 @@ LineScan scan_in_step(double rate_hz, const std::vector<Stretch>& all, const Noi
   std::vector<Vector3c> lab(half, Vector3c::Zero());
   std::vector<Vector3c> sensor(half, Vector3c::Zero());
   Spectra spectra(length);
+  out.stretches = 1;  // as good as: all have one phase
   for (const Stretch* s : near) {
+    out.samples += static_cast<double>(s->known);
     spectra.transform(*s);
     const Eigen::Matrix3cd back = s->rotation.transpose().cast<Complex>();
     const Complex turn = std::polar(1.0, -2 * M_PI * out.step_hz * (s->start_s - first_s));
@@ -204,6 +208,25 @@ LineScan scan_in_step(double rate_hz, const std::vector<Stretch>& all, const Noi
         kTwoFrames_nats;
   }
   return out;
+}
+
+double shown_line_mg(const LineScan& scan, double nats, const Eigen::Vector3d& noise_mg2) {
+  constexpr double kBetweenBins = 0.95;  // of the power, on average: half-bin steps
+  constexpr double kMostRatio = 1e6;
+  const auto m = static_cast<double>(scan.stretches);
+  // `signal`: of the line's power over the noise's, summed over the stretches.
+  const auto shown_nats = [&](double signal) {
+    const double largest =
+        scan.stretches == 1 ? signal + 3 : (m + signal) * (1 + 3 / std::max(signal, 1e-9));
+    return eigenvalue_nats(largest, scan.stretches) - kTwoFrames_nats;
+  };
+  double low = std::sqrt(3 * m), high = kMostRatio * low;  // below it no direction stands out
+  for (int halving = 0; halving < 60; ++halving) {
+    const double middle = std::sqrt(low * high);
+    (shown_nats(middle) < nats ? low : high) = middle;
+  }
+  const double per_mg2 = kBetweenBins * scan.samples / 4 * noise_mg2.cwiseInverse().mean();
+  return std::sqrt(high / per_mg2);
 }
 
 }  // namespace sixpoint::gap

@@ -406,6 +406,10 @@ class LineFinder {
     Kind kind = Kind::in_step;
     double step_hz = 0;
     for (const auto& [of, scan] : scans()) {
+      if (found.empty() && !scan.nats.empty()) {
+        const double own_mg = shown_line_mg(scan, threshold_nats(scan), white_mg2());
+        bound_mg_ = std::min(bound_mg_.value_or(own_mg), own_mg);
+      }
       const auto peak = best_peak(scan);
       if (peak && (!best || peak->nats > best->nats)) {
         best = peak;
@@ -426,8 +430,18 @@ class LineFinder {
     return line;
   }
 
+  // Once the first was looked for.
+  std::optional<double> bound_mg() const { return bound_mg_; }
+
  private:
   enum class Kind { of_long, of_dwells, in_step };
+
+  static double threshold_nats(const LineScan& scan) {
+    return std::log(static_cast<double>(scan.nats.size())) - std::log(kFalseLines);
+  }
+  Eigen::Vector3d white_mg2() const {
+    return Eigen::Vector3d(noise_.white_mg[0], noise_.white_mg[1], noise_.white_mg[2]).cwiseAbs2();
+  }
 
   std::vector<std::pair<Kind, LineScan>> scans() const {
     constexpr double kLong_s = 60;
@@ -463,9 +477,8 @@ class LineFinder {
       return best;
     }
     const auto first = static_cast<std::size_t>(std::ceil(kLowest_hz / scan.step_hz));
-    const double log_bins = std::log(static_cast<double>(scan.nats.size()));
     for (std::size_t k = first; k + 2 < scan.nats.size(); ++k) {
-      const double nats = scan.nats[k] - log_bins + std::log(kFalseLines);
+      const double nats = scan.nats[k] - threshold_nats(scan);
       if (nats > 0 && (!best || nats > best->nats)) {
         const double f = static_cast<double>(k) * scan.step_hz;
         if (std::none_of(taken_hz_.begin(), taken_hz_.end(),
@@ -568,18 +581,19 @@ class LineFinder {
   std::vector<Stretch> all_;
   const Stretch* longest_ = nullptr;
   std::vector<double> taken_hz_;
+  std::optional<double> bound_mg_;
 };
 
 }  // namespace
 
-std::vector<SpectralLine> find_lines(const Bundle& bundle, const CleanSamples& clean,
-                                     const NoiseSpectrum& noise) {
+FoundLines find_lines(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise) {
   constexpr std::size_t kMost = 8;
   constexpr int kMostTried = 16;
-  std::vector<SpectralLine> lines;
+  FoundLines found;
+  std::vector<SpectralLine>& lines = found.lines;
   auto all = noise.usable() ? stretches(bundle, clean) : std::vector<Stretch>{};
   if (all.empty()) {
-    return lines;
+    return found;
   }
   LineFinder finder(bundle.rate_hz, noise, std::move(all));
   // Strongest first: a dwell of some seconds spreads a line over its neighbourhood.
@@ -600,7 +614,8 @@ std::vector<SpectralLine> find_lines(const Bundle& bundle, const CleanSamples& c
   }
   std::sort(lines.begin(), lines.end(),
             [](const SpectralLine& a, const SpectralLine& b) { return a.gain_nats > b.gain_nats; });
-  return lines;
+  found.bound_mg = finder.bound_mg();
+  return found;
 }
 
 }  // namespace sixpoint::gap

@@ -1,6 +1,8 @@
 // Lines in the spectrum of still records, and their frame: fixed in the laboratory or the sensor.
 //
-//   const auto lines = gap::find_lines(bundle, clean, gap::noise_spectrum(bundle, clean));
+//   const auto found = gap::find_lines(bundle, clean, gap::noise_spectrum(bundle, clean));
+//   found.lines;      // strongest first
+//   found.bound_mg;  // a line of that length is found half of the time
 //
 // A line that turns with the unit (a vector fixed in the sensor's frame) is electrical; one whose
 // direction stays in the room is vibration of the floor. Two cases are tried in each frame: every
@@ -11,6 +13,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "gap/features/noise.h"
@@ -37,8 +40,13 @@ struct SpectralLine {
   double apart_nats = 0;
 };
 
-// Strongest first, at most eight. What a strong line spreads about itself is none.
-std::vector<SpectralLine> find_lines(const Bundle& bundle, const CleanSamples& clean,
-                                     const NoiseSpectrum& noise);
+struct FoundLines {
+  std::vector<SpectralLine> lines;  // strongest first, at most eight
+  // Length of the vector at which a line is found half of the time; none without records at rest.
+  std::optional<double> bound_mg;
+};
+
+// What a strong line spreads about itself is none.
+FoundLines find_lines(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise);
 
 }  // namespace sixpoint::gap

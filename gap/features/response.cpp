@@ -49,6 +49,7 @@ constexpr double kFormLeft = 0.1;
 constexpr double kMountLowest_hz = 4, kMountHighest_hz = 45, kMountHighest_q = 8;
 constexpr double kLowestCorner_hz = 4;    // of corners and resonances tried
 constexpr double kHighestOfRate = 0.495;  // corners: what the bilinear transform can hold
+constexpr double kHighestTried = 0.492;   // the end of the grid of corners
 constexpr double kSmallTone_g = 1.5;      // larger tones also show curvature of third order
 constexpr double kLineGuard_hz = 2.1;     // four bins beside a line
 constexpr int kFolds = 4;                 // of the tones' frequencies
@@ -85,6 +86,7 @@ class Search {
   Response run() {
     out_.has_tones = !ratios_.empty();
     fit_flat();
+    find_bounds();
     find_low_pass();
     std::vector<double> low_pass_log = flat_;
     double base_chi = flat_chi_;
@@ -159,6 +161,52 @@ class Search {
     flat_chi_ = chi_of(flat_);
   }
 
+  // What the data of a unit with this filter or mount, and without chance, say of it. A search of
+  // two numbers finds one nat more, by chance.
+  double expected_nats(const LowPass& low_pass) const {
+    Search made = *this;
+    made.pink_ = {};
+    const std::vector<double> logs = logs_of(low_pass);
+    for (Bin& bin : made.bins_) {
+      const double h2 = std::pow(low_pass.noise_gain(bin.frequency_hz, rate_hz_), 2);
+      bin.variance = std::pow(out_.white_mg[bin.axis], 2) * h2 + rounding_;
+    }
+    for (std::size_t i = 0; i < made.ratios_.size(); ++i) {
+      made.ratios_[i].log_amplitude = logs[i];
+    }
+    const double noise_nats = made.fit_noise(low_pass).nats - made.fit_noise({}).nats;
+    return noise_nats > kNoiseAgrees_nats ? noise_nats + 0.5 * made.chi_of(flat_) : 0;
+  }
+  double expected_nats(const Resonance& resonance) const {
+    Search made = *this;
+    const std::vector<double> logs = logs_of(resonance, flat_);
+    for (std::size_t i = 0; i < made.ratios_.size(); ++i) {
+      made.ratios_[i].log_amplitude = logs[i];
+    }
+    return 0.5 * made.chi_of(flat_);
+  }
+
+  void find_bounds() {
+    const double needed_nats = std::max(kSignificant_nats, options_.named_from_nats) - 1;
+    // The highest frequency up to `high` from which on down it shows.
+    const auto highest = [&](double low, double high, const auto& of) {
+      if (expected_nats(of(low)) < needed_nats) {
+        return 0.0;
+      }
+      for (int halving = 0; halving < 12; ++halving) {
+        const double middle = std::sqrt(low * high);
+        (expected_nats(of(middle)) < needed_nats ? high : low) = middle;
+      }
+      return low;
+    };
+    out_.bound_corner_hz =
+        highest(kLowestCorner_hz, kHighestTried * rate_hz_,
+                [](double corner_hz) { return LowPass{.corner_hz = corner_hz, .order = 4}; });
+    out_.bound_mount_hz = highest(kMountLowest_hz, kMountHighest_hz, [](double frequency_hz) {
+      return Resonance{.frequency_hz = frequency_hz, .q = 2.5};
+    });
+  }
+
   // Without and with 1/f noise.
   void find_low_pass() {
     search_low_pass();
@@ -182,7 +230,7 @@ class Search {
   // at the corner tells it to a thousandth, and on the grid a wrong form may be nearer.
   void search_low_pass() {
     const auto corners =
-        static_cast<int>(std::log(0.492 * rate_hz_ / kLowestCorner_hz) / std::log(1.05));
+        static_cast<int>(std::log(kHighestTried * rate_hz_ / kLowestCorner_hz) / std::log(1.05));
     for (const LowPassForm form :
          {LowPassForm::sampled, LowPassForm::mixed, LowPassForm::analogue}) {
       if (ratios_.empty() && form == LowPassForm::mixed) {

@@ -30,6 +30,10 @@ struct Response {
   double tone_left_sd = 0;   // ... of tones, less what is significant of low-pass and resonance
   bool low_pass_significant = false;
   bool resonance_significant = false;
+  // What shows half of the time: corners of an order of four, and mounts of a q of 2.5 (the
+  // catalogue's), up to these frequencies. 0: none does.
+  double bound_corner_hz = 0;
+  double bound_mount_hz = 0;
   // What is left of the tones' amplitudes beyond noise, as a share: how well the form is known.
   double tone_form_share = 0;
   std::array<double, 3> white_mg{};  // of one sample before rounding and filter
@@ -55,6 +59,7 @@ struct ResponseOptions {
   bool allow_low_pass = true;
   bool allow_resonance = true;
   std::vector<double> lines_hz;  // spectral lines: bins beside them are left out
+  double named_from_nats = 0;    // evidence from which on what is significant is named, too
 };
 
 Response find_response(const Bundle& bundle, const NoiseSpectrum& noise,

@@ -272,6 +272,21 @@ double free_spectrum_nats(const std::vector<Coefficient>& coefficients) {
 
 }  // namespace
 
+double SlowNoise::expected_nats(bool flicker, double size, double tried) const {
+  double sum_nats = 0;
+  for (const Mode& mode : modes) {
+    const double per_size2 = flicker ? mode.flicker : mode.walk;
+    for (const double white_mg2 : mode.white_mg2) {
+      if (white_mg2 > 0) {
+        const double ratio = tried * tried * per_size2 / white_mg2;
+        const double variance = 1 + size * size * per_size2 / white_mg2;
+        sum_nats += 0.5 * (variance * ratio / (1 + ratio) - std::log1p(ratio));
+      }
+    }
+  }
+  return sum_nats;
+}
+
 double flicker_density_mg2(double flicker_mg) { return flicker_mg * flicker_mg; }
 
 SlowNoise slow_noise(const Bundle& bundle, const CleanSamples& clean, const NoiseSpectrum& noise) {

@@ -54,6 +54,9 @@ struct SlowNoise {
     double nats = 0;
   };
   Best best() const;
+  // Evidence that these records are expected to have for 1/f noise of the size that is tried, in mg,
+  // or for a walk in mg per sqrt(s), where it is there with another size.
+  double expected_nats(bool flicker, double size, double tried) const;
 };
 
 // Power density at 1 Hz, one-sided, mg^2/Hz: `flicker_mg` is its square root, as in sim/effects.

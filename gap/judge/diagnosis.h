@@ -44,7 +44,8 @@ struct EffectFinding {
   double share_of_gap = 0;
   // That it is there and adds more than DiagnoseOptions::matters_mg.
   double probability_it_matters = 0;
-  // The size, in the unit of the first parameter, that this recording shows half of the time.
+  // The size, in the unit of the first parameter, that this recording shows half of the time; of a
+  // vector its length. None of an effect without a size, and where no segment shows it.
   std::optional<double> bound = {};
   // Earlier units behind the sizes that were expected of it; 0: the catalogue's sizes.
   std::size_t learnt_from_units = 0;

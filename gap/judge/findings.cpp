@@ -43,6 +43,9 @@ void complete(const Request& request, Findings& found) {
         list->begin(), list->end(),
         [](const EffectFinding& a, const EffectFinding& b) { return a.nats > b.nats; });
     for (EffectFinding& f : *list) {
+      if (const auto bound = found.bounds.find(f.name); bound != found.bounds.end()) {
+        f.bound = bound->second;
+      }
       const CatalogueEntry* entry = find_entry(f.name);
       if (entry != nullptr && entry->datasheet > 0 && !f.parameters.empty()) {
         const std::vector<double>& values = f.parameters.front().value;
@@ -169,6 +172,7 @@ void Findings::append(Findings later) {
   join(alarms, later.alarms);
   join(outside_means_mg2, later.outside_means_mg2);
   worst_sd = std::max(worst_sd, later.worst_sd);
+  bounds.merge(later.bounds);
 }
 
 bool Findings::accepted(const std::string& effect) const { return contains(effects, effect); }

@@ -11,6 +11,7 @@
 // Internal to gap/judge. Units: nats, standard deviations, mg^2.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,8 @@ struct Findings {
   std::vector<EffectFinding> candidates;  // all that were judged
   std::vector<Alarm> alarms;
   double worst_sd = 0;  // of all tests and other causes, alarms or not
+  // EffectFinding::bound of every effect that has one, judged or not.
+  std::map<std::string, double> bounds;
   // Mean squares per axis of what effects add to the gap that the means do not show.
   std::vector<double> outside_means_mg2;
 

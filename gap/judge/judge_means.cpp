@@ -259,13 +259,15 @@ void judge_effect(const Request& request, const Explanation& explanation, const 
   if (!estimate) {
     return;
   }
+  if (const std::optional<double> bound = explanation.bound(name)) {
+    found.bounds[name] = *bound;
+  }
   const bool in = explanation.best().contains(name);
   const double gain = explanation.gain_nats(name);
   EffectFinding f{.name = name,
                   .nats = in ? std::max(kPresent_nats, gain) : std::min(kAbsent_nats, gain),
                   .parameters = parameters_of(name, *estimate),
                   .held_out_gain_nats = explanation.held_out_nats(name),
-                  .bound = explanation.bound(name),
                   .learnt_from_units = learnt_from(request.options.learnt, name)};
   if (in) {
     f.confounded_with = confounded(request, explanation, name, found, before);
@@ -282,6 +284,12 @@ void judge_effect(const Request& request, const Explanation& explanation, const 
 void judge_scatter(const Request& request, const Explanation& explanation, const SlowNoise& slow,
                    Scatter kind, Findings& found) {
   const std::string name(to_string(kind));
+  const auto in_records = [&](double size, double tried) {
+    return kind == Scatter::seating ? 0 : slow.expected_nats(kind == Scatter::flicker, size, tried);
+  };
+  if (const std::optional<double> bound = explanation.bound(kind, in_records)) {
+    found.bounds[name] = *bound;
+  }
   const Fit& fit = explanation.best();
   const bool in = fit.scatter == kind;
   const double gain = explanation.gain_nats(name, in);

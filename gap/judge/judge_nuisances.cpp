@@ -19,6 +19,9 @@ constexpr double kSameScale = 0.98;
 // Chi-square of six beyond which gains and offsets are no unit's: a probability of 5e-8.
 constexpr double kFarOut_chi = 45;
 
+// A common gain anywhere in 0.73 to 0.97, with the unit's own 2 % about it.
+constexpr double kLeastCommonGain = 0.73, kCommonGainSpan = 0.24;
+
 // Log density of gains and offsets of a unit, if the gains lie about `centre`; no constants.
 double unit_nats(const ForwardState& s, double centre) {
   double nats = 0;
@@ -43,8 +46,6 @@ struct WrongMode {
 };
 
 WrongMode wrong_mode(const ForwardState& s) {
-  // A common gain anywhere in 0.73 to 0.97, with the unit's own 2 % about it.
-  constexpr double kLeastCommonGain = 0.73, kCommonGainSpan = 0.24;
   constexpr int kCommonGains = 120;
   WrongMode mode;
   double best = kNoEvidence_nats;
@@ -99,6 +100,19 @@ void undo_mode(const ForwardState& s, double common, Nuisances& nuisances) {
   nuisances.found.outside_means_mg2.push_back(square / 3);
 }
 
+// The common gain, of a unit without offsets, from which on down a mode is accepted.
+double bound_gain() {
+  double low = kLeastCommonGain, high = 1;
+  for (int halving = 0; halving < 20; ++halving) {
+    const double middle = (low + high) / 2;
+    ForwardState s;
+    s.gain.setConstant(middle);
+    const double nats = wrong_mode(s).nats - unit_nats(s, 1) + kLogPriorEffect;
+    (nats > kAccept_nats ? low : high) = middle;
+  }
+  return low;
+}
+
 }  // namespace
 
 Nuisances judge_nuisances(const Request& request, const ForwardState& s, bool judged) {
@@ -114,6 +128,7 @@ Nuisances judge_nuisances(const Request& request, const ForwardState& s, bool ju
   if (!judged) {
     return out;
   }
+  out.found.bounds["filter_mismatch"] = bound_gain();
   const WrongMode mode = wrong_mode(s);
   const double gain_nats = mode.nats - unit_nats(s, 1) + kLogPriorEffect;
   const double z = chi_to_sd(chi, 6);

@@ -116,7 +116,11 @@ Lines judge_lines(const Request& request, const CleanSamples& clean, const Noise
   constexpr double kApart_nats = 7;         // lines reached 4, what is none began at 10
   constexpr double kLineForm = 0.1;         // a line's size may change by this share
   Lines lines;
-  lines.list = find_lines(request.bundle, clean, noise);
+  const auto [list, bound_mg] = find_lines(request.bundle, clean, noise);
+  lines.list = list;
+  if (bound_mg) {
+    lines.found.bounds["floor_vibration"] = lines.found.bounds["electrical_line"] = *bound_mg;
+  }
   // The poses of one half contradict those of the other: a line that only some poses have, or noise
   // that differs from dwell to dwell (truncated, it is smaller where a mean lies near zero). What
   // one long record shows of a small line predicts nothing for a half that hardly shows it, so that
@@ -198,10 +202,17 @@ ResponseStep judge_response(const Request& request, const NoiseSpectrum& noise,
   options.lines_hz = frequencies_of(lines);
   options.allow_low_pass = request.allowed("bandwidth");
   options.allow_resonance = request.allowed("soft_mount");
+  options.named_from_nats = kResponseCost_nats - kLogPriorEffect + kAccept_nats;
   const std::vector<ToneFit> whole = whole_tones(tones);
   ResponseStep step;
   step.response = find_response(request.bundle, noise, whole, options);
   judge_low_pass(request, step.response, whole, step.found);
+  if (step.response.bound_corner_hz > 0) {
+    step.found.bounds["bandwidth"] = step.response.bound_corner_hz;
+  }
+  if (step.response.bound_mount_hz > 0) {
+    step.found.bounds["soft_mount"] = step.response.bound_mount_hz;
+  }
   if (step.response.has_tones && options.allow_resonance) {
     judge_resonance(request, step.response, whole, step.found);
   }
@@ -214,6 +225,7 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   // decay, gain of ringing over a plain decay, how strong ringing is surely no rest of a line, and
   // how near a line is.
   constexpr double kAmplitudePrior = 0.03, kPairs = 60, kRings_nats = 3;
+  constexpr double kTypicalDecay_s = 0.4;  // the catalogue's, of the bound
   constexpr double kSurelyRings_sd = 4.5, kNearLine_hz = 2.5;
   // A mount rings in several modes: how far frequency and decay of one mode stand for all.
   constexpr double kModeShare = 0.03, kDecayShare = 0.15;
@@ -229,9 +241,15 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   const StepResponse::Mode& mode = step.mode;
   const double sd = std::max(1e-9, mode.amplitude_sd);
   const double relative = sd / std::max(1e-9, mode.amplitude);
-  EffectFinding f{.name = "settling",
-                  .nats = step.gain_nats - 2 * std::log1p(kAmplitudePrior / sd) - std::log(kPairs) +
-                          kLogPriorEffect};
+  const auto cost_nats = [&](double amplitude_sd) {
+    return 2 * std::log1p(kAmplitudePrior / amplitude_sd) + std::log(kPairs) - kLogPriorEffect;
+  };
+  EffectFinding f{.name = "settling", .nats = step.gain_nats - cost_nats(sd)};
+  // A mode of amplitude a has a^2 / 2 per squared standard uncertainty, and its phase one more by
+  // chance. That uncertainty: of either quadrature, whose samples weigh exp(-2 t / decay) / 2.
+  const double bound_sd = step.sd * std::sqrt(4 / (kTypicalDecay_s * request.bundle.rate_hz));
+  settling.found.bounds["settling"] =
+      bound_sd * std::sqrt(2 * (kAccept_nats + cost_nats(bound_sd) - 1));
   const bool significant = f.nats > kAccept_nats;
   if (significant) {
     f.held_out_gain_nats = held_out_step_nats(request.bundle, clean, noise, lines_hz);

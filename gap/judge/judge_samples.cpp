@@ -106,6 +106,13 @@ Findings judge_marks(const Request& request, const CleanSamples& clean) {
     found.alarm(kShortRunsAlarm_sd,
                 fmt::format("codes: {} short runs of one value", clean.stuck.runs));
   }
+  // The shortest hold of each, and a level that is just not reached. Of turned axes and wraps there
+  // is no size.
+  found.bounds["charging_zeros"] = static_cast<double>(kZeroRun) / bundle.rate_hz;
+  found.bounds["idle_sleep"] = bundle.rate_hz / static_cast<double>(std::max<std::size_t>(1, all));
+  if (clean.driven_g > 0) {
+    found.bounds["saturation"] = clean.driven_g;
+  }
   if (clean.wrapped_samples > kFewWraps) {
     mark({.name = "wrap"}, clean.wrapped_samples, kPerWrap_nats, 0, kWrap_mg2,
          fmt::format("{} samples overflowed in the high shaker", clean.wrapped_samples));

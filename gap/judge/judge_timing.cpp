@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -151,8 +152,8 @@ void judge_clock(const Request& request, const HostTiming& host, const std::vect
                         .held_out_gain_nats =
                             host.usable ? host.clock_held_out_nats : nats - kLogPriorEffect - 1,
                         .outside_datasheet = std::abs(ppm) > kDatasheetClock_ppm,
-                        .gap_mg2 = gap_mg2,
-                        .bound = known_ppm * std::sqrt(2 * (kAccept_nats + 0.5 * z * z - nats))});
+                        .gap_mg2 = gap_mg2});
+    found.bounds["clock_error"] = known_ppm * std::sqrt(2 * (kAccept_nats + 0.5 * z * z - nats));
   }
 }
 
@@ -204,6 +205,11 @@ void judge_slips(const Request& request, const HostTiming& host, const ToneClock
   };
   judge("dropped_samples", true);
   judge("duplicated_samples", false);
+  if (samples > 0) {
+    // Each shows: half of the recordings have one or more where the mean number is log 2.
+    found.bounds["dropped_samples"] = found.bounds["duplicated_samples"] =
+        std::numbers::ln2 / static_cast<double>(samples);
+  }
   if (by_host && by_tones.samples > kEnoughSamples && lost + repeated == 0 &&
       by_tones.lost + by_tones.repeated > 0) {
     found.alarm(kPhaseStepAlarm_sd,
@@ -298,6 +304,23 @@ JitterFit fit_jitter(const JitterSums& sums) {
   return fit;
 }
 
+// The jitter, in ms, whose z in jitter_sums() is expected to be this: what it adds to a residual
+// makes that less sure.
+double jitter_of_z(const std::vector<JitterTone>& tones, double z) {
+  double low_s2 = 0, high_s2 = 1;
+  for (int halving = 0; halving < 80; ++halving) {
+    const double variance_s2 = (low_s2 + high_s2) / 2;
+    double down = 0;
+    for (const JitterTone& tone : tones) {
+      const double lever = 0.5 * std::pow(tone.w * tone.found_mg, 2);
+      const double level = tone.white_mg2 + lever * variance_s2;
+      down += std::pow(lever / level, 2) * tone.samples / 4;
+    }
+    (variance_s2 * std::sqrt(down) < z ? low_s2 : high_s2) = variance_s2;
+  }
+  return 1e3 * std::sqrt(high_s2);
+}
+
 // Adds accepted jitter to `timing`, and frees the tones' amplitudes of what it takes off.
 void judge_jitter(const Request& request, const NoiseSpectrum& noise, Timing& timing) {
   constexpr double kCost_nats = 4;  // convention: of its size, and of heavy tails
@@ -309,6 +332,8 @@ void judge_jitter(const Request& request, const NoiseSpectrum& noise, Timing& ti
   const auto [jitter_ms, sd_ms] = fit_jitter(sums);
   const double nats = (z > 0 ? 0.5 * z * z : 0) - kCost_nats + kLogPriorEffect;
   const bool there = nats > kAccept_nats;
+  timing.found.bounds["jitter"] =
+      jitter_of_z(sums.tones, std::sqrt(2 * (kAccept_nats + kCost_nats - kLogPriorEffect)));
   if (there && !request.allowed("jitter")) {
     timing.found.alarm(z, "timing: scatter on the slopes of the tones");
     return;

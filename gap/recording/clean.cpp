@@ -11,7 +11,6 @@ namespace {
 
 using gt3x::Counts;
 
-constexpr std::size_t kZeroRun = 10;  // all three axes zero ten times over: no pose does that
 constexpr int kFullScaleLow = -2048;  // the stored number's 12 bits
 constexpr int kFullScaleHigh = 2047;
 constexpr double kTurn = 4096;  // what an overflow takes away
@@ -277,10 +276,21 @@ void undo_wrap(const Bundle& bundle, CleanSamples& clean) {
   }
 }
 
-// Counts of one axis in the vibrations that drive it by 2 g and more; empty where none does.
+constexpr double kDriven_g = 2;  // convention: the catalogue's saturation begins at 5 g
+
+double driven_g(const Bundle& bundle) {
+  double most_lsb = 0;
+  for (const DrivenAxis& driven : driven_axes(bundle)) {
+    if (std::abs(driven.amplitude_lsb) >= kDriven_g * bundle.accel_scale_lsb_per_g) {
+      most_lsb = std::max(most_lsb, std::min<double>(driven.peak_lsb(), kFullScaleHigh));
+    }
+  }
+  return most_lsb / bundle.accel_scale_lsb_per_g;
+}
+
+// Counts of one axis in the vibrations that drive it by so much; empty where none does.
 std::vector<std::size_t> driven_histogram(const Bundle& bundle, const CleanSamples& clean,
                                           std::size_t axis) {
-  constexpr double kDriven_g = 2;  // convention: the catalogue's saturation begins at 5 g
   std::vector<std::size_t> histogram;
   for (const Segment& segment : bundle.segments) {
     if (!segment.vibration) {
@@ -380,6 +390,7 @@ CleanSamples clean_samples(const Bundle& bundle) {
       find_plateau(histogram, axis, true, clean);
     }
   }
+  clean.driven_g = driven_g(bundle);
   mark_clipped(clean);
   return clean;
 }

@@ -20,6 +20,9 @@
 
 namespace sixpoint::gap {
 
+// So many samples of zero on all axes are a run of zeros: no pose has them.
+inline constexpr std::size_t kZeroRun = 10;
+
 enum SampleFlag : std::uint8_t {
   kSampleGood = 0,
   kSampleZero = 1,      // within a run of zeros on all axes
@@ -68,7 +71,7 @@ struct CleanSamples {
   // Mean distance, in g, of the poses from what the protocol says, axes as decided.
   double pose_error_g = 0;
 
-  RunTally zeros;  // 10 samples and more with zero on all axes
+  RunTally zeros;  // kZeroRun samples and more
   RunTally held;   // a second and more of one value, not zero
   RunTally stuck;  // runs of one value shorter than that, longer than chance allows
   std::size_t wrapped_samples = 0;
@@ -78,6 +81,7 @@ struct CleanSamples {
   std::array<std::array<double, 2>, 3> plateau_lsb{};  // per axis low, high; 0 where none
   std::size_t plateau_samples = 0;
   std::size_t full_scale_samples = 0;  // at the record's own limits: nothing wrong
+  double driven_g = 0;  // the furthest that a vibration of 2 g and more drives an axis in its range
 
   std::vector<ClockSlip> slips;  // ascending; set by mark_slips() (gap/features/timing.h)
 };

@@ -181,5 +181,30 @@ TEST(Trials, RealisticUnitsHaveManyEffectsAndOneThatDominates) {
   EXPECT_GT(rates.size(), 7U);
 }
 
+TEST(Trials, FaintOnesAreGradualAndSmall) {
+  const gap::TrialShares shares{.none = 0, .pair = 0.5, .outside = 0, .faint = true};
+  const std::vector<std::string>& gradual = gap::gradual_effects();
+  std::set<std::string> names;
+  double least = 1;
+  for (std::uint64_t i = 0; i < 120; ++i) {
+    const auto trial = gap::draw_trial(78, i, kProduction, shares);
+    ASSERT_OK(trial);
+    EXPECT_EQ(trial->effects.size(), trial->kind == TrialKind::pair ? 2U : 1U);
+    for (const gap::TrialEffect& effect : trial->effects) {
+      EXPECT_NE(std::find(gradual.begin(), gradual.end(), effect.name), gradual.end())
+          << effect.name;
+      EXPECT_GE(effect.severity, 0.005);
+      EXPECT_LE(effect.severity, 0.3);
+      names.insert(effect.name);
+      least = std::min(least, effect.severity);
+    }
+  }
+  EXPECT_EQ(names.size(), gradual.size());
+  EXPECT_LT(least, 0.01);
+  const auto wraps = gap::draw_trial(78, 1, kProduction, shares, {"wrap"});
+  ASSERT_FALSE(wraps.has_value());
+  EXPECT_EQ(wraps.error().code, ErrorCode::usage);
+}
+
 }  // namespace
 }  // namespace sixpoint

@@ -149,6 +149,34 @@ TEST(EvidenceAnswers, BoundShowsHalfOfTheTime) {
   EXPECT_LT(shown(0.3 * *bound), 4);
 }
 
+// The same of a bad seat, and of 1/f noise that the records do not show.
+TEST(EvidenceAnswers, BoundOfScatterShowsHalfOfTheTime) {
+  const auto nothing = [](double, double) { return 0.0; };
+  const auto still = tests::made_dwells();
+  const std::optional<double> bound =
+      Explanation(still, only({"seating"})).bound(Scatter::seating, nothing);
+  ASSERT_TRUE(bound);
+  const auto shown = [&](double size_deg) {
+    int count = 0;
+    for (unsigned seed = 1; seed <= 30; ++seed) {
+      const auto blocks =
+          tests::made_dwells({}, seed, 60, std::hypot(kNominalSeating_deg, size_deg));
+      count += Explanation(blocks, only({"seating"})).gain_nats("seating") > kAccept_nats ? 1 : 0;
+    }
+    return count;
+  };
+  EXPECT_GT(shown(*bound), 6);
+  EXPECT_LT(shown(*bound), 28);
+  EXPECT_GT(shown(2 * *bound), 27);
+  EXPECT_LT(shown(0.4 * *bound), 4);
+  // Records that show every size leave nothing to the dwells.
+  const auto much = [](double, double) { return 1e3; };
+  EXPECT_LT(Explanation(still, only({"seating"})).bound(Scatter::flicker, much).value_or(1), 1e-3);
+  EXPECT_FALSE(Explanation(still, only({"seating"})).bound(Scatter::flicker, [](double, double) {
+    return -1e9;
+  }));
+}
+
 // By hand: a drift of d over hours h, less what the offset takes over (the mean).
 TEST(EvidenceAnswers, GapOfAnEffectIsItsMeanSquareWithoutTheOffset) {
   const Eigen::Vector3d drift(9, -6, 7);

@@ -212,5 +212,29 @@ TEST(LineScan, InStepShowsAWeakerLineThanPowers) {
   EXPECT_LT(by_powers, in_step / 2);
 }
 
+// Lines of the size that is said to have twelve nats half of the time have them in about half of the
+// scans, whatever the scan: powers of one stretch and of eighteen, and all in step.
+TEST(LineScan, TheShownLineIsShownHalfOfTheTime) {
+  const NoiseSpectrum noise = white(Eigen::Vector3d::Ones());
+  constexpr double kNats = 12;
+  constexpr int kScans = 20;
+  for (const std::size_t dwells : {0U, 1U, 18U}) {  // 0: in step
+    const auto scan_of = [&](const std::vector<Stretch>& all) {
+      return dwells == 0 ? scan_in_step(kRate_hz, all, noise)
+                         : scan_powers(kRate_hz, all_of(all), noise);
+    };
+    int shown = 0;
+    for (unsigned seed = 1; seed <= static_cast<unsigned>(kScans); ++seed) {
+      auto all = noise_dwells(dwells == 0 ? 18 : dwells, seed);
+      const double size_mg = shown_line_mg(scan_of(all), kNats, Eigen::Vector3d::Ones());
+      add(all, {size_mg, 0, 0}, kLine_hz);
+      shown += nats_at(scan_of(all), kLine_hz) > kNats ? 1 : 0;
+    }
+    // The line lies on a bin, where the scan has 1 / 0.95 as much.
+    EXPECT_GT(shown, kScans / 4) << dwells;
+    EXPECT_LT(shown, kScans - kScans / 10) << dwells;
+  }
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

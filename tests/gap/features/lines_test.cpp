@@ -17,7 +17,7 @@ TEST(Lines, FrameIsTold) {
       return Eigen::Vector3d(s.rotation.col(2) + (lab ? Eigen::Vector3d(s.rotation * line) : line));
     });
     const CleanSamples clean = clean_samples(bundle);
-    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean)).lines;
     ASSERT_EQ(lines.size(), 1U);
     EXPECT_EQ(lines[0].in_lab, lab);
     EXPECT_TRUE(lines[0].decidable);
@@ -28,7 +28,7 @@ TEST(Lines, FrameIsTold) {
   }
   const Bundle none = tests::made_production({});
   const CleanSamples clean = clean_samples(none);
-  EXPECT_TRUE(find_lines(none, clean, noise_spectrum(none, clean)).empty());
+  EXPECT_TRUE(find_lines(none, clean, noise_spectrum(none, clean)).lines.empty());
 }
 
 // What a unit records that loses a sample (steps > 0) or has one twice in some seconds of each
@@ -67,14 +67,14 @@ TEST(Lines, LostSamplesDoNotSpreadALine) {
     return step_response(bundle, clean, noise_spectrum(bundle, clean), {line.frequency_hz})
         .gain_nats;
   };
-  const auto spread = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+  const auto spread = find_lines(bundle, clean, noise_spectrum(bundle, clean)).lines;
   ASSERT_FALSE(spread.empty());
   EXPECT_GT(off_sd(spread[0]), 10) << "samples stand where they are stored";
   EXPECT_GT(ringing_nats(spread[0]), 12);
 
   mark_slips(host_timing(bundle), clean);
   EXPECT_GT(clean.slips.size(), 18U);
-  const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+  const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean)).lines;
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_NEAR(lines[0].frequency_hz, 26.8, 0.02);
   EXPECT_FALSE(lines[0].in_lab);
@@ -99,7 +99,7 @@ TEST(Lines, PhaseByTheHostsClockShowsTheFrameOfASmallLine) {
                                  (lab ? Eigen::Vector3d(s.rotation * line) : line));
         });
     const CleanSamples clean = clean_samples(bundle);
-    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean)).lines;
     ASSERT_EQ(lines.size(), 1U) << seed;
     EXPECT_EQ(lines[0].in_lab, lab) << seed;
     EXPECT_NEAR(lines[0].frequency_hz, kHost_hz * (1 + kUnitClock), 2e-3) << seed;
@@ -121,7 +121,7 @@ TEST(Lines, NoiseDoesNotMakeASmallLineLarger) {
           return Eigen::Vector3d(s.rotation.col(2) + std::cos(2 * M_PI * 17.3 * t + phase) * v);
         });
     const CleanSamples clean = clean_samples(bundle);
-    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean));
+    const auto lines = find_lines(bundle, clean, noise_spectrum(bundle, clean)).lines;
     ASSERT_EQ(lines.size(), 1U) << seed;
     sum += lines[0].vector_mg.norm() / (1000 * v.norm());
     EXPECT_GT(lines[0].held_out_nats, 0) << "each half of the poses predicts the other: " << seed;

@@ -58,5 +58,17 @@ TEST(SlowNoise, JumpsAreNoWalk) {
   EXPECT_LT(jump_sd(false), 4);
 }
 
+// By hand: one mode of variance 1 + 3 on one axis, tried with the right size, with none, and with
+// another.
+TEST(SlowNoise, ExpectedEvidenceIsThatOfTwoVariances) {
+  SlowNoise slow;
+  slow.modes.push_back({.white_mg2 = {2, 0, 0}, .walk = 6, .flicker = 1.5});
+  EXPECT_NEAR(slow.expected_nats(false, 1, 1), 0.5 * (3 - std::log(4.0)), 1e-12);
+  EXPECT_NEAR(slow.expected_nats(true, 2, 2), 0.5 * (3 - std::log(4.0)), 1e-12);
+  EXPECT_EQ(slow.expected_nats(false, 1, 0), 0);
+  EXPECT_LT(slow.expected_nats(false, 0, 1), 0) << "there is none";
+  EXPECT_LT(slow.expected_nats(false, 1, 2), slow.expected_nats(false, 1, 1));
+}
+
 }  // namespace
 }  // namespace sixpoint::gap
