@@ -84,9 +84,6 @@ std::string constants_text(const Json& constants) {
   return fmt::format("{} LSB/g, {} LSB", sensitivity, zero);
 }
 
-namespace {
-
-// What a terminal does not show stands as \xNN.
 std::string bash_word(const std::string& word) {
   if (printable(word) == word) {
     return repair::shell_word(word);
@@ -102,8 +99,6 @@ std::string bash_word(const std::string& word) {
   }
   return quoted + "'";
 }
-
-}  // namespace
 
 void next_step(Context& context, bool as_json, const std::vector<std::string>& words) {
   if (as_json) {

@@ -40,9 +40,12 @@ class Columns {
 // `constants` as calib::to_json() writes them; empty where it is not that.
 std::string constants_text(const Json& constants);
 
+// One argument of a command line that people are told to give, as bash takes it: in quotes where it
+// needs them, and what a terminal does not show as \xNN.
+std::string bash_word(const std::string& word);
+
 // The last line of a result: the command that people give next, on stderr. `words` are the command
-// and its arguments; a word with a blank, a quote or a line feed is printed as bash takes it. Nothing
-// with --json.
+// and its arguments, each as bash_word() has it. Nothing with --json.
 void next_step(Context& context, bool as_json, const std::vector<std::string>& words);
 
 // A path as an argument that is no option: "./-a" for "-a".

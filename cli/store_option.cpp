@@ -12,9 +12,9 @@
 #include "base/atomic_file.h"
 #include "base/sha256.h"
 #include "cli/command.h"
+#include "cli/people_text.h"
 #include "db/records.h"
 #include "gt3x/forms/model.h"
-#include "repair/archive/archive_scripts.h"
 #include "station/records/run_records.h"
 
 namespace sixpoint::cli {
@@ -104,8 +104,7 @@ std::string journal_folder(const std::string& location) {
 std::string catch_up_line(const std::string& location) {
   const std::string file = store_file(location);
   return std::string("sixpoint store catch-up") +
-         (location.empty() ? ""
-                           : " --store " + (file.empty() ? "STORE" : repair::shell_word(location)));
+         (location.empty() ? "" : " --store " + (file.empty() ? "STORE" : bash_word(location)));
 }
 
 Result<db::Saved> keep_records(Context& context, const std::string& location,
@@ -133,7 +132,7 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
     context.log().warn(
         "nothing is lost: it is kept in {}; when there is space again, store it with '{} --journal "
         "{}'",
-        kept->folder, catch_up_line(location), repair::shell_word(kept->folder));
+        kept->folder, catch_up_line(location), bash_word(kept->folder));
     return kept;
   }
   if (kept->refusal->code != ErrorCode::device_unavailable) {

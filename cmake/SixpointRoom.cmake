@@ -39,8 +39,10 @@ function(sixpoint_room FOLDER)
   # compiled as one. So names in the anonymous namespaces of a room's files differ.
   set_target_properties(sixpoint_${name} PROPERTIES
     UNITY_BUILD ${SIXPOINT_UNITY} UNITY_BUILD_BATCH_SIZE 12)
-  # Rooms that wait for people, devices, disks and servers gain nothing by -O3, and take a third less time to compile.
-  if(FOLDER MATCHES "^(cli|db|device|mocks|station)(/|$)" AND NOT FOLDER MATCHES "^station/(records|statistics)$")
+  # Rooms that wait for people, devices, disks and servers, and those that work once for a file, gain nothing by -O3, and take
+  # a third less time to compile.
+  if((FOLDER MATCHES "^(cli|db|device|mocks|station)(/|$)" AND NOT FOLDER MATCHES "^station/(records|statistics)$") OR
+     FOLDER MATCHES "^(repair/(archive|batch|report|units)|gap/(adopt|benchmark|challenge|drawing|report))$")
     target_compile_options(sixpoint_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   endif()
   # Rooms that read foreign bytes tell the fuzzer which ways were taken; without it, it flies blind. Rooms that compute

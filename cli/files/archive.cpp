@@ -20,7 +20,6 @@
 #include "repair/archive/archive_merge.h"
 #include "repair/archive/archive_plan.h"
 #include "repair/archive/archive_run.h"
-#include "repair/archive/archive_scripts.h"
 #include "repair/archive/plan_folder.h"
 #include "repair/rescale/constants_finder.h"
 #include "station/records/software.h"
@@ -94,8 +93,8 @@ Status run_shard(const ArchiveOptions& options, Context& context) {
     context.people << fmt::format(
         "stopped: {} files of the shard are done; to go on:\n  sixpoint archive run {} --shard {} "
         "-o {}{}\n",
-        result->files.size(), repair::shell_word(options.plan), options.shard,
-        repair::shell_word(options.output), options.redo_outdated ? " --redo-outdated" : "");
+        result->files.size(), bash_word(options.plan), options.shard, bash_word(options.output),
+        options.redo_outdated ? " --redo-outdated" : "");
   }
   return {};
 }
@@ -107,15 +106,15 @@ class Rerun {
  public:
   Rerun(FileSystem& files, std::string plan) : plan_(std::move(plan)) {
     const auto output = repair::output_folder_of(files, absolute(plan_));
-    output_ = output && *output ? repair::shell_word(**output) : "OUTDIR";
+    output_ = output && *output ? bash_word(**output) : "OUTDIR";
   }
   std::string shard(std::size_t number) const {
-    return fmt::format("sixpoint archive run {} --shard {} -o {}", repair::shell_word(plan_),
-                       number, output_);
+    return fmt::format("sixpoint archive run {} --shard {} -o {}", bash_word(plan_), number,
+                       output_);
   }
   std::string array(const std::vector<std::size_t>& shards) const {
     return fmt::format("sbatch --array={} {}/run.sbatch {}", fmt::join(shards, ","),
-                       repair::shell_word(plan_), output_);
+                       bash_word(plan_), output_);
   }
 
  private:
@@ -286,8 +285,7 @@ class Merge {
       context_.log().warn(
           "{} files were repaired with constants {}, which were withdrawn since the plan was made "
           "({}): repair them by a new plan; 'sixpoint store recall {} --store {}' lists them",
-          files, db::shown_id(id), printable(reason), db::shown_id(id),
-          repair::shell_word(store_location_));
+          files, db::shown_id(id), printable(reason), db::shown_id(id), bash_word(store_location_));
     }
     return list;
   }

@@ -8,9 +8,9 @@
 #include "cli/files/archive_options.h"
 #include "cli/files/file_stream.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
-#include "repair/archive/archive_scripts.h"
 #include "repair/archive/plan_folder.h"
 #include "repair/archive/shard_results.h"
 #include "repair/triage/file_tree.h"
@@ -99,7 +99,7 @@ void print_plan(const ArchiveOptions& options, const PlannedArchive& planned, Co
     context.people << "dry run: nothing was written\n";
     return;
   }
-  const std::string folder = repair::shell_word(options.output);
+  const std::string folder = bash_word(options.output);
   context.people << fmt::format(
       "with Slurm:     sixpoint archive submit {0} -o OUTDIR\n"
       "on one machine: bash {0}/run_all.sh OUTDIR\n",

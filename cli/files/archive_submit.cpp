@@ -13,6 +13,7 @@
 #include "cli/command.h"
 #include "cli/files/archive_options.h"
 #include "cli/output.h"
+#include "cli/people_text.h"
 #include "repair/archive/archive_run.h"
 #include "repair/archive/archive_scripts.h"
 #include "repair/archive/plan_folder.h"
@@ -80,7 +81,7 @@ std::string shell_line(const Words& words) {
   std::string line;
   for (const std::string& word : words) {
     line += line.empty() ? "" : " ";
-    line += repair::shell_word(word);
+    line += bash_word(word);
   }
   return line;
 }
@@ -101,7 +102,7 @@ Status check_output(const ArchiveOptions& options, const std::string& folder, Co
   if (known && *known != output) {
     return fail(ErrorCode::usage,
                 fmt::format("the shards of this plan are repaired into {}", printable(*known)),
-                output, fmt::format("use -o {}, or make another plan", repair::shell_word(*known)));
+                output, fmt::format("use -o {}, or make another plan", bash_word(*known)));
   }
   return {};
 }

@@ -14,7 +14,6 @@
 #include "cli/stop_request.h"
 #include "cli/store_option.h"
 #include "cli/workers.h"
-#include "repair/archive/archive_scripts.h"
 #include "repair/archive/output_lock.h"
 #include "repair/batch/repair_files.h"
 #include "repair/rescale/constants_finder.h"
@@ -92,11 +91,11 @@ std::string line_that_goes_on(const RepairCommandOptions& options) {
   std::string line = "sixpoint repair";
   const auto add = [&](const char* name, const std::string& value) {
     if (!value.empty()) {
-      line += fmt::format(" {} {}", name, repair::shell_word(value));
+      line += fmt::format(" {} {}", name, bash_word(value));
     }
   };
   for (const std::string& path : options.paths) {
-    line += fmt::format(" {}", repair::shell_word(path_word(path)));
+    line += fmt::format(" {}", bash_word(path_word(path)));
   }
   add("-o", options.folder);
   add("--constants", options.sources.constants);

@@ -8,7 +8,7 @@
 
 #include "base/temporaries.h"
 #include "cli/context.h"
-#include "repair/archive/archive_scripts.h"
+#include "cli/people_text.h"
 
 namespace sixpoint::cli {
 namespace {
@@ -62,12 +62,11 @@ std::string text_when_stopped(const std::vector<std::string>& arguments) {
   }
   if (const std::string folder = export_folder(arguments);
       begins_with(arguments, {"gap", "challenge"}) && !folder.empty()) {
-    return "\nsixpoint: stopped; remove the folder " + repair::shell_word(folder) +
-           " and begin again\n";
+    return "\nsixpoint: stopped; remove the folder " + bash_word(folder) + " and begin again\n";
   }
   std::string text = "\nsixpoint: stopped; what is done stays, and this line goes on:\n  sixpoint";
   for (const std::string& argument : arguments) {
-    text.append(" ").append(repair::shell_word(argument));
+    text.append(" ").append(bash_word(argument));
   }
   return text + "\n";
 }

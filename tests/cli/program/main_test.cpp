@@ -112,6 +112,7 @@ TEST(StoppedText, FollowsTheTable) {
   EXPECT_EQ(says({"export", "a b", "-o", "o"}),
             "\nsixpoint: stopped; what is done stays, and this line goes on:\n"
             "  sixpoint export 'a b' -o o\n");
+  EXPECT_THAT(says({"export", "a\nb"}), HasSubstr("export $'a\\x0ab'\n")) << "one line";
   EXPECT_THAT(says({}), HasSubstr("this line goes on"));
 }
 
