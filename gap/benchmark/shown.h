@@ -9,12 +9,12 @@
 // Statistical Signal Processing II: Detection Theory", 1998, 4.3): a matched filter that alarms
 // at 3 standard deviations shows an effect of index 3 half of the time. The signal is the
 // difference of two simulations of one seed. It consists of
-//     means:   of each segment, in the noise of the samples and 0.17 mg of seating; and of its
-//              pieces of 10 s about that mean, in the noise alone. What rounding scatters is
-//              measured and subtracted
+//     means:   of each segment, and of its pieces of 10 s about that mean, in the noise of the
+//              samples. What rounding scatters is measured and subtracted
 //     samples: those that differ from their piece's mean by more than 1.25 counts, which no steady
 //              change does however it is rounded
-// these two beyond what one gain (2 %) and one offset (35 mg) of the unit take, per axis; and
+// these two beyond what one gain (2 %) and one offset (35 mg) of the unit take, per axis, and the seat
+// of each placement (0.01 degrees about each axis), which turns gravity and what the shaker moves; and
 //     times:   of the packets, within their segment, in the 2 ms (uniform) of the host's stamps
 // Nothing else is unknown: the other effects are not free, and a random effect is taken as if its
 // course were known. A method can hardly do better. Changes of single counts (the lowest bit, the
@@ -30,7 +30,8 @@
 namespace sixpoint::gap {
 
 inline constexpr double kShownAt = 3;  // standard deviations; convention
-// Standard deviation of a mean from placement to placement, if nothing else is known (docs/gap.md).
+// Standard deviation of a mean from placement to placement, across a force of 1 g, if nothing else is
+// known (docs/gap.md).
 inline constexpr double kSeating_mg = 0.17;
 
 struct Shown {

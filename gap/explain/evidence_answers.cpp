@@ -196,7 +196,7 @@ std::optional<double> Explanation::bound(const std::string& effect) const {
 }
 
 std::optional<double> Explanation::bound(
-    Scatter kind, const std::function<double(double is_mg, double tried_mg)>& record_nats) const {
+    Scatter kind, const std::function<double(double size, double tried)>& record_nats) const {
   constexpr double kRange = 100;  // beyond the sizes that are tried
   const std::vector<double> sizes = sizes_of(kind);
   const std::vector<Block>& blocks = model_.blocks();

@@ -78,7 +78,7 @@ class Explanation {
   // what a walk adds is one. `record_nats`: evidence for a size that is tried which the records are
   // expected to have where another size is there.
   std::optional<double> bound(
-      Scatter kind, const std::function<double(double is_mg, double tried_mg)>& record_nats) const;
+      Scatter kind, const std::function<double(double size, double tried)>& record_nats) const;
   // Log evidence that an effect of the best explanation (or "gain") changes in proportion to time,
   // over the best explanation, in which it is constant.
   double changing_nats(const std::string& effect) const;

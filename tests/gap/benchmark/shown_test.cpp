@@ -18,6 +18,7 @@ struct Made {
       segment.name = i < 2 ? "faces" : "reseat";
       segment.first_sample = 1000 * i;
       segment.samples = 1000;
+      segment.host_start_s = 60.0 * static_cast<double>(i);  // taken up in between
       run.segments.push_back(segment);
     }
     without.counts.resize(4000);
@@ -84,6 +85,28 @@ TEST(Shown, OfACubeTheHarmonicIsBeyondTheGain) {
   const double whole = 4000 * std::pow(kCube_counts * kLsb_mg, 2) * 5 / 16 / noise_mg2;
   // About zero the samples do not differ by more than rounding does.
   EXPECT_NEAR(made.shown().samples, whole / 10, 0.07 * whole / 10);
+}
+
+// A seat turns what a shaker moves, as it turns gravity: three counts across 1000 are 3 mg of 1 g, in
+// a seat of 0.17 mg, one number for each placement, and in the noise of its samples. What the counts
+// scatter about their mean is subtracted from the means: (3 LSB)^2 / 16.4816 of each of four.
+TEST(Shown, ASeatIsThePlacementsOwnInSamplesToo) {
+  for (const bool taken_up : {true, false}) {
+    Made made;
+    for (sim::ProtocolSegment& segment : made.run.segments) {
+      segment.host_start_s = static_cast<double>(segment.first_sample) * (taken_up ? 0.06 : 0.01);
+    }
+    for (std::size_t i = 0; i < made.without.counts.size(); ++i) {
+      made.without.counts[i][1] = static_cast<std::int16_t>(i % 2 == 0 ? 1000 : -1000);
+    }
+    made.with = made.without;
+    made.change([](std::size_t i) { return i % 2 == 0 ? 3 : -3; });
+    const double samples = taken_up ? 1000 : 4000;
+    const double noise = 16.4816 / (samples * std::pow(kLsb_mg, 2));
+    const double all = 4000 / samples * 9 / (kSeating_mg * kSeating_mg + noise);
+    const double scatter = 4 * std::pow(3 * kLsb_mg, 2) / 16.4816;
+    EXPECT_NEAR(std::pow(made.shown().index(), 2), all - scatter, 0.5);
+  }
 }
 
 // A line of two counts, up and down: 61.035 / 16.4816 each sample, and no mean.
