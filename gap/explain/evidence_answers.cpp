@@ -40,7 +40,7 @@ Eigen::MatrixXd scatter_columns(const std::vector<Block>& blocks, Scatter kind) 
     Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows, 3 * seats);
     Eigen::Index row = 0;
     for (const Block& block : blocks) {
-      const Eigen::Index seat = 3 * (block.placement - blocks.front().placement);
+      const Eigen::Index seat = Eigen::Index{3} * (block.placement - blocks.front().placement);
       columns.block(row, seat, block.size(), 3) = seating_lever(block);
       row += block.size();
     }
