@@ -10,6 +10,7 @@ namespace {
 
 // Conventions, with their reasons.
 constexpr double kPiece_s = 120;            // temperature moves by 2 C at most meanwhile
+constexpr double kMostPieces = 500;         // longer ones where a recording would have more
 constexpr double kRinging_s = 1;            // left out after a move
 constexpr double kLeastDwell_s = 2;         // of unmasked samples
 constexpr int kFolds = 8;                   // of hold-out
@@ -146,11 +147,16 @@ void add_dwell(Block block, const Bundle& bundle, const CleanSamples& clean,
   blocks.push_back(std::move(block));
 }
 
+double piece_s(const Bundle& bundle) {
+  return std::max(kPiece_s,
+                  static_cast<double>(bundle.samples.size()) / bundle.rate_hz / kMostPieces);
+}
+
 // A long record is cut into pieces; a short rest stays with the last.
 void add_dwells(const Block& block, const Bundle& bundle, const CleanSamples& clean,
                 const NoiseSpectrum& noise, Conditions& conditions, std::vector<Block>& blocks) {
   const Segment& segment = bundle.segments[block.segment];
-  const auto piece = static_cast<std::size_t>(kPiece_s * bundle.rate_hz);
+  const auto piece = static_cast<std::size_t>(piece_s(bundle) * bundle.rate_hz);
   std::size_t first =
       segment.may_ring()
           ? std::min(segment.samples / 4, static_cast<std::size_t>(kRinging_s * bundle.rate_hz))

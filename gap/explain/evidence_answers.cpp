@@ -198,9 +198,11 @@ std::optional<double> Explanation::bound(const std::string& effect) const {
 std::optional<double> Explanation::bound(
     Scatter kind, const std::function<double(double size, double tried)>& record_nats) const {
   constexpr double kRange = 100;  // beyond the sizes that are tried
+  // Three times the engineering protocol's; the work grows with the cube.
+  constexpr std::size_t kMostBlocks = 400;
   const std::vector<double> sizes = sizes_of(kind);
   const std::vector<Block>& blocks = model_.blocks();
-  if (blocks.empty()) {
+  if (blocks.empty() || blocks.size() > kMostBlocks) {
     return std::nullopt;
   }
   Eigen::MatrixXd scatter = scatter_columns(blocks, kind);

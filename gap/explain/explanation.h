@@ -76,7 +76,7 @@ class Explanation {
   std::optional<double> bound(const std::string& effect) const;
   // The same of a scatter of the catalogue, in the unit of sizes_of(), beside a drift, too: most of
   // what a walk adds is one. `record_nats`: evidence for a size that is tried which the records are
-  // expected to have where another size is there.
+  // expected to have where another size is there. None of more than 400 blocks.
   std::optional<double> bound(
       Scatter kind, const std::function<double(double size, double tried)>& record_nats) const;
   // Log evidence that an effect of the best explanation (or "gain") changes in proportion to time,

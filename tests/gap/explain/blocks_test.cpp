@@ -69,5 +69,21 @@ TEST(Blocks, LongRecordsAreCutIntoPiecesOfTwoMinutes) {
   EXPECT_EQ(blocks[18].placement, blocks[17].placement);
 }
 
+// A day at 10 Hz has 500 pieces and no more: the work of an explanation grows with their cube.
+TEST(Blocks, ADayIsCutIntoFiveHundredPieces) {
+  Bundle bundle = tests::made_production({});
+  bundle.rate_hz = 10;
+  const std::size_t more = 864'000 - bundle.samples.size();
+  bundle.segments.back().samples += more;
+  bundle.samples.insert(bundle.samples.end(), more, bundle.samples.back());
+  CleanSamples clean;
+  clean.samples = bundle.samples;
+  clean.flags.assign(bundle.samples.size(), kSampleGood);
+  const std::vector<Block> blocks = blocks_of(bundle, clean);
+  EXPECT_GT(blocks.size(), 500U);
+  EXPECT_LT(blocks.size(), 520U);
+  EXPECT_NEAR(blocks.back().seconds, 172.8, 0.25 * 172.8);
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

@@ -209,6 +209,16 @@ TEST(Protocol, LimitsAreWhereTheyAreSaidToBe) {
   EXPECT_FAILS(with("/segments/1/rotation/0/0", 1.001), ErrorCode::bad_data);
 }
 
+TEST(Protocol, MoreThanAThousandSegmentsAreRefused) {
+  const std::vector<Json> thousand(1'000, segment(0, kUp));
+  EXPECT_OK(read(protocol(thousand)));
+  std::vector<Json> more = thousand;
+  more.push_back(segment(0, kUp));
+  const auto refused = read(protocol(more));
+  EXPECT_FAILS(refused, ErrorCode::bad_data);
+  EXPECT_NE(refused.error().what.find("diagnose parts of it"), std::string::npos);
+}
+
 TEST(Protocol, MirroredPoseIsCalledSo) {
   const auto refused = read(protocol({segment(0, "[[1,0,0],[0,1,0],[0,0,-1]]")}));
   EXPECT_FAILS(refused, ErrorCode::bad_data);
