@@ -73,22 +73,35 @@ Eigen::MatrixXd scatter_columns(const std::vector<Block>& blocks, Scatter kind) 
 
 }  // namespace
 
+bool Explanation::has(const Tried& tried, const std::string& effect) const {
+  return to_string(tried.scatter) == effect || std::ranges::any_of(tried.subset.groups, [&](int g) {
+           return model_.group(g).effect == effect;
+         });
+}
+
 double Explanation::gain_nats(const std::string& effect, bool known_only) const {
-  const std::vector<int> own = model_.groups_of(effect);
   double with = kNoEvidence_nats;
   double without = kNoEvidence_nats;
   for (const Tried& tried : tried_) {
-    if (known_only && !in_catalogue(tried.scatter)) {
-      continue;
+    if (!known_only || in_catalogue(tried.scatter)) {
+      double& best = has(tried, effect) ? with : without;
+      best = std::max(best, tried.subset.nats);
     }
-    const std::vector<int>& groups = tried.subset.groups;
-    const bool has =
-        to_string(tried.scatter) == effect ||
-        std::find_first_of(groups.begin(), groups.end(), own.begin(), own.end()) != groups.end();
-    double& best = has ? with : without;
-    best = std::max(best, tried.subset.nats);
   }
   return with == kNoEvidence_nats || without == kNoEvidence_nats ? 0 : with - without;
+}
+
+double Explanation::stand_in_nats(const std::string& effect, const std::string& other) const {
+  double own = kNoEvidence_nats;
+  double others = kNoEvidence_nats;
+  for (const Tried& tried : tried_) {
+    const bool in = has(tried, effect);
+    if (in != has(tried, other)) {
+      double& best = in ? own : others;
+      best = std::max(best, tried.subset.nats);
+    }
+  }
+  return own == kNoEvidence_nats || others == kNoEvidence_nats ? kExcluded_nats : others - own;
 }
 
 std::optional<Explanation::Estimate> Explanation::estimate(const std::string& effect) const {
@@ -156,8 +169,8 @@ Explanation::Information Explanation::information(int g, std::vector<int> others
   for (Eigen::Index i = 0; i < std::min(3, group.count); ++i) {
     const double prior2 = group.prior_sd * group.prior_sd;
     const double left = std::min(posterior.covariance(at + i, at + i), prior2 * (1 - 1e-9));
-    // Posterior less prior precision.
-    sum.per_size2 += (1 / left - 1 / prior2) * (i == 0 ? 1 : kOthers);
+    // Posterior less prior precision, and what a prior of this width keeps of a size beyond it.
+    sum.per_size2 += (1 / left - 1 / prior2) * (1 - left / prior2) * (i == 0 ? 1 : kOthers);
     sum.occam_nats += 0.5 * std::log(prior2 / left);
   }
   return sum;

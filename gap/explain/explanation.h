@@ -52,6 +52,9 @@ class Explanation {
   // Log evidence of the best explanation with this effect over the best without it; 0 if only one
   // of the two was tried. `known_only`: scatter that the catalogue lacks does not compete.
   double gain_nats(const std::string& effect, bool known_only = false) const;
+  // Log evidence of the best explanation with `other` and without the effect over the best with the
+  // effect and without `other`; kExcluded_nats if only one of the two was tried.
+  double stand_in_nats(const std::string& effect, const std::string& other) const;
   // Log odds of the best explanation with an unknown kind of scatter over the best known one.
   double unknown_nats() const {
     return best_unknown_ ? best_unknown_->nats - best_known_.nats : kExcluded_nats;
@@ -119,6 +122,7 @@ class Explanation {
     Scatter scatter;
     Subset subset;
   };
+  bool has(const Tried& tried, const std::string& effect) const;
   struct Information {
     double per_size2 = 0;   // nats times two, for a size of one
     double occam_nats = 0;  // what the free numbers cost

@@ -82,6 +82,8 @@ double quick_erf(double x) {
 // Size of an effect that a unit has a little of, as a share of the typical (convention: from the
 // datasheet's typical values to what the best units have).
 constexpr double kSmallShare = 0.2;
+// Of one that a long recording just shows: as much below that.
+constexpr double kFaintShare = kSmallShare * kSmallShare;
 // Of one that is far beyond the catalogue's sizes.
 constexpr double kLargeShare = 4;
 
@@ -193,7 +195,7 @@ std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& lear
   // A prior of one width would count a small size as unlikely: 1.6 nats for each number of it. How
   // much an effect bends goes with its size.
   const std::size_t full = groups.size();
-  for (const double share : {kSmallShare, kLargeShare}) {
+  for (const double share : {kSmallShare, kFaintShare, kLargeShare}) {
     for (std::size_t i = 0; i < full; ++i) {
       if (varies_in_size(groups[i]) && (share < 1 || groups[i].curve_sd > 0)) {
         groups.push_back(groups[i]);

@@ -92,8 +92,9 @@ struct ParameterGroup {
 };
 inline constexpr int kForwardParameters = 70;
 // Every group, with each shape of warm_up and hysteresis as a group of its own, and each effect
-// that every unit has a little of twice: at its typical size, and at a fifth of it; those that bend
-// also at four times of it. Behind them each shape of what was learnt, for the effects among them.
+// that every unit has a little of three times: at its typical size, at a fifth of it, and at a
+// fifth of that; those that bend also at four times of it. Behind them each shape of what was
+// learnt, for the effects among them.
 std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& learnt = {});
 inline constexpr double kReference_c = 25;
 // The catalogue's parameter of a unit without the effect, from which the model's numbers count: its

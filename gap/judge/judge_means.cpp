@@ -28,8 +28,8 @@ constexpr double kPaysForChange = 0.1;
 constexpr double kFreeSpectrumCost_nats = 4;
 constexpr double kTauShare = 0.2;           // relative uncertainty of a time constant
 constexpr double kScatterSizeShare = 0.12;  // and of a scatter's size
-// Effects whose evidence is at most so much below zero could stand in for one that has at most so
-// much itself.
+// Effects that are at most so much less likely could stand in for one that has at most so much
+// evidence itself.
 constexpr double kStandIn_nats = -3;
 constexpr double kConfoundable_nats = 12;
 // From this gain on something is there, also where no part of the explanation is accepted.
@@ -160,12 +160,8 @@ std::vector<std::string> confounded(const Request& request, const Explanation& e
   for (const CatalogueEntry& entry : catalogue()) {
     const std::string other(entry.name);
     if (weak && other != name && request.allowed(other) && !found.accepted(other) &&
-        !before.accepted(other)) {
-      // Measured against the best without it, which holds this effect; 0: not tried.
-      const double gain = explanation.gain_nats(other);
-      if (gain > kStandIn_nats && gain != 0) {
-        others.push_back(other);
-      }
+        !before.accepted(other) && explanation.stand_in_nats(name, other) > kStandIn_nats) {
+      others.push_back(other);
     }
   }
   if (name == "local_gravity") {

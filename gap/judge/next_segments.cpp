@@ -16,6 +16,8 @@ constexpr double kLeastNats = 0.01;  // a question of which a segment says less 
 constexpr double kCertain = 0.99;    // a name that is this likely is no question any more
 constexpr double kEvenOdds = 0.5;
 constexpr double kBeyondDoubt_nats = 1e9;
+// Of the typical sizes and a fifth of them, but not of a fifth of that (parameter_groups()).
+constexpr double kSmallestOverPrior = 3;
 
 // `axis` up (or down), turned about the vertical.
 Eigen::Matrix3d planned_face(int axis, double sign, double yaw_rad = 0) {
@@ -179,15 +181,19 @@ class Expectation {
 
   bool in_means(const std::string& effect) const { return !model_.groups_of(effect).empty(); }
 
-  // What is known of the effect beside everything else that was found.
+  // What is known of the effect, of any size and shape, beside everything else that was found.
   double prior(const std::string& effect) const {
     const std::vector<int> own = model_.groups_of(effect);
     const std::vector<int> others = without(own);
-    // Effects that the means do not show count like one that they do.
-    const double nats =
-        own.empty() ? log_prior_of_count(others.size() + 1) - log_prior_of_count(others.size())
-                    : model_.log_prior(with_group(others, own.front())) - model_.log_prior(others);
-    return probability_of(nats);
+    if (own.empty()) {  // the means do not show it: it counts like one that they do
+      return probability_of(log_prior_of_count(others.size() + 1) -
+                            log_prior_of_count(others.size()));
+    }
+    double odds = 0;
+    for (const int g : own) {
+      odds += std::exp(model_.log_prior(with_group(others, g)) - model_.log_prior(others));
+    }
+    return odds / (1 + odds);
   }
 
   // Weight of evidence for the effect that the planned segment adds. `beside`: an effect that
@@ -222,11 +228,15 @@ class Expectation {
     return others;
   }
 
-  // The size and shape of the effect that the recording supports most.
+  // The size and shape of the effect that the recording supports most, but for sizes far below the
+  // smallest realistic one: a recording supports these because it says nothing of them.
   int likeliest(const std::string& effect, const std::vector<int>& others) const {
     int chosen = -1;
     double most = kNoEvidence_nats;
     for (const int g : model_.groups_of(effect)) {
+      if (model_.group(g).smallest > kSmallestOverPrior * model_.group(g).prior_sd) {
+        continue;
+      }
       const double nats = model_.solve(own_, with_group(others, g)).nats;
       if (chosen < 0 || nats > most) {
         most = nats;

@@ -25,8 +25,9 @@ TEST(Catalogue, EffectsOfTheMeansAreInIt) {
   for (const ParameterGroup& group : parameter_groups()) {
     EXPECT_EQ(find_entry(group.effect) == nullptr,
               group.effect == "gain" || group.effect == "offset");
-    // Of each effect there are groups of a fifth of the typical size and of four times of it.
-    EXPECT_LE(group.smallest, 5 * group.prior_sd) << group.effect;
+    // The least group of an effect is of a twenty-fifth of the typical size, the largest of four
+    // times of it.
+    EXPECT_LE(group.smallest, 25 * group.prior_sd) << group.effect;
     EXPECT_LE(group.prior_sd, 4 * group.largest) << group.effect;
     EXPECT_LE(group.first + group.count, kForwardParameters);
   }

@@ -92,6 +92,32 @@ TEST(EvidenceAnswers, GainIsTheEvidenceOverTheBestWithout) {
   EXPECT_GT(explanation.gain_nats("drift"), 10);
   EXPECT_LE(explanation.gain_nats("drift", true), with - model.evidence(data, {}) + 0.5);
   EXPECT_EQ(explanation.gain_nats("clock_error"), 0) << "never tried";
+  EXPECT_EQ(explanation.stand_in_nats("drift", "clock_error"), kExcluded_nats);
+}
+
+// With two effects allowed that are not there together: the evidence of the one over the other, by
+// the covariance of the values, and the same with the other sign from the other's side.
+TEST(EvidenceAnswers, WhatCouldStandInForAnEffectIsJudgedWithoutIt) {
+  const auto blocks = tests::made_dwells(
+      [](const Block& b) -> Eigen::Vector3d {
+        return b.middle_s / 3600 * Eigen::Vector3d(3, -2, 2.5);
+      },
+      5, 20);
+  const Explanation explanation(blocks, only({"drift", "warm_up"}));
+  ASSERT_EQ(explanation.best().scatter, Scatter::nominal);
+  const double warm_up = explanation.stand_in_nats("drift", "warm_up");
+  EXPECT_LT(warm_up, 0);
+  EXPECT_EQ(explanation.stand_in_nats("warm_up", "drift"), -warm_up);
+  const EvidenceModel& model = explanation.model();
+  const Eigen::MatrixXd linear = model.linearise(explanation.best().state);
+  const auto best_of = [&](const std::string& effect) {
+    double best = kNoEvidence_nats;
+    for (const int g : model.groups_of(effect)) {
+      best = std::max(best, tests::marginal(model, linear, {g}).nats() + model.log_prior({g}));
+    }
+    return best;
+  };
+  EXPECT_NEAR(warm_up, best_of("warm_up") - best_of("drift"), 0.1);
 }
 
 // A gain that grows by 0.03 %: the log Bayes factor of three more regressors, each axis' gain times
@@ -147,6 +173,30 @@ TEST(EvidenceAnswers, BoundShowsHalfOfTheTime) {
   EXPECT_LT(shown(*bound), 25);
   EXPECT_GT(shown(2.5 * *bound), 25);
   EXPECT_LT(shown(0.3 * *bound), 4);
+}
+
+// A misalignment of a fortieth of a typical one, three standard deviations in each number: that
+// its size could have been any up to the typical one counts little against it.
+TEST(EvidenceAnswers, ASizeFarBelowTheTypicalIsShown) {
+  const auto still = tests::made_dwells();
+  const EvidenceModel model(still, only({"misalignment"}));
+  Posterior known;
+  model.evidence(model.whiten(model.linearise(model.first_guess()), Scatter::nominal, 0),
+                 {model.groups_of("misalignment").front()}, &known);
+  ForwardState unit;
+  unit.misalignment_deg =
+      3 * known.covariance.diagonal().segment<3>(kNuisanceParameters).cwiseSqrt();
+  int count = 0;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    const auto blocks = tests::made_dwells(
+        [&](const Block& b) -> Eigen::Vector3d {
+          return (predict(unit, b, 1) - predict({}, b, 1)).head<3>();
+        },
+        seed);
+    const Explanation explanation(blocks, only({"misalignment"}));
+    count += explanation.gain_nats("misalignment") > kAccept_nats ? 1 : 0;
+  }
+  EXPECT_GE(count, 15);
 }
 
 // The same of a bad seat, and of 1/f noise that the records do not show.

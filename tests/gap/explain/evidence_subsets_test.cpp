@@ -67,8 +67,8 @@ TEST(EvidenceSubsets, ShapesShareThePriorOfTheirEffect) {
   const auto blocks = tests::made_dwells();
   const EvidenceModel model(blocks, {});
   const std::vector<int> warm_up = model.groups_of("warm_up");
-  ASSERT_EQ(warm_up.size(), 18U) << "six time constants, three sizes";
-  EXPECT_NEAR(model.log_prior({warm_up[2]}), log_prior_of_count(1) - std::log(18), 1e-12);
+  ASSERT_EQ(warm_up.size(), 24U) << "six time constants, four sizes";
+  EXPECT_NEAR(model.log_prior({warm_up[2]}), log_prior_of_count(1) - std::log(24), 1e-12);
   const std::vector<int> gravity = model.groups_of("local_gravity");
   EXPECT_NEAR(model.log_prior(gravity), log_prior_of_count(1), 1e-12);
   EXPECT_TRUE(model.groups_of("clock_error").empty()) << "it does not act on the means";

@@ -23,7 +23,7 @@ TEST(EvidenceModel, FirstGuessIsTheLineThroughTheMeans) {
 TEST(EvidenceModel, OnlyAllowedEffectsHaveColumns) {
   const auto blocks = tests::made_dwells();
   const EvidenceModel model(blocks, tests::only({"tilt", "drift"}));
-  ASSERT_EQ(model.group_count(), 7) << "two sizes of each effect, three of one that bends";
+  ASSERT_EQ(model.group_count(), 9) << "three sizes of each effect, four of one that bends";
   EXPECT_EQ(model.group(0).effect, "gain");
   EXPECT_EQ(model.group(1).effect, "offset");
   EXPECT_EQ(model.columns(), 3 + 3 + 2 + 3 + 18);
