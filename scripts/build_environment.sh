@@ -1,7 +1,7 @@
 # Sourced by the scripts that build. ccache finds what another clone of the same commit compiled.
 export CCACHE_BASEDIR="$PWD"
 export CCACHE_NOHASHDIR=1
-# The tests' precompiled header: ccache's manual, "Precompiled headers".
+# Precompiled headers: ccache's manual.
 export CCACHE_SLOPPINESS=pch_defines,time_macros
 
 # configure PRESET [option...]: quiet unless it fails.
