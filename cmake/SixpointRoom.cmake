@@ -17,30 +17,6 @@ if(SIXPOINT_SANITIZE)
     -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(sixpoint_warnings INTERFACE -fsanitize=${sanitizers})
 endif()
-# What ccache needs to keep objects that were compiled with a precompiled header.
-add_library(sixpoint_precompiled_flags INTERFACE)
-target_compile_options(sixpoint_precompiled_flags INTERFACE
-  $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>
-  "SHELL:$<$<CXX_COMPILER_ID:Clang>:-Xclang -fno-pch-timestamp>")
-# For modules of other languages (bindings/) rooms are position independent; calls within a room stay direct all the same.
-add_library(sixpoint_room_flags INTERFACE)
-target_compile_options(sixpoint_room_flags INTERFACE -fno-semantic-interposition)
-# The precompiled header has fmt: its definitions are the same in all that use it.
-target_compile_definitions(sixpoint_room_flags INTERFACE $<TARGET_PROPERTY:fmt::fmt,INTERFACE_COMPILE_DEFINITIONS>)
-target_link_libraries(sixpoint_room_flags INTERFACE sixpoint_warnings sixpoint_precompiled_flags)
-
-# Rooms that wait for people, devices, disks and servers gain nothing by -O3, and take a third less time to compile by -O1;
-# under the sanitizers even that takes three times as long as none.
-set(waiting_rooms "^(cli|db|device|mocks|station)(/|$)")
-set(rooms_that_compute "^station/(records|statistics)$")
-set(waiting_level $<IF:$<BOOL:${SIXPOINT_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
-# What most of their files include (cmake/precompiled.h) is compiled once. clang-tidy works without it, so that a file which
-# does not include what it uses fails there.
-add_library(sixpoint_precompiled OBJECT ${PROJECT_SOURCE_DIR}/cmake/precompiled.cpp)
-target_precompile_headers(sixpoint_precompiled PRIVATE ${PROJECT_SOURCE_DIR}/cmake/precompiled.h)
-set_target_properties(sixpoint_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON)
-target_compile_options(sixpoint_precompiled PRIVATE ${waiting_level})
-target_link_libraries(sixpoint_precompiled PRIVATE fmt::fmt tl::expected sixpoint_room_flags)
 
 function(sixpoint_room FOLDER)
   cmake_parse_arguments(ROOM "" "" "SOURCES;NEIGHBOURS;PRIVATE_NEIGHBOURS" ${ARGN})
@@ -56,7 +32,9 @@ function(sixpoint_room FOLDER)
   endforeach()
   add_library(sixpoint_${name} STATIC ${ROOM_SOURCES})
   add_library(sixpoint::${name} ALIAS sixpoint_${name})
+  # For the modules of other languages (bindings/). Calls within a room stay direct all the same.
   set_target_properties(sixpoint_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(sixpoint_${name} PRIVATE -fno-semantic-interposition)
   # Six tenths of the time of a compilation is reading headers and making code of the same templates: twelve files are
   # compiled as one. So names in the anonymous namespaces of a room's files differ.
   set_target_properties(sixpoint_${name} PROPERTIES
@@ -66,9 +44,10 @@ function(sixpoint_room FOLDER)
   if(SIXPOINT_FUZZ AND FOLDER MATCHES
      "^(base.*|calib|db|device.*|gap/recording|gap/unguided|gt3x.*|mocks.*|repair/rescale|repair/triage|sim|station/limits)$")
     target_compile_options(sixpoint_${name} PRIVATE -fsanitize=fuzzer-no-link)
-  elseif(FOLDER MATCHES "${waiting_rooms}" AND NOT FOLDER MATCHES "${rooms_that_compute}")
-    target_compile_options(sixpoint_${name} PRIVATE ${waiting_level})
-    target_precompile_headers(sixpoint_${name} REUSE_FROM sixpoint_precompiled)
+  elseif(FOLDER MATCHES "^(cli|db|device|mocks|station)(/|$)" AND NOT FOLDER MATCHES "^station/(records|statistics)$")
+    # Rooms that wait for people, devices, disks and servers gain nothing by -O3, and take a third less time to compile by
+    # -O1; under the sanitizers even that takes three times as long as none.
+    target_compile_options(sixpoint_${name} PRIVATE $<IF:$<BOOL:${SIXPOINT_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
   elseif(FOLDER MATCHES "^(repair/(archive|batch|report|units)|gap/(adopt|benchmark|challenge|drawing|report))$")
     # Rooms that work once for a file gain nothing by -O3 either.
     target_compile_options(sixpoint_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
@@ -76,7 +55,7 @@ function(sixpoint_room FOLDER)
   target_include_directories(sixpoint_${name} PUBLIC $<BUILD_INTERFACE:${view}>)
   target_link_libraries(sixpoint_${name}
     PUBLIC ${ROOM_NEIGHBOURS}
-    PRIVATE ${ROOM_PRIVATE_NEIGHBOURS} $<BUILD_INTERFACE:sixpoint_room_flags>)
+    PRIVATE ${ROOM_PRIVATE_NEIGHBOURS} $<BUILD_INTERFACE:sixpoint_warnings>)
 endfunction()
 
 # sixpoint_part(FOLDER NAME): the room as a library that the program loads when it first needs it

@@ -1,7 +1,7 @@
 # Sourced by the scripts that build. ccache finds what another clone of the same commit compiled.
 export CCACHE_BASEDIR="$PWD"
 export CCACHE_NOHASHDIR=1
-# Precompiled headers: ccache's manual.
+# The tests' precompiled header: ccache's manual, "Precompiled headers".
 export CCACHE_SLOPPINESS=pch_defines,time_macros
 
 # configure PRESET [option...]: quiet unless it fails.

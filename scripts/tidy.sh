@@ -30,7 +30,7 @@ status=0
 if [ -s "$work/asked" ]; then
   # Every file by itself.
   source scripts/build_environment.sh
-  configure release -B build/tidy -DSIXPOINT_UNITY=OFF -DSIXPOINT_TESTS=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON
+  configure release -B build/tidy -DSIXPOINT_UNITY=OFF -DSIXPOINT_TESTS=OFF
   cp -r build/generated build/tidy/
   end=$((within > 0 ? $(date +%s) + within : 0))
   check_one() {
