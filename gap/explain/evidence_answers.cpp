@@ -95,10 +95,10 @@ double Explanation::stand_in_nats(const std::string& effect, const std::string& 
   double own = kNoEvidence_nats;
   double others = kNoEvidence_nats;
   for (const Tried& tried : tried_) {
-    const bool in = has(tried, effect);
-    if (in != has(tried, other)) {
-      double& best = in ? own : others;
-      best = std::max(best, tried.subset.nats);
+    if (has(tried, effect)) {
+      own = std::max(own, tried.subset.nats);
+    } else if (has(tried, other)) {
+      others = std::max(others, tried.subset.nats);
     }
   }
   return own == kNoEvidence_nats || others == kNoEvidence_nats ? kExcluded_nats : others - own;

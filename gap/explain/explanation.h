@@ -53,7 +53,7 @@ class Explanation {
   // of the two was tried. `known_only`: scatter that the catalogue lacks does not compete.
   double gain_nats(const std::string& effect, bool known_only = false) const;
   // Log evidence of the best explanation with `other` and without the effect over the best with the
-  // effect and without `other`; kExcluded_nats if only one of the two was tried.
+  // effect; kExcluded_nats if only one of the two was tried.
   double stand_in_nats(const std::string& effect, const std::string& other) const;
   // Log odds of the best explanation with an unknown kind of scatter over the best known one.
   double unknown_nats() const {
