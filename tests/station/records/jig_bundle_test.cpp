@@ -67,36 +67,26 @@ nlohmann::json diagnosed(const std::string& device, const std::string& protocol)
   return nlohmann::json::parse(answer.out, nullptr, false);
 }
 
-// Oracle: the tilt and the misalignment of the virtual unit. They are small, and so is the time of
-// a production run: it hardly tells the one from the other. production+ is sure of both, with both
-// vectors right and known better.
+// Oracle: the tilt and the misalignment of the virtual unit, which are small: production+ is sure of
+// both, with both vectors right. (What production makes of such units: docs/gap.md, "At the jig".)
 TEST(JigBundle, HalfTurnsTellTheJigsTiltFromTheUnits) {
   const std::map<std::string, std::array<double, 3>> truth_deg = {
       {"tilt", {0.0291, -0.0075, 0}}, {"misalignment", {-0.0023, -0.0204, -0.0219}}};
   const auto& tilt = truth_deg.at("tilt");
   const auto& turned = truth_deg.at("misalignment");
-  const std::string device =
+  const nlohmann::json plus = diagnosed(
       fmt::format("virtual:seed=104,jig=auto,jig_tilt_deg={}/{}/0,misalignment_deg={}/{}/{}",
-                  tilt[0], tilt[1], turned[0], turned[1], turned[2]);
-  const auto uncertainty_deg = [](const nlohmann::json& effect, std::size_t axis) {
-    return effect["standard_uncertainty"]["rotation_vector_deg"][axis].get<double>();
-  };
-  const nlohmann::json production = diagnosed(device, "production");
-  ASSERT_FALSE(production["effects"].empty()) << production["brief"];
-  const nlohmann::json plus = diagnosed(device, "production+");
+                  tilt[0], tilt[1], turned[0], turned[1], turned[2]),
+      "production+");
   ASSERT_EQ(plus["effects"].size(), 2U) << plus["brief"];
   for (const nlohmann::json& effect : plus["effects"]) {
     const auto truth = truth_deg.find(effect["name"].get<std::string>());
     ASSERT_NE(truth, truth_deg.end()) << effect["name"];
     EXPECT_GT(effect["probability"].get<double>(), 0.9);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      EXPECT_NEAR(effect["parameters"]["rotation_vector_deg"][axis].get<double>(),
-                  truth->second[axis], 3 * uncertainty_deg(effect, axis) + 1e-9);
-    }
-    for (const nlohmann::json& before : production["effects"]) {
-      if (before["name"] == effect["name"]) {
-        EXPECT_GT(uncertainty_deg(before, 0), uncertainty_deg(effect, 0)) << effect["name"];
-      }
+      EXPECT_NEAR(
+          effect["parameters"]["rotation_vector_deg"][axis].get<double>(), truth->second[axis],
+          3 * effect["standard_uncertainty"]["rotation_vector_deg"][axis].get<double>() + 1e-9);
     }
   }
 }
