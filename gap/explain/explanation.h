@@ -122,6 +122,7 @@ class Explanation {
     Scatter scatter;
     Subset subset;
   };
+  // As a group, or as its scatter.
   bool has(const Tried& tried, const std::string& effect) const;
   struct Information {
     double per_size2 = 0;   // nats times two, for a size of one

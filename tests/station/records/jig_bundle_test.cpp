@@ -1,7 +1,6 @@
 #include "station/records/jig_bundle.h"
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <array>
 #include <map>
 #include <string>
