@@ -184,12 +184,13 @@ Subset EvidenceModel::climb(const Whitened& w, Subset from, bool generous, bool 
 
 Subset EvidenceModel::search(const Whitened& w, std::vector<Subset>& tried, bool swap) const {
   const auto better = [](const Subset& a, const Subset& b) { return a.nats > b.nats; };
-  // All singles and pairs; larger subsets grow from the best few.
+  // All singles and pairs; larger subsets grow from the best few. Faint sizes wait for that: they
+  // would double the pairs, and are seldom what makes a pair likely.
   std::vector<Subset> beam = {attempt(w, {}, tried)};
   for (int g = kNuisances; g < group_count(); ++g) {
     beam.push_back(attempt(w, {g}, tried));
     for (int h = g + 1; h < group_count(); ++h) {
-      if (fits({g}, h)) {
+      if (!group(g).faint && !group(h).faint && fits({g}, h)) {
         beam.push_back(attempt(w, {g, h}, tried));
       }
     }

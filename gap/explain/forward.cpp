@@ -202,6 +202,7 @@ std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& lear
         groups.back().prior_sd *= share;
         groups.back().curve_sd *= share;
         groups.back().cubic_sd *= share;
+        groups.back().faint = share == kFaintShare;
       }
     }
   }

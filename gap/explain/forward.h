@@ -76,6 +76,7 @@ struct ParameterGroup {
   double tau_s = 0;     // shape of warm_up
   int shape = 1;        // shape of hysteresis
   double cubic_sd = 0;  // of the seventh number on
+  bool faint = false;   // far below the typical size: see parameter_groups()
   // In the place of prior_mean and prior_sd where it is there: what earlier units had.
   std::optional<LearntSize> learnt = {};
 
@@ -93,7 +94,7 @@ struct ParameterGroup {
 inline constexpr int kForwardParameters = 70;
 // Every group, with each shape of warm_up and hysteresis as a group of its own, and each effect
 // that every unit has a little of three times: at its typical size, at a fifth of it, and at a
-// fifth of that; those that bend also at four times of it. Behind them each shape of what was
+// fifth of that (`faint`); those that bend also at four times of it. Behind them each shape of what was
 // learnt, for the effects among them.
 std::vector<ParameterGroup> parameter_groups(const std::vector<LearntSize>& learnt = {});
 inline constexpr double kReference_c = 25;
