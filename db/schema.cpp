@@ -255,7 +255,8 @@ Status migrate(Database& database) {
   SIXPOINT_ASSIGN(const auto version, database.schema_version());
   for (std::int64_t next = version + 1; next <= kSchemaVersion; ++next) {
     if (auto status = bring_to(next, database); !status) {
-      if (status.error().code != ErrorCode::internal) {
+      if (status.error().code != ErrorCode::internal &&
+          status.error().code != ErrorCode::bad_data) {
         return status;
       }
       return fail(

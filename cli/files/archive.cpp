@@ -445,9 +445,11 @@ void add_archive(CLI::App& app, Context& context) {
   plan.add_option("--shard-bytes", options.draft.shard_bytes,
                   "what a shard holds at most, such as 500MB (default: 4GB, 1000 shards at most)")
       ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::PositiveNumber)
       ->excludes(shards);
   plan.add_option("--at-once", options.draft.at_once,
-                  "tasks of the Slurm array at a time (default: 64; 0: no limit)");
+                  "tasks of the Slurm array at a time (default: 64; 0: no limit)")
+      ->check(CLI::Range(std::size_t{0}, repair::kMostShards));
   plan.add_flag("--hash", options.draft.hash,
                 "know files by SHA-256, not by size and time of change: reads all of them");
   add_source_options(plan, options.sources);

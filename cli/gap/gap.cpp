@@ -86,6 +86,10 @@ Result<Judged> diagnose_input(const GapCommandOptions& options, gap::DiagnoseOpt
     SIXPOINT_ASSIGN(const gap::Bundle bundle, gap::read_bundle(files, options.bundle));
     return judged(bundle, how);
   }
+  if (!options.scenario_out.empty()) {
+    return fail(ErrorCode::usage, "a recording without a protocol can't be simulated again",
+                options.bundle, "leave --scenario-out out, or record a bundle (docs/gap.md)");
+  }
   if (gap::is_readings_table(options.bundle)) {
     gap::ReadingsTableOptions table;
     table.rate_hz = options.rate_hz;

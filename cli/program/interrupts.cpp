@@ -19,10 +19,12 @@ std::string& stopped_text() {
   return text;
 }
 
-extern "C" void end_as_stopped(int /*signal*/) {
+extern "C" void end_as_stopped(int signal) {
   const std::string& text = stopped_text();
   remove_noted_temporaries();
-  static_cast<void>(!::write(STDERR_FILENO, text.data(), text.size()));
+  if (signal != SIGPIPE) {  // there the reader has gone, as `head` does when it has enough
+    static_cast<void>(!::write(STDERR_FILENO, text.data(), text.size()));
+  }
   ::_exit(kExitStopped);
 }
 
@@ -73,7 +75,7 @@ std::string text_when_stopped(const std::vector<std::string>& arguments) {
 
 void take_interrupts(const std::vector<std::string>& arguments) {
   stopped_text() = text_when_stopped(arguments);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) {
     struct sigaction before {};
     if (::sigaction(signal, nullptr, &before) == 0 && before.sa_handler == SIG_DFL) {
       struct sigaction action {};

@@ -1,5 +1,6 @@
-// Ctrl-C, SIGTERM and SIGHUP in a command that does not take them itself (cli/stop_request.h):
-// exit 3.
+// Ctrl-C, SIGTERM, SIGHUP and SIGPIPE in a command that does not take them itself
+// (cli/stop_request.h): exit 3. Of SIGPIPE nothing is said, since the reader has gone, as `head`
+// does.
 //
 //   take_interrupts({"export", "archive"});  // prints "sixpoint export archive" when it comes
 //

@@ -343,6 +343,7 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
                         device::SessionRecorder& recorder) {
   SIXPOINT_CHECK(check_name_option("--station", options.station));
   SIXPOINT_CHECK(check_name_option("--jig-id", options.jig_id));
+  SIXPOINT_CHECK(check_name_option("--operator", options.operator_name));
   SIXPOINT_CHECK(check_outputs(options, outputs));
   SIXPOINT_ASSIGN(auto session, session_options(context, options));
   SIXPOINT_ASSIGN(const station::SignedName who,

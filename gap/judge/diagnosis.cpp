@@ -145,6 +145,9 @@ std::string Diagnosis::brief() const {
 }
 
 Json augmented_scenario(const Diagnosis& diagnosis) {
+  if (diagnosis.protocol == kNoProtocol) {
+    return nullptr;
+  }
   Json json = {{"schema", "sixpoint/scenario/1"},
                {"seed", diagnosis.seed},
                {"protocol", diagnosis.protocol == "production" ? "production" : "engineering"},

@@ -92,6 +92,9 @@ struct NextSegment {
   std::vector<std::string> separates;
 };
 
+// Diagnosis::protocol of a plain recording or a table.
+inline constexpr const char* kNoProtocol = "none";
+
 enum class Verdict { no_gap, explained, partly_explained, unexplained };
 std::string_view to_string(Verdict verdict);
 
@@ -157,7 +160,8 @@ struct Diagnosis {
   nlohmann::ordered_json to_json() const;
 };
 
-// Settings with which `sixpoint simulate` reproduces the recording, gaps and all.
+// Settings with which `sixpoint simulate` reproduces the recording, gaps and all; null where no
+// protocol says what was done to the unit.
 nlohmann::ordered_json augmented_scenario(const Diagnosis& diagnosis);
 
 }  // namespace sixpoint::gap

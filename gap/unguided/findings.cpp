@@ -35,6 +35,8 @@ void finish(Diagnosis& diagnosis, const DiagnoseOptions& options) {
           name, entry.segment.empty() ? "none" : std::string(entry.segment));
     }
   }
+  set_shares(diagnosis.gap, true, options.matters_mg, diagnosis.effects);
+  set_shares(diagnosis.gap, false, options.matters_mg, diagnosis.candidates);
   // Six faces and back: 1.7 minutes, 12 placements of 0.135 nats each.
   diagnosis.next_segments.push_back(
       {"faces", 1.7, 0.135 * 12, {"misalignment", "second_order", "settling"}});

@@ -22,8 +22,8 @@ void set_sigmas(GapSize& gap);
 // The share of the square of the gap that is explained.
 double closed_fraction(const GapSize& gap);
 
-// Lists the effects that were not judged as not observable, suggests the next segment, and sets the
-// verdict:
+// Lists the effects that were not judged as not observable, sets the shares of the gap of those that
+// were, suggests the next segment, and sets the verdict:
 //
 //   something unknown | effects found | verdict
 //   yes               | none          | unexplained

@@ -139,12 +139,13 @@ double header_nats(const RecordingRests& recording) {
   return fits ? kHeaderFits_nats : kHeaderContradicts_nats;
 }
 
-double rms_mg(const Means& means, const LengthModel& model) {
-  double square = 0;
+// Of lengths at rest, about 1 g.
+double square_mg2(const Means& means, const LengthModel& model) {
+  double square_g2 = 0;
   for (const Eigen::Vector3d& m : means) {
-    square += std::pow(model.residual_g(m), 2);
+    square_g2 += std::pow(model.residual_g(m), 2);
   }
-  return 1000 * std::sqrt(square / static_cast<double>(means.size()));
+  return 1e6 * square_g2 / static_cast<double>(means.size());
 }
 
 void add(Diagnosis& out, EffectFinding finding) {
@@ -180,10 +181,11 @@ void find_far_length(const Means& means, Diagnosis& out) {
 
 // The gap before and after; gain and offset within their priors are the unit's own, no gap.
 void set_gap(const Means& means, const LengthModel& model, bool mismatch, GapSize& gap) {
-  gap.after_mg = rms_mg(means, model);
-  gap.before_mg = mismatch ? rms_mg(means, LengthModel()) : gap.after_mg;
+  gap.after_mg = std::sqrt(square_mg2(means, model));
+  gap.before_mg = mismatch ? std::sqrt(square_mg2(means, LengthModel())) : gap.after_mg;
   gap.floor_mg = kFloor_mg;
   set_sigmas(gap);
+  gap.by_feature[0] = {gap.before_sigma, gap.after_sigma};
   gap.after_interval_mg = {0.7 * gap.after_mg, 1.5 * gap.after_mg};
   gap.closed_fraction = mismatch && gap.before_mg > kFloor_mg ? closed_fraction(gap) : 0;
 }
@@ -205,6 +207,7 @@ void judge_lengths(const Means& means, const RecordingRests& recording,
   if (allowed) {
     EffectFinding finding{"filter_mismatch", 0, nats, {}, gain_nats - kNotHeldOut_nats, false, {}};
     const Vector6& e = other.estimate;
+    finding.gap_mg2 = std::max(0.0, square_mg2(means, LengthModel()) - square_mg2(means, other));
     finding.parameters.push_back({"gain", {other.common}, {kGainStated_sd}});
     finding.parameters.push_back(
         {"offset_g", {e[3], e[4], e[5]}, {kGainStated_sd, kGainStated_sd, kGainStated_sd}});
@@ -314,6 +317,7 @@ double temperature_range_c(const std::vector<Rest>& rests) {
 struct ZeroTempco {
   Eigen::Vector3d mg_per_c;
   Eigen::Vector3d sd_mg_per_c;
+  double gap_mg2 = 0;  // that it adds to the periods of a pose, per axis
 };
 
 // Nothing where the temperature changed by 5 C or less, or too few periods have one.
@@ -326,9 +330,11 @@ std::optional<ZeroTempco> zero_tempco(const std::vector<Rest>& rests) {
     return std::nullopt;
   }
   const Eigen::Vector3d slope = total.xy / total.xx;
-  return ZeroTempco{slope, ((total.yy - total.xx * slope.cwiseAbs2()).cwiseMax(0) /
-                            (kIndependentShare * total.n * total.xx))
-                               .cwiseSqrt()};
+  return ZeroTempco{slope,
+                    ((total.yy - total.xx * slope.cwiseAbs2()).cwiseMax(0) /
+                     (kIndependentShare * total.n * total.xx))
+                        .cwiseSqrt(),
+                    total.xx * slope.squaredNorm() / (3 * total.n)};
 }
 
 // How far the means of a pose move with temperature, and how far after the slopes of the other
@@ -382,6 +388,7 @@ void judge_tempco(const std::vector<Rest>& rests, Diagnosis& out) {
                         nats - kLogPriorEffect - kNotHeldOut_nats,
                         slope.cwiseAbs().maxCoeff() > kDatasheet_mg_per_c,
                         {"sensitivity_tempco"}};
+  finding.gap_mg2 = tempco->gap_mg2;
   finding.parameters.push_back({"mg_per_c", {slope[0], slope[1], slope[2]}, {sd[0], sd[1], sd[2]}});
   add(out, std::move(finding));
   if (nats > kAccept_nats && out.effects.size() == 1) {
@@ -396,7 +403,7 @@ Result<Diagnosis> diagnose_plain(FileSystem& files, const std::string& path,
   SIXPOINT_ASSIGN(const RecordingRests recording, read_rests(files, path));
   Diagnosis out;
   out.bundle = path;
-  out.protocol = "none";
+  out.protocol = kNoProtocol;
   out.serial = recording.serial;
   out.firmware = recording.firmware;
   out.seed = options.seed;

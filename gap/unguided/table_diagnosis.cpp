@@ -242,6 +242,9 @@ void judge(const Fits& fits, const std::vector<RestingReading>& rests,
   const bool explained = allowed && fits.accepted();
   if (allowed) {
     out.candidates.push_back(finding_of(fits));
+    out.candidates.back().gap_mg2 =
+        std::max(0.0, std::pow(root_mean_square_mg(fits.held_out.square), 2) -
+                          std::pow(root_mean_square_mg(fits.held_out.cross), 2));
   }
   if (explained) {
     out.effects = out.candidates;
@@ -265,7 +268,7 @@ Result<Diagnosis> diagnose_table(FileSystem& files, const std::string& path,
   SIXPOINT_ASSIGN(const ReadingsTable table, read_readings_table(files, path, table_options));
   Diagnosis out;
   out.bundle = path;
-  out.protocol = "none";
+  out.protocol = kNoProtocol;
   out.seed = options.seed;
   out.losses.emplace_back(
       "a table of readings: gain and zero are the sensor's own, only lengths at rest are judged");

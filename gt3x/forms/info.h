@@ -27,7 +27,9 @@ class Info {
   // An empty one, for recordings that are made here; lines end in CR LF, as the vendor's do.
   Info() = default;
 
-  // bad_data for text that holds no "Key: value" line at all, for UTF-16, and above 1 MiB.
+  // bad_data for text that holds no "Key: value" line at all, for UTF-16, above 1 MiB, and where
+  // two lines give different values for what decides how a recording is read: `Serial Number`,
+  // `Firmware`, `Sample Rate`, `Acceleration Scale`.
   static Result<Info> parse(std::string_view text);
   std::string serialise() const;
 

@@ -1,5 +1,7 @@
 #include "db/audit.h"
 
+#include <fmt/format.h>
+
 #include "store_fixture.h"
 
 namespace sixpoint::db {
@@ -62,6 +64,18 @@ TEST_F(StoreTest, AuditFindsWhatWasTouched) {
     ASSERT_OK(audit);
     EXPECT_FALSE(audit->ok) << change;
     EXPECT_FALSE(audit->findings.empty());
+  }
+}
+
+TEST_F(StoreTest, AuditFindsATableThatWasRemoved) {
+  for (const char* table : {"repairs", "constants", "head"}) {
+    place_->erase("main");
+    ASSERT_OK(open().add_constants(constants("MOS2A1", "current", 1), "w"));
+    place_->tamper("main", fmt::format("ALTER TABLE {} RENAME TO aside", table));
+    const auto audit = open().audit();
+    ASSERT_OK(audit);
+    EXPECT_FALSE(audit->ok) << table;
+    EXPECT_NE(audit->brief().find(table), std::string::npos) << audit->brief();
   }
 }
 

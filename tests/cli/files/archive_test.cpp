@@ -304,6 +304,8 @@ TEST_F(ArchiveCommand, WrongCommandsHaveTheirExitCodes) {
   EXPECT_EQ(run({"archive", "plan", folder_ / "empty", "-o", plan_}).exit_code, 66);
   EXPECT_EQ(plan({"--shards", "0"}).exit_code, 64);
   EXPECT_EQ(plan({"--shards", "2", "--shard-bytes", "1MB"}).exit_code, 64);
+  EXPECT_EQ(plan({"--shard-bytes", "0"}).exit_code, 64);
+  EXPECT_EQ(plan({"--at-once", "4294967297"}).exit_code, 64);
   EXPECT_EQ(plan({"--dry-run"}).exit_code, 0);
   EXPECT_FALSE(std::filesystem::exists(plan_));
   EXPECT_EQ(plan({"--shard-bytes", "100kB"}).exit_code, 0);

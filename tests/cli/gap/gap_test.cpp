@@ -101,8 +101,17 @@ TEST(GapCommand, TakesATableOfReadings) {
   const std::string table = folder / "t.csv";
   ASSERT_OK(write_file(posix_env().files, table, "x,y,z\n1,2,3\n"));
   EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table}).exit_code, 64);
-  EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table, "--rate", "30"}).exit_code,
-            2);
+  const auto found =
+      tests::run_command(posix_env(), {"gap", "diagnose", table, "--rate", "30", "--json"});
+  EXPECT_EQ(found.exit_code, 2);
+  EXPECT_TRUE(found.json()["augmented_scenario"].is_null());
+  const std::string scenario = folder / "s.json";
+  EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table, "--rate", "30",
+                                             "--scenario-out", scenario})
+                .exit_code,
+            64)
+      << "no protocol says what to simulate";
+  EXPECT_FALSE(std::filesystem::exists(scenario));
 }
 
 }  // namespace

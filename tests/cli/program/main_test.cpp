@@ -93,7 +93,7 @@ void Main::expect_ended_by(int signal) {
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 3) << text("e");
-  EXPECT_EQ(text("e"), "\nsixpoint: stopped; nothing was written\n");
+  EXPECT_EQ(text("e"), signal == SIGPIPE ? "" : "\nsixpoint: stopped; nothing was written\n");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out.gt3x"));
   EXPECT_FALSE(begun()) << "a temporary file stays";
 }
@@ -123,6 +123,9 @@ TEST_F(Main, SigtermDoesTheSame) { expect_ended_by(SIGTERM); }
 
 // As a terminal sends it that is closed.
 TEST_F(Main, SighupDoesTheSame) { expect_ended_by(SIGHUP); }
+
+// As a pipe sends it whose reader has gone, such as `head`.
+TEST_F(Main, SigpipeDoesTheSameAndIsSilent) { expect_ended_by(SIGPIPE); }
 
 // A bar is for a terminal, and a file is none.
 TEST_F(Main, NoProgressIsDrawnIntoAFile) {

@@ -70,7 +70,7 @@ TEST_F(CommandTest, JigRefusesByTheContractsCodes) {
   EXPECT_EQ(code_of({"--device", kDevice, "--jig", "manual"}), 2)
       << "the unit is never turned: inconclusive";
   EXPECT_EQ(code_of({}), 64);
-  for (const char* option : {"--station", "--jig-id"}) {
+  for (const char* option : {"--station", "--jig-id", "--operator"}) {
     for (const std::string& name : {std::string("bench \xff"), std::string(201, 'x')}) {
       EXPECT_EQ(code_of({"--device", kDevice, "--jig", "virtual", option, name}), 64) << option;
     }

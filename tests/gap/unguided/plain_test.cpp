@@ -31,7 +31,13 @@ TEST(Plain, AffectedUnitsHaveTheWrongFilter) {
     const auto d = diagnose_plain(posix_env().files, tests::shared_file(name));
     ASSERT_OK(d);
     ASSERT_FALSE(d->effects.empty()) << name;
-    EXPECT_EQ(d->effects.front().name, "filter_mismatch");
+    const EffectFinding& mismatch = d->effects.front();
+    EXPECT_EQ(mismatch.name, "filter_mismatch");
+    // It alone closes the gap of 100 mg and more (16CPAN03).
+    EXPECT_GT(mismatch.share_of_gap, 0.99) << name;
+    EXPECT_GT(mismatch.probability_it_matters, 0.9) << name;
+    EXPECT_EQ(d->gap.by_feature[0][0], d->gap.before_sigma);
+    EXPECT_EQ(augmented_scenario(*d), nullptr) << "nothing says what was done to the unit";
     EXPECT_GT(d->not_observable.size(), 20U);
   }
 }
@@ -57,6 +63,8 @@ TEST(Plain, ChamberRunHasTheVendorsDrift) {
   EXPECT_NEAR(k[0], -0.16, 0.06);
   EXPECT_NEAR(k[1], -0.40, 0.06);
   EXPECT_NEAR(k[2], -0.43, 0.06);
+  EXPECT_GT(tempco->share_of_gap, 0.3);
+  EXPECT_GT(tempco->probability_it_matters, 0.9);
   // 0 to 30 C at 0.4 mg/C are some 4 mg of rms. What the other poses' slopes foretell of a pose is
   // not all of it: the sensitivity moves with temperature too, by the direction.
   EXPECT_GT(d->gap.before_mg, 2);

@@ -67,6 +67,16 @@ TEST(Info, Refuses) {
   EXPECT_EQ(Info::parse("Sample Rate: 0")->sample_rate_hz(), 0.0);
 }
 
+TEST(Info, TwoValuesOfWhatDecidesAreRefused) {
+  for (const std::string key : {"Serial Number", "Firmware", "Sample Rate", "Acceleration Scale"}) {
+    const auto two = Info::parse(key + ": 1\r\nSubject Name: a\r\n" + key + ": 2\r\n");
+    EXPECT_FAILS(two, ErrorCode::bad_data);
+    EXPECT_NE(two.error().what.find(key), std::string::npos) << two.error().what;
+    EXPECT_OK(Info::parse(key + ": 1\r\n" + key + ": 1 \r\n"));
+  }
+  EXPECT_OK(Info::parse("Firmware: 1\nSubject Name: a\nSubject Name: b\n"));
+}
+
 TEST(Info, TicksBothWays) {
   const auto time = from_ticks(635'641'850'400'000'000);
   ASSERT_TRUE(time);
