@@ -43,7 +43,7 @@ gap::Answer closed_world(const gap::Diagnosis& diagnosis, const std::string& nam
     }
   }
   std::ranges::stable_sort(accepted, [](const auto* a, const auto* b) {
-    return std::pair(a->share_of_gap, a->nats) > std::pair(b->share_of_gap, b->nats);
+    return std::pair(a->gap_mg2, a->nats) > std::pair(b->gap_mg2, b->nats);
   });
   for (const gap::EffectFinding* finding : accepted) {
     answer.effects.emplace_back(finding->name, 1 / (1 + std::exp(-finding->nats)));

@@ -50,9 +50,9 @@ std::vector<double> uncertainties_of(Json json) {
   return numbers_of(json);
 }
 
-// What follows from other parameters, and is no setting of the simulator.
-bool derived(std::string_view effect, std::string_view parameter) {
-  return (effect == "tilt" && parameter == "angle_deg") || parameter == "order";
+// What has a mean over units.
+bool is_adopted(std::string_view effect, std::string_view parameter) {
+  return !is_derived(effect, parameter) && parameter != "order";
 }
 
 // `finding`: an entry of effects or candidates.
@@ -69,7 +69,7 @@ EffectEvidence effect_of(const Json& finding) {
   const Json& form = finding.contains("form_uncertainty") ? finding["form_uncertainty"] : none;
   for (const auto& [name, value] : finding.at("parameters").items()) {
     NamedValue parameter{name, numbers_of(value), {}};
-    if (parameter.value.empty() || derived(effect.name, name)) {
+    if (parameter.value.empty() || !is_adopted(effect.name, name)) {
       continue;
     }
     if (sd.contains(name)) {

@@ -566,6 +566,18 @@ class Search {
 
 }  // namespace
 
+double Response::correlated_samples(double rate_hz) const {
+  constexpr int kFrequencies = 128;
+  double square = 0;
+  double fourth = 0;
+  for (int i = 0; i < kFrequencies; ++i) {
+    const double h2 = std::pow(noise_gain(rate_hz / 2 * (i + 0.5) / kFrequencies, rate_hz), 2);
+    square += h2 / kFrequencies;
+    fourth += h2 * h2 / kFrequencies;
+  }
+  return fourth / (square * square);
+}
+
 Response find_response(const Bundle& bundle, const NoiseSpectrum& noise,
                        const std::vector<ToneFit>& tones, const ResponseOptions& options) {
   return Search(bundle, noise, tones, options).run();

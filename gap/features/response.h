@@ -53,6 +53,9 @@ struct Response {
   double noise_gain(double frequency_hz, double rate_hz) const {
     return low_pass_significant ? low_pass.noise_gain(frequency_hz, rate_hz) : 1;
   }
+  // How many samples of the filtered noise count for one in a mean square: the sum of their squared
+  // correlations (Bartlett 1946), by Parseval the mean of |H|^4 over the squared mean of |H|^2.
+  double correlated_samples(double rate_hz) const;
 };
 
 struct ResponseOptions {

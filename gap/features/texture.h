@@ -24,11 +24,12 @@ namespace sixpoint::gap {
 struct Texture {
   // All in standard deviations of a normal variable.
   struct Scale {
-    std::size_t samples = 0;  // of one stretch; 0: 1 to 8 together
-    double tails_sd = 0;      // excess kurtosis, signed
-    double dwells_sd = 0;     // variances from dwell to dwell (pieces of ten seconds)
-    double moments_sd = 0;    // energies of all axes from moment to moment (1.28 s)
-    double loudest_sd = 0;    // the loudest moment, their number allowed for
+    std::size_t samples = 0;   // of one stretch; 0: 1 to 8 together
+    double tails_sd = 0;       // excess kurtosis, signed
+    double sd_per_excess = 0;  // what an excess of one would be
+    double dwells_sd = 0;      // variances from dwell to dwell (pieces of ten seconds)
+    double moments_sd = 0;     // energies of all axes from moment to moment (1.28 s)
+    double loudest_sd = 0;     // the loudest moment, their number allowed for
     std::size_t loudest_segment = 0;
   };
   std::vector<Scale> scales;

@@ -144,6 +144,11 @@ std::string Diagnosis::brief() const {
   return "";
 }
 
+bool is_derived(std::string_view effect, std::string_view parameter) {
+  return (effect == "tilt" && parameter == "angle_deg") ||
+         (effect == "flicker" && parameter == "floor_mg");
+}
+
 Json augmented_scenario(const Diagnosis& diagnosis) {
   if (diagnosis.protocol == kNoProtocol) {
     return nullptr;
@@ -162,8 +167,7 @@ Json augmented_scenario(const Diagnosis& diagnosis) {
     entry["name"] = effect.name;
     entry["parameters"] = Json::object();
     for (const NamedValue& parameter : effect.parameters) {
-      const bool is_derived = effect.name == "tilt" && parameter.name == "angle_deg";
-      if (!is_derived) {
+      if (!is_derived(effect.name, parameter.name)) {
         entry["parameters"][parameter.name] = values(parameter.value);
       }
     }

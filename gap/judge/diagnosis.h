@@ -26,6 +26,10 @@ struct NamedValue {
   std::vector<double> form_sd = {};
 };
 
+// Whether a parameter of this effect follows from its others and is no setting of the simulator:
+// `angle_deg` of a tilt, `floor_mg` of flicker.
+bool is_derived(std::string_view effect, std::string_view parameter);
+
 // Its uncertainties for people: "0.012", and "-" for a number that nothing shows.
 std::vector<std::string> uncertainty_texts(const NamedValue& parameter);
 

@@ -188,19 +188,20 @@ void Findings::accept_likely(std::size_t before, bool unnamed) {
   }
 }
 
-void set_shares(const GapSize& gap, bool named, double matters_mg,
-                std::vector<EffectFinding>& findings) {
-  double sum_mg2 = 0;
-  double largest_mg2 = 0;
-  for (const EffectFinding& f : findings) {
-    sum_mg2 += std::max(0.0, f.gap_mg2);
-    largest_mg2 = std::max(largest_mg2, f.gap_mg2);
+void set_shares(const Diagnosis& out, double matters_mg, std::vector<EffectFinding>& effects,
+                std::vector<EffectFinding>& candidates) {
+  double whole_mg2 = out.unknown.size_mg * out.unknown.size_mg;
+  for (const EffectFinding& f : effects) {
+    whole_mg2 += std::max(0.0, f.gap_mg2);
   }
-  const double above_floor_mg2 = gap.before_mg * gap.before_mg - gap.floor_mg * gap.floor_mg;
-  const double whole_mg2 = std::max(above_floor_mg2, named ? sum_mg2 : largest_mg2);
-  for (EffectFinding& f : findings) {
-    f.share_of_gap = whole_mg2 > 0 ? std::clamp(f.gap_mg2 / whole_mg2, 0.0, 1.0) : 0;
-    f.probability_it_matters = probability_it_matters(f, matters_mg);
+  if (effects.empty()) {
+    whole_mg2 = out.gap.before_mg * out.gap.before_mg - out.gap.floor_mg * out.gap.floor_mg;
+  }
+  for (auto* list : {&effects, &candidates}) {
+    for (EffectFinding& f : *list) {
+      f.share_of_gap = whole_mg2 > 0 ? std::clamp(f.gap_mg2 / whole_mg2, 0.0, 1.0) : 0;
+      f.probability_it_matters = probability_it_matters(f, matters_mg);
+    }
   }
 }
 
@@ -228,9 +229,7 @@ void finish(const Request& request, Findings found, Diagnosis& out) {
   std::stable_sort(
       found.effects.begin(), found.effects.end(),
       [](const EffectFinding& a, const EffectFinding& b) { return a.gap_mg2 > b.gap_mg2; });
-  for (auto* list : {&found.effects, &found.candidates}) {
-    set_shares(out.gap, list == &found.effects, request.options.matters_mg, *list);
-  }
+  set_shares(out, request.options.matters_mg, found.effects, found.candidates);
   out.verdict = out.unknown.present
                     ? (found.effects.empty() ? Verdict::unexplained : Verdict::partly_explained)
                     : (found.effects.empty() ? Verdict::no_gap : Verdict::explained);

@@ -89,11 +89,12 @@ inline double nats_to_sd(double nats) { return std::sqrt(2 * nats); }
 // The contract's name of the parameters that the forward model estimates; empty for other effects.
 std::string parameter_name(const std::string& effect);
 
-// Sets each effect's share of the gap and the probability that it matters from its gap_mg2. What is
-// `named` together is the whole at most, since its sizes are not of the readings that the gap is
-// measured on; candidates exclude each other.
-void set_shares(const GapSize& gap, bool named, double matters_mg,
-                std::vector<EffectFinding>& findings);
+// Sets the share of the gap and the probability that it matters from each gap_mg2. The whole is
+// what is named and what nothing named explains (unknown.size_mg), which is `gap` in other readings:
+// of what is fully explained the shares add up to one. Where nothing is named it is the gap above the
+// floor. A candidate's is what it would have of the same whole.
+void set_shares(const Diagnosis& out, double matters_mg, std::vector<EffectFinding>& effects,
+                std::vector<EffectFinding>& candidates);
 
 // Completes the answer. Candidates for the whole catalogue, strongest evidence first; effects by
 // what they close of the gap, largest first: evidence says only how sure they are. What is named is

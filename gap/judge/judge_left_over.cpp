@@ -137,7 +137,8 @@ void test_tone_residual(const Request& request, const Records& records, const To
   constexpr double kJitterVariance = 0.01, kJitterTests = 4;
   // Slow noise has few degrees of freedom: it varies by about its own size.
   const double z = (tone.residual_mg * tone.residual_mg / total - 1) /
-                   std::sqrt(2 / static_cast<double>(tone.samples) +
+                   std::sqrt(2 * records.response.correlated_samples(request.bundle.rate_hz) /
+                                 static_cast<double>(tone.samples) +
                              (jitter ? kJitterVariance : 0) + std::pow(slow_mg2 / total, 2));
   found.test(
       jitter ? z / kJitterTests : z - kSlowChance_sd,

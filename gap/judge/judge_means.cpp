@@ -107,14 +107,27 @@ struct SizeCurve {
   std::vector<double> sizes;  // ascending
   std::vector<double> nats;
 
+  // By the parabola over the logarithm of the size through the three next sizes: straight lines
+  // between them would have their maximum on a size that was tried, whatever the true one.
   double at(double size) const {
-    for (std::size_t i = 1; i < sizes.size(); ++i) {
-      if (size <= sizes[i]) {
-        const double share = (size - sizes[i - 1]) / (sizes[i] - sizes[i - 1]);
-        return nats[i - 1] * (1 - share) + nats[i] * share;
-      }
+    if (size >= sizes.back()) {
+      return nats.back();
     }
-    return nats.back();
+    if (size <= sizes[1]) {  // the first is 0
+      return nats[0] + size / sizes[1] * (nats[1] - nats[0]);
+    }
+    const auto above = std::ranges::upper_bound(sizes, size) - sizes.begin();
+    const auto middle =
+        static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(above, 2, std::ssize(sizes) - 2));
+    double sum = 0;
+    for (std::size_t i = middle - 1; i <= middle + 1; ++i) {
+      double share = 1;
+      for (std::size_t k = middle - 1; k <= middle + 1; ++k) {
+        share *= k == i ? 1 : std::log(size / sizes[k]) / std::log(sizes[i] / sizes[k]);
+      }
+      sum += share * nats[i];
+    }
+    return sum;
   }
 };
 
@@ -296,6 +309,12 @@ void judge_scatter(const Request& request, const Explanation& explanation, const
                                       : std::min(kAbsent_nats, gain),
                   .parameters = {{parameter_name(name), {size}, {kScatterSizeShare * size}}},
                   .held_out_gain_nats = in ? gain : std::min(0.0, gain)};
+  if (kind == Scatter::flicker) {
+    // The floor of the Allan deviation: its square is 2 ln 2 times the density at 1 Hz (Riley, NIST
+    // Special Publication 1065, 2008).
+    const double floor_mg = std::sqrt(2 * M_LN2) * size;
+    f.parameters.push_back({"floor_mg", {floor_mg}, {kScatterSizeShare * floor_mg}});
+  }
   if (in) {
     const SlowStructure structure = kind == Scatter::seating
                                         ? SlowStructure{}

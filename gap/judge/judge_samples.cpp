@@ -100,12 +100,6 @@ Findings judge_marks(const Request& request, const CleanSamples& clean) {
        static_cast<double>(clean.zeros.samples) / bundle.rate_hz, "zero on all axes");
   hold("idle_sleep", clean.held, "fraction", share_of(clean.held.samples, all),
        "one value repeated for a second and more");
-  // A hold that ends at a segment's end is a short run of its own: one in five holds does.
-  if (clean.stuck.samples > 0 &&
-      (clean.held.runs == 0 || clean.stuck.runs > 1 + clean.held.runs / 5)) {
-    found.alarm(kShortRunsAlarm_sd,
-                fmt::format("codes: {} short runs of one value", clean.stuck.runs));
-  }
   // The shortest hold of each, and a level that is just not reached. Of turned axes and wraps there
   // is no size.
   found.bounds["charging_zeros"] = static_cast<double>(kZeroRun) / bundle.rate_hz;
@@ -125,6 +119,29 @@ Findings judge_marks(const Request& request, const CleanSamples& clean) {
   }
   return found;
 }
+
+namespace {
+
+// Excess kurtosis that repeated samples add at one sample's scale, less at all others: a share of
+// the differences is zero, which alone would add three times the share.
+double excess_of_repeats(const Findings& before) {
+  constexpr double kNone = 0;
+  const auto found = std::ranges::find(before.effects, "duplicated_samples", &EffectFinding::name);
+  return found == before.effects.end() ? kNone : 3 * found->parameters.front().value.front();
+}
+
+// A hold that ends at a segment's end is a short run of its own: one in five holds does. What a
+// filter leaves of the noise stays on one value for long by chance.
+void judge_short_runs(const Records& records, Findings& found) {
+  const CleanSamples& clean = records.clean;
+  if (!records.response.low_pass_significant && clean.stuck.samples > 0 &&
+      (clean.held.runs == 0 || clean.stuck.runs > 1 + clean.held.runs / 5)) {
+    found.alarm(kShortRunsAlarm_sd,
+                fmt::format("codes: {} short runs of one value", clean.stuck.runs));
+  }
+}
+
+}  // namespace
 
 Findings judge_texture(const Request& request, const Records& records, const Findings& before) {
   Findings found;
@@ -150,7 +167,10 @@ Findings judge_texture(const Request& request, const Records& records, const Fin
             ? "the fast noise"
             : fmt::format("the noise within {:.2g} s",
                           2 * static_cast<double>(scale.samples) / request.bundle.rate_hz);
-    found.test(std::abs(scale.tails_sd) + exact, fmt::format("codes: {} is not Gaussian", noise),
+    const double excess_sd =
+        scale.tails_sd -
+        std::clamp(scale.tails_sd, 0.0, excess_of_repeats(before) * scale.sd_per_excess);
+    found.test(std::abs(excess_sd) + exact, fmt::format("codes: {} is not Gaussian", noise),
                everywhere);
     found.test(scale.dwells_sd + exact, fmt::format("codes: {} changes from dwell to dwell", noise),
                everywhere);
@@ -222,6 +242,7 @@ Findings judge_codes(const Request& request, const Records& records, double slow
   // Half the samples of a dwell of seven seconds, as CodeStatistics cuts them.
   constexpr double kHalfDwell_s = 3.5;
   Findings found;
+  judge_short_runs(records, found);
   const CodeStatistics& codes = records.codes;
   if (codes.samples == 0) {
     return found;

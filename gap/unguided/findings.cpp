@@ -35,8 +35,12 @@ void finish(Diagnosis& diagnosis, const DiagnoseOptions& options) {
           name, entry.segment.empty() ? "none" : std::string(entry.segment));
     }
   }
-  set_shares(diagnosis.gap, true, options.matters_mg, diagnosis.effects);
-  set_shares(diagnosis.gap, false, options.matters_mg, diagnosis.candidates);
+  if (diagnosis.unknown.present) {
+    const GapSize& gap = diagnosis.gap;
+    diagnosis.unknown.size_mg =
+        std::sqrt(std::max(0.0, std::pow(gap.after_mg, 2) - std::pow(gap.floor_mg, 2)));
+  }
+  set_shares(diagnosis, options.matters_mg, diagnosis.effects, diagnosis.candidates);
   // Six faces and back: 1.7 minutes, 12 placements of 0.135 nats each.
   diagnosis.next_segments.push_back(
       {"faces", 1.7, 0.135 * 12, {"misalignment", "second_order", "settling"}});

@@ -26,6 +26,18 @@ TEST(Response, ClosedForms) {
               2 / (1 + std::pow(2.5, 4)) + 1 / (1 + std::pow(7.5, 4)), 1e-12);
 }
 
+// Oracle: an ideal low-pass at a quarter of half the rate leaves one free number in four samples
+// (Nyquist); a filter of order 8 is nearly one.
+TEST(Response, FilteredNoiseHasFewerFreeSamples) {
+  Response response;
+  EXPECT_NEAR(response.correlated_samples(100), 1, 1e-12);
+  response.low_pass.corner_hz = 12.5;
+  response.low_pass.order = 8;
+  EXPECT_NEAR(response.correlated_samples(100), 1, 1e-12) << "not significant";
+  response.low_pass_significant = true;
+  EXPECT_NEAR(response.correlated_samples(100), 4, 0.4);
+}
+
 // Tones at 0.9 of their amplitude on a mount of 14 Hz; the gain is of the axis, not of the mount.
 TEST(Response, TonesBehindAResonanceGiveItsFrequencyAndQ) {
   Bundle bundle;

@@ -1,5 +1,8 @@
 #include "gap/features/texture.h"
 
+#include <array>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "gap/made_bundle.h"
@@ -112,6 +115,44 @@ TEST(Texture, WhatIsNoLinearFilterHasTails) {
 // kFreeOfGrid_lsb2: here the grid of counts gives the noise its form.
 TEST(Texture, NoiseBelowTheGridIsNotJudged) {
   EXPECT_EQ(texture_with_play(0.0039, 0.002).scales.front().tails_sd, 0);
+}
+
+// A Butterworth filter of order four at an eighth of the rate (by the bilinear transform) leaves
+// half a count: neighbours are rounded alike, and the form shows that beyond one sample's scale.
+TEST(Texture, WhatIsRoundedAlikeIsNotJudgedByItsForm) {
+  MadeNoise noise(0.0041);
+  const double k = std::tan(M_PI / 8);
+  struct Section {
+    double damping;
+    Eigen::Vector3d x1 = Eigen::Vector3d::Zero(), x2 = x1, y1 = x1, y2 = x1;
+  };
+  std::array<Section, 2> sections = {Section{2 * std::cos(M_PI / 8)}, {2 * std::cos(3 * M_PI / 8)}};
+  const Texture texture = texture_of([&](const Segment& s, double) {
+    Eigen::Vector3d x = noise();
+    for (Section& f : sections) {
+      const double n = 1 / (1 + k * f.damping + k * k);
+      const Eigen::Vector3d y = n * (k * k * (x + 2 * f.x1 + f.x2) - 2 * (k * k - 1) * f.y1 -
+                                     (1 - k * f.damping + k * k) * f.y2);
+      f.x2 = f.x1;
+      f.x1 = x;
+      f.y2 = f.y1;
+      f.y1 = y;
+      x = y;
+    }
+    return Eigen::Vector3d(s.rotation.col(2) + x);
+  });
+  for (const Texture::Scale& scale : texture.scales) {
+    if (scale.samples > 0 && scale.samples <= 4) {
+      EXPECT_EQ(scale.tails_sd, 0) << scale.samples;
+    }
+  }
+  MadeNoise white(0.0041);
+  EXPECT_NE(texture_of([&](const Segment& s, double) {
+              return Eigen::Vector3d(s.rotation.col(2) + white());
+            })
+                .scales[2]
+                .tails_sd,
+            0);
 }
 
 TEST(Texture, KnocksAndSpellsAreFoundWhereTheyAre) {

@@ -1,5 +1,6 @@
 #include "gap/judge/diagnose.h"
 
+#include <cmath>
 #include <set>
 #include <string>
 
@@ -8,6 +9,7 @@
 
 #include "expect_result.h"
 #include "gap/explain/catalogue.h"
+#include "gap/explain/scatter.h"
 #include "gap/made_bundle.h"
 #include "gap/simulated_bundle.h"
 #include "sanitized.h"
@@ -25,6 +27,30 @@ const NamedValue* parameter_of(const Diagnosis& d, const std::string& effect,
     }
   }
   return nullptr;
+}
+
+// Oracle: the Allan deviation of a density h / f is the root of 2 ln 2 h.
+TEST(Diagnose, FlickerHasASizeBetweenThoseThatAreTriedAndItsFloor) {
+  const auto bundle =
+      tests::simulated({{"schema", "sixpoint/scenario/1"},
+                        {"seed", 1},
+                        {"protocol", "production"},
+                        {"effects", {{{"name", "flicker"}, {"parameters", {{"mg", 1.0}}}}}}});
+  ASSERT_OK(bundle);
+  const auto found = diagnose(*bundle, {});
+  ASSERT_OK(found);
+  const NamedValue* size = parameter_of(*found, "flicker", "mg");
+  const NamedValue* floor = parameter_of(*found, "flicker", "floor_mg");
+  ASSERT_NE(size, nullptr);
+  ASSERT_NE(floor, nullptr);
+  EXPECT_NEAR(size->value[0], 1, 2 * size->sd[0]);
+  for (const double tried : sizes_of(Scatter::flicker)) {
+    EXPECT_GT(std::abs(size->value[0] - tried), 0.01);
+  }
+  EXPECT_NEAR(floor->value[0] / size->value[0], 1.17741, 1e-5);
+  const auto scenario = augmented_scenario(*found);
+  EXPECT_TRUE(scenario["effects"][0]["parameters"].contains("mg"));
+  EXPECT_FALSE(scenario["effects"][0]["parameters"].contains("floor_mg"));
 }
 
 TEST(Diagnose, NothingMissingNoAlarm) {

@@ -43,8 +43,8 @@ TEST(Findings, EffectsAreOrderedByTheirShareOfTheGap) {
   finish(asked.request, found, out);
   ASSERT_EQ(out.effects.size(), 2U);
   EXPECT_EQ(out.effects[0].name, "tilt");
-  EXPECT_NEAR(out.effects[0].share_of_gap, 0.9, 1e-12) << "9 of 16 - 6 mg^2";
-  EXPECT_NEAR(out.effects[1].share_of_gap, 0.025, 1e-12);
+  EXPECT_NEAR(out.effects[0].share_of_gap, 9 / 9.25, 1e-12);
+  EXPECT_NEAR(out.effects[1].share_of_gap, 0.25 / 9.25, 1e-12);
   EXPECT_GT(out.effects[0].probability_it_matters, 0.99) << "3 +- 0.3 mg";
   EXPECT_LT(out.effects[1].probability_it_matters, 1e-6) << "0.5 +- 0.05 mg";
   Findings larger;
@@ -52,8 +52,18 @@ TEST(Findings, EffectsAreOrderedByTheirShareOfTheGap) {
   larger.add(asked.request, {.name = "tilt", .nats = 9, .gap_mg2 = 12});
   finish(asked.request, larger, out);
   ASSERT_EQ(out.effects.size(), 2U);
-  EXPECT_NEAR(out.effects[0].share_of_gap, 0.6, 1e-12) << "of 20 mg^2, not of 10";
+  EXPECT_NEAR(out.effects[0].share_of_gap, 0.6, 1e-12) << "of 20 mg^2";
   EXPECT_NEAR(out.effects[1].share_of_gap, 0.4, 1e-12);
+  // Something unknown of sqrt(5) mg beside them.
+  larger.alarm(100, "what");
+  out.gap.after_mg = std::sqrt(11.0);
+  finish(asked.request, larger, out);
+  EXPECT_NEAR(out.effects[0].share_of_gap, 12.0 / 25, 1e-12);
+  for (const EffectFinding& candidate : out.candidates) {
+    if (candidate.name == "tilt") {
+      EXPECT_EQ(candidate.share_of_gap, out.effects[0].share_of_gap);
+    }
+  }
 }
 
 TEST(Findings, NineToOneIsAccepted) {

@@ -91,6 +91,43 @@ TEST(JudgeCodes, RepeatsThatSlowNoiseMakesAreExpected) {
   EXPECT_LT(beside.worst_sd, 2.5);
 }
 
+// What a filter leaves of the noise stays on one value for long by chance.
+TEST(JudgeCodes, ShortRunsAlarmButNotBehindAFilter) {
+  const Made made(tests::made_production({}));
+  Records records;
+  records.clean.stuck = {1, 25, {2}};
+  const Findings plain = judge_codes(made.request, records, 0, {});
+  ASSERT_EQ(plain.alarms.size(), 1U);
+  EXPECT_EQ(plain.alarms[0].where, "codes: 1 short runs of one value");
+  records.response.low_pass_significant = true;
+  EXPECT_TRUE(judge_codes(made.request, records, 0, {}).alarms.empty());
+}
+
+// A share of the samples repeats the one before.
+TEST(JudgeTexture, RepeatedSamplesAreNoOtherNoise) {
+  constexpr double kShare = 0.08;
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> noise_g(0, 0.0039);
+  std::bernoulli_distribution repeats(kShare);
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  tests::MadeUnit unit;
+  unit.noise_g.setConstant(1e-6);
+  const Made made(tests::made_production(unit, [&](const Segment& s, double) {
+    if (!repeats(random)) {
+      last = Eigen::Vector3d(noise_g(random), noise_g(random), noise_g(random));
+    }
+    return Eigen::Vector3d(s.rotation.col(2) + last);
+  }));
+  Records records;
+  records.clean = made.clean;
+  records.noise = made.noise;
+  EXPECT_FALSE(judge_texture(made.request, records, {}).alarms.empty());
+  Findings before;
+  before.add(made.request,
+             {.name = "duplicated_samples", .nats = 9, .parameters = {{"rate", {kShare}, {}}}});
+  EXPECT_TRUE(judge_texture(made.request, records, before).alarms.empty());
+}
+
 // Alarms about noise that is louder by this share in every third dwell, beside a vibration of the
 // floor of this size.
 std::size_t texture_alarms(double louder, double line_mg) {
