@@ -106,8 +106,8 @@ TEST(GapCommand, TakesATableOfReadings) {
   EXPECT_EQ(found.exit_code, 2);
   EXPECT_TRUE(found.json()["augmented_scenario"].is_null());
   const std::string scenario = folder / "s.json";
-  EXPECT_EQ(tests::run_command(posix_env(), {"gap", "diagnose", table, "--rate", "30",
-                                             "--scenario-out", scenario})
+  EXPECT_EQ(tests::run_command(
+                posix_env(), {"gap", "diagnose", table, "--rate", "30", "--scenario-out", scenario})
                 .exit_code,
             64)
       << "no protocol says what to simulate";
