@@ -44,6 +44,7 @@ struct NormalSums {
 struct Whitened {
   Scatter scatter = Scatter::nominal;
   double size = 0;          // deg, mg/sqrt(s) or mg
+  double seats_deg = 0;     // bad seats beside a slow noise; 0: none
   double outside_nats = 0;  // evidence for this size from records (slow noise), and its prior
   Eigen::MatrixXd x;        // a column for each parameter of every group
   Eigen::VectorXd y;
@@ -88,10 +89,15 @@ struct Fit {
   Posterior posterior;                 // nuisances first, then the subset's columns
   Scatter scatter = Scatter::nominal;
   double scatter_size = 0;
+  double seats_deg = 0;  // bad seats beside a slow noise; 0: none
   double nats = 0;
   Eigen::VectorXd residual;  // whitened, per row
 
   bool contains(const std::string& effect) const;
+  // Of one kind of scatter of the catalogue; 0: the fit does not have it.
+  double size_of(Scatter kind) const {
+    return kind == scatter ? scatter_size : kind == Scatter::seating ? seats_deg : 0;
+  }
 };
 
 class EvidenceModel {
@@ -126,8 +132,9 @@ class EvidenceModel {
   // Columns of all parameters, and in the last one the values that they add up to.
   Eigen::MatrixXd linearise(const ForwardState& at) const;
   // Divides rows by the square root of their covariance; half the logarithm of its determinant.
-  double whiten_rows(Scatter scatter, double size, Eigen::MatrixXd& rows) const;
-  Whitened whiten(Eigen::MatrixXd linear, Scatter scatter, double size) const;
+  double whiten_rows(Scatter scatter, double size, Eigen::MatrixXd& rows,
+                     double seats_deg = 0) const;
+  Whitened whiten(Eigen::MatrixXd linear, Scatter scatter, double size, double seats_deg = 0) const;
 
   // evidence_subsets.cpp
   // These groups beside the nuisances, without the covariance's determinant.
@@ -137,7 +144,8 @@ class EvidenceModel {
                   Posterior* posterior = nullptr) const;
   // Of these groups beside this scatter, over none: see log_prior_of_count(), and
   // learnt_log_prior() of what was learnt.
-  double log_prior(const std::vector<int>& groups, Scatter scatter = Scatter::nominal) const;
+  double log_prior(const std::vector<int>& groups, Scatter scatter = Scatter::nominal,
+                   double seats_deg = 0) const;
   // The likeliest subset; every subset that was tried is added to `tried`. `swap`: also tries each
   // other effect in the place of each one found (some hundred subsets more).
   Subset search(const Whitened& w, std::vector<Subset>& tried, bool swap = false) const;
@@ -150,11 +158,11 @@ class EvidenceModel {
   Subset climb(const Whitened& w, Subset from, bool generous, bool swap,
                std::vector<Subset>& tried) const;
   // Of these groups and this scatter, those whose prior is that of their count.
-  std::size_t counted(const std::vector<int>& groups, Scatter scatter) const;
+  std::size_t counted(const std::vector<int>& groups, Scatter scatter, double seats_deg) const;
   Subset attempt(const Whitened& w, std::vector<int> groups, std::vector<Subset>& tried) const;
   bool fits(const std::vector<int>& groups, int g) const;
   Eigen::Index whiten_blocks(std::size_t first, std::size_t last, Scatter scatter, double size,
-                             Eigen::Index first_row, double& half_log_det,
+                             double seats_deg, Eigen::Index first_row, double& half_log_det,
                              Eigen::MatrixXd& rows) const;
   void add_columns(const ForwardState& at, const Block& block, const Eigen::VectorXd& base, int g,
                    Eigen::Index row, Eigen::MatrixXd& x, Eigen::VectorXd& theta) const;

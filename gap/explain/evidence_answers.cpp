@@ -9,19 +9,19 @@ namespace sixpoint::gap {
 namespace {
 
 // Mean square about their mean that scatter adds to the blocks' means.
-double scatter_mg2(const std::vector<Block>& blocks, const Fit& fit) {
+double scatter_mg2(const std::vector<Block>& blocks, Scatter kind, double size) {
   const double n = static_cast<double>(blocks.size());
-  const double size2 = fit.scatter_size * fit.scatter_size;
+  const double size2 = size * size;
   double own = 0, shared = 0;
   for (const Block& a : blocks) {
-    if (fit.scatter == Scatter::seating) {
+    if (kind == Scatter::seating) {
       own += size2 * seating_lever(a).topRows<3>().squaredNorm() / 3;
       continue;
     }
     const double start_s = blocks.front().middle_s - blocks.front().seconds / 2;
-    own += size2 * scatter_kernel(fit.scatter, a, a, start_s);
+    own += size2 * scatter_kernel(kind, a, a, start_s);
     for (const Block& b : blocks) {
-      shared += size2 * scatter_kernel(fit.scatter, a, b, start_s);
+      shared += size2 * scatter_kernel(kind, a, b, start_s);
     }
   }
   return std::max(0.0, own / n - shared / (n * n));
@@ -74,9 +74,10 @@ Eigen::MatrixXd scatter_columns(const std::vector<Block>& blocks, Scatter kind) 
 }  // namespace
 
 bool Explanation::has(const Tried& tried, const std::string& effect) const {
-  return to_string(tried.scatter) == effect || std::ranges::any_of(tried.subset.groups, [&](int g) {
-           return model_.group(g).effect == effect;
-         });
+  return to_string(tried.scatter) == effect ||
+         (tried.bad_seats && effect == to_string(Scatter::seating)) ||
+         std::ranges::any_of(tried.subset.groups,
+                             [&](int g) { return model_.group(g).effect == effect; });
 }
 
 double Explanation::gain_nats(const std::string& effect, bool known_only) const {
@@ -199,8 +200,8 @@ std::optional<double> Explanation::bound(const std::string& effect) const {
       continue;  // the bound is that of an effect about which nothing is known
     }
     const Information known = information(g, others);
-    const double prior = model_.log_prior(with_group(others, g), best().scatter) -
-                         model_.log_prior(others, best().scatter);
+    const double prior = model_.log_prior(with_group(others, g), best().scatter, best().seats_deg) -
+                         model_.log_prior(others, best().scatter, best().seats_deg);
     const double needed = kAccept_nats + known.occam_nats - prior;
     const double size = std::sqrt(2 * std::max(0.0, needed) / std::max(1e-12, known.per_size2));
     least = std::min(least.value_or(size), size);
@@ -307,8 +308,10 @@ std::map<std::string, double> Explanation::gap_mg2() const {
   for (std::size_t i = 0; i < names.size(); ++i) {
     found[names[i]] = adds_mg.col(static_cast<Eigen::Index>(i)).dot(all_mg) / std::max(1.0, n);
   }
-  if (best().scatter != Scatter::nominal && in_catalogue(best().scatter)) {
-    found[std::string(to_string(best().scatter))] = scatter_mg2(model_.blocks(), best());
+  for (const Scatter kind : {Scatter::seating, Scatter::random_walk, Scatter::flicker}) {
+    if (const double size = best().size_of(kind); size > 0) {
+      found[std::string(to_string(kind))] = scatter_mg2(model_.blocks(), kind, size);
+    }
   }
   return found;
 }

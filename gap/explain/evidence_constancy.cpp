@@ -125,7 +125,7 @@ Regressors regressors(const EvidenceModel& model, const Fit& fit, const Eigen::M
       }
     }
   }
-  all.half_log_det = model.whiten_rows(fit.scatter, fit.scatter_size, all.rows);
+  all.half_log_det = model.whiten_rows(fit.scatter, fit.scatter_size, all.rows, fit.seats_deg);
   return all;
 }
 
@@ -156,7 +156,8 @@ Refit refit(const EvidenceModel& model, const Fit& fit, const Regressors& all) {
   Refit again;
   again.left = value - x * estimate;
   again.nats = 0.5 * pull.dot(estimate) - 0.5 * value.squaredNorm() - all.half_log_det -
-               half_log_determinant(normal) + model.log_prior(fit.subset.groups, fit.scatter);
+               half_log_determinant(normal) +
+               model.log_prior(fit.subset.groups, fit.scatter, fit.seats_deg);
   again.taken = x.transpose() * all.rows.rightCols(all.rows.cols() - used - 1);
   normal.matrixL().solveInPlace(again.taken);
   return again;
@@ -248,9 +249,11 @@ std::vector<Inconstancy> Explanation::inconstancies() const {
   if (best_known_.scatter != Scatter::nominal) {
     // Without scatter, but against what is accepted as if it were certain: a probability of e^-x is
     // to be just that.
-    const double certain_nats = best_known_.nats -
-                                model_.log_prior(best_known_.subset.groups, best_known_.scatter) -
-                                scatter_log_prior(best_known_.scatter);
+    const double certain_nats =
+        best_known_.nats -
+        model_.log_prior(best_known_.subset.groups, best_known_.scatter, best_known_.seats_deg) -
+        scatter_log_prior(best_known_.scatter) -
+        (best_known_.seats_deg > 0 ? scatter_log_prior(Scatter::seating) : 0);
     add_changes(model_, best_nominal_, linear_of(best_nominal_), factors, certain_nats, by_factor);
   }
   std::vector<Inconstancy> found;

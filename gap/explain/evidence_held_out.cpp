@@ -101,20 +101,21 @@ std::vector<double> Explanation::left_over_sigma(const std::set<std::string>& na
       left_mg -= linear_.col(fitted.columns[c]) * fitted.mean[static_cast<Eigen::Index>(c)];
     }
   }
+  const auto named_size = [&](Scatter kind) {
+    return named.count(std::string(to_string(kind))) != 0 ? best().size_of(kind) : 0;
+  };
   const Scatter scatter = best().scatter;
-  const double size2 = named.count(std::string(to_string(scatter))) != 0
-                           ? best().scatter_size * best().scatter_size
-                           : 0;
+  const double size2 = scatter == Scatter::seating ? 0 : std::pow(named_size(scatter), 2);
+  const double seats2 = std::pow(named_size(Scatter::seating), 2);
   const std::vector<Block>& blocks = model_.blocks();
   const double start_s = blocks.empty() ? 0 : blocks.front().middle_s - blocks.front().seconds / 2;
   std::vector<double> sigma;
   for (int row = 0; row < model_.rows(); ++row) {
     const Block& block = model_.block_of_row(row);
     const int feature = model_.feature_of_row(row);
-    double variance_mg2 = nominal_variance_mg2(block, feature);
-    if (scatter == Scatter::seating) {
-      variance_mg2 += size2 * seating_lever(block).row(feature).squaredNorm();
-    } else if (feature < kToneAmplitude) {
+    double variance_mg2 = nominal_variance_mg2(block, feature) +
+                          seats2 * seating_lever(block).row(feature).squaredNorm();
+    if (feature < kToneAmplitude) {
       variance_mg2 += size2 * scatter_kernel(scatter, block, block, start_s);
     }
     sigma.push_back(left_mg[row] / std::sqrt(variance_mg2));

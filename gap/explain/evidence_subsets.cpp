@@ -107,17 +107,19 @@ double log_prior_of_count(std::size_t count) {
   return log_sum(kFew + static_cast<double>(count) * kLogPriorEffect, kEven) - log_sum(kFew, kEven);
 }
 
-std::size_t EvidenceModel::counted(const std::vector<int>& groups, Scatter scatter) const {
+std::size_t EvidenceModel::counted(const std::vector<int>& groups, Scatter scatter,
+                                   double seats_deg) const {
   const auto effects =
       std::count_if(groups.begin(), groups.end(), [&](int g) { return !group(g).learnt; });
   const bool also_scatter = scatter != Scatter::nominal && in_catalogue(scatter);
-  return static_cast<std::size_t>(effects) + (also_scatter ? 1 : 0);
+  return static_cast<std::size_t>(effects) + (also_scatter ? 1 : 0) + (seats_deg > 0 ? 1 : 0);
 }
 
-double EvidenceModel::log_prior(const std::vector<int>& groups, Scatter scatter) const {
+double EvidenceModel::log_prior(const std::vector<int>& groups, Scatter scatter,
+                                double seats_deg) const {
   // The scatter's own prior is in Whitened::outside_nats already.
-  const bool counts = scatter != Scatter::nominal && in_catalogue(scatter);
-  double sum = log_prior_of_count(counted(groups, scatter)) - (counts ? kLogPriorEffect : 0);
+  const auto scatters = static_cast<double>(counted({}, scatter, seats_deg));
+  double sum = log_prior_of_count(counted(groups, scatter, seats_deg)) - scatters * kLogPriorEffect;
   for (const int g : groups) {
     const std::vector<int> same = groups_of(group(g).effect);
     // The shapes of an effect share its prior.
@@ -131,7 +133,7 @@ double EvidenceModel::log_prior(const std::vector<int>& groups, Scatter scatter)
 
 Subset EvidenceModel::attempt(const Whitened& w, std::vector<int> groups,
                               std::vector<Subset>& tried) const {
-  const double nats = evidence(w, groups) + log_prior(groups, w.scatter);
+  const double nats = evidence(w, groups) + log_prior(groups, w.scatter, w.seats_deg);
   tried.push_back({std::move(groups), nats});
   return tried.back();
 }
@@ -149,7 +151,7 @@ bool EvidenceModel::fits(const std::vector<int>& groups, int g) const {
 Subset EvidenceModel::climb(const Whitened& w, Subset from, bool generous, bool swap,
                             std::vector<Subset>& tried) const {
   const auto height = [&](const Subset& s) {
-    return s.nats - (generous ? log_prior_of_count(counted(s.groups, w.scatter)) : 0);
+    return s.nats - (generous ? log_prior_of_count(counted(s.groups, w.scatter, w.seats_deg)) : 0);
   };
   for (;;) {
     Subset best = from;
@@ -232,6 +234,7 @@ Fit EvidenceModel::make_fit(const Whitened& w, const Subset& subset, const Forwa
   fit.subset = subset;
   fit.scatter = w.scatter;
   fit.scatter_size = w.size;
+  fit.seats_deg = w.seats_deg;
   fit.nats = subset.nats;
   evidence(w, subset.groups, &fit.posterior);
   fit.state = at;

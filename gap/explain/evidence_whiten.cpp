@@ -21,17 +21,17 @@ bool by_placement_only(Scatter scatter) {
          scatter == Scatter::by_placement;
 }
 
-// Covariance of two blocks for one kind of scatter of the given size; of a block with itself the
-// noise included. `first`: the recording's first block.
+// Covariance of two blocks for one kind of scatter of the given size, and bad seats beside it; of a
+// block with itself the noise included. `first`: the recording's first block.
 Eigen::MatrixXd covariance_of(const Block& a, const Block& b, Scatter scatter, double size,
-                              const Block& first) {
+                              double seats_deg, const Block& first) {
   Eigen::MatrixXd v =
       &a == &b ? a.white_mg2 : Eigen::MatrixXd(Eigen::MatrixXd::Zero(a.size(), b.size()));
   const bool one_placement = a.placement == b.placement;
   const bool one_pose = scatter == Scatter::by_pose && same_pose(a, b);
   if (one_placement || one_pose) {
     const double seat_deg =
-        scatter == Scatter::seating ? std::hypot(kNominalSeating_deg, size) : kNominalSeating_deg;
+        std::hypot(kNominalSeating_deg, scatter == Scatter::seating ? size : seats_deg);
     // Scatter by pose may also be a rotation.
     const double turn_deg = one_pose ? size / kMgPerDegree : 0;
     const double sd_deg = one_placement ? std::hypot(seat_deg, turn_deg) : turn_deg;
@@ -112,8 +112,8 @@ Eigen::MatrixXd EvidenceModel::linearise(const ForwardState& at) const {
 
 // Whitens the rows of blocks first..last, from first_row on; returns how many rows they have.
 Eigen::Index EvidenceModel::whiten_blocks(std::size_t first, std::size_t last, Scatter scatter,
-                                          double size, Eigen::Index first_row, double& half_log_det,
-                                          Eigen::MatrixXd& rows) const {
+                                          double size, double seats_deg, Eigen::Index first_row,
+                                          double& half_log_det, Eigen::MatrixXd& rows) const {
   Eigen::Index count = 0;
   for (std::size_t b = first; b < last; ++b) {
     count += blocks_[b].size();
@@ -125,7 +125,7 @@ Eigen::Index EvidenceModel::whiten_blocks(std::size_t first, std::size_t last, S
     Eigen::Index rj = ri;
     for (std::size_t j = i; j < last; ++j) {
       const Block& bj = blocks_[j];
-      const Eigen::MatrixXd c = covariance_of(bi, bj, scatter, size, blocks_.front());
+      const Eigen::MatrixXd c = covariance_of(bi, bj, scatter, size, seats_deg, blocks_.front());
       v.block(ri, rj, bi.size(), bj.size()) = c;
       if (i != j) {
         v.block(rj, ri, bj.size(), bi.size()) = c.transpose();
@@ -141,7 +141,8 @@ Eigen::Index EvidenceModel::whiten_blocks(std::size_t first, std::size_t last, S
   return count;
 }
 
-double EvidenceModel::whiten_rows(Scatter scatter, double size, Eigen::MatrixXd& rows) const {
+double EvidenceModel::whiten_rows(Scatter scatter, double size, Eigen::MatrixXd& rows,
+                                  double seats_deg) const {
   double half_log_det = 0;
   Eigen::Index first_row = 0;
   for (std::size_t first = 0; first < blocks_.size();) {
@@ -149,17 +150,20 @@ double EvidenceModel::whiten_rows(Scatter scatter, double size, Eigen::MatrixXd&
     while (last < blocks_.size() && blocks_[last].placement == blocks_[first].placement) {
       ++last;
     }
-    first_row += whiten_blocks(first, last, scatter, size, first_row, half_log_det, rows);
+    first_row +=
+        whiten_blocks(first, last, scatter, size, seats_deg, first_row, half_log_det, rows);
     first = last;
   }
   return half_log_det;
 }
 
-Whitened EvidenceModel::whiten(Eigen::MatrixXd linear, Scatter scatter, double size) const {
+Whitened EvidenceModel::whiten(Eigen::MatrixXd linear, Scatter scatter, double size,
+                               double seats_deg) const {
   Whitened w;
   w.scatter = scatter;
   w.size = size;
-  w.half_log_det = whiten_rows(scatter, size, linear);
+  w.seats_deg = seats_deg;
+  w.half_log_det = whiten_rows(scatter, size, linear, seats_deg);
   w.y = linear.col(columns_);
   w.x = linear.leftCols(columns_);
   w.sums = {w.x.transpose() * w.x, w.x.transpose() * w.y, w.y.squaredNorm()};
@@ -168,6 +172,9 @@ Whitened EvidenceModel::whiten(Eigen::MatrixXd linear, Scatter scatter, double s
   }
   if (scatter != Scatter::nominal) {
     w.outside_nats += scatter_log_prior(scatter);
+  }
+  if (seats_deg > 0) {
+    w.outside_nats += scatter_log_prior(Scatter::seating);
   }
   return w;
 }

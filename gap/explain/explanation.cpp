@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 namespace sixpoint::gap {
 namespace {
@@ -73,11 +74,40 @@ std::optional<double> likeliest_size(std::vector<std::array<double, 2>> tried) {
   return std::nullopt;
 }
 
+// Sizes that are tried, one after another from `start` uphill; the likeliest. `nats_of` is not asked
+// twice for one of them.
+double likeliest_of(const std::vector<double>& sizes, double start,
+                    const std::function<double(double)>& nats_of) {
+  std::map<std::size_t, double> known;
+  const auto nats = [&](std::size_t i) {
+    const auto [at, is_new] = known.try_emplace(i, 0);
+    return is_new ? at->second = nats_of(sizes[i]) : at->second;
+  };
+  const auto above = std::ranges::lower_bound(sizes, start) - sizes.begin();
+  std::size_t best = std::min(static_cast<std::size_t>(above), sizes.size() - 1);
+  for (;;) {
+    const std::size_t before = best;
+    for (const std::size_t next : {before - 1, before + 1}) {  // below 0: beyond the end
+      if (next < sizes.size() && nats(next) > nats(best)) {
+        best = next;
+      }
+    }
+    if (best == before) {
+      break;
+    }
+  }
+  std::vector<std::array<double, 2>> tried;
+  for (const auto& [i, value] : known) {
+    tried.push_back({sizes[i], value});
+  }
+  return likeliest_size(tried).value_or(sizes[best]);
+}
+
 }  // namespace
 
-void Explanation::remember(Scatter scatter, const std::vector<Subset>& tried) {
+void Explanation::remember(const Whitened& data, const std::vector<Subset>& tried) {
   for (const Subset& subset : tried) {
-    tried_.push_back({scatter, subset});
+    tried_.push_back({data.scatter, data.seats_deg > 0, subset});
   }
 }
 
@@ -105,7 +135,7 @@ ForwardState Explanation::explain_nominal() {
   }
   nominal_ = model_.make_fit(data_, {{}, model_.evidence(data_, {})}, fit.state);
   best_known_ = best_nominal_ = fit;
-  remember(Scatter::nominal, tried);
+  remember(data_, tried);
   return fit.state;
 }
 
@@ -129,7 +159,7 @@ Explanation::Trial Explanation::explain_by(Scatter scatter, const Eigen::MatrixX
     Whitened data = model_.whiten(linear, scatter, size);
     std::vector<Subset> tried;
     const Subset subset = model_.search(data, tried);
-    remember(scatter, tried);
+    remember(data, tried);
     sizes.push_back({size, subset.nats});
     if (!best.fit || subset.nats > best.fit->nats) {
       best.fit = model_.make_fit(data, subset, model_.first_guess());
@@ -157,6 +187,37 @@ Explanation::Trial Explanation::explain_by(Scatter scatter, const Eigen::MatrixX
   return best;
 }
 
+// Bad seats beside a slow noise. The records inside the dwells say best how large the noise is, the
+// placements how bad the seats are: each size is searched beside the other one, and the subset of
+// effects beside both.
+Explanation::Trial Explanation::explain_by_slow_noise_and_seats(Scatter slow,
+                                                                const Eigen::MatrixXd& linear) {
+  constexpr int kRounds = 2;
+  constexpr double kMiddle_deg = 0.04;  // of the seats that are tried
+  const std::vector<double> sizes = sizes_of(slow);
+  const auto& record_nats = model_.options().record_nats;
+  double size = *std::ranges::max_element(
+      sizes, {}, [&](double tried) { return record_nats ? record_nats(slow, tried) : 0; });
+  double seats_deg = kMiddle_deg;
+  std::vector<int> groups = best_known_.subset.groups;
+  Trial trial;
+  for (int round = 0; round < kRounds; ++round) {
+    seats_deg = likeliest_of(sizes_of(Scatter::seating), seats_deg, [&](double tried_deg) {
+      return model_.evidence(model_.whiten(linear, slow, size, tried_deg), groups);
+    });
+    size = likeliest_of(sizes, size, [&](double tried) {
+      return model_.evidence(model_.whiten(linear, slow, tried, seats_deg), groups);
+    });
+    trial.data = model_.whiten(linear, slow, size, seats_deg);
+    std::vector<Subset> tried;
+    const Subset subset = model_.search(trial.data, tried);
+    remember(trial.data, tried);
+    trial.fit = model_.make_fit(trial.data, subset, model_.first_guess());
+    groups = subset.groups;
+  }
+  return trial;
+}
+
 // Puts the trial in the place of the best of its sort, if it is better.
 void Explanation::compete(Scatter scatter, Trial trial, Whitened& unknown_data) {
   if (!trial.fit) {
@@ -170,10 +231,11 @@ void Explanation::compete(Scatter scatter, Trial trial, Whitened& unknown_data) 
   } else if (trial.fit->nats > best_known_.nats) {
     // Once more about its own estimate.
     const ForwardState& at = trial.fit->state;
-    data_ = model_.whiten(model_.linearise(at), scatter, trial.fit->scatter_size);
+    data_ =
+        model_.whiten(model_.linearise(at), scatter, trial.fit->scatter_size, trial.fit->seats_deg);
     std::vector<Subset> tried;
     best_known_ = model_.make_fit(data_, model_.search(data_, tried, true), at);
-    remember(scatter, tried);
+    remember(data_, tried);
   }
 }
 
@@ -184,12 +246,23 @@ Explanation::Explanation(const std::vector<Block>& blocks, EvidenceOptions optio
   if (chi_sd(model_, best_nominal_) >= kScatters_sd || records_show_slow_noise()) {
     const Eigen::MatrixXd linear = model_.linearise(model_.first_guess());
     Whitened unknown_data;
+    const auto allowed = [&](Scatter scatter) {
+      return !in_catalogue(scatter) || model_.allowed(std::string(to_string(scatter)));
+    };
     for (const Scatter scatter :
          {Scatter::seating, Scatter::random_walk, Scatter::flicker, Scatter::by_pose,
           Scatter::by_placement, Scatter::by_session, Scatter::seat_walks, Scatter::by_temperature,
           Scatter::by_time, Scatter::by_time_fast}) {
-      if (!in_catalogue(scatter) || model_.allowed(std::string(to_string(scatter)))) {
+      if (allowed(scatter)) {
         compete(scatter, explain_by(scatter, linear), unknown_data);
+      }
+    }
+    const Scatter found = best_known_.scatter;
+    for (const Scatter slow : {Scatter::random_walk, Scatter::flicker}) {
+      if (allowed(slow) && allowed(Scatter::seating) &&
+          (found == Scatter::random_walk || found == Scatter::flicker ||
+           (found == Scatter::seating && records_show_slow_noise()))) {
+        compete(slow, explain_by_slow_noise_and_seats(slow, linear), unknown_data);
       }
     }
     if (unknown_wins()) {

@@ -8,8 +8,8 @@
 //   }
 //
 // Scatter between dwells is nominal seating (0.01 deg per placement) and at most one more kind: one
-// of the catalogue (seating, random_walk, flicker), or one that the catalogue lacks and that stands
-// for unknown causes (scatter.h). If an unknown kind wins, no random effect of the catalogue has
+// of the catalogue (seating, random_walk, flicker; or bad seats beside one of the others), or one
+// that the catalogue lacks and that stands for unknown causes (scatter.h). If an unknown kind wins, no random effect of the catalogue has
 // the structure of this scatter.
 //
 // The object refers to `blocks`, which must outlive it. It is constant after construction.
@@ -120,6 +120,7 @@ class Explanation {
  private:
   struct Tried {
     Scatter scatter;
+    bool bad_seats;  // beside it
     Subset subset;
   };
   // As a group, or as its scatter.
@@ -136,10 +137,11 @@ class Explanation {
     std::optional<Fit> fit;
     Whitened data;
   };
-  void remember(Scatter scatter, const std::vector<Subset>& tried);
+  void remember(const Whitened& data, const std::vector<Subset>& tried);
   ForwardState explain_nominal();
   bool records_show_slow_noise() const;
   Trial explain_by(Scatter scatter, const Eigen::MatrixXd& linear);
+  Trial explain_by_slow_noise_and_seats(Scatter slow, const Eigen::MatrixXd& linear);
   void compete(Scatter scatter, Trial trial, Whitened& unknown_data);
 
   EvidenceModel model_;

@@ -66,7 +66,8 @@ void add_means(const std::vector<Block>& blocks, const Fit& fit, double lsb_mg, 
     const Eigen::VectorXd off = block.value_mg - predict(fit.state, block, lsb_mg);
     for (Eigen::Index a = 0; a < 3; ++a) {
       left(i, a) = off[a];
-      white(i, a) = nominal_variance_mg2(block, a);
+      white(i, a) = nominal_variance_mg2(block, a) +
+                    fit.seats_deg * fit.seats_deg * seating_lever(block).row(a).squaredNorm();
     }
     for (Eigen::Index j = 0; j < n; ++j) {
       slow(i, j) = fit.scatter_size * fit.scatter_size *

@@ -300,9 +300,9 @@ void judge_scatter(const Request& request, const Explanation& explanation, const
     found.bounds[name] = *bound;
   }
   const Fit& fit = explanation.best();
-  const bool in = fit.scatter == kind;
+  const double size = fit.size_of(kind);
+  const bool in = size > 0;
   const double gain = explanation.gain_nats(name, in);
-  const double size = in ? fit.scatter_size : 0;
   EffectFinding f{.name = name,
                   .nats = in          ? std::max(kPresent_nats, gain)
                           : gain == 0 ? kNeverTried_nats
@@ -396,7 +396,8 @@ Findings judge_means(const Request& request, const Explanation& explanation, con
   const auto unnamed = [&] {
     return quiet && much > kMuch_nats &&
            std::none_of(found.effects.begin(), found.effects.end(), [&](const EffectFinding& e) {
-             return e.name == to_string(fit.scatter) || fit.contains(e.name);
+             return e.name == to_string(fit.scatter) || fit.contains(e.name) ||
+                    (fit.seats_deg > 0 && e.name == to_string(Scatter::seating));
            });
   };
   found.accept_likely(before.effects.size(), unnamed());

@@ -164,7 +164,10 @@ class Expectation {
       : model_(explanation.model()),
         best_(explanation.best()),
         rate_hz_(request.bundle.rate_hz),
-        own_(model_.whiten(model_.linearise(best_.state), best_.scatter, best_.scatter_size).sums),
+        own_(model_
+                 .whiten(model_.linearise(best_.state), best_.scatter, best_.scatter_size,
+                         best_.seats_deg)
+                 .sums),
         after_(own_) {}
 
   void plan(const std::vector<PlannedPiece>& pieces) {
