@@ -1,5 +1,6 @@
 // Derivatives by the parameters, and rows divided by the root of their covariance.
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -91,6 +92,34 @@ TEST(EvidenceWhiten, RowsAreDividedByTheRootOfTheCovariance) {
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(v).eigenvalues();
     EXPECT_NEAR(half_log_det, 0.5 * eigenvalues.array().log().sum(), 1e-3) << to_string(scatter);
   }
+}
+
+// Bad seats beside a walk: whitened, the covariance of both is the identity. Oracle: the walk's alone
+// and what seats of the same size add alone.
+TEST(EvidenceWhiten, SeatsAddToSlowNoise) {
+  constexpr double kWalk = 0.3;
+  constexpr double kSeats_deg = 0.1;
+  const auto blocks = tests::made_dwells();
+  const EvidenceModel model(blocks, {});
+  const Eigen::Index n = model.rows();
+  const auto covariance = [&](Scatter scatter, double size) {
+    Eigen::MatrixXd root = Eigen::MatrixXd::Identity(n, n);
+    model.whiten_rows(scatter, size, root);
+    const Eigen::MatrixXd back = root.inverse();
+    return Eigen::MatrixXd(back * back.transpose());
+  };
+  Eigen::MatrixXd root = Eigen::MatrixXd::Identity(n, n);
+  model.whiten_rows(Scatter::random_walk, kWalk, root, kSeats_deg);
+  const Eigen::MatrixXd both = covariance(Scatter::random_walk, kWalk) +
+                               covariance(Scatter::seating, kSeats_deg) -
+                               covariance(Scatter::nominal, 0);
+  EXPECT_LT(
+      (root * both * root.transpose() - Eigen::MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(),
+      1e-3);
+  const double both_nats =
+      model.whiten(model.linearise({}), Scatter::random_walk, kWalk, kSeats_deg).outside_nats;
+  EXPECT_NEAR(both_nats,
+              scatter_log_prior(Scatter::random_walk) + scatter_log_prior(Scatter::seating), 1e-12);
 }
 
 // What the records say of a size, and the size's prior, are added outside of the rows.

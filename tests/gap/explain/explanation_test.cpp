@@ -51,6 +51,37 @@ TEST(Explanation, SeatingOfItsSize) {
   EXPECT_LT(fit.scatter_size, 0.16);
 }
 
+// Seats of 0.15 degrees and a walk of 0.2 mg in the root of a second: each of its size, where one
+// alone would have to be larger. What the records say of the walk is left out.
+TEST(Explanation, BadSeatsBesideAWalk) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  Eigen::Vector3d walk_mg = Eigen::Vector3d::Zero();
+  constexpr double kEvery_s = 60;
+  const auto blocks = tests::made_dwells(
+      [&](const Block&) -> Eigen::Vector3d {
+        walk_mg += 0.2 * std::sqrt(kEvery_s) *
+                   Eigen::Vector3d(normal(random), normal(random), normal(random));
+        return walk_mg;
+      },
+      5, kEvery_s, 0.15);
+  const Explanation explanation(blocks, only({"seating", "random_walk"}));
+  const Fit& fit = explanation.best();
+  EXPECT_EQ(fit.scatter, Scatter::random_walk);
+  EXPECT_GT(fit.size_of(Scatter::random_walk), 0.13);
+  EXPECT_LT(fit.size_of(Scatter::random_walk), 0.3);
+  EXPECT_GT(fit.size_of(Scatter::seating), 0.1);
+  EXPECT_LT(fit.size_of(Scatter::seating), 0.22);
+  EXPECT_EQ(fit.size_of(Scatter::flicker), 0);
+  EXPECT_GT(explanation.gain_nats("seating"), 3);
+  EXPECT_GT(explanation.gain_nats("random_walk"), 3);
+  const auto gap_mg2 = explanation.gap_mg2();
+  EXPECT_GT(gap_mg2.at("seating"), 1);
+  EXPECT_GT(gap_mg2.at("random_walk"), 1);
+  // Either alone takes the other one for itself.
+  EXPECT_EQ(Explanation(blocks, only({"random_walk"})).best().size_of(Scatter::seating), 0);
+}
+
 // Each seat begins where the one before was. Seats of the same size that are new each time are
 // `seating` (above).
 TEST(Explanation, ASeatThatWalksIsUnknown) {
