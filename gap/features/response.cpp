@@ -41,6 +41,7 @@ struct Pink {
 // Decisions in nats. Corner and order, or frequency and q, are two numbers found on a grid of some
 // hundreds of points: log(1000) and as much again for one false alarm in a thousand.
 constexpr double kSignificant_nats = 14;
+constexpr double kLeft_sd = 4;           // that a low-pass leaves of the tones: something is wrong
 constexpr double kNoiseAgrees_nats = 5;  // of a low-pass that tones show: noise passes it, too
 constexpr double kPinkCost_nats = 2;     // a size found on a grid
 // A mount's form is not known to the last per cent: nine tenths of what is there must go.
@@ -76,6 +77,7 @@ class Search {
       add_ratio(tone, bundle.segments[tone.segment], noise);
     }
     flat_.assign(ratios_.size(), 0);
+    mount_log_ = flat_;
     std::set<std::size_t> axes;
     for (const Ratio& r : ratios_) {
       axes.insert(r.axis);
@@ -87,14 +89,36 @@ class Search {
     out_.has_tones = !ratios_.empty();
     fit_flat();
     find_bounds();
+    Search from_noise = *this;
     find_low_pass();
+    double chi = find_mount();
+    // The tones may have chosen another filter than the noise passed, or none, without the mount.
+    if (chi - freedom_ > kLeft_sd * std::sqrt(2 * freedom_) &&
+        from_noise.find_low_pass_beside_mount()) {
+      const double other_chi = from_noise.find_mount();
+      if (from_noise.out_.resonance_significant &&
+          from_noise.out_.low_pass.noise_nats - 0.5 * other_chi >
+              out_.low_pass.noise_nats - 0.5 * chi + kSignificant_nats) {
+        *this = std::move(from_noise);
+        chi = other_chi;
+      }
+    }
+    measure_left_over(chi);
+    return out_;
+  }
+
+ private:
+  // The mount on top of the low-pass, where that is significant. What is significant of both is left
+  // with the chi-square that is returned.
+  double find_mount() {
     std::vector<double> low_pass_log = flat_;
-    double base_chi = flat_chi_;
+    double base_chi = chi_of(flat_);
     if (out_.low_pass_significant) {
-      low_pass_log = logs_of(out_.low_pass);
-      base_chi = chi_of(low_pass_log);
       fit_noise_behind_low_pass();
       out_.low_pass.held_out_nats = held_out_low_pass(out_.low_pass);
+      mount_log_ = flat_;
+      low_pass_log = logs_of(out_.low_pass);
+      base_chi = chi_of(low_pass_log);
     }
     const double chi = find_resonance(low_pass_log, base_chi);
     const Resonance& mount = out_.resonance;
@@ -102,14 +126,33 @@ class Search {
         options_.allow_resonance && mount.tone_nats > kSignificant_nats &&
         mount.frequency_hz > kMountLowest_hz && mount.frequency_hz < kMountHighest_hz &&
         mount.q < kMountHighest_q && chi - freedom_ < kFormLeft * (base_chi - freedom_);
-    if (out_.resonance_significant) {
-      out_.resonance.held_out_nats = held_out_resonance(out_.resonance, low_pass_log);
+    if (!out_.resonance_significant) {
+      return base_chi;
     }
-    measure_left_over(out_.resonance_significant ? chi : base_chi);
-    return out_;
+    out_.resonance.held_out_nats = held_out_resonance(out_.resonance, low_pass_log);
+    return chi;
   }
 
- private:
+  // The low-pass that the noise alone chooses, the mount on top of it, and the low-pass that noise
+  // and tones choose beside that mount: a mount does not act on the sensor's noise. False where
+  // there is no mount.
+  bool find_low_pass_beside_mount() {
+    tones_count_ = false;
+    search_low_pass();
+    tones_count_ = true;
+    const std::vector<double> low_pass_log = logs_of(out_.low_pass);
+    const double base_chi = chi_of(low_pass_log);
+    find_resonance(low_pass_log, base_chi);
+    if (!options_.allow_resonance || out_.resonance.tone_nats <= kSignificant_nats) {
+      return false;
+    }
+    mount_log_ = logs_of(out_.resonance, flat_);
+    out_.low_pass = {};
+    out_.resonance = {};
+    find_low_pass();
+    return out_.low_pass_significant;
+  }
+
   struct NoiseFit {
     double nats = 0, left_sd = 0;
     std::array<double, 3> white_mg{};
@@ -158,7 +201,6 @@ class Search {
       out_.white_mg = with_pink.white_mg;
       pink_ = {};
     }
-    flat_chi_ = chi_of(flat_);
   }
 
   // What the data of a unit with this filter or mount, and without chance, say of it. A search of
@@ -265,7 +307,7 @@ class Search {
 
   void try_low_pass(LowPass low_pass, LowPass& best) const {
     low_pass.noise_nats = fit_noise(low_pass).nats - flat_nats_;
-    low_pass.tone_nats = 0.5 * (flat_chi_ - chi_of(logs_of(low_pass)));
+    low_pass.tone_nats = tones_count_ ? 0.5 * (chi_of(mount_log_) - chi_of(logs_of(low_pass))) : 0;
     if (nats_of(low_pass) > nats_of(best)) {
       best = low_pass;
     }
@@ -434,11 +476,12 @@ class Search {
                : pink_.mg * pink_.mg * std::pow(frequency_hz, -pink_.slope) * rate_hz_ / 2;
   }
 
-  // Logarithms of a low-pass' gain at the tones; of a resonance' gain on top of `base`.
+  // Logarithms of a low-pass' gain at the tones, on top of a mount; of a resonance' gain on top of
+  // `base`.
   std::vector<double> logs_of(const LowPass& low_pass) const {
-    std::vector<double> logs(ratios_.size());
+    std::vector<double> logs = mount_log_;
     for (std::size_t i = 0; i < ratios_.size(); ++i) {
-      logs[i] = std::log(std::max(1e-6, low_pass.tone_gain(ratios_[i].frequency_hz, rate_hz_)));
+      logs[i] += std::log(std::max(1e-6, low_pass.tone_gain(ratios_[i].frequency_hz, rate_hz_)));
     }
     return logs;
   }
@@ -518,7 +561,7 @@ class Search {
       const LowPass best = refitted(found, [&](const LowPass& low_pass) {
         return 0.5 * chi_of(logs_of(low_pass), k) - fit_noise(low_pass).nats;
       });
-      nats += 0.5 * (held_out_chi(flat_, k) - held_out_chi(logs_of(best), k));
+      nats += 0.5 * (held_out_chi(mount_log_, k) - held_out_chi(logs_of(best), k));
     }
     return nats;
   }
@@ -554,13 +597,14 @@ class Search {
   double effective_ = 0;  // independent blocks of the spectrum
   std::vector<Bin> bins_;
   std::vector<Ratio> ratios_;
-  std::vector<double> tone_hz_;  // in order of appearance: their folds
-  std::vector<double> flat_;     // zeros: no gain at any tone
-  double freedom_ = 0;           // of the ratios
-  Pink pink_;                    // beside the white in fit_noise()
-  Pink flat_pink_;               // beside flat noise
-  double flat_nats_ = 0;         // of flat noise, with its 1/f noise
-  double flat_chi_ = 0;
+  std::vector<double> tone_hz_;    // in order of appearance: their folds
+  std::vector<double> flat_;       // zeros: no gain at any tone
+  std::vector<double> mount_log_;  // of a mount that is known while low-passes are searched
+  bool tones_count_ = true;        // in the choice of a low-pass
+  double freedom_ = 0;             // of the ratios
+  Pink pink_;                      // beside the white in fit_noise()
+  Pink flat_pink_;                 // beside flat noise
+  double flat_nats_ = 0;           // of flat noise, with its 1/f noise
   Response out_;
 };
 
