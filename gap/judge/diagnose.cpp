@@ -28,7 +28,7 @@ Records judge_records(const Request& request, CleanSamples clean, NoiseSpectrum 
   Lines lines = judge_lines(request, clean, noise, codes);
   Timing timing = judge_timing(request, clean, noise, lines);
   ResponseStep response = judge_response(request, noise, timing.tones, lines);
-  Settling settling = judge_settling(request, clean, noise, lines);
+  Settling settling = judge_settling(request, clean, noise, lines, response.response);
   for (Findings* step : {&timing.found, &lines.found, &response.found, &settling.found}) {
     found.append(std::move(*step));
   }

@@ -220,7 +220,7 @@ ResponseStep judge_response(const Request& request, const NoiseSpectrum& noise,
 }
 
 Settling judge_settling(const Request& request, const CleanSamples& clean,
-                        const NoiseSpectrum& noise, const Lines& lines) {
+                        const NoiseSpectrum& noise, const Lines& lines, const Response& response) {
   // Conventions: prior of the amplitude (and phase), number of independent pairs of frequency and
   // decay, gain of ringing over a plain decay, how strong ringing is surely no rest of a line, and
   // how near a line is.
@@ -254,8 +254,10 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   if (significant) {
     f.held_out_gain_nats = held_out_step_nats(request.bundle, clean, noise, lines_hz);
   }
+  // A filter begins at rest: what it makes of the first samples looks like a second mode.
+  const double amplitude = response.low_pass_significant ? mode.amplitude : step.amplitude;
   f.parameters = {
-      {"amplitude", {step.amplitude}, {std::hypot(sd, kFormShare * step.amplitude)}},
+      {"amplitude", {amplitude}, {std::hypot(sd, kFormShare * amplitude)}},
       {"frequency_hz",
        {mode.frequency_hz},
        {std::hypot(relative / (2 * M_PI * std::max(0.03, mode.decay_s)),
@@ -273,7 +275,7 @@ Settling judge_settling(const Request& request, const CleanSamples& clean,
   const bool named = there && rings && request.allowed("settling");
   settling.unexplained = there && !named;
   if (named) {
-    f.gap_mg2 = std::pow(1000 * step.amplitude, 2) * mode.decay_s / 4 / kDwell_s * kRingingShare;
+    f.gap_mg2 = std::pow(1000 * amplitude, 2) * mode.decay_s / 4 / kDwell_s * kRingingShare;
     settling.found.outside_means_mg2.push_back(f.gap_mg2);
   }
   if (named || !there) {

@@ -79,7 +79,7 @@ struct Settling {
   Findings found;
 };
 Settling judge_settling(const Request& request, const CleanSamples& clean,
-                        const NoiseSpectrum& noise, const Lines& lines);
+                        const NoiseSpectrum& noise, const Lines& lines, const Response& response);
 
 // All that the records show; nothing changes it afterwards.
 struct Records {

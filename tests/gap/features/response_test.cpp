@@ -64,5 +64,46 @@ TEST(Response, TonesBehindAResonanceGiveItsFrequencyAndQ) {
   EXPECT_FALSE(response.low_pass_significant);
 }
 
+// A mount of 16 Hz before a filter of 22 Hz: the noise has passed the filter alone, the tones both.
+TEST(Response, TheNoiseTellsAFilterFromTheMountBeforeIt) {
+  Bundle bundle;
+  bundle.rate_hz = 100;
+  bundle.accel_scale_lsb_per_g = 256;
+  const double rounding_mg2 = std::pow(1000.0 / 256, 2) / 12;
+  const auto filter = [](double f_hz) { return low_pass_gain(f_hz, 22, 2, 100); };
+  NoiseSpectrum noise;
+  noise.blocks = 400;
+  noise.white_mg = {4, 4, 4};
+  for (int k = 1; k < 64; ++k) {
+    noise.frequency_hz.push_back(k * 50.0 / 64);
+    for (std::vector<double>& variance_mg2 : noise.variance_mg2) {
+      variance_mg2.push_back(std::pow(4 * filter(noise.frequency_hz.back()), 2) + rounding_mg2);
+    }
+  }
+  const Resonance mount{16, 2.5, ResonanceForm::second_order, 0};
+  std::vector<ToneFit> tones;
+  for (const double f_hz : {2.0, 3.0, 5.0, 8.0, 12.0, 15.0, 20.0, 30.0, 40.0}) {
+    Segment segment;
+    segment.kind = Segment::Kind::vibration;
+    segment.vibration = Vibration{Eigen::Vector3d::UnitZ(), f_hz, 1};
+    ToneFit tone;
+    tone.segment = bundle.segments.size();
+    tone.axis = 2;
+    tone.usable = true;
+    tone.samples = 1000;
+    tone.in_phase_mg[2] = 1000 * filter(f_hz) * resonance_gain(f_hz, mount);
+    tone.residual_mg = 4;
+    bundle.segments.push_back(segment);
+    tones.push_back(tone);
+  }
+  const Response response = find_response(bundle, noise, tones, {});
+  ASSERT_TRUE(response.low_pass_significant);
+  ASSERT_TRUE(response.resonance_significant);
+  EXPECT_EQ(response.low_pass.order, 2);
+  EXPECT_NEAR(response.low_pass.corner_hz, 22, 0.1);
+  EXPECT_NEAR(response.resonance.frequency_hz, 16, 0.1);
+  EXPECT_NEAR(response.resonance.q, 2.5, 0.05);
+}
+
 }  // namespace
 }  // namespace sixpoint::gap

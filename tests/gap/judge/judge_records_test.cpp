@@ -61,14 +61,25 @@ TEST(JudgeRecords, RingingAfterMovesIsSettling) {
     return Eigen::Vector3d(s.rotation.col(2) + ring * s.approach_g);
   });
   const Made made(ringing);
-  const Settling settling = judge_settling(made.request, made.clean, made.noise, {});
+  const Settling settling = judge_settling(made.request, made.clean, made.noise, {}, {});
   const EffectFinding* found = effect(settling.found, "settling");
   ASSERT_NE(found, nullptr);
   EXPECT_NEAR(found->parameters[0].value[0], 0.04, 0.01);
   EXPECT_NEAR(found->parameters[1].value[0], 6, 0.2);
   EXPECT_FALSE(settling.unexplained);
+  // Behind a filter the ringing begins at nothing.
+  const Made filtered(tests::made_production({}, [](const Segment& s, double t) {
+    const double ring = 0.04 * std::exp(-t / 0.4) * std::cos(2 * M_PI * 6 * t);
+    return Eigen::Vector3d(s.rotation.col(2) + (1 - std::exp(-t / 0.03)) * ring * s.approach_g);
+  }));
+  Response response;
+  response.low_pass_significant = true;
+  const Settling behind =
+      judge_settling(filtered.request, filtered.clean, filtered.noise, {}, response);
+  ASSERT_NE(effect(behind.found, "settling"), nullptr);
+  EXPECT_NEAR(effect(behind.found, "settling")->parameters[0].value[0], 0.04, 0.01);
   const Made stripped(ringing, {.without = {"settling"}});
-  EXPECT_TRUE(judge_settling(stripped.request, stripped.clean, stripped.noise, {}).unexplained);
+  EXPECT_TRUE(judge_settling(stripped.request, stripped.clean, stripped.noise, {}, {}).unexplained);
 }
 
 }  // namespace
