@@ -14,6 +14,11 @@ namespace {
 
 constexpr std::size_t kMostFindings = 20;
 
+// Damaged, or a table that is not there: the servers call that an error of the statement.
+bool is_finding(const Error& error) {
+  return error.code == ErrorCode::bad_data || error.code == ErrorCode::internal;
+}
+
 class Audit {
  public:
   Audit(Database& database, Bytes earlier_head)
@@ -61,7 +66,7 @@ class Audit {
 
   // What cannot be read is a finding; other errors say nothing about the history.
   Status take_unreadable(const Status& read, const std::string& what) {
-    if (read || read.error().code != ErrorCode::bad_data) {
+    if (read || !is_finding(read.error())) {
       return read;
     }
     add(fmt::format("{} cannot be read: {}", what, read.error().what));
@@ -71,7 +76,7 @@ class Audit {
 
   Result<AuditReport> report() {
     const auto head = read_head(database_);
-    if (!head && head.error().code != ErrorCode::bad_data) {
+    if (!head && !is_finding(head.error())) {
       return fail(head.error());  // no answer says nothing about the rows
     }
     if (!head || head->rows != last_seq_ || head->hash != previous_) {

@@ -255,8 +255,7 @@ Status migrate(Database& database) {
   SIXPOINT_ASSIGN(const auto version, database.schema_version());
   for (std::int64_t next = version + 1; next <= kSchemaVersion; ++next) {
     if (auto status = bring_to(next, database); !status) {
-      if (status.error().code != ErrorCode::internal &&
-          status.error().code != ErrorCode::bad_data) {
+      if (status.error().code != ErrorCode::internal) {
         return status;
       }
       return fail(

@@ -372,11 +372,6 @@ class PostgresDatabase final : public Database {
     if (state.starts_with("22")) {
       return {ErrorCode::bad_data, what, where, "the text or number cannot be stored as it is"};
     }
-    // No such table, no such column, and what is asked after one in the same transaction.
-    if (state == "42P01" || state == "42703" || state == "25P02") {
-      return {ErrorCode::bad_data, what, where,
-              "a table or column of the store was removed: restore the last backup"};
-    }
     if (state.starts_with("XX")) {
       return {ErrorCode::bad_data, what, where,
               "the server finds its own files damaged: keep them, restore the last backup"};

@@ -53,12 +53,6 @@ Error to_error(const SQLite::Exception& exception, const std::string& path) {
       return {ErrorCode::bad_data, what, path,
               "the store keeps its history as it is; write a correction instead"};
     default:
-      // SQLite has one code for this and for a statement that is wrong.
-      if (what.find("no such table") != std::string::npos ||
-          what.find("no such column") != std::string::npos) {
-        return {ErrorCode::bad_data, what, path,
-                "a part of the store was removed: keep this file, and restore the last backup"};
-      }
       return {ErrorCode::internal, what, path, "please report this with the command line"};
   }
 }

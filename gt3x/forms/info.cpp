@@ -1,7 +1,6 @@
 #include "gt3x/forms/info.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -12,8 +11,6 @@ namespace sixpoint::gt3x {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-constexpr std::array<std::string_view, 4> kDecidingKeys = {"Serial Number", "Firmware",
-                                                           "Sample Rate", "Acceleration Scale"};
 constexpr std::size_t kMaxSize = 1 << 20;
 constexpr std::int64_t kTicksAt1970 = 621'355'968'000'000'000;
 constexpr std::int64_t kTicksPerSecond = 10'000'000;
@@ -65,8 +62,6 @@ Result<Info> Info::parse(std::string_view text) {
                 "another program has changed it; download the recording from the unit again");
   }
   Info info;
-  std::array<std::optional<std::string>, kDecidingKeys.size()> deciding;  // as said first
-  std::string_view two_values;                                            // the key that has them
   if (text.starts_with(kByteOrderMark)) {
     info.byte_order_mark_ = true;
     text.remove_prefix(kByteOrderMark.size());
@@ -82,22 +77,12 @@ Result<Info> Info::parse(std::string_view text) {
       line.key = trimmed(whole.substr(0, colon));
       line.value = trimmed(whole.substr(colon + 1));
       any = any || !line.key.empty();
-      for (std::size_t k = 0; k < kDecidingKeys.size(); ++k) {
-        if (line.key == kDecidingKeys[k]) {
-          deciding[k] = deciding[k].value_or(line.value);
-          two_values = *deciding[k] == line.value ? two_values : kDecidingKeys[k];
-        }
-      }
     }
     info.lines_.push_back(std::move(line));
   }
   if (!any) {
     return fail(ErrorCode::bad_data, "info.txt holds no 'Key: value' line", {},
                 "check that this is a recording; download it from the unit again");
-  }
-  if (!two_values.empty()) {
-    return fail(ErrorCode::bad_data, fmt::format("info.txt gives two values for '{}'", two_values),
-                {}, "another program has changed it; download the recording from the unit again");
   }
   return info;
 }
@@ -126,6 +111,14 @@ std::optional<std::string_view> Info::get(std::string_view key) const {
     return std::nullopt;
   }
   return found->value;
+}
+
+std::optional<std::string_view> Info::other(std::string_view key) const {
+  const std::optional<std::string_view> first = get(key);
+  const auto found = std::ranges::find_if(
+      lines_, [&](const Line& line) { return line.key == key && line.value != first; });
+  return first && found != lines_.end() ? std::optional<std::string_view>(found->value)
+                                        : std::nullopt;
 }
 
 void Info::set(std::string_view key, std::string_view value) {

@@ -27,14 +27,14 @@ class Info {
   // An empty one, for recordings that are made here; lines end in CR LF, as the vendor's do.
   Info() = default;
 
-  // bad_data for text that holds no "Key: value" line at all, for UTF-16, above 1 MiB, and where
-  // two lines give different values for what decides how a recording is read: `Serial Number`,
-  // `Firmware`, `Sample Rate`, `Acceleration Scale`.
+  // bad_data for text that holds no "Key: value" line at all, for UTF-16, and above 1 MiB.
   static Result<Info> parse(std::string_view text);
   std::string serialise() const;
 
   // The value of the first line with this key, without blanks around it; keys are compared exactly.
   std::optional<std::string_view> get(std::string_view key) const;
+  // The value of the first line with this key that says something else than the first one.
+  std::optional<std::string_view> other(std::string_view key) const;
   // Every "Key: value" line, in order.
   std::vector<std::pair<std::string, std::string>> pairs() const;
   // Changes the first line with this key, or adds one at the end. Line ends inside the value become

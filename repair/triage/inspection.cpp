@@ -162,6 +162,14 @@ class HeaderCheck {
     std::optional<double> scale_lsb_per_g = info.accel_scale_lsb_per_g();
     std::string firmware = info.firmware();
     std::string before = "info.txt";
+    for (const char* key : {"Serial Number", "Firmware", "Sample Rate", "Acceleration Scale"}) {
+      if (const auto other = info.other(key)) {
+        found_.warnings.push_back(
+            fmt::format("info.txt says two things for '{}': {}, which counts, "
+                        "and {}",
+                        key, printable(*info.get(key), 60), printable(*other, 60)));
+      }
+    }
     for (const auto& set : reader.parameter_sets()) {
       const auto rate = set->parameters.values.find(gt3x::kParameterSampleRate);
       if (rate != set->parameters.values.end()) {

@@ -55,14 +55,6 @@ Result<gt3x::UnitMemory> unit_memory(gt3x::Recording& recording) {
   return memory;
 }
 
-FileFacts header_facts(const gt3x::Info& info) {
-  FileFacts facts;
-  facts.serial = info.serial();
-  facts.firmware = info.firmware();
-  facts.recorded = info.start();
-  return facts;
-}
-
 namespace {
 
 void add_firmware(const std::string& firmware, FileFacts& facts) {
@@ -74,6 +66,16 @@ void add_firmware(const std::string& firmware, FileFacts& facts) {
 }
 
 }  // namespace
+
+FileFacts header_facts(const gt3x::Info& info) {
+  FileFacts facts;
+  facts.serial = info.serial();
+  facts.other_serial = info.other("Serial Number").value_or("");
+  facts.firmware = info.firmware();
+  add_firmware(std::string(info.other("Firmware").value_or("")), facts);
+  facts.recorded = info.start();
+  return facts;
+}
 
 void add_facts(const gt3x::Parameters& in_force, FileFacts& facts) {
   facts.calibration_time = in_force.calibration_time;

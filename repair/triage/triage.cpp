@@ -178,6 +178,11 @@ Triage triage(const FileFacts& facts) {
   if (facts.serial.empty()) {
     return {Verdict::cannot_tell, {"the file does not say its unit's serial number"}};
   }
+  if (!facts.other_serial.empty()) {
+    return {Verdict::cannot_tell,
+            {fmt::format("info.txt names two units, {} and {}", printable(facts.serial, 60),
+                         printable(facts.other_serial, 60))}};
+  }
   if (!is_mos(facts.serial)) {
     return {Verdict::not_affected,
             {fmt::format("serial number {}: only units whose number begins with MOS are affected",
@@ -193,7 +198,7 @@ Triage triage(const FileFacts& facts) {
     result = {};
   }
   if (!facts.other_firmware.empty()) {
-    result.reasons.push_back(fmt::format("info.txt names firmware {}, the PARAMETERS record {}",
+    result.reasons.push_back(fmt::format("the file names two firmware versions, {} and {}",
                                          printable(facts.firmware, 40),
                                          printable(facts.other_firmware, 40)));
   }

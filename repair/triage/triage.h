@@ -10,7 +10,7 @@
 //
 // | serial number | calibrated         | firmware                        | verdict      |
 // |---------------|--------------------|---------------------------------|--------------|
-// | not said      | any                | any                             | cannot_tell  |
+// | not said, two | any                | any                             | cannot_tell  |
 // | not MOS...    | any                | any                             | not_affected |
 // | MOS...        | from 2014-03-24 on | any                             | not_affected |
 // | MOS...        | any                | below 1.4.0, or from 1.8.0 on   | not_affected |
@@ -25,8 +25,8 @@
 // A date before 2012 is none: the family was not made then, so a clock had not been set. Nor is one
 // more than a day behind the start of the recording, where that is from 2012 on: a unit is
 // calibrated before it records, so one of the two clocks was wrong; the day is for zones of time.
-// Two firmware versions: info.txt names one and the PARAMETERS record another. Two dates: of two
-// PARAMETERS records.
+// Two firmware versions: info.txt names two, or one and the PARAMETERS record another. Two dates: of
+// two PARAMETERS records.
 #pragma once
 
 #include <optional>
@@ -44,9 +44,10 @@ struct FileFacts {
   std::string serial;
   std::string firmware;
   std::optional<UtcTime> calibration_time;
-  std::string other_firmware = {};       // of the PARAMETERS record, where info.txt names another
+  std::string other_firmware = {};       // of another line or the PARAMETERS record, if it differs
   std::optional<UtcTime> recorded = {};  // from then on, as the header says
   std::optional<UtcTime> other_calibration_time = {};  // where a later record names another
+  std::string other_serial = {};                       // where info.txt names two units
 };
 
 // The date, where it can be one.

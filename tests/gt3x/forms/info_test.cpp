@@ -67,14 +67,13 @@ TEST(Info, Refuses) {
   EXPECT_EQ(Info::parse("Sample Rate: 0")->sample_rate_hz(), 0.0);
 }
 
-TEST(Info, TwoValuesOfWhatDecidesAreRefused) {
-  for (const std::string key : {"Serial Number", "Firmware", "Sample Rate", "Acceleration Scale"}) {
-    const auto two = Info::parse(key + ": 1\r\nSubject Name: a\r\n" + key + ": 2\r\n");
-    EXPECT_FAILS(two, ErrorCode::bad_data);
-    EXPECT_NE(two.error().what.find(key), std::string::npos) << two.error().what;
-    EXPECT_OK(Info::parse(key + ": 1\r\n" + key + ": 1 \r\n"));
-  }
-  EXPECT_OK(Info::parse("Firmware: 1\nSubject Name: a\nSubject Name: b\n"));
+TEST(Info, OfAKeyThatStandsTwiceTheFirstCountsAndTheOtherIsKnown) {
+  const auto two = Info::parse("Firmware: 1.5.0\nRate: 1\nFirmware: 1.5.0 \nFirmware: 1.9.2\n");
+  ASSERT_OK(two);
+  EXPECT_EQ(two->firmware(), "1.5.0");
+  EXPECT_EQ(two->other("Firmware"), "1.9.2");
+  EXPECT_FALSE(two->other("Rate"));
+  EXPECT_FALSE(two->other("Serial Number"));
 }
 
 TEST(Info, TicksBothWays) {

@@ -306,6 +306,20 @@ TEST(Inspection, SaysWhereTheHeadersDisagree) {
       Contains(HasSubstr("the PARAMETERS record before says an acceleration scale of 341")));
 }
 
+TEST(Inspection, WhatInfoSaysTwiceIsToldAndDecidesNothing) {
+  const Inspection found =
+      inspected(made_log(5), made_info() +
+                                 "Serial Number: MOS2A45130451\r\nFirmware: 1.9.2\r\n"
+                                 "Sample Rate: 100\r\nAcceleration Scale: 341\r\n");
+  EXPECT_THAT(
+      found.warnings,
+      ElementsAre(HasSubstr("'Serial Number': MOS2A45130450, which counts, and MOS2A45130451"),
+                  HasSubstr("1.9.2"), HasSubstr("'Sample Rate': 30"), HasSubstr("341")));
+  EXPECT_EQ(found.facts.other_serial, "MOS2A45130451");
+  EXPECT_EQ(found.facts.other_firmware, "1.9.2");
+  EXPECT_EQ(found.rate_hz, 30);
+}
+
 TEST(Inspection, DamageIsToldWithPlaceAndTimeAndNotForEver) {
   Bytes log = made_log(1);
   const std::size_t place = log.size();

@@ -60,6 +60,18 @@ TEST(Triage, FollowsTheTable) {
   }
 }
 
+TEST(Triage, OfTwoUnitsNothingIsKnown) {
+  for (const auto& [serial, other] : {std::pair{"MOS2A45130450", "MOS2A45130451"},
+                                      {"TAS1H30182785", "MOS2A45130450"},
+                                      {"MOS2A45130450", "TAS1H30182785"}}) {
+    FileFacts two = facts(serial, "1.5.0", "2013-11-12");
+    two.other_serial = other;
+    const Triage result = triage(two);
+    EXPECT_EQ(result.verdict, Verdict::cannot_tell);
+    EXPECT_NE(result.reasons.front().find(other), std::string::npos) << result.reasons.front();
+  }
+}
+
 TEST(Triage, TwoFirmwareVersionsAreTwoAnswersUnlessBothSayTheSame) {
   struct Row {
     const char* firmware;
