@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "gap/explain/catalogue.h"
+#include "gap/explain/temperature_lag.h"
 #include "gap/judge/next_segments.h"
 #include "gap/judge/steps.h"
 
@@ -84,35 +85,10 @@ Diagnosis header_of(const Request& request, const ProtocolKind& kind) {
   return out;
 }
 
-Diagnosis diagnose(const Request& request) {
+// All that follows from the records, and from the temperatures of the bundle.
+Diagnosis diagnose_records(const Request& request, const ProtocolKind& kind, const Records& records,
+                           PoseCheck poses, Findings found, Diagnosis out) {
   const Bundle& bundle = request.bundle;
-  const ProtocolKind kind = protocol_kind(bundle);
-  Diagnosis out = header_of(request, kind);
-  CleanSamples clean = clean_samples(bundle);
-  mark_slips(host_timing(bundle), clean);
-  Findings found = judge_marks(request, clean);
-  PoseCheck poses = judge_poses(bundle, clean);
-  if (poses.moving) {
-    return inconclusive(
-        request, std::move(found),
-        "the unit moves inside the segments: the protocol's sample numbers are not of this "
-        "recording",
-        std::move(out));
-  }
-  found.append(std::move(poses.found));
-  NoiseSpectrum noise = noise_spectrum(bundle, clean);
-  if (!noise.usable()) {
-    return inconclusive(
-        request, std::move(found),
-        fmt::format(
-            "too little of the recording lies still and unmasked to know even its noise: of "
-            "{} samples {} are zero on all axes, {} hold one value and {} are clipped",
-            clean.flags.size(), flagged(clean, kSampleZero), flagged(clean, kSampleHeld),
-            flagged(clean, kSampleClipped)),
-        std::move(out));
-  }
-  const Records records = judge_records(request, std::move(clean), std::move(noise), found);
-  out.unit.noise_mg = records.response.white_mg;
   const std::vector<Block> blocks = blocks_of(bundle, records);
   if (blocks.empty()) {
     return inconclusive(request, std::move(found), "no dwell of two unmasked seconds is left",
@@ -154,6 +130,52 @@ Diagnosis diagnose(const Request& request) {
   // Two poses fit any gains and offsets, and what else is there.
   out.inconclusive = out.verdict == Verdict::no_gap && pose_count < kLeastPoses;
   return out;
+}
+
+Diagnosis diagnose(const Request& request) {
+  const Bundle& bundle = request.bundle;
+  const ProtocolKind kind = protocol_kind(bundle);
+  Diagnosis out = header_of(request, kind);
+  CleanSamples clean = clean_samples(bundle);
+  mark_slips(host_timing(bundle), clean);
+  Findings found = judge_marks(request, clean);
+  PoseCheck poses = judge_poses(bundle, clean);
+  if (poses.moving) {
+    return inconclusive(
+        request, std::move(found),
+        "the unit moves inside the segments: the protocol's sample numbers are not of this "
+        "recording",
+        std::move(out));
+  }
+  found.append(std::move(poses.found));
+  NoiseSpectrum noise = noise_spectrum(bundle, clean);
+  if (!noise.usable()) {
+    return inconclusive(
+        request, std::move(found),
+        fmt::format(
+            "too little of the recording lies still and unmasked to know even its noise: of "
+            "{} samples {} are zero on all axes, {} hold one value and {} are clipped",
+            clean.flags.size(), flagged(clean, kSampleZero), flagged(clean, kSampleHeld),
+            flagged(clean, kSampleClipped)),
+        std::move(out));
+  }
+  const Records records = judge_records(request, std::move(clean), std::move(noise), found);
+  out.unit.noise_mg = records.response.white_mg;
+  const double lag_s =
+      bundle.temperature.empty()
+          ? likeliest_lag_s(bundle, blocks_of(bundle, records), {.lsb_mg = request.lsb_mg()})
+          : 0;
+  if (lag_s > 0) {
+    out.losses.push_back(fmt::format(
+        "the unit follows the commanded temperature with a lag of {:.0f} s, as its readings show",
+        lag_s));
+    Bundle followed = bundle;
+    followed.temperature = following_temperature(bundle, lag_s);
+    return diagnose_records({followed, request.options}, kind, records, std::move(poses),
+                            std::move(found), std::move(out));
+  }
+  return diagnose_records(request, kind, records, std::move(poses), std::move(found),
+                          std::move(out));
 }
 
 }  // namespace
