@@ -192,7 +192,7 @@ Explanation::Trial Explanation::explain_by(Scatter scatter, const Eigen::MatrixX
 // effects beside both.
 Explanation::Trial Explanation::explain_by_slow_noise_and_seats(Scatter slow,
                                                                 const Eigen::MatrixXd& linear) {
-  constexpr int kRounds = 2;
+  constexpr int kTurns = 2;
   constexpr double kMiddle_deg = 0.04;  // of the seats that are tried
   const std::vector<double> sizes = sizes_of(slow);
   const auto& record_nats = model_.options().record_nats;
@@ -201,7 +201,7 @@ Explanation::Trial Explanation::explain_by_slow_noise_and_seats(Scatter slow,
   double seats_deg = kMiddle_deg;
   std::vector<int> groups = best_known_.subset.groups;
   Trial trial;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kTurns; ++round) {
     seats_deg = likeliest_of(sizes_of(Scatter::seating), seats_deg, [&](double tried_deg) {
       return model_.evidence(model_.whiten(linear, slow, size, tried_deg), groups);
     });
