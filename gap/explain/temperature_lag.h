@@ -1,6 +1,6 @@
 // The unit's temperature where no log says it: it follows the commanded one with a lag.
 //
-//   const double lag_s = likeliest_lag_s(bundle, blocks_of(bundle), {.lsb_mg = 3.9});
+//   const double lag_s = likeliest_lag_s(bundle, blocks, {.lsb_mg = 3.9});
 //   bundle.temperature = following_temperature(bundle, lag_s);  // then make the blocks again
 //
 // A unit in a chamber takes on its temperature as a body of one time constant does (Newton's law of
