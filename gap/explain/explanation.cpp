@@ -97,6 +97,7 @@ double likeliest_of(const std::vector<double>& sizes, double start,
     }
   }
   std::vector<std::array<double, 2>> tried;
+  tried.reserve(known.size());
   for (const auto& [i, value] : known) {
     tried.push_back({sizes[i], value});
   }

@@ -12,13 +12,18 @@ constexpr double kStep_s = 10;
 // Lags that are tried (conventions): a sensor on a board follows in seconds, a unit in its case in
 // minutes.
 constexpr double kLeastLag_s = 10;
-constexpr double kMostLag_s = 1200;
 constexpr double kFactor = 1.5;
+constexpr int kLags = 12;  // to 865 s
 constexpr double kTwentyTimes_nats = 3;
 constexpr double kChanges_c = 2;
+constexpr double kLongest_s = 30 * 86400;  // what a protocol says is another's word
 
 double end_s(const Segment& segment, const Bundle& bundle) {
   return segment.host_start_s + static_cast<double>(segment.samples) / bundle.rate_hz;
+}
+
+double span_s(const Bundle& bundle) {
+  return end_s(bundle.segments.back(), bundle) - bundle.segments.front().host_start_s;
 }
 
 bool changes(const Bundle& bundle) {
@@ -57,8 +62,10 @@ TemperatureLog following_temperature(const Bundle& bundle, double lag_s) {
   double unit_c = bundle.segments.front().temperature_start_c;
   const double kept = lag_s > 0 ? std::exp(-kStep_s / lag_s) : 0;
   auto segment = bundle.segments.begin();
-  for (double time_s = start_s; time_s < end_s(bundle.segments.back(), bundle) + kStep_s;
-       time_s += kStep_s) {
+  const double length_s = std::clamp(span_s(bundle), 0.0, kLongest_s);
+  const int steps = 1 + static_cast<int>(std::ceil(length_s / kStep_s));
+  for (int step = 0; step < steps; ++step) {
+    const double time_s = start_s + kStep_s * step;
     while (segment + 1 != bundle.segments.end() && time_s > end_s(*segment, bundle)) {
       ++segment;
     }
@@ -78,7 +85,7 @@ TemperatureLog following_temperature(const Bundle& bundle, double lag_s) {
 double likeliest_lag_s(const Bundle& bundle, std::vector<Block> blocks,
                        const EvidenceOptions& options) {
   if (!bundle.temperature.empty() || bundle.segments.empty() || blocks.empty() ||
-      !changes(bundle)) {
+      !changes(bundle) || !(span_s(bundle) <= kLongest_s)) {
     return 0;
   }
   const auto nats_of = [&](double lag_s) {
@@ -103,8 +110,8 @@ double likeliest_lag_s(const Bundle& bundle, std::vector<Block> blocks,
       best_s = lag_s;
     }
   };
-  for (double lag_s = kLeastLag_s; lag_s < kMostLag_s; lag_s *= kFactor) {
-    try_lag(lag_s);
+  for (int i = 0; i < kLags; ++i) {
+    try_lag(kLeastLag_s * std::pow(kFactor, i));
   }
   double factor = kFactor;
   for (int halving = 0; halving < 6 && best_s > 0; ++halving) {

@@ -18,12 +18,14 @@
 
 namespace sixpoint::gap {
 
-// Every ten seconds of host time, from the first segment's start to the last one's end.
+// Every ten seconds of host time, from the first segment's start to the last one's end, of thirty
+// days at most.
 TemperatureLog following_temperature(const Bundle& bundle, double lag_s);
 
 // The lag with which temperature explains the blocks best, beside the other effects of the means
 // that every unit has a little of. 0 where the bundle has a log, where the commanded temperature
-// does not change by 2 C, or where no lag is twenty times as likely as none.
+// does not change by 2 C, where the bundle lasts for more than thirty days, or where no lag is twenty
+// times as likely as none.
 double likeliest_lag_s(const Bundle& bundle, std::vector<Block> blocks,
                        const EvidenceOptions& options);
 

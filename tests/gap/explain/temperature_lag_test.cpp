@@ -59,6 +59,10 @@ TEST(TemperatureLag, IsFoundWhereTheZeroFollowsTemperature) {
                             blocks_with_tempco(bundle, 120, 0.5), {}),
             0)
       << "it was not changed";
+  Bundle endless = bundle;
+  endless.segments.back().host_start_s = 1e9;
+  EXPECT_EQ(likeliest_lag_s(endless, blocks_with_tempco(bundle, 120, 0.5), {}), 0);
+  EXPECT_LT(following_temperature(endless, 120).temperature_c.size(), 300'000U);
   Bundle logged = bundle;
   logged.temperature = following_temperature(bundle, 120);
   EXPECT_EQ(likeliest_lag_s(logged, blocks_with_tempco(bundle, 120, 0.5), {}), 0)
