@@ -45,9 +45,8 @@ std::vector<int> usual_groups(const EvidenceModel& model) {
       "third_order", "offset_tempco", "sensitivity_tempco", "drift"};
   std::vector<int> groups;
   for (const std::string_view effect : kUsual) {
-    for (const int g : model.groups_of(std::string(effect))) {
-      groups.push_back(g);
-      break;
+    if (const auto own = model.groups_of(std::string(effect)); !own.empty()) {
+      groups.push_back(own.front());
     }
   }
   std::ranges::sort(groups);

@@ -125,9 +125,8 @@ namespace {
 // Excess kurtosis that repeated samples add at one sample's scale, less at all others: a share of
 // the differences is zero, which alone would add three times the share.
 double excess_of_repeats(const Findings& before) {
-  constexpr double kNone = 0;
   const auto found = std::ranges::find(before.effects, "duplicated_samples", &EffectFinding::name);
-  return found == before.effects.end() ? kNone : 3 * found->parameters.front().value.front();
+  return found == before.effects.end() ? 0 : 3 * found->parameters.front().value.front();
 }
 
 // A hold that ends at a segment's end is a short run of its own: one in five holds does. What a
