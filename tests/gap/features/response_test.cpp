@@ -7,6 +7,23 @@
 namespace sixpoint::gap {
 namespace {
 
+// A usable fit of a tone along z, whose amplitude came through `gain`.
+void add_tone(Bundle& bundle, std::vector<ToneFit>& tones, double f_hz, double amplitude_g,
+              double gain) {
+  Segment segment;
+  segment.kind = Segment::Kind::vibration;
+  segment.vibration = Vibration{Eigen::Vector3d::UnitZ(), f_hz, amplitude_g};
+  ToneFit tone;
+  tone.segment = bundle.segments.size();
+  tone.axis = 2;
+  tone.usable = true;
+  tone.samples = 1000;
+  tone.in_phase_mg[2] = 1000 * amplitude_g * gain;
+  tone.residual_mg = 4;
+  bundle.segments.push_back(segment);
+  tones.push_back(tone);
+}
+
 TEST(Response, ClosedForms) {
   EXPECT_NEAR(low_pass_gain(20, 20, 4, 100), M_SQRT1_2, 1e-12);
   EXPECT_NEAR(low_pass_gain(1, 30, 4, 100), 1, 1e-6);
@@ -43,19 +60,8 @@ TEST(Response, TonesBehindAResonanceGiveItsFrequencyAndQ) {
   Bundle bundle;
   std::vector<ToneFit> tones;
   const Resonance mount{14, 2.5, ResonanceForm::second_order, 0};
-  for (const double f : {2.0, 4.0, 7.0, 10.0, 13.0, 16.0, 25.0, 40.0}) {
-    Segment segment;
-    segment.kind = Segment::Kind::vibration;
-    segment.vibration = Vibration{Eigen::Vector3d::UnitZ(), f, 0.5};
-    ToneFit tone;
-    tone.segment = bundle.segments.size();
-    tone.axis = 2;
-    tone.usable = true;
-    tone.samples = 1000;
-    tone.in_phase_mg[2] = 500 * 0.9 * resonance_gain(f, mount);
-    tone.residual_mg = 4;
-    bundle.segments.push_back(segment);
-    tones.push_back(tone);
+  for (const double f_hz : {2.0, 4.0, 7.0, 10.0, 13.0, 16.0, 25.0, 40.0}) {
+    add_tone(bundle, tones, f_hz, 0.5, 0.9 * resonance_gain(f_hz, mount));
   }
   const Response response = find_response(bundle, {}, tones, {});
   ASSERT_TRUE(response.resonance_significant);
@@ -83,18 +89,7 @@ TEST(Response, TheNoiseTellsAFilterFromTheMountBeforeIt) {
   const Resonance mount{16, 2.5, ResonanceForm::second_order, 0};
   std::vector<ToneFit> tones;
   for (const double f_hz : {2.0, 3.0, 5.0, 8.0, 12.0, 15.0, 20.0, 30.0, 40.0}) {
-    Segment segment;
-    segment.kind = Segment::Kind::vibration;
-    segment.vibration = Vibration{Eigen::Vector3d::UnitZ(), f_hz, 1};
-    ToneFit tone;
-    tone.segment = bundle.segments.size();
-    tone.axis = 2;
-    tone.usable = true;
-    tone.samples = 1000;
-    tone.in_phase_mg[2] = 1000 * filter(f_hz) * resonance_gain(f_hz, mount);
-    tone.residual_mg = 4;
-    bundle.segments.push_back(segment);
-    tones.push_back(tone);
+    add_tone(bundle, tones, f_hz, 1, filter(f_hz) * resonance_gain(f_hz, mount));
   }
   const Response response = find_response(bundle, noise, tones, {});
   ASSERT_TRUE(response.low_pass_significant);
