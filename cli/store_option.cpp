@@ -126,7 +126,9 @@ Result<db::Saved> keep_records(Context& context, const std::string& location,
     }
     return kept;
   }
-  context.log().warn("{}", kept->refusal->brief());
+  // Without its hint: it would say to do the work again.
+  context.log().warn(
+      "{}", Error{kept->refusal->code, kept->refusal->what, kept->refusal->where, {}}.brief());
   if (kept->last_resort) {
     context.worsen(ErrorCode::io);
     context.log().warn(

@@ -7,6 +7,7 @@
 #include "cli/output.h"
 #include "cli/station/operator.h"
 #include "cli/store_option.h"
+#include "station/records/station_guard.h"
 #include "station/records/station_records.h"
 
 namespace sixpoint::cli {
@@ -122,8 +123,13 @@ Status retest(const CheckUnitCommandOptions& options, Context& context) {
   }
   SIXPOINT_ASSIGN(auto store, open_existing_store(context, options.store));
   SIXPOINT_ASSIGN(const auto limits, station::read_limits(context.env.files, options.limits));
+  SIXPOINT_ASSIGN(const db::UnitHistory history, store.unit_history(options.serial));
+  if (history.empty()) {
+    context.log().warn("{}: the store knows no such unit", printable(options.serial));
+  }
   SIXPOINT_ASSIGN(const auto state,
-                  station::unit_retest_state(store, options.serial, limits.retest));
+                  station::StationGuard(context.env, guard_folder(options.store), limits)
+                      .unit_state(store, options.serial));
   context.worsen(state.may_start ? kExitPassed : kExitFailed);
   Json json = document("retest");
   json["serial"] = options.serial;

@@ -390,8 +390,7 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
     return done.kept ? Status{} : fail(done.kept.error());
   };
   SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, stop, store_run));
-  if (const Status noted = guard.note_verdict(identity.serial, done.report.verdict, record.kind);
-      !noted) {
+  if (const Status noted = guard.note_run(record, done.kept && done.kept->in_store()); !noted) {
     context.log().warn("{}", noted.error().brief());
   }
   if (done.kept) {

@@ -174,12 +174,12 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
         return {};
       }));
   stored.is_kept_here = !saved.in_store();
+  run.id = stored.ids.run_id;
   if (saved.in_store()) {
     stored.documents = station::documents_of(run);  // made from the store alone
-    run.id = stored.ids.run_id;
     print_label(run);
   }
-  if (const Status noted = guard_.note_verdict(report.serial, report.verdict, run.kind); !noted) {
+  if (const Status noted = guard_.note_run(run, saved.in_store()); !noted) {
     context_.log().warn("{}", noted.error().brief());
   }
   return stored;

@@ -18,6 +18,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kName = "/memory.json";
 constexpr std::uint64_t kMostMemory_bytes = 16U << 20U;
 constexpr std::size_t kMostNames = 64;
+constexpr std::size_t kMostWaiting = 64;  // runs of one unit
 
 bool contains(const std::vector<std::string>& list, const std::string& text) {
   return std::ranges::find(list, text) != list.end();
@@ -43,6 +44,14 @@ Json to_json(const StationMemory& memory) {
                              {"retest_of", state.retest_of},
                              {"reason", state.reason}};
   }
+  json["waiting"] = Json::object();
+  for (const auto& [serial, runs] : memory.waiting) {
+    for (const EndedRun& each : runs) {
+      json["waiting"][serial].push_back({{"run", each.run.id},
+                                         {"verdict", to_string(each.run.verdict)},
+                                         {"ended", to_iso8601(each.ended)}});
+    }
+  }
   return json;
 }
 
@@ -62,6 +71,18 @@ StationMemory parse_memory(const Json& json) {
     item.at("retest_of").get_to(state.retest_of);
     item.at("reason").get_to(state.reason);
     memory.units[serial] = state;
+  }
+  const Json waiting = json.value("waiting", Json::object());  // earlier versions did not note it
+  for (const auto& [serial, runs] : waiting.items()) {
+    for (const Json& item : runs) {
+      const auto verdict = parse_jig_verdict(item.at("verdict").get<std::string>());
+      const auto ended = parse_iso8601(item.at("ended").get<std::string>());
+      if (!verdict || !ended) {
+        throw std::invalid_argument("waiting");
+      }
+      memory.waiting[serial].push_back(
+          {{item.at("run").get<std::string>(), *verdict, {}, false}, *ended});
+    }
   }
   return memory;
 }
@@ -84,14 +105,15 @@ Result<StationMemory> StationGuard::memory() const {
   }
   try {
     return parse_memory(Json::parse(*bytes, nullptr, false));
-  } catch (const std::exception&) {  // of nlohmann
+  } catch (const std::exception&) {  // of nlohmann, and a value that is none
     return damaged();
   }
 }
 
 Status StationGuard::remember(StationMemory memory) const {
   const bool known = env_.files.info(folder_ + kName).has_value();
-  if (!known && !memory.locked && memory.check_units.empty() && memory.units.empty()) {
+  if (!known && !memory.locked && memory.check_units.empty() && memory.units.empty() &&
+      memory.waiting.empty()) {
     return {};
   }
   if (memory.id.empty()) {
@@ -133,16 +155,48 @@ Result<RetestState> StationGuard::ask_store(db::Store& store, const std::string&
       known.locked_as = each;
     }
   }
-  SIXPOINT_ASSIGN(const RetestState unit, unit_retest_state(store, serial, limits_.retest));
-  known.units.erase(serial);
-  if (demands_something(unit)) {
-    known.units[serial] = unit;
-  }
+  SIXPOINT_CHECK(refresh(known, store, serial));
   SIXPOINT_CHECK(remember(known));
   if (known.locked && !contains(known.check_units, serial)) {
     return fail(station_is_locked(known.why, known.locked_as));
   }
-  return station::may_start(store, serial, name, limits_);
+  const auto waiting = known.waiting.find(serial);
+  return station::may_start(
+      store, serial, name, limits_,
+      waiting == known.waiting.end() ? std::vector<EndedRun>{} : waiting->second);
+}
+
+Result<RetestState> StationGuard::refresh(StationMemory& memory, db::Store& store,
+                                          const std::string& serial) const {
+  std::vector<EndedRun> waiting;
+  for (const EndedRun& each : memory.waiting[serial]) {
+    const auto found = each.run.id.empty() ? Result<std::string>(fail(ErrorCode::no_input, ""))
+                                           : store.whole_key("runs", each.run.id);
+    if (!found && found.error().code != ErrorCode::no_input) {
+      return fail(found.error());
+    }
+    if (!found) {
+      waiting.push_back(each);
+    }
+  }
+  SIXPOINT_ASSIGN(RetestState state, unit_retest_state(store, serial, limits_.retest, waiting));
+  memory.units.erase(serial);
+  if (demands_something(state)) {
+    memory.units[serial] = state;
+  } else {
+    // A run that nothing took will never be in the store.
+    std::erase_if(waiting, [](const EndedRun& each) { return each.run.id.empty(); });
+  }
+  memory.waiting[serial] = std::move(waiting);
+  if (memory.waiting[serial].empty()) {
+    memory.waiting.erase(serial);
+  }
+  return state;
+}
+
+Result<RetestState> StationGuard::unit_state(db::Store& store, const std::string& serial) const {
+  SIXPOINT_ASSIGN(StationMemory known, memory());
+  return refresh(known, store, serial);
 }
 
 Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
@@ -165,15 +219,24 @@ Result<RetestState> StationGuard::ask_memory(const std::string& serial) const {
   return unit->second;
 }
 
-Status StationGuard::note_verdict(const std::string& serial, JigVerdict verdict,
-                                  std::string_view kind) {
-  if (kind != "jig") {
+Status StationGuard::note_run(const db::RunRecord& run, bool is_stored) {
+  const auto verdict = parse_jig_verdict(run.verdict);
+  const bool failed =
+      verdict && (*verdict == JigVerdict::fail || *verdict == JigVerdict::conditional_fail);
+  if (run.kind != "jig" || !verdict || (!failed && !is_passed(*verdict))) {
     return {};
   }
   SIXPOINT_ASSIGN(StationMemory known, memory());
-  const auto found = known.units.find(serial);
+  const auto found = known.units.find(run.serial);
+  if (!is_stored && (failed || found != known.units.end())) {
+    std::vector<EndedRun>& waiting = known.waiting[run.serial];
+    waiting.push_back({{run.id, *verdict, {}, false}, run.ended});
+    if (waiting.size() > kMostWaiting) {
+      waiting.erase(waiting.begin());
+    }
+  }
   RetestState state = found == known.units.end() ? RetestState{} : found->second;
-  if (verdict == JigVerdict::fail || verdict == JigVerdict::conditional_fail) {
+  if (failed) {
     ++state.failures_in_row;
     state.passes_needed = limits_.retest.passes_after_failure;
     if (state.failures_in_row >= limits_.retest.most_failures) {
@@ -181,16 +244,14 @@ Status StationGuard::note_verdict(const std::string& serial, JigVerdict verdict,
       state.reason = fmt::format("the unit failed {} times in a row, as often as the limits allow",
                                  state.failures_in_row);
     }
-    known.units[serial] = state;
-  } else if (is_passed(verdict) && found != known.units.end()) {
+    known.units[run.serial] = state;
+  } else if (found != known.units.end()) {
     state.failures_in_row = 0;
     if (--state.passes_needed > 0) {
-      known.units[serial] = state;
+      known.units[run.serial] = state;
     } else {
       known.units.erase(found);
     }
-  } else {
-    return {};
   }
   return remember(std::move(known));
 }

@@ -3,7 +3,7 @@
 //
 //   StationGuard guard(env, "data/station/3f2a", limits);
 //   SIXPOINT_ASSIGN(const RetestState state, guard.may_start(opened, "MOS2A45130007", "bench-1"));
-//   SIXPOINT_CHECK(guard.note_verdict("MOS2A45130007", JigVerdict::fail, "jig"));  // after it
+//   SIXPOINT_CHECK(guard.note_run(run, /*is_stored=*/true));  // after it
 //
 // The station has an identity of its own: the folder beside its state, one for each store. Its file
 // memory.json holds an identifier that is made once, the names that the station went by, and what
@@ -13,7 +13,9 @@
 // | store   | the station, under any of its names | unit                    | answer              |
 // |---------|-------------------------------------|-------------------------|---------------------|
 // | answers | open or locked                      | any                     | as may_start() of   |
-// |         |                                     |                         | station_records.h   |
+// |         |                                     |                         | station_records.h,  |
+// |         |                                     |                         | with the runs that  |
+// |         |                                     |                         | it does not have    |
 // | away    | locked when the store said it last  | a check unit            | yes                 |
 // | away    | locked when the store said it last  | any other               | configuration error |
 // | away    | open                                | failed too often        | configuration error |
@@ -29,13 +31,13 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "base/env.h"
 #include "db/store.h"
 #include "station/limits/limits.h"
 #include "station/limits/verdict.h"
+#include "station/records/station_records.h"
 
 namespace sixpoint::station {
 
@@ -47,6 +49,7 @@ struct StationMemory {
   std::string why;        // for people
   std::vector<std::string> check_units;
   std::map<std::string, RetestState> units;  // those whose earlier runs demand something
+  std::map<std::string, std::vector<EndedRun>> waiting;  // runs that the store does not have yet
 };
 
 class StationGuard {
@@ -58,8 +61,11 @@ class StationGuard {
   // `store`: the store, or why it does not answer.
   Result<RetestState> may_start(Result<db::Store>& store, const std::string& serial,
                                 const std::string& name);
-  // After a run, whether it was stored or not. Only those of kind "jig" count, as in the store.
-  Status note_verdict(const std::string& serial, JigVerdict verdict, std::string_view kind);
+  // What the unit's runs demand of the next one, those too that the store does not have yet.
+  Result<RetestState> unit_state(db::Store& store, const std::string& serial) const;
+  // After a run. Only those of kind "jig" count, as in the store. `run.id` is empty where nothing
+  // took the run.
+  Status note_run(const db::RunRecord& run, bool is_stored);
 
   Result<StationMemory> memory() const;  // empty where nothing was remembered
 
@@ -67,6 +73,9 @@ class StationGuard {
   Result<RetestState> ask_store(db::Store& store, const std::string& serial,
                                 const std::string& name);
   Result<RetestState> ask_memory(const std::string& serial) const;
+  // Brings what `memory` holds about the unit up to what the store has now.
+  Result<RetestState> refresh(StationMemory& memory, db::Store& store,
+                              const std::string& serial) const;
   Status remember(StationMemory memory) const;
 
   Env& env_;

@@ -358,25 +358,32 @@ Json StationState::to_json() const {
 }
 
 Result<RetestState> unit_retest_state(db::Store& store, const std::string& serial,
-                                      const RetestPolicy& policy) {
+                                      const RetestPolicy& policy,
+                                      const std::vector<EndedRun>& waiting) {
   SIXPOINT_ASSIGN(const auto events, store.station_events());
-  std::vector<EarlierRun> earlier;
-  std::vector<UtcTime> ended;
+  std::vector<EndedRun> runs;
   db::RunFilter filter;
   filter.serial = serial;
   SIXPOINT_CHECK(store.for_each_run(filter, [&](const db::RunRecord& run) -> Status {
-    earlier.push_back({run.id, parse_jig_verdict(run.verdict).value_or(JigVerdict::inconclusive),
-                       run.codes, false});
-    ended.push_back(run.ended);
+    runs.push_back({{run.id, parse_jig_verdict(run.verdict).value_or(JigVerdict::inconclusive),
+                     run.codes, false},
+                    run.ended});
     return {};
   }));
+  runs.insert(runs.end(), waiting.begin(), waiting.end());
+  std::ranges::stable_sort(runs, {}, &EndedRun::ended);
   for (const db::StationEvent& event : events) {
     if (event.action == "release" && event.serial == serial) {
-      const auto after = std::upper_bound(ended.begin(), ended.end(), event.made_at);
-      if (after != ended.begin()) {
-        earlier[static_cast<std::size_t>(after - ended.begin()) - 1].released_after = true;
+      const auto after = std::ranges::upper_bound(runs, event.made_at, {}, &EndedRun::ended);
+      if (after != runs.begin()) {
+        std::prev(after)->run.released_after = true;
       }
     }
+  }
+  std::vector<EarlierRun> earlier;
+  earlier.reserve(runs.size());
+  for (EndedRun& each : runs) {
+    earlier.push_back(std::move(each.run));
   }
   return retest_state(earlier, policy);
 }
@@ -399,7 +406,8 @@ Error unit_needs_release(const RetestState& state, const std::string& serial) {
 }
 
 Result<RetestState> may_start(db::Store& store, const std::string& serial,
-                              const std::string& station, const Limits& limits) {
+                              const std::string& station, const Limits& limits,
+                              const std::vector<EndedRun>& waiting) {
   SIXPOINT_ASSIGN(const auto events, store.station_events());
   const std::set<std::string> check_units = check_units_of(events);
   if (check_units.contains(serial)) {
@@ -409,7 +417,7 @@ Result<RetestState> may_start(db::Store& store, const std::string& serial,
   if (here.locked) {
     return fail(station_is_locked(here.brief(), station));
   }
-  SIXPOINT_ASSIGN(RetestState state, unit_retest_state(store, serial, limits.retest));
+  SIXPOINT_ASSIGN(RetestState state, unit_retest_state(store, serial, limits.retest, waiting));
   if (!state.may_start) {
     return fail(unit_needs_release(state, serial));
   }

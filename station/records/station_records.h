@@ -88,9 +88,16 @@ Result<StationState> station_state(db::Store& store, const std::string& station,
 //   any other                                         added
 Result<std::string> add_decision(db::Store& store, const db::StationEvent& decision);
 
-// What a unit's earlier jig runs and releases demand of the next one.
+// A run of a unit, and when it ended.
+struct EndedRun {
+  EarlierRun run;
+  UtcTime ended;
+};
+// What a unit's earlier jig runs and releases demand of the next one. `waiting`: runs that the
+// store does not have yet.
 Result<RetestState> unit_retest_state(db::Store& store, const std::string& serial,
-                                      const RetestPolicy& policy);
+                                      const RetestPolicy& policy,
+                                      const std::vector<EndedRun>& waiting = {});
 
 // The rule that decides whether a unit may be measured now, in this order:
 //
@@ -100,7 +107,8 @@ Result<RetestState> unit_retest_state(db::Store& store, const std::string& seria
 //   failed too often (limits)   open      configuration error: an engineer releases the unit
 //   any other                   open      yes, with what its earlier runs demand of this one
 Result<RetestState> may_start(db::Store& store, const std::string& serial,
-                              const std::string& station, const Limits& limits);
+                              const std::string& station, const Limits& limits,
+                              const std::vector<EndedRun>& waiting = {});
 
 // May constants that a run put into the store be written into their unit now ("write now")?
 //

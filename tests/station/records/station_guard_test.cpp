@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "station/records/made_station.h"
@@ -23,17 +24,29 @@ class StationGuards : public tests::StationRecords {
     Result<db::Store> away = fail(ErrorCode::io, "the server does not answer");
     return guard_.may_start(away, serial, name);
   }
+  // A run that ended just now and that the store does not have, or has.
+  Status note(const std::string& serial, JigVerdict verdict, bool is_stored = false,
+              const std::string& kind = "jig") {
+    db::RunRecord run;
+    run.id = fmt::format("{:064x}", ++noted_);
+    run.serial = serial;
+    run.kind = kind;
+    run.verdict = to_string(verdict);
+    run.ended = env_.clock.now();
+    return guard_.note_run(run, is_stored);
+  }
   void lock() {
     decide("check_unit", "CHECK1");
     baseline();
     add_run("CHECK1", JigVerdict::pass, 200);
   }
   StationGuard guard_;
+  int noted_ = 0;
 };
 
 TEST_F(StationGuards, WhereNothingIsToBeRememberedNothingIsWritten) {
   EXPECT_OK(ask("MOS2A1"));
-  EXPECT_OK(guard_.note_verdict("MOS2A1", JigVerdict::pass, "jig"));
+  EXPECT_OK(note("MOS2A1", JigVerdict::pass));
   EXPECT_FALSE(posix_env().files.info(folder_ / "memory"));
   EXPECT_OK(ask_without_store("MOS2A1"));
 }
@@ -79,29 +92,74 @@ TEST_F(StationGuards, TheLimitOnFailuresHoldsWhileTheStoreIsAway) {
   EXPECT_OK(ask("MOS2A1"));
   for (int failures = 2; failures <= default_limits().retest.most_failures; ++failures) {
     EXPECT_OK(ask_without_store("MOS2A1"));
-    ASSERT_OK(guard_.note_verdict("MOS2A1", JigVerdict::fail, "jig"));
+    ASSERT_OK(note("MOS2A1", JigVerdict::fail));
   }
   const auto refused = ask_without_store("MOS2A1");
   EXPECT_FAILS(refused, ErrorCode::configuration);
   EXPECT_THAT(refused.error().hint, HasSubstr("retest MOS2A1 --release"));
   EXPECT_OK(ask_without_store("MOS2A2"));
   // Passes that are needed after a failure count down.
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::fail, "jig"));
+  ASSERT_OK(note("MOS2A3", JigVerdict::fail));
   EXPECT_EQ(ask_without_store("MOS2A3")->passes_needed, 2);
   // A write after the run, and a gage study, are no second run.
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass, kWriteKind));
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::fail, kStudyKind));
+  ASSERT_OK(note("MOS2A3", JigVerdict::pass, false, kWriteKind));
+  ASSERT_OK(note("MOS2A3", JigVerdict::fail, false, kStudyKind));
   EXPECT_EQ(ask_without_store("MOS2A3")->passes_needed, 2);
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass, "jig"));
+  ASSERT_OK(note("MOS2A3", JigVerdict::pass));
   EXPECT_EQ(ask_without_store("MOS2A3")->passes_needed, 1);
-  ASSERT_OK(guard_.note_verdict("MOS2A3", JigVerdict::pass, "jig"));
+  ASSERT_OK(note("MOS2A3", JigVerdict::pass));
   EXPECT_FALSE(guard_.memory()->units.contains("MOS2A3"));
+}
+
+// A full disk: the store answers what it has, and takes nothing. A tester's four runs: the fourth
+// passed.
+TEST_F(StationGuards, RunsThatAStoreDoesNotTakeCountBesideThoseThatItHas) {
+  add_run("MOS2A1", JigVerdict::fail);
+  EXPECT_EQ(ask("MOS2A1")->failures_in_row, 1);
+  ASSERT_OK(note("MOS2A1", JigVerdict::fail));
+  EXPECT_EQ(ask("MOS2A1")->failures_in_row, 2);
+  EXPECT_EQ(ask("MOS2A1")->passes_needed, 2);
+  ASSERT_OK(note("MOS2A1", JigVerdict::fail));
+  EXPECT_FAILS(ask("MOS2A1"), ErrorCode::configuration);
+  EXPECT_EQ(guard_.unit_state(store_, "MOS2A1")->failures_in_row, 3);
+  EXPECT_OK(ask("MOS2A2")) << "another unit is not concerned";
+  // The release comes after them.
+  decide("release", "MOS2A1");
+  EXPECT_EQ(ask("MOS2A1")->failures_in_row, 0);
+  EXPECT_EQ(ask("MOS2A1")->passes_needed, 2) << "released, and not yet passed";
+  ASSERT_OK(note("MOS2A1", JigVerdict::pass));
+  EXPECT_EQ(ask("MOS2A1")->passes_needed, 1);
+  ASSERT_OK(note("MOS2A1", JigVerdict::pass));
+  EXPECT_EQ(ask("MOS2A1")->passes_needed, 1);
+  EXPECT_TRUE(ask("MOS2A1")->retest_of.empty()) << "it counts as passed";
+}
+
+TEST_F(StationGuards, ARunThatTheStoreTookLaterCountsOnce) {
+  add_run("MOS2A1", JigVerdict::fail);
+  db::RunRecord taken;
+  ASSERT_OK(store_.for_each_run({}, [&](const db::RunRecord& run) -> Status {
+    taken = run;
+    return {};
+  }));
+  ASSERT_OK(guard_.note_run(taken, /*is_stored=*/false));
+  EXPECT_EQ(ask("MOS2A1")->failures_in_row, 1);
+  EXPECT_TRUE(guard_.memory()->waiting.empty());
+  // A run that nothing took has no id: it counts until the unit counts as passed.
+  taken.id.clear();
+  ASSERT_OK(guard_.note_run(taken, /*is_stored=*/false));
+  EXPECT_EQ(ask("MOS2A1")->failures_in_row, 2);
+  add_run("MOS2A1", JigVerdict::pass);
+  add_run("MOS2A1", JigVerdict::pass);
+  EXPECT_EQ(ask("MOS2A1")->failures_in_row, 0);
+  EXPECT_TRUE(guard_.memory()->waiting.empty());
 }
 
 TEST_F(StationGuards, AMemoryThatCannotBeReadOpensNothing) {
   lock();
   EXPECT_FAILS(ask("MOS2A1"), ErrorCode::configuration);
-  for (const char* text : {"", "{}", "[]", R"({"id": 7})"}) {
+  for (const char* text : {"", "{}", "[]", R"({"id": 7})",
+                           R"({"id": "a", "names": [], "locked": false, "locked_as": "", "why": "",
+                               "check_units": [], "units": {}, "waiting": {"MOS2A1": [{}]}})"}) {
     std::ofstream(folder_ / "memory/memory.json") << text;
     EXPECT_FAILS(ask_without_store("MOS2A1"), ErrorCode::configuration);
     const auto held = ask("MOS2A1");
