@@ -208,15 +208,19 @@ std::string run_folder(const Context& context, const JigCommandOptions& options,
 
 station::UnfinishedRun unfinished_run(const JigCommandOptions& options,
                                       const device::Identity& identity,
-                                      const station::JigSessionOptions& session) {
+                                      const station::JigSessionOptions& session,
+                                      bool is_authenticated) {
   return {.device = options.device,
           .serial = identity.serial,
           .firmware = identity.firmware,
           .operator_name = options.operator_name,
+          .is_authenticated = is_authenticated,
           .station = options.station,
           .write = options.write,
           .filter = session.filter,
-          .protocol = session.run.protocol};
+          .protocol = session.run.protocol,
+          .jig_id = options.jig_id,
+          .gravity_m_per_s2 = session.gravity.m_per_s2};
 }
 
 Result<station::JigSessionOptions> session_options(Context& context,
@@ -301,22 +305,27 @@ station::JigHooks terminal_hooks(Context& context, const JigCommandOptions& opti
   return hooks;
 }
 
+// Stores a run that has ended; `begun`: who measured it, where several did.
+using StoreEndedRun =
+    std::function<Status(const station::JigReport&, const station::UnfinishedRun& begun)>;
+
 // The run itself. It is saved in a folder while it is under way, so that the next program can go on
 // with it, until `store_run` has stored the report.
-Result<station::JigReport> run_and_store(
-    Context& context, const JigCommandOptions& options, const JiggedUnit& opened,
-    const station::JigSessionOptions& session, std::optional<StopRequest>& stop,
-    const std::function<Status(const station::JigReport&)>& store_run) {
+Result<station::JigReport> run_and_store(Context& context, const JigCommandOptions& options,
+                                         const JiggedUnit& opened,
+                                         const station::JigSessionOptions& session,
+                                         bool is_authenticated, std::optional<StopRequest>& stop,
+                                         const StoreEndedRun& store_run) {
   station::JigHooks hooks = terminal_hooks(context, options, opened, stop);
   const device::Identity& identity = opened.unit->identity();
   const std::string path = run_folder(context, options, *opened.jig, identity.serial);
   station::RunFolder folder(context.env, path);
   station::RunSaver saver(
-      folder, unfinished_run(options, identity, session),
+      folder, unfinished_run(options, identity, session, is_authenticated),
       [&context](const std::string& warning) { context.log().warn("{}", warning); });
   std::optional<station::JigResume> left;
   if (!path.empty()) {
-    left = saver.take_left_over(options.anew);
+    SIXPOINT_ASSIGN(left, saver.take_left_over(options.anew));
     hooks.raw = [&saver](std::string_view rows) { saver.add_rows(rows); };
     hooks.progress = [&saver](const station::JigReport& report, const station::JigRun& run) {
       saver.save(report, run);
@@ -333,7 +342,7 @@ Result<station::JigReport> run_and_store(
   }
   SIXPOINT_ASSIGN(auto report,
                   station::run_jig(opened.on_jig(), context.env, session, hooks, left));
-  if (store_run(report) && !path.empty()) {
+  if (store_run(report, saver.state()) && !path.empty()) {
     saver.end();
   }
   return report;
@@ -376,8 +385,10 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
   SIXPOINT_ASSIGN(auto record,
                   record_before(options, session, identity.serial, opened.jig->name(), store));
   JigDone done;
-  const auto store_run = [&](const station::JigReport& report) -> Status {
-    station::complete_run_record(record, report, options.study, who.is_authenticated);
+  const auto store_run = [&](const station::JigReport& report,
+                             const station::UnfinishedRun& begun) -> Status {
+    record.operator_name = begun.operator_name;
+    station::complete_run_record(record, report, options.study, begun.is_authenticated);
     station::RunIds stored;
     done.kept =
         keep_records(context, options.store, store, [&](db::RecordWriter& writer) -> Status {
@@ -389,7 +400,8 @@ Result<JigDone> measure(Context& context, const JigCommandOptions& options, Outp
     record.id = done.run_id;
     return done.kept ? Status{} : fail(done.kept.error());
   };
-  SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session, stop, store_run));
+  SIXPOINT_ASSIGN(done.report, run_and_store(context, options, opened, session,
+                                             who.is_authenticated, stop, store_run));
   if (const Status noted = guard.note_run(record, done.kept && done.kept->in_store()); !noted) {
     context.log().warn("{}", noted.error().brief());
   }

@@ -154,7 +154,7 @@ Result<station::RunInStore> StationStore::add_run(const station::JigReport& meas
                                                   const station::RunLabels& labels) {
   const std::lock_guard lock(mutex_);
   db::RunRecord run = station::run_record_before(
-      session_, measured.serial, options_.jig_id.empty() ? measured.jig : options_.jig_id);
+      session_, measured.serial, labels.jig_id.empty() ? measured.jig : labels.jig_id);
   run.jig_due = jig_due_.due;
   station::JigReport report = measured;
   if (std::string note = station::jig_due_note(jig_due_, measured.started); !note.empty()) {
@@ -230,6 +230,7 @@ Result<station::LanesOptions> lanes_options(Context& context,
   lanes.devices = options.devices;
   lanes.state_folder = state_folder(options);
   lanes.station = options.station;
+  lanes.jig_id = options.jig_id;
   lanes.capture_folder = options.files;
   lanes.capture.side_s = options.side_s;
   SIXPOINT_ASSIGN(const auto gravity, local_gravity(options.gravity));

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "db/name_rule.h"
+#include "station/lanes/continue_rule.h"
 #include "station/lanes/lane.h"
 
 namespace sixpoint::station {
@@ -72,16 +72,6 @@ JigReport interrupted_report(const UnfinishedRun& left, const JigSessionOptions&
   return report;
 }
 
-// Of a run that another person took over, or whose constants another person wrote. Names that the
-// store does not take together (db::check_name) leave the one who ended it.
-std::string both_names(const std::string& began, const std::string& ended) {
-  if (began == ended || began.ends_with(", then " + ended)) {
-    return began;
-  }
-  std::string both = began.empty() ? ended : began + ", then " + ended;
-  return db::check_name(both) ? both : ended;
-}
-
 }  // namespace
 
 void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
@@ -135,8 +125,9 @@ void Lanes::Lane::run(const std::stop_token& stop, const StartOrder& order,
     const std::lock_guard lock(mutex_);
     who = both_names(who, operator_name_);
   }
-  show_result(*report, {std::move(who), state.is_authenticated, state.station,
-                        session.retest.retest_of, state.kind});
+  show_result(*report,
+              {std::move(who), state.is_authenticated, state.station, session.retest.retest_of,
+               state.kind, state.jig_id.value_or(shared_.options.jig_id)});
   const std::lock_guard lock(mutex_);
   if (report->usable() && !report->written && !report->write_begun && run_) {
     UnfinishedRun& last = unwritten_.emplace(state);
@@ -188,6 +179,8 @@ UnfinishedRun Lanes::Lane::new_run(const StartOrder& order, calib::FilterConfigu
   run.client = order.client;
   run.write = order.write;
   run.filter = filter;
+  run.jig_id = shared_.options.jig_id;
+  run.gravity_m_per_s2 = shared_.options.session.gravity.m_per_s2;
   return run;
 }
 
@@ -408,6 +401,12 @@ void Lanes::Lane::continue_run(const std::stop_token& stop, const UnfinishedRun&
     run_->started = left.resume.started;
     identity_.firmware = left.firmware;
   }
+  UnfinishedRun now = new_run(order, left.filter);
+  now.serial = left.serial;
+  now.protocol = left.protocol;
+  if (const auto goes_on = run_goes_on(left, now); !goes_on) {
+    return end_interrupted(left, "interrupted: " + goes_on.error().what, goes_on.error().code);
+  }
   const auto unit = wait_to_continue(stop, order, "run", LaneState::running);
   if (stop.stop_requested()) {
     return;
@@ -426,7 +425,12 @@ void Lanes::Lane::end_interrupted(const UnfinishedRun& left, const std::string& 
     report.verdict = JigVerdict::stopped;
     report.codes = {"stopped"};
   }
-  show_result(report, {left.operator_name, left.is_authenticated, left.station, {}, left.kind});
+  show_result(report, {left.operator_name,
+                       left.is_authenticated,
+                       left.station,
+                       {},
+                       left.kind,
+                       left.jig_id.value_or(shared_.options.jig_id)});
 }
 
 }  // namespace sixpoint::station

@@ -49,6 +49,7 @@ struct RunLabels {
   std::string station;
   std::string retest_of;     // the run that this one repeats, or empty
   std::string kind = "jig";  // or kWriteKind
+  std::string jig_id = {};   // the jig's own number, or empty
 };
 // What became of a run that was to be stored.
 struct RunInStore {
@@ -72,6 +73,7 @@ struct LanesOptions {
   std::vector<std::string> devices;  // one lane each, 1 to kMostLanes
   std::string state_folder;          // of this station; made when it is not there
   std::string station;               // its name, for the record
+  std::string jig_id;                // the jig's own number: a run goes on on that jig alone
   JigSessionOptions session;
   StartCheck may_start;
   WriteCheck may_write;

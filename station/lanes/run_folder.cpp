@@ -9,6 +9,7 @@
 
 #include "base/atomic_file.h"
 #include "base/sha256.h"
+#include "station/lanes/continue_rule.h"
 #include "station/run/jig_progress.h"
 
 namespace sixpoint::station {
@@ -92,6 +93,12 @@ Result<UnfinishedRun> parse_run(const Json& json) {
   SIXPOINT_ASSIGN(run.resume.written, parse_page(json.at("written")));
   // Folders of earlier versions do not have these.
   SIXPOINT_ASSIGN(run.protocol, parse_jig_protocol(json.value("protocol", "production")));
+  if (json.contains("jig_id") && !json["jig_id"].is_null()) {
+    run.jig_id = json["jig_id"].get<std::string>();
+  }
+  if (json.contains("gravity_m_per_s2") && !json["gravity_m_per_s2"].is_null()) {
+    run.gravity_m_per_s2 = json["gravity_m_per_s2"].get<double>();
+  }
   run.kind = json.value("kind", run.kind);
   run.retest = parse_retest(json.value("retest", Json(nullptr)));
   run.rows_bytes = json.value("rows_bytes", run.rows_bytes);
@@ -197,27 +204,30 @@ Status RunFolder::save(const UnfinishedRun& run) {
   if (file_) {
     SIXPOINT_CHECK(file_->sync());  // the rows that the state is about come first
   }
-  const Json json = {{"schema", "sixpoint/unfinished-run/1"},
-                     {"device", run.device},
-                     {"serial", run.serial},
-                     {"firmware", run.firmware},
-                     {"operator", run.operator_name},
-                     {"operator_authenticated", run.is_authenticated},
-                     {"station", run.station},
-                     {"client", run.client},
-                     {"write", run.write},
-                     {"kind", run.kind},
-                     {"retest", retest_to_json(run.retest)},
-                     {"rows_bytes", run.rows_bytes},
-                     {"rows_sha256", run.rows_sha256},
-                     {"filter", calib::to_string(run.filter)},
-                     {"protocol", to_string(run.protocol)},
-                     {"started", to_iso8601(run.resume.started)},
-                     {"as_found", page_to_json(run.resume.as_found)},
-                     {"written", page_to_json(run.resume.written)},
-                     {"write_begun", run.resume.write_begun},
-                     {"stream", stream_to_json(run.resume.stream)},
-                     {"progress", to_json(run.resume.progress)}};
+  const Json json = {
+      {"schema", "sixpoint/unfinished-run/1"},
+      {"device", run.device},
+      {"serial", run.serial},
+      {"firmware", run.firmware},
+      {"operator", run.operator_name},
+      {"operator_authenticated", run.is_authenticated},
+      {"station", run.station},
+      {"client", run.client},
+      {"write", run.write},
+      {"kind", run.kind},
+      {"retest", retest_to_json(run.retest)},
+      {"rows_bytes", run.rows_bytes},
+      {"rows_sha256", run.rows_sha256},
+      {"filter", calib::to_string(run.filter)},
+      {"protocol", to_string(run.protocol)},
+      {"jig_id", run.jig_id ? Json(*run.jig_id) : Json(nullptr)},
+      {"gravity_m_per_s2", run.gravity_m_per_s2 ? Json(*run.gravity_m_per_s2) : Json(nullptr)},
+      {"started", to_iso8601(run.resume.started)},
+      {"as_found", page_to_json(run.resume.as_found)},
+      {"written", page_to_json(run.resume.written)},
+      {"write_begun", run.resume.write_begun},
+      {"stream", stream_to_json(run.resume.stream)},
+      {"progress", to_json(run.resume.progress)}};
   return write_state(env_.files, folder_, kRun, json);
 }
 
@@ -332,7 +342,7 @@ void RunSaver::check(const Status& status) {
   }
 }
 
-std::optional<JigResume> RunSaver::take_left_over(bool begin_again) {
+Result<std::optional<JigResume>> RunSaver::take_left_over(bool begin_again) {
   auto left = folder_.load();
   if (!left) {
     warn_(left.error().brief() + "; it is set aside");
@@ -342,11 +352,16 @@ std::optional<JigResume> RunSaver::take_left_over(bool begin_again) {
   if (!*left) {
     return std::nullopt;
   }
-  if ((*left)->serial != state_.serial || (*left)->filter != state_.filter ||
-      (*left)->protocol != state_.protocol || begin_again) {
+  bool goes_on = false;
+  if (!begin_again) {
+    SIXPOINT_ASSIGN(goes_on, run_goes_on(**left, state_));
+  }
+  if (!goes_on) {
     check(folder_.clear());
     return std::nullopt;
   }
+  state_.operator_name = both_names((*left)->operator_name, state_.operator_name);
+  state_.is_authenticated = state_.is_authenticated && (*left)->is_authenticated;
   return std::move((*left)->resume);
 }
 

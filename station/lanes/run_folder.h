@@ -37,6 +37,9 @@ struct UnfinishedRun {
   std::string kind = "jig";  // or kWriteKind (run_records.h)
   calib::FilterConfiguration filter = calib::FilterConfiguration::current;
   JigProtocol protocol = JigProtocol::production;
+  // Where it is measured; nothing in folders of earlier versions.
+  std::optional<std::string> jig_id = {};
+  std::optional<double> gravity_m_per_s2 = {};
   // What the unit's earlier runs demanded when it was measured; nothing where that was not noted.
   std::optional<RetestState> retest = {};
   // Of the rows of samples when this was saved: a run whose placements were measured on rows that
@@ -100,9 +103,10 @@ class RunSaver {
 
   const UnfinishedRun& state() const { return state_; }
   void set_retest(const RetestState& retest) { state_.retest = retest; }
-  // What an earlier program left of this unit's run under this filter and protocol. All else is
-  // removed; what cannot be read is set aside, with a warning.
-  std::optional<JigResume> take_left_over(bool begin_again);
+  // What an earlier program left of this unit's run, where it may be gone on with
+  // (continue_rule.h); the state then names both operators. All else is removed; what cannot be
+  // read is set aside, with a warning. Errors: those of the rule; the run stays.
+  Result<std::optional<JigResume>> take_left_over(bool begin_again);
   void add_rows(std::string_view rows) { check(folder_.append(rows)); }  // for JigHooks::raw
   void save(const JigReport& report, const JigRun& run);                 // for JigHooks::progress
   Status save_now(const JigReport& report, const JigRun& run);  // for JigHooks::write_begins

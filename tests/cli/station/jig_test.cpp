@@ -300,6 +300,11 @@ TEST_F(CommandTest, ProductionPlusGoesOnAfterACrash) {
   for (std::string word; more >> word;) {
     words.push_back(word);
   }
+  std::vector<std::string> elsewhere = words;
+  elsewhere.insert(elsewhere.end(), {"--jig-id", "J-2"});
+  const auto refused = run(elsewhere);
+  EXPECT_EQ(refused.exit_code, 64) << "the readings that are there are of another jig";
+  EXPECT_THAT(refused.people, HasSubstr("give --jig-id as it was begun, and the run goes on"));
   const auto answer = run(words);
   EXPECT_EQ(answer.exit_code, 0) << answer.people;
   EXPECT_THAT(answer.people, testing::ContainsRegex("goes on; it has 1[56] placements"));

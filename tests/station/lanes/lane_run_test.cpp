@@ -304,6 +304,7 @@ TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
     UnfinishedRun left;
     left.device = device;
     left.serial = "MOS2A45139999";  // another unit than the one in the lane now
+    left.station = "bench-1";
     left.client = "me";
     left.write = true;
     left.kind = begun ? kWriteKind : "jig";
@@ -324,6 +325,33 @@ TEST(LaneRun, AWriteThatWasBegunByAKilledProgramLeavesTheUnitUnknown) {
     EXPECT_EQ(station.reports.front().as_left.has_value(), !begun);
     EXPECT_EQ(station.reports.front().verdict, JigVerdict::stopped);
   }
+}
+
+// The station was ended in mid-run and begins again on another jig (a tester's finding: the record
+// named the second one alone).
+TEST(LaneRun, ARunDoesNotGoOnOnAnotherJig) {
+  const tests::TemporaryFolder folder;
+  const std::string device = "virtual:seed=7,serial=MOS2A45130007,jig=auto";
+  UnfinishedRun left;
+  left.device = device;
+  left.serial = "MOS2A45130007";
+  left.operator_name = "Ada";
+  left.station = "bench-1";
+  left.jig_id = "J-1";
+  left.resume.started = *parse_iso8601("2026-01-02T03:04:05");
+  ASSERT_OK(
+      RunFolder(posix_env(), folder.path() + "/state/lane-1-" + text_sha256(device).substr(0, 8))
+          .save(left));
+  Station station({device}, folder.path());
+  const Json lane = station.wait(1, [](const Json& json) {
+    return json["result"].is_object() && json["result"]["stored"] == true;
+  });
+  EXPECT_THAT(lane["result"].dump(), testing::HasSubstr("begun on jig 'J-1', and this is ''"));
+  const std::lock_guard lock(station.mutex);
+  ASSERT_EQ(station.reports.size(), 1U);
+  EXPECT_EQ(station.reports.front().verdict, JigVerdict::inconclusive);
+  EXPECT_EQ(station.operators.front(), "Ada");
+  EXPECT_EQ(station.jigs.front(), "J-1");
 }
 
 TEST(LaneRun, AStoreThatFailsIsTriedAgain) {

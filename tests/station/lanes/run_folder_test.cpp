@@ -282,8 +282,36 @@ TEST(RunFolder, ARunOfAnotherProtocolIsNotGoneOnWith) {
     EXPECT_EQ((*folder.load())->protocol, JigProtocol::production_plus);
     run.protocol = protocol;
     RunSaver saver(folder, run, [](const std::string& warning) { ADD_FAILURE() << warning; });
-    EXPECT_EQ(saver.take_left_over(false).has_value(), protocol == JigProtocol::production_plus);
+    EXPECT_EQ(saver.take_left_over(false)->has_value(), protocol == JigProtocol::production_plus);
   }
+}
+
+// Five of six sides on J-1 and the sixth on J-2 are no run on either; nothing is lost by the
+// refusal.
+TEST(RunFolder, ARunThatWasBegunOnAnotherJigStaysUntilItIsNamedOrBegunAnew) {
+  const tests::TemporaryFolder place;
+  RunFolder folder(posix_env(), place / "run");
+  UnfinishedRun run = a_run();
+  run.operator_name = "Ada";
+  run.is_authenticated = true;
+  run.jig_id = "J-1";
+  run.gravity_m_per_s2 = 9.81;
+  ASSERT_OK(folder.save(run));
+  const auto warn = [](const std::string& warning) { ADD_FAILURE() << warning; };
+  UnfinishedRun now = run;
+  now.operator_name = "Bo";
+  now.is_authenticated = true;
+  now.jig_id = "J-2";
+  EXPECT_FAILS(RunSaver(folder, now, warn).take_left_over(false), ErrorCode::usage);
+  now.jig_id = "J-1";
+  RunSaver saver(folder, now, warn);
+  const auto left = saver.take_left_over(false);
+  ASSERT_OK(left);
+  EXPECT_TRUE(left->has_value());
+  EXPECT_EQ(saver.state().operator_name, "Ada, then Bo");
+  EXPECT_TRUE(saver.state().is_authenticated);
+  now.jig_id = "J-2";
+  EXPECT_FALSE(RunSaver(folder, now, warn).take_left_over(true)->has_value());
 }
 
 }  // namespace

@@ -75,6 +75,7 @@ class Station {
           operators.push_back(labels.operator_name);
           authenticated.push_back(labels.is_authenticated);
           kinds.push_back(labels.kind);
+          jigs.push_back(labels.jig_id);
           return RunInStore{{"abc123", "def456"}, is_kept_here, {"report.json"}};
         },
         [](const CaptureReport&) -> Result<std::string> { return std::string("c0ffee"); });
@@ -155,6 +156,7 @@ class Station {
   std::vector<JigReport> reports;
   std::vector<std::string> operators;
   std::vector<std::string> kinds;
+  std::vector<std::string> jigs;
   std::vector<bool> authenticated;
   std::mutex start_mutex;                   // guards the three that follow
   RetestState retest;                       // what the unit's earlier runs demand
